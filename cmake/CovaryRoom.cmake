@@ -1,0 +1,29 @@
+# covary_room(<name> SOURCES a.cpp ... DEPENDS room-or-target ... TESTS a_test.cpp ...)
+#
+# A room is one folder of src/: a library `covary_<name>` made of SOURCES, which may use only the rooms it DEPENDS on
+# (tests/layers checks the includes), and one program `<name>_tests` made of the TESTS that lie beside the code.
+function(covary_room name)
+  cmake_parse_arguments(ROOM "" "" "SOURCES;DEPENDS;TESTS;TEST_DEPENDS" ${ARGN})
+  if(ROOM_SOURCES)
+    add_library(covary_${name} STATIC ${ROOM_SOURCES})
+    set(scope PUBLIC)
+  else()
+    add_library(covary_${name} INTERFACE)
+    set(scope INTERFACE)
+  endif()
+  target_include_directories(covary_${name} ${scope} ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/include)
+  target_link_libraries(covary_${name} ${scope} covary_options ${ROOM_DEPENDS})
+  if(ROOM_TESTS AND COVARY_TESTS)
+    covary_test(${name}_tests SOURCES ${ROOM_TESTS} DEPENDS covary_${name} ${ROOM_TEST_DEPENDS})
+  endif()
+endfunction()
+
+# covary_test(<program> SOURCES ... DEPENDS ...): a GoogleTest program, each of its tests known to CTest.
+function(covary_test program)
+  cmake_parse_arguments(TEST "" "" "SOURCES;DEPENDS" ${ARGN})
+  add_executable(${program} ${TEST_SOURCES})
+  target_include_directories(${program} PRIVATE ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/tests)
+  target_link_libraries(${program} PRIVATE ${TEST_DEPENDS} GTest::gtest_main)
+  target_compile_definitions(${program} PRIVATE COVARY_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  gtest_discover_tests(${program} DISCOVERY_TIMEOUT 60 DISCOVERY_MODE PRE_TEST)
+endfunction()

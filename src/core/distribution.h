@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// Sampling from tabulated distributions by inversion, which maps neighbouring numbers to neighbouring results.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/vec.h"
+
+namespace covary {
+
+/// Discrete distribution over indices 0 … n-1 with given non-negative weights.
+class Discrete {
+ public:
+  Discrete() = default;
+  /// Throws Error(kInput) when weights are empty, negative, not finite or all zero.
+  explicit Discrete(std::span<const float> weights);
+
+  struct Result {
+    uint32_t index;
+    float pmf;       ///< probability of `index`
+    float remapped;  ///< `u` stretched over the cell it fell into: again uniform in [0, 1), independent of index
+  };
+  /// `u` in [0, 1). Indices of zero weight are never returned.
+  Result sample(float u) const;
+  float pmf(uint32_t index) const { return cdf_[index + 1] - cdf_[index]; }
+  uint32_t size() const { return static_cast<uint32_t>(cdf_.size()) - 1; }
+  /// Sum of the weights as given.
+  double sum() const { return sum_; }
+
+ private:
+  std::vector<float> cdf_;
+  double sum_ = 0;
+};
+
+/// Piecewise-constant density on [0,1]^2 over a grid of width x height cells, row-major.
+class PiecewiseConstant2D {
+ public:
+  PiecewiseConstant2D() = default;
+  /// Throws Error(kInput) like Discrete.
+  PiecewiseConstant2D(std::span<const float> weights, int width, int height);
+
+  struct Result {
+    Vec2 uv;
+    float pdf;  ///< per unit area of [0,1]^2
+  };
+  Result sample(Vec2 u) const;
+  /// Density at `uv` in [0,1)^2, per unit area of the unit square.
+  float pdf(Vec2 uv) const;
+  int width() const { return width_; }
+  int height() const { return height_; }
+
+ private:
+  int width_ = 0, height_ = 0;
+  Discrete rows_;
+  std::vector<Discrete> columns_;  // one per row; empty rows hold a uniform one that is never chosen
+};
+
+}  // namespace covary

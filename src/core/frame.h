@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// Orthonormal frames, and trigonometry of directions given in the local frame whose z axis is the normal.
+#pragma once
+
+#include "core/vec.h"
+
+namespace covary {
+
+/// Right-handed orthonormal frame (s, t, n).
+struct Frame {
+  Vec3 s{1, 0, 0}, t{0, 1, 0}, n{0, 0, 1};
+
+  Frame() = default;
+  Frame(const Vec3& s_, const Vec3& t_, const Vec3& n_) : s(s_), t(t_), n(n_) {}
+
+  /// A frame around the unit normal `n`, continuous in `n` on each half space n.z >= 0 and n.z < 0
+  /// (Duff et al. 2017, "Building an Orthonormal Basis, Revisited").
+  explicit Frame(const Vec3& normal) : n(normal) {
+    const float sign = std::copysign(1.0f, n.z);
+    const float a = -1 / (sign + n.z), b = n.x * n.y * a;
+    s = {1 + sign * n.x * n.x * a, sign * b, -sign * n.x};
+    t = {b, sign + n.y * n.y * a, -n.y};
+  }
+
+  /// A frame around `normal` whose s axis is the tangent made orthogonal to the normal; falls back to Frame(normal)
+  /// when the tangent is parallel to the normal or zero.
+  static Frame from_tangent(const Vec3& normal, const Vec3& tangent) {
+    const Vec3 s = tangent - normal * dot(normal, tangent);
+    const float l2 = length_squared(s);
+    if (!(l2 > 1e-20f)) return Frame(normal);
+    const Vec3 su = s * (1 / std::sqrt(l2));
+    return {su, cross(normal, su), normal};
+  }
+
+  Vec3 to_local(const Vec3& v) const { return {dot(v, s), dot(v, t), dot(v, n)}; }
+  Vec3 to_world(const Vec3& v) const { return s * v.x + t * v.y + n * v.z; }
+};
+
+inline float cos_theta(const Vec3& w) { return w.z; }
+inline float cos2_theta(const Vec3& w) { return w.z * w.z; }
+inline float sin2_theta(const Vec3& w) { return std::max(0.0f, w.x * w.x + w.y * w.y); }
+inline float sin_theta(const Vec3& w) { return std::sqrt(sin2_theta(w)); }
+inline float tan2_theta(const Vec3& w) { return sin2_theta(w) / cos2_theta(w); }
+inline float abs_cos_theta(const Vec3& w) { return std::abs(w.z); }
+inline bool same_hemisphere(const Vec3& a, const Vec3& b) { return a.z * b.z > 0; }
+/// Mirror direction about the z axis.
+inline Vec3 reflect(const Vec3& w) { return {-w.x, -w.y, w.z}; }
+/// Mirror direction about the unit vector `m`.
+inline Vec3 reflect(const Vec3& w, const Vec3& m) { return m * (2 * dot(w, m)) - w; }
+
+}  // namespace covary

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+// Random numbers with addresses. Every number a path reads is a pure function of
+//     (seed, pass, pixel or none, sample, dimension),
+// so that a result does not depend on threads, tiles or order, any sample can be replayed alone, and common random
+// numbers differ from independent ones in one thing only: the pixel is left out of the key.
+//
+// The dimension is itself an address (vertex of the path, event at that vertex). Two neighbouring pixels' paths read the
+// same number for the same event although one of them may have drawn fewer numbers before it.
+#pragma once
+
+#include <cstdint>
+
+#include "core/vec.h"
+
+namespace covary {
+
+/// 64-bit finaliser with full avalanche ("variant 13" of D. Stafford, as used by SplitMix64).
+inline uint64_t mix64(uint64_t z) {
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
+  return z ^ (z >> 31);
+}
+/// Key of the pair (a, b); not symmetric.
+inline uint64_t combine64(uint64_t a, uint64_t b) { return mix64(mix64(a + 0x9e3779b97f4a7c15ull) ^ (b * 0xd1342543de82ef95ull + 0x632be59bd9b4e019ull)); }
+
+/// What a random number decides. One vertex of a path has kEventsPerVertex addresses.
+enum class Event : uint32_t {
+  kPixel,            ///< position inside the pixel (vertex 0)
+  kLens,             ///< position on the lens (vertex 0)
+  kLightChoice,      ///< which emitter
+  kLightPosition,    ///< where on the emitter
+  kLightPrimitive,   ///< which part of the emitter (triangle), and further needs of emitters
+  kLightDirection,   ///< direction of emission (light subpaths)
+  kLobe,             ///< which lobe of the BSDF
+  kDirection,        ///< direction within the lobe
+  kRoulette,         ///< survival
+  kTechnique,        ///< choice between BSDF and guiding
+  kGuide,            ///< direction from guiding
+  kConnection,       ///< choices of bidirectional connections
+};
+inline constexpr uint32_t kEventsPerVertex = 16;
+
+enum class Sampling : uint32_t { kIndependent, kCrn };
+
+/// Stream of the numbers of one path. Copying is cheap; there is no state.
+class PathRandom {
+ public:
+  /// Key of a path. `pass` numbers the passes of a plan; `pixel` is y * width + x in the full frame, so that crops see
+  /// the same numbers; ignored for common random numbers.
+  PathRandom(Sampling sampling, uint64_t seed, uint32_t pass, uint64_t pixel, uint64_t sample)
+      : key_(combine64(combine64(combine64(seed, pass), sampling == Sampling::kCrn ? ~uint64_t{0} : pixel), sample)) {}
+
+  /// One number in [0, 1), a multiple of 2^-24.
+  float get_1d(uint32_t vertex, Event event) const { return to_unit(static_cast<uint32_t>(bits(vertex, event) >> 32)); }
+  /// Two independent numbers in [0, 1).
+  Vec2 get_2d(uint32_t vertex, Event event) const {
+    const uint64_t z = bits(vertex, event);
+    return {to_unit(static_cast<uint32_t>(z >> 32)), to_unit(static_cast<uint32_t>(z))};
+  }
+
+ private:
+  static float to_unit(uint32_t u) { return static_cast<float>(u >> 8) * 0x1p-24f; }
+  uint64_t bits(uint32_t vertex, Event event) const {
+    const uint64_t dimension = vertex * kEventsPerVertex + static_cast<uint32_t>(event);
+    return mix64(key_ + (dimension + 1) * 0x9e3779b97f4a7c15ull);
+  }
+  uint64_t key_;
+};
+
+}  // namespace covary

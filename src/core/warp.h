@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+// Maps from the unit square to domains used in light transport, each with its density. All maps are continuous almost
+// everywhere, which keeps common random numbers correlated.
+#pragma once
+
+#include "core/vec.h"
+
+namespace covary::warp {
+
+/// Uniform on the unit disk by the concentric map (Shirley & Chiu 1997); density 1/pi per unit area.
+inline Vec2 square_to_disk(Vec2 u) {
+  const float x = 2 * u.x - 1, y = 2 * u.y - 1;
+  if (x == 0 && y == 0) return {0, 0};
+  float r, phi;
+  if (std::abs(x) > std::abs(y)) {
+    r = x, phi = (kPi / 4) * (y / x);
+  } else {
+    r = y, phi = (kPi / 2) - (kPi / 4) * (x / y);
+  }
+  return {r * std::cos(phi), r * std::sin(phi)};
+}
+inline float disk_pdf() { return kInvPi; }
+
+/// Cosine-weighted on the upper hemisphere; density cos(theta)/pi per unit solid angle.
+inline Vec3 square_to_cosine_hemisphere(Vec2 u) {
+  const Vec2 d = square_to_disk(u);
+  return {d.x, d.y, safe_sqrt(1 - d.x * d.x - d.y * d.y)};
+}
+inline float cosine_hemisphere_pdf_solid_angle(float cos_theta) { return cos_theta > 0 ? cos_theta * kInvPi : 0; }
+
+/// Uniform on the unit sphere; density 1/(4 pi) per unit solid angle.
+inline Vec3 square_to_sphere(Vec2 u) {
+  const float z = 1 - 2 * u.y, r = safe_sqrt(1 - z * z), phi = kTwoPi * u.x;
+  return {r * std::cos(phi), r * std::sin(phi), z};
+}
+inline float sphere_pdf_solid_angle() { return 1 / (4 * kPi); }
+
+/// Uniform in the cone of directions around +z whose cosine is at least `cos_max`; `one_minus_cos_max` is passed because
+/// it is small for distant lights and its difference from 1 would lose digits.
+inline Vec3 square_to_cone(Vec2 u, float one_minus_cos_max) {
+  const Vec2 d = square_to_disk(u);
+  const float r2 = d.x * d.x + d.y * d.y;              // uniform in [0, 1)
+  const float one_minus_cos = r2 * one_minus_cos_max;  // uniform in [0, 1 - cos_max)
+  const float scale = safe_sqrt(one_minus_cos_max * (2 - one_minus_cos));  // sin(theta) / sqrt(r2)
+  return {d.x * scale, d.y * scale, 1 - one_minus_cos};
+}
+inline float cone_pdf_solid_angle(float one_minus_cos_max) { return 1 / (kTwoPi * one_minus_cos_max); }
+
+/// Barycentric coordinates (b1, b2) uniform on a triangle; density 1/area per unit area.
+inline Vec2 square_to_triangle(Vec2 u) {
+  const float t = safe_sqrt(1 - u.x);
+  return {1 - t, t * u.y};
+}
+
+/// Tent of radius `radius` centred at 0; density (1 - |x|/radius)/radius.
+inline float interval_to_tent(float u, float radius) {
+  return u < 0.5f ? radius * (std::sqrt(2 * u) - 1) : radius * (1 - std::sqrt(2 * (1 - u)));
+}
+inline float tent_pdf(float x, float radius) { return std::max(0.0f, 1 - std::abs(x) / radius) / radius; }
+
+}  // namespace covary::warp

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "scene/parameters.h"
+#include "scene/scene.h"
+
+namespace covary {
+
+struct LoadOptions {
+  std::map<std::string, std::string> defines;  ///< -D name=value, overriding <default>
+  int width = 0, height = 0;                   ///< override the film size when > 0 (the crop is then dropped)
+  /// Makes the integrator from the scene's <integrator> element, so that its mistakes are reported with all others.
+  /// When empty, the element is only kept in LoadedScene::integrator_type.
+  std::function<std::shared_ptr<SceneObject>(Parameters&)> make_integrator;
+};
+
+struct LoadedScene {
+  std::unique_ptr<Scene> scene;
+  int width = 0, height = 0;                   ///< full frame
+  int crop_x = 0, crop_y = 0, crop_width = 0, crop_height = 0;
+  FilterSettings filter;
+  int spp = 4;                                 ///< of the scene's sampler
+  std::string integrator_type;                 ///< "" when the file names none
+  std::shared_ptr<SceneObject> integrator;
+  std::vector<std::string> warnings;
+  double read_seconds = 0;                     ///< parsing and reading files; Scene::build_seconds() comes on top
+  std::string content_hash;                    ///< hex; over the scene's XML, defines and all files it reads
+};
+
+/// Reads a Mitsuba XML scene. Throws Error(kInput) with every problem of the file, or Error(kIo).
+LoadedScene load_scene(const std::string& path, const LoadOptions& options = {});
+
+}  // namespace covary

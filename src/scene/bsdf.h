@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+// Reflectance models. A Bsdf is what a scene file describes. Bound to one surface point it gives a BsdfClosure: all
+// textures looked up, wrappers (two-sided, mask, bump map) resolved, ready to be evaluated and sampled many times.
+//
+// Conventions. All directions are unit vectors in the local shading frame (z = shading normal) and point away from the
+// surface: `wo` towards where the path came from (the camera, for paths from the camera), `wi` towards where it goes.
+// The value always includes the cosine: eval = f(wo, wi) |cos theta_i|.
+//
+// Densities are given per technique: a closure is a mixture of n_lobes() lobes, lobe l is chosen with probability
+// pmf_l(wo) and has density pdf_l(wi | wo) per unit solid angle; the density of sample() is sum_l pmf_l pdf_l. Control
+// variates are made of exactly these.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "core/arena.h"
+#include "scene/object.h"
+#include "scene/surface_hit.h"
+#include "scene/texture.h"
+
+namespace covary {
+
+/// Kinds of lobes; a closure's flags are the union over its lobes.
+enum LobeFlags : uint32_t {
+  kDiffuseReflection = 1, kDiffuseTransmission = 2,
+  kGlossyReflection = 4, kGlossyTransmission = 8,
+  kDeltaReflection = 16, kDeltaTransmission = 32,
+  kNullTransmission = 64,  ///< straight through, as if the surface were absent
+  kReflection = kDiffuseReflection | kGlossyReflection | kDeltaReflection,
+  kTransmission = kDiffuseTransmission | kGlossyTransmission | kDeltaTransmission | kNullTransmission,
+  kDelta = kDeltaReflection | kDeltaTransmission | kNullTransmission,
+  kSmooth = kDiffuseReflection | kDiffuseTransmission | kGlossyReflection | kGlossyTransmission,
+};
+
+/// What the path carries: radiance (traced from the camera) or importance (traced from a light). Refraction scales
+/// radiance by the squared ratio of indices, importance not.
+enum class TransportMode : uint8_t { kRadiance, kImportance };
+
+struct BsdfValue {
+  Spectrum value;              ///< f(wo, wi) |cos theta_i|; zero for delta lobes
+  float pdf_solid_angle = 0;   ///< density of sample() at wi, delta lobes excluded
+};
+
+struct BsdfSample {
+  Vec3 wi;
+  Spectrum weight;     ///< f |cos theta_i| / pdf; zero when sampling failed
+  float pdf = 0;       ///< per unit solid angle; for a delta lobe the discrete probability of the direction
+  float eta = 1;       ///< index ratio crossed: eta of the side of wi over that of wo … 1 for reflection
+  uint32_t flags = 0;  ///< the LobeFlags of the chosen lobe
+  uint32_t lobe = 0;   ///< its index
+  bool valid() const { return pdf > 0; }
+  bool is_delta() const { return (flags & kDelta) != 0; }
+};
+
+/// Largest number of lobes of any closure, nested models included.
+inline constexpr int kMaxLobes = 8;
+
+/// A reflectance model at one surface point. Lives in an Arena; trivially destructible.
+class BsdfClosure {
+ public:
+  /// Union of the flags of the lobes.
+  virtual uint32_t flags() const = 0;
+  /// Value and mixture density for smooth lobes; {0, 0} where both are zero.
+  virtual BsdfValue eval(const Vec3& wo, const Vec3& wi) const = 0;
+  /// Draws wi. `u_lobe` and `u` are uniform in [0,1) and [0,1)^2 and independent. Delta lobes take part.
+  virtual BsdfSample sample(const Vec3& wo, float u_lobe, Vec2 u) const = 0;
+
+  virtual int n_lobes() const = 0;
+  /// Writes n_lobes() selection probabilities; they sum to 1, or all are 0 where sample() always fails.
+  virtual void lobe_pmfs(const Vec3& wo, float* pmfs) const = 0;
+  /// Writes n_lobes() densities per unit solid angle of wi; 0 for delta lobes.
+  virtual void lobe_pdfs(const Vec3& wo, const Vec3& wi, float* pdfs) const = 0;
+
+ protected:
+  ~BsdfClosure() = default;
+};
+
+class Bsdf : public SceneObject {
+ public:
+  /// Union of the flags of all lobes this model can have anywhere.
+  virtual uint32_t flags() const = 0;
+  /// The model at a point. `wo_front`: whether wo lies on the side of the shading normal (two-sided models choose by
+  /// it). The closure lives until the arena is reset.
+  virtual const BsdfClosure* bind(const SurfaceHit& hit, bool wo_front, TransportMode mode, Arena& arena) const = 0;
+  /// True when bind() reads hit.dp_du, hit.dp_dv or needs the frame aligned with dp_du (anisotropy, bump maps).
+  virtual bool needs_derivatives() const { return false; }
+  /// Approximate directional albedo for the auxiliary image `Albedo`: reflectance for diffuse parts, Fresnel-free
+  /// specular colour otherwise; in [0, 1].
+  virtual Spectrum albedo(const SurfaceHit& hit) const = 0;
+};
+
+using BsdfPtr = std::shared_ptr<const Bsdf>;
+
+}  // namespace covary

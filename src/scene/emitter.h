@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// Light sources. The density of each technique is available on its own and names its measure.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "core/ray.h"
+#include "core/spectrum.h"
+#include "scene/object.h"
+#include "scene/surface_hit.h"
+
+namespace covary {
+
+/// A point on a light as seen from a reference point.
+struct EmitterSample {
+  Vec3 wi;                     ///< unit direction from the reference point to the light
+  float distance = kInfinity;  ///< to the light; infinite for environments and directional lights
+  Vec3 p, n;                   ///< point and unit geometric normal on the light (unset when infinitely far)
+  Spectrum radiance;           ///< emitted towards the reference point; for delta lights: irradiance on a surface facing wi (already divided by distance squared)
+  float pdf_solid_angle = 0;   ///< at the reference point; 1 (a discrete probability) for delta lights; 0: sampling failed
+  bool is_delta = false;       ///< position or direction is a delta; BSDF sampling cannot hit it
+};
+
+/// Start of a light path.
+struct EmissionSample {
+  Ray ray;                        ///< leaves the light
+  Vec3 n;                         ///< unit geometric normal at the origin; the direction itself for point-like lights
+  Spectrum radiance;              ///< emitted radiance (area, environment) or intensity (point-like)
+  float pdf_position = 0;         ///< per unit area; for infinite lights per unit area of the disk perpendicular to the ray; 1 if delta
+  float pdf_direction = 0;        ///< per unit solid angle; 1 if delta
+  bool delta_position = false, delta_direction = false;
+};
+
+class Emitter : public SceneObject {
+ public:
+  /// Called once by the scene before rendering, with the bounds of everything that can be hit (never empty radius).
+  virtual void set_scene_bounds(const Bounds3& /*bounds*/) {}
+  /// Infinitely far lights that a ray leaving the scene can hit (environment map, constant).
+  virtual bool is_environment() const { return false; }
+  /// Position or direction is a delta: only sample_towards() finds this light.
+  virtual bool is_delta() const { return false; }
+
+  /// Radiance an area light emits at a hit on its own shape in world direction `w` (away from the surface).
+  virtual Spectrum surface_radiance(const SurfaceHit& /*hit*/, const Vec3& /*w*/) const { return {}; }
+  /// Radiance arriving along a ray that leaves the scene in world direction `d`; environments only.
+  virtual Spectrum environment_radiance(const Vec3& /*d*/) const { return {}; }
+
+  /// Samples the light as seen from `reference`. `u` uniform in [0,1)^2, `u_primitive` a third number.
+  virtual EmitterSample sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const = 0;
+  /// Density of sample_towards() per unit solid angle at `reference` for the point `hit` on this area light.
+  virtual float pdf_solid_angle(const Vec3& /*reference*/, const SurfaceHit& /*hit*/) const { return 0; }
+  /// Density of sample_towards() per unit solid angle for direction `d`; environments only.
+  virtual float environment_pdf_solid_angle(const Vec3& /*d*/) const { return 0; }
+
+  /// Samples a ray that leaves the light, for paths that start there.
+  virtual EmissionSample sample_emission(Vec2 u_position, Vec2 u_direction, float u_primitive) const = 0;
+
+  /// Emitted power, summed over the surface and directions, in RGB; infinite lights: through the scene's bounding sphere.
+  virtual Spectrum power() const = 0;
+};
+
+}  // namespace covary

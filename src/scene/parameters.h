@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: Apache-2.0
+// The description of one object of a scene file, and typed access to its parameters. Plugins (BSDFs, textures, …) are
+// made from Parameters only; they never see XML. Whatever a plugin does not ask for is reported as an unknown parameter,
+// with the names it did ask for as suggestions.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "core/error.h"
+#include "core/spectrum.h"
+#include "core/transform.h"
+#include "scene/object.h"
+#include "scene/texture.h"
+
+namespace covary {
+
+struct SourceLocation {
+  std::string file;
+  int line = 0, column = 0;
+  std::string text() const;  ///< "file:line:column"
+};
+
+/// Collects all problems of a scene so that they can be reported at once.
+class Diagnostics {
+ public:
+  void error(const SourceLocation& where, const std::string& message);
+  /// Harmless; a repeated message of the same kind should be counted by the caller and given once.
+  void warn(const SourceLocation& where, const std::string& message);
+  bool has_errors() const { return !errors_.empty(); }
+  /// Throws Error(kInput) with all errors, sorted by file and line, one a line "file:line:column: message".
+  void throw_if_errors() const;
+  const std::vector<std::string>& warnings() const { return warnings_; }
+
+ private:
+  struct Entry { SourceLocation where; std::string message; };
+  std::vector<Entry> errors_;
+  std::vector<std::string> warnings_;
+};
+
+/// A spectrum given by wavelength (nm) and value pairs, sorted by wavelength.
+struct SampledSpectrum { std::vector<std::pair<float, float>> samples; };
+/// <rgb>: three numbers taken as linear RGB.  <spectrum value="0.5"> is a plain double.
+struct ColourValue { Spectrum rgb; };
+
+struct ObjectDescription;
+using ObjectPtr = std::shared_ptr<const ObjectDescription>;
+
+using Value = std::variant<bool, int64_t, double, std::string, Vec3, ColourValue, SampledSpectrum, Transform, ObjectPtr>;
+
+struct Property {
+  std::string name;  ///< "" or "_arg_N" for nested objects without a name
+  Value value;
+  SourceLocation where;
+};
+
+/// One object of the file: <kind type="type" id="id" name="name"> … </kind>, references resolved.
+struct ObjectDescription {
+  std::string kind;  ///< "bsdf", "texture", "shape", "emitter", "sensor", "film", "rfilter", "sampler", "integrator", …
+  std::string type, id;
+  SourceLocation where;
+  std::vector<Property> properties;
+};
+
+/// How a sampled spectrum becomes RGB: reflectances and emission differ by the white point; indices of refraction are
+/// weighted like reflectances but may exceed 1.
+enum class SpectrumRole { kReflectance, kEmission, kIndex };
+
+class ObjectFactory;
+
+/// Typed access. Every getter marks the name as known; a missing required parameter, a wrong type or a value out of
+/// range is recorded in Diagnostics and the getter returns a usable default, so that all problems are found in one run.
+class Parameters {
+ public:
+  Parameters(const ObjectDescription& object, ObjectFactory& factory, Diagnostics& diagnostics);
+
+  const ObjectDescription& object() const { return object_; }
+  const std::string& type() const { return object_.type; }
+  bool has(const std::string& name);
+
+  bool get_bool(const std::string& name, bool fallback);
+  int get_int(const std::string& name, int fallback, int lowest, int highest);
+  float get_float(const std::string& name, float fallback, float lowest = -kInfinity, float highest = kInfinity);
+  std::string get_string(const std::string& name, const std::string& fallback);
+  /// One of `choices`; anything else is an error that lists them.
+  std::string get_choice(const std::string& name, const std::string& fallback, const std::vector<std::string>& choices);
+  std::string require_string(const std::string& name);
+  Vec3 get_vec3(const std::string& name, const Vec3& fallback);
+  Transform get_transform(const std::string& name);  ///< identity when absent
+  /// A colour that may not be textured: number, rgb or spectrum.
+  Spectrum get_spectrum(const std::string& name, const Spectrum& fallback, SpectrumRole role);
+  /// A texture; numbers and colours become ConstantTexture.
+  TexturePtr get_texture(const std::string& name, const Spectrum& fallback, SpectrumRole role = SpectrumRole::kReflectance);
+  TexturePtr get_texture(const std::string& name, float fallback);
+  /// The same, null when absent.
+  TexturePtr find_texture(const std::string& name, SpectrumRole role = SpectrumRole::kReflectance);
+  /// File relative to the scene's search paths; "" and an error when it does not exist.
+  std::string require_file(const std::string& name);
+
+  /// All nested objects of class T that no other getter has taken, in file order ("bsdf" inside "twosided").
+  /// `kind` is the tag they must have, e.g. "bsdf".
+  template <typename T>
+  std::vector<std::shared_ptr<const T>> children(const std::string& kind) {
+    std::vector<std::shared_ptr<const T>> result;
+    for (const std::shared_ptr<const SceneObject>& object : child_objects(kind))
+      if (auto typed = std::dynamic_pointer_cast<const T>(object)) result.push_back(std::move(typed));
+    return result;
+  }
+
+  /// Records an error about this object, or about one of its parameters.
+  void error(const std::string& message);
+  void error_at(const std::string& parameter, const std::string& message);
+  void warn(const std::string& message);
+  /// Reports every property nobody asked for. The factory calls it after the plugin was made.
+  void report_unknown();
+
+ private:
+  std::vector<std::shared_ptr<const SceneObject>> child_objects(const std::string& kind);
+  const Property* find(const std::string& name);
+
+  const ObjectDescription& object_;
+  ObjectFactory& factory_;
+  Diagnostics& diagnostics_;
+  std::vector<std::string> known_;
+  std::vector<bool> used_;
+};
+
+/// Makes scene objects out of descriptions, each only once (objects referenced by id are shared). Implemented by io.
+class ObjectFactory {
+ public:
+  virtual ~ObjectFactory() = default;
+  /// Null when the object could not be made; the reason is then in the diagnostics.
+  virtual std::shared_ptr<const SceneObject> make(const ObjectPtr& description) = 0;
+  /// Absolute path of a file named in the scene; nullopt when no such file exists.
+  virtual std::optional<std::string> resolve_file(const std::string& name, const SourceLocation& where) = 0;
+};
+
+/// One line of a room's registry: plugin name and how to make it. `make` returns null after recording an error.
+template <typename T>
+struct Plugin {
+  const char* name;
+  std::shared_ptr<T> (*make)(Parameters& parameters);
+};
+
+/// Linear Rec. 709 RGB of a sampled spectrum (CIE 1931 2° observer). Index and reflectance: equal-energy white maps to
+/// (1,1,1). Emission: likewise, radiance per nanometre of a constant spectrum 1 maps to (1,1,1).
+Spectrum spectrum_to_rgb(const SampledSpectrum& spectrum, SpectrumRole role);
+
+}  // namespace covary

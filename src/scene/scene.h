@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+// Everything light can meet: shapes, lights, camera; and the queries integrators need.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/transform.h"
+#include "scene/camera.h"
+#include "scene/emitter.h"
+#include "scene/shape.h"
+#include "scene/surface_hit.h"
+
+namespace covary {
+
+/// Shapes that are placed several times.
+struct ShapeGroup : SceneObject { std::vector<ShapePtr> shapes; };
+
+struct Instance {
+  std::shared_ptr<const ShapeGroup> group;
+  Transform to_world;
+};
+
+/// What a loader hands over.
+struct SceneParts {
+  std::vector<ShapePtr> shapes;                          ///< each with a BSDF and perhaps an area light set
+  std::vector<Instance> instances;
+  std::vector<std::shared_ptr<const Emitter>> emitters;  ///< in file order, area lights of `shapes` included
+  std::shared_ptr<const Camera> camera;
+};
+
+enum class FilterKind { kBox, kTent, kGaussian };
+/// Reconstruction filter. Every sample contributes to one pixel only, with weight one: its position inside the filter's
+/// footprint is drawn from the filter itself.
+struct FilterSettings {
+  FilterKind kind = FilterKind::kBox;
+  float radius = 0.5f;   ///< in pixels: box 0.5, tent 1, gaussian 4 standard deviations
+  float stddev = 0.5f;   ///< gaussian only
+};
+
+class RayTracer;
+
+class Scene {
+ public:
+  /// Builds the ray tracer's hierarchy.
+  explicit Scene(SceneParts parts);
+  ~Scene();
+  Scene(const Scene&) = delete;
+  Scene& operator=(const Scene&) = delete;
+
+  /// Nearest surface along the ray; false when there is none.
+  bool intersect(const Ray& ray, SurfaceHit& hit) const;
+  /// Whether anything lies on the ray before t_max.
+  bool occluded(const Ray& ray) const;
+
+  const Camera& camera() const { return *parts_.camera; }
+  std::span<const std::shared_ptr<const Emitter>> emitters() const { return parts_.emitters; }
+  /// The light at infinity that rays leaving the scene meet, or null.
+  const Emitter* environment() const { return environment_; }
+  const Bounds3& bounds() const { return bounds_; }
+  size_t n_triangles() const { return n_triangles_; }
+  size_t n_shapes() const { return parts_.shapes.size(); }
+  double build_seconds() const { return build_seconds_; }
+
+ private:
+  SceneParts parts_;
+  std::unique_ptr<RayTracer> tracer_;
+  const Emitter* environment_ = nullptr;
+  Bounds3 bounds_;
+  size_t n_triangles_ = 0;
+  double build_seconds_ = 0;
+};
+
+/// Offset of ray origins against self-intersection, relative to the size of coordinates.
+inline constexpr float kRayEpsilon = 1500 * 0x1p-24f;
+
+/// `p` moved off its surface to the side `w` points to.
+inline Vec3 offset_origin(const Vec3& p, const Vec3& ng, const Vec3& w) {
+  const float magnitude = (1 + max_component(abs(p))) * kRayEpsilon;
+  return p + ng * std::copysign(magnitude, dot(ng, w));
+}
+
+}  // namespace covary

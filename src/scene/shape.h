@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// Surfaces. Ray intersection itself is in ray_tracer.h; a Shape says what lies at a point and samples its area.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "core/ray.h"
+#include "scene/bsdf.h"
+#include "scene/emitter.h"
+#include "scene/object.h"
+#include "scene/surface_hit.h"
+
+namespace covary {
+
+struct AreaSample {
+  Vec3 p, n;           ///< point and unit geometric normal
+  Vec2 uv;
+  float pdf_area = 0;  ///< per unit area
+};
+
+class Shape : public SceneObject {
+ public:
+  virtual Bounds3 bounds() const = 0;
+  virtual float area() const = 0;
+  /// Uniform by area. `u_primitive` chooses among parts (triangles).
+  virtual AreaSample sample_area(Vec2 u, float u_primitive) const = 0;
+  /// Point by surface parameters (for textured lights): only shapes whose (u, v) cover the unit square once.
+  /// Returns pdf_area for a density of 1 per unit (u, v) area; pdf_area == 0: not supported by this shape.
+  virtual AreaSample sample_uv(Vec2 /*uv*/) const { return {}; }
+  /// Samples the shape as seen from `reference`; default: uniform by area. pdf in solid angle at reference.
+  virtual EmitterSample sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const;
+  virtual float pdf_solid_angle(const Vec3& reference, const SurfaceHit& hit) const;
+  /// Interpolated colour stored at the vertices ("vertex_color"), white where the mesh has none.
+  virtual Spectrum vertex_colour(const SurfaceHit& /*hit*/) const { return Spectrum(1); }
+  virtual bool has_vertex_colour() const { return false; }
+
+  const Bsdf* bsdf() const { return bsdf_.get(); }
+  const Emitter* emitter() const { return emitter_.get(); }
+  void set_bsdf(BsdfPtr bsdf) { bsdf_ = std::move(bsdf); }
+  void set_emitter(std::shared_ptr<const Emitter> emitter) { emitter_ = std::move(emitter); }
+
+ private:
+  BsdfPtr bsdf_;
+  std::shared_ptr<const Emitter> emitter_;
+};
+
+using ShapePtr = std::shared_ptr<Shape>;
+
+}  // namespace covary

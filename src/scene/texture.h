@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// Textures: functions on surfaces with values in RGB or in one channel.
+#pragma once
+
+#include <memory>
+
+#include "scene/object.h"
+#include "scene/surface_hit.h"
+
+namespace covary {
+
+class Texture : public SceneObject {
+ public:
+  /// Linear RGB value at the point. Not clamped: models clamp reflectances themselves when they must.
+  virtual Spectrum eval(const SurfaceHit& hit) const = 0;
+  /// One-channel value: the luminance of a colour texture, the first channel of a raw or grey one.
+  virtual float eval_1(const SurfaceHit& hit) const = 0;
+  /// Derivatives of eval_1 with respect to the surface parameters (u, v), for bump maps.
+  virtual Vec2 grad_1(const SurfaceHit& hit) const = 0;
+  /// True when eval does not depend on the point.
+  virtual bool is_constant() const { return false; }
+  /// Mean of eval_1 over the texture, used for the probability of sampling lobes (not for values).
+  virtual float mean() const = 0;
+
+  struct PositionSample {
+    Vec2 uv;
+    float pdf;  ///< per unit area of the (u, v) unit square
+  };
+  /// Point of the (u, v) unit square with density roughly proportional to the luminance; uniform by default.
+  virtual PositionSample sample_position(Vec2 u) const { return {u, 1}; }
+  virtual float pdf_position(Vec2 /*uv*/) const { return 1; }
+};
+
+using TexturePtr = std::shared_ptr<const Texture>;
+
+/// The same value everywhere.
+class ConstantTexture final : public Texture {
+ public:
+  explicit ConstantTexture(const Spectrum& value) : value_(value), grey_(value.r == value.g && value.g == value.b ? value.r : luminance(value)) {}
+  Spectrum eval(const SurfaceHit&) const override { return value_; }
+  float eval_1(const SurfaceHit&) const override { return grey_; }
+  Vec2 grad_1(const SurfaceHit&) const override { return {}; }
+  bool is_constant() const override { return true; }
+  float mean() const override { return covary::mean(value_); }
+
+ private:
+  Spectrum value_;
+  float grey_;
+};
+
+}  // namespace covary
