@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// Light emitted by a surface. The shape owns its light (Shape::set_emitter); the light only refers to the shape. A scene
+// file may use one description for several shapes: each shape then gets its own clone, which shares the texture.
+//
+//     auto light = prototype.clone();
+//     light->attach(shape.get());
+//     shape->set_emitter(light);
+#pragma once
+
+#include <memory>
+
+#include "scene/emitter.h"
+#include "scene/shape.h"
+#include "scene/texture.h"
+
+namespace covary {
+
+class AreaLight final : public Emitter {
+ public:
+  /// `radiance` must not be null. Emits on the side the geometric normal points to, equally in all directions of it.
+  explicit AreaLight(TexturePtr radiance);
+
+  /// Sets the surface that emits; call it once, when the shape is complete, before anything else but clone(). `shape`
+  /// must outlive the light.
+  void attach(const Shape* shape);
+  /// The same light without a shape.
+  std::shared_ptr<AreaLight> clone() const { return std::make_shared<AreaLight>(radiance_); }
+  const Shape* shape() const { return shape_; }
+
+  Spectrum surface_radiance(const SurfaceHit& hit, const Vec3& w) const override;
+  EmitterSample sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const override;
+  float pdf_solid_angle(const Vec3& reference, const SurfaceHit& hit) const override;
+  EmissionSample sample_emission(Vec2 u_position, Vec2 u_direction, float u_primitive) const override;
+  /// pi times the integral of the radiance over the surface; for textures by quadrature.
+  Spectrum power() const override;
+
+ private:
+  /// How points are chosen on the surface.
+  enum class Strategy {
+    kShape,  ///< constant radiance: as the shape likes best from the reference point
+    kUv,     ///< textured, on a shape whose (u, v) cover the unit square: proportional to the texture's luminance
+    kArea,   ///< textured, other shapes: uniform by area
+  };
+  /// A point chosen by position only (kUv, kArea), with its density per unit area.
+  AreaSample sample_position(Vec2 u, float u_primitive) const;
+  Spectrum radiance_at(const AreaSample& at) const;
+
+  TexturePtr radiance_;
+  Spectrum constant_;  // the radiance where it does not vary
+  bool textured_;
+  Strategy strategy_ = Strategy::kShape;
+  const Shape* shape_ = nullptr;
+};
+
+}  // namespace covary
