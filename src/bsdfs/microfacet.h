@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+// Distributions of microfacet normals (GGX and Beckmann, anisotropic) after Walter et al. 2007, "Microfacet Models for
+// Refraction through Rough Surfaces", with Smith's masking and exact sampling of the visible normals (Heitz 2014,
+// "Understanding the Masking-Shadowing Function"; Heitz & d'Eon 2014; Dupuy & Benyoub 2023).
+//
+//   code            paper
+//   alpha_u/v       alpha_x, alpha_y     roughness along the s and t axis of the shading frame
+//   eval(m)         D(m)
+//   smith_g1(w, m)  G1(w, m)
+//   pdf(w, m)       D_w(m) = G1(w, m) |w.m| D(m) / cos(theta_w)
+#pragma once
+
+#include "core/frame.h"
+
+namespace covary {
+
+enum class MicrofacetType : uint8_t { kBeckmann, kGgx };
+
+class Microfacet {
+ public:
+  /// Roughness below 1e-4 is raised to it.
+  Microfacet(MicrofacetType type, float alpha_u, float alpha_v)
+      : alpha_u_(std::max(alpha_u, 1e-4f)), alpha_v_(std::max(alpha_v, 1e-4f)), type_(type) {}
+
+  MicrofacetType type() const { return type_; }
+  float alpha_u() const { return alpha_u_; }
+  float alpha_v() const { return alpha_v_; }
+
+  /// Density of normals D(m): area of microfacets per unit solid angle of m and unit area of the surface; integral of
+  /// D(m) cos(theta_m) is 1. Zero below the surface and where too small to matter (D cos < 1e-20).
+  float eval(const Vec3& m) const {
+    const float slope2 = sqr(m.x / alpha_u_) + sqr(m.y / alpha_v_), cos2 = m.z * m.z;
+    const float norm = kPi * alpha_u_ * alpha_v_;
+    const float d = type_ == MicrofacetType::kGgx ? 1 / (norm * sqr(slope2 + cos2))  // [Walter2007] Eq. (33)
+                                                  : std::exp(-slope2 / cos2) / (norm * sqr(cos2));  // Eq. (25)
+    return d * m.z > 1e-20f ? d : 0;
+  }
+
+  /// Fraction of the microfacets with normal m that are visible from w; 0 when w sees the back of either surface.
+  /// For w in the lower hemisphere m is still the upward normal, and its lower side is meant.
+  float smith_g1(const Vec3& w, const Vec3& m) const { return dot(w, m) * w.z > 0 ? smith_g1(w) : 0; }
+  /// The same without the test of orientation; it does not depend on m.
+  float smith_g1(const Vec3& w) const {
+    const float xy2 = sqr(alpha_u_ * w.x) + sqr(alpha_v_ * w.y), z = std::abs(w.z);
+    return type_ == MicrofacetType::kGgx ? 2 * z / (z + std::sqrt(z * z + xy2)) : beckmann_g1(xy2, z);
+  }
+  /// Separable masking and shadowing, G1(wi, m) G1(wo, m).
+  float smith_g(const Vec3& wi, const Vec3& wo, const Vec3& m) const { return smith_g1(wi, m) * smith_g1(wo, m); }
+
+  /// Density of sample(): visible normals from w, per unit solid angle of m. `w.z` > 0.
+  float pdf(const Vec3& w, const Vec3& m) const {
+    const float wm = dot(w, m);
+    if (!(wm * w.z > 0)) return 0;
+    if (type_ == MicrofacetType::kGgx) {  // G1 / cos(theta_w) without the division of two small numbers
+      const float xy2 = sqr(alpha_u_ * w.x) + sqr(alpha_v_ * w.y);
+      return eval(m) * 2 * wm / (w.z + std::sqrt(w.z * w.z + xy2));
+    }
+    return eval(m) * smith_g1(w) * wm / w.z;
+  }
+
+  struct Sample {
+    Vec3 m;
+    float pdf;  ///< per unit solid angle of m
+  };
+  /// Normal visible from w (`w.z` > 0), continuous in u. For GGX it is continuous in w as well; for Beckmann except at
+  /// w = (0, 0, 1).
+  Sample sample(const Vec3& w, Vec2 u) const {
+    const Vec3 m = type_ == MicrofacetType::kGgx ? sample_ggx(w, u) : sample_beckmann(w, u);
+    return {m, pdf(w, m)};
+  }
+
+ private:
+  // Dupuy & Benyoub 2023, "Sampling Visible GGX Normals with Spherical Caps": the normals visible on a hemisphere are
+  // the half vectors between w and a uniformly distributed direction of the spherical cap z > -w.z. An anisotropic
+  // distribution is a stretched hemisphere.
+  Vec3 sample_ggx(const Vec3& w, Vec2 u) const {
+    const Vec3 v = normalize({alpha_u_ * w.x, alpha_v_ * w.y, w.z});
+    const float phi = kTwoPi * u.x;
+    const float z = (1 - u.y) * (1 + v.z) - v.z;
+    const float r = safe_sqrt(1 - z * z);
+    const Vec3 h{r * std::cos(phi) + v.x, r * std::sin(phi) + v.y, z + v.z};
+    return normalize({alpha_u_ * h.x, alpha_v_ * h.y, std::max(h.z, 1e-9f)});
+  }
+  Vec3 sample_beckmann(const Vec3& w, Vec2 u) const;
+  /// `xy2` = squared tangential part of w scaled by the roughness, `z` = cosine of w.
+  static float beckmann_g1(float xy2, float z);
+
+  float alpha_u_, alpha_v_;
+  MicrofacetType type_;
+};
+
+/// Inverse of the error function on (-1, 1), relative error about 1e-6 (Giles 2012, "Approximating the erfinv
+/// function", single precision).
+float erf_inv(float x);
+
+}  // namespace covary
