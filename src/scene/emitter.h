@@ -17,6 +17,7 @@ struct EmitterSample {
   Vec3 wi;                     ///< unit direction from the reference point to the light
   float distance = kInfinity;  ///< to the light; infinite for environments and directional lights
   Vec3 p, n;                   ///< point and unit geometric normal on the light (unset when infinitely far)
+  Vec2 uv;                     ///< surface parameters of p (area lights)
   Spectrum radiance;           ///< emitted towards the reference point; for delta lights: irradiance on a surface facing wi (already divided by distance squared)
   float pdf_solid_angle = 0;   ///< at the reference point; 1 (a discrete probability) for delta lights; 0: sampling failed
   bool is_delta = false;       ///< position or direction is a delta; BSDF sampling cannot hit it

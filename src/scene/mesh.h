@@ -25,22 +25,33 @@ class TriangleMesh final : public Shape {
   /// Degenerate triangles (zero area) are dropped and counted.
   explicit TriangleMesh(MeshData data);
 
-  Bounds3 bounds() const override;
-  float area() const override;
+  Bounds3 bounds() const override { return bounds_; }
+  void fill(const Ray& ray, SurfaceHit& hit, bool with_derivatives) const override;
+  float area() const override { return static_cast<float>(areas_.sum()); }
+  size_t n_primitives() const override { return triangles_.size(); }
   AreaSample sample_area(Vec2 u, float u_primitive) const override;
   Spectrum vertex_colour(const SurfaceHit& hit) const override;
-  bool has_vertex_colour() const override { return !data_.colours.empty(); }
+  bool has_vertex_colour() const override { return !colours_.empty(); }
+  /// Makes sample_area() and area() ready; called by the scene for meshes that emit. Not needed otherwise.
+  void prepare_sampling();
 
-  const MeshData& data() const { return data_; }
+  /// Vertices lie in one record each, so that a hit touches few cache lines and the ray tracer shares the array.
+  struct Vertex {
+    Vec3 p, n;
+    Vec2 uv;
+  };
+  const std::vector<Vertex>& vertices() const { return vertices_; }
+  const std::vector<std::array<uint32_t, 3>>& triangles() const { return triangles_; }
   size_t n_degenerate() const { return n_degenerate_; }
-  /// Fills in everything of `hit` but t, shape, bsdf, emitter, from primitive and barycentric.
-  void fill(SurfaceHit& hit, bool with_derivatives) const;
 
  private:
-  MeshData data_;
+  std::vector<Vertex> vertices_;
+  std::vector<std::array<uint32_t, 3>> triangles_;
+  std::vector<Spectrum> colours_;
+  Bounds3 bounds_;
+  bool has_normals_ = false, has_uvs_ = false;
   size_t n_degenerate_ = 0;
-  Discrete areas_;  // only made when the mesh emits
-  void prepare_sampling();
+  Discrete areas_;
 };
 
 }  // namespace covary

@@ -22,7 +22,11 @@ struct AreaSample {
 class Shape : public SceneObject {
  public:
   virtual Bounds3 bounds() const = 0;
+  /// Completes a hit of this shape: p, ng, frame and uv (and dp_du, dp_dv, with the frame aligned to dp_du, if
+  /// `with_derivatives`) from t, primitive and barycentric as the ray tracer left them.
+  virtual void fill(const Ray& ray, SurfaceHit& hit, bool with_derivatives) const = 0;
   virtual float area() const = 0;
+  virtual size_t n_primitives() const { return 1; }
   /// Uniform by area. `u_primitive` chooses among parts (triangles).
   virtual AreaSample sample_area(Vec2 u, float u_primitive) const = 0;
   /// Point by surface parameters (for textured lights): only shapes whose (u, v) cover the unit square once.

@@ -26,7 +26,7 @@ struct SurfaceHit {
   uint32_t primitive = 0;  ///< triangle index within a mesh
   Vec2 barycentric;        ///< weights of the triangle's 2nd and 3rd vertex
 
-  /// Mean over the vertices of the hit primitive of the named vertex attribute; see Shape::vertex_colour.
+  /// Colour stored at the vertices, interpolated; see Shape::vertex_colour.
   Spectrum vertex_colour() const;
 };
 

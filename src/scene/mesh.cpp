@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scene/mesh.h"
+
+#include <string>
+#include <utility>
+
+#include "core/error.h"
+#include "core/warp.h"
+
+namespace covary {
+namespace {
+
+void check_length(const char* what, size_t length, size_t n_vertices) {
+  if (length != 0 && length != n_vertices)
+    throw Error(ErrorCode::kInput, "a mesh has " + std::to_string(n_vertices) + " vertices but " +
+                                       std::to_string(length) + " " + what);
+}
+
+}  // namespace
+
+TriangleMesh::TriangleMesh(MeshData data)
+    : triangles_(std::move(data.triangles)),
+      colours_(std::move(data.colours)),
+      has_normals_(!data.normals.empty()),
+      has_uvs_(!data.uvs.empty()) {
+  const size_t n = data.positions.size();
+  check_length("normals", data.normals.size(), n);
+  check_length("texture coordinates", data.uvs.size(), n);
+  check_length("vertex colours", colours_.size(), n);
+
+  const float sign = data.flip_normals ? -1.0f : 1.0f;
+  vertices_.resize(n);
+  for (size_t i = 0; i < n; ++i) {
+    if (!is_finite(data.positions[i]))
+      throw Error(ErrorCode::kInput, "vertex " + std::to_string(i) + " of a mesh has a position that is not finite");
+    vertices_[i] = {data.positions[i], has_normals_ ? data.normals[i] * sign : Vec3{}, has_uvs_ ? data.uvs[i] : Vec2{}};
+    bounds_.extend(data.positions[i]);
+  }
+
+  // Degenerate triangles cannot be hit and have no normal: they are left out.
+  size_t kept = 0;
+  for (size_t i = 0; i < triangles_.size(); ++i) {
+    std::array<uint32_t, 3> t = triangles_[i];
+    for (uint32_t index : t)
+      if (index >= n)
+        throw Error(ErrorCode::kInput, "triangle " + std::to_string(i) + " of a mesh uses vertex " +
+                                           std::to_string(index) + ", but there are only " + std::to_string(n));
+    if (data.flip_normals) std::swap(t[1], t[2]);
+    const Vec3 p0 = vertices_[t[0]].p;
+    const Vec3 normal = cross(vertices_[t[1]].p - p0, vertices_[t[2]].p - p0);
+    if (length_squared(normal) > 0) triangles_[kept++] = t;
+  }
+  n_degenerate_ = triangles_.size() - kept;
+  triangles_.resize(kept);
+}
+
+void TriangleMesh::prepare_sampling() {
+  if (triangles_.empty()) throw Error(ErrorCode::kInput, "a mesh that emits light has no triangle of positive area");
+  std::vector<float> areas;
+  areas.reserve(triangles_.size());
+  for (const auto& t : triangles_) {
+    const Vec3 p0 = vertices_[t[0]].p;
+    areas.push_back(0.5f * length(cross(vertices_[t[1]].p - p0, vertices_[t[2]].p - p0)));
+  }
+  areas_ = Discrete(areas);
+}
+
+void TriangleMesh::fill(const Ray& /*ray*/, SurfaceHit& hit, bool with_derivatives) const {
+  const auto& t = triangles_[hit.primitive];
+  const Vertex &v0 = vertices_[t[0]], &v1 = vertices_[t[1]], &v2 = vertices_[t[2]];
+  const float b1 = hit.barycentric.x, b2 = hit.barycentric.y, b0 = 1 - b1 - b2;
+  const Vec3 e1 = v1.p - v0.p, e2 = v2.p - v0.p;
+  hit.p = v0.p * b0 + v1.p * b1 + v2.p * b2;
+  hit.ng = normalize(cross(e1, e2));
+  Vec3 n = hit.ng;
+  if (has_normals_) {
+    const Vec3 interpolated = v0.n * b0 + v1.n * b1 + v2.n * b2;
+    const float l2 = length_squared(interpolated);
+    if (l2 > 0) n = interpolated * (1 / std::sqrt(l2));
+  }
+  hit.uv = has_uvs_ ? v0.uv * b0 + v1.uv * b1 + v2.uv * b2 : hit.barycentric;
+  if (!with_derivatives) {
+    hit.frame = Frame(n);
+    return;
+  }
+  hit.dp_du = e1, hit.dp_dv = e2;
+  if (has_uvs_) {
+    const Vec2 d1 = v1.uv - v0.uv, d2 = v2.uv - v0.uv;
+    const float determinant = d1.x * d2.y - d1.y * d2.x;
+    const float inverse = determinant != 0 ? 1 / determinant : 0;
+    hit.dp_du = (e1 * d2.y - e2 * d1.y) * inverse;
+    hit.dp_dv = (e2 * d1.x - e1 * d2.x) * inverse;
+  }
+  hit.frame = Frame::from_tangent(n, hit.dp_du);
+}
+
+AreaSample TriangleMesh::sample_area(Vec2 u, float u_primitive) const {
+  const Discrete::Result chosen = areas_.sample(u_primitive);
+  const auto& t = triangles_[chosen.index];
+  const Vertex &v0 = vertices_[t[0]], &v1 = vertices_[t[1]], &v2 = vertices_[t[2]];
+  const Vec2 b = warp::square_to_triangle(u);
+  const float b0 = 1 - b.x - b.y;
+  const Vec3 normal = cross(v1.p - v0.p, v2.p - v0.p);
+  const float twice_area = length(normal);
+  return {v0.p * b0 + v1.p * b.x + v2.p * b.y, normal * (1 / twice_area),
+          has_uvs_ ? v0.uv * b0 + v1.uv * b.x + v2.uv * b.y : b, 1 / area()};
+}
+
+Spectrum TriangleMesh::vertex_colour(const SurfaceHit& hit) const {
+  if (colours_.empty()) return Spectrum(1);
+  const auto& t = triangles_[hit.primitive];
+  const float b1 = hit.barycentric.x, b2 = hit.barycentric.y;
+  return colours_[t[0]] * (1 - b1 - b2) + colours_[t[1]] * b1 + colours_[t[2]] * b2;
+}
+
+}  // namespace covary

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scene/ray_tracer.h"
+
+#include <algorithm>
+#include <map>
+#include <string>
+
+#include "core/error.h"
+#include "scene/analytic_shape.h"
+#include "scene/mesh.h"
+
+namespace covary {
+namespace {
+
+void on_embree_error(void*, RTCError code, const char* text) {
+  throw Error(ErrorCode::kInternal, "Embree error " + std::to_string(code) + ": " + (text ? text : "no description"));
+}
+
+Ray to_ray(RTCRayN* ray, unsigned n, unsigned i) {
+  return {{RTCRayN_org_x(ray, n, i), RTCRayN_org_y(ray, n, i), RTCRayN_org_z(ray, n, i)},
+          {RTCRayN_dir_x(ray, n, i), RTCRayN_dir_y(ray, n, i), RTCRayN_dir_z(ray, n, i)},
+          RTCRayN_tfar(ray, n, i)};
+}
+
+void analytic_bounds(const RTCBoundsFunctionArguments* args) {
+  const Bounds3 b = static_cast<const AnalyticShape*>(args->geometryUserPtr)->bounds();
+  *args->bounds_o = {b.lower.x, b.lower.y, b.lower.z, 0, b.upper.x, b.upper.y, b.upper.z, 0};
+}
+
+void analytic_intersect(const RTCIntersectFunctionNArguments* args) {
+  const auto* shape = static_cast<const AnalyticShape*>(args->geometryUserPtr);
+  RTCRayN* rays = RTCRayHitN_RayN(args->rayhit, args->N);
+  RTCHitN* hits = RTCRayHitN_HitN(args->rayhit, args->N);
+  for (unsigned i = 0; i < args->N; ++i) {
+    if (!args->valid[i]) continue;
+    const float t = shape->intersect(to_ray(rays, args->N, i));
+    if (t == kInfinity) continue;
+    RTCRayN_tfar(rays, args->N, i) = t;
+    RTCHitN_geomID(hits, args->N, i) = args->geomID;
+    RTCHitN_primID(hits, args->N, i) = args->primID;
+    RTCHitN_instID(hits, args->N, i, 0) = args->context->instID[0];
+  }
+}
+
+void analytic_occluded(const RTCOccludedFunctionNArguments* args) {
+  const auto* shape = static_cast<const AnalyticShape*>(args->geometryUserPtr);
+  for (unsigned i = 0; i < args->N; ++i)
+    if (args->valid[i] && shape->intersect(to_ray(args->ray, args->N, i)) != kInfinity)
+      RTCRayN_tfar(args->ray, args->N, i) = -kInfinity;
+}
+
+RTCGeometry mesh_geometry(RTCDevice device, const TriangleMesh& mesh) {
+  const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+  // Embree reads 16 bytes of each vertex; the record is longer than that, so the last one is safe too.
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, mesh.vertices().data(), 0,
+                             sizeof(TriangleMesh::Vertex), mesh.vertices().size());
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.triangles().data(), 0,
+                             sizeof(mesh.triangles()[0]), mesh.triangles().size());
+  return geometry;
+}
+
+RTCGeometry analytic_geometry(RTCDevice device, const AnalyticShape& shape) {
+  const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
+  rtcSetGeometryUserPrimitiveCount(geometry, 1);
+  rtcSetGeometryUserData(geometry, const_cast<AnalyticShape*>(&shape));
+  rtcSetGeometryBoundsFunction(geometry, analytic_bounds, nullptr);
+  rtcSetGeometryIntersectFunction(geometry, analytic_intersect);
+  rtcSetGeometryOccludedFunction(geometry, analytic_occluded);
+  return geometry;
+}
+
+RTCRay to_embree(const Ray& ray) {
+  RTCRay r;
+  r.org_x = ray.o.x, r.org_y = ray.o.y, r.org_z = ray.o.z;
+  r.dir_x = ray.d.x, r.dir_y = ray.d.y, r.dir_z = ray.d.z;
+  r.tnear = 0, r.tfar = ray.t_max, r.time = 0, r.mask = ~0u, r.id = 0, r.flags = 0;
+  return r;
+}
+
+/// Moves a hit found in a group's space to the world.
+void place(SurfaceHit& hit, const Transform& to_world, bool with_derivatives) {
+  hit.p = to_world.point(hit.p);
+  hit.ng = normalize(to_world.normal(hit.ng));
+  const Vec3 n = normalize(to_world.normal(hit.frame.n));
+  if (!with_derivatives) {
+    hit.frame = Frame(n);
+    return;
+  }
+  hit.dp_du = to_world.vector(hit.dp_du);
+  hit.dp_dv = to_world.vector(hit.dp_dv);
+  hit.frame = Frame::from_tangent(n, hit.dp_du);
+}
+
+}  // namespace
+
+RayTracer::Group RayTracer::make_group(std::span<const ShapePtr> shapes) const {
+  Group group;
+  group.scene = rtcNewScene(device_);
+  rtcSetSceneBuildQuality(group.scene, RTC_BUILD_QUALITY_MEDIUM);
+  for (const ShapePtr& shape : shapes) {
+    const auto* mesh = dynamic_cast<const TriangleMesh*>(shape.get());
+    const RTCGeometry geometry = mesh ? mesh_geometry(device_, *mesh)
+                                      : analytic_geometry(device_, dynamic_cast<const AnalyticShape&>(*shape));
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometryByID(group.scene, geometry, static_cast<unsigned>(group.shapes.size()));
+    rtcReleaseGeometry(geometry);
+    group.shapes.push_back(shape.get());
+  }
+  return group;
+}
+
+RayTracer::RayTracer(std::span<const ShapePtr> shapes, std::span<const Instance> instances)
+    : device_(rtcNewDevice(nullptr)) {
+  if (!device_) throw Error(ErrorCode::kInternal, "Embree cannot create a device on this machine");
+  rtcSetDeviceErrorFunction(device_, on_embree_error, nullptr);
+  top_ = make_group(shapes);
+
+  std::map<const ShapeGroup*, size_t> index;
+  for (const Instance& instance : instances)
+    if (index.emplace(instance.group.get(), groups_.size()).second) {
+      groups_.push_back(make_group(instance.group->shapes));
+      rtcCommitScene(groups_.back().scene);
+    }
+  for (const Instance& instance : instances) {
+    const Group& group = groups_[index.at(instance.group.get())];
+    const RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_INSTANCE);
+    rtcSetGeometryInstancedScene(geometry, group.scene);
+    float columns[12];
+    for (int c = 0; c < 4; ++c)
+      for (int r = 0; r < 3; ++r) columns[c * 3 + r] = static_cast<float>(instance.to_world.matrix()[r][c]);
+    rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns);
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometryByID(top_.scene, geometry, static_cast<unsigned>(top_.shapes.size() + placed_.size()));
+    rtcReleaseGeometry(geometry);
+    placed_.push_back({&group, instance.to_world});
+  }
+  rtcCommitScene(top_.scene);
+}
+
+RayTracer::~RayTracer() {
+  rtcReleaseScene(top_.scene);
+  for (const Group& group : groups_) rtcReleaseScene(group.scene);
+  rtcReleaseDevice(device_);
+}
+
+bool RayTracer::intersect(const Ray& ray, SurfaceHit& hit) const {
+  RTCRayHit query;
+  query.ray = to_embree(ray);
+  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcIntersect1(top_.scene, &context, &query);
+  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
+
+  const unsigned instance = query.hit.instID[0];
+  const Placed* placed =
+      instance == RTC_INVALID_GEOMETRY_ID ? nullptr : &placed_[instance - top_.shapes.size()];
+  const Shape* shape = (placed ? *placed->group : top_).shapes[query.hit.geomID];
+  hit.t = query.ray.tfar;
+  hit.primitive = query.hit.primID;
+  hit.barycentric = {query.hit.u, query.hit.v};
+  hit.shape = shape, hit.bsdf = shape->bsdf(), hit.emitter = shape->emitter();
+  const bool with_derivatives = hit.bsdf->needs_derivatives();
+  if (!placed) {
+    shape->fill(ray, hit, with_derivatives);
+  } else {
+    const Transform to_local = placed->to_world.inverse();
+    shape->fill({to_local.point(ray.o), to_local.vector(ray.d), ray.t_max}, hit, with_derivatives);
+    place(hit, placed->to_world, with_derivatives);
+  }
+  return true;
+}
+
+bool RayTracer::occluded(const Ray& ray) const {
+  RTCRay query = to_embree(ray);
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcOccluded1(top_.scene, &context, &query);
+  return query.tfar < 0;
+}
+
+}  // namespace covary

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+// The one place that knows Embree.
+#pragma once
+
+#include <embree3/rtcore.h>
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "scene/scene.h"
+
+namespace covary {
+
+class RayTracer {
+ public:
+  RayTracer(std::span<const ShapePtr> shapes, std::span<const Instance> instances);
+  ~RayTracer();
+  RayTracer(const RayTracer&) = delete;
+  RayTracer& operator=(const RayTracer&) = delete;
+
+  bool intersect(const Ray& ray, SurfaceHit& hit) const;
+  bool occluded(const Ray& ray) const;
+
+ private:
+  struct Group {  // shapes of one Embree scene, indexed by geometry id
+    RTCScene scene = nullptr;
+    std::vector<const Shape*> shapes;
+  };
+  Group make_group(std::span<const ShapePtr> shapes) const;
+
+  RTCDevice device_ = nullptr;
+  Group top_;                 // shapes, then instances
+  std::vector<Group> groups_;
+  struct Placed {
+    const Group* group;
+    Transform to_world;
+  };
+  std::vector<Placed> placed_;  // by geometry id in top_ minus top_.shapes.size()
+};
+
+}  // namespace covary

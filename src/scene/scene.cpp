@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scene/scene.h"
+
+#include <chrono>
+#include <utility>
+
+#include "core/error.h"
+#include "scene/mesh.h"
+#include "scene/ray_tracer.h"
+
+namespace covary {
+
+Scene::Scene(SceneParts parts) : parts_(std::move(parts)) {
+  const auto start = std::chrono::steady_clock::now();
+  COVARY_CHECK(parts_.camera, "a scene needs a camera");
+  for (const ShapePtr& shape : parts_.shapes) {
+    COVARY_CHECK(shape->bsdf(), "every shape needs a BSDF");
+    if (auto* mesh = dynamic_cast<TriangleMesh*>(shape.get()); mesh && mesh->emitter()) mesh->prepare_sampling();
+    bounds_.extend(shape->bounds());
+    n_triangles_ += dynamic_cast<const TriangleMesh*>(shape.get()) ? shape->n_primitives() : 0;
+  }
+  for (const Instance& instance : parts_.instances)
+    for (const ShapePtr& shape : instance.group->shapes) {
+      bounds_.extend(instance.to_world.bounds(shape->bounds()));
+      n_triangles_ += dynamic_cast<const TriangleMesh*>(shape.get()) ? shape->n_primitives() : 0;
+    }
+  if (bounds_.empty()) bounds_ = {{-1, -1, -1}, {1, 1, 1}};  // lights at infinity still need a sphere to shine through
+  tracer_ = std::make_unique<RayTracer>(parts_.shapes, parts_.instances);
+
+  for (const auto& emitter : parts_.emitters) {
+    // Emitters are shared as const by the loader; this is the one moment they learn the scene's size.
+    const_cast<Emitter&>(*emitter).set_scene_bounds(bounds_);
+    if (emitter->is_environment()) {
+      if (environment_) throw Error(ErrorCode::kInput, "a scene can have only one environment light");
+      environment_ = emitter.get();
+    }
+  }
+  build_seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+Scene::~Scene() = default;
+bool Scene::intersect(const Ray& ray, SurfaceHit& hit) const { return tracer_->intersect(ray, hit); }
+bool Scene::occluded(const Ray& ray) const { return tracer_->occluded(ray); }
+
+}  // namespace covary

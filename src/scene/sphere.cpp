@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <string>
+
+#include "core/error.h"
+#include "core/warp.h"
+#include "scene/analytic_shape.h"
+
+namespace covary {
+namespace {
+
+/// Length of the images of the three axes; throws unless they are equal and orthogonal.
+float similarity_scale(const Transform& t) {
+  const Vec3 x = t.vector({1, 0, 0}), y = t.vector({0, 1, 0}), z = t.vector({0, 0, 1});
+  const float l = length(x), tolerance = 1e-3f * l;
+  if (std::abs(length(y) - l) > tolerance || std::abs(length(z) - l) > tolerance ||
+      std::abs(dot(x, y)) > tolerance * l || std::abs(dot(x, z)) > tolerance * l || std::abs(dot(y, z)) > tolerance * l)
+    throw Error(ErrorCode::kInput, "the to_world transformation of a sphere must scale all axes alike, without shear");
+  return l;
+}
+
+}  // namespace
+
+Sphere::Sphere(const Transform& to_world, const Vec3& center, float radius, bool flip_normals)
+    : to_world_(to_world * Transform::translate(center) * Transform::scale({radius, radius, radius})),
+      to_local_(to_world_.inverse()),
+      center_(to_world_.point({0, 0, 0})),
+      radius_(similarity_scale(to_world_)),
+      sign_(flip_normals ? -1.0f : 1.0f) {}
+
+Bounds3 Sphere::bounds() const {
+  const Vec3 r{radius_, radius_, radius_};
+  return {center_ - r, center_ + r};
+}
+
+float Sphere::intersect(const Ray& ray) const {
+  // Double precision: large spheres seen from far away lose too many digits in single precision.
+  const double ox = double(ray.o.x) - center_.x, oy = double(ray.o.y) - center_.y, oz = double(ray.o.z) - center_.z;
+  const double b = ox * ray.d.x + oy * ray.d.y + oz * ray.d.z;
+  const double a = double(ray.d.x) * ray.d.x + double(ray.d.y) * ray.d.y + double(ray.d.z) * ray.d.z;
+  const double c = ox * ox + oy * oy + oz * oz - double(radius_) * radius_;
+  const double discriminant = b * b - a * c;
+  if (discriminant < 0) return kInfinity;
+  // The root with the larger magnitude first, the other from their product: no cancellation.
+  const double q = -(b + std::copysign(std::sqrt(discriminant), b));
+  const double t0 = std::min(q / a, c / q), t1 = std::max(q / a, c / q);
+  const double t = t0 > 0 ? t0 : t1;
+  return t > 0 && t < ray.t_max ? static_cast<float>(t) : kInfinity;
+}
+
+void Sphere::fill(const Ray& ray, SurfaceHit& hit, bool with_derivatives) const {
+  const Vec3 outward = normalize(ray.at(hit.t) - center_);
+  hit.p = center_ + outward * radius_;
+  hit.ng = outward * sign_;
+  const Vec3 local = to_local_.vector(outward) * radius_;
+  const float phi = std::atan2(local.y, local.x), rho = std::sqrt(local.x * local.x + local.y * local.y);
+  hit.uv = {(phi < 0 ? phi + kTwoPi : phi) / kTwoPi, std::acos(std::clamp(local.z, -1.0f, 1.0f)) / kPi};
+  if (!with_derivatives) {
+    hit.frame = Frame(hit.ng);
+    return;
+  }
+  const float inverse_rho = rho > 0 ? 1 / rho : 0;
+  hit.dp_du = to_world_.vector(Vec3{-local.y, local.x, 0} * kTwoPi);
+  hit.dp_dv = rho > 0 ? to_world_.vector(Vec3{local.z * local.x * inverse_rho, local.z * local.y * inverse_rho, -rho} * kPi)
+                      : to_world_.vector({kPi, 0, 0});
+  hit.frame = Frame::from_tangent(hit.ng, hit.dp_du);
+}
+
+AreaSample Sphere::sample_area(Vec2 u, float /*u_primitive*/) const {
+  const Vec3 d = warp::square_to_sphere(u);
+  return {center_ + d * radius_, d * sign_, {}, 1 / area()};
+}
+
+EmitterSample Sphere::sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const {
+  const Vec3 to_center = center_ - reference;
+  const float d2 = length_squared(to_center), sin2_max = radius_ * radius_ / d2;
+  if (!(sin2_max < 1)) return Shape::sample_towards(reference, u, u_primitive);
+  // 1 - cos(theta_max) without cancellation.
+  const float one_minus_cos_max = sin2_max / (1 + safe_sqrt(1 - sin2_max));
+  const Vec3 local = warp::square_to_cone(u, one_minus_cos_max);
+  EmitterSample sample;
+  sample.wi = Frame(to_center * (1 / std::sqrt(d2))).to_world(local);
+  // Nearer intersection of the direction with the sphere.
+  const float b = dot(to_center, sample.wi), half_chord = safe_sqrt(radius_ * radius_ - std::max(0.0f, d2 - b * b));
+  sample.distance = b - half_chord;
+  const Vec3 outward = normalize(reference + sample.wi * sample.distance - center_);
+  sample.p = center_ + outward * radius_;
+  sample.n = outward * sign_;
+  const Vec3 q = to_local_.vector(outward) * radius_;
+  const float phi = std::atan2(q.y, q.x);
+  sample.uv = {(phi < 0 ? phi + kTwoPi : phi) / kTwoPi, std::acos(std::clamp(q.z, -1.0f, 1.0f)) / kPi};
+  sample.pdf_solid_angle = warp::cone_pdf_solid_angle(one_minus_cos_max);
+  return sample;
+}
+
+float Sphere::pdf_solid_angle(const Vec3& reference, const SurfaceHit& hit) const {
+  const float sin2_max = radius_ * radius_ / length_squared(center_ - reference);
+  if (!(sin2_max < 1)) return Shape::pdf_solid_angle(reference, hit);
+  return warp::cone_pdf_solid_angle(sin2_max / (1 + safe_sqrt(1 - sin2_max)));
+}
+
+}  // namespace covary
