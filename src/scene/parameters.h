@@ -33,6 +33,8 @@ class Diagnostics {
   void error(const SourceLocation& where, const std::string& message);
   /// Harmless; a repeated message of the same kind should be counted by the caller and given once.
   void warn(const SourceLocation& where, const std::string& message);
+  /// Takes over everything `other` holds; for objects that are made in parallel.
+  void append(const Diagnostics& other);
   bool has_errors() const { return !errors_.empty(); }
   /// Throws Error(kInput) with all errors, sorted by file and line, one a line "file:line:column: message".
   void throw_if_errors() const;
@@ -44,9 +46,10 @@ class Diagnostics {
   std::vector<std::string> warnings_;
 };
 
-/// A spectrum given by wavelength (nm) and value pairs, sorted by wavelength.
+/// A spectrum given by wavelength (nm) and value pairs, strictly increasing in wavelength, linear in between and zero
+/// outside. A single pair is a constant spectrum (its wavelength does not matter): <spectrum value="0.5">.
 struct SampledSpectrum { std::vector<std::pair<float, float>> samples; };
-/// <rgb>: three numbers taken as linear RGB.  <spectrum value="0.5"> is a plain double.
+/// <rgb>: three numbers taken as linear RGB.
 struct ColourValue { Spectrum rgb; };
 
 struct ObjectDescription;
@@ -68,8 +71,8 @@ struct ObjectDescription {
   std::vector<Property> properties;
 };
 
-/// How a sampled spectrum becomes RGB: reflectances and emission differ by the white point; indices of refraction are
-/// weighted like reflectances but may exceed 1.
+/// How a sampled spectrum becomes RGB. Reflectances are seen under D65, the white of linear RGB, and clamped to [0, 1];
+/// indices of refraction likewise, but they may exceed 1. Emission is taken as it is.
 enum class SpectrumRole { kReflectance, kEmission, kIndex };
 
 class ObjectFactory;
@@ -148,8 +151,9 @@ struct Plugin {
   std::shared_ptr<T> (*make)(Parameters& parameters);
 };
 
-/// Linear Rec. 709 RGB of a sampled spectrum (CIE 1931 2° observer). Index and reflectance: equal-energy white maps to
-/// (1,1,1). Emission: likewise, radiance per nanometre of a constant spectrum 1 maps to (1,1,1).
+/// Linear Rec. 709 RGB of a sampled spectrum (CIE 1931 2° observer), negative components clamped to 0. A reflectance or
+/// index of 1 everywhere maps to (1,1,1). An emission of 1 everywhere has Y = 1 and the chromaticity of illuminant E,
+/// which is not neutral in this space: (1.205, 0.948, 0.909).
 Spectrum spectrum_to_rgb(const SampledSpectrum& spectrum, SpectrumRole role);
 
 }  // namespace covary
