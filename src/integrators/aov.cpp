@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "integrators/aov.h"
+
+#include <tbb/parallel_for.h>
+
+#include "integrators/render_pass.h"
+
+namespace covary {
+
+void render_aovs(const Scene& scene, const FilterSettings& filter, Sampling sampling, uint64_t seed, uint32_t pass,
+                 uint32_t spp, Film& film) {
+  Image albedo(film.width(), film.height(), 3), normal = albedo, position = albedo;
+  tbb::parallel_for(0, film.height(), [&](int y) {
+    for (int x = 0; x < film.width(); ++x) {
+      const int frame_x = film.crop().x + x, frame_y = film.crop().y + y;
+      Spectrum a;
+      Vec3 n, p;
+      for (uint32_t s = 0; s < spp; ++s) {
+        const uint64_t pixel = static_cast<uint64_t>(frame_y) * film.frame_width() + frame_x;
+        const PathRandom random(sampling, seed, pass, pixel, s);
+        const Ray ray =
+            scene.camera().ray(film_position(filter, frame_x, frame_y, random), random.get_2d(0, Event::kLens));
+        SurfaceHit hit;
+        if (!scene.intersect(ray, hit)) continue;
+        a += hit.bsdf->albedo(hit);
+        n += hit.frame.n;
+        p += hit.p;
+      }
+      const float scale = 1 / static_cast<float>(spp);
+      const float values[3][3] = {{a.r, a.g, a.b}, {n.x, n.y, n.z}, {p.x, p.y, p.z}};
+      Image* images[3] = {&albedo, &normal, &position};
+      for (int i = 0; i < 3; ++i)
+        for (int c = 0; c < 3; ++c) images[i]->pixel(x, y)[c] = values[i][c] * scale;
+    }
+  });
+  film.aovs["Albedo"] = std::move(albedo);
+  film.aovs["N"] = std::move(normal);
+  film.aovs["P"] = std::move(position);
+}
+
+}  // namespace covary

@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "integrators/render_pass.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <tuple>
+
+#include "core/error.h"
+#include "core/warp.h"
+
+namespace covary {
+namespace {
+
+constexpr int kTileSize = 16;
+constexpr size_t kMaxBadSamples = 10;
+
+using Clock = std::chrono::steady_clock;
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+/// Offset from the pixel centre, drawn from a gaussian with the given standard deviation cut off at `radius`, by
+/// inversion of its cumulative distribution (rational start of Giles 2010 for the inverse error function, one Newton step).
+float interval_to_gaussian(float u, float stddev, float radius) {
+  const double tail = std::erf(radius / (stddev * std::sqrt(2.0)));  // mass inside the cut-off
+  const double p = std::clamp((2.0 * u - 1.0) * tail, -1 + 1e-15, 1 - 1e-15);
+  double w = -std::log((1 - p) * (1 + p)), x;
+  if (w < 5) {
+    w -= 2.5;
+    x = 2.81022636e-08;
+    for (double c : {3.43273939e-07, -3.5233877e-06, -4.39150654e-06, 0.00021858087, -0.00125372503, -0.00417768164,
+                     0.246640727, 1.50140941})
+      x = c + x * w;
+  } else {
+    w = std::sqrt(w) - 3;
+    x = -0.000200214257;
+    for (double c : {0.000100950558, 0.00134934322, -0.00367342844, 0.00573950773, -0.0076224613, 0.00943887047,
+                     1.00167406, 2.83297682})
+      x = c + x * w;
+  }
+  x *= p;
+  x -= (std::erf(x) - p) / (2 / std::sqrt(M_PI) * std::exp(-x * x));
+  return static_cast<float>(x * stddev * std::sqrt(2.0));
+}
+
+/// Everything one thread accumulates.
+struct Worker {
+  PathContext context;
+  std::vector<Spectrum> sums;
+  uint64_t n_samples = 0, n_not_finite = 0, n_negative = 0;
+  std::vector<BadSample> bad_samples;
+};
+
+struct Tile {
+  int x0, y0, x1, y1;  // in the film
+};
+
+std::vector<Tile> make_tiles(const Film& film) {
+  std::vector<Tile> tiles;
+  for (int y = 0; y < film.height(); y += kTileSize)
+    for (int x = 0; x < film.width(); x += kTileSize)
+      tiles.push_back({x, y, std::min(x + kTileSize, film.width()), std::min(y + kTileSize, film.height())});
+  return tiles;
+}
+
+PathRandom sample_random(const PassSettings& settings, const Camera& camera, int x, int y, uint64_t sample) {
+  const uint64_t pixel = static_cast<uint64_t>(y) * camera.width() + x;
+  return {settings.sampling, settings.seed, settings.pass, pixel, sample};
+}
+
+Spectrum take_sample(const Scene& scene, const Integrator& integrator, const FilterSettings& filter,
+                     const PathRandom& random, int x, int y, PathContext& context) {
+  const Ray ray = scene.camera().ray(film_position(filter, x, y, random), random.get_2d(0, Event::kLens));
+  return integrator.radiance(scene, ray, random, context);
+}
+
+/// Sorts by pixel and sample and keeps the first few; which ones does not depend on the order they came in.
+void keep_first(std::vector<BadSample>& samples) {
+  std::sort(samples.begin(), samples.end(), [](const BadSample& a, const BadSample& b) {
+    return std::tie(a.y, a.x, a.sample) < std::tie(b.y, b.x, b.sample);
+  });
+  if (samples.size() > kMaxBadSamples) samples.resize(kMaxBadSamples);
+}
+
+/// True when the sample may enter the film; otherwise it is counted and remembered.
+bool is_good(const Spectrum& value, int x, int y, uint64_t sample, Worker& worker) {
+  const bool finite = is_finite(value);
+  if (finite && value.r >= 0 && value.g >= 0 && value.b >= 0) [[likely]] return true;
+  ++(finite ? worker.n_negative : worker.n_not_finite);
+  worker.bad_samples.push_back({x, y, sample, value});
+  if (worker.bad_samples.size() > 20 * kMaxBadSamples) keep_first(worker.bad_samples);
+  return false;
+}
+
+void render_tile(const Scene& scene, const Integrator& integrator, const PassSettings& settings, const Tile& tile,
+                 uint32_t begin, uint32_t end, Film& film, Worker& worker) {
+  const int groups = film.groups();
+  worker.sums.resize(groups);
+  for (int y = tile.y0; y < tile.y1; ++y)
+    for (int x = tile.x0; x < tile.x1; ++x) {
+      std::fill(worker.sums.begin(), worker.sums.end(), Spectrum(0));
+      const int frame_x = film.crop().x + x, frame_y = film.crop().y + y;
+      for (uint32_t s = begin; s < end; ++s) {
+        const PathRandom random = sample_random(settings, scene.camera(), frame_x, frame_y, s);
+        const Spectrum value =
+            take_sample(scene, integrator, settings.filter, random, frame_x, frame_y, worker.context);
+        if (is_good(value, frame_x, frame_y, s, worker)) worker.sums[s % groups] += value;
+      }
+      worker.n_samples += end - begin;
+      film.add(x, y, (end - begin) / groups, worker.sums);
+    }
+}
+
+}  // namespace
+
+uint32_t wave_size(int groups) { return static_cast<uint32_t>(groups) * std::max(1, 16 / groups); }
+
+Vec2 film_position(const FilterSettings& filter, int x, int y, const PathRandom& random) {
+  const Vec2 u = random.get_2d(0, Event::kPixel);
+  const Vec2 centre{static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f};
+  switch (filter.kind) {
+    case FilterKind::kBox: return centre + Vec2{(2 * u.x - 1) * filter.radius, (2 * u.y - 1) * filter.radius};
+    case FilterKind::kTent:
+      return centre + Vec2{warp::interval_to_tent(u.x, filter.radius), warp::interval_to_tent(u.y, filter.radius)};
+    case FilterKind::kGaussian:
+      return centre + Vec2{interval_to_gaussian(u.x, filter.stddev, filter.radius),
+                           interval_to_gaussian(u.y, filter.stddev, filter.radius)};
+  }
+  throw Error(ErrorCode::kInternal, "unknown reconstruction filter");
+}
+
+PassResult render_pass(const Scene& scene, const Integrator& integrator, const PassSettings& settings, Film& film) {
+  const auto start = Clock::now();
+  COVARY_CHECK(settings.spp % film.groups() == 0, "samples per pixel must be a multiple of the number of groups");
+  COVARY_CHECK(film.frame_width() == scene.camera().width() && film.frame_height() == scene.camera().height(),
+               "film and camera differ in size");
+  const std::vector<Tile> tiles = make_tiles(film);
+  const uint32_t wave = wave_size(film.groups());
+  const auto count_of = [&](const Tile& tile) { return film.count(tile.x0, tile.y0); };
+
+  uint64_t total = 0;
+  uint32_t fewest = settings.spp;
+  for (const Tile& tile : tiles) {
+    const uint32_t count = std::min(count_of(tile), settings.spp);
+    fewest = std::min(fewest, count);
+    total += uint64_t{settings.spp - count} * static_cast<uint64_t>((tile.x1 - tile.x0) * (tile.y1 - tile.y0));
+  }
+
+  tbb::enumerable_thread_specific<Worker> workers;
+  std::atomic<uint64_t> done{0};
+  std::atomic<bool> out_of_time{false};
+  const auto ended = [&] {
+    return out_of_time.load(std::memory_order_relaxed) ||
+           (settings.stop && settings.stop->load(std::memory_order_relaxed));
+  };
+  // A wave ends at a multiple of `wave` samples, so that interrupted and uninterrupted renders add in the same steps.
+  while (fewest < settings.spp && !ended()) {
+    const uint32_t end = std::min(settings.spp, (fewest / wave + 1) * wave);
+    tbb::parallel_for(
+        tbb::blocked_range<size_t>(0, tiles.size(), 1),
+        [&](const tbb::blocked_range<size_t>& range) {
+          for (size_t i = range.begin(); i != range.end(); ++i) {
+            const Tile& tile = tiles[i];
+            const uint32_t begin = count_of(tile);
+            if (begin >= end || ended()) continue;
+            render_tile(scene, integrator, settings, tile, begin, end, film, workers.local());
+            const auto n_pixels = static_cast<uint64_t>((tile.x1 - tile.x0) * (tile.y1 - tile.y0));
+            const uint64_t now = done.fetch_add(n_pixels * (end - begin)) + n_pixels * (end - begin);
+            if (settings.seconds > 0 && seconds_since(start) >= settings.seconds) out_of_time = true;
+            if (settings.progress) settings.progress(now, total);
+          }
+        },
+        tbb::simple_partitioner());
+    if (ended()) break;
+    fewest = end;
+    if (settings.checkpoint) settings.checkpoint();
+  }
+
+  PassResult result;
+  for (const Worker& worker : workers) {
+    result.n_samples += worker.n_samples;
+    result.n_rays += worker.context.n_rays;
+    result.n_not_finite += worker.n_not_finite;
+    result.n_negative += worker.n_negative;
+    result.bad_samples.insert(result.bad_samples.end(), worker.bad_samples.begin(), worker.bad_samples.end());
+  }
+  keep_first(result.bad_samples);
+  result.complete =
+      std::all_of(tiles.begin(), tiles.end(), [&](const Tile& tile) { return count_of(tile) >= settings.spp; });
+  result.seconds = seconds_since(start);
+  return result;
+}
+
+ReplayedSample replay_sample(const Scene& scene, const Integrator& integrator, const PassSettings& settings, int x,
+                             int y, uint64_t sample) {
+  PathContext context;
+  const PathRandom random = sample_random(settings, scene.camera(), x, y, sample);
+  const Spectrum value = take_sample(scene, integrator, settings.filter, random, x, y, context);
+  return {film_position(settings.filter, x, y, random), value, context.n_rays};
+}
+
+}  // namespace covary

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+// A pass: renders samples of one scene into a film. The film's own counts say what is still to do, so starting,
+// resuming and adding samples are the same operation, and the result has the same bits however the work was split:
+// every sample is a function of its address (core/random.h), and a pixel's samples are added in a fixed order, wave by
+// wave, by whichever thread.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "film/film.h"
+#include "integrators/integrator.h"
+
+namespace covary {
+
+struct PassSettings {
+  Sampling sampling = Sampling::kIndependent;
+  uint64_t seed = 0;
+  uint32_t pass = 0;            ///< position in the plan; passes of one plan never share numbers
+  uint32_t spp = 0;             ///< samples per pixel to reach; a multiple of the film's groups
+  FilterSettings filter;
+  double seconds = 0;           ///< stop after this time when > 0; pixels then differ in count by at most one wave
+  /// Set from a signal handler to stop at the next tile.
+  const std::atomic<bool>* stop = nullptr;
+  /// Called from any thread after each tile with the samples done since the start; must be thread-safe.
+  std::function<void(uint64_t done, uint64_t total)> progress;
+  /// Called between waves, when the film is whole and may be written.
+  std::function<void()> checkpoint;
+};
+
+/// A sample whose value is not finite or negative. It enters the film as black and is counted.
+struct BadSample {
+  int x, y;  ///< pixel in the full frame
+  uint64_t sample;
+  Spectrum value;
+};
+
+struct PassResult {
+  uint64_t n_samples = 0;   ///< taken by this call
+  uint64_t n_rays = 0;      ///< camera, BSDF and shadow rays
+  uint64_t n_not_finite = 0, n_negative = 0;
+  std::vector<BadSample> bad_samples;  ///< the first few, ordered by pixel and sample
+  bool complete = false;    ///< every pixel has settings.spp samples
+  double seconds = 0;
+};
+
+/// Renders until every pixel of `film` has settings.spp samples, or time or the stop flag ends it.
+PassResult render_pass(const Scene& scene, const Integrator& integrator, const PassSettings& settings, Film& film);
+
+/// The value of one sample, with the film position it was taken at: what render_pass() adds for (x, y, sample).
+struct ReplayedSample {
+  Vec2 position;
+  Spectrum value;
+  uint64_t n_rays;
+};
+ReplayedSample replay_sample(const Scene& scene, const Integrator& integrator, const PassSettings& settings, int x,
+                             int y, uint64_t sample);
+
+/// Samples per pixel and wave for a film of `groups` groups: a multiple of `groups`, about 16.
+uint32_t wave_size(int groups);
+
+/// Position of a sample in pixels of the full frame, distributed around the pixel's centre like the filter.
+Vec2 film_position(const FilterSettings& filter, int x, int y, const PathRandom& random);
+
+}  // namespace covary
