@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "core/error.h"
 #include "core/spectrum.h"
 
 namespace covary {
@@ -21,10 +22,13 @@ struct Image {
   Image(int w, int h, int c) : width(w), height(h), channels(c), data(static_cast<size_t>(w) * h * c) {}
   float* pixel(int x, int y) { return data.data() + (static_cast<size_t>(y) * width + x) * channels; }
   const float* pixel(int x, int y) const { return data.data() + (static_cast<size_t>(y) * width + x) * channels; }
-  Spectrum rgb(int x, int y) const { const float* p = pixel(x, y); return {p[0], p[1], p[2]}; }
+  Spectrum rgb(int x, int y) const {
+    const float* p = pixel(x, y);
+    return {p[0], p[1], p[2]};
+  }
 };
 
-/// Position of the film's pixels in the full frame.
+/// Position of an image's pixels in the full frame.
 struct CropWindow {
   int x = 0, y = 0, width = 0, height = 0;
   bool operator==(const CropWindow&) const = default;
@@ -32,8 +36,11 @@ struct CropWindow {
 
 class Film {
  public:
+  static constexpr int kMaxGroups = 1024;
+
   Film() = default;
   /// `frame_width` x `frame_height`: the full frame; `crop`: the part of it this film holds; `groups` >= 1.
+  /// Throws Error(kInput) when the crop is empty or not inside the frame, or `groups` is not in 1 … kMaxGroups.
   Film(int frame_width, int frame_height, const CropWindow& crop, int groups);
 
   int width() const { return crop_.width; }
@@ -48,18 +55,27 @@ class Film {
   Spectrum group_mean(int x, int y, int group) const;
   /// Mean of all samples.
   Spectrum mean(int x, int y) const;
-  /// Adds `added` samples to each of the pixel's groups; `sums` holds groups() sums of the new samples.
+  /// Adds `added_per_group` samples to each of the pixel's groups; `sums` holds groups() sums of the new samples.
+  /// Different pixels may be added to from different threads.
   void add(int x, int y, uint32_t added_per_group, std::span<const Spectrum> sums);
   /// The T group means of a pixel, contiguous: groups() x RGB.
   const float* groups_of(int x, int y) const { return groups_data_.data() + index(x, y) * groups_ * 3; }
 
   Image mean_image() const;
   Image group_image(int group) const;
+  /// Samples per pixel, averaged over the film; exact where all pixels have the same count.
+  double mean_count() const;
 
-  /// Free-form facts that travel with the file (seed, sampling, scene hash, version, command line, …).
+  /// Facts that travel with the file, as text; film_key names those with a meaning, others are kept as they are.
   std::map<std::string, std::string> attributes;
   /// Auxiliary images of the same size by name ("Albedo", "N", "P"), 3 channels each.
   std::map<std::string, Image> aovs;
+
+  /// The arrays behind the film, for readers and writers: counts row-major; data as [pixel][group][rgb].
+  std::vector<uint32_t>& counts() { return counts_; }
+  const std::vector<uint32_t>& counts() const { return counts_; }
+  std::vector<float>& data() { return groups_data_; }
+  const std::vector<float>& data() const { return groups_data_; }
 
  private:
   size_t index(int x, int y) const { return static_cast<size_t>(y) * crop_.width + x; }
@@ -69,5 +85,23 @@ class Film {
   std::vector<uint32_t> counts_;    // per pixel
   std::vector<float> groups_data_;  // [pixel][group][rgb]
 };
+
+/// Names of attributes with a meaning to this room.
+namespace film_key {
+inline constexpr const char* kSeed = "seed";             ///< decimal; after a merge all seeds, ascending: "1,2,7"
+inline constexpr const char* kSampling = "sampling";     ///< "independent" or "crn"
+inline constexpr const char* kSceneHash = "scene_hash";  ///< content of the scene
+inline constexpr const char* kSettings = "settings";     ///< all options that change the samples except the seed
+inline constexpr const char* kVersion = "version";       ///< of the program
+inline constexpr const char* kCommand = "command";       ///< command line
+inline constexpr const char* kComplete = "complete";     ///< "true", or "false" for an interrupted render
+}  // namespace film_key
+
+/// The film of all samples of `films`: per pixel and group the mean weighted by counts, computed in double over all
+/// films at once. The films' order does not matter, bit for bit. Throws Error(kInput) when the films differ in frame,
+/// crop, groups, sampling, scene hash, settings or auxiliary images, or share a seed, because then they hold the same
+/// samples. `names` are the films' names in error messages. Of the attributes those remain that all films share, and
+/// kSeed, kComplete.
+Film merge_films(std::span<const Film> films, std::span<const std::string> names);
 
 }  // namespace covary

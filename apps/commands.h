@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+// The subcommands of `covary`. Each function adds one subcommand whose callback does the work and throws covary::Error;
+// main.cpp turns errors into a message and an exit code. A new subcommand is one file, one line here, one in main.cpp.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+namespace covary {
+
+void add_merge(CLI::App& app);
+
+/// The command line as given, with quotes where a shell needs them; for the `command` attribute of films.
+const std::string& command_line();
+
+}  // namespace covary

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+// The `covary` program. Exit codes: 0 done, 1 failed, 2 wrong usage.
+#include <cstdio>
+#include <exception>
+#include <new>
+#include <string>
+#include <vector>
+
+#include "commands.h"
+#include "core/error.h"
+
+namespace covary {
+namespace {
+
+std::string quoted(const std::string& word) {
+  const char* safe = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=./,:@%";
+  if (!word.empty() && word.find_first_not_of(safe) == std::string::npos) return word;
+  std::string text = "'";
+  for (char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return text + "'";
+}
+
+std::string g_command_line;
+
+int report(const char* program, const Error& error) {
+  const bool usage = error.code() == ErrorCode::kUsage;
+  std::fprintf(stderr, "%s: %s%s\n", program, error.code() == ErrorCode::kInternal ? "internal error: " : "",
+               error.what());
+  return usage ? 2 : 1;
+}
+
+int run(int argc, char** argv) {
+  CLI::App app("covary: Monte Carlo rendering with less noise by control variates and correlated sampling", "covary");
+  app.set_version_flag("--version", "covary " COVARY_VERSION, "Print the version and exit");
+  app.require_subcommand(0, 1);
+  app.failure_message(CLI::FailureMessage::simple);
+  add_merge(app);
+
+  if (argc < 2) {
+    std::fputs(app.help().c_str(), stdout);
+    return 0;
+  }
+  // CLI11 would call an unknown subcommand a stray argument; name it and the nearest one.
+  const std::string first = argv[1];
+  if (!first.empty() && first[0] != '-') {
+    std::vector<std::string> names;
+    for (const CLI::App* command : app.get_subcommands(nullptr)) names.push_back(command->get_name());
+    if (std::find(names.begin(), names.end(), first) == names.end())
+      throw Error(ErrorCode::kUsage,
+                  "unknown command '" + first + "'" + did_you_mean(first, names) + "; 'covary --help' lists all");
+  }
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& success) {  // --help, --version
+    return app.exit(success);
+  } catch (const CLI::ParseError& error) {
+    const std::string command = app.get_subcommands().empty() ? "" : " " + app.get_subcommands()[0]->get_name();
+    throw Error(ErrorCode::kUsage, std::string(error.what()) + "; see 'covary" + command + " --help'");
+  }
+  if (app.get_subcommands().empty()) throw Error(ErrorCode::kUsage, "no command given; 'covary --help' lists all");
+  return 0;
+}
+
+}  // namespace
+
+const std::string& command_line() { return g_command_line; }
+
+}  // namespace covary
+
+int main(int argc, char** argv) {
+  for (int i = 0; i < argc; ++i)
+    covary::g_command_line += (i ? " " : "") + (i ? covary::quoted(argv[i]) : std::string("covary"));
+  try {
+    return covary::run(argc, argv);
+  } catch (const covary::Error& error) {
+    return covary::report("covary", error);
+  } catch (const std::bad_alloc&) {
+    std::fputs("covary: out of memory\n", stderr);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "covary: internal error: %s\n", error.what());
+  }
+  return 1;
+}

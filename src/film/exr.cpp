@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "film/exr.h"
+
+#include <OpenEXR/ImfChannelList.h>
+#include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfIO.h>
+#include <OpenEXR/ImfInputPart.h>
+#include <OpenEXR/ImfMultiPartInputFile.h>
+#include <OpenEXR/ImfOutputFile.h>
+#include <OpenEXR/ImfPartType.h>
+#include <OpenEXR/ImfStringAttribute.h>
+#include <OpenEXR/ImfThreading.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <mutex>
+#include <thread>
+
+#include "film/output_file.h"
+
+namespace covary {
+namespace Imf = OPENEXR_IMF_NAMESPACE;
+namespace {
+
+/// More pixels than this in one direction is taken as damage.
+constexpr int kMaxSize = 1 << 18;
+/// Bytes of pixels per byte of file that no compression reaches.
+constexpr double kMaxRatio = 1e5;
+
+/// OutputFile as OpenEXR's stream. OpenEXR ignores errors in its last write, the table of lines; OutputFile remembers
+/// them for commit().
+class Stream : public Imf::OStream {
+ public:
+  Stream(OutputFile& file, const std::string& name) : Imf::OStream(name.c_str()), file_(file) {}
+  void write(const char c[], int n) override { file_.write(c, static_cast<size_t>(n)); }
+  uint64_t tellp() override { return file_.position(); }
+  void seekp(uint64_t position) override { file_.seek(position); }
+
+ private:
+  OutputFile& file_;
+};
+
+void start_threads() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    Imf::setGlobalThreadCount(static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1u, 64u)));
+    Imf::Header::setMaxImageSize(kMaxSize, kMaxSize);
+  });
+}
+
+Imf::PixelType pixel_type(const ExrPlane& plane) {
+  return plane.type == ExrPlane::Type::kUint ? Imf::UINT : Imf::FLOAT;
+}
+
+Imf::Slice slice(const ExrPlane& plane, const Imath::Box2i& window) {
+  const size_t width = static_cast<size_t>(window.max.x - window.min.x + 1);
+  return Imf::Slice::Make(pixel_type(plane), plane.base, window, plane.pixel_stride, plane.pixel_stride * width);
+}
+
+[[noreturn]] void fail(const std::string& path, const std::string& what) {
+  throw Error(ErrorCode::kInput, path + ": " + what);
+}
+
+const char* type_name(Imf::PixelType type) {
+  return type == Imf::HALF ? "half" : type == Imf::FLOAT ? "float" : "uint";
+}
+
+std::string compression_name(Imf::Compression compression) {
+  constexpr const char* kNames[] = {"none", "rle", "zips", "zip", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab"};
+  const auto i = static_cast<size_t>(compression);
+  return i < std::size(kNames) ? kNames[i] : "unknown";
+}
+
+}  // namespace
+
+void write_exr(const std::string& path, const ImagePlace& place, const std::map<std::string, std::string>& attributes,
+               std::span<const ExrPlane> planes) {
+  start_threads();
+  const CropWindow& w = place.window;
+  const Imath::Box2i window({w.x, w.y}, {w.x + w.width - 1, w.y + w.height - 1});
+  Imf::Header header(Imath::Box2i({0, 0}, {place.frame_width - 1, place.frame_height - 1}), window);
+  header.compression() = Imf::ZIP_COMPRESSION;
+  for (const auto& [key, value] : attributes) header.insert(key, Imf::StringAttribute(value));
+  Imf::FrameBuffer pixels;
+  for (const ExrPlane& plane : planes) {
+    header.channels().insert(plane.name, Imf::Channel(pixel_type(plane)));
+    pixels.insert(plane.name, slice(plane, window));
+  }
+  OutputFile file(path);
+  try {
+    Stream stream(file, path);
+    Imf::OutputFile exr(stream, header);
+    exr.setFrameBuffer(pixels);
+    exr.writePixels(w.height);
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception& error) {
+    throw Error(ErrorCode::kIo, fmt::format("cannot write {}: {}", path, error.what()));
+  }
+  file.commit();
+}
+
+struct ExrFile::Handle {
+  explicit Handle(const std::string& path) : file(path.c_str()) {}
+  Imf::MultiPartInputFile file;
+  Imath::Box2i window;
+  std::map<std::string, std::pair<int, std::string>> parts;  // channel -> part, name in the part
+};
+
+ExrFile::~ExrFile() = default;
+
+ExrFile::ExrFile(const std::string& path) : path_(path) {
+  start_threads();
+  // OpenEXR's own messages do not tell a missing file from a damaged one.
+  std::FILE* probe = std::fopen(path.c_str(), "rb");
+  if (!probe) throw Error(ErrorCode::kIo, fmt::format("cannot read {}: {}", path, std::strerror(errno)));
+  unsigned char magic[4] = {0, 0, 0, 0};
+  const size_t n_read = std::fread(magic, 1, 4, probe);
+  std::fclose(probe);
+  if (n_read != 4 || magic[0] != 0x76 || magic[1] != 0x2f || magic[2] != 0x31 || magic[3] != 0x01)
+    fail(path, "not an EXR file");
+  try {
+    handle_ = std::make_unique<Handle>(path);
+  } catch (const std::exception& error) {
+    fail(path, fmt::format("damaged EXR file: {}", error.what()));
+  }
+
+  const int n_parts = handle_->file.parts();
+  for (int part = 0; part < n_parts; ++part) {
+    const Imf::Header& header = handle_->file.header(part);
+    if (header.hasType() && Imf::isDeepData(header.type())) fail(path, "deep EXR files are not supported");
+    const Imath::Box2i display = header.displayWindow(), window = header.dataWindow();
+    const auto extent = [](int low, int high) { return static_cast<int64_t>(high) - low + 1; };
+    const int64_t width = extent(window.min.x, window.max.x), height = extent(window.min.y, window.max.y);
+    const int64_t frame_width = extent(display.min.x, display.max.x),
+                  frame_height = extent(display.min.y, display.max.y);
+    if (std::min({width, height, frame_width, frame_height}) < 1 ||
+        std::max({width, height, frame_width, frame_height}) > kMaxSize)
+      fail(path, fmt::format("{} x {} pixels in a frame of {} x {}; accepted are 1 to {} in each direction", width,
+                             height, frame_width, frame_height, kMaxSize));
+    ImagePlace place{static_cast<int>(frame_width), static_cast<int>(frame_height), {}};
+    place.window = {window.min.x - display.min.x, window.min.y - display.min.y, static_cast<int>(width),
+                    static_cast<int>(height)};
+    if (part == 0) {
+      place_ = place;
+      handle_->window = window;
+      compression_ = compression_name(header.compression());
+    } else if (!(place == place_)) {
+      fail(path, "parts with different windows are not supported");
+    }
+    const std::string prefix = n_parts > 1 && header.hasName() ? header.name() + "." : "";
+    for (auto it = header.channels().begin(); it != header.channels().end(); ++it) {
+      const Imf::Channel& channel = it.channel();
+      if (channel.xSampling != 1 || channel.ySampling != 1)
+        fail(path, fmt::format("channel {} is sub-sampled, which is not supported", it.name()));
+      std::string name = it.name();
+      if (!name.starts_with(prefix)) name = prefix + name;
+      channels_.push_back({name, type_name(channel.type)});
+      handle_->parts[name] = {part, it.name()};
+    }
+    for (auto it = header.begin(); it != header.end(); ++it)
+      if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&it.attribute()))
+        attributes_.emplace(it.name(), text->value());
+  }
+  if (channels_.empty()) fail(path, "an EXR file without channels");
+
+  // A damaged header can promise more pixels than fit in memory or than the file can hold.
+  const double bytes = static_cast<double>(place_.window.width) * place_.window.height * sizeof(float);
+  const double memory = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
+  std::error_code ignored;
+  const double file_bytes = static_cast<double>(std::filesystem::file_size(path, ignored));
+  if (bytes > memory || bytes > kMaxRatio * file_bytes)
+    fail(path, fmt::format("the header says {} x {} pixels, more than a file of {:.0f} bytes or the memory can hold",
+                           place_.window.width, place_.window.height, file_bytes));
+}
+
+const ExrFile::Channel* ExrFile::find(const std::string& name) const {
+  const auto it = std::find_if(channels_.begin(), channels_.end(), [&](const Channel& c) { return c.name == name; });
+  return it == channels_.end() ? nullptr : &*it;
+}
+
+void ExrFile::read(std::span<const ExrPlane> planes) const {
+  std::map<int, Imf::FrameBuffer> buffers;  // by part
+  for (const ExrPlane& plane : planes) {
+    const auto it = handle_->parts.find(plane.name);
+    COVARY_CHECK(it != handle_->parts.end(), "channel " + plane.name + " exists");
+    buffers[it->second.first].insert(it->second.second, slice(plane, handle_->window));
+  }
+  try {
+    for (const auto& [part, buffer] : buffers) {
+      Imf::InputPart input(handle_->file, part);
+      input.setFrameBuffer(buffer);
+      input.readPixels(handle_->window.min.y, handle_->window.max.y);
+    }
+  } catch (const std::exception& error) {
+    fail(path_, fmt::format("damaged or incomplete EXR file: {}", error.what()));
+  }
+}
+
+}  // namespace covary

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+// OpenEXR files in and out. Input from any renderer: scan lines or tiles, half, float or uint, one or several parts.
+// Output: scan lines, ZIP, compressed on all processors.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "film/film.h"
+
+namespace covary {
+
+/// Values of one channel in memory: rows of `width` pixels without gaps, `pixel_stride` bytes from pixel to pixel.
+struct ExrPlane {
+  enum class Type { kFloat, kUint };
+  std::string name;
+  Type type = Type::kFloat;
+  void* base = nullptr;
+  size_t pixel_stride = 0;
+};
+
+/// Where an image lies: the full frame, and the window of pixels that a file holds, relative to the frame's corner.
+struct ImagePlace {
+  int frame_width = 0, frame_height = 0;
+  CropWindow window;
+  bool operator==(const ImagePlace&) const = default;
+};
+
+/// Writes the planes (which are only read) with string attributes; the file appears under its name only when complete.
+/// Throws Error(kIo).
+void write_exr(const std::string& path, const ImagePlace& place, const std::map<std::string, std::string>& attributes,
+               std::span<const ExrPlane> planes);
+
+class ExrFile {
+ public:
+  struct Channel {
+    std::string name;  ///< with the name of the part in front where the file has several parts
+    std::string type;  ///< "half", "float" or "uint"
+  };
+
+  /// Opens the file and checks its header. Throws Error(kIo) when it cannot be opened, Error(kInput) when it is not an
+  /// EXR file, is damaged, absurdly large, or of a kind that is not supported (deep or sub-sampled pixels).
+  explicit ExrFile(const std::string& path);
+  ~ExrFile();
+
+  /// The window may stick out of the frame.
+  const ImagePlace& place() const { return place_; }
+  const std::vector<Channel>& channels() const { return channels_; }
+  const Channel* find(const std::string& name) const;
+  const std::map<std::string, std::string>& attributes() const { return attributes_; }  ///< those that are strings
+  const std::string& compression() const { return compression_; }
+
+  /// Reads the named channels, all of which must exist; values are converted to the plane's type. Throws Error(kInput)
+  /// when the file ends early or its pixels are damaged.
+  void read(std::span<const ExrPlane> planes) const;
+
+ private:
+  struct Handle;
+  std::string path_;
+  std::unique_ptr<Handle> handle_;
+  ImagePlace place_;
+  std::vector<Channel> channels_;
+  std::map<std::string, std::string> attributes_;
+  std::string compression_;
+};
+
+}  // namespace covary

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "film/film_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+#include "film/exr.h"
+
+namespace covary {
+namespace {
+
+constexpr const char* kPrefix = "covary:";
+constexpr const char* kFormat = "film";  // attribute covary:film, version of the format
+constexpr const char* kFormatVersion = "1";
+constexpr const char* kGroups = "groups";
+constexpr const char* kSamples = "samples";  // attribute covary:samples and channel `samples`
+
+/// Attributes that follow from the film's numbers: written, and not kept in Film::attributes when read.
+bool is_derived(const std::string& key) { return key == kFormat || key == kGroups || key == kSamples; }
+
+std::array<const char*, 3> suffixes(const std::string& aov) {
+  if (aov == "N" || aov == "P") return {".X", ".Y", ".Z"};
+  return {".R", ".G", ".B"};
+}
+
+std::string group_name(int group) { return fmt::format("group{:02d}", group); }
+
+/// The channels of a film and where their values lie; the same list serves writing and reading.
+/// `means` holds the image of R G B where the film has several groups.
+std::vector<ExrPlane> film_planes(Film& film, Image& means) {
+  std::vector<ExrPlane> planes;
+  const auto add_rgb = [&](const std::array<std::string, 3>& names, float* data, size_t values_per_pixel) {
+    for (size_t c = 0; c < 3; ++c)
+      planes.push_back({names[c], ExrPlane::Type::kFloat, data + c, values_per_pixel * sizeof(float)});
+  };
+  const size_t stride = static_cast<size_t>(film.groups()) * 3;
+  if (film.groups() == 1) {
+    add_rgb({"R", "G", "B"}, film.data().data(), stride);
+  } else {
+    add_rgb({"R", "G", "B"}, means.data.data(), 3);
+    for (int g = 0; g < film.groups(); ++g) {
+      const std::string name = group_name(g);
+      add_rgb({name + ".R", name + ".G", name + ".B"}, film.data().data() + g * 3, stride);
+    }
+  }
+  planes.push_back({kSamples, ExrPlane::Type::kUint, film.counts().data(), sizeof(uint32_t)});
+  for (auto& [name, image] : film.aovs) {
+    COVARY_CHECK(image.width == film.width() && image.height == film.height() && image.channels == 3,
+                 "auxiliary image " + name + " has the film's size and 3 channels");
+    const auto suffix = suffixes(name);
+    add_rgb({name + suffix[0], name + suffix[1], name + suffix[2]}, image.data.data(), 3);
+  }
+  return planes;
+}
+
+[[noreturn]] void fail(const std::string& path, const std::string& what) {
+  throw Error(ErrorCode::kInput, path + ": " + what);
+}
+
+/// The names of the auxiliary images: every triple of channels that is neither a group nor the mean.
+std::vector<std::string> find_aovs(const ExrFile& file, int groups) {
+  std::vector<std::string> names;
+  for (const ExrFile::Channel& channel : file.channels()) {
+    const size_t dot = channel.name.rfind('.');
+    const std::string name = channel.name.substr(0, dot == std::string::npos ? 0 : dot);
+    if (name.empty() || (name.starts_with("group") && groups > 1)) continue;
+    if (names.empty() || names.back() != name) names.push_back(name);
+  }
+  return names;
+}
+
+}  // namespace
+
+void write_film(const std::string& path, const Film& film) {
+  std::map<std::string, std::string> attributes;
+  for (const auto& [key, value] : film.attributes) attributes[kPrefix + key] = value;
+  const auto derive = [&](const char* key, const std::string& value) {
+    attributes[std::string(kPrefix) + key] = value;
+  };
+  derive(kFormat, kFormatVersion);
+  derive(kGroups, fmt::to_string(film.groups()));
+  derive(kSamples, fmt::to_string(film.mean_count()));
+
+  Image means = film.groups() > 1 ? film.mean_image() : Image();
+  // The list of planes serves reading, too, and so wants a film it may write to; write_exr only reads.
+  write_exr(path, {film.frame_width(), film.frame_height(), film.crop()}, attributes,
+            film_planes(const_cast<Film&>(film), means));
+}
+
+Film read_film(const std::string& path) {
+  const ExrFile file(path);
+  std::map<std::string, std::string> attributes;
+  for (const auto& [name, value] : file.attributes())
+    if (name.starts_with(kPrefix)) attributes[name.substr(std::string(kPrefix).size())] = value;
+  if (!attributes.count(kFormat)) fail(path, "not a film of covary (attribute covary:film is missing)");
+  if (attributes[kFormat] != kFormatVersion)
+    fail(path, fmt::format("film format '{}'; this version reads '{}'", attributes[kFormat], kFormatVersion));
+
+  int groups = 0;
+  const std::string text = attributes[kGroups];
+  if (text.empty() || text.size() > 6 || text.find_first_not_of("0123456789") != std::string::npos ||
+      (groups = std::stoi(text)) < 1 || groups > Film::kMaxGroups)
+    fail(path, fmt::format("attribute covary:groups is '{}'; expected is 1 to {}", text, Film::kMaxGroups));
+  // Before memory is taken: all channels must be there, with the right type.
+  if (!file.find(group_name(groups - 1) + ".R") && groups > 1)
+    fail(path, fmt::format("channel {}.R of a film with {} groups is missing", group_name(groups - 1), groups));
+
+  Film film;
+  try {
+    film = Film(file.place().frame_width, file.place().frame_height, file.place().window, groups);
+  } catch (const Error& error) {
+    fail(path, error.what());
+  }
+  for (const auto& [key, value] : attributes)
+    if (!is_derived(key)) film.attributes[key] = value;
+  for (const std::string& name : find_aovs(file, groups)) film.aovs[name] = Image(film.width(), film.height(), 3);
+
+  Image means = groups > 1 ? Image(film.width(), film.height(), 3) : Image();
+  const std::vector<ExrPlane> planes = film_planes(film, means);
+  for (const ExrPlane& plane : planes) {
+    const ExrFile::Channel* found = file.find(plane.name);
+    if (!found) fail(path, fmt::format("channel {} of a film with {} groups is missing", plane.name, groups));
+    const char* expected = plane.type == ExrPlane::Type::kUint ? "uint" : "float";
+    if (found->type != expected)
+      fail(path, fmt::format("channel {} is of type {}; expected is {}", plane.name, found->type, expected));
+  }
+  for (const ExrFile::Channel& channel : file.channels())
+    if (std::none_of(planes.begin(), planes.end(), [&](const ExrPlane& p) { return p.name == channel.name; }))
+      fail(path, fmt::format("channel {} does not belong to a film with {} groups", channel.name, groups));
+  file.read(planes);
+
+  for (int y = 0; y < film.height(); ++y)
+    for (int x = 0; x < film.width(); ++x)
+      if (film.count(x, y) % static_cast<uint32_t>(groups) != 0)
+        fail(path, fmt::format("{} samples at pixel ({}, {}); with {} groups expected is a multiple of {}",
+                               film.count(x, y), film.crop().x + x, film.crop().y + y, groups, groups));
+  return film;
+}
+
+}  // namespace covary

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// Films on disk: multi-channel float EXR files, described in docs/file-formats.md. Writing and reading a film gives the
+// same bits.
+#pragma once
+
+#include <string>
+
+#include "film/film.h"
+
+namespace covary {
+
+/// Writes `film`; the file appears under its name only when complete. Throws Error(kIo).
+void write_film(const std::string& path, const Film& film);
+
+/// Reads a film written by write_film. Throws Error(kIo) when the file cannot be read and Error(kInput) when it is not
+/// a film or is damaged.
+Film read_film(const std::string& path);
+
+}  // namespace covary
