@@ -52,8 +52,8 @@ float get_ior(Parameters& parameters, const std::string& name, const std::string
     names.push_back(entry.name);
     list += (list.empty() ? "" : ", ") + names.back();
   }
-  parameters.error_at(name, fmt::format("unknown material '{}'{}; accepted: a number in [0.01, 100] or one of {}",
-                                        value, did_you_mean(value, names), list));
+  parameters.error_at(name, fmt::format("is the unknown material '{}'; accepted: a number in [0.01, 100], {}{}", value,
+                                        list, did_you_mean(value, names)));
   return fallback_ior;
 }
 
@@ -66,31 +66,32 @@ ConductorInput get_conductor(Parameters& parameters) {
   const bool has_eta = parameters.has("eta"), has_k = parameters.has("k");
   const std::string material = parameters.get_string("material", "none");
   if (material != "none" && (has_eta || has_k))
-    parameters.error_at("material", fmt::format("'{}' is given together with 'eta' or 'k'; give either a material or "
-                                                "both indices",
-                                                material));
+    parameters.error_at("material",
+                        fmt::format("is '{}' together with 'eta' or 'k'; accepted: one or the other", material));
   const auto constant = [](const Spectrum& value) { return ColourInput(std::make_shared<ConstantTexture>(value)); };
   if (material != "none" && !has_eta && !has_k) {
     if (const ConductorPreset* preset = find_conductor_preset(material))
-      return {constant(preset->eta), constant(preset->k), false};
-    parameters.error_at("material", fmt::format("unknown conductor '{}'{}; accepted: none, {}", material,
-                                                did_you_mean(material, conductor_preset_names()),
-                                                fmt::join(conductor_preset_names(), ", ")));
+      return {constant(preset->eta), constant(preset->k)};
+    const std::vector<std::string> names = conductor_preset_names();
+    parameters.error_at("material", fmt::format("is the unknown conductor '{}'; accepted: none, {}{}", material,
+                                                fmt::join(names, ", "), did_you_mean(material, names)));
   }
   // The pair eta = 0, k = 1 reflects everything at every angle.
   return {ColourInput(parameters.get_texture("eta", Spectrum(0), SpectrumRole::kIndex)),
-          ColourInput(parameters.get_texture("k", Spectrum(1), SpectrumRole::kIndex)), !has_eta && !has_k};
+          ColourInput(parameters.get_texture("k", Spectrum(1), SpectrumRole::kIndex))};
 }
 
 std::vector<BsdfPtr> get_nested_bsdfs(Parameters& parameters, size_t least, size_t most) {
   size_t n_described = 0;
   for (const Property& property : parameters.object().properties)
-    if (const ObjectPtr* object = std::get_if<ObjectPtr>(&property.value))
-      if (*object && (*object)->kind == "bsdf") ++n_described;
+    if (const ObjectPtr* object = std::get_if<ObjectPtr>(&property.value)) {
+      if (!*object) return {};  // an unresolved reference, already reported
+      if ((*object)->kind == "bsdf") ++n_described;
+    }
   std::vector<BsdfPtr> nested = parameters.children<Bsdf>("bsdf");
   if (n_described < least || n_described > most) {
     parameters.error(
-        fmt::format("'{}' has {} nested reflectance models; it takes {}", parameters.type(), n_described,
+        fmt::format("has {} nested reflectance models; it takes {}", n_described,
                     least == most ? fmt::format("exactly {}", least) : fmt::format("{} or {}", least, most)));
     return {};
   }

@@ -60,7 +60,6 @@ float get_relative_ior(Parameters& parameters, const std::string& interior);
 /// given.
 struct ConductorInput {
   ColourInput eta, k;
-  bool is_mirror;  ///< reflects everything at every angle
 };
 ConductorInput get_conductor(Parameters& parameters);
 

@@ -60,7 +60,7 @@ std::shared_ptr<Bsdf> make_twosided(Parameters& parameters) {
   if (nested.empty()) return nullptr;
   auto result = std::make_shared<TwoSided>(nested.front(), nested.back());
   if (!allow_transmission && (result->flags() & kTransmission)) {
-    parameters.error("'twosided' contains a model that transmits light; it takes models that only reflect");
+    parameters.error("a nested model transmits light; accepted: models that only reflect, or any with 'allow_transmission'");
     return nullptr;
   }
   return result;
