@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+# Entry to the project. `make demo` and `make test` start from a bare Debian 12: they install what is missing, build and run.
+#
+#   make setup            install missing packages (needs root or sudo only when something is missing)
+#   make build            build/release/covary
+#   make demo             render a small scene twice (common random numbers, independent) into out/
+#   make test             build and run all tests but the nightly ones      TESTS=regex selects some
+#   make bench            build and run the micro benchmarks                BENCH=regex selects some
+#   make lint             formatting, static analysis, layers               ALL=1 analyses every file, not only changed ones
+#   make install          install under PREFIX (default /usr/local)
+#   make asan|ubsan|tsan  build and run the tests under a sanitizer
+#   make clean            remove build/ and out/
+#
+# ARCH=x86-64-v3 builds for every AVX2 machine instead of this one; WERROR=ON makes warnings errors; JOBS=n limits
+# parallelism (default: processors, fewer when memory is short).
+
+ARCH   ?= native
+WERROR ?= OFF
+PREFIX ?= /usr/local
+JOBS   ?= $(shell scripts/jobs)
+TESTS  ?= .
+BENCH  ?= .
+CTEST   = ctest --output-on-failure --no-tests=error -LE nightly -R '$(TESTS)' -j $(JOBS)
+CONFIGURE = -DCOVARY_ARCH=$(ARCH) -DCOVARY_WERROR=$(WERROR)
+
+.PHONY: all setup configure build demo test nightly bench lint install asan ubsan tsan clean
+all: build
+
+setup:
+	@scripts/setup
+
+configure: setup
+	@cmake --preset release $(CONFIGURE) --log-level=WARNING
+
+build: configure
+	@cmake --build build/release -j $(JOBS) --target covary
+
+demo: build
+	@scripts/demo build/release/covary out
+
+test: configure
+	@cmake --build build/release -j $(JOBS)
+	@cd build/release && $(CTEST)
+
+nightly: configure
+	@cmake --build build/release -j $(JOBS)
+	@cd build/release && ctest --output-on-failure -j $(JOBS)
+
+bench: configure
+	@cmake --build build/release -j $(JOBS)
+	@scripts/bench build/release '$(BENCH)'
+
+lint:
+	@scripts/setup lint
+	@cmake --preset release $(CONFIGURE) --log-level=WARNING
+	@scripts/lint build/release $(if $(ALL),--all)
+
+install: build
+	@cmake --install build/release --prefix $(PREFIX) --component covary
+
+asan ubsan tsan: setup
+	@cmake --preset $@ $(CONFIGURE) --log-level=WARNING
+	@cmake --build build/$@ -j $(JOBS)
+	@cd build/$@ && ../../scripts/sanitized $@ $(CTEST)
+
+clean:
+	rm -rf build out

@@ -1,0 +1,196 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""House rules that a compiler does not check, over the files of one source tree.
+
+Each check is a function from the tree's root to a list of problems "file:line: what is wrong". layers_test.py runs them
+over this project and over trees with planted violations. On the command line: layers.py [--lengths] ROOT.
+"""
+import os
+import re
+import sys
+
+# What each room may include, the arrows of docs/architecture.md. Entries are direct; everything behind them follows.
+ARROWS = {
+    "core": [],
+    "film": ["core"],
+    "estimators": ["film"],
+    "cuda": ["estimators"],
+    "scene": ["core"],
+    "textures": ["scene"],
+    "bsdfs": ["textures"],
+    "emitters": ["textures"],
+    "io": ["bsdfs", "emitters"],
+    "sampling": ["scene"],
+    "integrators": ["sampling", "film"],
+}
+SOURCE_FOLDERS = ["src", "include", "apps", "python", "tests", "benchmarks"]
+CPP = (".h", ".cpp", ".cu", ".cuh")
+INCLUDE = re.compile(r'^\s*#\s*include\s*"([^"]+)"')
+CITATION = re.compile(r"\[([A-Z][A-Za-z]+\d{4}[a-z]?)\]")
+LONG_FILE = 450
+
+
+def visible_rooms(room):
+    """The room itself and everything its arrows lead to."""
+    seen, todo = {room}, [room]
+    while todo:
+        for target in ARROWS[todo.pop()]:
+            if target not in seen:
+                seen.add(target)
+                todo.append(target)
+    return seen
+
+
+def files(root, folders, endings):
+    for folder in folders:
+        for directory, subdirectories, names in os.walk(os.path.join(root, folder)):
+            subdirectories.sort()
+            for name in sorted(names):
+                if name.endswith(endings):
+                    yield os.path.relpath(os.path.join(directory, name), root)
+
+
+def read(root, path):
+    with open(os.path.join(root, path), encoding="utf-8") as file:
+        return file.read()
+
+
+def lines(root, path):
+    return list(enumerate(read(root, path).splitlines(), 1))
+
+
+def is_test(path):
+    return re.search(r"_(test|bench)\.(cpp|cu)$", path) is not None
+
+
+def includes_follow_arrows(root):
+    """A room includes itself and the rooms its arrows lead to. Tests see every room, and alone the helpers of tests/."""
+    problems = []
+    for path in files(root, ["src", "include", "apps", "python"], CPP):
+        parts = path.split(os.sep)
+        room = parts[1] if parts[0] == "src" else parts[0]
+        if parts[0] == "src" and room not in ARROWS:
+            problems.append(f"{path}:1: src/{room} is not a room; known are {', '.join(sorted(ARROWS))}")
+            continue
+        for number, text in lines(root, path):
+            match = INCLUDE.match(text)
+            if not match:
+                continue
+            target = match[1]
+            here = f"{path}:{number}: "
+            folder = target.split("/")[0]
+            if ".." in target.split("/"):
+                problems.append(here + f"'{target}' climbs out of its folder; name the room instead")
+            elif folder == "apps" or ("/" not in target and parts[0] != "apps"):
+                problems.append(here + f"'{target}' does not name a room")
+            elif folder in ARROWS:
+                if parts[0] == "src" and not is_test(path) and folder not in visible_rooms(room):
+                    problems.append(here + f"{room} may not include '{target}'; it sees {', '.join(sorted(visible_rooms(room)))}")
+            elif os.path.exists(os.path.join(root, "tests", target)) and not is_test(path):
+                problems.append(here + f"'{target}' is for tests only")
+    return problems
+
+
+def links_follow_arrows(root):
+    """The DEPENDS of a room's CMakeLists.txt obey the same arrows."""
+    problems = []
+    for room in ARROWS:
+        path = os.path.join("src", room, "CMakeLists.txt")
+        if not os.path.exists(os.path.join(root, path)):
+            continue
+        text = "\n".join(text.split("#")[0] for _, text in lines(root, path))
+        for names in re.findall(r"\bDEPENDS\b([^)]*?)(?=\bTESTS\b|\bTEST_DEPENDS\b|\bSOURCES\b|\))", text):
+            for target in re.findall(r"covary_(\w+)", names):
+                if target in ARROWS and target not in visible_rooms(room):
+                    problems.append(f"{path}:1: {room} may not depend on covary_{target}")
+    return problems
+
+
+def licence_lines(root):
+    """Every source file names its licence in one of its first two lines."""
+    problems = []
+    scripts = [path for path in files(root, ["scripts", ".ci"], ("",)) if not path.endswith((".txt", ".md"))]
+    for path in [*files(root, SOURCE_FOLDERS, (*CPP, ".py")), *scripts]:
+        head = " ".join(text for _, text in lines(root, path)[:2])
+        if "SPDX-License-Identifier: Apache-2.0" not in head:
+            problems.append(f"{path}:1: lacks the line 'SPDX-License-Identifier: Apache-2.0'")
+    return problems
+
+
+FORBIDDEN = [
+    (re.compile(r"^\s*#\s*if\s+0\b"), "disabled code; delete it"),
+    (re.compile(r"\b(TODO|FIXME|XXX)\b(?!\(#\d+\))"), "a note for later without an issue number: write TODO(#12)"),
+    (re.compile(r"\bGTEST_SKIP\b|\bDISABLED_\w+"), "a test that does not run"),
+]
+
+
+def no_leftovers(root):
+    """No disabled code, no notes for later without an issue, no tests that do not run."""
+    problems = []
+    for path in files(root, SOURCE_FOLDERS, (*CPP, ".py")):
+        if path.startswith(os.path.join("tests", "layers")):
+            continue  # the patterns and their planted violations themselves
+        for number, text in lines(root, path):
+            problems += [f"{path}:{number}: {reason}" for pattern, reason in FORBIDDEN if pattern.search(text)]
+    return problems
+
+
+def citations_have_entries(root):
+    """Every [Key2024] in the code and the documentation has an entry in docs/references.bib."""
+    known = set(re.findall(r"^@\w+\{(\w+),", read(root, os.path.join("docs", "references.bib")), re.M))
+    problems = []
+    for path in [*files(root, SOURCE_FOLDERS, CPP), *files(root, ["docs"], (".md",))]:
+        for number, text in lines(root, path):
+            problems += [f"{path}:{number}: [{key}] is not in docs/references.bib"
+                         for key in CITATION.findall(text) if key not in known]
+    return problems
+
+
+def documented_names_match_registries(root):
+    """docs/scene-format.md has one heading per plugin of each room's registry.cpp, and no others.
+
+    A registry line is `{"name", make_something}`; in the page, plugins are the names in backquotes in `###` headings
+    below the `##` heading that ends in "(`room`)".
+    """
+    documented, room = {}, None
+    for _, text in lines(root, os.path.join("docs", "scene-format.md")):
+        if text.startswith("## "):
+            heading = re.search(r"\(`(\w+)`\)$", text)
+            room = heading[1] if heading else None
+        elif room and text.startswith("### "):
+            documented.setdefault(room, set()).update(re.findall(r"`(\w+)`", text))
+    problems = []
+    for room in ["textures", "bsdfs", "emitters", "integrators", "io"]:
+        path = os.path.join("src", room, "registry.cpp")
+        if not os.path.exists(os.path.join(root, path)):
+            continue
+        text = "\n".join(text.split("//")[0] for _, text in lines(root, path))
+        registered = set(re.findall(r'\{\s*"(\w+)"\s*,', text))
+        if not registered:
+            problems.append(f"{path}:1: no plugin found here; is it still written as {{\"name\", make}}?")
+        for name in sorted(registered - documented.get(room, set())):
+            problems.append(f"docs/scene-format.md:1: lacks '{name}' of {path}")
+        for name in sorted(documented.get(room, set()) - registered):
+            problems.append(f"docs/scene-format.md:1: describes '{name}', which {path} does not have")
+    return problems
+
+
+CHECKS = [includes_follow_arrows, links_follow_arrows, licence_lines, no_leftovers, citations_have_entries,
+          documented_names_match_registries]
+
+
+def length_report(root):
+    """Files over LONG_FILE lines, longest first: each might be two files."""
+    counted = [(len(lines(root, path)), path) for path in files(root, SOURCE_FOLDERS, (*CPP, ".py"))]
+    return [f"{path}: {count} lines; would it be two files?" for count, path in sorted(counted, reverse=True) if count > LONG_FILE]
+
+
+def main():
+    root = sys.argv[-1]
+    problems = [problem for check in CHECKS for problem in check(root)]
+    print("\n".join(problems + (length_report(root) if "--lengths" in sys.argv else [])))
+    return 1 if problems else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

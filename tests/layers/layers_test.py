@@ -1,0 +1,128 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""The house rules hold in this project, and each of them finds violations planted into a small tree."""
+import os
+import sys
+import tempfile
+import unittest
+
+sys.dont_write_bytecode = True
+import layers  # noqa: E402
+
+ROOT = os.path.abspath(os.path.join(os.path.dirname(__file__), "..", ".."))
+SPDX = "// SPDX-License-Identifier: Apache-2.0\n"
+
+
+class Repository(unittest.TestCase):
+    """Every check passes on the project itself."""
+
+    def test_all_checks(self):
+        for check in layers.CHECKS:
+            with self.subTest(check.__name__):
+                self.assertEqual([], check(ROOT))
+
+    def test_sees_the_sources(self):
+        """The checks above would also pass if they looked into the wrong folder."""
+        self.assertGreater(len(list(layers.files(ROOT, ["src"], layers.CPP))), 20)
+
+
+class Planted(unittest.TestCase):
+    """A clean tree gives no problem; each violation gives exactly one, at its place."""
+
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+        self.write("src/core/vec.h", SPDX)
+        self.write("src/scene/scene.h", SPDX + '#include "core/vec.h"\n#include <vector>\n')
+        self.write("src/integrators/path.cpp", SPDX + '#include "scene/scene.h"\n#include "core/vec.h"\n')
+        self.write("src/integrators/path_test.cpp", SPDX + '#include "statistics/chi2.h"\n#include "io/load_scene.h"\n')
+        self.write("src/integrators/CMakeLists.txt", "covary_room(integrators SOURCES path.cpp DEPENDS covary_scene covary_film)\n")
+        self.write("tests/statistics/chi2.h", SPDX)
+        self.write("docs/references.bib", "@article{Veach1995,\n}\n")
+        self.write("docs/scene-format.md", "# Scenes\n## Reflectance (`bsdfs`)\n")
+
+    def write(self, path, text):
+        full = os.path.join(self.folder.name, path)
+        os.makedirs(os.path.dirname(full), exist_ok=True)
+        with open(full, "w", encoding="utf-8") as file:
+            file.write(text)
+
+    def expect(self, check, *problems):
+        found = check(self.folder.name)
+        self.assertEqual(len(problems), len(found), found)
+        for expected, actual in zip(problems, found):
+            self.assertIn(expected, actual)
+
+    def test_clean_tree(self):
+        for check in layers.CHECKS:
+            self.expect(check)
+
+    def test_include_against_an_arrow(self):
+        self.write("src/film/film.cpp", SPDX + '#include "core/vec.h"\n#include "scene/scene.h"\n')
+        self.expect(layers.includes_follow_arrows, "src/film/film.cpp:3: film may not include 'scene/scene.h'")
+
+    def test_every_missing_arrow_is_refused(self):
+        """All pairs of rooms: an include is accepted exactly when the arrows lead there."""
+        for room in layers.ARROWS:
+            for target in layers.ARROWS:
+                with self.subTest(room=room, target=target):
+                    self.write(f"src/{room}/x.h", SPDX + f'  #  include "{target}/y.h"\n')
+                    refused = [f"src/{room}/x.h:2"] if target not in layers.visible_rooms(room) else []
+                    self.expect(layers.includes_follow_arrows, *refused)
+            self.write(f"src/{room}/x.h", SPDX)
+
+    def test_arrows_have_no_cycle_and_known_directions(self):
+        for room in layers.ARROWS:
+            for target in layers.visible_rooms(room) - {room}:
+                self.assertNotIn(room, layers.visible_rooms(target))
+        self.assertEqual({"core", "film", "estimators"}, layers.visible_rooms("estimators"))
+        self.assertNotIn("film", layers.visible_rooms("io"))
+        self.assertNotIn("bsdfs", layers.visible_rooms("integrators"))
+
+    def test_include_by_climbing(self):
+        self.write("src/core/a.h", SPDX + '#include "../scene/scene.h"\n')
+        self.expect(layers.includes_follow_arrows, "src/core/a.h:2: '../scene/scene.h' climbs out")
+
+    def test_include_without_room(self):
+        self.write("src/core/a.cpp", SPDX + '#include "vec.h"\n')
+        self.expect(layers.includes_follow_arrows, "src/core/a.cpp:2: 'vec.h' does not name a room")
+
+    def test_include_of_a_test_helper(self):
+        self.write("src/core/a.cpp", SPDX + '#include "statistics/chi2.h"\n')
+        self.expect(layers.includes_follow_arrows, "src/core/a.cpp:2: 'statistics/chi2.h' is for tests only")
+
+    def test_unknown_room(self):
+        self.write("src/utils/a.cpp", SPDX)
+        self.expect(layers.includes_follow_arrows, "src/utils is not a room")
+
+    def test_link_against_an_arrow(self):
+        self.write("src/film/CMakeLists.txt", "covary_room(film\n  SOURCES film.cpp\n  DEPENDS covary_core covary_io\n  TESTS film_test.cpp)\n")
+        self.expect(layers.links_follow_arrows, "film may not depend on covary_io")
+
+    def test_missing_licence(self):
+        self.write("src/core/a.cpp", "#include <vector>\n")
+        self.write("scripts/run", "#!/bin/sh\necho\n")
+        self.expect(layers.licence_lines, "src/core/a.cpp:1", "scripts/run:1")
+
+    def test_leftovers(self):
+        self.write("src/core/a.cpp", SPDX + "#if 0\n#endif\n// TODO tidy\n// TODO(#12) tidy\n")
+        self.write("src/core/a_test.cpp", SPDX + "TEST(A, DISABLED_b) {\n  GTEST_SKIP();\n}\n")
+        self.expect(layers.no_leftovers, "src/core/a.cpp:2: disabled code", "src/core/a.cpp:4: a note for later",
+                    "src/core/a_test.cpp:2: a test that does not run", "src/core/a_test.cpp:3: a test that does not run")
+
+    def test_citation_without_entry(self):
+        self.write("src/core/a.cpp", SPDX + "// [Veach1995] Eq. (3)\n// [Heitz2018] listing 1\n")
+        self.expect(layers.citations_have_entries, "src/core/a.cpp:3: [Heitz2018]")
+
+    def test_registry_and_page_differ(self):
+        self.write("src/bsdfs/registry.cpp", SPDX + '{"diffuse", make_diffuse}, {"plastic", make_plastic},  // {"old", x}\n')
+        self.write("docs/scene-format.md", "## Reflectance (`bsdfs`)\n### `diffuse`\n### `velvet`, `cloth`\n## Other\n### `plastic`\n")
+        self.expect(layers.documented_names_match_registries, "lacks 'plastic'", "describes 'cloth'", "describes 'velvet'")
+
+    def test_long_file_is_reported(self):
+        self.write("src/core/a.cpp", SPDX + "\n" * layers.LONG_FILE)
+        self.assertEqual([f"src/core/a.cpp: {layers.LONG_FILE + 1} lines; would it be two files?"], layers.length_report(self.folder.name))
+
+
+if __name__ == "__main__":
+    unittest.main()
