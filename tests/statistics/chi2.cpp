@@ -1,0 +1,332 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "statistics/chi2.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+#include <vector>
+
+namespace covary::statistics {
+
+namespace {
+
+struct Point2 {
+  double x, y;
+};
+struct Box {
+  double x0 = 0, x1 = 1, y0 = 0, y1 = 1;
+};
+using SquareSampler = std::function<std::optional<Point2>(const PathRandom&)>;
+using SquareDensity = std::function<double(double, double)>;
+
+// --- Quadrature ----------------------------------------------------------------------------------------------------
+
+/// Tensor product of the 5-point Gauss-Legendre rule.
+double gauss(const SquareDensity& f, const Box& b) {
+  static constexpr std::array<double, 5> kNodes{-0.9061798459386640, -0.5384693101056831, 0, 0.5384693101056831,
+                                                0.9061798459386640};
+  static constexpr std::array<double, 5> kWeights{0.2369268850561891, 0.4786286704993665, 0.5688888888888889,
+                                                  0.4786286704993665, 0.2369268850561891};
+  const double cx = (b.x0 + b.x1) / 2, hx = (b.x1 - b.x0) / 2, cy = (b.y0 + b.y1) / 2, hy = (b.y1 - b.y0) / 2;
+  double sum = 0;
+  for (int i = 0; i < 5; ++i)
+    for (int j = 0; j < 5; ++j) sum += kWeights[i] * kWeights[j] * f(cx + hx * kNodes[i], cy + hy * kNodes[j]);
+  return sum * hx * hy;
+}
+
+/// Halves the box in both directions until the integral changes by less than `tolerance`. The tolerance is halved, not
+/// quartered, at each level: discontinuities lie on curves, which meet twice as many boxes a level.
+double integrate(const SquareDensity& f, const Box& b, double whole, double tolerance, int depth) {
+  const double mx = (b.x0 + b.x1) / 2, my = (b.y0 + b.y1) / 2;
+  const std::array<Box, 4> parts{
+      {{b.x0, mx, b.y0, my}, {mx, b.x1, b.y0, my}, {b.x0, mx, my, b.y1}, {mx, b.x1, my, b.y1}}};
+  std::array<double, 4> values;
+  double sum = 0;
+  for (int i = 0; i < 4; ++i) sum += values[i] = gauss(f, parts[i]);
+  if (!(std::abs(sum - whole) > tolerance) || depth == 0) return sum;  // also when not finite
+  sum = 0;
+  for (int i = 0; i < 4; ++i) sum += integrate(f, parts[i], values[i], tolerance / 2, depth - 1);
+  return sum;
+}
+double integrate(const SquareDensity& f, const Box& b, double tolerance) {
+  return integrate(f, b, gauss(f, b), tolerance, 9);
+}
+
+double integrate_grid(const SquareDensity& f, double tolerance, int n) {
+  double sum = 0;
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j)
+      sum += integrate(f, {double(i) / n, double(i + 1) / n, double(j) / n, double(j + 1) / n}, tolerance / n);
+  return sum;
+}
+
+// --- Cells ---------------------------------------------------------------------------------------------------------
+
+/// Binary tree over the unit square. Its leaves hold about 16 of the points it was made from, and are where the density
+/// is integrated; subtrees that hold equally many points are the cells of the test. Space without points is cut off, so
+/// that every leaf is about as small as the details of the density in it.
+class Cells {
+ public:
+  struct Leaf {
+    Box box;
+    int cell;
+  };
+  Cells(std::vector<Point2> points, int n_cells) {
+    // The first cut is at y = 1/2: the horizon, where densities of directions are discontinuous.
+    nodes_.push_back({.split = 0.5, .axis = 1, .child = 1});
+    nodes_.resize(3);
+    const auto middle = std::partition(points.begin(), points.end(), [](const Point2& p) { return p.y < 0.5; });
+    const int64_t n = std::max<int64_t>(1, points.size()), n_low = middle - points.begin();
+    const int low = static_cast<int>(n_cells * n_low / n);
+    build(1, {0, 1, 0, 0.5}, {points.begin(), middle}, std::max(1, low), -1);
+    build(2, {0, 1, 0.5, 1}, {middle, points.end()}, std::max(1, n_cells - low), -1);
+  }
+  int find(const Point2& p) const {
+    int node = 0;
+    while (nodes_[node].child >= 0)
+      node = nodes_[node].child + ((nodes_[node].axis ? p.y : p.x) < nodes_[node].split ? 0 : 1);
+    return nodes_[node].cell;
+  }
+  const std::vector<Box>& boxes() const { return boxes_; }  ///< one per cell
+  const std::vector<Leaf>& leaves() const { return leaves_; }
+
+ private:
+  struct Node {
+    double split = 0;
+    int axis = 0, child = -1, cell = -1;
+  };
+  void build(int node, const Box& box, std::span<Point2> points, int n_cells, int cell) {
+    if (cell < 0 && (n_cells == 1 || points.size() < 32)) {
+      cell = static_cast<int>(boxes_.size());
+      boxes_.push_back(box);
+    }
+    if (points.size() < 32) {
+      nodes_[node].cell = cell;
+      leaves_.push_back({box, cell});
+      return;
+    }
+    const auto [x_min, x_max] = std::ranges::minmax(points, {}, &Point2::x);
+    const auto [y_min, y_max] = std::ranges::minmax(points, {}, &Point2::y);
+    const double dx = x_max.x - x_min.x, dy = y_max.y - y_min.y;
+    // Space without points goes to the cell it belongs to or, above the cells, makes one of its own.
+    const auto cut_off = [&](int axis, double split, bool points_below) {
+      cut(node, box, axis, split, points_below ? points : std::span<Point2>{},
+          points_below ? std::span<Point2>{} : points, points_below ? n_cells : 1, points_below ? 1 : n_cells, cell);
+    };
+    if (dx > 0 && box.x1 - x_max.x > 2 * dx) return cut_off(0, x_max.x + dx, true);
+    if (dx > 0 && x_min.x - box.x0 > 2 * dx) return cut_off(0, x_min.x - dx, false);
+    if (dy > 0 && box.y1 - y_max.y > 2 * dy) return cut_off(1, y_max.y + dy, true);
+    if (dy > 0 && y_min.y - box.y0 > 2 * dy) return cut_off(1, y_min.y - dy, false);
+    // Median cut, across the side along which the points fill more of the box.
+    const int axis = dx / (box.x1 - box.x0) * (dx > dy ? 2 : 1) > dy / (box.y1 - box.y0) * (dy > dx ? 2 : 1) ? 0 : 1;
+    const auto middle = points.begin() + points.size() / 2;
+    std::nth_element(points.begin(), middle, points.end(),
+                     [axis](const Point2& a, const Point2& b) { return axis ? a.y < b.y : a.x < b.x; });
+    cut(node, box, axis, axis ? middle->y : middle->x, {points.begin(), middle}, {middle, points.end()}, n_cells / 2,
+        n_cells - n_cells / 2, cell);
+  }
+  void cut(int node, const Box& box, int axis, double split, std::span<Point2> low_points,
+           std::span<Point2> high_points, int low_cells, int high_cells, int cell) {
+    Box low = box, high = box;
+    (axis ? low.y1 : low.x1) = split;
+    (axis ? high.y0 : high.x0) = split;
+    const int child = static_cast<int>(nodes_.size());
+    nodes_[node].split = split, nodes_[node].axis = axis, nodes_[node].child = child;
+    nodes_.resize(nodes_.size() + 2);
+    build(child, low, low_points, low_cells, cell);
+    build(child + 1, high, high_points, high_cells, cell);
+  }
+  std::vector<Node> nodes_;
+  std::vector<Box> boxes_;
+  std::vector<Leaf> leaves_;
+};
+
+// --- The test ------------------------------------------------------------------------------------------------------
+
+/// Writes observed and expected counts and a script that draws them; returns a sentence that names both.
+std::string write_report(const std::string& name, const std::vector<Box>& boxes, const std::vector<double>& observed,
+                         const std::vector<double>& expected) {
+  std::string folder = (std::filesystem::temp_directory_path() / "covary-chi2-XXXXXX").string();
+  if (!mkdtemp(folder.data())) return " (no table: cannot create a folder like " + folder + ")";
+  std::string file = name;
+  for (char& c : file)
+    if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
+  const std::string csv = folder + "/" + file + ".csv", script = folder + "/" + file + ".py";
+  std::ofstream table(csv);
+  table << "x0,x1,y0,y1,observed,expected\n";
+  for (size_t i = 0; i < observed.size(); ++i) {
+    const Box b = i < boxes.size() ? boxes[i] : Box{double(i), double(i + 1), 0, 1};
+    table << fmt::format("{:.9g},{:.9g},{:.9g},{:.9g},{},{:.6g}\n", b.x0, b.x1, b.y0, b.y1, observed[i], expected[i]);
+  }
+  std::ofstream(script) << R"(import sys, csv, matplotlib.pyplot as plt
+from matplotlib.patches import Rectangle
+rows = [[float(v) for v in r] for r in list(csv.reader(open(sys.argv[0][:-3] + '.csv')))[1:]]
+figure, axes = plt.subplots(1, 3, figsize=(18, 6), sharex=True, sharey=True)
+def value(kind, x0, x1, y0, y1, observed, expected):
+    area = (x1 - x0) * (y1 - y0)
+    return [observed / area, expected / area, (observed - expected) / max(expected, 1) ** 0.5][kind]
+for kind, title in enumerate(['observed density', 'expected density', '(observed - expected) / sigma']):
+    values = [value(kind, *r) for r in rows]
+    low, high = (-6, 6) if kind == 2 else (0, max(value(1, *r) for r in rows) or 1)
+    for r, v in zip(rows, values):
+        t = min(max((v - low) / (high - low), 0), 1)
+        axes[kind].add_patch(Rectangle((r[0], r[2]), r[1] - r[0], r[3] - r[2],
+                                       color=plt.cm.coolwarm(t) if kind == 2 else plt.cm.viridis(t)))
+    axes[kind].set_title(title), axes[kind].set_xlim(min(r[0] for r in rows), max(r[1] for r in rows))
+    axes[kind].set_ylim(1, 0), axes[kind].set_xlabel('phi / 2 pi, or u'), axes[kind].set_ylabel('(1 - z) / 2, or v')
+plt.savefig(sys.argv[0][:-3] + '.png')
+)";
+  return fmt::format("\n  table: {}\n  plot:  python3 {}", csv, script);
+}
+
+/// `expected` may sum to less than `n`; the rest belongs to one more cell, that of the failed samples.
+Chi2Result compare(const std::vector<Box>& boxes, const std::vector<double>& observed,
+                   const std::vector<double>& expected, double n, double zero_density_samples,
+                   const Chi2Options& options) {
+  Chi2Result result;
+  double n_observed = 0, n_expected = 0;
+  bool finite = true;
+  for (size_t i = 0; i < observed.size(); ++i) {
+    n_observed += observed[i], n_expected += expected[i];
+    finite = finite && std::isfinite(expected[i]) && expected[i] >= -1e-3;
+  }
+  result.mass = n_expected / n, result.fraction = n_observed / n;
+
+  // Cells, smallest first, so that those below 5 are pooled, together with the next larger one if they need it.
+  std::vector<std::pair<double, double>> cells;
+  for (size_t i = 0; i < observed.size(); ++i) cells.emplace_back(expected[i], observed[i]);
+  const double n_left = n - n_expected;
+  if (n_left >= std::max(5.0, n * options.mass_tolerance)) cells.emplace_back(n_left, n - n_observed);
+  std::sort(cells.begin(), cells.end());
+  std::pair<double, double> pool{0, 0};
+  int n_used = 0;
+  for (const auto& [e, o] : cells) {
+    if (pool.first < 5 && (e < 5 || pool.first > 0)) {
+      pool.first += e, pool.second += o;
+    } else {
+      result.statistic += (o - e) * (o - e) / e, ++n_used;
+    }
+  }
+  if (pool.first >= 1e-6 * n) {
+    result.statistic += (pool.second - pool.first) * (pool.second - pool.first) / pool.first, ++n_used;
+  } else {  // nothing is expected there: next to no sample may fall there
+    zero_density_samples = std::max(zero_density_samples, pool.second);
+  }
+  result.dof = n_used - 1;
+  result.p_value = result.dof > 0 ? chi2_p_value(result.statistic, result.dof) : 1;
+
+  std::string why;
+  if (!finite)
+    why = "the density is negative or not finite somewhere";
+  else if (std::abs(result.mass - result.fraction) >
+           options.mass_tolerance + 6 * 0.5 / std::sqrt(n) * (n_left >= n * options.mass_tolerance ? 1 : 0))
+    why = fmt::format("the density integrates to {:.5f}, but {:.5f} of the samples succeed", result.mass,
+                      result.fraction);
+  else if (zero_density_samples > 2e-5 * n)
+    why = fmt::format("{} samples fall where the density is zero", zero_density_samples);
+  else if (!(result.p_value >= options.alpha))
+    why = "samples and density differ";
+  result.accepted = why.empty();
+  result.message = fmt::format("{}: {}; chi2 = {:.1f}, dof = {}, p = {:.3g}, alpha = {:.3g}, N = {}, mass = {:.5f}",
+                               options.name, result.accepted ? "accepted" : why, result.statistic, result.dof,
+                               result.p_value, options.alpha, n, result.mass);
+  if (!result.accepted) result.message += write_report(options.name, boxes, observed, expected);
+  return result;
+}
+
+Chi2Result run(const SquareSampler& sample, const SquareDensity& pdf, const Chi2Options& options) {
+  const auto draw = [&](uint32_t pass, uint64_t i) {
+    return sample(PathRandom(Sampling::kIndependent, options.seed, pass, 0, i));
+  };
+  std::vector<Point2> pilot;
+  for (int i = 0; i < options.n_samples / 4; ++i)
+    if (const auto p = draw(1, i)) pilot.push_back(*p);
+  const Cells cells(std::move(pilot), options.n_cells);
+
+  const size_t n_cells = cells.boxes().size();
+  std::vector<double> observed(n_cells), expected(n_cells);
+  double zero_density_samples = 0;
+  for (int i = 0; i < options.n_samples; ++i) {
+    const auto p = draw(0, i);
+    if (!p) continue;
+    ++observed[cells.find(*p)];
+    if (i < options.n_samples / 8 && !(pdf(p->x, p->y) > 0)) zero_density_samples += 8;
+  }
+  // Each cell's integral good to a tenth of the standard deviation of its count.
+  const double tolerance = 0.1 / std::sqrt(double(options.n_samples) * n_cells) * n_cells / cells.leaves().size();
+  for (const Cells::Leaf& leaf : cells.leaves())
+    expected[leaf.cell] += options.n_samples * integrate(pdf, leaf.box, tolerance);
+  return compare(cells.boxes(), observed, expected, options.n_samples, zero_density_samples, options);
+}
+
+Point2 square_from_direction(const Vec3& w) {
+  double x = std::atan2(double(w.y), double(w.x)) / (2 * std::numbers::pi);
+  if (x < 0) x += 1;
+  // (1 - z) / 2 without cancellation near the poles, where narrow lobes lie.
+  const double s2 = double(w.x) * w.x + double(w.y) * w.y, z = std::abs(double(w.z));
+  const double near = std::min(0.5, s2 / (2 * (1 + z)));
+  return {std::clamp(x, 0.0, 1.0), w.z >= 0 ? near : 1 - near};
+}
+
+}  // namespace
+
+Vec3 direction_from_square(double x, double y) {
+  const double z = 1 - 2 * y, r = std::sqrt(std::max(0.0, 4 * y * (1 - y))), phi = 2 * std::numbers::pi * x;
+  return {static_cast<float>(r * std::cos(phi)), static_cast<float>(r * std::sin(phi)), static_cast<float>(z)};
+}
+
+Chi2Result chi2_sphere(const Sampler<Vec3>& sample, const Density<Vec3>& pdf, const Chi2Options& options) {
+  return run(
+      [&](const PathRandom& random) -> std::optional<Point2> {
+        const auto w = sample(random);
+        return w ? std::optional(square_from_direction(*w)) : std::nullopt;
+      },
+      [&](double x, double y) { return 4 * std::numbers::pi * pdf(direction_from_square(x, y)); }, options);
+}
+
+Chi2Result chi2_square(const Sampler<Vec2>& sample, const Density<Vec2>& pdf, const Chi2Options& options) {
+  return run(
+      [&](const PathRandom& random) -> std::optional<Point2> {
+        const auto p = sample(random);
+        return p ? std::optional(Point2{p->x, p->y}) : std::nullopt;
+      },
+      [&](double x, double y) {
+        return pdf({static_cast<float>(x), static_cast<float>(y)});
+      },
+      options);
+}
+
+Chi2Result chi2_discrete(std::span<const double> observed, std::span<const double> probabilities,
+                         const Chi2Options& options) {
+  double n = 0, mass = 0;
+  for (const double o : observed) n += o;
+  std::vector<double> expected;
+  double zero_density_samples = 0;
+  for (size_t i = 0; i < probabilities.size(); ++i) {
+    mass += probabilities[i];
+    expected.push_back(n * probabilities[i]);
+    if (probabilities[i] == 0) zero_density_samples += n * (observed[i] > 0);
+  }
+  return compare({}, {observed.begin(), observed.end()}, expected, n, zero_density_samples, options);
+}
+
+double integrate_sphere(const Density<Vec3>& f, double tolerance, int n) {
+  return integrate_grid([&](double x, double y) { return 4 * std::numbers::pi * f(direction_from_square(x, y)); },
+                        tolerance, n);
+}
+double integrate_square(const Density<Vec2>& f, double tolerance, int n) {
+  return integrate_grid(
+      [&](double x, double y) {
+        return f({static_cast<float>(x), static_cast<float>(y)});
+      },
+      tolerance, n);
+}
+
+}  // namespace covary::statistics

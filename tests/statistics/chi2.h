@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+// Chi-square tests of goodness of fit: does a sampler draw from the density it claims?
+//
+// The domain (sphere of directions or unit square) is mapped to the unit square with constant area ratio and cut into
+// about `n_cells` boxes that hold equally many of a first, independent batch of samples, so that narrow lobes are
+// resolved. The density is integrated over each box by adaptive Gauss-Legendre quadrature; a second batch is counted.
+// Boxes with expected count below 5 are pooled. Failed samples (and those the sampler leaves out on purpose, such as
+// delta lobes) form one more cell with the probability that the density leaves over, so the total mass is tested too.
+//
+// Default N = 400 000 samples in 128 cells at alpha = 5e-7: detects, with power 0.99, a relative error of the density
+// of 2.3 % rms over the domain, 26 % in a single cell, and of the total mass of 0.15 % (numerical tolerance) where no
+// sample fails.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "core/random.h"
+#include "core/vec.h"
+#include "statistics/p_values.h"
+
+namespace covary::statistics {
+
+struct Chi2Options {
+  std::string name = "chi2";  ///< names the case in messages and files
+  int n_samples = 400000;     ///< of the counted batch; a quarter more is drawn to place the cells
+  int n_cells = 128;          ///< upper bound
+  uint64_t seed = 1;
+  double alpha = test_alpha();     ///< false-positive probability of this case
+  double mass_tolerance = 1.5e-3;  ///< numerical error allowed in the integral of the density
+};
+
+struct Chi2Result {
+  bool accepted = false;
+  double p_value = 0;
+  double statistic = 0;
+  int dof = 0;
+  double mass = 0;      ///< integral of the density over the domain
+  double fraction = 0;  ///< fraction of samples that did not fail
+  std::string message = "the test was not run";
+};
+
+/// Draws one sample from numbers of `random` (use vertex 0 and any events); nullopt when sampling fails.
+template <typename Point>
+using Sampler = std::function<std::optional<Point>(const PathRandom& random)>;
+template <typename Point>
+using Density = std::function<double(const Point&)>;
+
+/// Directions; the density is per unit solid angle.
+Chi2Result chi2_sphere(const Sampler<Vec3>& sample, const Density<Vec3>& pdf, const Chi2Options& options = {});
+/// Points of the unit square [0, 1)^2; the density is per unit area.
+Chi2Result chi2_square(const Sampler<Vec2>& sample, const Density<Vec2>& pdf, const Chi2Options& options = {});
+/// Indices 0 ... probabilities.size() - 1.
+Chi2Result chi2_discrete(std::span<const double> observed, std::span<const double> probabilities,
+                         const Chi2Options& options = {});
+
+/// Integral of a density over the sphere or the unit square, by the quadrature the tests use, in `n` x `n` boxes.
+double integrate_sphere(const Density<Vec3>& f, double tolerance = 1e-5, int n = 16);
+double integrate_square(const Density<Vec2>& f, double tolerance = 1e-5, int n = 16);
+
+/// Equal-area map of the unit square to the sphere and back: x = phi / 2 pi, y = (1 - z) / 2.
+Vec3 direction_from_square(double x, double y);
+
+}  // namespace covary::statistics
