@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scenes of a folder, and a scene file with its film and path length replaced, as text, for Mitsuba.
+
+Both renderers must see the same film. covary takes it from its command line; for Mitsuba the XML is edited in memory,
+because not every scene has <default> parameters for it.
+"""
+import dataclasses
+import hashlib
+import pathlib
+import xml.etree.ElementTree as ET
+
+FILE_NAMES = ("scene_v3.xml", "scene.xml")
+
+
+class SceneError(Exception):
+    """A folder or file that is not a scene; the message says which and why."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Settings:
+    """What both renderers are told. max_depth None: the scene's own."""
+
+    width: int
+    height: int
+    spp: int
+    max_depth: int | None = None
+
+
+def find(folder, names):
+    """Scene files by name: sub-folders of `folder` holding scene_v3.xml or scene.xml, and `names` ending in .xml."""
+    found = {}
+    if folder is not None:
+        for sub in sorted(pathlib.Path(folder).iterdir()):
+            for file_name in FILE_NAMES:
+                if (sub / file_name).is_file():
+                    found[sub.name] = sub / file_name
+                    break
+    if not names:
+        if not found:
+            raise SceneError(f"no scene in '{folder}': no sub-folder holds {' or '.join(FILE_NAMES)}")
+        return found
+    chosen = {}
+    for name in names:
+        if name.endswith(".xml") and pathlib.Path(name).is_file():
+            chosen[pathlib.Path(name).stem] = pathlib.Path(name)
+        elif name in found:
+            chosen[name] = found[name]
+        else:
+            raise SceneError(f"no scene '{name}'; '{folder}' holds {', '.join(found) or 'none'}")
+    return chosen
+
+
+def frame_size(path):
+    """Width and height the scene file asks for, <default> parameters resolved."""
+    root = ET.parse(path).getroot()
+    defaults = {d.get("name"): d.get("value") for d in root.iter("default")}
+    size = {}
+    for entry in root.find(".//film").findall("integer"):
+        value = entry.get("value")
+        size[entry.get("name")] = int(defaults[value[1:]] if value.startswith("$") else value)
+    return size["width"], size["height"]
+
+
+def scaled_size(path, pixels, multiple=8):
+    """The multiple-of-`multiple` frame with the scene's aspect ratio (exactly, where it can) of about `pixels`."""
+    width, height = frame_size(path)
+    best = None
+    for w in range(multiple, 8192, multiple):
+        h = max(multiple, round(w * height / width / multiple) * multiple)
+        distortion = abs(w / h * height / width - 1)
+        if distortion > 0.01 or w * h > 2 * pixels or 2 * w * h < pixels:
+            continue
+        if best is None or abs(w * h - pixels) < abs(best[0] * best[1] - pixels):
+            best = (w, h)
+    if best is None:
+        raise SceneError(f"{path}: no frame of about {pixels} pixels has the aspect ratio {width}:{height}")
+    return best
+
+
+def _set_integer(parent, name, value):
+    for entry in parent.findall("integer"):
+        if entry.get("name") == name:
+            entry.set("value", str(value))
+            return
+    ET.SubElement(parent, "integer", name=name, value=str(value))
+
+
+def mitsuba_text(path, settings):
+    """The scene file with box filter and the film size and path length of `settings`."""
+    root = ET.parse(path).getroot()
+    film = root.find(".//film")
+    for entry in film.findall("rfilter"):
+        film.remove(entry)
+    ET.SubElement(film, "rfilter", type="box")
+    _set_integer(film, "width", settings.width)
+    _set_integer(film, "height", settings.height)
+    if settings.max_depth is not None:
+        _set_integer(root.find("integrator"), "max_depth", settings.max_depth)
+    return ET.tostring(root, encoding="unicode")
+
+
+def fingerprint(text):
+    """Eight hex digits that change with the scene text (meshes and textures are not read)."""
+    return hashlib.sha256(text.encode()).hexdigest()[:8]
