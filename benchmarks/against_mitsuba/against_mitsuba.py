@@ -32,7 +32,7 @@ def parse(arguments):
     common = argparse.ArgumentParser(add_help=False)
     common.add_argument("names", nargs="*", metavar="NAME", help="scene names, or .xml files; all scenes when absent")
     common.add_argument("--scenes", metavar="DIR", help="folder with one sub-folder per scene")
-    common.add_argument("--spp", type=int, help="samples per pixel (agree: 128, speed: 32)")
+    common.add_argument("--spp", type=int, help="samples per pixel (agree: 128 or more, speed: 32)")
     common.add_argument("--pixels", type=int, help="about so many pixels, aspect ratio kept (agree: 9216, speed: 230400)")
     common.add_argument("--max-depth", type=int, help="instead of the scenes' own")
     common.add_argument("--threads", type=int, default=0, help="for both renderers; 0: all cores")
@@ -42,6 +42,9 @@ def parse(arguments):
     program.add_argument("--covary-option", action="append", default=[], metavar="OPTION", help="passed on; repeatable")
     seeds = argparse.ArgumentParser(add_help=False)
     seeds.add_argument("--seeds", type=int, default=32, help="renders of each side")
+    seeds.add_argument("--target-error", type=float, default=0.0015, metavar="E",
+                       help="multiply a scene's spp by 4, at most twice, until the relative standard error of Mitsuba's "
+                       "image mean is below E (not with --spp)")
     seeds.add_argument("--cache", default=DEFAULT_CACHE, metavar="DIR", help="Mitsuba's renders are kept here")
     agree = commands.add_parser("agree", parents=[common, program, seeds])
     agree.add_argument("--suite-alpha", type=float, default=1e-3,
@@ -56,6 +59,20 @@ def parse(arguments):
 def settings_of(scene, options, pixels, spp):
     width, height = scene_files.scaled_size(scene, options.pixels or pixels)
     return scene_files.Settings(width, height, options.spp or spp, options.max_depth)
+
+
+def reference_stack(name, scene, options):
+    """Mitsuba's renders of a scene, and the settings they were made with."""
+    settings = settings_of(scene, options, 9216, 128)
+    for factor in (1, 4, 16):
+        scaled = dataclasses.replace(settings, spp=settings.spp * factor)
+        stack = renderers.mitsuba_stack(name, scene, scaled, range(options.seeds), options.cache,
+                                        threads=options.threads)
+        grey = stack.mean(axis=(1, 2, 3), dtype=numpy.float64)
+        error = grey.std(ddof=1) / len(grey) ** 0.5 / grey.mean()
+        if options.spp or error < options.target_error:
+            break
+    return stack, scaled, grey.mean(), error
 
 
 def machine():
@@ -128,9 +145,7 @@ def agree(options):
     report, failed = {"machine": machine(), "covary": covary.version(), "scenes": {}}, False
     for name, scene in scenes.items():
         try:
-            settings = settings_of(scene, options, 9216, 128)
-            reference = renderers.mitsuba_stack(name, scene, settings, range(options.seeds), options.cache,
-                                                threads=options.threads)
+            reference, settings, _, _ = reference_stack(name, scene, options)
             tested = covary.stack(scene, settings, range(options.seeds), options.threads)
             result = agreement.agreement(reference, tested, alpha)
             lines.append(agree_row(name, settings, result))
@@ -149,13 +164,11 @@ def agree(options):
     return 1 if failed else 0
 
 
-def reference(options):
+def make_reference(options):
     for name, scene in scene_files.find(options.scenes, options.names).items():
-        settings = settings_of(scene, options, 9216, 128)
-        stack = renderers.mitsuba_stack(name, scene, settings, range(options.seeds), options.cache,
-                                        threads=options.threads)
-        grey = stack.mean(axis=(1, 2, 3))
-        print(f"{name}: mean {grey.mean():.6g}, standard error {grey.std(ddof=1) / len(grey) ** 0.5 / grey.mean():.3%}")
+        _, settings, mean, error = reference_stack(name, scene, options)
+        print(f"{name}: {settings.width}x{settings.height}, {settings.spp} spp, mean {mean:.6g}, standard error {error:.3%}",
+              flush=True)
     return 0
 
 
@@ -180,7 +193,7 @@ def measure_speed(options):
 def main(arguments):
     options = parse(arguments)
     try:
-        return {"agree": agree, "reference": reference, "speed": measure_speed}[options.command](options)
+        return {"agree": agree, "reference": make_reference, "speed": measure_speed}[options.command](options)
     except (scene_files.SceneError, FileNotFoundError) as error:
         print(f"against_mitsuba: {error}", file=sys.stderr)
         return 2
