@@ -18,6 +18,12 @@ float similarity_scale(const Transform& t) {
   return l;
 }
 
+/// (phi / 2 pi, theta / pi) of a unit vector.
+Vec2 spherical_uv(const Vec3& local) {
+  const float phi = std::atan2(local.y, local.x);
+  return {(phi < 0 ? phi + kTwoPi : phi) / kTwoPi, std::acos(std::clamp(local.z, -1.0f, 1.0f)) / kPi};
+}
+
 }  // namespace
 
 Sphere::Sphere(const Transform& to_world, const Vec3& center, float radius, bool flip_normals)
@@ -52,8 +58,8 @@ void Sphere::fill(const Ray& ray, SurfaceHit& hit, bool with_derivatives) const 
   hit.p = center_ + outward * radius_;
   hit.ng = outward * sign_;
   const Vec3 local = to_local_.vector(outward) * radius_;
-  const float phi = std::atan2(local.y, local.x), rho = std::sqrt(local.x * local.x + local.y * local.y);
-  hit.uv = {(phi < 0 ? phi + kTwoPi : phi) / kTwoPi, std::acos(std::clamp(local.z, -1.0f, 1.0f)) / kPi};
+  const float rho = std::sqrt(local.x * local.x + local.y * local.y);
+  hit.uv = spherical_uv(local);
   if (!with_derivatives) {
     hit.frame = Frame(hit.ng);
     return;
@@ -67,7 +73,7 @@ void Sphere::fill(const Ray& ray, SurfaceHit& hit, bool with_derivatives) const 
 
 AreaSample Sphere::sample_area(Vec2 u, float /*u_primitive*/) const {
   const Vec3 d = warp::square_to_sphere(u);
-  return {center_ + d * radius_, d * sign_, {}, 1 / area()};
+  return {center_ + d * radius_, d * sign_, spherical_uv(to_local_.vector(d) * radius_), 1 / area()};
 }
 
 EmitterSample Sphere::sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const {
@@ -85,9 +91,7 @@ EmitterSample Sphere::sample_towards(const Vec3& reference, Vec2 u, float u_prim
   const Vec3 outward = normalize(reference + sample.wi * sample.distance - center_);
   sample.p = center_ + outward * radius_;
   sample.n = outward * sign_;
-  const Vec3 q = to_local_.vector(outward) * radius_;
-  const float phi = std::atan2(q.y, q.x);
-  sample.uv = {(phi < 0 ? phi + kTwoPi : phi) / kTwoPi, std::acos(std::clamp(q.z, -1.0f, 1.0f)) / kPi};
+  sample.uv = spherical_uv(to_local_.vector(outward) * radius_);
   sample.pdf_solid_angle = warp::cone_pdf_solid_angle(one_minus_cos_max);
   return sample;
 }
