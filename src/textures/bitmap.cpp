@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: Apache-2.0
+// `bitmap`: a texture from an image file. Values agree with Mitsuba 3's plugin of this name.
+//
+// | parameter   | type      | default  | meaning |
+// |-------------|-----------|----------|-------------------------------------------------------------------------------|
+// | filename    | string    | required | PNG, JPEG, EXR, HDR, PFM, TGA, BMP, … ; alpha is ignored | | raw         |
+// boolean   | false    | values are data, not colours: integers are not decoded from sRGB              | | filter_type
+// | string    | bilinear | `bilinear` or `nearest`                                                       | | wrap_mode
+// | string    | repeat   | outside [0, 1]: `repeat`, `mirror` or `clamp`                                 | | to_uv |
+// transform | identity | from surface parameters to texture coordinates                                | | format |
+// string    | auto     | accepted for compatibility; 8-bit files are stored as bytes, others as floats | | accel |
+// boolean   | true     | accepted for compatibility; no effect                                         |
+//
+// A one-channel lookup gives the grey value, or the luminance of a colour (also of a raw one).
+#include "textures/bitmap.h"
+
+#include <array>
+#include <memory>
+#include <mutex>
+
+#include "core/distribution.h"
+#include "core/warp.h"
+#include "textures/registry.h"
+
+namespace covary {
+namespace {
+
+using DecodeTable = std::array<float, 256>;
+
+const DecodeTable& decode_table(bool srgb) {
+  static const auto kTables = [] {
+    std::array<DecodeTable, 2> tables;
+    for (int i = 0; i < 256; ++i) {
+      tables[0][i] = static_cast<float>(i) / 255;
+      tables[1][i] = srgb_to_linear(tables[0][i]);
+    }
+    return tables;
+  }();
+  return kTables[srgb];
+}
+
+// Four ways to keep texels. Each has Value (what a lookup gives) and value(index).
+
+class FloatGrey {
+ public:
+  using Value = float;
+  explicit FloatGrey(Image& image) : texels_(std::move(image.floats)) {}
+  float value(size_t i) const { return texels_[i]; }
+
+ private:
+  std::vector<float> texels_;
+};
+
+class FloatRgb {
+ public:
+  using Value = Spectrum;
+  explicit FloatRgb(Image& image) : texels_(std::move(image.floats)) {}
+  Spectrum value(size_t i) const { return {texels_[3 * i], texels_[3 * i + 1], texels_[3 * i + 2]}; }
+
+ private:
+  std::vector<float> texels_;
+};
+
+class ByteGrey {
+ public:
+  using Value = float;
+  ByteGrey(Image& image, const DecodeTable& decode) : texels_(std::move(image.bytes)), decode_(decode.data()) {}
+  float value(size_t i) const { return decode_[texels_[i]]; }
+
+ private:
+  std::vector<uint8_t> texels_;
+  const float* decode_;
+};
+
+class ByteRgb {
+ public:
+  using Value = Spectrum;
+  ByteRgb(const Image& image, const DecodeTable& decode) : texels_(image.n_pixels()), decode_(decode.data()) {
+    for (size_t i = 0; i < texels_.size(); ++i)
+      texels_[i] = image.bytes[3 * i] | image.bytes[3 * i + 1] << 8 | image.bytes[3 * i + 2] << 16;
+  }
+  Spectrum value(size_t i) const {
+    const uint32_t rgb = texels_[i];
+    return {decode_[rgb & 255], decode_[rgb >> 8 & 255], decode_[rgb >> 16]};
+  }
+
+ private:
+  std::vector<uint32_t> texels_;  // one load per texel
+  const float* decode_;
+};
+
+float grey(float value) { return value; }
+float grey(const Spectrum& value) { return luminance(value); }
+
+/// Where a coordinate falls along one axis: between texels `i0` and `i1`, at the fraction `f` from the first.
+struct AxisCell {
+  int i0, i1;
+  float f;
+  float direction;  // -1 where mirroring reverses the axis
+};
+
+/// `n` texels along the axis; any `u`, also one that is not finite (which gives some texel).
+inline AxisCell find_cell(float u, int n, WrapMode wrap) {
+  float direction = 1;
+  switch (wrap) {
+    case WrapMode::kRepeat:
+      u -= std::floor(u);
+      break;
+    case WrapMode::kMirror:
+      u -= 2 * std::floor(u * 0.5f);
+      if (u > 1) u = 2 - u, direction = -1;
+      break;
+    case WrapMode::kClamp:
+      u = clamp01(u);
+      break;
+  }
+  float x = u * static_cast<float>(n) - 0.5f;
+  x = x > -0.5f ? x : -0.5f;  // also catches NaN
+  const int i = std::min(static_cast<int>(std::floor(x)), n - 1);
+  const float f = x - static_cast<float>(i);
+  if (wrap == WrapMode::kRepeat) return {i < 0 ? n - 1 : i, i + 1 < n ? i + 1 : 0, f, direction};
+  return {std::max(i, 0), std::min(i + 1, n - 1), f, direction};
+}
+
+template <typename Texels>
+class Bitmap final : public Texture {
+ public:
+  using Value = typename Texels::Value;
+
+  Bitmap(Texels texels, int width, int height, const BitmapSettings& settings)
+      : texels_(std::move(texels)),
+        width_(width),
+        height_(height),
+        settings_(settings),
+        samples_luminance_(settings.to_uv.permutes_unit_square()) {
+    double sum = 0;
+    const size_t n = static_cast<size_t>(width) * height;
+    for (size_t i = 0; i < n; ++i) sum += grey(texels_.value(i));
+    mean_ = static_cast<float>(sum / static_cast<double>(n));
+  }
+
+  Spectrum eval(const SurfaceHit& hit) const override { return Spectrum(lookup(hit.uv)); }
+  float eval_1(const SurfaceHit& hit) const override { return grey(lookup(hit.uv)); }
+  float mean() const override { return mean_; }
+
+  Vec2 grad_1(const SurfaceHit& hit) const override {
+    if (settings_.filter == FilterType::kNearest) return {0, 0};
+    const Vec2 st = settings_.to_uv.apply(hit.uv);
+    const AxisCell x = find_cell(st.x, width_, settings_.wrap), y = find_cell(st.y, height_, settings_.wrap);
+    const float v00 = grey_at(x.i0, y.i0), v10 = grey_at(x.i1, y.i0);
+    const float v01 = grey_at(x.i0, y.i1), v11 = grey_at(x.i1, y.i1);
+    const Vec2 d = {lerp(y.f, v10 - v00, v11 - v01) * x.direction * static_cast<float>(width_),
+                    lerp(x.f, v01 - v00, v11 - v10) * y.direction * static_cast<float>(height_)};
+    return settings_.to_uv.chain(d);
+  }
+
+  PositionSample sample_position(Vec2 u) const override {
+    const PiecewiseConstant2D* texel_choice = distribution();
+    if (!texel_choice) return {u, 1};
+    // A texel in proportion to its luminance, then the filter around its centre: together the interpolated luminance.
+    Vec2 st = texel_choice->sample(u).uv;
+    if (settings_.filter == FilterType::kBilinear) {
+      st.x = within_filter(st.x, width_);
+      st.y = within_filter(st.y, height_);
+    }
+    return {settings_.to_uv.apply_inverse(st), density(*texel_choice, st)};
+  }
+
+  float pdf_position(Vec2 uv) const override {
+    const PiecewiseConstant2D* texel_choice = distribution();
+    return texel_choice ? density(*texel_choice, settings_.to_uv.apply(uv)) : 1;
+  }
+
+ private:
+  Value lookup(Vec2 uv) const {
+    const Vec2 st = settings_.to_uv.apply(uv);
+    const AxisCell x = find_cell(st.x, width_, settings_.wrap), y = find_cell(st.y, height_, settings_.wrap);
+    if (settings_.filter == FilterType::kNearest) return texels_.value(index(nearest(x), nearest(y)));
+    const size_t row0 = static_cast<size_t>(y.i0) * width_, row1 = static_cast<size_t>(y.i1) * width_;
+    return lerp(y.f, lerp(x.f, texels_.value(row0 + x.i0), texels_.value(row0 + x.i1)),
+                lerp(x.f, texels_.value(row1 + x.i0), texels_.value(row1 + x.i1)));
+  }
+
+  static int nearest(const AxisCell& cell) { return cell.f < 0.5f ? cell.i0 : cell.i1; }
+  size_t index(int x, int y) const { return static_cast<size_t>(y) * width_ + x; }
+  float grey_at(int x, int y) const { return grey(texels_.value(index(x, y))); }
+
+  /// `s` uniform within its texel becomes tent-distributed around the texel's centre. What falls outside [0, 1] comes
+  /// back in as the wrap mode says; mirror and clamp extend the border texel, so both fold back.
+  float within_filter(float s, int n) const {
+    const float x = s * static_cast<float>(n), texel = std::min(std::floor(x), static_cast<float>(n - 1));
+    const float t = (texel + 0.5f + warp::interval_to_tent(clamp01(x - texel), 1)) / static_cast<float>(n);
+    if (settings_.wrap == WrapMode::kRepeat) return clamp01(t < 0 ? t + 1 : (t >= 1 ? t - 1 : t));
+    return clamp01(t < 0 ? -t : (t > 1 ? 2 - t : t));
+  }
+
+  /// Density of sample_position per unit area, at texture coordinates `st`.
+  float density(const PiecewiseConstant2D& texel_choice, Vec2 st) const {
+    const AxisCell x = find_cell(st.x, width_, settings_.wrap), y = find_cell(st.y, height_, settings_.wrap);
+    const auto at = [&](int i, int j) {
+      return texel_choice.pdf({(static_cast<float>(i) + 0.5f) / width_, (static_cast<float>(j) + 0.5f) / height_});
+    };
+    if (settings_.filter == FilterType::kNearest) return at(nearest(x), nearest(y));
+    return lerp(y.f, lerp(x.f, at(x.i0, y.i0), at(x.i1, y.i0)), lerp(x.f, at(x.i0, y.i1), at(x.i1, y.i1)));
+  }
+
+  /// Made when first asked for, because few textures emit; null: positions are uniform.
+  const PiecewiseConstant2D* distribution() const {
+    if (!samples_luminance_) return nullptr;
+    std::call_once(distribution_once_, [this] {
+      const size_t n = static_cast<size_t>(width_) * height_;
+      std::vector<float> weights(n);
+      bool any = false;
+      for (size_t i = 0; i < n; ++i) {
+        const float w = grey(texels_.value(i));
+        weights[i] = w > 0 && w < kInfinity ? w : 0;
+        any |= weights[i] > 0;
+      }
+      if (any) distribution_ = std::make_unique<PiecewiseConstant2D>(weights, width_, height_);
+    });
+    return distribution_.get();
+  }
+
+  Texels texels_;
+  int width_, height_;
+  BitmapSettings settings_;
+  bool samples_luminance_;
+  float mean_;
+  mutable std::once_flag distribution_once_;
+  mutable std::unique_ptr<const PiecewiseConstant2D> distribution_;
+};
+
+template <typename Texels>
+std::shared_ptr<Texture> wrap_texels(Texels texels, const Image& image, const BitmapSettings& settings) {
+  return std::make_shared<Bitmap<Texels>>(std::move(texels), image.width, image.height, settings);
+}
+
+}  // namespace
+
+std::shared_ptr<Texture> make_bitmap_texture(Image image, const BitmapSettings& settings) {
+  const bool decode = image.srgb && !settings.raw;
+  if (!image.bytes.empty()) {
+    const DecodeTable& table = decode_table(decode);
+    if (image.channels == 1) return wrap_texels(ByteGrey(image, table), image, settings);
+    return wrap_texels(ByteRgb(image, table), image, settings);
+  }
+  if (decode)
+    for (float& value : image.floats) value = srgb_to_linear(value);
+  if (image.channels == 1) return wrap_texels(FloatGrey(image), image, settings);
+  return wrap_texels(FloatRgb(image), image, settings);
+}
+
+std::shared_ptr<Texture> make_bitmap(Parameters& parameters) {
+  const std::string path = parameters.require_file("filename");
+  BitmapSettings settings;
+  settings.raw = parameters.get_bool("raw", false);
+  settings.filter = parameters.get_choice("filter_type", "bilinear", {"bilinear", "nearest"}) == "nearest"
+                        ? FilterType::kNearest
+                        : FilterType::kBilinear;
+  const std::string wrap = parameters.get_choice("wrap_mode", "repeat", {"repeat", "mirror", "clamp"});
+  settings.wrap = wrap == "mirror" ? WrapMode::kMirror : (wrap == "clamp" ? WrapMode::kClamp : WrapMode::kRepeat);
+  settings.to_uv = UvTransform(parameters.get_transform("to_uv"));
+  parameters.get_choice("format", "auto", {"auto", "variant", "float16", "fp16", "uint8"});
+  parameters.get_bool("accel", true);
+  if (path.empty()) return nullptr;  // already reported
+  try {
+    return make_bitmap_texture(read_image(path), settings);
+  } catch (const Error& error) {
+    parameters.error_at("filename", error.what());
+    return nullptr;
+  }
+}
+
+}  // namespace covary

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// Textures made of an image. Texel (x, y), y counted from the top row of the picture, has its centre at
+// ((x + 0.5) / width, (y + 0.5) / height) in texture coordinates: v = 0 is the top row.
+#pragma once
+
+#include "scene/texture.h"
+#include "textures/image.h"
+#include "textures/uv_transform.h"
+
+namespace covary {
+
+enum class WrapMode { kRepeat, kMirror, kClamp };
+enum class FilterType { kBilinear, kNearest };
+
+struct BitmapSettings {
+  bool raw = false;  ///< integer files hold linear values: no sRGB decoding
+  FilterType filter = FilterType::kBilinear;
+  WrapMode wrap = WrapMode::kRepeat;
+  UvTransform to_uv;  ///< from surface parameters to texture coordinates
+};
+
+/// Texture that looks values up in `image`, which has at least one pixel. Positions are sampled exactly in proportion
+/// to the interpolated luminance where to_uv maps the unit square onto itself, uniformly otherwise.
+std::shared_ptr<Texture> make_bitmap_texture(Image image, const BitmapSettings& settings);
+
+}  // namespace covary

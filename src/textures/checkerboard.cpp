@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// `checkerboard`: two by two squares per unit of (u, v), after Mitsuba 3's plugin of this name.
+//
+// | parameter | type             | default  | meaning                                        |
+// |-----------|------------------|----------|------------------------------------------------|
+// | color0    | colour, texture  | 0.4      | squares on the diagonal, (0, 0) among them     |
+// | color1    | colour, texture  | 0.2      | the other squares                              |
+// | to_uv     | transform        | identity | from surface parameters to texture coordinates |
+#include "textures/registry.h"
+#include "textures/uv_transform.h"
+
+namespace covary {
+namespace {
+
+class Checkerboard final : public Texture {
+ public:
+  Checkerboard(TexturePtr color0, TexturePtr color1, const UvTransform& to_uv)
+      : color0_(std::move(color0)), color1_(std::move(color1)), to_uv_(to_uv) {}
+
+  Spectrum eval(const SurfaceHit& hit) const override { return at(hit).eval(hit); }
+  float eval_1(const SurfaceHit& hit) const override { return at(hit).eval_1(hit); }
+  /// Of the square's own texture: the edges between squares have no derivative.
+  Vec2 grad_1(const SurfaceHit& hit) const override { return at(hit).grad_1(hit); }
+  float mean() const override { return 0.5f * (color0_->mean() + color1_->mean()); }
+
+ private:
+  const Texture& at(const SurfaceHit& hit) const {
+    const Vec2 st = to_uv_.apply(hit.uv);
+    const bool right = st.x - std::floor(st.x) > 0.5f, lower = st.y - std::floor(st.y) > 0.5f;
+    return right == lower ? *color0_ : *color1_;
+  }
+
+  TexturePtr color0_, color1_;
+  UvTransform to_uv_;
+};
+
+}  // namespace
+
+std::shared_ptr<Texture> make_checkerboard(Parameters& parameters) {
+  TexturePtr color0 = parameters.get_texture("color0", 0.4f), color1 = parameters.get_texture("color1", 0.2f);
+  const UvTransform to_uv(parameters.get_transform("to_uv"));
+  return std::make_shared<Checkerboard>(std::move(color0), std::move(color1), to_uv);
+}
+
+}  // namespace covary
