@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Light emitted by a surface. The shape owns its light (Shape::set_emitter); the light only refers to the shape. A scene
-// file may use one description for several shapes: each shape then gets its own clone, which shares the texture.
+// Light emitted by a surface. The shape owns its light (Shape::set_emitter); the light only refers to the shape. A
+// scene file may use one description for several shapes: each shape then gets its own clone, which shares the texture.
 //
 //     auto light = prototype.clone();
 //     light->attach(shape.get());
@@ -28,6 +28,8 @@ class AreaLight final : public Emitter {
   const Shape* shape() const { return shape_; }
 
   Spectrum surface_radiance(const SurfaceHit& hit, const Vec3& w) const override;
+  /// Textured lights on shapes whose (u, v) cover the unit square (Shape::sample_uv): positions in proportion to the
+  /// texture's luminance. All others: as the shape likes best from the reference point.
   EmitterSample sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const override;
   float pdf_solid_angle(const Vec3& reference, const SurfaceHit& hit) const override;
   EmissionSample sample_emission(Vec2 u_position, Vec2 u_direction, float u_primitive) const override;
@@ -35,20 +37,14 @@ class AreaLight final : public Emitter {
   Spectrum power() const override;
 
  private:
-  /// How points are chosen on the surface.
-  enum class Strategy {
-    kShape,  ///< constant radiance: as the shape likes best from the reference point
-    kUv,     ///< textured, on a shape whose (u, v) cover the unit square: proportional to the texture's luminance
-    kArea,   ///< textured, other shapes: uniform by area
-  };
-  /// A point chosen by position only (kUv, kArea), with its density per unit area.
+  /// A point chosen by position only, with its density per unit area.
   AreaSample sample_position(Vec2 u, float u_primitive) const;
-  Spectrum radiance_at(const AreaSample& at) const;
+  Spectrum radiance_at(const Vec3& p, const Vec3& n, Vec2 uv) const;
 
   TexturePtr radiance_;
   Spectrum constant_;  // the radiance where it does not vary
   bool textured_;
-  Strategy strategy_ = Strategy::kShape;
+  bool samples_uv_ = false;
   const Shape* shape_ = nullptr;
 };
 

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+// `area`: a surface that emits light, nested in a shape.
+//
+// | parameter | type            | default | meaning                                                   |
+// |-----------|-----------------|---------|-----------------------------------------------------------|
+// | radiance  | colour, texture | 1       | emitted on the side of the shape's (perhaps flipped) normal |
+#include "emitters/area.h"
+
+#include "core/warp.h"
+#include "emitters/registry.h"
+
+namespace covary {
+
+AreaLight::AreaLight(TexturePtr radiance) : radiance_(std::move(radiance)), textured_(!radiance_->is_constant()) {
+  if (!textured_) constant_ = radiance_->eval(SurfaceHit{});
+}
+
+void AreaLight::attach(const Shape* shape) {
+  COVARY_CHECK(shape != nullptr && shape_ == nullptr, "an area light belongs to exactly one shape");
+  shape_ = shape;
+  samples_uv_ = textured_ && shape->sample_uv({0.5f, 0.5f}).pdf_area > 0;
+}
+
+Spectrum AreaLight::surface_radiance(const SurfaceHit& hit, const Vec3& w) const {
+  if (!(dot(hit.ng, w) > 0)) return Spectrum();
+  return textured_ ? radiance_->eval(hit) : constant_;
+}
+
+Spectrum AreaLight::radiance_at(const Vec3& p, const Vec3& n, Vec2 uv) const {
+  if (!textured_) return constant_;
+  SurfaceHit hit;
+  hit.p = p, hit.ng = n, hit.frame = Frame(n), hit.uv = uv, hit.shape = shape_;
+  return radiance_->eval(hit);
+}
+
+AreaSample AreaLight::sample_position(Vec2 u, float u_primitive) const {
+  if (!samples_uv_) return shape_->sample_area(u, u_primitive);
+  const Texture::PositionSample position = radiance_->sample_position(u);
+  AreaSample area = shape_->sample_uv(position.uv);
+  area.pdf_area *= position.pdf;
+  return area;
+}
+
+EmitterSample AreaLight::sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const {
+  EmitterSample sample;
+  if (samples_uv_) {
+    const AreaSample area = sample_position(u, u_primitive);
+    const Vec3 d = area.p - reference;
+    const float distance_squared = length_squared(d);
+    if (!(distance_squared > 0)) return sample;
+    sample.distance = std::sqrt(distance_squared);
+    sample.wi = d * (1 / sample.distance);
+    sample.p = area.p, sample.n = area.n, sample.uv = area.uv;
+    // Density per unit area to density per unit solid angle.
+    sample.pdf_solid_angle = area.pdf_area * distance_squared / std::abs(dot(sample.wi, area.n));
+  } else {
+    sample = shape_->sample_towards(reference, u, u_primitive);
+  }
+  if (!(sample.pdf_solid_angle > 0 && sample.pdf_solid_angle < kInfinity)) return EmitterSample{};
+  if (dot(sample.n, sample.wi) < 0) sample.radiance = radiance_at(sample.p, sample.n, sample.uv);
+  return sample;
+}
+
+float AreaLight::pdf_solid_angle(const Vec3& reference, const SurfaceHit& hit) const {
+  if (!samples_uv_) return shape_->pdf_solid_angle(reference, hit);
+  const Vec3 d = hit.p - reference;
+  const float distance_squared = length_squared(d);
+  const float cosine = std::abs(dot(d, hit.ng)) / std::sqrt(distance_squared);
+  const float pdf_area = radiance_->pdf_position(hit.uv) * shape_->sample_uv(hit.uv).pdf_area;
+  return cosine > 0 ? pdf_area * distance_squared / cosine : 0;
+}
+
+EmissionSample AreaLight::sample_emission(Vec2 u_position, Vec2 u_direction, float u_primitive) const {
+  EmissionSample sample;
+  const AreaSample area = sample_position(u_position, u_primitive);
+  const Vec3 w = warp::square_to_cosine_hemisphere(u_direction);
+  if (!(area.pdf_area > 0) || !(w.z > 0)) return sample;
+  sample.ray = {area.p, Frame(area.n).to_world(w)};
+  sample.n = area.n;
+  sample.radiance = radiance_at(area.p, area.n, area.uv);
+  sample.pdf_position = area.pdf_area;
+  sample.pdf_direction = warp::cosine_hemisphere_pdf_solid_angle(w.z);
+  return sample;
+}
+
+Spectrum AreaLight::power() const {
+  if (!textured_) return constant_ * (kPi * shape_->area());
+  // Mean of radiance over density, at points of the plastic-number lattice in three dimensions (Roberts 2018), which
+  // cover the cube evenly.
+  constexpr int kPoints = 4096;
+  constexpr double kPlastic = 1.22074408460575947536;  // positive root of x^4 = x + 1
+  double sum[3] = {0, 0, 0};
+  for (int i = 0; i < kPoints; ++i) {
+    double x[3], step = 1;
+    for (double& coordinate : x) {
+      step /= kPlastic;
+      coordinate = 0.5 + step * i;
+      coordinate -= std::floor(coordinate);
+    }
+    const Vec2 u = {static_cast<float>(x[0]) * kOneMinusEpsilon, static_cast<float>(x[1]) * kOneMinusEpsilon};
+    const AreaSample at = sample_position(u, static_cast<float>(x[2]) * kOneMinusEpsilon);
+    if (!(at.pdf_area > 0)) continue;
+    const Spectrum radiance = radiance_at(at.p, at.n, at.uv);
+    for (int c = 0; c < 3; ++c) sum[c] += radiance[c] / at.pdf_area;
+  }
+  const double scale = static_cast<double>(kPi) / kPoints;
+  return {static_cast<float>(sum[0] * scale), static_cast<float>(sum[1] * scale), static_cast<float>(sum[2] * scale)};
+}
+
+std::shared_ptr<Emitter> make_area(Parameters& parameters) {
+  TexturePtr radiance = parameters.get_texture("radiance", Spectrum(1), SpectrumRole::kEmission);
+  if (!radiance) return nullptr;  // already reported
+  return std::make_shared<AreaLight>(std::move(radiance));
+}
+
+}  // namespace covary

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// `constant`: the same radiance from all directions.
+//
+// | parameter | type   | default | meaning  |
+// |-----------|--------|---------|----------|
+// | radiance  | colour | 1       | radiance |
+#include "core/warp.h"
+#include "emitters/registry.h"
+#include "emitters/scene_sphere.h"
+
+namespace covary {
+namespace {
+
+class ConstantLight final : public Emitter {
+ public:
+  explicit ConstantLight(const Spectrum& radiance) : radiance_(radiance) {}
+
+  void set_scene_bounds(const Bounds3& bounds) override { scene_ = SceneSphere(bounds); }
+  bool is_environment() const override { return true; }
+  Spectrum environment_radiance(const Vec3&) const override { return radiance_; }
+  float environment_pdf_solid_angle(const Vec3&) const override { return warp::sphere_pdf_solid_angle(); }
+
+  EmitterSample sample_towards(const Vec3&, Vec2 u, float) const override {
+    EmitterSample sample;
+    sample.wi = warp::square_to_sphere(u);
+    sample.radiance = radiance_;
+    sample.pdf_solid_angle = warp::sphere_pdf_solid_angle();
+    return sample;
+  }
+
+  EmissionSample sample_emission(Vec2 u_position, Vec2 u_direction, float) const override {
+    EmissionSample sample;
+    const Vec3 d = warp::square_to_sphere(u_direction);
+    sample.ray = {scene_.disk_point(d, u_position), d};
+    sample.n = d;
+    sample.radiance = radiance_;
+    sample.pdf_position = 1 / scene_.disk_area();
+    sample.pdf_direction = warp::sphere_pdf_solid_angle();
+    return sample;
+  }
+
+  Spectrum power() const override { return radiance_ * (4 * kPi * scene_.disk_area()); }
+
+ private:
+  Spectrum radiance_;
+  SceneSphere scene_;
+};
+
+}  // namespace
+
+std::shared_ptr<Emitter> make_constant(Parameters& parameters) {
+  parameters.get_transform("to_world");  // harmless: nothing to rotate
+  return std::make_shared<ConstantLight>(parameters.get_spectrum("radiance", Spectrum(1), SpectrumRole::kEmission));
+}
+
+}  // namespace covary

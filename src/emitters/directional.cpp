@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+// `directional`: parallel light from infinitely far away.
+//
+// | parameter  | type      | default  | meaning                                                        |
+// |------------|-----------|----------|----------------------------------------------------------------|
+// | irradiance | colour    | 1        | on a surface that faces the light                              |
+// | direction  | vector    | (0,0,1)  | the way the light travels; not together with to_world          |
+// | to_world   | transform | identity | the light travels along the image of the z axis                |
+#include "emitters/registry.h"
+#include "emitters/scene_sphere.h"
+
+namespace covary {
+namespace {
+
+class DirectionalLight final : public Emitter {
+ public:
+  DirectionalLight(const Vec3& direction, const Spectrum& irradiance)
+      : direction_(direction), irradiance_(irradiance) {}
+
+  void set_scene_bounds(const Bounds3& bounds) override { scene_ = SceneSphere(bounds); }
+  bool is_delta() const override { return true; }
+
+  EmitterSample sample_towards(const Vec3&, Vec2, float) const override {
+    EmitterSample sample;
+    sample.wi = -direction_;
+    sample.radiance = irradiance_;
+    sample.pdf_solid_angle = 1;
+    sample.is_delta = true;
+    return sample;
+  }
+
+  EmissionSample sample_emission(Vec2 u_position, Vec2, float) const override {
+    EmissionSample sample;
+    sample.ray = {scene_.disk_point(direction_, u_position), direction_};
+    sample.n = direction_;
+    sample.radiance = irradiance_;
+    sample.pdf_position = 1 / scene_.disk_area();
+    sample.pdf_direction = 1;
+    sample.delta_direction = true;
+    return sample;
+  }
+
+  Spectrum power() const override { return irradiance_ * scene_.disk_area(); }
+
+ private:
+  Vec3 direction_;
+  Spectrum irradiance_;
+  SceneSphere scene_;
+};
+
+}  // namespace
+
+std::shared_ptr<Emitter> make_directional(Parameters& parameters) {
+  if (parameters.has("direction") && parameters.has("to_world"))
+    parameters.error_at("direction", "give either 'direction' or 'to_world', not both");
+  Vec3 direction = parameters.get_vec3("direction", parameters.get_transform("to_world").vector({0, 0, 1}));
+  if (!(length_squared(direction) > 0)) {
+    parameters.error_at("direction", "the direction has length zero");
+    direction = {0, 0, 1};
+  }
+  return std::make_shared<DirectionalLight>(
+      normalize(direction), parameters.get_spectrum("irradiance", Spectrum(1), SpectrumRole::kEmission));
+}
+
+}  // namespace covary

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+// `envmap`: light from infinitely far away, given by an image in latitude-longitude format; see environment_image.h for
+// the mapping and the sampling.
+//
+// | parameter        | type      | default  | meaning                                                              |
+// |------------------|-----------|----------|----------------------------------------------------------------------|
+// | filename         | string    | required | image, as for the texture `bitmap`; the top row lies around +y       |
+// | scale            | float     | 1        | factor, not negative                                                 |
+// | to_world         | transform | identity | rotation of the map                                                  |
+// | mis_compensation | boolean   | false    | sample only what is brighter than the mean; right only for           |
+// |                  |           |          | integrators that combine it with the sampling of the surface         |
+#include "emitters/environment_image.h"
+#include "emitters/registry.h"
+#include "emitters/rotation.h"
+#include "emitters/scene_sphere.h"
+
+namespace covary {
+namespace {
+
+class EnvironmentMap final : public Emitter {
+ public:
+  EnvironmentMap(EnvironmentImage image, const Rotation& rotation) : image_(std::move(image)), rotation_(rotation) {}
+
+  void set_scene_bounds(const Bounds3& bounds) override { scene_ = SceneSphere(bounds); }
+  bool is_environment() const override { return true; }
+
+  Spectrum environment_radiance(const Vec3& d) const override { return image_.lookup(rotation_.to_local(d)).value; }
+  float environment_pdf_solid_angle(const Vec3& d) const override {
+    return image_.lookup(rotation_.to_local(d)).pdf_solid_angle;
+  }
+
+  EmitterSample sample_towards(const Vec3&, Vec2 u, float) const override {
+    const EnvironmentImage::Sample from = image_.sample(u);
+    EmitterSample sample;
+    sample.wi = rotation_.to_world(from.d);
+    sample.radiance = from.value;
+    sample.pdf_solid_angle = from.pdf_solid_angle;
+    return sample;
+  }
+
+  EmissionSample sample_emission(Vec2 u_position, Vec2 u_direction, float) const override {
+    const EnvironmentImage::Sample from = image_.sample(u_direction);
+    EmissionSample sample;
+    const Vec3 d = -rotation_.to_world(from.d);
+    sample.ray = {scene_.disk_point(d, u_position), d};
+    sample.n = d;
+    sample.radiance = from.value;
+    sample.pdf_position = 1 / scene_.disk_area();
+    sample.pdf_direction = from.pdf_solid_angle;
+    return sample;
+  }
+
+  Spectrum power() const override { return image_.integral() * scene_.disk_area(); }
+
+ private:
+  EnvironmentImage image_;
+  Rotation rotation_;
+  SceneSphere scene_;
+};
+
+}  // namespace
+
+std::shared_ptr<Emitter> make_envmap(Parameters& parameters) {
+  const std::string path = parameters.require_file("filename");
+  const float scale = parameters.get_float("scale", 1, 0);
+  const bool mis_compensation = parameters.get_bool("mis_compensation", false);
+  Rotation rotation;
+  const Transform to_world = parameters.get_transform("to_world");
+  try {
+    rotation = Rotation(to_world);
+  } catch (const Error& error) {
+    parameters.error_at("to_world", error.what());
+  }
+  if (path.empty()) return nullptr;  // already reported
+  try {
+    return std::make_shared<EnvironmentMap>(EnvironmentImage(read_linear_rgb(path), scale, mis_compensation), rotation);
+  } catch (const Error& error) {
+    parameters.error_at("filename", error.what());
+    return nullptr;
+  }
+}
+
+}  // namespace covary

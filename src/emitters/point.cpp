@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// `point`: light from one point, equally in all directions.
+//
+// | parameter | type      | default  | meaning                                      |
+// |-----------|-----------|----------|----------------------------------------------|
+// | intensity | colour    | 1        | power per unit solid angle                   |
+// | position  | point     | (0,0,0)  | where it stands; not together with to_world  |
+// | to_world  | transform | identity | the point is the image of the origin         |
+#include "core/warp.h"
+#include "emitters/registry.h"
+
+namespace covary {
+namespace {
+
+class PointLight final : public Emitter {
+ public:
+  PointLight(const Vec3& position, const Spectrum& intensity) : position_(position), intensity_(intensity) {}
+
+  bool is_delta() const override { return true; }
+
+  EmitterSample sample_towards(const Vec3& reference, Vec2, float) const override {
+    EmitterSample sample;
+    const Vec3 d = position_ - reference;
+    const float distance_squared = length_squared(d);
+    if (!(distance_squared > 0)) return sample;
+    sample.distance = std::sqrt(distance_squared);
+    sample.wi = d * (1 / sample.distance);
+    sample.p = position_, sample.n = -sample.wi;
+    sample.radiance = intensity_ * (1 / distance_squared);
+    sample.pdf_solid_angle = 1;
+    sample.is_delta = true;
+    return sample;
+  }
+
+  EmissionSample sample_emission(Vec2, Vec2 u_direction, float) const override {
+    EmissionSample sample;
+    sample.ray = {position_, warp::square_to_sphere(u_direction)};
+    sample.n = sample.ray.d;
+    sample.radiance = intensity_;
+    sample.pdf_position = 1;
+    sample.pdf_direction = warp::sphere_pdf_solid_angle();
+    sample.delta_position = true;
+    return sample;
+  }
+
+  Spectrum power() const override { return intensity_ * (4 * kPi); }
+
+ private:
+  Vec3 position_;
+  Spectrum intensity_;
+};
+
+}  // namespace
+
+std::shared_ptr<Emitter> make_point(Parameters& parameters) {
+  if (parameters.has("position") && parameters.has("to_world"))
+    parameters.error_at("position", "give either 'position' or 'to_world', not both");
+  const Vec3 position = parameters.get_vec3("position", parameters.get_transform("to_world").point({0, 0, 0}));
+  return std::make_shared<PointLight>(position,
+                                      parameters.get_spectrum("intensity", Spectrum(1), SpectrumRole::kEmission));
+}
+
+}  // namespace covary

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "emitters/registry.h"
+
+namespace covary {
+
+std::span<const Plugin<Emitter>> emitter_plugins() {
+  static constexpr Plugin<Emitter> kPlugins[] = {
+      {"area", make_area},     {"constant", make_constant}, {"directional", make_directional},
+      {"envmap", make_envmap}, {"point", make_point},       {"spot", make_spot},
+  };
+  return kPlugins;
+}
+
+}  // namespace covary

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "core/transform.h"
+
+namespace covary {
+
+/// Rotation or reflection of directions: what `to_world` does to a light that has no size. Keeps lengths.
+class Rotation {
+ public:
+  Rotation() = default;
+  /// The linear part of `t` without its uniform scale. Throws Error(kInput) when it is not a similarity, because
+  /// directions would then be distorted.
+  explicit Rotation(const Transform& t);
+  Vec3 to_world(const Vec3& v) const { return x_ * v.x + y_ * v.y + z_ * v.z; }
+  Vec3 to_local(const Vec3& v) const { return {dot(x_, v), dot(y_, v), dot(z_, v)}; }
+
+ private:
+  Vec3 x_{1, 0, 0}, y_{0, 1, 0}, z_{0, 0, 1};  // images of the axes
+};
+
+}  // namespace covary

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+// `spot`: light from one point into a cone around the z axis. The intensity is constant up to beam_width and falls
+// linearly in the angle to zero at cutoff_angle.
+//
+// | parameter    | type      | default          | meaning                                                       |
+// |--------------|-----------|------------------|---------------------------------------------------------------|
+// | intensity    | colour    | 1                | power per unit solid angle in the middle                      |
+// | cutoff_angle | float     | 20               | half angle of the cone in degrees, in (0, 180)                |
+// | beam_width   | float     | 0.75 * cutoff    | half angle of full intensity in degrees, up to cutoff_angle   |
+// | texture      | texture   | none             | projected factor; its unit square spans the cone (cutoff < 90) |
+// | to_world     | transform | identity         | the light stands at the image of the origin                   |
+#include "core/warp.h"
+#include "emitters/registry.h"
+#include "emitters/rotation.h"
+
+namespace covary {
+namespace {
+
+struct SpotSettings {
+  Vec3 position;
+  Rotation rotation;
+  Spectrum intensity;
+  float cutoff = 0, beam_width = 0;  // radians, 0 <= beam_width <= cutoff
+  TexturePtr texture;                // or null
+};
+
+class SpotLight final : public Emitter {
+ public:
+  explicit SpotLight(SpotSettings settings)
+      : s_(std::move(settings)),
+        cos_cutoff_(std::cos(s_.cutoff)),
+        cos_beam_(std::cos(s_.beam_width)),
+        one_minus_cos_cutoff_(2 * sqr(std::sin(s_.cutoff / 2))) {}
+
+  bool is_delta() const override { return true; }
+
+  EmitterSample sample_towards(const Vec3& reference, Vec2, float) const override {
+    EmitterSample sample;
+    const Vec3 d = s_.position - reference;
+    const float distance_squared = length_squared(d);
+    if (!(distance_squared > 0)) return sample;
+    sample.distance = std::sqrt(distance_squared);
+    sample.wi = d * (1 / sample.distance);
+    sample.p = s_.position, sample.n = -sample.wi;
+    sample.radiance = intensity(s_.rotation.to_local(-sample.wi)) * (1 / distance_squared);
+    sample.pdf_solid_angle = 1;
+    sample.is_delta = true;
+    return sample;
+  }
+
+  /// Uniform in the cone.
+  EmissionSample sample_emission(Vec2, Vec2 u_direction, float) const override {
+    EmissionSample sample;
+    const Vec3 local = warp::square_to_cone(u_direction, one_minus_cos_cutoff_);
+    sample.ray = {s_.position, s_.rotation.to_world(local)};
+    sample.n = sample.ray.d;
+    sample.radiance = intensity(local);
+    sample.pdf_position = 1;
+    sample.pdf_direction = warp::cone_pdf_solid_angle(one_minus_cos_cutoff_);
+    sample.delta_position = true;
+    return sample;
+  }
+
+  Spectrum power() const override {
+    const float c = s_.cutoff, b = s_.beam_width;
+    if (!s_.texture) {
+      // 2 pi times the integral of sin(t) up to b and of sin(t) (c - t) / (c - b) from b to c.
+      const float mean_cosine = c - b > 1e-4f ? (std::sin(c) - std::sin(b)) / (c - b) : std::cos(c);
+      return s_.intensity * (kTwoPi * (1 - mean_cosine));
+    }
+    constexpr int kGrid = 64;
+    Spectrum sum;
+    for (int y = 0; y < kGrid; ++y)
+      for (int x = 0; x < kGrid; ++x)
+        sum += intensity(warp::square_to_cone({(x + 0.5f) / kGrid, (y + 0.5f) / kGrid}, one_minus_cos_cutoff_));
+    return sum * (kTwoPi * one_minus_cos_cutoff_ / (kGrid * kGrid));
+  }
+
+ private:
+  /// Power per unit solid angle in the unit direction `local` away from the light.
+  Spectrum intensity(const Vec3& local) const {
+    if (!(local.z > cos_cutoff_)) return Spectrum();
+    float falloff = 1;
+    if (local.z < cos_beam_) falloff = (s_.cutoff - std::acos(local.z)) / (s_.cutoff - s_.beam_width);
+    const Spectrum value = s_.intensity * std::max(falloff, 0.0f);
+    if (!s_.texture) return value;
+    SurfaceHit hit;
+    const float scale = 0.5f / (local.z * std::tan(s_.cutoff));
+    hit.uv = {0.5f + local.x * scale, 0.5f + local.y * scale};
+    return value * s_.texture->eval(hit);
+  }
+
+  SpotSettings s_;
+  float cos_cutoff_, cos_beam_, one_minus_cos_cutoff_;
+};
+
+}  // namespace
+
+std::shared_ptr<Emitter> make_spot(Parameters& parameters) {
+  SpotSettings settings;
+  settings.intensity = parameters.get_spectrum("intensity", Spectrum(1), SpectrumRole::kEmission);
+  float cutoff = parameters.get_float("cutoff_angle", 20, 0, 180);
+  const float beam_width = parameters.get_float("beam_width", 0.75f * cutoff, 0, 180);
+  settings.texture = parameters.find_texture("texture");
+  const Transform to_world = parameters.get_transform("to_world");
+  if (!(cutoff > 0 && cutoff < 180) || (settings.texture && cutoff >= 90)) {
+    parameters.error_at("cutoff_angle", settings.texture
+                                            ? "must lie between 0 and 90 degrees for a light with a texture"
+                                            : "must lie between 0 and 180 degrees");
+    cutoff = 20;
+  }
+  if (beam_width > cutoff) parameters.error_at("beam_width", "must not exceed cutoff_angle");
+  settings.cutoff = cutoff * (kPi / 180);
+  settings.beam_width = std::min(beam_width, cutoff) * (kPi / 180);
+  settings.position = to_world.point({0, 0, 0});
+  try {
+    settings.rotation = Rotation(to_world);
+  } catch (const Error& error) {
+    parameters.error_at("to_world", error.what());
+  }
+  return std::make_shared<SpotLight>(std::move(settings));
+}
+
+}  // namespace covary
