@@ -22,15 +22,15 @@ struct LoadOptions {
 
 struct LoadedScene {
   std::unique_ptr<Scene> scene;
-  int width = 0, height = 0;                   ///< full frame
+  int width = 0, height = 0;  ///< full frame
   int crop_x = 0, crop_y = 0, crop_width = 0, crop_height = 0;
   FilterSettings filter;
-  int spp = 4;                                 ///< of the scene's sampler
-  std::string integrator_type;                 ///< "" when the file names none
+  int spp = 4;                  ///< of the scene's sampler
+  std::string integrator_type;  ///< "" when the file names none
   std::shared_ptr<SceneObject> integrator;
   std::vector<std::string> warnings;
-  double read_seconds = 0;                     ///< parsing and reading files; Scene::build_seconds() comes on top
-  std::string content_hash;                    ///< hex; over the scene's XML, defines and all files it reads
+  double read_seconds = 0;   ///< parsing and reading files; Scene::build_seconds() comes on top
+  std::string content_hash;  ///< hex; over the scene's XML, defines and all files it reads
 };
 
 /// Reads a Mitsuba XML scene. Throws Error(kInput) with every problem of the file, or Error(kIo).

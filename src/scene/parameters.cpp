@@ -80,11 +80,13 @@ Parameters::Parameters(const ObjectDescription& object, ObjectFactory& factory, 
 
 const Property* Parameters::find(const std::string& name) {
   if (std::find(known_.begin(), known_.end(), name) == known_.end()) known_.push_back(name);
-  for (size_t i = 0; i < object_.properties.size(); ++i)
-    if (object_.properties[i].name == name) {
-      used_[i] = true;
-      return &object_.properties[i];
-    }
+  for (size_t i = 0; i < object_.properties.size(); ++i) {
+    const Property& property = object_.properties[i];
+    if (property.name != name) continue;
+    used_[i] = true;
+    const ObjectPtr* object = std::get_if<ObjectPtr>(&property.value);
+    return object && !*object ? nullptr : &property;  // null: a value that was reported as wrong when it was read
+  }
   return nullptr;
 }
 
@@ -168,7 +170,7 @@ std::string Parameters::get_choice(const std::string& name, const std::string& f
 
 std::string Parameters::require_string(const std::string& name) {
   if (find(name)) return get_string(name, "");
-  error(fmt::format("the string '{}' is missing", name));
+  if (!has(name)) error(fmt::format("the string '{}' is missing", name));
   return "";
 }
 
@@ -219,7 +221,6 @@ TexturePtr Parameters::find_texture(const std::string& name, SpectrumRole role) 
     }
     return std::make_shared<ConstantTexture>(get_spectrum(name, Spectrum(0), role));
   }
-  if (!*object) return nullptr;  // an unresolved reference, already reported
   if ((*object)->kind != "texture") {
     error_at(name, "must be a texture, float, rgb colour or spectrum, not " + type_name(property->value));
     return nullptr;
@@ -264,7 +265,7 @@ void Parameters::report_unknown() {
     if (used_[i]) continue;
     const Property& property = object_.properties[i];
     const ObjectPtr* object = std::get_if<ObjectPtr>(&property.value);
-    if (object && !*object) continue;  // an unresolved reference, already reported
+    if (object && !*object) continue;  // a value that was reported as wrong when it was read
     if (property.name.empty()) {
       const std::string nested = object ? subject(**object) : type_name(property.value);
       diagnostics_.error(property.where, fmt::format("{} cannot hold {}", subject(object_), nested));

@@ -55,6 +55,8 @@ struct ColourValue { Spectrum rgb; };
 struct ObjectDescription;
 using ObjectPtr = std::shared_ptr<const ObjectDescription>;
 
+/// A null ObjectPtr stands for a value that could not be read; the reason is in the diagnostics, and getters then behave
+/// as if the parameter were absent.
 using Value = std::variant<bool, int64_t, double, std::string, Vec3, ColourValue, SampledSpectrum, Transform, ObjectPtr>;
 
 struct Property {

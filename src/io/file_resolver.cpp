@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/file_resolver.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+
+namespace covary {
+namespace fs = std::filesystem;
+
+void FileResolver::add_folder(const std::string& folder) { folders_.insert(folders_.begin(), folder); }
+
+std::string FileResolver::resolve(const std::string& name, const SourceLocation& where, Diagnostics& diagnostics) {
+  std::vector<fs::path> candidates;
+  if (fs::path(name).is_absolute()) {
+    candidates.emplace_back(name);
+  } else {
+    for (const std::string& folder : folders_) candidates.push_back(fs::path(folder) / name);
+    candidates.push_back(fs::path(where.file).parent_path() / name);
+  }
+  std::error_code ignored;
+  for (const fs::path& candidate : candidates)
+    if (fs::is_regular_file(candidate, ignored)) {
+      const std::lock_guard lock(mutex_);
+      files_.emplace(candidate.string(), name);
+      return candidate.string();
+    }
+
+  // Suggest what lies in the folder the name points into.
+  std::vector<std::string> neighbours;
+  std::string searched;
+  for (size_t i = 0; i < candidates.size(); ++i) {
+    const fs::path folder = candidates[i].parent_path();
+    const std::string shown = folder.empty() ? "." : folder.string();
+    if (searched.find("'" + shown + "'") != std::string::npos) continue;
+    searched += (searched.empty() ? "'" : ", '") + shown + "'";
+    size_t looked_at = 0;
+    for (fs::directory_iterator it(folder.empty() ? fs::path(".") : folder, ignored), end; !ignored && it != end;
+         it.increment(ignored)) {
+      if (++looked_at > 2000) break;
+      neighbours.push_back((fs::path(name).parent_path() / it->path().filename()).string());
+    }
+  }
+  diagnostics.error(where, fmt::format("file '{}' not found in {}{}", name, searched, did_you_mean(name, neighbours)));
+  return "";
+}
+
+std::map<std::string, std::string> FileResolver::files() const {
+  const std::lock_guard lock(mutex_);
+  return files_;
+}
+
+}  // namespace covary

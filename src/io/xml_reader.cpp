@@ -1,0 +1,528 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/xml_reader.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <filesystem>
+#include <unordered_map>
+#include <unordered_set>
+
+#include "io/content_hash.h"
+#include "io/file_view.h"
+#include "io/spectrum_objects.h"
+#include "io/upgrade.h"
+#include "io/xml_document.h"
+#include "io/xml_values.h"
+
+namespace covary {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr int kMaxIncludeDepth = 15;
+constexpr int kMaxNesting = 64;
+
+const std::vector<std::string> kObjectTags = {"scene",  "bsdf",  "texture", "emitter",    "shape",
+                                              "sensor", "film",  "rfilter", "integrator", "sampler",
+                                              "medium", "phase", "volume",  "subsurface"};
+const std::vector<std::string> kOtherTags = {"boolean", "integer", "float",    "string",    "point",   "vector",
+                                             "rgb",     "srgb",    "spectrum", "blackbody", "include", "alias",
+                                             "default", "path",    "ref",      "transform"};
+const std::vector<std::string> kTransformTags = {"translate", "rotate",  "scale", "lookat",
+                                                 "lookAt",    "look_at", "matrix"};
+
+bool contains(const std::vector<std::string>& names, std::string_view name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+Vec3 to_vec3(const std::vector<double>& v) {
+  return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
+}
+
+/// Any direction orthogonal to `d`.
+Vec3 some_orthogonal(const Vec3& d) { return std::abs(d.x) > std::abs(d.y) ? Vec3{-d.z, 0, d.x} : Vec3{0, d.z, -d.y}; }
+
+class Reader {
+ public:
+  Reader(const std::map<std::string, std::string>& defines, FileResolver& files, Diagnostics& diagnostics)
+      : defines_(defines), files_(files), diagnostics_(diagnostics) {
+    for (const auto& [name, value] : defines) digest_ += name + "=" + value + "\n";
+  }
+
+  SceneXml read(std::string_view text, const std::string& name) {
+    const std::string folder = fs::path(name).parent_path().string();
+    files_.add_folder(folder.empty() ? "." : folder);
+    auto holder = std::make_shared<ObjectDescription>();
+    read_document(text, name, *holder, 0);
+    SceneXml result;
+    if (!holder->properties.empty()) {
+      resolve_references();
+      break_cycles();
+      evaluate_spectra();
+      defines_.report_unused(name, diagnostics_);
+      result.scene = std::get<ObjectPtr>(holder->properties[0].value);
+    }
+    result.hash = hash_bytes(digest_);
+    return result;
+  }
+
+ private:
+  struct Document {
+    XmlDocument xml;
+    bool old;  // of version 0.x or 1.x
+  };
+  struct Alias {
+    std::string id, as;
+    SourceLocation where;
+  };
+
+  // ---- files ----
+
+  void read_document(std::string_view text, const std::string& name, ObjectDescription& parent, int depth) {
+    digest_ += hash_text(hash_bytes(text)) + "\n";
+    Document document{{text, name, diagnostics_}, false};
+    const pugi::xml_node root = document.xml.root();
+    if (!root) return;
+    const SourceLocation where = document.xml.where(root);
+    if (depth == 0 && std::string_view(root.name()) != "scene") {
+      diagnostics_.error(where, fmt::format("the root element is <{}>; a scene file starts with <scene>", root.name()));
+      return;
+    }
+    if (!contains(kObjectTags, root.name())) {
+      diagnostics_.error(where, fmt::format("the root element of an included file cannot be <{}>", root.name()));
+      return;
+    }
+    document.old = read_version(root, where) < 2;
+    if (depth > 0 && std::string_view(root.name()) == "scene") {
+      check_root_attributes(root, where);
+      read_children(document, root, parent, depth, 0);  // as if the content stood in place of <include>
+    } else {
+      read_object(document, root, parent, depth, 0, true);
+    }
+  }
+
+  /// Major version of the file format; 3 after an error.
+  int read_version(pugi::xml_node root, const SourceLocation& where) {
+    const pugi::xml_attribute attribute = root.attribute("version");
+    if (!attribute) {
+      diagnostics_.error(where,
+                         fmt::format("<{}> has no attribute 'version'; add version=\"3.0.0\", or \"0.6.0\" if the "
+                                     "file uses names like 'toWorld'",
+                                     root.name()));
+      return 3;
+    }
+    const std::string_view text = attribute.value();
+    int parts[3] = {0, 0, 0};
+    const char *p = text.data(), *const end = text.data() + text.size();
+    int n = 0;
+    for (; n < 3; ++n) {
+      const auto [next, error] = std::from_chars(p, end, parts[n]);
+      if (error != std::errc() || parts[n] < 0) break;
+      p = next;
+      if (p == end) {
+        ++n;
+        break;
+      }
+      if (*p++ != '.') {
+        n = 0;
+        break;
+      }
+    }
+    if (n == 0 || p != end) {
+      diagnostics_.error(where, fmt::format("version '{}' is not of the form 3.0.0", text));
+      return 3;
+    }
+    return parts[0];
+  }
+
+  void check_root_attributes(pugi::xml_node root, const SourceLocation& where) {
+    const XmlAttributes checked(root, where, defines_, {"version", "id", "name"}, diagnostics_);
+  }
+
+  void read_include(const Document& document, pugi::xml_node node, ObjectDescription& parent, int depth) {
+    const SourceLocation where = document.xml.where(node);
+    const XmlAttributes attributes(node, where, defines_, {"!filename", "name"}, diagnostics_);
+    if (!attributes.complete()) return;
+    if (depth + 1 >= kMaxIncludeDepth) {
+      diagnostics_.error(where, fmt::format("more than {} nested includes", kMaxIncludeDepth));
+      return;
+    }
+    const std::string path = files_.resolve(attributes.get("filename"), where, diagnostics_);
+    if (path.empty()) return;
+    try {
+      const FileView file(path);
+      const size_t before = parent.properties.size();
+      read_document(file.text(), path, parent, depth + 1);
+      if (!attributes.get("name").empty() && parent.properties.size() == before + 1)
+        parent.properties.back().name = attributes.get("name");
+    } catch (const Error& error) {
+      diagnostics_.error(where, error.what());
+    }
+  }
+
+  // ---- elements ----
+
+  void read_children(const Document& document, pugi::xml_node node, ObjectDescription& object, int depth, int nesting) {
+    for (const pugi::xml_node child : node.children()) {
+      if (child.type() == pugi::node_pcdata || child.type() == pugi::node_cdata) {
+        diagnostics_.error(document.xml.where(node),
+                           fmt::format("<{}> holds text; parameters are elements", node.name()));
+        continue;
+      }
+      if (child.type() != pugi::node_element) continue;
+      const std::string_view tag = child.name();
+      if (contains(kObjectTags, tag) || (tag == "spectrum" && child.attribute("type"))) {
+        read_object(document, child, object, depth, nesting + 1, false);
+      } else if (tag == "include") {
+        read_include(document, child, object, depth);
+      } else {
+        read_property(document, child, object);
+      }
+    }
+  }
+
+  void read_object(const Document& document, pugi::xml_node node, ObjectDescription& parent, int depth, int nesting,
+                   bool root) {
+    const SourceLocation where = document.xml.where(node);
+    if (nesting > kMaxNesting) {
+      diagnostics_.error(where, fmt::format("more than {} nested objects", kMaxNesting));
+      return;
+    }
+    const bool is_scene = std::string_view(node.name()) == "scene";
+    if (is_scene && !root) {
+      diagnostics_.error(where, "<scene> can only be the root element");
+      return;
+    }
+    const XmlAttributes attributes =
+        root ? (is_scene ? XmlAttributes(node, where, defines_, {"version", "id", "name"}, diagnostics_)
+                         : XmlAttributes(node, where, defines_, {"version", "!type", "id", "name"}, diagnostics_))
+             : XmlAttributes(node, where, defines_, {"!type", "id", "name"}, diagnostics_);
+    auto object = std::make_shared<ObjectDescription>();
+    object->kind = node.name();
+    object->type = is_scene ? "scene" : attributes.get("type");
+    object->id = attributes.get("id");
+    object->where = where;
+    objects_.push_back(object);
+    if (!object->id.empty()) {
+      const auto [other, inserted] = ids_.emplace(object->id, object);
+      if (!inserted)
+        diagnostics_.error(where,
+                           fmt::format("id '{}' is used twice; first at {}", object->id, other->second->where.text()));
+    }
+    read_children(document, node, *object, depth, nesting);
+    if (document.old) upgrade_object(*object, diagnostics_);
+    // An object without a type was reported; whoever asks for it must not report it again.
+    add(parent, {attributes.get("name"), attributes.complete() ? ObjectPtr(object) : ObjectPtr(), where});
+  }
+
+  /// Everything that is not an object.
+  void read_property(const Document& document, pugi::xml_node node, ObjectDescription& owner) {
+    const std::string tag = node.name();
+    const SourceLocation where = document.xml.where(node);
+    if (tag != "transform") {
+      for (const pugi::xml_node child : node.children())
+        if (child.type() == pugi::node_element)
+          diagnostics_.error(document.xml.where(child),
+                             fmt::format("<{}> cannot stand inside <{}>", child.name(), tag));
+    }
+    if (contains(kTransformTags, tag)) {
+      diagnostics_.error(where, fmt::format("<{}> can only stand inside <transform>", tag));
+    } else if (!contains(kOtherTags, tag)) {
+      std::vector<std::string> tags = kOtherTags;
+      tags.insert(tags.end(), kObjectTags.begin(), kObjectTags.end());
+      diagnostics_.error(where, fmt::format("unknown element <{}>{}", tag, did_you_mean(tag, tags)));
+    } else if (tag == "default") {
+      const XmlAttributes attributes(node, where, defines_, {"!name", "!value"}, diagnostics_);
+      if (!attributes.complete()) return;
+      if (attributes.get("name").empty()) {
+        diagnostics_.error(where, "<default> needs a name that is not empty");
+      } else {
+        defines_.add_default(attributes.get("name"), attributes.get("value"));
+      }
+    } else if (tag == "alias") {
+      const XmlAttributes attributes(node, where, defines_, {"!id", "!as"}, diagnostics_);
+      if (attributes.complete()) aliases_.push_back({attributes.get("id"), attributes.get("as"), where});
+    } else if (tag == "path") {
+      read_path(node, where, owner);
+    } else if (tag == "ref") {
+      const XmlAttributes attributes(node, where, defines_, {"!id", "name"}, diagnostics_);
+      if (!attributes.complete()) return;
+      auto reference = std::make_shared<ObjectDescription>();  // stands in until everything is read
+      reference->kind = "ref", reference->id = attributes.get("id"), reference->where = where;
+      add(owner, {attributes.get("name"), ObjectPtr(reference), where});
+    } else {
+      read_value(document, node, owner, tag, where);
+    }
+  }
+
+  void read_path(pugi::xml_node node, const SourceLocation& where, const ObjectDescription& owner) {
+    const XmlAttributes attributes(node, where, defines_, {"!value"}, diagnostics_);
+    if (!attributes.complete()) return;
+    if (owner.kind != "scene") {
+      diagnostics_.error(where, "<path> can only stand inside <scene>");
+      return;
+    }
+    const fs::path value(attributes.get("value"));
+    const fs::path folder = value.is_absolute() ? value : fs::path(where.file).parent_path() / value;
+    std::error_code ignored;
+    if (fs::is_directory(folder, ignored)) {
+      files_.add_folder(folder.string());
+    } else {
+      diagnostics_.error(where, fmt::format("folder '{}' not found", folder.string()));
+    }
+  }
+
+  void read_value(const Document& document, pugi::xml_node node, ObjectDescription& owner, const std::string& tag,
+                  const SourceLocation& where) {
+    std::string name = node.attribute("name").value();
+    const auto read = [&](std::initializer_list<std::string_view> accepted) {
+      XmlAttributes attributes(node, where, defines_, accepted, diagnostics_);
+      name = attributes.get("name");
+      if (!attributes.complete()) throw Error(ErrorCode::kInput, "");
+      return attributes;
+    };
+    try {
+      Value value;
+      if (tag == "transform") {
+        read({"!name"});
+        value = read_transform(document, node);
+      } else if (tag == "point" || tag == "vector") {
+        const XmlAttributes attributes = read({"!name", "value", "x", "y", "z"});
+        for (const char* axis : {"x", "y", "z"})
+          if (!attributes.find("value") && !attributes.find(axis))
+            throw Error(ErrorCode::kInput, fmt::format("<{}> needs x, y and z, or value", tag));
+        value = read_xyz(attributes, tag, 0);
+      } else if (tag == "blackbody") {
+        const XmlAttributes attributes = read({"!name", "!temperature", "scale"});
+        std::string temperature = attributes.get("temperature");
+        if (temperature.ends_with('K') || temperature.ends_with('k')) temperature.pop_back();
+        value = blackbody_spectrum(parse_number(temperature), parse_number(attributes.get("scale", "1")));
+      } else if (tag == "spectrum") {
+        value = read_spectrum(read({"!name", "value", "filename", "intent"}), where);
+      } else if (tag == "rgb" || tag == "srgb") {
+        const std::string text = read({"!name", "!value", "intent"}).get("value");
+        value = tag == "rgb" ? parse_rgb(text) : parse_srgb(text);
+      } else {
+        const std::string text = read({"!name", "!value"}).get("value");
+        if (tag == "boolean") value = parse_boolean(text);
+        if (tag == "integer") value = parse_integer(text);
+        if (tag == "float") value = parse_number(text);
+        if (tag == "string") value = text;
+      }
+      add(owner, {name, std::move(value), where});
+    } catch (const Error& error) {
+      // The empty message: already recorded. The null object keeps the parameter known but without a value.
+      if (*error.what() != '\0')
+        diagnostics_.error(where, name.empty() ? error.what() : fmt::format("'{}': {}", name, error.what()));
+      add(owner, {name, ObjectPtr(), where});
+    }
+  }
+
+  static Vec3 read_xyz(const XmlAttributes& attributes, const std::string& tag, double missing) {
+    if (const std::string* value = attributes.find("value")) {
+      if (attributes.find("x") || attributes.find("y") || attributes.find("z"))
+        throw Error(ErrorCode::kInput, fmt::format("<{}> takes either value or x, y and z", tag));
+      if (split_list(*value).size() == 1) return Vec3(to_vec3(std::vector<double>(3, parse_number(*value))));
+      return to_vec3(parse_numbers(*value, 3));
+    }
+    std::vector<double> v(3, missing);
+    for (int i = 0; i < 3; ++i)
+      if (const std::string* text = attributes.find(i == 0 ? "x" : (i == 1 ? "y" : "z"))) v[i] = parse_number(*text);
+    return to_vec3(v);
+  }
+
+  Value read_spectrum(const XmlAttributes& attributes, const SourceLocation& where) {
+    const std::string *value = attributes.find("value"), *filename = attributes.find("filename");
+    if (!value == !filename) throw Error(ErrorCode::kInput, "<spectrum> takes either value or filename");
+    if (value) return parse_spectrum(*value);
+    const std::string path = files_.resolve(*filename, where, diagnostics_);
+    if (path.empty()) throw Error(ErrorCode::kInput, "");
+    try {
+      return parse_spectrum_file(FileView(path).text());
+    } catch (const Error& error) {
+      throw Error(ErrorCode::kInput, fmt::format("spectrum file '{}': {}", *filename, error.what()));
+    }
+  }
+
+  /// The product of the operations, the first applied first. Wrong ones are recorded and left out.
+  Transform read_transform(const Document& document, pugi::xml_node node) {
+    Transform transform;
+    for (const pugi::xml_node child : node.children()) {
+      if (child.type() != pugi::node_element) continue;
+      const SourceLocation where = document.xml.where(child);
+      const std::string tag = child.name();
+      if (!contains(kTransformTags, tag)) {
+        diagnostics_.error(
+            where, fmt::format("<{}> cannot stand inside <transform>{}", tag, did_you_mean(tag, kTransformTags)));
+        continue;
+      }
+      try {
+        transform = read_operation(child, tag, where) * transform;
+      } catch (const Error& error) {
+        if (*error.what() != '\0') diagnostics_.error(where, fmt::format("<{}>: {}", tag, error.what()));
+      }
+    }
+    return transform;
+  }
+
+  Transform read_operation(pugi::xml_node node, const std::string& tag, const SourceLocation& where) {
+    const auto read = [&](std::initializer_list<std::string_view> accepted) {
+      XmlAttributes attributes(node, where, defines_, accepted, diagnostics_);
+      if (!attributes.complete()) throw Error(ErrorCode::kInput, "");
+      return attributes;
+    };
+    if (tag == "translate") return Transform::translate(read_xyz(read({"value", "x", "y", "z"}), tag, 0));
+    if (tag == "scale") return Transform::scale(read_xyz(read({"value", "x", "y", "z"}), tag, 1));
+    if (tag == "rotate") {
+      const XmlAttributes attributes = read({"!angle", "value", "x", "y", "z"});
+      const Vec3 axis = read_xyz(attributes, tag, 0);
+      if (axis == Vec3{}) throw Error(ErrorCode::kInput, "the axis is zero");
+      return Transform::rotate(axis, parse_number(attributes.get("angle")));
+    }
+    if (tag == "matrix") {
+      const XmlAttributes attributes = read({"!value"});
+      const std::string text = attributes.get("value");
+      const size_t n = split_list(text).size();
+      if (n != 16 && n != 9) throw Error(ErrorCode::kInput, fmt::format("{} values; expected 9 or 16", n));
+      const std::vector<double> v = parse_numbers(text, n);
+      Matrix4 m = Transform().matrix();
+      const size_t side = n == 16 ? 4 : 3;
+      for (size_t i = 0; i < n; ++i) m[i / side][i % side] = v[i];
+      return Transform(m);
+    }
+    const XmlAttributes attributes = read({"!origin", "!target", "up"});
+    const Vec3 origin = to_vec3(parse_numbers(attributes.get("origin"), 3));
+    const Vec3 target = to_vec3(parse_numbers(attributes.get("target"), 3));
+    Vec3 up;
+    if (!attributes.get("up").empty()) up = to_vec3(parse_numbers(attributes.get("up"), 3));
+    if (up == Vec3{}) up = some_orthogonal(target - origin);
+    return Transform::look_at(origin, target, up);
+  }
+
+  /// Appends a property; false when its name is taken.
+  bool add(ObjectDescription& owner, Property property) {
+    if (!property.name.empty())
+      for (const Property& other : owner.properties)
+        if (other.name == property.name) {
+          diagnostics_.error(property.where, fmt::format("parameter '{}' of {} '{}' is given twice; first at {}",
+                                                         property.name, owner.kind, owner.type, other.where.text()));
+          return false;
+        }
+    owner.properties.push_back(std::move(property));
+    return true;
+  }
+
+  // ---- after everything is read ----
+
+  void resolve_references() {
+    // An alias may name another alias: repeat while something changes.
+    std::vector<Alias> open = aliases_;
+    for (bool progress = true; progress && !open.empty();) {
+      progress = false;
+      std::vector<Alias> left;
+      for (const Alias& alias : open) {
+        const auto source = ids_.find(alias.id);
+        if (source == ids_.end()) {
+          left.push_back(alias);
+          continue;
+        }
+        progress = true;
+        const std::shared_ptr<ObjectDescription> object = source->second;
+        const auto [other, inserted] = ids_.emplace(alias.as, object);
+        if (!inserted)
+          diagnostics_.error(alias.where,
+                             fmt::format("id '{}' is used twice; first at {}", alias.as, other->second->where.text()));
+      }
+      open = std::move(left);
+    }
+    std::vector<std::string> known;
+    for (const auto& entry : ids_) known.push_back(entry.first);
+    std::sort(known.begin(), known.end());
+    for (const Alias& alias : open)
+      diagnostics_.error(alias.where,
+                         fmt::format("alias of the unknown id '{}'{}", alias.id, did_you_mean(alias.id, known)));
+    for (const auto& object : objects_) {
+      for (Property& property : object->properties) {
+        const ObjectPtr* reference = std::get_if<ObjectPtr>(&property.value);
+        if (!reference || !*reference || (*reference)->kind != "ref") continue;
+        const std::string id = (*reference)->id;
+        const auto found = ids_.find(id);
+        if (found == ids_.end())
+          diagnostics_.error(property.where,
+                             fmt::format("reference to the unknown id '{}'{}", id, did_you_mean(id, known)));
+        property.value = found != ids_.end() ? ObjectPtr(found->second) : ObjectPtr();
+      }
+    }
+  }
+
+  /// Records an error for every reference that leads back to an object it is part of, and cuts it.
+  void break_cycles() {
+    std::unordered_set<const ObjectDescription*> done;
+    std::unordered_set<const ObjectDescription*> open;
+    // Depth of the recursion: chains of references can be long, so it works with a stack of its own.
+    struct Step {
+      ObjectDescription* object;
+      size_t next;
+    };
+    for (const auto& start : objects_) {
+      if (done.contains(start.get())) continue;
+      std::vector<Step> stack = {{start.get(), 0}};
+      open.insert(start.get());
+      while (!stack.empty()) {
+        Step& step = stack.back();
+        if (step.next == step.object->properties.size()) {
+          open.erase(step.object);
+          done.insert(step.object);
+          stack.pop_back();
+          continue;
+        }
+        Property& property = step.object->properties[step.next++];
+        ObjectPtr* child = std::get_if<ObjectPtr>(&property.value);
+        if (!child || !*child || done.contains(child->get())) continue;
+        if (open.contains(child->get())) {
+          diagnostics_.error(property.where, fmt::format("'{}' refers to itself", (*child)->id));
+          child->reset();
+          continue;
+        }
+        open.insert(child->get());
+        stack.push_back({const_cast<ObjectDescription*>(child->get()), 0});
+      }
+    }
+  }
+
+  /// <spectrum type="…"> objects become plain values wherever they are used.
+  void evaluate_spectra() {
+    for (const auto& object : objects_) {
+      for (Property& property : object->properties) {
+        const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value);
+        if (child && *child && (*child)->kind == "spectrum")
+          property.value = spectrum_value(ObjectPtr(*child), diagnostics_);
+      }
+    }
+  }
+
+  XmlDefines defines_;
+  FileResolver& files_;
+  Diagnostics& diagnostics_;
+  std::string digest_;
+  std::vector<std::shared_ptr<ObjectDescription>> objects_;  // all of them
+  std::unordered_map<std::string, std::shared_ptr<ObjectDescription>> ids_;
+  std::vector<Alias> aliases_;
+};
+
+}  // namespace
+
+SceneXml read_scene_xml_text(std::string_view text, const std::string& name,
+                             const std::map<std::string, std::string>& defines, FileResolver& files,
+                             Diagnostics& diagnostics) {
+  return Reader(defines, files, diagnostics).read(text, name);
+}
+
+SceneXml read_scene_xml(const std::string& path, const std::map<std::string, std::string>& defines, FileResolver& files,
+                        Diagnostics& diagnostics) {
+  const FileView file(path);
+  return read_scene_xml_text(file.text(), path, defines, files, diagnostics);
+}
+
+}  // namespace covary

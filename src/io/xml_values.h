@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// Values as they are written in attributes of scene files. All functions throw Error(kInput) with the text they could
+// not read and what they accept; the caller adds the place.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "scene/parameters.h"
+
+namespace covary {
+
+/// Splits at blanks and commas.
+std::vector<std::string_view> split_list(std::string_view text);
+
+/// A finite number; blanks around it are ignored.
+double parse_number(std::string_view text);
+int64_t parse_integer(std::string_view text);
+bool parse_boolean(std::string_view text);
+/// `count` numbers.
+std::vector<double> parse_numbers(std::string_view text, size_t count);
+
+/// Linear RGB: one number (grey), three numbers, or "#rrggbb" (sRGB encoded).
+ColourValue parse_rgb(std::string_view text);
+/// The same, but numbers are sRGB encoded too.
+ColourValue parse_srgb(std::string_view text);
+
+/// "0.5" (constant), or at least two "wavelength:value" pairs with increasing wavelengths in nanometres.
+SampledSpectrum parse_spectrum(std::string_view text);
+/// Lines of "wavelength value"; "#" starts a comment. `text` is the content of an .spd file.
+SampledSpectrum parse_spectrum_file(std::string_view text);
+/// Pairs of the two lists; throws like parse_spectrum.
+SampledSpectrum make_spectrum(const std::vector<double>& wavelengths, const std::vector<double>& values);
+
+/// Planck's law in W / (m^2 sr nm), every nanometre of the visible range. `temperature` in kelvin.
+SampledSpectrum blackbody_spectrum(double temperature, double scale);
+
+}  // namespace covary
