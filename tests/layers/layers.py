@@ -175,8 +175,22 @@ def documented_names_match_registries(root):
     return problems
 
 
+PARAMETER = re.compile(r'\bparameters\.(?:(?:get|require)_\w+|find_texture)\(\s*"(\w+)"')
+
+
+def documented_parameters(root):
+    """Every parameter name that a plugin reads stands in backquotes in docs/scene-format.md."""
+    page = read(root, os.path.join("docs", "scene-format.md"))
+    problems = []
+    for path in files(root, ["src"], (".cpp", ".h")):
+        if not is_test(path):
+            problems += [f"docs/scene-format.md:1: lacks the parameter '{name}' of {path}:{number}"
+                         for number, text in lines(root, path) for name in PARAMETER.findall(text) if f"`{name}`" not in page]
+    return problems
+
+
 CHECKS = [includes_follow_arrows, links_follow_arrows, licence_lines, no_leftovers, citations_have_entries,
-          documented_names_match_registries]
+          documented_names_match_registries, documented_parameters]
 
 
 def length_report(root):

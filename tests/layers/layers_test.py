@@ -119,6 +119,11 @@ class Planted(unittest.TestCase):
         self.write("docs/scene-format.md", "## Reflectance (`bsdfs`)\n### `diffuse`\n### `velvet`, `cloth`\n## Other\n### `plastic`\n")
         self.expect(layers.documented_names_match_registries, "lacks 'plastic'", "describes 'cloth'", "describes 'velvet'")
 
+    def test_parameter_without_documentation(self):
+        self.write("src/bsdfs/diffuse.cpp", SPDX + 'f(parameters.get_texture("reflectance", 1), parameters.get_bool("new", 1));\n')
+        self.write("docs/scene-format.md", "| `reflectance` |\n")
+        self.expect(layers.documented_parameters, "lacks the parameter 'new' of src/bsdfs/diffuse.cpp:2")
+
     def test_long_file_is_reported(self):
         self.write("src/core/a.cpp", SPDX + "\n" * layers.LONG_FILE)
         self.assertEqual([f"src/core/a.cpp: {layers.LONG_FILE + 1} lines; would it be two files?"], layers.length_report(self.folder.name))
