@@ -10,7 +10,7 @@
 // | specular_transmittance | colour/texture | 1       | factor on the refraction; not physical unless 1   |
 //
 // Reflection is chosen with the Fresnel reflectance as probability. Refracted radiance is scaled by the squared ratio
-// of indices (Veach 1997, Eq. 5.15), importance not.
+// of indices (Veach 1997, Section 5.2), importance not.
 #include "bsdfs/fresnel.h"
 #include "bsdfs/inputs.h"
 #include "bsdfs/registry.h"

@@ -6,6 +6,7 @@
 #include <cctype>
 
 #include "bsdfs/conductor_presets.h"
+#include "bsdfs/roughness.h"
 
 namespace covary {
 namespace {
@@ -79,6 +80,24 @@ ConductorInput get_conductor(Parameters& parameters) {
   // The pair eta = 0, k = 1 reflects everything at every angle.
   return {ColourInput(parameters.get_texture("eta", Spectrum(0), SpectrumRole::kIndex)),
           ColourInput(parameters.get_texture("k", Spectrum(1), SpectrumRole::kIndex))};
+}
+
+RoughnessInput get_roughness(Parameters& parameters) {
+  const MicrofacetType type = parameters.get_choice("distribution", "beckmann", {"beckmann", "ggx"}) == "ggx"
+                                  ? MicrofacetType::kGgx
+                                  : MicrofacetType::kBeckmann;
+  const bool sample_visible = parameters.get_bool("sample_visible", true);
+  const bool has_u = parameters.has("alpha_u"), has_v = parameters.has("alpha_v");
+  if (has_u != has_v)
+    parameters.error_at(has_u ? "alpha_u" : "alpha_v", "is given alone; accepted: both 'alpha_u' and 'alpha_v'");
+  if ((has_u || has_v) && parameters.has("alpha"))
+    parameters.error_at("alpha", "is given together with 'alpha_u' or 'alpha_v'; accepted: one or the other");
+  const auto get = [&](const char* name) {
+    return NumberInput(parameters.get_texture(name, Spectrum(0.1f), SpectrumRole::kIndex));
+  };
+  if (has_u || has_v) return {type, get("alpha_u"), get("alpha_v"), sample_visible, true};
+  NumberInput alpha = get("alpha");
+  return {type, alpha, alpha, sample_visible, false};
 }
 
 std::vector<BsdfPtr> get_nested_bsdfs(Parameters& parameters, size_t least, size_t most) {

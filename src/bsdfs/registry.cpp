@@ -5,12 +5,18 @@ namespace covary {
 
 std::span<const Plugin<Bsdf>> bsdf_plugins() {
   static constexpr Plugin<Bsdf> kPlugins[] = {
+      {"blendbsdf", make_blendbsdf},
+      {"bumpmap", make_bumpmap},
       {"conductor", make_conductor},
       {"dielectric", make_dielectric},
       {"diffuse", make_diffuse},
       {"mask", make_mask},
+      {"normalmap", make_normalmap},
       {"null", make_null},
       {"plastic", make_plastic},
+      {"roughconductor", make_roughconductor},
+      {"roughdielectric", make_roughdielectric},
+      {"roughplastic", make_roughplastic},
       {"thindielectric", make_thindielectric},
       {"twosided", make_twosided},
   };

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// normalmap: replaces the shading normal of a model by one stored in a texture.
+//
+// | name                   | type    | default  | meaning                                                        |
+// |------------------------|---------|----------|----------------------------------------------------------------|
+// | normalmap              | texture | required | colour (n + 1) / 2 of the normal n in the shading frame; use a raw (linear) bitmap |
+// | (nested)               | bsdf    |          | exactly one model                                              |
+// | flip_invalid_normals   | bool    | true     | keep the normal on the side of the camera (perturbed.h)        |
+// | use_shadowing_function | bool    | true     | soften the shadow at grazing light (perturbed.h)               |
+//
+// The x axis of the stored normals follows dp/du.
+#include "bsdfs/inputs.h"
+#include "bsdfs/perturbed.h"
+#include "bsdfs/registry.h"
+
+namespace covary {
+namespace {
+
+class NormalMap final : public Bsdf {
+ public:
+  NormalMap(TexturePtr normals, BsdfPtr nested, bool flip_invalid, bool shadow_terminator)
+      : normals_(std::move(normals)),
+        nested_(std::move(nested)),
+        flip_invalid_(flip_invalid),
+        shadow_terminator_(shadow_terminator) {}
+
+  uint32_t flags() const override { return nested_->flags(); }
+  const BsdfClosure* bind(const SurfaceHit& hit, bool wo_front, TransportMode mode, Arena& arena) const override {
+    const BsdfClosure* nested = nested_->bind(hit, wo_front, mode, arena);
+    const Spectrum c = normals_->eval(hit);
+    const Vec3 stored{2 * c.r - 1, 2 * c.g - 1, 2 * c.b - 1};
+    const float l = length(stored);
+    if (!(l > 0)) return nested;
+    // From the frame along dp/du to the local shading frame; the same when the two coincide.
+    const Frame uv = Frame::from_tangent({0, 0, 1}, hit.frame.to_local(hit.dp_du));
+    return make_perturbed(nested, {uv.to_world(stored * (1 / l)), uv.s, flip_invalid_, shadow_terminator_}, mode,
+                          arena);
+  }
+  bool needs_derivatives() const override { return true; }
+  Spectrum albedo(const SurfaceHit& hit) const override { return nested_->albedo(hit); }
+
+ private:
+  TexturePtr normals_;
+  BsdfPtr nested_;
+  bool flip_invalid_, shadow_terminator_;
+};
+
+}  // namespace
+
+std::shared_ptr<Bsdf> make_normalmap(Parameters& parameters) {
+  const TexturePtr normals = parameters.find_texture("normalmap");
+  if (!normals && !parameters.has("normalmap")) parameters.error("the texture 'normalmap' is missing");
+  const bool flip_invalid = parameters.get_bool("flip_invalid_normals", true);
+  const bool shadow_terminator = parameters.get_bool("use_shadowing_function", true);
+  const std::vector<BsdfPtr> nested = get_nested_bsdfs(parameters, 1, 1);
+  if (nested.empty() || !normals) return nullptr;
+  return std::make_shared<NormalMap>(normals, nested[0], flip_invalid, shadow_terminator);
+}
+
+}  // namespace covary

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// A model whose shading normal is perturbed, for bump and normal maps.
+#pragma once
+
+#include "scene/bsdf.h"
+
+namespace covary {
+
+struct Perturbation {
+  Vec3 normal;             ///< unit, in the local shading frame, z > 0 in most cases
+  Vec3 tangent;            ///< direction the perturbed frame's s axis follows, in the local shading frame
+  bool flip_invalid;       ///< turn the normal about z where it would face away from the camera's side
+  bool shadow_terminator;  ///< soften the transition to shadow at grazing light
+};
+
+/// `nested` as if the surface had the perturbed normal. Lives in the arena like every closure.
+///
+/// flip_invalid after Schüßler et al. 2017, "Microfacet-based Normal Mapping for Robust Monte Carlo Path Tracing";
+/// shadow_terminator after Estevez et al. 2019, "A Microfacet-Based Shadowing Function to Solve the Bump Terminator
+/// Problem". Light that would leave through the unperturbed surface is dropped, so energy may be lost, never gained
+/// through the back.
+///
+/// The value is not symmetric: light and camera play different parts. For importance it is the exact adjoint of the
+/// value for radiance, f*(wo, wi) = f(wi, wo), so that light and camera paths estimate the same image. One exception:
+/// mirror directions whose two sides would choose different flips carry no importance.
+const BsdfClosure* make_perturbed(const BsdfClosure* nested, const Perturbation& perturbation, TransportMode mode,
+                                  Arena& arena);
+
+}  // namespace covary

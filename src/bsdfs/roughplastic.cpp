@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: Apache-2.0
+// roughplastic: a diffuse base under a rough dielectric coating, on the side of the normal; black from the other side.
+//
+// | name                 | type           | default       | meaning                                                |
+// |----------------------|----------------|---------------|--------------------------------------------------------|
+// | diffuse_reflectance  | colour/texture | 0.5           | reflectance of the base                                |
+// | nonlinear            | bool           | false         | colour shift by repeated scattering inside the coating |
+// | int_ior              | number/string  | polypropylene | index of refraction of the coating                     |
+// | ext_ior              | number/string  | air           | index of refraction outside; must differ from int_ior  |
+// | specular_reflectance | colour/texture | 1             | factor on the coating's reflection                     |
+// | distribution         | string         | beckmann      | distribution of microfacet normals: beckmann or ggx    |
+// | alpha                | number         | 0.1           | roughness                                              |
+// | sample_visible       | bool           | true          | see roughness.h                                        |
+//
+// As plastic.cpp, with the transmittance T of the rough interface in place of 1 - F:
+//     f_diffuse = T(wi) T(wo) rho / (pi eta^2 (1 - rho Ri)).
+// T(cos) is tabulated when the model is made, by quadrature over the visible normals; Ri is the mean reflectance of the
+// interface from inside, by the same quadrature.
+#include <array>
+
+#include "bsdfs/fresnel.h"
+#include "bsdfs/registry.h"
+#include "bsdfs/roughness.h"
+
+namespace covary {
+namespace {
+
+/// Points in (0, 1) and weights (sum 1) of Gauss-Legendre quadrature.
+template <int n>
+struct GaussLegendre {
+  std::array<double, n> x, weight;
+  GaussLegendre() {
+    for (int i = 0; i < n; ++i) {
+      // Newton's method for the roots of the Legendre polynomial P_n, from the classical asymptotic estimate.
+      double z = std::cos(M_PI * (i + 0.75) / (n + 0.5)), derivative = 1;
+      for (int step = 0; step < 8; ++step) {
+        double p = 1, previous = 0;
+        for (int k = 1; k <= n; ++k) {
+          const double next = ((2 * k - 1) * z * p - (k - 1) * previous) / k;
+          previous = p, p = next;
+        }
+        derivative = n * (z * p - previous) / (z * z - 1);
+        z -= p / derivative;
+      }
+      x[i] = 0.5 * (1 + z);
+      weight[i] = 1 / ((1 - z * z) * derivative * derivative);
+    }
+  }
+};
+
+/// Directional transmittance of a rough dielectric interface from outside, and its mean reflectance from inside.
+class RoughTransmittance {
+ public:
+  RoughTransmittance(const Microfacet& normals, float eta) {
+    double internal = 0;
+    for (int i = 0; i < kSize; ++i) {
+      const float mu = std::max(1e-6f, static_cast<float>(i) / (kSize - 1));
+      const Vec3 w{std::sqrt(1 - mu * mu), 0, mu};
+      external_[i] = static_cast<float>(integrate(normals, w, eta, false));
+      internal += integrate(normals, w, 1 / eta, true) * mu;
+    }
+    internal_reflectance_ = static_cast<float>(2 * internal / kSize);
+  }
+  /// `cos_theta` in [0, 1].
+  float operator()(float cos_theta) const {
+    const float x = cos_theta * (kSize - 1);
+    const int i = std::min(static_cast<int>(x), kSize - 2);
+    return lerp(x - static_cast<float>(i), external_[i], external_[i + 1]);
+  }
+  float internal_reflectance() const { return internal_reflectance_; }
+
+ private:
+  static constexpr int kSize = 64;
+
+  /// Fraction of the power from w that the interface reflects, or transmits, in one scattering: the mean over the
+  /// visible normals of F G1(w'), or (1 - F) G1(w').
+  static double integrate(const Microfacet& normals, const Vec3& w, float eta, bool reflected) {
+    static const GaussLegendre<32> rule;
+    double sum = 0;
+    for (size_t i = 0; i < rule.x.size(); ++i)
+      for (size_t j = 0; j < rule.x.size(); ++j) {
+        const Vec3 m = normals.sample(w, {static_cast<float>(rule.x[i]), static_cast<float>(rule.x[j])}).m;
+        const DielectricFresnel f = fresnel_dielectric(dot(w, m), eta);
+        const Vec3 out = reflected ? reflect(w, m) : refract(w, m, f.cos_theta_t, f.eta_ti);
+        if (reflected ? out.z > 0 : out.z < 0)
+          sum += rule.weight[i] * rule.weight[j] * normals.smith_g1(out, m) *
+                 (reflected ? f.reflectance : 1 - f.reflectance);
+      }
+    return sum;
+  }
+
+  std::array<float, kSize> external_;
+  float internal_reflectance_;
+};
+
+class RoughPlasticClosure final : public BsdfClosure {
+ public:
+  /// `base`: rho / (pi eta^2 (1 - rho Ri)).
+  RoughPlasticClosure(const RoughSurface& surface, const RoughTransmittance& transmittance, float eta,
+                      float specular_weight, const Spectrum& base, const Spectrum& specular)
+      : surface_(surface),
+        transmittance_(transmittance),
+        eta_(eta),
+        specular_weight_(specular_weight),
+        base_(base),
+        specular_(specular) {}
+
+  uint32_t flags() const override { return kGlossyReflection | kDiffuseReflection; }
+  BsdfValue eval(const Vec3& wo, const Vec3& wi) const override {
+    if (!(wo.z > 0 && wi.z > 0)) return {};
+    const Vec3 m = normalize(wo + wi);
+    const Microfacet& normals = surface_.normals;
+    const float om = dot(wo, m), t_o = transmittance_(wo.z), pmf = specular_pmf(t_o);
+    const float d_g1 = normals.eval(m) * normals.smith_g1(wo, m) / (4 * wo.z);
+    const float coating = fresnel_dielectric(om, eta_).reflectance * d_g1 * normals.smith_g1(wi, m);
+    const float pdf = surface_.sample_visible ? d_g1 : surface_.pdf(wo, m) / (4 * om);
+    return {specular_ * coating + base_ * (wi.z * t_o * transmittance_(wi.z)),
+            pmf * pdf + (1 - pmf) * warp::cosine_hemisphere_pdf_solid_angle(wi.z)};
+  }
+  BsdfSample sample(const Vec3& wo, float u_lobe, Vec2 u) const override {
+    if (!(wo.z > 0)) return {};
+    BsdfSample s;
+    if (u_lobe < specular_pmf(transmittance_(wo.z))) {
+      s.wi = reflect(wo, surface_.sample(wo, u).m);
+      s.flags = kGlossyReflection;
+    } else {
+      s.wi = warp::square_to_cosine_hemisphere(u);
+      s.flags = kDiffuseReflection;
+      s.lobe = 1;
+    }
+    const BsdfValue v = eval(wo, s.wi);
+    if (!(v.pdf_solid_angle > 0)) return {};
+    s.pdf = v.pdf_solid_angle;
+    s.weight = v.value / s.pdf;
+    return s;
+  }
+  int n_lobes() const override { return 2; }
+  void lobe_pmfs(const Vec3& wo, float* pmfs) const override {
+    pmfs[0] = wo.z > 0 ? specular_pmf(transmittance_(wo.z)) : 0;
+    pmfs[1] = wo.z > 0 ? 1 - pmfs[0] : 0;
+  }
+  void lobe_pdfs(const Vec3& wo, const Vec3& wi, float* pdfs) const override {
+    pdfs[0] = pdfs[1] = 0;
+    if (!(wo.z > 0 && wi.z > 0)) return;
+    const Vec3 m = normalize(wo + wi);
+    pdfs[0] = surface_.pdf(wo, m) / (4 * dot(wo, m));
+    pdfs[1] = warp::cosine_hemisphere_pdf_solid_angle(wi.z);
+  }
+
+ private:
+  /// Probability of the coating's lobe, by its directional reflectance and the mean colours.
+  float specular_pmf(float t_o) const {
+    const float specular = (1 - t_o) * specular_weight_, diffuse = t_o * (1 - specular_weight_);
+    return specular + diffuse > 0 ? specular / (specular + diffuse) : 1;
+  }
+
+  RoughSurface surface_;
+  const RoughTransmittance& transmittance_;
+  float eta_, specular_weight_;
+  Spectrum base_, specular_;
+};
+
+class RoughPlastic final : public Bsdf {
+ public:
+  RoughPlastic(const RoughSurface& surface, float eta, bool nonlinear, ColourInput diffuse, ColourInput specular)
+      : surface_(surface),
+        transmittance_(surface.normals, eta),
+        eta_(eta),
+        nonlinear_(nonlinear),
+        diffuse_(std::move(diffuse)),
+        specular_(std::move(specular)) {
+    const float sum = diffuse_.mean() + specular_.mean();
+    specular_weight_ = sum > 0 ? specular_.mean() / sum : 0.5f;
+  }
+
+  uint32_t flags() const override { return kGlossyReflection | kDiffuseReflection; }
+  const BsdfClosure* bind(const SurfaceHit& hit, bool, TransportMode, Arena& arena) const override {
+    const Spectrum rho = diffuse_.eval(hit);
+    const float internal = transmittance_.internal_reflectance();
+    const Spectrum trapped = nonlinear_ ? rho * internal : Spectrum(internal);
+    const Spectrum base = rho * kInvPi / ((Spectrum(1) - trapped) * sqr(eta_));
+    return arena.make<RoughPlasticClosure>(surface_, transmittance_, eta_, specular_weight_, base, specular_.eval(hit));
+  }
+  Spectrum albedo(const SurfaceHit& hit) const override { return clamp01(diffuse_.eval(hit)); }
+
+ private:
+  RoughSurface surface_;
+  RoughTransmittance transmittance_;
+  float eta_, specular_weight_;
+  bool nonlinear_;
+  ColourInput diffuse_, specular_;
+};
+
+}  // namespace
+
+std::shared_ptr<Bsdf> make_roughplastic(Parameters& parameters) {
+  const RoughnessInput roughness = get_roughness(parameters);
+  const float eta = get_relative_ior(parameters, "polypropylene");
+  const bool nonlinear = parameters.get_bool("nonlinear", false);
+  ColourInput diffuse(parameters.get_texture("diffuse_reflectance", Spectrum(0.5f)));
+  ColourInput specular(parameters.get_texture("specular_reflectance", Spectrum(1)));
+  if (roughness.anisotropic || !roughness.alpha_u.is_constant()) {
+    parameters.error_at(roughness.anisotropic ? "alpha_u" : "alpha", "is not one number; accepted: one number 'alpha'");
+    return nullptr;
+  }
+  if (eta == 1) {
+    parameters.error("'int_ior' and 'ext_ior' are equal; they must differ");
+    return nullptr;
+  }
+  return std::make_shared<RoughPlastic>(roughness.eval({}), eta, nonlinear, std::move(diffuse), std::move(specular));
+}
+
+}  // namespace covary
