@@ -18,12 +18,13 @@ function(covary_room name)
   endif()
 endfunction()
 
-# covary_test(<program> SOURCES ... DEPENDS ...): a GoogleTest program, each of its tests known to CTest.
+# covary_test(<program> SOURCES ... DEPENDS ... [LABEL statistical|nightly]): a GoogleTest program, each of its tests
+# known to CTest.
 function(covary_test program)
-  cmake_parse_arguments(TEST "" "" "SOURCES;DEPENDS" ${ARGN})
+  cmake_parse_arguments(TEST "" "LABEL" "SOURCES;DEPENDS" ${ARGN})
   add_executable(${program} ${TEST_SOURCES})
   target_include_directories(${program} PRIVATE ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/tests)
   target_link_libraries(${program} PRIVATE ${TEST_DEPENDS} GTest::gtest_main)
   target_compile_definitions(${program} PRIVATE COVARY_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
-  gtest_discover_tests(${program} DISCOVERY_TIMEOUT 60 DISCOVERY_MODE PRE_TEST)
+  gtest_discover_tests(${program} DISCOVERY_TIMEOUT 60 DISCOVERY_MODE PRE_TEST PROPERTIES LABELS "${TEST_LABEL}")
 endfunction()
