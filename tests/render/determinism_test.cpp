@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+// The same scene, seed and settings give the same bits: for any number of threads, any crop, any interruption.
+#include <tbb/global_control.h>
+
+#include <random>
+#include <thread>
+
+#include "film/film_file.h"
+#include "render_fixture.h"
+
+namespace covary {
+namespace {
+
+const std::string kRoom = std::string(COVARY_SOURCE_DIR) + "/scenes/room.xml";
+
+TestScene load_room(int width, int height) {
+  LoadOptions options;
+  options.width = width, options.height = height;
+  options.make_integrator = [](Parameters& parameters) -> std::shared_ptr<SceneObject> {
+    return integrator_plugins()[0].make(parameters, PathLengthSettings::from(parameters));
+  };
+  return {load_scene(kRoom, options)};
+}
+
+PassSettings pass(const TestScene& scene, Sampling sampling, uint32_t spp) {
+  PassSettings settings;
+  settings.sampling = sampling, settings.seed = 7, settings.spp = spp, settings.filter = scene.loaded.filter;
+  return settings;
+}
+
+TEST(Determinism, OneTwoAndFiveThreads) {
+  const TestScene scene = load_room(70, 45);
+  for (const Sampling sampling : {Sampling::kIndependent, Sampling::kCrn}) {
+    std::vector<Film> films;
+    for (const size_t threads : {1, 2, 5}) {
+      const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+      films.push_back(render(scene, 24, 7, sampling, 12));
+    }
+    EXPECT_TRUE(same_bits(films[0], films[1]));
+    EXPECT_TRUE(same_bits(films[0], films[2]));
+  }
+}
+
+TEST(Determinism, AnotherSeedGivesOtherBits) {
+  const TestScene scene = load_room(16, 16);
+  EXPECT_FALSE(same_bits(render(scene, 2, 1), render(scene, 2, 2)));
+}
+
+TEST(Determinism, ACropIsACutOfTheFrame) {
+  const TestScene scene = load_room(60, 40);
+  const Film frame = render(scene, 4, 7);
+  const CropWindow crop{13, 9, 30, 21};
+  Film part(60, 40, crop, 1);
+  render_pass(scene.scene(), scene.integrator(), pass(scene, Sampling::kIndependent, 4), part);
+  for (int y = 0; y < crop.height; ++y)
+    for (int x = 0; x < crop.width; ++x) ASSERT_EQ(part.mean(x, y), frame.mean(crop.x + x, crop.y + y));
+}
+
+// Stopped at random moments (after a random number of tiles), written, read and continued, until done.
+TEST(Determinism, TwentyInterruptions) {
+  const TestScene scene = load_room(70, 45);
+  constexpr uint32_t kSpp = 60;
+  Film whole = new_film(scene, 12);
+  PassSettings settings = pass(scene, Sampling::kCrn, kSpp);
+  int n_tiles = 0;
+  std::atomic<int> tiles{0};
+  settings.progress = [&](uint64_t, uint64_t) { ++tiles; };
+  render_pass(scene.scene(), scene.integrator(), settings, whole);
+  n_tiles = tiles;
+
+  const std::string file = (std::filesystem::temp_directory_path() / ("covary_resume_" + std::to_string(getpid()) + ".exr")).string();
+  std::mt19937 random(5);
+  Film film = new_film(scene, 12);
+  int interruptions = 0;
+  for (bool complete = false; !complete;) {
+    std::atomic<bool> stop{false};
+    std::atomic<int> left{interruptions < 20 ? 1 + static_cast<int>(random() % (n_tiles / 12)) : n_tiles};
+    settings.stop = &stop;
+    settings.progress = [&](uint64_t, uint64_t) { if (--left <= 0) stop = true; };
+    complete = render_pass(scene.scene(), scene.integrator(), settings, film).complete;
+    if (!complete) ++interruptions;
+    write_film(file, film);
+    film = read_film(file);
+  }
+  std::filesystem::remove(file);
+  EXPECT_EQ(interruptions, 20);
+  EXPECT_TRUE(same_bits(film, whole));
+}
+
+TEST(Determinism, TimeLimitStopsBetweenTiles) {
+  const TestScene scene = load_room(64, 48);
+  Film film = new_film(scene);
+  PassSettings settings = pass(scene, Sampling::kIndependent, 1u << 30);
+  settings.seconds = 0.2;
+  const PassResult result = render_pass(scene.scene(), scene.integrator(), settings, film);
+  EXPECT_FALSE(result.complete);
+  const auto [lowest, highest] = std::minmax_element(film.counts().begin(), film.counts().end());
+  EXPECT_LE(*highest - *lowest, wave_size(1));
+  EXPECT_GT(*highest, 0u);
+}
+
+TEST(Determinism, ReplayGivesTheSampleThatEntersTheFilm) {
+  const TestScene scene = load_room(20, 20);
+  const Film film = render(scene, 1, 7);
+  const ReplayedSample sample =
+      replay_sample(scene.scene(), scene.integrator(), pass(scene, Sampling::kIndependent, 1), 11, 13, 0);
+  EXPECT_EQ(sample.value, film.mean(11, 13));
+  EXPECT_GT(sample.n_rays, 0u);
+}
+
+TEST(Determinism, DoublingAllLightsDoublesTheImage) {
+  const auto text = [](const char* radiance) {
+    return scene_text(std::string("<shape type='sphere'><point name='center' z='5'/><bsdf type='plastic'/></shape>"
+                                  "<shape type='rectangle'><transform name='to_world'><rotate x='1' angle='90'/>"
+                                  "<translate y='3' z='4'/></transform><emitter type='area'><rgb name='radiance' value='") +
+                          radiance + "'/></emitter></shape>", 20, 20);
+  };
+  const Film one = render(load_text(text("1.5")), 8, 0), two = render(load_text(text("3")), 8, 0);
+  for (int y = 0; y < 20; ++y)
+    for (int x = 0; x < 20; ++x) ASSERT_EQ(two.mean(x, y), one.mean(x, y) * 2);
+}
+
+TEST(CommonRandomNumbers, AFlatUniformlyLitWallIsFlat) {
+  // A wall that fills the view, lit only by a constant environment: every pixel's path sees the same.
+  const TestScene scene = load_text(scene_text(
+      "<shape type='rectangle'><transform name='to_world'><scale value='1000'/><rotate y='1' angle='180'/><translate z='1'/></transform>"
+      "<bsdf type='diffuse'><rgb name='reflectance' value='0.5'/></bsdf></shape><emitter type='constant'/>", 24, 16, 3,
+      "<float name='fov' value='20'/>"));
+  const Film crn = render(scene, 24, 5, Sampling::kCrn, 12);
+  for (int y = 0; y < 16; ++y)
+    for (int x = 0; x < 24; ++x)
+      for (int t = 0; t < 12; ++t) ASSERT_EQ(crn.group_mean(x, y, t), crn.group_mean(0, 0, t));
+  // The twin: independent numbers do not give a flat image.
+  const Film independent = render(scene, 24, 5, Sampling::kIndependent, 12);
+  EXPECT_NE(independent.group_mean(0, 0, 0), independent.group_mean(1, 0, 0));
+}
+
+TEST(CommonRandomNumbers, TwoRendersAreTheSame) {
+  const TestScene scene = load_room(30, 20);
+  EXPECT_TRUE(same_bits(render(scene, 12, 9, Sampling::kCrn, 12), render(scene, 12, 9, Sampling::kCrn, 12)));
+}
+
+}  // namespace
+}  // namespace covary

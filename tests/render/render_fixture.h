@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+// Renders of small scenes given as text, for tests across the whole renderer.
+#pragma once
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <string>
+
+#include "integrators/integrator.h"
+#include "integrators/render_pass.h"
+#include "io/load_scene.h"
+
+namespace covary {
+
+/// A scene read from XML text, with its integrator.
+struct TestScene {
+  LoadedScene loaded;
+  const Scene& scene() const { return *loaded.scene; }
+  const Integrator& integrator() const { return dynamic_cast<const Integrator&>(*loaded.integrator); }
+};
+
+/// `min_depth` as on the command line.
+inline TestScene load_text(const std::string& xml, int min_depth = 0) {
+  const std::filesystem::path folder =
+      std::filesystem::temp_directory_path() / ("covary_render_test_" + std::to_string(getpid()));
+  std::filesystem::create_directories(folder);
+  const std::filesystem::path file = folder / "scene.xml";
+  std::ofstream(file) << xml;
+  LoadOptions options;
+  options.make_integrator = [&](Parameters& parameters) -> std::shared_ptr<SceneObject> {
+    PathLengthSettings lengths = PathLengthSettings::from(parameters);
+    lengths.min_depth = min_depth;
+    for (const IntegratorPlugin& plugin : integrator_plugins())
+      if (parameters.type() == plugin.name) return plugin.make(parameters, lengths);
+    return nullptr;
+  };
+  TestScene result{load_scene(file.string(), options)};
+  std::filesystem::remove_all(folder);
+  return result;
+}
+
+/// A scene of the given body: path integrator, box filter, camera at the origin looking along +z unless `sensor` says
+/// otherwise.
+inline std::string scene_text(const std::string& body, int width, int height, int max_depth = -1,
+                              const std::string& sensor = "", const std::string& integrator = "") {
+  return "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='" +
+         std::to_string(max_depth) + "'/>" + integrator + "</integrator><sensor type='perspective'>" + sensor +
+         "<film type='hdrfilm'><integer name='width' value='" + std::to_string(width) +
+         "'/><integer name='height' value='" + std::to_string(height) + "'/><rfilter type='box'/></film></sensor>" +
+         body + "</scene>";
+}
+
+inline Film new_film(const TestScene& scene, int groups = 1) {
+  const LoadedScene& l = scene.loaded;
+  return Film(l.width, l.height, {l.crop_x, l.crop_y, l.crop_width, l.crop_height}, groups);
+}
+
+inline Film render(const TestScene& scene, uint32_t spp, uint64_t seed, Sampling sampling = Sampling::kIndependent,
+                   int groups = 1) {
+  Film film = new_film(scene, groups);
+  PassSettings settings;
+  settings.sampling = sampling, settings.seed = seed, settings.spp = spp, settings.filter = scene.loaded.filter;
+  const PassResult result = render_pass(scene.scene(), scene.integrator(), settings, film);
+  EXPECT_TRUE(result.complete);
+  EXPECT_EQ(result.n_not_finite + result.n_negative, 0u);
+  return film;
+}
+
+/// Mean over all pixels and channels.
+inline double image_mean(const Film& film) {
+  double sum = 0;
+  for (int y = 0; y < film.height(); ++y)
+    for (int x = 0; x < film.width(); ++x) sum += mean(film.mean(x, y));
+  return sum / (static_cast<double>(film.width()) * film.height());
+}
+
+inline bool same_bits(const Film& a, const Film& b) {
+  return a.counts() == b.counts() && a.data().size() == b.data().size() &&
+         std::memcmp(a.data().data(), b.data().data(), a.data().size() * sizeof(float)) == 0;
+}
+
+}  // namespace covary
