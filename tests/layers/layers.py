@@ -175,7 +175,7 @@ def documented_names_match_registries(root):
     return problems
 
 
-PARAMETER = re.compile(r'\bparameters\.(?:(?:get|require)_\w+|find_texture)\(\s*"(\w+)"')
+PARAMETER = re.compile(r'\bparameters(?:\.(?:(?:get|require)_\w+|find_texture)\(|,)\s*"(\w+)"')
 
 
 def documented_parameters(root):
