@@ -47,15 +47,16 @@ class Microfacet {
   /// Separable masking and shadowing, G1(wi, m) G1(wo, m).
   float smith_g(const Vec3& wi, const Vec3& wo, const Vec3& m) const { return smith_g1(wi, m) * smith_g1(wo, m); }
 
+  /// G1(w) / cos(theta_w) without dividing two small numbers; finite up to grazing w for GGX. `w.z` > 0.
+  float smith_g1_over_cos(const Vec3& w) const {
+    if (type_ == MicrofacetType::kBeckmann) return smith_g1(w) / w.z;
+    return 2 / (w.z + std::sqrt(w.z * w.z + sqr(alpha_u_ * w.x) + sqr(alpha_v_ * w.y)));
+  }
+
   /// Density of sample(): visible normals from w, per unit solid angle of m. `w.z` > 0.
   float pdf(const Vec3& w, const Vec3& m) const {
     const float wm = dot(w, m);
-    if (!(wm * w.z > 0)) return 0;
-    if (type_ == MicrofacetType::kGgx) {  // G1 / cos(theta_w) without the division of two small numbers
-      const float xy2 = sqr(alpha_u_ * w.x) + sqr(alpha_v_ * w.y);
-      return eval(m) * 2 * wm / (w.z + std::sqrt(w.z * w.z + xy2));
-    }
-    return eval(m) * smith_g1(w) * wm / w.z;
+    return wm * w.z > 0 ? eval(m) * smith_g1_over_cos(w) * wm : 0;
   }
 
   struct Sample {

@@ -14,6 +14,8 @@ std::span<const Plugin<Bsdf>> bsdf_plugins() {
       {"normalmap", make_normalmap},
       {"null", make_null},
       {"plastic", make_plastic},
+      {"principled", make_principled},
+      {"principledthin", make_principledthin},
       {"roughconductor", make_roughconductor},
       {"roughdielectric", make_roughdielectric},
       {"roughplastic", make_roughplastic},

@@ -22,6 +22,8 @@ std::shared_ptr<Bsdf> make_mask(Parameters& parameters);
 std::shared_ptr<Bsdf> make_normalmap(Parameters& parameters);
 std::shared_ptr<Bsdf> make_null(Parameters& parameters);
 std::shared_ptr<Bsdf> make_plastic(Parameters& parameters);
+std::shared_ptr<Bsdf> make_principled(Parameters& parameters);
+std::shared_ptr<Bsdf> make_principledthin(Parameters& parameters);
 std::shared_ptr<Bsdf> make_roughconductor(Parameters& parameters);
 std::shared_ptr<Bsdf> make_roughdielectric(Parameters& parameters);
 std::shared_ptr<Bsdf> make_roughplastic(Parameters& parameters);
