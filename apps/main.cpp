@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The `covary` program. Exit codes: 0 done, 1 failed, 2 wrong usage.
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <new>
@@ -29,12 +30,30 @@ int report(const char* program, const Error& error) {
   return usage ? 2 : 1;
 }
 
+/// What is wrong with the first argument that no option takes; "" when there is none.
+std::string describe_extra(const CLI::App& app) {
+  const CLI::App& command = app.get_subcommands().empty() ? app : *app.get_subcommands()[0];
+  const std::string name = &command == &app ? "covary" : "covary " + command.get_name();
+  const std::vector<std::string> extras = app.remaining(true);
+  if (extras.empty()) return "";
+  const std::string extra = extras[0].substr(0, extras[0].find('='));
+  const std::string help = "; see '" + name + " --help'";
+  if (!extra.starts_with('-')) return "too many arguments, beginning with '" + extra + "'" + help;
+  std::vector<std::string> names;
+  for (const CLI::Option* option : command.get_options())
+    for (const std::string& known : option->get_lnames()) names.push_back("--" + known);
+  return "unknown option '" + extra + "'" + did_you_mean(extra, names) + help;
+}
+
 int run(int argc, char** argv) {
   CLI::App app("covary: Monte Carlo rendering with less noise by control variates and correlated sampling", "covary");
   app.set_version_flag("--version", "covary " COVARY_VERSION, "Print the version and exit");
   app.require_subcommand(0, 1);
   app.failure_message(CLI::FailureMessage::simple);
+  add_compare(app);
   add_merge(app);
+  add_info(app);
+  add_convert(app);
 
   if (argc < 2) {
     std::fputs(app.help().c_str(), stdout);
@@ -54,10 +73,14 @@ int run(int argc, char** argv) {
   } catch (const CLI::Success& success) {  // --help, --version
     return app.exit(success);
   } catch (const CLI::ParseError& error) {
+    // A misspelt option comes before what CLI11 finds first: that the option meant is missing.
+    const std::string extra = describe_extra(app);
+    if (!extra.empty()) throw Error(ErrorCode::kUsage, extra);
     const std::string command = app.get_subcommands().empty() ? "" : " " + app.get_subcommands()[0]->get_name();
     throw Error(ErrorCode::kUsage, std::string(error.what()) + "; see 'covary" + command + " --help'");
   }
   if (app.get_subcommands().empty()) throw Error(ErrorCode::kUsage, "no command given; 'covary --help' lists all");
+  if (std::fflush(stdout) != 0 || std::ferror(stdout)) throw Error(ErrorCode::kIo, "cannot write to standard output");
   return 0;
 }
 

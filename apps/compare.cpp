@@ -1,0 +1,247 @@
+// SPDX-License-Identifier: Apache-2.0
+// covary compare: errors of images against one reference, or two independent ones.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <vector>
+
+#include "commands.h"
+#include "film/error_map.h"
+#include "film/image_file.h"
+#include "film/metrics.h"
+#include "film/output_file.h"
+
+namespace covary {
+namespace {
+
+struct CompareOptions {
+  std::vector<std::string> images;
+  std::string reference, reference2, layer, error_map;
+  std::vector<std::string> metrics{"relmse"};
+  std::vector<double> error_range;
+  std::optional<std::string> json;  // "" and "-": standard output
+};
+
+/// One image's errors; values in the order of the metrics asked for.
+struct Comparison {
+  CropWindow window;
+  std::vector<MetricResult> results;
+  double mean = 0, reference_mean = 0;
+};
+
+Image cut(const PlacedImage& source, const CropWindow& window) {
+  Image result(window.width, window.height, 3);
+  for (int y = 0; y < window.height; ++y)
+    std::copy_n(source.image.pixel(window.x - source.place.window.x, window.y - source.place.window.y + y),
+                static_cast<size_t>(window.width) * 3, result.pixel(0, y));
+  return result;
+}
+
+/// The pixels that image and reference share, in the frame.
+CropWindow common_window(const CropWindow& a, const CropWindow& b) {
+  const int x0 = std::max(a.x, b.x), y0 = std::max(a.y, b.y);
+  return {x0, y0, std::min(a.x + a.width, b.x + b.width) - x0, std::min(a.y + a.height, b.y + b.height) - y0};
+}
+
+std::string text_of(const CropWindow& w) { return fmt::format("{} x {} at ({}, {})", w.width, w.height, w.x, w.y); }
+
+CropWindow align(const std::string& path, const PlacedImage& image, const std::string& reference_path,
+                 const PlacedImage& reference, const CropWindow& window) {
+  const ImagePlace &a = image.place, &b = reference.place;
+  if (a.frame_width != b.frame_width || a.frame_height != b.frame_height)
+    throw Error(ErrorCode::kInput,
+                fmt::format("{} has a frame of {} x {} pixels, {} one of {} x {}", path, a.frame_width, a.frame_height,
+                            reference_path, b.frame_width, b.frame_height));
+  const CropWindow common = common_window(window, b.window);
+  if (common.width < 1 || common.height < 1)
+    throw Error(ErrorCode::kInput, fmt::format("{} ({}) and {} ({}) have no pixels in common", path, text_of(a.window),
+                                               reference_path, text_of(b.window)));
+  return common;
+}
+
+double mean_of(const Image& image, const Image& map) {
+  double sum = 0;
+  uint64_t n = 0;
+  for (size_t p = 0; p < map.data.size(); ++p)
+    if (std::isfinite(map.data[p])) {
+      for (size_t c = 0; c < 3; ++c) sum += image.data[p * 3 + c];
+      n += 3;
+    }
+  return sum / static_cast<double>(n);
+}
+
+Comparison compare_one(const CompareOptions& options, const std::vector<PlacedImage>& references,
+                       const std::string& path) {
+  const PlacedImage image = read_image(path, options.layer);
+  Comparison comparison;
+  comparison.window = align(path, image, options.reference, references[0], image.place.window);
+  bool low_dynamic_range = image.low_dynamic_range && references[0].low_dynamic_range;
+  if (references.size() == 2) {
+    comparison.window = align(path, image, options.reference2, references[1], comparison.window);
+    low_dynamic_range = low_dynamic_range && references[1].low_dynamic_range;
+  }
+  const Image pixels = cut(image, comparison.window);
+  std::vector<Image> aligned;
+  for (const PlacedImage& reference : references) aligned.push_back(cut(reference, comparison.window));
+  for (const std::string& name : options.metrics) {
+    try {
+      comparison.results.push_back(compute_metric(find_metric(name).metric, pixels, aligned, low_dynamic_range));
+    } catch (const Error& error) {
+      throw Error(error.code(), path + ": " + error.what());
+    }
+  }
+  const Image& map = comparison.results[0].map;
+  comparison.mean = mean_of(pixels, map);
+  for (const Image& reference : aligned)
+    comparison.reference_mean += mean_of(reference, map) / static_cast<double>(aligned.size());
+  return comparison;
+}
+
+nlohmann::ordered_json json_of(const CompareOptions& options, const std::string& path, const Comparison& c) {
+  nlohmann::ordered_json object{{"image", path}, {"reference", options.reference}};
+  if (!options.reference2.empty()) object["reference2"] = options.reference2;
+  object["window"] = {c.window.x, c.window.y, c.window.width, c.window.height};
+  object["pixels"] = c.results[0].n_pixels;
+  object["non_finite_pixels"] = c.results[0].n_non_finite;
+  object["mean"] = c.mean;
+  object["reference_mean"] = c.reference_mean;
+  for (size_t m = 0; m < options.metrics.size(); ++m) object[options.metrics[m]] = c.results[m].value;
+  return object;
+}
+
+void print_table(const CompareOptions& options, const std::vector<Comparison>& comparisons) {
+  size_t width = 5;
+  for (const std::string& path : options.images) width = std::max(width, path.size());
+  for (const std::string& name : options.metrics) {
+    const MetricInfo& info = find_metric(name);
+    fmt::print("{} = {}\n", name, options.reference2.empty() ? info.formula : info.formula_two);
+  }
+  fmt::print("{:{}}", "image", width);
+  for (const std::string& name : options.metrics) fmt::print("  {:>12}", name);
+  fmt::print("  {:>10}\n", "mean/ref.");
+  for (size_t i = 0; i < comparisons.size(); ++i) {
+    fmt::print("{:{}}", options.images[i], width);
+    for (const MetricResult& result : comparisons[i].results) fmt::print("  {:12.6g}", result.value);
+    fmt::print("  {:10.6f}\n", comparisons[i].mean / comparisons[i].reference_mean);
+  }
+}
+
+/// E.png for one image; E-<name>.png for several, with a number where names repeat.
+std::vector<std::string> map_paths(const CompareOptions& options) {
+  if (options.images.size() == 1) return {options.error_map};
+  const std::filesystem::path path(options.error_map);
+  std::vector<std::string> result;
+  for (const std::string& image : options.images) {
+    const auto named = [&](const std::string& suffix) {
+      const std::string stem = std::filesystem::path(image).stem().string();
+      return (path.parent_path() / (path.stem().string() + "-" + stem + suffix + path.extension().string())).string();
+    };
+    std::string name = named("");
+    for (int n = 2; std::find(result.begin(), result.end(), name) != result.end(); ++n)
+      name = named(fmt::format("-{}", n));
+    result.push_back(name);
+  }
+  return result;
+}
+
+/// One map per image, of the first metric, all on one scale.
+void write_error_maps(const CompareOptions& options, const std::vector<Comparison>& comparisons) {
+  std::vector<Image> maps;
+  for (const Comparison& c : comparisons) maps.push_back(c.results[0].map);
+  ErrorScale scale;
+  if (!options.error_range.empty())
+    scale = {options.error_range[0], options.error_range[1], options.metrics[0] != "flip"};
+  else if (options.metrics[0] != "flip")
+    scale = decade_scale(maps);
+  const std::vector<std::string> paths = map_paths(options);
+  for (size_t i = 0; i < maps.size(); ++i) {
+    write_png(paths[i], colour_errors(maps[i], scale));
+    fmt::print(stderr, "{}: {} of {}, {}\n", paths[i], options.metrics[0], options.images[i], scale.legend());
+  }
+}
+
+void check_options(const CompareOptions& options) {
+  const auto usage = [](const std::string& text) { throw Error(ErrorCode::kUsage, text); };
+  for (const std::string& name : options.metrics) {
+    find_metric(name);
+    if (std::count(options.metrics.begin(), options.metrics.end(), name) > 1)
+      usage("--metric names '" + name + "' more than once");
+  }
+  if (!options.error_map.empty() && std::filesystem::path(options.error_map).extension() != ".png")
+    usage("--error-map '" + options.error_map + "': the name must end in .png");
+  if (!options.error_range.empty()) {
+    if (options.error_map.empty()) usage("--error-range needs --error-map");
+    const bool positive = options.metrics[0] == "flip" || options.error_range[0] > 0;
+    if (!positive || !(options.error_range[0] < options.error_range[1]))
+      usage(fmt::format("--error-range {},{}: expected are two rising positive numbers", options.error_range[0],
+                        options.error_range[1]));
+  }
+  // "--json a.exr" would take the image for the name of the JSON file.
+  for (const char* extension : {".exr", ".png", ".hdr", ".pfm", ".jpg"})
+    if (options.json && std::filesystem::path(*options.json).extension() == extension)
+      usage("--json '" + *options.json + "' names an image; give --json=- for standard output, or a file");
+}
+
+void compare(const CompareOptions& options) {
+  check_options(options);
+  std::vector<PlacedImage> references{read_image(options.reference, options.layer)};
+  if (!options.reference2.empty()) references.push_back(read_image(options.reference2, options.layer));
+
+  std::vector<Comparison> comparisons;
+  for (const std::string& path : options.images) {
+    comparisons.push_back(compare_one(options, references, path));
+    const Comparison& c = comparisons.back();
+    if (c.results[0].n_non_finite)
+      fmt::print(stderr, "covary: {}: {} of {} pixels are not finite here or in the reference and are left out\n", path,
+                 c.results[0].n_non_finite, c.results[0].n_non_finite + c.results[0].n_pixels);
+    if (!(c.window == references[0].place.window))
+      fmt::print(stderr, "covary: {}: compared over the pixels in common, {}\n", path, text_of(c.window));
+    if (options.error_map.empty())
+      for (MetricResult& result : comparisons.back().results) result.map = Image();
+  }
+
+  const bool json_to_output = options.json && (options.json->empty() || *options.json == "-");
+  std::string json;
+  if (options.json)
+    for (size_t i = 0; i < comparisons.size(); ++i)
+      json += json_of(options, options.images[i], comparisons[i]).dump() + "\n";
+  if (json_to_output)
+    std::fputs(json.c_str(), stdout);
+  else
+    print_table(options, comparisons);
+  if (options.json && !json_to_output) write_text_file(*options.json, json);
+  if (!options.error_map.empty()) write_error_maps(options, comparisons);
+}
+
+}  // namespace
+
+void add_compare(CLI::App& app) {
+  const auto o = std::make_shared<CompareOptions>();
+  CLI::App* command = app.add_subcommand("compare", "Errors of images against a reference");
+  command->add_option("IMAGES", o->images, "Images of any renderer (EXR, PNG, HDR, PFM, …)")->required();
+  command->add_option("-r,--reference", o->reference, "The reference image")->required();
+  command->add_option(
+      "--reference2", o->reference2,
+      "A second reference with samples of its own: products (F - R1)(F - R2) cancel the references' noise");
+  command->add_option("-m,--metric", o->metrics, "relmse, mse, mae, mape, flip; several separated by commas")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->capture_default_str();
+  command->add_option("--layer", o->layer, "Compare this layer (N, group03, …) in place of R G B");
+  command
+      ->add_option("--json", o->json, "One JSON object per image and line; to standard output without FILE or with -")
+      ->expected(0, 1)
+      ->type_name("[FILE]");
+  command->add_option("--error-map", o->error_map, "PNG of the first metric's error per pixel; its scale is printed");
+  command->add_option("--error-range", o->error_range, "LOW,HIGH: ends of the error map's scale")
+      ->delimiter(',')
+      ->expected(2);
+  command->callback([o] { compare(*o); });
+}
+
+}  // namespace covary

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+// covary info: what an image or film holds, without reading its pixels.
+#include <fmt/format.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "commands.h"
+#include "film/image_file.h"
+
+namespace covary {
+namespace {
+
+struct InfoOptions {
+  std::string path;
+  bool json = false;
+};
+
+void print_json(const ImageInfo& info, const std::string& path) {
+  const CropWindow& w = info.place.window;
+  nlohmann::ordered_json object{{"file", path}, {"format", info.format}};
+  object["frame"] = {info.place.frame_width, info.place.frame_height};
+  object["window"] = {w.x, w.y, w.width, w.height};
+  object["compression"] = info.compression;
+  for (const ExrFile::Channel& c : info.channels) object["channels"][c.name] = c.type;
+  object["attributes"] = info.attributes;
+  // Text in files need not be valid UTF-8, which JSON must be.
+  fmt::print("{}\n", object.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+}
+
+/// Channels by layer: "group00 (R G B, float)".
+std::string describe_channels(const std::vector<ExrFile::Channel>& channels) {
+  std::map<std::string, std::pair<std::string, std::string>> layers;  // layer -> components, type
+  for (const ExrFile::Channel& c : channels) {
+    const size_t dot = c.name.rfind('.');
+    auto& [components, type] = layers[dot == std::string::npos ? "" : c.name.substr(0, dot)];
+    components += (components.empty() ? "" : " ") + c.name.substr(dot == std::string::npos ? 0 : dot + 1);
+    if (type.find(c.type) == std::string::npos) type += (type.empty() ? "" : ", ") + c.type;
+  }
+  std::string text;
+  for (const auto& [layer, content] : layers)
+    text += fmt::format("  {}{}{} ({})\n", layer, layer.empty() ? "" : ": ", content.first, content.second);
+  return text;
+}
+
+void info(const InfoOptions& options) {
+  const ImageInfo info = inspect_image(options.path);
+  if (options.json) return print_json(info, options.path);
+  const CropWindow& w = info.place.window;
+  fmt::print("{}: {} x {} pixels", options.path, w.width, w.height);
+  if (w.x || w.y || w.width != info.place.frame_width || w.height != info.place.frame_height)
+    fmt::print(" at ({}, {}) of a frame of {} x {}", w.x, w.y, info.place.frame_width, info.place.frame_height);
+  fmt::print(", {}{}{}\n", info.format, info.compression.empty() ? "" : ", compression ", info.compression);
+  fmt::print("channels\n{}", describe_channels(info.channels));
+  if (!info.attributes.empty()) fmt::print("attributes\n");
+  for (const auto& [name, value] : info.attributes) fmt::print("  {}: {}\n", name, value);
+}
+
+}  // namespace
+
+void add_info(CLI::App& app) {
+  const auto options = std::make_shared<InfoOptions>();
+  CLI::App* command = app.add_subcommand("info", "What a film or image holds: size, channels, attributes");
+  command->add_option("FILE", options->path, "A film or image")->required();
+  command->add_flag("--json", options->json, "One JSON object");
+  command->callback([options] { info(*options); });
+}
+
+}  // namespace covary

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// Images of any renderer: EXR by OpenEXR, all other formats by OpenImageIO; PNG output.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "film/exr.h"
+
+namespace covary {
+
+/// What a file holds, without its pixels.
+struct ImageInfo {
+  std::string format;       ///< "openexr", or OpenImageIO's name
+  std::string compression;  ///< "" when unknown
+  ImagePlace place;
+  std::vector<ExrFile::Channel> channels;
+  std::map<std::string, std::string> attributes;
+};
+
+struct PlacedImage {
+  ImagePlace place;
+  Image image;                     ///< linear RGB
+  bool low_dynamic_range = false;  ///< the file held 8- or 16-bit integers
+};
+
+/// Throws Error(kIo) when the file cannot be opened and Error(kInput) when it is damaged or of an unknown format.
+ImageInfo inspect_image(const std::string& path);
+
+/// Reads three channels as linear RGB (integer files are decoded from sRGB). `layer` chooses among the channels of a
+/// file: "N" for N.X N.Y N.Z, "group03" for group03.R/G/B, or a single channel's whole name, shown grey; "" is R G B,
+/// or Y, or the only layer there is. Throws like inspect_image; an unknown layer is Error(kInput) that names those
+/// there are.
+PlacedImage read_image(const std::string& path, const std::string& layer = "");
+
+/// The three channels (one for grey, given three times) that `layer` means among `channels`; throws like read_image.
+std::vector<std::string> layer_channels(const std::string& path, const std::vector<ExrFile::Channel>& channels,
+                                        const std::string& layer);
+
+/// Transfer functions of sRGB (IEC 61966-2-1), of values in [0, 1].
+float srgb_to_linear(float encoded);
+float linear_to_srgb(float linear);
+
+/// Writes linear RGB as 8-bit sRGB, values clamped to [0, 1], not-a-number as black. Throws Error(kIo).
+void write_png(const std::string& path, const Image& linear);
+
+}  // namespace covary

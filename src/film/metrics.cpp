@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "film/metrics.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "film/flip.h"
+
+namespace covary {
+namespace {
+
+constexpr double kOffset = 0.01;  ///< keeps relative errors finite at black pixels
+
+void check_sizes(const Image& image, std::span<const Image> references) {
+  COVARY_CHECK(references.size() == 1 || references.size() == 2, "one or two references");
+  for (const Image& r : references)
+    if (r.width != image.width || r.height != image.height)
+      throw Error(ErrorCode::kInput, fmt::format("the image has {} x {} pixels, the reference {} x {}", image.width,
+                                                 image.height, r.width, r.height));
+  for (const Image& r : references) COVARY_CHECK(r.channels == 3 && image.channels == 3, "3 channels");
+}
+
+bool pixel_is_finite(const Image& image, size_t p) {
+  const float* v = image.data.data() + p * 3;
+  return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]);
+}
+
+/// One pixel of a render and of its references, in double.
+struct Pixel {
+  std::array<double, 3> f, r1, r2, r;  // r: mean of the references
+  double grey = 0;                     // mean of r over the channels
+  Pixel(const Image& image, std::span<const Image> references, size_t p) {
+    for (size_t c = 0; c < 3; ++c) {
+      f[c] = image.data[p * 3 + c];
+      r1[c] = references.front().data[p * 3 + c];
+      r2[c] = references.back().data[p * 3 + c];
+      r[c] = 0.5 * (r1[c] + r2[c]);
+      grey += r[c] / 3;
+    }
+  }
+  /// Mean over the channels of (F - R1)(F - R2); the squared difference when there is one reference.
+  double squared_error() const {
+    double sum = 0;
+    for (size_t c = 0; c < 3; ++c) sum += (f[c] - r1[c]) * (f[c] - r2[c]);
+    return sum / 3;
+  }
+};
+
+double pixel_error(Metric metric, const Pixel& p) {
+  double sum = 0;
+  switch (metric) {
+    case Metric::kRelMse:
+      return p.squared_error() / (p.grey * p.grey + kOffset);
+    case Metric::kMse:
+      return p.squared_error();
+    case Metric::kMae:
+      for (size_t c = 0; c < 3; ++c) sum += std::abs(p.f[c] - p.r[c]) / 3;
+      return sum;
+    case Metric::kMape:
+      for (size_t c = 0; c < 3; ++c) sum += std::abs(p.f[c] - p.r[c]) / (std::abs(p.r[c]) + kOffset) / 3;
+      return sum;
+    case Metric::kFlip:
+      break;
+  }
+  throw Error(ErrorCode::kInternal, "FLIP is not a sum over single pixels");
+}
+
+/// FLIP looks at neighbourhoods: pixels that are left out become equal in both images.
+Image flip_map(const Image& image, std::span<const Image> references, const std::vector<char>& finite,
+               bool low_dynamic_range) {
+  Image f = image, r = references.front();
+  for (size_t p = 0; p < finite.size(); ++p)
+    for (size_t i = p * 3; i < p * 3 + 3; ++i) {
+      r.data[i] = 0.5f * (r.data[i] + references.back().data[i]);
+      if (!finite[p]) f.data[i] = r.data[i] = 0;
+    }
+  return low_dynamic_range ? flip_ldr(f, r) : flip_hdr(f, r);
+}
+
+}  // namespace
+
+const std::vector<MetricInfo>& metrics() {
+  static const std::vector<MetricInfo> all{
+      {Metric::kRelMse, "relmse", "1/(3N) sum ||F - R||^2 / (R'^2 + 0.01), R' = mean of R's RGB",
+       "1/(3N) sum (F - R1).(F - R2) / (R'^2 + 0.01), R' = mean of (R1 + R2)/2's RGB"},
+      {Metric::kMse, "mse", "1/(3N) sum ||F - R||^2", "1/(3N) sum (F - R1).(F - R2)"},
+      {Metric::kMae, "mae", "1/(3N) sum |F - R|", "1/(3N) sum |F - (R1 + R2)/2|"},
+      {Metric::kMape, "mape", "1/(3N) sum |F - R| / (|R| + 0.01)",
+       "1/(3N) sum |F - R| / (|R| + 0.01), R = (R1 + R2)/2"},
+      {Metric::kFlip, "flip", "1/N sum FLIP, 67 pixels per degree",
+       "1/N sum FLIP against (R1 + R2)/2, 67 pixels per degree"},
+  };
+  return all;
+}
+
+const MetricInfo& find_metric(const std::string& name) {
+  std::vector<std::string> names;
+  for (const MetricInfo& info : metrics()) {
+    if (info.name == name) return info;
+    names.push_back(info.name);
+  }
+  throw Error(ErrorCode::kUsage, fmt::format("unknown metric '{}'{}; accepted are {}", name, did_you_mean(name, names),
+                                             fmt::join(names, ", ")));
+}
+
+MetricResult compute_metric(Metric metric, const Image& image, std::span<const Image> references,
+                            bool low_dynamic_range) {
+  check_sizes(image, references);
+  const size_t n_pixels = static_cast<size_t>(image.width) * image.height;
+  MetricResult result;
+  std::vector<char> finite(n_pixels);
+  for (size_t p = 0; p < n_pixels; ++p) {
+    finite[p] =
+        pixel_is_finite(image, p) && pixel_is_finite(references.front(), p) && pixel_is_finite(references.back(), p);
+    ++(finite[p] ? result.n_pixels : result.n_non_finite);
+  }
+  if (result.n_pixels == 0)
+    throw Error(ErrorCode::kInput,
+                fmt::format("none of the {} pixels is finite in the image and the reference", n_pixels));
+
+  result.map = metric == Metric::kFlip ? flip_map(image, references, finite, low_dynamic_range)
+                                       : Image(image.width, image.height, 1);
+  double sum = 0;
+  for (size_t p = 0; p < n_pixels; ++p) {
+    if (!finite[p]) {
+      result.map.data[p] = std::numeric_limits<float>::quiet_NaN();
+      continue;
+    }
+    const double error =
+        metric == Metric::kFlip ? result.map.data[p] : pixel_error(metric, Pixel(image, references, p));
+    result.map.data[p] = static_cast<float>(error);
+    sum += error;
+  }
+  result.value = sum / static_cast<double>(result.n_pixels);
+  return result;
+}
+
+ErrorSplit::ErrorSplit(std::vector<Image> references) : references_(std::move(references)) {
+  check_sizes(references_.at(0), references_);
+  const size_t n_pixels = static_cast<size_t>(references_[0].width) * references_[0].height;
+  sum_.assign(n_pixels * 3, 0);
+  sum_squares_.assign(n_pixels * 3, 0);
+  finite_.resize(n_pixels);
+  for (size_t p = 0; p < n_pixels; ++p)
+    finite_[p] = pixel_is_finite(references_.front(), p) && pixel_is_finite(references_.back(), p);
+}
+
+void ErrorSplit::add(const Image& image) {
+  check_sizes(image, references_);
+  double error = 0, grey = 0;
+  uint64_t n_finite = 0;
+  for (size_t p = 0; p < finite_.size(); ++p) {
+    finite_[p] = finite_[p] && pixel_is_finite(image, p);
+    if (!finite_[p]) continue;
+    ++n_finite;
+    const Pixel pixel(image, references_, p);
+    error += pixel_error(Metric::kRelMse, pixel);
+    for (size_t c = 0; c < 3; ++c) {
+      const double d = pixel.f[c] - pixel.r[c];
+      sum_[p * 3 + c] += d;
+      sum_squares_[p * 3 + c] += d * d;
+      grey += pixel.f[c] / 3;
+    }
+  }
+  if (n_finite == 0) throw Error(ErrorCode::kInput, "no pixel is finite in all renders and references");
+  rel_mse_.push_back(error / static_cast<double>(n_finite));
+  means_.push_back(grey / static_cast<double>(n_finite));
+  ++n_renders_;
+}
+
+ErrorSplit::Result ErrorSplit::result() const {
+  if (n_renders_ < 2)
+    throw Error(ErrorCode::kInput, fmt::format("variance and bias of {} renders; at least 2 are needed", n_renders_));
+  const double k = static_cast<double>(n_renders_);
+  Result result;
+  result.n_renders = n_renders_;
+  double variance = 0, squared_bias = 0, reference_sum = 0;
+  for (size_t p = 0; p < finite_.size(); ++p) {
+    ++(finite_[p] ? result.n_pixels : result.n_non_finite);
+    if (!finite_[p]) continue;
+    const Pixel pixel(references_.front(), references_, p);
+    const double weight = 1 / (3 * (pixel.grey * pixel.grey + kOffset));
+    reference_sum += pixel.grey;
+    for (size_t c = 0; c < 3; ++c) {
+      const double mean = sum_[p * 3 + c] / k;  // of F - R
+      const double v = (sum_squares_[p * 3 + c] - k * mean * mean) / (k - 1);
+      // (F̄ - R1)(F̄ - R2) = (F̄ - R)^2 - ((R1 - R2)/2)^2; E of it is bias^2 + v/K.
+      const double half = 0.5 * (pixel.r1[c] - pixel.r2[c]);
+      variance += weight * v;
+      squared_bias += weight * (mean * mean - half * half - v / k);
+    }
+  }
+  const double n = static_cast<double>(result.n_pixels);
+  result.variance = variance / n;
+  result.squared_bias = squared_bias / n;
+  const auto mean_and_error = [&](const std::vector<double>& values) {
+    double sum = 0, squares = 0;
+    for (double v : values) sum += v;
+    for (double v : values) squares += (v - sum / k) * (v - sum / k);
+    return std::pair(sum / k, std::sqrt(squares / (k - 1) / k));
+  };
+  std::tie(result.rel_mse, result.rel_mse_error) = mean_and_error(rel_mse_);
+  const auto [mean, error] = mean_and_error(means_);
+  result.mean_ratio = mean / (reference_sum / n);
+  result.mean_ratio_error = error / (reference_sum / n);
+  return result;
+}
+
+}  // namespace covary
