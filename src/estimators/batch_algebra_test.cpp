@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+// Lanes and the algebra of many small systems, against the standard library and Eigen in double precision.
+#include "estimators/batch_algebra.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <vector>
+
+#include "estimators/test_images.h"
+
+namespace covary {
+namespace {
+
+using lanes::kLanes;
+using lanes::vfloat;
+
+TEST(Lanes, ExpOfNonpositiveIsAccurate) {
+  for (float x = 0; x > -86.9f; x -= 0.0137f) {
+    const double exact = std::exp(static_cast<double>(x));
+    EXPECT_NEAR(lanes::exp_of_nonpositive(lanes::splat(x))[3] / exact, 1.0, 3e-7 - 1e-7 * x) << x;
+  }
+  EXPECT_EQ(lanes::exp_of_nonpositive(vfloat{})[0], 1.0f);
+  EXPECT_EQ(lanes::exp_of_nonpositive(lanes::splat(-1e30f))[0], 0.0f);
+  EXPECT_EQ(lanes::exp_of_nonpositive(lanes::splat(-INFINITY))[0], 0.0f);
+}
+
+TEST(Lanes, TransposeSwapsRowsAndLanes) {
+  vfloat rows[kLanes];
+  for (int i = 0; i < kLanes; ++i)
+    for (int l = 0; l < kLanes; ++l) rows[i][l] = static_cast<float>(100 * i + l);
+  lanes::transpose(rows);
+  for (int i = 0; i < kLanes; ++i)
+    for (int l = 0; l < kLanes; ++l) EXPECT_EQ(rows[i][l], static_cast<float>(100 * l + i));
+}
+
+/// Every size up to three register tiles and beyond, vectors stored by rows and by columns.
+TEST(BatchAlgebra, GramAndSolveAgreeWithEigen) {
+  for (int m : {1, 2, 3, 4, 5, 6, 7, 8, 9, 11, 13, 25, 33, 40}) {
+    for (int n : {1, 5, 33}) {
+      for (bool by_rows : {true, false}) {
+        std::vector<vfloat> X(static_cast<size_t>(m) * n), G(batch::packed_size(m + 1)), b(m), inverse(m);
+        const ptrdiff_t row = by_rows ? n : 1, sum = by_rows ? 1 : m;
+        for (int i = 0; i < m; ++i)
+          for (int s = 0; s < n; ++s)
+            for (int l = 0; l < kLanes; ++l) X[i * row + s * sum][l] = test::noise(m, 1000 * i + s, l);
+        for (int i = 0; i < m; ++i)
+          for (int l = 0; l < kLanes; ++l) b[i][l] = test::noise(m + 50, i, l);
+        batch::gram(X.data(), row, sum, m, n, G.data());
+        std::vector<vfloat> x = b, solved = G;
+        const float shift = 0.3f;
+        batch::solve_shifted(solved.data(), lanes::splat(shift), m, x.data(), inverse.data());
+        for (int l : {0, 3, kLanes - 1}) {
+          Eigen::MatrixXd A(m, n);
+          Eigen::VectorXd rhs(m);
+          for (int i = 0; i < m; ++i) {
+            rhs(i) = b[i][l];
+            for (int s = 0; s < n; ++s) A(i, s) = X[i * row + s * sum][l];
+          }
+          const Eigen::MatrixXd expected = A * A.transpose();
+          const Eigen::VectorXd solution = (expected + shift * Eigen::MatrixXd::Identity(m, m)).ldlt().solve(rhs);
+          for (int i = 0; i < m; ++i) {
+            for (int j = 0; j <= i; ++j) ASSERT_NEAR(G[batch::packed(i, j)][l], expected(i, j), 1e-5) << m << " " << n;
+            ASSERT_NEAR(x[i][l], solution(i), 2e-5) << "m " << m << " n " << n << " lane " << l;
+          }
+        }
+      }
+    }
+  }
+}
+
+/// Rank 1 with 1e7 times the shift: rounding would make pivots negative; the solution must stay near the exact one.
+TEST(BatchAlgebra, SolveSurvivesNearlySingularSystems) {
+  const int m = 12;
+  std::vector<vfloat> X(m), G(batch::packed_size(m + 1)), b(m), inverse(m);
+  for (int i = 0; i < m; ++i) X[i] = b[i] = lanes::splat(3000.0f + 10.0f * static_cast<float>(i));
+  batch::gram(X.data(), 1, 1, m, 1, G.data());
+  batch::solve_shifted(G.data(), lanes::splat(1.0f), m, b.data(), inverse.data());
+  // x = X / (X.X + 1), so that X.x is 1 up to 1e-8.
+  float product = 0;
+  for (int i = 0; i < m; ++i) product += X[i][0] * b[i][0];
+  EXPECT_NEAR(product, 1.0f, 1e-3f);
+}
+
+}  // namespace
+}  // namespace covary

@@ -1,0 +1,306 @@
+// SPDX-License-Identifier: Apache-2.0
+// Layout of the work: tiles of the image in parallel; in a tile, kLanes pixels at a time, one per lane. Per pixel, what a
+// neighbour contributes (a "record") lies contiguous in memory, so that a neighbour is a few vector loads and a
+// transposition.
+//
+// The T centred group means of a pixel span only T - 1 dimensions. They are replaced by T - 1 orthonormal contrasts
+// (Helmert), which have the same inner products: no centring, and systems of T - 1 instead of T rows.
+#include "estimators/control_variates.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <array>
+#include <cmath>
+
+#include "estimators/batch_algebra.h"
+#include "estimators/neighbours.h"
+
+namespace covary {
+namespace {
+
+using namespace lanes;
+
+constexpr int kTileWidth = 64, kTileHeight = 32;
+
+/// Offsets in the record of a pixel.
+struct RecordLayout {
+  explicit RecordLayout(int groups)
+      : contrasts(3 * (groups - 1)),
+        difference(contrasts),
+        error(contrasts + 3),
+        group_variance(contrasts + 6),
+        h_variance(contrasts + 9),
+        size(contrasts + 12) {}
+  int contrasts;       ///< number of contrasts, all channels: [contrast][rgb], at 0
+  int difference;      ///< g - h
+  int error;           ///< error variance of h for the penalty, times T
+  int group_variance;  ///< sample variance of the CRN groups
+  int h_variance;      ///< variance of h for the error estimate
+  int size;
+};
+
+/// Scratch memory of one thread.
+struct Workspace {
+  std::vector<float> records;  ///< of the tile and its border
+  std::vector<vint> keys;
+  std::vector<uint16_t> chosen;
+  std::vector<vfloat> x;     ///< [neighbour][contrast], later scaled by 1 / sqrt(V_h)
+  std::vector<vfloat> tail;  ///< [neighbour][rest of the record]
+  std::vector<vfloat> y;     ///< [contrast]
+  std::vector<vfloat> y_tail;
+  std::vector<vfloat> scale;  ///< [neighbour] 1 / sqrt(V_h)
+  std::vector<vfloat> gram, inverse, b, gamma;
+};
+
+struct Tile {
+  int x0, y0, x1, y1;
+};
+
+class Regression {
+ public:
+  Regression(const ControlVariateInput& input, const ControlVariateSettings& settings,
+             const std::vector<unsigned char>& valid, EstimatorResult& result)
+      : in_(input),
+        s_(settings),
+        valid_(valid),
+        result_(result),
+        T_(input.crn.groups),
+        layout_(T_),
+        search_(settings.k, settings.window, settings.include_target),
+        radius_(settings.window / 2) {}
+
+  void run_tile(const Tile& tile, Workspace& w) const {
+    prepare(w);
+    make_records(tile, w);
+    for (int y = tile.y0; y < tile.y1; ++y)
+      for (int x = tile.x0; x < tile.x1; x += kLanes) run_batch(tile, x, y, w);
+  }
+
+ private:
+  int record_stride(const Tile& tile) const { return tile.x1 - tile.x0 + 2 * radius_; }
+  size_t record_index(const Tile& tile, int x, int y) const {
+    return (static_cast<size_t>(y - tile.y0 + radius_) * record_stride(tile) + (x - tile.x0 + radius_)) * layout_.size;
+  }
+
+  void prepare(Workspace& w) const {
+    if (!w.x.empty()) return;
+    const size_t k = s_.k, rows = layout_.contrasts, m = std::min(k, s_.shared ? rows : rows / 3);
+    w.records.resize(static_cast<size_t>(kTileWidth + 2 * radius_) * (kTileHeight + 2 * radius_) * layout_.size +
+                     kLanes);
+    w.keys.resize(search_.offsets().size());
+    w.chosen.resize(k * kLanes);
+    w.x.resize(k * rows);
+    w.tail.resize(k * (layout_.size - rows));
+    w.y.resize(rows);
+    w.y_tail.resize(layout_.size - rows);
+    w.scale.resize(k);
+    w.gram.resize(batch::packed_size(m + 1));
+    w.inverse.resize(m);
+    w.b.resize(std::max<size_t>(m, rows));
+    w.gamma.resize(k);
+  }
+
+  void make_records(const Tile& tile, Workspace& w) const {
+    std::vector<float> weights(T_);
+    for (int j = 1; j < T_; ++j) weights[j] = 1.0f / std::sqrt(static_cast<float>(j) * static_cast<float>(j + 1));
+    for (int y = tile.y0 - radius_; y < tile.y1 + radius_; ++y)
+      for (int x = tile.x0 - radius_; x < tile.x1 + radius_; ++x) {
+        float* record = w.records.data() + record_index(tile, x, y);
+        const bool inside = x >= 0 && y >= 0 && x < in_.crn.width && y < in_.crn.height;
+        if (!inside || !valid_[static_cast<size_t>(y) * in_.crn.width + x]) {
+          std::fill(record, record + layout_.size, 0.0f);
+          for (int c = 0; c < 3; ++c) record[layout_.error + c] = kUseless;
+          continue;
+        }
+        // Contrast j: (x_0 + … + x_{j-1} - j x_j) / sqrt(j (j + 1)).
+        const float* p = in_.crn.pixel(x, y);
+        float sum[3] = {p[0], p[1], p[2]}, squares[3] = {};
+        for (int j = 1; j < T_; ++j)
+          for (int c = 0; c < 3; ++c) {
+            const float value = p[3 * j + c];
+            const float contrast = (sum[c] - static_cast<float>(j) * value) * weights[j];
+            sum[c] += value;
+            squares[c] += contrast * contrast;
+            record[3 * (j - 1) + c] = contrast;
+          }
+        for (int c = 0; c < 3; ++c) {
+          record[layout_.difference + c] = in_.crn_moments->mean.row(c, y)[x] - in_.h->row(c, y)[x];
+          record[layout_.error + c] = in_.error_of_h ? static_cast<float>(T_) * in_.error_of_h->row(c, y)[x] : 0.0f;
+          record[layout_.group_variance + c] = squares[c] / static_cast<float>(T_ - 1);
+          record[layout_.h_variance + c] = in_.variance_of_h ? in_.variance_of_h->row(c, y)[x] : 0.0f;
+        }
+      }
+  }
+
+  /// Reads the records at `source` (one per lane) into lanes: first the contrasts, then the tail.
+  void gather(const float* const* source, vfloat* contrasts, vfloat* tail) const {
+    for (int first = 0; first < layout_.size; first += kLanes) {
+      vfloat block[kLanes];
+      for (int l = 0; l < kLanes; ++l) block[l] = load(source[l] + first);
+      transpose(block);
+      for (int i = 0; i < std::min(kLanes, layout_.size - first); ++i) {
+        const int element = first + i;
+        (element < layout_.contrasts ? contrasts[element] : tail[element - layout_.contrasts]) = block[i];
+      }
+    }
+  }
+
+  vfloat tail_value(const vfloat* tail, int offset) const { return tail[offset - layout_.contrasts]; }
+
+  void run_batch(const Tile& tile, int x, int y, Workspace& w) const {
+    const int n_lanes = std::min(kLanes, tile.x1 - x), k = s_.k, n_tail = layout_.size - layout_.contrasts;
+    search_.find(in_.crn_moments->mean, x, y, w.keys.data(), w.chosen.data());
+
+    // Lanes beyond the tile repeat its last pixel's record; what they compute is not used.
+    const float* target[kLanes];
+    for (int l = 0; l < kLanes; ++l) target[l] = w.records.data() + record_index(tile, std::min(x + l, tile.x1 - 1), y);
+    gather(target, w.y.data(), w.y_tail.data());
+    const ptrdiff_t row = static_cast<ptrdiff_t>(record_stride(tile)) * layout_.size;
+    for (int i = 0; i < k; ++i) {
+      const float* source[kLanes];
+      for (int l = 0; l < kLanes; ++l) {
+        const Offset o = search_.offsets()[w.chosen[l * k + i]];
+        source[l] = target[l] + o.dy * row + o.dx * layout_.size;
+      }
+      gather(source, w.x.data() + static_cast<size_t>(i) * layout_.contrasts,
+             w.tail.data() + static_cast<size_t>(i) * n_tail);
+    }
+
+    if (s_.shared) {
+      find_coefficients(0, 3, w);
+      for (int c = 0; c < 3; ++c) finish_channel(c, x, y, n_lanes, w);
+    } else {
+      for (int c = 0; c < 3; ++c) {
+        find_coefficients(c, 1, w);
+        finish_channel(c, x, y, n_lanes, w);
+      }
+    }
+  }
+
+  /// V_h,i of Eq. (10) for the channels [first, first + count), summed over them, as scale_i = 1 / sqrt(V_h,i).
+  void find_penalties(int first, int count, Workspace& w) const {
+    const int k = s_.k, n_tail = layout_.size - layout_.contrasts;
+    const auto sum = [&](const vfloat* tail, int offset) {
+      vfloat total = tail_value(tail, offset + first);
+      for (int c = first + 1; c < first + count; ++c) total += tail_value(tail, offset + c);
+      return total;
+    };
+    if (!in_.error_of_h) {
+      vfloat diagonal = {};
+      for (int i = 0; i < k; ++i) diagonal += sum(w.tail.data() + i * n_tail, layout_.group_variance);
+      const vfloat penalty =
+          max(diagonal * ((s_.ridge > 0 ? s_.ridge : kNegligibleRidge) / static_cast<float>(k)), splat(1e-30f));
+      const vfloat scale = 1.0f / lanes::sqrt(penalty);
+      for (int i = 0; i < k; ++i) w.scale[i] = scale;
+      return;
+    }
+    const vfloat own = sum(w.y_tail.data(), layout_.error);
+    for (int i = 0; i < k; ++i) {
+      const vfloat* tail = w.tail.data() + i * n_tail;
+      const vfloat error = sum(tail, layout_.error);
+      const vfloat penalty = s_.symmetric ? 0.5f * (own + error) : error;
+      const vfloat smallest = kSmallestPenalty * sum(tail, layout_.group_variance) + 1e-30f;
+      w.scale[i] = 1.0f / lanes::sqrt(max(penalty, smallest));
+    }
+  }
+
+  /// Solves Eq. (10). With Z = X V_h^-1/2 and beta = V_h^-1/2 gamma it reads
+  ///   gamma = (Z^T Z + (T - 1) I)^-1 Z^T y = Z^T (Z Z^T + (T - 1) I)^-1 y;
+  /// the smaller of the two systems is solved. Leaves beta in gamma and Z in x.
+  void find_coefficients(int first, int count, Workspace& w) const {
+    const int k = s_.k, all = layout_.contrasts, step = count == 3 ? 1 : 3, rows = all / step;
+    find_penalties(first, count, w);
+    for (int i = 0; i < k; ++i) {
+      vfloat* x = w.x.data() + static_cast<size_t>(i) * all + first;
+      for (int r = 0; r < rows; ++r) x[r * step] *= w.scale[i];
+    }
+    const vfloat shift = splat(static_cast<float>(T_ - 1));
+    const vfloat* X = w.x.data() + first;
+    const vfloat* Y = w.y.data() + first;
+    if (k <= rows) {
+      batch::gram(X, all, step, k, rows, w.gram.data());
+      for (int i = 0; i < k; ++i) w.gamma[i] = dot(X + static_cast<size_t>(i) * all, Y, step, rows);
+      batch::solve_shifted(w.gram.data(), shift, k, w.gamma.data(), w.inverse.data());
+    } else {
+      batch::gram(X, step, all, rows, k, w.gram.data());
+      for (int r = 0; r < rows; ++r) w.b[r] = Y[r * step];
+      batch::solve_shifted(w.gram.data(), shift, rows, w.b.data(), w.inverse.data());
+      for (int i = 0; i < k; ++i) {
+        vfloat g = {};
+        for (int r = 0; r < rows; ++r) g += X[static_cast<size_t>(i) * all + r * step] * w.b[r];
+        w.gamma[i] = g;
+      }
+    }
+  }
+
+  static vfloat dot(const vfloat* a, const vfloat* b, int step, int n) {
+    vfloat even = {}, odd = {};
+    int r = 0;
+    for (; r + 1 < n; r += 2) {
+      even += a[r * step] * b[r * step];
+      odd += a[(r + 1) * step] * b[(r + 1) * step];
+    }
+    if (r < n) even += a[r * step] * b[r * step];
+    return even + odd;
+  }
+
+  /// Eq. (7) and Eq. (8) for one channel.
+  void finish_channel(int c, int x, int y, int n_lanes, Workspace& w) const {
+    const int k = s_.k, n_tail = layout_.size - layout_.contrasts;
+    vfloat estimate = load(in_.crn_moments->mean.row(c, y) + x), h_part = {};
+    for (int i = 0; i < k; ++i) {
+      const vfloat beta = w.gamma[i] * w.scale[i];
+      const vfloat* tail = w.tail.data() + i * n_tail;
+      estimate -= beta * tail_value(tail, layout_.difference + c);
+      if (s_.std_error) h_part += beta * beta * tail_value(tail, layout_.h_variance + c);
+    }
+    for (int l = 0; l < n_lanes; ++l) result_.estimate.pixel(x + l, y)[c] = estimate[l];
+    if (!s_.std_error) return;
+
+    // [YM2025] Eq. (8) with the estimated quantities: variance of the group residuals, and of the h.
+    vfloat squares = {};
+    for (int r = c; r < layout_.contrasts; r += 3) {
+      vfloat residual = w.y[r];
+      for (int i = 0; i < k; ++i) residual -= w.gamma[i] * w.x[static_cast<size_t>(i) * layout_.contrasts + r];
+      squares += residual * residual;
+    }
+    const vfloat error = lanes::sqrt(squares / static_cast<float>(T_ * (T_ - 1)) + h_part);
+    for (int l = 0; l < n_lanes; ++l) result_.std_error.pixel(x + l, y)[c] = error[l];
+  }
+
+  const ControlVariateInput& in_;
+  const ControlVariateSettings& s_;
+  const std::vector<unsigned char>& valid_;
+  EstimatorResult& result_;
+  const int T_;
+  const RecordLayout layout_;
+  const NeighbourSearch search_;
+  const int radius_;
+};
+
+}  // namespace
+
+void apply_control_variates(const ControlVariateInput& input, const ControlVariateSettings& settings,
+                            const std::vector<unsigned char>& valid, EstimatorResult& result) {
+  const int width = input.crn.width, height = input.crn.height;
+  result.estimate = Image(width, height, 3);
+  result.std_error = settings.std_error ? Image(width, height, 3) : Image();
+  const Regression regression(input, settings, valid, result);
+  const int columns = (width + kTileWidth - 1) / kTileWidth, rows = (height + kTileHeight - 1) / kTileHeight;
+  tbb::enumerable_thread_specific<Workspace> workspaces;
+  tbb::parallel_for(
+      tbb::blocked_range<int>(0, columns * rows, 1),
+      [&](const tbb::blocked_range<int>& range) {
+        Workspace& workspace = workspaces.local();
+        for (int i = range.begin(); i < range.end(); ++i) {
+          const int x0 = i % columns * kTileWidth, y0 = i / columns * kTileHeight;
+          regression.run_tile({x0, y0, std::min(x0 + kTileWidth, width), std::min(y0 + kTileHeight, height)},
+                              workspace);
+        }
+      },
+      tbb::simple_partitioner());
+}
+
+}  // namespace covary

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// The estimator all image-space control variates of Yang & Moon 2025 share: Eq. (7) with the coefficients of Eq. (10),
+//     F^ = f - sum_i beta_i (g_i - h_i),    beta = (X^T X / (T - 1) + V_h)^-1 X^T y / (T - 1),
+// for every pixel, given the error variances V_h. X, y: centred group means of the CRN image at the neighbours and at the
+// target; f, g: their means; h: means of the PT image. What V_h is makes the difference between the methods (iicv.h,
+// cv_baseline.h).
+#pragma once
+
+#include "estimators/grouped_image.h"
+#include "estimators/planes.h"
+
+namespace covary {
+
+/// Smallest V_h,i relative to the variance of the CRN groups at i. It bounds the condition number, so that single
+/// precision suffices; PT and CRN estimate the same integrals, so that the true ratio is about one.
+inline constexpr float kSmallestPenalty = 1e-4f;
+/// Ridge that stands for zero (minimum norm), relative to the mean diagonal.
+inline constexpr float kNegligibleRidge = 1e-6f;
+
+struct ControlVariateSettings {
+  int k = 25;
+  int window = 11;
+  bool include_target = true;
+  /// One coefficient per neighbour for R, G and B together (rows of X and y stacked, penalties summed), or one each.
+  bool shared = true;
+  /// V_h,i = (error of the target + error of neighbour i) / 2 instead of the error of neighbour i.
+  bool symmetric = true;
+  /// Where positive: V_h = ridge * (mean diagonal of X^T X / (T - 1)) * I instead of `error_of_h`.
+  float ridge = 0;
+  /// Also estimate the standard error of F^ by Eq. (8).
+  bool std_error = false;
+};
+
+struct ControlVariateInput {
+  GroupedImage crn;
+  const Moments* crn_moments = nullptr;   ///< mean: kFar outside and at invalid pixels
+  const Planes* h = nullptr;              ///< 3 planes: mean of the PT image; 0 outside and at invalid pixels
+  const Planes* error_of_h = nullptr;     ///< 3 planes: estimated error variance of h; kUseless where there is none
+  const Planes* variance_of_h = nullptr;  ///< 3 planes: variance of h for the error estimate; only with std_error
+};
+
+/// Fills `result.estimate` and, where asked for, `result.std_error`; pixels marked 0 in `valid` are left as they come.
+/// All planes need a border of at least window / 2. Bit-identical for any number of threads.
+void apply_control_variates(const ControlVariateInput& input, const ControlVariateSettings& settings,
+                            const std::vector<unsigned char>& valid, EstimatorResult& result);
+
+}  // namespace covary

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "estimators/cv_baseline.h"
+
+#include <fmt/format.h>
+
+#include "estimators/control_variates.h"
+
+namespace covary {
+
+std::vector<std::string> CvBaselineOptions::validate() const {
+  std::vector<std::string> problems;
+  if (window < 3 || window > 63 || window % 2 == 0)
+    problems.push_back(fmt::format("window is {}, expected an odd number from 3 to 63", window));
+  const int candidates = window * window - (include_target ? 0 : 1);
+  if (k < 1 || k > candidates)
+    problems.push_back(fmt::format("k is {}, expected 1 to {}, the number of {}pixels in a window of {} x {}", k,
+                                   candidates, include_target ? "" : "neighbouring ", window, window));
+  if (!(ridge >= 0)) problems.push_back(fmt::format("ridge is {}, expected zero or a positive number", ridge));
+  return problems;
+}
+
+EstimatorResult cv_baseline(const GroupedImage& crn, const GroupedImage& pt, const CvBaselineOptions& options) {
+  std::vector<std::string> problems = options.validate();
+  check_inputs(crn, pt, 3, options.std_error ? 2 : 1, problems);
+  throw_if_any("cv_baseline", problems);
+
+  EstimatorResult result;
+  const std::vector<unsigned char> valid = finite_pixels(crn, pt, result.nonfinite_pixels);
+  const Moments g = moments(crn, valid, options.window / 2, kFar), h = moments(pt, valid, options.window / 2, 0.0f);
+  ControlVariateSettings settings;
+  settings.k = options.k;
+  settings.window = options.window;
+  settings.include_target = options.include_target;
+  settings.shared = options.shared_coefficients;
+  // [YM2025] Eq. (6) is Eq. (10) with V_h = 0; a ridge on X^T X is one of 1 / (T - 1) times its size on X^T X / (T - 1),
+  // and both are relative to the mean diagonal.
+  settings.ridge = options.ridge;
+  settings.std_error = options.std_error;
+  ControlVariateInput input{crn, &g, &h.mean, nullptr, &h.variance_of_mean};
+  apply_control_variates(input, settings, valid, result);
+  fill_invalid(crn, pt, valid, result.estimate);
+  return result;
+}
+
+}  // namespace covary

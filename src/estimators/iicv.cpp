@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "estimators/iicv.h"
+
+#include <fmt/format.h>
+
+#include "estimators/control_variates.h"
+#include "estimators/pilot.h"
+
+namespace covary {
+
+IicvOptions IicvOptions::paper() { return IicvOptions{}; }
+
+std::vector<std::string> IicvOptions::validate() const {
+  std::vector<std::string> problems;
+  const auto check_window = [&](const char* name, int value) {
+    if (value < 3 || value > 63 || value % 2 == 0)
+      problems.push_back(fmt::format("{} is {}, expected an odd number from 3 to 63", name, value));
+  };
+  check_window("window", window);
+  check_window("pilot_window", pilot_window);
+  const int candidates = window * window - (include_target ? 0 : 1);
+  if (k < 1 || k > candidates)
+    problems.push_back(fmt::format("k is {}, expected 1 to {}, the number of {}pixels in a window of {} x {}", k,
+                                   candidates, include_target ? "" : "neighbouring ", window, window));
+  if (!(ridge > 0)) problems.push_back(fmt::format("ridge is {}, expected a positive number", ridge));
+  return problems;
+}
+
+EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& pt, const IicvOptions& options) {
+  std::vector<std::string> problems = options.validate();
+  const bool needs_groups =
+      options.penalty == Penalty::kSample || options.penalty == Penalty::kCrossFit || options.std_error;
+  check_inputs(crn, pt, 3, needs_groups ? 2 : 1, problems);
+  throw_if_any("iicv", problems);
+
+  EstimatorResult result;
+  const std::vector<unsigned char> valid = finite_pixels(crn, pt, result.nonfinite_pixels);
+  const int border = std::max(options.window, options.pilot_window) / 2;
+  const Moments g = moments(crn, valid, border, kFar);
+
+  ControlVariateSettings settings;
+  settings.k = options.k;
+  settings.window = options.window;
+  settings.include_target = options.include_target;
+  settings.shared = options.shared_coefficients;
+  settings.symmetric = options.symmetric;
+  settings.std_error = options.std_error;
+  ControlVariateInput input{crn, &g};
+
+  if (options.penalty == Penalty::kCrossFit) {
+    // Halves: even and odd groups. Each half's pilot judges the other half's values, so that the penalty is independent of
+    // the value it belongs to.
+    const Moments half[2] = {moments(pt, valid, border, 0.0f, 0, 2), moments(pt, valid, border, 0.0f, 1, 2)};
+    EstimatorResult part[2];
+    for (int i : {0, 1}) {
+      const Planes error = pilot_error(g, half[1 - i].mean, options.pilot_window, false, border);
+      input.h = &half[i].mean;
+      input.error_of_h = &error;
+      input.variance_of_h = &half[i].variance_of_mean;
+      apply_control_variates(input, settings, valid, part[i]);
+    }
+    result.estimate = std::move(part[0].estimate);
+    result.std_error = std::move(part[0].std_error);
+    // The two estimates share the CRN image: their errors may be fully correlated, so that standard errors are averaged.
+    for (size_t i = 0; i < result.estimate.data.size(); ++i)
+      result.estimate.data[i] = 0.5f * (result.estimate.data[i] + part[1].estimate.data[i]);
+    for (size_t i = 0; i < result.std_error.data.size(); ++i)
+      result.std_error.data[i] = 0.5f * (result.std_error.data[i] + part[1].std_error.data[i]);
+  } else {
+    const Moments h = moments(pt, valid, border, 0.0f);
+    Planes pilot;
+    input.h = &h.mean;
+    input.variance_of_h = &h.variance_of_mean;
+    switch (options.penalty) {
+      case Penalty::kSample:
+        input.error_of_h = &h.variance_of_mean;
+        break;
+      case Penalty::kHomogeneous:
+        settings.ridge = options.ridge;
+        break;
+      default:
+        pilot = pilot_error(g, h.mean, options.pilot_window, options.penalty == Penalty::kSmoothed, border);
+        input.error_of_h = &pilot;
+    }
+    apply_control_variates(input, settings, valid, result);
+  }
+  fill_invalid(crn, pt, valid, result.estimate);
+  return result;
+}
+
+}  // namespace covary

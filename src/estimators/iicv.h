@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// Imperfect image-space control variates. C. Yang, B. Moon, ACM Trans. Graph. 44(6), 2025 [YM2025], Sec. 4.
+//
+// Two images of one scene, each with independent groups of samples: CRN (all pixels use the same random numbers) and PT
+// (independent numbers). Neighbouring pixels of the CRN image are control variates of a pixel; their unknown expectations
+// are taken from the PT image, and the coefficients allow for its errors.
+//
+// Claim: consistent, not unbiased; coefficients and penalties are estimated from the samples they are applied to. Pixels
+// of the PT image must be independent of each other (box filter), values linear.
+#pragma once
+
+#include "estimators/grouped_image.h"
+
+namespace covary {
+
+/// How the error variances V_h of the PT image are estimated.
+enum class Penalty {
+  kPilot,        ///< squared difference from a cross-bilateral pilot, [YM2025] Eq. (11): the paper's
+  kSample,       ///< sample variance of the groups; the paper's ablation
+  kSmoothed,     ///< the pilot's squares averaged over the guided window: less energy loss, more error
+  kHomogeneous,  ///< the same for all neighbours, `ridge` times the mean diagonal of X^T X / (T - 1): nearly unbiased
+  kCrossFit,     ///< pilot of one half of the PT groups, applied to the other half; average of both
+};
+
+struct IicvOptions {
+  /// Number of control variates. Default 25 ([YM2025] Sec. 5, Fig. 11); 1 … number of pixels in the window. More costs
+  /// time and gains little.
+  int k = 25;
+  /// Side of the square they are chosen from. Default 11 ([YM2025] Sec. 4; 21 for k = 50, 100); odd, 3 … 63.
+  int window = 11;
+  /// Whether the target pixel is one of its own control variates; without it its PT value is unused. Default true (the
+  /// paper does not say; measured).
+  bool include_target = true;
+  /// One coefficient per neighbour for all channels (rows stacked) or one per channel. The paper does not say.
+  bool shared_coefficients = true;
+  /// Penalty from the mean of the neighbour's and the target's error, [YM2025] end of Sec. 4. Default true.
+  bool symmetric = true;
+  Penalty penalty = Penalty::kPilot;
+  /// Side of the pilot's window. Default 11 ([YM2025] Eq. (11)); odd, 3 … 63.
+  int pilot_window = 11;
+  /// Factor of Penalty::kHomogeneous, > 0. Default 1: both images are estimates of the same integrals.
+  float ridge = 1.0f;
+  /// Also estimate the standard error of the result, [YM2025] Eq. (8).
+  bool std_error = false;
+
+  /// The published estimator with its published settings.
+  static IicvOptions paper();
+  /// Everything that is wrong with the options; empty if nothing is.
+  std::vector<std::string> validate() const;
+};
+
+/// Throws Error(kUsage) that lists every problem of options and inputs. `crn` needs at least 3 groups, `pt` 2 for
+/// Penalty::kSample, kCrossFit and std_error, otherwise 1. Bit-identical for any number of threads.
+EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& pt, const IicvOptions& options = {});
+
+}  // namespace covary

@@ -1,0 +1,377 @@
+// SPDX-License-Identifier: Apache-2.0
+// IICV and the baseline against the double-precision reference, identities, degenerate inputs, determinism.
+#include "estimators/iicv.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <functional>
+#include <limits>
+
+#include "core/error.h"
+#include "estimators/control_variates.h"
+#include "estimators/cv_baseline.h"
+#include "estimators/neighbours.h"
+#include "estimators/reference_control_variates.h"
+#include "estimators/test_images.h"
+
+namespace covary {
+namespace {
+
+using reference::Rgb;
+using reference::RgbImage;
+
+/// The neighbours of all pixels (neighbours_test shows that they are the right ones).
+std::vector<std::vector<reference::Pixel>> neighbours(const GroupedImage& crn, int k, int window, bool include_target) {
+  const std::vector<unsigned char> valid(static_cast<size_t>(crn.width) * crn.height, 1);
+  const Planes guide = moments(crn, valid, window / 2, kFar).mean;
+  const NeighbourSearch search(k, window, include_target);
+  std::vector<lanes::vint> keys(search.offsets().size());
+  std::vector<uint16_t> chosen(static_cast<size_t>(k) * lanes::kLanes);
+  std::vector<std::vector<reference::Pixel>> result(valid.size());
+  for (int y = 0; y < crn.height; ++y)
+    for (int x = 0; x < crn.width; ++x) {
+      search.find(guide, x, y, keys.data(), chosen.data());
+      for (int i = 0; i < k; ++i) {
+        const Offset o = search.offsets()[chosen[i]];
+        const reference::Pixel q{x + o.dx, y + o.dy};
+        if (q.x >= 0 && q.y >= 0 && q.x < crn.width && q.y < crn.height) result[y * crn.width + x].push_back(q);
+      }
+    }
+  return result;
+}
+
+/// Largest difference from the reference, in standard deviations of the CRN mean, of estimate and standard error.
+struct Difference {
+  double estimate = 0, std_error = 0;
+};
+
+Difference compare(const EstimatorResult& fast, const GroupedImage& crn, const GroupedImage& pt,
+                   const RgbImage& error_of_h, int k, int window, bool include_target,
+                   const reference::Settings& settings) {
+  const auto all = neighbours(crn, k, window, include_target);
+  const RgbImage h = reference::map_pixels(pt, [&](int x, int y) { return reference::mean(pt, x, y); });
+  const RgbImage variance =
+      reference::map_pixels(pt, [&](int x, int y) { return reference::variance_of_mean(pt, x, y); });
+  Difference worst;
+  for (int y = 0; y < crn.height; ++y)
+    for (int x = 0; x < crn.width; ++x) {
+      const reference::Result exact =
+          reference::control_variates(crn, h, error_of_h, variance, {x, y}, all[y * crn.width + x], settings);
+      const Rgb noise = reference::variance_of_mean(crn, x, y);
+      for (int c = 0; c < 3; ++c) {
+        const double unit = std::sqrt(noise[c]) + 1e-9;
+        worst.estimate = std::max(worst.estimate, std::abs(fast.estimate.pixel(x, y)[c] - exact.estimate[c]) / unit);
+        if (!fast.std_error.data.empty())
+          worst.std_error =
+              std::max(worst.std_error, std::abs(fast.std_error.pixel(x, y)[c] - exact.std_error[c]) / unit);
+      }
+    }
+  return worst;
+}
+
+RgbImage pilot_of(const GroupedImage& crn, const GroupedImage& pt, int window) {
+  return reference::pilot_error(crn, reference::map_pixels(pt, [&](int x, int y) { return reference::mean(pt, x, y); }),
+                                window);
+}
+
+/// Both forms of the system (k below and above the number of rows), both kinds of coefficients, symmetric or not, with
+/// and without the target, several group counts.
+TEST(Iicv, AgreesWithTheReference) {
+  struct Case {
+    int k, window, groups;
+    bool include_target, shared, symmetric;
+  };
+  for (const Case& c :
+       {Case{25, 11, 12, true, true, true}, Case{25, 11, 12, true, false, true}, Case{25, 11, 12, false, true, false},
+        Case{6, 7, 12, true, false, false}, Case{40, 11, 12, true, true, true}, Case{50, 21, 4, true, true, true},
+        Case{25, 11, 24, false, false, true}, Case{10, 5, 3, true, true, true}}) {
+    const test::Grouped crn = test::crn_image(41, 27, c.groups, 1), pt = test::pt_image(41, 27, c.groups, 2);
+    IicvOptions options;
+    options.k = c.k;
+    options.window = c.window;
+    options.include_target = c.include_target;
+    options.shared_coefficients = c.shared;
+    options.symmetric = c.symmetric;
+    options.std_error = true;
+    const EstimatorResult fast = iicv(crn.view(), pt.view(), options);
+    const RgbImage error = pilot_of(crn.view(), pt.view(), 11);
+    const Difference d = compare(fast, crn.view(), pt.view(), error, c.k, c.window, c.include_target,
+                                 {c.shared, c.symmetric, 0, kSmallestPenalty});
+    EXPECT_LT(d.estimate, 2e-3) << "k " << c.k << " shared " << c.shared << " groups " << c.groups;
+    EXPECT_LT(d.std_error, 2e-3) << "k " << c.k << " shared " << c.shared << " groups " << c.groups;
+  }
+}
+
+TEST(Iicv, OtherPenaltiesAgreeWithTheReference) {
+  const test::Grouped crn = test::crn_image(41, 27, 12, 1), pt = test::pt_image(41, 27, 12, 2);
+  const GroupedImage pt_view = pt.view();
+  IicvOptions options;
+  reference::Settings settings{true, true, 0, kSmallestPenalty};
+
+  options.penalty = Penalty::kSample;
+  const RgbImage variance =
+      reference::map_pixels(pt_view, [&](int x, int y) { return reference::variance_of_mean(pt_view, x, y); });
+  EXPECT_LT(
+      compare(iicv(crn.view(), pt.view(), options), crn.view(), pt.view(), variance, 25, 11, true, settings).estimate,
+      2e-3);
+
+  options.penalty = Penalty::kSmoothed;
+  const RgbImage pilot = pilot_of(crn.view(), pt.view(), 11);
+  const RgbImage smoothed =
+      reference::map_pixels(pt_view, [&](int x, int y) { return reference::guided_mean(crn.view(), pilot, 11, x, y); });
+  EXPECT_LT(
+      compare(iicv(crn.view(), pt.view(), options), crn.view(), pt.view(), smoothed, 25, 11, true, settings).estimate,
+      2e-3);
+
+  options.penalty = Penalty::kHomogeneous;
+  options.ridge = 0.7f;
+  settings.ridge = 0.7;
+  EXPECT_LT(
+      compare(iicv(crn.view(), pt.view(), options), crn.view(), pt.view(), pilot, 25, 11, true, settings).estimate,
+      2e-3);
+}
+
+/// The halves of a cross-fit are the plain estimator on half of the groups with the other half's pilot.
+TEST(Iicv, CrossFitAgreesWithTheReference) {
+  const test::Grouped crn = test::crn_image(41, 27, 12, 1), pt = test::pt_image(41, 27, 12, 2);
+  const GroupedImage view = pt.view();
+  RgbImage half[2];
+  for (int i : {0, 1})
+    half[i] = reference::map_pixels(view, [&](int x, int y) { return reference::mean(view, x, y, i, 2); });
+  const auto all = neighbours(crn.view(), 25, 11, true);
+  IicvOptions options;
+  options.penalty = Penalty::kCrossFit;
+  const EstimatorResult fast = iicv(crn.view(), view, options);
+  const RgbImage error[2] = {reference::pilot_error(crn.view(), half[1], 11),
+                             reference::pilot_error(crn.view(), half[0], 11)};
+  for (int y = 0; y < view.height; ++y)
+    for (int x = 0; x < view.width; ++x) {
+      Rgb average{};
+      for (int i : {0, 1}) {
+        const auto r = reference::control_variates(crn.view(), half[i], error[i], error[i], {x, y},
+                                                   all[y * view.width + x], {true, true, 0, kSmallestPenalty});
+        for (int c = 0; c < 3; ++c) average[c] += 0.5 * r.estimate[c];
+      }
+      const Rgb noise = reference::variance_of_mean(crn.view(), x, y);
+      for (int c = 0; c < 3; ++c)
+        EXPECT_NEAR(fast.estimate.pixel(x, y)[c], average[c], 2e-3 * std::sqrt(noise[c])) << x << ", " << y;
+    }
+}
+
+TEST(CvBaseline, WithARidgeAgreesWithTheReference) {
+  const test::Grouped crn = test::crn_image(41, 27, 12, 1), pt = test::pt_image(41, 27, 12, 2);
+  const RgbImage unused = pilot_of(crn.view(), pt.view(), 11);
+  for (bool shared : {false, true}) {
+    CvBaselineOptions options;
+    options.ridge = 0.05f;
+    options.shared_coefficients = shared;
+    const EstimatorResult fast = cv_baseline(crn.view(), pt.view(), options);
+    EXPECT_LT(compare(fast, crn.view(), pt.view(), unused, 25, 11, true, {shared, false, 0.05, 0}).estimate, 2e-3);
+  }
+}
+
+/// Minimum norm: against the pseudo-inverse.
+TEST(CvBaseline, WithoutRidgeIsTheMinimumNormSolution) {
+  const test::Grouped crn = test::crn_image(30, 20, 12, 1), pt = test::pt_image(30, 20, 12, 2);
+  const GroupedImage view = crn.view(), pt_view = pt.view();
+  const auto all = neighbours(view, 25, 11, true);
+  const EstimatorResult fast = cv_baseline(view, pt_view);
+  for (int y = 0; y < view.height; ++y)
+    for (int x = 0; x < view.width; ++x)
+      for (int c = 0; c < 3; ++c) {
+        const auto& near = all[y * view.width + x];
+        Eigen::MatrixXd X(12, 25);
+        Eigen::VectorXd target(12), difference(25);
+        for (int t = 0; t < 12; ++t) {
+          target(t) = view.pixel(x, y)[3 * t + c];
+          for (int i = 0; i < 25; ++i) X(t, i) = view.pixel(near[i].x, near[i].y)[3 * t + c];
+        }
+        const double f = target.mean();
+        for (int i = 0; i < 25; ++i)
+          difference(i) = X.col(i).mean() - reference::mean(pt_view, near[i].x, near[i].y)[c];
+        target.array() -= f;
+        X.rowwise() -= X.colwise().mean().eval();
+        const Eigen::VectorXd beta = X.completeOrthogonalDecomposition().solve(target);
+        const double noise = std::sqrt(reference::variance_of_mean(view, x, y)[c]);
+        EXPECT_NEAR(fast.estimate.pixel(x, y)[c], f - beta.dot(difference), 0.02 * noise) << x << ", " << y;
+      }
+}
+
+/// Least squares with shared coefficients and the target among the neighbours: the target itself.
+TEST(CvBaseline, WithSharedCoefficientsIsThePtImage) {
+  const test::Grouped crn = test::crn_image(30, 20, 12, 1), pt = test::pt_image(30, 20, 12, 2);
+  CvBaselineOptions options;
+  options.shared_coefficients = true;
+  const EstimatorResult fast = cv_baseline(crn.view(), pt.view(), options);
+  for (int y = 0; y < 20; ++y)
+    for (int x = 0; x < 30; ++x)
+      for (int c = 0; c < 3; ++c)
+        EXPECT_NEAR(fast.estimate.pixel(x, y)[c], reference::mean(pt.view(), x, y)[c], 2e-3) << x << ", " << y;
+}
+
+/// Powers of two scale floats exactly, and the estimator is homogeneous.
+TEST(Iicv, ScalingTheInputsScalesTheResultExactly) {
+  test::Grouped crn = test::crn_image(40, 23, 12, 3), pt = test::pt_image(40, 23, 12, 4);
+  IicvOptions options;
+  options.std_error = true;
+  const EstimatorResult once = iicv(crn.view(), pt.view(), options);
+  for (float& v : crn.data) v *= 4;
+  for (float& v : pt.data) v *= 4;
+  const EstimatorResult scaled = iicv(crn.view(), pt.view(), options);
+  for (size_t i = 0; i < once.estimate.data.size(); ++i) {
+    ASSERT_EQ(4 * once.estimate.data[i], scaled.estimate.data[i]);
+    ASSERT_EQ(4 * once.std_error.data[i], scaled.std_error.data[i]);
+  }
+}
+
+/// No variance in the CRN image: nothing to explain, the result is the CRN mean.
+TEST(Iicv, WithoutCrnVarianceIsTheCrnMean) {
+  test::Grouped crn = test::constant_image(30, 20, 12, 0.25f);
+  const test::Grouped pt = test::pt_image(30, 20, 12, 4);
+  for (bool shared : {true, false}) {
+    IicvOptions options;
+    options.shared_coefficients = shared;
+    const EstimatorResult result = iicv(crn.view(), pt.view(), options);
+    for (float v : result.estimate.data) EXPECT_NEAR(v, 0.25f, 1e-6f);
+  }
+}
+
+TEST(Iicv, BlackIsBlack) {
+  const test::Grouped black = test::constant_image(30, 20, 12, 0.0f);
+  IicvOptions options;
+  options.std_error = true;
+  for (Penalty penalty :
+       {Penalty::kPilot, Penalty::kSample, Penalty::kSmoothed, Penalty::kHomogeneous, Penalty::kCrossFit}) {
+    options.penalty = penalty;
+    const EstimatorResult result = iicv(black.view(), black.view(), options);
+    for (float v : result.estimate.data) ASSERT_EQ(v, 0.0f);
+    for (float v : result.std_error.data) ASSERT_EQ(v, 0.0f);
+  }
+  const EstimatorResult result = cv_baseline(black.view(), black.view());
+  for (float v : result.estimate.data) ASSERT_EQ(v, 0.0f);
+}
+
+/// A PT image without error: the coefficient of the target goes to 1 and the result to PT.
+TEST(Iicv, WithAnExactPtImageIsThePtImage) {
+  const test::Grouped crn = test::crn_image(30, 20, 12, 3);
+  test::Grouped exact = test::constant_image(30, 20, 12, 0);
+  for (int y = 0; y < 20; ++y)
+    for (int x = 0; x < 30; ++x)
+      for (int i = 0; i < 36; ++i) exact.pixel(x, y)[i] = static_cast<float>(test::expected(x, y, i % 3));
+  IicvOptions options;
+  options.penalty = Penalty::kSample;
+  const EstimatorResult result = iicv(crn.view(), exact.view(), options);
+  for (int y = 0; y < 20; ++y)
+    for (int x = 0; x < 30; ++x)
+      for (int c = 0; c < 3; ++c) {
+        const double noise = std::sqrt(reference::variance_of_mean(crn.view(), x, y)[c]);
+        EXPECT_NEAR(result.estimate.pixel(x, y)[c], test::expected(x, y, c), 0.05 * noise);
+      }
+}
+
+/// Bits do not depend on the number of threads, nor on where a pixel lies in a tile or vector: inside a crop, farther
+/// than the windows reach from its border, they are those of the whole image.
+TEST(Iicv, BitsDoNotDependOnThreadsTilesOrCrops) {
+  const test::Grouped crn = test::crn_image(150, 90, 6, 3), pt = test::pt_image(150, 90, 6, 4);
+  IicvOptions options;
+  options.std_error = true;
+  options.penalty = Penalty::kSmoothed;
+  const auto with_threads = [&](int n) {
+    tbb::global_control control(tbb::global_control::max_allowed_parallelism, n);
+    return iicv(crn.view(), pt.view(), options);
+  };
+  const EstimatorResult one = with_threads(1);
+  for (int n : {2, 5}) {
+    const EstimatorResult more = with_threads(n);
+    EXPECT_EQ(one.estimate.data, more.estimate.data);
+    EXPECT_EQ(one.std_error.data, more.std_error.data);
+  }
+
+  const int x0 = 13, y0 = 9, width = 101, height = 60, reach = 5 + 5 + 5;  // neighbours, their error, its pilot
+  const auto crop = [&](const test::Grouped& image) {
+    test::Grouped part = test::constant_image(width, height, image.groups, 0);
+    for (int y = 0; y < height; ++y)
+      std::copy_n(image.view().pixel(x0, y0 + y), static_cast<size_t>(width) * image.groups * 3, part.pixel(0, y));
+    return part;
+  };
+  const EstimatorResult part = iicv(crop(crn).view(), crop(pt).view(), options);
+  for (int y = reach; y < height - reach; ++y)
+    for (int x = reach; x < width - reach; ++x)
+      for (int c = 0; c < 3; ++c)
+        ASSERT_EQ(part.estimate.pixel(x, y)[c], one.estimate.pixel(x0 + x, y0 + y)[c]) << x << ", " << y;
+}
+
+/// A bad value spoils its own pixel at most, and is counted.
+TEST(Iicv, NonFiniteValuesStayWhereTheyAre) {
+  const test::Grouped crn = test::crn_image(40, 30, 6, 3), pt = test::pt_image(40, 30, 6, 4);
+  const EstimatorResult good = iicv(crn.view(), pt.view());
+  test::Grouped bad_crn = crn, bad_pt = pt;
+  bad_crn.pixel(10, 12)[4] = std::numeric_limits<float>::quiet_NaN();
+  bad_pt.pixel(30, 5)[0] = std::numeric_limits<float>::infinity();
+  for (int i = 0; i < 18; ++i)
+    bad_crn.pixel(39, 29)[i] = bad_pt.pixel(39, 29)[i] = std::numeric_limits<float>::quiet_NaN();
+  const EstimatorResult result = iicv(bad_crn.view(), bad_pt.view());
+  EXPECT_EQ(result.nonfinite_pixels, 3);
+  EXPECT_EQ(good.nonfinite_pixels, 0);
+  for (float v : result.estimate.data) ASSERT_TRUE(std::isfinite(v));
+  // Far from all three nothing changes.
+  EXPECT_EQ(result.estimate.pixel(2, 25)[0], good.estimate.pixel(2, 25)[0]);
+  // The pixel itself: the mean of its finite groups in both images; without any, zero.
+  double sum = 0;
+  for (int t = 0; t < 6; ++t)
+    sum += (t == 1 ? 0 : crn.view().pixel(10, 12)[3 * t + 1]) + pt.view().pixel(10, 12)[3 * t + 1];
+  EXPECT_NEAR(result.estimate.pixel(10, 12)[1], sum / 11, 1e-5);
+  EXPECT_EQ(result.estimate.pixel(39, 29)[2], 0.0f);
+}
+
+TEST(Iicv, ImagesSmallerThanTheWindowWork) {
+  for (const auto& [width, height] : {std::pair{1, 1}, {3, 2}, {1, 9}, {7, 1}}) {
+    const test::Grouped crn = test::crn_image(width, height, 5, 3), pt = test::pt_image(width, height, 5, 4);
+    const EstimatorResult fast = iicv(crn.view(), pt.view());
+    const Difference d = compare(fast, crn.view(), pt.view(), pilot_of(crn.view(), pt.view(), 11), 25, 11, true,
+                                 {true, true, 0, kSmallestPenalty});
+    EXPECT_LT(d.estimate, 2e-3) << width << " x " << height;
+  }
+}
+
+std::string message_of(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ErrorCode::kUsage);
+    return e.what();
+  }
+  return "no error";
+}
+
+TEST(Iicv, ReportsEveryProblemAtOnce) {
+  const test::Grouped two = test::constant_image(8, 6, 2, 1), one = test::constant_image(8, 5, 1, 1);
+  IicvOptions options;
+  options.k = 200;
+  options.pilot_window = 10;
+  options.ridge = 0;
+  options.penalty = Penalty::kSample;
+  EXPECT_EQ(
+      message_of([&] { iicv(two.view(), one.view(), options); }),
+      "iicv: pilot_window is 10, expected an odd number from 3 to 63; k is 200, expected 1 to 121, the number of "
+      "pixels "
+      "in a window of 11 x 11; ridge is 0, expected a positive number; the CRN image is 8 x 6 and the PT image 8 x 5; "
+      "they must have the same size; the CRN image has 2 groups, at least 3 are needed (12 are recommended); the PT "
+      "image has 1 group, at least 2 are needed with these settings");
+  EXPECT_EQ(message_of([&] { cv_baseline(one.view(), one.view()); }),
+            "cv_baseline: the CRN image has 1 group, at least 3 are needed (12 are recommended)");
+  CvBaselineOptions baseline;
+  baseline.window = 4;
+  baseline.include_target = false;
+  baseline.k = 16;
+  baseline.ridge = -1;
+  EXPECT_EQ(
+      message_of([&] { cv_baseline(two.view(), two.view(), baseline); }),
+      "cv_baseline: window is 4, expected an odd number from 3 to 63; k is 16, expected 1 to 15, the number of "
+      "neighbouring pixels in a window of 4 x 4; ridge is -1, expected zero or a positive number; the CRN image has 2 "
+      "groups, at least 3 are needed (12 are recommended)");
+}
+
+}  // namespace
+}  // namespace covary

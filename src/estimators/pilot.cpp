@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "estimators/pilot.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+
+namespace covary {
+namespace {
+
+using namespace lanes;
+
+struct Rgb {
+  vfloat r, g, b;
+};
+
+Rgb load_rgb(const Planes& p, int x, int y) {
+  return {load(p.row(0, y) + x), load(p.row(1, y) + x), load(p.row(2, y) + x)};
+}
+
+/// Cross-bilateral mean of `image` at (x + lane, y).
+Rgb guided_mean(const Moments& g, const Planes& image, int radius, int x, int y) {
+  const Rgb centre = load_rgb(g.mean, x, y), variance = load_rgb(g.variance_of_mean, x, y);
+  const vfloat inverse_bandwidth = -1.0f / max(variance.r + variance.g + variance.b, splat(1e-30f));
+  vfloat weights = {};
+  Rgb sum = {};
+  for (int dy = -radius; dy <= radius; ++dy)
+    for (int dx = -radius; dx <= radius; ++dx) {
+      const Rgb q = load_rgb(g.mean, x + dx, y + dy), v = load_rgb(image, x + dx, y + dy);
+      const vfloat dr = q.r - centre.r, dg = q.g - centre.g, db = q.b - centre.b;
+      const vfloat w = exp_of_nonpositive((dr * dr + dg * dg + db * db) * inverse_bandwidth);
+      weights += w;
+      sum.r += w * v.r;
+      sum.g += w * v.g;
+      sum.b += w * v.b;
+    }
+  const vfloat inverse = 1.0f / weights;  // the pixel itself has weight 1
+  return {sum.r * inverse, sum.g * inverse, sum.b * inverse};
+}
+
+/// Stores the first n lanes of `values` at row y, columns x …
+void store_rgb(Planes& planes, int x, int y, int n, const Rgb& values) {
+  const vfloat* v[3] = {&values.r, &values.g, &values.b};
+  for (int c = 0; c < 3; ++c) {
+    float* row = planes.row(c, y) + x;
+    if (n == kLanes)
+      store(row, *v[c]);
+    else
+      for (int l = 0; l < n; ++l) row[l] = (*v[c])[l];
+  }
+}
+
+template <typename Batch>
+void for_each_batch(int width, int height, const Batch& batch) {
+  tbb::parallel_for(tbb::blocked_range<int>(0, height, 4), [&](const tbb::blocked_range<int>& rows) {
+    for (int y = rows.begin(); y < rows.end(); ++y)
+      for (int x = 0; x < width; x += kLanes) batch(x, y, std::min(kLanes, width - x));
+  });
+}
+
+}  // namespace
+
+Planes pilot_error(const Moments& g, const Planes& h, int window, bool smoothed, int border) {
+  const int radius = window / 2, width = h.width(), height = h.height();
+  // Smoothing reads windows of the squares; outside the frame its weights are zero, and the values must be finite.
+  Planes squares(width, height, 3, smoothed ? radius : border, smoothed ? 0.0f : kUseless);
+  for_each_batch(width, height, [&](int x, int y, int n) {
+    const Rgb pilot = guided_mean(g, h, radius, x, y), value = load_rgb(h, x, y);
+    const vfloat r = pilot.r - value.r, gg = pilot.g - value.g, b = pilot.b - value.b;
+    store_rgb(squares, x, y, n, {r * r, gg * gg, b * b});
+  });
+  if (!smoothed) return squares;
+  Planes result(width, height, 3, border, kUseless);
+  for_each_batch(width, height,
+                 [&](int x, int y, int n) { store_rgb(result, x, y, n, guided_mean(g, squares, radius, x, y)); });
+  return result;
+}
+
+}  // namespace covary

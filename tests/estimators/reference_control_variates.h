@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+// The image-space control variates of Yang & Moon 2025 as written in the paper, in double precision, one pixel at a time,
+// with no regard for speed. Eq. numbers are the paper's.
+#pragma once
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <vector>
+
+#include "estimators/grouped_image.h"
+
+namespace covary::reference {
+
+struct Pixel {
+  int x, y;
+};
+using Rgb = std::array<double, 3>;
+using RgbImage = std::vector<Rgb>;
+
+inline Rgb mean(const GroupedImage& image, int x, int y, int first = 0, int step = 1) {
+  Rgb m{};
+  int n = 0;
+  for (int t = first; t < image.groups; t += step, ++n)
+    for (int c = 0; c < 3; ++c) m[c] += image.pixel(x, y)[3 * t + c];
+  for (double& v : m) v /= n;
+  return m;
+}
+
+inline Rgb variance_of_mean(const GroupedImage& image, int x, int y, int first = 0, int step = 1) {
+  const Rgb m = mean(image, x, y, first, step);
+  Rgb v{};
+  int n = 0;
+  for (int t = first; t < image.groups; t += step, ++n)
+    for (int c = 0; c < 3; ++c) v[c] += std::pow(image.pixel(x, y)[3 * t + c] - m[c], 2);
+  for (double& s : v) s /= n * (n - 1.0);
+  return v;
+}
+
+inline double distance2(const Rgb& a, const Rgb& b) {
+  double d = 0;
+  for (int c = 0; c < 3; ++c) d += (a[c] - b[c]) * (a[c] - b[c]);
+  return d;
+}
+
+template <typename Function>
+RgbImage map_pixels(const GroupedImage& image, const Function& function) {
+  RgbImage result;
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x) result.push_back(function(x, y));
+  return result;
+}
+
+/// Cross-bilateral mean of `values` at (x, y), guided by the CRN image; the weights of Eq. (11).
+inline Rgb guided_mean(const GroupedImage& crn, const RgbImage& values, int window, int x, int y) {
+  const int r = window / 2;
+  const Rgb centre = mean(crn, x, y), variance = variance_of_mean(crn, x, y);
+  const double bandwidth = variance[0] + variance[1] + variance[2];
+  Rgb sum{};
+  double weights = 0;
+  for (int qy = std::max(0, y - r); qy <= std::min(crn.height - 1, y + r); ++qy)
+    for (int qx = std::max(0, x - r); qx <= std::min(crn.width - 1, x + r); ++qx) {
+      const double w = std::exp(-distance2(mean(crn, qx, qy), centre) / bandwidth);
+      weights += w;
+      for (int c = 0; c < 3; ++c) sum[c] += w * values[qy * crn.width + qx][c];
+    }
+  for (double& s : sum) s /= weights;
+  return sum;
+}
+
+/// Eq. (11) for the mean image `h`.
+inline RgbImage pilot_error(const GroupedImage& crn, const RgbImage& h, int window) {
+  return map_pixels(crn, [&](int x, int y) {
+    Rgb e = guided_mean(crn, h, window, x, y);
+    for (int c = 0; c < 3; ++c) e[c] = std::pow(e[c] - h[y * crn.width + x][c], 2);
+    return e;
+  });
+}
+
+struct Settings {
+  bool shared = true, symmetric = true;
+  double ridge = 0;             ///< > 0: replaces the errors of h
+  double smallest_penalty = 0;  ///< relative to the variance of the CRN groups
+};
+
+struct Result {
+  Rgb estimate, std_error;
+};
+
+/// Eqs. (7), (8), (10) at `target` with the given neighbours. `error_of_h`: per pixel, of the mean.
+inline Result control_variates(const GroupedImage& crn, const RgbImage& h, const RgbImage& error_of_h,
+                               const RgbImage& variance_of_h, Pixel target, const std::vector<Pixel>& neighbours,
+                               const Settings& s) {
+  const int T = crn.groups, k = static_cast<int>(neighbours.size());
+  const auto index = [&](Pixel p) { return p.y * crn.width + p.x; };
+  std::array<Eigen::MatrixXd, 3> X;
+  std::array<Eigen::VectorXd, 3> y;
+  for (int c = 0; c < 3; ++c) {
+    X[c].resize(T, k);
+    y[c].resize(T);
+    for (int t = 0; t < T; ++t) {
+      y[c](t) = crn.pixel(target.x, target.y)[3 * t + c] - mean(crn, target.x, target.y)[c];
+      for (int i = 0; i < k; ++i)
+        X[c](t, i) =
+            crn.pixel(neighbours[i].x, neighbours[i].y)[3 * t + c] - mean(crn, neighbours[i].x, neighbours[i].y)[c];
+    }
+  }
+  // V_h for the groups: a group mean has T times the variance of the mean.
+  const auto penalty = [&](int first, int last) {
+    Eigen::VectorXd V(k), group_variance(k);
+    double own = 0;
+    for (int c = first; c <= last; ++c) own += T * error_of_h[index(target)][c];
+    for (int i = 0; i < k; ++i) {
+      double error = 0;
+      group_variance(i) = 0;
+      for (int c = first; c <= last; ++c) {
+        error += T * error_of_h[index(neighbours[i])][c];
+        group_variance(i) += X[c].col(i).squaredNorm() / (T - 1);
+      }
+      V(i) = std::max(s.symmetric ? 0.5 * (own + error) : error, s.smallest_penalty * group_variance(i));
+    }
+    if (s.ridge > 0) V.setConstant(s.ridge * group_variance.mean());
+    return V;
+  };
+  // Eq. (10); shared coefficients stack the rows of the channels.
+  std::array<Eigen::VectorXd, 3> beta;
+  for (int c = 0; c < (s.shared ? 1 : 3); ++c) {
+    const int last = s.shared ? 2 : c;
+    Eigen::MatrixXd A = penalty(c, last).asDiagonal();
+    Eigen::VectorXd b = Eigen::VectorXd::Zero(k);
+    for (int d = c; d <= last; ++d) {
+      A += X[d].transpose() * X[d] / (T - 1);
+      b += X[d].transpose() * y[d] / (T - 1);
+    }
+    beta[c] = A.ldlt().solve(b);
+  }
+  if (s.shared) beta[1] = beta[2] = beta[0];
+
+  Result result{mean(crn, target.x, target.y), {}};
+  for (int c = 0; c < 3; ++c) {
+    double variance = (y[c] - X[c] * beta[c]).squaredNorm() / (T - 1) / T;  // Eq. (8)
+    for (int i = 0; i < k; ++i) {
+      const Pixel q = neighbours[i];
+      result.estimate[c] -= beta[c](i) * (mean(crn, q.x, q.y)[c] - h[index(q)][c]);  // Eq. (7)
+      variance += beta[c](i) * beta[c](i) * variance_of_h[index(q)][c];
+    }
+    result.std_error[c] = std::sqrt(variance);
+  }
+  return result;
+}
+
+}  // namespace covary::reference
