@@ -4,12 +4,14 @@
     against_mitsuba.py agree --scenes DIR [NAME...]       exit code 1 where a scene does not agree
     against_mitsuba.py reference --scenes DIR [NAME...]   only fills the cache of Mitsuba renders
     against_mitsuba.py speed --scenes DIR [NAME...]
+    against_mitsuba.py store SCENE.xml... --to DIR        block means of Mitsuba's renders as JSON, for tests/against_mitsuba
 
 See README.md in this folder for what is compared, how, and how to read the tables.
 """
 import argparse
 import dataclasses
 import datetime
+import importlib.metadata
 import json
 import os
 import pathlib
@@ -50,6 +52,8 @@ def parse(arguments):
     agree.add_argument("--suite-alpha", type=float, default=1e-3,
                        help="probability that any test of the run fails although all scenes agree")
     commands.add_parser("reference", parents=[common, seeds])
+    store = commands.add_parser("store", parents=[common, seeds])
+    store.add_argument("--to", required=True, metavar="DIR")
     timing = commands.add_parser("speed", parents=[common, program])
     timing.add_argument("--rounds", type=int, default=3, help="repetitions, in alternating order")
     timing.add_argument("--variants", nargs="+", default=["llvm_ad_rgb", "scalar_rgb"])
@@ -172,6 +176,32 @@ def make_reference(options):
     return 0
 
 
+def store(options):
+    """Keeps what a test needs of Mitsuba's renders: mean and standard error of the image mean and of each block."""
+    for name, scene in scene_files.find(options.scenes, options.names).items():
+        stack, settings, _, _ = reference_stack(name, scene, options)
+        blocks = agreement.block_means(stack)
+        mean = stack.mean(axis=(1, 2), dtype=numpy.float64)
+
+        def digits(values, count):
+            return [float(f"{value:.{count}g}") for value in numpy.ravel(values)]
+
+        def error(values):
+            return digits(values.std(axis=0, ddof=1) / len(values) ** 0.5, 4)
+
+        record = {
+            "scene": name, "renderer": f"Mitsuba {importlib.metadata.version('mitsuba')} llvm_ad_rgb",
+            **dataclasses.asdict(settings), "seeds": len(stack), "block": agreement.BLOCK,
+            "layout": "blocks: rows, columns, then red, green, blue; errors: standard errors of the means over seeds",
+            "mean": digits(mean.mean(axis=0), 7), "mean_errors": error(mean),
+            "blocks": digits(blocks.mean(axis=0), 7), "block_errors": error(blocks),
+        }
+        path = pathlib.Path(options.to) / f"{name}.json"
+        path.write_text(json.dumps(record).replace(', "', ',\n "') + "\n")
+        print(f"{path}: {settings.width}x{settings.height}, {len(stack)} seeds of {settings.spp} spp")
+    return 0
+
+
 def measure_speed(options):
     scenes = scene_files.find(options.scenes, options.names)
     covary = renderers.Covary(options.covary, tuple(options.covary_option))
@@ -193,7 +223,8 @@ def measure_speed(options):
 def main(arguments):
     options = parse(arguments)
     try:
-        return {"agree": agree, "reference": make_reference, "speed": measure_speed}[options.command](options)
+        return {"agree": agree, "reference": make_reference, "store": store,
+                "speed": measure_speed}[options.command](options)
     except (scene_files.SceneError, FileNotFoundError) as error:
         print(f"against_mitsuba: {error}", file=sys.stderr)
         return 2

@@ -6,6 +6,7 @@ because not every scene has <default> parameters for it.
 """
 import dataclasses
 import hashlib
+import math
 import pathlib
 import xml.etree.ElementTree as ET
 
@@ -62,19 +63,19 @@ def frame_size(path):
 
 
 def scaled_size(path, pixels, multiple=8):
-    """The multiple-of-`multiple` frame with the scene's aspect ratio (exactly, where it can) of about `pixels`."""
+    """A frame of about `pixels` pixels and nearly the scene's aspect ratio, both sides divisible by `multiple`.
+
+    A distorted aspect ratio changes the picture (both renderers see the same), so it counts ten times as much as a
+    missed number of pixels."""
     width, height = frame_size(path)
-    best = None
-    for w in range(multiple, 8192, multiple):
-        h = max(multiple, round(w * height / width / multiple) * multiple)
-        distortion = abs(w / h * height / width - 1)
-        if distortion > 0.01 or w * h > 2 * pixels or 2 * w * h < pixels:
-            continue
-        if best is None or abs(w * h - pixels) < abs(best[0] * best[1] - pixels):
-            best = (w, h)
-    if best is None:
-        raise SceneError(f"{path}: no frame of about {pixels} pixels has the aspect ratio {width}:{height}")
-    return best
+
+    def cost(size):
+        w, h = size
+        return 10 * abs(math.log(w * height / (h * width))) + abs(math.log(w * h / pixels))
+
+    sides = range(multiple, 8192 + 1, multiple)
+    rounded = (max(multiple, round(w * height / width / multiple) * multiple) for w in sides)
+    return min(zip(sides, rounded), key=cost)
 
 
 def _set_integer(parent, name, value):
