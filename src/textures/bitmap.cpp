@@ -11,7 +11,9 @@
 // string    | auto     | accepted for compatibility; 8-bit files are stored as bytes, others as floats | | accel |
 // boolean   | true     | accepted for compatibility; no effect                                         |
 //
-// A one-channel lookup gives the grey value, or the luminance of a colour (also of a raw one).
+// A one-channel lookup gives the grey value, or the luminance of a colour (also of a raw one). Different from Mitsuba 3.9:
+// the gradient follows the chain rule for every to_uv (there, only for square images or diagonal to_uv), 16-bit files
+// keep all their digits, and lights sample positions uniformly where to_uv does not keep the unit square (an error there).
 #include "textures/bitmap.h"
 
 #include <array>
@@ -266,7 +268,7 @@ std::shared_ptr<Texture> make_bitmap(Parameters& parameters) {
   try {
     return make_bitmap_texture(read_image(path), settings);
   } catch (const Error& error) {
-    parameters.error_at("filename", error.what());
+    parameters.error_at("filename", std::string("cannot be used: ") + error.what());
     return nullptr;
   }
 }

@@ -6,6 +6,9 @@
 // | color0    | colour, texture  | 0.4      | squares on the diagonal, (0, 0) among them     |
 // | color1    | colour, texture  | 0.2      | the other squares                              |
 // | to_uv     | transform        | identity | from surface parameters to texture coordinates |
+//
+// Different from Mitsuba 3.9: one-channel lookups (opacity, roughness, …) see the same squares as colour lookups; there,
+// color0 and color1 change places.
 #include "textures/registry.h"
 #include "textures/uv_transform.h"
 
@@ -37,7 +40,8 @@ class Checkerboard final : public Texture {
 }  // namespace
 
 std::shared_ptr<Texture> make_checkerboard(Parameters& parameters) {
-  TexturePtr color0 = parameters.get_texture("color0", 0.4f), color1 = parameters.get_texture("color1", 0.2f);
+  TexturePtr color0 = parameters.get_texture("color0", Spectrum(0.4f), SpectrumRole::kEmission);
+  TexturePtr color1 = parameters.get_texture("color1", Spectrum(0.2f), SpectrumRole::kEmission);
   const UvTransform to_uv(parameters.get_transform("to_uv"));
   return std::make_shared<Checkerboard>(std::move(color0), std::move(color1), to_uv);
 }

@@ -35,7 +35,7 @@ std::shared_ptr<Texture> make_mesh_attribute(Parameters& parameters) {
   const float scale = parameters.get_float("scale", 1, 0);
   if (name.empty()) return nullptr;  // already reported
   if (name != "vertex_color") {
-    parameters.error_at("name", "unknown mesh attribute '" + name + "'; accepted is 'vertex_color'");
+    parameters.error_at("name", "is '" + name + "'; the only mesh attribute known is 'vertex_color'");
     return nullptr;
   }
   return std::make_shared<VertexColour>(scale);

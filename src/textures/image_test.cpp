@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+// Files that must be rejected with a message that names them. Correct files: bitmap_test.cpp.
+#include "textures/image.h"
+
+#include <OpenImageIO/imageio.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "support/describe.h"
+
+namespace covary {
+namespace {
+
+using test_support::TemporaryFolder;
+
+std::string error_of(const std::string& path) {
+  try {
+    read_image(path);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+void write(const std::string& path, const std::string& bytes) { std::ofstream(path, std::ios::binary) << bytes; }
+
+/// A picture of random numbers, which no format can pack.
+void write_noise(const std::string& path, int width, int height, const std::vector<std::string>& channels) {
+  const auto output = OIIO::ImageOutput::create(path);
+  ASSERT_TRUE(output);
+  OIIO::ImageSpec spec(width, height, static_cast<int>(channels.size()), OIIO::TypeDesc::UINT8);
+  if (path.ends_with(".exr")) spec.format = OIIO::TypeDesc::FLOAT;
+  spec.channelnames = channels;
+  ASSERT_TRUE(output->open(path, spec)) << output->geterror();
+  std::vector<uint8_t> pixels(static_cast<size_t>(width) * height * channels.size());
+  for (size_t i = 0; i < pixels.size(); ++i) pixels[i] = static_cast<uint8_t>((i * 2654435761u) >> 13);
+  ASSERT_TRUE(output->write_image(OIIO::TypeDesc::UINT8, pixels.data()));
+  ASSERT_TRUE(output->close());
+}
+
+TEST(Image, NamesAFileThatDoesNotExist) {
+  EXPECT_EQ(error_of("/no/such/file.png"), "cannot open image '/no/such/file.png': not a file");
+}
+
+TEST(Image, RejectsWhatIsNotAnImage) {
+  const TemporaryFolder folder;
+  for (const char* name : {"a.png", "a.jpg", "a.exr", "a.hdr", "a.pfm", "a.tga", "a.xyz"}) {
+    const std::string path = folder.file(name);
+    write(path, "plain text is not a picture, however long it may be");
+    EXPECT_NE(error_of(path).find("'" + path + "'"), std::string::npos) << name << ": " << error_of(path);
+    write(path, "");
+    EXPECT_NE(error_of(path).find("'" + path + "'"), std::string::npos) << name << ": " << error_of(path);
+  }
+}
+
+TEST(Image, RejectsTruncatedFiles) {
+  const TemporaryFolder folder;
+  for (const char* name : {"a.png", "a.exr", "a.tga"}) {
+    const std::string path = folder.file(name);
+    write_noise(path, 64, 64, {"R", "G", "B"});
+    const Image whole = read_image(path);
+    EXPECT_EQ(whole.width, 64) << name;
+    std::filesystem::resize_file(path, std::filesystem::file_size(path) / 2);
+    EXPECT_NE(error_of(path).find("image '" + path + "' is broken"), std::string::npos)
+        << name << ": " << error_of(path);
+  }
+}
+
+TEST(Image, RejectsEmptyAndAbsurdSizes) {
+  const TemporaryFolder folder;
+  const std::string empty = folder.file("empty.pfm");
+  write(empty, "PF\n0 0\n-1.0\n");
+  EXPECT_NE(error_of(empty).find("'" + empty + "'"), std::string::npos) << error_of(empty);
+
+  const std::string png = folder.file("huge.png");
+  write_noise(png, 8, 8, {"R", "G", "B"});
+  std::fstream file(png, std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp(16);  // width and height in the header; its checksum is wrong now, which is an error as well
+  file << std::string("\x00\x0f\x00\x00\x00\x0f\x00\x00", 8);
+  file.close();
+  EXPECT_NE(error_of(png).find("'" + png + "'"), std::string::npos) << error_of(png);
+
+  const std::string pfm = folder.file("huge.pfm");
+  write(pfm, "PF\n40000 40000\n-1.0\nabcdefgh");
+  EXPECT_NE(error_of(pfm).find("image '" + pfm + "' claims 40000 x 40000 pixels in 28 bytes"), std::string::npos)
+      << error_of(pfm);
+}
+
+TEST(Image, RejectsChannelsThatAreNotColours) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("xyz.exr");
+  write_noise(path, 4, 4, {"X", "Y", "Z"});
+  EXPECT_EQ(error_of(path), "image '" + path + "' has the channels X, Y, Z; a texture needs R, G, B or a grey one");
+}
+
+TEST(Image, FindsColoursAmongOtherChannels) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("many.exr");
+  write_noise(path, 4, 4, {"depth", "B", "G", "id", "R"});
+  const Image image = read_image(path);
+  ASSERT_EQ(image.channels, 3);
+  // OpenEXR stores channels by name; whatever their order in the file, value i of the written five is that of its name.
+  const auto written = [](size_t i) { return static_cast<float>(static_cast<uint8_t>((i * 2654435761u) >> 13)) / 255; };
+  for (size_t i = 0; i < 16; ++i) {
+    EXPECT_FLOAT_EQ(image.floats[3 * i], written(5 * i + 4));
+    EXPECT_FLOAT_EQ(image.floats[3 * i + 1], written(5 * i + 2));
+    EXPECT_FLOAT_EQ(image.floats[3 * i + 2], written(5 * i + 1));
+  }
+}
+
+TEST(Image, LinearImagesRejectValuesThatAreNotFinite) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("bad.pfm");
+  std::string bytes = "Pf\n2 2\n-1.0\n";
+  const float values[4] = {1, 2, 3, std::numeric_limits<float>::infinity()};  // bottom row first
+  bytes.append(reinterpret_cast<const char*>(values), sizeof(values));
+  write(path, bytes);
+  try {
+    read_linear_rgb(path);
+    FAIL() << "accepted";
+  } catch (const Error& error) {
+    EXPECT_EQ(std::string(error.what()),
+              "image '" + path + "' holds the value inf at pixel (1, 0); all must be finite");
+  }
+}
+
+}  // namespace
+}  // namespace covary
