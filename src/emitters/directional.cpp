@@ -52,10 +52,10 @@ class DirectionalLight final : public Emitter {
 
 std::shared_ptr<Emitter> make_directional(Parameters& parameters) {
   if (parameters.has("direction") && parameters.has("to_world"))
-    parameters.error_at("direction", "give either 'direction' or 'to_world', not both");
+    parameters.error_at("direction", "cannot be combined with 'to_world'");
   Vec3 direction = parameters.get_vec3("direction", parameters.get_transform("to_world").vector({0, 0, 1}));
   if (!(length_squared(direction) > 0)) {
-    parameters.error_at("direction", "the direction has length zero");
+    parameters.error_at("direction", "has length zero");
     direction = {0, 0, 1};
   }
   return std::make_shared<DirectionalLight>(

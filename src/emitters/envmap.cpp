@@ -75,7 +75,7 @@ std::shared_ptr<Emitter> make_envmap(Parameters& parameters) {
   try {
     return std::make_shared<EnvironmentMap>(EnvironmentImage(read_linear_rgb(path), scale, mis_compensation), rotation);
   } catch (const Error& error) {
-    parameters.error_at("filename", error.what());
+    parameters.error_at("filename", std::string("cannot be used: ") + error.what());
     return nullptr;
   }
 }

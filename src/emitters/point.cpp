@@ -54,7 +54,7 @@ class PointLight final : public Emitter {
 
 std::shared_ptr<Emitter> make_point(Parameters& parameters) {
   if (parameters.has("position") && parameters.has("to_world"))
-    parameters.error_at("position", "give either 'position' or 'to_world', not both");
+    parameters.error_at("position", "cannot be combined with 'to_world'");
   const Vec3 position = parameters.get_vec3("position", parameters.get_transform("to_world").point({0, 0, 0}));
   return std::make_shared<PointLight>(position,
                                       parameters.get_spectrum("intensity", Spectrum(1), SpectrumRole::kEmission));

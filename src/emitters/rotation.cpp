@@ -12,7 +12,7 @@ Rotation::Rotation(const Transform& t) : x_(t.vector({1, 0, 0})), y_(t.vector({0
   const float skew = std::max(std::abs(dot(x_, y_)), std::max(std::abs(dot(y_, z_)), std::abs(dot(z_, x_))));
   if (!(longest - shortest <= kTolerance * longest) || !(skew <= kTolerance * longest * longest))
     throw Error(ErrorCode::kInput,
-                "the transformation distorts directions; only rotations, reflections, translations and uniform scales "
+                "distorts directions; only rotations, reflections, translations and uniform scales "
                 "are accepted here");
   // Files give matrices with few digits: make the axes orthonormal, so that densities stay right.
   x_ = normalize(x_);
