@@ -13,13 +13,21 @@ struct Frame {
   Frame() = default;
   Frame(const Vec3& s_, const Vec3& t_, const Vec3& n_) : s(s_), t(t_), n(n_) {}
 
-  /// A frame around the unit normal `n`, continuous in `n` on each half space n.z >= 0 and n.z < 0
-  /// (Duff et al. 2017, "Building an Orthonormal Basis, Revisited").
+  /// A frame around the unit normal `n` that varies continuously over the whole sphere but for one small cap: the axes
+  /// of a fixed frame (e1, e2, pole), turned by the shortest rotation that takes the pole to the normal. Continuity is
+  /// what keeps common random numbers correlated: neighbouring pixels scatter in the same directions. The usual
+  /// constructions jump where a coordinate changes sign, which is where walls have their normals.
   explicit Frame(const Vec3& normal) : n(normal) {
-    const float sign = std::copysign(1.0f, n.z);
-    const float a = -1 / (sign + n.z), b = n.x * n.y * a;
-    s = {1 + sign * n.x * n.x * a, sign * b, -sign * n.x};
-    t = {b, sign + n.y * n.y * a, -n.y};
+    constexpr Vec3 kPole{0.48f, 0.64f, 0.6f}, kE1{0.8f, -0.6f, 0}, kE2{0.36f, 0.48f, -0.8f};
+    const float c = 1 + dot(n, kPole);
+    if (c > 1e-2f) [[likely]] {
+      const Vec3 h = (n + kPole) * (1 / c);
+      s = kE1 - h * dot(n, kE1);
+      t = kE2 - h * dot(n, kE2);
+    } else {
+      s = normalize(kE1 - n * dot(n, kE1));
+      t = cross(n, s);
+    }
   }
 
   /// A frame around `normal` whose s axis is the tangent made orthogonal to the normal; falls back to Frame(normal)
