@@ -6,7 +6,7 @@
     against_mitsuba.py speed --scenes DIR [NAME...]
     against_mitsuba.py store SCENE.xml... --to DIR        block means of Mitsuba's renders as JSON, for tests/against_mitsuba
 
-See README.md in this folder for what is compared, how, and how to read the tables.
+See ../README.md for what is compared, how, and how to read the tables.
 """
 import argparse
 import dataclasses
@@ -43,7 +43,7 @@ def parse(arguments):
     program.add_argument("--covary", default="build/release/covary", metavar="PROGRAM")
     program.add_argument("--covary-option", action="append", default=[], metavar="OPTION", help="passed on; repeatable")
     seeds = argparse.ArgumentParser(add_help=False)
-    seeds.add_argument("--seeds", type=int, default=32, help="renders of each side")
+    seeds.add_argument("--seeds", type=int, default=16, help="renders of each side")
     seeds.add_argument("--target-error", type=float, default=0.0015, metavar="E",
                        help="multiply a scene's spp by 4, at most twice, until the relative standard error of Mitsuba's "
                        "image mean is below E (not with --spp)")
