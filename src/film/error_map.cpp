@@ -41,7 +41,7 @@ ErrorScale decade_scale(std::span<const Image> maps) {
                  [](float v) { return std::isfinite(v) && v > 0; });
   if (values.empty()) return {1e-4, 1, true};
   const auto quantile = [&](double q) {
-    const auto it = values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
+    const auto it = values.begin() + std::lround(q * static_cast<double>(values.size() - 1));
     std::nth_element(values.begin(), it, values.end());
     return static_cast<double>(*it);
   };

@@ -4,24 +4,17 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <bit>
-#include <cstdlib>
-#include <filesystem>
 
 #include "core/random.h"
 #include "film/film_file.h"
+#include "support/files.h"
 
 namespace covary {
 namespace {
 
-/// A folder of its own for each test.
-std::string test_file(const std::string& name) {
-  const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-  const auto folder = std::filesystem::path(::testing::TempDir()) /
-                      (std::string("covary_") + info->test_suite_name() + "_" + info->name());
-  std::filesystem::create_directories(folder);
-  return (folder / name).string();
-}
+using test_support::contains, test_support::message_of, test_support::test_file;
 
 /// Sums of `n` pseudo-random samples in [0, 4) for each group.
 std::vector<Spectrum> sums(const Film& film, uint64_t seed, int x, int y, uint32_t n) {
@@ -54,19 +47,6 @@ bool same_bits(const Film& a, const Film& b) {
          std::equal(a.data().begin(), a.data().end(), b.data().begin(),
                     [](float u, float v) { return std::bit_cast<uint32_t>(u) == std::bit_cast<uint32_t>(v); });
 }
-
-/// The message of the Error that `call` throws.
-template <typename Call>
-std::string message_of(Call&& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
-}
-
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 TEST(Film, AddsUpToTheMean) {
   Film film(2, 1, {0, 0, 2, 1}, 2);

@@ -226,7 +226,8 @@ Image flip_ldr(const Image& image, const Image& reference, float pixels_per_degr
 FlipExposures flip_exposures(const Image& reference) {
   std::vector<float> luminances;
   for (size_t i = 0; i < reference.data.size(); i += 3)
-    luminances.push_back(multiply(kXyzFromRgb, {reference.data[i], reference.data[i + 1], reference.data[i + 2]}).y);
+    luminances.push_back(0.2126f * reference.data[i] + 0.7152f * reference.data[i + 1] +
+                         0.0722f * reference.data[i + 2]);
   const auto middle = luminances.begin() + static_cast<std::ptrdiff_t>(luminances.size() / 2);
   std::nth_element(luminances.begin(), middle, luminances.end());
   // A reference that is mostly or all black has no such exposures; the smallest positive value stands in.

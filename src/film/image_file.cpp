@@ -131,7 +131,8 @@ std::vector<std::string> layer_channels(const std::string& path, const std::vect
   const std::string have = fmt::format("layers: {}; channels: {}", known.empty() ? "none" : known, all);
   if (layer.empty()) fail(path, "no channels R G B; choose a layer (" + have + ")");
   std::vector<std::string> candidates = layers;
-  for (const ExrFile::Channel& c : channels) candidates.push_back(c.name);
+  for (const ExrFile::Channel& c : channels)
+    if (c.name.find('.') == std::string::npos) candidates.push_back(c.name);
   fail(path, fmt::format("no layer '{}'{} ({})", layer, did_you_mean(layer, candidates), have));
 }
 

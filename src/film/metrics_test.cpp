@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+// Error measures: values worked out by hand, the product form with two references, and the split into bias and variance.
+#include "film/metrics.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "core/random.h"
+#include "support/files.h"
+
+namespace covary {
+namespace {
+
+using test_support::contains, test_support::message_of;
+
+Image image_of(std::vector<float> values) {
+  Image image(static_cast<int>(values.size() / 3), 1, 3);
+  image.data = std::move(values);
+  return image;
+}
+
+double value(Metric metric, const Image& image, std::vector<Image> references) {
+  return compute_metric(metric, image, references).value;
+}
+
+/// 1 + x/64 plus noise of standard deviation `sigma`, uniform; `seed` makes it.
+Image noisy(int size, double offset, double sigma, uint64_t seed) {
+  Image image(size, size, 3);
+  for (size_t i = 0; i < image.data.size(); ++i) {
+    const float u = PathRandom(Sampling::kIndependent, seed, 0, i, 0).get_1d(0, Event::kPixel);
+    const double clean = 1 + static_cast<double>(i / 3 % size) / 64;
+    image.data[i] = static_cast<float>(clean + offset + sigma * std::sqrt(12.0) * (u - 0.5));
+  }
+  return image;
+}
+
+TEST(Metrics, WorkedOutByHand) {
+  // Differences (1, 0, -1) at a pixel of mean 2, and (0.3, 0, 0) at a black one.
+  const Image f = image_of({2, 2, 2, 0.3f, 0, 0}), r = image_of({1, 2, 3, 0, 0, 0});
+  EXPECT_NEAR(value(Metric::kRelMse, f, {r}), (2 / 4.01 + 0.09 / 0.01) / 6, 1e-6);
+  EXPECT_NEAR(value(Metric::kMse, f, {r}), 2.09 / 6, 1e-7);
+  EXPECT_NEAR(value(Metric::kMae, f, {r}), 2.3 / 6, 1e-7);
+  EXPECT_NEAR(value(Metric::kMape, f, {r}), (1 / 1.01 + 1 / 3.01 + 0.3 / 0.01) / 6, 1e-6);
+  const MetricResult result = compute_metric(Metric::kMse, f, std::vector{r});
+  EXPECT_NEAR(result.map.data[0], 2.0 / 3, 1e-6);
+  EXPECT_NEAR(result.map.data[1], 0.03, 1e-6);
+  EXPECT_EQ(result.n_pixels, 2u);
+}
+
+TEST(Metrics, TwoReferencesWorkedOutByHand) {
+  const Image f = image_of({2, 2, 2}), r1 = image_of({1, 2, 4}), r2 = image_of({1.5f, 3, 3});
+  const double products = 1 * 0.5 + 0 * -1 + -2 * -1, grey = (1.25 + 2.5 + 3.5) / 3;
+  EXPECT_NEAR(value(Metric::kRelMse, f, {r1, r2}), products / (3 * (grey * grey + 0.01)), 1e-7);
+  EXPECT_NEAR(value(Metric::kMse, f, {r1, r2}), products / 3, 1e-7);
+  EXPECT_NEAR(value(Metric::kMae, f, {r1, r2}), (0.75 + 0.5 + 1.5) / 3, 1e-7);
+  EXPECT_EQ(value(Metric::kRelMse, f, {r1, r1}), value(Metric::kRelMse, f, {r1}));
+}
+
+// F differs from the truth by 0.1 everywhere; the references have noise of 0.2. The products' mean over N = 3 * 64^2 values
+// has standard deviation s = sqrt(2 * 0.1^2 * 0.2^2 + 0.2^4) / sqrt(N) = 4.4e-4. alpha = 1e-5: |z| < 4.42; an error of
+// (4.42 + 2.33) s = 3.0e-3 is found with power 0.99. The squares' bias, 0.2^2 = 0.04, is 91 s.
+TEST(Metrics, ProductFormIsFreeOfTheReferencesNoise) {
+  const Image f = noisy(64, 0.1, 0, 1), r1 = noisy(64, 0, 0.2, 2), r2 = noisy(64, 0, 0.2, 3);
+  const double s = std::sqrt(2 * 0.01 * 0.04 + 0.0016) / std::sqrt(3.0 * 64 * 64);
+  EXPECT_LT(std::abs(value(Metric::kMse, f, {r1, r2}) - 0.01), 4.42 * s);
+  // Planted: the same noise in both references, and one reference.
+  EXPECT_GT(std::abs(value(Metric::kMse, f, {r1, r1}) - 0.01), 4.42 * s);
+  EXPECT_GT(std::abs(value(Metric::kMse, f, {r1}) - 0.01), 4.42 * s);
+}
+
+TEST(Metrics, NonFinitePixelsAreLeftOutAndCounted) {
+  const float nan = std::numeric_limits<float>::quiet_NaN(), inf = std::numeric_limits<float>::infinity();
+  const Image f = image_of({2, 2, 2, 1, nan, 1, 1, 1, 1, 5, 5, 5}),
+              r = image_of({1, 1, 1, 1, 1, 1, 1, inf, 1, 5, 5, 5});
+  for (const MetricInfo& info : metrics()) {
+    const MetricResult result = compute_metric(info.metric, f, std::vector{r});
+    EXPECT_EQ(result.n_pixels, 2u) << info.name;
+    EXPECT_EQ(result.n_non_finite, 2u) << info.name;
+    EXPECT_TRUE(std::isfinite(result.value)) << info.name;
+    EXPECT_TRUE(std::isnan(result.map.data[1]) && std::isnan(result.map.data[2])) << info.name;
+  }
+  EXPECT_NEAR(value(Metric::kMse, f, {r}), 0.5, 1e-7);
+  EXPECT_TRUE(contains(message_of([&] {
+                         value(Metric::kMse, image_of({nan, 0, 0}), {image_of({1, 1, 1})});
+                       }),
+                       "none of the 1 pixels is finite"));
+}
+
+TEST(Metrics, NamesAndSizes) {
+  for (const MetricInfo& info : metrics()) EXPECT_EQ(find_metric(info.name).metric, info.metric);
+  EXPECT_TRUE(contains(message_of([] { find_metric("relmsee"); }),
+                       "unknown metric 'relmsee'; did you mean 'relmse'?; accepted are relmse, mse, mae, mape, flip"));
+  EXPECT_TRUE(contains(message_of([] { value(Metric::kMse, Image(4, 3, 3), {Image(3, 4, 3)}); }),
+                       "the image has 4 x 3 pixels, the reference 3 x 4"));
+}
+
+// K = 24 renders with bias 0.05 and noise 0.1 against references with noise 0.1, weights 1/(R'^2 + 0.01).
+// The squared bias' standard deviation over N = 3 * 48^2 = 6912 values of weight w <= 1 is at most
+// sqrt((v/K)^2 * 2 + 4 b^2 v/K + ...) / sqrt(N) < 3.0e-4 with the references' products sqrt(2 b^2 r^2 + r^4) = 0.0122 -> 1.5e-4;
+// alpha = 1e-5, |z| < 4.42: tolerance 1.4e-3 of 0.05^2 w. The planted mistakes are larger: no correction for two references
+// adds r^2/2 w = 5e-3 w, where the mean weight w is 0.53.
+TEST(ErrorSplit, FindsBiasAndVariance) {
+  constexpr int kSize = 48, kRenders = 24;
+  const std::vector references{noisy(kSize, 0, 0.1, 1), noisy(kSize, 0, 0.1, 2)};
+  ErrorSplit two(references), one({references[0]});
+  for (int k = 0; k < kRenders; ++k) {
+    two.add(noisy(kSize, 0.05, 0.1, 100 + k));
+    one.add(noisy(kSize, 0.05, 0.1, 100 + k));
+  }
+  const double weight =
+      compute_metric(Metric::kRelMse, noisy(kSize, 1, 0, 3), std::vector{noisy(kSize, 0, 0, 3)}).value;
+  const ErrorSplit::Result result = two.result();
+  EXPECT_EQ(result.n_renders, 24u);
+  EXPECT_EQ(result.n_pixels, static_cast<uint64_t>(kSize * kSize));
+  EXPECT_NEAR(result.squared_bias, 0.0025 * weight, 1.4e-3 * weight);
+  // A variance over 24 * 6912 values of a uniform distribution: relative standard deviation sqrt(0.8 / 1.6e5) = 0.22 %.
+  EXPECT_NEAR(result.variance, 0.01 * weight, 0.01 * 0.012 * weight);
+  EXPECT_NEAR(result.rel_mse, result.variance + result.squared_bias, 1e-12);
+  // One reference: its own variance 0.01 counts as bias. That must not pass for 0.0025.
+  EXPECT_NEAR(one.result().squared_bias, 0.0125 * weight, 3e-3 * weight);
+  EXPECT_GT(std::abs(one.result().squared_bias - 0.0025 * weight), 1.4e-3 * weight);
+  // The mean of the clean image is 1 + 47/128; standard error of the renders' means 0.1 / sqrt(24 * 6912) = 2.5e-4, of the
+  // references' 8.5e-4, together 8.9e-4 / 1.37 relative.
+  EXPECT_NEAR(result.mean_ratio, 1 + 0.05 / (1 + 47.0 / 128), 4.42 * 8.9e-4 / 1.37);
+  EXPECT_NEAR(result.mean_ratio_error, 2.5e-4 / 1.37, 1.3e-4);
+}
+
+TEST(ErrorSplit, LeavesOutNonFinitePixelsOfAnyRender) {
+  ErrorSplit split({noisy(4, 0, 0, 1)});
+  Image broken = noisy(4, 0.1, 0.1, 2);
+  broken.data[5] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_TRUE(contains(message_of([&] { split.result(); }), "variance and bias of 0 renders; at least 2 are needed"));
+  split.add(noisy(4, 0.1, 0.1, 3));
+  split.add(broken);
+  split.add(noisy(4, 0.1, 0.1, 4));
+  EXPECT_EQ(split.result().n_pixels, 15u);
+  EXPECT_EQ(split.result().n_non_finite, 1u);
+  EXPECT_TRUE(std::isfinite(split.result().squared_bias));
+}
+
+}  // namespace
+}  // namespace covary

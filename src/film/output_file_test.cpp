@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+// Files appear complete or not at all.
+#include "film/output_file.h"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <csignal>
+#include <fstream>
+#include <iterator>
+
+#include "film/film_file.h"
+#include "film/image_file.h"
+#include "support/files.h"
+
+namespace covary {
+namespace {
+
+namespace fs = std::filesystem;
+using test_support::contains, test_support::message_of, test_support::test_file, test_support::test_folder;
+
+std::string content(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+size_t n_files(const fs::path& folder) {
+  return static_cast<size_t>(std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
+}
+
+/// While it lives, files cannot grow beyond `bytes`: what a full disk looks like to a program.
+class FullDisk {
+ public:
+  explicit FullDisk(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit limit{bytes, before_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~FullDisk() {
+    setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+
+ private:
+  rlimit before_;
+  sighandler_t handler_;
+};
+
+TEST(OutputFile, AppearsOnlyWhenCommitted) {
+  const std::string path = test_file("a.txt");
+  {
+    OutputFile file(path);
+    file.write("abc", 3);
+    EXPECT_FALSE(fs::exists(path));
+    EXPECT_EQ(n_files(test_folder()), 1u);  // the temporary one
+  }
+  EXPECT_EQ(n_files(test_folder()), 0u);
+  write_text_file(path, "old");
+  {
+    OutputFile file(path);
+    file.write("newer", 5);
+    EXPECT_EQ(content(path), "old");
+    file.commit();
+  }
+  EXPECT_EQ(content(path), "newer");
+  EXPECT_EQ(n_files(test_folder()), 1u);
+}
+
+TEST(OutputFile, FollowsSymbolicLinks) {
+  const std::string path = test_file("target.txt"), link = test_file("link.txt");
+  write_text_file(path, "old");
+  fs::create_symlink("target.txt", link);
+  write_text_file(link, "new");
+  EXPECT_TRUE(fs::is_symlink(link));
+  EXPECT_EQ(content(path), "new");
+}
+
+TEST(OutputFile, SaysWhyItCannotWrite) {
+  EXPECT_TRUE(
+      contains(message_of([] { OutputFile("/nowhere/a.exr"); }), "cannot write /nowhere/a.exr: there is no folder"));
+  EXPECT_TRUE(
+      contains(message_of([] { OutputFile("/dev/null"); }), "cannot write /dev/null: it exists and is not a regular"));
+  EXPECT_TRUE(contains(message_of([] { OutputFile(test_folder().string()); }), "is not a regular file"));
+  EXPECT_TRUE(contains(message_of([] { OutputFile(""); }), "it names no file"));
+  EXPECT_TRUE(
+      contains(message_of([] { OutputFile("/proc/self/covary.exr"); }), "cannot write /proc/self/covary.exr: "));
+}
+
+// The limit takes effect in the header, amid the pixels, and in OpenEXR's last write, whose failure it hides.
+TEST(OutputFile, AFullDiskLeavesTheOldFile) {
+  Film film(64, 64, {0, 0, 64, 64}, 2);
+  for (size_t i = 0; i < film.data().size(); ++i) film.data()[i] = static_cast<float>((i * 2654435761u) % 65537);
+  const std::string path = test_file("film.exr"), png = test_file("image.png");
+  write_film(path, film);
+  const std::string before = content(path);
+  const size_t size = before.size();
+  for (size_t limit : {size_t{0}, size_t{10}, size_t{700}, size / 2, size - 1}) {
+    const FullDisk disk(limit);
+    EXPECT_TRUE(contains(message_of([&] { write_film(path, film); }), "cannot write " + path + ": File too large"))
+        << limit;
+    EXPECT_EQ(content(path), before);
+    EXPECT_EQ(n_files(test_folder()), 1u);
+  }
+  {
+    const FullDisk disk(100);
+    EXPECT_TRUE(contains(message_of([&] { write_png(png, film.mean_image()); }), "cannot write " + png));
+    EXPECT_EQ(n_files(test_folder()), 1u);
+  }
+  const FullDisk disk(size);
+  write_film(path, film);
+  EXPECT_EQ(content(path), before);
+}
+
+}  // namespace
+}  // namespace covary
