@@ -1,0 +1,367 @@
+// SPDX-License-Identifier: Apache-2.0
+// From a scene file to a Scene: the XML is read, then everything that reads files (textures, environment maps, meshes) is
+// made in parallel, then the rest is put together in file order. Problems are collected throughout and thrown once.
+#include "io/load_scene.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <chrono>
+#include <unordered_set>
+
+#include "emitters/area.h"
+#include "io/content_hash.h"
+#include "io/file_view.h"
+#include "io/object_factory.h"
+#include "io/sensor.h"
+#include "io/shapes.h"
+#include "io/xml_reader.h"
+#include "scene/mesh.h"
+
+namespace covary {
+namespace {
+
+/// Whether other objects are nested in it.
+bool is_leaf(const ObjectDescription& object) {
+  return std::none_of(object.properties.begin(), object.properties.end(),
+                      [](const Property& p) { return std::holds_alternative<ObjectPtr>(p.value); });
+}
+
+/// A shape while it is made: its surface in parallel, then material and light.
+struct ShapeJob {
+  ShapeJob(ObjectPtr object, MadeObjects& made, FileResolver& files)
+      : description(std::move(object)),
+        factory(made, files, diagnostics),
+        parameters(*description, factory, diagnostics) {}
+  ShapeJob(const ShapeJob&) = delete;
+  ShapeJob& operator=(const ShapeJob&) = delete;
+
+  ObjectPtr description;
+  Diagnostics diagnostics;
+  SceneFactory factory;
+  Parameters parameters;
+  ShapePtr shape;
+  bool in_group = false;
+};
+
+/// A texture or emitter that reads a file and holds no other object.
+struct LeafJob {
+  ObjectPtr description;
+  Diagnostics diagnostics;
+};
+
+class Loader {
+ public:
+  Loader(const LoadOptions& options, LoadedScene& result)
+      : options_(options), result_(result), factory_(made_, files_, diagnostics_) {}
+
+  void load(const std::string& path) {
+    const auto start = std::chrono::steady_clock::now();
+    xml_ = read_scene_xml(path, options_.defines, files_, diagnostics_);
+    if (!xml_.scene) {
+      diagnostics_.throw_if_errors();
+      throw Error(ErrorCode::kInput, path + ": the file holds no scene");
+    }
+    collect_jobs();
+    run_jobs();
+    assemble();
+    hash_files();
+    result_.warnings = diagnostics_.warnings();
+    diagnostics_.throw_if_errors();
+    result_.read_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    result_.scene = std::make_unique<Scene>(std::move(parts_));
+  }
+
+ private:
+  // ---- what can be made in parallel ----
+
+  void collect_jobs() {
+    std::unordered_set<const ObjectDescription*> seen;
+    for (const Property& property : xml_.scene->properties)
+      if (const ObjectPtr* object = std::get_if<ObjectPtr>(&property.value)) collect_leaves(*object, seen);
+    for (const Property& property : xml_.scene->properties) {
+      const ObjectPtr* object = std::get_if<ObjectPtr>(&property.value);
+      if (!object || !*object || (*object)->kind != "shape") continue;
+      if ((*object)->type == "shapegroup") {
+        for (const Property& member : (*object)->properties)
+          if (const ObjectPtr* shape = std::get_if<ObjectPtr>(&member.value)) add_shape_job(*shape, true);
+      } else if ((*object)->type != "instance") {
+        add_shape_job(*object, false);
+      }
+    }
+  }
+
+  void collect_leaves(const ObjectPtr& object, std::unordered_set<const ObjectDescription*>& seen) {
+    if (!object || !seen.insert(object.get()).second) return;
+    if ((object->kind == "texture" || object->kind == "emitter") && is_leaf(*object)) {
+      leaves_.push_back(std::make_unique<LeafJob>());
+      leaves_.back()->description = object;
+    }
+    for (const Property& property : object->properties)
+      if (const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value)) collect_leaves(*child, seen);
+  }
+
+  void add_shape_job(const ObjectPtr& object, bool in_group) {
+    if (!object || object->kind != "shape" || jobs_by_description_.contains(object.get())) return;
+    jobs_.push_back(std::make_unique<ShapeJob>(object, made_, files_));
+    jobs_.back()->in_group = in_group;
+    jobs_by_description_[object.get()] = jobs_.back().get();
+  }
+
+  void run_jobs() {
+    // Textures first: one of them takes longer than many meshes.
+    tbb::parallel_for(size_t{0}, leaves_.size() + jobs_.size(), [&](size_t i) {
+      if (i < leaves_.size()) {
+        SceneFactory factory(made_, files_, leaves_[i]->diagnostics);
+        factory.make(leaves_[i]->description);
+      } else {
+        make_surface(*jobs_[i - leaves_.size()]);
+      }
+    });
+    for (const auto& leaf : leaves_) diagnostics_.append(leaf->diagnostics);
+  }
+
+  static void make_surface(ShapeJob& job) {
+    const Plugin<Shape>* plugin =
+        find_plugin(shape_plugins(), *job.description, job.diagnostics, {"instance", "shapegroup"});
+    if (plugin) job.shape = make_checked(job.parameters, plugin->make);
+  }
+
+  // ---- putting it together ----
+
+  void assemble() {
+    for (const Property& property : xml_.scene->properties) {
+      const ObjectPtr* pointer = std::get_if<ObjectPtr>(&property.value);
+      if (!pointer) {
+        diagnostics_.error(property.where, fmt::format("<scene> has no parameter '{}'", property.name));
+      } else if (*pointer && placed_.insert(pointer->get()).second) {
+        place(*pointer);
+      }
+    }
+    for (const auto& job : jobs_) diagnostics_.append(job->diagnostics);
+    if (n_degenerate_ > 0)
+      diagnostics_.warn({}, fmt::format("{} triangles of zero area in {} meshes were left out, the first in {}",
+                                        n_degenerate_, n_degenerate_meshes_, first_degenerate_.text()));
+    if (!sensor_) {
+      diagnostics_.error(xml_.scene->where, "the scene has no sensor");
+    } else if (sensor_made_) {
+      set_up_camera(*sensor_made_);
+    }
+  }
+
+  void place(const ObjectPtr& object) {
+    const std::string& kind = object->kind;
+    if (kind == "shape") {
+      if (object->type == "shapegroup") {
+        group(object);
+      } else if (object->type == "instance") {
+        place_instance(object);
+      } else {
+        ShapeJob& job = *jobs_by_description_.at(object.get());
+        finish_shape(job);
+        if (job.shape) parts_.shapes.push_back(job.shape);
+      }
+    } else if (kind == "emitter") {
+      place_emitter(object);
+    } else if (kind == "sensor") {
+      if (sensor_) {
+        diagnostics_.warn(object->where, "the scene has several sensors; this one is not used, but the one at " +
+                                             sensor_->where.text());
+        return;
+      }
+      sensor_ = object;
+      sensor_made_ = std::dynamic_pointer_cast<const SensorSettings>(factory_.make(object));
+    } else if (kind == "integrator") {
+      place_integrator(object);
+    } else if (kind == "bsdf" || kind == "texture") {
+      factory_.make(object);  // also those nothing uses, so that their mistakes are found
+    } else {
+      diagnostics_.error(object->where, fmt::format("<{}> cannot stand inside <scene>", kind));
+    }
+  }
+
+  void finish_shape(ShapeJob& job) {
+    Parameters& p = job.parameters;
+    const auto bsdfs = p.children<Bsdf>("bsdf");
+    if (bsdfs.size() > 1) p.error(fmt::format("has {} bsdfs; expected one", bsdfs.size()));
+    const auto emitters = p.children<Emitter>("emitter");
+    if (emitters.size() > 1) p.error(fmt::format("has {} emitters; expected one", emitters.size()));
+    if (job.description->type != "shapegroup" && job.shape) p.report_unknown();
+    if (!job.shape) return;
+
+    job.shape->set_bsdf(bsdfs.empty() ? default_bsdf() : bsdfs[0]);
+    if (!emitters.empty()) {
+      const auto* area = dynamic_cast<const AreaLight*>(emitters[0].get());
+      if (!area) {
+        p.error("only an emitter 'area' can be part of a shape");
+      } else if (job.in_group) {
+        p.error("an emitter cannot be part of a shapegroup");
+      } else {
+        const std::shared_ptr<AreaLight> light = area->clone();
+        light->attach(job.shape.get());
+        job.shape->set_emitter(light);
+        parts_.emitters.push_back(light);
+      }
+    }
+    if (const auto* mesh = dynamic_cast<const TriangleMesh*>(job.shape.get()); mesh && mesh->n_degenerate() > 0) {
+      if (n_degenerate_ == 0) first_degenerate_ = job.description->where;
+      n_degenerate_ += mesh->n_degenerate();
+      ++n_degenerate_meshes_;
+    }
+  }
+
+  BsdfPtr default_bsdf() {
+    if (!default_bsdf_) {
+      auto description = std::make_shared<ObjectDescription>();
+      description->kind = "bsdf", description->type = "diffuse", description->where = xml_.scene->where;
+      default_description_ = description;
+      default_bsdf_ = std::dynamic_pointer_cast<const Bsdf>(factory_.make(default_description_));
+    }
+    return default_bsdf_;
+  }
+
+  /// The shapegroup of a description; each is made once.
+  std::shared_ptr<const ShapeGroup> group(const ObjectPtr& object) {
+    std::shared_ptr<const SceneObject> made;
+    if (made_.find(object.get(), made)) return std::dynamic_pointer_cast<const ShapeGroup>(made);
+    auto shapes = std::make_shared<ShapeGroup>();
+    for (const Property& property : object->properties) {
+      const ObjectPtr* member = std::get_if<ObjectPtr>(&property.value);
+      if (member && !*member) continue;
+      const auto job = member ? jobs_by_description_.find(member->get()) : jobs_by_description_.end();
+      if (job == jobs_by_description_.end()) {
+        diagnostics_.error(property.where, "a shapegroup can hold shapes only");
+        continue;
+      }
+      finish_shape(*job->second);
+      if (job->second->shape) shapes->shapes.push_back(job->second->shape);
+    }
+    if (shapes->shapes.empty()) diagnostics_.error(object->where, "shape 'shapegroup': holds no shape");
+    made_.add(object.get(), shapes);
+    return shapes;
+  }
+
+  void place_instance(const ObjectPtr& object) {
+    Parameters p(*object, factory_, diagnostics_);
+    // Groups are made by the loader, not by the factory: make them known before asking for children.
+    for (const Property& property : object->properties)
+      if (const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value))
+        if (*child && (*child)->kind == "shape" && (*child)->type == "shapegroup") group(*child);
+    Instance instance;
+    instance.to_world = p.get_transform("to_world");
+    const bool only_groups =
+        std::all_of(object->properties.begin(), object->properties.end(), [](const Property& property) {
+          const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value);
+          return !child || !*child || (*child)->kind != "shape" || (*child)->type == "shapegroup";
+        });
+    if (!only_groups) {
+      p.error("must refer to a shapegroup");
+      return;
+    }
+    const auto groups = p.children<ShapeGroup>("shape");
+    p.report_unknown();
+    if (groups.size() != 1) {
+      p.error(fmt::format("refers to {} shapegroups; expected one", groups.size()));
+      return;
+    }
+    instance.group = groups[0];
+    parts_.instances.push_back(std::move(instance));
+  }
+
+  void place_emitter(const ObjectPtr& object) {
+    const auto emitter = std::dynamic_pointer_cast<const Emitter>(factory_.make(object));
+    if (!emitter) return;
+    if (dynamic_cast<const AreaLight*>(emitter.get())) {
+      diagnostics_.error(object->where, "emitter 'area' must stand inside the shape that emits");
+      return;
+    }
+    if (emitter->is_environment()) {
+      if (environment_)
+        diagnostics_.error(object->where,
+                           "a second emitter at infinity; the first is at " + environment_->where.text());
+      environment_ = object;
+    }
+    parts_.emitters.push_back(emitter);
+  }
+
+  void place_integrator(const ObjectPtr& object) {
+    if (integrator_) {
+      diagnostics_.error(object->where, "a second integrator; the first is at " + integrator_->where.text());
+      return;
+    }
+    integrator_ = object;
+    result_.integrator_type = object->type;
+    if (!options_.make_integrator) return;
+    Parameters p(*object, factory_, diagnostics_);
+    result_.integrator = make_checked(p, options_.make_integrator);
+    p.report_unknown();
+  }
+
+  void set_up_camera(const SensorSettings& sensor) {
+    FilmSettings film = sensor.film;
+    if (options_.width > 0 || options_.height > 0) {
+      if (options_.width > 0) film.width = options_.width;
+      if (options_.height > 0) film.height = options_.height;
+      film.crop_x = film.crop_y = 0;
+      film.crop_width = film.width, film.crop_height = film.height;
+    }
+    result_.width = film.width, result_.height = film.height;
+    result_.crop_x = film.crop_x, result_.crop_y = film.crop_y;
+    result_.crop_width = film.crop_width, result_.crop_height = film.crop_height;
+    result_.filter = film.filter;
+    result_.spp = sensor.sampler.sample_count;
+    try {
+      parts_.camera = std::make_shared<Camera>(sensor.camera, film.width, film.height);
+    } catch (const Error& error) {
+      diagnostics_.error(sensor_->where, fmt::format("sensor '{}': {}", sensor_->type, error.what()));
+    }
+  }
+
+  // ---- content hash ----
+
+  void hash_files() {
+    const auto names = files_.files();
+    std::vector<std::pair<std::string, std::string>> files;  // name in the scene, path; afterwards: name, hash
+    for (const auto& [path, name] : names) files.emplace_back(name, path);
+    tbb::parallel_for(size_t{0}, files.size(), [&](size_t i) {
+      try {
+        files[i].second = hash_text(hash_bytes(FileView(files[i].second).bytes()));
+      } catch (const Error&) {
+        files[i].second = "unreadable";  // whoever needed the file has recorded why
+      }
+    });
+    std::sort(files.begin(), files.end());
+    std::string digest = hash_text(xml_.hash) + "\n";
+    for (const auto& [name, hash] : files) digest += name + "\n" + hash + "\n";
+    result_.content_hash = hash_text(hash_bytes(digest));
+  }
+
+  const LoadOptions& options_;
+  LoadedScene& result_;
+  Diagnostics diagnostics_;
+  FileResolver files_;
+  MadeObjects made_;
+  SceneFactory factory_;
+  SceneXml xml_;
+  std::vector<std::unique_ptr<LeafJob>> leaves_;
+  std::vector<std::unique_ptr<ShapeJob>> jobs_;
+  std::unordered_map<const ObjectDescription*, ShapeJob*> jobs_by_description_;
+  std::unordered_set<const ObjectDescription*> placed_;
+  SceneParts parts_;
+  ObjectPtr sensor_, integrator_, environment_, default_description_;
+  std::shared_ptr<const SensorSettings> sensor_made_;
+  BsdfPtr default_bsdf_;
+  size_t n_degenerate_ = 0, n_degenerate_meshes_ = 0;
+  SourceLocation first_degenerate_;
+};
+
+}  // namespace
+
+LoadedScene load_scene(const std::string& path, const LoadOptions& options) {
+  LoadedScene result;
+  Loader(options, result).load(path);
+  return result;
+}
+
+}  // namespace covary

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/object_factory.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <span>
+
+#include "bsdfs/registry.h"
+#include "emitters/registry.h"
+#include "io/sensor.h"
+#include "textures/registry.h"
+
+namespace covary {
+namespace {
+
+/// The parts of a sensor have no registries of their own: what they say is settings.
+std::span<const Plugin<SceneObject>> setting_plugins(const std::string& kind) {
+  static constexpr auto kFilter = [](Parameters& p) -> std::shared_ptr<SceneObject> { return make_filter(p); };
+  static constexpr auto kFilm = [](Parameters& p) -> std::shared_ptr<SceneObject> { return make_film(p); };
+  static constexpr auto kSampler = [](Parameters& p) -> std::shared_ptr<SceneObject> { return make_sampler(p); };
+  static constexpr auto kSensor = [](Parameters& p) -> std::shared_ptr<SceneObject> { return make_sensor(p); };
+  static const Plugin<SceneObject> kFilters[] = {{"box", kFilter}, {"gaussian", kFilter}, {"tent", kFilter}};
+  static const Plugin<SceneObject> kFilms[] = {{"hdrfilm", kFilm}};
+  static const Plugin<SceneObject> kSamplers[] = {
+      {"independent", kSampler}, {"halton", kSampler},     {"hammersley", kSampler}, {"ldsampler", kSampler},
+      {"multijitter", kSampler}, {"orthogonal", kSampler}, {"sobol", kSampler},      {"stratified", kSampler}};
+  static const Plugin<SceneObject> kSensors[] = {{"perspective", kSensor}, {"thinlens", kSensor}};
+  if (kind == "rfilter") return kFilters;
+  if (kind == "film") return kFilms;
+  if (kind == "sampler") return kSamplers;
+  if (kind == "sensor") return kSensors;
+  return {};
+}
+
+}  // namespace
+
+bool MadeObjects::find(const ObjectDescription* description, Object& object) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = objects_.find(description);
+  if (found == objects_.end()) return false;
+  object = found->second;
+  return true;
+}
+
+void MadeObjects::add(const ObjectDescription* description, Object object) {
+  const std::lock_guard lock(mutex_);
+  objects_.emplace(description, std::move(object));
+}
+
+void report_unknown_type(const ObjectDescription& description, std::vector<std::string> supported,
+                         Diagnostics& diagnostics) {
+  std::sort(supported.begin(), supported.end());
+  std::string list;
+  for (const std::string& name : supported) list += (list.empty() ? "'" : ", '") + name + "'";
+  const std::string hint = did_you_mean(description.type, supported);
+  diagnostics.error(description.where, fmt::format("unknown {} '{}'{} Supported: {}", description.kind,
+                                                   description.type, hint.empty() ? "." : hint, list));
+}
+
+std::shared_ptr<const SceneObject> SceneFactory::make(const ObjectPtr& description) {
+  std::shared_ptr<const SceneObject> object;
+  if (made_.find(description.get(), object)) return object;
+  object = create(*description);
+  made_.add(description.get(), object);
+  return object;
+}
+
+std::shared_ptr<const SceneObject> SceneFactory::create(const ObjectDescription& description) {
+  const auto through = [&](auto plugins) -> std::shared_ptr<const SceneObject> {
+    const auto* plugin = find_plugin(plugins, description, diagnostics_);
+    if (!plugin) return nullptr;
+    Parameters parameters(description, *this, diagnostics_);
+    auto object = make_checked(parameters, plugin->make);
+    parameters.report_unknown();
+    return object;
+  };
+  if (description.kind == "texture") return through(texture_plugins());
+  if (description.kind == "bsdf") return through(bsdf_plugins());
+  if (description.kind == "emitter") return through(emitter_plugins());
+  const auto settings = setting_plugins(description.kind);
+  if (!settings.empty()) return through(settings);
+  diagnostics_.error(description.where, fmt::format("<{}> is not supported here", description.kind));
+  return nullptr;
+}
+
+std::optional<std::string> SceneFactory::resolve_file(const std::string& name, const SourceLocation& where) {
+  std::string path = files_.resolve(name, where, diagnostics_);
+  if (path.empty()) return std::nullopt;
+  return path;
+}
+
+}  // namespace covary

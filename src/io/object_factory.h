@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <span>
+#include <string>
+#include <unordered_map>
+
+#include "io/file_resolver.h"
+#include "scene/parameters.h"
+
+namespace covary {
+
+/// Objects made so far, by their description; shared by the factories of one scene.
+class MadeObjects {
+ public:
+  using Object = std::shared_ptr<const SceneObject>;
+  /// False when `description` was never made; `object` may be null for one that failed.
+  bool find(const ObjectDescription* description, Object& object) const;
+  void add(const ObjectDescription* description, Object object);
+
+ private:
+  mutable std::mutex mutex_;
+  std::unordered_map<const ObjectDescription*, Object> objects_;
+};
+
+/// Makes textures, reflectance models, emitters and the parts of sensors through the registries of their rooms. Each
+/// factory reports to one Diagnostics; several may work at the same time on descriptions that share no nested object.
+class SceneFactory final : public ObjectFactory {
+ public:
+  SceneFactory(MadeObjects& made, FileResolver& files, Diagnostics& diagnostics)
+      : made_(made), files_(files), diagnostics_(diagnostics) {}
+
+  std::shared_ptr<const SceneObject> make(const ObjectPtr& description) override;
+  std::optional<std::string> resolve_file(const std::string& name, const SourceLocation& where) override;
+
+ private:
+  std::shared_ptr<const SceneObject> create(const ObjectDescription& description);
+
+  MadeObjects& made_;
+  FileResolver& files_;
+  Diagnostics& diagnostics_;
+};
+
+/// Records that there is no such type of that kind, with the nearest names and all `supported` ones.
+void report_unknown_type(const ObjectDescription& description, std::vector<std::string> supported,
+                         Diagnostics& diagnostics);
+
+/// The plugin `type` of a registry, or null after recording an error that lists what is supported. `kind` and `extra` (more
+/// supported names) are for the message.
+template <typename T>
+const Plugin<T>* find_plugin(std::span<const Plugin<T>> plugins, const ObjectDescription& description,
+                             Diagnostics& diagnostics, std::vector<std::string> extra = {}) {
+  for (const Plugin<T>& plugin : plugins)
+    if (description.type == plugin.name) return &plugin;
+  for (const Plugin<T>& plugin : plugins) extra.emplace_back(plugin.name);
+  report_unknown_type(description, std::move(extra), diagnostics);
+  return nullptr;
+}
+
+/// Calls `make(parameters)`, records what it throws, and reports parameters nobody asked for.
+template <typename Make>
+auto make_checked(Parameters& parameters, Make&& make) -> decltype(make(parameters)) {
+  decltype(make(parameters)) object = nullptr;
+  try {
+    object = make(parameters);
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::kInternal) throw;
+    parameters.error(error.what());
+  }
+  return object;
+}
+
+}  // namespace covary

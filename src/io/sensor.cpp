@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+// Sensors, films, reconstruction filters and samplers by the names and parameters of Mitsuba.
+#include "io/sensor.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "io/xml_values.h"
+
+namespace covary {
+namespace {
+
+constexpr float kHuge = std::numeric_limits<float>::max();
+constexpr int kMaxSize = 1 << 16;  // pixels along one axis
+constexpr int kMaxInt = std::numeric_limits<int>::max();
+
+/// The only child of its kind, or null.
+template <typename T>
+std::shared_ptr<const T> only_child(Parameters& p, const std::string& kind) {
+  const auto children = p.children<T>(kind);
+  if (children.size() > 1) p.error(fmt::format("has {} {}s; expected one", children.size(), kind));
+  return children.empty() ? nullptr : children[0];
+}
+
+void read_field_of_view(Parameters& p, CameraSettings& camera) {
+  static const std::vector<std::string> kAxes = {"x", "y", "diagonal", "smaller", "larger"};
+  const bool has_fov = p.has("fov"), has_length = p.has("focal_length");
+  if (has_fov && has_length) p.error_at("focal_length", "cannot stand beside 'fov'");
+  if (has_fov) {
+    camera.fov_degrees = p.get_float("fov", 50);
+    if (!(camera.fov_degrees > 0 && camera.fov_degrees < 180)) {
+      p.error_at("fov", fmt::format("is {}; it must lie in (0, 180)", camera.fov_degrees));
+      camera.fov_degrees = 50;
+    }
+    const std::string axis = p.get_choice("fov_axis", "x", kAxes);
+    camera.fov_axis = axis == "y"          ? FovAxis::kY
+                      : axis == "diagonal" ? FovAxis::kDiagonal
+                      : axis == "smaller"  ? FovAxis::kSmaller
+                      : axis == "larger"   ? FovAxis::kLarger
+                                           : FovAxis::kX;
+    return;
+  }
+  // Focal length of a lens before a 36 x 24 mm film, as photographers say it.
+  std::string text = p.get_string("focal_length", "50mm");
+  if (text.ends_with("mm")) text.resize(text.size() - 2);
+  double length = 50;
+  try {
+    length = parse_number(text);
+  } catch (const Error& error) {
+    p.error_at("focal_length", fmt::format("{}; expected a length like '50mm'", error.what()));
+  }
+  if (!(length > 0)) {
+    p.error_at("focal_length", fmt::format("is {} mm; it must be positive", length));
+    length = 50;
+  }
+  camera.fov_degrees =
+      static_cast<float>(2 * 180 / std::numbers::pi * std::atan(std::sqrt(36.0 * 36 + 24 * 24) / (2 * length)));
+  camera.fov_axis = FovAxis::kDiagonal;
+  if (p.has("fov_axis")) p.get_choice("fov_axis", "diagonal", {"diagonal"});
+}
+
+}  // namespace
+
+std::shared_ptr<FilterObject> make_filter(Parameters& p) {
+  auto filter = std::make_shared<FilterObject>();
+  FilterSettings& settings = filter->settings;
+  if (p.type() == "box") {
+    settings = {FilterKind::kBox, 0.5f, 0.5f};
+  } else if (p.type() == "tent") {
+    settings = {FilterKind::kTent, p.get_float("radius", 1, 0, 100), 0.5f};
+  } else {
+    settings.kind = FilterKind::kGaussian;
+    settings.stddev = p.get_float("stddev", 0.5f, 0, 25);
+    settings.radius = 4 * settings.stddev;
+  }
+  if (settings.radius > 0) return filter;
+  p.error("its width is 0; it must be positive");
+  return nullptr;
+}
+
+std::shared_ptr<FilmSettings> make_film(Parameters& p) {
+  auto film = std::make_shared<FilmSettings>();
+  film->width = p.get_int("width", 768, 1, kMaxSize);
+  film->height = p.get_int("height", 576, 1, kMaxSize);
+  film->crop_x = p.get_int("crop_offset_x", 0, 0, kMaxSize);
+  film->crop_y = p.get_int("crop_offset_y", 0, 0, kMaxSize);
+  film->crop_width = p.get_int("crop_width", film->width, 1, kMaxSize);
+  film->crop_height = p.get_int("crop_height", film->height, 1, kMaxSize);
+  if (film->crop_x + film->crop_width > film->width || film->crop_y + film->crop_height > film->height)
+    p.error(fmt::format("the crop window of {} x {} pixels at ({}, {}) leaves the film of {} x {}", film->crop_width,
+                        film->crop_height, film->crop_x, film->crop_y, film->width, film->height));
+  // Files are written as the command line says; these are accepted where they ask for what is written anyway.
+  p.get_choice("file_format", "openexr", {"openexr", "exr"});
+  if (p.get_choice("pixel_format", "rgb", {"rgb", "rgba"}) == "rgba") p.warn("no alpha channel is written");
+  p.get_choice("component_format", "float32", {"float16", "float32"});
+  for (const char* ignored : {"banner", "high_quality_edges", "sample_border", "compensate"})
+    p.get_bool(ignored, false);
+  if (const auto filter = only_child<FilterObject>(p, "rfilter")) film->filter = filter->settings;
+  return film;
+}
+
+std::shared_ptr<SamplerSettings> make_sampler(Parameters& p) {
+  auto sampler = std::make_shared<SamplerSettings>();
+  sampler->sample_count = p.get_int("sample_count", 4, 1, kMaxInt);
+  p.get_int("seed", 0, 0, kMaxInt);  // the command line's --seed counts
+  p.get_bool("jitter", true);
+  for (const char* ignored : {"strength", "dimension", "scramble"}) p.get_int(ignored, 0, -kMaxInt, kMaxInt);
+  return sampler;
+}
+
+std::shared_ptr<SensorSettings> make_sensor(Parameters& p) {
+  auto sensor = std::make_shared<SensorSettings>();
+  CameraSettings& camera = sensor->camera;
+  camera.to_world = p.get_transform("to_world");
+  read_field_of_view(p, camera);
+  camera.near_clip = p.get_float("near_clip", 1e-2f, 0, kHuge);
+  camera.far_clip = p.get_float("far_clip", 1e4f, 0, kHuge);
+  if (!(camera.near_clip > 0 && camera.near_clip < camera.far_clip))
+    p.error(fmt::format("near_clip is {} and far_clip {}; expected 0 < near_clip < far_clip", camera.near_clip,
+                        camera.far_clip));
+  camera.focus_distance = p.get_float("focus_distance", camera.far_clip, 0, kHuge);
+  if (p.type() == "thinlens") {
+    if (!p.has("aperture_radius")) p.error("the float 'aperture_radius' is missing");
+    camera.aperture_radius = p.get_float("aperture_radius", 0, 0, kHuge);
+    if (!(camera.focus_distance > 0)) p.error_at("focus_distance", "is 0; it must be positive");
+  } else {
+    camera.principal_point_offset = {p.get_float("principal_point_offset_x", 0),
+                                     p.get_float("principal_point_offset_y", 0)};
+  }
+  for (const char* time : {"shutter_open", "shutter_close"}) p.get_float(time, 0);  // nothing moves
+  if (const auto film = only_child<FilmSettings>(p, "film")) sensor->film = *film;
+  if (const auto sampler = only_child<SamplerSettings>(p, "sampler")) sensor->sampler = *sampler;
+  return sensor;
+}
+
+}  // namespace covary

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "scene/camera.h"
+#include "scene/parameters.h"
+#include "scene/scene.h"
+
+namespace covary {
+
+/// <film>: size, crop window and reconstruction filter.
+struct FilmSettings : SceneObject {
+  int width = 768, height = 576;
+  int crop_x = 0, crop_y = 0, crop_width = 768, crop_height = 576;
+  FilterSettings filter{FilterKind::kGaussian, 2.0f, 0.5f};
+};
+
+struct FilterObject : SceneObject {
+  FilterSettings settings;
+};
+
+struct SamplerSettings : SceneObject {
+  int sample_count = 4;
+};
+
+/// <sensor>: the camera still without its film size, which the command line may change.
+struct SensorSettings : SceneObject {
+  CameraSettings camera;
+  FilmSettings film;
+  SamplerSettings sampler;
+};
+
+// Each records an error for what it does not support.
+std::shared_ptr<FilterObject> make_filter(Parameters& parameters);
+std::shared_ptr<FilmSettings> make_film(Parameters& parameters);
+std::shared_ptr<SamplerSettings> make_sampler(Parameters& parameters);
+std::shared_ptr<SensorSettings> make_sensor(Parameters& parameters);
+
+}  // namespace covary
