@@ -56,7 +56,7 @@ lint:
 	@scripts/lint build/release $(if $(ALL),--all)
 
 install: build
-	@cmake --install build/release --prefix $(PREFIX) --component covary
+	@cmake --install build/release --prefix $(PREFIX)
 
 asan ubsan tsan: setup
 	@cmake --preset $@ $(CONFIGURE) --log-level=WARNING
