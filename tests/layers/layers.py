@@ -146,8 +146,17 @@ def citations_have_entries(root):
     return problems
 
 
+REGISTRIES = {
+    "io": ["shapes.cpp", "object_factory.cpp"],
+    "textures": ["registry.cpp"],
+    "bsdfs": ["registry.cpp"],
+    "emitters": ["registry.cpp"],
+    "integrators": ["registry.cpp"],
+}
+
+
 def documented_names_match_registries(root):
-    """docs/scene-format.md has one heading per plugin of each room's registry.cpp, and no others.
+    """docs/scene-format.md has a heading for each plugin of each room's registry, and no others.
 
     A registry line is `{"name", make_something}`; in the page, plugins are the names in backquotes in `###` headings
     below the `##` heading that ends in "(`room`)".
@@ -160,22 +169,24 @@ def documented_names_match_registries(root):
         elif room and text.startswith("### "):
             documented.setdefault(room, set()).update(re.findall(r"`(\w+)`", text))
     problems = []
-    for room in ["textures", "bsdfs", "emitters", "integrators", "io"]:
-        path = os.path.join("src", room, "registry.cpp")
-        if not os.path.exists(os.path.join(root, path)):
-            continue
-        text = "\n".join(text.split("//")[0] for _, text in lines(root, path))
-        registered = set(re.findall(r'\{\s*"(\w+)"\s*,', text))
-        if not registered:
-            problems.append(f"{path}:1: no plugin found here; is it still written as {{\"name\", make}}?")
+    for room, names in REGISTRIES.items():
+        registered = set()
+        for path in (os.path.join("src", room, name) for name in names):
+            if not os.path.exists(os.path.join(root, path)):
+                continue
+            text = "\n".join(text.split("//")[0] for _, text in lines(root, path))
+            found = re.findall(r'\{\s*"(\w+)"\s*,\s*(?:make_|k[A-Z])\w+\s*\}', text)
+            registered.update(found)
+            if not found:
+                problems.append(f"{path}:1: no plugin found here; is it still written as {{\"name\", make_name}}?")
         for name in sorted(registered - documented.get(room, set())):
-            problems.append(f"docs/scene-format.md:1: lacks '{name}' of {path}")
+            problems.append(f"docs/scene-format.md:1: lacks '{name}' of src/{room}")
         for name in sorted(documented.get(room, set()) - registered):
-            problems.append(f"docs/scene-format.md:1: describes '{name}', which {path} does not have")
+            problems.append(f"docs/scene-format.md:1: describes '{name}', which src/{room} does not have")
     return problems
 
 
-PARAMETER = re.compile(r'\bparameters(?:\.(?:(?:get|require)_\w+|find_texture)\(|,)\s*"(\w+)"')
+PARAMETER = re.compile(r'\b(?:p|parameters)(?:\.(?:(?:get|require)_\w+|find_texture)\(|,)\s*"(\w+)"')
 
 
 def documented_parameters(root):
