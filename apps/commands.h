@@ -8,6 +8,7 @@
 
 namespace covary {
 
+void add_render(CLI::App& app);
 void add_compare(CLI::App& app);
 void add_merge(CLI::App& app);
 void add_info(CLI::App& app);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The `covary` program. Exit codes: 0 done, 1 failed, 2 wrong usage.
 #include <algorithm>
+#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <new>
@@ -50,6 +51,7 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", "covary " COVARY_VERSION, "Print the version and exit");
   app.require_subcommand(0, 1);
   app.failure_message(CLI::FailureMessage::simple);
+  add_render(app);
   add_compare(app);
   add_merge(app);
   add_info(app);
@@ -93,6 +95,8 @@ const std::string& command_line() { return g_command_line; }
 int main(int argc, char** argv) {
   for (int i = 0; i < argc; ++i)
     covary::g_command_line += (i ? " " : "") + (i ? covary::quoted(argv[i]) : std::string("covary"));
+  // A file that outgrows its limit is an error like a full disk, which leaves no half-written file behind.
+  std::signal(SIGXFSZ, SIG_IGN);
   try {
     return covary::run(argc, argv);
   } catch (const covary::Error& error) {

@@ -35,7 +35,7 @@ struct Frame {
   static Frame from_tangent(const Vec3& normal, const Vec3& tangent) {
     const Vec3 s = tangent - normal * dot(normal, tangent);
     const float l2 = length_squared(s);
-    if (!(l2 > 1e-20f)) return Frame(normal);
+    if (!(l2 > 1e-10f * length_squared(tangent))) return Frame(normal);
     const Vec3 su = s * (1 / std::sqrt(l2));
     return {su, cross(normal, su), normal};
   }

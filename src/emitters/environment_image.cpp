@@ -17,7 +17,7 @@ double tent_times_sine(double theta, double d, double direction) {
 
 }  // namespace
 
-EnvironmentImage::EnvironmentImage(const Image& image, float scale, bool mis_compensation)
+EnvironmentImage::EnvironmentImage(const TexelImage& image, float scale, bool mis_compensation)
     : width_(image.width), height_(std::max(image.height, 3)) {
   COVARY_CHECK(image.channels == 3 && image.floats.size() == image.n_pixels() * 3 && image.n_pixels() > 0,
                "an environment needs a linear RGB image");

@@ -29,7 +29,7 @@ class EnvironmentImage {
   /// last row. `scale` multiplies all values, >= 0.
   /// `mis_compensation`: subtract the mean luminance from the sampling weights (Karlík et al. 2019), for use together
   /// with a technique that covers all directions.
-  EnvironmentImage(const Image& image, float scale, bool mis_compensation);
+  EnvironmentImage(const TexelImage& image, float scale, bool mis_compensation);
 
   struct Lookup {
     Spectrum value;

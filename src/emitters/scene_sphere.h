@@ -13,7 +13,9 @@ struct SceneSphere {
   float radius = 1;
 
   SceneSphere() = default;
-  explicit SceneSphere(const Bounds3& bounds) : center(bounds.center()), radius(bounds.radius()) {}
+  explicit SceneSphere(const Bounds3& bounds) : center(bounds.center()), radius(bounds.radius()) {
+    if (!(radius > 0)) radius = 1;  // a scene that is a single point
+  }
 
   float disk_area() const { return kPi * radius * radius; }
   /// Origin of a ray in direction `d` into the scene, uniform on the disk perpendicular to `d` that touches the sphere

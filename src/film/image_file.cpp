@@ -14,6 +14,7 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <iterator>
 
 #include "film/output_file.h"
 
@@ -38,6 +39,12 @@ bool is_exr(const std::string& path) {
   return magic[0] == 0x76 && magic[1] == 0x2f && magic[2] == 0x31 && magic[3] == 0x01;
 }
 
+/// OpenImageIO's last message, without line breaks at its end.
+std::string oiio_error(std::string text) {
+  text.erase(text.find_last_not_of(" \n") + 1);
+  return text;
+}
+
 /// An image that OpenImageIO can read; EXR never comes here.
 class OtherFile {
  public:
@@ -45,7 +52,7 @@ class OtherFile {
     OIIO::ImageSpec config;
     config["oiio:UnassociatedAlpha"] = 1;  // colours as stored: alpha is not used
     input_ = OIIO::ImageInput::open(path, &config);
-    if (!input_) fail(path, fmt::format("not an image that can be read: {}", OIIO::geterror()));
+    if (!input_) fail(path, fmt::format("not an image that can be read: {}", oiio_error(OIIO::geterror())));
     const OIIO::ImageSpec& s = spec();
     const double memory = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
     if (s.width < 1 || s.height < 1 || s.nchannels < 1 || s.depth > 1 || s.deep ||
@@ -70,7 +77,7 @@ class OtherFile {
   std::vector<float> read() {
     std::vector<float> values(static_cast<size_t>(spec().width) * spec().height * spec().nchannels);
     if (!input_->read_image(0, 0, 0, spec().nchannels, OIIO::TypeDesc::FLOAT, values.data()))
-      fail(path_, fmt::format("damaged or incomplete image: {}", input_->geterror()));
+      fail(path_, fmt::format("damaged or incomplete image: {}", oiio_error(input_->geterror())));
     return values;
   }
 
@@ -130,9 +137,10 @@ std::vector<std::string> layer_channels(const std::string& path, const std::vect
   if (channels.size() > 20) all += " …";
   const std::string have = fmt::format("layers: {}; channels: {}", known.empty() ? "none" : known, all);
   if (layer.empty()) fail(path, "no channels R G B; choose a layer (" + have + ")");
-  std::vector<std::string> candidates = layers;
+  std::vector<std::string> candidates;
+  std::copy_if(layers.begin(), layers.end(), std::back_inserter(candidates), [](const auto& l) { return !l.empty(); });
   for (const ExrFile::Channel& c : channels)
-    if (c.name.find('.') == std::string::npos) candidates.push_back(c.name);
+    if (c.name.size() > 1 && c.name.find('.') == std::string::npos) candidates.push_back(c.name);
   fail(path, fmt::format("no layer '{}'{} ({})", layer, did_you_mean(layer, candidates), have));
 }
 
@@ -184,14 +192,6 @@ PlacedImage read_image(const std::string& path, const std::string& layer) {
     }
   }
   return result;
-}
-
-float srgb_to_linear(float encoded) {
-  return encoded <= 0.04045f ? encoded / 12.92f : std::pow((encoded + 0.055f) / 1.055f, 2.4f);
-}
-
-float linear_to_srgb(float linear) {
-  return linear <= 0.0031308f ? 12.92f * linear : 1.055f * std::pow(linear, 1 / 2.4f) - 0.055f;
 }
 
 void write_png(const std::string& path, const Image& linear) {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "core/srgb.h"
 #include "film/exr.h"
 
 namespace covary {
@@ -36,10 +37,6 @@ PlacedImage read_image(const std::string& path, const std::string& layer = "");
 /// The three channels (one for grey, given three times) that `layer` means among `channels`; throws like read_image.
 std::vector<std::string> layer_channels(const std::string& path, const std::vector<ExrFile::Channel>& channels,
                                         const std::string& layer);
-
-/// Transfer functions of sRGB (IEC 61966-2-1), of values in [0, 1].
-float srgb_to_linear(float encoded);
-float linear_to_srgb(float linear);
 
 /// Writes linear RGB as 8-bit sRGB, values clamped to [0, 1], not-a-number as black. Throws Error(kIo).
 void write_png(const std::string& path, const Image& linear);

@@ -6,6 +6,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "core/srgb.h"
+
 namespace covary {
 namespace {
 
@@ -38,16 +40,14 @@ float to_float(double v) {
   return f;
 }
 
-/// IEC 61966-2-1.
-float srgb_to_linear(double v) { return to_float(v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4)); }
-
 Spectrum parse_hex(std::string_view text) {
   uint32_t bits = 0;
   const auto [end, error] = std::from_chars(text.data() + 1, text.data() + text.size(), bits, 16);
   if (text.size() != 7 || error != std::errc() || end != text.data() + text.size())
     fail(fmt::format("'{}' is not a colour; expected '#rrggbb'", shown(text)));
-  return {srgb_to_linear(((bits >> 16) & 255) / 255.0), srgb_to_linear(((bits >> 8) & 255) / 255.0),
-          srgb_to_linear((bits & 255) / 255.0)};
+  return {srgb_to_linear(static_cast<float>((bits >> 16) & 255) / 255),
+          srgb_to_linear(static_cast<float>((bits >> 8) & 255) / 255),
+          srgb_to_linear(static_cast<float>(bits & 255) / 255)};
 }
 
 std::vector<double> parse_colour_numbers(std::string_view text) {
@@ -114,7 +114,7 @@ ColourValue parse_srgb(std::string_view text) {
   text = trim(text);
   if (!text.empty() && text.front() == '#') return {parse_hex(text)};
   const std::vector<double> v = parse_colour_numbers(text);
-  return {{srgb_to_linear(v[0]), srgb_to_linear(v[1]), srgb_to_linear(v[2])}};
+  return {{srgb_to_linear(to_float(v[0])), srgb_to_linear(to_float(v[1])), srgb_to_linear(to_float(v[2]))}};
 }
 
 SampledSpectrum make_spectrum(const std::vector<double>& wavelengths, const std::vector<double>& values) {

@@ -21,6 +21,7 @@
 #include <mutex>
 
 #include "core/distribution.h"
+#include "core/srgb.h"
 #include "core/warp.h"
 #include "textures/registry.h"
 
@@ -46,7 +47,7 @@ const DecodeTable& decode_table(bool srgb) {
 class FloatGrey {
  public:
   using Value = float;
-  explicit FloatGrey(Image& image) : texels_(std::move(image.floats)) {}
+  explicit FloatGrey(TexelImage& image) : texels_(std::move(image.floats)) {}
   float value(size_t i) const { return texels_[i]; }
 
  private:
@@ -56,7 +57,7 @@ class FloatGrey {
 class FloatRgb {
  public:
   using Value = Spectrum;
-  explicit FloatRgb(Image& image) : texels_(std::move(image.floats)) {}
+  explicit FloatRgb(TexelImage& image) : texels_(std::move(image.floats)) {}
   Spectrum value(size_t i) const { return {texels_[3 * i], texels_[3 * i + 1], texels_[3 * i + 2]}; }
 
  private:
@@ -66,7 +67,7 @@ class FloatRgb {
 class ByteGrey {
  public:
   using Value = float;
-  ByteGrey(Image& image, const DecodeTable& decode) : texels_(std::move(image.bytes)), decode_(decode.data()) {}
+  ByteGrey(TexelImage& image, const DecodeTable& decode) : texels_(std::move(image.bytes)), decode_(decode.data()) {}
   float value(size_t i) const { return decode_[texels_[i]]; }
 
  private:
@@ -77,7 +78,7 @@ class ByteGrey {
 class ByteRgb {
  public:
   using Value = Spectrum;
-  ByteRgb(const Image& image, const DecodeTable& decode) : texels_(image.n_pixels()), decode_(decode.data()) {
+  ByteRgb(const TexelImage& image, const DecodeTable& decode) : texels_(image.n_pixels()), decode_(decode.data()) {
     for (size_t i = 0; i < texels_.size(); ++i)
       texels_[i] = image.bytes[3 * i] | image.bytes[3 * i + 1] << 8 | image.bytes[3 * i + 2] << 16;
   }
@@ -233,13 +234,13 @@ class Bitmap final : public Texture {
 };
 
 template <typename Texels>
-std::shared_ptr<Texture> wrap_texels(Texels texels, const Image& image, const BitmapSettings& settings) {
+std::shared_ptr<Texture> wrap_texels(Texels texels, const TexelImage& image, const BitmapSettings& settings) {
   return std::make_shared<Bitmap<Texels>>(std::move(texels), image.width, image.height, settings);
 }
 
 }  // namespace
 
-std::shared_ptr<Texture> make_bitmap_texture(Image image, const BitmapSettings& settings) {
+std::shared_ptr<Texture> make_bitmap_texture(TexelImage image, const BitmapSettings& settings) {
   const bool decode = image.srgb && !settings.raw;
   if (!image.bytes.empty()) {
     const DecodeTable& table = decode_table(decode);
@@ -266,7 +267,7 @@ std::shared_ptr<Texture> make_bitmap(Parameters& parameters) {
   parameters.get_bool("accel", true);
   if (path.empty()) return nullptr;  // already reported
   try {
-    return make_bitmap_texture(read_image(path), settings);
+    return make_bitmap_texture(read_texels(path), settings);
   } catch (const Error& error) {
     parameters.error_at("filename", std::string("cannot be used: ") + error.what());
     return nullptr;

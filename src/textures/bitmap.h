@@ -21,6 +21,6 @@ struct BitmapSettings {
 
 /// Texture that looks values up in `image`, which has at least one pixel. Positions are sampled exactly in proportion
 /// to the interpolated luminance where to_uv maps the unit square onto itself, uniformly otherwise.
-std::shared_ptr<Texture> make_bitmap_texture(Image image, const BitmapSettings& settings);
+std::shared_ptr<Texture> make_bitmap_texture(TexelImage image, const BitmapSettings& settings);
 
 }  // namespace covary

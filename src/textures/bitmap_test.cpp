@@ -88,8 +88,8 @@ TEST(Bitmap, AgreesWithMitsubaInAllFileFormatsFiltersAndWrapModes) {
 }
 
 /// 5 x 3 texels of values 0 to 1, some of them black, so that the density has zeros.
-Image sample_image(int channels, bool bytes) {
-  Image image;
+TexelImage sample_image(int channels, bool bytes) {
+  TexelImage image;
   image.width = 5, image.height = 3, image.channels = channels, image.srgb = bytes;
   for (int i = 0; i < 15 * channels; ++i) {
     const uint64_t random = mix64(1000 + i / channels == 1003 ? 0 : 77 + i);
@@ -190,7 +190,7 @@ TEST(Bitmap, SamplesUniformlyWhereTheTransformDoesNotKeepTheUnitSquare) {
 }
 
 TEST(Bitmap, SamplesUniformlyWhenBlack) {
-  Image image;
+  TexelImage image;
   image.width = 2, image.height = 2, image.channels = 1, image.floats = {0, 0, 0, 0};
   const auto t = make_bitmap_texture(image, {});
   EXPECT_EQ(t->sample_position({0.25f, 0.75f}).pdf, 1);

@@ -10,6 +10,7 @@
 #include <filesystem>
 
 #include "core/error.h"
+#include "core/srgb.h"
 
 namespace covary {
 namespace {
@@ -68,11 +69,7 @@ std::vector<T> read_channels(OIIO::ImageInput& input, const OIIO::ImageSpec& spe
 
 }  // namespace
 
-float srgb_to_linear(float encoded) {
-  return encoded <= 0.04045f ? encoded / 12.92f : std::pow((encoded + 0.055f) / 1.055f, 2.4f);
-}
-
-Image read_image(const std::string& path) {
+TexelImage read_texels(const std::string& path) {
   OIIO::ImageSpec config;
   config.attribute("oiio:UnassociatedAlpha", 1);  // do not multiply colours by alpha
   config.attribute("oiio:RawColor", 1);
@@ -85,7 +82,7 @@ Image read_image(const std::string& path) {
   check_size(spec, path);
 
   const std::vector<int> channels = choose_channels(spec, path);
-  Image image;
+  TexelImage image;
   image.width = spec.width, image.height = spec.height, image.channels = static_cast<int>(channels.size());
   image.srgb = !spec.format.is_floating_point();
   if (spec.format == OIIO::TypeDesc::UINT8)
@@ -95,10 +92,10 @@ Image read_image(const std::string& path) {
   return image;
 }
 
-Image read_linear_rgb(const std::string& path) {
-  const Image source = read_image(path);
+TexelImage read_linear_rgb(const std::string& path) {
+  const TexelImage source = read_texels(path);
   const size_t n_values = source.n_pixels() * source.channels;
-  Image result;
+  TexelImage result;
   result.width = source.width, result.height = source.height, result.channels = 3;
   result.floats.resize(source.n_pixels() * 3);
   for (size_t i = 0; i < n_values; ++i) {

@@ -11,7 +11,7 @@ namespace covary {
 
 /// Pixels row by row from the top of the picture, channels interleaved. Exactly one of `bytes` and `floats` is filled
 /// in.
-struct Image {
+struct TexelImage {
   int width = 0, height = 0;
   int channels = 0;            ///< 1 (grey) or 3 (RGB)
   std::vector<uint8_t> bytes;  ///< of files with 8 bits per channel, as they stand in the file
@@ -24,13 +24,10 @@ struct Image {
 /// Reads the first picture of a file in any format OpenImageIO knows (PNG, JPEG, EXR, HDR, PFM, TGA, BMP, PPM, TIFF).
 /// Throws Error with the file's name: kIo when it cannot be opened, kInput when it is broken, empty, not an image,
 /// absurdly large, or has neither red, green and blue nor grey channels.
-Image read_image(const std::string& path);
+TexelImage read_texels(const std::string& path);
 
-/// Linear value of an sRGB-encoded one in [0, 1] (IEC 61966-2-1).
-float srgb_to_linear(float encoded);
-
-/// The image as linear RGB floats, three per pixel; throws like read_image, and Error(kInput) for a value that is not
+/// The image as linear RGB floats, three per pixel; throws like read_texels, and Error(kInput) for a value that is not
 /// finite.
-Image read_linear_rgb(const std::string& path);
+TexelImage read_linear_rgb(const std::string& path);
 
 }  // namespace covary

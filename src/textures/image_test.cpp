@@ -16,7 +16,7 @@ using test_support::TemporaryFolder;
 
 std::string error_of(const std::string& path) {
   try {
-    read_image(path);
+    read_texels(path);
   } catch (const Error& error) {
     return error.what();
   }
@@ -59,7 +59,7 @@ TEST(Image, RejectsTruncatedFiles) {
   for (const char* name : {"a.png", "a.exr", "a.tga"}) {
     const std::string path = folder.file(name);
     write_noise(path, 64, 64, {"R", "G", "B"});
-    const Image whole = read_image(path);
+    const TexelImage whole = read_texels(path);
     EXPECT_EQ(whole.width, 64) << name;
     std::filesystem::resize_file(path, std::filesystem::file_size(path) / 2);
     EXPECT_NE(error_of(path).find("image '" + path + "' is broken"), std::string::npos)
@@ -98,7 +98,7 @@ TEST(Image, FindsColoursAmongOtherChannels) {
   const TemporaryFolder folder;
   const std::string path = folder.file("many.exr");
   write_noise(path, 4, 4, {"depth", "B", "G", "id", "R"});
-  const Image image = read_image(path);
+  const TexelImage image = read_texels(path);
   ASSERT_EQ(image.channels, 3);
   // OpenEXR stores channels by name; whatever their order in the file, value i of the written five is that of its name.
   const auto written = [](size_t i) { return static_cast<float>(static_cast<uint8_t>((i * 2654435761u) >> 13)) / 255; };
