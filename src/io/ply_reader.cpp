@@ -13,136 +13,12 @@
 
 #include "core/error.h"
 #include "io/mesh_file.h"
+#include "io/ply_header.h"
 
 namespace covary {
 namespace {
 
 static_assert(std::endian::native == std::endian::little);
-
-[[noreturn]] void fail(const std::string& message) { throw Error(ErrorCode::kInput, "PLY: " + message); }
-
-// ---- header ---------------------------------------------------------------------------------------------------------
-
-enum class Type : uint8_t { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kInt64, kUint64, kFloat32, kFloat64 };
-constexpr size_t kTypeSize[] = {1, 1, 2, 2, 4, 4, 8, 8, 4, 8};
-size_t size_of(Type type) { return kTypeSize[static_cast<size_t>(type)]; }
-
-/// Where a vertex property goes; kSkip: nowhere.
-enum Slot : int8_t { kX, kY, kZ, kNx, kNy, kNz, kU, kV, kR, kG, kB, kSlots, kSkip = -1 };
-
-struct PlyProperty {
-  std::string name;
-  Type type = Type::kFloat32;
-  bool is_list = false;
-  Type count_type = Type::kUint8;
-  Slot slot = kSkip;
-};
-
-struct PlyElement {
-  std::string name;
-  uint64_t count = 0;
-  std::vector<PlyProperty> properties;
-
-  bool has_lists() const {
-    for (const PlyProperty& p : properties)
-      if (p.is_list) return true;
-    return false;
-  }
-  /// Bytes of a record, lists counted as empty.
-  size_t smallest_record() const {
-    size_t size = 0;
-    for (const PlyProperty& p : properties) size += size_of(p.is_list ? p.count_type : p.type);
-    return size;
-  }
-};
-
-enum class Format { kAscii, kLittleEndian, kBigEndian };
-
-struct Header {
-  Format format = Format::kAscii;
-  std::vector<PlyElement> elements;
-  size_t size = 0;  // bytes up to the body
-};
-
-Type parse_type(std::string_view name, size_t line) {
-  static constexpr std::pair<std::string_view, Type> kNames[] = {
-      {"char", Type::kInt8},     {"int8", Type::kInt8},       {"uchar", Type::kUint8},    {"uint8", Type::kUint8},
-      {"short", Type::kInt16},   {"int16", Type::kInt16},     {"ushort", Type::kUint16},  {"uint16", Type::kUint16},
-      {"int", Type::kInt32},     {"int32", Type::kInt32},     {"uint", Type::kUint32},    {"uint32", Type::kUint32},
-      {"long", Type::kInt64},    {"int64", Type::kInt64},     {"ulong", Type::kUint64},   {"uint64", Type::kUint64},
-      {"float", Type::kFloat32}, {"float32", Type::kFloat32}, {"double", Type::kFloat64}, {"float64", Type::kFloat64}};
-  for (const auto& [known, type] : kNames)
-    if (known == name) return type;
-  fail(fmt::format("line {}: unknown type '{}'", line, name));
-}
-
-std::vector<std::string_view> words_of(std::string_view line) {
-  std::vector<std::string_view> words;
-  size_t i = 0;
-  while (i < line.size()) {
-    while (i < line.size() && (line[i] == ' ' || line[i] == '\t' || line[i] == '\r')) ++i;
-    const size_t start = i;
-    while (i < line.size() && line[i] != ' ' && line[i] != '\t' && line[i] != '\r') ++i;
-    if (i > start) words.push_back(line.substr(start, i - start));
-  }
-  return words;
-}
-
-Header parse_header(std::string_view text) {
-  Header header;
-  bool has_format = false;
-  size_t start = 0;
-  for (size_t line = 1;; ++line) {
-    const size_t end = text.find('\n', start);
-    if (end == std::string_view::npos) fail(fmt::format("line {}: the header has no 'end_header'", line));
-    const std::vector<std::string_view> words = words_of(text.substr(start, end - start));
-    start = end + 1;
-    if (line == 1) {
-      if (words.size() != 1 || words[0] != "ply") fail("the file does not start with 'ply'");
-      continue;
-    }
-    if (words.empty() || words[0] == "comment" || words[0] == "obj_info") continue;
-    if (words[0] == "end_header") break;
-    if (words[0] == "format" && words.size() == 3) {
-      if (words[1] == "ascii") {
-        header.format = Format::kAscii;
-      } else if (words[1] == "binary_little_endian") {
-        header.format = Format::kLittleEndian;
-      } else if (words[1] == "binary_big_endian") {
-        header.format = Format::kBigEndian;
-      } else {
-        fail(fmt::format("line {}: unknown format '{}'; expected ascii, binary_little_endian or binary_big_endian",
-                         line, words[1]));
-      }
-      if (words[2] != "1.0") fail(fmt::format("line {}: version '{}'; expected 1.0", line, words[2]));
-      has_format = true;
-    } else if (words[0] == "element" && words.size() == 3) {
-      PlyElement element;
-      element.name = words[1];
-      const auto [rest, error] = std::from_chars(words[2].data(), words[2].data() + words[2].size(), element.count);
-      if (error != std::errc() || rest != words[2].data() + words[2].size())
-        fail(fmt::format("line {}: '{}' is not a number of elements", line, words[2]));
-      for (const PlyElement& other : header.elements)
-        if (other.name == element.name) fail(fmt::format("line {}: element '{}' is given twice", line, element.name));
-      header.elements.push_back(std::move(element));
-    } else if (words[0] == "property" && (words.size() == 3 || (words.size() == 5 && words[1] == "list"))) {
-      if (header.elements.empty()) fail(fmt::format("line {}: a property before any element", line));
-      PlyProperty property;
-      property.is_list = words.size() == 5;
-      property.name = words.back();
-      property.type = parse_type(words[words.size() - 2], line);
-      if (property.is_list) property.count_type = parse_type(words[2], line);
-      if (property.is_list && property.count_type >= Type::kFloat32)
-        fail(fmt::format("line {}: the length of list '{}' must be an integer", line, property.name));
-      header.elements.back().properties.push_back(std::move(property));
-    } else {
-      fail(fmt::format("line {}: cannot read '{}'", line, words[0]));
-    }
-  }
-  if (!has_format) fail("the header has no 'format' line");
-  header.size = start;
-  return header;
-}
 
 /// Gives the vertex properties their slots. Returns which groups are complete.
 struct Contents {
@@ -158,10 +34,10 @@ Contents assign_slots(PlyElement& vertex) {
     for (std::string_view name : names)
       if (!find(name)) return false;
     int slot = first_slot;
-    for (std::string_view name : names) find(name)->slot = static_cast<Slot>(slot++);
+    for (std::string_view name : names) find(name)->slot = static_cast<PlySlot>(slot++);
     return true;
   };
-  if (!assign({"x", "y", "z"}, kX)) fail("the vertices lack one of the properties x, y, z");
+  if (!assign({"x", "y", "z"}, kX)) fail_ply("the vertices lack one of the properties x, y, z");
   Contents contents;
   contents.normals = assign({"nx", "ny", "nz"}, kNx);
   contents.uvs = assign({"texture_u", "texture_v"}, kU) || assign({"s", "t"}, kU) || assign({"u", "v"}, kU) ||
@@ -191,38 +67,38 @@ class BinaryBody {
     p_ += size;
     return at;
   }
-  bool read(Type type, double& value) {
+  bool read(PlyType type, double& value) {
     const std::byte* at = take(size_of(type));
     if (!at) return false;
     switch (type) {
-      case Type::kInt8:
+      case PlyType::kInt8:
         value = load<int8_t>(at);
         break;
-      case Type::kUint8:
+      case PlyType::kUint8:
         value = load<uint8_t>(at);
         break;
-      case Type::kInt16:
+      case PlyType::kInt16:
         value = load<int16_t>(at);
         break;
-      case Type::kUint16:
+      case PlyType::kUint16:
         value = load<uint16_t>(at);
         break;
-      case Type::kInt32:
+      case PlyType::kInt32:
         value = load<int32_t>(at);
         break;
-      case Type::kUint32:
+      case PlyType::kUint32:
         value = load<uint32_t>(at);
         break;
-      case Type::kInt64:
+      case PlyType::kInt64:
         value = static_cast<double>(load<int64_t>(at));
         break;
-      case Type::kUint64:
+      case PlyType::kUint64:
         value = static_cast<double>(load<uint64_t>(at));
         break;
-      case Type::kFloat32:
+      case PlyType::kFloat32:
         value = load<float>(at);
         break;
-      case Type::kFloat64:
+      case PlyType::kFloat64:
         value = load<double>(at);
         break;
     }
@@ -250,7 +126,7 @@ class AsciiBody {
   uint64_t capacity(const PlyElement& element) const {
     return (static_cast<size_t>(end_ - p_) + 1) / std::max<size_t>(2, 2 * element.properties.size());
   }
-  bool read(Type type, double& value) {
+  bool read(PlyType type, double& value) {
     while (p_ < end_ && (*p_ == ' ' || *p_ == '\t' || *p_ == '\n' || *p_ == '\r')) ++p_;
     if (p_ < end_ && *p_ == '+') ++p_;
     const char* start = p_;
@@ -258,7 +134,7 @@ class AsciiBody {
     // from_chars leaves the value alone when it is out of range: too small is 0, too large is found by check_mesh().
     if (error == std::errc::result_out_of_range) value = std::strtod(std::string(start, rest).c_str(), nullptr);
     if (error == std::errc::invalid_argument || (rest<end_&& * rest> ' ')) return false;
-    if (type < Type::kFloat32 && value != std::floor(value)) return false;
+    if (type < PlyType::kFloat32 && value != std::floor(value)) return false;
     p_ = rest;
     return true;
   }
@@ -268,11 +144,11 @@ class AsciiBody {
 };
 
 /// Largest value of integer colours.
-float colour_scale(Type type) {
+float colour_scale(PlyType type) {
   switch (type) {
-    case Type::kUint8:
+    case PlyType::kUint8:
       return 1 / 255.0f;
-    case Type::kUint16:
+    case PlyType::kUint16:
       return 1 / 65535.0f;
     default:
       return 1;
@@ -295,11 +171,12 @@ void store(MeshData& mesh, const Contents& contents, size_t i, const float* v) {
 }
 
 [[noreturn]] void fail_in(const PlyElement& element, uint64_t index) {
-  fail(fmt::format("the file ends, or a number cannot be read, in {} {} of {}", element.name, index, element.count));
+  fail_ply(
+      fmt::format("the file ends, or a number cannot be read, in {} {} of {}", element.name, index, element.count));
 }
 
 template <typename Body>
-double read_value(Body& body, Type type, const PlyElement& element, uint64_t index) {
+double read_value(Body& body, PlyType type, const PlyElement& element, uint64_t index) {
   double value = 0;
   if (!body.read(type, value)) fail_in(element, index);
   return value;
@@ -309,7 +186,7 @@ template <typename Body>
 uint64_t read_length(Body& body, const PlyProperty& property, const PlyElement& element, uint64_t index) {
   const double length = read_value(body, property.count_type, element, index);
   if (!(length >= 0 && length <= 1e9))
-    fail(fmt::format("list '{}' of {} {} has length {}", property.name, element.name, index, length));
+    fail_ply(fmt::format("list '{}' of {} {} has length {}", property.name, element.name, index, length));
   return static_cast<uint64_t>(length);
 }
 
@@ -322,10 +199,10 @@ void skip_list(Body& body, const PlyProperty& property, const PlyElement& elemen
 /// Vertices of plain single-precision numbers in the machine's byte order. False: not that layout.
 bool read_float_vertices(BinaryBody& body, const PlyElement& element, const Contents& contents, MeshData& mesh) {
   if (body.swap() || element.has_lists()) return false;
-  std::vector<std::pair<size_t, Slot>> fields;
+  std::vector<std::pair<size_t, PlySlot>> fields;
   size_t offset = 0;
   for (const PlyProperty& p : element.properties) {
-    if (p.slot != kSkip && p.type != Type::kFloat32) return false;
+    if (p.slot != kSkip && p.type != PlyType::kFloat32) return false;
     if (p.slot != kSkip) fields.emplace_back(offset, p.slot);
     offset += size_of(p.type);
   }
@@ -361,7 +238,8 @@ void read_vertices(Body& body, const PlyElement& element, const Contents& conten
 bool read_plain_faces(BinaryBody& body, const PlyElement& element, MeshData& mesh) {
   if (body.swap() || element.properties.size() != 1) return false;
   const PlyProperty& list = element.properties[0];
-  if (list.count_type != Type::kUint8 || (list.type != Type::kInt32 && list.type != Type::kUint32)) return false;
+  if (list.count_type != PlyType::kUint8 || (list.type != PlyType::kInt32 && list.type != PlyType::kUint32))
+    return false;
   std::array<uint32_t, 255> corners;
   for (uint64_t i = 0; i < element.count; ++i) {
     const std::byte* length = body.take(1);
@@ -381,10 +259,10 @@ bool read_plain_faces(BinaryBody& body, const PlyElement& element, MeshData& mes
 template <typename Body>
 void read_faces(Body& body, const PlyElement& element, MeshData& mesh) {
   const auto is_indices = [](const PlyProperty& p) {
-    return p.is_list && (p.name == "vertex_indices" || p.name == "vertex_index") && p.type < Type::kFloat32;
+    return p.is_list && (p.name == "vertex_indices" || p.name == "vertex_index") && p.type < PlyType::kFloat32;
   };
   if (std::none_of(element.properties.begin(), element.properties.end(), is_indices))
-    fail("the faces have no integer list 'vertex_indices' or 'vertex_index'");
+    fail_ply("the faces have no integer list 'vertex_indices' or 'vertex_index'");
   mesh.triangles.reserve(element.count);
   if constexpr (std::is_same_v<Body, BinaryBody>)
     if (read_plain_faces(body, element, mesh)) return;
@@ -400,7 +278,7 @@ void read_faces(Body& body, const PlyElement& element, MeshData& mesh) {
         uint32_t first = 0, previous = 0;
         for (uint64_t k = 0; k < n; ++k) {
           const double value = read_value(body, p.type, element, i);
-          if (!(value >= 0 && value < kMaxIndex)) fail(fmt::format("face {} uses vertex {}", i, value));
+          if (!(value >= 0 && value < kMaxIndex)) fail_ply(fmt::format("face {} uses vertex {}", i, value));
           const uint32_t index = static_cast<uint32_t>(value);
           if (k == 0) first = index;
           if (k >= 2) mesh.triangles.push_back({first, previous, index});
@@ -411,13 +289,13 @@ void read_faces(Body& body, const PlyElement& element, MeshData& mesh) {
 }
 
 template <typename Body>
-void read_body(Body body, Header& header, MeshData& mesh) {
+void read_body(Body body, PlyHeader& header, MeshData& mesh) {
   for (PlyElement& element : header.elements) {
     const bool is_vertex = element.name == "vertex", is_face = element.name == "face";
     if (element.properties.empty() && !is_vertex && !is_face) continue;
     if (element.count > body.capacity(element) || element.count >= std::numeric_limits<uint32_t>::max())
-      fail(fmt::format("the header promises {} elements '{}', more than the file can hold", element.count,
-                       element.name));
+      fail_ply(fmt::format("the header promises {} elements '{}', more than the file can hold", element.count,
+                           element.name));
     if (is_vertex) {
       const Contents contents = assign_slots(element);
       read_vertices(body, element, contents, mesh);
@@ -440,16 +318,16 @@ void read_body(Body body, Header& header, MeshData& mesh) {
 
 MeshFile read_ply(std::span<const std::byte> bytes) {
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  Header header = parse_header(text);
+  PlyHeader header = parse_ply_header(text);
   for (const char* needed : {"vertex", "face"})
     if (std::none_of(header.elements.begin(), header.elements.end(),
                      [&](const PlyElement& e) { return e.name == needed; }))
-      fail(fmt::format("the file has no element '{}'", needed));
+      fail_ply(fmt::format("the file has no element '{}'", needed));
   MeshFile file;
-  if (header.format == Format::kAscii) {
+  if (header.format == PlyFormat::kAscii) {
     read_body(AsciiBody(text.substr(header.size)), header, file.mesh);
   } else {
-    read_body(BinaryBody(bytes.subspan(header.size), header.format == Format::kBigEndian), header, file.mesh);
+    read_body(BinaryBody(bytes.subspan(header.size), header.format == PlyFormat::kBigEndian), header, file.mesh);
   }
   check_mesh(file);
   return file;

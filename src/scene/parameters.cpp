@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <tuple>
 
 namespace covary {
@@ -71,6 +72,17 @@ std::string quoted_list(const std::vector<std::string>& names) {
   return text;
 }
 
+/// "lie in [0, 1]", "be at least 0", …: what must be true of a value, where the largest number of a type means no limit.
+template <typename T>
+std::string range_text(T lowest, T highest) {
+  const bool bounded_below = lowest > std::numeric_limits<T>::lowest();
+  const bool bounded_above = highest < std::numeric_limits<T>::max();
+  if (bounded_below && bounded_above) return fmt::format("lie in [{}, {}]", lowest, highest);
+  if (bounded_below) return fmt::format("be at least {}", lowest);
+  if (bounded_above) return fmt::format("be at most {}", highest);
+  return "fit into a float";
+}
+
 std::string subject(const ObjectDescription& object) { return object.kind + " '" + object.type + "'"; }
 
 }  // namespace
@@ -127,7 +139,7 @@ int Parameters::get_int(const std::string& name, int fallback, int lowest, int h
     return fallback;
   }
   if (*value < lowest || *value > highest) {
-    error_at(name, fmt::format("is {}; it must lie in [{}, {}]", *value, lowest, highest));
+    error_at(name, fmt::format("is {}; it must {}", *value, range_text(lowest, highest)));
     return fallback;
   }
   return static_cast<int>(*value);
@@ -146,7 +158,7 @@ float Parameters::get_float(const std::string& name, float fallback, float lowes
     return fallback;
   }
   if (!(value >= lowest && value <= highest) || !std::isfinite(value)) {
-    error_at(name, fmt::format("is {}; it must lie in [{}, {}]", value, lowest, highest));
+    error_at(name, fmt::format("is {}; it must {}", value, range_text(lowest, highest)));
     return fallback;
   }
   return value;

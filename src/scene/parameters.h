@@ -154,8 +154,8 @@ struct Plugin {
 };
 
 /// Linear Rec. 709 RGB of a sampled spectrum (CIE 1931 2° observer), negative components clamped to 0. A reflectance or
-/// index of 1 everywhere maps to (1,1,1). An emission of 1 everywhere has Y = 1 and the chromaticity of illuminant E,
-/// which is not neutral in this space: (1.205, 0.948, 0.909).
+/// index of 1 everywhere maps to (1,1,1), within 0.2 % when it is sampled. An emission of 1
+/// everywhere has Y = 1 and the chromaticity of illuminant E, which is not neutral in this space: (1.205, 0.948, 0.909).
 Spectrum spectrum_to_rgb(const SampledSpectrum& spectrum, SpectrumRole role);
 
 }  // namespace covary
