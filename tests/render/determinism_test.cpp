@@ -74,7 +74,7 @@ TEST(Determinism, TwentyInterruptions) {
   int interruptions = 0;
   for (bool complete = false; !complete;) {
     std::atomic<bool> stop{false};
-    std::atomic<int> left{interruptions < 20 ? 1 + static_cast<int>(random() % (n_tiles / 12)) : n_tiles};
+    std::atomic<int> left{interruptions < 20 ? 1 + static_cast<int>(random() % (n_tiles / 24)) : n_tiles};
     settings.stop = &stop;
     settings.progress = [&](uint64_t, uint64_t) { if (--left <= 0) stop = true; };
     complete = render_pass(scene.scene(), scene.integrator(), settings, film).complete;
@@ -110,7 +110,7 @@ TEST(Determinism, ReplayGivesTheSampleThatEntersTheFilm) {
 
 TEST(Determinism, DoublingAllLightsDoublesTheImage) {
   const auto text = [](const char* radiance) {
-    return scene_text(std::string("<shape type='sphere'><point name='center' z='5'/><bsdf type='plastic'/></shape>"
+    return scene_text(std::string("<shape type='sphere'><point name='center' x='0' y='0' z='5'/><bsdf type='plastic'/></shape>"
                                   "<shape type='rectangle'><transform name='to_world'><rotate x='1' angle='90'/>"
                                   "<translate y='3' z='4'/></transform><emitter type='area'><rgb name='radiance' value='") +
                           radiance + "'/></emitter></shape>", 20, 20);
