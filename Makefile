@@ -30,7 +30,7 @@ setup:
 	@scripts/setup
 
 configure: setup
-	@cmake --preset release $(CONFIGURE) --log-level=WARNING
+	@cmake --preset release $(CONFIGURE) > /dev/null
 
 build: configure
 	@cmake --build build/release -j $(JOBS) --target covary
@@ -52,14 +52,14 @@ bench: configure
 
 lint:
 	@scripts/setup lint
-	@cmake --preset release $(CONFIGURE) --log-level=WARNING
+	@cmake --preset release $(CONFIGURE) > /dev/null
 	@scripts/lint build/release $(if $(ALL),--all)
 
 install: build
 	@cmake --install build/release --prefix $(PREFIX)
 
 asan ubsan tsan: setup
-	@cmake --preset $@ $(CONFIGURE) --log-level=WARNING
+	@cmake --preset $@ $(CONFIGURE) > /dev/null
 	@cmake --build build/$@ -j $(JOBS)
 	@cd build/$@ && ../../scripts/sanitized $@ $(CTEST)
 
