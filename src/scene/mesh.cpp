@@ -52,6 +52,48 @@ TriangleMesh::TriangleMesh(MeshData data)
   }
   n_degenerate_ = triangles_.size() - kept;
   triangles_.resize(kept);
+  parallelogram_ = find_parallelogram();
+}
+
+TriangleMesh::Parallelogram TriangleMesh::find_parallelogram() const {
+  if (triangles_.size() != 2 || !has_uvs_) return {};
+  // Each triangle must have three corners of the unit square in (u, v), and miss opposite ones.
+  Vec2 missing[2] = {{0.5f, 0.5f}, {0.5f, 0.5f}};
+  for (int i = 0; i < 2; ++i)
+    for (int corner = 0; corner < 4; ++corner) {
+      const Vec2 uv = {static_cast<float>(corner & 1), static_cast<float>(corner >> 1)};
+      int n_found = 0;
+      for (const uint32_t index : triangles_[i]) n_found += vertices_[index].uv == uv;
+      if (n_found > 1 || (n_found == 0 && missing[i].x != 0.5f)) return {};
+      if (n_found == 0) missing[i] = uv;
+    }
+  if (!(missing[0] + missing[1] == Vec2{1, 1})) return {};
+
+  const auto& t = triangles_[0];
+  const Vertex &v0 = vertices_[t[0]], &v1 = vertices_[t[1]], &v2 = vertices_[t[2]];
+  const Vec3 e1 = v1.p - v0.p, e2 = v2.p - v0.p;
+  const Vec2 d1 = v1.uv - v0.uv, d2 = v2.uv - v0.uv;
+  const float inverse = 1 / (d1.x * d2.y - d1.y * d2.x);
+  Parallelogram result;
+  result.dp_du = (e1 * d2.y - e2 * d1.y) * inverse;
+  result.dp_dv = (e2 * d1.x - e1 * d2.x) * inverse;
+  result.origin = v0.p - result.dp_du * v0.uv.x - result.dp_dv * v0.uv.y;
+  result.n = normalize(cross(e1, e2));
+  const float tolerance = 1e-5f * (length(result.dp_du) + length(result.dp_dv) + max_component(abs(v0.p)));
+  for (const uint32_t index : triangles_[1]) {
+    const Vertex& v = vertices_[index];
+    if (!(length(result.origin + result.dp_du * v.uv.x + result.dp_dv * v.uv.y - v.p) <= tolerance)) return {};
+  }
+  const auto& s = triangles_[1];
+  const Vec3 other = cross(vertices_[s[1]].p - vertices_[s[0]].p, vertices_[s[2]].p - vertices_[s[0]].p);
+  if (!(dot(other, result.n) > 0)) return {};
+  result.inverse_area = 1 / length(cross(result.dp_du, result.dp_dv));
+  return result;
+}
+
+AreaSample TriangleMesh::sample_uv(Vec2 uv) const {
+  const Parallelogram& q = parallelogram_;
+  return {q.origin + q.dp_du * uv.x + q.dp_dv * uv.y, q.n, uv, q.inverse_area};
 }
 
 void TriangleMesh::prepare_sampling() {

@@ -30,6 +30,8 @@ class TriangleMesh final : public Shape {
   float area() const override { return static_cast<float>(areas_.sum()); }
   size_t n_primitives() const override { return triangles_.size(); }
   AreaSample sample_area(Vec2 u, float u_primitive) const override;
+  /// Only for two triangles that make a parallelogram whose (u, v) cover the unit square, such as `rectangle`.
+  AreaSample sample_uv(Vec2 uv) const override;
   Spectrum vertex_colour(const SurfaceHit& hit) const override;
   bool has_vertex_colour() const override { return !colours_.empty(); }
   /// Makes sample_area() and area() ready; called by the scene for meshes that emit. Not needed otherwise.
@@ -52,6 +54,14 @@ class TriangleMesh final : public Shape {
   bool has_normals_ = false, has_uvs_ = false;
   size_t n_degenerate_ = 0;
   Discrete areas_;
+
+  /// p = origin + u dp_du + v dp_dv over the whole mesh; inverse_area == 0: it is no such parallelogram.
+  struct Parallelogram {
+    Vec3 origin, dp_du, dp_dv, n;
+    float inverse_area = 0;
+  };
+  Parallelogram find_parallelogram() const;
+  Parallelogram parallelogram_;
 };
 
 }  // namespace covary
