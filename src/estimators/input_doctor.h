@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Checks two grouped images, from any renderer, for what the image-space control variates assume of them: finite linear
+// values; pixels of the PT image independent of each other and of the CRN image; pixels of the CRN image really sharing
+// their random numbers; groups that are independent renders of one scene.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "estimators/grouped_image.h"
+
+namespace covary {
+
+struct Finding {
+  enum class Severity { kNote, kWarning, kError };
+  Severity severity;
+  /// What is wrong and, for errors, the setting to change in the renderer that made the image.
+  std::string text;
+};
+
+/// Mean rank correlation over the groups of pairs of pixels, with its standard error, were the pairs independent.
+struct Correlation {
+  double value = 0, standard_error = 0;
+  long pairs = 0;  ///< 0: not measured (fewer than 3 groups, or no noise)
+};
+
+struct InputReport {
+  Correlation crn_horizontal, crn_vertical;  ///< neighbours of the CRN image
+  Correlation pt_horizontal, pt_vertical;    ///< neighbours of the PT image
+  Correlation crn_pt;                        ///< the same pixel in both
+  double crn_mean = 0, pt_mean = 0;          ///< grey image means
+  double mean_difference_sigmas = 0;         ///< difference of the image means in standard errors, from the groups
+  long nonfinite_pixels = 0, negative_pixels = 0, clipped_pixels = 0;
+  std::vector<Finding> findings;
+  bool has_errors() const;
+};
+
+/// Measures the images and says what is wrong. Looks at every pixel for its values and at no more than about 250 000
+/// pairs for each correlation. Throws Error(kUsage) where the sizes differ or an image is empty. The images need not have
+/// the same number of groups; with fewer than 3, correlations cannot be measured, which is a warning.
+InputReport examine_inputs(const GroupedImage& crn, const GroupedImage& pt);
+
+}  // namespace covary
