@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -28,35 +29,49 @@ using SquareDensity = std::function<double(double, double)>;
 
 // --- Quadrature ----------------------------------------------------------------------------------------------------
 
-/// Tensor product of the 5-point Gauss-Legendre rule.
-double gauss(const SquareDensity& f, const Box& b) {
-  static constexpr std::array<double, 5> kNodes{-0.9061798459386640, -0.5384693101056831, 0, 0.5384693101056831,
-                                                0.9061798459386640};
-  static constexpr std::array<double, 5> kWeights{0.2369268850561891, 0.4786286704993665, 0.5688888888888889,
-                                                  0.4786286704993665, 0.2369268850561891};
+struct Rule {
+  double integral;
+  bool edge;  ///< the integrand vanishes at some nodes and not at others: its support may end inside the box
+};
+
+/// Tensor product of the 5-point Gauss-Lobatto rule, whose nodes reach to the rim of the box, where the support of a
+/// density often ends.
+Rule lobatto(const SquareDensity& f, const Box& b) {
+  static constexpr double kRim = 1 - 1e-6;  // not on it: two boxes share it, and a horizon belongs to neither side
+  static constexpr std::array<double, 5> kNodes{-kRim, -0.6546536707079771, 0, 0.6546536707079771, kRim};
+  static constexpr std::array<double, 5> kWeights{0.1, 49.0 / 90, 32.0 / 45, 49.0 / 90, 0.1};
   const double cx = (b.x0 + b.x1) / 2, hx = (b.x1 - b.x0) / 2, cy = (b.y0 + b.y1) / 2, hy = (b.y1 - b.y0) / 2;
   double sum = 0;
+  int n_zeros = 0;
   for (int i = 0; i < 5; ++i)
-    for (int j = 0; j < 5; ++j) sum += kWeights[i] * kWeights[j] * f(cx + hx * kNodes[i], cy + hy * kNodes[j]);
-  return sum * hx * hy;
+    for (int j = 0; j < 5; ++j) {
+      const double value = f(cx + hx * kNodes[i], cy + hy * kNodes[j]);
+      sum += kWeights[i] * kWeights[j] * value;
+      n_zeros += value == 0;
+    }
+  return {sum * hx * hy, n_zeros > 0 && n_zeros < 25};
 }
 
-/// Halves the box in both directions until the integral changes by less than `tolerance`. The tolerance is halved, not
-/// quartered, at each level: discontinuities lie on curves, which meet twice as many boxes a level.
-double integrate(const SquareDensity& f, const Box& b, double whole, double tolerance, int depth) {
-  const double mx = (b.x0 + b.x1) / 2, my = (b.y0 + b.y1) / 2;
+/// Cuts the box in four until the integral changes by less than `tolerance`, and at least 6 times around an edge. The
+/// tolerance is halved, not quartered, at each level: edges are curves, which meet twice as many boxes. The cuts are not
+/// in the middle but jittered, so that the errors along an edge parallel to the axes do not add up.
+double integrate(const SquareDensity& f, const Box& b, const Rule& whole, double tolerance, int level) {
+  const uint64_t bits = combine64(std::bit_cast<uint64_t>(b.x0 + b.x1), std::bit_cast<uint64_t>(b.y0 + b.y1));
+  const double rx = 0.4 + 0.2 * (bits >> 40) * 0x1p-24, ry = 0.4 + 0.2 * (bits & 0xffffff) * 0x1p-24;
+  const double mx = b.x0 + rx * (b.x1 - b.x0), my = b.y0 + ry * (b.y1 - b.y0);
   const std::array<Box, 4> parts{
       {{b.x0, mx, b.y0, my}, {mx, b.x1, b.y0, my}, {b.x0, mx, my, b.y1}, {mx, b.x1, my, b.y1}}};
-  std::array<double, 4> values;
+  std::array<Rule, 4> values;
   double sum = 0;
-  for (int i = 0; i < 4; ++i) sum += values[i] = gauss(f, parts[i]);
-  if (!(std::abs(sum - whole) > tolerance) || depth == 0) return sum;  // also when not finite
+  for (int i = 0; i < 4; ++i) values[i] = lobatto(f, parts[i]), sum += values[i].integral;
+  const bool converged = !(std::abs(sum - whole.integral) > tolerance);  // also when not finite
+  if ((converged && !(whole.edge && level < 6)) || level == 9) return sum;
   sum = 0;
-  for (int i = 0; i < 4; ++i) sum += integrate(f, parts[i], values[i], tolerance / 2, depth - 1);
+  for (int i = 0; i < 4; ++i) sum += integrate(f, parts[i], values[i], tolerance / 2, level + 1);
   return sum;
 }
 double integrate(const SquareDensity& f, const Box& b, double tolerance) {
-  return integrate(f, b, gauss(f, b), tolerance, 9);
+  return integrate(f, b, lobatto(f, b), tolerance, 0);
 }
 
 double integrate_grid(const SquareDensity& f, double tolerance, int n) {
@@ -69,7 +84,7 @@ double integrate_grid(const SquareDensity& f, double tolerance, int n) {
 
 // --- Cells ---------------------------------------------------------------------------------------------------------
 
-/// Binary tree over the unit square. Its leaves hold about 16 of the points it was made from, and are where the density
+/// Binary tree over the unit square. Its leaves hold about 50 of the points it was made from, and are where the density
 /// is integrated; subtrees that hold equally many points are the cells of the test. Space without points is cut off, so
 /// that every leaf is about as small as the details of the density in it.
 class Cells {
@@ -85,8 +100,8 @@ class Cells {
     const auto middle = std::partition(points.begin(), points.end(), [](const Point2& p) { return p.y < 0.5; });
     const int64_t n = std::max<int64_t>(1, points.size()), n_low = middle - points.begin();
     const int low = static_cast<int>(n_cells * n_low / n);
-    build(1, {0, 1, 0, 0.5}, {points.begin(), middle}, std::max(1, low), -1);
-    build(2, {0, 1, 0.5, 1}, {middle, points.end()}, std::max(1, n_cells - low), -1);
+    build(1, {0, 1, 0, 0.5}, {points.begin(), middle}, std::max(1, low), -1, 0);
+    build(2, {0, 1, 0.5, 1}, {middle, points.end()}, std::max(1, n_cells - low), -1, 0);
   }
   int find(const Point2& p) const {
     int node = 0;
@@ -102,46 +117,52 @@ class Cells {
     double split = 0;
     int axis = 0, child = -1, cell = -1;
   };
-  void build(int node, const Box& box, std::span<Point2> points, int n_cells, int cell) {
-    if (cell < 0 && (n_cells == 1 || points.size() < 32)) {
+  void build(int node, const Box& box, std::span<Point2> points, int n_cells, int cell, int depth) {
+    if (cell < 0 && (n_cells == 1 || points.size() < 64)) {
       cell = static_cast<int>(boxes_.size());
       boxes_.push_back(box);
     }
-    if (points.size() < 32) {
-      nodes_[node].cell = cell;
-      leaves_.push_back({box, cell});
-      return;
-    }
+    if (points.size() < 4) return make_leaf(node, box, cell);
     const auto [x_min, x_max] = std::ranges::minmax(points, {}, &Point2::x);
     const auto [y_min, y_max] = std::ranges::minmax(points, {}, &Point2::y);
     const double dx = x_max.x - x_min.x, dy = y_max.y - y_min.y;
-    // Space without points goes to the cell it belongs to or, above the cells, makes one of its own.
-    const auto cut_off = [&](int axis, double split, bool points_below) {
-      cut(node, box, axis, split, points_below ? points : std::span<Point2>{},
-          points_below ? std::span<Point2>{} : points, points_below ? n_cells : 1, points_below ? 1 : n_cells, cell);
+    // Space without points is cut off, the farthest three quarters first, so that boxes grow with their distance. It
+    // goes to the cell it belongs to or, above the cells, makes one of its own.
+    const auto cut_off = [&](int axis, double points_end, double box_end) {
+      const double split = points_end + (box_end - points_end) / 4;
+      const std::span<Point2> none;
+      if (box_end > points_end)
+        cut(node, box, axis, split, points, none, n_cells, 1, cell, depth);
+      else
+        cut(node, box, axis, split, none, points, 1, n_cells, cell, depth);
     };
-    if (dx > 0 && box.x1 - x_max.x > 2 * dx) return cut_off(0, x_max.x + dx, true);
-    if (dx > 0 && x_min.x - box.x0 > 2 * dx) return cut_off(0, x_min.x - dx, false);
-    if (dy > 0 && box.y1 - y_max.y > 2 * dy) return cut_off(1, y_max.y + dy, true);
-    if (dy > 0 && y_min.y - box.y0 > 2 * dy) return cut_off(1, y_min.y - dy, false);
-    // Median cut, across the side along which the points fill more of the box.
-    const int axis = dx / (box.x1 - box.x0) * (dx > dy ? 2 : 1) > dy / (box.y1 - box.y0) * (dy > dx ? 2 : 1) ? 0 : 1;
+    if (dx > 0 && box.x1 - x_max.x > 2 * dx) return cut_off(0, x_max.x, box.x1);
+    if (dx > 0 && x_min.x - box.x0 > 2 * dx) return cut_off(0, x_min.x, box.x0);
+    if (dy > 0 && box.y1 - y_max.y > 2 * dy) return cut_off(1, y_max.y, box.y1);
+    if (dy > 0 && y_min.y - box.y0 > 2 * dy) return cut_off(1, y_min.y, box.y0);
+    if (points.size() < 64) return make_leaf(node, box, cell);
+    // Median cut, across the sides in turn, unless the points do not differ there.
+    const int axis = dx > 0 && (dy == 0 || depth % 2) ? 0 : 1;
     const auto middle = points.begin() + points.size() / 2;
     std::nth_element(points.begin(), middle, points.end(),
                      [axis](const Point2& a, const Point2& b) { return axis ? a.y < b.y : a.x < b.x; });
     cut(node, box, axis, axis ? middle->y : middle->x, {points.begin(), middle}, {middle, points.end()}, n_cells / 2,
-        n_cells - n_cells / 2, cell);
+        n_cells - n_cells / 2, cell, depth + 1);
+  }
+  void make_leaf(int node, const Box& box, int cell) {
+    nodes_[node].cell = cell;
+    leaves_.push_back({box, cell});
   }
   void cut(int node, const Box& box, int axis, double split, std::span<Point2> low_points,
-           std::span<Point2> high_points, int low_cells, int high_cells, int cell) {
+           std::span<Point2> high_points, int low_cells, int high_cells, int cell, int depth) {
     Box low = box, high = box;
     (axis ? low.y1 : low.x1) = split;
     (axis ? high.y0 : high.x0) = split;
     const int child = static_cast<int>(nodes_.size());
     nodes_[node].split = split, nodes_[node].axis = axis, nodes_[node].child = child;
     nodes_.resize(nodes_.size() + 2);
-    build(child, low, low_points, low_cells, cell);
-    build(child + 1, high, high_points, high_cells, cell);
+    build(child, low, low_points, low_cells, cell, depth);
+    build(child + 1, high, high_points, high_cells, cell, depth);
   }
   std::vector<Node> nodes_;
   std::vector<Box> boxes_;
@@ -245,8 +266,9 @@ Chi2Result run(const SquareSampler& sample, const SquareDensity& pdf, const Chi2
   const auto draw = [&](uint32_t pass, uint64_t i) {
     return sample(PathRandom(Sampling::kIndependent, options.seed, pass, 0, i));
   };
-  std::vector<Point2> pilot;
-  for (int i = 0; i < options.n_samples / 4; ++i)
+  std::vector<Point2> pilot;  // enough to resolve the density, also where most samples fail
+  const size_t n_wanted = 200 * static_cast<size_t>(options.n_cells);
+  for (int i = 0; i < 4 * options.n_samples && pilot.size() < n_wanted; ++i)
     if (const auto p = draw(1, i)) pilot.push_back(*p);
   const Cells cells(std::move(pilot), options.n_cells);
 

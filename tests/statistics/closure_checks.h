@@ -12,7 +12,7 @@
 namespace covary::statistics {
 
 /// Checks `closure` for one outgoing direction and returns the messages of all failures (none: it passed).
-///   1. the probabilities of the lobes sum to 1 (or 0);
+///   1. the probabilities of the lobes do not sum to more than 1;
 ///   2. for samples: eval() gives the density and value * 1 / density the sample promised; the density is
 ///      sum_l pmf_l pdf_l; a lobe's flags are among the closure's;
 ///   3. chi-square of the mixture (delta lobes left out), and of each smooth lobe against pmf_l pdf_l;
