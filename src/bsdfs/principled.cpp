@@ -130,7 +130,7 @@ class PrincipledClosure final : public BsdfClosure {
     if (!(kind == kGlossyTransmission ? i.z < 0 : i.z > 0)) return {};
     const Terms t = terms(view, i);
     const float pdf = t.mixture(view);
-    if (!(pdf > 0)) return {};
+    if (!(t.pdf[lobe] > 0 && pdf > 0)) return {};
     return {.wi = view.front ? i : -i,
             .weight = t.value / pdf,
             .pdf = pdf,

@@ -85,7 +85,7 @@ class ThinClosure final : public BsdfClosure {
     if (lobe == kTransmit || lobe == kDiffuseTransmit) i.z = -i.z;
     const Terms t = terms(o, i);
     const float pdf = t.mixture(pmf);
-    if (!(pdf > 0)) return {};
+    if (!(t.pdf[lobe] > 0 && pdf > 0)) return {};
     return {
         .wi = wo.z > 0 ? i : -i, .weight = t.value / pdf, .pdf = pdf, .eta = 1, .flags = kFlags[lobe], .lobe = lobe};
   }
@@ -145,7 +145,8 @@ class ThinClosure final : public BsdfClosure {
       t.value = diffuse_transmission_ * -i.z;
       if (!(specular_ > 0)) return t;
       const Vec3 h = normalize(o + Vec3{i.x, i.y, -i.z});
-      if (dot(i, h) >= 0) return t;  // the ray would leave on the wrong side of the microfacet
+      // Only rays that also leave on the far side of the microfacet. Not reciprocal; scenes are made with it.
+      if (dot(i, h) >= 0) return t;
       const float visible = 0.25f * transmission_.eval(h) * transmission_.smith_g1_over_cos(o);
       t.pdf[1] = visible;
       t.value += specular_transmission_ *
