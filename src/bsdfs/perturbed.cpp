@@ -23,10 +23,8 @@ class PerturbedClosure final : public BsdfClosure {
     if (wo.z == 0 || wi.z == 0) return {};
     const bool flip = flips(wo);
     BsdfValue v = eval_in(frame(flip), wo, wi);
-    if (mode_ == TransportMode::kImportance) {
-      const bool camera_flip = flips(wi);
-      if (camera_flip != flip) v.value = eval_in(frame(camera_flip), wo, wi).value;
-    }
+    if (mode_ == TransportMode::kImportance && flips(wi) != flip)
+      v.value = eval_in(frame(!flip), wo, wi).value;  // the camera's direction decides about the value
     return v;
   }
   BsdfSample sample(const Vec3& wo, float u_lobe, Vec2 u) const override {
@@ -42,12 +40,12 @@ class PerturbedClosure final : public BsdfClosure {
     }
     const Vec3 pi = s.wi;
     s.wi = f.to_world(pi);
+    if (!(s.wi.z * pi.z > 0)) return {};
     if (mode_ == TransportMode::kImportance && flips(s.wi) != flip) {
       if (s.is_delta()) return {};
       s.weight = eval(wo, s.wi).value / s.pdf;
     } else {
       s.weight *= factor(wo, s.wi, po, pi);
-      if (mode_ == TransportMode::kRadiance && !(s.wi.z * pi.z > 0)) return {};
     }
     return s;
   }
@@ -59,7 +57,7 @@ class PerturbedClosure final : public BsdfClosure {
     const Frame& f = frame(flips(wo));
     const Vec3 pi = f.to_local(wi);
     nested_->lobe_pdfs(f.to_local(wo), pi, pdfs);
-    if (mode_ == TransportMode::kRadiance && !(wi.z * pi.z > 0))
+    if (!(wi.z * pi.z > 0))
       for (int i = 0; i < nested_->n_lobes(); ++i) pdfs[i] = 0;
   }
 
@@ -72,7 +70,7 @@ class PerturbedClosure final : public BsdfClosure {
     const Vec3 po = f.to_local(wo), pi = f.to_local(wi);
     BsdfValue v = nested_->eval(po, pi);
     v.value *= factor(wo, wi, po, pi);
-    if (mode_ == TransportMode::kRadiance && !(wi.z * pi.z > 0)) return {};
+    if (!(wi.z * pi.z > 0)) v.pdf_solid_angle = 0;  // sample() drops it
     return v;
   }
   /// Value over the nested model's value; `po`, `pi` are wo, wi in the perturbed frame.

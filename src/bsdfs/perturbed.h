@@ -21,8 +21,9 @@ struct Perturbation {
 /// through the back.
 ///
 /// The value is not symmetric: light and camera play different parts. For importance it is the exact adjoint of the
-/// value for radiance, f*(wo, wi) = f(wi, wo), so that light and camera paths estimate the same image. One exception:
-/// mirror directions whose two sides would choose different flips carry no importance.
+/// value for radiance, f*(wo, wi) = f(wi, wo), so that light and camera paths estimate the same image. Some pairs of
+/// directions whose two sides choose different flips are found from the camera only: mirror reflections among them carry
+/// no importance.
 const BsdfClosure* make_perturbed(const BsdfClosure* nested, const Perturbation& perturbation, TransportMode mode,
                                   Arena& arena);
 
