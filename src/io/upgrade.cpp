@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Names and parameters of Mitsuba 0.x files in today's terms (docs/scenes.md lists them).
+// Names and parameters of Mitsuba 0.x files in today's terms (docs/scene-format.md lists them).
 #include "io/upgrade.h"
 
 #include <fmt/format.h>
