@@ -43,6 +43,7 @@ struct ShapeJob {
   Parameters parameters;
   ShapePtr shape;
   bool in_group = false;
+  bool asked_everything = false;  // else what is left over says nothing about unknown parameters
 };
 
 /// A texture or emitter that reads a file and holds no other object.
@@ -125,7 +126,14 @@ class Loader {
   static void make_surface(ShapeJob& job) {
     const Plugin<Shape>* plugin =
         find_plugin(shape_plugins(), *job.description, job.diagnostics, {"instance", "shapegroup"});
-    if (plugin) job.shape = make_checked(job.parameters, plugin->make);
+    if (!plugin) return;
+    try {
+      job.shape = plugin->make(job.parameters);
+      job.asked_everything = true;
+    } catch (const Error& error) {
+      if (error.code() == ErrorCode::kInternal) throw;
+      job.parameters.error(error.what());
+    }
   }
 
   // ---- putting it together ----
@@ -187,7 +195,7 @@ class Loader {
     if (bsdfs.size() > 1) p.error(fmt::format("has {} bsdfs; expected one", bsdfs.size()));
     const auto emitters = p.children<Emitter>("emitter");
     if (emitters.size() > 1) p.error(fmt::format("has {} emitters; expected one", emitters.size()));
-    if (job.description->type != "shapegroup" && job.shape) p.report_unknown();
+    if (job.asked_everything) p.report_unknown();
     if (!job.shape) return;
 
     job.shape->set_bsdf(bsdfs.empty() ? default_bsdf() : bsdfs[0]);
@@ -295,7 +303,6 @@ class Loader {
     if (!options_.make_integrator) return;
     Parameters p(*object, factory_, diagnostics_);
     result_.integrator = make_checked(p, options_.make_integrator);
-    p.report_unknown();
   }
 
   void set_up_camera(const SensorSettings& sensor) {

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <charconv>
+#include <cstdlib>
 #include <limits>
 #include <string>
 
@@ -39,16 +40,21 @@ class Line {
   float number() {
     skip_blanks();
     if (p_ < end_ && *p_ == '+') ++p_;
-    float value = 0;  // also for numbers too small to represent
+    double value = 0;
     const auto [rest, error] = std::from_chars(p_, end_, value);
-    if (error == std::errc::invalid_argument || (rest < end_ && *rest != ' ' && *rest != '\t' && *rest != '\r'))
-      fail(fmt::format("'{}' is not a number", word()));
+    const char* start = p_;
     p_ = rest;
-    return value;
+    if (error == std::errc::invalid_argument || !at_blank()) {
+      p_ = start;
+      fail(fmt::format("'{}' is not a number", word()));
+    }
+    // from_chars leaves the value alone when it is out of range: too small is 0, too large is found by check_mesh().
+    if (error == std::errc::result_out_of_range) value = std::strtod(std::string(start, rest).c_str(), nullptr);
+    return static_cast<float>(value);
   }
   /// Index in "a/b/c"; kNone when empty. `count`: how many there are so far, for negative ones.
   uint32_t index(size_t count, const char* what) {
-    if (p_ == end_ || *p_ == '/' || *p_ == ' ' || *p_ == '\t' || *p_ == '\r') return kNone;
+    if (at_blank() || *p_ == '/') return kNone;
     int64_t value = 0;
     const auto [rest, error] = std::from_chars(p_, end_, value);
     if (error != std::errc()) fail(fmt::format("'{}' is not an index", word()));
@@ -58,6 +64,7 @@ class Line {
     if (from_zero < 0 || from_zero >= n) fail(fmt::format("{} {} does not exist; there are {}", what, value, count));
     return static_cast<uint32_t>(from_zero);
   }
+  bool at_blank() const { return p_ == end_ || *p_ == ' ' || *p_ == '\t' || *p_ == '\r'; }
   bool take(char c) {
     if (p_ == end_ || *p_ != c) return false;
     ++p_;
@@ -122,7 +129,7 @@ class ObjReader {
       uv = line.index(uvs_.size(), "texture coordinate");
       if (line.take('/')) normal = line.index(normals_.size(), "normal");
     }
-    if (const std::string_view rest = line.word(); !rest.empty()) line.fail(fmt::format("'{}' after an index", rest));
+    if (!line.at_blank()) line.fail(fmt::format("'{}' after an index", line.word()));
 
     for (uint32_t v = chains_[position]; v != kNone; v = vertices_[v].next)
       if (vertices_[v].uv == uv && vertices_[v].normal == normal) return v;

@@ -71,9 +71,7 @@ std::shared_ptr<const SceneObject> SceneFactory::create(const ObjectDescription&
     const auto* plugin = find_plugin(plugins, description, diagnostics_);
     if (!plugin) return nullptr;
     Parameters parameters(description, *this, diagnostics_);
-    auto object = make_checked(parameters, plugin->make);
-    parameters.report_unknown();
-    return object;
+    return make_checked(parameters, plugin->make);
   };
   if (description.kind == "texture") return through(texture_plugins());
   if (description.kind == "bsdf") return through(bsdf_plugins());

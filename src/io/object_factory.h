@@ -59,17 +59,19 @@ const Plugin<T>* find_plugin(std::span<const Plugin<T>> plugins, const ObjectDes
   return nullptr;
 }
 
-/// Calls `make(parameters)`, records what it throws, and reports parameters nobody asked for.
+/// What `make(parameters)` returns. Records what it throws; reports parameters nobody asked for when it does not throw
+/// (otherwise it may not have come to ask).
 template <typename Make>
 auto make_checked(Parameters& parameters, Make&& make) -> decltype(make(parameters)) {
-  decltype(make(parameters)) object = nullptr;
   try {
-    object = make(parameters);
+    auto object = make(parameters);
+    parameters.report_unknown();
+    return object;
   } catch (const Error& error) {
     if (error.code() == ErrorCode::kInternal) throw;
     parameters.error(error.what());
+    return nullptr;
   }
-  return object;
 }
 
 }  // namespace covary

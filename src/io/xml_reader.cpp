@@ -105,22 +105,17 @@ class Reader {
     }
     const std::string_view text = attribute.value();
     int parts[3] = {0, 0, 0};
-    const char *p = text.data(), *const end = text.data() + text.size();
-    int n = 0;
-    for (; n < 3; ++n) {
-      const auto [next, error] = std::from_chars(p, end, parts[n]);
-      if (error != std::errc() || parts[n] < 0) break;
-      p = next;
-      if (p == end) {
-        ++n;
-        break;
-      }
-      if (*p++ != '.') {
-        n = 0;
-        break;
-      }
+    const char* p = text.data();
+    const char* const end = p + text.size();
+    bool valid = false;
+    for (int& part : parts) {
+      const auto [next, error] = std::from_chars(p, end, part);
+      valid = error == std::errc() && part >= 0 && (next == end || *next == '.');
+      if (!valid || next == end) break;
+      p = next + 1;
+      valid = false;  // a dot must be followed by a number
     }
-    if (n == 0 || p != end) {
+    if (!valid) {
       diagnostics_.error(where, fmt::format("version '{}' is not of the form 3.0.0", text));
       return 3;
     }

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace covary {
+
+enum class PlyType : uint8_t { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kInt64, kUint64, kFloat32, kFloat64 };
+inline size_t size_of(PlyType type) {
+  constexpr size_t kSizes[] = {1, 1, 2, 2, 4, 4, 8, 8, 4, 8};
+  return kSizes[static_cast<size_t>(type)];
+}
+
+/// Where a vertex property goes; kSkip: nowhere.
+enum PlySlot : int8_t { kX, kY, kZ, kNx, kNy, kNz, kU, kV, kR, kG, kB, kSlots, kSkip = -1 };
+
+struct PlyProperty {
+  std::string name;
+  PlyType type = PlyType::kFloat32;
+  bool is_list = false;
+  PlyType count_type = PlyType::kUint8;
+  PlySlot slot = kSkip;
+};
+
+struct PlyElement {
+  std::string name;
+  uint64_t count = 0;
+  std::vector<PlyProperty> properties;
+
+  bool has_lists() const {
+    for (const PlyProperty& p : properties)
+      if (p.is_list) return true;
+    return false;
+  }
+  /// Bytes of a record, lists counted as empty.
+  size_t smallest_record() const {
+    size_t size = 0;
+    for (const PlyProperty& p : properties) size += size_of(p.is_list ? p.count_type : p.type);
+    return size;
+  }
+};
+
+enum class PlyFormat { kAscii, kLittleEndian, kBigEndian };
+
+struct PlyHeader {
+  PlyFormat format = PlyFormat::kAscii;
+  std::vector<PlyElement> elements;
+  size_t size = 0;  ///< bytes up to the body
+};
+
+/// Throws Error(kInput) that names the line.
+PlyHeader parse_ply_header(std::string_view text);
+/// Throws the Error(kInput) of PLY files.
+[[noreturn]] void fail_ply(const std::string& message);
+
+}  // namespace covary

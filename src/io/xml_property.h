@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <pugixml.hpp>
+#include <string>
+#include <vector>
+
+#include "io/file_resolver.h"
+#include "io/xml_document.h"
+#include "scene/parameters.h"
+
+namespace covary {
+
+/// The elements that can stand inside <transform>.
+const std::vector<std::string>& transform_tags();
+
+/// Reads the elements that hold one value: numbers, texts, points, colours, spectra and transforms.
+class PropertyReader {
+ public:
+  PropertyReader(XmlDefines& defines, FileResolver& files, Diagnostics& diagnostics)
+      : defines_(defines), files_(files), diagnostics_(diagnostics) {}
+
+  /// The property `node` describes. After recording an error its value is a null ObjectPtr, which keeps the parameter
+  /// known, but without a value.
+  Property read(const XmlDocument& document, pugi::xml_node node);
+
+ private:
+  Value read_spectrum(const XmlAttributes& attributes, const SourceLocation& where);
+  /// The product of the operations, the first applied first. Wrong ones are recorded and left out.
+  Transform read_transform(const XmlDocument& document, pugi::xml_node node);
+  Transform read_operation(pugi::xml_node node, const std::string& tag, const SourceLocation& where);
+
+  XmlDefines& defines_;
+  FileResolver& files_;
+  Diagnostics& diagnostics_;
+};
+
+}  // namespace covary

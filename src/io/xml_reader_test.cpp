@@ -1,0 +1,470 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/xml_reader.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "support/describe.h"
+#include "support/files.h"
+
+namespace covary {
+namespace {
+
+using test_support::contains;
+using test_support::message_of;
+using test_support::TemporaryFolder;
+
+/// A scene read from text, with all that was wrong in `errors`.
+struct Read {
+  SceneXml xml;
+  std::string errors;
+  std::vector<std::string> warnings;
+};
+
+Read read(const std::string& text, const std::map<std::string, std::string>& defines = {},
+          const std::string& name = "scene.xml") {
+  Read result;
+  Diagnostics diagnostics;
+  FileResolver files;
+  result.xml = read_scene_xml_text(text, name, defines, files, diagnostics);
+  result.errors = message_of([&] { diagnostics.throw_if_errors(); });
+  result.warnings = diagnostics.warnings();
+  return result;
+}
+
+/// The same inside <scene version="3.0.0"> on the first line.
+Read read_scene(const std::string& body, const std::map<std::string, std::string>& defines = {}) {
+  return read("<scene version=\"3.0.0\">\n" + body + "\n</scene>\n", defines);
+}
+
+const ObjectDescription& child(const Read& read, size_t i = 0) {
+  return *std::get<ObjectPtr>(read.xml.scene->properties.at(i).value);
+}
+
+const Value& value(const ObjectDescription& object, const std::string& name) {
+  for (const Property& property : object.properties)
+    if (property.name == name) return property.value;
+  throw Error(ErrorCode::kInternal, "no property " + name);
+}
+
+template <typename T>
+T value(const Read& read, const std::string& name) {
+  return std::get<T>(value(child(read), name));
+}
+
+// ---- objects and values ----
+
+TEST(XmlReader, ReadsObjectsAndValues) {
+  const Read r = read_scene(R"(<bsdf type="diffuse" id="white">
+  <boolean name="b" value="true"/>
+  <integer name="i" value="-3"/>
+  <float name="f" value="0.25"/>
+  <string name="s" value="a &lt; b"/>
+  <point name="p" x="1" y="2" z="3"/>
+  <vector name="v" value="4 5 6"/>
+  <rgb name="c" value="0.1, 0.2, 0.3"/>
+  <srgb name="d" value="#ffffff"/>
+  <spectrum name="l" value="400:1, 500:2"/>
+  <blackbody name="e" temperature="5000K"/>
+  <texture name="t" type="bitmap"/>
+</bsdf>)");
+  EXPECT_EQ(r.errors, "no error");
+  EXPECT_EQ(child(r).kind, "bsdf");
+  EXPECT_EQ(child(r).type, "diffuse");
+  EXPECT_EQ(child(r).id, "white");
+  EXPECT_EQ(child(r).where.text(), "scene.xml:2:1");
+  EXPECT_TRUE(value<bool>(r, "b"));
+  EXPECT_EQ(value<int64_t>(r, "i"), -3);
+  EXPECT_EQ(value<double>(r, "f"), 0.25);
+  EXPECT_EQ(value<std::string>(r, "s"), "a < b");
+  EXPECT_EQ(value<Vec3>(r, "p"), (Vec3{1, 2, 3}));
+  EXPECT_EQ(value<Vec3>(r, "v"), (Vec3{4, 5, 6}));
+  EXPECT_EQ(value<ColourValue>(r, "c").rgb, Spectrum(0.1f, 0.2f, 0.3f));
+  EXPECT_EQ(value<ColourValue>(r, "d").rgb, Spectrum(1));
+  EXPECT_EQ(value<SampledSpectrum>(r, "l").samples.size(), 2u);
+  EXPECT_EQ(value<SampledSpectrum>(r, "e").samples.size(), 471u);
+  EXPECT_EQ(value<ObjectPtr>(r, "t")->type, "bitmap");
+  EXPECT_EQ(value<ObjectPtr>(r, "t")->where.text(), "scene.xml:13:3");
+}
+
+TEST(XmlReader, ReadsSpectrumObjects) {
+  const Read r = read_scene(R"(<spectrum type="uniform" id="half"><float name="value" value="0.5"/></spectrum>
+<emitter type="area">
+  <ref name="a" id="half"/>
+  <spectrum name="b" type="irregular"><string name="wavelengths" value="400, 500"/><string name="values" value="1, 2"/></spectrum>
+  <spectrum name="c" type="regular"><float name="wavelength_min" value="400"/><float name="wavelength_max" value="600"/>
+    <string name="values" value="1, 2, 3"/></spectrum>
+  <spectrum name="d" type="blackbody"><float name="temperature" value="3000"/></spectrum>
+  <spectrum name="e" type="srgb"><rgb name="color" value="1 2 3"/></spectrum>
+  <spectrum name="f" type="d65"><float name="scale" value="2"/></spectrum>
+</emitter>)");
+  EXPECT_EQ(r.errors, "no error");
+  const ObjectDescription& emitter = child(r, 1);
+  EXPECT_EQ(std::get<double>(value(emitter, "a")), 0.5);
+  using Samples = std::vector<std::pair<float, float>>;
+  EXPECT_EQ(std::get<SampledSpectrum>(value(emitter, "b")).samples, (Samples{{400, 1}, {500, 2}}));
+  EXPECT_EQ(std::get<SampledSpectrum>(value(emitter, "c")).samples, (Samples{{400, 1}, {500, 2}, {600, 3}}));
+  EXPECT_EQ(std::get<SampledSpectrum>(value(emitter, "d")).samples.size(), 471u);
+  EXPECT_EQ(std::get<ColourValue>(value(emitter, "e")).rgb, Spectrum(1, 2, 3));
+  EXPECT_EQ(std::get<ColourValue>(value(emitter, "f")).rgb, Spectrum(2));
+}
+
+TEST(XmlReader, ReportsWrongSpectrumObjects) {
+  const Read r = read_scene(R"(<emitter type="area">
+<spectrum name="a" type="blackbdy"/>
+<spectrum name="b" type="blackbody"/>
+<spectrum name="c" type="irregular"><string name="wavelengths" value="400, 500"/><string name="values" value="1"/></spectrum>
+<spectrum name="d" type="uniform"><float name="valu" value="1"/></spectrum>
+</emitter>)");
+  EXPECT_EQ(r.errors,
+            "scene.xml:3:1: unknown spectrum 'blackbdy'; did you mean 'blackbody'?; supported: 'blackbody', 'd65', "
+            "'irregular', "
+            "'regular', 'rgb', 'srgb', 'uniform'\n"
+            "scene.xml:4:1: spectrum 'blackbody': the float 'temperature' is missing\n"
+            "scene.xml:5:1: spectrum 'irregular': a spectrum has 2 wavelengths but 1 values\n"
+            "scene.xml:6:35: unknown parameter 'valu' of spectrum 'uniform'; did you mean 'value'?");
+}
+
+TEST(XmlReader, ReadsSpectrumFiles) {
+  const TemporaryFolder folder;
+  std::ofstream(folder.file("a.spd")) << "400 1\n500 2\n";
+  std::ofstream(folder.file("b.spd")) << "400 1\n300 2\n";
+  const Read r = read(
+      "<scene version=\"3.0.0\"><bsdf type=\"diffuse\"><spectrum name=\"a\" filename=\"a.spd\"/>\n"
+      "<spectrum name=\"b\" filename=\"b.spd\"/>\n<spectrum name=\"c\" filename=\"c.spd\"/>\n"
+      "<spectrum name=\"d\"/></bsdf></scene>",
+      {}, folder.file("scene.xml"));
+  EXPECT_EQ(value<SampledSpectrum>(r, "a").samples.size(), 2u);
+  EXPECT_TRUE(contains(
+      r.errors,
+      "scene.xml:2:1: 'b': spectrum file 'b.spd': the wavelengths of a spectrum must increase, but 300 follows 400"));
+  EXPECT_TRUE(contains(
+      r.errors, "scene.xml:3:1: file 'c.spd' not found in '" + folder.file("").substr(0, folder.file("").size() - 1)));
+  EXPECT_TRUE(contains(r.errors, "did you mean 'a.spd' or 'b.spd'"));
+  EXPECT_TRUE(contains(r.errors, "scene.xml:4:1: 'd': <spectrum> takes either value or filename"));
+}
+
+// ---- transforms ----
+
+Transform transform_of(const std::string& operations) {
+  const Read r = read_scene("<shape type=\"cube\"><transform name=\"to_world\">" + operations + "</transform></shape>");
+  EXPECT_EQ(r.errors, "no error");
+  return value<Transform>(r, "to_world");
+}
+
+void expect_near(const Vec3& a, const Vec3& b) {
+  EXPECT_NEAR(a.x, b.x, 1e-6f);
+  EXPECT_NEAR(a.y, b.y, 1e-6f);
+  EXPECT_NEAR(a.z, b.z, 1e-6f);
+}
+
+TEST(XmlReader, ReadsTransforms) {
+  expect_near(transform_of("<translate x=\"1\" z=\"3\"/>").point({0, 0, 0}), {1, 0, 3});
+  expect_near(transform_of("<translate value=\"1 2 3\"/>").point({0, 0, 0}), {1, 2, 3});
+  expect_near(transform_of("<scale x=\"2\"/>").point({1, 1, 1}), {2, 1, 1});
+  expect_near(transform_of("<scale value=\"3\"/>").point({1, 1, 1}), {3, 3, 3});
+  expect_near(transform_of("<rotate z=\"1\" angle=\"90\"/>").point({1, 0, 0}), {0, 1, 0});
+  expect_near(transform_of("<matrix value=\"1 0 0 5  0 1 0 6  0 0 1 7  0 0 0 1\"/>").point({0, 0, 0}), {5, 6, 7});
+  expect_near(transform_of("<matrix value=\"0 1 0  1 0 0  0 0 1\"/>").point({1, 2, 3}), {2, 1, 3});
+  for (const char* tag : {"lookat", "lookAt", "look_at"}) {
+    const Transform look =
+        transform_of(std::string("<") + tag + " origin=\"1, 2, 3\" target=\"1, 2, 10\" up=\"0, 1, 0\"/>");
+    expect_near(look.point({0, 0, 0}), {1, 2, 3});
+    expect_near(look.vector({0, 0, 1}), {0, 0, 1});
+    expect_near(look.vector({0, 1, 0}), {0, 1, 0});
+  }
+  expect_near(transform_of("<lookat origin=\"0 0 0\" target=\"0 5 0\"/>").vector({0, 0, 1}), {0, 1, 0});  // any up
+}
+
+TEST(XmlReader, AppliesOperationsInTheirOrder) {
+  expect_near(transform_of("<translate x=\"1\"/><scale value=\"2\"/>").point({0, 0, 0}), {2, 0, 0});
+  expect_near(transform_of("<scale value=\"2\"/><translate x=\"1\"/>").point({0, 0, 0}), {1, 0, 0});
+}
+
+TEST(XmlReader, ReportsWrongTransforms) {
+  const Read r = read_scene(R"(<shape type="cube"><transform name="a">
+<rotate x="0" angle="3"/>
+<rotate x="1"/>
+<matrix value="1 2 3"/>
+<scale x="0"/>
+<scale value="1" x="2"/>
+<translat x="1"/>
+<lookat origin="0 0 0" target="0 0 0" up="0 1 0"/>
+</transform><translate x="1"/></shape>)");
+  EXPECT_TRUE(contains(r.errors, "scene.xml:3:1: <rotate>: the axis is zero\n"));
+  EXPECT_TRUE(contains(r.errors, "scene.xml:4:1: <rotate> needs the attribute 'angle'\n"));
+  EXPECT_TRUE(contains(r.errors, "scene.xml:5:1: <matrix>: 3 values; expected 9 or 16\n"));
+  EXPECT_TRUE(contains(r.errors, "scene.xml:6:1: <scale>: "));
+  EXPECT_TRUE(contains(r.errors, "scene.xml:7:1: <scale>: <scale> takes either value or x, y and z\n"));
+  EXPECT_TRUE(
+      contains(r.errors, "scene.xml:8:1: <translat> cannot stand inside <transform>; did you mean 'translate'?\n"));
+  EXPECT_TRUE(contains(r.errors, "scene.xml:9:1: <lookat>: "));
+  EXPECT_TRUE(contains(r.errors, "scene.xml:10:13: <translate> can only stand inside <transform>"));
+}
+
+// ---- malformed and unknown ----
+
+TEST(XmlReader, ReportsMalformedXmlWithLineAndColumn) {
+  const Read r = read("<scene version=\"3.0.0\">\n  <bsdf type=\"diffuse\">\n  </bsd>\n</scene>");
+  EXPECT_EQ(r.xml.scene, nullptr);
+  EXPECT_TRUE(contains(r.errors, "scene.xml:3:5: malformed XML: "));
+  EXPECT_TRUE(contains(read("").errors, "scene.xml:1:1: malformed XML: "));
+  EXPECT_TRUE(contains(read("<scene version=\"3.0.0\"><a b=c/></scene>").errors, "scene.xml:1:"));
+  EXPECT_EQ(read("\xff\xfe<").errors, "scene.xml:1:1: the file is UTF-16 encoded; expected UTF-8");
+}
+
+TEST(XmlReader, AcceptsAByteOrderMarkAndWindowsLines) {
+  const Read r =
+      read("\xef\xbb\xbf<?xml version=\"1.0\"?>\r\n<scene version=\"3.0.0\">\r\n<flim type=\"x\"/>\r\n</scene>\r\n");
+  EXPECT_EQ(r.errors, "scene.xml:3:1: unknown element <flim>; did you mean 'film'?");
+}
+
+TEST(XmlReader, ReportsWrongRoots) {
+  EXPECT_EQ(read("<bsdf type=\"diffuse\" version=\"3.0.0\"/>").errors,
+            "scene.xml:1:1: the root element is <bsdf>; a scene file starts with <scene>");
+  EXPECT_EQ(read("<scene/>").errors,
+            "scene.xml:1:1: <scene> has no attribute 'version'; add version=\"3.0.0\", or \"0.6.0\" if the file uses "
+            "names like "
+            "'toWorld'");
+  EXPECT_EQ(read("<scene version=\"new\"/>").errors, "scene.xml:1:1: version 'new' is not of the form 3.0.0");
+  EXPECT_EQ(read("<scene version=\"3.\"/>").errors, "scene.xml:1:1: version '3.' is not of the form 3.0.0");
+  EXPECT_NE(read("<scene version=\"3.1.2.3\"/>").errors, "no error");
+  EXPECT_NE(read("<scene version=\"-3\"/>").errors, "no error");
+  EXPECT_EQ(read("<scene version=\"3\"/>").errors, "no error");
+  EXPECT_EQ(read("<scene version=\"3.6.1\"/>").errors, "no error");
+}
+
+TEST(XmlReader, ReportsAllProblemsAtOnce) {
+  const Read r = read_scene(R"(<bdsf type="diffuse"/>
+<bsdf/>
+<bsdf typ="diffuse"/>
+<bsdf type="diffuse">
+  <float name="a" value="x"/>
+  <float name="b"/>
+  <float name="c" value="1" unit="mm"/>
+  <point name="d" x="1" y="2"/>
+  <float name="e" value="1"><integer name="f" value="1"/></float>
+  text
+</bsdf>
+<scene/>)");
+  EXPECT_EQ(r.errors,
+            "scene.xml:2:1: unknown element <bdsf>; did you mean 'bsdf'?\n"
+            "scene.xml:3:1: <bsdf> needs the attribute 'type'\n"
+            "scene.xml:4:1: <bsdf> needs the attribute 'type'\n"
+            "scene.xml:4:1: unknown attribute 'typ' of <bsdf>; did you mean 'type'?\n"
+            "scene.xml:5:1: <bsdf> holds text; parameters are elements\n"
+            "scene.xml:6:3: 'a': 'x' is not a number\n"
+            "scene.xml:7:3: <float> needs the attribute 'value'\n"
+            "scene.xml:8:3: unknown attribute 'unit' of <float>\n"
+            "scene.xml:9:3: 'd': <point> needs x, y and z, or value\n"
+            "scene.xml:10:29: <integer> cannot stand inside <float>\n"
+            "scene.xml:13:1: <scene> can only be the root element");
+}
+
+TEST(XmlReader, ReportsNamesGivenTwice) {
+  const Read r = read_scene(
+      "<bsdf type=\"diffuse\" id=\"a\"><float name=\"x\" value=\"1\"/>\n<float name=\"x\" value=\"2\"/></bsdf>\n"
+      "<bsdf type=\"diffuse\" id=\"a\"/>\n<bsdf type=\"a\" type=\"b\"/>");
+  EXPECT_EQ(r.errors,
+            "scene.xml:3:1: parameter 'x' of bsdf 'diffuse' is given twice; first at scene.xml:2:29\n"
+            "scene.xml:4:1: id 'a' is used twice; first at scene.xml:2:1\n"
+            "scene.xml:5:1: attribute 'type' of <bsdf> is given twice");
+}
+
+TEST(XmlReader, BoundsNesting) {
+  std::string deep;
+  for (int i = 0; i < 1000; ++i) deep += "<bsdf type=\"twosided\">";
+  for (int i = 0; i < 1000; ++i) deep += "</bsdf>";
+  EXPECT_TRUE(contains(read_scene(deep).errors, "more than 64 nested objects"));
+}
+
+// ---- parameters of the scene ----
+
+TEST(XmlReader, SubstitutesParameters) {
+  const std::string body = R"(<default name="res" value="1"/>
+<default name="resx" value="2"/>
+<default name="kind" value="diff"/>
+<bsdf type="${}kind$kind$res"><string name="s" value="$resx-$res-\$res"/></bsdf>)";
+  EXPECT_TRUE(
+      contains(read_scene(body).errors, "scene.xml:5:1: attribute 'type' of <bsdf>: parameter '$' is not defined"));
+  const std::string good = R"(<default name="res" value="1"/><default name="resx" value="2"/>
+<bsdf type="a$res"><string name="s" value="$resx-$res-\$res"/></bsdf>)";
+  const Read r = read_scene(good);
+  EXPECT_EQ(r.errors, "no error");
+  EXPECT_EQ(child(r).type, "a1");
+  EXPECT_EQ(value<std::string>(r, "s"), "2-1-$res");
+  EXPECT_EQ(value<std::string>(read_scene(good, {{"res", "7"}}), "s"), "2-7-$res");
+}
+
+TEST(XmlReader, ReportsUndefinedAndUnusedParameters) {
+  const std::string body = R"(<default name="spp" value="16"/><default name="depth" value="3"/>
+<bsdf type="x"><integer name="s" value="$sppp"/><integer name="t" value="$sp"/></bsdf>)";
+  EXPECT_EQ(read_scene(body).errors,
+            "scene.xml:3:16: 's': '16p' is not an integer\n"
+            "scene.xml:3:49: attribute 'value' of <integer>: parameter '$sp' is not defined; did you mean 'spp'?");
+  EXPECT_EQ(read_scene("<default name=\"spp\" value=\"16\"/><default name=\"depth\" value=\"3\"/>",
+                       {{"samples", "4"}, {"sp", "3"}})
+                .errors,
+            "scene.xml: the scene does not use the parameter 'samples' that was defined from outside; its parameters "
+            "are 'depth', "
+            "'spp'\n"
+            "scene.xml: the scene does not use the parameter 'sp' that was defined from outside; did you mean 'spp'?; "
+            "its parameters "
+            "are 'depth', 'spp'");
+  EXPECT_EQ(read_scene("", {{"a", "4"}}).errors,
+            "scene.xml: the scene does not use the parameter 'a' that was defined from outside; it has no parameters");
+}
+
+TEST(XmlReader, BoundsSubstitution) {
+  std::string body = "<default name=\"a\" value=\"xxxxxxxxxxxxxxxx\"/>";
+  for (char c = 'b'; c <= 'z'; ++c) {
+    const std::string p = std::string("$") + static_cast<char>(c - 1);
+    body += std::string("<default name=\"") + c + "\" value=\"" + p + p + p + p + "\"/>";
+  }
+  EXPECT_TRUE(contains(read_scene(body).errors, "an attribute grows beyond 1 MiB by substitution"));
+}
+
+// ---- references ----
+
+TEST(XmlReader, ResolvesReferencesInAnyOrder) {
+  const Read r = read_scene(R"(<shape type="cube"><ref id="later"/><ref name="bsdf" id="other"/></shape>
+<alias id="later" as="other"/>
+<bsdf type="diffuse" id="later"/>)");
+  EXPECT_EQ(r.errors, "no error");
+  const ObjectPtr later = std::get<ObjectPtr>(r.xml.scene->properties[1].value);
+  EXPECT_EQ(std::get<ObjectPtr>(child(r).properties[0].value), later);
+  EXPECT_EQ(value<ObjectPtr>(r, "bsdf"), later);
+}
+
+TEST(XmlReader, ReportsUnknownReferences) {
+  const Read r = read_scene(
+      "<bsdf type=\"diffuse\" id=\"wood\"/>\n<shape type=\"cube\"><ref id=\"wod\"/></shape>\n<alias id=\"x\" "
+      "as=\"y\"/>\n"
+      "<alias id=\"wood\" as=\"wood\"/>");
+  EXPECT_EQ(r.errors,
+            "scene.xml:3:20: reference to the unknown id 'wod'; did you mean 'wood'?\n"
+            "scene.xml:4:1: alias of the unknown id 'x'\n"
+            "scene.xml:5:1: id 'wood' is used twice; first at scene.xml:2:1");
+}
+
+TEST(XmlReader, ReportsReferencesInACircle) {
+  const Read r = read_scene(
+      "<bsdf type=\"twosided\" id=\"a\"><ref id=\"b\"/></bsdf>\n<bsdf type=\"twosided\" id=\"b\"><ref "
+      "id=\"a\"/></bsdf>\n"
+      "<bsdf type=\"twosided\" id=\"c\"><ref id=\"c\"/></bsdf>");
+  EXPECT_EQ(r.errors, "scene.xml:3:30: 'a' refers to itself\nscene.xml:4:30: 'c' refers to itself");
+}
+
+// ---- files ----
+
+TEST(XmlReader, IncludesFiles) {
+  const TemporaryFolder folder;
+  std::ofstream(folder.file("objects.xml"))
+      << "<scene version=\"0.6.0\"><bsdf type=\"plastic\" id=\"p\"><float name=\"intIOR\" value=\"$ior\"/></bsdf>\n"
+         "<shape type=\"cube\"/></scene>";
+  std::ofstream(folder.file("one.xml")) << "<bsdf version=\"3.0.0\" type=\"diffuse\"/>";
+  const Read r = read(
+      "<scene version=\"3.0.0\"><default name=\"ior\" value=\"1.4\"/><include filename=\"objects.xml\"/>"
+      "<shape type=\"sphere\"><include filename=\"one.xml\"/><ref name=\"x\" id=\"p\"/></shape></scene>",
+      {}, folder.file("scene.xml"));
+  EXPECT_EQ(r.errors, "no error");
+  ASSERT_EQ(r.xml.scene->properties.size(), 3u);
+  EXPECT_EQ(value<double>(r, "int_ior"), 1.4);
+  EXPECT_EQ(child(r, 1).type, "cube");
+  EXPECT_EQ(std::get<ObjectPtr>(child(r, 2).properties[0].value)->type, "diffuse");
+  EXPECT_EQ(value(child(r, 2), "x").index(), Value(ObjectPtr()).index());
+  EXPECT_EQ(child(r, 1).where.text(), folder.file("objects.xml") + ":2:1");
+}
+
+TEST(XmlReader, ReportsProblemsOfIncludedFiles) {
+  const TemporaryFolder folder;
+  std::ofstream(folder.file("bad.xml")) << "<scene version=\"3.0.0\">\n<bsdf>\n</scene>";
+  std::ofstream(folder.file("loop.xml")) << "<scene version=\"3.0.0\"><include filename=\"loop.xml\"/></scene>";
+  const std::string errors = read(
+                                 "<scene version=\"3.0.0\"><include filename=\"bad.xml\"/>\n<include "
+                                 "filename=\"loop.xml\"/>\n<include filename=\"lop.xml\"/></scene>",
+                                 {}, folder.file("scene.xml"))
+                                 .errors;
+  EXPECT_TRUE(contains(errors, "bad.xml:3:3: malformed XML: "));
+  EXPECT_TRUE(contains(errors, "loop.xml:1:24: more than 15 nested includes"));
+  EXPECT_TRUE(contains(errors, "scene.xml:3:1: file 'lop.xml' not found"));
+  EXPECT_TRUE(contains(errors, "did you mean 'loop.xml'"));
+}
+
+TEST(XmlReader, SearchesFoldersOfPathElements) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder.file("sub"));
+  std::ofstream(folder.file("sub/a.spd")) << "400 1\n500 2\n";
+  const Read r = read(
+      "<scene version=\"3.0.0\"><path value=\"sub\"/><bsdf type=\"x\"><spectrum name=\"s\" "
+      "filename=\"a.spd\"/></bsdf>\n"
+      "<path value=\"nowhere\"/>\n<bsdf type=\"y\"><path value=\"sub\"/></bsdf></scene>",
+      {}, folder.file("scene.xml"));
+  EXPECT_EQ(value<SampledSpectrum>(r, "s").samples.size(), 2u);
+  EXPECT_TRUE(contains(r.errors, "scene.xml:2:1: folder '" + folder.file("nowhere") + "' not found"));
+  EXPECT_TRUE(contains(r.errors, "scene.xml:3:16: <path> can only stand inside <scene>"));
+}
+
+TEST(XmlReader, HashFollowsTextAndDefines) {
+  const std::string body = "<default name=\"a\" value=\"1\"/><bsdf type=\"x$a\"/>";
+  const uint64_t hash = read_scene(body).xml.hash;
+  EXPECT_EQ(read_scene(body).xml.hash, hash);
+  EXPECT_NE(read_scene(body + " ").xml.hash, hash);
+  EXPECT_NE(read_scene(body, {{"a", "1"}}).xml.hash, hash);
+  EXPECT_NE(read_scene(body, {{"a", "1"}}).xml.hash, read_scene(body, {{"a", "2"}}).xml.hash);
+}
+
+// ---- older files ----
+
+Read read_old(const std::string& body) { return read("<scene version=\"0.6.0\">\n" + body + "\n</scene>\n"); }
+
+TEST(XmlReader, TurnsOldNamesIntoTodays) {
+  const Read r = read_old(R"(<sensor type="perspective"><string name="fovAxis" value="smaller"/>
+<transform name="toWorld"><lookAt origin="0 0 0" target="0 0 1" up="0 1 0"/></transform>
+<float name="intIOR" value="1"/><float name="alphaU" value="1"/><float name="already_new" value="1"/></sensor>)");
+  EXPECT_EQ(r.errors, "no error");
+  EXPECT_EQ(value<std::string>(r, "fov_axis"), "smaller");
+  value<Transform>(r, "to_world");
+  EXPECT_EQ(value<double>(r, "int_ior"), 1);
+  EXPECT_EQ(value<double>(r, "alpha_u"), 1);
+  EXPECT_EQ(value<double>(r, "already_new"), 1);
+  // Files of today are taken as they are.
+  EXPECT_EQ(value<double>(read_scene("<bsdf type=\"x\"><float name=\"intIOR\" value=\"1\"/></bsdf>"), "intIOR"), 1);
+}
+
+TEST(XmlReader, TurnsOldTextureParametersIntoTodays) {
+  const Read r =
+      read_old(R"(<texture type="bitmap"><string name="filterType" value="ewa"/><float name="gamma" value="1"/>
+<float name="uscale" value="2"/><float name="voffset" value="0.5"/><float name="maxAnisotropy" value="20"/></texture>
+<texture type="bitmap"><float name="gamma" value="2.2"/></texture>
+<bsdf type="diffuse"><rgb name="diffuseReflectance" value="1"/></bsdf>
+<bsdf type="roughconductor"><float name="extEta" value="1"/></bsdf>
+<bsdf type="roughconductor"><float name="extEta" value="1.3"/></bsdf>)");
+  EXPECT_EQ(r.errors, "no error");
+  EXPECT_EQ(value<std::string>(r, "filter_type"), "bilinear");
+  EXPECT_TRUE(value<bool>(r, "raw"));
+  expect_near(value<Transform>(r, "to_uv").point({0.25f, 0.25f, 0}), {0.5f, 0.75f, 0});
+  EXPECT_EQ(child(r).properties.size(), 3u);
+  EXPECT_EQ(child(r, 1).properties.size(), 0u);
+  EXPECT_EQ(child(r, 2).properties[0].name, "reflectance");
+  EXPECT_EQ(child(r, 3).properties.size(), 0u);
+  EXPECT_EQ(child(r, 4).properties[0].name, "ext_eta");  // kept: nothing today means the same
+}
+
+TEST(XmlReader, WarnsAboutWhatItDropsFromOldFiles) {
+  const Read r = read_old(
+      "<film type=\"ldrfilm\"><float name=\"gamma\" value=\"2.2\"/><integer name=\"width\" value=\"3\"/></film>\n"
+      "<integrator type=\"path\"><boolean name=\"strictNormals\" value=\"true\"/></integrator>");
+  EXPECT_EQ(r.errors, "no error");
+  EXPECT_EQ(child(r).type, "hdrfilm");
+  EXPECT_EQ(child(r).properties.size(), 1u);
+  EXPECT_EQ(child(r, 1).properties.size(), 0u);
+  ASSERT_EQ(r.warnings.size(), 2u);
+  EXPECT_EQ(r.warnings[0], "scene.xml:2:1: film 'ldrfilm' is read as 'hdrfilm'");
+  EXPECT_EQ(r.warnings[1],
+            "scene.xml:3:25: parameter 'strict_normals' of integrator 'path' has no counterpart today and is ignored");
+}
+
+}  // namespace
+}  // namespace covary
