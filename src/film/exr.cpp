@@ -185,18 +185,24 @@ const ExrFile::Channel* ExrFile::find(const std::string& name) const {
   return it == channels_.end() ? nullptr : &*it;
 }
 
-void ExrFile::read(std::span<const ExrPlane> planes) const {
+void ExrFile::read(std::span<const ExrPlane> planes) const { read_rows(planes, 0, place_.window.height); }
+
+void ExrFile::read_rows(std::span<const ExrPlane> planes, int first_row, int n_rows) const {
+  COVARY_CHECK(first_row >= 0 && n_rows >= 1 && first_row + n_rows <= place_.window.height, "rows are in the window");
+  Imath::Box2i rows = handle_->window;
+  rows.min.y += first_row;
+  rows.max.y = rows.min.y + n_rows - 1;
   std::map<int, Imf::FrameBuffer> buffers;  // by part
   for (const ExrPlane& plane : planes) {
     const auto it = handle_->parts.find(plane.name);
     COVARY_CHECK(it != handle_->parts.end(), "channel " + plane.name + " exists");
-    buffers[it->second.first].insert(it->second.second, slice(plane, handle_->window));
+    buffers[it->second.first].insert(it->second.second, slice(plane, rows));
   }
   try {
     for (const auto& [part, buffer] : buffers) {
       Imf::InputPart input(handle_->file, part);
       input.setFrameBuffer(buffer);
-      input.readPixels(handle_->window.min.y, handle_->window.max.y);
+      input.readPixels(rows.min.y, rows.max.y);
     }
   } catch (const std::exception& error) {
     fail(path_, fmt::format("damaged or incomplete EXR file: {}", error.what()));

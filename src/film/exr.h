@@ -56,6 +56,8 @@ class ExrFile {
   /// Reads the named channels, all of which must exist; values are converted to the plane's type. Throws Error(kInput)
   /// when the file ends early or its pixels are damaged.
   void read(std::span<const ExrPlane> planes) const;
+  /// The same for `n_rows` rows from `first_row` of the window on; planes hold these rows only.
+  void read_rows(std::span<const ExrPlane> planes, int first_row, int n_rows) const;
 
  private:
   struct Handle;

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "estimators/grouped_file.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cctype>
+
+#include "core/error.h"
+
+namespace covary {
+namespace {
+
+[[noreturn]] void fail(const std::string& path, const std::string& what) {
+  throw Error(ErrorCode::kInput, path + ": " + what);
+}
+
+std::string attribute(const ExrFile& file, const std::string& key) {
+  const auto it = file.attributes().find(key);
+  return it == file.attributes().end() ? "" : it->second;
+}
+
+/// Prefixes P ("" or "name.") for which PR, PG, PB exist, in the file's order.
+std::vector<std::string> layer_prefixes(const ExrFile& file) {
+  std::vector<std::string> prefixes;
+  for (const ExrFile::Channel& channel : file.channels()) {
+    if (channel.name != "R" && !channel.name.ends_with(".R")) continue;
+    const std::string prefix = channel.name.substr(0, channel.name.size() - 1);
+    if (file.find(prefix + "G") && file.find(prefix + "B")) prefixes.push_back(prefix);
+  }
+  return prefixes;
+}
+
+std::string layer_name(const std::string& prefix) { return prefix.empty() ? "" : prefix.substr(0, prefix.size() - 1); }
+
+/// "group07" -> ("group", 7); number -1 without digits at the end.
+std::pair<std::string, int> split_number(const std::string& name) {
+  size_t digits = name.size();
+  while (digits > 0 && std::isdigit(static_cast<unsigned char>(name[digits - 1]))) --digits;
+  if (digits == name.size() || name.size() - digits > 6) return {name, -1};
+  return {name.substr(0, digits), std::stoi(name.substr(digits))};
+}
+
+std::string list_layers(const ExrFile& file, const std::vector<std::string>& prefixes) {
+  std::vector<std::string> names;
+  for (const std::string& p : prefixes) names.push_back(p.empty() ? "R,G,B" : "'" + layer_name(p) + "'");
+  if (!names.empty()) return fmt::format("images in it: {}", fmt::join(names, ", "));
+  for (const ExrFile::Channel& c : file.channels()) names.push_back(c.name);
+  return fmt::format("channels in it: {}", fmt::join(names, ", "));
+}
+
+/// Numbered layers STEM0, STEM1, …, in the order of their numbers; `stem` "" takes the only stem there is.
+std::vector<std::string> numbered_layers(const std::vector<std::string>& prefixes, const std::string& stem) {
+  std::vector<std::pair<int, std::string>> found;
+  std::string first_stem;
+  for (const std::string& prefix : prefixes) {
+    const auto [name, number] = split_number(layer_name(prefix));
+    if (number < 0 || (!stem.empty() && name != stem)) continue;
+    if (found.empty()) first_stem = name;
+    if (name != first_stem) return {};
+    found.emplace_back(number, prefix);
+  }
+  std::sort(found.begin(), found.end());
+  std::vector<std::string> result;
+  for (const auto& [number, prefix] : found) result.push_back(prefix);
+  return result;
+}
+
+/// The one image of a file.
+std::string single_layer(const std::string& path, const ExrFile& file, const std::vector<std::string>& prefixes,
+                         const std::string& layer) {
+  const auto has = [&](const std::string& prefix) {
+    return std::find(prefixes.begin(), prefixes.end(), prefix) != prefixes.end();
+  };
+  if (!layer.empty()) {
+    if (has(layer + ".")) return layer + ".";
+    std::vector<std::string> names;
+    for (const std::string& p : prefixes) names.push_back(layer_name(p));
+    fail(path, fmt::format("no image '{}'{}; {}", layer, did_you_mean(layer, names), list_layers(file, prefixes)));
+  }
+  if (has("")) return "";
+  if (prefixes.size() == 1) return prefixes[0];
+  std::vector<std::string> combined;
+  for (const std::string& p : prefixes)
+    if (p.ends_with("Combined.")) combined.push_back(p);
+  if (combined.size() == 1) return combined[0];
+  fail(path, fmt::format("{}; {}",
+                         prefixes.empty() ? "no image of channels R, G and B" : "several images; name one by its layer",
+                         list_layers(file, prefixes)));
+}
+
+}  // namespace
+
+GroupedFile::GroupedFile(const std::vector<std::string>& paths, const std::string& layer) {
+  COVARY_CHECK(!paths.empty(), "a grouped image needs a file");
+  name_ = paths.size() == 1 ? paths[0] : fmt::format("{} … {}", paths.front(), paths.back());
+  for (const std::string& path : paths) add_file(path, layer, paths.size() == 1);
+}
+
+void GroupedFile::add_file(const std::string& path, const std::string& layer, bool only_file) {
+  files_.push_back(std::make_unique<ExrFile>(path));
+  const ExrFile& file = *files_.back();
+  if (files_.size() == 1)
+    place_ = file.place();
+  else if (!(file.place() == place_))
+    fail(path,
+         fmt::format(
+             "{} x {} pixels at ({}, {}) of a frame of {} x {}; the first group has {} x {} at ({}, {}) of {} x {}",
+             file.place().window.width, file.place().window.height, file.place().window.x, file.place().window.y,
+             file.place().frame_width, file.place().frame_height, place_.window.width, place_.window.height,
+             place_.window.x, place_.window.y, place_.frame_width, place_.frame_height));
+
+  const std::vector<std::string> prefixes = layer_prefixes(file);
+  const std::vector<std::string> numbered = numbered_layers(prefixes, layer);
+  const size_t first_group = groups_.size();
+  if (numbered.size() > 1) {
+    if (!only_file)
+      fail(path,
+           fmt::format("holds {} groups; give one file with all groups, or one file with one image for each group",
+                       numbered.size()));
+    for (const std::string& prefix : numbered) groups_.push_back({0, prefix});
+  } else {
+    groups_.push_back({files_.size() - 1, single_layer(path, file, prefixes, layer)});
+  }
+  for (size_t g = first_group; g < groups_.size(); ++g)
+    for (const char* c : {"R", "G", "B"}) {
+      const std::string& type = file.find(groups_[g].prefix + c)->type;
+      if (type == "uint")
+        fail(path, fmt::format("channel {}{} holds integers; expected are float values", groups_[g].prefix, c));
+      has_half_ |= type == "half";
+    }
+
+  // What covary's films tell. Groups must have equal numbers of samples.
+  const std::string samples_text = attribute(file, "covary:samples");
+  const int64_t samples = samples_text.empty() ? 0 : static_cast<int64_t>(std::stod(samples_text) + 0.5);
+  if (files_.size() > 1 && samples_ != samples * static_cast<int64_t>(files_.size() - 1))
+    fail(path, fmt::format("has {} samples per pixel, the group before it {}; all groups must have the same number",
+                           samples, samples_ / static_cast<int64_t>(files_.size() - 1)));
+  samples_ += samples;
+  const auto agree = [&](const char* key, std::string& value) {
+    const std::string here = attribute(file, std::string("covary:") + key);
+    if (files_.size() > 1 && here != value)
+      fail(path, fmt::format("{} is '{}', in the first group '{}'", key, here, value));
+    value = here;
+  };
+  agree("sampling", sampling_);
+  agree("scene_hash", scene_hash_);
+}
+
+void GroupedFile::read_rows(int first_row, int n_rows, std::vector<float>& data) const {
+  const size_t per_pixel = groups_.size() * 3;
+  data.resize(static_cast<size_t>(width()) * n_rows * per_pixel);
+  for (size_t f = 0; f < files_.size(); ++f) {
+    std::vector<ExrPlane> planes;
+    for (size_t g = 0; g < groups_.size(); ++g) {
+      if (groups_[g].file != f) continue;
+      for (size_t c = 0; c < 3; ++c)
+        planes.push_back(
+            {groups_[g].prefix + "RGB"[c], ExrPlane::Type::kFloat, data.data() + 3 * g + c, per_pixel * sizeof(float)});
+    }
+    files_[f]->read_rows(planes, first_row, n_rows);
+  }
+}
+
+}  // namespace covary

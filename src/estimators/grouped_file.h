@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// Grouped images in EXR files of any renderer: films of covary, one file with a layer per group, or one file per group as
+// Mitsuba 3, pbrt-v4 and Blender write them. Rows are read on demand, so that memory does not depend on the image height.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "film/exr.h"
+
+namespace covary {
+
+class GroupedFile {
+ public:
+  /// One path: all groups, as layers that differ in a number (group00.R, group00.G, …), or a single image. Several paths:
+  /// one image each, the groups in the order given. An image is R, G, B, or NAME.R, NAME.G, NAME.B; where a file holds
+  /// several, Blender's "Combined" pass is taken if there is one, and `layer` names it otherwise (or the layers of the
+  /// groups without their number). Throws Error(kIo), and Error(kInput) with the layers there are.
+  explicit GroupedFile(const std::vector<std::string>& paths, const std::string& layer = "");
+
+  int width() const { return place_.window.width; }
+  int height() const { return place_.window.height; }
+  const ImagePlace& place() const { return place_; }
+  int groups() const { return static_cast<int>(groups_.size()); }
+  /// Samples per pixel of all groups together, 0 where the files do not tell.
+  int64_t samples() const { return samples_; }
+  /// Attribute of covary's films: "crn", "independent"; "" for other files.
+  const std::string& sampling() const { return sampling_; }
+  /// Attribute of covary's films, "" for other files.
+  const std::string& scene_hash() const { return scene_hash_; }
+  /// Whether a channel has 16 bits only.
+  bool has_half() const { return has_half_; }
+  /// For messages.
+  const std::string& name() const { return name_; }
+
+  /// Rows [first_row, first_row + n_rows) in the layout of GroupedImage.
+  void read_rows(int first_row, int n_rows, std::vector<float>& data) const;
+
+ private:
+  struct Group {
+    size_t file;
+    std::string prefix;  ///< of the channel names: "" or "name."
+  };
+  void add_file(const std::string& path, const std::string& layer, bool only_file);
+
+  std::vector<std::unique_ptr<ExrFile>> files_;
+  std::vector<Group> groups_;
+  ImagePlace place_;
+  int64_t samples_ = 0;
+  std::string sampling_, scene_hash_, name_;
+  bool has_half_ = false;
+};
+
+}  // namespace covary
