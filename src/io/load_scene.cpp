@@ -57,12 +57,12 @@ class Loader {
   Loader(const LoadOptions& options, LoadedScene& result)
       : options_(options), result_(result), factory_(made_, files_, diagnostics_) {}
 
-  void load(const std::string& path) {
+  void load(std::string_view text, const std::string& name) {
     const auto start = std::chrono::steady_clock::now();
-    xml_ = read_scene_xml(path, options_.defines, files_, diagnostics_);
+    xml_ = read_scene_xml(text, name, options_.defines, files_, diagnostics_);
     if (!xml_.scene) {
       diagnostics_.throw_if_errors();
-      throw Error(ErrorCode::kInput, path + ": the file holds no scene");
+      throw Error(ErrorCode::kInput, name + ": the file holds no scene");
     }
     collect_jobs();
     run_jobs();
@@ -365,10 +365,15 @@ class Loader {
 
 }  // namespace
 
-LoadedScene load_scene(const std::string& path, const LoadOptions& options) {
+LoadedScene load_scene_text(std::string_view xml, const std::string& name, const LoadOptions& options) {
   LoadedScene result;
-  Loader(options, result).load(path);
+  Loader(options, result).load(xml, name);
   return result;
+}
+
+LoadedScene load_scene(const std::string& path, const LoadOptions& options) {
+  const FileView file(path);
+  return load_scene_text(file.text(), path, options);
 }
 
 }  // namespace covary

@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "scene/parameters.h"
@@ -35,5 +36,7 @@ struct LoadedScene {
 
 /// Reads a Mitsuba XML scene. Throws Error(kInput) with every problem of the file, or Error(kIo).
 LoadedScene load_scene(const std::string& path, const LoadOptions& options = {});
+/// The same for XML in memory. `name` stands for the file in messages; files the scene names are looked up in its folder.
+LoadedScene load_scene_text(std::string_view xml, const std::string& name, const LoadOptions& options = {});
 
 }  // namespace covary

@@ -372,16 +372,10 @@ class Reader {
 
 }  // namespace
 
-SceneXml read_scene_xml_text(std::string_view text, const std::string& name,
-                             const std::map<std::string, std::string>& defines, FileResolver& files,
-                             Diagnostics& diagnostics) {
-  return Reader(defines, files, diagnostics).read(text, name);
-}
-
-SceneXml read_scene_xml(const std::string& path, const std::map<std::string, std::string>& defines, FileResolver& files,
+SceneXml read_scene_xml(std::string_view text, const std::string& name,
+                        const std::map<std::string, std::string>& defines, FileResolver& files,
                         Diagnostics& diagnostics) {
-  const FileView file(path);
-  return read_scene_xml_text(file.text(), path, defines, files, diagnostics);
+  return Reader(defines, files, diagnostics).read(text, name);
 }
 
 }  // namespace covary

@@ -19,14 +19,10 @@ struct SceneXml {
   uint64_t hash = 0;
 };
 
-/// Reads `path` and everything it includes. Problems go to `diagnostics`; Error(kIo) when `path` cannot be read.
-/// `files` gets the folders in which the scene's files are to be searched.
-SceneXml read_scene_xml(const std::string& path, const std::map<std::string, std::string>& defines, FileResolver& files,
+/// Reads the XML `text` and every file it includes. `name` stands for the text in messages, and its folder is where files
+/// are looked for first. Problems go to `diagnostics`; `files` gets the folders in which the scene's files are searched.
+SceneXml read_scene_xml(std::string_view text, const std::string& name,
+                        const std::map<std::string, std::string>& defines, FileResolver& files,
                         Diagnostics& diagnostics);
-
-/// The same for XML in memory; `name` is used in messages and its folder for relative files.
-SceneXml read_scene_xml_text(std::string_view text, const std::string& name,
-                             const std::map<std::string, std::string>& defines, FileResolver& files,
-                             Diagnostics& diagnostics);
 
 }  // namespace covary

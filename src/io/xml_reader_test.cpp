@@ -27,7 +27,7 @@ Read read(const std::string& text, const std::map<std::string, std::string>& def
   Read result;
   Diagnostics diagnostics;
   FileResolver files;
-  result.xml = read_scene_xml_text(text, name, defines, files, diagnostics);
+  result.xml = read_scene_xml(text, name, defines, files, diagnostics);
   result.errors = message_of([&] { diagnostics.throw_if_errors(); });
   result.warnings = diagnostics.warnings();
   return result;
