@@ -55,7 +55,7 @@ TEST_P(EnvironmentSampling, DirectionsFollowTheirDensity) {
                                                return environment.lookup(d).pdf_solid_angle *
                                                       std::sqrt(d.x * d.x + d.z * d.z) / result.mass * 1.2;
                                              },
-                                             {.name = GetParam().name});
+                                             {.name = GetParam().name, .n_samples = 50000});
   EXPECT_FALSE(wrong.accepted);
 }
 

@@ -69,7 +69,7 @@ void expect_rays_cover_the_scene(const Emitter& emitter) {
         const Vec2 uv = *on_disk(random);
         return Vec2{std::sqrt(uv.x), uv.y};
       },
-      [](const Vec2&) { return 1.0; }, {.name = "disk, planted"});
+      [](const Vec2&) { return 1.0; }, {.name = "disk, planted", .n_samples = 50000});
   EXPECT_FALSE(wrong.accepted);
 }
 
@@ -163,7 +163,7 @@ TEST(EnvironmentMap, SamplesWhatItClaimsInWorldSpace) {
       [&](const Vec3& d) {
         return light->environment_pdf_solid_angle(Transform::rotate({1, 2, 3}, 40).vector(d));
       },
-      {.name = "envmap, planted"});
+      {.name = "envmap, planted", .n_samples = 50000});
   EXPECT_FALSE(wrong.accepted);
 
   const Vec3 n = normalize(Vec3{1, 1, -1});
