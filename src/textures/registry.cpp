@@ -5,8 +5,8 @@ namespace covary {
 
 std::span<const Plugin<Texture>> texture_plugins() {
   static constexpr Plugin<Texture> kPlugins[] = {
-      {"bitmap", make_bitmap},   {"checkerboard", make_checkerboard}, {"mesh_attribute", make_mesh_attribute},
-      {"uniform", make_uniform}, {"vertexcolor", make_vertex_colour},
+      {"bitmap", make_bitmap}, {"checkerboard", make_checkerboard}, {"mesh_attribute", make_mesh_attribute},
+      {"scale", make_scaled},  {"uniform", make_uniform},           {"vertexcolor", make_vertex_colour},
   };
   return kPlugins;
 }

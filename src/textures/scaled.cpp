@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+// `scale` (Mitsuba 0.x): a texture times a colour.
+//
+// | parameter | type    | default  | meaning                        |
+// |-----------|---------|----------|--------------------------------|
+// | (nested)  | texture | required | the texture, under any name    |
+// | scale     | colour  | 1        | factor                         |
+#include "textures/registry.h"
+
+namespace covary {
+namespace {
+
+class ScaledTexture final : public Texture {
+ public:
+  ScaledTexture(TexturePtr nested, const Spectrum& scale)
+      : nested_(std::move(nested)), scale_(scale), grey_(scale.r == scale.g && scale.g == scale.b) {}
+
+  Spectrum eval(const SurfaceHit& hit) const override { return nested_->eval(hit) * scale_; }
+  float eval_1(const SurfaceHit& hit) const override {
+    return grey_ ? nested_->eval_1(hit) * scale_.r : luminance(eval(hit));
+  }
+  /// For a coloured factor, of the nested luminance times the factor's: nobody bump-maps colours.
+  Vec2 grad_1(const SurfaceHit& hit) const override { return nested_->grad_1(hit) * factor(); }
+  bool is_constant() const override { return nested_->is_constant(); }
+  float mean() const override { return nested_->mean() * factor(); }
+  PositionSample sample_position(Vec2 u) const override { return nested_->sample_position(u); }
+  float pdf_position(Vec2 uv) const override { return nested_->pdf_position(uv); }
+
+ private:
+  float factor() const { return grey_ ? scale_.r : luminance(scale_); }
+
+  TexturePtr nested_;
+  Spectrum scale_;
+  bool grey_;
+};
+
+}  // namespace
+
+std::shared_ptr<Texture> make_scaled(Parameters& parameters) {
+  const Spectrum scale = parameters.get_spectrum("scale", Spectrum(1), SpectrumRole::kEmission);
+  const auto nested = parameters.children<Texture>("texture");
+  if (nested.size() != 1) {
+    parameters.error("needs exactly one nested texture, but has " + std::to_string(nested.size()));
+    return nullptr;
+  }
+  return std::make_shared<ScaledTexture>(nested.front(), scale);
+}
+
+}  // namespace covary
