@@ -44,7 +44,7 @@ std::pair<std::string, int> split_number(const std::string& name) {
 
 std::string list_layers(const ExrFile& file, const std::vector<std::string>& prefixes) {
   std::vector<std::string> names;
-  for (const std::string& p : prefixes) names.push_back(p.empty() ? "R,G,B" : "'" + layer_name(p) + "'");
+  for (const std::string& p : prefixes) names.push_back(p.empty() ? "R,G,B" : fmt::format("'{}'", layer_name(p)));
   if (!names.empty()) return fmt::format("images in it: {}", fmt::join(names, ", "));
   for (const ExrFile::Channel& c : file.channels()) names.push_back(c.name);
   return fmt::format("channels in it: {}", fmt::join(names, ", "));

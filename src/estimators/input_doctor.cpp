@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/error.h"
+
 namespace covary {
 namespace {
 
@@ -40,34 +42,50 @@ bool centred_ranks(const GroupedImage& image, int x, int y, std::vector<float>& 
   return varies;
 }
 
-/// Mean over a grid of pixels of the rank correlation of a at (x, y) with b at (x + dx, y + dy).
-Correlation correlation(const GroupedImage& a, const GroupedImage& b, int dx, int dy) {
-  Correlation result;
-  const int T = a.groups;
-  if (T < 3 || b.groups != T) return result;
-  const long pixels = static_cast<long>(a.width - dx) * (a.height - dy);
-  // An odd step, so that no pattern of even period is hit always at the same phase.
-  const long step = std::max(1L, pixels / kMaxPairs) | 1;
-  std::vector<float> values(T), first(T), second(T);
-  double sum = 0;
-  for (long i = 0; i < pixels; i += step) {
-    const int x = static_cast<int>(i % (a.width - dx)), y = static_cast<int>(i / (a.width - dx));
-    if (!centred_ranks(a, x, y, values, first) || !centred_ranks(b, x + dx, y + dy, values, second)) continue;
-    double product = 0, square_a = 0, square_b = 0;
-    for (int t = 0; t < T; ++t) {
-      product += first[t] * second[t];
-      square_a += first[t] * first[t];
-      square_b += second[t] * second[t];
+/// Mean over pixels of the rank correlation of a at (x, y) with b at (x + dx, y + dy).
+class PairStatistics {
+ public:
+  PairStatistics(long n_pixels, int groups_a, int groups_b, int dx, int dy)
+      : T_(groups_a == groups_b && groups_a >= 3 ? groups_a : 0),
+        dx_(dx),
+        dy_(dy),
+        // An odd step, so that no pattern of even period is hit always at the same phase.
+        step_(std::max(1L, n_pixels / kMaxPairs) | 1),
+        values_(T_),
+        first_(T_),
+        second_(T_) {}
+
+  void add_rows(const GroupedImage& a, const GroupedImage& b) {
+    if (T_ == 0) return;
+    const long columns = a.width - dx_, pixels = columns * (a.height - dy_);
+    for (long i = 0; i < pixels; i += step_) {
+      const int x = static_cast<int>(i % columns), y = static_cast<int>(i / columns);
+      if (!centred_ranks(a, x, y, values_, first_) || !centred_ranks(b, x + dx_, y + dy_, values_, second_)) continue;
+      double product = 0, square_a = 0, square_b = 0;
+      for (int t = 0; t < T_; ++t) {
+        product += first_[t] * second_[t];
+        square_a += first_[t] * first_[t];
+        square_b += second_[t] * second_[t];
+      }
+      sum_ += product / std::sqrt(square_a * square_b);
+      ++pairs_;
     }
-    sum += product / std::sqrt(square_a * square_b);
-    ++result.pairs;
   }
-  if (result.pairs == 0) return result;
-  result.value = sum / static_cast<double>(result.pairs);
-  // Of independent ranks a correlation has variance 1 / (T - 1).
-  result.standard_error = 1.0 / std::sqrt(static_cast<double>(result.pairs) * (T - 1));
-  return result;
-}
+
+  Correlation result() const {
+    // Of independent ranks a correlation has variance 1 / (T - 1).
+    if (pairs_ == 0) return {};
+    const double n = static_cast<double>(pairs_);
+    return {sum_ / n, 1.0 / std::sqrt(n * (T_ - 1)), pairs_};
+  }
+
+ private:
+  int T_, dx_, dy_;
+  long step_;
+  std::vector<float> values_, first_, second_;
+  double sum_ = 0;
+  long pairs_ = 0;
+};
 
 /// Counts of values, and grey image means of the groups.
 struct Values {
@@ -77,16 +95,14 @@ struct Values {
   double mean = 0, variance_of_mean = 0;
 };
 
-Values examine_values(const GroupedImage& image) {
-  Values v;
-  v.group_means.resize(image.groups);
+void add_values(const GroupedImage& image, int first_row, Values& v) {
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x) {
       const float* p = image.pixel(x, y);
       bool nonfinite = false, negative = false, clipped = true;
       for (int i = 0; i < 3 * image.groups; ++i) {
         if (!std::isfinite(p[i])) {
-          if (v.bad_x < 0) v.bad_x = x, v.bad_y = y, v.bad_group = i / 3;
+          if (v.bad_x < 0) v.bad_x = x, v.bad_y = first_row + y, v.bad_group = i / 3;
           nonfinite = true;
         }
         negative |= p[i] < 0;
@@ -98,17 +114,20 @@ Values examine_values(const GroupedImage& image) {
       if (nonfinite) continue;
       for (int t = 0; t < image.groups; ++t) v.group_means[t] += grey(p + 3 * t);
     }
-  for (double& m : v.group_means) {
-    m /= static_cast<double>(image.width) * image.height;
-    v.mean += m / image.groups;
-  }
-  for (double m : v.group_means) v.variance_of_mean += (m - v.mean) * (m - v.mean);
-  v.variance_of_mean /= std::max(1.0, static_cast<double>(image.groups) * (image.groups - 1));
-  return v;
 }
 
-void check_values(const char* name, const GroupedImage& image, const Values& v, std::vector<Finding>& findings) {
-  const long pixels = static_cast<long>(image.width) * image.height;
+void finish(Values& v, long pixels) {
+  const double T = static_cast<double>(v.group_means.size());
+  for (double& m : v.group_means) {
+    m /= static_cast<double>(pixels);
+    v.mean += m / T;
+  }
+  for (double m : v.group_means) v.variance_of_mean += (m - v.mean) * (m - v.mean);
+  v.variance_of_mean /= std::max(1.0, T * (T - 1));
+}
+
+void check_values(const char* name, long pixels, const Values& v, std::vector<Finding>& findings) {
+  const size_t groups = v.group_means.size();
   if (v.nonfinite)
     findings.push_back(
         {Severity::kError,
@@ -126,8 +145,8 @@ void check_values(const char* name, const GroupedImage& image, const Values& v, 
          fmt::format("{}: {} of {} pixels are exactly 1 in all groups and channels: values are clipped; save "
                      "linear, unclipped 32-bit float values (not PNG, no tone mapping)",
                      name, v.clipped, pixels)});
-  for (int a = 0; a < image.groups; ++a)
-    for (int b = a + 1; b < image.groups; ++b)
+  for (size_t a = 0; a < groups; ++a)
+    for (size_t b = a + 1; b < groups; ++b)
       if (v.group_means[a] == v.group_means[b] && v.variance_of_mean > 0) {
         findings.push_back(
             {Severity::kError,
@@ -201,50 +220,95 @@ bool InputReport::has_errors() const {
   return std::any_of(findings.begin(), findings.end(), [](const Finding& f) { return f.severity == Severity::kError; });
 }
 
-InputReport examine_inputs(const GroupedImage& crn, const GroupedImage& pt) {
+struct InputDoctor::State {
+  State(int w, int h, int crn_groups, int pt_groups)
+      : width(w),
+        height(h),
+        crn_horizontal(long{w} * h, crn_groups, crn_groups, 1, 0),
+        crn_vertical(long{w} * h, crn_groups, crn_groups, 0, 1),
+        pt_horizontal(long{w} * h, pt_groups, pt_groups, 1, 0),
+        pt_vertical(long{w} * h, pt_groups, pt_groups, 0, 1),
+        crn_pt(long{w} * h, crn_groups, pt_groups, 0, 0) {
+    crn.group_means.resize(crn_groups);
+    pt.group_means.resize(pt_groups);
+  }
+  int width, height, next_row = 0;
+  Values crn, pt;
+  PairStatistics crn_horizontal, crn_vertical, pt_horizontal, pt_vertical, crn_pt;
+};
+
+InputDoctor::InputDoctor(int width, int height, int crn_groups, int pt_groups)
+    : state_(std::make_unique<State>(width, height, crn_groups, pt_groups)) {}
+InputDoctor::~InputDoctor() = default;
+
+void InputDoctor::add_rows(const GroupedImage& crn, const GroupedImage& pt) {
+  State& s = *state_;
   std::vector<std::string> problems;
   check_inputs(crn, pt, 1, 1, problems);
   throw_if_any("inputs", problems);
+  COVARY_CHECK(crn.width == s.width && s.next_row + crn.height <= s.height, "rows belong to the image");
+  add_values(crn, s.next_row, s.crn);
+  add_values(pt, s.next_row, s.pt);
+  s.crn_horizontal.add_rows(crn, crn);
+  s.crn_vertical.add_rows(crn, crn);
+  s.pt_horizontal.add_rows(pt, pt);
+  s.pt_vertical.add_rows(pt, pt);
+  s.crn_pt.add_rows(crn, pt);
+  s.next_row += crn.height;
+}
 
+InputReport InputDoctor::report() const {
+  const State& s = *state_;
+  COVARY_CHECK(s.next_row == s.height, "all rows were given");
+  const long pixels = static_cast<long>(s.width) * s.height;
+  Values crn = s.crn, pt = s.pt;
+  finish(crn, pixels);
+  finish(pt, pixels);
   InputReport r;
-  const Values a = examine_values(crn), b = examine_values(pt);
-  r.crn_mean = a.mean;
-  r.pt_mean = b.mean;
-  r.nonfinite_pixels = a.nonfinite + b.nonfinite;
-  r.negative_pixels = a.negative + b.negative;
-  r.clipped_pixels = a.clipped + b.clipped;
-  check_values("CRN", crn, a, r.findings);
-  check_values("PT", pt, b, r.findings);
+  r.crn_mean = crn.mean;
+  r.pt_mean = pt.mean;
+  r.nonfinite_pixels = crn.nonfinite + pt.nonfinite;
+  r.negative_pixels = crn.negative + pt.negative;
+  r.clipped_pixels = crn.clipped + pt.clipped;
+  check_values("CRN", pixels, crn, r.findings);
+  check_values("PT", pixels, pt, r.findings);
 
-  r.crn_horizontal = correlation(crn, crn, 1, 0);
-  r.crn_vertical = correlation(crn, crn, 0, 1);
-  r.pt_horizontal = correlation(pt, pt, 1, 0);
-  r.pt_vertical = correlation(pt, pt, 0, 1);
-  r.crn_pt = correlation(crn, pt, 0, 0);
+  r.crn_horizontal = s.crn_horizontal.result();
+  r.crn_vertical = s.crn_vertical.result();
+  r.pt_horizontal = s.pt_horizontal.result();
+  r.pt_vertical = s.pt_vertical.result();
+  r.crn_pt = s.crn_pt.result();
   check_correlations(r, r.findings);
-  if (pt.groups < 3)
+  const size_t crn_groups = crn.group_means.size(), pt_groups = pt.group_means.size();
+  if (pt_groups < 3)
     r.findings.push_back(
         {Severity::kWarning,
          fmt::format("PT: with {} group{} it cannot be checked whether its pixels are independent; 12 groups "
                      "are recommended",
-                     pt.groups, pt.groups == 1 ? "" : "s")});
+                     pt_groups, pt_groups == 1 ? "" : "s")});
   else if (r.pt_horizontal.pairs < kFewPairs)
     r.findings.push_back(
         {Severity::kNote,
          fmt::format("PT: only {} pairs of pixels with noise; correlations are little tested", r.pt_horizontal.pairs)});
 
-  if (crn.groups >= 3 && pt.groups >= 3 && r.nonfinite_pixels == 0) {
-    const double deviation = std::sqrt(a.variance_of_mean + b.variance_of_mean), difference = a.mean - b.mean;
+  if (crn_groups >= 3 && pt_groups >= 3 && r.nonfinite_pixels == 0) {
+    const double deviation = std::sqrt(crn.variance_of_mean + pt.variance_of_mean), difference = crn.mean - pt.mean;
     if (deviation > 0) r.mean_difference_sigmas = difference / deviation;
-    const double scale = std::max(std::abs(a.mean), std::abs(b.mean));
+    const double scale = std::max(std::abs(crn.mean), std::abs(pt.mean));
     if (std::abs(difference) > std::max(kMaxSigmas * deviation, 1e-4 * scale))
       r.findings.push_back(
           {Severity::kError,
            fmt::format("the image means {:.5g} (CRN) and {:.5g} (PT) differ by {:.1f} standard errors: the "
                        "images do not show the same scene with the same settings",
-                       a.mean, b.mean, std::abs(r.mean_difference_sigmas))});
+                       crn.mean, pt.mean, std::abs(r.mean_difference_sigmas))});
   }
   return r;
+}
+
+InputReport examine_inputs(const GroupedImage& crn, const GroupedImage& pt) {
+  InputDoctor doctor(crn.width, crn.height, crn.groups, pt.groups);
+  doctor.add_rows(crn, pt);
+  return doctor.report();
 }
 
 }  // namespace covary

@@ -4,6 +4,7 @@
 // their random numbers; groups that are independent renders of one scene.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -36,8 +37,24 @@ struct InputReport {
 };
 
 /// Measures the images and says what is wrong. Looks at every pixel for its values and at no more than about 250 000
-/// pairs for each correlation. Throws Error(kUsage) where the sizes differ or an image is empty. The images need not have
-/// the same number of groups; with fewer than 3, correlations cannot be measured, which is a warning.
+/// pairs for each correlation. Images can be given in bands of rows, from top to bottom; pairs across bands are left out.
+class InputDoctor {
+ public:
+  /// The images need not have the same number of groups; with fewer than 3, correlations cannot be measured, which is a
+  /// warning.
+  InputDoctor(int width, int height, int crn_groups, int pt_groups);
+  ~InputDoctor();
+  /// The next rows of both images. Throws Error(kUsage) where sizes differ or there is nothing.
+  void add_rows(const GroupedImage& crn, const GroupedImage& pt);
+  /// After the last row.
+  InputReport report() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// The report on whole images.
 InputReport examine_inputs(const GroupedImage& crn, const GroupedImage& pt);
 
 }  // namespace covary

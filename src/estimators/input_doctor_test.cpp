@@ -22,11 +22,12 @@ test::Grouped good_pt() { return test::pt_image(kWidth, kHeight, kGroups, 2); }
 /// All findings, errors marked "!", warnings "?".
 std::string findings(const test::Grouped& crn, const test::Grouped& pt) {
   std::string text;
-  for (const Finding& f : examine_inputs(crn.view(), pt.view()).findings)
-    text += (f.severity == Finding::Severity::kError     ? "!"
-             : f.severity == Finding::Severity::kWarning ? "?"
-                                                         : "") +
-            f.text + "\n";
+  for (const Finding& f : examine_inputs(crn.view(), pt.view()).findings) {
+    if (f.severity == Finding::Severity::kError) text += '!';
+    if (f.severity == Finding::Severity::kWarning) text += '?';
+    text += f.text;
+    text += '\n';
+  }
   return text;
 }
 
@@ -106,6 +107,23 @@ TEST(InputDoctor, FindsRepeatedGroupsAndOtherScenes) {
   pt = good_pt();
   for (float& v : pt.data) v *= 3;
   EXPECT_NE(findings(crn, pt).find("do not show the same scene"), std::string::npos);
+}
+
+TEST(InputDoctor, BandsGiveTheSameFindings) {
+  const test::Grouped crn = good_crn();
+  test::Grouped pt = filtered(good_pt(), 0.1f);
+  pt.pixel(7, 45)[4] = std::numeric_limits<float>::infinity();
+  InputDoctor doctor(kWidth, kHeight, kGroups, kGroups);
+  for (int y = 0; y < kHeight; y += 25) {
+    const int rows = std::min(25, kHeight - y);
+    doctor.add_rows({kWidth, rows, kGroups, crn.view().pixel(0, y)}, {kWidth, rows, kGroups, pt.view().pixel(0, y)});
+  }
+  const InputReport bands = doctor.report(), whole = examine_inputs(crn.view(), pt.view());
+  EXPECT_EQ(bands.findings[0].text, whole.findings[0].text);
+  EXPECT_NE(bands.findings[0].text.find("(7, 45) in group 1"), std::string::npos);
+  EXPECT_NEAR(bands.pt_horizontal.value, whole.pt_horizontal.value, 1e-12);
+  EXPECT_NEAR(bands.pt_vertical.value, whole.pt_vertical.value, 5 * whole.pt_vertical.standard_error);
+  EXPECT_NEAR(bands.crn_mean, whole.crn_mean, 1e-12);
 }
 
 TEST(InputDoctor, SaysWhatItCannotCheck) {
