@@ -207,7 +207,8 @@ plt.savefig(sys.argv[0][:-3] + '.png')
   return fmt::format("\n  table: {}\n  plot:  python3 {}", csv, script);
 }
 
-/// `expected` may sum to less than `n`; the rest belongs to one more cell, that of the failed samples.
+/// Two independent tests: is the fraction of samples that succeed the integral of the density, and are those samples
+/// distributed like the density? The p-value combines both (Sidak).
 Chi2Result compare(const std::vector<Box>& boxes, const std::vector<double>& observed,
                    const std::vector<double>& expected, double n, double zero_density_samples,
                    const Chi2Options& options) {
@@ -219,35 +220,35 @@ Chi2Result compare(const std::vector<Box>& boxes, const std::vector<double>& obs
     finite = finite && std::isfinite(expected[i]) && expected[i] >= -1e-3;
   }
   result.mass = n_expected / n, result.fraction = n_observed / n;
+  const double mass_variance = std::max(0.0, result.mass * (1 - result.mass)) / n;
+  const TestResult mass_test =
+      z_test(result.fraction, mass_variance, result.mass, options.alpha, options.mass_tolerance);
 
-  // Cells, smallest first, so that those below 5 are pooled, together with the next larger one if they need it.
-  std::vector<std::pair<double, double>> cells;
-  for (size_t i = 0; i < observed.size(); ++i) cells.emplace_back(expected[i], observed[i]);
-  const double n_left = n - n_expected;
-  if (n_left >= std::max(5.0, n * options.mass_tolerance)) cells.emplace_back(n_left, n - n_observed);
-  std::sort(cells.begin(), cells.end());
-  std::pair<double, double> pool{0, 0};
-  int n_used = 0;
-  for (const auto& [e, o] : cells) {
-    if (pool.first < 5 && (e < 5 || pool.first > 0)) {
-      pool.first += e, pool.second += o;
-    } else {
-      result.statistic += (o - e) * (o - e) / e, ++n_used;
+  double shape_p_value = 1;
+  if (finite && n_expected > 0) {
+    // Cells, smallest first, so that those below 5 are pooled, together with the next larger one if they need it.
+    std::vector<std::pair<double, double>> cells;
+    for (size_t i = 0; i < observed.size(); ++i) cells.emplace_back(expected[i] * n_observed / n_expected, observed[i]);
+    std::sort(cells.begin(), cells.end());
+    std::pair<double, double> pool{0, 0};
+    const auto add = [&](double e, double o) { result.statistic += (o - e) * (o - e) / e, ++result.dof; };
+    for (const auto& [e, o] : cells) {
+      if (pool.first < 5 && (e < 5 || pool.first > 0))
+        pool.first += e, pool.second += o;
+      else
+        add(e, o);
     }
+    if (pool.first > 0) add(pool.first, pool.second);
+    --result.dof;
+    if (result.dof > 0) shape_p_value = chi2_p_value(result.statistic, result.dof);
   }
-  if (pool.first >= 1e-6 * n) {
-    result.statistic += (pool.second - pool.first) * (pool.second - pool.first) / pool.first, ++n_used;
-  } else {  // nothing is expected there: next to no sample may fall there
-    zero_density_samples = std::max(zero_density_samples, pool.second);
-  }
-  result.dof = n_used - 1;
-  result.p_value = result.dof > 0 ? chi2_p_value(result.statistic, result.dof) : 1;
+  const double least = std::min(shape_p_value, mass_test.p_value);
+  result.p_value = mass_variance > 0 ? least * (2 - least) : shape_p_value;
 
   std::string why;
   if (!finite)
     why = "the density is negative or not finite somewhere";
-  else if (std::abs(result.mass - result.fraction) >
-           options.mass_tolerance + 6 * 0.5 / std::sqrt(n) * (n_left >= n * options.mass_tolerance ? 1 : 0))
+  else if (!(mass_test.p_value >= options.alpha / 2))
     why = fmt::format("the density integrates to {:.5f}, but {:.5f} of the samples succeed", result.mass,
                       result.fraction);
   else if (zero_density_samples > 2e-5 * n)
