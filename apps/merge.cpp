@@ -5,6 +5,7 @@
 
 #include "commands.h"
 #include "film/film_file.h"
+#include "film/merge.h"
 
 namespace covary {
 namespace {
@@ -15,9 +16,7 @@ struct MergeOptions {
 };
 
 void merge(const MergeOptions& options) {
-  std::vector<Film> films;
-  for (const std::string& path : options.inputs) films.push_back(read_film(path));
-  Film merged = merge_films(films, options.inputs);
+  Film merged = merge_film_files(options.inputs);
   merged.attributes[film_key::kVersion] = COVARY_VERSION;
   merged.attributes[film_key::kCommand] = command_line();
   write_film(options.output, merged);

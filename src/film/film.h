@@ -97,11 +97,4 @@ inline constexpr const char* kCommand = "command";       ///< command line
 inline constexpr const char* kComplete = "complete";     ///< "true", or "false" for an interrupted render
 }  // namespace film_key
 
-/// The film of all samples of `films`: per pixel and group the mean weighted by counts, computed in double over all
-/// films at once. The films' order does not matter, bit for bit. Throws Error(kInput) when the films differ in frame,
-/// crop, groups, sampling, scene hash, settings or auxiliary images, or share a seed, because then they hold the same
-/// samples. `names` are the films' names in error messages. Of the attributes those remain that all films share, and
-/// kSeed, kComplete.
-Film merge_films(std::span<const Film> films, std::span<const std::string> names);
-
 }  // namespace covary

@@ -71,7 +71,24 @@ std::vector<std::string> find_aovs(const ExrFile& file, int groups) {
   return names;
 }
 
+/// Attributes of a film, derived ones included, without the prefix.
+std::map<std::string, std::string> film_attributes(const ExrFile& file, const std::string& path) {
+  std::map<std::string, std::string> attributes;
+  for (const auto& [name, value] : file.attributes())
+    if (name.starts_with(kPrefix)) attributes[name.substr(std::string(kPrefix).size())] = value;
+  if (!attributes.count(kFormat)) fail(path, "not a film of covary (attribute covary:film is missing)");
+  if (attributes[kFormat] != kFormatVersion)
+    fail(path, fmt::format("film format '{}'; this version reads '{}'", attributes[kFormat], kFormatVersion));
+  return attributes;
+}
+
 }  // namespace
+
+std::map<std::string, std::string> read_film_attributes(const std::string& path) {
+  std::map<std::string, std::string> attributes = film_attributes(ExrFile(path), path);
+  std::erase_if(attributes, [](const auto& item) { return is_derived(item.first); });
+  return attributes;
+}
 
 void write_film(const std::string& path, const Film& film) {
   std::map<std::string, std::string> attributes;
@@ -91,13 +108,7 @@ void write_film(const std::string& path, const Film& film) {
 
 Film read_film(const std::string& path) {
   const ExrFile file(path);
-  std::map<std::string, std::string> attributes;
-  for (const auto& [name, value] : file.attributes())
-    if (name.starts_with(kPrefix)) attributes[name.substr(std::string(kPrefix).size())] = value;
-  if (!attributes.count(kFormat)) fail(path, "not a film of covary (attribute covary:film is missing)");
-  if (attributes[kFormat] != kFormatVersion)
-    fail(path, fmt::format("film format '{}'; this version reads '{}'", attributes[kFormat], kFormatVersion));
-
+  std::map<std::string, std::string> attributes = film_attributes(file, path);
   int groups = 0;
   const std::string text = attributes[kGroups];
   if (text.empty() || text.size() > 6 || text.find_first_not_of("0123456789") != std::string::npos ||

@@ -16,4 +16,7 @@ void write_film(const std::string& path, const Film& film);
 /// a film or is damaged.
 Film read_film(const std::string& path);
 
+/// The attributes alone, without reading pixels; throws like read_film.
+std::map<std::string, std::string> read_film_attributes(const std::string& path);
+
 }  // namespace covary

@@ -9,6 +9,7 @@
 
 #include "core/random.h"
 #include "film/film_file.h"
+#include "film/merge.h"
 #include "support/files.h"
 
 namespace covary {
@@ -179,7 +180,7 @@ TEST(Film, MergeRejectsWhatDoesNotBelongTogether) {
   EXPECT_TRUE(contains(message(b), "number of groups differs: '2' in a.exr, '3' in b.exr"));
   b = test_film(2, 2, 3), b.aovs["N"] = Image(17, 19, 3);
   EXPECT_TRUE(contains(message(b), "auxiliary images differs"));
-  b = Film(40, 30, {5, 7, 17, 18}, 2);
+  b = Film(40, 30, {5, 7, 17, 18}, 2), b.attributes = test_film(2, 2, 3).attributes;
   EXPECT_TRUE(contains(message(b), "17 x 19 at (5, 7) of 40 x 30"));
 }
 

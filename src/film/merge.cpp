@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "film/merge.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <functional>
+#include <limits>
+#include <set>
+
+#include "film/film_file.h"
+
+namespace covary {
+namespace {
+
+using Attributes = std::map<std::string, std::string>;
+
+std::string attribute(const Attributes& attributes, const std::string& key) {
+  const auto it = attributes.find(key);
+  return it == attributes.end() ? "" : it->second;
+}
+
+/// The seeds of a film, "1,2,7" -> {1, 2, 7}.
+std::set<uint64_t> seeds_of(const Attributes& attributes, const std::string& name) {
+  const std::string text = attribute(attributes, film_key::kSeed);
+  const auto fail = [&] {
+    throw Error(ErrorCode::kInput, fmt::format("{}: attribute seed is '{}'; expected are whole numbers below 2^64, "
+                                               "separated by commas",
+                                               name, text));
+  };
+  std::set<uint64_t> seeds;
+  for (size_t begin = 0; begin <= text.size();) {
+    const size_t end = std::min(text.find(',', begin), text.size());
+    const std::string item = text.substr(begin, end - begin);
+    if (item.empty() || item.find_first_not_of("0123456789") != std::string::npos) fail();
+    try {
+      seeds.insert(std::stoull(item));
+    } catch (const std::out_of_range&) {
+      fail();
+    }
+    begin = end + 1;
+  }
+  return seeds;
+}
+
+void check_same(const std::string& what, const std::string& a, const std::string& b, const std::string& name_a,
+                const std::string& name_b) {
+  if (a != b)
+    throw Error(ErrorCode::kInput,
+                fmt::format("films cannot be merged: {} differs: '{}' in {}, '{}' in {}", what, a, name_a, b, name_b));
+}
+
+std::string size_text(const Film& film) {
+  const CropWindow& c = film.crop();
+  return fmt::format("{} x {} at ({}, {}) of {} x {}", c.width, c.height, c.x, c.y, film.frame_width(),
+                     film.frame_height());
+}
+
+std::string aov_names(const Film& film) {
+  std::string text;
+  for (const auto& [name, image] : film.aovs) text += (text.empty() ? "" : ",") + name;
+  return text;
+}
+
+/// What all films share, plus the seeds; `order` becomes the films' indices by their smallest seeds.
+Attributes merge_attributes(std::span<const Attributes> films, std::span<const std::string> names,
+                            std::vector<size_t>& order) {
+  std::map<uint64_t, size_t> owner;  // seed -> film
+  for (size_t i = 0; i < films.size(); ++i) {
+    for (const char* key : {film_key::kSampling, film_key::kSceneHash, film_key::kSettings})
+      check_same(key, attribute(films[0], key), attribute(films[i], key), names[0], names[i]);
+    for (uint64_t seed : seeds_of(films[i], names[i])) {
+      const auto [it, is_new] = owner.emplace(seed, i);
+      if (!is_new)
+        throw Error(ErrorCode::kInput, fmt::format("films cannot be merged: {} and {} have the same seed {} and so the "
+                                                   "same samples; render with another --seed",
+                                                   names[it->second], names[i], seed));
+    }
+  }
+  Attributes merged = films[0];
+  std::erase_if(merged, [&](const auto& item) {
+    return std::any_of(films.begin(), films.end(),
+                       [&](const Attributes& film) { return attribute(film, item.first) != item.second; });
+  });
+  std::set<size_t> seen;
+  std::string seeds;
+  for (const auto& [seed, i] : owner) {
+    seeds += (seeds.empty() ? "" : ",") + std::to_string(seed);
+    if (seen.insert(i).second) order.push_back(i);
+  }
+  merged[film_key::kSeed] = seeds;
+  const bool complete = std::all_of(films.begin(), films.end(), [](const Attributes& film) {
+    return attribute(film, film_key::kComplete) != "false";
+  });
+  merged[film_key::kComplete] = complete ? "true" : "false";
+  return merged;
+}
+
+/// Sums of n_i m_i for an array with the same number of values for each pixel.
+class WeightedSum {
+ public:
+  void add(std::span<const float> values, std::span<const uint32_t> counts) {
+    sums_.resize(values.size());
+    const size_t per_pixel = values.size() / counts.size();
+    for (size_t p = 0; p < counts.size(); ++p)
+      for (size_t v = p * per_pixel; v < (p + 1) * per_pixel; ++v)
+        sums_[v] += static_cast<double>(counts[p]) * values[v];
+  }
+  /// Divides by the total counts; pixels without samples stay zero.
+  void mean(std::span<const uint32_t> counts, std::span<float> target) const {
+    const size_t per_pixel = target.size() / counts.size();
+    for (size_t p = 0; p < counts.size(); ++p)
+      for (size_t v = p * per_pixel; counts[p] && v < (p + 1) * per_pixel; ++v)
+        target[v] = static_cast<float>(sums_[v] / counts[p]);
+  }
+
+ private:
+  std::vector<double> sums_;
+};
+
+/// Merges films that `with_film(i, use)` hands out one after another.
+Film merge(std::span<const Attributes> attributes, std::span<const std::string> names,
+           const std::function<void(size_t, const std::function<void(const Film&)>&)>& with_film) {
+  std::vector<size_t> order;
+  Attributes merged_attributes = merge_attributes(attributes, names, order);
+  Film merged;
+  WeightedSum groups;
+  std::map<std::string, WeightedSum> aovs;
+  const std::string& first = names[order[0]];
+  const auto add = [&](const Film& film, const std::string& name) {
+    if (merged.counts().empty()) {
+      merged = Film(film.frame_width(), film.frame_height(), film.crop(), film.groups());
+      for (const auto& [aov, image] : film.aovs) merged.aovs[aov] = Image(film.width(), film.height(), 3);
+    }
+    check_same("the size", size_text(merged), size_text(film), first, name);
+    check_same("the number of groups", fmt::to_string(merged.groups()), fmt::to_string(film.groups()), first, name);
+    check_same("the list of auxiliary images", aov_names(merged), aov_names(film), first, name);
+    groups.add(film.data(), film.counts());
+    for (const auto& [aov, image] : film.aovs) aovs[aov].add(image.data, film.counts());
+    for (size_t p = 0; p < film.counts().size(); ++p) {
+      const uint64_t total = uint64_t{merged.counts()[p]} + film.counts()[p];
+      if (total > std::numeric_limits<uint32_t>::max())
+        throw Error(ErrorCode::kInput,
+                    fmt::format("films cannot be merged: {} samples at one pixel; a film holds at most "
+                                "{}",
+                                total, std::numeric_limits<uint32_t>::max()));
+      merged.counts()[p] = static_cast<uint32_t>(total);
+    }
+  };
+  for (size_t i : order) with_film(i, [&](const Film& film) { add(film, names[i]); });
+  groups.mean(merged.counts(), merged.data());
+  for (auto& [aov, image] : merged.aovs) aovs[aov].mean(merged.counts(), image.data);
+  merged.attributes = std::move(merged_attributes);
+  return merged;
+}
+
+}  // namespace
+
+Film merge_films(std::span<const Film> films, std::span<const std::string> names) {
+  COVARY_CHECK(!films.empty() && films.size() == names.size(), "one name per film, at least one film");
+  std::vector<Attributes> attributes;
+  for (const Film& film : films) attributes.push_back(film.attributes);
+  return merge(attributes, names, [&](size_t i, const auto& use) { use(films[i]); });
+}
+
+Film merge_film_files(std::span<const std::string> paths) {
+  COVARY_CHECK(!paths.empty(), "at least one film");
+  std::vector<Attributes> attributes;
+  for (const std::string& path : paths) attributes.push_back(read_film_attributes(path));
+  return merge(attributes, paths, [&](size_t i, const auto& use) { use(read_film(paths[i])); });
+}
+
+}  // namespace covary
