@@ -12,6 +12,7 @@
 
 #include "emitters/area.h"
 #include "io/content_hash.h"
+#include "io/description_key.h"
 #include "io/file_view.h"
 #include "io/object_factory.h"
 #include "io/sensor.h"
@@ -46,9 +47,9 @@ struct ShapeJob {
   bool asked_everything = false;  // else what is left over says nothing about unknown parameters
 };
 
-/// A texture or emitter that reads a file and holds no other object.
+/// A texture or emitter that holds no other object. Equal textures are made once.
 struct LeafJob {
-  ObjectPtr description;
+  std::vector<ObjectPtr> descriptions;
   Diagnostics diagnostics;
 };
 
@@ -96,8 +97,12 @@ class Loader {
   void collect_leaves(const ObjectPtr& object, std::unordered_set<const ObjectDescription*>& seen) {
     if (!object || !seen.insert(object.get()).second) return;
     if ((object->kind == "texture" || object->kind == "emitter") && is_leaf(*object)) {
-      leaves_.push_back(std::make_unique<LeafJob>());
-      leaves_.back()->description = object;
+      LeafJob*& same = leaves_by_key_[description_key(*object)];
+      if (!same || object->kind != "texture") {
+        leaves_.push_back(std::make_unique<LeafJob>());
+        same = leaves_.back().get();
+      }
+      same->descriptions.push_back(object);
     }
     for (const Property& property : object->properties)
       if (const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value)) collect_leaves(*child, seen);
@@ -115,7 +120,9 @@ class Loader {
     tbb::parallel_for(size_t{0}, leaves_.size() + jobs_.size(), [&](size_t i) {
       if (i < leaves_.size()) {
         SceneFactory factory(made_, files_, leaves_[i]->diagnostics);
-        factory.make(leaves_[i]->description);
+        const auto& same = leaves_[i]->descriptions;
+        const auto object = factory.make(same[0]);
+        for (size_t k = 1; k < same.size(); ++k) made_.add(same[k].get(), object);
       } else {
         make_surface(*jobs_[i - leaves_.size()]);
       }
@@ -352,6 +359,7 @@ class Loader {
   SceneFactory factory_;
   SceneXml xml_;
   std::vector<std::unique_ptr<LeafJob>> leaves_;
+  std::unordered_map<std::string, LeafJob*> leaves_by_key_;
   std::vector<std::unique_ptr<ShapeJob>> jobs_;
   std::unordered_map<const ObjectDescription*, ShapeJob*> jobs_by_description_;
   std::unordered_set<const ObjectDescription*> placed_;

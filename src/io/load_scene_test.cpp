@@ -6,7 +6,6 @@
 
 #include <fstream>
 
-#include "scene/mesh.h"
 #include "support/describe.h"
 #include "support/files.h"
 
@@ -283,6 +282,15 @@ TEST_F(LoadScene, SharesReferencedMaterialsAndGivesShapesADefault) {
   EXPECT_EQ(hit_.bsdf, first);
   ASSERT_TRUE(hits(s, {20, 0, 3}, {0, 0, -1}));
   EXPECT_NEAR(hit_.bsdf->albedo(hit_).g, 0.5f, 1e-6f);
+}
+
+TEST_F(LoadScene, ReportsMistakesOfEqualTexturesOnce) {
+  EXPECT_EQ(errors(kSensor + R"(
+<bsdf type="diffuse"><texture name="reflectance" type="checkerboard"><float name="size" value="3"/></texture></bsdf>
+<bsdf type="diffuse"><texture name="reflectance" type="checkerboard"><float name="size" value="3"/></texture></bsdf>
+<bsdf type="diffuse"><texture name="reflectance" type="checkerboard"><float name="size" value="4"/></texture></bsdf>)"),
+            "scene.xml:6:70: unknown parameter 'size' of texture 'checkerboard'; known: 'color0', 'color1', 'to_uv'\n"
+            "scene.xml:8:70: unknown parameter 'size' of texture 'checkerboard'; known: 'color0', 'color1', 'to_uv'");
 }
 
 TEST_F(LoadScene, GivesEveryEmittingShapeItsOwnLight) {
