@@ -30,8 +30,38 @@ class Discrete {
   double sum() const { return sum_; }
 
  private:
-  std::vector<float> cdf_;
+  std::vector<float> cdf_;       // n + 1 values from 0 to 1
+  std::vector<uint32_t> guide_;  // for each of n equal intervals of u, the first cell that reaches into it
   double sum_ = 0;
+};
+
+/// The same as Discrete by an alias table (Walker 1977, Vose 1991): one look into memory, but neighbouring numbers may
+/// give distant indices. For large tables whose result does not depend on the pixel.
+class AliasTable {
+ public:
+  /// Throws like Discrete.
+  explicit AliasTable(std::span<const float> weights);
+  struct Result {
+    uint32_t index;
+    float remapped;  ///< again uniform in [0, 1), independent of index
+  };
+  /// `u` in [0, 1).
+  Result sample(float u) const {
+    const auto n = static_cast<uint32_t>(cells_.size());
+    const float x = u * static_cast<float>(n);
+    const uint32_t i = std::min(static_cast<uint32_t>(x), n - 1);
+    const Cell& cell = cells_[i];
+    const float f = x - static_cast<float>(i);
+    if (f < cell.own) return {i, std::min(f / cell.own, kOneMinusEpsilon)};
+    return {cell.other, std::min((f - cell.own) / (1 - cell.own), kOneMinusEpsilon)};
+  }
+
+ private:
+  struct Cell {
+    float own;       // fraction of the cell that is its own index
+    uint32_t other;  // the rest
+  };
+  std::vector<Cell> cells_;
 };
 
 /// Piecewise-constant density on [0,1]^2 over a grid of width x height cells, row-major.

@@ -42,22 +42,10 @@ AreaSample AreaLight::sample_position(Vec2 u, float u_primitive) const {
 }
 
 EmitterSample AreaLight::sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const {
-  EmitterSample sample;
-  if (samples_uv_) {
-    const AreaSample area = sample_position(u, u_primitive);
-    const Vec3 d = area.p - reference;
-    const float distance_squared = length_squared(d);
-    if (!(distance_squared > 0)) return sample;
-    sample.distance = std::sqrt(distance_squared);
-    sample.wi = d * (1 / sample.distance);
-    sample.p = area.p, sample.n = area.n, sample.uv = area.uv;
-    // Density per unit area to density per unit solid angle.
-    sample.pdf_solid_angle = area.pdf_area * distance_squared / std::abs(dot(sample.wi, area.n));
-  } else {
-    sample = shape_->sample_towards(reference, u, u_primitive);
-  }
-  if (!(sample.pdf_solid_angle > 0 && sample.pdf_solid_angle < kInfinity)) return EmitterSample{};
-  if (dot(sample.n, sample.wi) < 0) sample.radiance = radiance_at(sample.p, sample.n, sample.uv);
+  EmitterSample sample = samples_uv_ ? Shape::towards(reference, sample_position(u, u_primitive))
+                                     : shape_->sample_towards(reference, u, u_primitive);
+  if (sample.pdf_solid_angle > 0 && dot(sample.n, sample.wi) < 0)
+    sample.radiance = radiance_at(sample.p, sample.n, sample.uv);
   return sample;
 }
 

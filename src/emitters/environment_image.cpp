@@ -15,68 +15,83 @@ double tent_times_sine(double theta, double d, double direction) {
   return direction * std::cos(theta) / d - (std::sin(end) - std::sin(theta)) / (d * d);
 }
 
+struct CellChoice {
+  int index;
+  float remapped;  // again uniform in [0, 1)
+};
+
+/// Chooses one of four cells in proportion to their weights, at least one of which is positive.
+CellChoice choose_cell(const float (&weights)[4], float u) {
+  float rest = u * (weights[0] + weights[1] + weights[2] + weights[3]);
+  int last = 0;
+  for (int i = 0; i < 4; ++i) {
+    if (!(weights[i] > 0)) continue;
+    last = i;
+    if (rest < weights[i]) break;
+    rest -= weights[i];
+  }
+  return {last, std::min(rest / weights[last], kOneMinusEpsilon)};
+}
+
 }  // namespace
 
 EnvironmentImage::EnvironmentImage(const TexelImage& image, float scale, bool mis_compensation)
-    : width_(image.width), height_(std::max(image.height, 3)) {
+    : width_(image.width),
+      height_(std::max(image.height, 3)),
+      blocks_x_((width_ + kBlock - 1) / kBlock),
+      blocks_y_((height_ + kBlock - 1) / kBlock) {
   COVARY_CHECK(image.channels == 3 && image.floats.size() == image.n_pixels() * 3 && image.n_pixels() > 0,
                "an environment needs a linear RGB image");
-  const size_t stride = static_cast<size_t>(width_) + 1;
-  texels_.resize(stride * height_);
-  for (int y = 0; y < height_; ++y)
-    for (int x = 0; x <= width_; ++x) {
-      const size_t source = (static_cast<size_t>(std::min(y, image.height - 1)) * width_ + x % width_) * 3;
-      const float* rgb = image.floats.data() + source;
-      texels_[y * stride + x].value = Spectrum(rgb[0], rgb[1], rgb[2]) * scale;
-    }
+  texels_.resize(static_cast<size_t>(blocks_x_) * blocks_y_ * kBlock * kBlock);
 
+  // Values, and the integral over the sphere: each row's tent against the sine.
   const double step = static_cast<double>(M_PI) / (height_ - 1);
-  sines_.resize(height_);
-  for (int y = 0; y < height_; ++y) sines_[y] = static_cast<float>(std::sin(y * step));
-  sines_.back() = 0;
-  // Integral over the sphere: each row's tent against the sine.
   double integral[3] = {0, 0, 0}, luminance_integral = 0;
+  float largest = 0;
   for (int y = 0; y < height_; ++y) {
     double row_weight = 0;
     if (y > 0) row_weight += tent_times_sine(y * step, step, -1);
     if (y + 1 < height_) row_weight += tent_times_sine(y * step, step, 1);
     const double per_texel = row_weight * step * 2 * M_PI / width_;
     for (int x = 0; x < width_; ++x) {
-      const Spectrum& value = texels_[y * stride + x].value;
+      const float* rgb = image.floats.data() + (static_cast<size_t>(std::min(y, image.height - 1)) * width_ + x) * 3;
+      const Spectrum value = Spectrum(rgb[0], rgb[1], rgb[2]) * scale;
+      texels_[index(x, y)].value = value;
       for (int c = 0; c < 3; ++c) integral[c] += per_texel * value[c];
       luminance_integral += per_texel * luminance(value);
+      largest = std::max(largest, luminance(value));
     }
   }
   for (int c = 0; c < 3; ++c) integral_[c] = static_cast<float>(integral[c]);
 
   // [Karlik2019] Sec. 4: the mean over the sphere is subtracted; a constant map keeps its weights.
   float offset = mis_compensation ? static_cast<float>(luminance_integral / (4 * M_PI)) : 0.0f;
-  float largest = 0;
-  for (const Texel& texel : texels_) largest = std::max(largest, luminance(texel.value));
   if (largest <= 1.01f * offset) offset = 0;
   black_ = !(largest > 0);
   if (black_) return;
 
-  std::vector<float> row_sums(height_), row(width_);
-  const std::vector<float> ones(width_, 1.0f);
+  std::vector<float> row_sums(blocks_y_), row(blocks_x_);
+  const std::vector<float> ones(blocks_x_, 1.0f);
   double z = 0;
-  columns_.reserve(height_);
-  for (int y = 0; y < height_; ++y) {
+  block_columns_.reserve(blocks_y_);
+  for (int block_y = 0; block_y < blocks_y_; ++block_y) {
+    std::fill(row.begin(), row.end(), 0.0f);
     double sum = 0;
-    for (int x = 0; x <= width_; ++x) {
-      Texel& texel = texels_[y * stride + x];
-      texel.weight = std::max(0.0f, luminance(texel.value) - offset);
-      if (x < width_) sum += row[x] = texel.weight;
+    for (int y = block_y * kBlock; y < std::min((block_y + 1) * kBlock, height_); ++y) {
+      // The mean sine of a tent on a pole is a third of a row away from it.
+      const double sine = tent_mass(y) < 1 ? std::sin(step / 3) : std::sin(y * step);
+      for (int x = 0; x < width_; ++x) {
+        Texel& texel = texels_[index(x, y)];
+        texel.weight = static_cast<float>(sine * std::max(0.0f, luminance(texel.value) - offset));
+        row[x / kBlock] += texel.weight * tent_mass(y);
+        sum += texel.weight * tent_mass(y);
+      }
     }
-    // Integral over the row's tent of the interpolated sine: 1/3 of its own, 1/6 of the neighbour's, on each side.
-    double tent = 0;
-    if (y > 0) tent += sines_[y] / 3.0 + sines_[y - 1] / 6.0;
-    if (y + 1 < height_) tent += sines_[y] / 3.0 + sines_[y + 1] / 6.0;
-    row_sums[y] = static_cast<float>(sum * tent);
-    z += sum * tent;
-    columns_.emplace_back(sum > 0 ? row : ones);
+    row_sums[block_y] = static_cast<float>(sum);
+    z += sum;
+    block_columns_.emplace_back(sum > 0 ? row : ones);
   }
-  rows_ = Discrete(row_sums);
+  block_rows_ = Discrete(row_sums);
   inverse_z_ = static_cast<float>(static_cast<double>(width_) * (height_ - 1) / z);
 }
 
@@ -87,12 +102,12 @@ EnvironmentImage::UvLookup EnvironmentImage::lookup_uv(float u, float v) const {
   const float fx = x - static_cast<float>(column), fy = y - static_cast<float>(row);
   if (column < 0) column += width_;
   column = std::clamp(column, 0, width_ - 1);
-  const Texel* top = texels_.data() + static_cast<size_t>(row) * (width_ + 1) + column;
-  const Texel* bottom = top + width_ + 1;
+  const int next = column + 1 < width_ ? column + 1 : 0;
+  const Texel &t00 = texels_[index(column, row)], &t10 = texels_[index(next, row)];
+  const Texel &t01 = texels_[index(column, row + 1)], &t11 = texels_[index(next, row + 1)];
   const float w00 = (1 - fx) * (1 - fy), w10 = fx * (1 - fy), w01 = (1 - fx) * fy, w11 = fx * fy;
-  const float weight = top[0].weight * w00 + top[1].weight * w10 + bottom[0].weight * w01 + bottom[1].weight * w11;
-  return {top[0].value * w00 + top[1].value * w10 + bottom[0].value * w01 + bottom[1].value * w11,
-          weight * lerp(fy, sines_[row], sines_[row + 1]) * inverse_z_};
+  return {t00.value * w00 + t10.value * w10 + t01.value * w01 + t11.value * w11,
+          (t00.weight * w00 + t10.weight * w10 + t01.weight * w01 + t11.weight * w11) * inverse_z_};
 }
 
 EnvironmentImage::Lookup EnvironmentImage::lookup(const Vec3& d) const {
@@ -105,40 +120,32 @@ EnvironmentImage::Lookup EnvironmentImage::lookup(const Vec3& d) const {
   return {found.value, sine > 0 ? found.pdf_uv / (2 * kPi * kPi * sine) : 0};
 }
 
-/// Distance from `row` in rows, in (-1, 1), with density proportional to the tent times the interpolated sine.
-float EnvironmentImage::sample_row_offset(int row, float u) const {
-  const float s = sines_[row];
-  const float above = row > 0 ? s / 3 + sines_[row - 1] / 6 : 0;
-  const float below = row + 1 < height_ ? s / 3 + sines_[row + 1] / 6 : 0;
-  const float split = above / (above + below);
-  const bool upwards = u < split;
-  u = upwards ? 1 - u / split : (u - split) / (1 - split);  // continuous across the row
-  u = clamp01(u);
-  const float slope = (upwards ? sines_[row - 1] : sines_[row + 1]) - s;
-  // Density (1 - t)(s + slope t); its integral s t + (slope - s) t^2/2 - slope t^3/3 = u (s/2 + slope/6), by Newton's
-  // method inside a bracket, from the solution for slope 0.
-  const float target = u * (s / 2 + slope / 6);
-  float lower = 0, upper = 1, t = 1 - safe_sqrt(1 - u);
-  for (int i = 0; i < 12; ++i) {
-    const float excess = t * (s + t * ((slope - s) * 0.5f - t * slope * (1.0f / 3))) - target;
-    (excess > 0 ? upper : lower) = t;
-    const float density = (1 - t) * (s + slope * t);
-    float next = density > 0 ? t - excess / density : 0.5f * (lower + upper);
-    if (!(next >= lower && next <= upper)) next = 0.5f * (lower + upper);
-    const float change = std::abs(next - t);
-    t = next;
-    if (change < 1e-6f) break;
-  }
-  return upwards ? -t : t;
-}
-
 EnvironmentImage::Sample EnvironmentImage::sample(Vec2 u) const {
   if (black_) return {{0, 1, 0}, Spectrum(), 0};
-  const Discrete::Result row = rows_.sample(u.y);
-  const Discrete::Result column = columns_[row.index].sample(u.x);
-  const float y = static_cast<float>(row.index) + sample_row_offset(static_cast<int>(row.index), row.remapped);
-  const float v = clamp01(y / static_cast<float>(height_ - 1));
-  float s = (static_cast<float>(column.index) + 0.5f + warp::interval_to_tent(column.remapped, 1)) /
+  const Discrete::Result block_row = block_rows_.sample(u.y);
+  const AliasTable::Result block_column = block_columns_[block_row.index].sample(u.x);
+
+  // A texel of the block: its row by what is left of u.y, its column by what is left of u.x.
+  const size_t first = (static_cast<size_t>(block_row.index) * blocks_x_ + block_column.index) * (kBlock * kBlock);
+  const Texel* block = texels_.data() + first;
+  const int y0 = static_cast<int>(block_row.index) * kBlock;
+  float rows[kBlock], row_weights[kBlock], columns[kBlock];
+  for (int i = 0; i < kBlock; ++i) {
+    const Texel* row = block + i * kBlock;
+    rows[i] = (row[0].weight + row[1].weight) + (row[2].weight + row[3].weight);
+    row_weights[i] = rows[i] * tent_mass(y0 + i);
+  }
+  const CellChoice row = choose_cell(row_weights, block_row.remapped);
+  for (int i = 0; i < kBlock; ++i) columns[i] = block[row.index * kBlock + i].weight;
+  const CellChoice column = choose_cell(columns, block_column.remapped);
+
+  // A position in the texel's tent, or in the half of it that lies inside the image.
+  const int y = y0 + row.index;
+  const float half_tent = 1 - safe_sqrt(1 - row.remapped);
+  const float offset = y == 0 ? half_tent : (y == height_ - 1 ? -half_tent : warp::interval_to_tent(row.remapped, 1));
+  const float v = clamp01((static_cast<float>(y) + offset) / static_cast<float>(height_ - 1));
+  float s = (static_cast<float>(block_column.index * kBlock + column.index) + 0.5f +
+             warp::interval_to_tent(column.remapped, 1)) /
             static_cast<float>(width_);
   s = clamp01(s < 0 ? s + 1 : (s >= 1 ? s - 1 : s));
 

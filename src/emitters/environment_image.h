@@ -5,13 +5,16 @@
 // Texel column i has its centre at u = (i + 0.5) / width; row j stands at v = j / (height - 1), the first and the last
 // row on the poles.
 //
-// Sampling. With h the tent functions of the interpolation, texel weights l_ij = max(0, luminance - offset) and
-// s(v) the linear interpolation of sin(pi v) between rows, the density per unit (u, v) area is
-//     p(u, v) = sum_ij l_ij h_i(u) h_j(v) s(v) / Z.
-// It is drawn by choosing a texel, then a position within its tent. Per unit solid angle that is, up to s(v)/sin(pi v)
-// (one but for a term of second order in the height of a row), the luminance over its integral over the sphere: the
-// estimate of the light from the map is nearly constant however small the sun, and the density is positive wherever
-// the interpolated luminance is.
+// Sampling. With h the tent functions of the interpolation, and texel weights w_ij = sin(theta_j) max(0, luminance -
+// offset), the density per unit (u, v) area is the interpolation of the weights,
+//     p(u, v) = sum_ij w_ij h_i(u) h_j(v) / Z,
+// drawn by choosing a texel, then a position within its tent. Per unit solid angle that is the luminance over its
+// integral, but for how the sine changes within a row: the estimate of the light from the map is nearly constant
+// however small the sun, and the density is positive wherever the interpolated luminance is (the rows on the poles take
+// the mean sine of their tents, not zero).
+//
+// Texels lie in blocks of 4 x 4, and the tables choose blocks: tables of a sixteenth of the size stay in the cache, and
+// a sample then reads one or two places of the large array.
 #pragma once
 
 #include <vector>
@@ -48,23 +51,28 @@ class EnvironmentImage {
   const Spectrum& integral() const { return integral_; }
 
  private:
+  static constexpr int kBlock = 4;
   struct Texel {
     Spectrum value;
-    float weight;  // l
+    float weight;  // w; zero for texels beyond the image
   };
+  size_t index(int x, int y) const {
+    const size_t block = static_cast<size_t>(y / kBlock) * blocks_x_ + x / kBlock;
+    return block * (kBlock * kBlock) + (y % kBlock) * kBlock + x % kBlock;
+  }
   /// Value and the sampling density per unit (u, v) area at u in [0, 1], v in [0, 1].
   struct UvLookup {
     Spectrum value;
     float pdf_uv;
   };
   UvLookup lookup_uv(float u, float v) const;
-  float sample_row_offset(int row, float u) const;
+  /// The share of a row's tent that lies inside the image.
+  float tent_mass(int row) const { return row == 0 || row == height_ - 1 ? 0.5f : 1.0f; }
 
-  int width_, height_;
-  std::vector<Texel> texels_;  // rows of width + 1, the last repeats the first
-  std::vector<float> sines_;   // sin(theta) of each row
-  Discrete rows_;              // empty when nothing is to be sampled
-  std::vector<Discrete> columns_;
+  int width_, height_, blocks_x_, blocks_y_;
+  std::vector<Texel> texels_;
+  Discrete block_rows_;  // empty when nothing is to be sampled
+  std::vector<AliasTable> block_columns_;
   bool black_ = true;
   float inverse_z_ = 0;
   Spectrum integral_;

@@ -21,11 +21,18 @@ struct PathContext {
   uint64_t n_rays = 0;
 };
 
+/// One camera ray, the random numbers of its path, and the estimate of the radiance arriving along it.
+struct CameraSample {
+  Ray ray;
+  PathRandom random;   ///< the integrator reads numbers at vertices >= 1 only
+  Spectrum radiance;   ///< zero on entry
+};
+
 class Integrator : public SceneObject {
  public:
-  /// One sample of the radiance arriving along `ray`. Reads numbers of `random` at vertices >= 1 only. Thread-safe.
-  virtual Spectrum radiance(const Scene& scene, const Ray& ray, const PathRandom& random,
-                            PathContext& context) const = 0;
+  /// Sets the radiance of each sample. Samples come in batches because hundreds of independent paths keep the machine
+  /// busier than one; the value of a sample does not depend on its batch. Thread-safe.
+  virtual void trace(const Scene& scene, std::span<CameraSample> samples, PathContext& context) const = 0;
   /// Registered name and settings, as they go into a film's attributes: equal text, equal estimator.
   virtual std::string description() const = 0;
 };

@@ -9,10 +9,10 @@ namespace covary {
 /// Probability of each light.
 inline float light_pmf(const Scene& scene) { return 1 / static_cast<float>(scene.emitters().size()); }
 
-/// Null when the scene has no lights.
-inline const Emitter* select_light(const Scene& scene, float u) {
+/// The light that `u` chooses; the scene must have one.
+inline const Emitter& select_light(const Scene& scene, float u) {
   const size_t n = scene.emitters().size();
-  return n ? scene.emitters()[std::min(static_cast<size_t>(u * static_cast<float>(n)), n - 1)].get() : nullptr;
+  return *scene.emitters()[std::min(static_cast<size_t>(u * static_cast<float>(n)), n - 1)];
 }
 
 /// Ray from a surface to a light sample, short of the light itself.

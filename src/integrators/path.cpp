@@ -11,6 +11,7 @@
 // The estimator is unbiased. A surface with a null lobe (mask, null) blocks light samples; light behind it is found by
 // paths that pass straight through, which carry full weight because no light sample could have found it.
 #include <memory>
+#include <vector>
 
 #include "core/error.h"
 #include "integrators/integrator.h"
@@ -25,108 +26,173 @@ float mis_weight(float a, float b) {
   return 1 / (1 + r * r);
 }
 
+/// A path that goes on: its next ray and what it carries.
+struct Path {
+  Ray ray;
+  Spectrum throughput{1};
+  float eta = 1;                // product of relative indices, undoes the radiance scaling in roulette
+  Vec3 previous_p;              // where the last BSDF sample started
+  float previous_pdf = 1;       // its density per unit solid angle
+  bool previous_delta = true;   // it came from a delta lobe or the camera
+  bool only_null = true;        // nothing but null surfaces met so far
+  bool found = false;           // whether the ray hit a surface
+  uint32_t sample = 0;          // which of the batch
+};
+
+/// A light sample that counts if nothing lies between.
+struct Connection {
+  Ray ray;
+  Spectrum radiance;
+  uint32_t sample;
+};
+
+/// The paths that are alive, and for each of them what the loops hand on to one another.
+struct Batch {
+  explicit Batch(size_t n) : paths(n), ray_hits(n), hits(n), lights(n) { connections.reserve(n); }
+  std::vector<Path> paths;
+  std::vector<RayHit> ray_hits;
+  std::vector<SurfaceHit> hits;
+  std::vector<EmitterSample> lights;
+  std::vector<Connection> connections;
+};
+
 class PathIntegrator final : public Integrator {
  public:
   explicit PathIntegrator(const PathLengthSettings& lengths) : lengths_(lengths) {}
 
-  Spectrum radiance(const Scene& scene, const Ray& camera_ray, const PathRandom& random,
-                    PathContext& context) const override {
-    Spectrum result, throughput(1);
-    if (lengths_.max_depth <= 0) return result;
-    Ray ray = camera_ray;
-    float eta = 1;                 // product of relative indices, undoes the radiance scaling in roulette
-    Vec3 previous_p;               // where the last BSDF sample started
-    float previous_pdf = 1;        // its density per unit solid angle
-    bool previous_delta = true;    // it came from a delta lobe or the camera
-    bool only_null = true;         // nothing but null surfaces met so far
+  // All paths of the batch advance together, one edge at a time, in short loops whose iterations do not depend on each
+  // other: while one waits for memory or a division, the processor works on the next.
+  void trace(const Scene& scene, std::span<CameraSample> samples, PathContext& context) const override {
+    if (lengths_.max_depth <= 0) return;
+    Batch batch(samples.size());
+    for (uint32_t i = 0; i < samples.size(); ++i) batch.paths[i].ray = samples[i].ray, batch.paths[i].sample = i;
 
-    for (int depth = 0;; ++depth) {
-      // Edges of the path that ends at what this ray meets: depth + 1.
-      const bool counts = depth + 1 >= lengths_.min_depth;
-      SurfaceHit hit;
-      ++context.n_rays;
-      bool found = scene.intersect(ray, hit);
-      if (lengths_.hide_emitters && depth == 0) found = skip_area_lights(scene, ray, hit, found, context);
-
-      if (!found) {
-        const Emitter* environment = scene.environment();
-        if (environment && counts && !(lengths_.hide_emitters && only_null)) {
-          const float weight =
-              previous_delta ? 1
-                             : mis_weight(previous_pdf, light_pmf(scene) * environment->environment_pdf_solid_angle(ray.d));
-          result += throughput * environment->environment_radiance(ray.d) * weight;
-        }
-        break;
-      }
-      if (hit.emitter && counts) {
-        const Spectrum emitted = hit.emitter->surface_radiance(hit, -ray.d);
-        if (!is_black(emitted)) {
-          const float weight =
-              previous_delta ? 1
-                             : mis_weight(previous_pdf, light_pmf(scene) * hit.emitter->pdf_solid_angle(previous_p, hit));
-          result += throughput * emitted * weight;
-        }
-      }
+    for (int depth = 0; !batch.paths.empty(); ++depth) {
+      find_surfaces(scene, depth, batch, context);
+      if (depth + 1 >= lengths_.min_depth)
+        for (size_t i = 0; i < batch.paths.size(); ++i)
+          samples[batch.paths[i].sample].radiance += emission(scene, batch.paths[i], batch.hits[i]);
       if (depth + 1 >= lengths_.max_depth) break;
+      end_paths_without_surface(batch);
 
       const uint32_t vertex = static_cast<uint32_t>(depth) + 1;
-      const Vec3 wo = hit.frame.to_local(-ray.d);
-      context.arena.reset();
-      const BsdfClosure* bsdf = hit.bsdf->bind(hit, wo.z > 0, TransportMode::kRadiance, context.arena);
-
-      if ((bsdf->flags() & kSmooth) && depth + 2 >= lengths_.min_depth)
-        result += throughput * light_sample(scene, hit, wo, *bsdf, random, vertex, context);
-
-      const BsdfSample sample =
-          bsdf->sample(wo, random.get_1d(vertex, Event::kLobe), random.get_2d(vertex, Event::kDirection));
-      if (!sample.valid() || is_black(sample.weight)) break;
-      throughput *= sample.weight;
-      eta *= sample.eta;
-      if (!(sample.flags & kNullTransmission)) only_null = false;
-
-      if (depth + 1 >= lengths_.rr_depth) {
-        const float survival = std::min(max_component(throughput) * eta * eta, 0.95f);
-        if (random.get_1d(vertex, Event::kRoulette) >= survival) break;
-        throughput *= 1 / survival;
-      }
-      const Vec3 wi = hit.frame.to_world(sample.wi);
-      previous_p = hit.p;
-      previous_pdf = sample.pdf;
-      previous_delta = sample.is_delta();
-      ray = {offset_origin(hit.p, hit.ng, wi), wi, kInfinity};
+      if (depth + 2 >= lengths_.min_depth && !scene.emitters().empty()) sample_lights(scene, vertex, samples, batch);
+      scatter(scene, vertex, samples, batch, context);
+      for (const Connection& connection : batch.connections)
+        if (!scene.occluded(connection.ray)) samples[connection.sample].radiance += connection.radiance;
+      context.n_rays += batch.connections.size();
+      batch.connections.clear();
     }
-    return result;
   }
 
   std::string description() const override { return "path " + lengths_.text(); }
 
  private:
-  /// Next-event estimation at a vertex: f cos L / pdf, weighted against BSDF sampling.
-  static Spectrum light_sample(const Scene& scene, const SurfaceHit& hit, const Vec3& wo, const BsdfClosure& bsdf,
-                               const PathRandom& random, uint32_t vertex, PathContext& context) {
-    const Emitter* emitter = select_light(scene, random.get_1d(vertex, Event::kLightChoice));
-    if (!emitter) return {};
-    const EmitterSample light = emitter->sample_towards(hit.p, random.get_2d(vertex, Event::kLightPosition),
-                                                        random.get_1d(vertex, Event::kLightPrimitive));
-    if (!(light.pdf_solid_angle > 0) || is_black(light.radiance)) return {};
-    const BsdfValue f = bsdf.eval(wo, hit.frame.to_local(light.wi));
-    if (is_black(f.value)) return {};
-    ++context.n_rays;
-    if (scene.occluded(shadow_ray(hit, light))) return {};
-    const float pdf = light_pmf(scene) * light.pdf_solid_angle;
-    const float weight = light.is_delta ? 1 : mis_weight(pdf, f.pdf_solid_angle);
-    return f.value * light.radiance * (weight / pdf);
+  /// Nearest hits of all rays.
+  void find_surfaces(const Scene& scene, int depth, Batch& batch, PathContext& context) const {
+    const size_t n = batch.paths.size();
+    for (size_t i = 0; i < n; ++i) batch.ray_hits[i] = scene.nearest(batch.paths[i].ray);
+    context.n_rays += n;
+    for (size_t i = 0; i < n; ++i) {
+      Path& path = batch.paths[i];
+      path.found = batch.ray_hits[i].found();
+      if (path.found) scene.resolve(path.ray, batch.ray_hits[i], batch.hits[i]);
+      if (lengths_.hide_emitters && depth == 0) skip_area_lights(scene, path, batch.hits[i], context);
+    }
   }
 
-  /// Follows `ray` past area lights; true when something else was hit.
-  static bool skip_area_lights(const Scene& scene, Ray& ray, SurfaceHit& hit, bool found, PathContext& context) {
-    while (found && hit.emitter) {
-      ray.o = offset_origin(hit.p, hit.ng, ray.d);
-      ray.t_max -= hit.t;
-      ++context.n_rays;
-      found = scene.intersect(ray, hit);
+  static void end_paths_without_surface(Batch& batch) {
+    size_t n_kept = 0;
+    for (size_t i = 0; i < batch.paths.size(); ++i) {
+      if (!batch.paths[i].found) continue;
+      if (n_kept != i) batch.paths[n_kept] = batch.paths[i], batch.hits[n_kept] = batch.hits[i];
+      ++n_kept;
     }
-    return found;
+    batch.paths.resize(n_kept);
+  }
+
+  /// One light sample for each vertex whose surface can use it.
+  static void sample_lights(const Scene& scene, uint32_t vertex, std::span<const CameraSample> samples, Batch& batch) {
+    for (size_t i = 0; i < batch.paths.size(); ++i) {
+      const SurfaceHit& hit = batch.hits[i];
+      batch.lights[i].pdf_solid_angle = 0;
+      if (!(hit.bsdf->flags() & kSmooth)) continue;
+      const PathRandom& random = samples[batch.paths[i].sample].random;
+      batch.lights[i] = select_light(scene, random.get_1d(vertex, Event::kLightChoice))
+                            .sample_towards(hit.p, random.get_2d(vertex, Event::kLightPosition),
+                                            random.get_1d(vertex, Event::kLightPrimitive));
+    }
+  }
+
+  /// Evaluates the surfaces: connections to the light samples, and the next rays. Paths that end are removed.
+  void scatter(const Scene& scene, uint32_t vertex, std::span<const CameraSample> samples, Batch& batch,
+               PathContext& context) const {
+    const bool connect = static_cast<int>(vertex) + 1 >= lengths_.min_depth && !scene.emitters().empty();
+    size_t n_alive = 0;
+    for (size_t i = 0; i < batch.paths.size(); ++i) {
+      Path& path = batch.paths[i];
+      const SurfaceHit& hit = batch.hits[i];
+      const PathRandom& random = samples[path.sample].random;
+      const Vec3 wo = hit.frame.to_local(-path.ray.d);
+      context.arena.reset();
+      const BsdfClosure* bsdf = hit.bsdf->bind(hit, wo.z > 0, TransportMode::kRadiance, context.arena);
+      if (connect && batch.lights[i].pdf_solid_angle > 0)
+        connect_light(scene, path, hit, wo, *bsdf, batch.lights[i], batch.connections);
+
+      const BsdfSample next =
+          bsdf->sample(wo, random.get_1d(vertex, Event::kLobe), random.get_2d(vertex, Event::kDirection));
+      if (!next.valid() || is_black(next.weight)) continue;
+      path.throughput *= next.weight;
+      path.eta *= next.eta;
+      if (!(next.flags & kNullTransmission)) path.only_null = false;
+      if (static_cast<int>(vertex) >= lengths_.rr_depth) {
+        const float survival = std::min(max_component(path.throughput) * sqr(path.eta), 0.95f);
+        if (random.get_1d(vertex, Event::kRoulette) >= survival) continue;
+        path.throughput *= 1 / survival;
+      }
+      const Vec3 wi = hit.frame.to_world(next.wi);
+      path.previous_p = hit.p;
+      path.previous_pdf = next.pdf;
+      path.previous_delta = next.is_delta();
+      path.ray = {offset_origin(hit.p, hit.ng, wi), wi, kInfinity};
+      batch.paths[n_alive++] = path;
+    }
+    batch.paths.resize(n_alive);
+  }
+
+  /// Contribution of what the path's ray met, weighted against light sampling.
+  Spectrum emission(const Scene& scene, const Path& path, const SurfaceHit& hit) const {
+    const Emitter* emitter = path.found ? hit.emitter : scene.environment();
+    if (!emitter || (!path.found && lengths_.hide_emitters && path.only_null)) return {};
+    const Spectrum radiance = path.throughput * (path.found ? emitter->surface_radiance(hit, -path.ray.d)
+                                                            : emitter->environment_radiance(path.ray.d));
+    if (path.previous_delta || is_black(radiance)) return radiance;
+    const float pdf_light = path.found ? emitter->pdf_solid_angle(path.previous_p, hit)
+                                       : emitter->environment_pdf_solid_angle(path.ray.d);
+    return radiance * mis_weight(path.previous_pdf, light_pmf(scene) * pdf_light);
+  }
+
+  /// Next-event estimation: f cos L / pdf, weighted against BSDF sampling, if nothing lies between.
+  static void connect_light(const Scene& scene, const Path& path, const SurfaceHit& hit, const Vec3& wo,
+                            const BsdfClosure& bsdf, const EmitterSample& light,
+                            std::vector<Connection>& connections) {
+    if (is_black(light.radiance)) return;
+    const BsdfValue f = bsdf.eval(wo, hit.frame.to_local(light.wi));
+    if (is_black(f.value)) return;
+    const float pdf = light_pmf(scene) * light.pdf_solid_angle;
+    const float weight = light.is_delta ? 1 : mis_weight(pdf, f.pdf_solid_angle);
+    connections.push_back(
+        {shadow_ray(hit, light), path.throughput * f.value * light.radiance * (weight / pdf), path.sample});
+  }
+
+  /// Follows the camera ray past area lights until something else is hit.
+  static void skip_area_lights(const Scene& scene, Path& path, SurfaceHit& hit, PathContext& context) {
+    while (path.found && hit.emitter) {
+      path.ray.o = offset_origin(hit.p, hit.ng, path.ray.d);
+      path.ray.t_max -= hit.t;
+      ++context.n_rays;
+      path.found = scene.intersect(path.ray, hit);
+    }
   }
 
   PathLengthSettings lengths_;

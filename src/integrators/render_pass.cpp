@@ -17,6 +17,7 @@ namespace covary {
 namespace {
 
 constexpr int kTileSize = 16;
+constexpr int kBatchSize = 256;  // paths traced together; larger ones leave the cache
 constexpr size_t kMaxBadSamples = 10;
 
 using Clock = std::chrono::steady_clock;
@@ -50,6 +51,7 @@ float interval_to_gaussian(float u, float stddev, float radius) {
 struct Worker {
   PathContext context;
   std::vector<Spectrum> sums;
+  std::vector<CameraSample> samples;
   uint64_t n_samples = 0, n_not_finite = 0, n_negative = 0;
   std::vector<BadSample> bad_samples;
 };
@@ -71,10 +73,9 @@ PathRandom sample_random(const PassSettings& settings, const Camera& camera, int
   return {settings.sampling, settings.seed, settings.pass, pixel, sample};
 }
 
-Spectrum take_sample(const Scene& scene, const Integrator& integrator, const FilterSettings& filter,
-                     const PathRandom& random, int x, int y, PathContext& context) {
-  const Ray ray = scene.camera().ray(film_position(filter, x, y, random), random.get_2d(0, Event::kLens));
-  return integrator.radiance(scene, ray, random, context);
+CameraSample camera_sample(const Scene& scene, const PassSettings& settings, int x, int y, uint64_t sample) {
+  const PathRandom random = sample_random(settings, scene.camera(), x, y, sample);
+  return {scene.camera().ray(film_position(settings.filter, x, y, random), random.get_2d(0, Event::kLens)), random, {}};
 }
 
 /// Sorts by pixel and sample and keeps the first few; which ones does not depend on the order they came in.
@@ -95,23 +96,36 @@ bool is_good(const Spectrum& value, int x, int y, uint64_t sample, Worker& worke
   return false;
 }
 
+/// Takes samples begin … end - 1 of all pixels of a tile, in batches of whole pixels.
 void render_tile(const Scene& scene, const Integrator& integrator, const PassSettings& settings, const Tile& tile,
                  uint32_t begin, uint32_t end, Film& film, Worker& worker) {
-  const int groups = film.groups();
+  const auto groups = static_cast<uint32_t>(film.groups());
+  const int tile_width = tile.x1 - tile.x0, n_pixels = tile_width * (tile.y1 - tile.y0);
+  const uint32_t per_pixel = end - begin;
+  const int batch_pixels = std::max(1, kBatchSize / static_cast<int>(per_pixel));
   worker.sums.resize(groups);
-  for (int y = tile.y0; y < tile.y1; ++y)
-    for (int x = tile.x0; x < tile.x1; ++x) {
+  for (int first = 0; first < n_pixels; first += batch_pixels) {
+    const int last = std::min(first + batch_pixels, n_pixels);
+    const auto film_x = [&](int pixel) { return tile.x0 + pixel % tile_width; };
+    const auto film_y = [&](int pixel) { return tile.y0 + pixel / tile_width; };
+    worker.samples.clear();
+    for (int pixel = first; pixel < last; ++pixel)
+      for (uint32_t s = begin; s < end; ++s)
+        worker.samples.push_back(
+            camera_sample(scene, settings, film.crop().x + film_x(pixel), film.crop().y + film_y(pixel), s));
+    integrator.trace(scene, worker.samples, worker.context);
+
+    const CameraSample* sample = worker.samples.data();
+    for (int pixel = first; pixel < last; ++pixel) {
+      const int x = film_x(pixel), y = film_y(pixel);
       std::fill(worker.sums.begin(), worker.sums.end(), Spectrum(0));
-      const int frame_x = film.crop().x + x, frame_y = film.crop().y + y;
-      for (uint32_t s = begin; s < end; ++s) {
-        const PathRandom random = sample_random(settings, scene.camera(), frame_x, frame_y, s);
-        const Spectrum value =
-            take_sample(scene, integrator, settings.filter, random, frame_x, frame_y, worker.context);
-        if (is_good(value, frame_x, frame_y, s, worker)) worker.sums[s % groups] += value;
-      }
-      worker.n_samples += end - begin;
-      film.add(x, y, (end - begin) / groups, worker.sums);
+      for (uint32_t s = begin; s < end; ++s, ++sample)
+        if (is_good(sample->radiance, film.crop().x + x, film.crop().y + y, s, worker))
+          worker.sums[s % groups] += sample->radiance;
+      film.add(x, y, per_pixel / groups, worker.sums);
     }
+    worker.n_samples += worker.samples.size();
+  }
 }
 
 }  // namespace
@@ -197,9 +211,9 @@ PassResult render_pass(const Scene& scene, const Integrator& integrator, const P
 ReplayedSample replay_sample(const Scene& scene, const Integrator& integrator, const PassSettings& settings, int x,
                              int y, uint64_t sample) {
   PathContext context;
-  const PathRandom random = sample_random(settings, scene.camera(), x, y, sample);
-  const Spectrum value = take_sample(scene, integrator, settings.filter, random, x, y, context);
-  return {film_position(settings.filter, x, y, random), value, context.n_rays};
+  CameraSample traced = camera_sample(scene, settings, x, y, sample);
+  integrator.trace(scene, {&traced, 1}, context);
+  return {film_position(settings.filter, x, y, traced.random), traced.radiance, context.n_rays};
 }
 
 }  // namespace covary

@@ -67,7 +67,8 @@ class BsdfClosure {
   virtual BsdfSample sample(const Vec3& wo, float u_lobe, Vec2 u) const = 0;
 
   virtual int n_lobes() const = 0;
-  /// Writes n_lobes() selection probabilities; they sum to 1, or all are 0 where sample() always fails.
+  /// Writes n_lobes() selection probabilities. They sum to 1, or to less where sample() fails with the rest (a nested
+  /// model that is black from this side).
   virtual void lobe_pmfs(const Vec3& wo, float* pmfs) const = 0;
   /// Writes n_lobes() densities per unit solid angle of wi; 0 for delta lobes.
   virtual void lobe_pdfs(const Vec3& wo, const Vec3& wi, float* pdfs) const = 0;

@@ -99,12 +99,17 @@ AreaSample TriangleMesh::sample_uv(Vec2 uv) const {
 void TriangleMesh::prepare_sampling() {
   if (triangles_.empty()) throw Error(ErrorCode::kInput, "a mesh that emits light has no triangle of positive area");
   std::vector<float> areas;
-  areas.reserve(triangles_.size());
+  facets_.clear();
   for (const auto& t : triangles_) {
-    const Vec3 p0 = vertices_[t[0]].p;
-    areas.push_back(0.5f * length(cross(vertices_[t[1]].p - p0, vertices_[t[2]].p - p0)));
+    const Vertex &v0 = vertices_[t[0]], &v1 = vertices_[t[1]], &v2 = vertices_[t[2]];
+    const Vec3 e1 = v1.p - v0.p, e2 = v2.p - v0.p, normal = cross(e1, e2);
+    // Without texture coordinates the surface parameters are the barycentric coordinates.
+    facets_.push_back({v0.p, e1, e2, normalize(normal), v0.uv, has_uvs_ ? v1.uv - v0.uv : Vec2{1, 0},
+                       has_uvs_ ? v2.uv - v0.uv : Vec2{0, 1}});
+    areas.push_back(0.5f * length(normal));
   }
   areas_ = Discrete(areas);
+  inverse_area_ = static_cast<float>(1 / areas_.sum());
 }
 
 void TriangleMesh::fill(const Ray& /*ray*/, SurfaceHit& hit, bool with_derivatives) const {
@@ -137,15 +142,13 @@ void TriangleMesh::fill(const Ray& /*ray*/, SurfaceHit& hit, bool with_derivativ
 }
 
 AreaSample TriangleMesh::sample_area(Vec2 u, float u_primitive) const {
-  const Discrete::Result chosen = areas_.sample(u_primitive);
-  const auto& t = triangles_[chosen.index];
-  const Vertex &v0 = vertices_[t[0]], &v1 = vertices_[t[1]], &v2 = vertices_[t[2]];
+  const Facet& facet = facets_[areas_.sample(u_primitive).index];
   const Vec2 b = warp::square_to_triangle(u);
-  const float b0 = 1 - b.x - b.y;
-  const Vec3 normal = cross(v1.p - v0.p, v2.p - v0.p);
-  const float twice_area = length(normal);
-  return {v0.p * b0 + v1.p * b.x + v2.p * b.y, normal * (1 / twice_area),
-          has_uvs_ ? v0.uv * b0 + v1.uv * b.x + v2.uv * b.y : b, 1 / area()};
+  return {facet.point(b), facet.n, facet.uv_at(b), inverse_area_};
+}
+
+EmitterSample TriangleMesh::sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const {
+  return towards(reference, TriangleMesh::sample_area(u, u_primitive));
 }
 
 Spectrum TriangleMesh::vertex_colour(const SurfaceHit& hit) const {

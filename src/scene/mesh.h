@@ -30,6 +30,7 @@ class TriangleMesh final : public Shape {
   float area() const override { return static_cast<float>(areas_.sum()); }
   size_t n_primitives() const override { return triangles_.size(); }
   AreaSample sample_area(Vec2 u, float u_primitive) const override;
+  EmitterSample sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const override;
   /// Only for two triangles that make a parallelogram whose (u, v) cover the unit square, such as `rectangle`.
   AreaSample sample_uv(Vec2 uv) const override;
   Spectrum vertex_colour(const SurfaceHit& hit) const override;
@@ -53,7 +54,17 @@ class TriangleMesh final : public Shape {
   Bounds3 bounds_;
   bool has_normals_ = false, has_uvs_ = false;
   size_t n_degenerate_ = 0;
+
+  /// What sampling reads of a triangle, ready to use.
+  struct Facet {
+    Vec3 p, e1, e2, n;  // point = p + b1 e1 + b2 e2
+    Vec2 uv, duv1, duv2;
+    Vec3 point(Vec2 b) const { return p + e1 * b.x + e2 * b.y; }
+    Vec2 uv_at(Vec2 b) const { return uv + duv1 * b.x + duv2 * b.y; }
+  };
+  std::vector<Facet> facets_;  // one per triangle after prepare_sampling()
   Discrete areas_;
+  float inverse_area_ = 0;
 
   /// p = origin + u dp_du + v dp_dv over the whole mesh; inverse_area == 0: it is no such parallelogram.
   struct Parallelogram {

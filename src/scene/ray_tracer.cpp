@@ -143,7 +143,7 @@ RayTracer::~RayTracer() {
   rtcReleaseDevice(device_);
 }
 
-bool RayTracer::intersect(const Ray& ray, SurfaceHit& hit) const {
+RayHit RayTracer::nearest(const Ray& ray) const {
   RTCRayHit query;
   query.ray = to_embree(ray);
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
@@ -151,17 +151,18 @@ bool RayTracer::intersect(const Ray& ray, SurfaceHit& hit) const {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   rtcIntersect1(top_.scene, &context, &query);
-  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
+  return {query.ray.tfar, {query.hit.u, query.hit.v}, query.hit.primID, query.hit.geomID, query.hit.instID[0]};
+}
 
-  const unsigned instance = query.hit.instID[0];
+void RayTracer::resolve(const Ray& ray, const RayHit& found, SurfaceHit& hit) const {
   const Placed* placed =
-      instance == RTC_INVALID_GEOMETRY_ID ? nullptr : &placed_[instance - top_.shapes.size()];
-  const Shape* shape = (placed ? *placed->group : top_).shapes[query.hit.geomID];
-  hit.t = query.ray.tfar;
-  hit.primitive = query.hit.primID;
-  hit.barycentric = {query.hit.u, query.hit.v};
+      found.instance == RTC_INVALID_GEOMETRY_ID ? nullptr : &placed_[found.instance - top_.shapes.size()];
+  const Shape* shape = (placed ? *placed->group : top_).shapes[found.geometry];
+  hit.t = found.t;
+  hit.primitive = found.primitive;
+  hit.barycentric = found.barycentric;
   hit.shape = shape, hit.bsdf = shape->bsdf(), hit.emitter = shape->emitter();
-  const bool with_derivatives = hit.bsdf->needs_derivatives();
+  const bool with_derivatives = shape->needs_derivatives();
   if (!placed) {
     shape->fill(ray, hit, with_derivatives);
   } else {
@@ -169,7 +170,6 @@ bool RayTracer::intersect(const Ray& ray, SurfaceHit& hit) const {
     shape->fill({to_local.point(ray.o), to_local.vector(ray.d), ray.t_max}, hit, with_derivatives);
     place(hit, placed->to_world, with_derivatives);
   }
-  return true;
 }
 
 bool RayTracer::occluded(const Ray& ray) const {

@@ -19,7 +19,8 @@ class RayTracer {
   RayTracer(const RayTracer&) = delete;
   RayTracer& operator=(const RayTracer&) = delete;
 
-  bool intersect(const Ray& ray, SurfaceHit& hit) const;
+  RayHit nearest(const Ray& ray) const;
+  void resolve(const Ray& ray, const RayHit& found, SurfaceHit& hit) const;
   bool occluded(const Ray& ray) const;
 
  private:

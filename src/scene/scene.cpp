@@ -39,7 +39,13 @@ Scene::Scene(SceneParts parts) : parts_(std::move(parts)) {
 }
 
 Scene::~Scene() = default;
-bool Scene::intersect(const Ray& ray, SurfaceHit& hit) const { return tracer_->intersect(ray, hit); }
+bool Scene::intersect(const Ray& ray, SurfaceHit& hit) const {
+  const RayHit found = tracer_->nearest(ray);
+  if (found.found()) tracer_->resolve(ray, found, hit);
+  return found.found();
+}
+RayHit Scene::nearest(const Ray& ray) const { return tracer_->nearest(ray); }
+void Scene::resolve(const Ray& ray, const RayHit& found, SurfaceHit& hit) const { tracer_->resolve(ray, found, hit); }
 bool Scene::occluded(const Ray& ray) const { return tracer_->occluded(ray); }
 
 }  // namespace covary

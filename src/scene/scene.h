@@ -43,6 +43,15 @@ struct FilterSettings {
 
 class RayTracer;
 
+/// What the ray tracer knows of a hit; Scene::resolve makes a SurfaceHit of it.
+struct RayHit {
+  static constexpr uint32_t kNone = ~0u;
+  float t = kInfinity;
+  Vec2 barycentric;
+  uint32_t primitive = kNone, geometry = kNone, instance = kNone;
+  bool found() const { return geometry != kNone; }
+};
+
 class Scene {
  public:
   /// Builds the ray tracer's hierarchy.
@@ -51,8 +60,11 @@ class Scene {
   Scene(const Scene&) = delete;
   Scene& operator=(const Scene&) = delete;
 
-  /// Nearest surface along the ray; false when there is none.
+  /// Nearest surface along the ray; false when there is none. The same as nearest() and resolve().
   bool intersect(const Ray& ray, SurfaceHit& hit) const;
+  RayHit nearest(const Ray& ray) const;
+  /// What lies at a hit of `ray` that was found.
+  void resolve(const Ray& ray, const RayHit& found, SurfaceHit& hit) const;
   /// Whether anything lies on the ray before t_max.
   bool occluded(const Ray& ray) const;
 

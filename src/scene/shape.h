@@ -35,17 +35,40 @@ class Shape : public SceneObject {
   /// Samples the shape as seen from `reference`; default: uniform by area. pdf in solid angle at reference.
   virtual EmitterSample sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const;
   virtual float pdf_solid_angle(const Vec3& reference, const SurfaceHit& hit) const;
+  /// A point sampled by area as seen from `reference`, its density converted to solid angle; pdf 0 for grazing views.
+  static EmitterSample towards(const Vec3& reference, const AreaSample& area) {
+    EmitterSample sample;
+    const Vec3 d = area.p - reference;
+    const float d2 = length_squared(d);
+    if (!(d2 > 0) || !(area.pdf_area > 0)) return sample;
+    const float inverse = 1 / std::sqrt(d2);
+    sample.distance = d2 * inverse;
+    sample.wi = d * inverse;
+    sample.p = area.p, sample.n = area.n, sample.uv = area.uv;
+    const float cosine = std::abs(dot(sample.wi, area.n));
+    sample.pdf_solid_angle = cosine > kGrazing ? area.pdf_area * d2 / cosine : 0;
+    return sample;
+  }
   /// Interpolated colour stored at the vertices ("vertex_color"), white where the mesh has none.
   virtual Spectrum vertex_colour(const SurfaceHit& /*hit*/) const { return Spectrum(1); }
   virtual bool has_vertex_colour() const { return false; }
 
+  /// Cosines below this count as zero.
+  static constexpr float kGrazing = 1e-12f;
+
   const Bsdf* bsdf() const { return bsdf_.get(); }
   const Emitter* emitter() const { return emitter_.get(); }
-  void set_bsdf(BsdfPtr bsdf) { bsdf_ = std::move(bsdf); }
+  void set_bsdf(BsdfPtr bsdf) {
+    bsdf_ = std::move(bsdf);
+    needs_derivatives_ = bsdf_ && bsdf_->needs_derivatives();
+  }
+  /// Whether hits on this shape need dp_du, dp_dv and an aligned frame.
+  bool needs_derivatives() const { return needs_derivatives_; }
   void set_emitter(std::shared_ptr<const Emitter> emitter) { emitter_ = std::move(emitter); }
 
  private:
   BsdfPtr bsdf_;
+  bool needs_derivatives_ = false;
   std::shared_ptr<const Emitter> emitter_;
 };
 
