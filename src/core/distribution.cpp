@@ -2,6 +2,7 @@
 #include "core/distribution.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "core/error.h"
@@ -22,6 +23,16 @@ double checked_sum(std::span<const float> weights) {
   }
   if (sum <= 0) throw Error(ErrorCode::kInput, "all weights of a distribution are zero");
   return sum;
+}
+
+/// The point at `fraction` of cell `index` of `n` equal cells of [0, 1). Rounding must not move it into the next cell,
+/// which pdf() would then look up: that one may be empty.
+float point_of_cell(uint32_t index, float fraction, int n) {
+  const auto cell = static_cast<int>(index);
+  float x = (static_cast<float>(index) + fraction) / static_cast<float>(n);
+  while (static_cast<int>(x * static_cast<float>(n)) > cell) x = std::nextafter(x, 0.0f);
+  while (static_cast<int>(x * static_cast<float>(n)) < cell) x = std::nextafter(x, 1.0f);
+  return x;
 }
 
 }  // namespace
@@ -96,8 +107,7 @@ PiecewiseConstant2D::PiecewiseConstant2D(std::span<const float> weights, int wid
 PiecewiseConstant2D::Result PiecewiseConstant2D::sample(Vec2 u) const {
   const Discrete::Result row = rows_.sample(u.y);
   const Discrete::Result column = columns_[row.index].sample(u.x);
-  return {{std::min((column.index + column.remapped) / width_, kOneMinusEpsilon),
-           std::min((row.index + row.remapped) / height_, kOneMinusEpsilon)},
+  return {{point_of_cell(column.index, column.remapped, width_), point_of_cell(row.index, row.remapped, height_)},
           row.pmf * column.pmf * width_ * height_};
 }
 
