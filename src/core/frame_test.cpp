@@ -29,7 +29,8 @@ TEST(Frame, IsOrthonormalAndRightHandedEverywhere) {
 }
 
 TEST(Frame, IsContinuousWhereWallsHaveTheirNormals) {
-  for (const Vec3& axis : {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}, Vec3{-1, 0, 0}, Vec3{0, -1, 0}, Vec3{0, 0, -1}}) {
+  for (const Vec3& axis :
+       {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}, Vec3{-1, 0, 0}, Vec3{0, -1, 0}, Vec3{0, 0, -1}}) {
     const Frame exact(axis);
     for (uint64_t i = 0; i < 100; ++i) {
       const Frame near_frame(normalize(axis + random_direction(i) * 1e-3f));
