@@ -26,34 +26,41 @@ float mis_weight(float a, float b) {
   return 1 / (1 + r * r);
 }
 
-/// A path that goes on: its next ray and what it carries.
+/// What a path that goes on carries.
 struct Path {
-  Ray ray;
   Spectrum throughput{1};
-  float eta = 1;                // product of relative indices, undoes the radiance scaling in roulette
-  Vec3 previous_p;              // where the last BSDF sample started
-  float previous_pdf = 1;       // its density per unit solid angle
-  bool previous_delta = true;   // it came from a delta lobe or the camera
-  bool only_null = true;        // nothing but null surfaces met so far
-  bool found = false;           // whether the ray hit a surface
-  uint32_t sample = 0;          // which of the batch
+  float eta = 1;               // product of relative indices, undoes the radiance scaling in roulette
+  Vec3 previous_p;             // where the last BSDF sample started
+  float previous_pdf = 1;      // its density per unit solid angle
+  bool previous_delta = true;  // it came from a delta lobe or the camera
+  bool only_null = true;       // nothing but null surfaces met so far
+  bool found = false;          // whether the ray hit a surface
+  uint32_t sample = 0;         // which of the batch
 };
 
 /// A light sample that counts if nothing lies between.
 struct Connection {
-  Ray ray;
   Spectrum radiance;
   uint32_t sample;
 };
 
 /// The paths that are alive, and for each of them what the loops hand on to one another.
 struct Batch {
-  explicit Batch(size_t n) : paths(n), ray_hits(n), hits(n), lights(n) { connections.reserve(n); }
+  explicit Batch(size_t n) : paths(n), rays(n), ray_hits(n), hits(n), lights(n), blocked(n) {
+    connections.reserve(n);
+    shadow_rays.reserve(n);
+  }
+  /// Keeps the first n paths.
+  void resize(size_t n) { paths.resize(n), rays.resize(n); }
+
   std::vector<Path> paths;
+  std::vector<Ray> rays;  // the next one of each path
   std::vector<RayHit> ray_hits;
   std::vector<SurfaceHit> hits;
   std::vector<EmitterSample> lights;
   std::vector<Connection> connections;
+  std::vector<Ray> shadow_rays;  // one of each connection
+  std::vector<uint8_t> blocked;
 };
 
 class PathIntegrator final : public Integrator {
@@ -65,23 +72,20 @@ class PathIntegrator final : public Integrator {
   void trace(const Scene& scene, std::span<CameraSample> samples, PathContext& context) const override {
     if (lengths_.max_depth <= 0) return;
     Batch batch(samples.size());
-    for (uint32_t i = 0; i < samples.size(); ++i) batch.paths[i].ray = samples[i].ray, batch.paths[i].sample = i;
+    for (uint32_t i = 0; i < samples.size(); ++i) batch.rays[i] = samples[i].ray, batch.paths[i].sample = i;
 
     for (int depth = 0; !batch.paths.empty(); ++depth) {
       find_surfaces(scene, depth, batch, context);
       if (depth + 1 >= lengths_.min_depth)
         for (size_t i = 0; i < batch.paths.size(); ++i)
-          samples[batch.paths[i].sample].radiance += emission(scene, batch.paths[i], batch.hits[i]);
+          samples[batch.paths[i].sample].radiance += emission(scene, batch.paths[i], batch.rays[i], batch.hits[i]);
       if (depth + 1 >= lengths_.max_depth) break;
       end_paths_without_surface(batch);
 
       const uint32_t vertex = static_cast<uint32_t>(depth) + 1;
       if (depth + 2 >= lengths_.min_depth && !scene.emitters().empty()) sample_lights(scene, vertex, samples, batch);
       scatter(scene, vertex, samples, batch, context);
-      for (const Connection& connection : batch.connections)
-        if (!scene.occluded(connection.ray)) samples[connection.sample].radiance += connection.radiance;
-      context.n_rays += batch.connections.size();
-      batch.connections.clear();
+      trace_connections(scene, samples, batch, context);
     }
   }
 
@@ -91,24 +95,25 @@ class PathIntegrator final : public Integrator {
   /// Nearest hits of all rays.
   void find_surfaces(const Scene& scene, int depth, Batch& batch, PathContext& context) const {
     const size_t n = batch.paths.size();
-    for (size_t i = 0; i < n; ++i) batch.ray_hits[i] = scene.nearest(batch.paths[i].ray);
+    scene.nearest(batch.rays, batch.ray_hits, depth == 0);
     context.n_rays += n;
     for (size_t i = 0; i < n; ++i) {
-      Path& path = batch.paths[i];
-      path.found = batch.ray_hits[i].found();
-      if (path.found) scene.resolve(path.ray, batch.ray_hits[i], batch.hits[i]);
-      if (lengths_.hide_emitters && depth == 0) skip_area_lights(scene, path, batch.hits[i], context);
+      batch.paths[i].found = batch.ray_hits[i].found();
+      if (batch.paths[i].found) scene.resolve(batch.rays[i], batch.ray_hits[i], batch.hits[i]);
     }
+    if (lengths_.hide_emitters && depth == 0)
+      for (size_t i = 0; i < n; ++i) skip_area_lights(scene, batch.paths[i], batch.rays[i], batch.hits[i], context);
   }
 
   static void end_paths_without_surface(Batch& batch) {
     size_t n_kept = 0;
     for (size_t i = 0; i < batch.paths.size(); ++i) {
       if (!batch.paths[i].found) continue;
-      if (n_kept != i) batch.paths[n_kept] = batch.paths[i], batch.hits[n_kept] = batch.hits[i];
+      if (n_kept != i)
+        batch.paths[n_kept] = batch.paths[i], batch.rays[n_kept] = batch.rays[i], batch.hits[n_kept] = batch.hits[i];
       ++n_kept;
     }
-    batch.paths.resize(n_kept);
+    batch.resize(n_kept);
   }
 
   /// One light sample for each vertex whose surface can use it.
@@ -133,11 +138,11 @@ class PathIntegrator final : public Integrator {
       Path& path = batch.paths[i];
       const SurfaceHit& hit = batch.hits[i];
       const PathRandom& random = samples[path.sample].random;
-      const Vec3 wo = hit.frame.to_local(-path.ray.d);
+      const Vec3 wo = hit.frame.to_local(-batch.rays[i].d);
       context.arena.reset();
       const BsdfClosure* bsdf = hit.bsdf->bind(hit, wo.z > 0, TransportMode::kRadiance, context.arena);
       if (connect && batch.lights[i].pdf_solid_angle > 0)
-        connect_light(scene, path, hit, wo, *bsdf, batch.lights[i], batch.connections);
+        connect_light(scene, path, hit, wo, *bsdf, batch.lights[i], batch);
 
       const BsdfSample next =
           bsdf->sample(wo, random.get_1d(vertex, Event::kLobe), random.get_2d(vertex, Event::kDirection));
@@ -154,44 +159,54 @@ class PathIntegrator final : public Integrator {
       path.previous_p = hit.p;
       path.previous_pdf = next.pdf;
       path.previous_delta = next.is_delta();
-      path.ray = {offset_origin(hit.p, hit.ng, wi), wi, kInfinity};
+      batch.rays[n_alive] = {offset_origin(hit.p, hit.ng, wi), wi, kInfinity};
       batch.paths[n_alive++] = path;
     }
-    batch.paths.resize(n_alive);
+    batch.resize(n_alive);
+  }
+
+  /// Adds the light samples that nothing hides.
+  static void trace_connections(const Scene& scene, std::span<CameraSample> samples, Batch& batch,
+                                PathContext& context) {
+    scene.occluded(batch.shadow_rays, batch.blocked);
+    context.n_rays += batch.shadow_rays.size();
+    for (size_t i = 0; i < batch.connections.size(); ++i)
+      if (!batch.blocked[i]) samples[batch.connections[i].sample].radiance += batch.connections[i].radiance;
+    batch.connections.clear();
+    batch.shadow_rays.clear();
   }
 
   /// Contribution of what the path's ray met, weighted against light sampling.
-  Spectrum emission(const Scene& scene, const Path& path, const SurfaceHit& hit) const {
+  Spectrum emission(const Scene& scene, const Path& path, const Ray& ray, const SurfaceHit& hit) const {
     const Emitter* emitter = path.found ? hit.emitter : scene.environment();
     if (!emitter || (!path.found && lengths_.hide_emitters && path.only_null)) return {};
-    const Spectrum radiance = path.throughput * (path.found ? emitter->surface_radiance(hit, -path.ray.d)
-                                                            : emitter->environment_radiance(path.ray.d));
+    const Spectrum radiance =
+        path.throughput * (path.found ? emitter->surface_radiance(hit, -ray.d) : emitter->environment_radiance(ray.d));
     if (path.previous_delta || is_black(radiance)) return radiance;
-    const float pdf_light = path.found ? emitter->pdf_solid_angle(path.previous_p, hit)
-                                       : emitter->environment_pdf_solid_angle(path.ray.d);
+    const float pdf_light =
+        path.found ? emitter->pdf_solid_angle(path.previous_p, hit) : emitter->environment_pdf_solid_angle(ray.d);
     return radiance * mis_weight(path.previous_pdf, light_pmf(scene) * pdf_light);
   }
 
   /// Next-event estimation: f cos L / pdf, weighted against BSDF sampling, if nothing lies between.
   static void connect_light(const Scene& scene, const Path& path, const SurfaceHit& hit, const Vec3& wo,
-                            const BsdfClosure& bsdf, const EmitterSample& light,
-                            std::vector<Connection>& connections) {
+                            const BsdfClosure& bsdf, const EmitterSample& light, Batch& batch) {
     if (is_black(light.radiance)) return;
     const BsdfValue f = bsdf.eval(wo, hit.frame.to_local(light.wi));
     if (is_black(f.value)) return;
     const float pdf = light_pmf(scene) * light.pdf_solid_angle;
     const float weight = light.is_delta ? 1 : mis_weight(pdf, f.pdf_solid_angle);
-    connections.push_back(
-        {shadow_ray(hit, light), path.throughput * f.value * light.radiance * (weight / pdf), path.sample});
+    batch.connections.push_back({path.throughput * f.value * light.radiance * (weight / pdf), path.sample});
+    batch.shadow_rays.push_back(shadow_ray(hit, light));
   }
 
   /// Follows the camera ray past area lights until something else is hit.
-  static void skip_area_lights(const Scene& scene, Path& path, SurfaceHit& hit, PathContext& context) {
+  static void skip_area_lights(const Scene& scene, Path& path, Ray& ray, SurfaceHit& hit, PathContext& context) {
     while (path.found && hit.emitter) {
-      path.ray.o = offset_origin(hit.p, hit.ng, path.ray.d);
-      path.ray.t_max -= hit.t;
+      ray.o = offset_origin(hit.p, hit.ng, ray.d);
+      ray.t_max -= hit.t;
       ++context.n_rays;
-      path.found = scene.intersect(path.ray, hit);
+      path.found = scene.intersect(ray, hit);
     }
   }
 

@@ -69,12 +69,14 @@ RTCGeometry analytic_geometry(RTCDevice device, const AnalyticShape& shape) {
   return geometry;
 }
 
-RTCRay to_embree(const Ray& ray) {
-  RTCRay r;
-  r.org_x = ray.o.x, r.org_y = ray.o.y, r.org_z = ray.o.z;
-  r.dir_x = ray.d.x, r.dir_y = ray.d.y, r.dir_z = ray.d.z;
-  r.tnear = 0, r.tfar = ray.t_max, r.time = 0, r.mask = ~0u, r.id = 0, r.flags = 0;
-  return r;
+/// Rays are handed to Embree in packets: camera rays gain most, scattered ones a little, single ones lose little.
+constexpr size_t kPacket = 16;
+
+void set_ray(RTCRay16& packet, size_t i, const Ray& ray) {
+  packet.org_x[i] = ray.o.x, packet.org_y[i] = ray.o.y, packet.org_z[i] = ray.o.z;
+  packet.dir_x[i] = ray.d.x, packet.dir_y[i] = ray.d.y, packet.dir_z[i] = ray.d.z;
+  packet.tnear[i] = 0, packet.tfar[i] = ray.t_max, packet.time[i] = 0, packet.mask[i] = ~0u;
+  packet.id[i] = 0, packet.flags[i] = 0;
 }
 
 /// Moves a hit found in a group's space to the world.
@@ -99,8 +101,8 @@ RayTracer::Group RayTracer::make_group(std::span<const ShapePtr> shapes) const {
   rtcSetSceneBuildQuality(group.scene, RTC_BUILD_QUALITY_MEDIUM);
   for (const ShapePtr& shape : shapes) {
     const auto* mesh = dynamic_cast<const TriangleMesh*>(shape.get());
-    const RTCGeometry geometry = mesh ? mesh_geometry(device_, *mesh)
-                                      : analytic_geometry(device_, dynamic_cast<const AnalyticShape&>(*shape));
+    const RTCGeometry geometry =
+        mesh ? mesh_geometry(device_, *mesh) : analytic_geometry(device_, dynamic_cast<const AnalyticShape&>(*shape));
     rtcCommitGeometry(geometry);
     rtcAttachGeometryByID(group.scene, geometry, static_cast<unsigned>(group.shapes.size()));
     rtcReleaseGeometry(geometry);
@@ -143,15 +145,44 @@ RayTracer::~RayTracer() {
   rtcReleaseDevice(device_);
 }
 
-RayHit RayTracer::nearest(const Ray& ray) const {
-  RTCRayHit query;
-  query.ray = to_embree(ray);
-  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+void RayTracer::nearest(std::span<const Ray> rays, std::span<RayHit> hits, bool coherent) const {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
-  rtcIntersect1(top_.scene, &context, &query);
-  return {query.ray.tfar, {query.hit.u, query.hit.v}, query.hit.primID, query.hit.geomID, query.hit.instID[0]};
+  context.flags = coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+  for (size_t first = 0; first < rays.size(); first += kPacket) {
+    const size_t n = std::min(kPacket, rays.size() - first);
+    RTCRayHit16 packet;
+    alignas(64) int valid[kPacket];
+    for (size_t i = 0; i < kPacket; ++i) {
+      valid[i] = i < n ? -1 : 0;
+      set_ray(packet.ray, i, rays[first + std::min(i, n - 1)]);
+      packet.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+      packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+    }
+    rtcIntersect16(valid, top_.scene, &context, &packet);
+    for (size_t i = 0; i < n; ++i)
+      hits[first + i] = {packet.ray.tfar[i],
+                         {packet.hit.u[i], packet.hit.v[i]},
+                         packet.hit.primID[i],
+                         packet.hit.geomID[i],
+                         packet.hit.instID[0][i]};
+  }
+}
+
+void RayTracer::occluded(std::span<const Ray> rays, std::span<uint8_t> blocked) const {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  for (size_t first = 0; first < rays.size(); first += kPacket) {
+    const size_t n = std::min(kPacket, rays.size() - first);
+    RTCRay16 packet;
+    alignas(64) int valid[kPacket];
+    for (size_t i = 0; i < kPacket; ++i) {
+      valid[i] = i < n ? -1 : 0;
+      set_ray(packet, i, rays[first + std::min(i, n - 1)]);
+    }
+    rtcOccluded16(valid, top_.scene, &context, &packet);
+    for (size_t i = 0; i < n; ++i) blocked[first + i] = packet.tfar[i] < 0;
+  }
 }
 
 void RayTracer::resolve(const Ray& ray, const RayHit& found, SurfaceHit& hit) const {
@@ -170,14 +201,6 @@ void RayTracer::resolve(const Ray& ray, const RayHit& found, SurfaceHit& hit) co
     shape->fill({to_local.point(ray.o), to_local.vector(ray.d), ray.t_max}, hit, with_derivatives);
     place(hit, placed->to_world, with_derivatives);
   }
-}
-
-bool RayTracer::occluded(const Ray& ray) const {
-  RTCRay query = to_embree(ray);
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  rtcOccluded1(top_.scene, &context, &query);
-  return query.tfar < 0;
 }
 
 }  // namespace covary

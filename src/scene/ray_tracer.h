@@ -19,9 +19,9 @@ class RayTracer {
   RayTracer(const RayTracer&) = delete;
   RayTracer& operator=(const RayTracer&) = delete;
 
-  RayHit nearest(const Ray& ray) const;
+  void nearest(std::span<const Ray> rays, std::span<RayHit> hits, bool coherent) const;
   void resolve(const Ray& ray, const RayHit& found, SurfaceHit& hit) const;
-  bool occluded(const Ray& ray) const;
+  void occluded(std::span<const Ray> rays, std::span<uint8_t> blocked) const;
 
  private:
   struct Group {  // shapes of one Embree scene, indexed by geometry id

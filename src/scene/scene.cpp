@@ -40,12 +40,20 @@ Scene::Scene(SceneParts parts) : parts_(std::move(parts)) {
 
 Scene::~Scene() = default;
 bool Scene::intersect(const Ray& ray, SurfaceHit& hit) const {
-  const RayHit found = tracer_->nearest(ray);
+  RayHit found;
+  tracer_->nearest({&ray, 1}, {&found, 1}, false);
   if (found.found()) tracer_->resolve(ray, found, hit);
   return found.found();
 }
-RayHit Scene::nearest(const Ray& ray) const { return tracer_->nearest(ray); }
+void Scene::nearest(std::span<const Ray> rays, std::span<RayHit> hits, bool coherent) const {
+  tracer_->nearest(rays, hits, coherent);
+}
 void Scene::resolve(const Ray& ray, const RayHit& found, SurfaceHit& hit) const { tracer_->resolve(ray, found, hit); }
-bool Scene::occluded(const Ray& ray) const { return tracer_->occluded(ray); }
+bool Scene::occluded(const Ray& ray) const {
+  uint8_t blocked = 0;
+  tracer_->occluded({&ray, 1}, {&blocked, 1});
+  return blocked;
+}
+void Scene::occluded(std::span<const Ray> rays, std::span<uint8_t> blocked) const { tracer_->occluded(rays, blocked); }
 
 }  // namespace covary

@@ -62,11 +62,14 @@ class Scene {
 
   /// Nearest surface along the ray; false when there is none. The same as nearest() and resolve().
   bool intersect(const Ray& ray, SurfaceHit& hit) const;
-  RayHit nearest(const Ray& ray) const;
+  /// Nearest hits of many rays. `coherent`: they start at one place and go roughly the same way.
+  void nearest(std::span<const Ray> rays, std::span<RayHit> hits, bool coherent) const;
   /// What lies at a hit of `ray` that was found.
   void resolve(const Ray& ray, const RayHit& found, SurfaceHit& hit) const;
   /// Whether anything lies on the ray before t_max.
   bool occluded(const Ray& ray) const;
+  /// The same for many rays; 1 where blocked.
+  void occluded(std::span<const Ray> rays, std::span<uint8_t> blocked) const;
 
   const Camera& camera() const { return *parts_.camera; }
   std::span<const std::shared_ptr<const Emitter>> emitters() const { return parts_.emitters; }
