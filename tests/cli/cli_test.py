@@ -313,8 +313,9 @@ class Damage(CliTest):
                 self.bad(1, "huge.exr: ", *command, preexec_fn=None if "SANITIZED" in os.environ else limits)
 
     def test_wrong_counts(self):
-        data = exr({"R": [1], "G": [1], "B": [1], "samples": [3]} | {f"group{g:02d}.{c}": [1] for g in range(2) for c in "RGB"},
-                   (1, 1), attributes={"covary:film": "1", "covary:groups": "2"}, types={"samples": UINT})
+        channels = {c: [1] for c in "RGB"} | {f"group{g:02d}.{c}": [1] for g in range(2) for c in "RGB"} | {"samples": [3]}
+        facts = {"film": "1", "groups": "2", "seed": "1", "sampling": "crn", "scene_hash": "abc", "settings": "path"}
+        data = exr(channels, (1, 1), attributes={f"covary:{k}": v for k, v in facts.items()}, types={"samples": UINT})
         self.write("a.exr", data)
         self.write("b.exr", film(2, size=(1, 1)))
         self.bad(1, "a.exr: 3 samples at pixel (0, 0); with 2 groups expected is a multiple of 2",
