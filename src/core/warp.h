@@ -3,6 +3,7 @@
 // everywhere, which keeps common random numbers correlated.
 #pragma once
 
+#include "core/trigonometry.h"
 #include "core/vec.h"
 
 namespace covary::warp {
@@ -10,14 +11,14 @@ namespace covary::warp {
 /// Uniform on the unit disk by the concentric map (Shirley & Chiu 1997); density 1/pi per unit area.
 inline Vec2 square_to_disk(Vec2 u) {
   const float x = 2 * u.x - 1, y = 2 * u.y - 1;
-  if (x == 0 && y == 0) return {0, 0};
-  float r, phi;
+  // Radius along the larger coordinate; the angle is measured from its axis, within 45 degrees.
   if (std::abs(x) > std::abs(y)) {
-    r = x, phi = (kPi / 4) * (y / x);
-  } else {
-    r = y, phi = (kPi / 2) - (kPi / 4) * (x / y);
+    const SinCos a = sincos_octant((kPi / 4) * (y / x));
+    return {x * a.cos, x * a.sin};
   }
-  return {r * std::cos(phi), r * std::sin(phi)};
+  if (y == 0) return {0, 0};
+  const SinCos a = sincos_octant((kPi / 4) * (x / y));
+  return {y * a.sin, y * a.cos};
 }
 inline float disk_pdf() { return kInvPi; }
 
@@ -30,8 +31,9 @@ inline float cosine_hemisphere_pdf_solid_angle(float cos_theta) { return cos_the
 
 /// Uniform on the unit sphere; density 1/(4 pi) per unit solid angle.
 inline Vec3 square_to_sphere(Vec2 u) {
-  const float z = 1 - 2 * u.y, r = safe_sqrt(1 - z * z), phi = kTwoPi * u.x;
-  return {r * std::cos(phi), r * std::sin(phi), z};
+  const float z = 1 - 2 * u.y, r = safe_sqrt(1 - z * z);
+  const SinCos phi = sincos_turns(u.x);
+  return {r * phi.cos, r * phi.sin, z};
 }
 inline float sphere_pdf_solid_angle() { return 1 / (4 * kPi); }
 

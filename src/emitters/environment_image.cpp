@@ -22,15 +22,13 @@ struct CellChoice {
 
 /// Chooses one of four cells in proportion to their weights, at least one of which is positive.
 CellChoice choose_cell(const float (&weights)[4], float u) {
-  float rest = u * (weights[0] + weights[1] + weights[2] + weights[3]);
-  int last = 0;
-  for (int i = 0; i < 4; ++i) {
-    if (!(weights[i] > 0)) continue;
-    last = i;
-    if (rest < weights[i]) break;
-    rest -= weights[i];
-  }
-  return {last, std::min(rest / weights[last], kOneMinusEpsilon)};
+  // Bounds between cells; comparisons instead of branches, which would be guessed wrong half of the time.
+  const float b1 = weights[0], b2 = b1 + weights[1], b3 = b2 + weights[2], sum = b3 + weights[3];
+  const float x = u * sum;
+  int index = (x >= b1) + (x >= b2) + (x >= b3);
+  while (!(weights[index] > 0)) index = (index + 3) % 4;  // rounding can reach into an empty last cell
+  const float lower = index == 0 ? 0 : (index == 1 ? b1 : (index == 2 ? b2 : b3));
+  return {index, std::clamp((x - lower) / weights[index], 0.0f, kOneMinusEpsilon)};
 }
 
 }  // namespace
@@ -149,13 +147,12 @@ EnvironmentImage::Sample EnvironmentImage::sample(Vec2 u) const {
             static_cast<float>(width_);
   s = clamp01(s < 0 ? s + 1 : (s >= 1 ? s - 1 : s));
 
-  const float theta = v * kPi, phi = s * kTwoPi;
-  const float sine = std::sin(theta);
+  const SinCos theta = sincos_turns(0.5f * v), phi = sincos_turns(s);
   const UvLookup found = lookup_uv(s, v);
   Sample sample;
-  sample.d = {std::sin(phi) * sine, std::cos(theta), -std::cos(phi) * sine};
+  sample.d = {phi.sin * theta.sin, theta.cos, -phi.cos * theta.sin};
   sample.value = found.value;
-  sample.pdf_solid_angle = sine > 1e-8f ? found.pdf_uv / (2 * kPi * kPi * sine) : 0;
+  sample.pdf_solid_angle = theta.sin > 1e-8f ? found.pdf_uv / (2 * kPi * kPi * theta.sin) : 0;
   return sample;
 }
 
