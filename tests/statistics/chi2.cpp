@@ -181,14 +181,15 @@ std::string write_report(const std::string& name, const std::vector<Box>& boxes,
     if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
   const std::string csv = folder + "/" + file + ".csv", script = folder + "/" + file + ".py";
   std::ofstream table(csv);
-  table << "x0,x1,y0,y1,observed,expected\n";
+  table << "cell,x0,x1,y0,y1,observed,expected\n";
   for (size_t i = 0; i < observed.size(); ++i) {
     const Box b = i < boxes.size() ? boxes[i] : Box{double(i), double(i + 1), 0, 1};
-    table << fmt::format("{:.9g},{:.9g},{:.9g},{:.9g},{},{:.6g}\n", b.x0, b.x1, b.y0, b.y1, observed[i], expected[i]);
+    table << fmt::format("{},{:.9g},{:.9g},{:.9g},{:.9g},{},{:.6g}\n", i, b.x0, b.x1, b.y0, b.y1, observed[i],
+                         expected[i]);
   }
   std::ofstream(script) << R"(import sys, csv, matplotlib.pyplot as plt
 from matplotlib.patches import Rectangle
-rows = [[float(v) for v in r] for r in list(csv.reader(open(sys.argv[0][:-3] + '.csv')))[1:]]
+rows = [[float(v) for v in r[1:]] for r in list(csv.reader(open(sys.argv[0][:-3] + '.csv')))[1:]]
 figure, axes = plt.subplots(1, 3, figsize=(18, 6), sharex=True, sharey=True)
 def value(kind, x0, x1, y0, y1, observed, expected):
     area = (x1 - x0) * (y1 - y0)
@@ -256,6 +257,15 @@ Chi2Result compare(const std::vector<Box>& boxes, const std::vector<double>& obs
   else if (!(result.p_value >= options.alpha))
     why = "samples and density differ";
   result.accepted = why.empty();
+  if (!result.accepted && finite && n_expected > 0) {  // point at the cell with the largest contribution
+    const auto contribution = [&](size_t i) {
+      return std::abs(observed[i] - expected[i]) / std::sqrt(expected[i] + 1);
+    };
+    size_t worst = 0;
+    for (size_t i = 1; i < observed.size(); ++i)
+      if (contribution(i) > contribution(worst)) worst = i;
+    why += fmt::format(" (most in cell {}: observed {}, expected {:.1f})", worst, observed[worst], expected[worst]);
+  }
   result.message = fmt::format("{}: {}; chi2 = {:.1f}, dof = {}, p = {:.3g}, alpha = {:.3g}, N = {}, mass = {:.5f}",
                                options.name, result.accepted ? "accepted" : why, result.statistic, result.dof,
                                result.p_value, options.alpha, n, result.mass);
