@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Reflection and refraction at a smooth interface: exact unpolarised Fresnel equations for dielectrics and conductors
-// (Born & Wolf, "Principles of Optics", sections 1.5 and 14.2), Schlick's approximation (Schlick 1994, Eq. 15), and the
-// mean over the hemisphere that layered diffuse models need.
+// ([BornWolf1999] sections 1.5 and 14.2), Schlick's approximation ([Schlick1994] Eq. (15)), and the mean over the
+// hemisphere that layered diffuse models need.
 //
 // Indices are relative: `eta` = index of the side opposite the normal over the index of the side the normal points to.
 #pragma once
@@ -76,8 +76,8 @@ inline Spectrum fresnel_schlick(const Spectrum& r0, float cos_theta_i, float eta
 /// the better one; relative error below 0.2 % for eta in [0.5, 1] and [1, 5].
 inline float fresnel_diffuse_reflectance(float eta) {
   const float r = 1 / eta;
-  if (eta < 1) return -1.4399f * eta * eta + 0.7099f * eta + 0.6681f + 0.0636f * r;  // Egan & Hilgeman 1973
-  // d'Eon & Irving 2011, "A Quantized-Diffusion Model for Rendering Translucent Materials", appendix
+  if (eta < 1) return -1.4399f * eta * eta + 0.7099f * eta + 0.6681f + 0.0636f * r;  // [Egan1973]
+  // [dEon2011] appendix
   return 0.919317f + r * (-3.4793f + r * (6.75335f + r * (-7.80989f + r * (4.98554f - 1.36881f * r))));
 }
 

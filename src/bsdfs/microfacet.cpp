@@ -35,12 +35,10 @@ float Microfacet::beckmann_g1(float xy2, float z) {
   return 2 / (1 + std::erf(a) + kInvSqrtPi * std::exp(-a * a) / a);
 }
 
-// Heitz & d'Eon 2014, "Importance Sampling Microfacet-Based BSDFs using the Distribution of Visible Normals": sample
-// the visible slopes of the unit-roughness surface, then rotate and stretch. The slope along w is found by inverting
-// its cumulative distribution
+// [HeitzDEon2014]: sample the visible slopes of the unit-roughness surface, then rotate and stretch. The slope along w
+// is found by inverting its cumulative distribution
 //     C(x) = 1 + x + tan(theta) exp(-erfinv(x)^2) / sqrt(pi),  x = erf(slope) in (-1, erf(cot theta)),
-// with Newton's method from the solution for grazing incidence (W. Jakob 2014, "An Improved Visible Normal Sampling
-// Routine for the Beckmann Distribution"): monotone and continuous in u.
+// with Newton's method from the solution for grazing incidence ([Jakob2014]): monotone and continuous in u.
 Vec3 Microfacet::sample_beckmann(const Vec3& w, Vec2 u) const {
   const Vec3 v = normalize({alpha_u_ * w.x, alpha_v_ * w.y, w.z});
   const float sin_v = std::sqrt(v.x * v.x + v.y * v.y);

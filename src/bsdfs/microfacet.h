@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Distributions of microfacet normals (GGX and Beckmann, anisotropic) after Walter et al. 2007, "Microfacet Models for
-// Refraction through Rough Surfaces", with Smith's masking and exact sampling of the visible normals (Heitz 2014,
-// "Understanding the Masking-Shadowing Function"; Heitz & d'Eon 2014; Dupuy & Benyoub 2023).
+// Distributions of microfacet normals (GGX and Beckmann, anisotropic) after [Walter2007], with Smith's masking and exact
+// sampling of the visible normals ([Heitz2014], [HeitzDEon2014], [Dupuy2023]).
 //
 //   code            paper
 //   alpha_u/v       alpha_x, alpha_y     roughness along the s and t axis of the shading frame
@@ -71,9 +70,8 @@ class Microfacet {
   }
 
  private:
-  // Dupuy & Benyoub 2023, "Sampling Visible GGX Normals with Spherical Caps": the normals visible on a hemisphere are
-  // the half vectors between w and a uniformly distributed direction of the spherical cap z > -w.z. An anisotropic
-  // distribution is a stretched hemisphere.
+  // [Dupuy2023]: the normals visible on a hemisphere are the half vectors between w and a uniformly distributed
+  // direction of the spherical cap z > -w.z. A distribution of any roughness is a stretched hemisphere.
   Vec3 sample_ggx(const Vec3& w, Vec2 u) const {
     const Vec3 v = normalize({alpha_u_ * w.x, alpha_v_ * w.y, w.z});
     const float phi = kTwoPi * u.x;
@@ -90,8 +88,7 @@ class Microfacet {
   MicrofacetType type_;
 };
 
-/// Inverse of the error function on (-1, 1), relative error about 1e-6 (Giles 2012, "Approximating the erfinv
-/// function", single precision).
+/// Inverse of the error function on (-1, 1), relative error about 1e-6 ([Giles2012] Table 5).
 float erf_inv(float x);
 
 }  // namespace covary

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// principled: one artist-friendly model for metals, plastics, coated and transmitting materials (Burley 2012 and 2015,
-// see principled_terms.h).
+// principled: one artist-friendly model for metals, plastics, coated and transmitting materials ([Burley2012] and
+// [Burley2015]).
 //
 // | name                              | type           | default | meaning                                           |
 // |-----------------------------------|----------------|---------|---------------------------------------------------|
-// | base_color                        | colour/texture | 0.5     | colour of the diffuse part, of metal, of refraction |
+// | base_color                        | colour/texture | 0.5     | colour of diffuse light, of metal, of refraction  |
 // | roughness                         | number/texture | 0.5     | GGX alpha is its square, at least 0.001           |
 // | anisotropic                       | number/texture | 0       | stretches highlights along dp/du                  |
 // | metallic                          | number/texture | 0       | blends dielectric and metal                       |
@@ -34,7 +34,7 @@
 namespace covary {
 namespace {
 
-/// Generalised Trowbridge-Reitz distribution with exponent 1 ([Burley2012] appendix B.2, Eq. (4) for D).
+/// Generalised Trowbridge-Reitz distribution with exponent 1 ([Burley2012] appendix B.2).
 class Gtr1 {
  public:
   explicit Gtr1(float alpha) : alpha2_(sqr(alpha)), scale_((alpha2_ - 1) / (kPi * std::log(alpha2_))) {}

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Terms shared by `principled` and `principledthin`, from B. Burley, "Physically-Based Shading at Disney" (2012) and
-// "Extending the Disney BRDF to a BSDF with Integrated Subsurface Scattering" (2015).
+// Terms shared by `principled` and `principledthin`, from [Burley2012] and its extension [Burley2015].
 #pragma once
 
 #include <fmt/format.h>

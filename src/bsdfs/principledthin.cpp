@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// principledthin: the thin-surface variant of `principled` (Burley 2015, see principled_terms.h), for leaves, paper,
+// principledthin: the thin-surface variant of `principled` ([Burley2015]), for leaves, paper,
 // curtains and panes modelled as a single sheet. Both sides look alike; light passes without being bent.
 //
 // | name                                 | type           | default | meaning                                          |
