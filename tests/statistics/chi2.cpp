@@ -2,6 +2,7 @@
 #include "statistics/chi2.h"
 
 #include <fmt/format.h>
+#include <gtest/gtest.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -171,15 +172,37 @@ class Cells {
 
 // --- The test ------------------------------------------------------------------------------------------------------
 
+/// Folder of this process' reports; removed at the end when all tests passed (planted bugs are rejected on purpose).
+class ReportFolder {
+ public:
+  ReportFolder() : path_((std::filesystem::temp_directory_path() / "covary-chi2-XXXXXX").string()) {
+    if (!mkdtemp(path_.data())) path_.clear();
+  }
+  ~ReportFolder() {
+    std::error_code ignored;
+    if (!path_.empty() && ::testing::UnitTest::GetInstance()->Passed()) std::filesystem::remove_all(path_, ignored);
+  }
+  /// Path of a new report without extension; empty when there is no folder.
+  std::string next(const std::string& name) {
+    if (path_.empty()) return "";
+    std::string file = fmt::format("{}-{}", ++n_reports_, name.substr(0, 80));
+    for (char& c : file)
+      if (!std::isalnum(static_cast<unsigned char>(c)) && c != '-') c = '_';
+    return path_ + "/" + file;
+  }
+
+ private:
+  std::string path_;
+  int n_reports_ = 0;
+};
+
 /// Writes observed and expected counts and a script that draws them; returns a sentence that names both.
 std::string write_report(const std::string& name, const std::vector<Box>& boxes, const std::vector<double>& observed,
                          const std::vector<double>& expected) {
-  std::string folder = (std::filesystem::temp_directory_path() / "covary-chi2-XXXXXX").string();
-  if (!mkdtemp(folder.data())) return " (no table: cannot create a folder like " + folder + ")";
-  std::string file = name;
-  for (char& c : file)
-    if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
-  const std::string csv = folder + "/" + file + ".csv", script = folder + "/" + file + ".py";
+  static ReportFolder folder;
+  const std::string file = folder.next(name);
+  if (file.empty()) return " (no table: cannot create a folder for temporary files)";
+  const std::string csv = file + ".csv", script = file + ".py";
   std::ofstream table(csv);
   table << "cell,x0,x1,y0,y1,observed,expected\n";
   for (size_t i = 0; i < observed.size(); ++i) {
