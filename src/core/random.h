@@ -48,7 +48,10 @@ class PathRandom {
   /// Key of a path. `pass` numbers the passes of a plan; `pixel` is y * width + x in the full frame, so that crops see
   /// the same numbers; ignored for common random numbers.
   PathRandom(Sampling sampling, uint64_t seed, uint32_t pass, uint64_t pixel, uint64_t sample)
-      : key_(combine64(combine64(combine64(seed, pass), sampling == Sampling::kCrn ? ~uint64_t{0} : pixel), sample)) {}
+      : key_(combine64(combine64(combine64(seed, pass), sampling == Sampling::kCrn ? ~uint64_t{0} : pixel), sample)),
+        sampling_(sampling) {}
+
+  Sampling sampling() const { return sampling_; }
 
   /// One number in [0, 1), a multiple of 2^-24.
   float get_1d(uint32_t vertex, Event event) const { return to_unit(static_cast<uint32_t>(bits(vertex, event) >> 32)); }
@@ -65,6 +68,7 @@ class PathRandom {
     return mix64(key_ + (dimension + 1) * 0x9e3779b97f4a7c15ull);
   }
   uint64_t key_;
+  Sampling sampling_;
 };
 
 }  // namespace covary

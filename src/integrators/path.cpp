@@ -26,6 +26,9 @@ float mis_weight(float a, float b) {
   return 1 / (1 + r * r);
 }
 
+/// First address of the vertices on surfaces that have delta lobes only.
+constexpr uint32_t kDeltaVertices = 1u << 20;
+
 /// What a path that goes on carries.
 struct Path {
   Spectrum throughput{1};
@@ -36,6 +39,7 @@ struct Path {
   bool only_null = true;       // nothing but null surfaces met so far
   bool found = false;          // whether the ray hit a surface
   uint32_t sample = 0;         // which of the batch
+  uint32_t n_smooth = 0;       // vertices so far on surfaces that have more than delta lobes
 };
 
 /// A light sample that counts if nothing lies between.
@@ -82,9 +86,9 @@ class PathIntegrator final : public Integrator {
       if (depth + 1 >= lengths_.max_depth) break;
       end_paths_without_surface(batch);
 
-      const uint32_t vertex = static_cast<uint32_t>(depth) + 1;
-      if (depth + 2 >= lengths_.min_depth && !scene.emitters().empty()) sample_lights(scene, vertex, samples, batch);
-      scatter(scene, vertex, samples, batch, context);
+      const bool connect = depth + 2 >= lengths_.min_depth && !scene.emitters().empty();
+      if (connect) sample_lights(scene, samples, batch);
+      scatter(scene, depth, connect, samples, batch, context);
       trace_connections(scene, samples, batch, context);
     }
   }
@@ -117,12 +121,13 @@ class PathIntegrator final : public Integrator {
   }
 
   /// One light sample for each vertex whose surface can use it.
-  static void sample_lights(const Scene& scene, uint32_t vertex, std::span<const CameraSample> samples, Batch& batch) {
+  static void sample_lights(const Scene& scene, std::span<const CameraSample> samples, Batch& batch) {
     for (size_t i = 0; i < batch.paths.size(); ++i) {
       const SurfaceHit& hit = batch.hits[i];
       batch.lights[i].pdf_solid_angle = 0;
       if (!(hit.bsdf->flags() & kSmooth)) continue;
       const PathRandom& random = samples[batch.paths[i].sample].random;
+      const uint32_t vertex = 1 + batch.paths[i].n_smooth;
       batch.lights[i] = select_light(scene, random.get_1d(vertex, Event::kLightChoice))
                             .sample_towards(hit.p, random.get_2d(vertex, Event::kLightPosition),
                                             random.get_1d(vertex, Event::kLightPrimitive));
@@ -130,15 +135,17 @@ class PathIntegrator final : public Integrator {
   }
 
   /// Evaluates the surfaces: connections to the light samples, and the next rays. Paths that end are removed.
-  void scatter(const Scene& scene, uint32_t vertex, std::span<const CameraSample> samples, Batch& batch,
+  void scatter(const Scene& scene, int depth, bool connect, std::span<const CameraSample> samples, Batch& batch,
                PathContext& context) const {
-    const bool connect = static_cast<int>(vertex) + 1 >= lengths_.min_depth && !scene.emitters().empty();
     size_t n_alive = 0;
     for (size_t i = 0; i < batch.paths.size(); ++i) {
       Path& path = batch.paths[i];
       const SurfaceHit& hit = batch.hits[i];
       const PathRandom& random = samples[path.sample].random;
       const Vec3 wo = hit.frame.to_local(-batch.rays[i].d);
+      // Mirrors and glass have addresses of their own: a path that met one reads, at the surfaces behind it, the same
+      // numbers as its neighbour that did not.
+      const uint32_t vertex = hit.bsdf->flags() & kSmooth ? 1 + path.n_smooth++ : kDeltaVertices + depth;
       context.arena.reset();
       const BsdfClosure* bsdf = hit.bsdf->bind(hit, wo.z > 0, TransportMode::kRadiance, context.arena);
       if (connect && batch.lights[i].pdf_solid_angle > 0)
@@ -150,8 +157,8 @@ class PathIntegrator final : public Integrator {
       path.throughput *= next.weight;
       path.eta *= next.eta;
       if (!(next.flags & kNullTransmission)) path.only_null = false;
-      if (static_cast<int>(vertex) >= lengths_.rr_depth) {
-        const float survival = std::min(max_component(path.throughput) * sqr(path.eta), 0.95f);
+      if (depth + 1 >= lengths_.rr_depth) {
+        const float survival = survival_probability(path, random.sampling());
         if (random.get_1d(vertex, Event::kRoulette) >= survival) continue;
         path.throughput *= 1 / survival;
       }
@@ -174,6 +181,14 @@ class PathIntegrator final : public Integrator {
       if (!batch.blocked[i]) samples[batch.connections[i].sample].radiance += batch.connections[i].radiance;
     batch.connections.clear();
     batch.shadow_rays.clear();
+  }
+
+  /// Roulette after the brightest channel, as if refraction had not scaled radiance. With common random numbers its
+  /// fourth root: few paths with large weights are what neighbouring pixels share least, so longer paths pay off there
+  /// (docs/performance.md, "Roulette").
+  static float survival_probability(const Path& path, Sampling sampling) {
+    const float brightest = max_component(path.throughput) * sqr(path.eta);
+    return std::min(sampling == Sampling::kCrn ? std::sqrt(std::sqrt(brightest)) : brightest, 0.95f);
   }
 
   /// Contribution of what the path's ray met, weighted against light sampling.

@@ -44,6 +44,7 @@ struct ShapeJob {
   Parameters parameters;
   ShapePtr shape;
   bool in_group = false;
+  const AreaLight* light = nullptr;  // of a shape in a group
   bool asked_everything = false;  // else what is left over says nothing about unknown parameters
 };
 
@@ -205,18 +206,15 @@ class Loader {
     if (job.asked_everything) p.report_unknown();
     if (!job.shape) return;
 
-    job.shape->set_bsdf(bsdfs.empty() ? default_bsdf() : bsdfs[0]);
+    job.shape->set_bsdf(bsdfs.empty() ? default_bsdf(!emitters.empty()) : bsdfs[0]);
     if (!emitters.empty()) {
       const auto* area = dynamic_cast<const AreaLight*>(emitters[0].get());
       if (!area) {
         p.error("only an emitter 'area' can be part of a shape");
       } else if (job.in_group) {
-        p.error("an emitter cannot be part of a shapegroup");
+        job.light = area;  // each instance becomes a light of its own, see place_instance
       } else {
-        const std::shared_ptr<AreaLight> light = area->clone();
-        light->attach(job.shape.get());
-        job.shape->set_emitter(light);
-        parts_.emitters.push_back(light);
+        add_light(*area, job.shape);
       }
     }
     if (const auto* mesh = dynamic_cast<const TriangleMesh*>(job.shape.get()); mesh && mesh->n_degenerate() > 0) {
@@ -226,14 +224,24 @@ class Loader {
     }
   }
 
-  BsdfPtr default_bsdf() {
-    if (!default_bsdf_) {
+  void add_light(const AreaLight& prototype, const ShapePtr& shape) {
+    const std::shared_ptr<AreaLight> light = prototype.clone();
+    light->attach(shape.get());
+    shape->set_emitter(light);
+    parts_.emitters.push_back(light);
+  }
+
+  /// What a shape without a BSDF gets, as in Mitsuba: diffuse of reflectance 0.5, or black if it emits light.
+  BsdfPtr default_bsdf(bool emits) {
+    DefaultBsdf& made = default_bsdfs_[emits];
+    if (!made.bsdf) {
       auto description = std::make_shared<ObjectDescription>();
       description->kind = "bsdf", description->type = "diffuse", description->where = xml_.scene->where;
-      default_description_ = description;
-      default_bsdf_ = std::dynamic_pointer_cast<const Bsdf>(factory_.make(default_description_));
+      if (emits) description->properties.push_back({"reflectance", 0.0, xml_.scene->where});
+      made.description = description;
+      made.bsdf = std::dynamic_pointer_cast<const Bsdf>(factory_.make(made.description));
     }
-    return default_bsdf_;
+    return made.bsdf;
   }
 
   /// The shapegroup of a description; each is made once.
@@ -250,9 +258,12 @@ class Loader {
         continue;
       }
       finish_shape(*job->second);
-      if (job->second->shape) shapes->shapes.push_back(job->second->shape);
+      if (!job->second->shape) continue;
+      if (job->second->light) group_lights_[shapes.get()].push_back({job->second->shape, job->second->light});
+      else shapes->shapes.push_back(job->second->shape);
     }
-    if (shapes->shapes.empty()) diagnostics_.error(object->where, "shape 'shapegroup': holds no shape");
+    if (shapes->shapes.empty() && group_lights_[shapes.get()].empty())
+      diagnostics_.error(object->where, "shape 'shapegroup': holds no shape");
     made_.add(object.get(), shapes);
     return shapes;
   }
@@ -280,8 +291,15 @@ class Loader {
       p.error(fmt::format("refers to {} shapegroups; expected one", groups.size()));
       return;
     }
+    // Shapes that emit are copied to their place, so that each copy is a light with its own area and position.
+    for (const GroupLight& member : group_lights_[groups[0].get()]) {
+      const ShapePtr placed = member.shape->transformed(instance.to_world);
+      placed->set_bsdf(member.shape->shared_bsdf());
+      add_light(*member.light, placed);
+      parts_.shapes.push_back(placed);
+    }
     instance.group = groups[0];
-    parts_.instances.push_back(std::move(instance));
+    if (!instance.group->shapes.empty()) parts_.instances.push_back(std::move(instance));
   }
 
   void place_emitter(const ObjectPtr& object) {
@@ -364,9 +382,18 @@ class Loader {
   std::unordered_map<const ObjectDescription*, ShapeJob*> jobs_by_description_;
   std::unordered_set<const ObjectDescription*> placed_;
   SceneParts parts_;
-  ObjectPtr sensor_, integrator_, environment_, default_description_;
+  struct GroupLight {
+    ShapePtr shape;
+    const AreaLight* light;
+  };
+  std::map<const ShapeGroup*, std::vector<GroupLight>> group_lights_;
+  struct DefaultBsdf {
+    ObjectPtr description;
+    BsdfPtr bsdf;
+  };
+  DefaultBsdf default_bsdfs_[2];  // of shapes that do not emit, and that do
+  ObjectPtr sensor_, integrator_, environment_;
   std::shared_ptr<const SensorSettings> sensor_made_;
-  BsdfPtr default_bsdf_;
   size_t n_degenerate_ = 0, n_degenerate_meshes_ = 0;
   SourceLocation first_degenerate_;
 };

@@ -336,12 +336,11 @@ TEST_F(LoadScene, ReportsWrongInstances) {
 <shape type="instance"/>
 <shape type="instance"><shape type="cube"/></shape>
 <shape type="shapegroup"/>
-<shape type="shapegroup"><bsdf type="diffuse"/><shape type="cube"><emitter type="area"/></shape></shape>)"),
+<shape type="shapegroup"><bsdf type="diffuse"/><shape type="cube"/></shape>)"),
             "scene.xml:6:1: shape 'instance': refers to 0 shapegroups; expected one\n"
             "scene.xml:7:1: shape 'instance': must refer to a shapegroup\n"
             "scene.xml:8:1: shape 'shapegroup': holds no shape\n"
-            "scene.xml:9:26: a shapegroup can hold shapes only\n"
-            "scene.xml:9:48: shape 'cube': an emitter cannot be part of a shapegroup");
+            "scene.xml:9:26: a shapegroup can hold shapes only");
 }
 
 // ---- files ----

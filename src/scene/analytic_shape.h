@@ -23,6 +23,7 @@ class Sphere final : public AnalyticShape {
   void fill(const Ray& ray, SurfaceHit& hit, bool with_derivatives) const override;
   float area() const override { return 4 * kPi * radius_ * radius_; }
   AreaSample sample_area(Vec2 u, float u_primitive) const override;
+  std::shared_ptr<Shape> transformed(const Transform& to_world) const override;
   /// From outside: uniform in the cone the sphere subtends.
   EmitterSample sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const override;
   float pdf_solid_angle(const Vec3& reference, const SurfaceHit& hit) const override;
@@ -43,23 +44,28 @@ class Disk final : public AnalyticShape {
   void fill(const Ray& ray, SurfaceHit& hit, bool with_derivatives) const override;
   float area() const override { return area_; }
   AreaSample sample_area(Vec2 u, float u_primitive) const override;
+  std::shared_ptr<Shape> transformed(const Transform& to_world) const override;
 
  private:
   Transform to_world_, to_local_;
   Vec3 normal_;
   float area_;
+  bool flipped_;
 };
 
 /// Lateral surface of a cylinder from p0 to p1, open at both ends, under `to_world`; normals point outwards unless
 /// flipped. (u, v) = (phi / 2 pi, position along the axis in [0, 1]). Non-uniform scale is an Error(kInput).
 class Cylinder final : public AnalyticShape {
  public:
+  /// The unit cylinder x^2 + y^2 = 1, z in [0, 1], under `to_world`.
+  Cylinder(const Transform& to_world, bool flip_normals);
   Cylinder(const Transform& to_world, const Vec3& p0, const Vec3& p1, float radius, bool flip_normals);
   float intersect(const Ray& ray) const override;
   Bounds3 bounds() const override;
   void fill(const Ray& ray, SurfaceHit& hit, bool with_derivatives) const override;
   float area() const override { return area_; }
   AreaSample sample_area(Vec2 u, float u_primitive) const override;
+  std::shared_ptr<Shape> transformed(const Transform& to_world) const override;
 
  private:
   Transform to_world_, to_local_;  // of the unit cylinder x^2 + y^2 = 1, z in [0, 1]

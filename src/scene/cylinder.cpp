@@ -20,7 +20,10 @@ Transform unit_cylinder_to_world(const Transform& to_world, const Vec3& p0, cons
 }  // namespace
 
 Cylinder::Cylinder(const Transform& to_world, const Vec3& p0, const Vec3& p1, float radius, bool flip_normals)
-    : to_world_(unit_cylinder_to_world(to_world, p0, p1, radius)),
+    : Cylinder(unit_cylinder_to_world(to_world, p0, p1, radius), flip_normals) {}
+
+Cylinder::Cylinder(const Transform& to_world, bool flip_normals)
+    : to_world_(to_world),
       to_local_(to_world_.inverse()),
       sign_(flip_normals ? -1.0f : 1.0f) {
   const Vec3 x = to_world_.vector({1, 0, 0}), y = to_world_.vector({0, 1, 0}), z = to_world_.vector({0, 0, 1});
@@ -64,6 +67,10 @@ void Cylinder::fill(const Ray& ray, SurfaceHit& hit, bool with_derivatives) cons
   hit.dp_du = to_world_.vector(Vec3{-local.y, local.x, 0} * kTwoPi);
   hit.dp_dv = to_world_.vector({0, 0, 1});
   hit.frame = Frame::from_tangent(hit.ng, hit.dp_du);
+}
+
+std::shared_ptr<Shape> Cylinder::transformed(const Transform& to_world) const {
+  return std::make_shared<Cylinder>(to_world * to_world_, sign_ < 0);
 }
 
 AreaSample Cylinder::sample_area(Vec2 u, float /*u_primitive*/) const {

@@ -8,7 +8,8 @@ Disk::Disk(const Transform& to_world, bool flip_normals)
     : to_world_(to_world),
       to_local_(to_world.inverse()),
       normal_(normalize(to_world.normal({0, 0, flip_normals ? -1.0f : 1.0f}))),
-      area_(kPi * length(cross(to_world.vector({1, 0, 0}), to_world.vector({0, 1, 0})))) {}
+      area_(kPi * length(cross(to_world.vector({1, 0, 0}), to_world.vector({0, 1, 0})))),
+      flipped_(flip_normals) {}
 
 Bounds3 Disk::bounds() const { return to_world_.bounds({{-1, -1, 0}, {1, 1, 0}}); }
 
@@ -35,6 +36,10 @@ void Disk::fill(const Ray& ray, SurfaceHit& hit, bool with_derivatives) const {
   hit.dp_du = to_world_.vector({c, s, 0});
   hit.dp_dv = to_world_.vector(Vec3{-s, c, 0} * (kTwoPi * r));
   hit.frame = Frame::from_tangent(normal_, hit.dp_du);
+}
+
+std::shared_ptr<Shape> Disk::transformed(const Transform& to_world) const {
+  return std::make_shared<Disk>(to_world * to_world_, flipped_);
 }
 
 AreaSample Disk::sample_area(Vec2 u, float /*u_primitive*/) const {

@@ -151,6 +151,20 @@ EmitterSample TriangleMesh::sample_towards(const Vec3& reference, Vec2 u, float 
   return towards(reference, TriangleMesh::sample_area(u, u_primitive));
 }
 
+std::shared_ptr<Shape> TriangleMesh::transformed(const Transform& to_world) const {
+  MeshData data;
+  data.triangles = triangles_;
+  data.colours = colours_;
+  for (const Vertex& vertex : vertices_) {
+    data.positions.push_back(to_world.point(vertex.p));
+    if (has_normals_) data.normals.push_back(normalize(to_world.normal(vertex.n)));
+    if (has_uvs_) data.uvs.push_back(vertex.uv);
+  }
+  if (to_world.flips_handedness())  // keeps the side of the geometric normal
+    for (auto& t : data.triangles) std::swap(t[1], t[2]);
+  return std::make_shared<TriangleMesh>(std::move(data));
+}
+
 Spectrum TriangleMesh::vertex_colour(const SurfaceHit& hit) const {
   if (colours_.empty()) return Spectrum(1);
   const auto& t = triangles_[hit.primitive];

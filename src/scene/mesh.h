@@ -33,6 +33,7 @@ class TriangleMesh final : public Shape {
   EmitterSample sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const override;
   /// Only for two triangles that make a parallelogram whose (u, v) cover the unit square, such as `rectangle`.
   AreaSample sample_uv(Vec2 uv) const override;
+  std::shared_ptr<Shape> transformed(const Transform& to_world) const override;
   Spectrum vertex_colour(const SurfaceHit& hit) const override;
   bool has_vertex_colour() const override { return !colours_.empty(); }
   /// Makes sample_area() and area() ready; called by the scene for meshes that emit. Not needed otherwise.

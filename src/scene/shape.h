@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "core/ray.h"
+#include "core/transform.h"
 #include "scene/bsdf.h"
 #include "scene/emitter.h"
 #include "scene/object.h"
@@ -56,6 +57,10 @@ class Shape : public SceneObject {
   /// Cosines below this count as zero.
   static constexpr float kGrazing = 1e-12f;
 
+  /// A copy moved by `to_world`, without BSDF and emitter. Throws Error(kInput) when the shape cannot be moved so.
+  virtual std::shared_ptr<Shape> transformed(const Transform& to_world) const = 0;
+
+  const BsdfPtr& shared_bsdf() const { return bsdf_; }
   const Bsdf* bsdf() const { return bsdf_.get(); }
   const Emitter* emitter() const { return emitter_.get(); }
   void set_bsdf(BsdfPtr bsdf) {

@@ -71,6 +71,10 @@ void Sphere::fill(const Ray& ray, SurfaceHit& hit, bool with_derivatives) const 
   hit.frame = Frame::from_tangent(hit.ng, hit.dp_du);
 }
 
+std::shared_ptr<Shape> Sphere::transformed(const Transform& to_world) const {
+  return std::make_shared<Sphere>(to_world * to_world_, Vec3{}, 1.0f, sign_ < 0);
+}
+
 AreaSample Sphere::sample_area(Vec2 u, float /*u_primitive*/) const {
   const Vec3 d = warp::square_to_sphere(u);
   return {center_ + d * radius_, d * sign_, spherical_uv(to_local_.vector(d) * radius_), 1 / area()};

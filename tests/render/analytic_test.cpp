@@ -115,6 +115,20 @@ TEST(DirectLight, DiskLight) {
   expect_image_mean(scene, 16, 0.6 * 3 * 4.0 / (4 + 25), 0.02);
 }
 
+TEST(DirectLight, EachInstanceOfALightShines) {
+  // Two placed copies of a sphere light that emits: the one of SphereLight, and one twice as large at the same direction
+  // and twice the distance, hidden behind nothing: each gives pi L (r/d)^2 cos.
+  const std::string group = "<shape type='shapegroup' id='lamp'><shape type='sphere'><emitter type='area'><rgb "
+                            "name='radiance' value='7'/></emitter></shape></shape>";
+  const std::string place = "<shape type='instance'><ref id='lamp'/><transform name='to_world'>%</transform></shape>";
+  std::string instances;
+  for (const char* transform : {"<translate x='3'/>", "<scale value='2'/><translate x='-6' z='-4'/>"})
+    instances += std::string(place).replace(place.find('%'), 1, transform);
+  const TestScene scene = load_text(scene_text(kPlane + group + instances, 16, 16, 2, kNarrow));
+  EXPECT_EQ(scene.scene().emitters().size(), 2u);
+  expect_image_mean(scene, 32, 2 * 0.6 * 7 * (1.0 / 25) * 0.8, 0.02);
+}
+
 TEST(DirectLight, ConstantEnvironment) {
   const TestScene scene = load_text(scene_text(
       std::string(kPlane) + "<emitter type='constant'><rgb name='radiance' value='0.25'/></emitter>", 16, 16, 2, kNarrow));
