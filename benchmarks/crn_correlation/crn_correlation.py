@@ -5,11 +5,13 @@
 
 Renders a 240 x 160 crop of each scene's own frame with 12 groups of 8 samples, with `--sampling crn` and
 `--sampling independent`, and prints the average correlation over groups of horizontally neighbouring pixels (see
-correlation.py). Runs in the Python environment of ../against_mitsuba/setup (Mitsuba reads the EXR files).
+correlation.py), mean and standard deviation over seeds: all pixels share one set of common random numbers, so that one
+seed says little. Runs in the Python environment of ../against_mitsuba/setup (Mitsuba reads the EXR files).
 """
 import argparse
 import json
 import pathlib
+import statistics
 import sys
 import tempfile
 
@@ -41,7 +43,7 @@ def main(arguments):
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"among {', '.join(CROPS)}; all when absent")
     parser.add_argument("--scenes", required=True, metavar="DIR", help="folder with one sub-folder per scene")
     parser.add_argument("--covary", default="build/release/covary", metavar="PROGRAM")
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--seeds", type=int, default=5, help="renders of each kind, at least 2")
     parser.add_argument("--json", metavar="FILE", help="also write the figures there")
     options = parser.parse_args(arguments)
     unknown = [name for name in options.names if name not in CROPS]
@@ -49,17 +51,22 @@ def main(arguments):
         parser.error(f"no crop for {', '.join(unknown)}; there is one for {', '.join(CROPS)}")
     scenes = scene_files.find(options.scenes, options.names or list(CROPS))
     print(f"{WIDTH} x {HEIGHT} pixels, {GROUPS} groups of {SAMPLES_PER_GROUP} samples\n")
-    print("| scene | crop at | CRN | independent | ± if independent | constant pairs |\n|---|---|---|---|---|---|")
+    print(f"{options.seeds} seeds: mean (standard deviation)\n")
+    print("| scene | crop at | CRN | independent | ± if independent |\n|---|---|---|---|---|")
     figures = {}
     for name, scene in scenes.items():
+        values = {"crn": [], "independent": []}
         with tempfile.TemporaryDirectory() as folder:
-            crn, independent = (measure(options.covary, scene, CROPS[name], sampling, options.seed, folder)
-                                for sampling in ("crn", "independent"))
+            for seed in range(options.seeds):
+                for sampling, found in values.items():
+                    result = measure(options.covary, scene, CROPS[name], sampling, seed, folder)
+                    found.append(result.mean)
+        null_error = result.null_error / options.seeds ** 0.5
+        texts = {sampling: f"{statistics.mean(found):+.4f} ({statistics.stdev(found):.4f})"
+                 for sampling, found in values.items()}
         x, y = CROPS[name]
-        print(f"| {name} | {x},{y} | {crn.mean:.3f} | {independent.mean:+.4f} | {independent.null_error:.4f} | "
-              f"{crn.constant_pairs} |", flush=True)
-        figures[name] = {"crop": [x, y, WIDTH, HEIGHT], "crn": crn.mean, "independent": independent.mean,
-                         "null_error": independent.null_error, "constant_pairs": crn.constant_pairs}
+        print(f"| {name} | {x},{y} | {texts['crn']} | {texts['independent']} | {null_error:.4f} |", flush=True)
+        figures[name] = {"crop": [x, y, WIDTH, HEIGHT], **values, "null_error": null_error}
     if options.json:
         pathlib.Path(options.json).write_text(json.dumps(figures, indent=1) + "\n")
 
