@@ -89,20 +89,25 @@ std::string filter_text(const FilterSettings& filter) {
 
 // ---- the scene -----------------------------------------------------------------------------------------------------
 
+const IntegratorPlugin* find_integrator(const std::string& name) {
+  for (const IntegratorPlugin& plugin : integrator_plugins())
+    if (name == plugin.name) return &plugin;
+  return nullptr;
+}
+
+std::string unknown_integrator(const std::string& name) {
+  std::vector<std::string> names;
+  for (const IntegratorPlugin& plugin : integrator_plugins()) names.push_back(plugin.name);
+  return fmt::format("unknown integrator '{}'{}; supported: {}", name, did_you_mean(name, names), fmt::join(names, ", "));
+}
+
 std::shared_ptr<Integrator> make_integrator(Parameters& parameters, const RenderOptions& options) {
   PathLengthSettings lengths = PathLengthSettings::from(parameters);
   if (options.min_depth) lengths.min_depth = *options.min_depth;
   if (options.max_depth) lengths.max_depth = *options.max_depth < 0 ? PathLengthSettings::kUnlimited : *options.max_depth;
-  const std::string name = options.integrator.empty() ? parameters.type() : options.integrator;
-  std::vector<std::string> names;
-  for (const IntegratorPlugin& plugin : integrator_plugins()) {
-    if (name == plugin.name) return plugin.make(parameters, lengths);
-    names.push_back(plugin.name);
-  }
-  const std::string message = fmt::format("unknown integrator '{}'{} Supported: {}", name, did_you_mean(name, names),
-                                          fmt::join(names, ", "));
-  if (!options.integrator.empty()) throw Error(ErrorCode::kUsage, "--integrator: " + message);
-  parameters.error(message);
+  const IntegratorPlugin* plugin = find_integrator(options.integrator.empty() ? parameters.type() : options.integrator);
+  if (plugin) return plugin->make(parameters, lengths);
+  parameters.error(unknown_integrator(parameters.type()));
   return nullptr;
 }
 
@@ -255,6 +260,8 @@ void replay(const RenderOptions& options, const LoadedScene& scene, const Integr
 void render(const RenderOptions& options) {
   if (options.replay.empty() && options.output.empty())
     throw Error(ErrorCode::kUsage, "no output given; use -o OUT.exr (or --replay X,Y,SAMPLE)");
+  if (!options.integrator.empty() && !find_integrator(options.integrator))
+    throw Error(ErrorCode::kUsage, "--integrator: " + unknown_integrator(options.integrator));
   if (!options.output.empty()) check_output_writable(options.output);
   const int threads = options.threads > 0 ? options.threads : static_cast<int>(std::thread::hardware_concurrency());
   const tbb::global_control control(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(threads));

@@ -155,6 +155,11 @@ class Loader {
         place(*pointer);
       }
     }
+    if (!integrator_) {  // as Mitsuba
+      auto description = std::make_shared<ObjectDescription>();
+      description->kind = "integrator", description->type = "path", description->where = xml_.scene->where;
+      place_integrator(description);
+    }
     for (const auto& job : jobs_) diagnostics_.append(job->diagnostics);
     if (n_degenerate_ > 0)
       diagnostics_.warn({}, fmt::format("{} triangles of zero area in {} meshes were left out, the first in {}",

@@ -71,7 +71,7 @@ TEST_F(LoadScene, HasMitsubasDefaults) {
   EXPECT_EQ(s.filter.kind, FilterKind::kGaussian);
   EXPECT_EQ(s.filter.stddev, 0.5f);
   EXPECT_EQ(s.filter.radius, 2.0f);
-  EXPECT_EQ(s.integrator_type, "");
+  EXPECT_EQ(s.integrator_type, "path");
   const CameraSettings& camera = s.scene->camera().settings();
   // A lens of 50 mm before 36 x 24 mm: 2 atan(43.267 / 100) over the diagonal.
   EXPECT_NEAR(camera.fov_degrees, 46.793f, 1e-3f);
