@@ -90,7 +90,7 @@ std::vector<T> read_vectors(Inflater& in, size_t n, bool double_precision) {
   static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % sizeof(float) == 0);
   const std::vector<float> numbers = read_floats(in, n * (sizeof(T) / sizeof(float)), double_precision);
   std::vector<T> result(n);
-  std::memcpy(static_cast<void*>(result.data()), numbers.data(), n * sizeof(T));
+  if (n > 0) std::memcpy(static_cast<void*>(result.data()), numbers.data(), n * sizeof(T));
   return result;
 }
 
