@@ -26,18 +26,20 @@ constexpr int kTileWidth = 64, kTileHeight = 32;
 
 /// Offsets in the record of a pixel.
 struct RecordLayout {
-  explicit RecordLayout(int groups)
-      : contrasts(3 * (groups - 1)),
+  RecordLayout(int groups, bool condition)
+      : group_contrasts(3 * (groups - 1)),
+        contrasts(group_contrasts + (condition ? 3 : 0)),
         difference(contrasts),
         error(contrasts + 3),
         group_variance(contrasts + 6),
         h_variance(contrasts + 9),
         size(contrasts + 12) {}
-  int contrasts;       ///< number of contrasts, all channels: [contrast][rgb], at 0
-  int difference;      ///< g - h
-  int error;           ///< error variance of h for the penalty, times T
-  int group_variance;  ///< sample variance of the CRN groups
-  int h_variance;      ///< variance of h for the error estimate
+  int group_contrasts;  ///< number of contrasts of the groups, all channels: [contrast][rgb], at 0
+  int contrasts;        ///< the same with the row of the condition, which acts like one more contrast
+  int difference;       ///< g - h
+  int error;            ///< error variance of h for the penalty, times T, with its lower limit
+  int group_variance;   ///< sample variance of the CRN groups
+  int h_variance;       ///< variance of h for the error estimate
   int size;
 };
 
@@ -67,7 +69,7 @@ class Regression {
         valid_(valid),
         result_(result),
         T_(input.crn.groups),
-        layout_(T_),
+        layout_(T_, settings.conservation > 0),
         search_(settings.k, settings.window, settings.include_target),
         radius_(settings.window / 2) {}
 
@@ -103,6 +105,7 @@ class Regression {
   }
 
   void make_records(const Tile& tile, Workspace& w) const {
+    const float condition = std::sqrt(s_.conservation * static_cast<float>(T_ - 1));
     std::vector<float> weights(T_);
     for (int j = 1; j < T_; ++j) weights[j] = 1.0f / std::sqrt(static_cast<float>(j) * static_cast<float>(j + 1));
     for (int y = tile.y0 - radius_; y < tile.y1 + radius_; ++y)
@@ -125,10 +128,17 @@ class Regression {
             squares[c] += contrast * contrast;
             record[3 * (j - 1) + c] = contrast;
           }
+        // [ours] The condition sum beta g = f as a row of X and y: adds conservation * g_i g_j to X^T X / (T - 1).
+        if (layout_.contrasts > layout_.group_contrasts)
+          for (int c = 0; c < 3; ++c)
+            record[layout_.group_contrasts + c] = condition * in_.crn_moments->mean.row(c, y)[x];
         for (int c = 0; c < 3; ++c) {
-          record[layout_.difference + c] = in_.crn_moments->mean.row(c, y)[x] - in_.h->row(c, y)[x];
-          record[layout_.error + c] = in_.error_of_h ? static_cast<float>(T_) * in_.error_of_h->row(c, y)[x] : 0.0f;
-          record[layout_.group_variance + c] = squares[c] / static_cast<float>(T_ - 1);
+          const float g = in_.crn_moments->mean.row(c, y)[x], group_variance = squares[c] / static_cast<float>(T_ - 1);
+          const float smallest = s_.conservation > 0 ? kSmallestRelativePenalty * g * g : 0.0f;
+          const float error = in_.error_of_h ? static_cast<float>(T_) * in_.error_of_h->row(c, y)[x] : 0.0f;
+          record[layout_.difference + c] = g - in_.h->row(c, y)[x];
+          record[layout_.error + c] = std::max({error, kSmallestPenalty * group_variance, smallest});
+          record[layout_.group_variance + c] = std::max(group_variance, smallest);
           record[layout_.h_variance + c] = in_.variance_of_h ? in_.variance_of_h->row(c, y)[x] : 0.0f;
         }
       }
@@ -201,8 +211,7 @@ class Regression {
       const vfloat* tail = w.tail.data() + i * n_tail;
       const vfloat error = sum(tail, layout_.error);
       const vfloat penalty = s_.symmetric ? 0.5f * (own + error) : error;
-      const vfloat smallest = kSmallestPenalty * sum(tail, layout_.group_variance) + 1e-30f;
-      w.scale[i] = 1.0f / lanes::sqrt(max(penalty, smallest));
+      w.scale[i] = 1.0f / lanes::sqrt(penalty + 1e-30f);
     }
   }
 
@@ -261,7 +270,7 @@ class Regression {
 
     // [YM2025] Eq. (8) with the estimated quantities: variance of the group residuals, and of the h.
     vfloat squares = {};
-    for (int r = c; r < layout_.contrasts; r += 3) {
+    for (int r = c; r < layout_.group_contrasts; r += 3) {
       vfloat residual = w.y[r];
       for (int i = 0; i < k; ++i) residual -= w.gamma[i] * w.x[static_cast<size_t>(i) * layout_.contrasts + r];
       squares += residual * residual;

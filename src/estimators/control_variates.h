@@ -14,6 +14,8 @@ namespace covary {
 /// Smallest V_h,i relative to the variance of the CRN groups at i. It bounds the condition number, so that single
 /// precision suffices; PT and CRN estimate the same integrals, so that the true ratio is about one.
 inline constexpr float kSmallestPenalty = 1e-4f;
+/// Smallest V_h,i relative to g_i^2, for the same reason, where there is a condition on sum_i beta_i g_i.
+inline constexpr float kSmallestRelativePenalty = 1e-6f;
 /// Ridge that stands for zero (minimum norm), relative to the mean diagonal.
 inline constexpr float kNegligibleRidge = 1e-6f;
 
@@ -25,6 +27,9 @@ struct ControlVariateSettings {
   bool shared = true;
   /// V_h,i = (error of the target + error of neighbour i) / 2 instead of the error of neighbour i.
   bool symmetric = true;
+  /// Weight of the condition sum_i beta_i g_i = f (in each channel), relative to g_i g_j in V_g; 0: none. Errors of the CRN
+  /// image that all pixels have in proportion to their brightness then cancel. Not in the paper.
+  float conservation = 0;
   /// Where positive: V_h = ridge * (mean diagonal of X^T X / (T - 1)) * I instead of `error_of_h`.
   float ridge = 0;
   /// Also estimate the standard error of F^ by Eq. (8).

@@ -146,6 +146,7 @@ void GroupedFile::add_file(const std::string& path, const std::string& layer, bo
   };
   agree("sampling", sampling_);
   agree("scene_hash", scene_hash_);
+  agree("settings", settings_);
 }
 
 void GroupedFile::read_rows(int first_row, int n_rows, std::vector<float>& data) const {

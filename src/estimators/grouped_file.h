@@ -28,8 +28,9 @@ class GroupedFile {
   int64_t samples() const { return samples_; }
   /// Attribute of covary's films: "crn", "independent"; "" for other files.
   const std::string& sampling() const { return sampling_; }
-  /// Attribute of covary's films, "" for other files.
+  /// Attributes of covary's films, "" for other files.
   const std::string& scene_hash() const { return scene_hash_; }
+  const std::string& settings() const { return settings_; }
   /// Whether a channel has 16 bits only.
   bool has_half() const { return has_half_; }
   /// For messages.
@@ -49,7 +50,7 @@ class GroupedFile {
   std::vector<Group> groups_;
   ImagePlace place_;
   int64_t samples_ = 0;
-  std::string sampling_, scene_hash_, name_;
+  std::string sampling_, scene_hash_, settings_, name_;
   bool has_half_ = false;
 };
 

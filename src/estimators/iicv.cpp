@@ -8,7 +8,13 @@
 
 namespace covary {
 
-IicvOptions IicvOptions::paper() { return IicvOptions{}; }
+IicvOptions IicvOptions::paper() {
+  IicvOptions options;
+  options.sample_share = 0;
+  options.conservation = 0;
+  options.feedback = false;
+  return options;
+}
 
 std::vector<std::string> IicvOptions::validate() const {
   std::vector<std::string> problems;
@@ -23,20 +29,45 @@ std::vector<std::string> IicvOptions::validate() const {
     problems.push_back(fmt::format("k is {}, expected 1 to {}, the number of {}pixels in a window of {} x {}", k,
                                    candidates, include_target ? "" : "neighbouring ", window, window));
   if (!(ridge > 0)) problems.push_back(fmt::format("ridge is {}, expected a positive number", ridge));
+  if (!(sample_share >= 0 && sample_share <= 1))
+    problems.push_back(fmt::format("sample_share is {}, expected a number from 0 to 1", sample_share));
+  if (!(conservation >= 0))
+    problems.push_back(fmt::format("conservation is {}, expected zero or a positive number", conservation));
+  if (feedback_options.window < 5 || feedback_options.window > 125 || feedback_options.window % 2 == 0)
+    problems.push_back(
+        fmt::format("feedback window is {}, expected an odd number from 5 to 125", feedback_options.window));
+  if (!(feedback_options.bandwidth > 0))
+    problems.push_back(fmt::format("feedback bandwidth is {}, expected a positive number", feedback_options.bandwidth));
   return problems;
 }
 
+namespace {
+
+/// (1 - share) * error + share * variance, for all pixels.
+void mix(Planes& error, const Planes& variance, float share) {
+  if (share == 0) return;
+  for (int c = 0; c < 3; ++c)
+    for (int y = 0; y < error.height(); ++y) {
+      float* e = error.row(c, y);
+      const float* v = variance.row(c, y);
+      for (int x = 0; x < error.width(); ++x) e[x] = (1 - share) * e[x] + share * v[x];
+    }
+}
+
+}  // namespace
+
 EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& pt, const IicvOptions& options) {
   std::vector<std::string> problems = options.validate();
-  const bool needs_groups =
-      options.penalty == Penalty::kSample || options.penalty == Penalty::kCrossFit || options.std_error;
-  check_inputs(crn, pt, 3, needs_groups ? 2 : 1, problems);
+  const bool needs_variance = options.penalty == Penalty::kSample || options.std_error || options.feedback ||
+                              (options.sample_share > 0 && options.penalty != Penalty::kHomogeneous);
+  const bool halves = options.penalty == Penalty::kCrossFit;
+  check_inputs(crn, pt, 3, halves ? (needs_variance ? 4 : 2) : (needs_variance ? 2 : 1), problems);
   throw_if_any("iicv", problems);
 
   EstimatorResult result;
   const std::vector<unsigned char> valid = finite_pixels(crn, pt, result.nonfinite_pixels);
   const int border = std::max(options.window, options.pilot_window) / 2;
-  const Moments g = moments(crn, valid, border, kFar);
+  const Moments g = moments(crn, valid, border, kFar), h = moments(pt, valid, border, 0.0f);
 
   ControlVariateSettings settings;
   settings.k = options.k;
@@ -44,16 +75,18 @@ EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& pt, const Iicv
   settings.include_target = options.include_target;
   settings.shared = options.shared_coefficients;
   settings.symmetric = options.symmetric;
-  settings.std_error = options.std_error;
+  settings.conservation = options.conservation;
+  settings.std_error = options.std_error || options.feedback;
   ControlVariateInput input{crn, &g};
 
-  if (options.penalty == Penalty::kCrossFit) {
+  if (halves) {
     // Halves: even and odd groups. Each half's pilot judges the other half's values, so that the penalty is independent of
     // the value it belongs to.
     const Moments half[2] = {moments(pt, valid, border, 0.0f, 0, 2), moments(pt, valid, border, 0.0f, 1, 2)};
     EstimatorResult part[2];
     for (int i : {0, 1}) {
-      const Planes error = pilot_error(g, half[1 - i].mean, options.pilot_window, false, border);
+      Planes error = pilot_error(g, half[1 - i].mean, options.pilot_window, false, border);
+      mix(error, half[1 - i].variance_of_mean, options.sample_share);
       input.h = &half[i].mean;
       input.error_of_h = &error;
       input.variance_of_h = &half[i].variance_of_mean;
@@ -67,8 +100,7 @@ EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& pt, const Iicv
     for (size_t i = 0; i < result.std_error.data.size(); ++i)
       result.std_error.data[i] = 0.5f * (result.std_error.data[i] + part[1].std_error.data[i]);
   } else {
-    const Moments h = moments(pt, valid, border, 0.0f);
-    Planes pilot;
+    Planes error;
     input.h = &h.mean;
     input.variance_of_h = &h.variance_of_mean;
     switch (options.penalty) {
@@ -79,13 +111,24 @@ EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& pt, const Iicv
         settings.ridge = options.ridge;
         break;
       default:
-        pilot = pilot_error(g, h.mean, options.pilot_window, options.penalty == Penalty::kSmoothed, border);
-        input.error_of_h = &pilot;
+        error = pilot_error(g, h.mean, options.pilot_window, options.penalty == Penalty::kSmoothed, border);
+        mix(error, h.variance_of_mean, options.sample_share);
+        input.error_of_h = &error;
     }
     apply_control_variates(input, settings, valid, result);
   }
+  if (options.feedback) {
+    add_feedback(h.mean, options.feedback_options, valid, result.std_error, result.estimate);
+    if (!options.std_error) result.std_error = Image();
+  }
   fill_invalid(crn, pt, valid, result.estimate);
   return result;
+}
+
+int iicv_reach(const IicvOptions& options) {
+  const int pilot = options.pilot_window / 2 * (options.penalty == Penalty::kSmoothed ? 2 : 1);
+  const int feedback = options.feedback ? options.feedback_options.window / 2 + 1 : 0;
+  return options.window / 2 + pilot + feedback;
 }
 
 }  // namespace covary

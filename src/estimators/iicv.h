@@ -5,10 +5,15 @@
 // (independent numbers). Neighbouring pixels of the CRN image are control variates of a pixel; their unknown expectations
 // are taken from the PT image, and the coefficients allow for its errors.
 //
+// The defaults go beyond the paper in three places, each an option: errors common to all CRN pixels cancel
+// (`conservation`), the penalty contains the expected beside the realised error of PT pixels (`sample_share`), and what the
+// penalty takes away is given back (`feedback`). IicvOptions::paper() has none of them.
+//
 // Claim: consistent, not unbiased; coefficients and penalties are estimated from the samples they are applied to. Pixels
 // of the PT image must be independent of each other (box filter), values linear.
 #pragma once
 
+#include "estimators/feedback.h"
 #include "estimators/grouped_image.h"
 
 namespace covary {
@@ -40,7 +45,19 @@ struct IicvOptions {
   int pilot_window = 11;
   /// Factor of Penalty::kHomogeneous, > 0. Default 1: both images are estimates of the same integrals.
   float ridge = 1.0f;
-  /// Also estimate the standard error of the result, [YM2025] Eq. (8).
+  /// Part of the penalty that is the sample variance of h instead of what `penalty` says, 0 … 1. The realised error of a
+  /// pilot tells outliers but depends on the value it judges; the sample variance is right on average. Not used by
+  /// kHomogeneous. Default 0.5 (measured); the paper has 0.
+  float sample_share = 0.5f;
+  /// Weight of the condition that the coefficients reproduce the CRN mean, sum_i beta_i g_i = f, relative to products of
+  /// means; >= 0. Errors of the CRN image in proportion to brightness, common to all pixels, cancel. Default 10 (measured;
+  /// 3 to 30 are alike); the paper has 0.
+  float conservation = 10.0f;
+  /// Residual feedback (feedback.h). Default on; the paper has none.
+  bool feedback = true;
+  FeedbackOptions feedback_options;
+  /// Also estimate the standard error of the result, [YM2025] Eq. (8). It is the error before the feedback, which changes
+  /// it little.
   bool std_error = false;
 
   /// The published estimator with its published settings.
@@ -49,8 +66,13 @@ struct IicvOptions {
   std::vector<std::string> validate() const;
 };
 
-/// Throws Error(kUsage) that lists every problem of options and inputs. `crn` needs at least 3 groups, `pt` 2 for
-/// Penalty::kSample, kCrossFit and std_error, otherwise 1. Bit-identical for any number of threads.
+/// Throws Error(kUsage) that lists every problem of options and inputs. `crn` needs at least 3 groups, `pt` 2 (4 for
+/// kCrossFit) where its sample variance is used, as with the defaults, and otherwise 1. Bit-identical for any number of
+/// threads.
 EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& pt, const IicvOptions& options = {});
+
+/// How far from a pixel, in rows or columns, the input can influence it. A part of an image that begins at an even row and
+/// column gives, farther than this from its cut edges, the bits of the whole image.
+int iicv_reach(const IicvOptions& options);
 
 }  // namespace covary

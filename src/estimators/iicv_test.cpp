@@ -13,6 +13,7 @@
 #include "estimators/cv_baseline.h"
 #include "estimators/neighbours.h"
 #include "estimators/reference_control_variates.h"
+#include "estimators/reference_feedback.h"
 #include "estimators/test_images.h"
 
 namespace covary {
@@ -87,7 +88,7 @@ TEST(Iicv, AgreesWithTheReference) {
         Case{6, 7, 12, true, false, false}, Case{40, 11, 12, true, true, true}, Case{50, 21, 4, true, true, true},
         Case{25, 11, 24, false, false, true}, Case{10, 5, 3, true, true, true}}) {
     const test::Grouped crn = test::crn_image(41, 27, c.groups, 1), pt = test::pt_image(41, 27, c.groups, 2);
-    IicvOptions options;
+    IicvOptions options = IicvOptions::paper();
     options.k = c.k;
     options.window = c.window;
     options.include_target = c.include_target;
@@ -106,7 +107,7 @@ TEST(Iicv, AgreesWithTheReference) {
 TEST(Iicv, OtherPenaltiesAgreeWithTheReference) {
   const test::Grouped crn = test::crn_image(41, 27, 12, 1), pt = test::pt_image(41, 27, 12, 2);
   const GroupedImage pt_view = pt.view();
-  IicvOptions options;
+  IicvOptions options = IicvOptions::paper();
   reference::Settings settings{true, true, 0, kSmallestPenalty};
 
   options.penalty = Penalty::kSample;
@@ -132,6 +133,55 @@ TEST(Iicv, OtherPenaltiesAgreeWithTheReference) {
       2e-3);
 }
 
+/// The condition on the coefficients, alone.
+TEST(Iicv, ConservationAgreesWithTheReference) {
+  const test::Grouped crn = test::crn_image(41, 27, 12, 1), pt = test::pt_image(41, 27, 12, 2);
+  const RgbImage error = pilot_of(crn.view(), pt.view(), 11);
+  for (const auto& [k, shared] : {std::pair{25, true}, {25, false}, {50, true}, {8, false}}) {
+    IicvOptions options = IicvOptions::paper();
+    options.conservation = 10;
+    options.k = k;
+    options.shared_coefficients = shared;
+    options.std_error = true;
+    const Difference d = compare(iicv(crn.view(), pt.view(), options), crn.view(), pt.view(), error, k, 11, true,
+                                 {shared, true, 0, kSmallestPenalty, 10});
+    EXPECT_LT(d.estimate, 3e-3) << "k " << k << " shared " << shared;
+    EXPECT_LT(d.std_error, 3e-3) << "k " << k << " shared " << shared;
+  }
+}
+
+/// Everything the defaults add: mixed penalty, condition, feedback.
+TEST(Iicv, DefaultsAgreeWithTheReference) {
+  for (const auto& [width, height] : {std::pair{41, 27}, {60, 6}, {1, 1}, {5, 40}}) {
+    const test::Grouped crn = test::crn_image(width, height, 12, 1), pt = test::pt_image(width, height, 12, 2);
+    const GroupedImage crn_view = crn.view(), pt_view = pt.view();
+    const EstimatorResult fast = iicv(crn_view, pt_view);
+    const RgbImage h = reference::map_pixels(pt_view, [&](int x, int y) { return reference::mean(pt_view, x, y); });
+    const RgbImage variance =
+        reference::map_pixels(pt_view, [&](int x, int y) { return reference::variance_of_mean(pt_view, x, y); });
+    RgbImage error = pilot_of(crn_view, pt_view, 11);
+    for (size_t i = 0; i < error.size(); ++i)
+      for (int c = 0; c < 3; ++c) error[i][c] = 0.5 * (error[i][c] + variance[i][c]);
+    const auto all = neighbours(crn_view, 25, 11, true);
+    RgbImage estimate, std_error;
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x) {
+        const reference::Result r = reference::control_variates(
+            crn_view, h, error, variance, {x, y}, all[y * width + x], {true, true, 0, kSmallestPenalty, 10});
+        estimate.push_back(r.estimate);
+        std_error.push_back(r.std_error);
+      }
+    estimate = reference::feedback(estimate, std_error, h, width, height, 41, 5);
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x) {
+        const Rgb noise = reference::variance_of_mean(crn_view, x, y);
+        for (int c = 0; c < 3; ++c)
+          EXPECT_NEAR(fast.estimate.pixel(x, y)[c], estimate[y * width + x][c], 3e-3 * std::sqrt(noise[c]))
+              << x << ", " << y << " of " << width << " x " << height;
+      }
+  }
+}
+
 /// The halves of a cross-fit are the plain estimator on half of the groups with the other half's pilot.
 TEST(Iicv, CrossFitAgreesWithTheReference) {
   const test::Grouped crn = test::crn_image(41, 27, 12, 1), pt = test::pt_image(41, 27, 12, 2);
@@ -140,7 +190,7 @@ TEST(Iicv, CrossFitAgreesWithTheReference) {
   for (int i : {0, 1})
     half[i] = reference::map_pixels(view, [&](int x, int y) { return reference::mean(view, x, y, i, 2); });
   const auto all = neighbours(crn.view(), 25, 11, true);
-  IicvOptions options;
+  IicvOptions options = IicvOptions::paper();
   options.penalty = Penalty::kCrossFit;
   const EstimatorResult fast = iicv(crn.view(), view, options);
   const RgbImage error[2] = {reference::pilot_error(crn.view(), half[1], 11),
@@ -230,10 +280,31 @@ TEST(Iicv, WithoutCrnVarianceIsTheCrnMean) {
   test::Grouped crn = test::constant_image(30, 20, 12, 0.25f);
   const test::Grouped pt = test::pt_image(30, 20, 12, 4);
   for (bool shared : {true, false}) {
-    IicvOptions options;
+    IicvOptions options = IicvOptions::paper();
     options.shared_coefficients = shared;
     const EstimatorResult result = iicv(crn.view(), pt.view(), options);
     for (float v : result.estimate.data) EXPECT_NEAR(v, 0.25f, 1e-6f);
+  }
+}
+
+/// An image worked on in bands of rows has the bits of the whole.
+TEST(Iicv, BandsGiveTheSameBits) {
+  const test::Grouped crn = test::crn_image(50, 140, 6, 3), pt = test::pt_image(50, 140, 6, 4);
+  IicvOptions options;
+  options.std_error = true;
+  const EstimatorResult whole = iicv(crn.view(), pt.view(), options);
+  const int reach = iicv_reach(options);
+  for (int y0 = 0; y0 < 140; y0 += 34) {
+    const int first = std::max(0, (y0 - reach) / 2 * 2), last = std::min(140, y0 + 34 + reach);
+    const auto band = [&](const GroupedImage& image) {
+      return GroupedImage{50, last - first, 6, image.pixel(0, first)};
+    };
+    const EstimatorResult part = iicv(band(crn.view()), band(pt.view()), options);
+    for (int y = y0; y < std::min(140, y0 + 34); ++y)
+      for (int i = 0; i < 150; ++i) {
+        ASSERT_EQ(part.estimate.pixel(0, y - first)[i], whole.estimate.pixel(0, y)[i]) << y;
+        ASSERT_EQ(part.std_error.pixel(0, y - first)[i], whole.std_error.pixel(0, y)[i]) << y;
+      }
   }
 }
 
@@ -259,7 +330,7 @@ TEST(Iicv, WithAnExactPtImageIsThePtImage) {
   for (int y = 0; y < 20; ++y)
     for (int x = 0; x < 30; ++x)
       for (int i = 0; i < 36; ++i) exact.pixel(x, y)[i] = static_cast<float>(test::expected(x, y, i % 3));
-  IicvOptions options;
+  IicvOptions options = IicvOptions::paper();
   options.penalty = Penalty::kSample;
   const EstimatorResult result = iicv(crn.view(), exact.view(), options);
   for (int y = 0; y < 20; ++y)
@@ -277,6 +348,7 @@ TEST(Iicv, BitsDoNotDependOnThreadsTilesOrCrops) {
   IicvOptions options;
   options.std_error = true;
   options.penalty = Penalty::kSmoothed;
+  options.feedback_options.window = 17;
   const auto with_threads = [&](int n) {
     tbb::global_control control(tbb::global_control::max_allowed_parallelism, n);
     return iicv(crn.view(), pt.view(), options);
@@ -288,13 +360,15 @@ TEST(Iicv, BitsDoNotDependOnThreadsTilesOrCrops) {
     EXPECT_EQ(one.std_error.data, more.std_error.data);
   }
 
-  const int x0 = 13, y0 = 9, width = 101, height = 60, reach = 5 + 5 + 5;  // neighbours, their error, its pilot
+  const int x0 = 12, y0 = 8, width = 101, height = 60;  // feedback cells begin at even coordinates
   const auto crop = [&](const test::Grouped& image) {
     test::Grouped part = test::constant_image(width, height, image.groups, 0);
     for (int y = 0; y < height; ++y)
       std::copy_n(image.view().pixel(x0, y0 + y), static_cast<size_t>(width) * image.groups * 3, part.pixel(0, y));
     return part;
   };
+  const int reach = iicv_reach(options);
+  ASSERT_LT(2 * reach, height);
   const EstimatorResult part = iicv(crop(crn).view(), crop(pt).view(), options);
   for (int y = reach; y < height - reach; ++y)
     for (int x = reach; x < width - reach; ++x)
@@ -304,7 +378,7 @@ TEST(Iicv, BitsDoNotDependOnThreadsTilesOrCrops) {
 
 /// A bad value spoils its own pixel at most, and is counted.
 TEST(Iicv, NonFiniteValuesStayWhereTheyAre) {
-  const test::Grouped crn = test::crn_image(40, 30, 6, 3), pt = test::pt_image(40, 30, 6, 4);
+  const test::Grouped crn = test::crn_image(100, 30, 6, 3), pt = test::pt_image(100, 30, 6, 4);
   const EstimatorResult good = iicv(crn.view(), pt.view());
   test::Grouped bad_crn = crn, bad_pt = pt;
   bad_crn.pixel(10, 12)[4] = std::numeric_limits<float>::quiet_NaN();
@@ -316,7 +390,7 @@ TEST(Iicv, NonFiniteValuesStayWhereTheyAre) {
   EXPECT_EQ(good.nonfinite_pixels, 0);
   for (float v : result.estimate.data) ASSERT_TRUE(std::isfinite(v));
   // Far from all three nothing changes.
-  EXPECT_EQ(result.estimate.pixel(2, 25)[0], good.estimate.pixel(2, 25)[0]);
+  EXPECT_EQ(result.estimate.pixel(95, 25)[0], good.estimate.pixel(95, 25)[0]);
   // The pixel itself: the mean of its finite groups in both images; without any, zero.
   double sum = 0;
   for (int t = 0; t < 6; ++t)
@@ -328,7 +402,7 @@ TEST(Iicv, NonFiniteValuesStayWhereTheyAre) {
 TEST(Iicv, ImagesSmallerThanTheWindowWork) {
   for (const auto& [width, height] : {std::pair{1, 1}, {3, 2}, {1, 9}, {7, 1}}) {
     const test::Grouped crn = test::crn_image(width, height, 5, 3), pt = test::pt_image(width, height, 5, 4);
-    const EstimatorResult fast = iicv(crn.view(), pt.view());
+    const EstimatorResult fast = iicv(crn.view(), pt.view(), IicvOptions::paper());
     const Difference d = compare(fast, crn.view(), pt.view(), pilot_of(crn.view(), pt.view(), 11), 25, 11, true,
                                  {true, true, 0, kSmallestPenalty});
     EXPECT_LT(d.estimate, 2e-3) << width << " x " << height;
@@ -347,16 +421,23 @@ std::string message_of(const std::function<void()>& call) {
 
 TEST(Iicv, ReportsEveryProblemAtOnce) {
   const test::Grouped two = test::constant_image(8, 6, 2, 1), one = test::constant_image(8, 5, 1, 1);
-  IicvOptions options;
+  IicvOptions options = IicvOptions::paper();
   options.k = 200;
   options.pilot_window = 10;
   options.ridge = 0;
+  options.sample_share = 2;
+  options.conservation = -1;
+  options.feedback_options = {4, 0};
   options.penalty = Penalty::kSample;
   EXPECT_EQ(
       message_of([&] { iicv(two.view(), one.view(), options); }),
       "iicv: pilot_window is 10, expected an odd number from 3 to 63; k is 200, expected 1 to 121, the number of "
       "pixels "
-      "in a window of 11 x 11; ridge is 0, expected a positive number; the CRN image is 8 x 6 and the PT image 8 x 5; "
+      "in a window of 11 x 11; ridge is 0, expected a positive number; "
+      "sample_share is 2, expected a number from 0 to 1; conservation is -1, expected zero or a positive number; "
+      "feedback window is 4, expected an odd number from 5 to 125; feedback bandwidth is 0, expected a positive "
+      "number; "
+      "the CRN image is 8 x 6 and the PT image 8 x 5; "
       "they must have the same size; the CRN image has 2 groups, at least 3 are needed (12 are recommended); the PT "
       "image has 1 group, at least 2 are needed with these settings");
   EXPECT_EQ(message_of([&] { cv_baseline(one.view(), one.view()); }),

@@ -81,6 +81,7 @@ struct Settings {
   bool shared = true, symmetric = true;
   double ridge = 0;             ///< > 0: replaces the errors of h
   double smallest_penalty = 0;  ///< relative to the variance of the CRN groups
+  double conservation = 0;      ///< weight of the condition sum beta g = f
 };
 
 struct Result {
@@ -105,21 +106,21 @@ inline Result control_variates(const GroupedImage& crn, const RgbImage& h, const
             crn.pixel(neighbours[i].x, neighbours[i].y)[3 * t + c] - mean(crn, neighbours[i].x, neighbours[i].y)[c];
     }
   }
-  // V_h for the groups: a group mean has T times the variance of the mean.
+  // V_h for the groups: a group mean has T times the variance of the mean. The error of h is not taken to be smaller than
+  // a small part of the variance of the CRN groups.
+  const auto group_variance = [&](Pixel p, int c) { return T * variance_of_mean(crn, p.x, p.y)[c]; };
+  const auto error = [&](Pixel p, int c) {
+    return std::max(T * error_of_h[index(p)][c], s.smallest_penalty * group_variance(p, c));
+  };
   const auto penalty = [&](int first, int last) {
-    Eigen::VectorXd V(k), group_variance(k);
-    double own = 0;
-    for (int c = first; c <= last; ++c) own += T * error_of_h[index(target)][c];
-    for (int i = 0; i < k; ++i) {
-      double error = 0;
-      group_variance(i) = 0;
+    Eigen::VectorXd V = Eigen::VectorXd::Zero(k);
+    double mean_diagonal = 0;
+    for (int i = 0; i < k; ++i)
       for (int c = first; c <= last; ++c) {
-        error += T * error_of_h[index(neighbours[i])][c];
-        group_variance(i) += X[c].col(i).squaredNorm() / (T - 1);
+        V(i) += s.symmetric ? 0.5 * (error(target, c) + error(neighbours[i], c)) : error(neighbours[i], c);
+        mean_diagonal += group_variance(neighbours[i], c) / k;
       }
-      V(i) = std::max(s.symmetric ? 0.5 * (own + error) : error, s.smallest_penalty * group_variance(i));
-    }
-    if (s.ridge > 0) V.setConstant(s.ridge * group_variance.mean());
+    if (s.ridge > 0) V.setConstant(s.ridge * mean_diagonal);
     return V;
   };
   // Eq. (10); shared coefficients stack the rows of the channels.
@@ -131,6 +132,10 @@ inline Result control_variates(const GroupedImage& crn, const RgbImage& h, const
     for (int d = c; d <= last; ++d) {
       A += X[d].transpose() * X[d] / (T - 1);
       b += X[d].transpose() * y[d] / (T - 1);
+      Eigen::VectorXd g(k);
+      for (int i = 0; i < k; ++i) g(i) = mean(crn, neighbours[i].x, neighbours[i].y)[d];
+      A += s.conservation * g * g.transpose();
+      b += s.conservation * g * mean(crn, target.x, target.y)[d];
     }
     beta[c] = A.ldlt().solve(b);
   }
