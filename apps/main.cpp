@@ -56,6 +56,7 @@ int run(int argc, char** argv) {
   add_merge(app);
   add_info(app);
   add_convert(app);
+  add_combine(app);
 
   if (argc < 2) {
     std::fputs(app.help().c_str(), stdout);

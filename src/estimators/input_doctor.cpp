@@ -19,7 +19,7 @@ constexpr double kMaxPtCorrelation = 0.05;
 constexpr double kMinCrnCorrelation = 0.02;
 constexpr double kMaxSigmas = 8;  // for t with about 11 degrees of freedom: false alarm below 1e-5
 constexpr long kMaxPairs = 250000;
-constexpr long kFewPairs = 1000;
+constexpr long kFewPairs = 200;
 
 float grey(const float* rgb) { return (rgb[0] + rgb[1] + rgb[2]) * (1.0f / 3.0f); }
 

@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: Apache-2.0
+"""covary combine, as a user runs it, on small images with the layouts of several renderers."""
+import array
+import json
+import random
+import struct
+import unittest
+import zlib
+
+from cli_test import CliTest
+from exr_writer import FLOAT, HALF, exr
+
+SIZE = WIDTH, HEIGHT = 24, 20
+GROUPS = 12
+
+
+def noisy(seed, common, groups=GROUPS, size=SIZE):
+    """Groups of pixel values (r, g, b): relative noise that all pixels share up to a fifth, or none of it."""
+    rng = random.Random(seed)
+    shared = [[rng.random() - 0.5 for _ in range(3)] for _ in range(groups)]
+    images = []
+    for g in range(groups):
+        image = {c: [] for c in "RGB"}
+        for y in range(size[1]):
+            for x in range(size[0]):
+                for i, c in enumerate("RGB"):
+                    own = rng.random() - 0.5
+                    noise = 0.8 * shared[g][i] + 0.2 * own if common else own
+                    image[c].append((1 + 0.02 * x + 0.1 * i) * (1 + noise))
+        images.append(image)
+    return images
+
+
+def mean(values):
+    return sum(values) / len(values)
+
+
+class Combine(CliTest):
+    def layers(self, name, images, size=SIZE, stem="group", types=None, **attributes):
+        channels = {f"{stem}{g:02d}.{c}": image[c] for g, image in enumerate(images) for c in "RGB"}
+        return self.write(name, exr(channels, size, None, {f"covary:{k}": v for k, v in attributes.items()},
+                                    types and {c: types for c in channels}))
+
+    def setUp(self):
+        super().setUp()
+        self.crn_images, self.pt_images = noisy(1, True), noisy(2, False)
+        self.layers("crn.exr", self.crn_images, sampling="crn", samples="96", scene_hash="a", settings="box")
+        self.layers("pt.exr", self.pt_images, sampling="independent", samples="96", scene_hash="a", settings="box")
+
+    def read(self, name):
+        """Channels of an EXR made by covary (ZIP), name -> values."""
+        data = (self.path / name).read_bytes()
+        at, channels, window = 8, [], None
+        while data[at] != 0:
+            end = data.index(b"\0", at)
+            key = data[at:end].decode()
+            kind_end = data.index(b"\0", end + 1)
+            size, = struct.unpack_from("<i", data, kind_end + 1)
+            value = data[kind_end + 5:kind_end + 5 + size]
+            if key == "channels":
+                i = 0
+                while value[i] != 0:
+                    j = value.index(b"\0", i)
+                    channels.append(value[i:j].decode())
+                    self.assertEqual(struct.unpack_from("<i", value, j + 1)[0], FLOAT)
+                    i = j + 17
+            if key == "dataWindow":
+                window = struct.unpack("<4i", value)
+            at = kind_end + 5 + size
+        at += 1
+        width, height = window[2] - window[0] + 1, window[3] - window[1] + 1
+        offsets = struct.unpack_from(f"<{(height + 15) // 16}Q", data, at)
+        result = {c: [] for c in channels}
+        for block, offset in enumerate(offsets):
+            rows = min(16, height - 16 * block)
+            size, = struct.unpack_from("<i", data, offset + 4)
+            raw = data[offset + 8:offset + 8 + size]
+            n = rows * width * 4 * len(channels)
+            if size < n:
+                raw = bytearray(zlib.decompress(raw))
+                for i in range(1, n):
+                    raw[i] = (raw[i - 1] + raw[i] - 128) & 255
+                half = (n + 1) // 2
+                mixed = bytearray(n)
+                mixed[0::2], mixed[1::2] = raw[:half], raw[half:]
+                raw = bytes(mixed)
+            values = array.array("f", raw)
+            for row in range(rows):
+                for i, c in enumerate(channels):
+                    first = (row * len(channels) + i) * width
+                    result[c] += values[first:first + width]
+        return result
+
+    def squared_error(self, channels):
+        return mean([(channels[c][y * WIDTH + x] - (1 + 0.02 * x + 0.1 * i)) ** 2
+                     for i, c in enumerate("RGB") for y in range(HEIGHT) for x in range(WIDTH)])
+
+    def test_result_has_less_noise(self):
+        self.good("combine", "--crn", "crn.exr", "--pt", "pt.exr", "-o", "out.exr", "--error", "--quiet")
+        out = self.read("out.exr")
+        self.assertEqual(sorted(out), ["B", "G", "R", "StdError.B", "StdError.G", "StdError.R"])
+        pt = {c: [mean([image[c][p] for image in self.pt_images]) for p in range(WIDTH * HEIGHT)] for c in "RGB"}
+        # PT with both halves' samples has half of this error.
+        self.assertLess(self.squared_error(out), 0.2 * self.squared_error(pt))
+        predicted = mean([v * v for c in "RGB" for v in out["StdError." + c]])
+        self.assertLess(predicted, 10 * self.squared_error(out))
+        self.assertGreater(predicted, 0.1 * self.squared_error(out))
+
+    def test_statistics(self):
+        result = self.good("combine", "--crn", "crn.exr", "--pt", "pt.exr", "-o", "out.exr", "--json", "-", "--quiet")
+        statistics = json.loads(result.stdout)
+        self.assertEqual(statistics["estimator"], "iicv")
+        self.assertEqual(statistics["crn_groups"], GROUPS)
+        self.assertGreater(statistics["rank_correlation"]["crn_horizontal"]["value"], 0.5)
+        self.assertLess(abs(statistics["rank_correlation"]["pt_horizontal"]["value"]), 0.1)
+        self.assertEqual(result.stderr, "")
+        info = self.good("info", "out.exr").stdout
+        self.assertIn("covary:estimator: iicv", info)
+        self.assertIn("covary:samples: 192", info)
+
+    def test_layouts_give_the_same_bits(self):
+        self.good("combine", "--crn", "crn.exr", "--pt", "pt.exr", "-o", "a.exr", "--quiet")
+        # One file per group: R G B beside another image (pbrt, Mitsuba), and Blender's passes.
+        crn = [self.write(f"crn{g}.exr", exr({**image, **{"nn." + c: [0] * WIDTH * HEIGHT for c in "RGB"}}, SIZE))
+               for g, image in enumerate(self.crn_images)]
+        pt = [self.write(f"pt{g}.exr", exr({**{"ViewLayer.Combined." + c: image[c] for c in "RGB"},
+                                            **{"ViewLayer.Emit." + c: [0] * WIDTH * HEIGHT for c in "RGB"}}, SIZE))
+              for g, image in enumerate(self.pt_images)]
+        self.good("combine", "--crn", *crn, "--pt", *pt, "-o", "b.exr", "--quiet")
+        self.assertEqual(self.read("a.exr"), self.read("b.exr"))
+        self.layers("named.exr", self.crn_images, stem="pass.")
+        self.good("combine", "--crn", "named.exr", "--crn-layer", "pass.", "--pt", "pt.exr", "-o", "c.exr", "--quiet")
+        self.assertEqual(self.read("a.exr"), self.read("c.exr"))
+
+    def test_bands_and_threads_give_the_same_bits(self):
+        size = (16, 200)
+        self.layers("tall_crn.exr", noisy(1, True, 4, size), size)
+        self.layers("tall_pt.exr", noisy(2, False, 4, size), size)
+        common = ["combine", "--crn", "tall_crn.exr", "--pt", "tall_pt.exr", "--error", "--quiet"]
+        self.good(*common, "-o", "whole.exr")
+        # 16 * (12 * 8 + 160) bytes per row: 0.4 MiB holds 102 rows.
+        self.good(*common, "-o", "bands.exr", "--memory", "0.4", "--threads", "1")
+        self.assertEqual(self.read("whole.exr"), self.read("bands.exr"))
+
+    def test_estimators_differ(self):
+        results = []
+        for options in ([], ["--paper"], ["--penalty", "homogeneous"], ["--variance", "sample"], ["--coefficients", "per-channel"],
+                        ["--asymmetric"], ["--exclude-target"], ["--k", "9"], ["--window", "7"], ["--feedback", "off"],
+                        ["--estimator", "cv-baseline"], ["--estimator", "cv-baseline", "--ridge", "0.1"],
+                        ["--estimator", "iduw"], ["--estimator", "iduw", "--window", "7"]):
+            self.good("combine", "--crn", "crn.exr", "--pt", "pt.exr", "-o", "out.exr", "--quiet", *options)
+            results.append(self.read("out.exr"))
+        for i, a in enumerate(results):
+            for b in results[:i]:
+                self.assertNotEqual(a, b)
+
+    def test_doctor_refuses_and_can_be_forced(self):
+        inputs = ["--crn", "pt.exr", "--pt", "crn.exr", "-o", "out.exr"]
+        result = self.bad(1, "are CRN and PT swapped?", "combine", *inputs)
+        self.assertIn("the files say that CRN was rendered with sampling 'independent' and PT with 'crn'", result.stderr)
+        self.assertIn("(--force combines them nevertheless)", result.stderr)
+        forced = self.good("combine", *inputs, "--force")
+        self.assertIn("warning: PT: errors of neighbouring pixels", forced.stderr)
+        self.assertTrue((self.path / "out.exr").exists())
+
+    def test_wide_filter(self):
+        wide = []
+        for image in self.pt_images:
+            wide.append({c: [0.1 * v[max(p - 1, 0)] + 0.8 * v[p] + 0.1 * v[min(p + 1, len(v) - 1)] for p in range(len(v))]
+                         for c, v in image.items()})
+        self.layers("wide.exr", wide)
+        self.bad(1, 'in Mitsuba <rfilter type="box"/>', "combine", "--crn", "crn.exr", "--pt", "wide.exr", "-o", "out.exr")
+
+    def test_attributes_that_contradict(self):
+        self.layers("other.exr", self.pt_images, sampling="independent", samples="96", scene_hash="b", settings="tent")
+        result = self.bad(1, "different scenes", "combine", "--crn", "crn.exr", "--pt", "other.exr", "-o", "out.exr")
+        self.assertIn("CRN with 'box', PT with 'tent'", result.stderr)
+
+    def test_half_floats_are_accepted_with_a_warning(self):
+        self.layers("half.exr", self.pt_images, types=HALF)
+        result = self.good("combine", "--crn", "crn.exr", "--pt", "half.exr", "-o", "out.exr")
+        self.assertIn("warning: PT: values have 16 bits", result.stderr)
+
+    def test_not_finite(self):
+        self.pt_images[3]["G"][5] = float("nan")
+        self.layers("nan.exr", self.pt_images)
+        inputs = ["--crn", "crn.exr", "--pt", "nan.exr", "-o", "out.exr"]
+        self.bad(1, "PT: 1 of 480 pixels hold NaN or infinite values, the first at (5, 0) in group 3", "combine", *inputs)
+        result = self.good("combine", *inputs, "--force", "--quiet", "--json", "-")
+        self.assertEqual(json.loads(result.stdout)["nonfinite_pixels"], 1)
+        self.assertTrue(all(v == v for c in self.read("out.exr").values() for v in c))
+
+    def test_wrong_usage(self):
+        inputs = ["combine", "--crn", "crn.exr", "--pt", "pt.exr", "-o", "out.exr"]
+        self.bad(2, "k is 500, expected 1 to 121", *inputs, "--k", "500")
+        self.bad(2, "window is 10, expected an odd number from 3 to 63", *inputs, "--window", "10")
+        self.bad(2, "--penalty is an option of --estimator iicv, not of iduw", *inputs, "--estimator", "iduw", "--penalty", "pilot")
+        self.bad(2, "--samples is an option of --estimator iduw, not of iicv", *inputs, "--samples", "3")
+        self.bad(2, "--penalty", *inputs, "--penalty", "none")
+        self.bad(2, "--pt is required", "combine", "--crn", "crn.exr", "-o", "out.exr")
+        self.layers("two.exr", self.crn_images[:2])
+        self.bad(2, "the CRN image has 2 groups, at least 3 are needed", "combine", "--crn", "two.exr", "--pt", "pt.exr",
+                 "-o", "out.exr", "--force")
+        self.layers("anonymous.exr", self.crn_images)
+        self.bad(2, "needs --samples N", "combine", "--crn", "anonymous.exr", "--pt", "pt.exr", "-o", "out.exr",
+                 "--estimator", "iduw")
+
+    def test_sizes_must_agree(self):
+        self.layers("small.exr", noisy(2, False, 4, (8, 6)), (8, 6))
+        self.bad(1, "small.exr has 8 x 6 pixels at (0, 0) of 8 x 6; both images must show the same pixels", "combine", "--crn",
+                 "crn.exr", "--pt", "small.exr", "-o", "out.exr")
+
+
+if __name__ == "__main__":
+    unittest.main()
