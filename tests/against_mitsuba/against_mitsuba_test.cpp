@@ -110,14 +110,14 @@ Comparison compare(const std::vector<Means>& renders, Values Means::*part, const
   return comparison;
 }
 
-/// Both families accept?
-bool agree(const std::vector<Means>& renders, const nlohmann::json& reference) {
+/// Both families accept? Their p-values are recorded under `what`.
+bool agree(const std::string& what, const std::vector<Means>& renders, const nlohmann::json& reference) {
   const Comparison image =
       compare(renders, &Means::image, reference["mean"], reference["mean_errors"], reference["seeds"]);
   const Comparison blocks =
       compare(renders, &Means::blocks, reference["blocks"], reference["block_errors"], reference["seeds"]);
-  ::testing::Test::RecordProperty("image_p", std::to_string(image.p_value));
-  ::testing::Test::RecordProperty("blocks_p", std::to_string(blocks.p_value));
+  ::testing::Test::RecordProperty(what + "_image_p", std::to_string(image.p_value));
+  ::testing::Test::RecordProperty(what + "_blocks_p", std::to_string(blocks.p_value));
   EXPECT_LT(image.detectable.back(), 0.015);
   EXPECT_LT(blocks.detectable[blocks.detectable.size() / 2], 0.15);
   return image.p_value >= statistics::test_alpha() && blocks.p_value >= statistics::test_alpha();
@@ -126,22 +126,22 @@ bool agree(const std::vector<Means>& renders, const nlohmann::json& reference) {
 void check(const std::string& name, const std::string& scene_path) {
   const nlohmann::json reference = read_reference(name);
   const std::vector<Means> renders = render(source_path(scene_path), reference);
-  EXPECT_TRUE(agree(renders, reference)) << "to see where: benchmarks/against_mitsuba/against_mitsuba.py agree "
-                                         << source_path(scene_path);
+  EXPECT_TRUE(agree("own", renders, reference))
+      << "to see where: benchmarks/against_mitsuba/against_mitsuba.py agree " << source_path(scene_path);
 
   std::vector<Means> brighter = renders;
   for (Means& means : brighter) {
     for (double& value : means.image) value *= 1.02;
     for (double& value : means.blocks) value *= 1.02;
   }
-  EXPECT_FALSE(agree(brighter, reference)) << "a planted factor of 1.02 was not seen";
+  EXPECT_FALSE(agree("planted_factor", brighter, reference)) << "a planted factor of 1.02 was not seen";
 
   const Values& values = renders[0].blocks;
   const size_t middle = values.size() / 6 * 3;  // first channel of a block near the middle of the frame
   std::vector<Means> patched = renders;
   for (Means& means : patched)
     for (size_t c = 0; c < 3; ++c) means.blocks[middle + c] *= 1.3;
-  EXPECT_FALSE(agree(patched, reference)) << "a planted bright block was not seen";
+  EXPECT_FALSE(agree("planted_block", patched, reference)) << "a planted bright block was not seen";
 }
 
 TEST(AgainstMitsuba, Room) { check("room", "scenes/room.xml"); }
