@@ -200,8 +200,16 @@ def documented_parameters(root):
     return problems
 
 
+def documented_commands(root):
+    """Every subcommand of the program is in the README, as `covary name …`."""
+    readme = read(root, "README.md")
+    return [f"README.md:1: lacks the command 'covary {name}' of {path}:{number}"
+            for path in files(root, ["apps"], (".cpp",)) for number, text in lines(root, path)
+            for name in re.findall(r'add_subcommand\("(\w+)"', text) if f"`covary {name} " not in readme]
+
+
 CHECKS = [includes_follow_arrows, links_follow_arrows, licence_lines, no_leftovers, citations_have_entries,
-          documented_names_match_registries, documented_parameters]
+          documented_names_match_registries, documented_parameters, documented_commands]
 
 
 def length_report(root):

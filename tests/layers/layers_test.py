@@ -39,6 +39,7 @@ class Planted(unittest.TestCase):
         self.write("src/integrators/CMakeLists.txt", "covary_room(integrators SOURCES path.cpp DEPENDS covary_scene covary_film)\n")
         self.write("tests/statistics/chi2.h", SPDX)
         self.write("docs/references.bib", "@article{Veach1995,\n}\n")
+        self.write("README.md", "# Small\n")
         self.write("docs/scene-format.md", "# Scenes\n## Reflectance (`bsdfs`)\n")
 
     def write(self, path, text):
@@ -123,6 +124,12 @@ class Planted(unittest.TestCase):
         self.write("src/bsdfs/diffuse.cpp", SPDX + 'f(parameters.get_texture("reflectance", 1), parameters.get_bool("new", 1));\n')
         self.write("docs/scene-format.md", "| `reflectance` |\n")
         self.expect(layers.documented_parameters, "lacks the parameter 'new' of src/bsdfs/diffuse.cpp:2")
+
+    def test_command_without_documentation(self):
+        self.write("apps/render.cpp", SPDX + 'auto* a = app.add_subcommand("render", "Render a scene");\n')
+        self.write("apps/merge.cpp", SPDX + 'auto* a = app.add_subcommand("merge", "Merge films");\n')
+        self.write("README.md", "| `covary render SCENE` |\n")
+        self.expect(layers.documented_commands, "lacks the command 'covary merge' of apps/merge.cpp:2")
 
     def test_long_file_is_reported(self):
         self.write("src/core/a.cpp", SPDX + "\n" * layers.LONG_FILE)
