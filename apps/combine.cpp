@@ -335,7 +335,7 @@ void add_combine(CLI::App& app) {
       ->check(CLI::IsMember({"shared", "per-channel"}));
   command->add_option("--sample-share", o->sample_share,
                       "Part of the penalty that is the sample variance; default 0.5");
-  command->add_option("--conservation", o->conservation, "Weight of the condition sum beta g = f; default 10");
+  command->add_option("--conservation", o->conservation, "Weight of the condition sum beta g = f; default 30");
   command->add_option("--feedback", o->feedback, "on or off: give back what the penalty takes away; default on")
       ->transform(CLI::CheckedTransformer(std::map<std::string, bool>{{"on", true}, {"off", false}}).description(""))
       ->type_name("on|off");

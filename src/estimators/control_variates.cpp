@@ -37,9 +37,9 @@ struct RecordLayout {
   int group_contrasts;  ///< number of contrasts of the groups, all channels: [contrast][rgb], at 0
   int contrasts;        ///< the same with the row of the condition, which acts like one more contrast
   int difference;       ///< g - h
-  int error;            ///< error variance of h for the penalty, times T, with its lower limit
+  int error;            ///< error variance of h for the penalty, times T
   int group_variance;   ///< sample variance of the CRN groups
-  int h_variance;       ///< variance of h for the error estimate
+  int h_variance;       ///< variance of h
   int size;
 };
 
@@ -105,7 +105,6 @@ class Regression {
   }
 
   void make_records(const Tile& tile, Workspace& w) const {
-    const float condition = std::sqrt(s_.conservation * static_cast<float>(T_ - 1));
     std::vector<float> weights(T_);
     for (int j = 1; j < T_; ++j) weights[j] = 1.0f / std::sqrt(static_cast<float>(j) * static_cast<float>(j + 1));
     for (int y = tile.y0 - radius_; y < tile.y1 + radius_; ++y)
@@ -128,17 +127,12 @@ class Regression {
             squares[c] += contrast * contrast;
             record[3 * (j - 1) + c] = contrast;
           }
-        // [ours] The condition sum beta g = f as a row of X and y: adds conservation * g_i g_j to X^T X / (T - 1).
         if (layout_.contrasts > layout_.group_contrasts)
-          for (int c = 0; c < 3; ++c)
-            record[layout_.group_contrasts + c] = condition * in_.crn_moments->mean.row(c, y)[x];
+          for (int c = 0; c < 3; ++c) record[layout_.group_contrasts + c] = in_.crn_moments->mean.row(c, y)[x];
         for (int c = 0; c < 3; ++c) {
-          const float g = in_.crn_moments->mean.row(c, y)[x], group_variance = squares[c] / static_cast<float>(T_ - 1);
-          const float smallest = s_.conservation > 0 ? kSmallestRelativePenalty * g * g : 0.0f;
-          const float error = in_.error_of_h ? static_cast<float>(T_) * in_.error_of_h->row(c, y)[x] : 0.0f;
-          record[layout_.difference + c] = g - in_.h->row(c, y)[x];
-          record[layout_.error + c] = std::max({error, kSmallestPenalty * group_variance, smallest});
-          record[layout_.group_variance + c] = std::max(group_variance, smallest);
+          record[layout_.difference + c] = in_.crn_moments->mean.row(c, y)[x] - in_.h->row(c, y)[x];
+          record[layout_.error + c] = in_.error_of_h ? static_cast<float>(T_) * in_.error_of_h->row(c, y)[x] : 0.0f;
+          record[layout_.group_variance + c] = squares[c] / static_cast<float>(T_ - 1);
           record[layout_.h_variance + c] = in_.variance_of_h ? in_.variance_of_h->row(c, y)[x] : 0.0f;
         }
       }
@@ -189,29 +183,64 @@ class Regression {
     }
   }
 
+  /// Sum over the channels [first, first + count) of an element of the tail.
+  vfloat channel_sum(const vfloat* tail, int offset, int first, int count) const {
+    vfloat total = tail_value(tail, offset + first);
+    for (int c = first + 1; c < first + count; ++c) total += tail_value(tail, offset + c);
+    return total;
+  }
+
+  /// The condition on the coefficients as a row of X and y (one for each channel, like a contrast of the groups), scaled
+  /// by sqrt(conservation (T - 1) S / N).
+  void scale_condition(int first, int count, Workspace& w) const {
+    const int k = s_.k, n_tail = layout_.size - layout_.contrasts;
+    vfloat S = {}, N = {};
+    for (int i = 0; i < k; ++i) {
+      S += channel_sum(w.tail.data() + i * n_tail, layout_.group_variance, first, count);
+      for (int c = first; c < first + count; ++c) {
+        const vfloat g = w.x[static_cast<size_t>(i) * layout_.contrasts + layout_.group_contrasts + c];
+        N += g * g;
+      }
+    }
+    const vfloat factor = lanes::sqrt(S / max(N, splat(1e-30f)) * (s_.conservation * static_cast<float>(T_ - 1)));
+    for (int c = first; c < first + count; ++c) {
+      for (int i = 0; i < k; ++i)
+        w.x[static_cast<size_t>(i) * layout_.contrasts + layout_.group_contrasts + c] *= factor;
+      w.y[layout_.group_contrasts + c] *= factor;
+    }
+  }
+
   /// V_h,i of Eq. (10) for the channels [first, first + count), summed over them, as scale_i = 1 / sqrt(V_h,i).
   void find_penalties(int first, int count, Workspace& w) const {
     const int k = s_.k, n_tail = layout_.size - layout_.contrasts;
-    const auto sum = [&](const vfloat* tail, int offset) {
-      vfloat total = tail_value(tail, offset + first);
-      for (int c = first + 1; c < first + count; ++c) total += tail_value(tail, offset + c);
-      return total;
-    };
+    vfloat homogeneous = {};
     if (!in_.error_of_h) {
-      vfloat diagonal = {};
-      for (int i = 0; i < k; ++i) diagonal += sum(w.tail.data() + i * n_tail, layout_.group_variance);
-      const vfloat penalty =
-          max(diagonal * ((s_.ridge > 0 ? s_.ridge : kNegligibleRidge) / static_cast<float>(k)), splat(1e-30f));
-      const vfloat scale = 1.0f / lanes::sqrt(penalty);
-      for (int i = 0; i < k; ++i) w.scale[i] = scale;
-      return;
+      for (int i = 0; i < k; ++i)
+        homogeneous += channel_sum(w.tail.data() + i * n_tail, layout_.group_variance, first, count);
+      homogeneous *= (s_.ridge > 0 ? s_.ridge : kNegligibleRidge) / static_cast<float>(k);
     }
-    const vfloat own = sum(w.y_tail.data(), layout_.error);
+    const vfloat own = channel_sum(w.y_tail.data(), layout_.error, first, count);
+    const float variance_share = s_.sample_share * static_cast<float>(T_);
     for (int i = 0; i < k; ++i) {
       const vfloat* tail = w.tail.data() + i * n_tail;
-      const vfloat error = sum(tail, layout_.error);
-      const vfloat penalty = s_.symmetric ? 0.5f * (own + error) : error;
-      w.scale[i] = 1.0f / lanes::sqrt(penalty + 1e-30f);
+      vfloat penalty = homogeneous, smallest = {};
+      if (in_.error_of_h) {
+        const vfloat error = channel_sum(tail, layout_.error, first, count);
+        penalty = s_.symmetric ? 0.5f * (own + error) : error;
+        if (s_.sample_share > 0)
+          penalty =
+              (1 - s_.sample_share) * penalty + variance_share * channel_sum(tail, layout_.h_variance, first, count);
+        smallest = kSmallestPenalty * channel_sum(tail, layout_.group_variance, first, count);
+      }
+      if (s_.conservation > 0) {
+        vfloat squares = {};
+        for (int c = first; c < first + count; ++c) {
+          const vfloat element = w.x[static_cast<size_t>(i) * layout_.contrasts + layout_.group_contrasts + c];
+          squares += element * element;
+        }
+        smallest = max(smallest, squares * (kSmallestPenalty / (s_.conservation * static_cast<float>(T_ - 1))));
+      }
+      w.scale[i] = 1.0f / lanes::sqrt(max(penalty, smallest) + 1e-30f);
     }
   }
 
@@ -220,6 +249,7 @@ class Regression {
   /// the smaller of the two systems is solved. Leaves beta in gamma and Z in x.
   void find_coefficients(int first, int count, Workspace& w) const {
     const int k = s_.k, all = layout_.contrasts, step = count == 3 ? 1 : 3, rows = all / step;
+    if (s_.conservation > 0) scale_condition(first, count, w);
     find_penalties(first, count, w);
     for (int i = 0; i < k; ++i) {
       vfloat* x = w.x.data() + static_cast<size_t>(i) * all + first;
@@ -265,7 +295,9 @@ class Regression {
       estimate -= beta * tail_value(tail, layout_.difference + c);
       if (s_.std_error) h_part += beta * beta * tail_value(tail, layout_.h_variance + c);
     }
-    for (int l = 0; l < n_lanes; ++l) result_.estimate.pixel(x + l, y)[c] = estimate[l];
+    // Squares of values beyond 10^18 overflow; such pixels show the PT image.
+    for (int l = 0; l < n_lanes; ++l)
+      result_.estimate.pixel(x + l, y)[c] = std::isfinite(estimate[l]) ? estimate[l] : in_.h->row(c, y)[x + l];
     if (!s_.std_error) return;
 
     // [YM2025] Eq. (8) with the estimated quantities: variance of the group residuals, and of the h.
@@ -276,7 +308,9 @@ class Regression {
       squares += residual * residual;
     }
     const vfloat error = lanes::sqrt(squares / static_cast<float>(T_ * (T_ - 1)) + h_part);
-    for (int l = 0; l < n_lanes; ++l) result_.std_error.pixel(x + l, y)[c] = error[l];
+    for (int l = 0; l < n_lanes; ++l)
+      result_.std_error.pixel(x + l, y)[c] =
+          std::isfinite(error[l]) ? error[l] : std::sqrt(in_.variance_of_h->row(c, y)[x + l]);
   }
 
   const ControlVariateInput& in_;

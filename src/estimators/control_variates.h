@@ -14,8 +14,6 @@ namespace covary {
 /// Smallest V_h,i relative to the variance of the CRN groups at i. It bounds the condition number, so that single
 /// precision suffices; PT and CRN estimate the same integrals, so that the true ratio is about one.
 inline constexpr float kSmallestPenalty = 1e-4f;
-/// Smallest V_h,i relative to g_i^2, for the same reason, where there is a condition on sum_i beta_i g_i.
-inline constexpr float kSmallestRelativePenalty = 1e-6f;
 /// Ridge that stands for zero (minimum norm), relative to the mean diagonal.
 inline constexpr float kNegligibleRidge = 1e-6f;
 
@@ -27,8 +25,12 @@ struct ControlVariateSettings {
   bool shared = true;
   /// V_h,i = (error of the target + error of neighbour i) / 2 instead of the error of neighbour i.
   bool symmetric = true;
-  /// Weight of the condition sum_i beta_i g_i = f (in each channel), relative to g_i g_j in V_g; 0: none. Errors of the CRN
-  /// image that all pixels have in proportion to their brightness then cancel. Not in the paper.
+  /// Part of V_h,i that is the variance of h_i (`variance_of_h`) instead of `error_of_h`. Not in the paper.
+  float sample_share = 0;
+  /// Weight of the condition sum_i beta_i g_i = f (in each channel); 0: none. X^T X / (T - 1) gets the additional term
+  ///     conservation * (S / N) g g^T,   S, N: means over the neighbours of the group variance and of g_i^2,
+  /// as if errors in proportion to the brightness, `conservation` times as large as the errors there are, were common to
+  /// all pixels. Not in the paper.
   float conservation = 0;
   /// Where positive: V_h = ridge * (mean diagonal of X^T X / (T - 1)) * I instead of `error_of_h`.
   float ridge = 0;
@@ -41,7 +43,7 @@ struct ControlVariateInput {
   const Moments* crn_moments = nullptr;   ///< mean: kFar outside and at invalid pixels
   const Planes* h = nullptr;              ///< 3 planes: mean of the PT image; 0 outside and at invalid pixels
   const Planes* error_of_h = nullptr;     ///< 3 planes: estimated error variance of h; kUseless where there is none
-  const Planes* variance_of_h = nullptr;  ///< 3 planes: variance of h for the error estimate; only with std_error
+  const Planes* variance_of_h = nullptr;  ///< 3 planes: variance of h; for std_error and sample_share
 };
 
 /// Fills `result.estimate` and, where asked for, `result.std_error`; pixels marked 0 in `valid` are left as they come.

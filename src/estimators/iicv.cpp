@@ -41,21 +41,6 @@ std::vector<std::string> IicvOptions::validate() const {
   return problems;
 }
 
-namespace {
-
-/// (1 - share) * error + share * variance, for all pixels.
-void mix(Planes& error, const Planes& variance, float share) {
-  if (share == 0) return;
-  for (int c = 0; c < 3; ++c)
-    for (int y = 0; y < error.height(); ++y) {
-      float* e = error.row(c, y);
-      const float* v = variance.row(c, y);
-      for (int x = 0; x < error.width(); ++x) e[x] = (1 - share) * e[x] + share * v[x];
-    }
-}
-
-}  // namespace
-
 EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& pt, const IicvOptions& options) {
   std::vector<std::string> problems = options.validate();
   const bool needs_variance = options.penalty == Penalty::kSample || options.std_error || options.feedback ||
@@ -76,6 +61,7 @@ EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& pt, const Iicv
   settings.shared = options.shared_coefficients;
   settings.symmetric = options.symmetric;
   settings.conservation = options.conservation;
+  settings.sample_share = options.sample_share;
   settings.std_error = options.std_error || options.feedback;
   ControlVariateInput input{crn, &g};
 
@@ -85,8 +71,7 @@ EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& pt, const Iicv
     const Moments half[2] = {moments(pt, valid, border, 0.0f, 0, 2), moments(pt, valid, border, 0.0f, 1, 2)};
     EstimatorResult part[2];
     for (int i : {0, 1}) {
-      Planes error = pilot_error(g, half[1 - i].mean, options.pilot_window, false, border);
-      mix(error, half[1 - i].variance_of_mean, options.sample_share);
+      const Planes error = pilot_error(g, half[1 - i].mean, options.pilot_window, false, border);
       input.h = &half[i].mean;
       input.error_of_h = &error;
       input.variance_of_h = &half[i].variance_of_mean;
@@ -112,7 +97,6 @@ EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& pt, const Iicv
         break;
       default:
         error = pilot_error(g, h.mean, options.pilot_window, options.penalty == Penalty::kSmoothed, border);
-        mix(error, h.variance_of_mean, options.sample_share);
         input.error_of_h = &error;
     }
     apply_control_variates(input, settings, valid, result);

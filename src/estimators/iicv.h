@@ -45,14 +45,14 @@ struct IicvOptions {
   int pilot_window = 11;
   /// Factor of Penalty::kHomogeneous, > 0. Default 1: both images are estimates of the same integrals.
   float ridge = 1.0f;
-  /// Part of the penalty that is the sample variance of h instead of what `penalty` says, 0 … 1. The realised error of a
-  /// pilot tells outliers but depends on the value it judges; the sample variance is right on average. Not used by
-  /// kHomogeneous. Default 0.5 (measured); the paper has 0.
+  /// Part of the penalty that is the sample variance of h instead of what `penalty` says (and never symmetric), 0 … 1. The
+  /// realised error of a pilot tells outliers but depends on the value it judges; the sample variance is right on average.
+  /// Not used by kHomogeneous. Default 0.5 (measured); the paper has 0.
   float sample_share = 0.5f;
-  /// Weight of the condition that the coefficients reproduce the CRN mean, sum_i beta_i g_i = f, relative to products of
-  /// means; >= 0. Errors of the CRN image in proportion to brightness, common to all pixels, cancel. Default 10 (measured;
-  /// 3 to 30 are alike); the paper has 0.
-  float conservation = 10.0f;
+  /// Weight of the condition that the coefficients reproduce the CRN mean, sum_i beta_i g_i = f; >= 0. It treats errors in
+  /// proportion to brightness, so many times as large as the errors there are, as common to all pixels of the CRN image,
+  /// and so cancels them. Default 30 (measured); the paper has 0.
+  float conservation = 30.0f;
   /// Residual feedback (feedback.h). Default on; the paper has none.
   bool feedback = true;
   FeedbackOptions feedback_options;

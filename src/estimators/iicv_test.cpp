@@ -133,18 +133,19 @@ TEST(Iicv, OtherPenaltiesAgreeWithTheReference) {
       2e-3);
 }
 
-/// The condition on the coefficients, alone.
+/// The condition on the coefficients and the mixed penalty.
 TEST(Iicv, ConservationAgreesWithTheReference) {
   const test::Grouped crn = test::crn_image(41, 27, 12, 1), pt = test::pt_image(41, 27, 12, 2);
   const RgbImage error = pilot_of(crn.view(), pt.view(), 11);
   for (const auto& [k, shared] : {std::pair{25, true}, {25, false}, {50, true}, {8, false}}) {
     IicvOptions options = IicvOptions::paper();
     options.conservation = 10;
+    options.sample_share = 0.25f;
     options.k = k;
     options.shared_coefficients = shared;
     options.std_error = true;
     const Difference d = compare(iicv(crn.view(), pt.view(), options), crn.view(), pt.view(), error, k, 11, true,
-                                 {shared, true, 0, kSmallestPenalty, 10});
+                                 {shared, true, 0, kSmallestPenalty, 10, 0.25});
     EXPECT_LT(d.estimate, 3e-3) << "k " << k << " shared " << shared;
     EXPECT_LT(d.std_error, 3e-3) << "k " << k << " shared " << shared;
   }
@@ -159,15 +160,13 @@ TEST(Iicv, DefaultsAgreeWithTheReference) {
     const RgbImage h = reference::map_pixels(pt_view, [&](int x, int y) { return reference::mean(pt_view, x, y); });
     const RgbImage variance =
         reference::map_pixels(pt_view, [&](int x, int y) { return reference::variance_of_mean(pt_view, x, y); });
-    RgbImage error = pilot_of(crn_view, pt_view, 11);
-    for (size_t i = 0; i < error.size(); ++i)
-      for (int c = 0; c < 3; ++c) error[i][c] = 0.5 * (error[i][c] + variance[i][c]);
+    const RgbImage error = pilot_of(crn_view, pt_view, 11);
     const auto all = neighbours(crn_view, 25, 11, true);
     RgbImage estimate, std_error;
     for (int y = 0; y < height; ++y)
       for (int x = 0; x < width; ++x) {
         const reference::Result r = reference::control_variates(
-            crn_view, h, error, variance, {x, y}, all[y * width + x], {true, true, 0, kSmallestPenalty, 10});
+            crn_view, h, error, variance, {x, y}, all[y * width + x], {true, true, 0, kSmallestPenalty, 30, 0.5});
         estimate.push_back(r.estimate);
         std_error.push_back(r.std_error);
       }
@@ -273,6 +272,38 @@ TEST(Iicv, ScalingTheInputsScalesTheResultExactly) {
     ASSERT_EQ(4 * once.estimate.data[i], scaled.estimate.data[i]);
     ASSERT_EQ(4 * once.std_error.data[i], scaled.std_error.data[i]);
   }
+}
+
+/// A visible lamp: bright, and nearly without noise. Single precision must hold.
+TEST(Iicv, BrightPixelsWithLittleNoiseAreKept) {
+  test::Grouped crn = test::crn_image(40, 30, 12, 3), pt = test::pt_image(40, 30, 12, 4);
+  const auto paint = [](test::Grouped& image, float noise) {
+    for (int y = 8; y < 20; ++y)
+      for (int x = 10; x < 30; ++x)
+        for (int i = 0; i < 36; ++i) {
+          const float base = (i % 3 == 0 ? 60.0f : i % 3 == 1 ? 18.0f : 5.0f) * (1 + 0.001f * static_cast<float>(x));
+          image.pixel(x, y)[i] = base * (1 + noise * test::noise(7, i, x));
+        }
+  };
+  for (float noise : {0.0f, 1e-7f, 1e-5f, 1e-3f}) {
+    paint(crn, noise);
+    paint(pt, noise);
+    const EstimatorResult result = iicv(crn.view(), pt.view());
+    for (int y = 8; y < 20; ++y)
+      for (int x = 10; x < 30; ++x)
+        EXPECT_NEAR(result.estimate.pixel(x, y)[0], 60.0f * (1 + 0.001f * static_cast<float>(x)), 60 * (noise + 2e-6f));
+  }
+}
+
+/// Values whose squares overflow: finite results, here those of the PT image.
+TEST(Iicv, AbsurdlyLargeValuesGiveFiniteResults) {
+  test::Grouped crn = test::crn_image(40, 30, 12, 3), pt = test::pt_image(40, 30, 12, 4);
+  for (int i = 0; i < 36; ++i)
+    crn.pixel(20, 10)[i] = pt.pixel(20, 10)[i] = 1e25f * (1.0f + 0.1f * static_cast<float>(i));
+  IicvOptions options;
+  options.std_error = true;
+  const EstimatorResult result = iicv(crn.view(), pt.view(), options);
+  for (float v : result.estimate.data) ASSERT_TRUE(std::isfinite(v));
 }
 
 /// No variance in the CRN image: nothing to explain, the result is the CRN mean.

@@ -81,7 +81,8 @@ struct Settings {
   bool shared = true, symmetric = true;
   double ridge = 0;             ///< > 0: replaces the errors of h
   double smallest_penalty = 0;  ///< relative to the variance of the CRN groups
-  double conservation = 0;      ///< weight of the condition sum beta g = f
+  double conservation = 0;      ///< weight of the condition sum beta g = f, relative to the noise
+  double sample_share = 0;      ///< part of the penalty that is the variance of h
 };
 
 struct Result {
@@ -106,20 +107,28 @@ inline Result control_variates(const GroupedImage& crn, const RgbImage& h, const
             crn.pixel(neighbours[i].x, neighbours[i].y)[3 * t + c] - mean(crn, neighbours[i].x, neighbours[i].y)[c];
     }
   }
-  // V_h for the groups: a group mean has T times the variance of the mean. The error of h is not taken to be smaller than
-  // a small part of the variance of the CRN groups.
+  // V_h for the groups: a group mean has T times the variance of the mean. It is not taken to be smaller than a small part
+  // of the variance of the CRN groups.
   const auto group_variance = [&](Pixel p, int c) { return T * variance_of_mean(crn, p.x, p.y)[c]; };
-  const auto error = [&](Pixel p, int c) {
-    return std::max(T * error_of_h[index(p)][c], s.smallest_penalty * group_variance(p, c));
-  };
-  const auto penalty = [&](int first, int last) {
-    Eigen::VectorXd V = Eigen::VectorXd::Zero(k);
+  const auto penalty = [&](int first, int last, double condition) {
+    const auto sum = [&](const auto& element) {
+      double total = 0;
+      for (int c = first; c <= last; ++c) total += element(c);
+      return total;
+    };
+    Eigen::VectorXd V(k);
     double mean_diagonal = 0;
-    for (int i = 0; i < k; ++i)
-      for (int c = first; c <= last; ++c) {
-        V(i) += s.symmetric ? 0.5 * (error(target, c) + error(neighbours[i], c)) : error(neighbours[i], c);
-        mean_diagonal += group_variance(neighbours[i], c) / k;
-      }
+    for (int i = 0; i < k; ++i) {
+      const Pixel q = neighbours[i];
+      const double groups = sum([&](int c) { return group_variance(q, c); });
+      const double own = sum([&](int c) { return T * error_of_h[index(target)][c]; });
+      const double error = sum([&](int c) { return T * error_of_h[index(q)][c]; });
+      const double variance = sum([&](int c) { return T * variance_of_h[index(q)][c]; });
+      const double brightness = sum([&](int c) { return std::pow(mean(crn, q.x, q.y)[c], 2); });
+      V(i) = (1 - s.sample_share) * (s.symmetric ? 0.5 * (own + error) : error) + s.sample_share * variance;
+      V(i) = std::max({V(i), s.smallest_penalty * groups, s.smallest_penalty * condition * brightness});
+      mean_diagonal += groups / k;
+    }
     if (s.ridge > 0) V.setConstant(s.ridge * mean_diagonal);
     return V;
   };
@@ -127,15 +136,23 @@ inline Result control_variates(const GroupedImage& crn, const RgbImage& h, const
   std::array<Eigen::VectorXd, 3> beta;
   for (int c = 0; c < (s.shared ? 1 : 3); ++c) {
     const int last = s.shared ? 2 : c;
-    Eigen::MatrixXd A = penalty(c, last).asDiagonal();
+    // The condition: conservation times the group variance, as a common error in proportion to the brightness.
+    double noise = 0, squares = 0;
+    for (const Pixel q : neighbours)
+      for (int d = c; d <= last; ++d) {
+        noise += group_variance(q, d);
+        squares += std::pow(mean(crn, q.x, q.y)[d], 2);
+      }
+    const double condition = s.conservation > 0 ? noise / squares : 0;
+    Eigen::MatrixXd A = penalty(c, last, condition).asDiagonal();
     Eigen::VectorXd b = Eigen::VectorXd::Zero(k);
     for (int d = c; d <= last; ++d) {
       A += X[d].transpose() * X[d] / (T - 1);
       b += X[d].transpose() * y[d] / (T - 1);
       Eigen::VectorXd g(k);
       for (int i = 0; i < k; ++i) g(i) = mean(crn, neighbours[i].x, neighbours[i].y)[d];
-      A += s.conservation * g * g.transpose();
-      b += s.conservation * g * mean(crn, target.x, target.y)[d];
+      A += s.conservation * condition * g * g.transpose();
+      b += s.conservation * condition * g * mean(crn, target.x, target.y)[d];
     }
     beta[c] = A.ldlt().solve(b);
   }
