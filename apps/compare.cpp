@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "film/alignment.h"
 #include "film/error_map.h"
 #include "film/image_file.h"
 #include "film/metrics.h"
@@ -34,36 +35,6 @@ struct Comparison {
   double mean = 0, reference_mean = 0;
 };
 
-Image cut(const PlacedImage& source, const CropWindow& window) {
-  Image result(window.width, window.height, 3);
-  for (int y = 0; y < window.height; ++y)
-    std::copy_n(source.image.pixel(window.x - source.place.window.x, window.y - source.place.window.y + y),
-                static_cast<size_t>(window.width) * 3, result.pixel(0, y));
-  return result;
-}
-
-/// The pixels that image and reference share, in the frame.
-CropWindow common_window(const CropWindow& a, const CropWindow& b) {
-  const int x0 = std::max(a.x, b.x), y0 = std::max(a.y, b.y);
-  return {x0, y0, std::min(a.x + a.width, b.x + b.width) - x0, std::min(a.y + a.height, b.y + b.height) - y0};
-}
-
-std::string text_of(const CropWindow& w) { return fmt::format("{} x {} at ({}, {})", w.width, w.height, w.x, w.y); }
-
-CropWindow align(const std::string& path, const PlacedImage& image, const std::string& reference_path,
-                 const PlacedImage& reference, const CropWindow& window) {
-  const ImagePlace &a = image.place, &b = reference.place;
-  if (a.frame_width != b.frame_width || a.frame_height != b.frame_height)
-    throw Error(ErrorCode::kInput,
-                fmt::format("{} has a frame of {} x {} pixels, {} one of {} x {}", path, a.frame_width, a.frame_height,
-                            reference_path, b.frame_width, b.frame_height));
-  const CropWindow common = common_window(window, b.window);
-  if (common.width < 1 || common.height < 1)
-    throw Error(ErrorCode::kInput, fmt::format("{} ({}) and {} ({}) have no pixels in common", path, text_of(a.window),
-                                               reference_path, text_of(b.window)));
-  return common;
-}
-
 double mean_of(const Image& image, const Image& map) {
   double sum = 0;
   uint64_t n = 0;
@@ -79,10 +50,10 @@ Comparison compare_one(const CompareOptions& options, const std::vector<PlacedIm
                        const std::string& path) {
   const PlacedImage image = read_image(path, options.layer);
   Comparison comparison;
-  comparison.window = align(path, image, options.reference, references[0], image.place.window);
+  comparison.window = common_window(path, image.place, image.place.window, options.reference, references[0].place);
   bool low_dynamic_range = image.low_dynamic_range && references[0].low_dynamic_range;
   if (references.size() == 2) {
-    comparison.window = align(path, image, options.reference2, references[1], comparison.window);
+    comparison.window = common_window(path, image.place, comparison.window, options.reference2, references[1].place);
     low_dynamic_range = low_dynamic_range && references[1].low_dynamic_range;
   }
   const Image pixels = cut(image, comparison.window);

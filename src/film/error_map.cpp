@@ -23,6 +23,8 @@ float channel(uint32_t colour, int c) { return static_cast<float>((colour >> (16
 
 }  // namespace
 
+std::span<const uint32_t> error_colours() { return kColours; }
+
 std::string ErrorScale::legend() const {
   constexpr std::array<const char*, 5> kNames{"black", "violet", "red", "orange", "pale yellow"};
   std::string text;
