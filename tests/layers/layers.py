@@ -15,6 +15,7 @@ ARROWS = {
     "film": ["core"],
     "estimators": ["film"],
     "cuda": ["estimators"],
+    "report": ["film"],
     "scene": ["core"],
     "textures": ["scene"],
     "bsdfs": ["textures"],

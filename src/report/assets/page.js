@@ -1,0 +1,65 @@
+// Builds the page from its document (docs/report.md) and follows links.
+
+const report = JSON.parse(document.getElementById("document").textContent);
+const store = new ImageStore(report.image_sizes);
+const comparers = [];
+set_error_colours(report.error_colours);
+
+function draw_notes(block) {
+  const names = { error: "Errors", warning: "Warnings", info: "Notes" };
+  return el("aside", { class: `notes ${block.kind}`, "aria-label": names[block.kind] }, el("strong", {}, names[block.kind]),
+    el("ul", {}, block.items.map((item) => el("li", {}, item))));
+}
+
+function draw_comparer(block) {
+  const comparer = new Comparer(block, store, keep_link);
+  comparers.push(comparer);
+  return comparer.element;
+}
+
+const DRAW = { table: draw_table, plot: draw_plot, comparer: draw_comparer, notes: draw_notes };
+
+/** Consecutive plots stand side by side where there is room. */
+function draw_blocks(blocks) {
+  const elements = [];
+  for (const block of blocks) {
+    const element = DRAW[block.type](block);
+    if (block.type !== "plot") elements.push(element);
+    else if (elements.at(-1)?.className === "plots") elements.at(-1).append(element);
+    else elements.push(el("div", { class: "plots" }, element));
+  }
+  return elements;
+}
+
+function draw_section(section) {
+  return el("section", { class: "part", id: section.id }, section.heading ? el("h2", {}, section.heading) : null,
+    (section.text ?? []).map((paragraph) => el("p", { class: "prose" }, paragraph)), draw_blocks(section.blocks ?? []));
+}
+
+function draw_head() {
+  const sections = (report.sections ?? []).filter((section) => section.heading);
+  return [
+    el("h1", {}, report.title), report.subtitle ? el("p", { class: "subtitle" }, report.subtitle) : "",
+    report.meta?.length ? el("dl", {}, report.meta.map(([key, value]) => el("div", {}, el("dt", {}, key), el("dd", {}, String(value))))) : "",
+    sections.length > 1 ? el("nav", { "aria-label": "Sections" }, sections.map((s) => el("a", { href: `#${s.id}` }, s.heading))) : "",
+  ].filter(Boolean);
+}
+
+/** Puts a link into the address bar, without an entry in the history. */
+function keep_link(hash) {
+  if (hash !== location.hash) history.replaceState(null, "", hash);
+}
+
+function follow_link() {
+  const link = parse_link(location.hash);
+  const comparer = link && comparers.find((c) => c.block.id === link.comparer);
+  if (!comparer) return;
+  comparer.open(link);
+  comparer.element.scrollIntoView({ block: "start" });
+}
+
+document.getElementById("head").append(...draw_head());
+document.getElementById("content").replaceChildren(...(report.sections ?? []).map(draw_section));
+follow_link();
+window.addEventListener("hashchange", follow_link);
+comparers.forEach((comparer) => { comparer.started = true; });

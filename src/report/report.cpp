@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "report/report.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <set>
+#include <thread>
+
+#include "core/error.h"
+#include "film/error_map.h"
+#include "film/output_file.h"
+#include "report/embedded.h"
+#include "report/image_block.h"
+
+namespace covary {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+void append(std::string& text, std::initializer_list<std::string_view> parts) {
+  for (const std::string_view part : parts) text += part, text += '\n';
+}
+
+std::string escaped_html(std::string_view text) {
+  std::string result;
+  for (const char c : text) switch (c) {
+      case '&':
+        result += "&amp;";
+        break;
+      case '<':
+        result += "&lt;";
+        break;
+      case '>':
+        result += "&gt;";
+        break;
+      case '"':
+        result += "&quot;";
+        break;
+      default:
+        result += c;
+    }
+  return result;
+}
+
+/// JSON that may stand inside a <script>: no '<', so nothing in it can end the element or begin a comment. Text that is
+/// not UTF-8, such as a file name, keeps its place with replacement characters.
+std::string script_json(const Json& json) {
+  std::string result;
+  for (const char c : json.dump(-1, ' ', false, Json::error_handler_t::replace)) {
+    if (c == '<')
+      result += "\\u003c";
+    else
+      result += c;
+  }
+  return result;
+}
+
+using Sizes = std::map<std::string, std::pair<int, int>>;
+
+void check_block(const Json& block, const Sizes& sizes) {
+  const std::string type = block.value("type", "");
+  constexpr std::array kTypes{"table", "plot", "comparer", "notes"};
+  COVARY_CHECK(std::find(kTypes.begin(), kTypes.end(), type) != kTypes.end(), "unknown block type '" + type + "'");
+  if (type != "comparer") return;
+  for (const Json& scene : block.at("scenes")) {
+    std::set<std::pair<int, int>> scene_sizes;
+    for (const Json& image : scene.at("images")) {
+      const auto& id = image.at("image").get_ref<const std::string&>();
+      COVARY_CHECK(sizes.contains(id), "the document names an image '" + id + "' that is not there");
+      scene_sizes.insert(sizes.at(id));
+    }
+    COVARY_CHECK(scene_sizes.size() == 1, "a scene of a comparer needs images, all of one size");
+  }
+}
+
+void check(const Json& document, const std::vector<ReportImage>& images) {
+  Sizes sizes;
+  for (const ReportImage& image : images) {
+    const std::pair<int, int> size{image.rgb.width, image.rgb.height};
+    COVARY_CHECK(sizes.emplace(image.id, size).second, "two images are called '" + image.id + "'");
+    COVARY_CHECK(image.rgb.channels == 3, "image '" + image.id + "' does not have 3 channels");
+  }
+  for (const Json& section : document.value("sections", Json::array()))
+    for (const Json& block : section.value("blocks", Json::array())) check_block(block, sizes);
+}
+
+std::string styles() {
+  std::string text;
+  append(text, {report_files::page_css, report_files::comparer_css});
+  return text;
+}
+
+/// All scripts in one function, so that their names stay off the page's global scope; later files use earlier ones.
+std::string scripts() {
+  using namespace report_files;
+  std::string text;
+  append(text, {"(() => {", "\"use strict\";", dom_js, format_js, colour_js, images_js, link_js, viewport_js, insets_js,
+                figure_js, controls_js, gestures_js, comparer_js, table_js, plot_js, page_js, "})();"});
+  return text;
+}
+
+/// page.html with each {{name}} replaced.
+std::string fill_page(const Json& document, const std::vector<ReportImage>& images) {
+  Json data = document;
+  data["error_colours"] = error_colours();
+  data["image_sizes"] = Json::object();
+  for (const ReportImage& image : images) data["image_sizes"][image.id] = {image.rgb.width, image.rgb.height};
+  const std::array<std::pair<std::string_view, std::string>, 6> values{{
+      {"title", escaped_html(document.value("title", "covary"))},
+      {"styles", styles()},
+      {"licence", std::string(report_files::chart_licence_txt)},
+      {"library", std::string(report_files::chart_min_js)},
+      {"document", script_json(data)},
+      {"scripts", scripts()},
+  }};
+  const std::string_view page = report_files::page_html;
+  std::string text;
+  size_t position = 0;
+  while (true) {
+    const size_t begin = page.find("{{", position);
+    text += page.substr(position, begin - position);
+    if (begin == std::string_view::npos) return text;
+    const size_t end = page.find("}}", begin);
+    const std::string_view name = page.substr(begin + 2, end - begin - 2);
+    const auto* value = std::find_if(values.begin(), values.end(), [&](const auto& v) { return v.first == name; });
+    COVARY_CHECK(value != values.end(), fmt::format("page.html asks for '{}'", name));
+    text += value->second;
+    position = end + 2;
+  }
+}
+
+std::string image_element(const ReportImage& image) {
+  return fmt::format("<script type=\"application/octet-stream\" data-image=\"{}\">{}</script>\n",
+                     escaped_html(image.id), encode_image(image.rgb));
+}
+
+/// The images stand behind everything else, so that a browser shows the page while it still reads them.
+void write_images(OutputFile& file, const std::vector<ReportImage>& images) {
+  const size_t at_once = std::max(1u, std::thread::hardware_concurrency());
+  std::vector<std::string> elements(at_once);
+  for (size_t first = 0; first < images.size(); first += at_once) {
+    const size_t n = std::min(at_once, images.size() - first);
+    tbb::parallel_for(size_t{0}, n, [&](size_t i) { elements[i] = image_element(images[first + i]); });
+    for (size_t i = 0; i < n; ++i) file.write(elements[i].data(), elements[i].size());
+  }
+}
+
+}  // namespace
+
+void write_report(const std::string& path, const Json& document, const std::vector<ReportImage>& images) {
+  check(document, images);
+  OutputFile file(path);
+  const std::string page = fill_page(document, images);
+  file.write(page.data(), page.size());
+  write_images(file, images);
+  file.commit();
+}
+
+}  // namespace covary
