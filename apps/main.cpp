@@ -57,6 +57,7 @@ int run(int argc, char** argv) {
   add_info(app);
   add_convert(app);
   add_combine(app);
+  add_view(app);
 
   if (argc < 2) {
     std::fputs(app.help().c_str(), stdout);
