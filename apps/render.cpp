@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// covary render: a scene to a film.
+// covary render: a scene to an image, by a plan: one or two passes, and the estimator that makes the image of them.
 #include <fmt/format.h>
 #include <sys/resource.h>
 #include <tbb/global_control.h>
 
+#include <array>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -15,24 +18,31 @@
 
 #include "commands.h"
 #include "core/error.h"
+#include "estimator_options.h"
+#include "estimators/mean.h"
+#include "estimators/predicted_error.h"
+#include "estimators/result_file.h"
 #include "film/film_file.h"
 #include "film/image_file.h"
 #include "film/output_file.h"
 #include "integrators/aov.h"
 #include "integrators/integrator.h"
-#include "integrators/render_pass.h"
 #include "io/load_scene.h"
 #include "progress.h"
+#include "render_passes.h"
 
 namespace covary {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+constexpr uint32_t kFirstBudget = 96;  // samples per pixel before --until looks at the error for the first time
+
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 struct RenderOptions {
-  std::string scene, output, integrator, estimator = "none", sampling = "independent", rfilter, json, save_passes;
-  std::string resolution, crop, replay;
+  std::string scene, output, integrator, sampling, split = "1:1", rfilter, json, passes;
+  std::string resolution, crop, replay, until;
+  EstimatorOptions estimator;
   std::vector<std::string> defines;
   std::optional<uint32_t> spp, groups;
   std::optional<int> min_depth, max_depth;
@@ -80,9 +90,12 @@ FilterSettings filter_named(const std::string& name) {
 
 std::string filter_text(const FilterSettings& filter) {
   switch (filter.kind) {
-    case FilterKind::kBox: return fmt::format("box radius={}", filter.radius);
-    case FilterKind::kTent: return fmt::format("tent radius={}", filter.radius);
-    case FilterKind::kGaussian: return fmt::format("gaussian radius={} stddev={}", filter.radius, filter.stddev);
+    case FilterKind::kBox:
+      return fmt::format("box radius={}", filter.radius);
+    case FilterKind::kTent:
+      return fmt::format("tent radius={}", filter.radius);
+    case FilterKind::kGaussian:
+      return fmt::format("gaussian radius={} stddev={}", filter.radius, filter.stddev);
   }
   throw Error(ErrorCode::kInternal, "unknown reconstruction filter");
 }
@@ -98,13 +111,15 @@ const IntegratorPlugin* find_integrator(const std::string& name) {
 std::string unknown_integrator(const std::string& name) {
   std::vector<std::string> names;
   for (const IntegratorPlugin& plugin : integrator_plugins()) names.push_back(plugin.name);
-  return fmt::format("unknown integrator '{}'{}; supported: {}", name, did_you_mean(name, names), fmt::join(names, ", "));
+  return fmt::format("unknown integrator '{}'{}; supported: {}", name, did_you_mean(name, names),
+                     fmt::join(names, ", "));
 }
 
 std::shared_ptr<Integrator> make_integrator(Parameters& parameters, const RenderOptions& options) {
   PathLengthSettings lengths = PathLengthSettings::from(parameters);
   if (options.min_depth) lengths.min_depth = *options.min_depth;
-  if (options.max_depth) lengths.max_depth = *options.max_depth < 0 ? PathLengthSettings::kUnlimited : *options.max_depth;
+  if (options.max_depth)
+    lengths.max_depth = *options.max_depth < 0 ? PathLengthSettings::kUnlimited : *options.max_depth;
   const IntegratorPlugin* plugin = find_integrator(options.integrator.empty() ? parameters.type() : options.integrator);
   if (plugin) return plugin->make(parameters, lengths);
   parameters.error(unknown_integrator(parameters.type()));
@@ -154,8 +169,8 @@ double peak_memory_bytes() {
   return static_cast<double>(usage.ru_maxrss) * 1024;
 }
 
-/// Command that repeats one sample: the user's own, with the sample in place of the outputs.
-std::string replay_command(const RenderOptions& o, const BadSample& bad) {
+/// Command that repeats one sample of a pass: the user's own, with the sample in place of the outputs.
+std::string replay_command(const RenderOptions& o, const Pass& pass, const BadSample& bad) {
   std::string text = "covary render " + o.scene;
   for (const std::string& define : o.defines) text += " -D " + define;
   if (!o.resolution.empty()) text += " --resolution " + o.resolution;
@@ -163,79 +178,336 @@ std::string replay_command(const RenderOptions& o, const BadSample& bad) {
   if (o.min_depth) text += fmt::format(" --min-depth {}", *o.min_depth);
   if (o.max_depth) text += fmt::format(" --max-depth {}", *o.max_depth);
   if (!o.rfilter.empty()) text += " --rfilter " + o.rfilter;
-  return text + fmt::format(" --sampling {} --seed {} --replay {},{},{}", o.sampling, o.seed, bad.x, bad.y, bad.sample);
+  return text +
+         fmt::format(" --sampling {} --seed {} --replay {},{},{}", pass.name(), o.seed, bad.x, bad.y, bad.sample);
 }
 
-void report_bad_samples(const RenderOptions& options, const PassResult& result) {
+void report_bad_samples(const RenderOptions& options, const Pass& pass) {
+  const PassResult& result = pass.result;
   if (result.bad_samples.empty()) return;
   fmt::print(stderr, "warning: {} samples were not finite and {} negative; they count as black. The first:\n",
              result.n_not_finite, result.n_negative);
   for (const BadSample& bad : result.bad_samples)
     fmt::print(stderr, "  pixel ({}, {}), sample {}: ({}, {}, {})\n    {}\n", bad.x, bad.y, bad.sample, bad.value.r,
-               bad.value.g, bad.value.b, replay_command(options, bad));
+               bad.value.g, bad.value.b, replay_command(options, pass, bad));
 }
 
-nlohmann::json statistics(const RenderOptions& options, const LoadedScene& scene, const Film& film,
-                          const PassResult& result, double load_seconds, double write_seconds, int threads) {
-  const double rate = 1 / std::max(result.seconds, 1e-9);
-  nlohmann::json bad = nlohmann::json::array();
-  for (const BadSample& b : result.bad_samples)
-    bad.push_back({{"x", b.x}, {"y", b.y}, {"sample", b.sample}, {"replay", replay_command(options, b)}});
-  return {{"version", COVARY_VERSION},
-          {"command", command_line()},
-          {"scene", options.scene},
-          {"scene_hash", scene.content_hash},
-          {"width", film.width()},
-          {"height", film.height()},
-          {"samples_per_pixel", film.mean_count()},
-          {"groups", film.groups()},
-          {"sampling", options.sampling},
-          {"seed", options.seed},
-          {"threads", threads},
-          {"complete", result.complete},
-          {"seconds",
-           {{"load", load_seconds},
-            {"build", scene.scene->build_seconds()},
-            {"render", result.seconds},
-            {"write", write_seconds}}},
-          {"samples", result.n_samples},
-          {"rays", result.n_rays},
-          {"samples_per_second", static_cast<double>(result.n_samples) * rate},
-          {"paths_per_second", static_cast<double>(result.n_samples) * rate},
-          {"rays_per_second", static_cast<double>(result.n_rays) * rate},
-          {"triangles", scene.scene->n_triangles()},
-          {"peak_memory_bytes", peak_memory_bytes()},
-          {"not_finite_samples", result.n_not_finite},
-          {"negative_samples", result.n_negative},
-          {"bad_samples", bad}};
-}
+/// What has become of the plan.
+struct Outcome {
+  std::vector<Pass> passes;
+  EstimatorResult image;
+  std::optional<double> predicted_relmse;
+  double load_seconds = 0, estimate_seconds = 0, write_seconds = 0;
 
-// ---- the film --------------------------------------------------------------------------------------------------------
-
-/// The film to continue, or a new one.
-Film open_film(const RenderOptions& options, const LoadedScene& scene, const CropWindow& crop, int groups,
-               const std::map<std::string, std::string>& attributes) {
-  if (!options.resume || !std::filesystem::exists(options.output)) {
-    Film film(scene.width, scene.height, crop, groups);
-    film.attributes = attributes;
-    return film;
+  template <typename F>
+  double sum(F value) const {
+    double total = 0;
+    for (const Pass& pass : passes) total += static_cast<double>(value(pass));
+    return total;
   }
-  Film film = read_film(options.output);
+  double samples_per_pixel() const {
+    return sum([](const Pass& p) { return p.film.mean_count(); });
+  }
+  double render_seconds() const {
+    return sum([](const Pass& p) { return p.result.seconds; });
+  }
+  bool complete() const {
+    return std::all_of(passes.begin(), passes.end(), [](const Pass& p) { return p.count >= p.settings.spp; });
+  }
+};
+
+nlohmann::ordered_json statistics(const RenderOptions& options, const LoadedScene& scene, const Outcome& outcome,
+                                  int threads) {
+  const Film& film = outcome.passes.back().film;
+  const double samples = outcome.sum([](const Pass& p) { return p.result.n_samples; });
+  const double rays = outcome.sum([](const Pass& p) { return p.result.n_rays; });
+  const double rate = 1 / std::max(outcome.render_seconds(), 1e-9);
+  nlohmann::ordered_json passes = nlohmann::json::array(), bad = nlohmann::json::array();
+  for (const Pass& pass : outcome.passes) {
+    passes.push_back({{"sampling", pass.name()},
+                      {"samples_per_pixel", pass.film.mean_count()},
+                      {"groups", pass.film.groups()},
+                      {"samples", pass.result.n_samples},
+                      {"rays", pass.result.n_rays},
+                      {"seconds", pass.result.seconds}});
+    for (const BadSample& b : pass.result.bad_samples)
+      bad.push_back({{"x", b.x}, {"y", b.y}, {"sample", b.sample}, {"replay", replay_command(options, pass, b)}});
+  }
+  nlohmann::ordered_json json = {
+      {"version", COVARY_VERSION},
+      {"command", command_line()},
+      {"output", options.output},
+      {"scene", options.scene},
+      {"scene_hash", scene.content_hash},
+      {"width", film.width()},
+      {"height", film.height()},
+      {"estimator", options.estimator.text()},
+      {"samples_per_pixel", outcome.samples_per_pixel()},
+      {"seed", options.seed},
+      {"threads", threads},
+      {"complete", outcome.complete()},
+      {"passes", passes},
+      {"seconds",
+       {{"load", outcome.load_seconds},
+        {"build", scene.scene->build_seconds()},
+        {"render", outcome.render_seconds()},
+        {"estimate", outcome.estimate_seconds},
+        {"write", outcome.write_seconds}}},
+      {"samples", samples},
+      {"rays", rays},
+      {"samples_per_second", samples * rate},
+      {"rays_per_second", rays * rate},
+      {"triangles", scene.scene->n_triangles()},
+      {"peak_memory_bytes", peak_memory_bytes()},
+      {"not_finite_samples", outcome.sum([](const Pass& p) { return p.result.n_not_finite; })},
+      {"negative_samples", outcome.sum([](const Pass& p) { return p.result.n_negative; })},
+      {"bad_samples", bad}};
+  if (outcome.predicted_relmse) json["predicted_relmse"] = *outcome.predicted_relmse;
+  return json;
+}
+
+// ---- the plan ------------------------------------------------------------------------------------------------------
+
+bool is_plain(const RenderOptions& options) { return options.estimator.name == "none"; }
+
+/// Parts of the budget for the CRN and the independent pass, "1:3".
+std::array<double, 2> parse_split(const std::string& text) {
+  const auto parts = parse_numbers("--split", text, ':', 2, "CRN:INDEPENDENT in whole numbers, e.g. 1:1");
+  if (parts[0] < 1 || parts[1] < 1 || parts[0] > 1000 || parts[1] > 1000)
+    throw Error(ErrorCode::kUsage, "--split '" + text + "': each part must be 1 to 1000");
+  const double sum = static_cast<double>(parts[0] + parts[1]);
+  return {static_cast<double>(parts[0]) / sum, static_cast<double>(parts[1]) / sum};
+}
+
+double parse_until(const std::string& text) {
+  const std::string key = "relmse=";
+  size_t end = 0;
+  double value = 0;
+  if (text.starts_with(key)) try {
+      value = std::stod(text.substr(key.size()), &end);
+    } catch (const std::exception&) {
+      end = 0;
+    }
+  if (end == 0 || key.size() + end != text.size() || !(value > 0) || !std::isfinite(value))
+    throw Error(ErrorCode::kUsage, "--until '" + text + "': expected relmse=X with X > 0, e.g. relmse=0.005");
+  return value;
+}
+
+/// Samples per pixel of each pass for a budget of `total`; the passes' groups are those of the first call.
+void set_budget(const RenderOptions& options, uint32_t total, std::vector<Pass>& passes) {
+  const auto parts = parse_split(options.split);
+  for (size_t i = 0; i < passes.size(); ++i) {
+    const auto groups = static_cast<uint32_t>(passes[i].film.groups());
+    const double part = passes.size() == 1 ? 1.0 : parts[i];
+    const auto wanted = static_cast<uint32_t>(std::ceil(part * total - 1e-9));
+    passes[i].settings.spp = (std::max(wanted, 1u) + groups - 1) / groups * groups;
+  }
+}
+
+/// How many groups each pass keeps: a tenth of the noise in a variance is worth 12 of them; small passes have as many as
+/// they have samples.
+int number_of_groups(const RenderOptions& options, uint32_t budget) {
+  if (is_plain(options))
+    return static_cast<int>(options.groups.value_or(options.sampling == "crn" || !options.until.empty() ? 12 : 1));
+  const auto parts = parse_split(options.split);
+  const double fewest = std::min(parts[0], parts[1]) * budget;
+  const auto groups = static_cast<int>(options.groups.value_or(std::clamp(static_cast<int>(fewest), 3, 12)));
+  if (groups < 3)
+    throw Error(ErrorCode::kUsage,
+                fmt::format("--groups {}: --estimator {} needs at least 3 groups to measure how pixels "
+                            "vary together",
+                            groups, options.estimator.name));
+  return groups;
+}
+
+/// Where the films are while the plan runs.
+std::filesystem::path passes_folder(const RenderOptions& options) {
+  return options.passes.empty() ? std::filesystem::path(options.output).replace_extension(".passes")
+                                : std::filesystem::path(options.passes);
+}
+
+/// A plain render without --passes has its film in the output.
+bool output_is_film(const RenderOptions& options) { return is_plain(options) && options.passes.empty(); }
+
+std::string costs_path(const Pass& pass) {
+  return std::filesystem::path(pass.path).replace_extension(".json").string();
+}
+
+/// Continues the film at pass.path if it is there.
+void resume(Pass& pass, const Film& empty, bool with_costs) {
+  pass.film = read_film(pass.path);
+  Film& film = pass.film;
   const auto differs = [&](const std::string& what, const std::string& old_value, const std::string& new_value) {
     throw Error(ErrorCode::kInput, fmt::format("--resume: '{}' was rendered with {} {}, this command asks for {}",
-                                               options.output, what, old_value, new_value));
+                                               pass.path, what, old_value, new_value));
   };
-  const auto size_text = [](int w, int h, const CropWindow& c) {
-    return fmt::format("{} x {}, crop {},{},{},{}", w, h, c.x, c.y, c.width, c.height);
+  const auto size_text = [](const Film& f) {
+    const CropWindow& c = f.crop();
+    return fmt::format("{} x {}, crop {},{},{},{}", f.frame_width(), f.frame_height(), c.x, c.y, c.width, c.height);
   };
-  const std::string old_size = size_text(film.frame_width(), film.frame_height(), film.crop());
-  const std::string new_size = size_text(scene.width, scene.height, crop);
-  if (old_size != new_size) differs("frame", old_size, new_size);
-  if (film.groups() != groups) differs("groups", std::to_string(film.groups()), std::to_string(groups));
+  if (size_text(film) != size_text(empty)) differs("frame", size_text(film), size_text(empty));
+  if (film.groups() != empty.groups()) differs("groups", std::to_string(film.groups()), std::to_string(empty.groups()));
   for (const char* key : {film_key::kSceneHash, film_key::kSampling, film_key::kSeed, film_key::kSettings})
-    if (film.attributes[key] != attributes.at(key)) differs(key, film.attributes[key], attributes.at(key));
-  film.attributes = attributes;
-  return film;
+    if (film.attributes[key] != empty.attributes.at(key)) differs(key, film.attributes[key], empty.attributes.at(key));
+  film.attributes = empty.attributes;
+  film.aovs.clear();
+  pass.count = smallest_count(film);
+  if (!with_costs || !std::filesystem::exists(costs_path(pass))) return;
+  std::ifstream file(costs_path(pass));
+  const nlohmann::json costs = nlohmann::json::parse(file, nullptr, false);
+  if (costs.is_discarded()) return;
+  pass.result.n_samples = costs.value("samples", uint64_t{0});
+  pass.result.n_rays = costs.value("rays", uint64_t{0});
+  pass.result.seconds = costs.value("seconds", 0.0);
+}
+
+std::vector<Pass> make_passes(const RenderOptions& options, const LoadedScene& scene, const Integrator& integrator,
+                              uint32_t budget) {
+  std::vector<std::string> names = {"crn", "independent"};
+  if (is_plain(options)) names = {options.sampling.empty() ? "independent" : options.sampling};
+  std::vector<Pass> passes;
+  for (const std::string& name : names) {
+    Pass pass;
+    pass.settings.sampling = name == "crn" ? Sampling::kCrn : Sampling::kIndependent;
+    pass.settings.seed = options.seed;
+    pass.settings.filter = options.rfilter.empty() ? scene.filter : filter_named(options.rfilter);
+    pass.path = output_is_film(options) ? options.output : (passes_folder(options) / (name + ".exr")).string();
+    pass.film = Film(scene.width, scene.height, crop_window(options, scene), number_of_groups(options, budget));
+    pass.film.attributes = {
+        {film_key::kSeed, std::to_string(options.seed)},
+        {film_key::kSampling, name},
+        {film_key::kSceneHash, scene.content_hash},
+        {film_key::kSettings, integrator.description() + "; filter " + filter_text(pass.settings.filter)},
+        {film_key::kVersion, COVARY_VERSION},
+        {film_key::kCommand, command_line()},
+        {film_key::kComplete, "false"},
+    };
+    if (options.resume && std::filesystem::exists(pass.path)) resume(pass, pass.film, !options.passes.empty());
+    passes.push_back(std::move(pass));
+  }
+  set_budget(options, budget, passes);
+  return passes;
+}
+
+/// Keeps the films, so that --resume can go on from here.
+void save_passes(const RenderOptions& options, std::vector<Pass>& passes, bool complete) {
+  if (!output_is_film(options)) std::filesystem::create_directories(passes_folder(options));
+  for (Pass& pass : passes) {
+    pass.film.attributes[film_key::kComplete] = complete ? "true" : "false";
+    write_film(pass.path, pass.film);
+    if (options.passes.empty()) continue;
+    const nlohmann::ordered_json costs = {
+        {"samples", pass.result.n_samples}, {"rays", pass.result.n_rays}, {"seconds", pass.result.seconds}};
+    write_text_file(costs_path(pass), costs.dump(2) + "\n");
+  }
+}
+
+/// Films that were kept for --resume alone.
+void remove_passes(const RenderOptions& options, const std::vector<Pass>& passes) {
+  if (!options.passes.empty() || output_is_film(options)) return;
+  std::error_code ignored;
+  for (const Pass& pass : passes) std::filesystem::remove(pass.path, ignored);
+  std::filesystem::remove(passes_folder(options), ignored);  // only when empty
+}
+
+GroupedImage grouped(const Film& film) { return {film.width(), film.height(), film.groups(), film.data().data()}; }
+
+/// Makes the image of the passes.
+void estimate(const RenderOptions& options, Outcome& outcome) {
+  const auto start = Clock::now();
+  const std::vector<Pass>& passes = outcome.passes;
+  if (is_plain(options)) {
+    outcome.image = mean_of_groups(grouped(passes[0].film));
+  } else {
+    const auto crn_samples = static_cast<int64_t>(std::llround(passes[0].film.mean_count()));
+    outcome.image = make_estimator(options.estimator, predicts_error(options.estimator.name), crn_samples)
+                        .apply(grouped(passes[0].film), grouped(passes[1].film));
+  }
+  if (!outcome.image.std_error.data.empty()) outcome.predicted_relmse = predicted_relmse(outcome.image);
+  outcome.estimate_seconds += seconds_since(start);
+}
+
+/// The next budget on the way to a relMSE of `target`: error falls like 1 / samples, or more slowly.
+uint32_t next_budget(uint32_t budget, double predicted, double target, uint32_t limit) {
+  const double factor = std::clamp(1.1 * predicted / target, 1.25, 4.0);
+  return static_cast<uint32_t>(std::min<double>(limit, std::ceil(factor * budget)));
+}
+
+/// Renders and estimates, once or until the predicted error is small enough. False when interrupted.
+bool run(const RenderOptions& options, const LoadedScene& scene, const Integrator& integrator, uint32_t budget,
+         uint32_t limit, Outcome& outcome) {
+  const double target = options.until.empty() ? 0 : parse_until(options.until);
+  const auto start = Clock::now();
+  auto last_checkpoint = start;
+  for (;;) {
+    ProgressLine progress(std::filesystem::path(options.scene).stem().string(), options.quiet);
+    RenderLimits limits;
+    limits.seconds = options.seconds > 0 ? std::max(options.seconds - seconds_since(start), 1e-3) : 0;
+    limits.stop = &g_stop;
+    limits.progress = [&](uint64_t done, uint64_t total) {
+      progress.update(done, options.seconds > 0 && !options.spp ? 0 : total, limits.seconds);
+    };
+    limits.checkpoint = [&] {
+      if (options.checkpoint_seconds <= 0 || seconds_since(last_checkpoint) < options.checkpoint_seconds) return;
+      save_passes(options, outcome.passes, false);
+      last_checkpoint = Clock::now();
+    };
+    render_passes(*scene.scene, integrator, outcome.passes, limits);
+    progress.finish();
+    if (g_stop && !outcome.complete()) return false;
+    if (!is_plain(options) || target > 0) estimate(options, outcome);
+    const bool out_of_time = options.seconds > 0 && seconds_since(start) >= options.seconds;
+    if (target == 0 || *outcome.predicted_relmse <= target || budget >= limit || out_of_time) return true;
+    budget = next_budget(budget, *outcome.predicted_relmse, target, limit);
+    set_budget(options, budget, outcome.passes);
+  }
+}
+
+// ---- output ----------------------------------------------------------------------------------------------------------
+
+void write_image(const RenderOptions& options, const LoadedScene& scene, Outcome& outcome) {
+  Pass& last = outcome.passes.back();
+  Film& film = last.film;
+  if (options.aovs)
+    render_aovs(*scene.scene, last.settings.filter, last.settings.sampling, last.settings.seed, last.settings.pass, 16,
+                film);
+  if (is_plain(options)) {
+    film.attributes[film_key::kComplete] = "true";
+    write_film(options.output, film);
+    if (options.preview) write_png(preview_path(options.output), film.mean_image());
+    return;
+  }
+  std::map<std::string, std::string> attributes;
+  for (const char* key :
+       {film_key::kSeed, film_key::kSceneHash, film_key::kSettings, film_key::kVersion, film_key::kCommand})
+    attributes[std::string("covary:") + key] = film.attributes.at(key);
+  attributes["covary:estimator"] = options.estimator.text();
+  attributes["covary:samples"] = fmt::format("{:g}", outcome.samples_per_pixel());
+  const ImagePlace place{film.frame_width(), film.frame_height(), film.crop()};
+  write_result(options.output, place, attributes, outcome.image, film.aovs);
+  if (options.preview) write_png(preview_path(options.output), outcome.image.estimate);
+}
+
+void print_summary(const RenderOptions& options, const LoadedScene& scene, const Outcome& outcome) {
+  std::string samples;
+  for (const Pass& pass : outcome.passes)
+    samples += fmt::format("{}{:g} {}", samples.empty() ? "" : " + ", pass.film.mean_count(), pass.name());
+  const double seconds = std::max(outcome.render_seconds(), 1e-9);
+  fmt::print(stderr,
+             "{}: {} x {}, {} samples per pixel in {:.2f} s (load {:.2f} s, build {:.2f} s, {} samples/s, {} rays/s)\n",
+             options.output, outcome.passes[0].film.width(), outcome.passes[0].film.height(), samples, seconds,
+             outcome.load_seconds, scene.scene->build_seconds(),
+             format_count(outcome.sum([](const Pass& p) { return p.result.n_samples; }) / seconds),
+             format_count(outcome.sum([](const Pass& p) { return p.result.n_rays; }) / seconds));
+  if (!is_plain(options)) {
+    fmt::print(stderr, "{} in {:.2f} s", options.estimator.text(), outcome.estimate_seconds);
+    if (outcome.predicted_relmse) fmt::print(stderr, ", predicted relMSE {:.3g}", *outcome.predicted_relmse);
+    fmt::print(stderr, "\n");
+  } else if (!options.until.empty()) {
+    fmt::print(stderr, "predicted relMSE {:.3g}\n", *outcome.predicted_relmse);
+  }
+  if (!options.until.empty() && *outcome.predicted_relmse > parse_until(options.until))
+    fmt::print(stderr, "warning: --until {} was not reached\n", options.until);
 }
 
 void check_output_writable(const std::string& output) {
@@ -244,12 +516,15 @@ void check_output_writable(const std::string& output) {
     throw Error(ErrorCode::kIo, "cannot write '" + output + "': the folder '" + folder.string() + "' does not exist");
 }
 
-void replay(const RenderOptions& options, const LoadedScene& scene, const Integrator& integrator,
-            const PassSettings& settings) {
+void replay(const RenderOptions& options, const LoadedScene& scene, const Integrator& integrator) {
   const auto at = parse_numbers("--replay", options.replay, ',', 3, "X,Y,SAMPLE, e.g. 640,360,17");
   if (at[0] >= scene.width || at[1] >= scene.height)
     throw Error(ErrorCode::kUsage,
                 fmt::format("--replay '{}' is outside the {} x {} frame", options.replay, scene.width, scene.height));
+  PassSettings settings;
+  settings.sampling = options.sampling == "crn" ? Sampling::kCrn : Sampling::kIndependent;
+  settings.seed = options.seed;
+  settings.filter = options.rfilter.empty() ? scene.filter : filter_named(options.rfilter);
   const ReplayedSample sample = replay_sample(*scene.scene, integrator, settings, static_cast<int>(at[0]),
                                               static_cast<int>(at[1]), static_cast<uint64_t>(at[2]));
   fmt::print("pixel ({}, {}), sample {}, film position ({}, {}), {} rays\nradiance ({:.9g}, {:.9g}, {:.9g})\n", at[0],
@@ -257,109 +532,112 @@ void replay(const RenderOptions& options, const LoadedScene& scene, const Integr
              sample.value.b);
 }
 
-void render(const RenderOptions& options) {
+/// Everything that can be wrong before the scene is loaded.
+void check_options(RenderOptions& options) {
+  const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
   if (options.replay.empty() && options.output.empty())
-    throw Error(ErrorCode::kUsage, "no output given; use -o OUT.exr (or --replay X,Y,SAMPLE)");
+    usage("no output given; use -o OUT.exr (or --replay X,Y,SAMPLE)");
   if (!options.integrator.empty() && !find_integrator(options.integrator))
-    throw Error(ErrorCode::kUsage, "--integrator: " + unknown_integrator(options.integrator));
+    usage("--integrator: " + unknown_integrator(options.integrator));
+  if (!options.sampling.empty() && options.estimator.command->count("--estimator") && !is_plain(options))
+    usage(fmt::format(
+        "--sampling is an option of --estimator none; {} renders one pass with common random numbers and one "
+        "with independent ones",
+        options.estimator.name));
+  if (!options.sampling.empty()) options.estimator.name = "none";
+  if (is_plain(options) && options.estimator.command->count("--split"))
+    usage("--split is an option of estimators with two passes, not of none");
+  parse_split(options.split);
+  if (!options.until.empty()) {
+    parse_until(options.until);
+    if (!is_plain(options) && !predicts_error(options.estimator.name))
+      usage("--until: " + options.estimator.name + " does not estimate its error");
+    if (is_plain(options) && options.groups.value_or(2) < 2) usage("--until needs --groups 2 or more");
+  }
+  check_estimator_options(options.estimator);
   if (!options.output.empty()) check_output_writable(options.output);
+}
+
+void render(RenderOptions options) {
+  check_options(options);
   const int threads = options.threads > 0 ? options.threads : static_cast<int>(std::thread::hardware_concurrency());
   const tbb::global_control control(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(threads));
 
+  Outcome outcome;
   const auto load_start = Clock::now();
   LoadedScene scene = load(options);
-  const double load_seconds = seconds_since(load_start) - scene.scene->build_seconds();
+  outcome.load_seconds = seconds_since(load_start) - scene.scene->build_seconds();
   for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", warning);
   const auto& integrator = dynamic_cast<const Integrator&>(*scene.integrator);
+  if (!options.replay.empty()) return replay(options, scene, integrator);
 
-  PassSettings settings;
-  settings.sampling = options.sampling == "crn" ? Sampling::kCrn : Sampling::kIndependent;
-  settings.seed = options.seed;
-  settings.filter = options.rfilter.empty() ? scene.filter : filter_named(options.rfilter);
-  settings.seconds = options.seconds;
-  settings.stop = &g_stop;
-  if (!options.replay.empty()) return replay(options, scene, integrator, settings);
-
-  const auto groups = static_cast<int>(options.groups.value_or(settings.sampling == Sampling::kCrn ? 12 : 1));
-  const uint32_t wanted = options.spp.value_or(options.seconds > 0 ? 1u << 30 : static_cast<uint32_t>(scene.spp));
-  settings.spp = (wanted + groups - 1) / groups * groups;
-  if (settings.spp != wanted && options.seconds <= 0)
-    fmt::print(stderr, "note: {} samples per pixel instead of {}, so that all {} groups have the same size\n",
-               settings.spp, wanted, groups);
-
-  const CropWindow crop = crop_window(options, scene);
-  const std::map<std::string, std::string> attributes = {
-      {film_key::kSeed, std::to_string(options.seed)},
-      {film_key::kSampling, options.sampling},
-      {film_key::kSceneHash, scene.content_hash},
-      {film_key::kSettings, integrator.description() + "; filter " + filter_text(settings.filter)},
-      {film_key::kVersion, COVARY_VERSION},
-      {film_key::kCommand, command_line()},
-      {film_key::kComplete, "false"},
-  };
-  Film film = open_film(options, scene, crop, groups, attributes);
+  const bool open_ended = options.seconds > 0 || !options.until.empty();
+  const uint32_t limit = options.spp.value_or(open_ended ? 1u << 30 : static_cast<uint32_t>(scene.spp));
+  const uint32_t budget = options.until.empty() ? limit : std::min(limit, kFirstBudget);
+  outcome.passes = make_passes(options, scene, integrator, budget);
+  const double planned = outcome.sum([](const Pass& p) { return p.settings.spp; });
+  if (planned != budget && !open_ended)
+    fmt::print(stderr, "note: {:g} samples per pixel instead of {}, so that all {} groups have the same size\n",
+               planned, budget, outcome.passes[0].film.groups());
 
   g_stop = false;
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
-  ProgressLine progress(std::filesystem::path(options.scene).stem().string(), options.quiet);
-  settings.progress = [&](uint64_t done, uint64_t total) {
-    progress.update(done, options.seconds > 0 && !options.spp ? 0 : total, options.seconds);
-  };
-  auto last_checkpoint = Clock::now();
-  settings.checkpoint = [&] {
-    if (options.checkpoint_seconds <= 0 || seconds_since(last_checkpoint) < options.checkpoint_seconds) return;
-    write_film(options.output, film);
-    last_checkpoint = Clock::now();
-  };
-  const PassResult result = render_pass(*scene.scene, integrator, settings, film);
-  progress.finish();
+  const bool done = run(options, scene, integrator, budget, limit, outcome);
 
   const auto write_start = Clock::now();
-  if (options.aovs && !g_stop)
-    render_aovs(*scene.scene, settings.filter, settings.sampling, settings.seed, settings.pass, 16, film);
-  const bool done = result.complete || options.seconds > 0;
-  film.attributes[film_key::kComplete] = done && !g_stop ? "true" : "false";
-  write_film(options.output, film);
-  if (options.preview) write_png(preview_path(options.output), film.mean_image());
-  if (!options.save_passes.empty()) {
-    std::filesystem::create_directories(options.save_passes);
-    write_film(options.save_passes + "/pass00-" + options.sampling + ".exr", film);
+  if (!done || !options.passes.empty()) save_passes(options, outcome.passes, done);
+  if (done) {
+    write_image(options, scene, outcome);
+    remove_passes(options, outcome.passes);
   }
-  const double write_seconds = seconds_since(write_start);
+  outcome.write_seconds = seconds_since(write_start);
 
-  report_bad_samples(options, result);
+  for (const Pass& pass : outcome.passes) report_bad_samples(options, pass);
   if (!options.json.empty()) {
-    const std::string text =
-        statistics(options, scene, film, result, load_seconds, write_seconds, threads).dump(2) + "\n";
-    if (options.json == "-") fmt::print("{}", text);
-    else write_text_file(options.json, text);
+    const std::string text = statistics(options, scene, outcome, threads).dump(2) + "\n";
+    if (options.json == "-")
+      fmt::print("{}", text);
+    else
+      write_text_file(options.json, text);
   }
-  if (g_stop && !result.complete)
-    throw Error(ErrorCode::kIo, fmt::format("interrupted after {:.1f} of {} samples per pixel; '{}' holds what was "
-                                            "rendered, the same command with --resume continues",
-                                            film.mean_count(), settings.spp, options.output));
-  if (!options.quiet)
-    fmt::print(stderr, "{}: {} x {}, {:g} samples per pixel in {:.2f} s (load {:.2f} s, build {:.2f} s, {} samples/s, {} rays/s)\n",
-               options.output, film.width(), film.height(), film.mean_count(), result.seconds, load_seconds,
-               scene.scene->build_seconds(), format_count(static_cast<double>(result.n_samples) / result.seconds),
-               format_count(static_cast<double>(result.n_rays) / result.seconds));
+  if (!done)
+    throw Error(
+        ErrorCode::kIo,
+        fmt::format("interrupted after {:.1f} of {:g} samples per pixel; '{}' holds what was rendered, the same "
+                    "command with --resume continues",
+                    outcome.samples_per_pixel(), outcome.sum([](const Pass& p) { return p.settings.spp; }),
+                    output_is_film(options) ? options.output : passes_folder(options).string()));
+  if (!options.quiet) print_summary(options, scene, outcome);
 }
 
 }  // namespace
 
 void add_render(CLI::App& app) {
   const auto o = std::make_shared<RenderOptions>();
-  CLI::App* command = app.add_subcommand("render", "Render a scene (Mitsuba XML) into a film (EXR)");
+  CLI::App* command = app.add_subcommand("render", "Render a scene (Mitsuba XML) into an image (EXR)");
   command->add_option("SCENE", o->scene, "Scene file, Mitsuba XML")->required();
-  command->add_option("-o,--output", o->output, "The film (EXR); a PNG preview appears beside it");
-  command->add_option("--spp", o->spp, "Samples per pixel; default: the scene's")->check(CLI::Range(1u, 1u << 30));
+  command->add_option("-o,--output", o->output, "The image (EXR); a PNG preview appears beside it");
+  command->add_option("--spp", o->spp, "Samples per pixel of all passes together; default: the scene's")
+      ->check(CLI::Range(1u, 1u << 30));
   command->add_option("--integrator", o->integrator, "Integrator instead of the scene's: path");
-  command->add_option("--estimator", o->estimator, "How passes become the image")->check(CLI::IsMember({"none"}));
-  command->add_option("--sampling", o->sampling, "Random numbers: per pixel, or common to all pixels")
+  command
+      ->add_option("--estimator", o->estimator.name,
+                   "How passes become the image: iicv, cv-baseline or iduw of a pass with common random numbers and an "
+                   "independent one, or none: the mean of a single pass")
+      ->check(CLI::IsMember({"iicv", "cv-baseline", "iduw", "none"}))
+      ->capture_default_str();
+  command->add_option("--split", o->split, "CRN:INDEPENDENT, parts of the samples for the two passes")
+      ->capture_default_str();
+  command
+      ->add_option("--sampling", o->sampling,
+                   "Random numbers per pixel, or common to all; a single pass (estimator none)")
       ->check(CLI::IsMember({"independent", "crn"}));
-  command->add_option("--groups", o->groups, "Groups of samples whose means the film keeps; default 12 for crn, else 1")
+  command
+      ->add_option("--groups", o->groups,
+                   "Groups of samples whose means films keep; default 12, 1 for a single independent pass")
       ->check(CLI::Range(1u, 1024u));
+  command->add_option("--until", o->until, "relmse=X: add samples until the predicted error is X, at most --spp");
   command->add_option("--seed", o->seed, "Seed of the random numbers")->capture_default_str();
   command->add_option("--resolution", o->resolution, "WIDTHxHEIGHT of the full frame; default: the scene's");
   command->add_option("--crop", o->crop, "X,Y,WIDTH,HEIGHT: render only these pixels of the frame");
@@ -371,20 +649,21 @@ void add_render(CLI::App& app) {
       ->check(CLI::IsMember({"box", "tent", "gaussian"}));
   command->add_option("--threads", o->threads, "Number of threads; default: all")->check(CLI::Range(1, 4096));
   command->add_option("--time", o->seconds, "Stop after this many seconds of rendering")->check(CLI::PositiveNumber);
-  command->add_flag("--resume", o->resume, "Continue the film at the output path, if there is one");
-  command->add_option("--checkpoint", o->checkpoint_seconds, "Seconds between writing the unfinished film; 0: never")
+  command->add_option("--passes,--save-passes", o->passes, "Folder that keeps the film of every pass");
+  command->add_flag("--resume", o->resume, "Continue the films of an interrupted render, or those in --passes");
+  command->add_option("--checkpoint", o->checkpoint_seconds, "Seconds between writing unfinished films; 0: never")
       ->capture_default_str()
       ->check(CLI::NonNegativeNumber);
   command->add_option("-D,--define", o->defines, "name=value for the scene's <default> elements")
       ->take_all()
       ->expected(1)
       ->allow_extra_args(false);
-  command->add_flag("--aovs", o->aovs, "Add the images Albedo, N (normal) and P (position) to the film");
-  command->add_option("--save-passes", o->save_passes, "Folder that receives the film of every pass");
+  command->add_flag("--aovs", o->aovs, "Add the images Albedo, N (normal) and P (position) to the output");
   command->add_option("--replay", o->replay, "X,Y,SAMPLE: print one sample instead of rendering");
   command->add_option("--json", o->json, "File for statistics; '-': standard output");
   command->add_flag("!--no-preview", o->preview, "Do not write the PNG");
   command->add_flag("--quiet", o->quiet, "No progress and no summary");
+  add_estimator_options(*command, o->estimator);
   command->callback([o] { render(*o); });
 }
 

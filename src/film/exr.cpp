@@ -79,6 +79,14 @@ std::string compression_name(Imf::Compression compression) {
 
 }  // namespace
 
+void add_image_planes(const std::string& name, Image& image, std::vector<ExrPlane>& planes) {
+  COVARY_CHECK(image.channels == 3, "an image of three channels");
+  const std::string components = name == "N" || name == "P" ? "XYZ" : "RGB";
+  for (size_t c = 0; c < 3; ++c)
+    planes.push_back({(name.empty() ? "" : name + ".") + components[c], ExrPlane::Type::kFloat, image.data.data() + c,
+                      3 * sizeof(float)});
+}
+
 void write_exr(const std::string& path, const ImagePlace& place, const std::map<std::string, std::string>& attributes,
                std::span<const ExrPlane> planes) {
   start_threads();

@@ -20,11 +20,6 @@ constexpr const char* kSamples = "samples";  // attribute covary:samples and cha
 /// Attributes that follow from the film's numbers: written, and not kept in Film::attributes when read.
 bool is_derived(const std::string& key) { return key == kFormat || key == kGroups || key == kSamples; }
 
-std::array<const char*, 3> suffixes(const std::string& aov) {
-  if (aov == "N" || aov == "P") return {".X", ".Y", ".Z"};
-  return {".R", ".G", ".B"};
-}
-
 std::string group_name(int group) { return fmt::format("group{:02d}", group); }
 
 /// The channels of a film and where their values lie; the same list serves writing and reading.
@@ -47,10 +42,9 @@ std::vector<ExrPlane> film_planes(Film& film, Image& means) {
   }
   planes.push_back({kSamples, ExrPlane::Type::kUint, film.counts().data(), sizeof(uint32_t)});
   for (auto& [name, image] : film.aovs) {
-    COVARY_CHECK(image.width == film.width() && image.height == film.height() && image.channels == 3,
-                 "auxiliary image " + name + " has the film's size and 3 channels");
-    const auto suffix = suffixes(name);
-    add_rgb({name + suffix[0], name + suffix[1], name + suffix[2]}, image.data.data(), 3);
+    COVARY_CHECK(image.width == film.width() && image.height == film.height(),
+                 "auxiliary image " + name + " has the film's size");
+    add_image_planes(name, image, planes);
   }
   return planes;
 }

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "estimator_options.h"
+
+#include <fmt/format.h>
+
+#include "core/error.h"
+#include "estimators/cv_baseline.h"
+#include "estimators/iduw.h"
+
+namespace covary {
+namespace {
+
+const char* const kGroup = "Estimator";
+
+template <typename T, typename U>
+void set(T& target, const std::optional<U>& value) {
+  if (value) target = *value;
+}
+
+PairEstimator make_iicv(const EstimatorOptions& o, bool std_error) {
+  IicvOptions options = o.paper ? IicvOptions::paper() : IicvOptions();
+  set(options.k, o.k);
+  set(options.window, o.window);
+  set(options.pilot_window, o.pilot_window);
+  set(options.penalty, o.penalty);
+  set(options.ridge, o.ridge);
+  set(options.sample_share, o.sample_share);
+  set(options.conservation, o.conservation);
+  set(options.feedback, o.feedback);
+  set(options.feedback_options.window, o.feedback_window);
+  set(options.feedback_options.bandwidth, o.feedback_bandwidth);
+  if (o.asymmetric) options.symmetric = false;
+  if (o.exclude_target) options.include_target = false;
+  if (!o.coefficients.empty()) options.shared_coefficients = o.coefficients == "shared";
+  options.std_error = std_error;
+  throw_if_any(o.name, options.validate());
+  return {[options](const GroupedImage& crn, const GroupedImage& pt) { return iicv(crn, pt, options); },
+          iicv_reach(options)};
+}
+
+PairEstimator make_cv_baseline(const EstimatorOptions& o, bool std_error) {
+  CvBaselineOptions options;
+  set(options.k, o.k);
+  set(options.window, o.window);
+  set(options.ridge, o.ridge);
+  if (o.exclude_target) options.include_target = false;
+  if (!o.coefficients.empty()) options.shared_coefficients = o.coefficients == "shared";
+  options.std_error = std_error;
+  throw_if_any(o.name, options.validate());
+  return {[options](const GroupedImage& crn, const GroupedImage& pt) { return cv_baseline(crn, pt, options); },
+          options.window / 2};
+}
+
+PairEstimator make_iduw(const EstimatorOptions& o, int64_t crn_samples) {
+  IduwOptions options;
+  set(options.window, o.window);
+  options.samples = static_cast<int>(crn_samples);
+  throw_if_any(o.name, options.validate());
+  return {[options](const GroupedImage& crn, const GroupedImage& pt) { return iduw(crn, pt, options); }, -1};
+}
+
+}  // namespace
+
+const std::map<std::string, std::string>& estimators_of_option() {
+  static const std::map<std::string, std::string> table = {
+      {"--paper", "iicv"},
+      {"--k", "iicv, cv-baseline"},
+      {"--window", "iicv, cv-baseline, iduw"},
+      {"--penalty", "iicv"},
+      {"--pilot-window", "iicv"},
+      {"--ridge", "iicv, cv-baseline"},
+      {"--asymmetric", "iicv"},
+      {"--exclude-target", "iicv, cv-baseline"},
+      {"--coefficients", "iicv, cv-baseline"},
+      {"--sample-share", "iicv"},
+      {"--conservation", "iicv"},
+      {"--feedback", "iicv"},
+      {"--feedback-window", "iicv"},
+      {"--feedback-bandwidth", "iicv"},
+  };
+  return table;
+}
+
+bool predicts_error(const std::string& estimator) { return estimator == "iicv" || estimator == "cv-baseline"; }
+
+void add_estimator_options(CLI::App& command, EstimatorOptions& o) {
+  o.command = &command;
+  const auto add = [&](CLI::Option* option) { return option->group(kGroup); };
+  const std::map<std::string, Penalty> penalties = {{"pilot", Penalty::kPilot},
+                                                    {"sample", Penalty::kSample},
+                                                    {"smoothed", Penalty::kSmoothed},
+                                                    {"homogeneous", Penalty::kHomogeneous},
+                                                    {"cross-fit", Penalty::kCrossFit}};
+  const std::map<std::string, bool> on_off = {{"on", true}, {"off", false}};
+  add(command.add_flag("--paper", o.paper, "iicv as published: no sample share, no conservation, no feedback"));
+  add(command.add_option("--k", o.k, "Number of control variates; default 25"));
+  add(command.add_option("--window", o.window, "Side of the window they are chosen from; default 11 (iduw: 15)"));
+  add(command.add_option("--penalty,--variance", o.penalty,
+                         "Error of the PT pixels: pilot, sample, smoothed, homogeneous or cross-fit; default pilot"))
+      ->transform(CLI::CheckedTransformer(penalties).description(""))
+      ->type_name("NAME");
+  add(command.add_option("--pilot-window", o.pilot_window, "Side of the pilot's window; default 11"));
+  add(command.add_option("--ridge", o.ridge,
+                         "Factor of the homogeneous penalty (default 1), or ridge of cv-baseline (0)"));
+  add(command.add_flag("--asymmetric", o.asymmetric, "Penalty of the neighbour alone, not averaged with the target's"));
+  add(command.add_flag("--exclude-target", o.exclude_target, "Leave the target out of its own control variates"));
+  add(command.add_option("--coefficients", o.coefficients, "One coefficient for all channels, or one per channel"))
+      ->check(CLI::IsMember({"shared", "per-channel"}));
+  add(command.add_option("--sample-share", o.sample_share,
+                         "Part of the penalty that is the sample variance; default 0.5"));
+  add(command.add_option("--conservation", o.conservation, "Weight of the condition sum beta g = f; default 30"));
+  add(command.add_option("--feedback", o.feedback, "on or off: give back what the penalty takes away; default on"))
+      ->transform(CLI::CheckedTransformer(on_off).description(""))
+      ->type_name("on|off");
+  add(command.add_option("--feedback-window", o.feedback_window, "Side of the feedback's window; default 41"));
+  add(command.add_option("--feedback-bandwidth", o.feedback_bandwidth, "Bandwidth in standard errors; default 5"));
+}
+
+void check_estimator_options(const EstimatorOptions& o) {
+  for (const auto& [option, estimators] : estimators_of_option())
+    if (o.command->count(option) && (", " + estimators + ",").find(", " + o.name + ",") == std::string::npos)
+      throw Error(ErrorCode::kUsage,
+                  fmt::format("{} is an option of --estimator {}, not of {}", option, estimators, o.name));
+  if (o.name != "none") make_estimator(o, false, 1);
+}
+
+PairEstimator make_estimator(const EstimatorOptions& o, bool std_error, int64_t crn_samples) {
+  if (o.name == "iicv") return make_iicv(o, std_error);
+  if (o.name == "cv-baseline") return make_cv_baseline(o, std_error);
+  if (o.name == "iduw") return make_iduw(o, crn_samples);
+  throw Error(ErrorCode::kInternal, "estimator '" + o.name + "' does not combine a pair of images");
+}
+
+std::string EstimatorOptions::text() const {
+  std::string result = name;
+  for (const CLI::Option* option : command->get_options()) {
+    if (option->get_group() != kGroup || !option->count()) continue;
+    result += " --" + option->get_lnames().front();
+    if (option->get_expected_max() > 0)
+      for (const std::string& value : option->results()) result += " " + value;
+  }
+  return result;
+}
+
+}  // namespace covary
