@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <sys/resource.h>
 #include <tbb/global_control.h>
+#include <unistd.h>
 
 #include <array>
 #include <atomic>
@@ -22,6 +23,7 @@
 #include "estimators/mean.h"
 #include "estimators/predicted_error.h"
 #include "estimators/result_file.h"
+#include "film/display.h"
 #include "film/film_file.h"
 #include "film/image_file.h"
 #include "film/output_file.h"
@@ -35,13 +37,14 @@ namespace covary {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr uint32_t kFirstBudget = 96;  // samples per pixel before --until looks at the error for the first time
+constexpr double kPreviewSeconds = 0.5;  // between images for a viewer
+constexpr uint32_t kFirstBudget = 96;    // samples per pixel before --until looks at the error for the first time
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 struct RenderOptions {
   std::string scene, output, integrator, sampling, split = "1:1", rfilter, json, passes;
-  std::string resolution, crop, replay, until;
+  std::string resolution, crop, replay, until, display_server;
   EstimatorOptions estimator;
   std::vector<std::string> defines;
   std::optional<uint32_t> spp, groups;
@@ -427,6 +430,19 @@ void estimate(const RenderOptions& options, Outcome& outcome) {
   outcome.estimate_seconds += seconds_since(start);
 }
 
+/// A picture for a viewer while the passes go on: the mean of all samples so far.
+Image preview_of(const std::vector<Pass>& passes) {
+  Image image = passes[0].film.mean_image();
+  double samples = passes[0].film.mean_count();
+  for (size_t i = 1; i < passes.size(); ++i) {
+    const Image next = passes[i].film.mean_image();
+    samples += passes[i].film.mean_count();
+    const auto part = static_cast<float>(passes[i].film.mean_count() / std::max(samples, 1.0));
+    for (size_t k = 0; k < image.data.size(); ++k) image.data[k] += part * (next.data[k] - image.data[k]);
+  }
+  return image;
+}
+
 /// The next budget on the way to a relMSE of `target`: error falls like 1 / samples, or more slowly.
 uint32_t next_budget(uint32_t budget, double predicted, double target, uint32_t limit) {
   const double factor = std::clamp(1.1 * predicted / target, 1.25, 4.0);
@@ -435,10 +451,10 @@ uint32_t next_budget(uint32_t budget, double predicted, double target, uint32_t 
 
 /// Renders and estimates, once or until the predicted error is small enough. False when interrupted.
 bool run(const RenderOptions& options, const LoadedScene& scene, const Integrator& integrator, uint32_t budget,
-         uint32_t limit, Outcome& outcome) {
+         uint32_t limit, Display* display, Outcome& outcome) {
   const double target = options.until.empty() ? 0 : parse_until(options.until);
   const auto start = Clock::now();
-  auto last_checkpoint = start;
+  auto last_checkpoint = start, last_preview = start;
   for (;;) {
     ProgressLine progress(std::filesystem::path(options.scene).stem().string(), options.quiet);
     RenderLimits limits;
@@ -448,6 +464,10 @@ bool run(const RenderOptions& options, const LoadedScene& scene, const Integrato
       progress.update(done, options.seconds > 0 && !options.spp ? 0 : total, limits.seconds);
     };
     limits.checkpoint = [&] {
+      if (display && display->ready() && seconds_since(last_preview) >= kPreviewSeconds) {
+        display->update(preview_of(outcome.passes));
+        last_preview = Clock::now();
+      }
       if (options.checkpoint_seconds <= 0 || seconds_since(last_checkpoint) < options.checkpoint_seconds) return;
       save_passes(options, outcome.passes, false);
       last_checkpoint = Clock::now();
@@ -563,6 +583,13 @@ void render(RenderOptions options) {
   const int threads = options.threads > 0 ? options.threads : static_cast<int>(std::thread::hardware_concurrency());
   const tbb::global_control control(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(threads));
 
+  std::optional<Display> display;
+  if (!options.display_server.empty())
+    display.emplace(options.display_server, options.output, [](const std::string& text) {
+      // On a terminal over the line of progress.
+      fmt::print(stderr, "{}warning: {}\n", isatty(2) == 1 ? "\r\033[K" : "", text);
+    });
+
   Outcome outcome;
   const auto load_start = Clock::now();
   LoadedScene scene = load(options);
@@ -583,7 +610,8 @@ void render(RenderOptions options) {
   g_stop = false;
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
-  const bool done = run(options, scene, integrator, budget, limit, outcome);
+  const bool done = run(options, scene, integrator, budget, limit, display ? &*display : nullptr, outcome);
+  if (display) display->update(done && !is_plain(options) ? outcome.image.estimate : preview_of(outcome.passes));
 
   const auto write_start = Clock::now();
   if (!done || !options.passes.empty()) save_passes(options, outcome.passes, done);
@@ -637,6 +665,8 @@ void add_render(CLI::App& app) {
       ->add_option("--groups", o->groups,
                    "Groups of samples whose means films keep; default 12, 1 for a single independent pass")
       ->check(CLI::Range(1u, 1024u));
+  command->add_option("--display-server", o->display_server,
+                      "HOST:PORT of a running tev, which shows the image while it renders");
   command->add_option("--until", o->until, "relmse=X: add samples until the predicted error is X, at most --spp");
   command->add_option("--seed", o->seed, "Seed of the random numbers")->capture_default_str();
   command->add_option("--resolution", o->resolution, "WIDTHxHEIGHT of the full frame; default: the scene's");

@@ -1,14 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """covary combine, as a user runs it, on small images with the layouts of several renderers."""
-import array
 import json
 import random
-import struct
 import unittest
-import zlib
 
 from cli_test import CliTest
-from exr_writer import FLOAT, HALF, exr
+from exr_reader import read_exr
+from exr_writer import HALF, exr
 
 SIZE = WIDTH, HEIGHT = 24, 20
 GROUPS = 12
@@ -48,48 +46,7 @@ class Combine(CliTest):
         self.layers("pt.exr", self.pt_images, sampling="independent", samples="96", scene_hash="a", settings="box")
 
     def read(self, name):
-        """Channels of an EXR made by covary (ZIP), name -> values."""
-        data = (self.path / name).read_bytes()
-        at, channels, window = 8, [], None
-        while data[at] != 0:
-            end = data.index(b"\0", at)
-            key = data[at:end].decode()
-            kind_end = data.index(b"\0", end + 1)
-            size, = struct.unpack_from("<i", data, kind_end + 1)
-            value = data[kind_end + 5:kind_end + 5 + size]
-            if key == "channels":
-                i = 0
-                while value[i] != 0:
-                    j = value.index(b"\0", i)
-                    channels.append(value[i:j].decode())
-                    self.assertEqual(struct.unpack_from("<i", value, j + 1)[0], FLOAT)
-                    i = j + 17
-            if key == "dataWindow":
-                window = struct.unpack("<4i", value)
-            at = kind_end + 5 + size
-        at += 1
-        width, height = window[2] - window[0] + 1, window[3] - window[1] + 1
-        offsets = struct.unpack_from(f"<{(height + 15) // 16}Q", data, at)
-        result = {c: [] for c in channels}
-        for block, offset in enumerate(offsets):
-            rows = min(16, height - 16 * block)
-            size, = struct.unpack_from("<i", data, offset + 4)
-            raw = data[offset + 8:offset + 8 + size]
-            n = rows * width * 4 * len(channels)
-            if size < n:
-                raw = bytearray(zlib.decompress(raw))
-                for i in range(1, n):
-                    raw[i] = (raw[i - 1] + raw[i] - 128) & 255
-                half = (n + 1) // 2
-                mixed = bytearray(n)
-                mixed[0::2], mixed[1::2] = raw[:half], raw[half:]
-                raw = bytes(mixed)
-            values = array.array("f", raw)
-            for row in range(rows):
-                for i, c in enumerate(channels):
-                    first = (row * len(channels) + i) * width
-                    result[c] += values[first:first + width]
-        return result
+        return read_exr((self.path / name).read_bytes())
 
     def squared_error(self, channels):
         return mean([(channels[c][y * WIDTH + x] - (1 + 0.02 * x + 0.1 * i)) ** 2
