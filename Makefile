@@ -3,7 +3,7 @@
 #
 #   make setup            install missing packages (needs root or sudo only when something is missing)
 #   make build            build/release/covary
-#   make demo             render a small scene twice (common random numbers, independent) into out/
+#   make demo             render a small scene plainly and with IICV into out/
 #   make test             build and run all tests but the nightly ones      TESTS=regex selects some
 #   make bench            build and run the micro benchmarks                BENCH=regex selects some
 #   make lint             formatting, static analysis, layers               ALL=1 analyses every file, not only changed ones

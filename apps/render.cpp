@@ -16,6 +16,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <thread>
+#include <utility>
 
 #include "commands.h"
 #include "core/error.h"
@@ -336,9 +337,9 @@ std::string costs_path(const Pass& pass) {
   return std::filesystem::path(pass.path).replace_extension(".json").string();
 }
 
-/// Continues the film at pass.path if it is there.
-void resume(Pass& pass, const Film& empty, bool with_costs) {
-  pass.film = read_film(pass.path);
+/// Puts the film at pass.path in the place of the empty one, which it must match.
+void resume(Pass& pass, bool with_costs) {
+  const Film empty = std::exchange(pass.film, read_film(pass.path));
   Film& film = pass.film;
   const auto differs = [&](const std::string& what, const std::string& old_value, const std::string& new_value) {
     throw Error(ErrorCode::kInput, fmt::format("--resume: '{}' was rendered with {} {}, this command asks for {}",
@@ -385,7 +386,7 @@ std::vector<Pass> make_passes(const RenderOptions& options, const LoadedScene& s
         {film_key::kCommand, command_line()},
         {film_key::kComplete, "false"},
     };
-    if (options.resume && std::filesystem::exists(pass.path)) resume(pass, pass.film, !options.passes.empty());
+    if (options.resume && std::filesystem::exists(pass.path)) resume(pass, !options.passes.empty());
     passes.push_back(std::move(pass));
   }
   set_budget(options, budget, passes);

@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Plans of passes and estimators: covary render with image-space control variates, as a user runs it."""
+import json
+import os
+import signal
+import subprocess
+import time
+import unittest
+from pathlib import Path
+
+from cli_test import COVARY, CliTest
+
+SCENES = Path(os.environ["SCENES"])
+ROOM = str(SCENES / "room.xml")
+SMALL = ("--resolution", "64x48", "--quiet", "--no-preview")
+
+
+class RenderTest(CliTest):
+    def relmse(self, image, reference):
+        return json.loads(self.good("compare", image, "--reference", reference, "--json", "-").stdout)["relmse"]
+
+
+    def same(self, a, b):
+        self.assertEqual(self.relmse(a, b), 0.0, f"{a} and {b} differ")
+
+    def statistics(self, *arguments):
+        return json.loads(self.good("render", ROOM, *SMALL, "--json", "-", *arguments).stdout)
+
+
+class Plans(RenderTest):
+    def test_default_is_iicv_and_equals_combine_of_the_two_passes(self):
+        facts = self.statistics("-o", "a.exr", "--spp", "48", "--seed", "3")
+        self.assertEqual(facts["estimator"], "iicv")
+        self.assertEqual([(p["sampling"], p["samples_per_pixel"], p["groups"]) for p in facts["passes"]],
+                         [("crn", 24, 12), ("independent", 24, 12)])
+        self.assertEqual(facts["samples_per_pixel"], 48)
+        self.assertGreater(facts["predicted_relmse"], 0)
+        for sampling in ("crn", "independent"):
+            self.good("render", ROOM, *SMALL, "-o", f"{sampling}.exr", "--sampling", sampling, "--groups", "12", "--spp", "24",
+                      "--seed", "3")
+        self.good("combine", "--crn", "crn.exr", "--pt", "independent.exr", "-o", "b.exr", "--error", "--quiet")
+        self.same("a.exr", "b.exr")
+        info = json.loads(self.good("info", "a.exr", "--json").stdout)
+        self.assertEqual(set(info["channels"]), {"R", "G", "B", "StdError.R", "StdError.G", "StdError.B"})
+        self.assertEqual(info["attributes"]["covary:estimator"], "iicv")
+        self.assertFalse(list(self.path.glob("*.passes")), "passes are not left behind")
+
+    def test_less_error_than_plain_at_equal_samples(self):
+        self.good("render", ROOM, *SMALL, "-o", "r.exr", "--estimator", "none", "--spp", "1024", "--seed", "9")
+        self.good("render", ROOM, *SMALL, "-o", "plain.exr", "--estimator", "none", "--spp", "48", "--seed", "3")
+        self.good("render", ROOM, *SMALL, "-o", "iicv.exr", "--spp", "48", "--seed", "3")
+        self.assertLess(self.relmse("iicv.exr", "r.exr"), 0.7 * self.relmse("plain.exr", "r.exr"))
+
+    def test_estimators_share_passes(self):
+        first = self.statistics("-o", "a.exr", "--spp", "48", "--passes", "films")
+        self.assertEqual(sorted(p.name for p in (self.path / "films").iterdir()),
+                         ["crn.exr", "crn.json", "independent.exr", "independent.json"])
+        films = {p.name: p.stat().st_mtime_ns for p in (self.path / "films").iterdir() if p.suffix == ".exr"}
+        for estimator in ("cv-baseline", "iduw", "iicv"):
+            facts = self.statistics("-o", f"{estimator}.exr", "--spp", "48", "--passes", "films", "--resume", "--estimator",
+                                    estimator)
+            self.assertEqual(facts["seconds"]["render"], first["seconds"]["render"], "the cost of shared passes is known")
+            self.assertEqual(facts["samples"], first["samples"])
+        self.same("a.exr", "iicv.exr")
+        self.assertGreater(self.relmse("iduw.exr", "a.exr"), 0)
+        self.assertEqual(set(films), {"crn.exr", "independent.exr"})
+
+    def test_split(self):
+        facts = self.statistics("-o", "a.exr", "--spp", "96", "--split", "1:3")
+        self.assertEqual([p["samples_per_pixel"] for p in facts["passes"]], [24, 72])
+
+    def test_few_samples_have_fewer_groups(self):
+        facts = self.statistics("-o", "a.exr", "--spp", "8")
+        self.assertEqual([(p["samples_per_pixel"], p["groups"]) for p in facts["passes"]], [(4, 4), (4, 4)])
+        facts = self.statistics("-o", "a.exr", "--spp", "1")
+        self.assertEqual([(p["samples_per_pixel"], p["groups"]) for p in facts["passes"]], [(3, 3), (3, 3)])
+
+    def test_until(self):
+        facts = self.statistics("-o", "a.exr", "--until", "relmse=0.0015")
+        self.assertLessEqual(facts["predicted_relmse"], 0.0015)
+        self.assertGreater(facts["samples_per_pixel"], 96)
+        self.good("render", ROOM, *SMALL, "-o", "b.exr", "--spp", str(int(facts["samples_per_pixel"])))
+        self.same("a.exr", "b.exr")
+        result = self.good("render", ROOM, "--resolution", "64x48", "-o", "c.exr", "--until", "relmse=1e-9", "--spp", "48")
+        self.assertIn("warning: --until relmse=1e-9 was not reached", result.stderr)
+        facts = self.statistics("-o", "d.exr", "--until", "relmse=0.02", "--estimator", "none")
+        self.assertLessEqual(facts["predicted_relmse"], 0.02)
+
+    def test_time(self):
+        facts = self.statistics("-o", "a.exr", "--time", "0.5")
+        self.assertLess(facts["seconds"]["render"], 5)
+        self.assertTrue(all(p["samples_per_pixel"] >= 12 for p in facts["passes"]))
+
+    def test_aovs(self):
+        self.good("render", ROOM, *SMALL, "-o", "a.exr", "--spp", "24", "--aovs")
+        channels = json.loads(self.good("info", "a.exr", "--json").stdout)["channels"]
+        self.assertTrue({"Albedo.R", "N.X", "P.Z", "StdError.B", "G"} <= set(channels))
+
+    def test_wrong_options(self):
+        render = ("render", ROOM, "-o", "a.exr")
+        self.bad(2, "--sampling is an option of --estimator none", *render, "--estimator", "iicv", "--sampling", "crn")
+        self.bad(2, "--split is an option of estimators with two passes", *render, "--estimator", "none", "--split", "1:2")
+        self.bad(2, "expected CRN:INDEPENDENT", *render, "--split", "half")
+        self.bad(2, "expected relmse=X", *render, "--until", "0.01")
+        self.bad(2, "expected relmse=X", *render, "--until", "relmse=0.01x")
+        self.bad(2, "iduw does not estimate its error", *render, "--until", "relmse=0.01", "--estimator", "iduw")
+        self.bad(2, "--paper is an option of --estimator iicv, not of cv-baseline", *render, "--estimator", "cv-baseline",
+                 "--paper")
+        self.bad(2, "--k is an option of", *render, "--estimator", "none", "--k", "3")
+        self.bad(2, "at least 3 groups", *render, "--groups", "2")
+        self.bad(2, "window", *render, "--window", "4")
+
+
+class Interruption(RenderTest):
+    def test_interrupted_and_resumed(self):
+        """Interrupted at several moments, resumed each time: the bits of an uninterrupted render, and no film left over."""
+        arguments = ["render", ROOM, "--resolution", "64x48", "--spp", "600", "--no-preview"]
+        self.good(*arguments, "--quiet", "-o", "whole.exr")
+        interrupted = 0
+        for attempt in range(40):
+            command = [COVARY, *arguments, "-o", "parts.exr", "--resume"]
+            process = subprocess.Popen(command, cwd=self.path, stderr=subprocess.PIPE, text=True)
+            time.sleep(0.25 + 0.1 * attempt)
+            process.send_signal(signal.SIGINT)
+            message = process.communicate(timeout=60)[1]
+            if process.returncode == 0:
+                break
+            self.assertIn(process.returncode, (1, -signal.SIGINT), message)  # the signal itself before the render begins
+            if process.returncode == 1:
+                interrupted += 1
+                self.assertIn("interrupted after", message)
+                self.assertIn("parts.passes", message)
+                self.assertTrue((self.path / "parts.passes" / "crn.exr").exists())
+        self.assertEqual(process.returncode, 0)
+        self.assertGreater(interrupted, 0)
+        self.same("whole.exr", "parts.exr")
+        self.assertFalse((self.path / "parts.passes").exists())
+
+    def test_passes_of_another_render_are_refused(self):
+        self.good("render", ROOM, *SMALL, "-o", "a.exr", "--spp", "24", "--passes", "films")
+        again = ("render", ROOM, *SMALL, "-o", "b.exr", "--spp", "24", "--passes", "films", "--resume")
+        self.bad(1, "was rendered with seed 0, this command asks for 7", *again, "--seed", "7")
+        self.bad(1, "was rendered with groups 12, this command asks for 6", *again, "--groups", "6")
+
+
+if __name__ == "__main__":
+    unittest.main()
