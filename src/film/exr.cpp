@@ -88,12 +88,12 @@ void add_image_planes(const std::string& name, Image& image, std::vector<ExrPlan
 }
 
 void write_exr(const std::string& path, const ImagePlace& place, const std::map<std::string, std::string>& attributes,
-               std::span<const ExrPlane> planes) {
+               std::span<const ExrPlane> planes, ExrCompression compression) {
   start_threads();
   const CropWindow& w = place.window;
   const Imath::Box2i window({w.x, w.y}, {w.x + w.width - 1, w.y + w.height - 1});
   Imf::Header header(Imath::Box2i({0, 0}, {place.frame_width - 1, place.frame_height - 1}), window);
-  header.compression() = Imf::ZIP_COMPRESSION;
+  header.compression() = compression == ExrCompression::kZip ? Imf::ZIP_COMPRESSION : Imf::NO_COMPRESSION;
   for (const auto& [key, value] : attributes) header.insert(key, Imf::StringAttribute(value));
   Imf::FrameBuffer pixels;
   for (const ExrPlane& plane : planes) {

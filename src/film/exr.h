@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // OpenEXR files in and out. Input from any renderer: scan lines or tiles, half, float or uint, one or several parts.
-// Output: scan lines, ZIP, compressed on all processors.
+// Output: scan lines, ZIP on all processors, or not compressed.
 #pragma once
 
 #include <map>
@@ -33,10 +33,12 @@ struct ImagePlace {
   bool operator==(const ImagePlace&) const = default;
 };
 
+enum class ExrCompression { kZip, kNone };
+
 /// Writes the planes (which are only read) with string attributes; the file appears under its name only when complete.
 /// Throws Error(kIo).
 void write_exr(const std::string& path, const ImagePlace& place, const std::map<std::string, std::string>& attributes,
-               std::span<const ExrPlane> planes);
+               std::span<const ExrPlane> planes, ExrCompression compression = ExrCompression::kZip);
 
 class ExrFile {
  public:

@@ -2,6 +2,7 @@
 #include "film/film_file.h"
 
 #include <fmt/format.h>
+#include <zlib.h>
 
 #include <algorithm>
 #include <array>
@@ -15,12 +16,26 @@ constexpr const char* kPrefix = "covary:";
 constexpr const char* kFormat = "film";  // attribute covary:film, version of the format
 constexpr const char* kFormatVersion = "1";
 constexpr const char* kGroups = "groups";
-constexpr const char* kSamples = "samples";  // attribute covary:samples and channel `samples`
+constexpr const char* kChecksum = "checksum";  // CRC-32 of counts, group means and auxiliary images
+constexpr const char* kSamples = "samples";    // attribute covary:samples and channel `samples`
 
 /// Attributes that follow from the film's numbers: written, and not kept in Film::attributes when read.
-bool is_derived(const std::string& key) { return key == kFormat || key == kGroups || key == kSamples; }
+bool is_derived(const std::string& key) {
+  return key == kFormat || key == kGroups || key == kSamples || key == kChecksum;
+}
 
 std::string group_name(int group) { return fmt::format("group{:02d}", group); }
+
+std::string checksum(const Film& film) {
+  uLong crc = crc32_z(0, nullptr, 0);
+  const auto add = [&](const auto& values) {
+    crc = crc32_z(crc, reinterpret_cast<const Bytef*>(values.data()), values.size() * sizeof(values[0]));
+  };
+  add(film.counts());
+  add(film.data());
+  for (const auto& [name, image] : film.aovs) add(image.data);
+  return fmt::format("{:08x}", crc);
+}
 
 /// The channels of a film and where their values lie; the same list serves writing and reading.
 /// `means` holds the image of R G B where the film has several groups.
@@ -93,11 +108,13 @@ void write_film(const std::string& path, const Film& film) {
   derive(kFormat, kFormatVersion);
   derive(kGroups, fmt::to_string(film.groups()));
   derive(kSamples, fmt::to_string(film.mean_count()));
+  derive(kChecksum, checksum(film));
 
   Image means = film.groups() > 1 ? film.mean_image() : Image();
   // The list of planes serves reading, too, and so wants a film it may write to; write_exr only reads.
   write_exr(path, {film.frame_width(), film.frame_height(), film.crop()}, attributes,
-            film_planes(const_cast<Film&>(film), means));
+            film_planes(const_cast<Film&>(film), means),
+            film.groups() > 1 ? ExrCompression::kNone : ExrCompression::kZip);
 }
 
 Film read_film(const std::string& path) {
@@ -135,6 +152,10 @@ Film read_film(const std::string& path) {
     if (std::none_of(planes.begin(), planes.end(), [&](const ExrPlane& p) { return p.name == channel.name; }))
       fail(path, fmt::format("channel {} does not belong to a film with {} groups", channel.name, groups));
   file.read(planes);
+  if (const std::string stored = attributes[kChecksum], found = checksum(film); !stored.empty() && stored != found)
+    fail(path, fmt::format("the pixels have the checksum {}, not {} as the attribute covary:checksum says: the file is "
+                           "damaged, or another program changed it",
+                           found, stored));
 
   for (int y = 0; y < film.height(); ++y)
     for (int x = 0; x < film.width(); ++x)
