@@ -1,8 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "render_passes.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "commands.h"
+#include "core/error.h"
+#include "film/film_file.h"
+#include "film/output_file.h"
 
 namespace covary {
 namespace {
@@ -25,9 +36,142 @@ uint64_t samples_left(const Pass& pass) {
   return left;
 }
 
+/// The smallest number of samples a pixel of the film has.
+uint32_t smallest_count(const Film& film) { return *std::min_element(film.counts().begin(), film.counts().end()); }
+
+std::string filter_text(const FilterSettings& filter) {
+  switch (filter.kind) {
+    case FilterKind::kBox:
+      return fmt::format("box radius={}", filter.radius);
+    case FilterKind::kTent:
+      return fmt::format("tent radius={}", filter.radius);
+    case FilterKind::kGaussian:
+      return fmt::format("gaussian radius={} stddev={}", filter.radius, filter.stddev);
+  }
+  throw Error(ErrorCode::kInternal, "unknown reconstruction filter");
+}
+
+/// How many groups each pass keeps: 12 as in [YM2025] Sec. 5, or as many as the smaller pass has samples.
+int number_of_groups(const RenderOptions& options, uint32_t budget) {
+  if (options.is_plain())
+    return static_cast<int>(options.groups.value_or(options.sampling == "crn" || !options.until.empty() ? 12 : 1));
+  const auto parts = parse_split(options.split);
+  const double fewest = std::min(parts[0], parts[1]) * budget;
+  const auto groups = static_cast<int>(options.groups.value_or(std::clamp(static_cast<int>(fewest), 3, 12)));
+  if (groups < 3)
+    throw Error(ErrorCode::kUsage,
+                fmt::format("--groups {}: --estimator {} needs at least 3 groups to measure how pixels "
+                            "vary together",
+                            groups, options.estimator.name));
+  return groups;
+}
+
+std::string costs_path(const Pass& pass) {
+  return std::filesystem::path(pass.path).replace_extension(".json").string();
+}
+
+/// Puts the film at pass.path in the place of the empty one, which it must match.
+void resume(Pass& pass, bool with_costs) {
+  const Film empty = std::exchange(pass.film, read_film(pass.path));
+  Film& film = pass.film;
+  const auto differs = [&](const std::string& what, const std::string& old_value, const std::string& new_value) {
+    throw Error(ErrorCode::kInput, fmt::format("--resume: '{}' was rendered with {} {}, this command asks for {}",
+                                               pass.path, what, old_value, new_value));
+  };
+  const auto size_text = [](const Film& f) {
+    const CropWindow& c = f.crop();
+    return fmt::format("{} x {}, crop {},{},{},{}", f.frame_width(), f.frame_height(), c.x, c.y, c.width, c.height);
+  };
+  if (size_text(film) != size_text(empty)) differs("frame", size_text(film), size_text(empty));
+  if (film.groups() != empty.groups()) differs("groups", std::to_string(film.groups()), std::to_string(empty.groups()));
+  for (const char* key : {film_key::kSceneHash, film_key::kSampling, film_key::kSeed, film_key::kSettings})
+    if (film.attributes[key] != empty.attributes.at(key)) differs(key, film.attributes[key], empty.attributes.at(key));
+  film.attributes = empty.attributes;
+  film.aovs.clear();
+  pass.count = smallest_count(film);
+  if (!with_costs || !std::filesystem::exists(costs_path(pass))) return;
+  std::ifstream file(costs_path(pass));
+  const nlohmann::json costs = nlohmann::json::parse(file, nullptr, false);
+  if (costs.is_discarded()) return;
+  pass.result.n_samples = costs.value("samples", uint64_t{0});
+  pass.result.n_rays = costs.value("rays", uint64_t{0});
+  pass.result.seconds = costs.value("seconds", 0.0);
+}
+
 }  // namespace
 
-uint32_t smallest_count(const Film& film) { return *std::min_element(film.counts().begin(), film.counts().end()); }
+CropWindow crop_window(const RenderOptions& options, const LoadedScene& scene) {
+  if (options.crop.empty()) return {scene.crop_x, scene.crop_y, scene.crop_width, scene.crop_height};
+  const auto c = parse_numbers("--crop", options.crop, ',', 4, "X,Y,WIDTH,HEIGHT in pixels, e.g. 240,560,240,160");
+  if (c[2] < 1 || c[3] < 1 || c[0] + c[2] > scene.width || c[1] + c[3] > scene.height)
+    throw Error(ErrorCode::kUsage, fmt::format("--crop '{}' does not fit into the {} x {} frame", options.crop,
+                                               scene.width, scene.height));
+  return {static_cast<int>(c[0]), static_cast<int>(c[1]), static_cast<int>(c[2]), static_cast<int>(c[3])};
+}
+
+std::filesystem::path passes_folder(const RenderOptions& options) {
+  return options.passes.empty() ? std::filesystem::path(options.output).replace_extension(".passes")
+                                : std::filesystem::path(options.passes);
+}
+
+bool output_is_film(const RenderOptions& options) { return options.is_plain() && options.passes.empty(); }
+
+void set_budget(const RenderOptions& options, uint32_t total, std::vector<Pass>& passes) {
+  const auto parts = parse_split(options.split);
+  for (size_t i = 0; i < passes.size(); ++i) {
+    const auto groups = static_cast<uint32_t>(passes[i].film.groups());
+    const double part = passes.size() == 1 ? 1.0 : parts[i];
+    const auto wanted = static_cast<uint32_t>(std::ceil(part * total - 1e-9));
+    passes[i].settings.spp = (std::max(wanted, 1u) + groups - 1) / groups * groups;
+  }
+}
+
+std::vector<Pass> make_passes(const RenderOptions& options, const LoadedScene& scene, const Integrator& integrator,
+                              uint32_t budget) {
+  std::vector<std::string> names = {"crn", "independent"};
+  if (options.is_plain()) names = {options.sampling.empty() ? "independent" : options.sampling};
+  std::vector<Pass> passes;
+  for (const std::string& name : names) {
+    Pass pass;
+    pass.settings.sampling = name == "crn" ? Sampling::kCrn : Sampling::kIndependent;
+    pass.settings.seed = options.seed;
+    pass.settings.filter = options.rfilter.empty() ? scene.filter : filter_named(options.rfilter);
+    pass.path = output_is_film(options) ? options.output : (passes_folder(options) / (name + ".exr")).string();
+    pass.film = Film(scene.width, scene.height, crop_window(options, scene), number_of_groups(options, budget));
+    pass.film.attributes = {
+        {film_key::kSeed, std::to_string(options.seed)},
+        {film_key::kSampling, name},
+        {film_key::kSceneHash, scene.content_hash},
+        {film_key::kSettings, integrator.description() + "; filter " + filter_text(pass.settings.filter)},
+        {film_key::kVersion, COVARY_VERSION},
+        {film_key::kCommand, command_line()},
+        {film_key::kComplete, "false"},
+    };
+    if (options.resume && std::filesystem::exists(pass.path)) resume(pass, !options.passes.empty());
+    passes.push_back(std::move(pass));
+  }
+  set_budget(options, budget, passes);
+  return passes;
+}
+
+void save_passes(const RenderOptions& options, std::vector<Pass>& passes, bool complete) {
+  if (!output_is_film(options)) std::filesystem::create_directories(passes_folder(options));
+  for (Pass& pass : passes) {
+    pass.film.attributes[film_key::kComplete] = complete ? "true" : "false";
+    write_film(pass.path, pass.film);
+    if (options.passes.empty()) continue;
+    const nlohmann::ordered_json costs = {
+        {"samples", pass.result.n_samples}, {"rays", pass.result.n_rays}, {"seconds", pass.result.seconds}};
+    write_text_file(costs_path(pass), costs.dump(2) + "\n");
+  }
+}
+
+void remove_passes(const RenderOptions& options, const std::vector<Pass>& passes) {
+  if (!options.passes.empty() || output_is_film(options)) return;
+  std::error_code ignored;
+  for (const Pass& pass : passes) std::filesystem::remove(pass.path, ignored);
+  std::filesystem::remove(passes_folder(options), ignored);  // only when empty
+}
 
 void render_passes(const Scene& scene, const Integrator& integrator, std::vector<Pass>& passes,
                    const RenderLimits& limits) {

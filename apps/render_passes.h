@@ -3,12 +3,15 @@
 #pragma once
 
 #include <atomic>
+#include <filesystem>
 #include <functional>
 #include <string>
 #include <vector>
 
 #include "film/film.h"
 #include "integrators/render_pass.h"
+#include "io/load_scene.h"
+#include "render_options.h"
 
 namespace covary {
 
@@ -22,15 +25,33 @@ struct Pass {
   std::string name() const { return settings.sampling == Sampling::kCrn ? "crn" : "independent"; }
 };
 
-/// The smallest number of samples a pixel of the film has.
-uint32_t smallest_count(const Film& film);
-
 struct RenderLimits {
   double seconds = 0;                       ///< > 0: stop after this time, once every pixel has samples of every pass
   const std::atomic<bool>* stop = nullptr;  ///< stop at the next tile
   std::function<void(uint64_t done, uint64_t total)> progress;  ///< samples of all passes together
   std::function<void()> checkpoint;                             ///< called between waves
 };
+
+/// The passes that the options ask for, with `budget` samples per pixel together; with --resume, films that are there are
+/// continued. Throws Error(kInput) where such a film belongs to another render.
+std::vector<Pass> make_passes(const RenderOptions& options, const LoadedScene& scene, const Integrator& integrator,
+                              uint32_t budget);
+
+/// Sets the samples per pixel of each pass for a budget of `total`, rounded up to whole groups.
+void set_budget(const RenderOptions& options, uint32_t total, std::vector<Pass>& passes);
+
+/// The part of the frame that is rendered.
+CropWindow crop_window(const RenderOptions& options, const LoadedScene& scene);
+
+/// Where the films are while the plan runs.
+std::filesystem::path passes_folder(const RenderOptions& options);
+/// A plain render without --passes has its film in the output.
+bool output_is_film(const RenderOptions& options);
+
+/// Keeps the films, so that --resume can go on from here.
+void save_passes(const RenderOptions& options, std::vector<Pass>& passes, bool complete);
+/// Removes films that were kept for --resume alone.
+void remove_passes(const RenderOptions& options, const std::vector<Pass>& passes);
 
 /// Renders all passes up to their settings.spp. The pass with the smallest part of its samples is next, one wave at a time,
 /// so that the passes advance together.

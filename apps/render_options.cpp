@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render_options.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "core/error.h"
+
+namespace covary {
+
+std::vector<int64_t> parse_numbers(const std::string& option, const std::string& text, char separator, size_t count,
+                                   const std::string& example) {
+  std::vector<int64_t> numbers;
+  size_t begin = 0;
+  while (begin <= text.size()) {
+    const size_t end = std::min(text.find(separator, begin), text.size());
+    const std::string word = text.substr(begin, end - begin);
+    if (word.empty() || word.size() > 18 || word.find_first_not_of("0123456789") != std::string::npos) break;
+    numbers.push_back(std::stoll(word));
+    begin = end + 1;
+  }
+  if (numbers.size() != count || begin <= text.size())
+    throw Error(ErrorCode::kUsage, option + " '" + text + "': expected " + example);
+  return numbers;
+}
+
+std::map<std::string, std::string> parse_defines(const std::vector<std::string>& defines) {
+  std::map<std::string, std::string> result;
+  for (const std::string& define : defines) {
+    const size_t equals = define.find('=');
+    if (equals == 0 || equals == std::string::npos)
+      throw Error(ErrorCode::kUsage, "-D '" + define + "': expected name=value");
+    result[define.substr(0, equals)] = define.substr(equals + 1);
+  }
+  return result;
+}
+
+std::array<double, 2> parse_split(const std::string& text) {
+  const auto parts = parse_numbers("--split", text, ':', 2, "CRN:INDEPENDENT in whole numbers, e.g. 1:1");
+  if (parts[0] < 1 || parts[1] < 1 || parts[0] > 1000 || parts[1] > 1000)
+    throw Error(ErrorCode::kUsage, "--split '" + text + "': each part must be 1 to 1000");
+  const double sum = static_cast<double>(parts[0] + parts[1]);
+  return {static_cast<double>(parts[0]) / sum, static_cast<double>(parts[1]) / sum};
+}
+
+double parse_until(const std::string& text) {
+  const std::string key = "relmse=";
+  size_t end = 0;
+  double value = 0;
+  if (text.starts_with(key)) try {
+      value = std::stod(text.substr(key.size()), &end);
+    } catch (const std::exception&) {
+      end = 0;
+    }
+  if (end == 0 || key.size() + end != text.size() || !(value > 0) || !std::isfinite(value))
+    throw Error(ErrorCode::kUsage, "--until '" + text + "': expected relmse=X with X > 0, e.g. relmse=0.005");
+  return value;
+}
+
+FilterSettings filter_named(const std::string& name) {
+  if (name == "box") return {FilterKind::kBox, 0.5f, 0};
+  if (name == "tent") return {FilterKind::kTent, 1.0f, 0};
+  return {FilterKind::kGaussian, 2.0f, 0.5f};
+}
+
+const IntegratorPlugin* find_integrator(const std::string& name) {
+  for (const IntegratorPlugin& plugin : integrator_plugins())
+    if (name == plugin.name) return &plugin;
+  return nullptr;
+}
+
+std::string unknown_integrator(const std::string& name) {
+  std::vector<std::string> names;
+  for (const IntegratorPlugin& plugin : integrator_plugins()) names.push_back(plugin.name);
+  return fmt::format("unknown integrator '{}'{}; supported: {}", name, did_you_mean(name, names),
+                     fmt::join(names, ", "));
+}
+
+namespace {
+
+void check_output_writable(const std::string& output) {
+  const std::filesystem::path folder = std::filesystem::absolute(output).parent_path();
+  if (!std::filesystem::is_directory(folder))
+    throw Error(ErrorCode::kIo, "cannot write '" + output + "': the folder '" + folder.string() + "' does not exist");
+}
+
+}  // namespace
+
+void check_options(RenderOptions& options) {
+  const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
+  if (options.replay.empty() && options.output.empty())
+    usage("no output given; use -o OUT.exr (or --replay X,Y,SAMPLE)");
+  if (!options.integrator.empty() && !find_integrator(options.integrator))
+    usage("--integrator: " + unknown_integrator(options.integrator));
+  if (!options.sampling.empty() && options.estimator.command->count("--estimator") && !options.is_plain())
+    usage(fmt::format(
+        "--sampling is an option of --estimator none; {} renders one pass with common random numbers and one "
+        "with independent ones",
+        options.estimator.name));
+  if (!options.sampling.empty()) options.estimator.name = "none";
+  if (options.is_plain() && options.estimator.command->count("--split"))
+    usage("--split is an option of estimators with two passes, not of none");
+  parse_split(options.split);
+  if (!options.until.empty()) {
+    parse_until(options.until);
+    if (!options.is_plain() && !predicts_error(options.estimator.name))
+      usage("--until: " + options.estimator.name + " does not estimate its error");
+    if (options.is_plain() && options.groups.value_or(2) < 2) usage("--until needs --groups 2 or more");
+  }
+  check_estimator_options(options.estimator);
+  if (!options.output.empty()) check_output_writable(options.output);
+}
+
+void add_render_options(CLI::App& command, RenderOptions& o) {
+  command.add_option("SCENE", o.scene, "Scene file, Mitsuba XML")->required();
+  command.add_option("-o,--output", o.output, "The image (EXR); a PNG preview appears beside it");
+  command.add_option("--spp", o.spp, "Samples per pixel of all passes together; default: the scene's")
+      ->check(CLI::Range(1u, 1u << 30));
+  command.add_option("--integrator", o.integrator, "Integrator instead of the scene's: path");
+  command
+      .add_option("--estimator", o.estimator.name,
+                  "How passes become the image: iicv, cv-baseline or iduw of a pass with common random numbers and an "
+                  "independent one, or none: the mean of a single pass")
+      ->check(CLI::IsMember({"iicv", "cv-baseline", "iduw", "none"}))
+      ->capture_default_str();
+  command.add_option("--split", o.split, "CRN:INDEPENDENT, parts of the samples for the two passes")
+      ->capture_default_str();
+  command
+      .add_option("--sampling", o.sampling,
+                  "Random numbers per pixel, or common to all; a single pass (estimator none)")
+      ->check(CLI::IsMember({"independent", "crn"}));
+  command
+      .add_option("--groups", o.groups,
+                  "Groups of samples whose means films keep; default 12, 1 for a single independent pass")
+      ->check(CLI::Range(1u, 1024u));
+  command.add_option("--display-server", o.display_server,
+                     "HOST:PORT of a running tev, which shows the image while it renders");
+  command.add_option("--until", o.until, "relmse=X: add samples until the predicted error is X, at most --spp");
+  command.add_option("--seed", o.seed, "Seed of the random numbers")->capture_default_str();
+  command.add_option("--resolution", o.resolution, "WIDTHxHEIGHT of the full frame; default: the scene's");
+  command.add_option("--crop", o.crop, "X,Y,WIDTH,HEIGHT: render only these pixels of the frame");
+  command.add_option("--min-depth", o.min_depth, "Leave out paths with fewer edges than this")
+      ->check(CLI::Range(0, 1 << 30));
+  command.add_option("--max-depth", o.max_depth, "Largest number of path edges; -1: no limit; default: the scene's")
+      ->check(CLI::Range(-1, 1 << 30));
+  command.add_option("--rfilter", o.rfilter, "Reconstruction filter instead of the scene's")
+      ->check(CLI::IsMember({"box", "tent", "gaussian"}));
+  command.add_option("--threads", o.threads, "Number of threads; default: all")->check(CLI::Range(1, 4096));
+  command.add_option("--time", o.seconds, "Stop after this many seconds of rendering")->check(CLI::PositiveNumber);
+  command.add_option("--passes,--save-passes", o.passes, "Folder that keeps the film of every pass");
+  command.add_flag("--resume", o.resume, "Continue the films of an interrupted render, or those in --passes");
+  command.add_option("--checkpoint", o.checkpoint_seconds, "Seconds between writing unfinished films; 0: never")
+      ->capture_default_str()
+      ->check(CLI::NonNegativeNumber);
+  command.add_option("-D,--define", o.defines, "name=value for the scene's <default> elements")
+      ->take_all()
+      ->expected(1)
+      ->allow_extra_args(false);
+  command.add_flag("--aovs", o.aovs, "Add the images Albedo, N (normal) and P (position) to the output");
+  command.add_option("--replay", o.replay, "X,Y,SAMPLE: print one sample instead of rendering");
+  command.add_option("--json", o.json, "File for statistics; '-': standard output");
+  command.add_flag("!--no-preview", o.preview, "Do not write the PNG");
+  command.add_flag("--quiet", o.quiet, "No progress and no summary");
+  add_estimator_options(command, o.estimator);
+}
+
+}  // namespace covary

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// The options of `covary render`.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <array>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "estimator_options.h"
+#include "integrators/integrator.h"
+#include "scene/scene.h"
+
+namespace covary {
+
+struct RenderOptions {
+  std::string scene, output, integrator, sampling, split = "1:1", rfilter, json, passes;
+  std::string resolution, crop, replay, until, display_server;
+  EstimatorOptions estimator;
+  std::vector<std::string> defines;
+  std::optional<uint32_t> spp, groups;
+  std::optional<int> min_depth, max_depth;
+  uint64_t seed = 0;
+  int threads = 0;
+  double seconds = 0, checkpoint_seconds = 300;
+  bool resume = false, aovs = false, quiet = false, preview = true;
+
+  /// One pass, whose film is the result.
+  bool is_plain() const { return estimator.name == "none"; }
+};
+
+void add_render_options(CLI::App& command, RenderOptions& options);
+
+/// Everything that can be wrong before the scene is loaded, as Error(kUsage); and --sampling alone means a plain render.
+void check_options(RenderOptions& options);
+
+/// Whole numbers separated by `separator`; throws Error(kUsage) that names the option.
+std::vector<int64_t> parse_numbers(const std::string& option, const std::string& text, char separator, size_t count,
+                                   const std::string& example);
+std::map<std::string, std::string> parse_defines(const std::vector<std::string>& defines);
+/// --split "1:3": parts of the samples for the CRN and the independent pass; they add up to 1.
+std::array<double, 2> parse_split(const std::string& text);
+/// --until "relmse=0.005".
+double parse_until(const std::string& text);
+/// --rfilter.
+FilterSettings filter_named(const std::string& name);
+/// --integrator; nullptr where there is none of that name.
+const IntegratorPlugin* find_integrator(const std::string& name);
+/// The message for an unknown name, with the names there are.
+std::string unknown_integrator(const std::string& name);
+
+}  // namespace covary

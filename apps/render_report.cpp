@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "render_report.h"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+
+#include "commands.h"
+#include "progress.h"
+
+namespace covary {
+namespace {
+
+double peak_memory_bytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) * 1024;
+}
+
+/// Command that repeats one sample of a pass: the user's own, with the sample in place of the outputs.
+std::string replay_command(const RenderOptions& o, const Pass& pass, const BadSample& bad) {
+  std::string text = "covary render " + o.scene;
+  for (const std::string& define : o.defines) text += " -D " + define;
+  if (!o.resolution.empty()) text += " --resolution " + o.resolution;
+  if (!o.integrator.empty()) text += " --integrator " + o.integrator;
+  if (o.min_depth) text += fmt::format(" --min-depth {}", *o.min_depth);
+  if (o.max_depth) text += fmt::format(" --max-depth {}", *o.max_depth);
+  if (!o.rfilter.empty()) text += " --rfilter " + o.rfilter;
+  return text +
+         fmt::format(" --sampling {} --seed {} --replay {},{},{}", pass.name(), o.seed, bad.x, bad.y, bad.sample);
+}
+
+}  // namespace
+
+void report_bad_samples(const RenderOptions& options, const Pass& pass) {
+  const PassResult& result = pass.result;
+  if (result.bad_samples.empty()) return;
+  fmt::print(stderr, "warning: {} samples were not finite and {} negative; they count as black. The first:\n",
+             result.n_not_finite, result.n_negative);
+  for (const BadSample& bad : result.bad_samples)
+    fmt::print(stderr, "  pixel ({}, {}), sample {}: ({}, {}, {})\n    {}\n", bad.x, bad.y, bad.sample, bad.value.r,
+               bad.value.g, bad.value.b, replay_command(options, pass, bad));
+}
+
+nlohmann::ordered_json statistics(const RenderOptions& options, const LoadedScene& scene, const Outcome& outcome,
+                                  int threads) {
+  const Film& film = outcome.passes.back().film;
+  const double samples = outcome.sum([](const Pass& p) { return p.result.n_samples; });
+  const double rays = outcome.sum([](const Pass& p) { return p.result.n_rays; });
+  const double rate = 1 / std::max(outcome.render_seconds(), 1e-9);
+  nlohmann::ordered_json passes = nlohmann::json::array(), bad = nlohmann::json::array();
+  for (const Pass& pass : outcome.passes) {
+    passes.push_back({{"sampling", pass.name()},
+                      {"samples_per_pixel", pass.film.mean_count()},
+                      {"groups", pass.film.groups()},
+                      {"samples", pass.result.n_samples},
+                      {"rays", pass.result.n_rays},
+                      {"seconds", pass.result.seconds}});
+    for (const BadSample& b : pass.result.bad_samples)
+      bad.push_back({{"x", b.x}, {"y", b.y}, {"sample", b.sample}, {"replay", replay_command(options, pass, b)}});
+  }
+  nlohmann::ordered_json json = {
+      {"version", COVARY_VERSION},
+      {"command", command_line()},
+      {"output", options.output},
+      {"scene", options.scene},
+      {"scene_hash", scene.content_hash},
+      {"width", film.width()},
+      {"height", film.height()},
+      {"estimator", options.estimator.text()},
+      {"samples_per_pixel", outcome.samples_per_pixel()},
+      {"seed", options.seed},
+      {"threads", threads},
+      {"complete", outcome.complete()},
+      {"passes", passes},
+      {"seconds",
+       {{"load", outcome.load_seconds},
+        {"build", scene.scene->build_seconds()},
+        {"render", outcome.render_seconds()},
+        {"estimate", outcome.estimate_seconds},
+        {"write", outcome.write_seconds}}},
+      {"samples", samples},
+      {"rays", rays},
+      {"samples_per_second", samples * rate},
+      {"rays_per_second", rays * rate},
+      {"triangles", scene.scene->n_triangles()},
+      {"peak_memory_bytes", peak_memory_bytes()},
+      {"not_finite_samples", outcome.sum([](const Pass& p) { return p.result.n_not_finite; })},
+      {"negative_samples", outcome.sum([](const Pass& p) { return p.result.n_negative; })},
+      {"bad_samples", bad}};
+  if (outcome.predicted_relmse) json["predicted_relmse"] = *outcome.predicted_relmse;
+  return json;
+}
+
+void print_summary(const RenderOptions& options, const LoadedScene& scene, const Outcome& outcome) {
+  std::string samples;
+  for (const Pass& pass : outcome.passes)
+    samples += fmt::format("{}{:g} {}", samples.empty() ? "" : " + ", pass.film.mean_count(), pass.name());
+  const double seconds = std::max(outcome.render_seconds(), 1e-9);
+  fmt::print(stderr,
+             "{}: {} x {}, {} samples per pixel in {:.2f} s (load {:.2f} s, build {:.2f} s, {} samples/s, {} rays/s)\n",
+             options.output, outcome.passes[0].film.width(), outcome.passes[0].film.height(), samples, seconds,
+             outcome.load_seconds, scene.scene->build_seconds(),
+             format_count(outcome.sum([](const Pass& p) { return p.result.n_samples; }) / seconds),
+             format_count(outcome.sum([](const Pass& p) { return p.result.n_rays; }) / seconds));
+  if (!options.is_plain()) {
+    fmt::print(stderr, "{} in {:.2f} s", options.estimator.text(), outcome.estimate_seconds);
+    if (outcome.predicted_relmse) fmt::print(stderr, ", predicted relMSE {:.3g}", *outcome.predicted_relmse);
+    fmt::print(stderr, "\n");
+  } else if (!options.until.empty()) {
+    fmt::print(stderr, "predicted relMSE {:.3g}\n", *outcome.predicted_relmse);
+  }
+  if (!options.until.empty() && *outcome.predicted_relmse > parse_until(options.until))
+    fmt::print(stderr, "warning: --until {} was not reached\n", options.until);
+}
+
+}  // namespace covary

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is said of a render: statistics, the summary, samples that could not be used.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <vector>
+
+#include "estimators/grouped_image.h"
+#include "render_passes.h"
+
+namespace covary {
+
+/// What has become of the plan.
+struct Outcome {
+  std::vector<Pass> passes;
+  EstimatorResult image;
+  std::optional<double> predicted_relmse;
+  double load_seconds = 0, estimate_seconds = 0, write_seconds = 0;
+
+  template <typename F>
+  double sum(F value) const {
+    double total = 0;
+    for (const Pass& pass : passes) total += static_cast<double>(value(pass));
+    return total;
+  }
+  double samples_per_pixel() const {
+    return sum([](const Pass& p) { return p.film.mean_count(); });
+  }
+  double render_seconds() const {
+    return sum([](const Pass& p) { return p.result.seconds; });
+  }
+  bool complete() const {
+    return std::all_of(passes.begin(), passes.end(), [](const Pass& p) { return p.count >= p.settings.spp; });
+  }
+};
+
+/// The object of --json.
+nlohmann::ordered_json statistics(const RenderOptions& options, const LoadedScene& scene, const Outcome& outcome,
+                                  int threads);
+
+/// Lines on stderr about samples that were not finite or negative, with the commands that repeat them.
+void report_bad_samples(const RenderOptions& options, const Pass& pass);
+
+/// Lines on stderr about a finished render.
+void print_summary(const RenderOptions& options, const LoadedScene& scene, const Outcome& outcome);
+
+}  // namespace covary
