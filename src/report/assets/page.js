@@ -37,10 +37,11 @@ function draw_section(section) {
 }
 
 function draw_head() {
+  const meta = Array.isArray(report.meta) ? report.meta : Object.entries(report.meta ?? {});
   const sections = (report.sections ?? []).filter((section) => section.heading);
   return [
     el("h1", {}, report.title), report.subtitle ? el("p", { class: "subtitle" }, report.subtitle) : "",
-    report.meta?.length ? el("dl", {}, report.meta.map(([key, value]) => el("div", {}, el("dt", {}, key), el("dd", {}, String(value))))) : "",
+    meta.length ? el("dl", {}, meta.map(([key, value]) => el("div", {}, el("dt", {}, key), el("dd", {}, String(value))))) : "",
     sections.length > 1 ? el("nav", { "aria-label": "Sections" }, sections.map((s) => el("a", { href: `#${s.id}` }, s.heading))) : "",
   ].filter(Boolean);
 }

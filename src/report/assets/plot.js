@@ -44,22 +44,28 @@ function points_of(series) {
     .filter((p) => Number.isFinite(p.y));
 }
 
-/** Ticks of a logarithmic axis: powers of ten, and 2 and 5 times these where the axis spans few of them. */
-function log_tick(value, axis) {
-  const lead = Math.round(value / 10 ** Math.floor(Math.log10(value) + 1e-9));
-  const few = Math.log10(axis.max / axis.min) < 1.5;
-  return lead === 1 || (few && (lead === 2 || lead === 5)) ? significant(value, 1) : "";
+/** Ticks of a logarithmic axis: the points' own positions where they are few, else powers of ten, with 2 and 5 times these
+ *  where the axis spans few of them. */
+function log_ticks({ min, max }, values) {
+  const own = [...new Set(values)].sort((a, b) => a - b);
+  if (own.length > 0 && own.length <= 6 && own.every((v, i) => i === 0 || v / own[i - 1] > 1.3)) return own;
+  const steps = Math.log10(max / min) < 2 ? [1, 2, 5] : [1];
+  const ticks = [];
+  for (let power = Math.floor(Math.log10(min)); power <= Math.log10(max); power++)
+    ticks.push(...steps.map((step) => Number(`${step}e${power}`)).filter((v) => v >= min && v <= max));
+  return ticks;
 }
 
-function axis_of(axis, values) {
+function axis_of(axis, values, own_ticks) {
   const colours = { text: css_value("--text-soft"), grid: css_value("--line") };
   const common = { title: { display: Boolean(axis.label), text: axis.label, color: colours.text },
-    grid: { color: colours.grid, drawBorder: false }, ticks: { color: colours.text, maxRotation: 45 } };
+    grid: { color: colours.grid, drawBorder: false }, ticks: { color: colours.text, maxRotation: 0 } };
   if (axis.scale === "category") return { ...common, type: "category", grid: { display: false } };
-  if (axis.scale !== "log") return { ...common, type: "linear" };
+  if (axis.scale !== "log") return { ...common, type: "linear", beginAtZero: true };
   const positive = values.filter((v) => v > 0);
-  return { ...common, type: "logarithmic", suggestedMin: Math.min(...positive) / 1.15, suggestedMax: Math.max(...positive) * 1.15,
-    ticks: { ...common.ticks, autoSkip: false, callback(value) { return log_tick(value, this); } } };
+  return { ...common, type: "logarithmic", min: Math.min(...positive) / 1.25, max: Math.max(...positive) * 1.25,
+    afterBuildTicks(scale) { scale.ticks = log_ticks(scale, own_ticks ? positive : []).map((value) => ({ value })); },
+    ticks: { ...common.ticks, autoSkip: false, callback: (value) => String(Number(value.toPrecision(3))) } };
 }
 
 function dataset_of(series) {
@@ -85,9 +91,9 @@ function chart_of(block, canvas) {
     options: {
       animation: false, maintainAspectRatio: false, font: { family: "inherit" },
       interaction: { mode: "nearest", intersect: false },
-      scales: { x: axis_of(block.x, xs), y: axis_of(block.y, ys) },
+      scales: { x: axis_of(block.x, xs, true), y: axis_of(block.y, ys, false) },
       plugins: {
-        legend: { labels: { color: text, usePointStyle: true, boxWidth: 8, padding: 14 } },
+        legend: { labels: { color: text, usePointStyle: true, boxWidth: 10, boxHeight: 6, padding: 14 } },
         tooltip: { callbacks: {
           title: ([item]) => `${block.x.label ?? ""} ${typeof item.raw.x === "number" ? significant(item.raw.x, 4) : item.raw.x}`.trim(),
           label: (item) => `${item.dataset.label}: ${value_text(item.raw)}` } },
