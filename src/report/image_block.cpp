@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/error.h"
 
@@ -32,23 +33,24 @@ uint16_t half_bits(float value) {
 }
 
 std::vector<uint8_t> predicted_halves(const Image& image) {
+  const int width = image.width;
   const size_t n_values = image.data.size();
   std::vector<uint8_t> bytes(n_values * 2);
+  std::vector<int16_t> row(width), above(width);
   size_t i = 0;
-  for (int c = 0; c < image.channels; ++c) {
-    uint16_t row_start = 0;
+  for (int c = 0; c < image.channels; ++c)
     for (int y = 0; y < image.height; ++y) {
-      uint16_t previous = row_start;
-      for (int x = 0; x < image.width; ++x, ++i) {
-        const uint16_t bits = half_bits(image.pixel(x, y)[c]);
-        const auto difference = static_cast<uint16_t>(bits - previous);
-        bytes[i] = static_cast<uint8_t>(difference >> 8);
-        bytes[n_values + i] = static_cast<uint8_t>(difference & 0xff);
-        if (x == 0) row_start = bits;
-        previous = bits;
+      for (int x = 0; x < width; ++x, ++i) {
+        const float* pixel = image.pixel(x, y);
+        row[x] = static_cast<int16_t>(half_bits(pixel[c]) - (c > 0 ? half_bits(pixel[c - 1]) : 0));
+        const int suggested = x > 0 && y > 0 ? (row[x - 1] + above[x]) >> 1 : x > 0 ? row[x - 1] : y > 0 ? above[x] : 0;
+        const auto d = static_cast<int16_t>(row[x] - suggested);
+        const auto z = static_cast<uint16_t>(d >= 0 ? 2 * d : -2 * d - 1);
+        bytes[i] = static_cast<uint8_t>(z >> 8);
+        bytes[n_values + i] = static_cast<uint8_t>(z & 0xff);
       }
+      std::swap(row, above);
     }
-  }
   return bytes;
 }
 

@@ -32,13 +32,20 @@ TEST(Base64, AgreesWithTheExamplesOfRfc4648) {
   EXPECT_EQ(encoded("foobar"), "Zm9vYmFy");
 }
 
-TEST(PredictedHalves, AreDifferencesToTheLeftOrUpperNeighbour) {
+TEST(PredictedHalves, AreDifferencesFromTheNeighboursMean) {
   Image image(2, 2, 1);
   image.data = {1, 2, 0.5f, 0.5f};  // 0x3c00 0x4000 / 0x3800 0x3800
-  const std::vector<uint8_t> high{0x3c, 0x04, 0xfc, 0x00}, low{0, 0, 0, 0};
-  std::vector<uint8_t> expected = high;
-  expected.insert(expected.end(), low.begin(), low.end());
+  // 0x3c00; 0x4000 - 0x3c00; 0x3800 - 0x3c00 = -0x400; 0x3800 - (0x3800 + 0x4000) / 2 = -0x400
+  const std::vector<uint8_t> expected{0x78, 0x08, 0x07, 0x07, 0x00, 0x00, 0xff, 0xff};
   EXPECT_EQ(predicted_halves(image), expected);
+}
+
+TEST(PredictedHalves, OfChannelsInAFixedRatioAreSmall) {
+  Image image(8, 1, 2);
+  for (int x = 0; x < 8; ++x) image.pixel(x, 0)[0] = 1 << x, image.pixel(x, 0)[1] = 4 << x;
+  const std::vector<uint8_t> bytes = predicted_halves(image);
+  EXPECT_EQ(bytes[8], 0x10) << "a factor of 4 is 0x800 in the bits";
+  for (int x = 1; x < 8; ++x) EXPECT_EQ(bytes[8 + x], 0);
 }
 
 TEST(EncodeImage, CompressesWhatIsUniform) {

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads the EXR files that covary writes (scan lines, ZIP, 32-bit values) with the standard library alone, so that tests do
+"""Reads the EXR files that covary writes (scan lines, ZIP or uncompressed, 32-bit values) with the standard library alone, so that tests do
 not depend on the code that they test. Layout: https://openexr.com/en/latest/OpenEXRFileLayout.html"""
 import array
 import struct
 import zlib
 
-ROWS_PER_BLOCK = 16
+ROWS_PER_BLOCK = {0: 1, 3: 16}  # of the compressions none and ZIP
 TYPES = {0: "I", 2: "f"}  # uint, float
 
 
@@ -48,10 +48,11 @@ def read_exr(data):
     channels = channel_types(attributes["channels"])
     x0, y0, x1, y1 = struct.unpack("<4i", attributes["dataWindow"])
     width, height = x1 - x0 + 1, y1 - y0 + 1
-    n_blocks = (height + ROWS_PER_BLOCK - 1) // ROWS_PER_BLOCK
+    rows_per_block = ROWS_PER_BLOCK[attributes["compression"][0]]
+    n_blocks = (height + rows_per_block - 1) // rows_per_block
     result = {name: [] for name, _ in channels}
     for block, offset in enumerate(struct.unpack_from(f"<{n_blocks}Q", data, at)):
-        rows = min(ROWS_PER_BLOCK, height - ROWS_PER_BLOCK * block)
+        rows = min(rows_per_block, height - rows_per_block * block)
         size, = struct.unpack_from("<i", data, offset + 4)
         raw, line = unzipped(data[offset + 8:offset + 8 + size], rows * width * 4 * len(channels)), width * 4
         for start in range(0, len(raw), line):

@@ -15,7 +15,8 @@ class Comparer {
     this.failures = new Map();   // image id -> message
     this.pointer = null;         // {px, py} on the stage
     this.state = { scene: 0, a: 0, b: 0, layout: "single", mode: "image", exposure: 0, gain: 0, split: 0.5, aspect: 1 };
-    this.canvas = el("canvas", { tabindex: "0", role: "application", "aria-roledescription": "image comparer" });
+    this.canvas = el("canvas", { tabindex: "0", role: "application", "aria-roledescription": "image comparer",
+      "aria-busy": "true" });
     this.stage = el("div", { class: "stage" }, this.canvas);
     this.controls = new Controls(this);
     this.strip = new InsetStrip(this);

@@ -112,7 +112,7 @@ class Controls {
       this.pixel.textContent = "Point at a pixel to read its values.";
       return;
     }
-    const shown = comparer.state.layout === "grid" ? [at.pane.image] : comparer.panes().map((pane) => pane.image);
+    const shown = comparer.state.layout === "grid" ? comparer.images : comparer.panes().map((pane) => pane.image);
     const records = [...new Set([...shown, ...(comparer.reference ? [comparer.reference] : [])])];
     const reference = comparer.reference && comparer.store.ready(comparer.reference.image);
     const items = records.map((record) => {

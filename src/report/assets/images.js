@@ -23,20 +23,20 @@ function base64_bytes(text) {
 
 /** Undoes predicted_halves() of src/report/image_block.h; the result has three planes of half-float bits. */
 function unpredicted(bytes, width, height) {
-  const n = width * height * 3;
+  const plane = width * height, n = plane * 3;
   const halves = new Uint16Array(n);
+  let row = new Int16Array(width), above = new Int16Array(width);
   let i = 0;
-  for (let channel = 0; channel < 3; channel++) {
-    let row_start = 0;
+  for (let channel = 0; channel < 3; channel++)
     for (let y = 0; y < height; y++) {
-      let previous = row_start;
       for (let x = 0; x < width; x++, i++) {
-        previous = (previous + (bytes[i] << 8) + bytes[n + i]) & 65535;
-        halves[i] = previous;
-        if (x === 0) row_start = previous;
+        const z = (bytes[i] << 8) | bytes[n + i];
+        const suggested = x > 0 && y > 0 ? (row[x - 1] + above[x]) >> 1 : x > 0 ? row[x - 1] : y > 0 ? above[x] : 0;
+        row[x] = suggested + (z & 1 ? -(z + 1) >> 1 : z >> 1);
+        halves[i] = row[x] + (channel > 0 ? halves[i - plane] : 0);
       }
+      [row, above] = [above, row];
     }
-  }
   return halves;
 }
 
