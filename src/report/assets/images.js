@@ -40,10 +40,7 @@ function unpredicted(bytes, width, height) {
   return halves;
 }
 
-const page_read = new Promise((resolve) => {
-  if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", resolve);
-  else resolve();
-});
+const ARRIVAL_CHECK = 50;  // milliseconds
 
 class ImageStore {
   /** `sizes`: id -> [width, height], known before the images have arrived. */
@@ -66,8 +63,8 @@ class ImageStore {
 
   async decode(id) {
     let block = this.find(id);
-    if (!block?.nextElementSibling) {  // an image may still be arriving
-      await page_read;
+    while (document.readyState === "loading" && !block?.nextElementSibling) {  // the page is still arriving
+      await new Promise((resolve) => setTimeout(resolve, ARRIVAL_CHECK));
       block = this.find(id);
     }
     if (!block) throw new Error(`The page lacks the image '${id}'.`);
