@@ -89,7 +89,7 @@ function chart_of(block, canvas) {
     data: { labels: categories, datasets: block.series.map(dataset_of) },
     plugins: [error_bars],
     options: {
-      animation: false, maintainAspectRatio: false, font: { family: "inherit" },
+      animation: false, maintainAspectRatio: false, font: { family: getComputedStyle(document.body).fontFamily },
       interaction: { mode: "nearest", intersect: false },
       scales: { x: axis_of(block.x, xs, true), y: axis_of(block.y, ys, false) },
       plugins: {
