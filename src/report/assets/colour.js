@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Half floats to 8-bit colours: the picture itself, the error in false colour, the signed difference.
 
 const ERROR_RANGE = [1e-4, 10];    // relative squared error at both ends of the scale, at gain 0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The image comparer: its state, what it draws, and how the state becomes a link. Controls, gestures and insets are in
 // files of their own; all of them call update().
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Buttons and sliders around the stage, the line of pixel values, the help.
 
 const STOPS_RANGE = 10;

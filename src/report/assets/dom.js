@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Small helpers for building elements.
 
 /** An element; attributes that are functions become event listeners, null and false ones are left out. */

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A figure as papers print it: the whole picture with framed insets at the left, the insets of all images at the right,
 // names above and errors below each crop. A PNG with a white ground.
 

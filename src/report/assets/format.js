@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Numbers as text.
 
 /** `value` with `digits` significant digits; powers of ten only where plain digits would be long. */

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Pointer, wheel and keyboard on the stage.
 
 const PAN_STEP = 60;         // screen pixels per arrow key

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Images of the page: decoded from their text blocks when first needed, and kept while memory allows.
 
 const CACHE_BYTES = 384e6;

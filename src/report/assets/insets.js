@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Magnified crops of all images of a scene, side by side below the stage.
 
 const INSET_COLOURS = ["#f5a623", "#38b6ff", "#5fd35f", "#f06bd6", "#ffe14d", "#b58cff"];

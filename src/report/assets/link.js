@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Links into the page: #view=COMPARER/SCENE/IMAGE A/IMAGE B&layout=…&mode=…&zoom=…&x=…&y=…; docs/report.md lists all.
 
 const LINK_NUMBERS = ["exposure", "gain", "zoom", "x", "y", "split"];

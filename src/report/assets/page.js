@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Builds the page from its document (docs/report.md) and follows links.
 
 const report = JSON.parse(document.getElementById("document").textContent);

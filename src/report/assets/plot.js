@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Plots by Chart.js, with error bars, and the same numbers as a table for those who do not see them.
 
 const SERIES_COLOURS = 8;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Tables that sort by any column; the best value of a column is marked where the document says what is better.
 
 const cell_value = (cell) => (cell !== null && typeof cell === "object" ? cell.value : cell) ?? null;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Which part of an image a pane shows. All panes of a comparer share one viewport, so that they zoom and pan together.
 
 const MOST_ZOOM = 128;  // screen pixels per image pixel
