@@ -76,10 +76,6 @@ class PageTest(unittest.TestCase):
 
 
 class Page(PageTest):
-    def rows(self):
-        return self.page.evaluate("[...document.querySelectorAll('.table tbody')][0].innerText.split('\\n').filter(t => /[a-z]/i.test(t[0]))"
-                                  ".map(t => t.split('\\t')[0])")
-
     def test_shows_the_document_and_fetches_nothing(self):
         self.open()
         self.assertEqual(self.page.evaluate("document.title"), "Sample report")
@@ -96,6 +92,11 @@ class Page(PageTest):
             self.assertIn(part, text)
         self.assertEqual(self.page.evaluate("[...document.querySelector('.table').querySelectorAll('.best')].map(e => e.innerText)"),
                          ["0.00370", "9.2×"])
+
+    def test_best_of_each_group(self):
+        self.open()
+        self.assertEqual(self.page.evaluate("[...document.querySelectorAll('#failures .best')].map(e => e.innerText)"), ["0.500", "3.50"])
+        self.assertEqual(self.page.text("#failures tbody td:last-child"), "2")
 
     def test_table_sorts(self):
         self.open()

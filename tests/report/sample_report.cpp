@@ -80,6 +80,22 @@ Json table() {
              {"share", 0.11}}}}};
 }
 
+/// The best method of each scene.
+Json grouped_table() {
+  const auto row = [](const char* scene, const char* method, double error) {
+    return Json{{"scene", scene}, {"method", method}, {"error", error}, {"samples", 2}};
+  };
+  return {
+      {"type", "table"},
+      {"best_within", "scene"},
+      {"columns",
+       {{{"key", "scene"}, {"title", "Scene"}, {"kind", "text"}},
+        {{"key", "method"}, {"title", "Method"}, {"kind", "text"}},
+        {{"key", "error"}, {"title", "relMSE"}, {"kind", "number"}, {"better", "low"}},
+        {{"key", "samples"}, {"title", "Samples"}, {"kind", "number"}}}},
+      {"rows", {row("a", "m", 1.5), row("a", "n", 0.5), row("b", "m", 3.5), row("b", "n", 4.5), row("c", "m", 0.1)}}};
+}
+
 Json plots() {
   const std::vector<double> spp{48, 96, 192, 384};
   const Json convergence{{"type", "plot"},
@@ -117,7 +133,7 @@ Json document() {
             {{"id", "images"}, {"heading", "Images"}, {"blocks", {comparer()}}},
             {{"id", "failures"},
              {"heading", "Failures"},
-             {"blocks", {{{"type", "notes"}, {"kind", "error"}, {"items", {"a scene failed"}}}}}}}}};
+             {"blocks", {{{"type", "notes"}, {"kind", "error"}, {"items", {"a scene failed"}}}, grouped_table()}}}}}};
 }
 
 }  // namespace

@@ -32,7 +32,8 @@ function number_text(value, column) {
     case "percent": return `${significant(value * 100, digits)} %`;
     case "seconds": return seconds_text(value, digits);
     case "bytes": return bytes_text(value, digits);
-    default: return significant(value, digits);
+    default: return column.digits === undefined && Number.isInteger(value) && Math.abs(value) < 1e7
+      ? String(value).replace("-", "−") : significant(value, digits);
   }
 }
 

@@ -13,13 +13,24 @@ function sorted_rows(rows, column, descending) {
   });
 }
 
-function best_value(rows, column) {
-  const values = rows.map((row) => cell_value(row[column.key])).filter((v) => Number.isFinite(v));
-  if (!column.better || values.length < 2) return null;
-  return column.better === "low" ? Math.min(...values) : Math.max(...values);
+/** The cells to mark in a column: the best value, or those of each group of rows that have the same value of `within`. */
+function best_cells(rows, column, within) {
+  if (!column.better) return new Set();
+  const groups = new Map();
+  for (const row of rows) {
+    const group = within ? cell_value(row[within]) : null, value = cell_value(row[column.key]);
+    if (Number.isFinite(value)) groups.set(group, [...(groups.get(group) ?? []), { row, value }]);
+  }
+  const marked = new Set();
+  for (const cells of groups.values()) {
+    const values = cells.map((cell) => cell.value);
+    const best = column.better === "low" ? Math.min(...values) : Math.max(...values);
+    if (cells.length > 1) cells.filter((cell) => cell.value === best).forEach((cell) => marked.add(cell.row));
+  }
+  return marked;
 }
 
-function table_cell(cell, column, best) {
+function table_cell(cell, column, is_best) {
   const value = cell_value(cell), more = cell !== null && typeof cell === "object" ? cell : {};
   const is_text = column.kind === "text";
   if (value === null) return el("td", { class: is_text ? null : "number" }, el("span", { class: "missing", title: "no value" }, "–"), note_of(more));
@@ -27,16 +38,15 @@ function table_cell(cell, column, best) {
   const shown = more.link ? el("a", { href: more.link }, text) : text;
   const interval = Number.isFinite(more.low) && Number.isFinite(more.high)
     ? el("small", { class: "interval" }, `${number_text(more.low, column)} … ${number_text(more.high, column)}`) : null;
-  const is_best = best !== null && value === best;
   return el(column.row_head ? "th" : "td", { class: is_text ? null : "number", scope: column.row_head ? "row" : null },
-    is_best ? el("strong", { class: "best", title: "best of its column" }, shown) : shown, interval, note_of(more));
+    is_best ? el("strong", { class: "best", title: "the best" }, shown) : shown, interval, note_of(more));
 }
 
 const note_of = (cell) => (cell.note ? el("small", { class: "note" }, cell.note) : null);
 
 function draw_table(block) {
   const columns = block.columns.map((column, i) => ({ ...column, row_head: i === 0 }));
-  const best = columns.map((column) => best_value(block.rows, column));
+  const best = columns.map((column) => best_cells(block.rows, column, block.best_within));
   const body = el("tbody");
   let sorted_by = null, descending = false;
   const heads = columns.map((column) => {
@@ -46,7 +56,7 @@ function draw_table(block) {
     return head;
   });
   const fill = (rows) => body.replaceChildren(...rows.map((row) =>
-    el("tr", {}, columns.map((column, i) => table_cell(row[column.key] ?? null, column, best[i])))));
+    el("tr", {}, columns.map((column, i) => table_cell(row[column.key] ?? null, column, best[i].has(row))))));
   const sort = (column) => {
     descending = sorted_by === column ? !descending : column.better === "high";
     sorted_by = column;
