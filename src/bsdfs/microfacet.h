@@ -10,6 +10,7 @@
 #pragma once
 
 #include "core/frame.h"
+#include "core/trigonometry.h"
 
 namespace covary {
 
@@ -74,10 +75,10 @@ class Microfacet {
   // direction of the spherical cap z > -w.z. A distribution of any roughness is a stretched hemisphere.
   Vec3 sample_ggx(const Vec3& w, Vec2 u) const {
     const Vec3 v = normalize({alpha_u_ * w.x, alpha_v_ * w.y, w.z});
-    const float phi = kTwoPi * u.x;
+    const SinCos phi = sincos_turns(u.x);
     const float z = (1 - u.y) * (1 + v.z) - v.z;
     const float r = safe_sqrt(1 - z * z);
-    const Vec3 h{r * std::cos(phi) + v.x, r * std::sin(phi) + v.y, z + v.z};
+    const Vec3 h{r * phi.cos + v.x, r * phi.sin + v.y, z + v.z};
     return normalize({alpha_u_ * h.x, alpha_v_ * h.y, std::max(h.z, 1e-9f)});
   }
   Vec3 sample_beckmann(const Vec3& w, Vec2 u) const;

@@ -43,8 +43,9 @@ class Gtr1 {
   float pdf(const Vec3& m) const { return eval(m) * m.z; }
   Vec3 sample(Vec2 u) const {
     const float cos2 = (1 - std::pow(alpha2_, 1 - u.y)) / (1 - alpha2_);
-    const float s = safe_sqrt(1 - cos2), phi = kTwoPi * u.x;
-    return {s * std::cos(phi), s * std::sin(phi), safe_sqrt(cos2)};
+    const float s = safe_sqrt(1 - cos2);
+    const SinCos phi = sincos_turns(u.x);
+    return {s * phi.cos, s * phi.sin, safe_sqrt(cos2)};
   }
 
  private:

@@ -18,5 +18,20 @@ TEST(Trigonometry, AgreesWithTheLibrary) {
   }
 }
 
+TEST(Trigonometry, AngleAgreesWithTheLibrary) {
+  for (int i = 0; i < 8000; ++i) {
+    const double angle = 2 * M_PI * (i + 0.25) / 8000, radius = std::exp2(i % 40 - 20);
+    const auto x = static_cast<float>(radius * std::cos(angle)), y = static_cast<float>(radius * std::sin(angle));
+    double expected = std::atan2(double{y}, double{x}) / (2 * M_PI);
+    if (expected < 0) expected += 1;
+    EXPECT_NEAR(angle_turns(y, x), expected, 1e-7) << angle;
+  }
+  EXPECT_EQ(angle_turns(0, 1), 0);
+  EXPECT_EQ(angle_turns(1, 0), 0.25f);
+  EXPECT_EQ(angle_turns(0, -1), 0.5f);
+  EXPECT_EQ(angle_turns(-1, 0), 0.75f);
+  EXPECT_EQ(angle_turns(0, 0), 0);
+}
+
 }  // namespace
 }  // namespace covary

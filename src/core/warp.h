@@ -11,14 +11,13 @@ namespace covary::warp {
 /// Uniform on the unit disk by the concentric map (Shirley & Chiu 1997); density 1/pi per unit area.
 inline Vec2 square_to_disk(Vec2 u) {
   const float x = 2 * u.x - 1, y = 2 * u.y - 1;
-  // Radius along the larger coordinate; the angle is measured from its axis, within 45 degrees.
-  if (std::abs(x) > std::abs(y)) {
-    const SinCos a = sincos_octant((kPi / 4) * (y / x));
-    return {x * a.cos, x * a.sin};
-  }
-  if (y == 0) return {0, 0};
-  const SinCos a = sincos_octant((kPi / 4) * (x / y));
-  return {y * a.sin, y * a.cos};
+  // Radius along the larger coordinate; the angle is measured from its axis, within 45 degrees. Which coordinate is the
+  // larger cannot be predicted: values are chosen, not branches.
+  const bool along_x = std::abs(x) > std::abs(y);
+  const float radius = along_x ? x : y, other = along_x ? y : x;
+  const SinCos a = sincos_octant((kPi / 4) * (other / (radius == 0 ? 1 : radius)));
+  const float near = radius * a.cos, far = radius * a.sin;
+  return {along_x ? near : far, along_x ? far : near};
 }
 inline float disk_pdf() { return kInvPi; }
 
@@ -41,8 +40,8 @@ inline float sphere_pdf_solid_angle() { return 1 / (4 * kPi); }
 /// it is small for distant lights and its difference from 1 would lose digits.
 inline Vec3 square_to_cone(Vec2 u, float one_minus_cos_max) {
   const Vec2 d = square_to_disk(u);
-  const float r2 = d.x * d.x + d.y * d.y;              // uniform in [0, 1)
-  const float one_minus_cos = r2 * one_minus_cos_max;  // uniform in [0, 1 - cos_max)
+  const float r2 = d.x * d.x + d.y * d.y;                                  // uniform in [0, 1)
+  const float one_minus_cos = r2 * one_minus_cos_max;                      // uniform in [0, 1 - cos_max)
   const float scale = safe_sqrt(one_minus_cos_max * (2 - one_minus_cos));  // sin(theta) / sqrt(r2)
   return {d.x * scale, d.y * scale, 1 - one_minus_cos};
 }
@@ -56,7 +55,8 @@ inline Vec2 square_to_triangle(Vec2 u) {
 
 /// Tent of radius `radius` centred at 0; density (1 - |x|/radius)/radius.
 inline float interval_to_tent(float u, float radius) {
-  return u < 0.5f ? radius * (std::sqrt(2 * u) - 1) : radius * (1 - std::sqrt(2 * (1 - u)));
+  const float from_end = radius * (1 - std::sqrt(2 * std::min(u, 1 - u)));
+  return u < 0.5f ? -from_end : from_end;
 }
 inline float tent_pdf(float x, float radius) { return std::max(0.0f, 1 - std::abs(x) / radius) / radius; }
 

@@ -29,7 +29,11 @@ class Sphere final : public AnalyticShape {
   float pdf_solid_angle(const Vec3& reference, const SurfaceHit& hit) const override;
 
  private:
-  Transform to_world_, to_local_;
+  /// Of a world direction, along the sphere's own axes; keeps the length.
+  Vec3 to_local(const Vec3& d) const { return {dot(axes_[0], d), dot(axes_[1], d), dot(axes_[2], d)}; }
+
+  Transform to_world_;
+  Vec3 axes_[3];  // unit images of the local axes
   Vec3 center_;
   float radius_;
   float sign_;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/error.h"
+#include "core/trigonometry.h"
 #include "scene/analytic_shape.h"
 
 namespace covary {
@@ -23,15 +24,14 @@ Cylinder::Cylinder(const Transform& to_world, const Vec3& p0, const Vec3& p1, fl
     : Cylinder(unit_cylinder_to_world(to_world, p0, p1, radius), flip_normals) {}
 
 Cylinder::Cylinder(const Transform& to_world, bool flip_normals)
-    : to_world_(to_world),
-      to_local_(to_world_.inverse()),
-      sign_(flip_normals ? -1.0f : 1.0f) {
+    : to_world_(to_world), to_local_(to_world_.inverse()), sign_(flip_normals ? -1.0f : 1.0f) {
   const Vec3 x = to_world_.vector({1, 0, 0}), y = to_world_.vector({0, 1, 0}), z = to_world_.vector({0, 0, 1});
   const float r = length(x);
   if (std::abs(length(y) - r) > 1e-3f * r || std::abs(dot(x, y)) > 1e-3f * r * r ||
       std::abs(dot(x, z)) > 1e-3f * r * length(z) || std::abs(dot(y, z)) > 1e-3f * r * length(z))
-    throw Error(ErrorCode::kInput,
-                "the to_world transformation of a cylinder must keep its cross section a circle at right angles to the axis");
+    throw Error(
+        ErrorCode::kInput,
+        "the to_world transformation of a cylinder must keep its cross section a circle at right angles to the axis");
   area_ = kTwoPi * r * length(z);
 }
 
@@ -58,8 +58,7 @@ void Cylinder::fill(const Ray& ray, SurfaceHit& hit, bool with_derivatives) cons
   local.x *= inverse_r, local.y *= inverse_r;
   hit.p = to_world_.point(local);
   hit.ng = normalize(to_world_.normal({local.x, local.y, 0})) * sign_;
-  const float phi = std::atan2(local.y, local.x);
-  hit.uv = {(phi < 0 ? phi + kTwoPi : phi) / kTwoPi, local.z};
+  hit.uv = {angle_turns(local.y, local.x), local.z};
   if (!with_derivatives) {
     hit.frame = Frame(hit.ng);
     return;

@@ -26,8 +26,8 @@ void Disk::fill(const Ray& ray, SurfaceHit& hit, bool with_derivatives) const {
   local.z = 0;
   hit.p = to_world_.point(local);
   hit.ng = normal_;
-  const float r = std::sqrt(local.x * local.x + local.y * local.y), phi = std::atan2(local.y, local.x);
-  hit.uv = {r, (phi < 0 ? phi + kTwoPi : phi) / kTwoPi};
+  const float r = std::sqrt(local.x * local.x + local.y * local.y);
+  hit.uv = {r, angle_turns(local.y, local.x)};
   if (!with_derivatives) {
     hit.frame = Frame(normal_);
     return;
@@ -44,9 +44,7 @@ std::shared_ptr<Shape> Disk::transformed(const Transform& to_world) const {
 
 AreaSample Disk::sample_area(Vec2 u, float /*u_primitive*/) const {
   const Vec2 d = warp::square_to_disk(u);
-  const float phi = std::atan2(d.y, d.x);
-  return {to_world_.point({d.x, d.y, 0}), normal_,
-          {std::sqrt(dot(d, d)), (phi < 0 ? phi + kTwoPi : phi) / kTwoPi}, 1 / area_};
+  return {to_world_.point({d.x, d.y, 0}), normal_, {std::sqrt(dot(d, d)), angle_turns(d.y, d.x)}, 1 / area_};
 }
 
 }  // namespace covary

@@ -20,18 +20,20 @@ float similarity_scale(const Transform& t) {
 
 /// (phi / 2 pi, theta / pi) of a unit vector.
 Vec2 spherical_uv(const Vec3& local) {
-  const float phi = std::atan2(local.y, local.x);
-  return {(phi < 0 ? phi + kTwoPi : phi) / kTwoPi, std::acos(std::clamp(local.z, -1.0f, 1.0f)) / kPi};
+  const float rho = std::sqrt(local.x * local.x + local.y * local.y);
+  return {angle_turns(local.y, local.x), 2 * angle_turns(rho, local.z)};
 }
 
 }  // namespace
 
 Sphere::Sphere(const Transform& to_world, const Vec3& center, float radius, bool flip_normals)
     : to_world_(to_world * Transform::translate(center) * Transform::scale({radius, radius, radius})),
-      to_local_(to_world_.inverse()),
       center_(to_world_.point({0, 0, 0})),
       radius_(similarity_scale(to_world_)),
-      sign_(flip_normals ? -1.0f : 1.0f) {}
+      sign_(flip_normals ? -1.0f : 1.0f) {
+  for (int i = 0; i < 3; ++i)
+    axes_[i] = normalize(to_world_.vector({i == 0 ? 1.0f : 0, i == 1 ? 1.0f : 0, i == 2 ? 1.0f : 0}));
+}
 
 Bounds3 Sphere::bounds() const {
   const Vec3 r{radius_, radius_, radius_};
@@ -57,7 +59,7 @@ void Sphere::fill(const Ray& ray, SurfaceHit& hit, bool with_derivatives) const 
   const Vec3 outward = normalize(ray.at(hit.t) - center_);
   hit.p = center_ + outward * radius_;
   hit.ng = outward * sign_;
-  const Vec3 local = to_local_.vector(outward) * radius_;
+  const Vec3 local = to_local(outward);
   const float rho = std::sqrt(local.x * local.x + local.y * local.y);
   hit.uv = spherical_uv(local);
   if (!with_derivatives) {
@@ -66,8 +68,9 @@ void Sphere::fill(const Ray& ray, SurfaceHit& hit, bool with_derivatives) const 
   }
   const float inverse_rho = rho > 0 ? 1 / rho : 0;
   hit.dp_du = to_world_.vector(Vec3{-local.y, local.x, 0} * kTwoPi);
-  hit.dp_dv = rho > 0 ? to_world_.vector(Vec3{local.z * local.x * inverse_rho, local.z * local.y * inverse_rho, -rho} * kPi)
-                      : to_world_.vector({kPi, 0, 0});
+  hit.dp_dv = rho > 0
+                  ? to_world_.vector(Vec3{local.z * local.x * inverse_rho, local.z * local.y * inverse_rho, -rho} * kPi)
+                  : to_world_.vector({kPi, 0, 0});
   hit.frame = Frame::from_tangent(hit.ng, hit.dp_du);
 }
 
@@ -77,7 +80,7 @@ std::shared_ptr<Shape> Sphere::transformed(const Transform& to_world) const {
 
 AreaSample Sphere::sample_area(Vec2 u, float /*u_primitive*/) const {
   const Vec3 d = warp::square_to_sphere(u);
-  return {center_ + d * radius_, d * sign_, spherical_uv(to_local_.vector(d) * radius_), 1 / area()};
+  return {center_ + d * radius_, d * sign_, spherical_uv(to_local(d)), 1 / area()};
 }
 
 EmitterSample Sphere::sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const {
@@ -95,7 +98,7 @@ EmitterSample Sphere::sample_towards(const Vec3& reference, Vec2 u, float u_prim
   const Vec3 outward = normalize(reference + sample.wi * sample.distance - center_);
   sample.p = center_ + outward * radius_;
   sample.n = outward * sign_;
-  sample.uv = spherical_uv(to_local_.vector(outward) * radius_);
+  sample.uv = spherical_uv(to_local(outward));
   sample.pdf_solid_angle = warp::cone_pdf_solid_angle(one_minus_cos_max);
   return sample;
 }
