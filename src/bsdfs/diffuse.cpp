@@ -24,8 +24,8 @@ class DiffuseClosure final : public BsdfClosure {
     return {reflectance_ * pdf, pdf};
   }
   BsdfSample sample(const Vec3& wo, float, Vec2 u) const override {
-    if (!(wo.z > 0)) return {};
-    BsdfSample s;
+    BsdfSample s;  // the one object returned, so that it is built where the caller wants it
+    if (!(wo.z > 0)) return s;
     s.wi = warp::square_to_cosine_hemisphere(u);
     s.pdf = warp::cosine_hemisphere_pdf_solid_angle(s.wi.z);
     if (s.pdf > 0) s.weight = reflectance_;

@@ -117,8 +117,8 @@ class RoughPlasticClosure final : public BsdfClosure {
             pmf * pdf + (1 - pmf) * warp::cosine_hemisphere_pdf_solid_angle(wi.z)};
   }
   BsdfSample sample(const Vec3& wo, float u_lobe, Vec2 u) const override {
-    if (!(wo.z > 0)) return {};
-    BsdfSample s;
+    BsdfSample s;  // the one object returned, so that it is built where the caller wants it
+    if (!(wo.z > 0)) return s;
     if (u_lobe < specular_pmf(transmittance_(wo.z))) {
       s.wi = reflect(wo, surface_.sample(wo, u).m);
       s.flags = kGlossyReflection;
@@ -128,7 +128,7 @@ class RoughPlasticClosure final : public BsdfClosure {
       s.lobe = 1;
     }
     const BsdfValue v = eval(wo, s.wi);
-    if (!(v.pdf_solid_angle > 0)) return {};
+    if (!(v.pdf_solid_angle > 0)) return s;
     s.pdf = v.pdf_solid_angle;
     s.weight = v.value / s.pdf;
     return s;

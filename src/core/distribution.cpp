@@ -56,16 +56,6 @@ Discrete::Discrete(std::span<const float> weights) : cdf_(weights.size() + 1), s
   }
 }
 
-Discrete::Result Discrete::sample(float u) const {
-  // First cell whose upper bound exceeds u; it has positive weight because its bounds differ. The guide table leaves
-  // about one step of the search on average (Chen and Asau 1974).
-  const auto n = static_cast<uint32_t>(guide_.size());
-  uint32_t index = guide_[std::min(static_cast<uint32_t>(u * static_cast<float>(n)), n - 1)];
-  while (cdf_[index + 1] <= u) ++index;
-  const float lower = cdf_[index], width = cdf_[index + 1] - lower;
-  return {index, width, std::min((u - lower) / width, kOneMinusEpsilon)};
-}
-
 AliasTable::AliasTable(std::span<const float> weights) : cells_(weights.size()) {
   const double scale = static_cast<double>(weights.size()) / checked_sum(weights);
   std::vector<double> mass(weights.size());

@@ -23,7 +23,15 @@ class Discrete {
     float remapped;  ///< `u` stretched over the cell it fell into: again uniform in [0, 1), independent of index
   };
   /// `u` in [0, 1). Indices of zero weight are never returned.
-  Result sample(float u) const;
+  Result sample(float u) const {
+    // First cell whose upper bound exceeds u; it has positive weight because its bounds differ. The guide table leaves
+    // about one step of the search on average (Chen and Asau 1974).
+    const auto n = static_cast<uint32_t>(guide_.size());
+    uint32_t index = guide_[std::min(static_cast<uint32_t>(u * static_cast<float>(n)), n - 1)];
+    while (cdf_[index + 1] <= u) ++index;
+    const float lower = cdf_[index], width = cdf_[index + 1] - lower;
+    return {index, width, std::min((u - lower) / width, kOneMinusEpsilon)};
+  }
   float pmf(uint32_t index) const { return cdf_[index + 1] - cdf_[index]; }
   uint32_t size() const { return static_cast<uint32_t>(cdf_.size()) - 1; }
   /// Sum of the weights as given.
@@ -47,13 +55,14 @@ class AliasTable {
   };
   /// `u` in [0, 1).
   Result sample(float u) const {
-    const auto n = static_cast<uint32_t>(cells_.size());
-    const float x = u * static_cast<float>(n);
-    const uint32_t i = std::min(static_cast<uint32_t>(x), n - 1);
+    const float x = u * static_cast<float>(cells_.size());
+    const uint32_t i = cell_of(x);
     const Cell& cell = cells_[i];
+    // Values are chosen, not branches: a wrong guess would be found out only when memory has answered.
     const float f = x - static_cast<float>(i);
-    if (f < cell.own) return {i, std::min(f / cell.own, kOneMinusEpsilon)};
-    return {cell.other, std::min((f - cell.own) / (1 - cell.own), kOneMinusEpsilon)};
+    const bool own = f < cell.own;
+    const float lower = own ? 0 : cell.own, width = own ? cell.own : 1 - cell.own;
+    return {own ? i : cell.other, std::min((f - lower) / width, kOneMinusEpsilon)};
   }
 
  private:
@@ -61,6 +70,10 @@ class AliasTable {
     float own;       // fraction of the cell that is its own index
     uint32_t other;  // the rest
   };
+  /// `x` in [0, n].
+  uint32_t cell_of(float x) const {
+    return std::min(static_cast<uint32_t>(x), static_cast<uint32_t>(cells_.size()) - 1);
+  }
   std::vector<Cell> cells_;
 };
 

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/in_place.h"
 #include "integrators/integrator.h"
 #include "integrators/light_selection.h"
 
@@ -24,6 +25,12 @@ namespace {
 float mis_weight(float a, float b) {
   const float r = b / a;
   return 1 / (1 + r * r);
+}
+
+/// mis_weight(a, b) / a by one division, in double precision because squares of densities leave the range of float.
+float mis_weight_over_pdf(float a, float b) {
+  const double x = a, y = b;
+  return static_cast<float>(x / (x * x + y * y));
 }
 
 /// First address of the vertices on surfaces that have delta lobes only.
@@ -42,6 +49,13 @@ struct Path {
   uint32_t n_smooth = 0;       // vertices so far on surfaces that have more than delta lobes
 };
 
+/// Which light a vertex samples, and with which numbers.
+struct LightChoice {
+  const Emitter* emitter = nullptr;  // null: the surface cannot use light samples
+  Vec2 u;
+  float u_primitive = 0;
+};
+
 /// A light sample that counts if nothing lies between.
 struct Connection {
   Spectrum radiance;
@@ -52,11 +66,11 @@ struct Connection {
 struct Batch {
   /// Makes room for n fresh paths; what else the arrays hold is old and is overwritten before it is read.
   void start(size_t n) {
-    paths.assign(n, Path());
-    rays.resize(n);
-    if (hits.size() < n) ray_hits.resize(n), hits.resize(n), lights.resize(n), blocked.resize(n);
-    connections.clear();
-    shadow_rays.clear();
+    paths.resize(n), rays.resize(n);
+    for (Path& path : paths) make_in_place(path, [] { return Path(); });
+    if (hits.size() < n) ray_hits.resize(n), hits.resize(n), choices.resize(n), lights.resize(n);
+    if (blocked.size() < n) blocked.resize(n), connections.resize(n), shadow_rays.resize(n);
+    n_connections = 0;
   }
   /// Keeps the first n paths.
   void resize(size_t n) { paths.resize(n), rays.resize(n); }
@@ -65,10 +79,13 @@ struct Batch {
   std::vector<Ray> rays;  // the next one of each path
   std::vector<RayHit> ray_hits;
   std::vector<SurfaceHit> hits;
+  std::vector<LightChoice> choices;
   std::vector<EmitterSample> lights;
+  size_t n_connections = 0;
   std::vector<Connection> connections;
   std::vector<Ray> shadow_rays;  // one of each connection
   std::vector<uint8_t> blocked;
+  std::vector<uint32_t> alive;  // places of the paths that go on
 };
 
 class PathIntegrator final : public Integrator {
@@ -108,7 +125,8 @@ class PathIntegrator final : public Integrator {
     context.n_rays += n;
     for (size_t i = 0; i < n; ++i) {
       batch.paths[i].found = batch.ray_hits[i].found();
-      if (batch.paths[i].found) scene.resolve(batch.rays[i], batch.ray_hits[i], batch.hits[i]);
+      if (!batch.paths[i].found) continue;
+      scene.resolve(batch.rays[i], batch.ray_hits[i], batch.hits[i]);
     }
     if (lengths_.hide_emitters && depth == 0)
       for (size_t i = 0; i < n; ++i) skip_area_lights(scene, batch.paths[i], batch.rays[i], batch.hits[i], context);
@@ -125,32 +143,42 @@ class PathIntegrator final : public Integrator {
     batch.resize(n_kept);
   }
 
-  /// One light sample for each vertex whose surface can use it.
+  /// One light sample for each vertex whose surface can use it. All choices come first, so that memory answers to one
+  /// while the others are made.
   static void sample_lights(const Scene& scene, std::span<const CameraSample> samples, Batch& batch) {
     for (size_t i = 0; i < batch.paths.size(); ++i) {
-      const SurfaceHit& hit = batch.hits[i];
-      batch.lights[i].pdf_solid_angle = 0;
-      if (!(hit.bsdf->flags() & kSmooth)) continue;
+      batch.choices[i].emitter = nullptr;
+      if (!(batch.hits[i].bsdf_flags & kSmooth)) continue;
       const PathRandom& random = samples[batch.paths[i].sample].random;
       const uint32_t vertex = 1 + batch.paths[i].n_smooth;
-      batch.lights[i] = select_light(scene, random.get_1d(vertex, Event::kLightChoice))
-                            .sample_towards(hit.p, random.get_2d(vertex, Event::kLightPosition),
-                                            random.get_1d(vertex, Event::kLightPrimitive));
+      const Emitter& emitter = select_light(scene, random.get_1d(vertex, Event::kLightChoice));
+      const Vec2 u = random.get_2d(vertex, Event::kLightPosition);
+      batch.choices[i].emitter = &emitter;
+      batch.choices[i].u = u;
+      batch.choices[i].u_primitive = random.get_1d(vertex, Event::kLightPrimitive);
+    }
+    for (size_t i = 0; i < batch.paths.size(); ++i) {
+      const LightChoice& choice = batch.choices[i];
+      if (!choice.emitter)
+        batch.lights[i].pdf_solid_angle = 0;
+      else
+        make_in_place(batch.lights[i],
+                      [&] { return choice.emitter->sample_towards(batch.hits[i].p, choice.u, choice.u_primitive); });
     }
   }
 
   /// Evaluates the surfaces: connections to the light samples, and the next rays. Paths that end are removed.
   void scatter(const Scene& scene, int depth, bool connect, std::span<const CameraSample> samples, Batch& batch,
                PathContext& context) const {
-    size_t n_alive = 0;
-    for (size_t i = 0; i < batch.paths.size(); ++i) {
+    batch.alive.clear();
+    for (uint32_t i = 0; i < batch.paths.size(); ++i) {
       Path& path = batch.paths[i];
       const SurfaceHit& hit = batch.hits[i];
       const PathRandom& random = samples[path.sample].random;
       const Vec3 wo = hit.frame.to_local(-batch.rays[i].d);
       // Mirrors and glass have addresses of their own: a path that met one reads, at the surfaces behind it, the same
       // numbers as its neighbour that did not.
-      const uint32_t vertex = hit.bsdf->flags() & kSmooth ? 1 + path.n_smooth++ : kDeltaVertices + depth;
+      const uint32_t vertex = hit.bsdf_flags & kSmooth ? 1 + path.n_smooth++ : kDeltaVertices + depth;
       context.arena.reset();
       const BsdfClosure* bsdf = hit.bsdf->bind(hit, wo.z > 0, TransportMode::kRadiance, context.arena);
       if (connect && batch.lights[i].pdf_solid_angle > 0)
@@ -171,21 +199,22 @@ class PathIntegrator final : public Integrator {
       path.previous_p = hit.p;
       path.previous_pdf = next.pdf;
       path.previous_delta = next.is_delta();
-      batch.rays[n_alive] = {offset_origin(hit.p, hit.ng, wi), wi, kInfinity};
-      batch.paths[n_alive++] = path;
+      make_in_place(batch.rays[i], [&] { return Ray{offset_origin(hit.p, hit.ng, wi), wi, kInfinity}; });
+      batch.alive.push_back(i);
     }
-    batch.resize(n_alive);
+    for (size_t n = 0; n < batch.alive.size(); ++n)
+      if (const uint32_t i = batch.alive[n]; i != n) batch.paths[n] = batch.paths[i], batch.rays[n] = batch.rays[i];
+    batch.resize(batch.alive.size());
   }
 
   /// Adds the light samples that nothing hides.
   static void trace_connections(const Scene& scene, std::span<CameraSample> samples, Batch& batch,
                                 PathContext& context) {
-    scene.occluded(batch.shadow_rays, batch.blocked);
-    context.n_rays += batch.shadow_rays.size();
-    for (size_t i = 0; i < batch.connections.size(); ++i)
+    scene.occluded(std::span(batch.shadow_rays).first(batch.n_connections), batch.blocked);
+    context.n_rays += batch.n_connections;
+    for (size_t i = 0; i < batch.n_connections; ++i)
       if (!batch.blocked[i]) samples[batch.connections[i].sample].radiance += batch.connections[i].radiance;
-    batch.connections.clear();
-    batch.shadow_rays.clear();
+    batch.n_connections = 0;
   }
 
   /// Roulette after the brightest channel, as if refraction had not scaled radiance. With common random numbers its
@@ -215,9 +244,12 @@ class PathIntegrator final : public Integrator {
     const BsdfValue f = bsdf.eval(wo, hit.frame.to_local(light.wi));
     if (is_black(f.value)) return;
     const float pdf = light_pmf(scene) * light.pdf_solid_angle;
-    const float weight = light.is_delta ? 1 : mis_weight(pdf, f.pdf_solid_angle);
-    batch.connections.push_back({path.throughput * f.value * light.radiance * (weight / pdf), path.sample});
-    batch.shadow_rays.push_back(shadow_ray(hit, light));
+    const float weight = light.is_delta ? 1 / pdf : mis_weight_over_pdf(pdf, f.pdf_solid_angle);
+    const size_t n = batch.n_connections++;
+    make_in_place(batch.connections[n], [&] {
+      return Connection{path.throughput * f.value * light.radiance * weight, path.sample};
+    });
+    make_in_place(batch.shadow_rays[n], [&] { return shadow_ray(hit, light); });
   }
 
   /// Follows the camera ray past area lights until something else is hit.

@@ -11,6 +11,7 @@
 #include <tuple>
 
 #include "core/error.h"
+#include "core/in_place.h"
 #include "core/warp.h"
 
 namespace covary {
@@ -89,7 +90,8 @@ void keep_first(std::vector<BadSample>& samples) {
 /// True when the sample may enter the film; otherwise it is counted and remembered.
 bool is_good(const Spectrum& value, int x, int y, uint64_t sample, Worker& worker) {
   const bool finite = is_finite(value);
-  if (finite && value.r >= 0 && value.g >= 0 && value.b >= 0) [[likely]] return true;
+  if (finite && value.r >= 0 && value.g >= 0 && value.b >= 0) [[likely]]
+    return true;
   ++(finite ? worker.n_negative : worker.n_not_finite);
   worker.bad_samples.push_back({x, y, sample, value});
   if (worker.bad_samples.size() > 20 * kMaxBadSamples) keep_first(worker.bad_samples);
@@ -108,11 +110,14 @@ void render_tile(const Scene& scene, const Integrator& integrator, const PassSet
     const int last = std::min(first + batch_pixels, n_pixels);
     const auto film_x = [&](int pixel) { return tile.x0 + pixel % tile_width; };
     const auto film_y = [&](int pixel) { return tile.y0 + pixel / tile_width; };
-    worker.samples.clear();
+    const size_t n_samples = static_cast<size_t>(last - first) * per_pixel;
+    worker.samples.resize(n_samples, CameraSample{{}, PathRandom(settings.sampling, 0, 0, 0, 0), {}});
+    CameraSample* next = worker.samples.data();
     for (int pixel = first; pixel < last; ++pixel)
       for (uint32_t s = begin; s < end; ++s)
-        worker.samples.push_back(
-            camera_sample(scene, settings, film.crop().x + film_x(pixel), film.crop().y + film_y(pixel), s));
+        make_in_place(*next++, [&] {
+          return camera_sample(scene, settings, film.crop().x + film_x(pixel), film.crop().y + film_y(pixel), s);
+        });
     integrator.trace(scene, worker.samples, worker.context);
 
     const CameraSample* sample = worker.samples.data();
@@ -136,7 +141,8 @@ Vec2 film_position(const FilterSettings& filter, int x, int y, const PathRandom&
   const Vec2 u = random.get_2d(0, Event::kPixel);
   const Vec2 centre{static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f};
   switch (filter.kind) {
-    case FilterKind::kBox: return centre + Vec2{(2 * u.x - 1) * filter.radius, (2 * u.y - 1) * filter.radius};
+    case FilterKind::kBox:
+      return centre + Vec2{(2 * u.x - 1) * filter.radius, (2 * u.y - 1) * filter.radius};
     case FilterKind::kTent:
       return centre + Vec2{warp::interval_to_tent(u.x, filter.radius), warp::interval_to_tent(u.y, filter.radius)};
     case FilterKind::kGaussian:

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/in_place.h"
 #include "core/warp.h"
 
 namespace covary {
@@ -12,8 +13,8 @@ namespace {
 
 void check_length(const char* what, size_t length, size_t n_vertices) {
   if (length != 0 && length != n_vertices)
-    throw Error(ErrorCode::kInput, "a mesh has " + std::to_string(n_vertices) + " vertices but " +
-                                       std::to_string(length) + " " + what);
+    throw Error(ErrorCode::kInput,
+                "a mesh has " + std::to_string(n_vertices) + " vertices but " + std::to_string(length) + " " + what);
 }
 
 }  // namespace
@@ -127,7 +128,7 @@ void TriangleMesh::fill(const Ray& /*ray*/, SurfaceHit& hit, bool with_derivativ
   }
   hit.uv = has_uvs_ ? v0.uv * b0 + v1.uv * b1 + v2.uv * b2 : hit.barycentric;
   if (!with_derivatives) {
-    hit.frame = Frame(n);
+    make_in_place(hit.frame, [&] { return Frame(n); });
     return;
   }
   hit.dp_du = e1, hit.dp_dv = e2;
@@ -138,10 +139,12 @@ void TriangleMesh::fill(const Ray& /*ray*/, SurfaceHit& hit, bool with_derivativ
     hit.dp_du = (e1 * d2.y - e2 * d1.y) * inverse;
     hit.dp_dv = (e2 * d1.x - e1 * d2.x) * inverse;
   }
-  hit.frame = Frame::from_tangent(n, hit.dp_du);
+  make_in_place(hit.frame, [&] { return Frame::from_tangent(n, hit.dp_du); });
 }
 
 AreaSample TriangleMesh::sample_area(Vec2 u, float u_primitive) const {
+  // One map for the whole parallelogram is cheaper than a choice of triangle, and continuous.
+  if (parallelogram_.inverse_area > 0) return TriangleMesh::sample_uv(u);
   const Facet& facet = facets_[areas_.sample(u_primitive).index];
   const Vec2 b = warp::square_to_triangle(u);
   return {facet.point(b), facet.n, facet.uv_at(b), inverse_area_};

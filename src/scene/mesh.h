@@ -12,11 +12,11 @@ namespace covary {
 /// Vertex and index arrays of a triangle mesh in world space (or in the space of its shape group).
 struct MeshData {
   std::vector<Vec3> positions;
-  std::vector<Vec3> normals;       ///< unit, one per vertex, or empty: flat shading
-  std::vector<Vec2> uvs;           ///< one per vertex, or empty
-  std::vector<Spectrum> colours;   ///< one per vertex, or empty
+  std::vector<Vec3> normals;      ///< unit, one per vertex, or empty: flat shading
+  std::vector<Vec2> uvs;          ///< one per vertex, or empty
+  std::vector<Spectrum> colours;  ///< one per vertex, or empty
   std::vector<std::array<uint32_t, 3>> triangles;
-  bool flip_normals = false;       ///< reverse geometric and shading normals
+  bool flip_normals = false;  ///< reverse geometric and shading normals
 };
 
 class TriangleMesh final : public Shape {

@@ -192,7 +192,7 @@ void RayTracer::resolve(const Ray& ray, const RayHit& found, SurfaceHit& hit) co
   hit.t = found.t;
   hit.primitive = found.primitive;
   hit.barycentric = found.barycentric;
-  hit.shape = shape, hit.bsdf = shape->bsdf(), hit.emitter = shape->emitter();
+  hit.shape = shape, hit.bsdf = shape->bsdf(), hit.bsdf_flags = shape->bsdf_flags(), hit.emitter = shape->emitter();
   const bool with_derivatives = shape->needs_derivatives();
   if (!placed) {
     shape->fill(ray, hit, with_derivatives);

@@ -15,7 +15,7 @@
 namespace covary {
 
 struct AreaSample {
-  Vec3 p, n;           ///< point and unit geometric normal
+  Vec3 p, n;  ///< point and unit geometric normal
   Vec2 uv;
   float pdf_area = 0;  ///< per unit area
 };
@@ -66,7 +66,10 @@ class Shape : public SceneObject {
   void set_bsdf(BsdfPtr bsdf) {
     bsdf_ = std::move(bsdf);
     needs_derivatives_ = bsdf_ && bsdf_->needs_derivatives();
+    bsdf_flags_ = bsdf_ ? bsdf_->flags() : 0;
   }
+  /// The flags of bsdf(), at hand without asking it.
+  uint32_t bsdf_flags() const { return bsdf_flags_; }
   /// Whether hits on this shape need dp_du, dp_dv and an aligned frame.
   bool needs_derivatives() const { return needs_derivatives_; }
   void set_emitter(std::shared_ptr<const Emitter> emitter) { emitter_ = std::move(emitter); }
@@ -74,6 +77,7 @@ class Shape : public SceneObject {
  private:
   BsdfPtr bsdf_;
   bool needs_derivatives_ = false;
+  uint32_t bsdf_flags_ = 0;
   std::shared_ptr<const Emitter> emitter_;
 };
 
