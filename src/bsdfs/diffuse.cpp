@@ -52,6 +52,7 @@ class Diffuse final : public Bsdf {
     if (reflectance_.is_constant()) return &constant_;
     return arena.make<DiffuseClosure>(reflectance_.eval(hit));
   }
+  const Texture* main_texture() const override { return reflectance_.texture(); }
   Spectrum albedo(const SurfaceHit& hit) const override { return clamp01(reflectance_.eval(hit)); }
 
  private:

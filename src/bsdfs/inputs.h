@@ -20,6 +20,8 @@ class ColourInput {
   }
   bool is_constant() const { return !texture_; }
   Spectrum eval(const SurfaceHit& hit) const { return texture_ ? texture_->eval(hit) : value_; }
+  /// Null when constant.
+  const Texture* texture() const { return texture_.get(); }
   /// The value everywhere; black when not constant.
   const Spectrum& constant() const { return value_; }
   /// Mean over the texture, for the probabilities of lobes.

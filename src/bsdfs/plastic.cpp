@@ -90,6 +90,7 @@ class Plastic final : public Bsdf {
     const Spectrum base = rho / ((Spectrum(1) - trapped) * sqr(eta_));
     return arena.make<PlasticClosure>(eta_, specular_weight_, base, specular_.eval(hit));
   }
+  const Texture* main_texture() const override { return diffuse_.texture(); }
   Spectrum albedo(const SurfaceHit& hit) const override { return clamp01(diffuse_.eval(hit)); }
 
  private:

@@ -281,6 +281,7 @@ class Principled final : public Bsdf {
     return arena.make<PrincipledClosure>(point(hit), settings_, mode);
   }
   bool needs_derivatives() const override { return anisotropic_; }
+  const Texture* main_texture() const override { return in_.base_color.texture(); }
   Spectrum albedo(const SurfaceHit& hit) const override { return clamp01(in_.base_color.eval(hit)); }
 
  private:

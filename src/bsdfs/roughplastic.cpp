@@ -180,6 +180,7 @@ class RoughPlastic final : public Bsdf {
     const Spectrum base = rho * kInvPi / ((Spectrum(1) - trapped) * sqr(eta_));
     return arena.make<RoughPlasticClosure>(surface_, transmittance_, eta_, specular_weight_, base, specular_.eval(hit));
   }
+  const Texture* main_texture() const override { return diffuse_.texture(); }
   Spectrum albedo(const SurfaceHit& hit) const override { return clamp01(diffuse_.eval(hit)); }
 
  private:

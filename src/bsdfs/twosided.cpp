@@ -46,6 +46,7 @@ class TwoSided final : public Bsdf {
     return arena.make<MirroredClosure>(back_->bind(hit, true, mode, arena));
   }
   bool needs_derivatives() const override { return front_->needs_derivatives() || back_->needs_derivatives(); }
+  const Texture* main_texture() const override { return front_->main_texture(); }
   Spectrum albedo(const SurfaceHit& hit) const override { return front_->albedo(hit); }
 
  private:
@@ -60,7 +61,8 @@ std::shared_ptr<Bsdf> make_twosided(Parameters& parameters) {
   if (nested.empty()) return nullptr;
   auto result = std::make_shared<TwoSided>(nested.front(), nested.back());
   if (!allow_transmission && (result->flags() & kTransmission)) {
-    parameters.error("a nested model transmits light; accepted: models that only reflect, or any with 'allow_transmission'");
+    parameters.error(
+        "a nested model transmits light; accepted: models that only reflect, or any with 'allow_transmission'");
     return nullptr;
   }
   return result;

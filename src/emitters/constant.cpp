@@ -17,8 +17,7 @@ class ConstantLight final : public Emitter {
 
   void set_scene_bounds(const Bounds3& bounds) override { scene_ = SceneSphere(bounds); }
   bool is_environment() const override { return true; }
-  Spectrum environment_radiance(const Vec3&) const override { return radiance_; }
-  float environment_pdf_solid_angle(const Vec3&) const override { return warp::sphere_pdf_solid_angle(); }
+  EnvironmentLight environment(const Vec3&) const override { return {radiance_, warp::sphere_pdf_solid_angle()}; }
 
   EmitterSample sample_towards(const Vec3&, Vec2 u, float) const override {
     EmitterSample sample;

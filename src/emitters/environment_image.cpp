@@ -34,13 +34,10 @@ CellChoice choose_cell(const float (&weights)[4], float u) {
 }  // namespace
 
 EnvironmentImage::EnvironmentImage(const TexelImage& image, float scale, bool mis_compensation)
-    : width_(image.width),
-      height_(std::max(image.height, 3)),
-      blocks_x_((width_ + kBlock - 1) / kBlock),
-      blocks_y_((height_ + kBlock - 1) / kBlock) {
+    : width_(image.width), height_(std::max(image.height, 3)), layout_(width_, height_) {
   COVARY_CHECK(image.channels == 3 && image.floats.size() == image.n_pixels() * 3 && image.n_pixels() > 0,
                "an environment needs a linear RGB image");
-  texels_.resize(static_cast<size_t>(blocks_x_) * blocks_y_ * kBlock * kBlock);
+  texels_.resize(layout_.size());
 
   // Values, and the integral over the sphere: each row's tent against the sine.
   const double step = static_cast<double>(M_PI) / (height_ - 1);
@@ -54,7 +51,7 @@ EnvironmentImage::EnvironmentImage(const TexelImage& image, float scale, bool mi
     for (int x = 0; x < width_; ++x) {
       const float* rgb = image.floats.data() + (static_cast<size_t>(std::min(y, image.height - 1)) * width_ + x) * 3;
       const Spectrum value = Spectrum(rgb[0], rgb[1], rgb[2]) * scale;
-      texels_[index(x, y)].value = value;
+      texels_[layout_.index(x, y)].value = value;
       for (int c = 0; c < 3; ++c) integral[c] += per_texel * value[c];
       luminance_integral += per_texel * luminance(value);
       largest = std::max(largest, luminance(value));
@@ -68,18 +65,18 @@ EnvironmentImage::EnvironmentImage(const TexelImage& image, float scale, bool mi
   black_ = !(largest > 0);
   if (black_) return;
 
-  std::vector<float> row_sums(blocks_y_), row(blocks_x_);
-  const std::vector<float> ones(blocks_x_, 1.0f);
+  std::vector<float> row_sums(layout_.blocks_y()), row(layout_.blocks_x());
+  const std::vector<float> ones(layout_.blocks_x(), 1.0f);
   double z = 0;
-  block_columns_.reserve(blocks_y_);
-  for (int block_y = 0; block_y < blocks_y_; ++block_y) {
+  block_columns_.reserve(layout_.blocks_y());
+  for (int block_y = 0; block_y < layout_.blocks_y(); ++block_y) {
     std::fill(row.begin(), row.end(), 0.0f);
     double sum = 0;
     for (int y = block_y * kBlock; y < std::min((block_y + 1) * kBlock, height_); ++y) {
       // The mean sine of a tent on a pole is a third of a row away from it.
       const double sine = tent_mass(y) < 1 ? std::sin(step / 3) : std::sin(y * step);
       for (int x = 0; x < width_; ++x) {
-        Texel& texel = texels_[index(x, y)];
+        Texel& texel = texels_[layout_.index(x, y)];
         texel.weight = static_cast<float>(sine * std::max(0.0f, luminance(texel.value) - offset));
         row[x / kBlock] += texel.weight * tent_mass(y);
         sum += texel.weight * tent_mass(y);
@@ -101,49 +98,53 @@ EnvironmentImage::UvLookup EnvironmentImage::lookup_uv(float u, float v) const {
   if (column < 0) column += width_;
   column = std::clamp(column, 0, width_ - 1);
   const int next = column + 1 < width_ ? column + 1 : 0;
-  const Texel &t00 = texels_[index(column, row)], &t10 = texels_[index(next, row)];
-  const Texel &t01 = texels_[index(column, row + 1)], &t11 = texels_[index(next, row + 1)];
+  const Texel *upper = texels_.data() + layout_.row_offset(row), *lower = texels_.data() + layout_.row_offset(row + 1);
+  const size_t left = BlockLayout::column_offset(column), right = BlockLayout::column_offset(next);
+  const Texel &t00 = upper[left], &t10 = upper[right], &t01 = lower[left], &t11 = lower[right];
   const float w00 = (1 - fx) * (1 - fy), w10 = fx * (1 - fy), w01 = (1 - fx) * fy, w11 = fx * fy;
   return {t00.value * w00 + t10.value * w10 + t01.value * w01 + t11.value * w11,
           (t00.weight * w00 + t10.weight * w10 + t01.weight * w01 + t11.weight * w11) * inverse_z_};
 }
 
 EnvironmentImage::Lookup EnvironmentImage::lookup(const Vec3& d) const {
-  float u = std::atan2(d.x, -d.z) * (0.5f * kInvPi);
-  if (u < 0) u += 1;
   const float sine = std::sqrt(d.x * d.x + d.z * d.z);
-  const float v = std::atan2(sine, d.y) * kInvPi;
-  const UvLookup found = lookup_uv(u, v);
+  const UvLookup found = lookup_uv(angle_turns(d.x, -d.z), 2 * angle_turns(sine, d.y));
   // d(omega) = sin(theta) d(theta) d(phi) = 2 pi^2 sin(theta) du dv.
   return {found.value, sine > 0 ? found.pdf_uv / (2 * kPi * kPi * sine) : 0};
 }
 
+void EnvironmentImage::prefetch_table(Vec2 u) const {
+  if (!black_) block_columns_[block_rows_.sample(u.y).index].prefetch(u.x);
+}
+
+void EnvironmentImage::prefetch_texels(Vec2 u) const {
+  if (black_) return;
+  const Texel* texels = block(choose_block(u));
+  for (int i = 0; i < kBlock; ++i) __builtin_prefetch(texels + i * kBlock);
+}
+
 EnvironmentImage::Sample EnvironmentImage::sample(Vec2 u) const {
   if (black_) return {{0, 1, 0}, Spectrum(), 0};
-  const Discrete::Result block_row = block_rows_.sample(u.y);
-  const AliasTable::Result block_column = block_columns_[block_row.index].sample(u.x);
+  const BlockChoice chosen = choose_block(u);
 
   // A texel of the block: its row by what is left of u.y, its column by what is left of u.x.
-  const size_t first = (static_cast<size_t>(block_row.index) * blocks_x_ + block_column.index) * (kBlock * kBlock);
-  const Texel* block = texels_.data() + first;
-  const int y0 = static_cast<int>(block_row.index) * kBlock;
-  float rows[kBlock], row_weights[kBlock], columns[kBlock];
+  const Texel* texels = block(chosen);
+  const int x0 = static_cast<int>(chosen.x) * kBlock, y0 = static_cast<int>(chosen.y) * kBlock;
+  float row_weights[kBlock], columns[kBlock];
   for (int i = 0; i < kBlock; ++i) {
-    const Texel* row = block + i * kBlock;
-    rows[i] = (row[0].weight + row[1].weight) + (row[2].weight + row[3].weight);
-    row_weights[i] = rows[i] * tent_mass(y0 + i);
+    const Texel* row = texels + i * kBlock;
+    row_weights[i] = ((row[0].weight + row[1].weight) + (row[2].weight + row[3].weight)) * tent_mass(y0 + i);
   }
-  const CellChoice row = choose_cell(row_weights, block_row.remapped);
-  for (int i = 0; i < kBlock; ++i) columns[i] = block[row.index * kBlock + i].weight;
-  const CellChoice column = choose_cell(columns, block_column.remapped);
+  const CellChoice row = choose_cell(row_weights, chosen.remapped.y);
+  for (int i = 0; i < kBlock; ++i) columns[i] = texels[row.index * kBlock + i].weight;
+  const CellChoice column = choose_cell(columns, chosen.remapped.x);
 
   // A position in the texel's tent, or in the half of it that lies inside the image.
   const int y = y0 + row.index;
   const float half_tent = 1 - safe_sqrt(1 - row.remapped);
   const float offset = y == 0 ? half_tent : (y == height_ - 1 ? -half_tent : warp::interval_to_tent(row.remapped, 1));
   const float v = clamp01((static_cast<float>(y) + offset) / static_cast<float>(height_ - 1));
-  float s = (static_cast<float>(block_column.index * kBlock + column.index) + 0.5f +
-             warp::interval_to_tent(column.remapped, 1)) /
+  float s = (static_cast<float>(x0 + column.index) + 0.5f + warp::interval_to_tent(column.remapped, 1)) /
             static_cast<float>(width_);
   s = clamp01(s < 0 ? s + 1 : (s >= 1 ? s - 1 : s));
 

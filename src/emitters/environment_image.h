@@ -20,8 +20,10 @@
 #include <vector>
 
 #include "core/distribution.h"
+#include "core/large_vector.h"
 #include "core/spectrum.h"
 #include "core/vec.h"
+#include "textures/block_layout.h"
 #include "textures/image.h"
 
 namespace covary {
@@ -46,19 +48,32 @@ class EnvironmentImage {
     float pdf_solid_angle;  ///< 0 when the image is black
   };
   Sample sample(Vec2 u) const;
+  /// Ask memory for what sample(u) reads, which may lie anywhere in arrays larger than the caches: the entry of the table
+  /// of blocks, and when that has arrived, the texels of the block.
+  void prefetch_table(Vec2 u) const;
+  void prefetch_texels(Vec2 u) const;
 
   /// Integral of the value over the sphere of directions.
   const Spectrum& integral() const { return integral_; }
 
  private:
-  static constexpr int kBlock = 4;
+  static constexpr int kBlock = BlockLayout::kBlock;
   struct Texel {
     Spectrum value;
     float weight;  // w; zero for texels beyond the image
   };
-  size_t index(int x, int y) const {
-    const size_t block = static_cast<size_t>(y / kBlock) * blocks_x_ + x / kBlock;
-    return block * (kBlock * kBlock) + (y % kBlock) * kBlock + x % kBlock;
+  /// The block sample(u) looks into, and what is left of u.
+  struct BlockChoice {
+    uint32_t x, y;
+    Vec2 remapped;
+  };
+  BlockChoice choose_block(Vec2 u) const {
+    const Discrete::Result row = block_rows_.sample(u.y);
+    const AliasTable::Result column = block_columns_[row.index].sample(u.x);
+    return {column.index, row.index, {column.remapped, row.remapped}};
+  }
+  const Texel* block(const BlockChoice& at) const {
+    return texels_.data() + layout_.index(static_cast<int>(at.x) * kBlock, static_cast<int>(at.y) * kBlock);
   }
   /// Value and the sampling density per unit (u, v) area at u in [0, 1], v in [0, 1].
   struct UvLookup {
@@ -69,8 +84,9 @@ class EnvironmentImage {
   /// The share of a row's tent that lies inside the image.
   float tent_mass(int row) const { return row == 0 || row == height_ - 1 ? 0.5f : 1.0f; }
 
-  int width_, height_, blocks_x_, blocks_y_;
-  std::vector<Texel> texels_;
+  int width_, height_;
+  BlockLayout layout_;
+  LargeVector<Texel> texels_;
   Discrete block_rows_;  // empty when nothing is to be sampled
   std::vector<AliasTable> block_columns_;
   bool black_ = true;

@@ -24,9 +24,15 @@ class EnvironmentMap final : public Emitter {
   void set_scene_bounds(const Bounds3& bounds) override { scene_ = SceneSphere(bounds); }
   bool is_environment() const override { return true; }
 
-  Spectrum environment_radiance(const Vec3& d) const override { return image_.lookup(rotation_.to_local(d)).value; }
-  float environment_pdf_solid_angle(const Vec3& d) const override {
-    return image_.lookup(rotation_.to_local(d)).pdf_solid_angle;
+  EnvironmentLight environment(const Vec3& d) const override {
+    const EnvironmentImage::Lookup found = image_.lookup(rotation_.to_local(d));
+    return {found.value, found.pdf_solid_angle};
+  }
+  void prefetch(Vec2 u, PrefetchStep step) const override {
+    if (step == PrefetchStep::kTable)
+      image_.prefetch_table(u);
+    else
+      image_.prefetch_texels(u);
   }
 
   EmitterSample sample_towards(const Vec3&, Vec2 u, float) const override {

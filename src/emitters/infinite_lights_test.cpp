@@ -77,11 +77,11 @@ TEST(ConstantLight, SamplesTheSphereUniformlyAndLightsItEvenly) {
   const auto light = make("constant", {{"radiance", ColourValue{{1, 2, 3}}}}).object;
   light->set_scene_bounds(kBounds);
   EXPECT_TRUE(light->is_environment());
-  EXPECT_EQ(light->environment_radiance({0, 1, 0}), Spectrum(1, 2, 3));
+  EXPECT_EQ(light->environment({0, 1, 0}).radiance, Spectrum(1, 2, 3));
   const double radiance = luminance({1, 2, 3});
   const auto result = statistics::chi2_sphere(
       [&](const PathRandom& random) -> std::optional<Vec3> { return draw_towards(*light, {}, random).wi; },
-      [&](const Vec3& d) { return light->environment_pdf_solid_angle(d); }, {.name = "constant"});
+      [&](const Vec3& d) { return light->environment(d).pdf_solid_angle; }, {.name = "constant"});
   EXPECT_TRUE(result.accepted) << result.message;
   const auto irradiance = [&](const PathRandom& random) { return irradiance_estimate(*light, {}, {0, 1, 0}, random); };
   EXPECT_TRUE(mean_test(irradiance, M_PI * radiance).accepted);
@@ -135,7 +135,7 @@ TEST(EnvironmentMap, AgreesWithMitsuba) {
     ASSERT_EQ(made.errors, "");
     for (size_t i = 0; i < all["directions"].size(); ++i) {
       const Vec3 d = vector(all["directions"][i]);
-      const Spectrum value = made.object->environment_radiance(d);
+      const Spectrum value = made.object->environment(d).radiance;
       // Mitsuba's arc cosine loses digits near the poles: 3e-4 rad, times rows and values up to 15.
       const double tolerance = std::abs(d.y) > 0.999f ? 3e-2 : 2e-4;
       for (int c = 0; c < 3; ++c)
@@ -152,23 +152,23 @@ TEST(EnvironmentMap, SamplesWhatItClaimsInWorldSpace) {
   light->set_scene_bounds(kBounds);
   const auto result = statistics::chi2_sphere(
       [&](const PathRandom& random) -> std::optional<Vec3> { return draw_towards(*light, {}, random).wi; },
-      [&](const Vec3& d) { return light->environment_pdf_solid_angle(d); }, {.name = "envmap"});
+      [&](const Vec3& d) { return light->environment(d).pdf_solid_angle; }, {.name = "envmap"});
   EXPECT_TRUE(result.accepted) << result.message;
   const auto emitted = statistics::chi2_sphere(
       [&](const PathRandom& random) -> std::optional<Vec3> { return draw_emission(*light, random).ray.d; },
-      [&](const Vec3& d) { return light->environment_pdf_solid_angle(-d); }, {.name = "envmap emission"});
+      [&](const Vec3& d) { return light->environment(-d).pdf_solid_angle; }, {.name = "envmap emission"});
   EXPECT_TRUE(emitted.accepted) << emitted.message;
   const auto wrong = statistics::chi2_sphere(  // planted: the rotation forgotten
       [&](const PathRandom& random) -> std::optional<Vec3> { return draw_towards(*light, {}, random).wi; },
       [&](const Vec3& d) {
-        return light->environment_pdf_solid_angle(Transform::rotate({1, 2, 3}, 40).vector(d));
+        return light->environment(Transform::rotate({1, 2, 3}, 40).vector(d)).pdf_solid_angle;
       },
       {.name = "envmap, planted", .n_samples = 50000});
   EXPECT_FALSE(wrong.accepted);
 
   const Vec3 n = normalize(Vec3{1, 1, -1});
   const double irradiance = statistics::integrate_sphere(
-      [&](const Vec3& d) { return luminance(light->environment_radiance(d)) * std::max(0.0f, dot(d, n)); }, 1e-4);
+      [&](const Vec3& d) { return luminance(light->environment(d).radiance) * std::max(0.0f, dot(d, n)); }, 1e-4);
   const auto estimate = [&](const PathRandom& random) { return irradiance_estimate(*light, {}, n, random); };
   EXPECT_TRUE(mean_test(estimate, irradiance, 200000, 2e-4 * irradiance).accepted);
   EXPECT_FALSE(mean_test([&](const PathRandom& r) { return 1.05 * estimate(r); }, irradiance, 200000, 2e-4 * irradiance)

@@ -127,6 +127,7 @@ class PathIntegrator final : public Integrator {
       batch.paths[i].found = batch.ray_hits[i].found();
       if (!batch.paths[i].found) continue;
       scene.resolve(batch.rays[i], batch.ray_hits[i], batch.hits[i]);
+      if (const Texture* texture = batch.hits[i].shape->main_texture()) texture->prefetch(batch.hits[i].uv);
     }
     if (lengths_.hide_emitters && depth == 0)
       for (size_t i = 0; i < n; ++i) skip_area_lights(scene, batch.paths[i], batch.rays[i], batch.hits[i], context);
@@ -153,10 +154,14 @@ class PathIntegrator final : public Integrator {
       const uint32_t vertex = 1 + batch.paths[i].n_smooth;
       const Emitter& emitter = select_light(scene, random.get_1d(vertex, Event::kLightChoice));
       const Vec2 u = random.get_2d(vertex, Event::kLightPosition);
+      if (scene.environment()) emitter.prefetch(u, PrefetchStep::kTable);
       batch.choices[i].emitter = &emitter;
       batch.choices[i].u = u;
       batch.choices[i].u_primitive = random.get_1d(vertex, Event::kLightPrimitive);
     }
+    if (scene.environment())  // the only lights with large tables
+      for (size_t i = 0; i < batch.paths.size(); ++i)
+        if (batch.choices[i].emitter) batch.choices[i].emitter->prefetch(batch.choices[i].u, PrefetchStep::kValues);
     for (size_t i = 0; i < batch.paths.size(); ++i) {
       const LightChoice& choice = batch.choices[i];
       if (!choice.emitter)
@@ -229,11 +234,11 @@ class PathIntegrator final : public Integrator {
   Spectrum emission(const Scene& scene, const Path& path, const Ray& ray, const SurfaceHit& hit) const {
     const Emitter* emitter = path.found ? hit.emitter : scene.environment();
     if (!emitter || (!path.found && lengths_.hide_emitters && path.only_null)) return {};
-    const Spectrum radiance =
-        path.throughput * (path.found ? emitter->surface_radiance(hit, -ray.d) : emitter->environment_radiance(ray.d));
+    const EnvironmentLight light =
+        path.found ? EnvironmentLight{emitter->surface_radiance(hit, -ray.d)} : emitter->environment(ray.d);
+    const Spectrum radiance = path.throughput * light.radiance;
     if (path.previous_delta || is_black(radiance)) return radiance;
-    const float pdf_light =
-        path.found ? emitter->pdf_solid_angle(path.previous_p, hit) : emitter->environment_pdf_solid_angle(ray.d);
+    const float pdf_light = path.found ? emitter->pdf_solid_angle(path.previous_p, hit) : light.pdf_solid_angle;
     return radiance * mis_weight(path.previous_pdf, light_pmf(scene) * pdf_light);
   }
 

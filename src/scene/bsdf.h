@@ -23,9 +23,12 @@ namespace covary {
 
 /// Kinds of lobes; a closure's flags are the union over its lobes.
 enum LobeFlags : uint32_t {
-  kDiffuseReflection = 1, kDiffuseTransmission = 2,
-  kGlossyReflection = 4, kGlossyTransmission = 8,
-  kDeltaReflection = 16, kDeltaTransmission = 32,
+  kDiffuseReflection = 1,
+  kDiffuseTransmission = 2,
+  kGlossyReflection = 4,
+  kGlossyTransmission = 8,
+  kDeltaReflection = 16,
+  kDeltaTransmission = 32,
   kNullTransmission = 64,  ///< straight through, as if the surface were absent
   kReflection = kDiffuseReflection | kGlossyReflection | kDeltaReflection,
   kTransmission = kDiffuseTransmission | kGlossyTransmission | kDeltaTransmission | kNullTransmission,
@@ -38,8 +41,8 @@ enum LobeFlags : uint32_t {
 enum class TransportMode : uint8_t { kRadiance, kImportance };
 
 struct BsdfValue {
-  Spectrum value;              ///< f(wo, wi) |cos theta_i|; zero for delta lobes
-  float pdf_solid_angle = 0;   ///< density of sample() at wi, delta lobes excluded
+  Spectrum value;             ///< f(wo, wi) |cos theta_i|; zero for delta lobes
+  float pdf_solid_angle = 0;  ///< density of sample() at wi, delta lobes excluded
 };
 
 struct BsdfSample {
@@ -86,6 +89,8 @@ class Bsdf : public SceneObject {
   virtual const BsdfClosure* bind(const SurfaceHit& hit, bool wo_front, TransportMode mode, Arena& arena) const = 0;
   /// True when bind() reads hit.dp_du, hit.dp_dv or needs the frame aligned with dp_du (anisotropy, bump maps).
   virtual bool needs_derivatives() const { return false; }
+  /// A texture that bind() looks up, worth asking memory for ahead; or null.
+  virtual const Texture* main_texture() const { return nullptr; }
   /// Approximate directional albedo for the auxiliary image `Albedo`: reflectance for diffuse parts, Fresnel-free
   /// specular colour otherwise; in [0, 1].
   virtual Spectrum albedo(const SurfaceHit& hit) const = 0;

@@ -18,19 +18,33 @@ struct EmitterSample {
   float distance = kInfinity;  ///< to the light; infinite for environments and directional lights
   Vec3 p, n;                   ///< point and unit geometric normal on the light (unset when infinitely far)
   Vec2 uv;                     ///< surface parameters of p (area lights)
-  Spectrum radiance;           ///< emitted towards the reference point; for delta lights: irradiance on a surface facing wi (already divided by distance squared)
-  float pdf_solid_angle = 0;   ///< at the reference point; 1 (a discrete probability) for delta lights; 0: sampling failed
-  bool is_delta = false;       ///< position or direction is a delta; BSDF sampling cannot hit it
+  Spectrum
+      radiance;  ///< emitted towards the reference point; for delta lights: irradiance on a surface facing wi (already divided by distance squared)
+  float pdf_solid_angle =
+      0;                  ///< at the reference point; 1 (a discrete probability) for delta lights; 0: sampling failed
+  bool is_delta = false;  ///< position or direction is a delta; BSDF sampling cannot hit it
 };
 
 /// Start of a light path.
 struct EmissionSample {
-  Ray ray;                        ///< leaves the light
-  Vec3 n;                         ///< unit geometric normal at the origin; the direction itself for point-like lights
-  Spectrum radiance;              ///< emitted radiance (area, environment) or intensity (point-like)
-  float pdf_position = 0;         ///< per unit area; for infinite lights per unit area of the disk perpendicular to the ray; 1 if delta
-  float pdf_direction = 0;        ///< per unit solid angle; 1 if delta
+  Ray ray;            ///< leaves the light
+  Vec3 n;             ///< unit geometric normal at the origin; the direction itself for point-like lights
+  Spectrum radiance;  ///< emitted radiance (area, environment) or intensity (point-like)
+  float pdf_position =
+      0;  ///< per unit area; for infinite lights per unit area of the disk perpendicular to the ray; 1 if delta
+  float pdf_direction = 0;  ///< per unit solid angle; 1 if delta
   bool delta_position = false, delta_direction = false;
+};
+
+/// Light from infinitely far away in one direction.
+struct EnvironmentLight {
+  Spectrum radiance;
+  float pdf_solid_angle = 0;  ///< density of sample_towards() at the direction
+};
+
+enum class PrefetchStep {
+  kTable,   ///< the entry of a sampling table
+  kValues,  ///< what that entry leads to
 };
 
 class Emitter : public SceneObject {
@@ -44,15 +58,16 @@ class Emitter : public SceneObject {
 
   /// Radiance an area light emits at a hit on its own shape in world direction `w` (away from the surface).
   virtual Spectrum surface_radiance(const SurfaceHit& /*hit*/, const Vec3& /*w*/) const { return {}; }
-  /// Radiance arriving along a ray that leaves the scene in world direction `d`; environments only.
-  virtual Spectrum environment_radiance(const Vec3& /*d*/) const { return {}; }
+  /// What arrives along a ray that leaves the scene in world direction `d`; environments only.
+  virtual EnvironmentLight environment(const Vec3& /*d*/) const { return {}; }
 
+  /// Asks memory for what sample_towards() with this `u` will read, step by step, for many samples before the first is
+  /// taken. Changes no result.
+  virtual void prefetch(Vec2 /*u*/, PrefetchStep) const {}
   /// Samples the light as seen from `reference`. `u` uniform in [0,1)^2, `u_primitive` a third number.
   virtual EmitterSample sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const = 0;
   /// Density of sample_towards() per unit solid angle at `reference` for the point `hit` on this area light.
   virtual float pdf_solid_angle(const Vec3& /*reference*/, const SurfaceHit& /*hit*/) const { return 0; }
-  /// Density of sample_towards() per unit solid angle for direction `d`; environments only.
-  virtual float environment_pdf_solid_angle(const Vec3& /*d*/) const { return 0; }
 
   /// Samples a ray that leaves the light, for paths that start there.
   virtual EmissionSample sample_emission(Vec2 u_position, Vec2 u_direction, float u_primitive) const = 0;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/distribution.h"
+#include "core/large_vector.h"
 #include "scene/shape.h"
 
 namespace covary {
@@ -44,12 +45,12 @@ class TriangleMesh final : public Shape {
     Vec3 p, n;
     Vec2 uv;
   };
-  const std::vector<Vertex>& vertices() const { return vertices_; }
+  const LargeVector<Vertex>& vertices() const { return vertices_; }
   const std::vector<std::array<uint32_t, 3>>& triangles() const { return triangles_; }
   size_t n_degenerate() const { return n_degenerate_; }
 
  private:
-  std::vector<Vertex> vertices_;
+  LargeVector<Vertex> vertices_;
   std::vector<std::array<uint32_t, 3>> triangles_;
   std::vector<Spectrum> colours_;
   Bounds3 bounds_;

@@ -67,9 +67,11 @@ class Shape : public SceneObject {
     bsdf_ = std::move(bsdf);
     needs_derivatives_ = bsdf_ && bsdf_->needs_derivatives();
     bsdf_flags_ = bsdf_ ? bsdf_->flags() : 0;
+    main_texture_ = bsdf_ ? bsdf_->main_texture() : nullptr;
   }
-  /// The flags of bsdf(), at hand without asking it.
+  /// The flags and the main texture of bsdf(), at hand without asking it.
   uint32_t bsdf_flags() const { return bsdf_flags_; }
+  const Texture* main_texture() const { return main_texture_; }
   /// Whether hits on this shape need dp_du, dp_dv and an aligned frame.
   bool needs_derivatives() const { return needs_derivatives_; }
   void set_emitter(std::shared_ptr<const Emitter> emitter) { emitter_ = std::move(emitter); }
@@ -78,6 +80,7 @@ class Shape : public SceneObject {
   BsdfPtr bsdf_;
   bool needs_derivatives_ = false;
   uint32_t bsdf_flags_ = 0;
+  const Texture* main_texture_ = nullptr;
   std::shared_ptr<const Emitter> emitter_;
 };
 

@@ -17,6 +17,8 @@ class Texture : public SceneObject {
   virtual float eval_1(const SurfaceHit& hit) const = 0;
   /// Derivatives of eval_1 with respect to the surface parameters (u, v), for bump maps.
   virtual Vec2 grad_1(const SurfaceHit& hit) const = 0;
+  /// Asks memory for what eval() at these surface parameters will read. Changes no result.
+  virtual void prefetch(Vec2 /*uv*/) const {}
   /// True when eval does not depend on the point.
   virtual bool is_constant() const { return false; }
   /// Mean of eval_1 over the texture, used for the probability of sampling lobes (not for values).
@@ -36,7 +38,8 @@ using TexturePtr = std::shared_ptr<const Texture>;
 /// The same value everywhere.
 class ConstantTexture final : public Texture {
  public:
-  explicit ConstantTexture(const Spectrum& value) : value_(value), grey_(value.r == value.g && value.g == value.b ? value.r : luminance(value)) {}
+  explicit ConstantTexture(const Spectrum& value)
+      : value_(value), grey_(value.r == value.g && value.g == value.b ? value.r : luminance(value)) {}
   Spectrum eval(const SurfaceHit&) const override { return value_; }
   float eval_1(const SurfaceHit&) const override { return grey_; }
   Vec2 grad_1(const SurfaceHit&) const override { return {}; }

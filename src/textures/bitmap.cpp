@@ -21,8 +21,10 @@
 #include <mutex>
 
 #include "core/distribution.h"
+#include "core/large_vector.h"
 #include "core/srgb.h"
 #include "core/warp.h"
+#include "textures/block_layout.h"
 #include "textures/registry.h"
 
 namespace covary {
@@ -42,53 +44,73 @@ const DecodeTable& decode_table(bool srgb) {
   return kTables[srgb];
 }
 
-// Four ways to keep texels. Each has Value (what a lookup gives) and value(index).
+/// The values of an image of interleaved channels in the order of `layout`.
+template <typename T>
+LargeVector<T> in_blocks(const std::vector<T>& values, const TexelImage& image, const BlockLayout& layout) {
+  const int channels = image.channels;
+  LargeVector<T> result(layout.size() * channels);
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x)
+      std::copy_n(values.data() + (static_cast<size_t>(y) * image.width + x) * channels, channels,
+                  result.data() + layout.index(x, y) * channels);
+  return result;
+}
+
+// Four ways to keep texels. Each has Value (what a lookup gives), value(index) and prefetch(index), with the index of the
+// layout.
 
 class FloatGrey {
  public:
   using Value = float;
-  explicit FloatGrey(TexelImage& image) : texels_(std::move(image.floats)) {}
+  FloatGrey(const TexelImage& image, const BlockLayout& layout) : texels_(in_blocks(image.floats, image, layout)) {}
   float value(size_t i) const { return texels_[i]; }
+  void prefetch(size_t i) const { __builtin_prefetch(&texels_[i]); }
 
  private:
-  std::vector<float> texels_;
+  LargeVector<float> texels_;
 };
 
 class FloatRgb {
  public:
   using Value = Spectrum;
-  explicit FloatRgb(TexelImage& image) : texels_(std::move(image.floats)) {}
+  FloatRgb(const TexelImage& image, const BlockLayout& layout) : texels_(in_blocks(image.floats, image, layout)) {}
   Spectrum value(size_t i) const { return {texels_[3 * i], texels_[3 * i + 1], texels_[3 * i + 2]}; }
+  void prefetch(size_t i) const { __builtin_prefetch(&texels_[3 * i]); }
 
  private:
-  std::vector<float> texels_;
+  LargeVector<float> texels_;
 };
 
 class ByteGrey {
  public:
   using Value = float;
-  ByteGrey(TexelImage& image, const DecodeTable& decode) : texels_(std::move(image.bytes)), decode_(decode.data()) {}
+  ByteGrey(const TexelImage& image, const BlockLayout& layout, const DecodeTable& decode)
+      : texels_(in_blocks(image.bytes, image, layout)), decode_(decode.data()) {}
   float value(size_t i) const { return decode_[texels_[i]]; }
+  void prefetch(size_t i) const { __builtin_prefetch(&texels_[i]); }
 
  private:
-  std::vector<uint8_t> texels_;
+  LargeVector<uint8_t> texels_;
   const float* decode_;
 };
 
 class ByteRgb {
  public:
   using Value = Spectrum;
-  ByteRgb(const TexelImage& image, const DecodeTable& decode) : texels_(image.n_pixels()), decode_(decode.data()) {
-    for (size_t i = 0; i < texels_.size(); ++i)
-      texels_[i] = image.bytes[3 * i] | image.bytes[3 * i + 1] << 8 | image.bytes[3 * i + 2] << 16;
+  ByteRgb(const TexelImage& image, const BlockLayout& layout, const DecodeTable& decode)
+      : texels_(layout.size()), decode_(decode.data()) {
+    const uint8_t* rgb = image.bytes.data();
+    for (int y = 0; y < image.height; ++y)
+      for (int x = 0; x < image.width; ++x, rgb += 3) texels_[layout.index(x, y)] = rgb[0] | rgb[1] << 8 | rgb[2] << 16;
   }
   Spectrum value(size_t i) const {
     const uint32_t rgb = texels_[i];
     return {decode_[rgb & 255], decode_[rgb >> 8 & 255], decode_[rgb >> 16]};
   }
+  void prefetch(size_t i) const { __builtin_prefetch(&texels_[i]); }
 
  private:
-  std::vector<uint32_t> texels_;  // one load per texel
+  LargeVector<uint32_t> texels_;  // one load per texel
   const float* decode_;
 };
 
@@ -134,17 +156,25 @@ class Bitmap final : public Texture {
       : texels_(std::move(texels)),
         width_(width),
         height_(height),
+        layout_(width, height),
         settings_(settings),
         samples_luminance_(settings.to_uv.permutes_unit_square()) {
     double sum = 0;
-    const size_t n = static_cast<size_t>(width) * height;
-    for (size_t i = 0; i < n; ++i) sum += grey(texels_.value(i));
-    mean_ = static_cast<float>(sum / static_cast<double>(n));
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x) sum += grey_at(x, y);
+    mean_ = static_cast<float>(sum / (static_cast<double>(width) * height));
   }
 
   Spectrum eval(const SurfaceHit& hit) const override { return Spectrum(lookup(hit.uv)); }
   float eval_1(const SurfaceHit& hit) const override { return grey(lookup(hit.uv)); }
   float mean() const override { return mean_; }
+
+  void prefetch(Vec2 uv) const override {
+    const Vec2 st = settings_.to_uv.apply(uv);
+    const AxisCell x = find_cell(st.x, width_, settings_.wrap), y = find_cell(st.y, height_, settings_.wrap);
+    texels_.prefetch(layout_.index(x.i0, y.i0));
+    texels_.prefetch(layout_.index(x.i1, y.i1));
+  }
 
   Vec2 grad_1(const SurfaceHit& hit) const override {
     if (settings_.filter == FilterType::kNearest) return {0, 0};
@@ -178,15 +208,15 @@ class Bitmap final : public Texture {
   Value lookup(Vec2 uv) const {
     const Vec2 st = settings_.to_uv.apply(uv);
     const AxisCell x = find_cell(st.x, width_, settings_.wrap), y = find_cell(st.y, height_, settings_.wrap);
-    if (settings_.filter == FilterType::kNearest) return texels_.value(index(nearest(x), nearest(y)));
-    const size_t row0 = static_cast<size_t>(y.i0) * width_, row1 = static_cast<size_t>(y.i1) * width_;
-    return lerp(y.f, lerp(x.f, texels_.value(row0 + x.i0), texels_.value(row0 + x.i1)),
-                lerp(x.f, texels_.value(row1 + x.i0), texels_.value(row1 + x.i1)));
+    if (settings_.filter == FilterType::kNearest) return texels_.value(layout_.index(nearest(x), nearest(y)));
+    const size_t row0 = layout_.row_offset(y.i0), row1 = layout_.row_offset(y.i1);
+    const size_t column0 = BlockLayout::column_offset(x.i0), column1 = BlockLayout::column_offset(x.i1);
+    return lerp(y.f, lerp(x.f, texels_.value(row0 + column0), texels_.value(row0 + column1)),
+                lerp(x.f, texels_.value(row1 + column0), texels_.value(row1 + column1)));
   }
 
   static int nearest(const AxisCell& cell) { return cell.f < 0.5f ? cell.i0 : cell.i1; }
-  size_t index(int x, int y) const { return static_cast<size_t>(y) * width_ + x; }
-  float grey_at(int x, int y) const { return grey(texels_.value(index(x, y))); }
+  float grey_at(int x, int y) const { return grey(texels_.value(layout_.index(x, y))); }
 
   /// `s` uniform within its texel becomes tent-distributed around the texel's centre. What falls outside [0, 1] comes
   /// back in as the wrap mode says; mirror and clamp extend the border texel, so both fold back.
@@ -211,14 +241,15 @@ class Bitmap final : public Texture {
   const PiecewiseConstant2D* distribution() const {
     if (!samples_luminance_) return nullptr;
     std::call_once(distribution_once_, [this] {
-      const size_t n = static_cast<size_t>(width_) * height_;
-      std::vector<float> weights(n);
+      std::vector<float> weights;
+      weights.reserve(static_cast<size_t>(width_) * height_);
       bool any = false;
-      for (size_t i = 0; i < n; ++i) {
-        const float w = grey(texels_.value(i));
-        weights[i] = w > 0 && w < kInfinity ? w : 0;
-        any |= weights[i] > 0;
-      }
+      for (int y = 0; y < height_; ++y)
+        for (int x = 0; x < width_; ++x) {
+          const float w = grey_at(x, y);
+          weights.push_back(w > 0 && w < kInfinity ? w : 0);
+          any |= weights.back() > 0;
+        }
       if (any) distribution_ = std::make_unique<PiecewiseConstant2D>(weights, width_, height_);
     });
     return distribution_.get();
@@ -226,6 +257,7 @@ class Bitmap final : public Texture {
 
   Texels texels_;
   int width_, height_;
+  BlockLayout layout_;
   BitmapSettings settings_;
   bool samples_luminance_;
   float mean_;
@@ -242,15 +274,16 @@ std::shared_ptr<Texture> wrap_texels(Texels texels, const TexelImage& image, con
 
 std::shared_ptr<Texture> make_bitmap_texture(TexelImage image, const BitmapSettings& settings) {
   const bool decode = image.srgb && !settings.raw;
+  const BlockLayout layout(image.width, image.height);
   if (!image.bytes.empty()) {
     const DecodeTable& table = decode_table(decode);
-    if (image.channels == 1) return wrap_texels(ByteGrey(image, table), image, settings);
-    return wrap_texels(ByteRgb(image, table), image, settings);
+    if (image.channels == 1) return wrap_texels(ByteGrey(image, layout, table), image, settings);
+    return wrap_texels(ByteRgb(image, layout, table), image, settings);
   }
   if (decode)
     for (float& value : image.floats) value = srgb_to_linear(value);
-  if (image.channels == 1) return wrap_texels(FloatGrey(image), image, settings);
-  return wrap_texels(FloatRgb(image), image, settings);
+  if (image.channels == 1) return wrap_texels(FloatGrey(image, layout), image, settings);
+  return wrap_texels(FloatRgb(image, layout), image, settings);
 }
 
 std::shared_ptr<Texture> make_bitmap(Parameters& parameters) {

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// Arrays that are read at random places: they begin on a cache line, so that records that fit a line stay in one, and large
+// ones ask for huge pages, so that a read seldom has to look for its page first.
+#pragma once
+
+#include <cstddef>
+#include <new>
+#include <vector>
+
+#ifdef __linux__
+#include <sys/mman.h>
+#endif
+
+namespace covary {
+
+template <typename T>
+struct LargeArrayAllocator {
+  using value_type = T;
+  LargeArrayAllocator() = default;
+  template <typename U>
+  LargeArrayAllocator(const LargeArrayAllocator<U>&) {}
+
+  T* allocate(size_t n) {
+    const size_t size = n * sizeof(T);
+    void* memory = ::operator new(size, alignment(size));
+#ifdef __linux__
+    if (alignment(size) == kHugePage) madvise(memory, size, MADV_HUGEPAGE);  // a hint: refusal does no harm
+#endif
+    return static_cast<T*>(memory);
+  }
+  void deallocate(T* memory, size_t n) { ::operator delete(memory, alignment(n * sizeof(T))); }
+  template <typename U>
+  bool operator==(const LargeArrayAllocator<U>&) const {
+    return true;
+  }
+
+ private:
+  static constexpr std::align_val_t kCacheLine{64}, kHugePage{2u << 20};
+  static std::align_val_t alignment(size_t size) {
+    return size < static_cast<size_t>(kHugePage) ? kCacheLine : kHugePage;
+  }
+};
+
+template <typename T>
+using LargeVector = std::vector<T, LargeArrayAllocator<T>>;
+
+}  // namespace covary
