@@ -107,6 +107,7 @@ RayTracer::Group RayTracer::make_group(std::span<const ShapePtr> shapes) const {
     rtcAttachGeometryByID(group.scene, geometry, static_cast<unsigned>(group.shapes.size()));
     rtcReleaseGeometry(geometry);
     group.shapes.push_back(shape.get());
+    group.meshes.push_back(mesh);
   }
   return group;
 }
@@ -166,7 +167,13 @@ void RayTracer::nearest(std::span<const Ray> rays, std::span<RayHit> hits, bool 
                          packet.hit.primID[i],
                          packet.hit.geomID[i],
                          packet.hit.instID[0][i]};
+    // What resolve() reads of a mesh is asked for ahead: here the triangles, below their vertices.
+    for (size_t i = first; i < first + n; ++i)
+      if (const TriangleMesh* mesh = mesh_of(hits[i])) __builtin_prefetch(&mesh->triangles()[hits[i].primitive]);
   }
+  for (const RayHit& hit : hits.first(rays.size()))
+    if (const TriangleMesh* mesh = mesh_of(hit))
+      for (const uint32_t index : mesh->triangles()[hit.primitive]) __builtin_prefetch(&mesh->vertices()[index]);
 }
 
 void RayTracer::occluded(std::span<const Ray> rays, std::span<uint8_t> blocked) const {

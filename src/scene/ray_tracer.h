@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "scene/mesh.h"
 #include "scene/scene.h"
 
 namespace covary {
@@ -27,11 +28,16 @@ class RayTracer {
   struct Group {  // shapes of one Embree scene, indexed by geometry id
     RTCScene scene = nullptr;
     std::vector<const Shape*> shapes;
+    std::vector<const TriangleMesh*> meshes;  // the same; null where it is no mesh
   };
+  /// The mesh that was hit in the world's own space, or null.
+  const TriangleMesh* mesh_of(const RayHit& hit) const {
+    return hit.found() && hit.instance == RTC_INVALID_GEOMETRY_ID ? top_.meshes[hit.geometry] : nullptr;
+  }
   Group make_group(std::span<const ShapePtr> shapes) const;
 
   RTCDevice device_ = nullptr;
-  Group top_;                 // shapes, then instances
+  Group top_;  // shapes, then instances
   std::vector<Group> groups_;
   struct Placed {
     const Group* group;
