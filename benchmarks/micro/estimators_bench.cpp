@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+// The image-space estimators on a synthetic frame of 1280 x 720 pixels with 12 + 12 groups: the stages of iicv one by one,
+// and whole estimators. Stages run on one thread, estimators on all. items_per_second are pixels per second.
+#include <benchmark/benchmark.h>
+#include <tbb/global_control.h>
+
+#include <cmath>
+#include <vector>
+
+#include "core/random.h"
+#include "estimators/control_variates.h"
+#include "estimators/cv_baseline.h"
+#include "estimators/feedback.h"
+#include "estimators/iduw.h"
+#include "estimators/iicv.h"
+#include "estimators/neighbours.h"
+#include "estimators/pilot.h"
+
+namespace covary {
+namespace {
+
+constexpr int kWidth = 1280, kHeight = 720, kGroups = 12, kBorder = 5;
+
+float noise(uint64_t seed, uint64_t a, uint64_t b) {
+  return static_cast<float>(mix64(combine64(combine64(seed, a), b)) >> 40) * 0x1p-24f - 0.5f;
+}
+
+/// A smooth picture with edges and a textured part; `own`: part of the noise that pixels do not share.
+std::vector<float> make_image(uint64_t seed, float own) {
+  std::vector<float> data(static_cast<size_t>(kWidth) * kHeight * kGroups * 3);
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x) {
+      const uint64_t pixel = 1 + static_cast<uint64_t>(y) * kWidth + x;
+      const float texture = y > kHeight / 2 ? noise(1, pixel, 1) : 0.0f;
+      const float base = ((x / 90 + y / 70) % 2 ? 0.3f : 1.0f) * (1.0f + 0.5f * std::sin(0.02f * x) * std::cos(0.03f * y));
+      for (int i = 0; i < kGroups * 3; ++i)
+        data[(pixel - 1) * kGroups * 3 + i] =
+            base * (1.0f + 0.5f * texture) * (1.0f + (1.0f - own) * noise(seed, 0, i) + own * noise(seed, pixel, i));
+    }
+  return data;
+}
+
+struct Input {
+  std::vector<float> crn_data = make_image(2, 0.2f), pt_data = make_image(3, 1.0f);
+  GroupedImage crn{kWidth, kHeight, kGroups, crn_data.data()}, pt{kWidth, kHeight, kGroups, pt_data.data()};
+  std::vector<unsigned char> valid = std::vector<unsigned char>(static_cast<size_t>(kWidth) * kHeight, 1);
+  Moments g = moments(crn, valid, kBorder, kFar), h = moments(pt, valid, kBorder, 0.0f);
+  Planes error = pilot_error(g, h.mean, 11, false, kBorder);
+};
+
+const Input& input() {
+  static const Input instance;
+  return instance;
+}
+
+void count(benchmark::State& state) { state.SetItemsProcessed(state.iterations() * kWidth * kHeight); }
+
+void one_moments(benchmark::State& state) {
+  const Input& in = input();
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  for (auto _ : state) benchmark::DoNotOptimize(moments(in.crn, in.valid, kBorder, kFar));
+  count(state);
+}
+
+void one_pilot(benchmark::State& state) {
+  const Input& in = input();
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  for (auto _ : state) benchmark::DoNotOptimize(pilot_error(in.g, in.h.mean, 11, false, kBorder));
+  count(state);
+}
+
+void one_neighbours(benchmark::State& state) {
+  const Input& in = input();
+  const NeighbourSearch search(25, 11, true);
+  std::vector<lanes::vint> keys(search.offsets().size());
+  std::vector<uint16_t> chosen(25 * lanes::kLanes);
+  for (auto _ : state)
+    for (int y = 0; y < kHeight; ++y)
+      for (int x = 0; x < kWidth; x += lanes::kLanes) {
+        search.find(in.g.mean, x, y, keys.data(), chosen.data());
+        benchmark::DoNotOptimize(chosen.data());
+      }
+  count(state);
+}
+
+/// Search, gathering and solving, without and with error estimate.
+void one_regression(benchmark::State& state) {
+  const Input& in = input();
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  ControlVariateSettings settings;
+  settings.sample_share = IicvOptions().sample_share;
+  settings.conservation = IicvOptions().conservation;
+  settings.std_error = state.range(0) != 0;
+  const ControlVariateInput data{in.crn, &in.g, &in.h.mean, &in.error, &in.h.variance_of_mean};
+  for (auto _ : state) {
+    EstimatorResult result;
+    apply_control_variates(data, settings, in.valid, result);
+    benchmark::DoNotOptimize(result.estimate.data.data());
+  }
+  count(state);
+}
+
+void one_feedback(benchmark::State& state) {
+  const Input& in = input();
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  IicvOptions options;
+  options.feedback = false;
+  options.std_error = true;
+  const EstimatorResult before = iicv(in.crn, in.pt, options);
+  for (auto _ : state) {
+    Image estimate = before.estimate;
+    add_feedback(in.h.mean, FeedbackOptions(), in.valid, before.std_error, estimate);
+    benchmark::DoNotOptimize(estimate.data.data());
+  }
+  count(state);
+}
+
+void whole_iicv(benchmark::State& state, const IicvOptions& options) {
+  const Input& in = input();
+  for (auto _ : state) benchmark::DoNotOptimize(iicv(in.crn, in.pt, options).estimate.data.data());
+  count(state);
+}
+
+void whole_cv_baseline(benchmark::State& state) {
+  const Input& in = input();
+  for (auto _ : state) benchmark::DoNotOptimize(cv_baseline(in.crn, in.pt).estimate.data.data());
+  count(state);
+}
+
+void whole_iduw(benchmark::State& state) {
+  const Input& in = input();
+  IduwOptions options;
+  options.samples = 96;
+  for (auto _ : state) benchmark::DoNotOptimize(iduw(in.crn, in.pt, options).estimate.data.data());
+  count(state);
+}
+
+BENCHMARK(one_moments)->Unit(benchmark::kMillisecond);
+BENCHMARK(one_pilot)->Unit(benchmark::kMillisecond);
+BENCHMARK(one_neighbours)->Unit(benchmark::kMillisecond);
+BENCHMARK(one_regression)->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
+BENCHMARK(one_feedback)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(whole_iicv, default, IicvOptions())->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK_CAPTURE(whole_iicv, paper, IicvOptions::paper())->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(whole_cv_baseline)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(whole_iduw)->Unit(benchmark::kMillisecond)->UseRealTime();
+
+}  // namespace
+}  // namespace covary
