@@ -32,7 +32,8 @@ std::vector<float> make_image(uint64_t seed, float own) {
     for (int x = 0; x < kWidth; ++x) {
       const uint64_t pixel = 1 + static_cast<uint64_t>(y) * kWidth + x;
       const float texture = y > kHeight / 2 ? noise(1, pixel, 1) : 0.0f;
-      const float base = ((x / 90 + y / 70) % 2 ? 0.3f : 1.0f) * (1.0f + 0.5f * std::sin(0.02f * x) * std::cos(0.03f * y));
+      const float base =
+          ((x / 90 + y / 70) % 2 ? 0.3f : 1.0f) * (1.0f + 0.5f * std::sin(0.02f * x) * std::cos(0.03f * y));
       for (int i = 0; i < kGroups * 3; ++i)
         data[(pixel - 1) * kGroups * 3 + i] =
             base * (1.0f + 0.5f * texture) * (1.0f + (1.0f - own) * noise(seed, 0, i) + own * noise(seed, pixel, i));

@@ -81,48 +81,77 @@ inline void gram(const vfloat* X, ptrdiff_t row, ptrdiff_t sum, int m, int n, vf
   }
 }
 
-/// Solves (G + shift I) x = b for positive semidefinite G and shift > 0. `G`: packed, m rows, with room for one more row;
-/// destroyed. `bx`: b on entry, x on return. `inverse`: scratch for m vectors. In exact arithmetic no pivot is below
-/// `shift`; rounding is kept from going there.
-inline void solve_shifted(vfloat* G, vfloat shift, int m, vfloat* bx, vfloat* inverse) {
+namespace detail {
+
+/// What columns before j0 of the Cholesky factor leave of rows [i0, i0 + NA), columns [j0, j0 + NB).
+template <int NA, int NB>
+inline void subtract_columns(const vfloat* G, int i0, int j0, vfloat (&c)[NA][NB]) {
+  const vfloat *A[NA], *B[NB];
+  for (int a = 0; a < NA; ++a) A[a] = G + packed(i0 + a, 0);
+  for (int b = 0; b < NB; ++b) B[b] = G + packed(j0 + b, 0);
+  for (int a = 0; a < NA; ++a)
+    for (int b = 0; b < NB; ++b) c[a][b] = j0 + b <= i0 + a ? A[a][j0 + b] : vfloat{};
+  for (int q = 0; q < j0; ++q) {
+    vfloat va[NA], vb[NB];
+    for (int a = 0; a < NA; ++a) va[a] = A[a][q];
+    for (int b = 0; b < NB; ++b) vb[b] = B[b][q];
+    for (int a = 0; a < NA; ++a)
+      for (int b = 0; b < NB; ++b) c[a][b] -= va[a] * vb[b];
+  }
+}
+
+/// Columns [j0, j0 + NB) of the factor, those before being known: first the block on the diagonal, whose pivots are
+/// inverted into `inverse`, then the rows below it, to row m.
+template <int NB>
+inline void factor_diagonal(vfloat* G, const vfloat* shift, int j0, vfloat* inverse) {
+  vfloat c[NB][NB];
+  subtract_columns<NB, NB>(G, j0, j0, c);
+  for (int b = 0; b < NB; ++b) {
+    vfloat pivot = c[b][b] + shift[j0 + b];
+    for (int p = 0; p < b; ++p) pivot -= c[b][p] * c[b][p];
+    inverse[j0 + b] = 1.0f / lanes::sqrt(lanes::max(pivot, shift[j0 + b]));
+    for (int a = b + 1; a < NB; ++a) {
+      for (int p = 0; p < b; ++p) c[a][b] -= c[a][p] * c[b][p];
+      c[a][b] *= inverse[j0 + b];
+      G[packed(j0 + a, j0 + b)] = c[a][b];
+    }
+  }
+}
+
+template <int NA, int NB>
+inline void factor_rows(vfloat* G, int i0, int j0, const vfloat* inverse) {
+  vfloat c[NA][NB];
+  subtract_columns<NA, NB>(G, i0, j0, c);
+  for (int b = 0; b < NB; ++b)
+    for (int a = 0; a < NA; ++a) {
+      for (int p = 0; p < b; ++p) c[a][b] -= c[a][p] * G[packed(j0 + b, j0 + p)];
+      c[a][b] *= inverse[j0 + b];
+      G[packed(i0 + a, j0 + b)] = c[a][b];
+    }
+}
+
+template <int NB>
+inline void factor_columns(vfloat* G, const vfloat* shift, int m, int j0, vfloat* inverse) {
+  factor_diagonal<NB>(G, shift, j0, inverse);
+  int i = j0 + NB;
+  for (; i + kTileRows <= m + 1; i += kTileRows) factor_rows<kTileRows, NB>(G, i, j0, inverse);
+  for (; i <= m; ++i) factor_rows<1, NB>(G, i, j0, inverse);
+}
+
+}  // namespace detail
+
+/// Solves (G + diag(shift)) x = b for positive semidefinite G and m positive shifts. `G`: packed, m rows, with room for one
+/// more row; on return it holds, below the diagonal, the Cholesky factor L. `bx`: b on entry, x on return. `inverse`:
+/// receives the inverses of the m diagonal elements of L. In exact arithmetic no pivot is below its shift; rounding is
+/// kept from going there.
+inline void solve_shifted(vfloat* G, const vfloat* shift, int m, vfloat* bx, vfloat* inverse) {
+  using namespace detail;
   // b is carried along as row m, which then holds L^-1 b.
   vfloat* const last = G + packed(m, 0);
   for (int j = 0; j < m; ++j) last[j] = bx[j];
-
-  for (int j = 0; j < m; ++j) {
-    const vfloat* const Lj = G + packed(j, 0);
-    vfloat pivot = Lj[j] + shift, odd = {};
-    int p = 0;
-    for (; p + 1 < j; p += 2) {
-      pivot -= Lj[p] * Lj[p];
-      odd += Lj[p + 1] * Lj[p + 1];
-    }
-    if (p < j) pivot -= Lj[p] * Lj[p];
-    inverse[j] = 1.0f / lanes::sqrt(lanes::max(pivot - odd, shift));
-
-    int i = j + 1;
-    for (; i + 3 <= m; i += 4) {
-      vfloat *L0 = G + packed(i, 0), *L1 = G + packed(i + 1, 0), *L2 = G + packed(i + 2, 0), *L3 = G + packed(i + 3, 0);
-      vfloat c0 = L0[j], c1 = L1[j], c2 = L2[j], c3 = L3[j];
-      for (int q = 0; q < j; ++q) {
-        const vfloat l = Lj[q];
-        c0 -= L0[q] * l;
-        c1 -= L1[q] * l;
-        c2 -= L2[q] * l;
-        c3 -= L3[q] * l;
-      }
-      L0[j] = c0 * inverse[j];
-      L1[j] = c1 * inverse[j];
-      L2[j] = c2 * inverse[j];
-      L3[j] = c3 * inverse[j];
-    }
-    for (; i <= m; ++i) {
-      vfloat* Li = G + packed(i, 0);
-      vfloat c = Li[j];
-      for (int q = 0; q < j; ++q) c -= Li[q] * Lj[q];
-      Li[j] = c * inverse[j];
-    }
-  }
+  int j0 = 0;
+  for (; j0 + kTileColumns <= m; j0 += kTileColumns) factor_columns<kTileColumns>(G, shift, m, j0, inverse);
+  for (; j0 < m; ++j0) factor_columns<1>(G, shift, m, j0, inverse);
   // Back substitution by columns of L^T, that is by rows of L.
   for (int j = 0; j < m; ++j) bx[j] = last[j];
   for (int j = m - 1; j >= 0; --j) {
@@ -130,6 +159,43 @@ inline void solve_shifted(vfloat* G, vfloat shift, int m, vfloat* bx, vfloat* in
     bx[j] *= inverse[j];
     for (int q = 0; q < j; ++q) bx[q] -= Lj[q] * bx[j];
   }
+}
+
+/// Sum of weight_i (A^-1)_ii for A = G + diag(shift), from what solve_shifted leaves. `column`: scratch for m vectors.
+inline vfloat inverse_trace(const vfloat* L, const vfloat* inverse, const vfloat* weight, int m, vfloat* column) {
+  // A^-1 = L^-T L^-1; column j of L^-1 by forward substitution.
+  vfloat trace = {};
+  for (int j = 0; j < m; ++j) {
+    column[j] = inverse[j];
+    vfloat squares = inverse[j] * inverse[j];
+    for (int i = j + 1; i < m; ++i) {
+      const vfloat* const Li = L + packed(i, 0);
+      vfloat even = {}, odd = {};
+      int q = j;
+      for (; q + 1 < i; q += 2) {
+        even += Li[q] * column[q];
+        odd += Li[q + 1] * column[q + 1];
+      }
+      if (q < i) even += Li[q] * column[q];
+      column[i] = -(even + odd) * inverse[i];
+      squares += column[i] * column[i];
+    }
+    trace += weight[j] * squares;
+  }
+  return trace;
+}
+
+/// b^T A^-1 b likewise; b is destroyed.
+inline vfloat inverse_norm(const vfloat* L, const vfloat* inverse, int m, vfloat* b) {
+  vfloat norm = {};
+  for (int i = 0; i < m; ++i) {
+    const vfloat* const Li = L + packed(i, 0);
+    vfloat rest = b[i];
+    for (int q = 0; q < i; ++q) rest -= Li[q] * b[q];
+    b[i] = rest * inverse[i];
+    norm += b[i] * b[i];
+  }
+  return norm;
 }
 
 }  // namespace covary::batch

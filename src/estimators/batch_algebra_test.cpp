@@ -48,8 +48,13 @@ TEST(BatchAlgebra, GramAndSolveAgreeWithEigen) {
           for (int l = 0; l < kLanes; ++l) b[i][l] = test::noise(m + 50, i, l);
         batch::gram(X.data(), row, sum, m, n, G.data());
         std::vector<vfloat> x = b, solved = G;
-        const float shift = 0.3f;
-        batch::solve_shifted(solved.data(), lanes::splat(shift), m, x.data(), inverse.data());
+        std::vector<vfloat> shift(m);
+        for (int i = 0; i < m; ++i)
+          for (int l = 0; l < kLanes; ++l) shift[i][l] = 0.8f + test::noise(m + 60, i, l);
+        batch::solve_shifted(solved.data(), shift.data(), m, x.data(), inverse.data());
+        std::vector<vfloat> scratch(m), rhs_copy = b;
+        const vfloat trace = batch::inverse_trace(solved.data(), inverse.data(), shift.data(), m, scratch.data());
+        const vfloat norm = batch::inverse_norm(solved.data(), inverse.data(), m, rhs_copy.data());
         for (int l : {0, 3, kLanes - 1}) {
           Eigen::MatrixXd A(m, n);
           Eigen::VectorXd rhs(m);
@@ -58,7 +63,14 @@ TEST(BatchAlgebra, GramAndSolveAgreeWithEigen) {
             for (int s = 0; s < n; ++s) A(i, s) = X[i * row + s * sum][l];
           }
           const Eigen::MatrixXd expected = A * A.transpose();
-          const Eigen::VectorXd solution = (expected + shift * Eigen::MatrixXd::Identity(m, m)).ldlt().solve(rhs);
+          Eigen::MatrixXd shifted = expected;
+          for (int i = 0; i < m; ++i) shifted(i, i) += shift[i][l];
+          const Eigen::VectorXd solution = shifted.ldlt().solve(rhs);
+          const Eigen::MatrixXd inverted = shifted.inverse();
+          double expected_trace = 0;
+          for (int i = 0; i < m; ++i) expected_trace += shift[i][l] * inverted(i, i);
+          ASSERT_NEAR(trace[l], expected_trace, 1e-5 * m) << "m " << m << " n " << n;
+          ASSERT_NEAR(norm[l], rhs.dot(inverted * rhs), 1e-5 * m) << "m " << m << " n " << n;
           for (int i = 0; i < m; ++i) {
             for (int j = 0; j <= i; ++j) ASSERT_NEAR(G[batch::packed(i, j)][l], expected(i, j), 1e-5) << m << " " << n;
             ASSERT_NEAR(x[i][l], solution(i), 2e-5) << "m " << m << " n " << n << " lane " << l;
@@ -75,7 +87,8 @@ TEST(BatchAlgebra, SolveSurvivesNearlySingularSystems) {
   std::vector<vfloat> X(m), G(batch::packed_size(m + 1)), b(m), inverse(m);
   for (int i = 0; i < m; ++i) X[i] = b[i] = lanes::splat(3000.0f + 10.0f * static_cast<float>(i));
   batch::gram(X.data(), 1, 1, m, 1, G.data());
-  batch::solve_shifted(G.data(), lanes::splat(1.0f), m, b.data(), inverse.data());
+  const std::vector<vfloat> shift(m, lanes::splat(1.0f));
+  batch::solve_shifted(G.data(), shift.data(), m, b.data(), inverse.data());
   // x = X / (X.X + 1), so that X.x is 1 up to 1e-8.
   float product = 0;
   for (int i = 0; i < m; ++i) product += X[i][0] * b[i][0];

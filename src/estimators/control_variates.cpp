@@ -23,6 +23,8 @@ namespace {
 using namespace lanes;
 
 constexpr int kTileWidth = 64, kTileHeight = 32;
+/// Part of the degrees of freedom that a fit leaves at least, for the error estimate; less is the fit of an interpolation.
+constexpr float kFewestFreedom = 0.1f;
 
 /// Offsets in the record of a pixel.
 struct RecordLayout {
@@ -48,12 +50,14 @@ struct Workspace {
   std::vector<float> records;  ///< of the tile and its border
   std::vector<vint> keys;
   std::vector<uint16_t> chosen;
-  std::vector<vfloat> x;     ///< [neighbour][contrast], later scaled by 1 / sqrt(V_h)
+  std::vector<vfloat> x;     ///< [neighbour][contrast]
   std::vector<vfloat> tail;  ///< [neighbour][rest of the record]
   std::vector<vfloat> y;     ///< [contrast]
   std::vector<vfloat> y_tail;
-  std::vector<vfloat> scale;  ///< [neighbour] 1 / sqrt(V_h)
-  std::vector<vfloat> gram, inverse, b, gamma;
+  std::vector<vfloat> penalty;  ///< [neighbour] V_h
+  std::vector<vfloat> beta;     ///< [neighbour]
+  std::vector<vfloat> gram, shift, inverse, b, gamma;
+  vfloat freedom = {};
 };
 
 struct Tile {
@@ -97,7 +101,9 @@ class Regression {
     w.tail.resize(k * (layout_.size - rows));
     w.y.resize(rows);
     w.y_tail.resize(layout_.size - rows);
-    w.scale.resize(k);
+    w.penalty.resize(k);
+    w.beta.resize(k);
+    w.shift.resize(m);
     w.gram.resize(batch::packed_size(m + 1));
     w.inverse.resize(m);
     w.b.resize(std::max<size_t>(m, rows));
@@ -210,7 +216,7 @@ class Regression {
     }
   }
 
-  /// V_h,i of Eq. (10) for the channels [first, first + count), summed over them, as scale_i = 1 / sqrt(V_h,i).
+  /// V_h,i of Eq. (10) for the channels [first, first + count), summed over them.
   void find_penalties(int first, int count, Workspace& w) const {
     const int k = s_.k, n_tail = layout_.size - layout_.contrasts;
     vfloat homogeneous = {};
@@ -240,38 +246,65 @@ class Regression {
         }
         smallest = max(smallest, squares * (kSmallestPenalty / (s_.conservation * static_cast<float>(T_ - 1))));
       }
-      w.scale[i] = 1.0f / lanes::sqrt(max(penalty, smallest) + 1e-30f);
+      w.penalty[i] = max(penalty, smallest) + 1e-30f;
     }
   }
 
-  /// Solves Eq. (10). With Z = X V_h^-1/2 and beta = V_h^-1/2 gamma it reads
-  ///   gamma = (Z^T Z + (T - 1) I)^-1 Z^T y = Z^T (Z Z^T + (T - 1) I)^-1 y;
-  /// the smaller of the two systems is solved. Leaves beta in gamma and Z in x.
+  /// Solves Eq. (10), as
+  ///   beta = (X^T X + (T - 1) V_h)^-1 X^T y
+  /// or, with fewer rows than neighbours, with Z = X V_h^-1/2, as
+  ///   V_h^1/2 beta = gamma = Z^T (Z Z^T + (T - 1) I)^-1 y.
+  /// Leaves in gamma the coefficients of what is in x: X, or Z in the second case; in freedom the degrees of freedom that
+  /// the fit takes from the groups, trace(X (X^T X + (T - 1) V_h)^-1 X^T), over their number.
   void find_coefficients(int first, int count, Workspace& w) const {
     const int k = s_.k, all = layout_.contrasts, step = count == 3 ? 1 : 3, rows = all / step;
+    const int group_rows = layout_.group_contrasts / step;
+    const float T1 = static_cast<float>(T_ - 1);
     if (s_.conservation > 0) scale_condition(first, count, w);
     find_penalties(first, count, w);
-    for (int i = 0; i < k; ++i) {
-      vfloat* x = w.x.data() + static_cast<size_t>(i) * all + first;
-      for (int r = 0; r < rows; ++r) x[r * step] *= w.scale[i];
-    }
-    const vfloat shift = splat(static_cast<float>(T_ - 1));
     const vfloat* X = w.x.data() + first;
     const vfloat* Y = w.y.data() + first;
     if (k <= rows) {
       batch::gram(X, all, step, k, rows, w.gram.data());
-      for (int i = 0; i < k; ++i) w.gamma[i] = dot(X + static_cast<size_t>(i) * all, Y, step, rows);
-      batch::solve_shifted(w.gram.data(), shift, k, w.gamma.data(), w.inverse.data());
+      for (int i = 0; i < k; ++i) {
+        w.gamma[i] = dot(X + static_cast<size_t>(i) * all, Y, step, rows);
+        w.shift[i] = T1 * w.penalty[i];
+      }
+      batch::solve_shifted(w.gram.data(), w.shift.data(), k, w.gamma.data(), w.inverse.data());
+      for (int i = 0; i < k; ++i) w.beta[i] = w.gamma[i];
+      if (s_.std_error) {
+        w.freedom = splat(static_cast<float>(k)) -
+                    batch::inverse_trace(w.gram.data(), w.inverse.data(), w.shift.data(), k, w.b.data());
+        for (int r = group_rows; r < rows; ++r) {
+          for (int i = 0; i < k; ++i) w.b[i] = X[static_cast<size_t>(i) * all + r * step];
+          w.freedom -= batch::inverse_norm(w.gram.data(), w.inverse.data(), k, w.b.data());
+        }
+      }
     } else {
+      for (int i = 0; i < k; ++i) {
+        w.beta[i] = 1.0f / lanes::sqrt(w.penalty[i]);
+        vfloat* x = w.x.data() + static_cast<size_t>(i) * all + first;
+        for (int r = 0; r < rows; ++r) x[r * step] *= w.beta[i];
+      }
       batch::gram(X, step, all, rows, k, w.gram.data());
-      for (int r = 0; r < rows; ++r) w.b[r] = Y[r * step];
-      batch::solve_shifted(w.gram.data(), shift, rows, w.b.data(), w.inverse.data());
+      for (int r = 0; r < rows; ++r) {
+        w.b[r] = Y[r * step];
+        w.shift[r] = splat(T1);
+      }
+      batch::solve_shifted(w.gram.data(), w.shift.data(), rows, w.b.data(), w.inverse.data());
       for (int i = 0; i < k; ++i) {
         vfloat g = {};
         for (int r = 0; r < rows; ++r) g += X[static_cast<size_t>(i) * all + r * step] * w.b[r];
         w.gamma[i] = g;
+        w.beta[i] *= g;
+      }
+      if (s_.std_error) {
+        for (int r = group_rows; r < rows; ++r) w.shift[r] = vfloat{};
+        w.freedom = splat(static_cast<float>(group_rows)) -
+                    batch::inverse_trace(w.gram.data(), w.inverse.data(), w.shift.data(), rows, w.b.data());
       }
     }
+    w.freedom /= static_cast<float>(group_rows);
   }
 
   static vfloat dot(const vfloat* a, const vfloat* b, int step, int n) {
@@ -285,32 +318,48 @@ class Regression {
     return even + odd;
   }
 
-  /// Eq. (7) and Eq. (8) for one channel.
+  /// Eq. (7) for one channel, and Eq. (8) where asked for.
   void finish_channel(int c, int x, int y, int n_lanes, Workspace& w) const {
     const int k = s_.k, n_tail = layout_.size - layout_.contrasts;
-    vfloat estimate = load(in_.crn_moments->mean.row(c, y) + x), h_part = {};
-    for (int i = 0; i < k; ++i) {
-      const vfloat beta = w.gamma[i] * w.scale[i];
-      const vfloat* tail = w.tail.data() + i * n_tail;
-      estimate -= beta * tail_value(tail, layout_.difference + c);
-      if (s_.std_error) h_part += beta * beta * tail_value(tail, layout_.h_variance + c);
-    }
+    vfloat estimate = load(in_.crn_moments->mean.row(c, y) + x);
+    for (int i = 0; i < k; ++i) estimate -= w.beta[i] * tail_value(w.tail.data() + i * n_tail, layout_.difference + c);
     // Squares of values beyond 10^18 overflow; such pixels show the PT image.
     for (int l = 0; l < n_lanes; ++l)
       result_.estimate.pixel(x + l, y)[c] = std::isfinite(estimate[l]) ? estimate[l] : in_.h->row(c, y)[x + l];
     if (!s_.std_error) return;
-
-    // [YM2025] Eq. (8) with the estimated quantities: variance of the group residuals, and of the h.
-    vfloat squares = {};
-    for (int r = c; r < layout_.group_contrasts; r += 3) {
-      vfloat residual = w.y[r];
-      for (int i = 0; i < k; ++i) residual -= w.gamma[i] * w.x[static_cast<size_t>(i) * layout_.contrasts + r];
-      squares += residual * residual;
-    }
-    const vfloat error = lanes::sqrt(squares / static_cast<float>(T_ * (T_ - 1)) + h_part);
+    const vfloat error = lanes::sqrt(crn_variance(c, w) + pt_variance(c, w));
     for (int l = 0; l < n_lanes; ++l)
       result_.std_error.pixel(x + l, y)[c] =
           std::isfinite(error[l]) ? error[l] : std::sqrt(in_.variance_of_h->row(c, y)[x + l]);
+  }
+
+  /// The first three terms of [YM2025] Eq. (8): variance of f - sum_i beta_i g_i. The coefficients were fitted to the
+  /// same groups, so that their residuals are too small; generalised cross-validation (Golub, Heath, Wahba 1979) corrects
+  /// that by the degrees of freedom.
+  vfloat crn_variance(int c, const Workspace& w) const {
+    vfloat squares = {};
+    for (int r = c; r < layout_.group_contrasts; r += 3) {
+      vfloat residual = w.y[r];
+      for (int i = 0; i < s_.k; ++i) residual -= w.gamma[i] * w.x[static_cast<size_t>(i) * layout_.contrasts + r];
+      squares += residual * residual;
+    }
+    const vfloat left = max(1.0f - w.freedom, splat(kFewestFreedom));
+    return squares / (static_cast<float>(T_ * (T_ - 1)) * left * left);
+  }
+
+  /// The last term of Eq. (8): sum_i beta_i^2 var h_i. Penalties that contain the sample variance give large coefficients
+  /// to pixels whose sample variance happens to be small; to that part, the neighbours' mean variance is used for all.
+  vfloat pt_variance(int c, const Workspace& w) const {
+    const int n_tail = layout_.size - layout_.contrasts;
+    vfloat own = {}, variances = {}, squares = {}, count = {};
+    for (int i = 0; i < s_.k; ++i) {
+      const vfloat variance = tail_value(w.tail.data() + i * n_tail, layout_.h_variance + c);
+      own += w.beta[i] * w.beta[i] * variance;
+      squares += w.beta[i] * w.beta[i];
+      variances += variance;
+      count += w.beta[i] != 0.0f ? splat(1.0f) : vfloat{};  // places outside the frame have no coefficient
+    }
+    return (1 - s_.sample_share) * own + s_.sample_share * squares * variances / max(count, splat(1.0f));
   }
 
   const ControlVariateInput& in_;

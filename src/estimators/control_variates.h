@@ -34,7 +34,7 @@ struct ControlVariateSettings {
   float conservation = 0;
   /// Where positive: V_h = ridge * (mean diagonal of X^T X / (T - 1)) * I instead of `error_of_h`.
   float ridge = 0;
-  /// Also estimate the standard error of F^ by Eq. (8).
+  /// Also estimate the standard error of F^ by Eq. (8), its first part by generalised cross-validation.
   bool std_error = false;
 };
 

@@ -56,8 +56,8 @@ struct IicvOptions {
   /// Residual feedback (feedback.h). Default on; the paper has none.
   bool feedback = true;
   FeedbackOptions feedback_options;
-  /// Also estimate the standard error of the result, [YM2025] Eq. (8). It is the error before the feedback, which changes
-  /// it little.
+  /// Also estimate the standard error of the result: [YM2025] Eq. (8), with the residuals of the fit corrected for its
+  /// degrees of freedom. It is the error before the feedback, which changes it little.
   bool std_error = false;
 
   /// The published estimator with its published settings.

@@ -29,19 +29,32 @@ void NeighbourSearch::find(const Planes& guide, int x, int y, vint* keys, uint16
     const vfloat d2 = load(guide.row(2, gy) + gx) - f2;
     const vint key = (bits(d0 * d0 + d1 * d1 + d2 * d2) & ~index_mask_) | j;
     keys[j] = key;
-    smallest = key < smallest ? key : smallest;
+    // Key 0 is apart: mostly it is the target's own, of distance zero.
+    if (j > 0) smallest = key < smallest ? key : smallest;
     largest = key > largest ? key : largest;
   }
 
-  // Bisection for a threshold with exactly k keys at or below it: count(low) < k <= count(high).
-  vint low = smallest - 1, high = largest;
-  for (;;) {
-    const vint middle = low + ((high - low) >> 1);
+  // Search for a threshold with exactly k keys at or below it: count(low) < k <= count(high). Guesses alternate between
+  // interpolation and bisection.
+  if (k_ == 1) smallest = keys[0] < smallest ? keys[0] : smallest;
+  vint low = smallest - 1, high = largest, below = -(keys[0] < smallest), above = splat_int(n);
+  for (bool interpolate = true;; interpolate = !interpolate) {
+    const vint interval = high - low;
+    vint middle = low + (interval >> 1);
+    if (interpolate) {
+      const vfloat part = __builtin_convertvector(k_ - below, vfloat) / __builtin_convertvector(above - below, vfloat);
+      const vint guess = low + __builtin_convertvector(__builtin_convertvector(interval, vfloat) * part, vint);
+      middle = guess > low ? guess : low + 1;
+      middle = middle < high ? middle : high - 1;
+      middle = interval > 1 ? middle : low;
+    }
     vint count = {};
     for (int j = 0; j < n; ++j) count -= keys[j] <= middle;
     const vint enough = count >= k_;
     high = enough ? middle : high;
+    above = enough ? count : above;
     low = enough ? low : middle;
+    below = enough ? below : count;
     // A lane with exactly k keys is done; closing its interval keeps it so.
     low = count == k_ ? high : low;
     int open = 0;

@@ -134,6 +134,7 @@ inline Result control_variates(const GroupedImage& crn, const RgbImage& h, const
   };
   // Eq. (10); shared coefficients stack the rows of the channels.
   std::array<Eigen::VectorXd, 3> beta;
+  std::array<double, 3> left;  // 1 - degrees of freedom of the fit / degrees of freedom of the groups
   for (int c = 0; c < (s.shared ? 1 : 3); ++c) {
     const int last = s.shared ? 2 : c;
     // The condition: conservation times the group variance, as a common error in proportion to the brightness.
@@ -154,17 +155,28 @@ inline Result control_variates(const GroupedImage& crn, const RgbImage& h, const
       A += s.conservation * condition * g * g.transpose();
       b += s.conservation * condition * g * mean(crn, target.x, target.y)[d];
     }
-    beta[c] = A.ldlt().solve(b);
+    const Eigen::LDLT<Eigen::MatrixXd> factored = A.ldlt();
+    beta[c] = factored.solve(b);
+    double freedom = 0;
+    for (int d = c; d <= last; ++d) freedom += (X[d] * factored.solve(X[d].transpose().eval())).trace() / (T - 1);
+    left[c] = std::max(1 - freedom / ((last - c + 1) * (T - 1)), 0.1);
   }
-  if (s.shared) beta[1] = beta[2] = beta[0];
+  if (s.shared) {
+    beta[1] = beta[2] = beta[0];
+    left[1] = left[2] = left[0];
+  }
 
   Result result{mean(crn, target.x, target.y), {}};
   for (int c = 0; c < 3; ++c) {
-    double variance = (y[c] - X[c] * beta[c]).squaredNorm() / (T - 1) / T;  // Eq. (8)
+    // Eq. (8), the residuals by generalised cross-validation.
+    double variance = (y[c] - X[c] * beta[c]).squaredNorm() / (T - 1) / T / (left[c] * left[c]);
+    double mean_variance = 0;
+    for (const Pixel q : neighbours) mean_variance += variance_of_h[index(q)][c] / k;
     for (int i = 0; i < k; ++i) {
       const Pixel q = neighbours[i];
       result.estimate[c] -= beta[c](i) * (mean(crn, q.x, q.y)[c] - h[index(q)][c]);  // Eq. (7)
-      variance += beta[c](i) * beta[c](i) * variance_of_h[index(q)][c];
+      variance += beta[c](i) * beta[c](i) *
+                  ((1 - s.sample_share) * variance_of_h[index(q)][c] + s.sample_share * mean_variance);
     }
     result.std_error[c] = std::sqrt(variance);
   }
