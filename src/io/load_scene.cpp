@@ -11,7 +11,7 @@
 #include <unordered_set>
 
 #include "emitters/area.h"
-#include "io/content_hash.h"
+#include "core/content_hash.h"
 #include "io/description_key.h"
 #include "io/file_view.h"
 #include "io/object_factory.h"

@@ -9,7 +9,7 @@
 #include <unordered_map>
 #include <unordered_set>
 
-#include "io/content_hash.h"
+#include "core/content_hash.h"
 #include "io/file_view.h"
 #include "io/spectrum_objects.h"
 #include "io/upgrade.h"

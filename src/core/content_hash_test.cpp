@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/content_hash.h"
+#include "core/content_hash.h"
 
 #include <gtest/gtest.h>
 
