@@ -1,18 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
-// covary info: what an image or film holds, without reading its pixels.
+// covary info: what an image or film holds, without reading its pixels, or what a scene file describes.
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "commands.h"
+#include "core/error.h"
+#include "defines.h"
 #include "film/image_file.h"
+#include "io/load_scene.h"
 
 namespace covary {
 namespace {
 
 struct InfoOptions {
   std::string path;
+  std::vector<std::string> defines;
   bool json = false;
 };
 
@@ -43,7 +48,31 @@ std::string describe_channels(const std::vector<ExrFile::Channel>& channels) {
   return text;
 }
 
+void scene_info(const InfoOptions& options) {
+  LoadOptions load_options;
+  load_options.defines = parse_defines(options.defines);
+  const LoadedScene scene = load_scene(options.path, load_options);
+  for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", warning);
+  if (options.json) {
+    const nlohmann::ordered_json object{{"file", options.path},
+                                        {"format", "scene"},
+                                        {"frame", {scene.width, scene.height}},
+                                        {"window", {scene.crop_x, scene.crop_y, scene.crop_width, scene.crop_height}},
+                                        {"samples_per_pixel", scene.spp},
+                                        {"integrator", scene.integrator_type},
+                                        {"triangles", scene.scene->n_triangles()},
+                                        {"scene_hash", scene.content_hash}};
+    fmt::print("{}\n", object.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+    return;
+  }
+  fmt::print("{}: {} x {} pixels, {} samples per pixel, integrator {}\n{} triangles\nscene_hash: {}\n", options.path,
+             scene.width, scene.height, scene.spp, scene.integrator_type.empty() ? "not named" : scene.integrator_type,
+             scene.scene->n_triangles(), scene.content_hash);
+}
+
 void info(const InfoOptions& options) {
+  if (std::filesystem::path(options.path).extension() == ".xml") return scene_info(options);
+  if (!options.defines.empty()) throw Error(ErrorCode::kUsage, "-D is for scene files (.xml)");
   const ImageInfo info = inspect_image(options.path);
   if (options.json) return print_json(info, options.path);
   const CropWindow& w = info.place.window;
@@ -60,8 +89,9 @@ void info(const InfoOptions& options) {
 
 void add_info(CLI::App& app) {
   const auto options = std::make_shared<InfoOptions>();
-  CLI::App* command = app.add_subcommand("info", "What a film or image holds: size, channels, attributes");
-  command->add_option("FILE", options->path, "A film or image")->required();
+  CLI::App* command = app.add_subcommand("info", "What a film, image or scene holds: size, channels, attributes");
+  command->add_option("FILE", options->path, "A film or image, or a scene file (.xml)")->required();
+  add_define_option(*command, options->defines);
   command->add_flag("--json", options->json, "One JSON object");
   command->callback([options] { info(*options); });
 }

@@ -10,17 +10,10 @@
 
 #include "commands.h"
 #include "core/error.h"
+#include "core/shell_text.h"
 
 namespace covary {
 namespace {
-
-std::string quoted(const std::string& word) {
-  const char* safe = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=./,:@%";
-  if (!word.empty() && word.find_first_not_of(safe) == std::string::npos) return word;
-  std::string text = "'";
-  for (char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return text + "'";
-}
 
 std::string g_command_line;
 
@@ -57,6 +50,7 @@ int run(int argc, char** argv) {
   add_info(app);
   add_convert(app);
   add_combine(app);
+  add_experiment(app);
   add_view(app);
 
   if (argc < 2) {
@@ -95,8 +89,9 @@ const std::string& command_line() { return g_command_line; }
 }  // namespace covary
 
 int main(int argc, char** argv) {
-  for (int i = 0; i < argc; ++i)
-    covary::g_command_line += (i ? " " : "") + (i ? covary::quoted(argv[i]) : std::string("covary"));
+  std::vector<std::string> words(argv, argv + argc);
+  words[0] = "covary";
+  covary::g_command_line = covary::shell_text(words);
   // A file that outgrows its limit is an error like a full disk, which leaves no half-written file behind.
   std::signal(SIGXFSZ, SIG_IGN);
   try {

@@ -16,6 +16,7 @@
 
 #include "commands.h"
 #include "core/error.h"
+#include "defines.h"
 #include "estimators/mean.h"
 #include "estimators/predicted_error.h"
 #include "estimators/result_file.h"

@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "core/error.h"
+#include "defines.h"
 
 namespace covary {
 
@@ -24,17 +25,6 @@ std::vector<int64_t> parse_numbers(const std::string& option, const std::string&
   if (numbers.size() != count || begin <= text.size())
     throw Error(ErrorCode::kUsage, option + " '" + text + "': expected " + example);
   return numbers;
-}
-
-std::map<std::string, std::string> parse_defines(const std::vector<std::string>& defines) {
-  std::map<std::string, std::string> result;
-  for (const std::string& define : defines) {
-    const size_t equals = define.find('=');
-    if (equals == 0 || equals == std::string::npos)
-      throw Error(ErrorCode::kUsage, "-D '" + define + "': expected name=value");
-    result[define.substr(0, equals)] = define.substr(equals + 1);
-  }
-  return result;
 }
 
 std::array<double, 2> parse_split(const std::string& text) {
@@ -154,10 +144,7 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
   command.add_option("--checkpoint", o.checkpoint_seconds, "Seconds between writing unfinished films; 0: never")
       ->capture_default_str()
       ->check(CLI::NonNegativeNumber);
-  command.add_option("-D,--define", o.defines, "name=value for the scene's <default> elements")
-      ->take_all()
-      ->expected(1)
-      ->allow_extra_args(false);
+  add_define_option(command, o.defines);
   command.add_flag("--aovs", o.aovs, "Add the images Albedo, N (normal) and P (position) to the output");
   command.add_option("--replay", o.replay, "X,Y,SAMPLE: print one sample instead of rendering");
   command.add_option("--json", o.json, "File for statistics; '-': standard output");

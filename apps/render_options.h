@@ -40,7 +40,6 @@ void check_options(RenderOptions& options);
 /// Whole numbers separated by `separator`; throws Error(kUsage) that names the option.
 std::vector<int64_t> parse_numbers(const std::string& option, const std::string& text, char separator, size_t count,
                                    const std::string& example);
-std::map<std::string, std::string> parse_defines(const std::vector<std::string>& defines);
 /// --split "1:3": parts of the samples for the CRN and the independent pass; they add up to 1.
 std::array<double, 2> parse_split(const std::string& text);
 /// --until "relmse=0.005".

@@ -12,8 +12,6 @@
 namespace covary {
 namespace {
 
-constexpr double kOffset = 0.01;  ///< keeps relative errors finite at black pixels
-
 void check_sizes(const Image& image, std::span<const Image> references) {
   COVARY_CHECK(references.size() == 1 || references.size() == 2, "one or two references");
   for (const Image& r : references)
@@ -21,11 +19,6 @@ void check_sizes(const Image& image, std::span<const Image> references) {
       throw Error(ErrorCode::kInput, fmt::format("the image has {} x {} pixels, the reference {} x {}", image.width,
                                                  image.height, r.width, r.height));
   for (const Image& r : references) COVARY_CHECK(r.channels == 3 && image.channels == 3, "3 channels");
-}
-
-bool pixel_is_finite(const Image& image, size_t p) {
-  const float* v = image.data.data() + p * 3;
-  return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]);
 }
 
 /// One pixel of a render and of its references, in double.
@@ -53,14 +46,14 @@ double pixel_error(Metric metric, const Pixel& p) {
   double sum = 0;
   switch (metric) {
     case Metric::kRelMse:
-      return p.squared_error() / (p.grey * p.grey + kOffset);
+      return p.squared_error() / (p.grey * p.grey + kRelativeOffset);
     case Metric::kMse:
       return p.squared_error();
     case Metric::kMae:
       for (size_t c = 0; c < 3; ++c) sum += std::abs(p.f[c] - p.r[c]) / 3;
       return sum;
     case Metric::kMape:
-      for (size_t c = 0; c < 3; ++c) sum += std::abs(p.f[c] - p.r[c]) / (std::abs(p.r[c]) + kOffset) / 3;
+      for (size_t c = 0; c < 3; ++c) sum += std::abs(p.f[c] - p.r[c]) / (std::abs(p.r[c]) + kRelativeOffset) / 3;
       return sum;
     case Metric::kFlip:
       break;
@@ -81,6 +74,11 @@ Image flip_map(const Image& image, std::span<const Image> references, const std:
 }
 
 }  // namespace
+
+bool pixel_is_finite(const Image& image, size_t p) {
+  const float* v = image.data.data() + p * 3;
+  return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]);
+}
 
 const std::vector<MetricInfo>& metrics() {
   static const std::vector<MetricInfo> all{
@@ -135,77 +133,6 @@ MetricResult compute_metric(Metric metric, const Image& image, std::span<const I
     sum += error;
   }
   result.value = sum / static_cast<double>(result.n_pixels);
-  return result;
-}
-
-ErrorSplit::ErrorSplit(std::vector<Image> references) : references_(std::move(references)) {
-  check_sizes(references_.at(0), references_);
-  const size_t n_pixels = static_cast<size_t>(references_[0].width) * references_[0].height;
-  sum_.assign(n_pixels * 3, 0);
-  sum_squares_.assign(n_pixels * 3, 0);
-  finite_.resize(n_pixels);
-  for (size_t p = 0; p < n_pixels; ++p)
-    finite_[p] = pixel_is_finite(references_.front(), p) && pixel_is_finite(references_.back(), p);
-}
-
-void ErrorSplit::add(const Image& image) {
-  check_sizes(image, references_);
-  double error = 0, grey = 0;
-  uint64_t n_finite = 0;
-  for (size_t p = 0; p < finite_.size(); ++p) {
-    finite_[p] = finite_[p] && pixel_is_finite(image, p);
-    if (!finite_[p]) continue;
-    ++n_finite;
-    const Pixel pixel(image, references_, p);
-    error += pixel_error(Metric::kRelMse, pixel);
-    for (size_t c = 0; c < 3; ++c) {
-      const double d = pixel.f[c] - pixel.r[c];
-      sum_[p * 3 + c] += d;
-      sum_squares_[p * 3 + c] += d * d;
-      grey += pixel.f[c] / 3;
-    }
-  }
-  if (n_finite == 0) throw Error(ErrorCode::kInput, "no pixel is finite in all renders and references");
-  rel_mse_.push_back(error / static_cast<double>(n_finite));
-  means_.push_back(grey / static_cast<double>(n_finite));
-  ++n_renders_;
-}
-
-ErrorSplit::Result ErrorSplit::result() const {
-  if (n_renders_ < 2)
-    throw Error(ErrorCode::kInput, fmt::format("variance and bias of {} renders; at least 2 are needed", n_renders_));
-  const double k = static_cast<double>(n_renders_);
-  Result result;
-  result.n_renders = n_renders_;
-  double variance = 0, squared_bias = 0, reference_sum = 0;
-  for (size_t p = 0; p < finite_.size(); ++p) {
-    ++(finite_[p] ? result.n_pixels : result.n_non_finite);
-    if (!finite_[p]) continue;
-    const Pixel pixel(references_.front(), references_, p);
-    const double weight = 1 / (3 * (pixel.grey * pixel.grey + kOffset));
-    reference_sum += pixel.grey;
-    for (size_t c = 0; c < 3; ++c) {
-      const double mean = sum_[p * 3 + c] / k;  // of F - R
-      const double v = (sum_squares_[p * 3 + c] - k * mean * mean) / (k - 1);
-      // (F̄ - R1)(F̄ - R2) = (F̄ - R)^2 - ((R1 - R2)/2)^2; E of it is bias^2 + v/K.
-      const double half = 0.5 * (pixel.r1[c] - pixel.r2[c]);
-      variance += weight * v;
-      squared_bias += weight * (mean * mean - half * half - v / k);
-    }
-  }
-  const double n = static_cast<double>(result.n_pixels);
-  result.variance = variance / n;
-  result.squared_bias = squared_bias / n;
-  const auto mean_and_error = [&](const std::vector<double>& values) {
-    double sum = 0, squares = 0;
-    for (double v : values) sum += v;
-    for (double v : values) squares += (v - sum / k) * (v - sum / k);
-    return std::pair(sum / k, std::sqrt(squares / (k - 1) / k));
-  };
-  std::tie(result.rel_mse, result.rel_mse_error) = mean_and_error(rel_mse_);
-  const auto [mean, error] = mean_and_error(means_);
-  result.mean_ratio = mean / (reference_sum / n);
-  result.mean_ratio_error = error / (reference_sum / n);
   return result;
 }
 

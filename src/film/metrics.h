@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Errors of an image F against a reference R, and the split of the error of many renders into squared bias and
-// variance. N pixels, 3 channels c; R' is the mean of a pixel's three reference values. With two independent references
-// R1, R2 of equal quality, R is their mean, and where a formula is quadratic in F - R the product (F - R1)(F - R2)
-// takes the place of the square, so that the references' own noise cancels on average [the value can then be negative].
+// Errors of an image F against a reference R. N pixels, 3 channels c; R' is the mean of a pixel's three reference values.
+// With two independent references R1, R2 of equal quality, R is their mean, and where a formula is quadratic in F - R the
+// product (F - R1)(F - R2) takes the place of the square, so that the references' own noise cancels on average [the value
+// can then be negative].
 #pragma once
 
 #include <cstdint>
@@ -13,6 +13,9 @@
 #include "film/film.h"
 
 namespace covary {
+
+/// Keeps relative errors finite at black pixels.
+inline constexpr double kRelativeOffset = 0.01;
 
 enum class Metric { kRelMse, kMse, kMae, kMape, kFlip };
 
@@ -27,6 +30,9 @@ const std::vector<MetricInfo>& metrics();
 /// Throws Error(kUsage) that names the nearest metric.
 const MetricInfo& find_metric(const std::string& name);
 
+/// Whether pixel p (in rows, from 0) of an image of 3 channels has finite values only.
+bool pixel_is_finite(const Image& image, size_t p);
+
 struct MetricResult {
   double value = 0;           ///< mean over the finite pixels
   uint64_t n_pixels = 0;      ///< finite pixels
@@ -39,34 +45,5 @@ struct MetricResult {
 /// left.
 MetricResult compute_metric(Metric metric, const Image& image, std::span<const Image> references,
                             bool low_dynamic_range = false);
-
-/// Error of K independent renders of one scene, divided into variance and squared bias. All are relative as relMSE is:
-/// means over pixels and channels of x / (R'^2 + 0.01). Memory does not depend on K.
-class ErrorSplit {
- public:
-  /// With two independent references the squared bias is free of their noise; with one it contains the noise's square.
-  explicit ErrorSplit(std::vector<Image> references);
-  /// Adds a render with a seed of its own. Pixels that are not finite in any render or reference are left out.
-  void add(const Image& image);
-
-  struct Result {
-    uint64_t n_renders = 0, n_pixels = 0, n_non_finite = 0;
-    double rel_mse = 0;           ///< mean over the renders
-    double rel_mse_error = 0;     ///< standard error of that mean
-    double variance = 0;          ///< of one render; unbiased
-    double squared_bias = 0;      ///< unbiased, so it can be negative: rel_mse - variance
-    double mean_ratio = 0;        ///< mean of all renders over mean of the references
-    double mean_ratio_error = 0;  ///< its standard error over the renders
-  };
-  /// Throws Error(kInput) with fewer than two renders.
-  Result result() const;
-
- private:
-  std::vector<Image> references_;
-  uint64_t n_renders_ = 0;
-  std::vector<double> sum_, sum_squares_;  // of F - R per pixel and channel
-  std::vector<char> finite_;               // per pixel
-  std::vector<double> rel_mse_, means_;    // of each render
-};
 
 }  // namespace covary

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Error measures: values worked out by hand, the product form with two references, and the split into bias and variance.
+// Error measures: values worked out by hand, and the product form with two references.
 #include "film/metrics.h"
 
 #include <gtest/gtest.h>
@@ -94,50 +94,6 @@ TEST(Metrics, NamesAndSizes) {
                        "unknown metric 'relmsee'; did you mean 'relmse'?; accepted are relmse, mse, mae, mape, flip"));
   EXPECT_TRUE(contains(message_of([] { value(Metric::kMse, Image(4, 3, 3), {Image(3, 4, 3)}); }),
                        "the image has 4 x 3 pixels, the reference 3 x 4"));
-}
-
-// K = 24 renders with bias 0.05 and noise 0.1 against references with noise 0.1, weights 1/(R'^2 + 0.01).
-// The squared bias' standard deviation over N = 3 * 48^2 = 6912 values of weight w <= 1 is at most
-// sqrt((v/K)^2 * 2 + 4 b^2 v/K + ...) / sqrt(N) < 3.0e-4 with the references' products sqrt(2 b^2 r^2 + r^4) = 0.0122 -> 1.5e-4;
-// alpha = 1e-5, |z| < 4.42: tolerance 1.4e-3 of 0.05^2 w. The planted mistakes are larger: no correction for two references
-// adds r^2/2 w = 5e-3 w, where the mean weight w is 0.53.
-TEST(ErrorSplit, FindsBiasAndVariance) {
-  constexpr int kSize = 48, kRenders = 24;
-  const std::vector references{noisy(kSize, 0, 0.1, 1), noisy(kSize, 0, 0.1, 2)};
-  ErrorSplit two(references), one({references[0]});
-  for (int k = 0; k < kRenders; ++k) {
-    two.add(noisy(kSize, 0.05, 0.1, 100 + k));
-    one.add(noisy(kSize, 0.05, 0.1, 100 + k));
-  }
-  const double weight =
-      compute_metric(Metric::kRelMse, noisy(kSize, 1, 0, 3), std::vector{noisy(kSize, 0, 0, 3)}).value;
-  const ErrorSplit::Result result = two.result();
-  EXPECT_EQ(result.n_renders, 24u);
-  EXPECT_EQ(result.n_pixels, static_cast<uint64_t>(kSize * kSize));
-  EXPECT_NEAR(result.squared_bias, 0.0025 * weight, 1.4e-3 * weight);
-  // A variance over 24 * 6912 values of a uniform distribution: relative standard deviation sqrt(0.8 / 1.6e5) = 0.22 %.
-  EXPECT_NEAR(result.variance, 0.01 * weight, 0.01 * 0.012 * weight);
-  EXPECT_NEAR(result.rel_mse, result.variance + result.squared_bias, 1e-12);
-  // One reference: its own variance 0.01 counts as bias. That must not pass for 0.0025.
-  EXPECT_NEAR(one.result().squared_bias, 0.0125 * weight, 3e-3 * weight);
-  EXPECT_GT(std::abs(one.result().squared_bias - 0.0025 * weight), 1.4e-3 * weight);
-  // The mean of the clean image is 1 + 47/128; standard error of the renders' means 0.1 / sqrt(24 * 6912) = 2.5e-4, of the
-  // references' 8.5e-4, together 8.9e-4 / 1.37 relative.
-  EXPECT_NEAR(result.mean_ratio, 1 + 0.05 / (1 + 47.0 / 128), 4.42 * 8.9e-4 / 1.37);
-  EXPECT_NEAR(result.mean_ratio_error, 2.5e-4 / 1.37, 1.3e-4);
-}
-
-TEST(ErrorSplit, LeavesOutNonFinitePixelsOfAnyRender) {
-  ErrorSplit split({noisy(4, 0, 0, 1)});
-  Image broken = noisy(4, 0.1, 0.1, 2);
-  broken.data[5] = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_TRUE(contains(message_of([&] { split.result(); }), "variance and bias of 0 renders; at least 2 are needed"));
-  split.add(noisy(4, 0.1, 0.1, 3));
-  split.add(broken);
-  split.add(noisy(4, 0.1, 0.1, 4));
-  EXPECT_EQ(split.result().n_pixels, 15u);
-  EXPECT_EQ(split.result().n_non_finite, 1u);
-  EXPECT_TRUE(std::isfinite(split.result().squared_bias));
 }
 
 }  // namespace

@@ -14,6 +14,7 @@ ARROWS = {
     "core": [],
     "film": ["core"],
     "estimators": ["film"],
+    "lab": ["report"],
     "cuda": ["estimators"],
     "report": ["film"],
     "scene": ["core"],

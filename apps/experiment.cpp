@@ -1,0 +1,286 @@
+// SPDX-License-Identifier: Apache-2.0
+// covary experiment: scenes x methods x budgets x seeds, measured, as results and a report.
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <sstream>
+
+#include "commands.h"
+#include "commit.h"
+#include "core/content_hash.h"
+#include "core/error.h"
+#include "estimator_options.h"
+#include "film/output_file.h"
+#include "lab/builtin_suites.h"
+#include "lab/experiment.h"
+#include "lab/overrides.h"
+#include "lab/report_document.h"
+#include "progress.h"
+
+namespace covary {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ExperimentCommand {
+  std::string suite, output, cache, scenes;
+  std::string seeds;
+  std::vector<uint32_t> spp;
+  std::vector<double> seconds;
+  lab::Overrides overrides;
+  int threads = 0;
+  bool list = false, print = false, keep_passes = false, quiet = false;
+};
+
+std::atomic<bool> g_stop{false};
+
+extern "C" void stop_experiment(int signal) {
+  g_stop = true;
+  std::signal(signal, SIG_DFL);  // a second one ends the program at once
+}
+
+std::string read_file(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw Error(ErrorCode::kIo, "cannot open '" + path + "'");
+  std::stringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+std::string program_path() { return fs::read_symlink("/proc/self/exe").string(); }
+
+/// Version and commit; where the commit does not say what was built, the program's own content.
+std::string program_version() {
+  const std::string commit = COVARY_COMMIT;
+  std::string text = fmt::format("{} ({})", COVARY_VERSION, commit);
+  if (commit == "unknown" || commit.ends_with("-dirty")) text += " " + hash_text(hash_bytes(read_file(program_path())));
+  return text;
+}
+
+// ---- the suite -------------------------------------------------------------------------------------------------------
+
+void list_suites() {
+  for (const auto& [name, text] : lab::builtin_suites()) {
+    const lab::Suite suite = lab::parse_suite(std::string(text), name);
+    fmt::print("{:18} {}\n", name, suite.title);
+  }
+}
+
+lab::Suite builtin(const std::string& name) {
+  const auto found = lab::builtin_suites().find(name);
+  if (found != lab::builtin_suites().end()) return lab::parse_suite(std::string(found->second), name + ".json");
+  std::vector<std::string> names;
+  for (const auto& [known, text] : lab::builtin_suites()) names.push_back(known);
+  throw Error(ErrorCode::kUsage, fmt::format("no suite is named '{}'{}; expected SUITE.json, SCENE.xml or one of {}",
+                                             name, did_you_mean(name, names), fmt::join(names, ", ")));
+}
+
+/// The folder that a suite's scene files are relative to.
+std::string scenes_folder(const ExperimentCommand& command, const lab::Suite& suite) {
+  if (!command.scenes.empty()) return command.scenes;
+  const fs::path given(command.suite);
+  if (given.extension() == ".json") return (fs::absolute(given).parent_path() / suite.scene_root).string();
+  if (given.extension() == ".xml" || suite.scenes.empty()) return fs::current_path().string();
+  // A built-in suite: from the source tree, or as installed.
+  const fs::path program = fs::path(program_path()).parent_path();
+  if (!suite.scene_root.empty())
+    for (const fs::path& base : {fs::current_path(), program / ".." / "..", program / ".." / "share" / "covary"})
+      if (fs::exists(base / suite.scene_root / suite.scenes[0].file))
+        return (base / suite.scene_root).lexically_normal().string();
+  throw Error(ErrorCode::kUsage, fmt::format("the suite '{}' needs --scenes DIR, the folder that holds {}", suite.name,
+                                             suite.scenes[0].file));
+}
+
+lab::Suite load_suite(const ExperimentCommand& command) {
+  const fs::path given(command.suite);
+  lab::Suite suite;
+  if (given.extension() == ".json") {
+    suite = lab::parse_suite(read_file(command.suite), command.suite);
+  } else if (given.extension() == ".xml") {
+    if (!fs::exists(given)) throw Error(ErrorCode::kIo, "cannot open '" + command.suite + "'");
+    suite = builtin("compare");
+    // A scene called scene.xml is known by its folder.
+    const fs::path file = fs::absolute(given);
+    const bool common = file.stem().string().starts_with("scene");
+    lab::SceneEntry scene;
+    scene.name = common ? file.parent_path().filename().string() : file.stem().string();
+    scene.file = file.string();
+    suite.scenes.push_back(scene);
+  } else {
+    suite = builtin(command.suite);
+  }
+  lab::apply(command.overrides, suite);
+  return suite;
+}
+
+/// "5": seeds 1 to 5; "3,4,9": these.
+std::vector<uint64_t> parse_seeds(const std::string& text) {
+  std::vector<uint64_t> seeds;
+  std::stringstream words(text);
+  for (std::string word; std::getline(words, word, ',');) {
+    if (word.empty() || word.size() > 18 || word.find_first_not_of("0123456789") != std::string::npos)
+      throw Error(ErrorCode::kUsage,
+                  "--seeds '" + text + "': expected a number of seeds, or seeds separated by commas");
+    seeds.push_back(std::stoull(word));
+  }
+  if (seeds.size() != 1 || text.find(',') != std::string::npos) return seeds;
+  const uint64_t n = seeds[0];
+  if (n < 1 || n > 100000) throw Error(ErrorCode::kUsage, "--seeds '" + text + "': expected 1 to 100000 seeds");
+  seeds.clear();
+  for (uint64_t s = 1; s <= n; ++s) seeds.push_back(s);
+  return seeds;
+}
+
+// ---- progress --------------------------------------------------------------------------------------------------------
+
+/// One line on a terminal, drawn again and again; elsewhere a line every ten seconds. Failures stay.
+class ProgressPrinter {
+ public:
+  explicit ProgressPrinter(bool quiet) : quiet_(quiet), terminal_(isatty(2) == 1) {}
+  ~ProgressPrinter() { clear(); }
+
+  void print(const lab::Progress& p) {
+    using Kind = lab::Progress::Kind;
+    if (p.kind == Kind::kFailed) {
+      clear();
+      fmt::print(stderr, "failed: {}\n", p.what);
+      return;
+    }
+    const auto now = std::chrono::steady_clock::now();
+    if (quiet_ || (!terminal_ && now < next_)) return;
+    next_ = now + std::chrono::seconds(10);
+    const std::string left = p.seconds_left > 0 ? ", " + format_duration(p.seconds_left) + " left" : "";
+    const std::string line = fmt::format("[{}/{}{}] {}", p.done, p.total, left, p.what);
+    fmt::print(stderr, fmt::runtime(terminal_ ? "\r{}\033[K" : "{}\n"), line);
+    std::fflush(stderr);
+    drawn_ = true;
+  }
+  void clear() {
+    if (terminal_ && drawn_) std::fputs("\r\033[K", stderr);
+    drawn_ = false;
+  }
+
+ private:
+  bool quiet_, terminal_, drawn_ = false;
+  std::chrono::steady_clock::time_point next_{};
+};
+
+// ---- the command -----------------------------------------------------------------------------------------------------
+
+lab::PlanContext plan_context() {
+  lab::PlanContext context;
+  context.program_version = program_version();
+  for (const auto& [option, estimators] : estimators_of_option()) context.estimator_options.insert(option);
+  context.estimator_options.insert("--variance");  // the other name of --penalty
+  context.pair_estimators = {"iicv", "cv-baseline", "iduw"};
+  return context;
+}
+
+void write_results(const lab::Results& results, const std::string& folder) {
+  write_text_file(folder + "/results.json",
+                  to_json(results).dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+  write_text_file(folder + "/results.csv", to_csv(results));
+  nlohmann::ordered_json document = lab::report_document(results);
+  std::vector<ReportImage> images;
+  lab::add_pictures(results, document, images);
+  write_report(folder + "/report.html", document, images);
+}
+
+void print_summary(const lab::Results& results, const std::string& folder) {
+  const lab::Suite& suite = results.suite;
+  fmt::print(stderr, "{:20} {:>10} {:>12} {:>14} {:>14}\n", "method", "budget", "relMSE", "equal samples",
+             "equal time");
+  const auto factor = [](double value) {
+    return std::isfinite(value) ? fmt::format("{:.2f}x", value) : std::string("-");
+  };
+  for (const lab::Summary& s : results.summaries)
+    fmt::print(stderr, "{:20} {:>10} {:>12.4g} {:>14} {:>14}\n", suite.methods[s.method].name,
+               suite.budgets[s.budget].label(), s.relmse, factor(s.equal_sample.value), factor(s.equal_time.value));
+  for (const std::string& warning : results.warnings) fmt::print(stderr, "warning: {}\n", warning);
+  fmt::print(stderr, "{}/report.html, results.json, results.csv\n", folder);
+}
+
+void experiment(ExperimentCommand command) {
+  if (command.list) return list_suites();
+  if (command.suite.empty())
+    throw Error(ErrorCode::kUsage, "no suite given; expected SUITE.json, SCENE.xml or a name that --list shows");
+  if (!command.seeds.empty()) command.overrides.seeds = parse_seeds(command.seeds);
+  for (uint32_t spp : command.spp) command.overrides.budgets.push_back({spp, 0});
+  for (double seconds : command.seconds) command.overrides.budgets.push_back({0, seconds});
+  const lab::Suite suite = load_suite(command);
+  if (command.print) return fmt::print("{}\n", lab::to_json(suite).dump(2));
+  if (command.output.empty()) throw Error(ErrorCode::kUsage, "no folder for the results given; use -o DIR");
+  std::error_code error;
+  fs::create_directories(command.output, error);
+  if (error) throw Error(ErrorCode::kIo, fmt::format("cannot make the folder {}: {}", command.output, error.message()));
+
+  ProgressPrinter printer(command.quiet);
+  lab::ExperimentOptions options;
+  options.program = program_path();
+  options.cache_folder = fs::absolute(command.cache.empty() ? command.output + "/cache" : command.cache).string();
+  options.scenes_folder = scenes_folder(command, suite);
+  options.context = plan_context();
+  options.max_pixels = command.overrides.quick ? lab::kQuickPixels : 0;
+  options.threads = command.threads;
+  options.keep_passes = command.keep_passes;
+  options.stop = &g_stop;
+  options.progress = [&](const lab::Progress& p) { printer.print(p); };
+  g_stop = false;
+  std::signal(SIGINT, stop_experiment);
+  std::signal(SIGTERM, stop_experiment);
+  lab::Results results = lab::run_experiment(suite, options);
+  printer.clear();
+  results.version = options.context.program_version;
+  results.command = command_line();
+  results.date = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
+  results.machine = lab::machine_facts();
+  write_results(results, command.output);
+  if (!command.quiet) print_summary(results, command.output);
+  if (!results.failures.empty())
+    throw Error(ErrorCode::kInput,
+                fmt::format("{} of the experiment's parts failed; {}/results.json says which and why, "
+                            "and the same command tries them again",
+                            results.failures.size(), command.output));
+}
+
+}  // namespace
+
+void add_experiment(CLI::App& app) {
+  const auto o = std::make_shared<ExperimentCommand>();
+  CLI::App* command = app.add_subcommand("experiment", "Compare methods over scenes, budgets and seeds");
+  command->add_option("SUITE", o->suite, "A suite (JSON), a scene (XML), or the name of a built-in suite");
+  command->add_option("-o,--output", o->output, "Folder for report.html, results.json and results.csv");
+  command->add_flag("--list", o->list, "List the built-in suites");
+  command->add_flag("--print", o->print, "Print the suite as it would be run, as a start for one's own");
+  command->add_option("--scenes", o->scenes, "Folder of the suite's scene files");
+  command->add_option("--cache", o->cache, "Folder of finished runs; default: cache in the output folder");
+  command->add_flag("--quick", o->overrides.quick,
+                    "Small: 3 seeds, up to 192 samples per pixel, frames of up to 32400 pixels");
+  const auto list = [](CLI::Option* option) { option->delimiter(',')->group("In place of the suite's"); };
+  const auto single = [](CLI::Option* option) { option->group("In place of the suite's"); };
+  single(command->add_option("--seeds", o->seeds, "A number of seeds, or seeds separated by commas"));
+  list(command->add_option("--spp", o->spp, "Budgets in samples per pixel")->check(CLI::Range(1u, 1u << 30)));
+  list(command->add_option("--time", o->seconds, "Budgets in seconds")->check(CLI::PositiveNumber));
+  single(command->add_option("--crop", o->overrides.crop, "X,Y,WIDTH,HEIGHT, or WIDTHxHEIGHT in the middle"));
+  single(command->add_option("--resolution", o->overrides.resolution, "WIDTHxHEIGHT of the frames"));
+  list(command->add_option("--scenes-only", o->overrides.scenes, "Only these of its scenes"));
+  list(command->add_option("--methods-only", o->overrides.methods, "Only these of its methods, and the baseline"));
+  single(command->add_option("--baseline", o->overrides.baseline, "Method that ratios refer to"));
+  single(command->add_option("--reference-spp", o->overrides.reference_spp,
+                             "Samples per pixel of each of the two halves of the references"));
+  single(
+      command->add_option("--reference", o->overrides.reference_files, "One or two references (EXR)")->expected(1, 2));
+  command->add_option("--threads", o->threads, "Threads of each render; default: all")->check(CLI::Range(1, 4096));
+  command->add_flag("--keep-passes", o->keep_passes, "Keep the films of all passes in the cache");
+  command->add_flag("--quiet", o->quiet, "Failures only");
+  command->callback([o] { experiment(*o); });
+}
+
+}  // namespace covary

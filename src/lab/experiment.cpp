@@ -1,0 +1,322 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/experiment.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <map>
+#include <set>
+
+#include "core/content_hash.h"
+#include "core/error.h"
+#include "core/shell_text.h"
+#include "film/image_file.h"
+#include "lab/measure.h"
+#include "lab/process.h"
+#include "lab/runner.h"
+
+namespace covary::lab {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Guesses the time left from how long the runs took that were really done.
+class Clock {
+ public:
+  void add_planned(double work) { work_left_ += work, ++runs_left_; }
+  void remove_planned(double work) { work_left_ -= work, --runs_left_; }
+  void took(double work, double seconds) { work_ += work, seconds_ += seconds, ++runs_; }
+  double seconds_left() const {
+    if (runs_ == 0) return 0;
+    return work_ > 0 ? work_left_ * seconds_ / work_
+                     : static_cast<double>(runs_left_) * seconds_ / static_cast<double>(runs_);
+  }
+
+ private:
+  double work_left_ = 0, work_ = 0, seconds_ = 0;
+  size_t runs_left_ = 0, runs_ = 0;
+};
+
+class Experiment {
+ public:
+  Experiment(const Suite& suite, const ExperimentOptions& options)
+      : options_(options),
+        cache_(options.cache_folder),
+        runner_(cache_, options.program, options.threads, options.stop) {
+    results_.suite = suite;
+  }
+
+  Results run() {
+    const size_t n = results_.suite.scenes.size();
+    for (size_t s = 0; s < n && !stopped(); ++s) look_at(s);
+    while (results_.scenes.size() < n)
+      results_.scenes.push_back({SceneInstance{results_.suite.scenes[results_.scenes.size()]}, {}});
+    plan();
+    for (size_t s = 0; s < n && !stopped(); ++s)
+      if (usable_[s] && make_reference(s)) make_runs(s);
+    if (stopped())
+      throw Error(ErrorCode::kIo,
+                  fmt::format("interrupted after {} of {} runs; the same command continues", done_, total_));
+    for (size_t s = 0; s < n; ++s)
+      if (usable_[s]) measure_scene(s);
+    compare_cells(results_);
+    collect_warnings();
+    warn_of_noisy_references();
+    results_.complete = results_.failures.empty();
+    return std::move(results_);
+  }
+
+ private:
+  bool stopped() const { return options_.stop && options_.stop->load(); }
+
+  void report(Progress::Kind kind, const std::string& what) {
+    if (options_.progress) options_.progress({done_, total_, clock_.seconds_left(), what, kind});
+  }
+
+  /// Size and hash of a scene, from the program itself: a scene that crashes the reader must not end the experiment.
+  void look_at(size_t index) {
+    SceneInstance scene{results_.suite.scenes[index]};
+    scene.file = (fs::path(options_.scenes_folder) / scene.entry.file).string();
+    std::vector<std::string> command{options_.program, "info", scene.file, "--json"};
+    for (const std::string& define : scene.entry.defines) command.insert(command.end(), {"-D", define});
+    report(Progress::Kind::kStarted, scene.entry.name + ", reading");
+    const ProcessResult process = run_process(command, options_.stop);
+    std::string message = process.errors;
+    if (process.ok()) try {
+        const nlohmann::json info = nlohmann::json::parse(process.output);
+        scene.hash = info.at("scene_hash");
+        place(scene, info.at("frame").at(0), info.at("frame").at(1), options_.max_pixels);
+        usable_.push_back(true);
+        results_.scenes.push_back({scene, {}});
+        return;
+      } catch (const std::exception& error) {
+        message = error.what();
+      }
+    usable_.push_back(false);
+    results_.scenes.push_back({scene, {}});
+    if (!stopped()) {
+      command[0] = "covary";
+      fail({scene.entry.name, "", "", shell_text(command), message, process.exit_code, 0});
+    }
+  }
+
+  void plan() {
+    usable_.resize(results_.scenes.size(), false);
+    runs_.resize(results_.scenes.size());
+    references_.resize(results_.scenes.size());
+    for (size_t s = 0; s < results_.scenes.size(); ++s) {
+      if (!usable_[s]) continue;
+      const SceneInstance& scene = results_.scenes[s].scene;
+      if (results_.suite.reference_of(scene.entry).files.empty())
+        references_[s] = reference_runs(results_.suite, scene, options_.context);
+      runs_[s] = runs_of_scene(results_.suite, s, scene, options_.context);
+      for (const std::vector<Run>* runs : {&references_[s], &runs_[s]})
+        for (const Run& run : *runs) ++total_, clock_.add_planned(run.work);
+    }
+  }
+
+  /// A run from the cache or a new one.
+  std::optional<RunRecord> obtain(const Run& run, const std::string& what, RunFailure* failure) {
+    std::optional<RunRecord> record = runner_.find(run);
+    if (!record) {
+      report(Progress::Kind::kStarted, what);
+      const auto start = std::chrono::steady_clock::now();
+      Runner::Result result = runner_.execute(run, results_.scenes[run.scene].scene);
+      clock_.took(run.work, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+      if (result.failure) *failure = *result.failure;
+      record = result.record;
+    }
+    ++done_, clock_.remove_planned(run.work);
+    return record;
+  }
+
+  bool make_reference(size_t s) {
+    SceneResult& scene = results_.scenes[s];
+    const ReferencePlan& plan = results_.suite.reference_of(scene.scene.entry);
+    scene.reference.spp = plan.spp;
+    if (!plan.files.empty()) {
+      scene.reference.origin = "given";
+      for (const std::string& file : plan.files)
+        scene.reference.files.push_back(
+            fs::path(file).is_absolute() ? file : (fs::path(options_.scenes_folder) / file).string());
+      return true;
+    }
+    for (Run& run : references_[s]) {
+      run.scene = s;
+      RunFailure failure;
+      const auto record =
+          obtain(run, fmt::format("{}, reference, seed {}", scene.scene.entry.name, run.seed), &failure);
+      if (!record) {
+        usable_[s] = false;
+        if (!stopped())
+          fail({scene.scene.entry.name, "reference", "", failure.command, failure.message, failure.exit_code,
+                runs_[s].size()});
+        return false;
+      }
+      runner_.remove_passes(run.passes_key);
+      scene.reference.files.push_back(record->image);
+      scene.reference.seconds += record->render_seconds;
+      scene.reference.origin += (scene.reference.origin.empty() ? "" : "; ") + record->command;
+    }
+    return true;
+  }
+
+  void make_runs(size_t s) {
+    const Suite& suite = results_.suite;
+    const std::string& name = suite.scenes[s].name;
+    std::map<std::pair<size_t, size_t>, size_t> failed_cells;  // method, budget -> index into failures
+    const std::vector<Run>& runs = runs_[s];
+    for (size_t i = 0; i < runs.size() && !stopped(); ++i) {
+      const Run& run = runs[i];
+      const std::pair cell{run.method, run.budget};
+      if (const auto failed = failed_cells.find(cell); failed != failed_cells.end()) {
+        ++results_.failures[failed->second].not_tried;
+        ++done_, clock_.remove_planned(run.work);
+      } else {
+        const std::string &method = suite.methods[run.method].name, budget = suite.budgets[run.budget].label();
+        RunFailure failure;
+        const auto record = obtain(run, fmt::format("{}, {}, {}, seed {}", name, method, budget, run.seed), &failure);
+        if (record) {
+          records_[run.key] = *record;
+        } else if (!stopped()) {
+          failed_cells[cell] = results_.failures.size();
+          fail({name, method, budget, failure.command, failure.message, failure.exit_code, 0});
+        }
+      }
+      const bool last_of_passes = i + 1 == runs.size() || runs[i + 1].passes_key != run.passes_key;
+      if (last_of_passes && !stopped() && !options_.keep_passes) runner_.remove_passes(run.passes_key);
+    }
+  }
+
+  void measure_scene(size_t s) {
+    SceneResult& scene = results_.scenes[s];
+    if (scene.reference.files.empty()) return;
+    std::vector<Image> references;
+    try {
+      for (const std::string& file : scene.reference.files) references.push_back(read_window(file, scene.scene));
+      check_seeds(scene);
+    } catch (const std::exception& error) {
+      fail({scene.scene.entry.name, "reference", "", "", error.what(), 1, 0});
+      return;
+    }
+    const std::string reference_key = reference_identity(s);
+    for (size_t m = 0; m < results_.suite.methods.size(); ++m)
+      for (size_t b = 0; b < results_.suite.budgets.size(); ++b) {
+        Cell cell{s, m, b};
+        std::vector<std::string> keys;
+        for (const Run& run : runs_[s])
+          if (const auto record = records_.find(run.key);
+              run.method == m && run.budget == b && record != records_.end()) {
+            cell.runs.push_back({run.seed, record->second});
+            keys.push_back(run.key);
+          }
+        if (cell.runs.empty()) continue;
+        const MethodEntry& method = results_.suite.methods[m];
+        const Budget& budget = results_.suite.budgets[b];
+        try {
+          measure(cell, scene.scene, references, method.unbiased, budget, cache_, keys, reference_key);
+          scene.reference.relmse = cell.split.n_references == 2 ? cell.split.reference_error : kNone;
+          results_.cells.push_back(std::move(cell));
+        } catch (const std::exception& error) {
+          fail({scene.scene.entry.name, method.name, budget.label(), "", error.what(), 1, 0});
+        }
+      }
+  }
+
+  /// What errors of images depend on besides the image.
+  std::string reference_identity(size_t s) const {
+    const SceneResult& scene = results_.scenes[s];
+    std::string text = options_.context.program_version;
+    for (const Run& run : references_[s]) text += "\n" + run.key;
+    if (references_[s].empty())
+      for (const std::string& file : scene.reference.files)
+        text += fmt::format("\n{} {} {}", fs::absolute(file).string(), fs::file_size(file),
+                            fs::last_write_time(file).time_since_epoch().count());
+    return text;
+  }
+
+  /// References that were given and tell their seeds must not share one with a run or with each other.
+  void check_seeds(const SceneResult& scene) {
+    std::set<std::string> used;
+    for (uint64_t seed : results_.suite.seeds) used.insert(fmt::format("{}", seed));
+    for (const std::string& file : scene.reference.files) {
+      const auto attributes = inspect_image(file).attributes;
+      const auto hash = attributes.find("covary:scene_hash");
+      if (hash != attributes.end() && hash->second != scene.scene.hash)
+        results_.warnings.push_back(
+            fmt::format("{}: the reference {} is of another version of the scene", scene.scene.entry.name, file));
+      const auto seeds = attributes.find("covary:seed");
+      if (seeds == attributes.end()) continue;
+      for (size_t begin = 0; begin <= seeds->second.size();) {
+        const size_t end = std::min(seeds->second.find(',', begin), seeds->second.size());
+        const std::string seed = seeds->second.substr(begin, end - begin);
+        if (!used.insert(seed).second)
+          throw Error(ErrorCode::kInput,
+                      fmt::format("{}: the seed {} is also that of a run or of the other reference; they "
+                                  "share samples, and no error can be measured",
+                                  file, seed));
+        begin = end + 1;
+      }
+    }
+  }
+
+  void collect_warnings() {
+    const Suite& suite = results_.suite;
+    for (const Cell& cell : results_.cells) {
+      const std::string where = fmt::format("{}, {}, {}: ", suite.scenes[cell.scene].name,
+                                            suite.methods[cell.method].name, suite.budgets[cell.budget].label());
+      for (const std::string& text : cell.suspicions) results_.warnings.push_back(where + text);
+      if (std::abs(cell.time_ratio - 1) > 0.05)
+        results_.warnings.push_back(fmt::format("{}took {:.3g} s, {:+.0f} % off the budget", where,
+                                                cell.method_seconds.value, 100 * (cell.time_ratio - 1)));
+    }
+  }
+
+  /// One sentence a scene, about the method with the smallest error.
+  void warn_of_noisy_references() {
+    for (size_t s = 0; s < results_.scenes.size(); ++s) {
+      const Cell* best = nullptr;
+      for (const Cell& cell : results_.cells)
+        if (cell.scene == s && (!best || cell.split.relative.error.value < best->split.relative.error.value))
+          best = &cell;
+      if (!best || best->split.n_references < 2 || best->split.reference_error < best->split.relative.error.value)
+        continue;
+      results_.warnings.push_back(
+          fmt::format("{}: the reference's own relMSE, {:.2g}, is above that of the best method, {:.2g}: errors are "
+                      "still unbiased, but a "
+                      "reference of more samples would make them surer",
+                      results_.suite.scenes[s].name, best->split.reference_error, best->split.relative.error.value));
+    }
+  }
+
+  void fail(Failure failure) {
+    while (!failure.message.empty() && failure.message.back() == '\n') failure.message.pop_back();
+    report(Progress::Kind::kFailed,
+           fmt::format("{}{}{}: {}", failure.scene, failure.method.empty() ? "" : ", " + failure.method,
+                       failure.budget.empty() ? "" : ", " + failure.budget,
+                       failure.message.substr(0, failure.message.find('\n'))));
+    results_.failures.push_back(std::move(failure));
+  }
+
+  const ExperimentOptions& options_;
+  Cache cache_;
+  Runner runner_;
+  Results results_;
+  std::vector<bool> usable_;                         // per scene
+  std::vector<std::vector<Run>> runs_, references_;  // per scene
+  std::map<std::string, RunRecord> records_;         // by key
+  Clock clock_;
+  size_t done_ = 0, total_ = 0;
+};
+
+}  // namespace
+
+Results run_experiment(const Suite& suite, const ExperimentOptions& options) {
+  const std::vector<std::string> problems = validate(suite);
+  if (!problems.empty()) throw Error(ErrorCode::kUsage, fmt::format("{}", fmt::join(problems, "\n")));
+  return Experiment(suite, options).run();
+}
+
+}  // namespace covary::lab

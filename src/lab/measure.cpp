@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/measure.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/content_hash.h"
+#include "core/error.h"
+#include "film/alignment.h"
+#include "film/image_file.h"
+#include "film/metrics.h"
+
+namespace covary::lab {
+namespace {
+
+/// Errors of one image that are kept: the rest costs less than reading them.
+struct ImageErrors {
+  double mae = 0, flip = 0, predicted_relmse = kNone;
+};
+
+/// relMSE that the file's standard errors predict, with the references in the denominator; none where it has no such layer.
+double predicted_relmse(const std::string& path, const SceneInstance& scene, const std::vector<Image>& references) {
+  const ImageInfo info = inspect_image(path);
+  const bool has_errors = std::any_of(info.channels.begin(), info.channels.end(),
+                                      [](const ExrFile::Channel& c) { return c.name == "StdError.R"; });
+  if (!has_errors) return kNone;
+  const Image errors = read_window(path, scene, "StdError");
+  double sum = 0;
+  size_t n = 0;
+  for (size_t p = 0; p < errors.data.size() / 3; ++p) {
+    double grey = 0, squares = 0;
+    for (size_t i = 3 * p; i < 3 * p + 3; ++i) {
+      grey += (static_cast<double>(references.front().data[i]) + references.back().data[i]) / 6;
+      squares += static_cast<double>(errors.data[i]) * errors.data[i] / 3;
+    }
+    const double value = squares / (grey * grey + kRelativeOffset);
+    if (std::isfinite(value)) sum += value, ++n;
+  }
+  return sum / static_cast<double>(n);
+}
+
+double number_or_none(const nlohmann::json& json, const char* name) {
+  return json.contains(name) && json[name].is_number() ? json[name].get<double>() : kNone;
+}
+
+ImageErrors image_errors(const Image& image, const std::string& path, const SceneInstance& scene,
+                         const std::vector<Image>& references, const Cache& cache, const std::string& key) {
+  if (const std::optional<nlohmann::json> kept = cache.read_json("measures", key + ".json"))
+    return {number_or_none(*kept, "mae"), number_or_none(*kept, "flip"), number_or_none(*kept, "predicted_relmse")};
+  const ImageErrors errors{compute_metric(Metric::kMae, image, references).value,
+                           compute_metric(Metric::kFlip, image, references).value,
+                           predicted_relmse(path, scene, references)};
+  cache.write_json("measures", key + ".json",
+                   {{"mae", errors.mae}, {"flip", errors.flip}, {"predicted_relmse", errors.predicted_relmse}});
+  return errors;
+}
+
+Image mean_of(const std::vector<Image>& images) {
+  Image mean(images[0].width, images[0].height, 3);
+  for (size_t i = 0; i < mean.data.size(); ++i) {
+    double sum = 0;
+    for (const Image& image : images) sum += static_cast<double>(image.data[i]);
+    mean.data[i] = static_cast<float>(sum / static_cast<double>(images.size()));
+  }
+  return mean;
+}
+
+template <typename Value>
+std::vector<double> values_of(const Cell& cell, Value&& value) {
+  std::vector<double> values;
+  for (const RunResult& run : cell.runs) values.push_back(value(run));
+  return values;
+}
+
+double relmse(const RunResult& run) { return run.relmse; }
+double seconds(const RunResult& run) { return run.record.method_seconds(); }
+double mean(const std::vector<double>& values) { return mean_estimate(values).value; }
+
+double mean_without(const std::vector<double>& values, size_t left_out) {
+  const double n = static_cast<double>(values.size());
+  return (mean(values) * n - values[left_out]) / (n - 1);
+}
+
+/// 1 / (mean error x mean seconds).
+Estimate efficiency(const Cell& cell) {
+  const std::vector<double> errors = values_of(cell, relmse), times = values_of(cell, seconds);
+  return jackknife(1 / (mean(errors) * mean(times)), errors.size(),
+                   [&](size_t i) { return 1 / (mean_without(errors, i) * mean_without(times, i)); });
+}
+
+/// Values of the runs of both cells that have the same seed.
+template <typename Value>
+std::pair<std::vector<double>, std::vector<double>> in_pairs(const Cell& a, const Cell& b, Value&& value) {
+  std::pair<std::vector<double>, std::vector<double>> result;
+  for (const RunResult& run : a.runs)
+    for (const RunResult& other : b.runs)
+      if (run.seed == other.seed) result.first.push_back(value(run)), result.second.push_back(value(other));
+  return result;
+}
+
+template <typename Value>
+Estimate ratio(const Cell& numerator, const Cell& denominator, Value&& value) {
+  const auto [a, b] = in_pairs(numerator, denominator, value);
+  return ratio_of_means(a, b);
+}
+
+double published(const std::map<std::string, std::map<std::string, std::map<std::string, double>>>& table,
+                 const std::string& scene, const std::string& method, const std::string& budget) {
+  const auto s = table.find(scene);
+  if (s == table.end()) return kNone;
+  const auto m = s->second.find(method);
+  if (m == s->second.end()) return kNone;
+  const auto b = m->second.find(budget);
+  return b == m->second.end() ? kNone : b->second;
+}
+
+/// Error against samples over all budgets in samples, with the seeds that all of them have.
+Slope slope_of(const Results& results, size_t scene, size_t method) {
+  std::vector<double> samples;
+  std::vector<const Cell*> cells;
+  for (size_t b = 0; b < results.suite.budgets.size(); ++b)
+    if (const Cell* cell = results.find(scene, method, b); cell && results.suite.budgets[b].spp) {
+      samples.push_back(cell->samples_per_pixel);
+      cells.push_back(cell);
+    }
+  std::vector<std::vector<double>> errors(cells.size());
+  for (uint64_t seed : results.suite.seeds) {
+    std::vector<double> of_seed;
+    for (const Cell* cell : cells)
+      for (const RunResult& run : cell->runs)
+        if (run.seed == seed) of_seed.push_back(run.relmse);
+    if (of_seed.size() != cells.size()) continue;
+    for (size_t b = 0; b < cells.size(); ++b) errors[b].push_back(of_seed[b]);
+  }
+  return {scene, method, convergence_slope(samples, errors)};
+}
+
+Summary summary_of(const Results& results, size_t method, size_t budget) {
+  std::vector<Estimate> equal_sample, equal_time, error, published_ratio;
+  for (size_t s = 0; s < results.scenes.size(); ++s)
+    if (const Cell* cell = results.find(s, method, budget)) {
+      equal_sample.push_back(cell->equal_sample);
+      equal_time.push_back(cell->equal_time);
+      error.push_back(cell->split.relative.error);
+      published_ratio.push_back({cell->published_ratio, kNone, kNone, kNone});
+    }
+  Summary summary{method, budget};
+  summary.equal_sample = geometric_mean(equal_sample);
+  summary.equal_time = geometric_mean(equal_time, &summary.n_scenes);  // exists for samples and for seconds
+  summary.relmse = geometric_mean(error).value;
+  summary.published_ratio = geometric_mean(published_ratio).value;
+  return summary;
+}
+
+}  // namespace
+
+Image read_window(const std::string& path, const SceneInstance& scene, const std::string& layer) {
+  const PlacedImage source = read_image(path, layer);
+  const CropWindow &have = source.place.window, &want = scene.window;
+  if (source.place.frame_width != scene.frame_width || source.place.frame_height != scene.frame_height)
+    throw Error(ErrorCode::kInput, fmt::format("{} has a frame of {} x {} pixels, the scene one of {} x {}", path,
+                                               source.place.frame_width, source.place.frame_height, scene.frame_width,
+                                               scene.frame_height));
+  if (want.x < have.x || want.y < have.y || want.x + want.width > have.x + have.width ||
+      want.y + want.height > have.y + have.height)
+    throw Error(ErrorCode::kInput, fmt::format("{} ({}) does not cover {}", path, text_of(have), text_of(want)));
+  return cut(source, want);
+}
+
+void measure(Cell& cell, const SceneInstance& scene, const std::vector<Image>& references, bool unbiased,
+             const Budget& budget, const Cache& cache, const std::vector<std::string>& run_keys,
+             const std::string& reference_key) {
+  const size_t n = cell.runs.size();
+  std::vector<Image> images(n);
+  tbb::parallel_for(size_t{0}, n, [&](size_t s) {
+    RunResult& run = cell.runs[s];
+    images[s] = read_window(run.record.image, scene);
+    const std::string key = hash_text(hash_bytes(run_keys[s] + reference_key)) + hash_text(hash_bytes(reference_key));
+    const ImageErrors errors = image_errors(images[s], run.record.image, scene, references, cache, key);
+    run.mae = errors.mae, run.flip = errors.flip, run.predicted_relmse = errors.predicted_relmse;
+  });
+  cell.split = split_error(images, references);
+  for (size_t s = 0; s < n; ++s) {
+    cell.runs[s].relmse = cell.split.relative.of_render[s];
+    cell.runs[s].mse = cell.split.absolute.of_render[s];
+    cell.runs[s].mean_ratio = cell.split.mean_ratio_of_render[s];
+  }
+  cell.mae = mean_estimate(values_of(cell, [](const RunResult& r) { return r.mae; }));
+  cell.flip = mean_estimate(values_of(cell, [](const RunResult& r) { return r.flip; }));
+  if (n > 1) {
+    const Image average = mean_of(images);
+    cell.mae_of_mean = compute_metric(Metric::kMae, average, references).value;
+    cell.flip_of_mean = compute_metric(Metric::kFlip, average, references).value;
+  }
+  cell.load_seconds = mean_estimate(values_of(cell, [](const RunResult& r) { return r.record.load_seconds; }));
+  cell.render_seconds = mean_estimate(values_of(cell, [](const RunResult& r) { return r.record.render_seconds; }));
+  cell.estimate_seconds = mean_estimate(values_of(cell, [](const RunResult& r) { return r.record.estimate_seconds; }));
+  cell.then_seconds = mean_estimate(values_of(cell, [](const RunResult& r) { return r.record.then_seconds; }));
+  cell.method_seconds = mean_estimate(values_of(cell, seconds));
+  if (budget.seconds > 0) cell.time_ratio = cell.method_seconds.value / budget.seconds;
+  cell.samples_per_pixel = mean(values_of(cell, [](const RunResult& r) { return r.record.samples_per_pixel; }));
+  for (const RunResult& run : cell.runs)
+    cell.peak_memory_bytes = std::max(cell.peak_memory_bytes, run.record.peak_memory_bytes);
+  cell.efficiency = efficiency(cell);
+  cell.predicted_over_true =
+      ratio_of_means(values_of(cell, [](const RunResult& r) { return r.predicted_relmse; }), values_of(cell, relmse));
+  cell.suspicions = suspicions(cell.split, unbiased);
+}
+
+void compare_cells(Results& results) {
+  const Suite& suite = results.suite;
+  size_t baseline = 0;
+  while (suite.methods[baseline].name != suite.baseline) ++baseline;
+  for (Cell& cell : results.cells) {
+    const std::string& scene = suite.scenes[cell.scene].name;
+    const std::string& method = suite.methods[cell.method].name;
+    const Budget& budget = suite.budgets[cell.budget];
+    cell.published_relmse = published(suite.published_relmse, scene, method, budget.key());
+    cell.published_ratio = published(suite.published_ratio, scene, method, budget.key());
+    const Cell* base = results.find(cell.scene, baseline, cell.budget);
+    if (!base) continue;
+    // With a budget in seconds the errors themselves are those of equal times.
+    const Estimate errors = ratio(*base, cell, relmse);
+    if (budget.seconds > 0) {
+      cell.equal_time = errors;
+      continue;
+    }
+    cell.equal_sample = errors;
+    cell.equal_time = ratio(*base, cell, [](const RunResult& r) { return r.relmse * seconds(r); });
+  }
+  for (size_t s = 0; s < results.scenes.size(); ++s)
+    for (size_t m = 0; m < suite.methods.size(); ++m)
+      if (Slope slope = slope_of(results, s, m); std::isfinite(slope.exponent.value)) results.slopes.push_back(slope);
+  for (size_t b = 0; b < suite.budgets.size(); ++b)
+    for (size_t m = 0; m < suite.methods.size(); ++m)
+      if (Summary summary = summary_of(results, m, b); summary.n_scenes > 0) results.summaries.push_back(summary);
+}
+
+}  // namespace covary::lab

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// Choices of the command line in place of a suite's own: smaller presets need no new file.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "lab/suite.h"
+
+namespace covary::lab {
+
+struct Overrides {
+  std::vector<uint64_t> seeds;
+  std::vector<Budget> budgets;
+  std::string crop, resolution;      ///< of every scene
+  std::vector<std::string> scenes;   ///< only these
+  std::vector<std::string> methods;  ///< only these, and the baseline
+  std::string baseline;
+  std::optional<uint32_t> reference_spp;
+  std::vector<std::string> reference_files;  ///< of every scene
+  bool quick = false;  ///< at most 3 seeds, 192 samples per pixel, 1024 in each half of a reference
+};
+
+/// Frames that the suite neither sizes nor crops have so many pixels at most in a quick experiment.
+inline constexpr int64_t kQuickPixels = 32400;
+
+/// Throws Error(kUsage) where a scene or method named is not in the suite.
+void apply(const Overrides& overrides, Suite& suite);
+
+}  // namespace covary::lab

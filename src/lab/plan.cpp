@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/plan.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include "core/content_hash.h"
+#include "core/error.h"
+
+namespace covary::lab {
+namespace {
+
+using Words = std::vector<std::string>;
+
+/// Whole numbers between separators; empty where the text is anything else.
+std::vector<int> numbers(const std::string& text, char separator) {
+  std::vector<int> result;
+  const char *at = text.data(), *end = at + text.size();
+  for (;;) {
+    int value = 0;
+    const auto [next, error] = std::from_chars(at, end, value);
+    if (error != std::errc() || value < 0) return {};
+    result.push_back(value);
+    if (next == end) return result;
+    if (*next != separator) return {};
+    at = next + 1;
+  }
+}
+
+CropWindow crop_window(const SceneInstance& scene) {
+  const std::string& text = scene.entry.crop;
+  if (text.empty()) return {0, 0, scene.frame_width, scene.frame_height};
+  CropWindow window;
+  if (const std::vector<int> c = numbers(text, ','); c.size() == 4) {
+    window = {c[0], c[1], c[2], c[3]};
+  } else if (const std::vector<int> size = numbers(text, 'x'); size.size() == 2) {
+    window = {(scene.frame_width - size[0]) / 2, (scene.frame_height - size[1]) / 2, size[0], size[1]};
+  } else {
+    throw Error(ErrorCode::kUsage,
+                fmt::format("scene '{}': crop '{}': expected X,Y,WIDTH,HEIGHT or WIDTHxHEIGHT, which "
+                            "lies in the middle",
+                            scene.entry.name, text));
+  }
+  if (window.width < 1 || window.height < 1 || window.x < 0 || window.y < 0 ||
+      window.x + window.width > scene.frame_width || window.y + window.height > scene.frame_height)
+    throw Error(ErrorCode::kUsage, fmt::format("scene '{}': crop '{}' does not fit into the {} x {} frame",
+                                               scene.entry.name, text, scene.frame_width, scene.frame_height));
+  return window;
+}
+
+std::string key_of(const std::string& kind, const PlanContext& context, const SceneInstance& scene,
+                   std::initializer_list<Words> lists) {
+  std::string text = kind + "\n" + context.program_version + "\n" + scene.hash + "\n";
+  for (const Words& words : lists) {
+    for (const std::string& word : words) text += word + "\n";
+    text += "\n";
+  }
+  // Two independent hashes: a key must be unique among all results ever kept in a cache.
+  return hash_text(hash_bytes(text)) + hash_text(hash_bytes(text + kind));
+}
+
+bool is_option(const std::string& word) {
+  return word.size() > 1 && word[0] == '-' && !(word[1] >= '0' && word[1] <= '9') && word[1] != '.';
+}
+
+/// The method's options that change the passes: without those of estimators, and one word for all pair estimators.
+Words pass_options(const Words& options, const PlanContext& context) {
+  Words kept;
+  std::string estimator = *context.pair_estimators.begin();
+  for (size_t i = 0; i < options.size(); ++i) {
+    const size_t equals = options[i].find('=');
+    const std::string name = options[i].substr(0, equals);
+    Words values;
+    if (equals != std::string::npos) values.push_back(options[i].substr(equals + 1));
+    const size_t first = i;
+    while (i + 1 < options.size() && !is_option(options[i + 1])) values.push_back(options[++i]);
+    if (name == "--estimator" && !values.empty())
+      estimator = values[0];
+    else if (!context.estimator_options.contains(name))
+      kept.insert(kept.end(), options.begin() + static_cast<std::ptrdiff_t>(first),
+                  options.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+  }
+  kept.push_back(context.pair_estimators.contains(estimator) ? "pair" : estimator);
+  return kept;
+}
+
+Words joined(std::initializer_list<Words> lists) {
+  Words all;
+  for (const Words& words : lists) all.insert(all.end(), words.begin(), words.end());
+  return all;
+}
+
+Words flattened(const std::vector<Words>& steps) {
+  Words all;
+  for (const Words& step : steps) {
+    all.insert(all.end(), step.begin(), step.end());
+    all.emplace_back("|");
+  }
+  return all;
+}
+
+}  // namespace
+
+Words SceneInstance::options() const {
+  Words words;
+  for (const std::string& define : entry.defines) words.insert(words.end(), {"-D", define});
+  if (!entry.resolution.empty()) words.insert(words.end(), {"--resolution", entry.resolution});
+  // Always given, so that a crop in the scene file itself plays no part.
+  words.insert(words.end(), {"--crop", fmt::format("{},{},{},{}", window.x, window.y, window.width, window.height)});
+  if (entry.max_depth) words.insert(words.end(), {"--max-depth", fmt::format("{}", *entry.max_depth)});
+  return words;
+}
+
+void place(SceneInstance& scene, int width, int height, int64_t max_pixels) {
+  const double pixels = static_cast<double>(width) * height;
+  if (max_pixels > 0 && scene.entry.resolution.empty() && scene.entry.crop.empty() &&
+      pixels > static_cast<double>(max_pixels)) {
+    const double factor = std::sqrt(static_cast<double>(max_pixels) / pixels);
+    scene.entry.resolution = fmt::format("{}x{}", std::max(1, static_cast<int>(width * factor)),
+                                         std::max(1, static_cast<int>(height * factor)));
+  }
+  if (!scene.entry.resolution.empty()) {
+    const std::vector<int> size = numbers(scene.entry.resolution, 'x');
+    if (size.size() != 2 || size[0] < 1 || size[1] < 1)
+      throw Error(ErrorCode::kUsage, fmt::format("scene '{}': resolution '{}': expected WIDTHxHEIGHT, e.g. 1280x720",
+                                                 scene.entry.name, scene.entry.resolution));
+    width = size[0], height = size[1];
+  }
+  scene.frame_width = width, scene.frame_height = height;
+  scene.window = crop_window(scene);
+}
+
+std::vector<Run> reference_runs(const Suite& suite, const SceneInstance& scene, const PlanContext& context) {
+  std::vector<Run> runs;
+  const uint32_t spp = suite.reference_of(scene.entry).spp;
+  for (uint64_t seed : kReferenceSeeds) {
+    Run run;
+    run.seed = seed;
+    run.options = joined({scene.options(),
+                          suite.common_options,
+                          {"--estimator", "none", "--spp", fmt::format("{}", spp), "--seed", fmt::format("{}", seed)}});
+    run.work = static_cast<double>(spp) * static_cast<double>(scene.n_pixels());
+    run.key = key_of("reference", context, scene, {run.options});
+    run.passes_key = run.key;
+    runs.push_back(std::move(run));
+  }
+  return runs;
+}
+
+std::vector<Run> runs_of_scene(const Suite& suite, size_t index, const SceneInstance& scene,
+                               const PlanContext& context) {
+  std::vector<Run> runs;
+  for (uint64_t seed : suite.seeds)
+    for (size_t b = 0; b < suite.budgets.size(); ++b) {
+      const Budget& budget = suite.budgets[b];
+      const Words amount = budget.spp ? Words{"--spp", fmt::format("{}", budget.spp)}
+                                      : Words{"--time", fmt::format("{:g}", budget.seconds)};
+      const Words seed_words{"--seed", fmt::format("{}", seed)};
+      const auto first = static_cast<std::ptrdiff_t>(runs.size());
+      for (size_t m = 0; m < suite.methods.size(); ++m) {
+        const MethodEntry& method = suite.methods[m];
+        Run run;
+        run.scene = index, run.method = m, run.budget = b, run.seed = seed;
+        run.options = joined({scene.options(), suite.common_options, method.options, amount, seed_words});
+        run.then = method.then;
+        run.work = budget.spp * static_cast<double>(scene.n_pixels());
+        run.key = key_of("run", context, scene, {run.options, flattened(run.then)});
+        // What a time budget renders depends on the method's speed: such passes belong to one run alone.
+        run.passes_key = budget.spp ? key_of("passes", context, scene,
+                                             {scene.options(), suite.common_options, amount, seed_words,
+                                              pass_options(method.options, context)})
+                                    : run.key;
+        runs.push_back(std::move(run));
+      }
+      // Sharers of passes side by side, in the order of the first of them.
+      for (auto at = runs.begin() + first; at != runs.end(); ++at)
+        std::stable_partition(at, runs.end(), [&, key = at->passes_key](const Run& r) { return r.passes_key == key; });
+    }
+  return runs;
+}
+
+}  // namespace covary::lab

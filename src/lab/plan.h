@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// From a suite to command lines: what to run, in which order, and under which keys results are kept.
+#pragma once
+
+#include <set>
+#include <string>
+#include <vector>
+
+#include "lab/suite.h"
+
+namespace covary::lab {
+
+/// A scene as found on disk, with the suite's choices applied.
+struct SceneInstance {
+  SceneEntry entry;
+  std::string file;  ///< path
+  std::string hash;  ///< of the scene's content
+  int frame_width = 0, frame_height = 0;
+  CropWindow window;
+  /// Options of `covary render` that choose frame, crop, depth and definitions.
+  std::vector<std::string> options() const;
+  uint64_t n_pixels() const { return static_cast<uint64_t>(window.width) * window.height; }
+};
+
+/// Frame and window of a scene whose own frame is `width` x `height`. `max_pixels` > 0 scales a frame that the suite neither
+/// sizes nor crops down to so many pixels. Throws Error(kUsage) for texts that are no size or crop, or a crop outside the frame.
+void place(SceneInstance& scene, int width, int height, int64_t max_pixels);
+
+/// One child process to run: a render and the commands that follow it.
+struct Run {
+  size_t scene = 0, method = 0, budget = 0;  ///< indices into the suite; method and budget mean nothing for references
+  uint64_t seed = 0;
+  std::vector<std::string> options;  ///< of `covary render SCENE`, without outputs
+  std::vector<std::vector<std::string>> then;
+  double work = 0;         ///< samples, for the time left
+  std::string key;         ///< names the result: hash of program, scene, options, seed
+  std::string passes_key;  ///< the same for all runs that can share the films of their passes
+};
+
+/// What does not change from run to run.
+struct PlanContext {
+  std::string program_version;  ///< part of every key
+  /// Options that only estimators read ("--k"): they leave the passes as they are.
+  std::set<std::string> estimator_options;
+  /// Estimators that need the same pair of passes.
+  std::set<std::string> pair_estimators;
+};
+
+/// Both halves of the reference that is to be rendered for a scene.
+std::vector<Run> reference_runs(const Suite& suite, const SceneInstance& scene, const PlanContext& context);
+
+/// All runs of scene number `index`: seeds outermost, so that an interrupted experiment has every method; runs that share
+/// passes follow one another.
+std::vector<Run> runs_of_scene(const Suite& suite, size_t index, const SceneInstance& scene,
+                               const PlanContext& context);
+
+}  // namespace covary::lab

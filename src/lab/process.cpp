@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/process.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstring>
+
+#include "core/error.h"
+
+namespace covary::lab {
+namespace {
+
+constexpr size_t kErrorsKept = 65536;
+
+struct Pipe {
+  int read = -1, write = -1;
+  Pipe() {
+    std::array<int, 2> ends{};
+    if (pipe2(ends.data(), O_CLOEXEC) != 0)
+      throw Error(ErrorCode::kIo, fmt::format("cannot make a pipe: {}", std::strerror(errno)));
+    read = ends[0], write = ends[1];
+  }
+  ~Pipe() {
+    close(read);
+    close_write();
+  }
+  Pipe(const Pipe&) = delete;
+  Pipe& operator=(const Pipe&) = delete;
+  void close_write() {
+    if (write >= 0) close(write);
+    write = -1;
+  }
+};
+
+/// In the child, between fork and exec: only calls that are safe there.
+[[noreturn]] void become(char* const* arguments, int output, int errors, pid_t parent) {
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (getppid() != parent) _exit(127);  // the parent died before the line above
+  const int nothing = open("/dev/null", O_RDONLY);
+  dup2(nothing, 0);
+  dup2(output, 1);
+  dup2(errors, 2);
+  std::signal(SIGINT, SIG_DFL);
+  std::signal(SIGTERM, SIG_DFL);
+  execv(arguments[0], arguments);
+  _exit(127);
+}
+
+/// Appends what can be read; false at the end of the stream.
+bool read_some(int descriptor, std::string& text) {
+  std::array<char, 4096> buffer{};
+  const ssize_t n = read(descriptor, buffer.data(), buffer.size());
+  if (n < 0) return errno == EINTR || errno == EAGAIN;
+  text.append(buffer.data(), static_cast<size_t>(n));
+  return n > 0;
+}
+
+}  // namespace
+
+ProcessResult run_process(const std::vector<std::string>& command, const std::atomic<bool>* stop) {
+  std::vector<char*> arguments;
+  for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
+  arguments.push_back(nullptr);
+  Pipe output, errors;
+  const auto start = std::chrono::steady_clock::now();
+  const pid_t parent = getpid(), child = fork();
+  if (child < 0) throw Error(ErrorCode::kIo, fmt::format("cannot start a process: {}", std::strerror(errno)));
+  if (child == 0) become(arguments.data(), output.write, errors.write, parent);
+  output.close_write(), errors.close_write();
+
+  ProcessResult result;
+  bool asked = false;
+  std::array<pollfd, 2> streams{pollfd{output.read, POLLIN, 0}, pollfd{errors.read, POLLIN, 0}};
+  while (streams[0].fd >= 0 || streams[1].fd >= 0) {
+    if (stop && stop->load() && !asked) kill(child, SIGINT), asked = true;
+    if (poll(streams.data(), streams.size(), 100) <= 0) continue;
+    for (pollfd& stream : streams)
+      if (stream.revents && !read_some(stream.fd, &stream == &streams[0] ? result.output : result.errors))
+        stream.fd = -1;
+    if (result.errors.size() > 2 * kErrorsKept) result.errors.erase(0, result.errors.size() - kErrorsKept);
+  }
+  int status = 0;
+  rusage usage{};
+  while (wait4(child, &status, 0, &usage) < 0 && errno == EINTR) {
+  }
+  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  result.signal = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
+  result.exit_code = result.signal ? 128 + result.signal : WEXITSTATUS(status);
+  result.peak_memory_bytes = static_cast<uint64_t>(usage.ru_maxrss) * 1024;
+  if (result.exit_code == 127 && result.errors.empty()) result.errors = "cannot run " + command[0];
+  return result;
+}
+
+}  // namespace covary::lab

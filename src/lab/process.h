@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// One program run as a child, so that its failure or crash stays its own.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace covary::lab {
+
+struct ProcessResult {
+  int exit_code = 0;  ///< 128 + signal for a program ended by a signal
+  int signal = 0;
+  double seconds = 0;
+  uint64_t peak_memory_bytes = 0;
+  std::string output;  ///< standard output
+  std::string errors;  ///< standard error, the last 64 KiB
+  bool ok() const { return exit_code == 0; }
+};
+
+/// Runs `command` (path of the program, then its arguments) to its end. When *stop becomes true the child gets SIGINT once. The child
+/// is killed when the calling process dies, however that happens. Throws Error(kIo) when no process can be started.
+ProcessResult run_process(const std::vector<std::string>& command, const std::atomic<bool>* stop = nullptr);
+
+}  // namespace covary::lab

@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/report_document.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "lab/measure.h"
+#include "lab/report_tables.h"
+
+namespace covary::lab {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+void add_block(Json& section, Json block) {
+  if (!block.is_null()) section["blocks"].push_back(std::move(block));
+}
+
+void add_section(Json& document, Json section) {
+  if (!section["blocks"].empty()) document["sections"].push_back(std::move(section));
+}
+
+Json new_section(const std::string& id, const std::string& heading, std::vector<std::string> text = {}) {
+  return {{"id", id}, {"heading", heading}, {"text", text}, {"blocks", Json::array()}};
+}
+
+Json notes(const char* kind, const std::vector<std::string>& items) {
+  if (items.empty()) return nullptr;
+  return {{"type", "notes"}, {"kind", kind}, {"items", items}};
+}
+
+std::string text_of(const Failure& f) {
+  std::string where = f.scene;
+  for (const std::string& part : {f.method, f.budget})
+    if (!part.empty()) where += (where.empty() ? "" : ", ") + part;
+  std::string text = where + ": " + f.message;
+  if (f.exit_code) text += fmt::format(" (exit code {})", f.exit_code);
+  if (f.not_tried) text += fmt::format("; {} further runs were not tried", f.not_tried);
+  return f.command.empty() ? text : text + "\n" + f.command;
+}
+
+Json meta(const Results& results) {
+  const Suite& suite = results.suite;
+  std::string budgets;
+  for (const Budget& budget : suite.budgets) budgets += (budgets.empty() ? "" : ", ") + budget.label();
+  const Json& machine = results.machine;
+  Json pairs = Json::array();
+  const auto add = [&](const char* name, const std::string& value) { pairs.push_back(Json::array({name, value})); };
+  add("Suite", suite.name);
+  add("Budgets", budgets);
+  add("Seeds", fmt::format("{}", suite.seeds.size()));
+  add("Baseline", suite.baseline);
+  add("Version", results.version);
+  add("Date", results.date);
+  if (machine.is_object())
+    add("Machine",
+        fmt::format("{}, {} cores, {:.0f} GiB, {}", machine.value("processor", ""), machine.value("cores", 0),
+                    machine.value("memory_bytes", 0.0) / 1073741824, machine.value("system", "")));
+  add("Command", results.command);
+  return pairs;
+}
+
+Json methods_table(const Suite& suite) {
+  Json rows = Json::array();
+  for (const MethodEntry& method : suite.methods) {
+    std::string options = fmt::format("{}", fmt::join(method.options, " "));
+    for (const auto& step : method.then) options += fmt::format(" | covary {}", fmt::join(step, " "));
+    rows.push_back({{"name", method.name}, {"options", options}});
+  }
+  return {{"type", "table"},
+          {"caption", fmt::format("Options of covary render; common to all: {}", fmt::join(suite.common_options, " "))},
+          {"columns",
+           {{{"key", "name"}, {"title", "Method"}, {"kind", "text"}},
+            {{"key", "options"}, {"title", "Options"}, {"kind", "text"}}}},
+          {"rows", rows}};
+}
+
+Json scenes_table(const Results& results) {
+  const auto column = [](const char* key, const char* title, const char* kind) {
+    return Json{{"key", key}, {"title", title}, {"kind", kind}};
+  };
+  Json rows = Json::array();
+  for (const SceneResult& result : results.scenes) {
+    const SceneInstance& scene = result.scene;
+    rows.push_back({{"name", scene.entry.name},
+                    {"frame", fmt::format("{} × {}", scene.frame_width, scene.frame_height)},
+                    {"window", fmt::format("{} × {} at {}, {}", scene.window.width, scene.window.height, scene.window.x,
+                                           scene.window.y)},
+                    {"reference",
+                     result.reference.spp ? fmt::format("2 × {} spp", result.reference.spp) : result.reference.origin},
+                    {"error", std::isfinite(result.reference.relmse) ? Json(result.reference.relmse) : Json(nullptr)},
+                    {"credit", scene.entry.credit}});
+  }
+  return {{"type", "table"},
+          {"caption", "Scenes and references"},
+          {"columns",
+           {column("name", "Scene", "text"), column("frame", "Frame", "text"),
+            column("window", "Pixels measured", "text"), column("reference", "Reference", "text"),
+            column("error", "relMSE of the reference", "number"), column("credit", "Credit", "text")}},
+          {"rows", rows}};
+}
+
+const std::vector<std::string> kHowMeasured = {
+    "Every number is a mean over seeds. Intervals hold the true value with probability 95 %: Student's t over the "
+    "seeds, widened "
+    "by the references' own noise.",
+    "relMSE and MSE use the product (F − R₁)(F − R₂) of the differences to two independent references, in which the "
+    "references' "
+    "noise cancels; the squared bias is the same product over pairs of different seeds. Both can come out negative "
+    "where they are "
+    "too small to be seen. MAE and FLIP are against the mean of the references and contain its noise.",
+    "Equal samples: error of the baseline over error of the method with the same number of samples. Equal time: the "
+    "same with each "
+    "error multiplied by the method's time (render, estimate and later steps, without loading), as if errors fell like "
+    "1 / time; where "
+    "a budget is in seconds, the errors are those of that time."};
+
+}  // namespace
+
+size_t shown_budget(const Suite& suite) {
+  for (size_t b = 0; b < suite.budgets.size(); ++b)
+    if (suite.show && suite.budgets[b] == *suite.show) return b;
+  return suite.budgets.size() - 1;
+}
+
+Json report_document(const Results& results) {
+  const Suite& suite = results.suite;
+  Json document{
+      {"title", suite.title}, {"subtitle", suite.description}, {"meta", meta(results)}, {"sections", Json::array()}};
+  const size_t shown = shown_budget(suite);
+
+  Json summary = new_section("summary", "Summary");
+  std::vector<std::string> failures;
+  for (const Failure& failure : results.failures) failures.push_back(text_of(failure));
+  add_block(summary, notes("error", failures));
+  for (size_t b = 0; b < suite.budgets.size(); ++b) add_block(summary, summary_table(results, b));
+  add_block(summary, notes("warning", results.warnings));
+  add_section(document, std::move(summary));
+
+  Json errors = new_section("errors", "Errors");
+  if (!suite.published_source.empty()) errors["text"].push_back("Published values: " + suite.published_source + ".");
+  for (size_t b = 0; b < suite.budgets.size(); ++b) add_block(errors, error_table(results, b));
+  add_section(document, std::move(errors));
+
+  Json gains = new_section("gains", "Gains");
+  for (size_t b = 0; b < suite.budgets.size(); ++b) add_block(gains, ratio_table(results, b));
+  add_section(document, std::move(gains));
+
+  Json quality = new_section("bias", "Bias, variance and other measures");
+  add_block(quality, quality_table(results, shown));
+  add_section(document, std::move(quality));
+
+  Json convergence = new_section("convergence", "Convergence");
+  if (suite.budgets.size() > 1) {
+    for (size_t s = 0; s < suite.scenes.size(); ++s) add_block(convergence, convergence_plot(results, s));
+    add_block(convergence, slope_table(results));
+  }
+  add_section(document, std::move(convergence));
+
+  Json time = new_section("time", "Time");
+  for (size_t s = 0; s < suite.scenes.size(); ++s) add_block(time, time_plot(results, s));
+  add_block(time, time_table(results, shown));
+  add_section(document, std::move(time));
+
+  Json setup = new_section("setup", "How it was measured", kHowMeasured);
+  add_block(setup, methods_table(suite));
+  add_block(setup, scenes_table(results));
+  add_section(document, std::move(setup));
+  return document;
+}
+
+void add_pictures(const Results& results, Json& document, std::vector<ReportImage>& images) {
+  const Suite& suite = results.suite;
+  const size_t budget = shown_budget(suite);
+  Json scenes = Json::array();
+  for (size_t s = 0; s < results.scenes.size(); ++s) {
+    const SceneResult& result = results.scenes[s];
+    Json scene{{"name", result.scene.entry.name}, {"credit", result.scene.entry.credit}, {"images", Json::array()}};
+    for (size_t m = 0; m < suite.methods.size(); ++m) {
+      const Cell* cell = results.find(s, m, budget);
+      if (!cell) continue;
+      const std::string id = fmt::format("s{}m{}", s, m);
+      images.push_back({id, read_window(cell->runs[0].record.image, result.scene)});
+      Json image{{"name", suite.methods[m].name},
+                 {"image", id},
+                 {"label", fmt::format("relMSE {:.3g}", cell->runs[0].relmse)}};
+      if (suite.methods[m].name == suite.baseline) image["role"] = "baseline";
+      scene["images"].push_back(std::move(image));
+    }
+    if (scene["images"].empty()) continue;
+    const std::string id = fmt::format("s{}r", s);
+    Image reference = read_window(result.reference.files.front(), result.scene);
+    const Image other = read_window(result.reference.files.back(), result.scene);
+    for (size_t i = 0; i < reference.data.size(); ++i) reference.data[i] = 0.5f * (reference.data[i] + other.data[i]);
+    images.push_back({id, std::move(reference)});
+    scene["images"].push_back({{"name", "reference"}, {"image", id}, {"label", ""}, {"role", "reference"}});
+    for (const CropWindow& w : result.scene.entry.insets)
+      scene["insets"].push_back(
+          {{"x", w.x - result.scene.window.x}, {"y", w.y - result.scene.window.y}, {"w", w.width}, {"h", w.height}});
+    scenes.push_back(std::move(scene));
+  }
+  if (scenes.empty()) return;
+  const std::string heading = fmt::format("Images, {}, seed {}", suite.budgets[budget].label(), suite.seeds[0]);
+  Json section = new_section("images", heading);
+  add_block(section, {{"type", "comparer"}, {"id", "images"}, {"scenes", scenes}});
+  // After the summary, before the numbers in detail.
+  document["sections"].insert(document["sections"].begin() + 1, std::move(section));
+}
+
+}  // namespace covary::lab

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+// Results as a document of tables, plots and a comparer, as write_report() draws it (docs/report.md).
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "lab/results.h"
+#include "report/report.h"
+
+namespace covary::lab {
+
+/// The document without pictures: they cost reading.
+nlohmann::ordered_json report_document(const Results& results);
+
+/// Appends the comparer to the document and its images to `images`: for each scene the reference (mean of its halves) and
+/// the first seed of each method at the budget that the suite shows. Throws Error where an image cannot be read.
+void add_pictures(const Results& results, nlohmann::ordered_json& document, std::vector<ReportImage>& images);
+
+/// Index of the budget that pictures and single tables show: the suite's `show`, or the last.
+size_t shown_budget(const Suite& suite);
+
+}  // namespace covary::lab

@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/report_tables.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace covary::lab {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+Json value_of(const Estimate& e) {
+  if (!std::isfinite(e.value)) return nullptr;
+  Json json{{"value", e.value}};
+  if (std::isfinite(e.low)) json["low"] = e.low, json["high"] = e.high;
+  return json;
+}
+
+Json column(const std::string& key, const std::string& title, const char* kind, const char* better = nullptr) {
+  Json json{{"key", key}, {"title", title}, {"kind", kind}};
+  if (better) json["better"] = better;
+  return json;
+}
+
+Json table(const std::string& caption, Json columns, Json rows) {
+  if (rows.empty()) return nullptr;
+  return {{"type", "table"}, {"caption", caption}, {"columns", std::move(columns)}, {"rows", std::move(rows)}};
+}
+
+bool any_cell(const Results& results, size_t budget, bool (*has)(const Cell&)) {
+  return std::any_of(results.cells.begin(), results.cells.end(),
+                     [&](const Cell& cell) { return cell.budget == budget && has(cell); });
+}
+
+/// Rows of all cells at a budget, first scene and method.
+template <typename Fill>
+Json cell_rows(const Results& results, size_t budget, Fill&& fill) {
+  Json rows = Json::array();
+  for (const Cell& cell : results.cells) {
+    if (cell.budget != budget) continue;
+    Json row{{"scene", results.suite.scenes[cell.scene].name}, {"method", results.suite.methods[cell.method].name}};
+    fill(cell, row);
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+Json plot(const std::string& title, const std::string& x_label, Json series, const std::string& alt) {
+  if (series.empty()) return nullptr;
+  return {{"type", "plot"},
+          {"title", title},
+          {"x", {{"label", x_label}, {"scale", "log"}}},
+          {"y", {{"label", "relMSE"}, {"scale", "log"}}},
+          {"series", std::move(series)},
+          {"alt", alt}};
+}
+
+/// One line a method over the budgets that it has in `unit`.
+template <typename X, typename Use>
+Json error_series(const Results& results, size_t scene, X&& x, Use&& use) {
+  Json series = Json::array();
+  for (size_t m = 0; m < results.suite.methods.size(); ++m) {
+    Json line{{"name", results.suite.methods[m].name},
+              {"x", Json::array()},
+              {"y", Json::array()},
+              {"low", Json::array()},
+              {"high", Json::array()},
+              {"style", "line"}};
+    for (size_t b = 0; b < results.suite.budgets.size(); ++b) {
+      const Cell* cell = results.find(scene, m, b);
+      if (!cell || !use(results.suite.budgets[b]) || !(cell->split.relative.error.value > 0)) continue;
+      const Estimate& error = cell->split.relative.error;
+      line["x"].push_back(x(*cell));
+      line["y"].push_back(error.value);
+      // A logarithmic axis ends above zero.
+      line["low"].push_back(number(std::max(error.low, 0.1 * error.value)));
+      line["high"].push_back(number(error.high));
+    }
+    if (!line["x"].empty()) series.push_back(std::move(line));
+  }
+  return series;
+}
+
+/// "pt 0.013 to 0.0012, iicv 0.0018 to 0.0004": what a plot shows, for those who cannot see it.
+std::string alternative(const std::string& start, const Json& series) {
+  std::string text = start;
+  for (const Json& line : series)
+    text += fmt::format("; {}: {:.2g} to {:.2g}", line["name"].get<std::string>(), line["y"].front().get<double>(),
+                        line["y"].back().get<double>());
+  return text;
+}
+
+}  // namespace
+
+Json summary_table(const Results& results, size_t budget) {
+  const bool samples = results.suite.budgets[budget].spp > 0;
+  bool published = false;
+  Json rows = Json::array();
+  for (const Summary& s : results.summaries) {
+    if (s.budget != budget) continue;
+    published = published || std::isfinite(s.published_ratio);
+    rows.push_back({{"method", results.suite.methods[s.method].name},
+                    {"n", fmt::format("{}", s.n_scenes)},
+                    {"relmse", number(s.relmse)},
+                    {"sample", value_of(s.equal_sample)},
+                    {"time", value_of(s.equal_time)},
+                    {"published", number(s.published_ratio)}});
+  }
+  Json columns{column("method", "Method", "text"), column("n", "Scenes", "text"),
+               column("relmse", "relMSE", "number", "low")};
+  if (samples) columns.push_back(column("sample", "Equal samples", "ratio", "high"));
+  if (published) columns.push_back(column("published", "Published", "ratio"));
+  columns.push_back(column("time", "Equal time", "ratio", "high"));
+  return table(fmt::format("{}: geometric means over scenes; ratios are error of {} / error of the method",
+                           results.suite.budgets[budget].label(), results.suite.baseline),
+               columns, rows);
+}
+
+Json error_table(const Results& results, size_t budget) {
+  const Suite& suite = results.suite;
+  Json columns = Json::array({column("scene", "Scene", "text")}), rows = Json::array();
+  for (size_t m = 0; m < suite.methods.size(); ++m) {
+    const std::string& name = suite.methods[m].name;
+    columns.push_back(column(fmt::format("m{}", m), name, "number"));
+    const bool published = std::any_of(results.cells.begin(), results.cells.end(), [&](const Cell& c) {
+      return c.method == m && c.budget == budget && std::isfinite(c.published_relmse);
+    });
+    if (!published) continue;
+    columns.push_back(column(fmt::format("p{}", m), name + ", published", "number"));
+    columns.push_back(column(fmt::format("r{}", m), "ours / published", "ratio"));
+  }
+  for (size_t s = 0; s < suite.scenes.size(); ++s) {
+    Json row{{"scene", suite.scenes[s].name}};
+    for (size_t m = 0; m < suite.methods.size(); ++m) {
+      const Cell* cell = results.find(s, m, budget);
+      if (!cell) continue;
+      const Estimate& error = cell->split.relative.error;
+      row[fmt::format("m{}", m)] = value_of(error);
+      row[fmt::format("p{}", m)] = number(cell->published_relmse);
+      row[fmt::format("r{}", m)] = number(error.value / cell->published_relmse);
+    }
+    if (row.size() > 1) rows.push_back(std::move(row));
+  }
+  return table("relMSE, " + suite.budgets[budget].label(), columns, rows);
+}
+
+Json ratio_table(const Results& results, size_t budget) {
+  const Suite& suite = results.suite;
+  const bool samples = suite.budgets[budget].spp > 0;
+  const bool published = any_cell(results, budget, [](const Cell& c) { return std::isfinite(c.published_ratio); });
+  Json columns{column("scene", "Scene", "text"), column("method", "Method", "text")};
+  if (samples) columns.push_back(column("sample", "Equal samples", "ratio"));
+  if (published) columns.push_back(column("published", "Published", "ratio"));
+  columns.push_back(column("time", "Equal time", "ratio"));
+  columns.push_back(column("efficiency", "1 / (relMSE × s)", "number"));
+  Json rows = cell_rows(results, budget, [](const Cell& cell, Json& row) {
+    row["sample"] = value_of(cell.equal_sample);
+    row["published"] = number(cell.published_ratio);
+    row["time"] = value_of(cell.equal_time);
+    row["efficiency"] = value_of(cell.efficiency);
+  });
+  return table(fmt::format("Error of {} / error of the method, {}", suite.baseline, suite.budgets[budget].label()),
+               columns, rows);
+}
+
+Json quality_table(const Results& results, size_t budget) {
+  Json columns{column("scene", "Scene", "text"),
+               column("method", "Method", "text"),
+               column("relmse", "relMSE", "number"),
+               column("bias", "Squared bias", "number"),
+               column("share", "Bias share", "percent"),
+               column("variance", "Variance", "number"),
+               column("mean", "Image mean / reference", "number"),
+               column("mae", "MAE", "number"),
+               column("flip", "FLIP", "number"),
+               column("predicted", "Predicted / true error", "ratio")};
+  columns[6]["digits"] = 4;
+  Json rows = cell_rows(results, budget, [](const Cell& cell, Json& row) {
+    const SplitError& split = cell.split.relative;
+    row["relmse"] = value_of(split.error);
+    row["bias"] = value_of(split.squared_bias);
+    row["share"] = number(split.squared_bias.value / split.error.value);
+    row["variance"] = value_of(split.variance);
+    row["mean"] = value_of(cell.split.mean_ratio);
+    row["mae"] = value_of(cell.mae);
+    row["flip"] = value_of(cell.flip);
+    row["predicted"] = value_of(cell.predicted_over_true);
+  });
+  return table("Errors divided, " + results.suite.budgets[budget].label(), columns, rows);
+}
+
+Json time_table(const Results& results, size_t budget) {
+  const bool then = any_cell(results, budget, [](const Cell& c) { return c.then_seconds.value > 0; });
+  Json columns{column("scene", "Scene", "text"),      column("method", "Method", "text"),
+               column("spp", "spp", "number"),        column("load", "Load", "seconds"),
+               column("render", "Render", "seconds"), column("estimate", "Estimate", "seconds")};
+  if (then) columns.push_back(column("then", "Then", "seconds"));
+  columns.push_back(column("method_seconds", "Method", "seconds"));
+  columns.push_back(column("memory", "Peak memory", "bytes"));
+  if (results.suite.budgets[budget].seconds > 0) columns.push_back(column("ratio", "Of the budget", "percent"));
+  Json rows = cell_rows(results, budget, [](const Cell& cell, Json& row) {
+    row["spp"] = cell.samples_per_pixel;
+    row["load"] = number(cell.load_seconds.value);
+    row["render"] = value_of(cell.render_seconds);
+    row["estimate"] = value_of(cell.estimate_seconds);
+    row["then"] = value_of(cell.then_seconds);
+    row["method_seconds"] = value_of(cell.method_seconds);
+    row["memory"] = cell.peak_memory_bytes;
+    row["ratio"] = number(cell.time_ratio);
+  });
+  return table("Seconds, " + results.suite.budgets[budget].label(), columns, rows);
+}
+
+Json slope_table(const Results& results) {
+  Json columns = Json::array({column("scene", "Scene", "text")}), rows = Json::array();
+  for (size_t m = 0; m < results.suite.methods.size(); ++m)
+    columns.push_back(column(fmt::format("m{}", m), results.suite.methods[m].name, "number"));
+  for (size_t s = 0; s < results.suite.scenes.size(); ++s) {
+    Json row{{"scene", results.suite.scenes[s].name}};
+    for (const Slope& slope : results.slopes)
+      if (slope.scene == s) row[fmt::format("m{}", slope.method)] = value_of(slope.exponent);
+    if (row.size() > 1) rows.push_back(std::move(row));
+  }
+  return table("Exponent of relMSE against samples; −1 is a method without bias", columns, rows);
+}
+
+Json convergence_plot(const Results& results, size_t scene) {
+  const std::string& name = results.suite.scenes[scene].name;
+  Json series = error_series(
+      results, scene, [](const Cell& cell) { return cell.samples_per_pixel; },
+      [](const Budget& budget) { return budget.spp > 0; });
+  const std::string alt = alternative("relMSE of " + name + " from the fewest to the most samples", series);
+  return plot(name, "samples per pixel", std::move(series), alt);
+}
+
+Json time_plot(const Results& results, size_t scene) {
+  const std::string& name = results.suite.scenes[scene].name;
+  Json series = error_series(
+      results, scene, [](const Cell& cell) { return cell.method_seconds.value; }, [](const Budget&) { return true; });
+  const std::string alt = alternative("relMSE of " + name + " from the shortest to the longest time", series);
+  return plot(name, "seconds, render and estimate", std::move(series), alt);
+}
+
+}  // namespace covary::lab

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// Blocks of the report: tables and plots of results. Each is the JSON that docs/report.md describes; null where there is
+// nothing to show.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "lab/results.h"
+
+namespace covary::lab {
+
+/// Geometric means over scenes at one budget.
+nlohmann::ordered_json summary_table(const Results& results, size_t budget);
+/// relMSE of all scenes and methods at one budget, published values beside ours.
+nlohmann::ordered_json error_table(const Results& results, size_t budget);
+/// Equal-sample and equal-time ratios of all scenes and methods at one budget.
+nlohmann::ordered_json ratio_table(const Results& results, size_t budget);
+/// Bias, variance, other metrics, predicted error.
+nlohmann::ordered_json quality_table(const Results& results, size_t budget);
+nlohmann::ordered_json time_table(const Results& results, size_t budget);
+nlohmann::ordered_json slope_table(const Results& results);
+
+/// relMSE against samples per pixel, and against the seconds of the method.
+nlohmann::ordered_json convergence_plot(const Results& results, size_t scene);
+nlohmann::ordered_json time_plot(const Results& results, size_t scene);
+
+}  // namespace covary::lab

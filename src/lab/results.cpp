@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/results.h"
+
+#include <fmt/format.h>
+#include <sys/utsname.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <fstream>
+#include <thread>
+
+namespace covary::lab {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// JSON has no not-a-number: null.
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+Json json_of(const Estimate& e) {
+  return {{"value", number(e.value)},
+          {"standard_error", number(e.standard_error)},
+          {"low", number(e.low)},
+          {"high", number(e.high)}};
+}
+
+Json json_of(const SplitError& split) {
+  Json json = json_of(split.error);
+  json["squared_bias"] = json_of(split.squared_bias);
+  json["variance"] = json_of(split.variance);
+  return json;
+}
+
+Json json_of(const CropWindow& w) { return {w.x, w.y, w.width, w.height}; }
+
+Json json_of(const Budget& budget) {
+  if (budget.spp) return {{"spp", budget.spp}};
+  return {{"seconds", budget.seconds}};
+}
+
+Json json_of(const RunResult& run) {
+  const RunRecord& r = run.record;
+  return {{"seed", run.seed},
+          {"relmse", number(run.relmse)},
+          {"mse", number(run.mse)},
+          {"mae", number(run.mae)},
+          {"flip", number(run.flip)},
+          {"mean_ratio", number(run.mean_ratio)},
+          {"predicted_relmse", number(run.predicted_relmse)},
+          {"samples_per_pixel", r.samples_per_pixel},
+          {"seconds",
+           {{"load", r.load_seconds},
+            {"render", r.render_seconds},
+            {"estimate", r.estimate_seconds},
+            {"then", r.then_seconds}}},
+          {"peak_memory_bytes", r.peak_memory_bytes},
+          {"command", r.command},
+          {"image", r.image}};
+}
+
+Json json_of(const Cell& cell, const Results& results) {
+  const Suite& suite = results.suite;
+  Json mae = json_of(cell.mae), flip = json_of(cell.flip), seeds = Json::array(), runs = Json::array();
+  mae["of_mean"] = number(cell.mae_of_mean);
+  flip["of_mean"] = number(cell.flip_of_mean);
+  for (const RunResult& run : cell.runs) {
+    seeds.push_back(run.seed);
+    runs.push_back(json_of(run));
+  }
+  return {{"scene", suite.scenes[cell.scene].name},
+          {"method", suite.methods[cell.method].name},
+          {"budget", json_of(suite.budgets[cell.budget])},
+          {"seeds", seeds},
+          {"samples_per_pixel", cell.samples_per_pixel},
+          {"pixels", cell.split.n_pixels},
+          {"non_finite_pixels", cell.split.n_non_finite},
+          {"relmse", json_of(cell.split.relative)},
+          {"mse", json_of(cell.split.absolute)},
+          {"mae", mae},
+          {"flip", flip},
+          {"mean_ratio", json_of(cell.split.mean_ratio)},
+          {"equal_sample", json_of(cell.equal_sample)},
+          {"equal_time", json_of(cell.equal_time)},
+          {"seconds",
+           {{"load", json_of(cell.load_seconds)},
+            {"render", json_of(cell.render_seconds)},
+            {"estimate", json_of(cell.estimate_seconds)},
+            {"then", json_of(cell.then_seconds)},
+            {"method", json_of(cell.method_seconds)},
+            {"over_budget", number(cell.time_ratio)}}},
+          {"efficiency", json_of(cell.efficiency)},
+          {"predicted_over_true", json_of(cell.predicted_over_true)},
+          {"published", {{"relmse", number(cell.published_relmse)}, {"ratio", number(cell.published_ratio)}}},
+          {"peak_memory_bytes", cell.peak_memory_bytes},
+          {"warnings", cell.suspicions},
+          {"runs", runs}};
+}
+
+Json json_of(const SceneResult& result) {
+  const SceneInstance& scene = result.scene;
+  const Reference& reference = result.reference;
+  return {{"name", scene.entry.name},
+          {"file", scene.file},
+          {"hash", scene.hash},
+          {"frame", {scene.frame_width, scene.frame_height}},
+          {"window", json_of(scene.window)},
+          {"credit", scene.entry.credit},
+          {"reference",
+           {{"files", reference.files},
+            {"origin", reference.origin},
+            {"spp", reference.spp},
+            {"seconds", reference.seconds},
+            {"relmse", number(reference.relmse)}}}};
+}
+
+/// The first value of a key in a file of "key : value" lines, "" where there is none.
+std::string fact(const char* path, const std::string& key) {
+  std::ifstream file(path);
+  for (std::string line; std::getline(file, line);)
+    if (line.starts_with(key)) {
+      const size_t value = line.find_first_not_of(" \t", line.find_first_of(":=") + 1);
+      std::string text = value == std::string::npos ? "" : line.substr(value);
+      std::erase(text, '"');
+      return text;
+    }
+  return "";
+}
+
+}  // namespace
+
+const Cell* Results::find(size_t scene, size_t method, size_t budget) const {
+  for (const Cell& cell : cells)
+    if (cell.scene == scene && cell.method == method && cell.budget == budget) return &cell;
+  return nullptr;
+}
+
+Json to_json(const Results& results) {
+  const Suite& suite = results.suite;
+  Json json{{"format", "covary-experiment 1"}, {"complete", results.complete}, {"version", results.version},
+            {"command", results.command},      {"date", results.date},         {"machine", results.machine},
+            {"suite", to_json(suite)}};
+  for (const char* list : {"scenes", "cells", "slopes", "summary", "failures"}) json[list] = Json::array();
+  for (const SceneResult& scene : results.scenes) json["scenes"].push_back(json_of(scene));
+  for (const Cell& cell : results.cells) json["cells"].push_back(json_of(cell, results));
+  for (const Slope& slope : results.slopes)
+    json["slopes"].push_back({{"scene", suite.scenes[slope.scene].name},
+                              {"method", suite.methods[slope.method].name},
+                              {"relmse", json_of(slope.exponent)}});
+  for (const Summary& s : results.summaries)
+    json["summary"].push_back({{"method", suite.methods[s.method].name},
+                               {"budget", json_of(suite.budgets[s.budget])},
+                               {"scenes", s.n_scenes},
+                               {"relmse", number(s.relmse)},
+                               {"equal_sample", json_of(s.equal_sample)},
+                               {"equal_time", json_of(s.equal_time)},
+                               {"published_ratio", number(s.published_ratio)}});
+  for (const Failure& f : results.failures)
+    json["failures"].push_back({{"scene", f.scene},
+                                {"method", f.method},
+                                {"budget", f.budget},
+                                {"command", f.command},
+                                {"exit_code", f.exit_code},
+                                {"message", f.message},
+                                {"runs_not_tried", f.not_tried}});
+  json["warnings"] = results.warnings;
+  return json;
+}
+
+Json machine_facts() {
+  utsname system{};
+  uname(&system);
+  const double memory = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
+  return {{"processor", fact("/proc/cpuinfo", "model name")},
+          {"cores", std::thread::hardware_concurrency()},
+          {"memory_bytes", memory},
+          {"system", fact("/etc/os-release", "PRETTY_NAME")},
+          {"kernel", fmt::format("{} {}", system.sysname, system.release)}};
+}
+
+}  // namespace covary::lab

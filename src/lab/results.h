@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+// What an experiment found, and its two machine-readable forms. docs/file-formats.md describes both.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "lab/error_split.h"
+#include "lab/plan.h"
+#include "lab/runner.h"
+#include "lab/suite.h"
+
+namespace covary::lab {
+
+/// One run of a cell.
+struct RunResult {
+  uint64_t seed = 0;
+  RunRecord record;
+  double relmse = 0, mse = 0, mae = 0, flip = 0, mean_ratio = 0;
+  double predicted_relmse = kNone;  ///< from the run's own standard errors, where it has them
+};
+
+/// All runs of one scene, method and budget.
+struct Cell {
+  size_t scene = 0, method = 0, budget = 0;  ///< indices into the suite
+  std::vector<RunResult> runs;               ///< by seed, as in the suite
+  ErrorSplit split;
+  Estimate mae, flip;
+  double mae_of_mean = kNone, flip_of_mean = kNone;  ///< of the mean image of all runs
+  Estimate load_seconds, render_seconds, estimate_seconds, then_seconds;
+  Estimate method_seconds;  ///< render + estimate + then
+  double samples_per_pixel = 0, peak_memory_bytes = 0;
+  Estimate efficiency;  ///< 1 / (relMSE x method seconds)
+  /// Error of the baseline over error of this method: with the same budget; with the same time.
+  Estimate equal_sample, equal_time;
+  /// For time budgets: method seconds / budget.
+  double time_ratio = kNone;
+  Estimate predicted_over_true;  ///< predicted relMSE / relMSE
+  double published_relmse = kNone, published_ratio = kNone;
+  std::vector<std::string> suspicions;
+};
+
+struct Reference {
+  std::vector<std::string> files;
+  std::string origin;     ///< command lines or "given"
+  uint32_t spp = 0;       ///< of each half; 0 where given
+  double seconds = 0;     ///< both halves
+  double relmse = kNone;  ///< of the mean of the halves
+};
+
+struct SceneResult {
+  SceneInstance scene;
+  Reference reference;
+};
+
+struct Failure {
+  std::string scene, method, budget;  ///< empty where it concerns all
+  std::string command, message;
+  int exit_code = 0;
+  size_t not_tried = 0;  ///< runs that were left out because of it
+};
+
+struct Slope {
+  size_t scene = 0, method = 0;
+  Estimate exponent;
+};
+
+/// Geometric means over scenes.
+struct Summary {
+  size_t method = 0, budget = 0, n_scenes = 0;
+  Estimate equal_sample, equal_time;
+  double relmse = kNone, published_ratio = kNone;
+};
+
+struct Results {
+  Suite suite;
+  bool complete = false;  ///< nothing failed
+  std::string version, command, date;
+  nlohmann::ordered_json machine;
+  std::vector<SceneResult> scenes;  ///< as in the suite; a scene that could not be read has no frame
+  std::vector<Cell> cells;
+  std::vector<Slope> slopes;
+  std::vector<Summary> summaries;
+  std::vector<Failure> failures;
+  std::vector<std::string> warnings;
+
+  const Cell* find(size_t scene, size_t method, size_t budget) const;
+};
+
+nlohmann::ordered_json to_json(const Results& results);
+/// Long format: scene, method, budget, unit, seed, quantity, value, standard_error, low, high.
+std::string to_csv(const Results& results);
+
+/// Processor, cores, memory, operating system.
+nlohmann::ordered_json machine_facts();
+
+}  // namespace covary::lab

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/runner.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+
+#include "core/error.h"
+#include "core/shell_text.h"
+#include "film/output_file.h"
+#include "lab/process.h"
+
+namespace covary::lab {
+namespace {
+
+namespace fs = std::filesystem;
+using Words = std::vector<std::string>;
+
+std::optional<nlohmann::json> read_json_file(const std::string& path) {
+  std::ifstream file(path);
+  if (!file) return std::nullopt;
+  nlohmann::json json = nlohmann::json::parse(file, nullptr, false);
+  if (json.is_discarded()) return std::nullopt;
+  return json;
+}
+
+/// The command as a user types it: `covary` for the program's path.
+std::string typed(Words command) {
+  command[0] = "covary";
+  return shell_text(command);
+}
+
+RunRecord record_of(const nlohmann::json& stats) {
+  RunRecord record;
+  const nlohmann::json seconds = stats.value("seconds", nlohmann::json::object());
+  record.load_seconds = seconds.value("load", 0.0) + seconds.value("build", 0.0);
+  record.render_seconds = seconds.value("render", 0.0);
+  record.estimate_seconds = seconds.value("estimate", 0.0);
+  record.samples_per_pixel = stats.value("samples_per_pixel", 0.0);
+  record.peak_memory_bytes = stats.value("peak_memory_bytes", 0.0);
+  return record;
+}
+
+nlohmann::json json_of(const RunRecord& r) {
+  return {{"command", r.command},
+          {"seconds",
+           {{"load", r.load_seconds},
+            {"render", r.render_seconds},
+            {"estimate", r.estimate_seconds},
+            {"then", r.then_seconds}}},
+          {"samples_per_pixel", r.samples_per_pixel},
+          {"peak_memory_bytes", r.peak_memory_bytes},
+          {"messages", r.messages}};
+}
+
+}  // namespace
+
+Cache::Cache(std::string folder) : folder_(std::move(folder)) {
+  std::error_code error;
+  for (const char* kind : {"runs", "passes", "measures"}) fs::create_directories(fs::path(folder_) / kind, error);
+  if (error) throw Error(ErrorCode::kIo, fmt::format("cannot make the cache {}: {}", folder_, error.message()));
+  lock_ = open((folder_ + "/lock").c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0666);
+  if (lock_ < 0)
+    throw Error(ErrorCode::kIo, fmt::format("cannot write to the cache {}: {}", folder_, std::strerror(errno)));
+  if (flock(lock_, LOCK_EX | LOCK_NB) != 0) {
+    close(lock_);
+    throw Error(ErrorCode::kIo, fmt::format("the cache {} is in use by another experiment; wait for it, or give this "
+                                            "one its own by --cache DIR",
+                                            folder_));
+  }
+}
+
+Cache::~Cache() { close(lock_); }
+
+std::string Cache::path(const std::string& kind, const std::string& key) const {
+  return folder_ + "/" + kind + "/" + key;
+}
+
+std::optional<nlohmann::json> Cache::read_json(const std::string& kind, const std::string& key) const {
+  return read_json_file(path(kind, key));
+}
+
+void Cache::write_json(const std::string& kind, const std::string& key, const nlohmann::json& json) const {
+  write_text_file(path(kind, key), json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+}
+
+std::optional<RunRecord> Runner::find(const Run& run) const {
+  const std::string image = cache_.path("runs", run.key) + "/image.exr";
+  const std::optional<nlohmann::json> json = cache_.read_json("runs", run.key + "/run.json");
+  if (!json || !fs::exists(image)) return std::nullopt;
+  RunRecord record = record_of(*json);
+  record.image = image;
+  record.command = json->value("command", "");
+  record.messages = json->value("messages", "");
+  record.then_seconds = json->value("seconds", nlohmann::json::object()).value("then", 0.0);
+  return record;
+}
+
+Runner::Result Runner::execute(const Run& run, const SceneInstance& scene) const {
+  const std::string folder = cache_.path("runs", run.key), image = folder + "/image.exr",
+                    stats = folder + "/stats.json";
+  fs::create_directories(folder);
+  Words render{program_, "render", scene.file};
+  render.insert(render.end(), run.options.begin(), run.options.end());
+  const std::string typed_command = typed(render);
+  if (threads_ > 0) render.insert(render.end(), {"--threads", fmt::format("{}", threads_)});
+  std::string output = run.then.empty() ? image : folder + "/step0.exr";
+  render.insert(render.end(), {"--passes", cache_.path("passes", run.passes_key), "--resume", "--quiet", "--no-preview",
+                               "--json", stats, "-o", output});
+  const auto failed = [&](const std::string& command, const ProcessResult& process) -> Result {
+    if (stop_ && stop_->load()) return {};
+    const std::string signal = process.signal ? fmt::format("ended by signal {}; ", process.signal) : "";
+    return {std::nullopt, RunFailure{command, process.exit_code, signal + process.errors}};
+  };
+  const ProcessResult process = run_process(render, stop_);
+  if (!process.ok()) return failed(typed_command, process);
+  const std::optional<nlohmann::json> json = read_json_file(stats);
+  if (!json) return {std::nullopt, RunFailure{typed_command, 0, "the render wrote no statistics"}};
+  RunRecord record = record_of(*json);
+  record.image = image;
+  record.command = typed_command;
+  record.messages = process.errors;
+  for (size_t i = 0; i < run.then.size(); ++i) {
+    const std::string next = i + 1 == run.then.size() ? image : fmt::format("{}/step{}.exr", folder, i + 1);
+    Words step{program_, run.then[i][0], output};
+    step.insert(step.end(), run.then[i].begin() + 1, run.then[i].end());
+    const std::string typed_step = typed(step);
+    step.insert(step.end(), {"-o", next});
+    const ProcessResult after = run_process(step, stop_);
+    if (!after.ok()) return failed(typed_step, after);
+    record.then_seconds += after.seconds;
+    record.peak_memory_bytes = std::max(record.peak_memory_bytes, static_cast<double>(after.peak_memory_bytes));
+    record.command += " && " + typed_step;
+    record.messages += after.errors;
+    fs::remove(output);
+    output = next;
+  }
+  cache_.write_json("runs", run.key + "/run.json", json_of(record));
+  return {record, std::nullopt};
+}
+
+void Runner::remove_passes(const std::string& passes_key) const {
+  std::error_code ignored;
+  fs::remove_all(cache_.path("passes", passes_key), ignored);
+}
+
+}  // namespace covary::lab

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+// Runs of the program, kept on disk: what is there already is not run again, and what is there is always whole.
+//
+// The cache is a folder:
+//     runs/KEY/image.exr, stats.json    output of the render (or of the last command after it)
+//     runs/KEY/run.json                 what is known of the run; written last, so that its presence means "done"
+//     passes/KEY/                       films of runs that are not done, or kept on request
+//     measures/KEY.json                 errors of images
+#pragma once
+
+#include <atomic>
+#include <map>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "lab/plan.h"
+
+namespace covary::lab {
+
+/// A finished run.
+struct RunRecord {
+  std::string image;    ///< path of the EXR
+  std::string command;  ///< as typed in a shell
+  /// load: reading the scene and building the hierarchy; then: commands after the render, wall clock.
+  double load_seconds = 0, render_seconds = 0, estimate_seconds = 0, then_seconds = 0;
+  double samples_per_pixel = 0, peak_memory_bytes = 0;
+  std::string messages;  ///< what the run wrote to standard error
+  /// What the method takes beyond loading the scene.
+  double method_seconds() const { return render_seconds + estimate_seconds + then_seconds; }
+};
+
+/// A run that ended in an error.
+struct RunFailure {
+  std::string command;
+  int exit_code = 0;
+  std::string message;
+};
+
+class Cache {
+ public:
+  /// Makes the folder where needed and locks it against other experiments until this object ends. Throws Error(kIo).
+  explicit Cache(std::string folder);
+  ~Cache();
+  Cache(const Cache&) = delete;
+  Cache& operator=(const Cache&) = delete;
+
+  /// A path in the cache; the folder it lies in exists then.
+  std::string path(const std::string& kind, const std::string& key) const;
+  /// A JSON file of the cache; nothing where it is missing or damaged.
+  std::optional<nlohmann::json> read_json(const std::string& kind, const std::string& key) const;
+  void write_json(const std::string& kind, const std::string& key, const nlohmann::json& json) const;
+  const std::string& folder() const { return folder_; }
+
+ private:
+  std::string folder_;
+  int lock_ = -1;
+};
+
+class Runner {
+ public:
+  Runner(const Cache& cache, std::string program, int threads, const std::atomic<bool>* stop)
+      : cache_(cache), program_(std::move(program)), threads_(threads), stop_(stop) {}
+
+  /// The kept record of a run.
+  std::optional<RunRecord> find(const Run& run) const;
+  /// Runs it. Exactly one of the two is set, or none when it was stopped.
+  struct Result {
+    std::optional<RunRecord> record;
+    std::optional<RunFailure> failure;
+  };
+  Result execute(const Run& run, const SceneInstance& scene) const;
+  /// Removes the films of passes that no run needs any more.
+  void remove_passes(const std::string& passes_key) const;
+
+ private:
+  const Cache& cache_;
+  std::string program_;
+  int threads_;
+  const std::atomic<bool>* stop_;
+};
+
+}  // namespace covary::lab

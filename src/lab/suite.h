@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+// An experiment as data: scenes x methods x budgets x seeds. docs/experiments.md describes the file.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "film/film.h"
+
+namespace covary::lab {
+
+/// Samples per pixel or seconds: exactly one is set.
+struct Budget {
+  uint32_t spp = 0;
+  double seconds = 0;
+  bool operator==(const Budget&) const = default;
+  std::string label() const;  ///< "192 spp", "10 s"
+  std::string key() const;    ///< as in `published`: "192", "10s"
+};
+
+/// References made with `spp` samples per pixel in each half, or taken from one or two files.
+struct ReferencePlan {
+  uint32_t spp = 0;
+  std::vector<std::string> files;
+};
+
+struct SceneEntry {
+  std::string name;
+  std::string file;        ///< as written; relative to the suite's scene folder
+  std::string resolution;  ///< WIDTHxHEIGHT, or empty: the scene's own
+  std::string crop;        ///< X,Y,WIDTH,HEIGHT, or WIDTHxHEIGHT in the middle of the frame, or empty
+  std::optional<int64_t> max_depth;
+  std::vector<std::string> defines;  ///< name=value
+  std::string credit;                ///< author, title, licence
+  std::vector<CropWindow> insets;    ///< in the frame
+  std::optional<ReferencePlan> reference;
+};
+
+struct MethodEntry {
+  std::string name;
+  std::vector<std::string> options;            ///< of `covary render`
+  std::vector<std::vector<std::string>> then;  ///< further commands "covary WORD… IN -o OUT"
+  bool unbiased = false;                       ///< a squared bias then points to a wrong reference
+};
+
+struct Suite {
+  std::string name, title, description;
+  std::string scene_root;  ///< folder of the scene files
+  std::vector<SceneEntry> scenes;
+  std::vector<MethodEntry> methods;
+  std::vector<Budget> budgets;
+  std::vector<uint64_t> seeds;
+  std::vector<std::string> common_options;  ///< of every render, references included
+  std::string baseline;                     ///< name of a method
+  std::optional<Budget> show;               ///< budget of the pictures; default: the last
+  ReferencePlan reference;
+  std::string published_source;
+  /// [scene][method][budget key] -> relMSE, and -> error of the baseline / error of the method.
+  std::map<std::string, std::map<std::string, std::map<std::string, double>>> published_relmse, published_ratio;
+
+  const MethodEntry* method(const std::string& method_name) const;
+  const ReferencePlan& reference_of(const SceneEntry& scene) const {
+    return scene.reference ? *scene.reference : reference;
+  }
+};
+
+/// Seeds of the two halves of a reference; no run may use them.
+inline constexpr uint64_t kReferenceSeeds[2] = {900000001, 900000002};
+
+/// Reads a suite. `name` stands for the file in messages. Throws Error(kInput) that lists all problems with their lines.
+Suite parse_suite(const std::string& text, const std::string& name);
+
+/// Every problem of the suite as a whole, after all settings were overridden; empty when it can be run.
+std::vector<std::string> validate(const Suite& suite);
+
+nlohmann::ordered_json to_json(const Suite& suite);
+
+}  // namespace covary::lab

@@ -1,0 +1,323 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Experiments as a user runs them, on a scene of 32 x 24 pixels: results, interruptions, failures, the cache."""
+import copy
+import csv
+import json
+import os
+import random
+import signal
+import subprocess
+import tempfile
+import time
+import unittest
+from pathlib import Path
+
+COVARY = os.environ["COVARY"]
+SCENES = Path(__file__).resolve().parents[2] / "scenes"
+SUITES = SCENES.parent / "suites"
+
+SUITE = {
+    "name": "tiny",
+    "scenes": [{"name": "room", "file": "room.xml", "resolution": "32x24"}],
+    "methods": [{"name": "pt", "options": ["--estimator", "none"], "unbiased": True},
+                {"name": "iicv", "options": []}],
+    "budgets": [{"spp": 24}, {"spp": 48}],
+    "seeds": 2,
+    "common_options": ["--rfilter", "box"],
+    "baseline": "pt",
+    "reference": {"spp": 128},
+}
+
+
+def without_times(value):
+    """Results without what depends on the clock, the machine's load and the folder."""
+    dropped = {"seconds", "efficiency", "equal_time", "date", "command", "files", "origin", "image", "peak_memory_bytes"}
+    if isinstance(value, dict):
+        return {k: without_times(v) for k, v in value.items() if k not in dropped}
+    return [without_times(v) for v in value] if isinstance(value, list) else value
+
+
+class ExperimentTest(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+        self.path = Path(self.folder.name)
+        self.suite = copy.deepcopy(SUITE)
+
+    def command(self, *arguments, out="out"):
+        (self.path / "suite.json").write_text(json.dumps(self.suite, indent=1))
+        return [COVARY, "experiment", "suite.json", "-o", out, "--scenes", str(SCENES), "--threads", "2", *arguments]
+
+    def run_covary(self, command, **more):
+        return subprocess.run(command, cwd=self.path, capture_output=True, text=True, timeout=120, **more)
+
+    def results(self, *arguments, out="out", code=0):
+        done = self.run_covary(self.command(*arguments, out=out))
+        self.assertEqual(done.returncode, code, done.stderr)
+        self.stderr = done.stderr
+        return json.loads((self.path / out / "results.json").read_text())
+
+    def bad(self, code, message, *arguments):
+        done = self.run_covary(self.command(*arguments))
+        self.assertEqual(done.returncode, code, done.stderr)
+        self.assertIn(message, done.stderr)
+
+    def runs(self, out="out"):
+        """Time stamps of the images in the cache."""
+        return {p: p.stat().st_mtime_ns for p in (self.path / out / "cache" / "runs").glob("*/image.exr")}
+
+
+class Results(ExperimentTest):
+    """What one experiment leaves behind."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.first = cls()
+        cls.first.setUp()
+        cls.addClassCleanup(cls.first.doCleanups)
+        cls.shared = cls.first.results()
+
+    def setUp(self):
+        super().setUp()
+        if hasattr(self, "shared"):
+            self.path = self.first.path
+
+    def test_numbers(self):
+        results = self.shared
+        self.assertEqual(results["format"], "covary-experiment 1")
+        self.assertTrue(results["complete"])
+        self.assertEqual([(c["method"], c["budget"]["spp"]) for c in results["cells"]],
+                         [("pt", 24), ("pt", 48), ("iicv", 24), ("iicv", 48)])
+        for cell in results["cells"]:
+            with self.subTest(cell["method"]):
+                self.assertEqual((cell["seeds"], cell["pixels"]), ([1, 2], 32 * 24))
+                relmse = cell["relmse"]
+                self.assertAlmostEqual(relmse["value"], sum(r["relmse"] for r in cell["runs"]) / 2)
+                self.assertAlmostEqual(relmse["value"], relmse["squared_bias"]["value"] + relmse["variance"]["value"])
+                self.assertLess(relmse["low"], relmse["value"])
+                self.assertAlmostEqual(cell["seconds"]["method"]["value"],
+                                       sum(cell["seconds"][k]["value"] for k in ("render", "estimate", "then")))
+                self.assertGreater(cell["peak_memory_bytes"], 1e6)
+        pt, iicv = results["cells"][1], results["cells"][3]
+        self.assertEqual(pt["equal_sample"]["value"], 1)
+        self.assertAlmostEqual(iicv["equal_sample"]["value"], pt["relmse"]["value"] / iicv["relmse"]["value"])
+        self.assertGreater(iicv["equal_sample"]["value"], 1.5)
+        self.assertIsNone(pt["predicted_over_true"]["value"])
+        self.assertTrue(0.1 < iicv["predicted_over_true"]["value"] < 10)
+        self.assertEqual({s["method"] for s in results["slopes"]}, {"pt", "iicv"})
+        # The numbers are those of `covary compare`.
+        run, files = iicv["runs"][0], results["scenes"][0]["reference"]["files"]
+        compared = self.run_covary([COVARY, "compare", run["image"], "--reference", files[0], "--reference2", files[1],
+                                    "--metric", "relmse,mse,mae,flip", "--json"])
+        for name, value in json.loads(compared.stdout).items():
+            if name in ("relmse", "mse", "mae", "flip"):
+                self.assertAlmostEqual(run[name], value, places=12)
+        # The command line is one that can be typed, and gives the same image.
+        again = self.run_covary(run["command"].replace("covary", COVARY, 1).split() + ["-o", "again.exr", "--quiet"])
+        self.assertEqual(again.returncode, 0, again.stderr)
+        compared = self.run_covary([COVARY, "compare", run["image"], "--reference", "again.exr", "--metric", "mse", "--json"])
+        self.assertEqual(json.loads(compared.stdout)["mse"], 0)
+
+    def test_csv(self):
+        results = self.shared
+        with open(self.path / "out" / "results.csv", newline="") as file:
+            rows = list(csv.DictReader(file))
+        values = {(r["method"], r["budget"], r["seed"], r["quantity"]): r for r in rows}
+        self.assertEqual(len(values), len(rows))
+        for cell in results["cells"]:
+            row = values[cell["method"], str(cell["budget"]["spp"]), "", "relmse"]
+            self.assertEqual((row["scene"], row["unit"]), ("room", "spp"))
+            self.assertEqual(float(row["value"]), cell["relmse"]["value"])
+            self.assertEqual(float(row["high"]), cell["relmse"]["high"])
+            for run in cell["runs"]:
+                row = values[cell["method"], str(cell["budget"]["spp"]), str(run["seed"]), "flip"]
+                self.assertEqual(float(row["value"]), run["flip"])
+        self.assertIn("<!doctype html>", (self.path / "out" / "report.html").read_text()[:200].lower())
+
+    def test_finished_runs_are_not_run_again(self):
+        first, before = self.shared, self.runs()
+        self.assertEqual(len(before), 10)
+        second = self.results()
+        self.assertEqual(self.runs(), before)
+        self.assertEqual([c["runs"] for c in second["cells"]], [c["runs"] for c in first["cells"]])  # times, too
+        # Another seed only adds to what is there.
+        self.suite["seeds"] = [1, 2, 3]
+        self.results("--spp", "24")
+        after = self.runs()
+        self.assertEqual(len(after), 12)
+        self.assertEqual({p: t for p, t in after.items() if p in before}, before)
+        self.assertEqual(list((self.path / "out" / "cache" / "passes").iterdir()), [])
+
+
+class Kinds(ExperimentTest):
+    def test_time_budget(self):
+        self.suite["budgets"] = [{"seconds": 0.2}]
+        self.suite["seeds"] = 1
+        for cell in self.results()["cells"]:
+            spent = cell["seconds"]["over_budget"]
+            self.assertAlmostEqual(spent, cell["seconds"]["method"]["value"] / 0.2)
+            self.assertIsNone(cell["equal_sample"]["value"])
+            self.assertIsNotNone(cell["equal_time"]["value"])
+            flagged = [w for w in json.loads((self.path / "out" / "results.json").read_text())["warnings"]
+                       if f"{cell['method']}, 0.2 s: took" in w]
+            self.assertEqual(bool(flagged), abs(spent - 1) > 0.05, flagged)
+
+    def test_later_commands(self):
+        more = self.run_covary([COVARY, "render", str(SCENES / "room.xml"), "--resolution", "32x24", "--rfilter", "box", "--spp", "24",
+                                "--estimator", "none", "--seed", "99", "-o", "more.exr", "--quiet", "--no-preview"])
+        self.assertEqual(more.returncode, 0, more.stderr)
+        merge = ["merge", str(self.path / "more.exr")]
+        self.suite["methods"][1] = {"name": "merged", "options": ["--estimator", "none"], "then": [merge]}
+        self.suite["budgets"], self.suite["seeds"] = [{"spp": 24}], 1
+        cells = {c["method"]: c for c in self.results()["cells"]}
+        self.assertGreater(cells["merged"]["seconds"]["then"]["value"], 0)
+        self.assertLess(cells["merged"]["relmse"]["value"], cells["pt"]["relmse"]["value"])
+        self.assertIn(" && covary merge ", cells["merged"]["runs"][0]["command"])
+
+
+class Resume(ExperimentTest):
+    def test_killed_at_random_and_resumed(self):
+        expected = without_times(self.results(out="whole"))
+        random.seed(1)
+        killed = 0
+        for sent in (signal.SIGKILL, signal.SIGKILL, signal.SIGINT):
+            process = subprocess.Popen(self.command(), cwd=self.path, stderr=subprocess.PIPE, text=True)
+            time.sleep(random.uniform(0.1, 0.8))
+            process.send_signal(sent)
+            _, errors = process.communicate(timeout=60)
+            if sent == signal.SIGINT and process.returncode != 0:
+                self.assertEqual(process.returncode, 1)
+                self.assertRegex(errors, "interrupted after .* the same command continues")
+            killed += process.returncode != 0
+        self.assertGreater(killed, 0)
+        self.assertEqual(without_times(self.results()), expected)
+
+    def test_passes_are_shared(self):
+        self.suite["methods"] += [{"name": "paper", "options": ["--paper", "--k", "9"]}, {"name": "iduw", "options": ["--estimator=iduw"]},
+                                  {"name": "other split", "options": ["--split", "3:1"]}]
+        self.suite["budgets"] = [{"spp": 24}]
+        self.suite["seeds"] = 1
+        self.results("--keep-passes")
+        folders = list((self.path / "out" / "cache" / "passes").iterdir())
+        self.assertEqual(len([f for f in folders if (f / "crn.exr").exists()]), 2)
+
+    def test_one_experiment_at_a_time(self):
+        process = subprocess.Popen(self.command("--reference-spp", "100000"), cwd=self.path, stderr=subprocess.DEVNULL)
+        try:
+            deadline = time.time() + 20
+            while not (self.path / "out" / "cache" / "lock").exists() and time.time() < deadline:
+                time.sleep(0.02)
+            time.sleep(0.2)
+            self.bad(1, "is in use by another experiment")
+        finally:
+            process.kill()
+            process.wait()
+
+
+class Failures(ExperimentTest):
+    def test_the_rest_goes_on(self):
+        self.suite["scenes"].append({"name": "gone", "file": "gone.xml"})
+        self.suite["methods"].append({"name": "wrong", "options": ["--k", "-3"]})
+        self.suite["methods"].append({"name": "late", "options": ["--estimator", "none"], "then": [["merge", "nothing.exr"]]})
+        self.suite["budgets"] = [{"spp": 24}]
+        results = self.results(code=1)
+        self.assertFalse(results["complete"])
+        self.assertEqual([c["method"] for c in results["cells"]], ["pt", "iicv"])
+        failures = {(f["scene"], f["method"]): f for f in results["failures"]}
+        self.assertEqual(set(failures), {("gone", ""), ("room", "wrong"), ("room", "late")})
+        self.assertIn("gone.xml", failures["gone", ""]["message"])
+        self.assertEqual(failures["room", "wrong"]["exit_code"], 2)
+        self.assertEqual(failures["room", "wrong"]["runs_not_tried"], 1)
+        self.assertIn("k is -3", failures["room", "wrong"]["message"])
+        self.assertIn("nothing.exr", failures["room", "late"]["message"])
+        self.assertIn("failed: gone", self.stderr)
+
+
+class Mistakes(ExperimentTest):
+    def test_all_at_once_with_lines(self):
+        (self.path / "suite.json").write_text('{\n "name": "x",\n "scene": [],\n "methods": [{"nam": "a"}]\n}')
+        done = self.run_covary([COVARY, "experiment", "suite.json", "-o", "out"])
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("suite.json:3: scene: unknown key; did you mean 'scenes'", done.stderr)
+        self.assertIn("suite.json:4: methods[0].nam: unknown key; did you mean 'name'", done.stderr)
+        self.assertFalse((self.path / "out").exists())
+
+    def test_wrong_choices(self):
+        self.bad(2, "the suite has no scene 'romo'; did you mean 'room'", "--scenes-only", "romo")
+        self.bad(2, "--seeds 'x': expected a number of seeds", "--seeds", "x")
+        self.bad(2, "the seed 900000001 is reserved for references", "--seeds", "3,900000001")
+        self.bad(1, "crop '99x99' does not fit into the 32 x 24 frame", "--crop", "99x99")
+        for arguments, message in ((["qiuck"], "no suite is named 'qiuck'; did you mean 'quick'"), ([], "no suite given"),
+                                   (["iicv-table1", "-o", "out"], "needs --scenes DIR, the folder that holds bathroom2/scene_v3.xml")):
+            done = self.run_covary([COVARY, "experiment", *arguments])
+            self.assertEqual(done.returncode, 2, done.stderr)
+            self.assertIn(message, done.stderr)
+
+
+class References(ExperimentTest):
+    def render(self, name, seed, spp=128):
+        done = self.run_covary([COVARY, "render", str(SCENES / "room.xml"), "--resolution", "32x24", "--rfilter", "box",
+                                "--estimator", "none", "--seed", str(seed), "--spp", str(spp), "-o", name, "--quiet", "--no-preview"])
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return str(self.path / name)
+
+    def test_given_files(self):
+        self.suite["budgets"] = [{"spp": 24}]
+        a, b = self.render("a.exr", 77), self.render("b.exr", 78)
+        results = self.results("--reference", a, b)
+        self.assertEqual(results["scenes"][0]["reference"]["files"], [a, b])
+        # A seed that a run has, too.
+        reused = self.render("c.exr", 2)
+        results = self.results("--reference", a, reused, code=1)
+        self.assertIn("the seed 2 is also that of a run", results["failures"][0]["message"])
+        self.assertEqual(results["cells"], [])
+
+    def test_unknown_seeds_show_in_the_numbers(self):
+        """Without attributes nothing says which seeds a reference has; its noise does."""
+        self.suite["budgets"] = [{"spp": 48}]
+        self.suite["seeds"] = 3
+        self.suite["scenes"][0]["resolution"] = "64x48"
+        names = []
+        for name, seed in (("a", 77), ("b", 2)):
+            done = self.run_covary([COVARY, "render", str(SCENES / "room.xml"), "--resolution", "64x48", "--rfilter", "box", "--estimator",
+                                    "none", "--seed", str(seed), "--spp", "128", "-o", name + ".exr", "--quiet", "--no-preview"])
+            self.assertEqual(done.returncode, 0, done.stderr)
+            path = self.path / (name + ".exr")
+            # The attribute's name made unknown, in place.
+            path.write_bytes(path.read_bytes().replace(b"covary:seed", b"covary:s33d"))
+            names.append(str(path))
+        results = self.results("--reference", *names)
+        self.assertTrue(any("pt, 48 spp: render 2 leans to the second reference" in w for w in results["warnings"]), results["warnings"])
+
+
+class BuiltIn(ExperimentTest):
+    def test_every_suite_is_complete(self):
+        names = [line.split()[0] for line in self.run_covary([COVARY, "experiment", "--list"]).stdout.splitlines()]
+        self.assertEqual(set(names), {path.stem for path in SUITES.glob("*.json")})
+        for name in names:
+            with self.subTest(name):
+                done = self.run_covary([COVARY, "experiment", name, "--print"])
+                self.assertEqual(done.returncode, 0, done.stderr)
+                suite = json.loads(done.stdout)
+                self.assertEqual(suite["name"], name)
+                self.assertIn(suite["baseline"], [m["name"] for m in suite["methods"]])
+
+    def test_one_scene(self):
+        done = self.run_covary([COVARY, "experiment", str(SCENES / "room.xml"), "--quick", "-o", "out", "--resolution", "24x16", "--seeds", "1",
+                                "--spp", "24", "--reference-spp", "32", "--quiet"])
+        self.assertEqual(done.returncode, 0, done.stderr)
+        results = json.loads((self.path / "out" / "results.json").read_text())
+        self.assertEqual({c["method"] for c in results["cells"]}, {"pt", "crn", "iicv", "iicv-paper", "cv-baseline", "iduw"})
+        self.assertEqual(results["scenes"][0]["name"], "room")
+
+    def test_quick_scales_frames_down(self):
+        done = self.run_covary([COVARY, "experiment", str(SCENES / "room.xml"), "--quick", "--methods-only", "pt", "--spp", "4", "--seeds", "1",
+                                "--reference-spp", "4", "-o", "out"])
+        self.assertEqual(done.returncode, 0, done.stderr)
+        width, height = json.loads((self.path / "out" / "results.json").read_text())["scenes"][0]["frame"]
+        self.assertEqual((width, height), (220, 146))
+
+
+if __name__ == "__main__":
+    unittest.main()
