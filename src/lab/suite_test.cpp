@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "lab/builtin_suites.h"
 #include "support/files.h"
 
 namespace covary::lab {
@@ -52,6 +53,18 @@ TEST(Suite, ReadsEverything) {
 TEST(Suite, WrittenAndReadAgainIsTheSame) {
   const nlohmann::ordered_json json = to_json(parse_suite(kSuite, "small.json"));
   EXPECT_EQ(to_json(parse_suite(json.dump(2), "again.json")), json);
+}
+
+TEST(Suite, BuiltInSuitesAreRight) {
+  EXPECT_GE(builtin_suites().size(), 10u);
+  for (const auto& [name, text] : builtin_suites()) {
+    Suite suite = parse_suite(std::string(text), name);
+    EXPECT_EQ(suite.name, name);
+    if (suite.scenes.empty()) suite.scenes.push_back({"scene", "scene.xml"});  // a template
+    EXPECT_EQ(validate(suite), std::vector<std::string>{}) << name;
+    for (const SceneEntry& scene : suite.scenes)
+      EXPECT_TRUE(name == "compare" || !scene.credit.empty()) << name << ", " << scene.name;
+  }
 }
 
 TEST(Suite, ReportsAllMistakesWithTheirLines) {

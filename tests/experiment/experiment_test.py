@@ -178,12 +178,13 @@ class Kinds(ExperimentTest):
 
 class Resume(ExperimentTest):
     def test_killed_at_random_and_resumed(self):
+        self.suite["budgets"] = [{"spp": 24}]
         expected = without_times(self.results(out="whole"))
         random.seed(1)
         killed = 0
         for sent in (signal.SIGKILL, signal.SIGKILL, signal.SIGINT):
             process = subprocess.Popen(self.command(), cwd=self.path, stderr=subprocess.PIPE, text=True)
-            time.sleep(random.uniform(0.1, 0.8))
+            time.sleep(random.uniform(0.1, 0.6))
             process.send_signal(sent)
             _, errors = process.communicate(timeout=60)
             if sent == signal.SIGINT and process.returncode != 0:
@@ -277,6 +278,7 @@ class References(ExperimentTest):
         """Without attributes nothing says which seeds a reference has; its noise does."""
         self.suite["budgets"] = [{"spp": 48}]
         self.suite["seeds"] = 3
+        self.suite["methods"].pop()
         self.suite["scenes"][0]["resolution"] = "64x48"
         names = []
         for name, seed in (("a", 77), ("b", 2)):
@@ -292,16 +294,12 @@ class References(ExperimentTest):
 
 
 class BuiltIn(ExperimentTest):
-    def test_every_suite_is_complete(self):
+    def test_list(self):
         names = [line.split()[0] for line in self.run_covary([COVARY, "experiment", "--list"]).stdout.splitlines()]
         self.assertEqual(set(names), {path.stem for path in SUITES.glob("*.json")})
-        for name in names:
-            with self.subTest(name):
-                done = self.run_covary([COVARY, "experiment", name, "--print"])
-                self.assertEqual(done.returncode, 0, done.stderr)
-                suite = json.loads(done.stdout)
-                self.assertEqual(suite["name"], name)
-                self.assertIn(suite["baseline"], [m["name"] for m in suite["methods"]])
+        done = self.run_covary([COVARY, "experiment", "iicv-table1", "--print", "--scenes-only", "house", "--seeds", "2"])
+        suite = json.loads(done.stdout)
+        self.assertEqual(([s["name"] for s in suite["scenes"]], suite["seeds"]), (["house"], [1, 2]))
 
     def test_one_scene(self):
         done = self.run_covary([COVARY, "experiment", str(SCENES / "room.xml"), "--quick", "-o", "out", "--resolution", "24x16", "--seeds", "1",
