@@ -50,6 +50,7 @@ int run(int argc, char** argv) {
   add_info(app);
   add_convert(app);
   add_combine(app);
+  add_denoise(app);
   add_experiment(app);
   add_view(app);
 

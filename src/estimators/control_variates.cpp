@@ -334,7 +334,7 @@ class Regression {
   }
 
   /// The first three terms of [YM2025] Eq. (8): variance of f - sum_i beta_i g_i. The coefficients were fitted to the
-  /// same groups, so that their residuals are too small; generalised cross-validation (Golub, Heath, Wahba 1979) corrects
+  /// same groups, so that their residuals are too small; generalised cross-validation [GHW1979] corrects
   /// that by the degrees of freedom.
   vfloat crn_variance(int c, const Workspace& w) const {
     vfloat squares = {};

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// covary denoise: Open Image Denoise on an image, guided by its albedo and normal where it has them.
+#include "estimators/denoise.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <optional>
+
+#include "commands.h"
+#include "core/error.h"
+#include "film/image_file.h"
+
+namespace covary {
+namespace {
+
+struct Options {
+  std::string input, output;
+  DenoiseOptions denoise;
+  bool no_guides = false, quiet = false;
+};
+
+/// Layer `name` of the image, if it has one with three channels that begin so.
+std::optional<Image> guide(const std::string& path, const ImageInfo& info, const std::string& name) {
+  const auto n = std::count_if(info.channels.begin(), info.channels.end(),
+                               [&](const ExrFile::Channel& c) { return c.name.starts_with(name + "."); });
+  if (n != 3) return std::nullopt;
+  return read_image(path, name).image;
+}
+
+void run(const Options& o) {
+  const auto start = std::chrono::steady_clock::now();
+  const ImageInfo info = inspect_image(o.input);
+  const PlacedImage image = read_image(o.input);
+  std::optional<Image> albedo, normal;
+  if (!o.no_guides) {
+    albedo = guide(o.input, info, "Albedo");
+    if (albedo) normal = guide(o.input, info, "N");
+  }
+  Image result = denoise(image.image, albedo ? &*albedo : nullptr, normal ? &*normal : nullptr, o.denoise);
+  std::map<std::string, std::string> attributes = info.attributes;
+  attributes["covary:version"] = COVARY_VERSION;
+  attributes["covary:command"] = command_line();
+  attributes["covary:denoiser"] = "Open Image Denoise";
+  std::vector<ExrPlane> planes;
+  for (size_t c = 0; c < 3; ++c)
+    planes.push_back({std::string(1, "RGB"[c]), ExrPlane::Type::kFloat, result.data.data() + c, 12});
+  write_exr(o.output, image.place, attributes, planes);
+  if (!o.quiet)
+    std::fprintf(stderr, "%s: %d x %d, %s, in %.2f s\n", o.output.c_str(), result.width, result.height,
+                 normal   ? "guided by albedo and normal"
+                 : albedo ? "guided by albedo"
+                          : "without guides",
+                 std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+}
+
+}  // namespace
+
+void add_denoise(CLI::App& app) {
+  const auto o = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("denoise", "Denoise an image with Open Image Denoise (biased)");
+  command->add_option("IN", o->input, "Linear image (EXR); its layers Albedo and N are guides")->required();
+  command->add_option("-o,--output", o->output, "The result (EXR)")->required();
+  command->add_option("--oidn", o->denoise.library, "Open Image Denoise's library, or its folder");
+  command->add_flag("--no-guides", o->no_guides, "Do not use the layers Albedo and N");
+  command->add_flag("--quiet", o->quiet, "No summary");
+  command->callback([o] { run(*o); });
+}
+
+}  // namespace covary

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "estimators/denoise.h"
+
+#include <dlfcn.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "core/error.h"
+
+namespace covary {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kLibrary = "libOpenImageDenoise.so.2";
+
+/// The part of the library's C interface (version 2) that is used here; handles are opaque.
+struct Api {
+  static constexpr int kDeviceCpu = 1, kFormatFloat3 = 3;
+  void* (*new_device)(int type) = nullptr;
+  void (*commit_device)(void* device) = nullptr;
+  void (*release_device)(void* device) = nullptr;
+  int (*device_error)(void* device, const char** message) = nullptr;
+  void* (*new_filter)(void* device, const char* type) = nullptr;
+  void (*set_image)(void* filter, const char* name, void* data, int format, size_t width, size_t height,
+                    size_t byte_offset, size_t pixel_stride, size_t row_stride) = nullptr;
+  void (*set_bool)(void* filter, const char* name, bool value) = nullptr;
+  void (*commit_filter)(void* filter) = nullptr;
+  void (*execute_filter)(void* filter) = nullptr;
+  void (*release_filter)(void* filter) = nullptr;
+};
+
+/// Folders of the wheel `pyoidn` below a Python prefix.
+void add_wheel_folders(const fs::path& prefix, std::vector<fs::path>& folders) {
+  std::error_code ignored;
+  std::vector<fs::path> found;
+  for (const fs::directory_entry& entry : fs::directory_iterator(prefix / "lib", ignored))
+    if (entry.path().filename().string().starts_with("python3"))
+      for (const char* packages : {"site-packages", "dist-packages"})
+        found.push_back(entry.path() / packages / "pyoidn" / "oidn" / "lib");
+  std::sort(found.begin(), found.end());
+  folders.insert(folders.end(), found.begin(), found.end());
+}
+
+std::string environment(const char* name) {
+  const char* value = std::getenv(name);
+  return value ? value : "";
+}
+
+/// Where the library may be, in order. A name without a folder is left to the loader.
+std::vector<std::string> candidates(const DenoiseOptions& options) {
+  const auto in = [](const fs::path& path) { return (fs::is_directory(path) ? path / kLibrary : path).string(); };
+  if (!options.library.empty()) return {in(options.library)};
+  if (const std::string path = environment("COVARY_OIDN"); !path.empty()) return {in(path)};
+  std::vector<std::string> all = {kLibrary};
+  std::vector<fs::path> folders;
+  if (const std::string path = environment("VIRTUAL_ENV"); !path.empty()) add_wheel_folders(path, folders);
+  if (const std::string home = environment("HOME"); !home.empty())
+    add_wheel_folders(fs::path(home) / ".local", folders);
+  add_wheel_folders("/usr/local", folders);
+  add_wheel_folders("/usr", folders);
+  for (const fs::path& folder : folders)
+    if (fs::exists(folder / kLibrary)) all.push_back((folder / kLibrary).string());
+  return all;
+}
+
+struct Library {
+  std::string path;
+  void* handle = nullptr;
+};
+
+/// The library stays loaded until the program ends: its threads and ours may share a scheduler.
+Library open_library(const DenoiseOptions& options, std::string& why) {
+  for (const std::string& path : candidates(options)) {
+    if (void* handle = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL)) return {path, handle};
+    why = dlerror();
+  }
+  return {};
+}
+
+template <typename Function>
+void bind(const Library& library, const char* name, Function& function) {
+  function = reinterpret_cast<Function>(dlsym(library.handle, name));
+  if (!function)
+    throw Error(ErrorCode::kIo,
+                fmt::format("{} has no function {}; version 2 of Open Image Denoise is needed", library.path, name));
+}
+
+Api load(const DenoiseOptions& options) {
+  std::string why;
+  const Library library = open_library(options, why);
+  if (!library.handle)
+    throw Error(
+        ErrorCode::kUsage,
+        fmt::format("Open Image Denoise is not there ({}); install it with `pip install pyoidn`, or name {} or its "
+                    "folder with --oidn or the environment variable COVARY_OIDN",
+                    why, kLibrary));
+  Api api;
+  bind(library, "oidnNewDevice", api.new_device);
+  bind(library, "oidnCommitDevice", api.commit_device);
+  bind(library, "oidnReleaseDevice", api.release_device);
+  bind(library, "oidnGetDeviceError", api.device_error);
+  bind(library, "oidnNewFilter", api.new_filter);
+  bind(library, "oidnSetSharedFilterImage", api.set_image);
+  bind(library, "oidnSetFilterBool", api.set_bool);
+  bind(library, "oidnCommitFilter", api.commit_filter);
+  bind(library, "oidnExecuteFilter", api.execute_filter);
+  bind(library, "oidnReleaseFilter", api.release_filter);
+  return api;
+}
+
+void check_size(const char* name, const Image& rgb, const Image* guide) {
+  if (guide && (guide->width != rgb.width || guide->height != rgb.height || guide->channels != 3))
+    throw Error(ErrorCode::kInput,
+                fmt::format("denoise: the {} is {} x {} with {} channels, the image {} x {}; expected "
+                            "are 3 channels and the same size",
+                            name, guide->width, guide->height, guide->channels, rgb.width, rgb.height));
+}
+
+Image finite(const Image& image) {
+  Image copy = image;
+  for (float& value : copy.data)
+    if (!std::isfinite(value)) value = 0;
+  return copy;
+}
+
+}  // namespace
+
+std::string find_denoiser(const DenoiseOptions& options) {
+  std::string why;
+  return open_library(options, why).path;
+}
+
+Image denoise(const Image& rgb, const Image* albedo, const Image* normal, const DenoiseOptions& options) {
+  if (rgb.width < 1 || rgb.height < 1 || rgb.channels != 3)
+    throw Error(ErrorCode::kInput,
+                fmt::format("denoise: the image is {} x {} with {} channels; expected are 3 channels", rgb.width,
+                            rgb.height, rgb.channels));
+  check_size("albedo", rgb, albedo);
+  check_size("normal", rgb, normal);
+  if (normal && !albedo) throw Error(ErrorCode::kInput, "denoise: a normal without an albedo; the denoiser needs both");
+
+  const Api api = load(options);
+  const std::unique_ptr<void, void (*)(void*)> device(api.new_device(Api::kDeviceCpu), api.release_device);
+  const auto check = [&] {
+    const char* message = nullptr;
+    if (api.device_error(device.get(), &message) != 0 || !device)
+      throw Error(ErrorCode::kIo, fmt::format("Open Image Denoise: {}", message ? message : "no processor device"));
+  };
+  check();
+  api.commit_device(device.get());
+  check();
+  const std::unique_ptr<void, void (*)(void*)> filter(api.new_filter(device.get(), "RT"), api.release_filter);
+  check();
+
+  Image colour = finite(rgb), result(rgb.width, rgb.height, 3), albedo_copy, normal_copy;
+  const auto set = [&](const char* name, Image& image) {
+    api.set_image(filter.get(), name, image.data.data(), Api::kFormatFloat3, image.width, image.height, 0, 0, 0);
+  };
+  set("color", colour);
+  if (albedo) set("albedo", albedo_copy = finite(*albedo));
+  if (normal) set("normal", normal_copy = finite(*normal));
+  set("output", result);
+  api.set_bool(filter.get(), "hdr", true);
+  api.commit_filter(filter.get());
+  check();
+  api.execute_filter(filter.get());
+  check();
+  return result;
+}
+
+}  // namespace covary
