@@ -12,7 +12,8 @@
 namespace covary {
 
 /// Smallest V_h,i relative to the variance of the CRN groups at i. It bounds the condition number, so that single
-/// precision suffices; PT and CRN estimate the same integrals, so that the true ratio is about one.
+/// precision suffices; PT and CRN estimate the same integrals, so that the true ratio is about one. Values from 1e-5 to
+/// 1e-2 give the same errors within 0.1 % (kitchen, 192 spp).
 inline constexpr float kSmallestPenalty = 1e-4f;
 /// Ridge that stands for zero (minimum norm), relative to the mean diagonal.
 inline constexpr float kNegligibleRidge = 1e-6f;

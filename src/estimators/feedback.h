@@ -17,9 +17,9 @@ namespace covary {
 struct FeedbackOptions {
   /// Side of the window; odd, 5 … 125. Default 41 (measured; 61 gains less than 1 %, 21 loses 3 %).
   int window = 41;
-  /// kappa: pixels that differ by so many standard errors of the estimate have weight 1 / e; > 0. Less leaves more of the
-  /// bias of single bright pixels, more carries it across edges. Default 5 (measured; 4 to 12 are within 3 %).
-  float bandwidth = 5.0f;
+  /// kappa: pixels that differ by so many standard errors of the estimate have weight 1 / e; > 0. Less leaves less bias and
+  /// more noise. Default 2.5 (measured, docs/methods/iicv.md: half the squared bias of 8 at 2 % more error).
+  float bandwidth = 2.5f;
 };
 
 /// Adds the feedback to `estimate`, whose standard error is `std_error`. `h`: 3 planes, mean of the PT image. The sums run over cells of 2 x 2 pixels (means of
