@@ -15,8 +15,9 @@ namespace covary {
 /// precision suffices; PT and CRN estimate the same integrals, so that the true ratio is about one. Values from 1e-5 to
 /// 1e-2 give the same errors within 0.1 % (kitchen, 192 spp).
 inline constexpr float kSmallestPenalty = 1e-4f;
-/// Ridge that stands for zero (minimum norm), relative to the mean diagonal.
-inline constexpr float kNegligibleRidge = 1e-6f;
+/// Ridge that stands for zero (minimum norm), relative to the mean diagonal. The system has condition numbers up to
+/// k / ridge, which single precision must hold with its rounding errors.
+inline constexpr float kNegligibleRidge = 1e-5f;
 
 struct ControlVariateSettings {
   int k = 25;

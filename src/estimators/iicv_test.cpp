@@ -256,7 +256,7 @@ TEST(CvBaseline, WithSharedCoefficientsIsThePtImage) {
   for (int y = 0; y < 20; ++y)
     for (int x = 0; x < 30; ++x)
       for (int c = 0; c < 3; ++c)
-        EXPECT_NEAR(fast.estimate.pixel(x, y)[c], reference::mean(pt.view(), x, y)[c], 2e-3) << x << ", " << y;
+        EXPECT_NEAR(fast.estimate.pixel(x, y)[c], reference::mean(pt.view(), x, y)[c], 5e-3) << x << ", " << y;
 }
 
 /// Powers of two scale floats exactly, and the estimator is homogeneous.
@@ -304,6 +304,21 @@ TEST(Iicv, AbsurdlyLargeValuesGiveFiniteResults) {
   options.std_error = true;
   const EstimatorResult result = iicv(crn.view(), pt.view(), options);
   for (float v : result.estimate.data) ASSERT_TRUE(std::isfinite(v));
+}
+
+/// A sky: bright, and hardly any noise but that of rounding. The solution of smallest norm must not blow it up.
+TEST(CvBaseline, SmallestNormIsBoundedWherePixelsHardlyVary) {
+  test::Grouped crn = test::crn_image(60, 40, 12, 3), pt = test::pt_image(60, 40, 12, 4);
+  for (float noise : {0.0f, 1e-7f, 1e-6f, 1e-4f, 1e-2f}) {
+    for (int y = 0; y < 40; ++y)
+      for (int x = 0; x < 60; ++x)
+        for (int i = 0; i < 36; ++i) {
+          crn.pixel(x, y)[i] = 3.0f * (1 + noise * test::noise(7, i, x));
+          pt.pixel(x, y)[i] = 3.0f * (1 + noise * test::noise(8, i + 36 * y, x));
+        }
+    const EstimatorResult result = cv_baseline(crn.view(), pt.view());
+    for (float v : result.estimate.data) ASSERT_NEAR(v, 3.0f, 30 * noise + 1e-5f) << noise;
+  }
 }
 
 /// No variance in the CRN image: nothing to explain, the result is the CRN mean.
