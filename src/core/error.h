@@ -37,7 +37,8 @@ std::string did_you_mean(const std::string& name, const std::vector<std::string>
 }  // namespace covary
 
 /// Programming errors: always on, so not for inner loops.
-#define COVARY_CHECK(condition, message)                                                                         \
-  do {                                                                                                           \
-    if (!(condition)) throw ::covary::Error(::covary::ErrorCode::kInternal, std::string(message) + " (" #condition ")"); \
+#define COVARY_CHECK(condition, message)                                                                 \
+  do {                                                                                                   \
+    if (!(condition))                                                                                    \
+      throw ::covary::Error(::covary::ErrorCode::kInternal, std::string(message) + " (" #condition ")"); \
   } while (false)

@@ -21,22 +21,24 @@ inline uint64_t mix64(uint64_t z) {
   return z ^ (z >> 31);
 }
 /// Key of the pair (a, b); not symmetric.
-inline uint64_t combine64(uint64_t a, uint64_t b) { return mix64(mix64(a + 0x9e3779b97f4a7c15ull) ^ (b * 0xd1342543de82ef95ull + 0x632be59bd9b4e019ull)); }
+inline uint64_t combine64(uint64_t a, uint64_t b) {
+  return mix64(mix64(a + 0x9e3779b97f4a7c15ull) ^ (b * 0xd1342543de82ef95ull + 0x632be59bd9b4e019ull));
+}
 
 /// What a random number decides. One vertex of a path has kEventsPerVertex addresses.
 enum class Event : uint32_t {
-  kPixel,            ///< position inside the pixel (vertex 0)
-  kLens,             ///< position on the lens (vertex 0)
-  kLightChoice,      ///< which emitter
-  kLightPosition,    ///< where on the emitter
-  kLightPrimitive,   ///< which part of the emitter (triangle), and further needs of emitters
-  kLightDirection,   ///< direction of emission (light subpaths)
-  kLobe,             ///< which lobe of the BSDF
-  kDirection,        ///< direction within the lobe
-  kRoulette,         ///< survival
-  kTechnique,        ///< choice between BSDF and guiding
-  kGuide,            ///< direction from guiding
-  kConnection,       ///< choices of bidirectional connections
+  kPixel,           ///< position inside the pixel (vertex 0)
+  kLens,            ///< position on the lens (vertex 0)
+  kLightChoice,     ///< which emitter
+  kLightPosition,   ///< where on the emitter
+  kLightPrimitive,  ///< which part of the emitter (triangle), and further needs of emitters
+  kLightDirection,  ///< direction of emission (light subpaths)
+  kLobe,            ///< which lobe of the BSDF
+  kDirection,       ///< direction within the lobe
+  kRoulette,        ///< survival
+  kTechnique,       ///< choice between BSDF and guiding
+  kGuide,           ///< direction from guiding
+  kConnection,      ///< choices of bidirectional connections
 };
 inline constexpr uint32_t kEventsPerVertex = 16;
 

@@ -14,9 +14,18 @@ struct Spectrum {
   Spectrum(float r_, float g_, float b_) : r(r_), g(g_), b(b_) {}
   float operator[](int i) const { return i == 0 ? r : (i == 1 ? g : b); }
   float& operator[](int i) { return i == 0 ? r : (i == 1 ? g : b); }
-  Spectrum& operator+=(const Spectrum& o) { r += o.r, g += o.g, b += o.b; return *this; }
-  Spectrum& operator*=(const Spectrum& o) { r *= o.r, g *= o.g, b *= o.b; return *this; }
-  Spectrum& operator*=(float s) { r *= s, g *= s, b *= s; return *this; }
+  Spectrum& operator+=(const Spectrum& o) {
+    r += o.r, g += o.g, b += o.b;
+    return *this;
+  }
+  Spectrum& operator*=(const Spectrum& o) {
+    r *= o.r, g *= o.g, b *= o.b;
+    return *this;
+  }
+  Spectrum& operator*=(float s) {
+    r *= s, g *= s, b *= s;
+    return *this;
+  }
   bool operator==(const Spectrum&) const = default;
 };
 inline Spectrum operator+(const Spectrum& a, const Spectrum& b) { return {a.r + b.r, a.g + b.g, a.b + b.b}; }

@@ -24,8 +24,8 @@ struct PathContext {
 /// One camera ray, the random numbers of its path, and the estimate of the radiance arriving along it.
 struct CameraSample {
   Ray ray;
-  PathRandom random;   ///< the integrator reads numbers at vertices >= 1 only
-  Spectrum radiance;   ///< zero on entry
+  PathRandom random;  ///< the integrator reads numbers at vertices >= 1 only
+  Spectrum radiance;  ///< zero on entry
 };
 
 class Integrator : public SceneObject {
@@ -40,10 +40,10 @@ class Integrator : public SceneObject {
 /// Settings every integrator has; Mitsuba's meaning. The command line overrides those of the scene.
 struct PathLengthSettings {
   static constexpr int kUnlimited = std::numeric_limits<int>::max();
-  int min_depth = 0;            ///< contributions of paths with fewer edges are left out
-  int max_depth = kUnlimited;   ///< largest number of path edges; 1: directly visible light only; 0: black
-  int rr_depth = 5;             ///< number of edges after which Russian roulette begins
-  bool hide_emitters = false;   ///< lights are invisible to the camera
+  int min_depth = 0;           ///< contributions of paths with fewer edges are left out
+  int max_depth = kUnlimited;  ///< largest number of path edges; 1: directly visible light only; 0: black
+  int rr_depth = 5;            ///< number of edges after which Russian roulette begins
+  bool hide_emitters = false;  ///< lights are invisible to the camera
   /// Reads max_depth (-1: unlimited), rr_depth and hide_emitters.
   static PathLengthSettings from(Parameters& parameters);
   std::string text() const;

@@ -18,10 +18,10 @@ namespace covary {
 struct PassSettings {
   Sampling sampling = Sampling::kIndependent;
   uint64_t seed = 0;
-  uint32_t pass = 0;            ///< position in the plan; passes of one plan never share numbers
-  uint32_t spp = 0;             ///< samples per pixel to reach; a multiple of the film's groups
+  uint32_t pass = 0;  ///< position in the plan; passes of one plan never share numbers
+  uint32_t spp = 0;   ///< samples per pixel to reach; a multiple of the film's groups
   FilterSettings filter;
-  double seconds = 0;           ///< stop after this time when > 0; pixels then differ in count by at most one wave
+  double seconds = 0;  ///< stop after this time when > 0; pixels then differ in count by at most one wave
   /// Set from a signal handler to stop at the next tile.
   const std::atomic<bool>* stop = nullptr;
   /// Called from any thread after each tile with the samples done since the start; must be thread-safe.
@@ -38,11 +38,11 @@ struct BadSample {
 };
 
 struct PassResult {
-  uint64_t n_samples = 0;   ///< taken by this call
-  uint64_t n_rays = 0;      ///< camera, BSDF and shadow rays
+  uint64_t n_samples = 0;  ///< taken by this call
+  uint64_t n_rays = 0;     ///< camera, BSDF and shadow rays
   uint64_t n_not_finite = 0, n_negative = 0;
   std::vector<BadSample> bad_samples;  ///< the first few, ordered by pixel and sample
-  bool complete = false;    ///< every pixel has settings.spp samples
+  bool complete = false;               ///< every pixel has settings.spp samples
   double seconds = 0;
 };
 

@@ -10,8 +10,8 @@
 #include <chrono>
 #include <unordered_set>
 
-#include "emitters/area.h"
 #include "core/content_hash.h"
+#include "emitters/area.h"
 #include "io/description_key.h"
 #include "io/file_view.h"
 #include "io/object_factory.h"
@@ -45,7 +45,7 @@ struct ShapeJob {
   ShapePtr shape;
   bool in_group = false;
   const AreaLight* light = nullptr;  // of a shape in a group
-  bool asked_everything = false;  // else what is left over says nothing about unknown parameters
+  bool asked_everything = false;     // else what is left over says nothing about unknown parameters
 };
 
 /// A texture or emitter that holds no other object. Equal textures are made once.
@@ -264,8 +264,10 @@ class Loader {
       }
       finish_shape(*job->second);
       if (!job->second->shape) continue;
-      if (job->second->light) group_lights_[shapes.get()].push_back({job->second->shape, job->second->light});
-      else shapes->shapes.push_back(job->second->shape);
+      if (job->second->light)
+        group_lights_[shapes.get()].push_back({job->second->shape, job->second->light});
+      else
+        shapes->shapes.push_back(job->second->shape);
     }
     if (shapes->shapes.empty() && group_lights_[shapes.get()].empty())
       diagnostics_.error(object->where, "shape 'shapegroup': holds no shape");

@@ -11,11 +11,16 @@ namespace {
 float half_extent_x(float fov_degrees, FovAxis axis, float aspect) {
   const float t = std::tan(fov_degrees * (kPi / 360));
   switch (axis) {
-    case FovAxis::kX: return t;
-    case FovAxis::kY: return t * aspect;
-    case FovAxis::kDiagonal: return t * aspect / std::sqrt(1 + aspect * aspect);
-    case FovAxis::kSmaller: return aspect > 1 ? t * aspect : t;
-    case FovAxis::kLarger: return aspect > 1 ? t : t * aspect;
+    case FovAxis::kX:
+      return t;
+    case FovAxis::kY:
+      return t * aspect;
+    case FovAxis::kDiagonal:
+      return t * aspect / std::sqrt(1 + aspect * aspect);
+    case FovAxis::kSmaller:
+      return aspect > 1 ? t * aspect : t;
+    case FovAxis::kLarger:
+      return aspect > 1 ? t : t * aspect;
   }
   throw Error(ErrorCode::kInternal, "unknown field-of-view axis");
 }
@@ -33,7 +38,8 @@ Camera::Camera(const CameraSettings& settings, int width, int height)
   y_ = settings.to_world.vector({0, 1, 0});
   z_ = settings.to_world.vector({0, 0, 1});
   const float tolerance = 1e-3f;
-  if (std::abs(length(x_) - 1) > tolerance || std::abs(length(y_) - 1) > tolerance || std::abs(length(z_) - 1) > tolerance)
+  if (std::abs(length(x_) - 1) > tolerance || std::abs(length(y_) - 1) > tolerance ||
+      std::abs(length(z_) - 1) > tolerance)
     throw Error(ErrorCode::kInput, "the to_world transformation of a sensor must not scale");
 }
 

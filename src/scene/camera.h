@@ -16,12 +16,12 @@ enum class FovAxis { kX, kY, kDiagonal, kSmaller, kLarger };
 /// Perspective camera with a pinhole or a thin lens.
 struct CameraSettings {
   Transform to_world;
-  float fov_degrees = 50;             ///< full angle, in (0, 180)
+  float fov_degrees = 50;  ///< full angle, in (0, 180)
   FovAxis fov_axis = FovAxis::kX;
   float near_clip = 1e-2f, far_clip = 1e4f;  ///< distances along the viewing axis
-  Vec2 principal_point_offset{0, 0};  ///< relative to the film's size
-  float aperture_radius = 0;          ///< 0: pinhole
-  float focus_distance = 1;           ///< distance along the viewing axis in focus (thin lens)
+  Vec2 principal_point_offset{0, 0};         ///< relative to the film's size
+  float aperture_radius = 0;                 ///< 0: pinhole
+  float focus_distance = 1;                  ///< distance along the viewing axis in focus (thin lens)
 };
 
 class Camera : public SceneObject {

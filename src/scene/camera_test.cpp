@@ -18,13 +18,16 @@ CameraSettings settings_with(FovAxis axis, float fov) {
 }
 
 TEST(Camera, FieldOfViewSpansTheNamedAxis) {
-  struct Case { FovAxis axis; int width, height; Vec2 a, b; };
-  for (const Case& c : {Case{FovAxis::kX, 300, 200, {0, 100}, {300, 100}}, Case{FovAxis::kY, 300, 200, {150, 0}, {150, 200}},
-                        Case{FovAxis::kDiagonal, 300, 200, {0, 0}, {300, 200}},
-                        Case{FovAxis::kSmaller, 300, 200, {150, 0}, {150, 200}},
-                        Case{FovAxis::kSmaller, 200, 300, {0, 150}, {200, 150}},
-                        Case{FovAxis::kLarger, 300, 200, {0, 100}, {300, 100}},
-                        Case{FovAxis::kLarger, 200, 300, {100, 0}, {100, 300}}}) {
+  struct Case {
+    FovAxis axis;
+    int width, height;
+    Vec2 a, b;
+  };
+  for (const Case& c :
+       {Case{FovAxis::kX, 300, 200, {0, 100}, {300, 100}}, Case{FovAxis::kY, 300, 200, {150, 0}, {150, 200}},
+        Case{FovAxis::kDiagonal, 300, 200, {0, 0}, {300, 200}}, Case{FovAxis::kSmaller, 300, 200, {150, 0}, {150, 200}},
+        Case{FovAxis::kSmaller, 200, 300, {0, 150}, {200, 150}}, Case{FovAxis::kLarger, 300, 200, {0, 100}, {300, 100}},
+        Case{FovAxis::kLarger, 200, 300, {100, 0}, {100, 300}}}) {
     const Camera camera(settings_with(c.axis, 64), c.width, c.height);
     EXPECT_NEAR(degrees_between(camera.ray(c.a, {}).d, camera.ray(c.b, {}).d), 64, 1e-3f) << static_cast<int>(c.axis);
   }
@@ -33,8 +36,8 @@ TEST(Camera, FieldOfViewSpansTheNamedAxis) {
 TEST(Camera, LooksAlongZWithXToTheLeftAndYUp) {
   const Camera camera(settings_with(FovAxis::kX, 90), 100, 50);
   EXPECT_NEAR(camera.ray({50, 25}, {}).d.z, 1, 1e-6f);
-  EXPECT_GT(camera.ray({0, 25}, {}).d.x, 0.7f);    // left edge
-  EXPECT_GT(camera.ray({50, 0}, {}).d.y, 0.4f);    // top edge
+  EXPECT_GT(camera.ray({0, 25}, {}).d.x, 0.7f);  // left edge
+  EXPECT_GT(camera.ray({50, 0}, {}).d.y, 0.4f);  // top edge
 }
 
 TEST(Camera, ClipsAtNearAndFarPlanes) {

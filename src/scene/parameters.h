@@ -41,23 +41,31 @@ class Diagnostics {
   const std::vector<std::string>& warnings() const { return warnings_; }
 
  private:
-  struct Entry { SourceLocation where; std::string message; };
+  struct Entry {
+    SourceLocation where;
+    std::string message;
+  };
   std::vector<Entry> errors_;
   std::vector<std::string> warnings_;
 };
 
 /// A spectrum given by wavelength (nm) and value pairs, strictly increasing in wavelength, linear in between and zero
 /// outside. A single pair is a constant spectrum (its wavelength does not matter): <spectrum value="0.5">.
-struct SampledSpectrum { std::vector<std::pair<float, float>> samples; };
+struct SampledSpectrum {
+  std::vector<std::pair<float, float>> samples;
+};
 /// <rgb>: three numbers taken as linear RGB.
-struct ColourValue { Spectrum rgb; };
+struct ColourValue {
+  Spectrum rgb;
+};
 
 struct ObjectDescription;
 using ObjectPtr = std::shared_ptr<const ObjectDescription>;
 
 /// A null ObjectPtr stands for a value that could not be read; the reason is in the diagnostics, and getters then behave
 /// as if the parameter were absent.
-using Value = std::variant<bool, int64_t, double, std::string, Vec3, ColourValue, SampledSpectrum, Transform, ObjectPtr>;
+using Value =
+    std::variant<bool, int64_t, double, std::string, Vec3, ColourValue, SampledSpectrum, Transform, ObjectPtr>;
 
 struct Property {
   std::string name;  ///< "" or "_arg_N" for nested objects without a name
@@ -101,7 +109,8 @@ class Parameters {
   /// A colour that may not be textured: number, rgb or spectrum.
   Spectrum get_spectrum(const std::string& name, const Spectrum& fallback, SpectrumRole role);
   /// A texture; numbers and colours become ConstantTexture.
-  TexturePtr get_texture(const std::string& name, const Spectrum& fallback, SpectrumRole role = SpectrumRole::kReflectance);
+  TexturePtr get_texture(const std::string& name, const Spectrum& fallback,
+                         SpectrumRole role = SpectrumRole::kReflectance);
   TexturePtr get_texture(const std::string& name, float fallback);
   /// The same, null when absent.
   TexturePtr find_texture(const std::string& name, SpectrumRole role = SpectrumRole::kReflectance);

@@ -55,7 +55,8 @@ void expect_derivatives(const Scene& scene, const Ray& ray) {
 }
 
 TEST(RayTracer, SphereFromOutsideAndInside) {
-  const auto sphere = std::make_shared<Sphere>(Transform::rotate({1, 2, 3}, 40) * Transform::translate({1, 0, 0}), Vec3{0, 0, 0}, 2.0f, false);
+  const auto sphere = std::make_shared<Sphere>(Transform::rotate({1, 2, 3}, 40) * Transform::translate({1, 0, 0}),
+                                               Vec3{0, 0, 0}, 2.0f, false);
   const auto scene = scene_of({sphere});
   const Vec3 centre = (Transform::rotate({1, 2, 3}, 40)).point({1, 0, 0});
   SurfaceHit hit;
@@ -103,8 +104,10 @@ TEST(RayTracer, InstancesArePlacedCopies) {
   data.uvs = {{0, 0}, {1, 0}, {0.5f, 1}};
   data.triangles = {{0, 1, 2}};
   auto group = std::make_shared<ShapeGroup>();
-  group->shapes = {std::make_shared<TriangleMesh>(data), std::make_shared<Sphere>(Transform(), Vec3{0, 0, -3}, 1.0f, false)};
-  const Transform place = Transform::translate({10, 0, 0}) * Transform::rotate({0, 1, 0}, 90) * Transform::scale({2, 2, 2});
+  group->shapes = {std::make_shared<TriangleMesh>(data),
+                   std::make_shared<Sphere>(Transform(), Vec3{0, 0, -3}, 1.0f, false)};
+  const Transform place =
+      Transform::translate({10, 0, 0}) * Transform::rotate({0, 1, 0}, 90) * Transform::scale({2, 2, 2});
   const auto scene = scene_of({}, {{group, Transform()}, {group, place}});
   SurfaceHit hit;
   ASSERT_TRUE(scene->intersect({{0, 0, 5}, {0, 0, -1}}, hit));
@@ -137,16 +140,21 @@ void expect_sampling_agrees(const std::shared_ptr<Shape>& shape, const Vec3& ref
     expect_near(hit.ng, sample.n, 1e-3f);
     EXPECT_NEAR(hit.uv.x, sample.uv.x, 2e-3f);
     EXPECT_NEAR(hit.uv.y, sample.uv.y, 2e-3f);
-    EXPECT_NEAR(shape->pdf_solid_angle(reference, hit) / sample.pdf_solid_angle, 1, 5e-3f);  // single precision at grazing angles
+    EXPECT_NEAR(shape->pdf_solid_angle(reference, hit) / sample.pdf_solid_angle, 1,
+                5e-3f);  // single precision at grazing angles
   }
   EXPECT_GT(visible, 60);
 }
 
 TEST(ShapeSampling, AgreesWithRays) {
-  expect_sampling_agrees(std::make_shared<Sphere>(Transform::rotate({1, 1, 0}, 30), Vec3{1, 2, 3}, 0.7f, false), {4, -1, 0}, true);
+  expect_sampling_agrees(std::make_shared<Sphere>(Transform::rotate({1, 1, 0}, 30), Vec3{1, 2, 3}, 0.7f, false),
+                         {4, -1, 0}, true);
   expect_sampling_agrees(std::make_shared<Sphere>(Transform(), Vec3{0, 0, 0}, 3.0f, true), {0.5f, 1, 0.2f}, true);
-  expect_sampling_agrees(std::make_shared<Disk>(Transform::rotate({1, 1, 0}, 30) * Transform::scale({1, 2, 1}), false), {1, 1, 3}, true);
-  expect_sampling_agrees(std::make_shared<Cylinder>(Transform::rotate({1, 1, 0}, 30), Vec3{0, 0, 0}, Vec3{0, 1, 1}, 0.4f, false), {3, 1, 3}, false);
+  expect_sampling_agrees(std::make_shared<Disk>(Transform::rotate({1, 1, 0}, 30) * Transform::scale({1, 2, 1}), false),
+                         {1, 1, 3}, true);
+  expect_sampling_agrees(
+      std::make_shared<Cylinder>(Transform::rotate({1, 1, 0}, 30), Vec3{0, 0, 0}, Vec3{0, 1, 1}, 0.4f, false),
+      {3, 1, 3}, false);
   MeshData data;
   data.positions = {{-1, -1, 0}, {1, -1, 0}, {0, 1, 0}, {0, 0, -1}};
   data.triangles = {{0, 1, 2}, {3, 1, 2}};

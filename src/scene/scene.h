@@ -17,7 +17,9 @@
 namespace covary {
 
 /// Shapes that are placed several times.
-struct ShapeGroup : SceneObject { std::vector<ShapePtr> shapes; };
+struct ShapeGroup : SceneObject {
+  std::vector<ShapePtr> shapes;
+};
 
 struct Instance {
   std::shared_ptr<const ShapeGroup> group;
@@ -26,7 +28,7 @@ struct Instance {
 
 /// What a loader hands over.
 struct SceneParts {
-  std::vector<ShapePtr> shapes;                          ///< each with a BSDF and perhaps an area light set
+  std::vector<ShapePtr> shapes;  ///< each with a BSDF and perhaps an area light set
   std::vector<Instance> instances;
   std::vector<std::shared_ptr<const Emitter>> emitters;  ///< in file order, area lights of `shapes` included
   std::shared_ptr<const Camera> camera;
@@ -37,8 +39,8 @@ enum class FilterKind { kBox, kTent, kGaussian };
 /// footprint is drawn from the filter itself.
 struct FilterSettings {
   FilterKind kind = FilterKind::kBox;
-  float radius = 0.5f;   ///< in pixels: box 0.5, tent 1, gaussian 4 standard deviations
-  float stddev = 0.5f;   ///< gaussian only
+  float radius = 0.5f;  ///< in pixels: box 0.5, tent 1, gaussian 4 standard deviations
+  float stddev = 0.5f;  ///< gaussian only
 };
 
 class RayTracer;

@@ -33,9 +33,14 @@ void expect_image_mean(const TestScene& scene, uint32_t spp, double expected, do
 
 std::string furnace(double albedo, int max_depth, const std::string& extra = "") {
   const std::string a = std::to_string(albedo);
-  return scene_text("<shape type='cube'><boolean name='flip_normals' value='true'/><bsdf type='diffuse'><rgb "
-                    "name='reflectance' value='" + a + "'/></bsdf><emitter type='area'><rgb name='radiance' value='1'/>"
-                    "</emitter></shape>" + extra, 16, 16, max_depth);
+  return scene_text(
+      "<shape type='cube'><boolean name='flip_normals' value='true'/><bsdf type='diffuse'><rgb "
+      "name='reflectance' value='" +
+          a +
+          "'/></bsdf><emitter type='area'><rgb name='radiance' value='1'/>"
+          "</emitter></shape>" +
+          extra,
+      16, 16, max_depth);
 }
 
 // Radiance in a closed box that emits 1 and reflects a: L = 1 + a L.
@@ -50,8 +55,10 @@ TEST(Furnace, DepthCutGivesThePartialSum) {
   for (int depth = 1; depth <= 6; ++depth) {
     sum += std::pow(a, depth - 1);
     SCOPED_TRACE(depth);
-    if (depth == 1) EXPECT_FLOAT_EQ(static_cast<float>(image_mean(render(load_text(furnace(a, 1)), 4, 0))), 1.0f);
-    else expect_image_mean(load_text(furnace(a, depth)), 16, sum, 0.02);
+    if (depth == 1)
+      EXPECT_FLOAT_EQ(static_cast<float>(image_mean(render(load_text(furnace(a, 1)), 4, 0))), 1.0f);
+    else
+      expect_image_mean(load_text(furnace(a, depth)), 16, sum, 0.02);
   }
 }
 
@@ -78,7 +85,8 @@ TEST(PathLengths, ZeroIsBlack) { EXPECT_EQ(image_mean(render(load_text(furnace(0
 
 // A diffuse plane z = 4 facing the camera, lit from the camera's side.
 const char* const kPlane =
-    "<shape type='rectangle'><transform name='to_world'><scale value='50'/><rotate x='1' angle='180'/><translate z='4'/>"
+    "<shape type='rectangle'><transform name='to_world'><scale value='50'/><rotate x='1' angle='180'/><translate "
+    "z='4'/>"
     "</transform><bsdf type='diffuse'><rgb name='reflectance' value='0.6'/></bsdf></shape>";
 const char* const kNarrow = "<float name='fov' value='0.01'/>";  // all pixels see the point (0, 0, 4)
 
@@ -86,14 +94,16 @@ TEST(DirectLight, PointLightOverAPlane) {
   // L = albedo / pi * I cos / d^2 at distance 5 under the angle with cosine 4/5.
   const TestScene scene = load_text(scene_text(
       std::string(kPlane) + "<emitter type='point'><point name='position' x='3' y='0' z='0'/><rgb name='intensity' "
-                            "value='10'/></emitter>", 4, 4, 2, kNarrow));
+                            "value='10'/></emitter>",
+      4, 4, 2, kNarrow));
   EXPECT_NEAR(image_mean(render(scene, 4, 0)), 0.6 / M_PI * 10 * 0.8 / 25, 1e-4);
 }
 
 TEST(DirectLight, DirectionalLight) {
-  const TestScene scene = load_text(scene_text(
-      std::string(kPlane) + "<emitter type='directional'><vector name='direction' x='0' y='3' z='4'/><rgb "
-                            "name='irradiance' value='2'/></emitter>", 4, 4, 2, kNarrow));
+  const TestScene scene = load_text(
+      scene_text(std::string(kPlane) + "<emitter type='directional'><vector name='direction' x='0' y='3' z='4'/><rgb "
+                                       "name='irradiance' value='2'/></emitter>",
+                 4, 4, 2, kNarrow));
   EXPECT_NEAR(image_mean(render(scene, 4, 0)), 0.6 / M_PI * 2 * 0.8, 1e-4);
 }
 
@@ -118,8 +128,9 @@ TEST(DirectLight, DiskLight) {
 TEST(DirectLight, EachInstanceOfALightShines) {
   // Two placed copies of a sphere light that emits: the one of SphereLight, and one twice as large at the same direction
   // and twice the distance, hidden behind nothing: each gives pi L (r/d)^2 cos.
-  const std::string group = "<shape type='shapegroup' id='lamp'><shape type='sphere'><emitter type='area'><rgb "
-                            "name='radiance' value='7'/></emitter></shape></shape>";
+  const std::string group =
+      "<shape type='shapegroup' id='lamp'><shape type='sphere'><emitter type='area'><rgb "
+      "name='radiance' value='7'/></emitter></shape></shape>";
   const std::string place = "<shape type='instance'><ref id='lamp'/><transform name='to_world'>%</transform></shape>";
   std::string instances;
   for (const char* transform : {"<translate x='3'/>", "<scale value='2'/><translate x='-6' z='-4'/>"})
@@ -130,14 +141,16 @@ TEST(DirectLight, EachInstanceOfALightShines) {
 }
 
 TEST(DirectLight, ConstantEnvironment) {
-  const TestScene scene = load_text(scene_text(
-      std::string(kPlane) + "<emitter type='constant'><rgb name='radiance' value='0.25'/></emitter>", 16, 16, 2, kNarrow));
+  const TestScene scene = load_text(
+      scene_text(std::string(kPlane) + "<emitter type='constant'><rgb name='radiance' value='0.25'/></emitter>", 16, 16,
+                 2, kNarrow));
   expect_image_mean(scene, 32, 0.6 * 0.25, 0.02);
 }
 
 TEST(DirectLight, TwoLightsAddUp) {
-  const std::string sphere = "<shape type='sphere'><point name='center' x='3' y='0' z='0'/><emitter type='area'><rgb "
-                             "name='radiance' value='7'/></emitter></shape>";
+  const std::string sphere =
+      "<shape type='sphere'><point name='center' x='3' y='0' z='0'/><emitter type='area'><rgb "
+      "name='radiance' value='7'/></emitter></shape>";
   const TestScene scene = load_text(scene_text(
       std::string(kPlane) + sphere + "<emitter type='constant'><rgb name='radiance' value='0.25'/></emitter>", 16, 16,
       2, kNarrow));
@@ -147,18 +160,20 @@ TEST(DirectLight, TwoLightsAddUp) {
 
 TEST(Mask, LightBehindHalfOpaqueSurfaces) {
   // Two black surfaces of opacity 0.5 before a constant environment: a quarter of it arrives.
-  const std::string veil = "<shape type='rectangle'><transform name='to_world'><scale value='50'/><translate z='%'/>"
-                           "</transform><bsdf type='mask'><float name='opacity' value='0.5'/><bsdf type='diffuse'><rgb "
-                           "name='reflectance' value='0'/></bsdf></bsdf></shape>";
+  const std::string veil =
+      "<shape type='rectangle'><transform name='to_world'><scale value='50'/><translate z='%'/>"
+      "</transform><bsdf type='mask'><float name='opacity' value='0.5'/><bsdf type='diffuse'><rgb "
+      "name='reflectance' value='0'/></bsdf></bsdf></shape>";
   std::string two;
   for (const char* z : {"2", "3"}) two += std::string(veil).replace(veil.find('%'), 1, z);
-  const TestScene scene = load_text(scene_text(
-      two + "<emitter type='constant'><rgb name='radiance' value='8'/></emitter>", 16, 16, -1, kNarrow));
+  const TestScene scene = load_text(
+      scene_text(two + "<emitter type='constant'><rgb name='radiance' value='8'/></emitter>", 16, 16, -1, kNarrow));
   expect_image_mean(scene, 32, 2, 0.05);
 }
 
 TEST(HideEmitters, LightsAreInvisibleButShine) {
-  const std::string body = std::string(kPlane) +
+  const std::string body =
+      std::string(kPlane) +
       "<shape type='rectangle'><transform name='to_world'><translate z='1'/></transform><emitter type='area'><rgb "
       "name='radiance' value='5'/></emitter></shape>";
   const std::string hide = "<boolean name='hide_emitters' value='true'/>";

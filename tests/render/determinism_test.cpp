@@ -68,7 +68,8 @@ TEST(Determinism, TwentyInterruptions) {
   render_pass(scene.scene(), scene.integrator(), settings, whole);
   n_tiles = tiles;
 
-  const std::string file = (std::filesystem::temp_directory_path() / ("covary_resume_" + std::to_string(getpid()) + ".exr")).string();
+  const std::string file =
+      (std::filesystem::temp_directory_path() / ("covary_resume_" + std::to_string(getpid()) + ".exr")).string();
   std::mt19937 random(5);
   Film film = new_film(scene, 12);
   int interruptions = 0;
@@ -76,7 +77,9 @@ TEST(Determinism, TwentyInterruptions) {
     std::atomic<bool> stop{false};
     std::atomic<int> left{interruptions < 20 ? 1 + static_cast<int>(random() % (n_tiles / 24)) : n_tiles};
     settings.stop = &stop;
-    settings.progress = [&](uint64_t, uint64_t) { if (--left <= 0) stop = true; };
+    settings.progress = [&](uint64_t, uint64_t) {
+      if (--left <= 0) stop = true;
+    };
     complete = render_pass(scene.scene(), scene.integrator(), settings, film).complete;
     if (!complete) ++interruptions;
     write_film(file, film);
@@ -110,10 +113,12 @@ TEST(Determinism, ReplayGivesTheSampleThatEntersTheFilm) {
 
 TEST(Determinism, DoublingAllLightsDoublesTheImage) {
   const auto text = [](const char* radiance) {
-    return scene_text(std::string("<shape type='sphere'><point name='center' x='0' y='0' z='5'/><bsdf type='plastic'/></shape>"
-                                  "<shape type='rectangle'><transform name='to_world'><rotate x='1' angle='90'/>"
-                                  "<translate y='3' z='4'/></transform><emitter type='area'><rgb name='radiance' value='") +
-                          radiance + "'/></emitter></shape>", 20, 20);
+    return scene_text(
+        std::string("<shape type='sphere'><point name='center' x='0' y='0' z='5'/><bsdf type='plastic'/></shape>"
+                    "<shape type='rectangle'><transform name='to_world'><rotate x='1' angle='90'/>"
+                    "<translate y='3' z='4'/></transform><emitter type='area'><rgb name='radiance' value='") +
+            radiance + "'/></emitter></shape>",
+        20, 20);
   };
   const Film one = render(load_text(text("1.5")), 8, 0), two = render(load_text(text("3")), 8, 0);
   for (int y = 0; y < 20; ++y)
@@ -122,10 +127,11 @@ TEST(Determinism, DoublingAllLightsDoublesTheImage) {
 
 TEST(CommonRandomNumbers, AFlatUniformlyLitWallIsFlat) {
   // A wall that fills the view, lit only by a constant environment: every pixel's path sees the same.
-  const TestScene scene = load_text(scene_text(
-      "<shape type='rectangle'><transform name='to_world'><scale value='1000'/><rotate y='1' angle='180'/><translate z='1'/></transform>"
-      "<bsdf type='diffuse'><rgb name='reflectance' value='0.5'/></bsdf></shape><emitter type='constant'/>", 24, 16, 3,
-      "<float name='fov' value='20'/>"));
+  const TestScene scene = load_text(
+      scene_text("<shape type='rectangle'><transform name='to_world'><scale value='1000'/><rotate y='1' "
+                 "angle='180'/><translate z='1'/></transform>"
+                 "<bsdf type='diffuse'><rgb name='reflectance' value='0.5'/></bsdf></shape><emitter type='constant'/>",
+                 24, 16, 3, "<float name='fov' value='20'/>"));
   const Film crn = render(scene, 24, 5, Sampling::kCrn, 12);
   for (int y = 0; y < 16; ++y)
     for (int x = 0; x < 24; ++x)
