@@ -18,7 +18,7 @@ struct FeedbackOptions {
   /// Side of the window; odd, 5 … 125. Default 41 (measured; 61 gains less than 1 %, 21 loses 3 %).
   int window = 41;
   /// kappa: pixels that differ by so many standard errors of the estimate have weight 1 / e; > 0. Less leaves less bias and
-  /// more noise. Default 2.5 (measured, docs/methods/iicv.md: half the squared bias of 8 at 2 % more error).
+  /// more noise. Default 2.5 (measured, docs/methods/iicv.md: a fifth to a half less squared bias than 8 at 2 % more error).
   float bandwidth = 2.5f;
 };
 

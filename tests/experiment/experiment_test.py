@@ -188,7 +188,8 @@ class Resume(ExperimentTest):
             process.send_signal(sent)
             _, errors = process.communicate(timeout=60)
             if sent == signal.SIGINT and process.returncode != 0:
-                self.assertEqual(process.returncode, 1)
+                self.assertIn(process.returncode, (1, -signal.SIGINT), errors)
+            if process.returncode == 1:  # otherwise the signal came before the experiment began, or was SIGKILL
                 self.assertRegex(errors, "interrupted after .* the same command continues")
             killed += process.returncode != 0
         self.assertGreater(killed, 0)
