@@ -4,6 +4,7 @@
 
 #include <tbb/global_control.h>
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdio>
 #include <functional>
@@ -29,6 +30,7 @@ struct CombineOptions {
   bool error = false, force = false, quiet = false;
   std::optional<int> samples;
   double memory_mib = 4096;
+  std::vector<int> explain;  ///< x, y in the full frame
   int threads = 0;
 };
 
@@ -146,6 +148,57 @@ void write(const CombineOptions& o, const GroupedFile& crn, const GroupedFile& p
   write_result(o.output, crn.place(), attributes, result, no_aovs);
 }
 
+void check_explain(const CombineOptions& o, const PairEstimator& estimator, const GroupedFile& file) {
+  if (o.explain.empty()) return;
+  const CropWindow& window = file.place().window;
+  const int x = o.explain[0] - window.x, y = o.explain[1] - window.y;
+  if (!estimator.explain)
+    throw Error(ErrorCode::kUsage, "--explain: " + o.estimator.name + " has no control variates with coefficients");
+  if (x < 0 || y < 0 || x >= window.width || y >= window.height)
+    throw Error(ErrorCode::kUsage,
+                fmt::format("--explain {},{} is outside the image: {} x {} pixels at ({}, {})", o.explain[0],
+                            o.explain[1], window.width, window.height, window.x, window.y));
+}
+
+/// What one pixel is made of: f, and for each control variate its place, coefficients, CRN mean and PT mean.
+nlohmann::ordered_json explain(const CombineOptions& o, const PairEstimator& estimator, const GroupedFile& crn,
+                               Bands& bands) {
+  const CropWindow& window = crn.place().window;
+  const int x = o.explain[0] - window.x, y = o.explain[1] - window.y;
+  const int first = std::max(0, y - estimator.reach) / 2 * 2, last = std::min(window.height, y + estimator.reach + 1);
+  bands.read(first, last - first);
+  const auto mean = [&](const GroupedImage& image, int px, int py) {
+    std::array<double, 3> sum{};
+    for (int t = 0; t < image.groups; ++t)
+      for (int c = 0; c < 3; ++c) sum[c] += image.pixel(px, py)[3 * t + c] / image.groups;
+    return sum;
+  };
+  const GroupedImage g = bands.crn(), h = bands.pt();
+  nlohmann::ordered_json variates = nlohmann::ordered_json::array();
+  for (const ControlVariate& v : estimator.explain(g, h, x, y - first))
+    variates.push_back({{"dx", v.dx},
+                        {"dy", v.dy},
+                        {"beta", v.beta},
+                        {"crn", mean(g, x + v.dx, y - first + v.dy)},
+                        {"pt", mean(h, x + v.dx, y - first + v.dy)}});
+  return {{"x", o.explain[0]},
+          {"y", o.explain[1]},
+          {"crn", mean(g, x, y - first)},
+          {"pt", mean(h, x, y - first)},
+          {"control_variates", variates}};
+}
+
+void print_explanation(const nlohmann::ordered_json& pixel) {
+  const auto rgb = [](const nlohmann::ordered_json& v) {
+    return fmt::format("{:9.5f} {:9.5f} {:9.5f}", v[0].get<double>(), v[1].get<double>(), v[2].get<double>());
+  };
+  fmt::print("pixel ({}, {}): CRN {}, PT {}\n  dx  dy  {:>29}  {:>29}  {:>29}\n", pixel["x"].get<int>(),
+             pixel["y"].get<int>(), rgb(pixel["crn"]), rgb(pixel["pt"]), "coefficients", "CRN", "PT");
+  for (const auto& v : pixel["control_variates"])
+    fmt::print("{:4d}{:4d}  {}  {}  {}\n", v["dx"].get<int>(), v["dy"].get<int>(), rgb(v["beta"]), rgb(v["crn"]),
+               rgb(v["pt"]));
+}
+
 nlohmann::ordered_json json_of(const Correlation& c) {
   if (c.pairs == 0) return nullptr;
   return {{"value", c.value}, {"standard_error", c.standard_error}, {"pairs", c.pairs}};
@@ -169,6 +222,7 @@ void combine(const CombineOptions& o) {
   Stopwatch watch;
   const GroupedFile crn(o.crn, o.crn_layer), pt(o.pt, o.pt_layer);
   const PairEstimator estimator = make_pair_estimator(o, crn);
+  check_explain(o, estimator, crn);
 
   std::vector<Finding> findings;
   check_files(crn, pt, findings);
@@ -190,6 +244,9 @@ void combine(const CombineOptions& o) {
   const double estimate_seconds = watch.lap();
   write(o, crn, pt, result);
   const double write_seconds = watch.lap();
+  nlohmann::ordered_json pixel;
+  if (!o.explain.empty()) pixel = explain(o, estimator, crn, bands);
+  if (!o.explain.empty() && o.json != "-") print_explanation(pixel);
 
   if (!o.quiet)
     std::fprintf(stderr, "%s: %d x %d, %s of %d + %d groups in %.2f s (read and check %.2f s, write %.2f s)\n",
@@ -212,6 +269,7 @@ void combine(const CombineOptions& o) {
         {"crn_pt", json_of(report.crn_pt)}}},
       {"mean", {{"crn", report.crn_mean}, {"pt", report.pt_mean}}},
       {"seconds", {{"read_and_check", check_seconds}, {"estimate", estimate_seconds}, {"write", write_seconds}}}};
+  if (!o.explain.empty()) json["pixel"] = pixel;
   if (o.json == "-")
     std::fputs((json.dump(2) + "\n").c_str(), stdout);
   else
@@ -238,6 +296,10 @@ void add_combine(CLI::App& app) {
   command->add_option("--samples", o->samples,
                       "iduw: samples per pixel of the CRN image; default: what its file tells");
   command->add_flag("--error", o->error, "Add the standard error as channels StdError.R, .G, .B");
+  command->add_option("--explain", o->explain, "X,Y: print the control variates of this pixel and their coefficients")
+      ->delimiter(',')
+      ->expected(2)
+      ->type_name("X,Y");
   command->add_flag("--force", o->force, "Combine even where the check of the inputs finds errors");
   command
       ->add_option("--memory", o->memory_mib,

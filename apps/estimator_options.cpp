@@ -17,6 +17,15 @@ void set(T& target, const std::optional<U>& value) {
   if (value) target = *value;
 }
 
+template <typename Estimator, typename Options>
+std::vector<ControlVariate> explain(Estimator estimator, const GroupedImage& crn, const GroupedImage& pt,
+                                    Options options, int x, int y) {
+  PixelProbe probe{x, y, {}};
+  options.probe = &probe;
+  estimator(crn, pt, options);
+  return probe.control_variates;
+}
+
 PairEstimator make_iicv(const EstimatorOptions& o, bool std_error) {
   IicvOptions options = o.paper ? IicvOptions::paper() : IicvOptions();
   set(options.k, o.k);
@@ -35,7 +44,10 @@ PairEstimator make_iicv(const EstimatorOptions& o, bool std_error) {
   options.std_error = std_error;
   throw_if_any(o.name, options.validate());
   return {[options](const GroupedImage& crn, const GroupedImage& pt) { return iicv(crn, pt, options); },
-          iicv_reach(options)};
+          iicv_reach(options),
+          [options](const GroupedImage& crn, const GroupedImage& pt, int x, int y) {
+            return explain(iicv, crn, pt, options, x, y);
+          }};
 }
 
 PairEstimator make_cv_baseline(const EstimatorOptions& o, bool std_error) {
@@ -48,7 +60,10 @@ PairEstimator make_cv_baseline(const EstimatorOptions& o, bool std_error) {
   options.std_error = std_error;
   throw_if_any(o.name, options.validate());
   return {[options](const GroupedImage& crn, const GroupedImage& pt) { return cv_baseline(crn, pt, options); },
-          options.window / 2};
+          options.window / 2,
+          [options](const GroupedImage& crn, const GroupedImage& pt, int x, int y) {
+            return explain(cv_baseline, crn, pt, options, x, y);
+          }};
 }
 
 PairEstimator make_iduw(const EstimatorOptions& o, int64_t crn_samples) {
@@ -56,7 +71,7 @@ PairEstimator make_iduw(const EstimatorOptions& o, int64_t crn_samples) {
   set(options.window, o.window);
   options.samples = static_cast<int>(crn_samples);
   throw_if_any(o.name, options.validate());
-  return {[options](const GroupedImage& crn, const GroupedImage& pt) { return iduw(crn, pt, options); }, -1};
+  return {[options](const GroupedImage& crn, const GroupedImage& pt) { return iduw(crn, pt, options); }, -1, {}};
 }
 
 }  // namespace

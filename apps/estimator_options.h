@@ -31,6 +31,8 @@ struct EstimatorOptions {
 struct PairEstimator {
   std::function<EstimatorResult(const GroupedImage& crn, const GroupedImage& pt)> apply;
   int reach = 0;  ///< rows beyond its own that a band needs; -1: the whole image is needed
+  /// The control variates of a pixel; empty function where the estimator has none.
+  std::function<std::vector<ControlVariate>(const GroupedImage& crn, const GroupedImage& pt, int x, int y)> explain;
 };
 
 /// The estimators that take an option, for each option that only the estimator reads: "--k" -> "iicv, cv-baseline".

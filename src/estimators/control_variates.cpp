@@ -178,14 +178,25 @@ class Regression {
              w.tail.data() + static_cast<size_t>(i) * n_tail);
     }
 
-    if (s_.shared) {
-      find_coefficients(0, 3, w);
-      for (int c = 0; c < 3; ++c) finish_channel(c, x, y, n_lanes, w);
-    } else {
-      for (int c = 0; c < 3; ++c) {
-        find_coefficients(c, 1, w);
-        finish_channel(c, x, y, n_lanes, w);
-      }
+    for (int c = 0; c < 3; ++c) {
+      if (!s_.shared || c == 0) find_coefficients(c, s_.shared ? 3 : 1, w);
+      finish_channel(c, x, y, n_lanes, w);
+      if (s_.probe && s_.probe->y == y && s_.probe->x >= x && s_.probe->x < x + n_lanes) answer(c, x, w);
+    }
+  }
+
+  /// Writes the coefficients of channel c at the probe's pixel.
+  void answer(int c, int x, const Workspace& w) const {
+    const int lane = s_.probe->x - x;
+    if (!valid_[static_cast<size_t>(s_.probe->y) * in_.crn.width + s_.probe->x]) return;
+    std::vector<ControlVariate>& found = s_.probe->control_variates;
+    size_t n = 0;
+    for (int i = 0; i < s_.k; ++i) {
+      const Offset o = search_.offsets()[w.chosen[lane * s_.k + i]];
+      const int px = s_.probe->x + o.dx, py = s_.probe->y + o.dy;
+      if (px < 0 || py < 0 || px >= in_.crn.width || py >= in_.crn.height) continue;
+      if (c == 0) found.push_back({o.dx, o.dy, {}});
+      found[n++].beta[c] = w.beta[i][lane];
     }
   }
 

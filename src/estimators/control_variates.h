@@ -7,6 +7,7 @@
 #pragma once
 
 #include "estimators/grouped_image.h"
+#include "estimators/pixel_probe.h"
 #include "estimators/planes.h"
 
 namespace covary {
@@ -38,6 +39,7 @@ struct ControlVariateSettings {
   float ridge = 0;
   /// Also estimate the standard error of F^ by Eq. (8), its first part by generalised cross-validation.
   bool std_error = false;
+  PixelProbe* probe = nullptr;  ///< optional
 };
 
 struct ControlVariateInput {

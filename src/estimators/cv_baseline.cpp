@@ -36,6 +36,7 @@ EstimatorResult cv_baseline(const GroupedImage& crn, const GroupedImage& pt, con
   // and both are relative to the mean diagonal.
   settings.ridge = options.ridge;
   settings.std_error = options.std_error;
+  settings.probe = options.probe;
   ControlVariateInput input{crn, &g, &h.mean, nullptr, &h.variance_of_mean};
   apply_control_variates(input, settings, valid, result);
   fill_invalid(crn, pt, valid, result.estimate);

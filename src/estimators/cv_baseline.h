@@ -4,6 +4,7 @@
 #pragma once
 
 #include "estimators/grouped_image.h"
+#include "estimators/pixel_probe.h"
 
 namespace covary {
 
@@ -22,6 +23,7 @@ struct CvBaselineOptions {
   float ridge = 0;
   /// Also estimate the standard error by Eq. (8); `pt` then needs 2 groups.
   bool std_error = false;
+  PixelProbe* probe = nullptr;  ///< optional; inside the image
 
   std::vector<std::string> validate() const;
 };

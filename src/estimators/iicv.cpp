@@ -28,6 +28,8 @@ std::vector<std::string> IicvOptions::validate() const {
   if (k < 1 || k > candidates)
     problems.push_back(fmt::format("k is {}, expected 1 to {}, the number of {}pixels in a window of {} x {}", k,
                                    candidates, include_target ? "" : "neighbouring ", window, window));
+  if (probe && penalty == Penalty::kCrossFit)
+    problems.push_back("the penalty cross-fit has two sets of coefficients, so that no pixel can be explained by one");
   if (!(ridge > 0)) problems.push_back(fmt::format("ridge is {}, expected a positive number", ridge));
   if (!(sample_share >= 0 && sample_share <= 1))
     problems.push_back(fmt::format("sample_share is {}, expected a number from 0 to 1", sample_share));
@@ -63,6 +65,7 @@ EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& pt, const Iicv
   settings.conservation = options.conservation;
   settings.sample_share = options.sample_share;
   settings.std_error = options.std_error || options.feedback;
+  settings.probe = options.probe;
   ControlVariateInput input{crn, &g};
 
   if (halves) {

@@ -15,6 +15,7 @@
 
 #include "estimators/feedback.h"
 #include "estimators/grouped_image.h"
+#include "estimators/pixel_probe.h"
 
 namespace covary {
 
@@ -59,6 +60,7 @@ struct IicvOptions {
   /// Also estimate the standard error of the result: [YM2025] Eq. (8), with the residuals of the fit corrected for its
   /// degrees of freedom. It is the error before the feedback, which changes it little.
   bool std_error = false;
+  PixelProbe* probe = nullptr;  ///< optional; inside the image; not with kCrossFit, which has two sets of coefficients
 
   /// The published estimator with its published settings.
   static IicvOptions paper();

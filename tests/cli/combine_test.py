@@ -75,6 +75,22 @@ class Combine(CliTest):
         self.assertIn("covary:estimator: iicv", info)
         self.assertIn("covary:samples: 192", info)
 
+    def test_explain(self):
+        inputs = ["combine", "--crn", "crn.exr", "--pt", "pt.exr", "-o", "out.exr", "--quiet", "--paper"]
+        pixel = json.loads(self.good(*inputs, "--explain", "7,19", "--json", "-").stdout)["pixel"]
+        self.assertEqual(len(pixel["control_variates"]), 25)
+        out = self.read("out.exr")
+        for i, c in enumerate("RGB"):
+            expected = pixel["crn"][i] - sum(v["beta"][i] * (v["crn"][i] - v["pt"][i]) for v in pixel["control_variates"])
+            self.assertAlmostEqual(out[c][19 * WIDTH + 7], expected, 5)
+        table = self.good(*inputs, "--explain", "7,19").stdout
+        self.assertEqual(len(table.splitlines()), 2 + 25)
+        in_bands = self.good(*inputs, "--explain", "7,19", "--memory", "0.01").stdout
+        self.assertEqual(in_bands, table)
+        self.bad(2, "--explain 24,3 is outside the image: 24 x 20 pixels at (0, 0)", *inputs, "--explain", "24,3")
+        self.bad(2, "iduw has no control variates with coefficients", "combine", "--crn", "crn.exr", "--pt", "pt.exr",
+                 "-o", "out.exr", "--estimator", "iduw", "--explain", "1,1")
+
     def test_layouts_give_the_same_bits(self):
         self.good("combine", "--crn", "crn.exr", "--pt", "pt.exr", "-o", "a.exr", "--quiet")
         # One file per group: R G B beside another image (pbrt, Mitsuba), and Blender's passes.
