@@ -66,6 +66,16 @@ MeanImage mean_image(std::span<const Image> renders, const References& reference
   return mean;
 }
 
+/// body(p, grey, weight) for each finite pixel p: the reference's grey value, and the weight of relative errors.
+template <typename Body>
+void for_each_pixel(const MeanImage& mean, const References& references, const Body& body) {
+  for (size_t p = 0; p < mean.finite.size(); ++p) {
+    if (!mean.finite[p]) continue;
+    const double grey = references.grey(p);
+    body(p, grey, 1 / (grey * grey + kRelativeOffset));
+  }
+}
+
 /// One render against mean and references: weighted sums over the finite pixels.
 struct RenderSums {
   PerWeight error{}, around_mean{};  // (F_s - R1)(F_s - R2) and (F_s - F)^2
@@ -75,9 +85,7 @@ struct RenderSums {
 
 RenderSums sums_of(const Image& render, const MeanImage& mean, const References& references) {
   RenderSums sums;
-  for (size_t p = 0; p < mean.finite.size(); ++p) {
-    if (!mean.finite[p]) continue;
-    const double grey = references.grey(p), weight = 1 / (grey * grey + kRelativeOffset);
+  for_each_pixel(mean, references, [&](size_t p, double, double weight) {
     double error = 0, around_mean = 0, lean = 0;
     for (size_t i = 3 * p; i < 3 * p + 3; ++i) {
       const double from_mean = render.data[i] - mean.data[i], h = references.half_difference(i);
@@ -90,7 +98,7 @@ RenderSums sums_of(const Image& render, const MeanImage& mean, const References&
     sums.error[kRelative] += weight * error, sums.error[kAbsolute] += error;
     sums.around_mean[kRelative] += weight * around_mean, sums.around_mean[kAbsolute] += around_mean;
     sums.lean.add(weight * lean);
-  }
+  });
   return sums;
 }
 
@@ -104,9 +112,7 @@ struct ReferenceSums {
 
 ReferenceSums reference_sums(const MeanImage& mean, const References& references) {
   ReferenceSums sums;
-  for (size_t p = 0; p < mean.finite.size(); ++p) {
-    if (!mean.finite[p]) continue;
-    const double grey = references.grey(p), weight = 1 / (grey * grey + kRelativeOffset);
+  for_each_pixel(mean, references, [&](size_t p, double grey, double weight) {
     double product = 0, h_squared = 0, h_grey = 0;
     for (size_t i = 3 * p; i < 3 * p + 3; ++i) {
       const double h = references.half_difference(i);
@@ -120,7 +126,7 @@ ReferenceSums reference_sums(const MeanImage& mean, const References& references
     sums.own_error += weight * h_squared;
     sums.grey += grey, sums.grey_squares += h_grey * h_grey;
     sums.lean.add(weight * product);
-  }
+  });
   return sums;
 }
 
