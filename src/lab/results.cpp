@@ -48,11 +48,7 @@ Json json_of(const RunResult& run) {
           {"mean_ratio", number(run.mean_ratio)},
           {"predicted_relmse", number(run.predicted_relmse)},
           {"samples_per_pixel", r.samples_per_pixel},
-          {"seconds",
-           {{"load", r.load_seconds},
-            {"render", r.render_seconds},
-            {"estimate", r.estimate_seconds},
-            {"then", r.then_seconds}}},
+          {"seconds", seconds_of(r)},
           {"peak_memory_bytes", r.peak_memory_bytes},
           {"command", r.command},
           {"image", r.image}};

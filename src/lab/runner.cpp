@@ -49,17 +49,20 @@ RunRecord record_of(const nlohmann::json& stats) {
 
 nlohmann::json json_of(const RunRecord& r) {
   return {{"command", r.command},
-          {"seconds",
-           {{"load", r.load_seconds},
-            {"render", r.render_seconds},
-            {"estimate", r.estimate_seconds},
-            {"then", r.then_seconds}}},
+          {"seconds", seconds_of(r)},
           {"samples_per_pixel", r.samples_per_pixel},
           {"peak_memory_bytes", r.peak_memory_bytes},
           {"messages", r.messages}};
 }
 
 }  // namespace
+
+nlohmann::ordered_json seconds_of(const RunRecord& r) {
+  return {{"load", r.load_seconds},
+          {"render", r.render_seconds},
+          {"estimate", r.estimate_seconds},
+          {"then", r.then_seconds}};
+}
 
 Cache::Cache(std::string folder) : folder_(std::move(folder)) {
   std::error_code error;

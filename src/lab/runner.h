@@ -32,6 +32,9 @@ struct RunRecord {
   double method_seconds() const { return render_seconds + estimate_seconds + then_seconds; }
 };
 
+/// The object `seconds` of a run, in the cache and in results.
+nlohmann::ordered_json seconds_of(const RunRecord& record);
+
 /// A run that ended in an error.
 struct RunFailure {
   std::string command;
