@@ -1,80 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
-// IICV and the baseline against the double-precision reference, identities, degenerate inputs, determinism.
+// IICV against the double-precision reference, identities, degenerate inputs, determinism.
 #include "estimators/iicv.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include <functional>
 #include <limits>
 
 #include "core/error.h"
+#include "estimators/compare_with_reference.h"
 #include "estimators/control_variates.h"
-#include "estimators/cv_baseline.h"
-#include "estimators/neighbours.h"
 #include "estimators/reference_control_variates.h"
 #include "estimators/reference_feedback.h"
 #include "estimators/test_images.h"
+#include "support/files.h"
 
 namespace covary {
 namespace {
 
-using reference::Rgb;
-using reference::RgbImage;
-
-/// The neighbours of all pixels (neighbours_test shows that they are the right ones).
-std::vector<std::vector<reference::Pixel>> neighbours(const GroupedImage& crn, int k, int window, bool include_target) {
-  const std::vector<unsigned char> valid(static_cast<size_t>(crn.width) * crn.height, 1);
-  const Planes guide = moments(crn, valid, window / 2, kFar).mean;
-  const NeighbourSearch search(k, window, include_target);
-  std::vector<lanes::vint> keys(search.offsets().size());
-  std::vector<uint16_t> chosen(static_cast<size_t>(k) * lanes::kLanes);
-  std::vector<std::vector<reference::Pixel>> result(valid.size());
-  for (int y = 0; y < crn.height; ++y)
-    for (int x = 0; x < crn.width; ++x) {
-      search.find(guide, x, y, keys.data(), chosen.data());
-      for (int i = 0; i < k; ++i) {
-        const Offset o = search.offsets()[chosen[i]];
-        const reference::Pixel q{x + o.dx, y + o.dy};
-        if (q.x >= 0 && q.y >= 0 && q.x < crn.width && q.y < crn.height) result[y * crn.width + x].push_back(q);
-      }
-    }
-  return result;
-}
-
-/// Largest difference from the reference, in standard deviations of the CRN mean, of estimate and standard error.
-struct Difference {
-  double estimate = 0, std_error = 0;
-};
-
-Difference compare(const EstimatorResult& fast, const GroupedImage& crn, const GroupedImage& pt,
-                   const RgbImage& error_of_h, int k, int window, bool include_target,
-                   const reference::Settings& settings) {
-  const auto all = neighbours(crn, k, window, include_target);
-  const RgbImage h = reference::map_pixels(pt, [&](int x, int y) { return reference::mean(pt, x, y); });
-  const RgbImage variance =
-      reference::map_pixels(pt, [&](int x, int y) { return reference::variance_of_mean(pt, x, y); });
-  Difference worst;
-  for (int y = 0; y < crn.height; ++y)
-    for (int x = 0; x < crn.width; ++x) {
-      const reference::Result exact =
-          reference::control_variates(crn, h, error_of_h, variance, {x, y}, all[y * crn.width + x], settings);
-      const Rgb noise = reference::variance_of_mean(crn, x, y);
-      for (int c = 0; c < 3; ++c) {
-        const double unit = std::sqrt(noise[c]) + 1e-9;
-        worst.estimate = std::max(worst.estimate, std::abs(fast.estimate.pixel(x, y)[c] - exact.estimate[c]) / unit);
-        if (!fast.std_error.data.empty())
-          worst.std_error =
-              std::max(worst.std_error, std::abs(fast.std_error.pixel(x, y)[c] - exact.std_error[c]) / unit);
-      }
-    }
-  return worst;
-}
-
-RgbImage pilot_of(const GroupedImage& crn, const GroupedImage& pt, int window) {
-  return reference::pilot_error(crn, reference::map_pixels(pt, [&](int x, int y) { return reference::mean(pt, x, y); }),
-                                window);
-}
+using reference::compare, reference::Difference, reference::neighbours, reference::pilot_of;
+using reference::Rgb, reference::RgbImage;
+using test_support::message_of;
 
 /// Both forms of the system (k below and above the number of rows), both kinds of coefficients, symmetric or not, with
 /// and without the target, several group counts.
@@ -208,57 +154,6 @@ TEST(Iicv, CrossFitAgreesWithTheReference) {
     }
 }
 
-TEST(CvBaseline, WithARidgeAgreesWithTheReference) {
-  const test::Grouped crn = test::crn_image(41, 27, 12, 1), pt = test::pt_image(41, 27, 12, 2);
-  const RgbImage unused = pilot_of(crn.view(), pt.view(), 11);
-  for (bool shared : {false, true}) {
-    CvBaselineOptions options;
-    options.ridge = 0.05f;
-    options.shared_coefficients = shared;
-    const EstimatorResult fast = cv_baseline(crn.view(), pt.view(), options);
-    EXPECT_LT(compare(fast, crn.view(), pt.view(), unused, 25, 11, true, {shared, false, 0.05, 0}).estimate, 2e-3);
-  }
-}
-
-/// Minimum norm: against the pseudo-inverse.
-TEST(CvBaseline, WithoutRidgeIsTheMinimumNormSolution) {
-  const test::Grouped crn = test::crn_image(30, 20, 12, 1), pt = test::pt_image(30, 20, 12, 2);
-  const GroupedImage view = crn.view(), pt_view = pt.view();
-  const auto all = neighbours(view, 25, 11, true);
-  const EstimatorResult fast = cv_baseline(view, pt_view);
-  for (int y = 0; y < view.height; ++y)
-    for (int x = 0; x < view.width; ++x)
-      for (int c = 0; c < 3; ++c) {
-        const auto& near = all[y * view.width + x];
-        Eigen::MatrixXd X(12, 25);
-        Eigen::VectorXd target(12), difference(25);
-        for (int t = 0; t < 12; ++t) {
-          target(t) = view.pixel(x, y)[3 * t + c];
-          for (int i = 0; i < 25; ++i) X(t, i) = view.pixel(near[i].x, near[i].y)[3 * t + c];
-        }
-        const double f = target.mean();
-        for (int i = 0; i < 25; ++i)
-          difference(i) = X.col(i).mean() - reference::mean(pt_view, near[i].x, near[i].y)[c];
-        target.array() -= f;
-        X.rowwise() -= X.colwise().mean().eval();
-        const Eigen::VectorXd beta = X.completeOrthogonalDecomposition().solve(target);
-        const double noise = std::sqrt(reference::variance_of_mean(view, x, y)[c]);
-        EXPECT_NEAR(fast.estimate.pixel(x, y)[c], f - beta.dot(difference), 0.02 * noise) << x << ", " << y;
-      }
-}
-
-/// Least squares with shared coefficients and the target among the neighbours: the target itself.
-TEST(CvBaseline, WithSharedCoefficientsIsThePtImage) {
-  const test::Grouped crn = test::crn_image(30, 20, 12, 1), pt = test::pt_image(30, 20, 12, 2);
-  CvBaselineOptions options;
-  options.shared_coefficients = true;
-  const EstimatorResult fast = cv_baseline(crn.view(), pt.view(), options);
-  for (int y = 0; y < 20; ++y)
-    for (int x = 0; x < 30; ++x)
-      for (int c = 0; c < 3; ++c)
-        EXPECT_NEAR(fast.estimate.pixel(x, y)[c], reference::mean(pt.view(), x, y)[c], 5e-3) << x << ", " << y;
-}
-
 /// Powers of two scale floats exactly, and the estimator is homogeneous.
 TEST(Iicv, ScalingTheInputsScalesTheResultExactly) {
   test::Grouped crn = test::crn_image(40, 23, 12, 3), pt = test::pt_image(40, 23, 12, 4);
@@ -306,21 +201,6 @@ TEST(Iicv, AbsurdlyLargeValuesGiveFiniteResults) {
   for (float v : result.estimate.data) ASSERT_TRUE(std::isfinite(v));
 }
 
-/// A sky: bright, and hardly any noise but that of rounding. The solution of smallest norm must not blow it up.
-TEST(CvBaseline, SmallestNormIsBoundedWherePixelsHardlyVary) {
-  test::Grouped crn = test::crn_image(60, 40, 12, 3), pt = test::pt_image(60, 40, 12, 4);
-  for (float noise : {0.0f, 1e-7f, 1e-6f, 1e-4f, 1e-2f}) {
-    for (int y = 0; y < 40; ++y)
-      for (int x = 0; x < 60; ++x)
-        for (int i = 0; i < 36; ++i) {
-          crn.pixel(x, y)[i] = 3.0f * (1 + noise * test::noise(7, i, x));
-          pt.pixel(x, y)[i] = 3.0f * (1 + noise * test::noise(8, i + 36 * y, x));
-        }
-    const EstimatorResult result = cv_baseline(crn.view(), pt.view());
-    for (float v : result.estimate.data) ASSERT_NEAR(v, 3.0f, 30 * noise + 1e-5f) << noise;
-  }
-}
-
 /// No variance in the CRN image: nothing to explain, the result is the CRN mean.
 TEST(Iicv, WithoutCrnVarianceIsTheCrnMean) {
   test::Grouped crn = test::constant_image(30, 20, 12, 0.25f);
@@ -365,8 +245,6 @@ TEST(Iicv, BlackIsBlack) {
     for (float v : result.estimate.data) ASSERT_EQ(v, 0.0f);
     for (float v : result.std_error.data) ASSERT_EQ(v, 0.0f);
   }
-  const EstimatorResult result = cv_baseline(black.view(), black.view());
-  for (float v : result.estimate.data) ASSERT_EQ(v, 0.0f);
 }
 
 /// A PT image without error: the coefficient of the target goes to 1 and the result to PT.
@@ -455,16 +333,6 @@ TEST(Iicv, ImagesSmallerThanTheWindowWork) {
   }
 }
 
-std::string message_of(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const Error& e) {
-    EXPECT_EQ(e.code(), ErrorCode::kUsage);
-    return e.what();
-  }
-  return "no error";
-}
-
 TEST(Iicv, ReportsEveryProblemAtOnce) {
   const test::Grouped two = test::constant_image(8, 6, 2, 1), one = test::constant_image(8, 5, 1, 1);
   IicvOptions options = IicvOptions::paper();
@@ -476,7 +344,7 @@ TEST(Iicv, ReportsEveryProblemAtOnce) {
   options.feedback_options = {4, 0};
   options.penalty = Penalty::kSample;
   EXPECT_EQ(
-      message_of([&] { iicv(two.view(), one.view(), options); }),
+      message_of([&] { iicv(two.view(), one.view(), options); }, ErrorCode::kUsage),
       "iicv: pilot_window is 10, expected an odd number from 3 to 63; k is 200, expected 1 to 121, the number of "
       "pixels "
       "in a window of 11 x 11; ridge is 0, expected a positive number; "
@@ -486,18 +354,6 @@ TEST(Iicv, ReportsEveryProblemAtOnce) {
       "the CRN image is 8 x 6 and the PT image 8 x 5; "
       "they must have the same size; the CRN image has 2 groups, at least 3 are needed (12 are recommended); the PT "
       "image has 1 group, at least 2 are needed with these settings");
-  EXPECT_EQ(message_of([&] { cv_baseline(one.view(), one.view()); }),
-            "cv_baseline: the CRN image has 1 group, at least 3 are needed (12 are recommended)");
-  CvBaselineOptions baseline;
-  baseline.window = 4;
-  baseline.include_target = false;
-  baseline.k = 16;
-  baseline.ridge = -1;
-  EXPECT_EQ(
-      message_of([&] { cv_baseline(two.view(), two.view(), baseline); }),
-      "cv_baseline: window is 4, expected an odd number from 3 to 63; k is 16, expected 1 to 15, the number of "
-      "neighbouring pixels in a window of 4 x 4; ridge is -1, expected zero or a positive number; the CRN image has 2 "
-      "groups, at least 3 are needed (12 are recommended)");
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "core/error.h"
@@ -25,12 +26,13 @@ inline std::filesystem::path test_folder() {
 }
 inline std::string test_file(const std::string& name) { return (test_folder() / name).string(); }
 
-/// The message of the Error that `call` throws; "no error" when it throws none.
+/// The message of the Error that `call` throws, which must have the code where one is given; "no error" when it throws none.
 template <typename Call>
-std::string message_of(Call&& call) {
+std::string message_of(Call&& call, std::optional<ErrorCode> code = {}) {
   try {
     call();
   } catch (const Error& error) {
+    EXPECT_EQ(error.code(), code.value_or(error.code()));
     return error.what();
   }
   return "no error";

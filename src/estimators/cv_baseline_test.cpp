@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+// The baseline of plain control variates against the double-precision reference, identities, degenerate inputs.
+#include "estimators/cv_baseline.h"
+
+#include <gtest/gtest.h>
+
+#include "core/error.h"
+#include "estimators/compare_with_reference.h"
+#include "estimators/test_images.h"
+#include "support/files.h"
+
+namespace covary {
+namespace {
+
+using reference::compare, reference::neighbours, reference::pilot_of, reference::RgbImage;
+using test_support::message_of;
+
+TEST(CvBaseline, WithARidgeAgreesWithTheReference) {
+  const test::Grouped crn = test::crn_image(41, 27, 12, 1), pt = test::pt_image(41, 27, 12, 2);
+  const RgbImage unused = pilot_of(crn.view(), pt.view(), 11);
+  for (bool shared : {false, true}) {
+    CvBaselineOptions options;
+    options.ridge = 0.05f;
+    options.shared_coefficients = shared;
+    const EstimatorResult fast = cv_baseline(crn.view(), pt.view(), options);
+    EXPECT_LT(compare(fast, crn.view(), pt.view(), unused, 25, 11, true, {shared, false, 0.05, 0}).estimate, 2e-3);
+  }
+}
+
+/// Minimum norm: against the pseudo-inverse.
+TEST(CvBaseline, WithoutRidgeIsTheMinimumNormSolution) {
+  const test::Grouped crn = test::crn_image(30, 20, 12, 1), pt = test::pt_image(30, 20, 12, 2);
+  const GroupedImage view = crn.view(), pt_view = pt.view();
+  const auto all = neighbours(view, 25, 11, true);
+  const EstimatorResult fast = cv_baseline(view, pt_view);
+  for (int y = 0; y < view.height; ++y)
+    for (int x = 0; x < view.width; ++x)
+      for (int c = 0; c < 3; ++c) {
+        const auto& near = all[y * view.width + x];
+        Eigen::MatrixXd X(12, 25);
+        Eigen::VectorXd target(12), difference(25);
+        for (int t = 0; t < 12; ++t) {
+          target(t) = view.pixel(x, y)[3 * t + c];
+          for (int i = 0; i < 25; ++i) X(t, i) = view.pixel(near[i].x, near[i].y)[3 * t + c];
+        }
+        const double f = target.mean();
+        for (int i = 0; i < 25; ++i)
+          difference(i) = X.col(i).mean() - reference::mean(pt_view, near[i].x, near[i].y)[c];
+        target.array() -= f;
+        X.rowwise() -= X.colwise().mean().eval();
+        const Eigen::VectorXd beta = X.completeOrthogonalDecomposition().solve(target);
+        const double noise = std::sqrt(reference::variance_of_mean(view, x, y)[c]);
+        EXPECT_NEAR(fast.estimate.pixel(x, y)[c], f - beta.dot(difference), 0.02 * noise) << x << ", " << y;
+      }
+}
+
+/// Least squares with shared coefficients and the target among the neighbours: the target itself.
+TEST(CvBaseline, WithSharedCoefficientsIsThePtImage) {
+  const test::Grouped crn = test::crn_image(30, 20, 12, 1), pt = test::pt_image(30, 20, 12, 2);
+  CvBaselineOptions options;
+  options.shared_coefficients = true;
+  const EstimatorResult fast = cv_baseline(crn.view(), pt.view(), options);
+  for (int y = 0; y < 20; ++y)
+    for (int x = 0; x < 30; ++x)
+      for (int c = 0; c < 3; ++c)
+        EXPECT_NEAR(fast.estimate.pixel(x, y)[c], reference::mean(pt.view(), x, y)[c], 5e-3) << x << ", " << y;
+}
+
+/// A sky: bright, and hardly any noise but that of rounding. The solution of smallest norm must not blow it up.
+TEST(CvBaseline, SmallestNormIsBoundedWherePixelsHardlyVary) {
+  test::Grouped crn = test::crn_image(60, 40, 12, 3), pt = test::pt_image(60, 40, 12, 4);
+  for (float noise : {0.0f, 1e-7f, 1e-6f, 1e-4f, 1e-2f}) {
+    for (int y = 0; y < 40; ++y)
+      for (int x = 0; x < 60; ++x)
+        for (int i = 0; i < 36; ++i) {
+          crn.pixel(x, y)[i] = 3.0f * (1 + noise * test::noise(7, i, x));
+          pt.pixel(x, y)[i] = 3.0f * (1 + noise * test::noise(8, i + 36 * y, x));
+        }
+    const EstimatorResult result = cv_baseline(crn.view(), pt.view());
+    for (float v : result.estimate.data) ASSERT_NEAR(v, 3.0f, 30 * noise + 1e-5f) << noise;
+  }
+}
+
+TEST(CvBaseline, BlackIsBlack) {
+  const test::Grouped black = test::constant_image(30, 20, 12, 0.0f);
+  const EstimatorResult result = cv_baseline(black.view(), black.view());
+  for (float v : result.estimate.data) ASSERT_EQ(v, 0.0f);
+}
+
+TEST(CvBaseline, ReportsEveryProblemAtOnce) {
+  const test::Grouped two = test::constant_image(8, 6, 2, 1), one = test::constant_image(8, 5, 1, 1);
+  EXPECT_EQ(message_of([&] { cv_baseline(one.view(), one.view()); }, ErrorCode::kUsage),
+            "cv_baseline: the CRN image has 1 group, at least 3 are needed (12 are recommended)");
+  CvBaselineOptions options;
+  options.window = 4;
+  options.include_target = false;
+  options.k = 16;
+  options.ridge = -1;
+  EXPECT_EQ(
+      message_of([&] { cv_baseline(two.view(), two.view(), options); }, ErrorCode::kUsage),
+      "cv_baseline: window is 4, expected an odd number from 3 to 63; k is 16, expected 1 to 15, the number of "
+      "neighbouring pixels in a window of 4 x 4; ridge is -1, expected zero or a positive number; the CRN image has 2 "
+      "groups, at least 3 are needed (12 are recommended)");
+}
+
+}  // namespace
+}  // namespace covary

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whole images of the control variates of src/estimators against reference_control_variates.h.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "estimators/neighbours.h"
+#include "estimators/reference_control_variates.h"
+
+namespace covary::reference {
+
+/// The neighbours of all pixels (neighbours_test shows that they are the right ones).
+inline std::vector<std::vector<Pixel>> neighbours(const GroupedImage& crn, int k, int window, bool include_target) {
+  const std::vector<unsigned char> valid(static_cast<size_t>(crn.width) * crn.height, 1);
+  const Planes guide = moments(crn, valid, window / 2, kFar).mean;
+  const NeighbourSearch search(k, window, include_target);
+  std::vector<lanes::vint> keys(search.offsets().size());
+  std::vector<uint16_t> chosen(static_cast<size_t>(k) * lanes::kLanes);
+  std::vector<std::vector<Pixel>> result(valid.size());
+  for (int y = 0; y < crn.height; ++y)
+    for (int x = 0; x < crn.width; ++x) {
+      search.find(guide, x, y, keys.data(), chosen.data());
+      for (int i = 0; i < k; ++i) {
+        const Offset o = search.offsets()[chosen[i]];
+        const Pixel q{x + o.dx, y + o.dy};
+        if (q.x >= 0 && q.y >= 0 && q.x < crn.width && q.y < crn.height) result[y * crn.width + x].push_back(q);
+      }
+    }
+  return result;
+}
+
+/// Largest difference from the reference, in standard deviations of the CRN mean, of estimate and standard error.
+struct Difference {
+  double estimate = 0, std_error = 0;
+};
+
+inline Difference compare(const EstimatorResult& fast, const GroupedImage& crn, const GroupedImage& pt,
+                          const RgbImage& error_of_h, int k, int window, bool include_target,
+                          const Settings& settings) {
+  const auto all = neighbours(crn, k, window, include_target);
+  const RgbImage h = map_pixels(pt, [&](int x, int y) { return mean(pt, x, y); });
+  const RgbImage variance = map_pixels(pt, [&](int x, int y) { return variance_of_mean(pt, x, y); });
+  Difference worst;
+  for (int y = 0; y < crn.height; ++y)
+    for (int x = 0; x < crn.width; ++x) {
+      const Result exact = control_variates(crn, h, error_of_h, variance, {x, y}, all[y * crn.width + x], settings);
+      const Rgb noise = variance_of_mean(crn, x, y);
+      for (int c = 0; c < 3; ++c) {
+        const double unit = std::sqrt(noise[c]) + 1e-9;
+        worst.estimate = std::max(worst.estimate, std::abs(fast.estimate.pixel(x, y)[c] - exact.estimate[c]) / unit);
+        if (!fast.std_error.data.empty())
+          worst.std_error =
+              std::max(worst.std_error, std::abs(fast.std_error.pixel(x, y)[c] - exact.std_error[c]) / unit);
+      }
+    }
+  return worst;
+}
+
+/// The pilot penalty of all pixels of the PT image.
+inline RgbImage pilot_of(const GroupedImage& crn, const GroupedImage& pt, int window) {
+  return pilot_error(crn, map_pixels(pt, [&](int x, int y) { return mean(pt, x, y); }), window);
+}
+
+}  // namespace covary::reference
