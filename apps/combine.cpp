@@ -5,7 +5,6 @@
 #include <tbb/global_control.h>
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cstdio>
 #include <functional>
 #include <memory>
@@ -14,6 +13,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "core/stopwatch.h"
 #include "estimator_options.h"
 #include "estimators/grouped_file.h"
 #include "estimators/input_doctor.h"
@@ -63,19 +63,6 @@ void check_files(const GroupedFile& crn, const GroupedFile& pt, std::vector<Find
                "component_format \"float32\", in pbrt Film \"bool savefp16\" false, in Blender color_depth = '32'",
                name)});
 }
-
-class Stopwatch {
- public:
-  double lap() {
-    const auto now = std::chrono::steady_clock::now();
-    const double seconds = std::chrono::duration<double>(now - last_).count();
-    last_ = now;
-    return seconds;
-  }
-
- private:
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
-};
 
 /// Both images, some rows at a time.
 class Bands {

@@ -3,13 +3,13 @@
 #include "estimators/denoise.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <memory>
 #include <optional>
 
 #include "commands.h"
 #include "core/error.h"
+#include "core/stopwatch.h"
 #include "film/image_file.h"
 
 namespace covary {
@@ -30,7 +30,7 @@ std::optional<Image> guide(const std::string& path, const ImageInfo& info, const
 }
 
 void run(const Options& o) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   const ImageInfo info = inspect_image(o.input);
   const PlacedImage image = read_image(o.input);
   std::optional<Image> albedo, normal;
@@ -52,7 +52,7 @@ void run(const Options& o) {
                  normal   ? "guided by albedo and normal"
                  : albedo ? "guided by albedo"
                           : "without guides",
-                 std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+                 watch.seconds());
 }
 
 }  // namespace

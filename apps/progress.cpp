@@ -25,19 +25,16 @@ std::string format_count(double count) {
 }
 
 ProgressLine::ProgressLine(std::string label, bool quiet)
-    : label_(std::move(label)), quiet_(quiet), terminal_(isatty(2) == 1), start_(Clock::now()) {
-  next_ = start_ + (terminal_ ? std::chrono::milliseconds(100) : std::chrono::milliseconds(10000));
-}
+    : label_(std::move(label)), quiet_(quiet), terminal_(isatty(2) == 1), next_(terminal_ ? 0.1 : 10) {}
 
 void ProgressLine::update(uint64_t done, uint64_t total, double seconds_limit) {
   if (quiet_) return;
   const std::unique_lock lock(mutex_, std::try_to_lock);
   if (!lock) return;
-  const Clock::time_point now = Clock::now();
-  if (now < next_) return;
-  next_ = now + (terminal_ ? std::chrono::milliseconds(200) : std::chrono::milliseconds(10000));
+  const double elapsed = watch_.seconds();
+  if (elapsed < next_) return;
+  next_ = elapsed + (terminal_ ? 0.2 : 10);
 
-  const double elapsed = std::chrono::duration<double>(now - start_).count();
   const double rate = static_cast<double>(done) / elapsed;
   double fraction = total ? static_cast<double>(done) / static_cast<double>(total) : 0;
   double left = fraction > 0 ? elapsed * (1 - fraction) / fraction : 0;

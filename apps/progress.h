@@ -2,10 +2,11 @@
 #pragma once
 
 #include <atomic>
-#include <chrono>
 #include <cstdint>
 #include <mutex>
 #include <string>
+
+#include "core/stopwatch.h"
 
 namespace covary {
 
@@ -20,10 +21,10 @@ class ProgressLine {
   void finish();
 
  private:
-  using Clock = std::chrono::steady_clock;
   std::string label_;
   bool quiet_, terminal_, drawn_ = false;
-  Clock::time_point start_, next_;
+  Stopwatch watch_;
+  double next_;  // when to draw, seconds
   std::mutex mutex_;
 };
 

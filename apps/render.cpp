@@ -5,7 +5,6 @@
 #include <unistd.h>
 
 #include <atomic>
-#include <chrono>
 #include <cmath>
 #include <csignal>
 #include <filesystem>
@@ -16,6 +15,7 @@
 
 #include "commands.h"
 #include "core/error.h"
+#include "core/stopwatch.h"
 #include "defines.h"
 #include "estimators/mean.h"
 #include "estimators/predicted_error.h"
@@ -34,11 +34,8 @@
 namespace covary {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 constexpr double kPreviewSeconds = 0.5;  // between images for a viewer
 constexpr uint32_t kFirstBudget = 96;    // samples per pixel before --until looks at the error for the first time
-
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 std::shared_ptr<Integrator> make_integrator(Parameters& parameters, const RenderOptions& options) {
   PathLengthSettings lengths = PathLengthSettings::from(parameters);
@@ -75,7 +72,7 @@ GroupedImage grouped(const Film& film) { return {film.width(), film.height(), fi
 
 /// Makes the image of the passes.
 void estimate(const RenderOptions& options, Outcome& outcome) {
-  const auto start = Clock::now();
+  const Stopwatch watch;
   const std::vector<Pass>& passes = outcome.passes;
   if (options.is_plain()) {
     outcome.image = mean_of_groups(grouped(passes[0].film));
@@ -85,7 +82,7 @@ void estimate(const RenderOptions& options, Outcome& outcome) {
                         .apply(grouped(passes[0].film), grouped(passes[1].film));
   }
   if (!outcome.image.std_error.data.empty()) outcome.predicted_relmse = predicted_relmse(outcome.image);
-  outcome.estimate_seconds += seconds_since(start);
+  outcome.estimate_seconds += watch.seconds();
 }
 
 /// A picture for a viewer while the passes go on: the mean of all samples so far.
@@ -111,30 +108,30 @@ uint32_t next_budget(uint32_t budget, double predicted, double target, uint32_t 
 bool run(const RenderOptions& options, const LoadedScene& scene, const Integrator& integrator, uint32_t budget,
          uint32_t limit, Display* display, Outcome& outcome) {
   const double target = options.until.empty() ? 0 : parse_until(options.until);
-  const auto start = Clock::now();
-  auto last_checkpoint = start, last_preview = start;
+  const Stopwatch watch;
+  Stopwatch since_checkpoint, since_preview;
   for (;;) {
     ProgressLine progress(std::filesystem::path(options.scene).stem().string(), options.quiet);
     RenderLimits limits;
-    limits.seconds = options.seconds > 0 ? std::max(options.seconds - seconds_since(start), 1e-3) : 0;
+    limits.seconds = options.seconds > 0 ? std::max(options.seconds - watch.seconds(), 1e-3) : 0;
     limits.stop = &g_stop;
     limits.progress = [&](uint64_t done, uint64_t total) {
       progress.update(done, options.seconds > 0 && !options.spp ? 0 : total, limits.seconds);
     };
     limits.checkpoint = [&] {
-      if (display && display->ready() && seconds_since(last_preview) >= kPreviewSeconds) {
+      if (display && display->ready() && since_preview.seconds() >= kPreviewSeconds) {
         display->update(preview_of(outcome.passes));
-        last_preview = Clock::now();
+        since_preview = Stopwatch();
       }
-      if (options.checkpoint_seconds <= 0 || seconds_since(last_checkpoint) < options.checkpoint_seconds) return;
+      if (options.checkpoint_seconds <= 0 || since_checkpoint.seconds() < options.checkpoint_seconds) return;
       save_passes(options, outcome.passes, false);
-      last_checkpoint = Clock::now();
+      since_checkpoint = Stopwatch();
     };
     render_passes(*scene.scene, integrator, outcome.passes, limits);
     progress.finish();
     if (g_stop && !outcome.complete()) return false;
     if (!options.is_plain() || target > 0) estimate(options, outcome);
-    const bool out_of_time = options.seconds > 0 && seconds_since(start) >= options.seconds;
+    const bool out_of_time = options.seconds > 0 && watch.seconds() >= options.seconds;
     if (target == 0 || *outcome.predicted_relmse <= target || budget >= limit || out_of_time) return true;
     budget = next_budget(budget, *outcome.predicted_relmse, target, limit);
     set_budget(options, budget, outcome.passes);
@@ -197,9 +194,9 @@ void render(RenderOptions options) {
     });
 
   Outcome outcome;
-  const auto load_start = Clock::now();
+  const Stopwatch load_watch;
   LoadedScene scene = load(options);
-  outcome.load_seconds = seconds_since(load_start) - scene.scene->build_seconds();
+  outcome.load_seconds = load_watch.seconds() - scene.scene->build_seconds();
   for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", warning);
   const auto& integrator = dynamic_cast<const Integrator&>(*scene.integrator);
   if (!options.replay.empty()) return replay(options, scene, integrator);
@@ -219,13 +216,13 @@ void render(RenderOptions options) {
   const bool done = run(options, scene, integrator, budget, limit, display ? &*display : nullptr, outcome);
   if (display) display->update(done && !options.is_plain() ? outcome.image.estimate : preview_of(outcome.passes));
 
-  const auto write_start = Clock::now();
+  const Stopwatch write_watch;
   if (!done || !options.passes.empty()) save_passes(options, outcome.passes, done);
   if (done) {
     write_image(options, scene, outcome);
     remove_passes(options, outcome.passes);
   }
-  outcome.write_seconds = seconds_since(write_start);
+  outcome.write_seconds = write_watch.seconds();
 
   for (const Pass& pass : outcome.passes) report_bad_samples(options, pass);
   if (!options.json.empty()) {

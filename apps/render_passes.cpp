@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -12,6 +11,7 @@
 
 #include "commands.h"
 #include "core/error.h"
+#include "core/stopwatch.h"
 #include "film/film_file.h"
 #include "film/output_file.h"
 
@@ -175,7 +175,7 @@ void remove_passes(const RenderOptions& options, const std::vector<Pass>& passes
 
 void render_passes(const Scene& scene, const Integrator& integrator, std::vector<Pass>& passes,
                    const RenderLimits& limits) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   uint64_t total = 0;
   for (const Pass& pass : passes) total += samples_left(pass);
   uint64_t done = 0;
@@ -193,7 +193,7 @@ void render_passes(const Scene& scene, const Integrator& integrator, std::vector
       if (limits.progress) limits.progress(done + now, total);
     };
     if (limits.seconds > 0 && (pass.count > 0 || passes.size() == 1)) {
-      wave.seconds = limits.seconds - std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      wave.seconds = limits.seconds - watch.seconds();
       if (wave.seconds <= 0) return;
     }
     const PassResult result = render_pass(scene, integrator, wave, pass.film);

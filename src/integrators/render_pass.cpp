@@ -6,12 +6,12 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <tuple>
 
 #include "core/error.h"
 #include "core/in_place.h"
+#include "core/stopwatch.h"
 #include "core/warp.h"
 
 namespace covary {
@@ -20,9 +20,6 @@ namespace {
 constexpr int kTileSize = 16;
 constexpr int kBatchSize = 256;  // paths traced together; larger ones leave the cache
 constexpr size_t kMaxBadSamples = 10;
-
-using Clock = std::chrono::steady_clock;
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 /// Offset from the pixel centre, drawn from a gaussian with the given standard deviation cut off at `radius`, by
 /// inversion of its cumulative distribution (rational start of Giles 2010 for the inverse error function, one Newton step).
@@ -153,7 +150,7 @@ Vec2 film_position(const FilterSettings& filter, int x, int y, const PathRandom&
 }
 
 PassResult render_pass(const Scene& scene, const Integrator& integrator, const PassSettings& settings, Film& film) {
-  const auto start = Clock::now();
+  const Stopwatch watch;
   COVARY_CHECK(settings.spp % film.groups() == 0, "samples per pixel must be a multiple of the number of groups");
   COVARY_CHECK(film.frame_width() == scene.camera().width() && film.frame_height() == scene.camera().height(),
                "film and camera differ in size");
@@ -189,7 +186,7 @@ PassResult render_pass(const Scene& scene, const Integrator& integrator, const P
             render_tile(scene, integrator, settings, tile, begin, end, film, workers.local());
             const auto n_pixels = static_cast<uint64_t>((tile.x1 - tile.x0) * (tile.y1 - tile.y0));
             const uint64_t now = done.fetch_add(n_pixels * (end - begin)) + n_pixels * (end - begin);
-            if (settings.seconds > 0 && seconds_since(start) >= settings.seconds) out_of_time = true;
+            if (settings.seconds > 0 && watch.seconds() >= settings.seconds) out_of_time = true;
             if (settings.progress) settings.progress(now, total);
           }
         },
@@ -210,7 +207,7 @@ PassResult render_pass(const Scene& scene, const Integrator& integrator, const P
   keep_first(result.bad_samples);
   result.complete =
       std::all_of(tiles.begin(), tiles.end(), [&](const Tile& tile) { return count_of(tile) >= settings.spp; });
-  result.seconds = seconds_since(start);
+  result.seconds = watch.seconds();
   return result;
 }
 

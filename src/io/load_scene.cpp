@@ -7,10 +7,10 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <chrono>
 #include <unordered_set>
 
 #include "core/content_hash.h"
+#include "core/stopwatch.h"
 #include "emitters/area.h"
 #include "io/description_key.h"
 #include "io/file_view.h"
@@ -60,7 +60,7 @@ class Loader {
       : options_(options), result_(result), factory_(made_, files_, diagnostics_) {}
 
   void load(std::string_view text, const std::string& name) {
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     xml_ = read_scene_xml(text, name, options_.defines, files_, diagnostics_);
     if (!xml_.scene) {
       diagnostics_.throw_if_errors();
@@ -72,7 +72,7 @@ class Loader {
     hash_files();
     result_.warnings = diagnostics_.warnings();
     diagnostics_.throw_if_errors();
-    result_.read_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    result_.read_seconds = watch.seconds();
     result_.scene = std::make_unique<Scene>(std::move(parts_));
   }
 

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
 #include <map>
 #include <set>
@@ -12,6 +11,7 @@
 #include "core/content_hash.h"
 #include "core/error.h"
 #include "core/shell_text.h"
+#include "core/stopwatch.h"
 #include "film/image_file.h"
 #include "lab/measure.h"
 #include "lab/process.h"
@@ -122,9 +122,9 @@ class Experiment {
     std::optional<RunRecord> record = runner_.find(run);
     if (!record) {
       report(Progress::Kind::kStarted, what);
-      const auto start = std::chrono::steady_clock::now();
+      const Stopwatch watch;
       Runner::Result result = runner_.execute(run, results_.scenes[run.scene].scene);
-      clock_.took(run.work, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+      clock_.took(run.work, watch.seconds());
       if (result.failure) *failure = *result.failure;
       record = result.record;
     }

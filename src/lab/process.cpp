@@ -11,11 +11,11 @@
 
 #include <array>
 #include <cerrno>
-#include <chrono>
 #include <csignal>
 #include <cstring>
 
 #include "core/error.h"
+#include "core/stopwatch.h"
 
 namespace covary::lab {
 namespace {
@@ -72,7 +72,7 @@ ProcessResult run_process(const std::vector<std::string>& command, const std::at
   for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);
   Pipe output, errors;
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   const pid_t parent = getpid(), child = fork();
   if (child < 0) throw Error(ErrorCode::kIo, fmt::format("cannot start a process: {}", std::strerror(errno)));
   if (child == 0) become(arguments.data(), output.write, errors.write, parent);
@@ -93,7 +93,7 @@ ProcessResult run_process(const std::vector<std::string>& command, const std::at
   rusage usage{};
   while (wait4(child, &status, 0, &usage) < 0 && errno == EINTR) {
   }
-  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  result.seconds = watch.seconds();
   result.signal = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
   result.exit_code = result.signal ? 128 + result.signal : WEXITSTATUS(status);
   result.peak_memory_bytes = static_cast<uint64_t>(usage.ru_maxrss) * 1024;

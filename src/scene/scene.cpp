@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scene/scene.h"
 
-#include <chrono>
 #include <utility>
 
 #include "core/error.h"
+#include "core/stopwatch.h"
 #include "scene/mesh.h"
 #include "scene/ray_tracer.h"
 
 namespace covary {
 
 Scene::Scene(SceneParts parts) : parts_(std::move(parts)) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   COVARY_CHECK(parts_.camera, "a scene needs a camera");
   for (const ShapePtr& shape : parts_.shapes) {
     COVARY_CHECK(shape->bsdf(), "every shape needs a BSDF");
@@ -35,7 +35,7 @@ Scene::Scene(SceneParts parts) : parts_(std::move(parts)) {
       environment_ = emitter.get();
     }
   }
-  build_seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  build_seconds_ = watch.seconds();
 }
 
 Scene::~Scene() = default;
