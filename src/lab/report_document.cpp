@@ -148,6 +148,7 @@ Json report_document(const Results& results) {
   add_section(document, std::move(gains));
 
   Json quality = new_section("bias", "Bias, variance and other measures");
+  add_block(quality, front_plot(results, shown));
   add_block(quality, quality_table(results, shown));
   add_section(document, std::move(quality));
 

@@ -5,6 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
+
+#include "lab/statistics.h"
 
 namespace covary::lab {
 namespace {
@@ -49,12 +52,13 @@ Json cell_rows(const Results& results, size_t budget, Fill&& fill) {
   return rows;
 }
 
-Json plot(const std::string& title, const std::string& x_label, Json series, const std::string& alt) {
+Json plot(const std::string& title, const std::string& x_label, Json series, const std::string& alt,
+          const Json& y_axis = {{"label", "relMSE"}, {"scale", "log"}}) {
   if (series.empty()) return nullptr;
   return {{"type", "plot"},
           {"title", title},
           {"x", {{"label", x_label}, {"scale", "log"}}},
-          {"y", {{"label", "relMSE"}, {"scale", "log"}}},
+          {"y", y_axis},
           {"series", std::move(series)},
           {"alt", alt}};
 }
@@ -243,6 +247,41 @@ Json time_plot(const Results& results, size_t scene) {
       results, scene, [](const Cell& cell) { return cell.method_seconds.value; }, [](const Budget&) { return true; });
   const std::string alt = alternative("relMSE of " + name + " from the shortest to the longest time", series);
   return plot(name, "seconds, render and estimate", std::move(series), alt);
+}
+
+Json front_plot(const Results& results, size_t budget) {
+  const Suite& suite = results.suite;
+  Json series = Json::array();
+  std::string alt;
+  for (size_t m = 0; m < suite.methods.size(); ++m) {
+    std::vector<Estimate> gains;
+    double share = 0, square = 0;
+    for (const Cell& cell : results.cells) {
+      const SplitError& split = cell.split.relative;
+      if (cell.method != m || cell.budget != budget || !std::isfinite(split.squared_bias.value / split.error.value) ||
+          !std::isfinite(cell.equal_sample.value))
+        continue;
+      gains.push_back(cell.equal_sample);
+      share += split.squared_bias.value / split.error.value;
+      const double width = (split.squared_bias.high - split.squared_bias.low) / 2 / split.error.value;
+      square += width * width;  // not a number with two seeds, which give no interval
+    }
+    if (gains.size() != results.scenes.size()) continue;  // means over other scenes do not compare
+    const auto n = static_cast<double>(gains.size());
+    const double error = 1 / geometric_mean(gains).value;
+    share /= n;
+    const double width = std::sqrt(square) / n;
+    series.push_back({{"name", suite.methods[m].name},
+                      {"x", {error}},
+                      {"y", {share}},
+                      {"low", {number(share - width)}},
+                      {"high", {number(share + width)}},
+                      {"style", "points"}});
+    alt += fmt::format("{}{}: {:.3g}, {:.0f} %", alt.empty() ? "" : "; ", suite.methods[m].name, error, 100 * share);
+  }
+  return plot("Error against bias, " + suite.budgets[budget].label(), "relMSE / relMSE of " + suite.baseline,
+              std::move(series), "Error relative to the baseline and share of squared bias: " + alt,
+              {{"label", "squared bias / own relMSE"}, {"scale", "linear"}});
 }
 
 }  // namespace covary::lab
