@@ -56,6 +56,12 @@ void Film::add(int x, int y, uint32_t added_per_group, std::span<const Spectrum>
   count = static_cast<uint32_t>(total);
 }
 
+void Film::set(int x, int y, uint32_t count, const Spectrum& value) {
+  COVARY_CHECK(groups_ == 1 && counts_[index(x, y)] == 0, "only a pixel without samples and groups can be set");
+  std::copy_n(&value.r, 3, groups_data_.data() + index(x, y) * 3);
+  counts_[index(x, y)] = count;
+}
+
 Image Film::mean_image() const {
   Image image(width(), height(), 3);
   for (int y = 0; y < height(); ++y)

@@ -58,6 +58,8 @@ class Film {
   /// Adds `added_per_group` samples to each of the pixel's groups; `sums` holds groups() sums of the new samples.
   /// Different pixels may be added to from different threads.
   void add(int x, int y, uint32_t added_per_group, std::span<const Spectrum> sums);
+  /// Gives a pixel that has no samples the value that `count` samples together led to. For films with one group.
+  void set(int x, int y, uint32_t count, const Spectrum& value);
   /// The T group means of a pixel, contiguous: groups() x RGB.
   const float* groups_of(int x, int y) const { return groups_data_.data() + index(x, y) * groups_ * 3; }
 

@@ -49,6 +49,16 @@ bool same_bits(const Film& a, const Film& b) {
                     [](float u, float v) { return std::bit_cast<uint32_t>(u) == std::bit_cast<uint32_t>(v); });
 }
 
+TEST(Film, SetsAPixelExactly) {
+  Film film(2, 1, {0, 0, 2, 1}, 1);
+  const Spectrum value(0.1f, -1e-30f, 3e38f);  // times 49 it would not be a float
+  film.set(1, 0, 49, value);
+  EXPECT_EQ(film.mean(1, 0), value);
+  EXPECT_EQ(film.count(1, 0), 49u);
+  EXPECT_EQ(film.count(0, 0), 0u);
+  EXPECT_TRUE(contains(message_of([&] { film.set(1, 0, 49, value); }), "only a pixel without samples"));
+}
+
 TEST(Film, AddsUpToTheMean) {
   Film film(2, 1, {0, 0, 2, 1}, 2);
   film.add(1, 0, 2, std::vector{Spectrum(2, 4, 6), Spectrum(0, 0, 2)});

@@ -17,6 +17,7 @@
 #include "core/in_place.h"
 #include "integrators/integrator.h"
 #include "integrators/light_selection.h"
+#include "integrators/primary_sample.h"
 
 namespace covary {
 namespace {
@@ -151,7 +152,7 @@ class PathIntegrator final : public Integrator {
       batch.choices[i].emitter = nullptr;
       if (!(batch.hits[i].bsdf_flags & kSmooth)) continue;
       const PathRandom& random = samples[batch.paths[i].sample].random;
-      const uint32_t vertex = 1 + batch.paths[i].n_smooth;
+      const uint32_t vertex = kFirstSurfaceVertex + batch.paths[i].n_smooth;
       const Emitter& emitter = select_light(scene, random.get_1d(vertex, Event::kLightChoice));
       const Vec2 u = random.get_2d(vertex, Event::kLightPosition);
       if (scene.environment()) emitter.prefetch(u, PrefetchStep::kTable);
@@ -183,7 +184,7 @@ class PathIntegrator final : public Integrator {
       const Vec3 wo = hit.frame.to_local(-batch.rays[i].d);
       // Mirrors and glass have addresses of their own: a path that met one reads, at the surfaces behind it, the same
       // numbers as its neighbour that did not.
-      const uint32_t vertex = hit.bsdf_flags & kSmooth ? 1 + path.n_smooth++ : kDeltaVertices + depth;
+      const uint32_t vertex = hit.bsdf_flags & kSmooth ? kFirstSurfaceVertex + path.n_smooth++ : kDeltaVertices + depth;
       context.arena.reset();
       const BsdfClosure* bsdf = hit.bsdf->bind(hit, wo.z > 0, TransportMode::kRadiance, context.arena);
       if (connect && batch.lights[i].pdf_solid_angle > 0)

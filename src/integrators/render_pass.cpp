@@ -20,6 +20,7 @@ namespace {
 constexpr int kTileSize = 16;
 constexpr int kBatchSize = 256;  // paths traced together; larger ones leave the cache
 constexpr size_t kMaxBadSamples = 10;
+constexpr double kRoundSeconds = 0.5;  // between checkpoints where pixels are estimated from all their samples
 
 /// Offset from the pixel centre, drawn from a gaussian with the given standard deviation cut off at `radius`, by
 /// inversion of its cumulative distribution (rational start of Giles 2010 for the inverse error function, one Newton step).
@@ -52,6 +53,7 @@ struct Worker {
   std::vector<CameraSample> samples;
   uint64_t n_samples = 0, n_not_finite = 0, n_negative = 0;
   std::vector<BadSample> bad_samples;
+  double seconds = 0, estimate_seconds = 0;  // in tiles, and in settings.estimate
 };
 
 struct Tile {
@@ -95,7 +97,7 @@ bool is_good(const Spectrum& value, int x, int y, uint64_t sample, Worker& worke
   return false;
 }
 
-/// Takes samples begin … end - 1 of all pixels of a tile, in batches of whole pixels.
+/// Takes samples begin … end - 1 of all pixels of a tile, whole pixels together.
 void render_tile(const Scene& scene, const Integrator& integrator, const PassSettings& settings, const Tile& tile,
                  uint32_t begin, uint32_t end, Film& film, Worker& worker) {
   const auto groups = static_cast<uint32_t>(film.groups());
@@ -115,16 +117,26 @@ void render_tile(const Scene& scene, const Integrator& integrator, const PassSet
         make_in_place(*next++, [&] {
           return camera_sample(scene, settings, film.crop().x + film_x(pixel), film.crop().y + film_y(pixel), s);
         });
-    integrator.trace(scene, worker.samples, worker.context);
+    for (size_t i = 0; i < n_samples; i += kBatchSize)
+      integrator.trace(scene, std::span(worker.samples).subspan(i, std::min<size_t>(kBatchSize, n_samples - i)),
+                       worker.context);
 
-    const CameraSample* sample = worker.samples.data();
+    CameraSample* sample = worker.samples.data();
     for (int pixel = first; pixel < last; ++pixel) {
       const int x = film_x(pixel), y = film_y(pixel);
+      const std::span<const CameraSample> of_pixel(sample, per_pixel);
       std::fill(worker.sums.begin(), worker.sums.end(), Spectrum(0));
-      for (uint32_t s = begin; s < end; ++s, ++sample)
-        if (is_good(sample->radiance, film.crop().x + x, film.crop().y + y, s, worker))
-          worker.sums[s % groups] += sample->radiance;
-      film.add(x, y, per_pixel / groups, worker.sums);
+      for (uint32_t s = begin; s < end; ++s, ++sample) {
+        if (!is_good(sample->radiance, film.crop().x + x, film.crop().y + y, s, worker)) sample->radiance = Spectrum(0);
+        worker.sums[s % groups] += sample->radiance;
+      }
+      if (settings.estimate) {
+        const Stopwatch watch;
+        film.set(x, y, per_pixel, settings.estimate(of_pixel));
+        worker.estimate_seconds += watch.seconds();
+      } else {
+        film.add(x, y, per_pixel / groups, worker.sums);
+      }
     }
     worker.n_samples += worker.samples.size();
   }
@@ -152,10 +164,11 @@ Vec2 film_position(const FilterSettings& filter, int x, int y, const PathRandom&
 PassResult render_pass(const Scene& scene, const Integrator& integrator, const PassSettings& settings, Film& film) {
   const Stopwatch watch;
   COVARY_CHECK(settings.spp % film.groups() == 0, "samples per pixel must be a multiple of the number of groups");
+  COVARY_CHECK(!settings.estimate || film.groups() == 1, "an estimate from all samples of a pixel has no groups");
   COVARY_CHECK(film.frame_width() == scene.camera().width() && film.frame_height() == scene.camera().height(),
                "film and camera differ in size");
   const std::vector<Tile> tiles = make_tiles(film);
-  const uint32_t wave = wave_size(film.groups());
+  const uint32_t wave = settings.estimate ? settings.spp : wave_size(film.groups());
   const auto count_of = [&](const Tile& tile) { return film.count(tile.x0, tile.y0); };
 
   uint64_t total = 0;
@@ -173,17 +186,24 @@ PassResult render_pass(const Scene& scene, const Integrator& integrator, const P
     return out_of_time.load(std::memory_order_relaxed) ||
            (settings.stop && settings.stop->load(std::memory_order_relaxed));
   };
-  // A wave ends at a multiple of `wave` samples, so that interrupted and uninterrupted renders add in the same steps.
+  // A wave ends at a multiple of `wave` samples, so that interrupted and uninterrupted renders add in the same steps. The one
+  // wave of pixels that are estimated is cut into rounds of some time.
   while (fewest < settings.spp && !ended()) {
     const uint32_t end = std::min(settings.spp, (fewest / wave + 1) * wave);
+    const Stopwatch round_watch;
+    std::atomic<bool> round_over{false};
     tbb::parallel_for(
         tbb::blocked_range<size_t>(0, tiles.size(), 1),
         [&](const tbb::blocked_range<size_t>& range) {
           for (size_t i = range.begin(); i != range.end(); ++i) {
             const Tile& tile = tiles[i];
             const uint32_t begin = count_of(tile);
-            if (begin >= end || ended()) continue;
-            render_tile(scene, integrator, settings, tile, begin, end, film, workers.local());
+            if (begin >= end || ended() || round_over.load(std::memory_order_relaxed)) continue;
+            Worker& worker = workers.local();
+            const Stopwatch tile_watch;
+            render_tile(scene, integrator, settings, tile, begin, end, film, worker);
+            worker.seconds += tile_watch.seconds();
+            if (settings.estimate && round_watch.seconds() >= kRoundSeconds) round_over = true;
             const auto n_pixels = static_cast<uint64_t>((tile.x1 - tile.x0) * (tile.y1 - tile.y0));
             const uint64_t now = done.fetch_add(n_pixels * (end - begin)) + n_pixels * (end - begin);
             if (settings.seconds > 0 && watch.seconds() >= settings.seconds) out_of_time = true;
@@ -192,12 +212,15 @@ PassResult render_pass(const Scene& scene, const Integrator& integrator, const P
         },
         tbb::simple_partitioner());
     if (ended()) break;
-    fewest = end;
+    if (!round_over) fewest = end;
     if (settings.checkpoint) settings.checkpoint();
   }
 
   PassResult result;
+  double busy_seconds = 0;
   for (const Worker& worker : workers) {
+    busy_seconds += worker.seconds;
+    result.estimate_seconds += worker.estimate_seconds;
     result.n_samples += worker.n_samples;
     result.n_rays += worker.context.n_rays;
     result.n_not_finite += worker.n_not_finite;
@@ -208,6 +231,7 @@ PassResult render_pass(const Scene& scene, const Integrator& integrator, const P
   result.complete =
       std::all_of(tiles.begin(), tiles.end(), [&](const Tile& tile) { return count_of(tile) >= settings.spp; });
   result.seconds = watch.seconds();
+  if (busy_seconds > 0) result.estimate_seconds *= result.seconds / busy_seconds;  // its share of the time
   return result;
 }
 

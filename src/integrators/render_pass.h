@@ -8,6 +8,7 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <vector>
 
 #include "film/film.h"
@@ -15,18 +16,25 @@
 
 namespace covary {
 
+/// The value of a pixel from all its samples together. Called by several threads at once.
+using PixelEstimate = std::function<Spectrum(std::span<const CameraSample>)>;
+
 struct PassSettings {
   Sampling sampling = Sampling::kIndependent;
   uint64_t seed = 0;
   uint32_t pass = 0;  ///< position in the plan; passes of one plan never share numbers
   uint32_t spp = 0;   ///< samples per pixel to reach; a multiple of the film's groups
   FilterSettings filter;
+  /// When set, takes the place of the mean. The samples of a pixel are then taken in one go, and a thread holds all spp of them;
+  /// the film has one group, and its pixels are finished or have no samples.
+  PixelEstimate estimate;
   double seconds = 0;  ///< stop after this time when > 0; pixels then differ in count by at most one wave
   /// Set from a signal handler to stop at the next tile.
   const std::atomic<bool>* stop = nullptr;
   /// Called from any thread after each tile with the samples done since the start; must be thread-safe.
   std::function<void(uint64_t done, uint64_t total)> progress;
-  /// Called between waves, when the film is whole and may be written.
+  /// Called between waves, and with `estimate` about twice a second, when no thread works on the film and it may be
+  /// written.
   std::function<void()> checkpoint;
 };
 
@@ -44,6 +52,7 @@ struct PassResult {
   std::vector<BadSample> bad_samples;  ///< the first few, ordered by pixel and sample
   bool complete = false;               ///< every pixel has settings.spp samples
   double seconds = 0;
+  double estimate_seconds = 0;  ///< part of `seconds`: what settings.estimate took of the threads' time
 };
 
 /// Renders until every pixel of `film` has settings.spp samples, or time or the stop flag ends it.
