@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "estimators/polynomials.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "estimators/grouped_image.h"
+
+namespace covary {
+namespace {
+
+/// Rows of 8 numbers fill whole vector registers: 28 functions of 6 dimensions, 3 channels, one of padding.
+constexpr int kSize = 32;
+/// Pivots of the normal matrix, relative to the number of samples, are near 1 for many samples. Below this the
+/// coordinates do not determine the coefficients.
+constexpr double kSmallestPivot = 1e-10;
+
+/// The functions of degree 1 and 2 at one point, orthonormal on [0, 1)^d.
+void evaluate_basis(const float* u, int dimensions, double* basis) {
+  int n = 0;
+  for (int i = 0; i < dimensions; ++i) basis[n++] = std::sqrt(3.0) * (2.0 * u[i] - 1);
+  for (int i = 0; i < dimensions; ++i) {
+    basis[n++] = std::sqrt(1.25) * (basis[i] * basis[i] - 1);
+    for (int j = 0; j < i; ++j) basis[n++] = basis[i] * basis[j];
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> PolynomialsOptions::validate() const {
+  std::vector<std::string> problems;
+  if (dimensions < 1 || dimensions > kMaxDimensions)
+    problems.push_back(fmt::format("dimensions is {}, expected 1 to {}", dimensions, kMaxDimensions));
+  else if (samples <= static_cast<uint32_t>(n_coefficients()))
+    problems.push_back(fmt::format(
+        "{} samples per pixel are too few to fit the {} coefficients of {} dimensions, expected at least {}", samples,
+        n_coefficients(), dimensions, n_coefficients() + 1));
+  return problems;
+}
+
+Spectrum polynomials(std::span<const Spectrum> values, std::span<const float> coordinates, int dimensions) {
+  const PolynomialsOptions options{dimensions, static_cast<uint32_t>(values.size())};
+  std::vector<std::string> problems = options.validate();
+  if (problems.empty() && coordinates.size() != values.size() * static_cast<size_t>(dimensions))
+    problems.push_back(fmt::format("{} coordinates for {} samples, expected {} of each", coordinates.size(),
+                                   values.size(), dimensions));
+  throw_if_any("polynomials", problems);
+
+  const auto n = static_cast<double>(values.size());
+  double mean[3] = {0, 0, 0};
+  for (const Spectrum& value : values)
+    for (int c = 0; c < 3; ++c) mean[c] += value[c];
+  for (double& m : mean) m /= n;
+
+  // Inner products over the samples of the basis, the constant function last, and of the values less their mean.
+  const int constant = options.n_coefficients() - 1, size = constant + 4;
+  static_assert((PolynomialsOptions::kMaxDimensions + 1) * (PolynomialsOptions::kMaxDimensions + 2) / 2 + 3 <= kSize);
+  alignas(64) double products[kSize][kSize] = {}, v[kSize] = {};
+  for (size_t s = 0; s < values.size(); ++s) {
+    evaluate_basis(coordinates.data() + s * dimensions, dimensions, v);
+    v[constant] = 1;
+    for (int c = 0; c < 3; ++c) v[constant + 1 + c] = values[s][c] - mean[c];
+    for (int i = 0; i < size; ++i)
+      for (int j = 0; j <= (i | 7); ++j) products[i][j] += v[i] * v[j];
+  }
+
+  // Least squares by eliminating one function after the other. When only the constant one is left, its coefficient is the
+  // quotient of what is left of its products: the integral of the fit, as the integrals of all others are zero.
+  bool determined = true;
+  for (int k = 0; k < constant && determined; ++k) {
+    determined = products[k][k] > kSmallestPivot * n;
+    double column[kSize];
+    for (int i = k + 1; i < size; ++i) column[i] = products[i][k];
+    for (int i = k + 1; i < size; ++i) {
+      const double factor = column[i] / products[k][k];
+      for (int j = k + 1; j <= i; ++j) products[i][j] -= factor * column[j];
+    }
+  }
+  const double left = products[constant][constant];
+  determined = determined && left > kSmallestPivot * n;
+
+  Spectrum estimate;
+  for (int c = 0; c < 3; ++c)  // [Salaun2022]: the mean less sum beta_i (m_i - M_i)
+    estimate[c] = static_cast<float>(mean[c] + (determined ? products[constant + 1 + c][constant] / left : 0));
+  return estimate;
+}
+
+}  // namespace covary
