@@ -277,6 +277,13 @@ void add_combine(CLI::App& app) {
   command->add_option("--crn-layer", o->crn_layer, "Layer of the CRN image where its files hold several");
   command->add_option("--pt-layer", o->pt_layer, "Layer of the PT image where its files hold several");
   command->add_option("--estimator", o->estimator.name, "iicv, or a comparator")
+      ->check(CLI::Validator(
+          [](std::string& name) {
+            return name != "polynomials" ? std::string()
+                                         : "polynomials are fitted to the samples of each pixel, which images do not "
+                                           "hold; use 'covary render SCENE --estimator polynomials'";
+          },
+          ""))
       ->check(CLI::IsMember({"iicv", "cv-baseline", "iduw"}))
       ->capture_default_str();
   add_estimator_options(*command, o->estimator);

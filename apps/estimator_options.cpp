@@ -10,8 +10,6 @@
 namespace covary {
 namespace {
 
-const char* const kGroup = "Estimator";
-
 template <typename T, typename U>
 void set(T& target, const std::optional<U>& value) {
   if (value) target = *value;
@@ -96,11 +94,13 @@ const std::map<std::string, std::string>& estimators_of_option() {
   return table;
 }
 
+bool combines_pair(const std::string& estimator) { return estimator != "none" && estimator != "polynomials"; }
+
 bool predicts_error(const std::string& estimator) { return estimator == "iicv" || estimator == "cv-baseline"; }
 
 void add_estimator_options(CLI::App& command, EstimatorOptions& o) {
   o.command = &command;
-  const auto add = [&](CLI::Option* option) { return option->group(kGroup); };
+  const auto add = [&](CLI::Option* option) { return option->group(kEstimatorGroup); };
   const std::map<std::string, Penalty> penalties = {{"pilot", Penalty::kPilot},
                                                     {"sample", Penalty::kSample},
                                                     {"smoothed", Penalty::kSmoothed},
@@ -136,7 +136,7 @@ void check_estimator_options(const EstimatorOptions& o) {
     if (o.command->count(option) && (", " + estimators + ",").find(", " + o.name + ",") == std::string::npos)
       throw Error(ErrorCode::kUsage,
                   fmt::format("{} is an option of --estimator {}, not of {}", option, estimators, o.name));
-  if (o.name != "none") make_estimator(o, false, 1);
+  if (combines_pair(o.name)) make_estimator(o, false, 1);
 }
 
 PairEstimator make_estimator(const EstimatorOptions& o, bool std_error, int64_t crn_samples) {
@@ -149,7 +149,7 @@ PairEstimator make_estimator(const EstimatorOptions& o, bool std_error, int64_t 
 std::string EstimatorOptions::text() const {
   std::string result = name;
   for (const CLI::Option* option : command->get_options()) {
-    if (option->get_group() != kGroup || !option->count()) continue;
+    if (option->get_group() != kEstimatorGroup || !option->count()) continue;
     result += " --" + option->get_lnames().front();
     if (option->get_expected_max() > 0)
       for (const std::string& value : option->results()) result += " " + value;

@@ -12,6 +12,9 @@
 
 namespace covary {
 
+/// Group in the help of the options of estimators.
+inline constexpr const char* kEstimatorGroup = "Estimator";
+
 /// Options as given; what is not given is the estimator's own default.
 struct EstimatorOptions {
   std::string name = "iicv";
@@ -38,14 +41,17 @@ struct PairEstimator {
 /// The estimators that take an option, for each option that only the estimator reads: "--k" -> "iicv, cv-baseline".
 const std::map<std::string, std::string>& estimators_of_option();
 
+/// Whether the estimator makes its image of a CRN and an independent pass.
+bool combines_pair(const std::string& estimator);
+
 /// Whether the estimator can estimate the error of its result.
 bool predicts_error(const std::string& estimator);
 
 /// Adds the options of all estimators but `--estimator` itself.
 void add_estimator_options(CLI::App& command, EstimatorOptions& options);
 
-/// Throws Error(kUsage) for options of another estimator and for values out of range; for "none", which takes none of the
-/// options, too.
+/// Throws Error(kUsage) for options of another estimator and for values out of range; for estimators of a single pass, which
+/// take none of the options, too.
 void check_estimator_options(const EstimatorOptions& options);
 
 /// `std_error`: with the error estimate, where predicts_error(); `crn_samples`: samples per pixel of the CRN image. Throws like

@@ -70,11 +70,11 @@ extern "C" void on_signal(int signal) {
 
 GroupedImage grouped(const Film& film) { return {film.width(), film.height(), film.groups(), film.data().data()}; }
 
-/// Makes the image of the passes.
+/// Makes the image of the passes, or of a plain pass its standard error.
 void estimate(const RenderOptions& options, Outcome& outcome) {
   const Stopwatch watch;
   const std::vector<Pass>& passes = outcome.passes;
-  if (options.is_plain()) {
+  if (options.has_one_pass()) {
     outcome.image = mean_of_groups(grouped(passes[0].film));
   } else {
     const auto crn_samples = static_cast<int64_t>(std::llround(passes[0].film.mean_count()));
@@ -130,7 +130,7 @@ bool run(const RenderOptions& options, const LoadedScene& scene, const Integrato
     render_passes(*scene.scene, integrator, outcome.passes, limits);
     progress.finish();
     if (g_stop && !outcome.complete()) return false;
-    if (!options.is_plain() || target > 0) estimate(options, outcome);
+    if (!options.has_one_pass() || target > 0) estimate(options, outcome);
     const bool out_of_time = options.seconds > 0 && watch.seconds() >= options.seconds;
     if (target == 0 || *outcome.predicted_relmse <= target || budget >= limit || out_of_time) return true;
     budget = next_budget(budget, *outcome.predicted_relmse, target, limit);
@@ -148,7 +148,7 @@ void write_image(const RenderOptions& options, const LoadedScene& scene, Outcome
   if (options.aovs)
     render_aovs(*scene.scene, last.settings.filter, last.settings.sampling, last.settings.seed, last.settings.pass, 16,
                 film);
-  if (options.is_plain()) {
+  if (options.has_one_pass()) {
     film.attributes[film_key::kComplete] = "true";
     write_film(options.output, film);
     if (options.preview) write_png(preview_path(options.output), film.mean_image());
@@ -214,7 +214,7 @@ void render(RenderOptions options) {
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
   const bool done = run(options, scene, integrator, budget, limit, display ? &*display : nullptr, outcome);
-  if (display) display->update(done && !options.is_plain() ? outcome.image.estimate : preview_of(outcome.passes));
+  if (display) display->update(done && !options.has_one_pass() ? outcome.image.estimate : preview_of(outcome.passes));
 
   const Stopwatch write_watch;
   if (!done || !options.passes.empty()) save_passes(options, outcome.passes, done);

@@ -84,20 +84,27 @@ void check_options(RenderOptions& options) {
     usage("no output given; use -o OUT.exr (or --replay X,Y,SAMPLE)");
   if (!options.integrator.empty() && !find_integrator(options.integrator))
     usage("--integrator: " + unknown_integrator(options.integrator));
-  if (!options.sampling.empty() && options.estimator.command->count("--estimator") && !options.is_plain())
-    usage(fmt::format(
-        "--sampling is an option of --estimator none; {} renders one pass with common random numbers and one "
-        "with independent ones",
-        options.estimator.name));
-  if (!options.sampling.empty()) options.estimator.name = "none";
-  if (options.is_plain() && options.estimator.command->count("--split"))
-    usage("--split is an option of estimators with two passes, not of none");
+  const std::string& name = options.estimator.name;
+  const auto given = [&](const char* option) { return options.estimator.command->count(option) > 0; };
+  if (given("--sampling") && given("--estimator") && name != "none")
+    usage(fmt::format("--sampling is an option of --estimator none; {} renders one pass {}", name,
+                      options.has_one_pass() ? "with independent random numbers"
+                                             : "with common random numbers and one with independent ones"));
+  if (given("--sampling")) options.estimator.name = "none";
+  if (options.has_one_pass() && given("--split"))
+    usage("--split is an option of estimators with two passes, not of " + name);
+  if (!options.estimates_in_pass() && given("--dimensions"))
+    usage("--dimensions is an option of --estimator polynomials, not of " + name);
+  if (options.estimates_in_pass() && given("--groups"))
+    usage("--groups: polynomials are fitted to the samples of a pixel themselves, not to means of groups");
+  if (options.estimates_in_pass() && given("--time"))
+    usage(
+        "--time: polynomials are fitted to all samples of a pixel together, so their number must be known; use --spp");
   parse_split(options.split);
   if (!options.until.empty()) {
     parse_until(options.until);
-    if (!options.is_plain() && !predicts_error(options.estimator.name))
-      usage("--until: " + options.estimator.name + " does not estimate its error");
-    if (options.is_plain() && options.groups.value_or(2) < 2) usage("--until needs --groups 2 or more");
+    if (name != "none" && !predicts_error(name)) usage("--until: " + name + " does not estimate its error");
+    if (name == "none" && options.groups.value_or(2) < 2) usage("--until needs --groups 2 or more");
   }
   check_estimator_options(options.estimator);
   if (!options.output.empty()) check_output_writable(options.output);
@@ -112,8 +119,8 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
   command
       .add_option("--estimator", o.estimator.name,
                   "How passes become the image: iicv, cv-baseline or iduw of a pass with common random numbers and an "
-                  "independent one, or none: the mean of a single pass")
-      ->check(CLI::IsMember({"iicv", "cv-baseline", "iduw", "none"}))
+                  "independent one; of a single pass polynomials, for direct light, or none, the mean")
+      ->check(CLI::IsMember({"iicv", "cv-baseline", "iduw", "polynomials", "none"}))
       ->capture_default_str();
   command.add_option("--split", o.split, "CRN:INDEPENDENT, parts of the samples for the two passes")
       ->capture_default_str();
@@ -151,6 +158,12 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
   command.add_flag("!--no-preview", o.preview, "Do not write the PNG");
   command.add_flag("--quiet", o.quiet, "No progress and no summary");
   add_estimator_options(command, o.estimator);
+  command
+      .add_option("--dimensions", o.dimensions,
+                  "polynomials: how many of a path's first random numbers they are functions of")
+      ->check(CLI::Range(1, PolynomialsOptions::kMaxDimensions))
+      ->capture_default_str()
+      ->group(kEstimatorGroup);
 }
 
 }  // namespace covary

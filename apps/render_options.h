@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "estimator_options.h"
+#include "estimators/polynomials.h"
 #include "integrators/integrator.h"
 #include "scene/scene.h"
 
@@ -26,10 +27,13 @@ struct RenderOptions {
   uint64_t seed = 0;
   int threads = 0;
   double seconds = 0, checkpoint_seconds = 300;
+  int dimensions = PolynomialsOptions().dimensions;
   bool resume = false, aovs = false, quiet = false, preview = true;
 
   /// One pass, whose film is the result.
-  bool is_plain() const { return estimator.name == "none"; }
+  bool has_one_pass() const { return !combines_pair(estimator.name); }
+  /// The pass makes pixels of all their samples, instead of means of groups of them.
+  bool estimates_in_pass() const { return estimator.name == "polynomials"; }
 };
 
 void add_render_options(CLI::App& command, RenderOptions& options);

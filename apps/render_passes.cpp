@@ -12,8 +12,11 @@
 #include "commands.h"
 #include "core/error.h"
 #include "core/stopwatch.h"
+#include "estimators/grouped_image.h"
+#include "estimators/polynomials.h"
 #include "film/film_file.h"
 #include "film/output_file.h"
+#include "integrators/primary_sample.h"
 
 namespace covary {
 namespace {
@@ -24,6 +27,7 @@ void add(const PassResult& from, PassResult& to) {
   to.n_not_finite += from.n_not_finite;
   to.n_negative += from.n_negative;
   to.seconds += from.seconds;
+  to.estimate_seconds += from.estimate_seconds;
   to.bad_samples.insert(to.bad_samples.end(), from.bad_samples.begin(), from.bad_samples.end());
 }
 
@@ -53,7 +57,7 @@ std::string filter_text(const FilterSettings& filter) {
 
 /// How many groups each pass keeps: 12 as in [YM2025] Sec. 5, or as many as the smaller pass has samples.
 int number_of_groups(const RenderOptions& options, uint32_t budget) {
-  if (options.is_plain())
+  if (options.has_one_pass())
     return static_cast<int>(options.groups.value_or(options.sampling == "crn" || !options.until.empty() ? 12 : 1));
   const auto parts = parse_split(options.split);
   const double fewest = std::min(parts[0], parts[1]) * budget;
@@ -96,6 +100,30 @@ void resume(Pass& pass, bool with_costs) {
   pass.result.n_samples = costs.value("samples", uint64_t{0});
   pass.result.n_rays = costs.value("rays", uint64_t{0});
   pass.result.seconds = costs.value("seconds", 0.0);
+  pass.result.estimate_seconds = costs.value("estimate_seconds", 0.0);
+}
+
+/// Fits polynomials to the samples of a pixel.
+PixelEstimate polynomial_estimate(int dimensions) {
+  static_assert(PolynomialsOptions::kMaxDimensions <= kPrimaryDimensions);
+  return [dimensions](std::span<const CameraSample> samples) {
+    thread_local std::vector<Spectrum> values;
+    thread_local std::vector<float> coordinates;
+    values.clear();
+    for (const CameraSample& sample : samples) values.push_back(sample.radiance);
+    primary_coordinates(samples, dimensions, coordinates);
+    return polynomials(values, coordinates, dimensions);
+  };
+}
+
+/// Makes the pass one whose pixels are estimated from all their `samples`.
+void set_estimate(const RenderOptions& options, uint32_t samples, Pass& pass) {
+  throw_if_any(options.estimator.name, PolynomialsOptions{options.dimensions, samples}.validate());
+  pass.settings.estimate = polynomial_estimate(options.dimensions);
+  pass.film.attributes["estimator"] = options.estimator.text();
+  // The number of samples belongs to the settings: an estimate of few samples cannot become one of more.
+  pass.film.attributes[film_key::kSettings] +=
+      fmt::format("; polynomials dimensions={} samples={}", options.dimensions, samples);
 }
 
 }  // namespace
@@ -114,7 +142,7 @@ std::filesystem::path passes_folder(const RenderOptions& options) {
                                 : std::filesystem::path(options.passes);
 }
 
-bool output_is_film(const RenderOptions& options) { return options.is_plain() && options.passes.empty(); }
+bool output_is_film(const RenderOptions& options) { return options.has_one_pass() && options.passes.empty(); }
 
 void set_budget(const RenderOptions& options, uint32_t total, std::vector<Pass>& passes) {
   const auto parts = parse_split(options.split);
@@ -129,7 +157,7 @@ void set_budget(const RenderOptions& options, uint32_t total, std::vector<Pass>&
 std::vector<Pass> make_passes(const RenderOptions& options, const LoadedScene& scene, const Integrator& integrator,
                               uint32_t budget) {
   std::vector<std::string> names = {"crn", "independent"};
-  if (options.is_plain()) names = {options.sampling.empty() ? "independent" : options.sampling};
+  if (options.has_one_pass()) names = {options.sampling.empty() ? "independent" : options.sampling};
   std::vector<Pass> passes;
   for (const std::string& name : names) {
     Pass pass;
@@ -147,6 +175,7 @@ std::vector<Pass> make_passes(const RenderOptions& options, const LoadedScene& s
         {film_key::kCommand, command_line()},
         {film_key::kComplete, "false"},
     };
+    if (options.estimates_in_pass()) set_estimate(options, budget, pass);
     if (options.resume && std::filesystem::exists(pass.path)) resume(pass, !options.passes.empty());
     passes.push_back(std::move(pass));
   }
@@ -160,8 +189,9 @@ void save_passes(const RenderOptions& options, std::vector<Pass>& passes, bool c
     pass.film.attributes[film_key::kComplete] = complete ? "true" : "false";
     write_film(pass.path, pass.film);
     if (options.passes.empty()) continue;
-    const nlohmann::ordered_json costs = {
+    nlohmann::ordered_json costs = {
         {"samples", pass.result.n_samples}, {"rays", pass.result.n_rays}, {"seconds", pass.result.seconds}};
+    if (pass.settings.estimate) costs["estimate_seconds"] = pass.result.estimate_seconds;
     write_text_file(costs_path(pass), costs.dump(2) + "\n");
   }
 }
@@ -185,10 +215,10 @@ void render_passes(const Scene& scene, const Integrator& integrator, std::vector
                                    [](const Pass& a, const Pass& b) { return fraction(a) < fraction(b); });
     if (pass.count >= pass.settings.spp || stopped()) return;
     PassSettings wave = pass.settings;
-    const uint32_t size = wave_size(pass.film.groups());
+    const uint32_t size = wave.estimate ? wave.spp : wave_size(pass.film.groups());
     wave.spp = std::min(pass.settings.spp, (pass.count / size + 1) * size);
     wave.stop = limits.stop;
-    wave.checkpoint = nullptr;
+    wave.checkpoint = wave.estimate ? limits.checkpoint : nullptr;  // that wave is all there is
     wave.progress = [&](uint64_t now, uint64_t) {
       if (limits.progress) limits.progress(done + now, total);
     };

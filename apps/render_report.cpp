@@ -78,7 +78,7 @@ nlohmann::ordered_json statistics(const RenderOptions& options, const LoadedScen
        {{"load", outcome.load_seconds},
         {"build", scene.scene->build_seconds()},
         {"render", outcome.render_seconds()},
-        {"estimate", outcome.estimate_seconds},
+        {"estimate", outcome.all_estimate_seconds()},
         {"write", outcome.write_seconds}}},
       {"samples", samples},
       {"rays", rays},
@@ -104,8 +104,8 @@ void print_summary(const RenderOptions& options, const LoadedScene& scene, const
              outcome.load_seconds, scene.scene->build_seconds(),
              format_count(outcome.sum([](const Pass& p) { return p.result.n_samples; }) / seconds),
              format_count(outcome.sum([](const Pass& p) { return p.result.n_rays; }) / seconds));
-  if (!options.is_plain()) {
-    fmt::print(stderr, "{} in {:.2f} s", options.estimator.text(), outcome.estimate_seconds);
+  if (options.estimator.name != "none") {
+    fmt::print(stderr, "{} in {:.2f} s", options.estimator.text(), outcome.all_estimate_seconds());
     if (outcome.predicted_relmse) fmt::print(stderr, ", predicted relMSE {:.3g}", *outcome.predicted_relmse);
     fmt::print(stderr, "\n");
   } else if (!options.until.empty()) {

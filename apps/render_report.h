@@ -16,7 +16,7 @@ struct Outcome {
   std::vector<Pass> passes;
   EstimatorResult image;
   std::optional<double> predicted_relmse;
-  double load_seconds = 0, estimate_seconds = 0, write_seconds = 0;
+  double load_seconds = 0, estimate_seconds = 0, write_seconds = 0;  ///< estimate: after the passes
 
   template <typename F>
   double sum(F value) const {
@@ -27,8 +27,13 @@ struct Outcome {
   double samples_per_pixel() const {
     return sum([](const Pass& p) { return p.film.mean_count(); });
   }
+  /// Time of the passes, without what estimates inside them took.
   double render_seconds() const {
-    return sum([](const Pass& p) { return p.result.seconds; });
+    return sum([](const Pass& p) { return p.result.seconds - p.result.estimate_seconds; });
+  }
+  /// Time of making the image, inside the passes and of them.
+  double all_estimate_seconds() const {
+    return estimate_seconds + sum([](const Pass& p) { return p.result.estimate_seconds; });
   }
   bool complete() const {
     return std::all_of(passes.begin(), passes.end(), [](const Pass& p) { return p.count >= p.settings.spp; });

@@ -111,11 +111,88 @@ class Plans(RenderTest):
         self.bad(2, "window", *render, "--window", "4")
 
 
+class Polynomials(RenderTest):
+    OPTIONS = ("--estimator", "polynomials", "--spp", "48", "--max-depth", "2")
+
+    def attributes(self, name):
+        return json.loads(self.good("info", name, "--json").stdout)["attributes"]
+
+    def test_less_error_than_plain_at_equal_samples(self):
+        for name, *options in (("r.exr", "none", "--spp", "2048", "--seed", "9"), ("plain.exr", "none", "--spp", "96"),
+                               ("p.exr", "polynomials", "--spp", "96")):
+            self.good("render", str(SCENES / "wall.xml"), *SMALL, "-o", name, "--max-depth", "2", "--estimator", *options)
+        self.assertLess(self.relmse("p.exr", "r.exr"), 0.9 * self.relmse("plain.exr", "r.exr"))
+
+    def test_statistics_and_attributes(self):
+        facts = self.statistics("-o", "a.exr", *self.OPTIONS, "--dimensions", "2", "--aovs")
+        self.assertEqual(facts["estimator"], "polynomials --dimensions 2")
+        self.assertEqual([(p["sampling"], p["samples_per_pixel"], p["groups"]) for p in facts["passes"]],
+                         [("independent", 48, 1)])
+        seconds = facts["seconds"]
+        self.assertGreater(seconds["estimate"], 0)
+        self.assertAlmostEqual(seconds["render"] + seconds["estimate"], facts["passes"][0]["seconds"], 6)
+        attributes = self.attributes("a.exr")
+        self.assertEqual(attributes["covary:estimator"], "polynomials --dimensions 2")
+        self.assertIn("polynomials dimensions=2 samples=48", attributes["covary:settings"])
+        self.assertEqual((attributes["covary:samples"], attributes["covary:complete"]), ("48", "true"))
+        self.assertIn("Albedo.R", json.loads(self.good("info", "a.exr", "--json").stdout)["channels"])
+
+    def test_bits_depend_on_dimensions_alone(self):
+        self.statistics("-o", "a.exr", *self.OPTIONS)
+        for i, options in enumerate((["--threads", "1"], ["--passes", "films"], ["--dimensions", "4"])):
+            self.statistics("-o", f"b{i}.exr", *self.OPTIONS, *options)
+            self.same("a.exr", f"b{i}.exr")
+        self.statistics("-o", "two.exr", *self.OPTIONS, "--dimensions", "2")
+        self.assertGreater(self.relmse("two.exr", "a.exr"), 0)
+        self.statistics("-o", "crop.exr", *self.OPTIONS, "--crop", "9,8,21,17")
+        self.same("crop.exr", "a.exr")
+
+    def test_films_are_kept_and_belong_to_one_fit(self):
+        first = self.statistics("-o", "a.exr", *self.OPTIONS, "--passes", "films")
+        again = (*self.OPTIONS, "--passes", "films", "--resume")
+        facts = self.statistics("-o", "b.exr", *again)
+        self.assertEqual(facts["seconds"]["render"], first["seconds"]["render"])
+        self.assertEqual(facts["seconds"]["estimate"], first["seconds"]["estimate"])
+        self.same("a.exr", "b.exr")
+        for options, seen in ((["--dimensions", "2"], "dimensions=2 samples=48"), (["--spp", "96"], "dimensions=4 samples=96")):
+            arguments = [v for v in again if not (options[0] == "--spp" and v in ("--spp", "48"))]
+            result = self.bad(1, "--resume: 'films/independent.exr' was rendered with settings", "render", ROOM, *SMALL, "-o",
+                              "c.exr", *arguments, *options)
+            self.assertIn("dimensions=4 samples=48, this command asks for", result.stderr)
+            self.assertIn(seen, result.stderr)
+        self.bad(1, "was rendered with settings", "render", ROOM, *SMALL, "-o", "a.exr", "--resume", "--estimator", "none",
+                 "--spp", "48", "--max-depth", "2")
+
+    def test_wrong_options(self):
+        render = ("render", ROOM, *SMALL, "-o", "a.exr", "--estimator", "polynomials")
+        self.bad(2, "polynomials renders one pass with independent random numbers", *render, "--sampling", "crn")
+        self.bad(2, "--split is an option of estimators with two passes, not of polynomials", *render, "--split", "1:2")
+        self.bad(2, "--groups: polynomials are fitted to the samples of a pixel themselves", *render, "--groups", "4")
+        self.bad(2, "--until: polynomials does not estimate its error", *render, "--until", "relmse=0.1")
+        self.bad(2, "so their number must be known; use --spp", *render, "--time", "1")
+        self.bad(2, "--k is an option of --estimator iicv, cv-baseline, not of polynomials", *render, "--k", "3")
+        self.bad(2, "--dimensions is an option of --estimator polynomials, not of iicv", "render", ROOM, "-o", "a.exr",
+                 "--dimensions", "2")
+        self.bad(2, "7 not in range", *render, "--dimensions", "7")
+        self.bad(2, "28 samples per pixel are too few to fit the 28 coefficients of 6 dimensions, expected at least 29", *render,
+                 "--dimensions", "6", "--spp", "28")
+        self.bad(2, "polynomials are fitted to the samples of each pixel, which images do not hold", "combine", "--crn", "a.exr",
+                 "--pt", "b.exr", "-o", "c.exr", "--estimator", "polynomials")
+
+
 class Interruption(RenderTest):
     def test_interrupted_and_resumed(self):
+        for estimator in ("iicv", "polynomials"):
+            with self.subTest(estimator):
+                self.interrupt_and_resume(estimator)
+
+    def interrupt_and_resume(self, estimator):
         """Interrupted at several moments, resumed each time: the bits of an uninterrupted render, and no film left over."""
-        arguments = ["render", ROOM, "--resolution", "64x48", "--spp", "600", "--no-preview"]
+        spp = {"iicv": "600", "polynomials": "200"}[estimator]
+        arguments = ["render", ROOM, "--resolution", "64x48", "--spp", spp, "--no-preview", "--estimator", estimator]
         self.good(*arguments, "--quiet", "-o", "whole.exr")
+        film = "parts.exr" if estimator == "polynomials" else "parts.passes/crn.exr"
+        (self.path / "parts.exr").unlink(missing_ok=True)
         interrupted = 0
         for attempt in range(40):
             command = [COVARY, *arguments, "-o", "parts.exr", "--resume"]
@@ -129,8 +206,8 @@ class Interruption(RenderTest):
             if process.returncode == 1:
                 interrupted += 1
                 self.assertIn("interrupted after", message)
-                self.assertIn("parts.passes", message)
-                self.assertTrue((self.path / "parts.passes" / "crn.exr").exists())
+                self.assertIn(film.split("/")[0], message)
+                self.assertTrue((self.path / film).exists())
         self.assertEqual(process.returncode, 0)
         self.assertGreater(interrupted, 0)
         self.same("whole.exr", "parts.exr")
