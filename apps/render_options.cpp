@@ -93,6 +93,7 @@ void check_options(RenderOptions& options) {
   if (given("--sampling")) options.estimator.name = "none";
   if (options.has_one_pass() && given("--split"))
     usage("--split is an option of estimators with two passes, not of " + name);
+  // Not in estimators_of_option(), whose options leave passes as they are.
   if (!options.estimates_in_pass() && given("--dimensions"))
     usage("--dimensions is an option of --estimator polynomials, not of " + name);
   if (options.estimates_in_pass() && given("--groups"))
