@@ -15,6 +15,7 @@
 #include "estimators/iicv.h"
 #include "estimators/neighbours.h"
 #include "estimators/pilot.h"
+#include "estimators/polynomials.h"
 
 namespace covary {
 namespace {
@@ -116,6 +117,19 @@ void one_feedback(benchmark::State& state) {
   count(state);
 }
 
+/// One pixel of range(1) samples in range(0) dimensions.
+void one_polynomials(benchmark::State& state) {
+  const auto dimensions = static_cast<int>(state.range(0));
+  std::vector<Spectrum> values;
+  std::vector<float> coordinates;
+  for (int s = 0; s < state.range(1); ++s) {
+    values.emplace_back(1 + noise(5, s, 0), 1 + noise(5, s, 1), 1 + noise(5, s, 2));
+    for (int i = 0; i < dimensions; ++i) coordinates.push_back(0.5f + noise(6, s, i));
+  }
+  for (auto _ : state) benchmark::DoNotOptimize(polynomials(values, coordinates, dimensions));
+  state.SetItemsProcessed(state.iterations());
+}
+
 void whole_iicv(benchmark::State& state, const IicvOptions& options) {
   const Input& in = input();
   for (auto _ : state) benchmark::DoNotOptimize(iicv(in.crn, in.pt, options).estimate.data.data());
@@ -141,6 +155,7 @@ BENCHMARK(one_pilot)->Unit(benchmark::kMillisecond);
 BENCHMARK(one_neighbours)->Unit(benchmark::kMillisecond);
 BENCHMARK(one_regression)->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
 BENCHMARK(one_feedback)->Unit(benchmark::kMillisecond);
+BENCHMARK(one_polynomials)->ArgsProduct({{2, 4, 6}, {48, 192}});
 BENCHMARK_CAPTURE(whole_iicv, default, IicvOptions())->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK_CAPTURE(whole_iicv, paper, IicvOptions::paper())->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(whole_cv_baseline)->Unit(benchmark::kMillisecond)->UseRealTime();

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "estimators/grouped_image.h"
@@ -10,8 +11,9 @@
 namespace covary {
 namespace {
 
-/// Rows of 8 numbers fill whole vector registers: 28 functions of 6 dimensions, 3 channels, one of padding.
-constexpr int kSize = 32;
+constexpr int kSize = 32;  // 28 functions of 6 dimensions, 3 channels, and one to fill rows of kLanes
+constexpr int kLanes = 8;
+constexpr size_t kBlock = 4;  // samples that are added at once, so that sums are loaded and stored less often
 /// Pivots of the normal matrix, relative to the number of samples, are near 1 for many samples. Below this the
 /// coordinates do not determine the coefficients.
 constexpr double kSmallestPivot = 1e-10;
@@ -48,7 +50,7 @@ Spectrum polynomials(std::span<const Spectrum> values, std::span<const float> co
   throw_if_any("polynomials", problems);
 
   const auto n = static_cast<double>(values.size());
-  double mean[3] = {0, 0, 0};
+  double mean[3] = {0, 0, 0};  // of the values, and at the end the estimate
   for (const Spectrum& value : values)
     for (int c = 0; c < 3; ++c) mean[c] += value[c];
   for (double& m : mean) m /= n;
@@ -56,20 +58,26 @@ Spectrum polynomials(std::span<const Spectrum> values, std::span<const float> co
   // Inner products over the samples of the basis, the constant function last, and of the values less their mean.
   const int constant = options.n_coefficients() - 1, size = constant + 4;
   static_assert((PolynomialsOptions::kMaxDimensions + 1) * (PolynomialsOptions::kMaxDimensions + 2) / 2 + 3 <= kSize);
-  alignas(64) double products[kSize][kSize] = {}, v[kSize] = {};
-  for (size_t s = 0; s < values.size(); ++s) {
-    evaluate_basis(coordinates.data() + s * dimensions, dimensions, v);
-    v[constant] = 1;
-    for (int c = 0; c < 3; ++c) v[constant + 1 + c] = values[s][c] - mean[c];
+  alignas(64) double products[kSize][kSize] = {};
+  for (size_t first = 0; first < values.size(); first += kBlock) {
+    alignas(64) double v[kBlock][kSize] = {};
+    for (size_t s = first; s < std::min(first + kBlock, values.size()); ++s) {
+      double* const row = v[s - first];
+      evaluate_basis(coordinates.data() + s * dimensions, dimensions, row);
+      row[constant] = 1;
+      for (int c = 0; c < 3; ++c) row[constant + 1 + c] = values[s][c] - mean[c];
+    }
     for (int i = 0; i < size; ++i)
-      for (int j = 0; j <= (i | 7); ++j) products[i][j] += v[i] * v[j];
+      for (int j = 0; j <= i; j += kLanes)
+        for (int lane = j; lane < j + kLanes; ++lane)
+          for (size_t b = 0; b < kBlock; ++b) products[i][lane] += v[b][i] * v[b][lane];
   }
 
   // Least squares by eliminating one function after the other. When only the constant one is left, its coefficient is the
   // quotient of what is left of its products: the integral of the fit, as the integrals of all others are zero.
-  bool determined = true;
-  for (int k = 0; k < constant && determined; ++k) {
-    determined = products[k][k] > kSmallestPivot * n;
+  const auto determined = [&](int k) { return products[k][k] > kSmallestPivot * n; };
+  int k = 0;
+  for (; k < constant && determined(k); ++k) {
     double column[kSize];
     for (int i = k + 1; i < size; ++i) column[i] = products[i][k];
     for (int i = k + 1; i < size; ++i) {
@@ -77,13 +85,10 @@ Spectrum polynomials(std::span<const Spectrum> values, std::span<const float> co
       for (int j = k + 1; j <= i; ++j) products[i][j] -= factor * column[j];
     }
   }
-  const double left = products[constant][constant];
-  determined = determined && left > kSmallestPivot * n;
-
-  Spectrum estimate;
-  for (int c = 0; c < 3; ++c)  // [Salaun2022]: the mean less sum beta_i (m_i - M_i)
-    estimate[c] = static_cast<float>(mean[c] + (determined ? products[constant + 1 + c][constant] / left : 0));
-  return estimate;
+  // [Salaun2022]: the mean less sum beta_i (m_i - M_i).
+  if (k == constant && determined(constant))
+    for (int c = 0; c < 3; ++c) mean[c] += products[constant + 1 + c][constant] / products[constant][constant];
+  return {static_cast<float>(mean[0]), static_cast<float>(mean[1]), static_cast<float>(mean[2])};
 }
 
 }  // namespace covary
