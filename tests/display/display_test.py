@@ -52,6 +52,10 @@ class DisplayServer(unittest.TestCase):
         receiver = self.check_last_image("--estimator", "none", "--time", "1.6")
         self.assertGreaterEqual(receiver.packets.count(UPDATE_IMAGE_V3), 3)
 
+    def test_tiles_of_polynomials_arrive_while_rendering(self):
+        receiver = self.check_last_image("--estimator", "polynomials", "--spp", "512", "--threads", "1")
+        self.assertGreaterEqual(receiver.packets.count(UPDATE_IMAGE_V3), 2)
+
     def test_lost_viewer_changes_nothing(self):
         receiver = Receiver(stop_after=2)
         options = ("--estimator", "none", "--spp", "512")
