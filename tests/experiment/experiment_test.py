@@ -197,12 +197,16 @@ class Resume(ExperimentTest):
 
     def test_passes_are_shared(self):
         self.suite["methods"] += [{"name": "paper", "options": ["--paper", "--k", "9"]}, {"name": "iduw", "options": ["--estimator=iduw"]},
-                                  {"name": "other split", "options": ["--split", "3:1"]}]
+                                  {"name": "other split", "options": ["--split", "3:1"]},
+                                  *({"name": f"polynomials {d}", "options": ["--estimator", "polynomials", "--dimensions", d]}
+                                    for d in ("2", "3"))]
         self.suite["budgets"] = [{"spp": 24}]
         self.suite["seeds"] = 1
         self.results("--keep-passes")
         folders = list((self.path / "out" / "cache" / "passes").iterdir())
-        self.assertEqual(len([f for f in folders if (f / "crn.exr").exists()]), 2)
+        pairs = [f for f in folders if (f / "crn.exr").exists()]
+        self.assertEqual(len(pairs), 2)
+        self.assertEqual(len(folders) - len(pairs), 3, "films of single passes belong to one method: pt, and each fit")
 
     def test_one_experiment_at_a_time(self):
         process = subprocess.Popen(self.command("--reference-spp", "100000"), cwd=self.path, stderr=subprocess.DEVNULL)
