@@ -35,6 +35,7 @@ namespace covary {
 namespace {
 
 constexpr double kPreviewSeconds = 0.5;  // between images for a viewer
+constexpr int kTrialRows = 64;           // at least, where the time of the estimate is found out
 constexpr uint32_t kFirstBudget = 96;    // samples per pixel before --until looks at the error for the first time
 
 std::shared_ptr<Integrator> make_integrator(Parameters& parameters, const RenderOptions& options) {
@@ -68,21 +69,37 @@ extern "C" void on_signal(int signal) {
   std::signal(signal, SIG_DFL);  // a second one ends the program at once
 }
 
-GroupedImage grouped(const Film& film) { return {film.width(), film.height(), film.groups(), film.data().data()}; }
+/// The image that the estimator makes of rows first_row … first_row + n_rows - 1 of the passes.
+EstimatorResult estimate_rows(const RenderOptions& options, const std::vector<Pass>& passes, int first_row,
+                              int n_rows) {
+  const auto rows = [&](const Film& film) {
+    return GroupedImage{film.width(), n_rows, film.groups(), film.groups_of(0, first_row)};
+  };
+  if (options.has_one_pass()) return mean_of_groups(rows(passes[0].film));
+  const auto crn_samples = static_cast<int64_t>(std::llround(passes[0].film.mean_count()));
+  return make_estimator(options.estimator, predicts_error(options.estimator.name), crn_samples)
+      .apply(rows(passes[0].film), rows(passes[1].film));
+}
 
-/// Makes the image of the passes, or of a plain pass its standard error.
-void estimate(const RenderOptions& options, Outcome& outcome) {
+/// Makes the image of the passes, or of a plain pass its standard error; returns the seconds it took.
+double estimate(const RenderOptions& options, Outcome& outcome) {
   const Stopwatch watch;
-  const std::vector<Pass>& passes = outcome.passes;
-  if (options.has_one_pass()) {
-    outcome.image = mean_of_groups(grouped(passes[0].film));
-  } else {
-    const auto crn_samples = static_cast<int64_t>(std::llround(passes[0].film.mean_count()));
-    outcome.image = make_estimator(options.estimator, predicts_error(options.estimator.name), crn_samples)
-                        .apply(grouped(passes[0].film), grouped(passes[1].film));
-  }
+  outcome.image = estimate_rows(options, outcome.passes, 0, outcome.passes[0].film.height());
   if (!outcome.image.std_error.data.empty()) outcome.predicted_relmse = predicted_relmse(outcome.image);
-  outcome.estimate_seconds += watch.seconds();
+  const double seconds = watch.seconds();
+  outcome.estimate_seconds += seconds;
+  return seconds;
+}
+
+/// Seconds that the estimate will take, from a trial on rows in the middle: it depends on sizes, not on samples.
+double time_estimate(const RenderOptions& options, Outcome& outcome) {
+  if (options.has_one_pass()) return 0;  // a mean
+  const Stopwatch watch;
+  const int height = outcome.passes[0].film.height(), n_rows = std::min(height, std::max(kTrialRows, height / 8));
+  estimate_rows(options, outcome.passes, (height - n_rows) / 2, n_rows);
+  const double seconds = watch.seconds();
+  outcome.trial_seconds += seconds;
+  return seconds * height / n_rows;
 }
 
 /// A picture for a viewer while the passes go on: the mean of all samples so far.
@@ -104,19 +121,25 @@ uint32_t next_budget(uint32_t budget, double predicted, double target, uint32_t 
   return static_cast<uint32_t>(std::min<double>(limit, std::ceil(factor * budget)));
 }
 
-/// Renders and estimates, once or until the predicted error is small enough. False when interrupted.
+/// Renders and estimates, once or until the predicted error is small enough. `watch` began with the time that --time limits.
+/// False when interrupted.
 bool run(const RenderOptions& options, const LoadedScene& scene, const Integrator& integrator, uint32_t budget,
-         uint32_t limit, Display* display, Outcome& outcome) {
+         uint32_t limit, const Stopwatch& watch, Display* display, Outcome& outcome) {
   const double target = options.until.empty() ? 0 : parse_until(options.until);
-  const Stopwatch watch;
   Stopwatch since_checkpoint, since_preview;
+  std::optional<double> estimate_seconds;  // what the next estimate takes
+  const auto seconds_left = [&] {
+    if (!estimate_seconds) estimate_seconds = time_estimate(options, outcome);
+    return options.seconds - watch.seconds() - *estimate_seconds;
+  };
   for (;;) {
     ProgressLine progress(std::filesystem::path(options.scene).stem().string(), options.quiet);
+    const double progress_seconds = options.seconds > 0 ? std::max(options.seconds - watch.seconds(), 1e-3) : 0;
     RenderLimits limits;
-    limits.seconds = options.seconds > 0 ? std::max(options.seconds - watch.seconds(), 1e-3) : 0;
+    if (options.seconds > 0) limits.seconds_left = seconds_left;
     limits.stop = &g_stop;
     limits.progress = [&](uint64_t done, uint64_t total) {
-      progress.update(done, options.seconds > 0 && !options.spp ? 0 : total, limits.seconds);
+      progress.update(done, options.seconds > 0 && !options.spp ? 0 : total, progress_seconds);
     };
     limits.checkpoint = [&] {
       if (display && display->ready() && since_preview.seconds() >= kPreviewSeconds) {
@@ -124,14 +147,17 @@ bool run(const RenderOptions& options, const LoadedScene& scene, const Integrato
         since_preview = Stopwatch();
       }
       if (options.checkpoint_seconds <= 0 || since_checkpoint.seconds() < options.checkpoint_seconds) return;
+      const Stopwatch write_watch;
       save_passes(options, outcome.passes, false);
+      outcome.write_seconds += write_watch.seconds();
       since_checkpoint = Stopwatch();
     };
     render_passes(*scene.scene, integrator, outcome.passes, limits);
     progress.finish();
     if (g_stop && !outcome.complete()) return false;
-    if (!options.has_one_pass() || target > 0) estimate(options, outcome);
-    const bool out_of_time = options.seconds > 0 && watch.seconds() >= options.seconds;
+    if (!options.has_one_pass() || target > 0) estimate_seconds = estimate(options, outcome);
+    outcome.budget_seconds = watch.seconds();
+    const bool out_of_time = options.seconds > 0 && seconds_left() <= 0;
     if (target == 0 || *outcome.predicted_relmse <= target || budget >= limit || out_of_time) return true;
     budget = next_budget(budget, *outcome.predicted_relmse, target, limit);
     set_budget(options, budget, outcome.passes);
@@ -204,7 +230,11 @@ void render(RenderOptions options) {
   const bool open_ended = options.seconds > 0 || !options.until.empty();
   const uint32_t limit = options.spp.value_or(open_ended ? 1u << 30 : static_cast<uint32_t>(scene.spp));
   const uint32_t budget = options.until.empty() ? limit : std::min(limit, kFirstBudget);
-  outcome.passes = make_passes(options, scene, integrator, budget);
+  const Stopwatch watch;
+  const uint32_t affordable = affordable_budget(options, scene, integrator, budget);
+  if (options.seconds > 0) outcome.trial_seconds = watch.seconds();
+  outcome.passes = make_passes(options, scene, integrator, affordable);
+  set_budget(options, budget, outcome.passes);
   const double planned = outcome.sum([](const Pass& p) { return p.settings.spp; });
   if (planned != budget && !open_ended)
     fmt::print(stderr, "note: {:g} samples per pixel instead of {}, so that all {} groups have the same size\n",
@@ -213,7 +243,7 @@ void render(RenderOptions options) {
   g_stop = false;
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
-  const bool done = run(options, scene, integrator, budget, limit, display ? &*display : nullptr, outcome);
+  const bool done = run(options, scene, integrator, budget, limit, watch, display ? &*display : nullptr, outcome);
   if (display) display->update(done && !options.has_one_pass() ? outcome.image.estimate : preview_of(outcome.passes));
 
   const Stopwatch write_watch;
@@ -222,7 +252,7 @@ void render(RenderOptions options) {
     write_image(options, scene, outcome);
     remove_passes(options, outcome.passes);
   }
-  outcome.write_seconds = write_watch.seconds();
+  outcome.write_seconds += write_watch.seconds();
 
   for (const Pass& pass : outcome.passes) report_bad_samples(options, pass);
   if (!options.json.empty()) {

@@ -146,7 +146,10 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
   command.add_option("--rfilter", o.rfilter, "Reconstruction filter instead of the scene's")
       ->check(CLI::IsMember({"box", "tent", "gaussian"}));
   command.add_option("--threads", o.threads, "Number of threads; default: all")->check(CLI::Range(1, 4096));
-  command.add_option("--time", o.seconds, "Stop after this many seconds of rendering")->check(CLI::PositiveNumber);
+  command
+      .add_option("--time", o.seconds,
+                  "Seconds for rendering and estimating together; loading and writing are not counted")
+      ->check(CLI::PositiveNumber);
   command.add_option("--passes,--save-passes", o.passes, "Folder that keeps the film of every pass");
   command.add_flag("--resume", o.resume, "Continue the films of an interrupted render, or those in --passes");
   command.add_option("--checkpoint", o.checkpoint_seconds, "Seconds between writing unfinished films; 0: never")

@@ -2,6 +2,7 @@
 #include "render_passes.h"
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
@@ -55,18 +56,25 @@ std::string filter_text(const FilterSettings& filter) {
   throw Error(ErrorCode::kInternal, "unknown reconstruction filter");
 }
 
+/// How many groups the estimator needs at least.
+int fewest_groups(const RenderOptions& options) {
+  if (options.has_one_pass()) return 1;
+  return options.estimator.name == "iduw" || options.estimator.penalty == Penalty::kCrossFit ? 4 : 3;
+}
+
 /// How many groups each pass keeps: 12 as in [YM2025] Sec. 5, or as many as the smaller pass has samples.
 int number_of_groups(const RenderOptions& options, uint32_t budget) {
   if (options.has_one_pass())
     return static_cast<int>(options.groups.value_or(options.sampling == "crn" || !options.until.empty() ? 12 : 1));
   const auto parts = parse_split(options.split);
-  const double fewest = std::min(parts[0], parts[1]) * budget;
-  const auto groups = static_cast<int>(options.groups.value_or(std::clamp(static_cast<int>(fewest), 3, 12)));
-  if (groups < 3)
+  const auto samples = static_cast<int>(std::min(parts[0], parts[1]) * budget);
+  const int fewest = fewest_groups(options);
+  const auto groups = static_cast<int>(options.groups.value_or(std::clamp(samples, fewest, 12)));
+  if (groups < fewest)
     throw Error(ErrorCode::kUsage,
-                fmt::format("--groups {}: --estimator {} needs at least 3 groups to measure how pixels "
+                fmt::format("--groups {}: --estimator {} needs at least {} groups to measure how pixels "
                             "vary together",
-                            groups, options.estimator.name));
+                            groups, options.estimator.name, fewest));
   return groups;
 }
 
@@ -75,7 +83,7 @@ std::string costs_path(const Pass& pass) {
 }
 
 /// Puts the film at pass.path in the place of the empty one, which it must match.
-void resume(Pass& pass, bool with_costs) {
+void resume(Pass& pass, const RenderOptions& options) {
   const Film empty = std::exchange(pass.film, read_film(pass.path));
   Film& film = pass.film;
   const auto differs = [&](const std::string& what, const std::string& old_value, const std::string& new_value) {
@@ -87,13 +95,16 @@ void resume(Pass& pass, bool with_costs) {
     return fmt::format("{} x {}, crop {},{},{},{}", f.frame_width(), f.frame_height(), c.x, c.y, c.width, c.height);
   };
   if (size_text(film) != size_text(empty)) differs("frame", size_text(film), size_text(empty));
-  if (film.groups() != empty.groups()) differs("groups", std::to_string(film.groups()), std::to_string(empty.groups()));
+  // With --time the number of groups depends on the speed: the film's own is as good.
+  const bool any_groups = options.seconds > 0 && !options.groups && film.groups() >= fewest_groups(options);
+  if (film.groups() != empty.groups() && !any_groups)
+    differs("groups", std::to_string(film.groups()), std::to_string(empty.groups()));
   for (const char* key : {film_key::kSceneHash, film_key::kSampling, film_key::kSeed, film_key::kSettings})
     if (film.attributes[key] != empty.attributes.at(key)) differs(key, film.attributes[key], empty.attributes.at(key));
   film.attributes = empty.attributes;
   film.aovs.clear();
   pass.count = smallest_count(film);
-  if (!with_costs || !std::filesystem::exists(costs_path(pass))) return;
+  if (options.passes.empty() || !std::filesystem::exists(costs_path(pass))) return;
   std::ifstream file(costs_path(pass));
   const nlohmann::json costs = nlohmann::json::parse(file, nullptr, false);
   if (costs.is_discarded()) return;
@@ -126,6 +137,30 @@ void set_estimate(const RenderOptions& options, uint32_t samples, Pass& pass) {
       fmt::format("; polynomials dimensions={} samples={}", options.dimensions, samples);
 }
 
+/// Samples per second, from trials all over the window.
+double samples_per_second(const RenderOptions& options, const LoadedScene& scene, const Integrator& integrator) {
+  constexpr int kCells = 8, kSide = 16;  // a square of pixels in each cell of a grid
+  const CropWindow window = crop_window(options, scene);
+  PassSettings settings;
+  settings.spp = 1;
+  settings.filter = options.rfilter.empty() ? scene.filter : filter_named(options.rfilter);
+  const auto trial = [&](uint64_t seed) {
+    settings.seed = seed;
+    std::atomic<uint64_t> n_samples{0};
+    const Stopwatch watch;
+    tbb::parallel_for(0, kCells * kCells, [&](int i) {
+      const int x = i % kCells * window.width / kCells, y = i / kCells * window.height / kCells;
+      const int width = std::clamp(window.width / kCells, 1, kSide),
+                height = std::clamp(window.height / kCells, 1, kSide);
+      Film film(scene.width, scene.height, {window.x + x, window.y + y, width, height}, 1);
+      n_samples += render_pass(*scene.scene, integrator, settings, film).n_samples;
+    });
+    return static_cast<double>(n_samples) / watch.seconds();
+  };
+  trial(1);  // fills the caches
+  return trial(2);
+}
+
 }  // namespace
 
 CropWindow crop_window(const RenderOptions& options, const LoadedScene& scene) {
@@ -135,6 +170,14 @@ CropWindow crop_window(const RenderOptions& options, const LoadedScene& scene) {
     throw Error(ErrorCode::kUsage, fmt::format("--crop '{}' does not fit into the {} x {} frame", options.crop,
                                                scene.width, scene.height));
   return {static_cast<int>(c[0]), static_cast<int>(c[1]), static_cast<int>(c[2]), static_cast<int>(c[3])};
+}
+
+uint32_t affordable_budget(const RenderOptions& options, const LoadedScene& scene, const Integrator& integrator,
+                           uint32_t budget) {
+  if (options.seconds <= 0 || options.has_one_pass() || options.groups) return budget;
+  const CropWindow window = crop_window(options, scene);
+  const double samples = 0.5 * options.seconds * samples_per_second(options, scene, integrator);
+  return static_cast<uint32_t>(std::min<double>(budget, samples / window.width / window.height));
 }
 
 std::filesystem::path passes_folder(const RenderOptions& options) {
@@ -176,7 +219,7 @@ std::vector<Pass> make_passes(const RenderOptions& options, const LoadedScene& s
         {film_key::kComplete, "false"},
     };
     if (options.estimates_in_pass()) set_estimate(options, budget, pass);
-    if (options.resume && std::filesystem::exists(pass.path)) resume(pass, !options.passes.empty());
+    if (options.resume && std::filesystem::exists(pass.path)) resume(pass, options);
     passes.push_back(std::move(pass));
   }
   set_budget(options, budget, passes);
@@ -205,7 +248,6 @@ void remove_passes(const RenderOptions& options, const std::vector<Pass>& passes
 
 void render_passes(const Scene& scene, const Integrator& integrator, std::vector<Pass>& passes,
                    const RenderLimits& limits) {
-  const Stopwatch watch;
   uint64_t total = 0;
   for (const Pass& pass : passes) total += samples_left(pass);
   uint64_t done = 0;
@@ -215,15 +257,15 @@ void render_passes(const Scene& scene, const Integrator& integrator, std::vector
                                    [](const Pass& a, const Pass& b) { return fraction(a) < fraction(b); });
     if (pass.count >= pass.settings.spp || stopped()) return;
     PassSettings wave = pass.settings;
-    const uint32_t size = wave.estimate ? wave.spp : wave_size(pass.film.groups());
-    wave.spp = std::min(pass.settings.spp, (pass.count / size + 1) * size);
+    wave.spp =
+        wave.estimate ? pass.settings.spp : std::min(pass.settings.spp, wave_end(pass.count, pass.film.groups()));
     wave.stop = limits.stop;
     wave.checkpoint = wave.estimate ? limits.checkpoint : nullptr;  // that wave is all there is
     wave.progress = [&](uint64_t now, uint64_t) {
       if (limits.progress) limits.progress(done + now, total);
     };
-    if (limits.seconds > 0 && (pass.count > 0 || passes.size() == 1)) {
-      wave.seconds = limits.seconds - watch.seconds();
+    if (limits.seconds_left && pass.count > 0) {  // the pass that is farthest behind
+      wave.seconds = limits.seconds_left();
       if (wave.seconds <= 0) return;
     }
     const PassResult result = render_pass(scene, integrator, wave, pass.film);

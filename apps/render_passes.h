@@ -26,16 +26,22 @@ struct Pass {
 };
 
 struct RenderLimits {
-  double seconds = 0;                       ///< > 0: stop after this time, once every pixel has samples of every pass
   const std::atomic<bool>* stop = nullptr;  ///< stop at the next tile
+  /// Where given, asked before each wave once every pixel has samples of every pass: seconds that are left.
+  std::function<double()> seconds_left;
   std::function<void(uint64_t done, uint64_t total)> progress;  ///< samples of all passes together
   std::function<void()> checkpoint;                             ///< called between waves
 };
 
-/// The passes that the options ask for, with `budget` samples per pixel together; with --resume, films that are there are
-/// continued. Throws Error(kInput) where such a film belongs to another render.
+/// The passes that the options ask for, with `budget` samples per pixel together, which decides how many groups there are;
+/// with --resume, films that are there are continued. Throws Error(kInput) where such a film belongs to another render.
 std::vector<Pass> make_passes(const RenderOptions& options, const LoadedScene& scene, const Integrator& integrator,
                               uint32_t budget);
+
+/// The budget that decides how many groups the passes have: `budget`, or with --time what half of the time is enough for, so
+/// that no more groups are begun than can be filled. The speed is measured all over the window, in some ten milliseconds.
+uint32_t affordable_budget(const RenderOptions& options, const LoadedScene& scene, const Integrator& integrator,
+                           uint32_t budget);
 
 /// Sets the samples per pixel of each pass for a budget of `total`, rounded up to whole groups.
 void set_budget(const RenderOptions& options, uint32_t total, std::vector<Pass>& passes);

@@ -77,6 +77,7 @@ nlohmann::ordered_json statistics(const RenderOptions& options, const LoadedScen
       {"seconds",
        {{"load", outcome.load_seconds},
         {"build", scene.scene->build_seconds()},
+        {"trial", outcome.trial_seconds},
         {"render", outcome.render_seconds()},
         {"estimate", outcome.all_estimate_seconds()},
         {"write", outcome.write_seconds}}},
@@ -111,6 +112,10 @@ void print_summary(const RenderOptions& options, const LoadedScene& scene, const
   } else if (!options.until.empty()) {
     fmt::print(stderr, "predicted relMSE {:.3g}\n", *outcome.predicted_relmse);
   }
+  if (options.seconds > 0 && outcome.budget_seconds > 1.05 * options.seconds)
+    fmt::print(stderr, "warning: --time {:g} was exceeded: {:.2f} s for at least {} samples per pixel in each pass{}\n",
+               options.seconds, outcome.budget_seconds, outcome.passes[0].film.groups(),
+               options.has_one_pass() ? "" : " and the estimate");
   if (!options.until.empty() && *outcome.predicted_relmse > parse_until(options.until))
     fmt::print(stderr, "warning: --until {} was not reached\n", options.until);
 }

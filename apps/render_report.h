@@ -17,6 +17,8 @@ struct Outcome {
   EstimatorResult image;
   std::optional<double> predicted_relmse;
   double load_seconds = 0, estimate_seconds = 0, write_seconds = 0;  ///< estimate: after the passes
+  double trial_seconds = 0;   ///< of finding out, for --time, how fast passes and estimator are
+  double budget_seconds = 0;  ///< of what --time limits, in this call
 
   template <typename F>
   double sum(F value) const {

@@ -144,7 +144,13 @@ void render_tile(const Scene& scene, const Integrator& integrator, const PassSet
 
 }  // namespace
 
-uint32_t wave_size(int groups) { return static_cast<uint32_t>(groups) * std::max(1, 16 / groups); }
+uint32_t wave_end(uint32_t count, int groups) {
+  const uint32_t size = static_cast<uint32_t>(groups) * std::max(1, 16 / groups);
+  if (count >= size) return (count / size + 1) * size;
+  auto end = static_cast<uint32_t>(groups);
+  while (end <= count) end *= 2;
+  return std::min(end, size);
+}
 
 Vec2 film_position(const FilterSettings& filter, int x, int y, const PathRandom& random) {
   const Vec2 u = random.get_2d(0, Event::kPixel);
@@ -168,7 +174,6 @@ PassResult render_pass(const Scene& scene, const Integrator& integrator, const P
   COVARY_CHECK(film.frame_width() == scene.camera().width() && film.frame_height() == scene.camera().height(),
                "film and camera differ in size");
   const std::vector<Tile> tiles = make_tiles(film);
-  const uint32_t wave = settings.estimate ? settings.spp : wave_size(film.groups());
   const auto count_of = [&](const Tile& tile) { return film.count(tile.x0, tile.y0); };
 
   uint64_t total = 0;
@@ -186,10 +191,10 @@ PassResult render_pass(const Scene& scene, const Integrator& integrator, const P
     return out_of_time.load(std::memory_order_relaxed) ||
            (settings.stop && settings.stop->load(std::memory_order_relaxed));
   };
-  // A wave ends at a multiple of `wave` samples, so that interrupted and uninterrupted renders add in the same steps. The one
-  // wave of pixels that are estimated is cut into rounds of some time.
+  // Waves always end at the same counts, so that interrupted and uninterrupted renders add in the same steps. The one wave of
+  // pixels that are estimated is cut into rounds of some time.
   while (fewest < settings.spp && !ended()) {
-    const uint32_t end = std::min(settings.spp, (fewest / wave + 1) * wave);
+    const uint32_t end = settings.estimate ? settings.spp : std::min(settings.spp, wave_end(fewest, film.groups()));
     const Stopwatch round_watch;
     std::atomic<bool> round_over{false};
     tbb::parallel_for(

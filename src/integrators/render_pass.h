@@ -28,7 +28,7 @@ struct PassSettings {
   /// When set, takes the place of the mean. The samples of a pixel are then taken in one go, and a thread holds all spp of them;
   /// the film has one group, and its pixels are finished or have no samples.
   PixelEstimate estimate;
-  double seconds = 0;  ///< stop after this time when > 0; pixels then differ in count by at most one wave
+  double seconds = 0;  ///< stop after this time when > 0, in the middle of a wave
   /// Set from a signal handler to stop at the next tile.
   const std::atomic<bool>* stop = nullptr;
   /// Called from any thread after each tile with the samples done since the start; must be thread-safe.
@@ -67,8 +67,10 @@ struct ReplayedSample {
 ReplayedSample replay_sample(const Scene& scene, const Integrator& integrator, const PassSettings& settings, int x,
                              int y, uint64_t sample);
 
-/// Samples per pixel and wave for a film of `groups` groups: a multiple of `groups`, about 16.
-uint32_t wave_size(int groups);
+/// Samples per pixel at the end of a wave that begins with `count`, for a film of `groups` groups: twice as many, from one in
+/// each group on, and later the next multiple of about 16. So no pixel has less than half of the samples of another when
+/// time runs out in the middle of a wave.
+uint32_t wave_end(uint32_t count, int groups);
 
 /// Position of a sample in pixels of the full frame, distributed around the pixel's centre like the filter.
 Vec2 film_position(const FilterSettings& filter, int x, int y, const PathRandom& random);

@@ -168,6 +168,7 @@ std::vector<Run> runs_of_scene(const Suite& suite, size_t index, const SceneInst
         run.then = method.then;
         run.work = budget.spp * static_cast<double>(scene.n_pixels());
         run.key = key_of("run", context, scene, {run.options, flattened(run.then)});
+        run.timed = budget.seconds > 0;
         // What a time budget renders depends on the method's speed: such passes belong to one run alone.
         run.passes_key = budget.spp ? key_of("passes", context, scene,
                                              {scene.options(), suite.common_options, amount, seed_words,

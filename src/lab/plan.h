@@ -33,6 +33,7 @@ struct Run {
   std::vector<std::string> options;  ///< of `covary render SCENE`, without outputs
   std::vector<std::vector<std::string>> then;
   double work = 0;         ///< samples, for the time left
+  bool timed = false;      ///< with a budget in seconds: an interrupted run begins again
   std::string key;         ///< names the result: hash of program, scene, options, seed
   std::string passes_key;  ///< the same for all runs that can share the films of their passes
 };

@@ -40,7 +40,7 @@ RunRecord record_of(const nlohmann::json& stats) {
   RunRecord record;
   const nlohmann::json seconds = stats.value("seconds", nlohmann::json::object());
   record.load_seconds = seconds.value("load", 0.0) + seconds.value("build", 0.0);
-  record.render_seconds = seconds.value("render", 0.0);
+  record.render_seconds = seconds.value("render", 0.0) + seconds.value("trial", 0.0);
   record.estimate_seconds = seconds.value("estimate", 0.0);
   record.samples_per_pixel = stats.value("samples_per_pixel", 0.0);
   record.peak_memory_bytes = stats.value("peak_memory_bytes", 0.0);
@@ -114,8 +114,9 @@ Runner::Result Runner::execute(const Run& run, const SceneInstance& scene) const
   const std::string typed_command = typed(render);
   if (threads_ > 0) render.insert(render.end(), {"--threads", fmt::format("{}", threads_)});
   std::string output = run.then.empty() ? image : folder + "/step0.exr";
-  render.insert(render.end(), {"--passes", cache_.path("passes", run.passes_key), "--resume", "--quiet", "--no-preview",
-                               "--json", stats, "-o", output});
+  render.insert(render.end(), {"--passes", cache_.path("passes", run.passes_key), "--quiet", "--no-preview", "--json",
+                               stats, "-o", output});
+  if (!run.timed) render.emplace_back("--resume");
   const auto failed = [&](const std::string& command, const ProcessResult& process) -> Result {
     if (stop_ && stop_->load()) return {};
     const std::string signal = process.signal ? fmt::format("ended by signal {}; ", process.signal) : "";
