@@ -139,12 +139,17 @@ Json report_document(const Results& results) {
   add_section(document, std::move(summary));
 
   Json errors = new_section("errors", "Errors");
-  if (!suite.published_source.empty()) errors["text"].push_back("Published values: " + suite.published_source + ".");
   for (size_t b = 0; b < suite.budgets.size(); ++b) add_block(errors, error_table(results, b));
   add_section(document, std::move(errors));
 
+  Json published = new_section("published", "Published values");
+  for (size_t b = 0; b < suite.budgets.size(); ++b) add_block(published, published_table(results, b));
+
   Json gains = new_section("gains", "Gains");
   for (size_t b = 0; b < suite.budgets.size(); ++b) add_block(gains, ratio_table(results, b));
+  if (!suite.published_source.empty())
+    (published["blocks"].empty() ? gains : published)["text"].push_back("Published: " + suite.published_source + ".");
+  add_section(document, std::move(published));
   add_section(document, std::move(gains));
 
   Json quality = new_section("bias", "Bias, variance and other measures");

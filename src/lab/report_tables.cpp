@@ -39,12 +39,14 @@ bool any_cell(const Results& results, size_t budget, bool (*has)(const Cell&)) {
                      [&](const Cell& cell) { return cell.budget == budget && has(cell); });
 }
 
-/// Rows of all cells at a budget, first scene and method.
+bool every_cell(const Cell&) { return true; }
+
+/// Rows of the cells at a budget that `use` takes; scene and method come first.
 template <typename Fill>
-Json cell_rows(const Results& results, size_t budget, Fill&& fill) {
+Json cell_rows(const Results& results, size_t budget, Fill&& fill, bool (*use)(const Cell&) = every_cell) {
   Json rows = Json::array();
   for (const Cell& cell : results.cells) {
-    if (cell.budget != budget) continue;
+    if (cell.budget != budget || !use(cell)) continue;
     Json row{{"scene", results.suite.scenes[cell.scene].name}, {"method", results.suite.methods[cell.method].name}};
     fill(cell, row);
     rows.push_back(std::move(row));
@@ -127,29 +129,33 @@ Json summary_table(const Results& results, size_t budget) {
 Json error_table(const Results& results, size_t budget) {
   const Suite& suite = results.suite;
   Json columns = Json::array({column("scene", "Scene", "text")}), rows = Json::array();
-  for (size_t m = 0; m < suite.methods.size(); ++m) {
-    const std::string& name = suite.methods[m].name;
-    columns.push_back(column(fmt::format("m{}", m), name, "number"));
-    const bool published = std::any_of(results.cells.begin(), results.cells.end(), [&](const Cell& c) {
-      return c.method == m && c.budget == budget && std::isfinite(c.published_relmse);
-    });
-    if (!published) continue;
-    columns.push_back(column(fmt::format("p{}", m), name + ", published", "number"));
-    columns.push_back(column(fmt::format("r{}", m), "ours / published", "ratio"));
-  }
+  for (size_t m = 0; m < suite.methods.size(); ++m)
+    columns.push_back(column(fmt::format("m{}", m), suite.methods[m].name, "number"));
   for (size_t s = 0; s < suite.scenes.size(); ++s) {
     Json row{{"scene", suite.scenes[s].name}};
-    for (size_t m = 0; m < suite.methods.size(); ++m) {
-      const Cell* cell = results.find(s, m, budget);
-      if (!cell) continue;
-      const Estimate& error = cell->split.relative.error;
-      row[fmt::format("m{}", m)] = value_of(error);
-      row[fmt::format("p{}", m)] = number(cell->published_relmse);
-      row[fmt::format("r{}", m)] = number(error.value / cell->published_relmse);
-    }
+    for (size_t m = 0; m < suite.methods.size(); ++m)
+      if (const Cell* cell = results.find(s, m, budget))
+        row[fmt::format("m{}", m)] = value_of(cell->split.relative.error);
     if (row.size() > 1) rows.push_back(std::move(row));
   }
   return table("relMSE, " + suite.budgets[budget].label(), columns, rows);
+}
+
+Json published_table(const Results& results, size_t budget) {
+  const Json columns{column("scene", "Scene", "text"), column("method", "Method", "text"),
+                     column("ours", "Ours", "number"), column("published", "Published", "number"),
+                     column("ratio", "Ratio", "ratio")};
+  Json rows = cell_rows(
+      results, budget,
+      [](const Cell& cell, Json& row) {
+        const Estimate& error = cell.split.relative.error;
+        row["ours"] = value_of(error);
+        row["published"] = number(cell.published_relmse);
+        row["ratio"] = number(error.value / cell.published_relmse);
+      },
+      [](const Cell& cell) { return std::isfinite(cell.published_relmse); });
+  return table(fmt::format("relMSE, {}; ratio: ours / published", results.suite.budgets[budget].label()), columns,
+               rows);
 }
 
 Json ratio_table(const Results& results, size_t budget) {

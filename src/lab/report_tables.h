@@ -11,8 +11,10 @@ namespace covary::lab {
 
 /// Geometric means over scenes at one budget.
 nlohmann::ordered_json summary_table(const Results& results, size_t budget);
-/// relMSE of all scenes and methods at one budget, published values beside ours.
+/// relMSE of all scenes (rows) and methods (columns) at one budget.
 nlohmann::ordered_json error_table(const Results& results, size_t budget);
+/// relMSE beside published values, for the scenes and methods that have them.
+nlohmann::ordered_json published_table(const Results& results, size_t budget);
 /// Equal-sample and equal-time ratios of all scenes and methods at one budget.
 nlohmann::ordered_json ratio_table(const Results& results, size_t budget);
 /// Bias, variance, other metrics, predicted error.

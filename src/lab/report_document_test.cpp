@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the report says of results: tables with gaps, published values, failures, and texts that are odd.
+#include "lab/report_document.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+#include <limits>
+#include <sstream>
+
+#include "lab/report_tables.h"
+#include "support/files.h"
+
+namespace covary::lab {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using test_support::contains, test_support::test_file;
+
+const std::string kOdd = "a \"quoted\" <b>name</b> </script> ü\nsecond line";
+
+Cell cell_of(size_t scene, size_t method, size_t budget, double relmse) {
+  Cell cell{scene, method, budget};
+  cell.split.relative.error = {relmse, 0.1 * relmse, 0.8 * relmse, 1.2 * relmse};
+  cell.samples_per_pixel = 24;
+  return cell;
+}
+
+/// Two scenes, two methods, one budget; the second scene's second method is missing.
+Results three_cells() {
+  Results results;
+  Suite& suite = results.suite;
+  suite.title = "title", suite.name = "test";
+  suite.scenes = {{"room", "room.xml"}, {"veil", "veil.xml"}};
+  suite.methods = {{"pt", {}, {}, true}, {"iicv", {}, {}, false}};
+  suite.budgets = {{24, 0}};
+  suite.seeds = {1};
+  suite.baseline = "pt";
+  results.cells = {cell_of(0, 0, 0, 0.4), cell_of(0, 1, 0, 0.1), cell_of(1, 0, 0, 0.2)};
+  return results;
+}
+
+std::vector<std::string> keys(const Json& table) {
+  std::vector<std::string> result;
+  for (const Json& column : table["columns"]) result.push_back(column["key"]);
+  return result;
+}
+
+std::vector<std::string> section_ids(const Json& document) {
+  std::vector<std::string> result;
+  for (const Json& section : document["sections"]) result.push_back(section["id"]);
+  return result;
+}
+
+TEST(ReportTables, ErrorsHaveARowPerSceneAndAColumnPerMethod) {
+  const Json table = error_table(three_cells(), 0);
+  EXPECT_EQ(keys(table), (std::vector<std::string>{"scene", "m0", "m1"}));
+  ASSERT_EQ(table["rows"].size(), 2u);
+  EXPECT_EQ(table["rows"][0]["m1"], (Json{{"value", 0.1}, {"low", 0.8 * 0.1}, {"high", 1.2 * 0.1}}));
+  EXPECT_FALSE(table["rows"][1].contains("m1")) << "a run that failed leaves a gap";
+  EXPECT_TRUE(error_table(three_cells(), 0)["caption"] == "relMSE, 24 spp");
+  EXPECT_TRUE(error_table(Results{.suite = three_cells().suite}, 0).is_null()) << "nothing to show";
+}
+
+TEST(ReportTables, PublishedValuesHaveATableOfTheirOwn) {
+  Results results = three_cells();
+  EXPECT_TRUE(published_table(results, 0).is_null());
+  results.cells[1].published_relmse = 0.08;
+  const Json table = published_table(results, 0);
+  EXPECT_EQ(keys(table), (std::vector<std::string>{"scene", "method", "ours", "published", "ratio"}));
+  ASSERT_EQ(table["rows"].size(), 1u) << "only what was published";
+  const Json& row = table["rows"][0];
+  EXPECT_EQ(row["scene"], "room");
+  EXPECT_EQ(row["method"], "iicv");
+  EXPECT_EQ(row["ours"]["value"], 0.1);
+  EXPECT_EQ(row["published"], 0.08);
+  EXPECT_DOUBLE_EQ(row["ratio"].get<double>(), 0.1 / 0.08);
+  EXPECT_EQ(keys(error_table(results, 0)).size(), 3u) << "the table of errors stays as narrow as it is";
+}
+
+TEST(ReportTables, NumbersThatAreNotFiniteAreMissing) {
+  Results results = three_cells();
+  results.cells[0].split.relative.error = {};
+  results.cells[1].split.relative.error = {0.1, kNone, kNone, kNone};
+  results.cells[2].split.relative.error.value = std::numeric_limits<double>::infinity();
+  const Json errors = error_table(results, 0);
+  EXPECT_TRUE(errors["rows"][0]["m0"].is_null());
+  EXPECT_EQ(errors["rows"][0]["m1"], (Json{{"value", 0.1}})) << "one seed has no interval";
+  EXPECT_TRUE(errors["rows"][1]["m0"].is_null());
+  for (const Json& table : {quality_table(results, 0), time_table(results, 0), ratio_table(results, 0)})
+    EXPECT_EQ(table.dump().find("nan"), std::string::npos);
+  EXPECT_TRUE(quality_table(results, 0)["rows"][0]["share"].is_null());
+}
+
+TEST(ReportTables, ColumnsAppearWhereTheyHaveSomethingToSay) {
+  Results results = three_cells();
+  const auto has = [](const Json& table, const std::string& key) {
+    const std::vector<std::string> all = keys(table);
+    return std::find(all.begin(), all.end(), key) != all.end();
+  };
+  EXPECT_FALSE(has(ratio_table(results, 0), "published"));
+  EXPECT_TRUE(has(ratio_table(results, 0), "sample"));
+  EXPECT_FALSE(has(time_table(results, 0), "then"));
+  EXPECT_FALSE(has(time_table(results, 0), "ratio"));
+  results.cells[1].published_ratio = 4;
+  results.cells[1].then_seconds = {2, kNone, kNone, kNone};
+  results.suite.budgets = {{0, 10}};
+  EXPECT_TRUE(has(ratio_table(results, 0), "published"));
+  EXPECT_FALSE(has(ratio_table(results, 0), "sample")) << "a budget in seconds has no equal number of samples";
+  EXPECT_TRUE(has(time_table(results, 0), "then"));
+  EXPECT_TRUE(has(time_table(results, 0), "ratio"));
+}
+
+TEST(ReportTables, PlotsShowPositiveErrorsAndSayWhatTheyShow) {
+  Results results = three_cells();
+  results.suite.budgets = {{24, 0}, {48, 0}};
+  results.cells.push_back(cell_of(0, 0, 1, 0.2));
+  results.cells.push_back(cell_of(0, 1, 1, -0.001));
+  results.cells[0].split.relative.error.low = -1;
+  const Json plot = convergence_plot(results, 0);
+  ASSERT_EQ(plot["series"].size(), 2u);
+  EXPECT_EQ(plot["series"][0]["y"], (Json{0.4, 0.2}));
+  EXPECT_GT(plot["series"][0]["low"][0], 0) << "a logarithmic axis has no zero";
+  EXPECT_EQ(plot["series"][1]["y"], (Json{0.1})) << "a negative error has no place on it";
+  EXPECT_TRUE(contains(plot["alt"], "pt: 0.4 to 0.2"));
+  EXPECT_TRUE(convergence_plot(Results{.suite = results.suite}, 0).is_null());
+}
+
+TEST(ReportDocument, SectionsWithoutBlocksAreLeftOut) {
+  EXPECT_EQ(section_ids(report_document(three_cells())),
+            (std::vector<std::string>{"errors", "gains", "bias", "time", "setup"}));
+  Results results = three_cells();
+  results.suite.published_source = "somewhere";
+  results.cells[0].published_relmse = 1;
+  results.warnings = {"take care"};
+  const Json document = report_document(results);
+  EXPECT_EQ(section_ids(document),
+            (std::vector<std::string>{"summary", "errors", "published", "gains", "bias", "time", "setup"}));
+  EXPECT_EQ(document["sections"][2]["text"], (Json{"Published: somewhere."}));
+  EXPECT_EQ(document["sections"][0]["blocks"][0]["items"], (Json{"take care"}));
+}
+
+TEST(ReportDocument, FailuresComeFirstWithCommandAndMessage) {
+  Results results = three_cells();
+  results.failures = {{"veil", "iicv", "24 spp", "covary render veil.xml", "first line\nsecond", 139, 2},
+                      {"room", "", "", "", "no references", 0, 0}};
+  const Json block = report_document(results)["sections"][0]["blocks"][0];
+  EXPECT_EQ(block["kind"], "error");
+  EXPECT_EQ(block["items"][0],
+            "veil, iicv, 24 spp: first line\nsecond (exit code 139); 2 further runs were not tried\n"
+            "covary render veil.xml");
+  EXPECT_EQ(block["items"][1], "room: no references");
+}
+
+/// Names, messages and titles are the user's: whatever they hold, the page says it as it is and stays whole.
+TEST(ReportDocument, OddTextsReachThePageUnchanged) {
+  Results results = three_cells();
+  Suite& suite = results.suite;
+  suite.title = suite.description = suite.scenes[0].name = suite.methods[1].name = suite.scenes[0].credit = kOdd;
+  suite.methods[1].options = {"--estimator", kOdd};
+  results.scenes = {{SceneInstance{suite.scenes[0]}, {}}, {SceneInstance{suite.scenes[1]}, {}}};
+  results.failures = {{kOdd, kOdd, kOdd, kOdd, kOdd, 1, 0}};
+  results.warnings = {kOdd, "not UTF-8: \xff"};
+  const Json document = report_document(results);
+  EXPECT_EQ(document["title"], kOdd);
+  const std::string path = test_file("report.html");
+  write_report(path, document, {});
+  std::ifstream file(path, std::ios::binary);
+  std::stringstream text;
+  text << file.rdbuf();
+  const std::string page = text.str();
+  EXPECT_EQ(page.find("<b>name"), std::string::npos);
+  EXPECT_EQ(page.find("name</b> </script>"), std::string::npos);
+  EXPECT_TRUE(contains(page, "ü\\nsecond line"));
+  EXPECT_TRUE(contains(page, "\\\"quoted\\\""));
+}
+
+TEST(ReportDocument, ShowsTheBudgetOfTheSuite) {
+  Suite suite = three_cells().suite;
+  suite.budgets = {{24, 0}, {48, 0}, {96, 0}};
+  EXPECT_EQ(shown_budget(suite), 2u);
+  suite.show = Budget{48, 0};
+  EXPECT_EQ(shown_budget(suite), 1u);
+  suite.show = Budget{7, 0};
+  EXPECT_EQ(shown_budget(suite), 2u);
+}
+
+}  // namespace
+}  // namespace covary::lab
