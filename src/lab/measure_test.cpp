@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: Apache-2.0
+// Cells from images whose errors are known by hand, and what follows from several cells together.
+#include "lab/measure.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "core/error.h"
+#include "film/exr.h"
+#include "support/files.h"
+
+namespace covary::lab {
+namespace {
+
+using test_support::contains, test_support::message_of, test_support::test_file;
+
+constexpr int kWidth = 16, kHeight = 12;
+constexpr double kWeight = 1 / (1 + 0.01);  // of relMSE where the reference is 1
+
+Image constant(float value) {
+  Image image(kWidth, kHeight, 3);
+  std::fill(image.data.begin(), image.data.end(), value);
+  return image;
+}
+
+/// Writes an image into the test's folder, with standard errors where they are given.
+std::string write(const std::string& name, Image image, std::optional<float> std_error = {},
+                  const ImagePlace& place = {kWidth, kHeight, {0, 0, kWidth, kHeight}}) {
+  const std::string path = test_file(name);
+  std::vector<ExrPlane> planes;
+  add_image_planes("", image, planes);
+  Image errors = constant(std_error.value_or(0));
+  if (std_error) add_image_planes("StdError", errors, planes);
+  write_exr(path, place, {}, planes);
+  return path;
+}
+
+SceneInstance scene() {
+  SceneInstance result{{"room", "room.xml"}, "room.xml", "hash"};
+  result.frame_width = kWidth, result.frame_height = kHeight;
+  result.window = {0, 0, kWidth, kHeight};
+  return result;
+}
+
+RunResult run_of(uint64_t seed, const std::string& image, double render_seconds, double estimate_seconds) {
+  RunResult run{seed};
+  run.record.image = image;
+  run.record.render_seconds = render_seconds, run.record.estimate_seconds = estimate_seconds;
+  run.record.load_seconds = 100;
+  run.record.samples_per_pixel = 24;
+  run.record.peak_memory_bytes = 1000.0 * static_cast<double>(seed);
+  return run;
+}
+
+class Measure : public testing::Test {
+ protected:
+  /// Two runs with values 1.2 and 1.1 where the references say 1: errors 0.04 and 0.01 before weighting.
+  Cell two_runs() {
+    Cell cell;
+    cell.runs = {run_of(1, write("one.exr", constant(1.2f), 0.3f), 2, 1),
+                 run_of(2, write("two.exr", constant(1.1f), 0.1f), 4, 1)};
+    return cell;
+  }
+  void measure_cell(Cell& cell, const Budget& budget = {24, 0}) {
+    measure(cell, scene(), {constant(1)}, false, budget, cache_, keys_, "reference");
+  }
+  Cache cache_{test_file("cache")};
+  std::vector<std::string> keys_ = {"first run", "second run"};
+};
+
+TEST_F(Measure, ErrorsAndTimesAreThoseOfTheRuns) {
+  Cell cell = two_runs();
+  measure_cell(cell);
+  EXPECT_NEAR(cell.runs[0].mse, 0.04, 1e-6);
+  EXPECT_NEAR(cell.runs[1].relmse, 0.01 * kWeight, 1e-6);
+  EXPECT_NEAR(cell.split.relative.error.value, 0.025 * kWeight, 1e-6);
+  // The seeds' mean is 1.15. Variance: sum of squares around it, over n - 1.
+  EXPECT_NEAR(cell.split.absolute.variance.value, 2 * 0.05 * 0.05, 1e-6);
+  EXPECT_NEAR(cell.split.absolute.squared_bias.value, 0.2 * 0.1, 1e-6);
+  EXPECT_NEAR(cell.mae.value, 0.15, 1e-6);
+  EXPECT_NEAR(cell.mae_of_mean, 0.15, 1e-6);
+  EXPECT_NEAR(cell.runs[0].mean_ratio, 1.2, 1e-6);
+  EXPECT_DOUBLE_EQ(cell.load_seconds.value, 100);
+  EXPECT_DOUBLE_EQ(cell.method_seconds.value, 4) << "without load";
+  EXPECT_NEAR(cell.efficiency.value, 1 / (0.025 * kWeight * 4), 1e-3);
+  EXPECT_DOUBLE_EQ(cell.peak_memory_bytes, 2000) << "the largest";
+  EXPECT_DOUBLE_EQ(cell.samples_per_pixel, 24);
+  EXPECT_TRUE(std::isnan(cell.time_ratio)) << "a budget in samples takes as long as it takes";
+}
+
+TEST_F(Measure, TimeBudgetsAreComparedWithTheTimeTaken) {
+  Cell cell = two_runs();
+  measure_cell(cell, {0, 3.2});
+  EXPECT_DOUBLE_EQ(cell.time_ratio, 4 / 3.2);
+}
+
+TEST_F(Measure, PredictedErrorsComeFromTheLayerOfStandardErrors) {
+  Cell cell = two_runs();
+  measure_cell(cell);
+  EXPECT_NEAR(cell.runs[0].predicted_relmse, 0.09 * kWeight, 1e-6);
+  EXPECT_NEAR(cell.predicted_over_true.value, (0.09 + 0.01) / (0.04 + 0.01), 1e-5);
+  Cell plain;
+  plain.runs = {run_of(1, write("plain.exr", constant(1.2f)), 1, 0)};
+  keys_ = {"plain run"};
+  measure_cell(plain);
+  EXPECT_TRUE(std::isnan(plain.runs[0].predicted_relmse));
+  EXPECT_TRUE(std::isnan(plain.predicted_over_true.value));
+  EXPECT_TRUE(std::isnan(plain.mae_of_mean)) << "one run has no mean image of its own";
+}
+
+/// Errors that cost more than reading the image are kept, one file a run and reference.
+TEST_F(Measure, KeepsErrorsOfImages) {
+  Cell cell = two_runs();
+  measure_cell(cell);
+  Cell again = cell;
+  again.runs[0].record.image = write("one.exr", constant(3));
+  measure_cell(again);
+  EXPECT_EQ(again.runs[0].mae, cell.runs[0].mae) << "from the cache";
+  EXPECT_NEAR(again.runs[0].mse, 4, 1e-5) << "from the image";
+  measure(again, scene(), {constant(1)}, false, {24, 0}, cache_, keys_, "another reference");
+  EXPECT_NEAR(again.runs[0].mae, 2, 1e-5);
+}
+
+TEST_F(Measure, PixelsThatAreNotFiniteAreLeftOutAndCounted) {
+  Image bad = constant(1.2f);
+  bad.pixel(3, 4)[1] = std::numeric_limits<float>::quiet_NaN();
+  bad.pixel(5, 4)[0] = std::numeric_limits<float>::infinity();
+  Cell cell;
+  cell.runs = {run_of(1, write("bad.exr", bad), 1, 0)};
+  keys_ = {"bad run"};
+  measure_cell(cell);
+  EXPECT_EQ(cell.split.n_non_finite, 2u);
+  EXPECT_NEAR(cell.runs[0].mse, 0.04, 1e-6);
+}
+
+TEST_F(Measure, ReadsTheWindowFromLargerImagesAndRefusesOthers) {
+  Image whole = constant(0);
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x) whole.pixel(x, y)[0] = static_cast<float>(100 * y + x);
+  SceneInstance part = scene();
+  part.window = {5, 3, 4, 2};
+  const std::string path = write("whole.exr", whole);
+  const Image window = read_window(path, part);
+  EXPECT_EQ(window.width, 4);
+  EXPECT_EQ(window.pixel(3, 1)[0], 408);
+  part.frame_width = 32;
+  EXPECT_TRUE(contains(message_of([&] { read_window(path, part); }, ErrorCode::kInput),
+                       "has a frame of 16 x 12 pixels, the scene one of 32 x 12"));
+  part = scene();
+  const std::string moved = write("moved.exr", whole, {}, {32, 24, {8, 8, kWidth, kHeight}});
+  part.frame_width = 32, part.frame_height = 24;
+  EXPECT_TRUE(contains(message_of([&] { read_window(moved, part); }, ErrorCode::kInput), "does not cover"));
+}
+
+/// One scene, pt and iicv, budgets of 24 and 96 samples; relMSE by seed.
+Results two_methods(const std::vector<double>& pt, const std::vector<double>& iicv) {
+  Results results;
+  Suite& suite = results.suite;
+  suite.scenes = {{"room", "room.xml"}};
+  suite.methods = {{"pt", {}, {}, true}, {"iicv", {}, {}, false}};
+  suite.budgets = {{24, 0}, {96, 0}};
+  suite.seeds = {1, 2, 3};
+  suite.baseline = "pt";
+  results.scenes = {{scene(), {}}};
+  for (size_t m = 0; m < 2; ++m)
+    for (size_t b = 0; b < 2; ++b) {
+      const std::vector<double>& errors = m == 0 ? pt : iicv;
+      if (errors.empty()) continue;
+      Cell cell{0, m, b};
+      cell.samples_per_pixel = suite.budgets[b].spp;
+      for (size_t s = 0; s < errors.size(); ++s) {
+        RunResult run = run_of(s + 1, "", m == 0 ? 1 : 2, m == 0 ? 0 : 1);
+        run.relmse = errors[s] / (b == 0 ? 1 : 4);
+        cell.runs.push_back(run);
+      }
+      cell.split.relative.error = mean_estimate(errors);
+      results.cells.push_back(cell);
+    }
+  return results;
+}
+
+TEST(CompareCells, RatiosAreAgainstTheBaselineWithTheSameBudget) {
+  Results results = two_methods({0.3, 0.36, 0.3}, {0.1, 0.12, 0.1});
+  results.suite.published_relmse["room"]["iicv"]["24"] = 0.2;
+  results.suite.published_ratio["room"]["iicv"]["96"] = 5;
+  compare_cells(results);
+  const Cell &first = *results.find(0, 1, 0), &second = *results.find(0, 1, 1);
+  EXPECT_NEAR(first.equal_sample.value, 3, 1e-9);
+  EXPECT_NEAR(first.equal_time.value, 1, 1e-9) << "three times the error, a third of the time";
+  EXPECT_EQ(first.published_relmse, 0.2);
+  EXPECT_TRUE(std::isnan(first.published_ratio));
+  EXPECT_EQ(second.published_ratio, 5);
+  EXPECT_EQ(results.find(0, 0, 0)->equal_sample.value, 1);
+  ASSERT_EQ(results.slopes.size(), 2u);
+  EXPECT_NEAR(results.slopes[1].exponent.value, -1, 1e-9) << "four times the samples, a quarter of the error";
+  ASSERT_EQ(results.summaries.size(), 4u);
+  EXPECT_EQ(results.summaries[1].n_scenes, 1u);
+}
+
+/// A run that failed leaves its seed out on both sides, and no ratio where nothing is left.
+TEST(CompareCells, MissingRunsLeaveGaps) {
+  Results fewer = two_methods({0.3, 0.6, 0.3}, {0.1, 0.1});
+  compare_cells(fewer);
+  EXPECT_NEAR(fewer.find(0, 1, 0)->equal_sample.value, 4.5, 1e-9) << "seeds 1 and 2";
+  Results without = two_methods({}, {0.1, 0.1, 0.1});
+  compare_cells(without);
+  EXPECT_TRUE(std::isnan(without.find(0, 1, 0)->equal_sample.value));
+  for (const Summary& summary : without.summaries) EXPECT_EQ(summary.method, 1u);
+}
+
+TEST(CompareCells, BudgetsInSecondsCompareTheErrorsThemselves) {
+  Results results = two_methods({0.3, 0.36, 0.3}, {0.1, 0.12, 0.1});
+  results.suite.budgets = {{0, 5}, {0, 10}};
+  compare_cells(results);
+  EXPECT_NEAR(results.find(0, 1, 0)->equal_time.value, 3, 1e-9);
+  EXPECT_TRUE(std::isnan(results.find(0, 1, 0)->equal_sample.value));
+  EXPECT_TRUE(results.slopes.empty()) << "slopes are over samples";
+}
+
+}  // namespace
+}  // namespace covary::lab

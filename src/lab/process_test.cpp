@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+// Child processes: what they write, how they end, and what becomes of them when this process is told to stop.
+#include "lab/process.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <csignal>
+#include <thread>
+
+#include "support/files.h"
+
+namespace covary::lab {
+namespace {
+
+using test_support::contains;
+
+ProcessResult shell(const std::string& script, const std::atomic<bool>* stop = nullptr) {
+  return run_process({"/bin/sh", "-c", script}, stop);
+}
+
+TEST(Process, GivesBackBothStreamsAndTheExitCode) {
+  const ProcessResult result = shell("echo out; echo err >&2; exit 3");
+  EXPECT_EQ(result.output, "out\n");
+  EXPECT_EQ(result.errors, "err\n");
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_EQ(result.signal, 0);
+  EXPECT_FALSE(result.ok());
+  EXPECT_GT(result.seconds, 0);
+  EXPECT_GT(result.peak_memory_bytes, 0u);
+  EXPECT_TRUE(shell("exit 0").ok());
+}
+
+TEST(Process, TakesArgumentsAsTheyAre) {
+  const std::string odd = "a 'quoted' \"word\"\n$(exit 9) ü *";
+  EXPECT_EQ(run_process({"/bin/sh", "-c", "printf %s \"$1\"", "sh", odd}).output, odd);
+  EXPECT_EQ(run_process({"/bin/sh", "-c", "printf %s \"$#\"", "sh", "", "two words"}).output, "2");
+}
+
+TEST(Process, TellsTheSignalThatEndedIt) {
+  const ProcessResult result = shell("echo before >&2; kill -SEGV $$");
+  EXPECT_EQ(result.signal, SIGSEGV);
+  EXPECT_EQ(result.exit_code, 128 + SIGSEGV);
+  EXPECT_TRUE(contains(result.errors, "before\n"));
+  EXPECT_FALSE(result.ok());
+}
+
+TEST(Process, SaysThatAProgramCannotBeRun) {
+  const ProcessResult result = run_process({"/nowhere/program", "argument"});
+  EXPECT_EQ(result.exit_code, 127);
+  EXPECT_EQ(result.errors, "cannot run /nowhere/program");
+}
+
+/// Both pipes are emptied while the child runs: one that fills a pipe must not wait for ever. Of errors the end is kept.
+TEST(Process, TakesMoreThanAPipeHolds) {
+  const ProcessResult result = shell("head -c 1000000 /dev/zero; head -c 1000000 /dev/zero >&2; echo last >&2");
+  EXPECT_EQ(result.output.size(), 1000000u);
+  EXPECT_LE(result.errors.size(), 2 * 65536u + 4096u);
+  EXPECT_TRUE(result.errors.ends_with("last\n"));
+}
+
+TEST(Process, HasNothingToRead) { EXPECT_EQ(shell("cat; echo end").output, "end\n"); }
+
+TEST(Process, InterruptsTheChildWhenToldToStop) {
+  const std::atomic<bool> stop{true};
+  const ProcessResult caught = shell("trap 'echo caught; exit 5' INT; while :; do sleep 0.05; done", &stop);
+  // The signal may come before the trap is set.
+  EXPECT_TRUE((caught.exit_code == 5 && caught.output == "caught\n") || caught.signal == SIGINT) << caught.exit_code;
+}
+
+/// The child starts with default signals, whatever this process does with them.
+TEST(Process, ChildrenCanBeInterruptedThoughTheParentIgnoresIt) {
+  const auto before = std::signal(SIGINT, SIG_IGN);
+  std::atomic<bool> stop{false};
+  std::thread later([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    stop = true;
+  });
+  const ProcessResult result = run_process({"/bin/sleep", "60"}, &stop);
+  later.join();
+  std::signal(SIGINT, before);
+  EXPECT_EQ(result.signal, SIGINT);
+  EXPECT_LT(result.seconds, 30);
+}
+
+}  // namespace
+}  // namespace covary::lab
