@@ -262,7 +262,7 @@ void add_experiment(CLI::App& app) {
   command->add_option("--scenes", o->scenes, "Folder of the suite's scene files");
   command->add_option("--cache", o->cache, "Folder of finished runs; default: cache in the output folder");
   command->add_flag("--quick", o->overrides.quick,
-                    "Small: 3 seeds, up to 192 samples per pixel, frames of up to 32400 pixels");
+                    "Small: 3 seeds, up to 192 samples per pixel, frames of up to 32400 pixels, crops of up to 12000");
   const auto list = [](CLI::Option* option) { option->delimiter(',')->group("In place of the suite's"); };
   const auto single = [](CLI::Option* option) { option->group("In place of the suite's"); };
   single(command->add_option("--seeds", o->seeds, "A number of seeds, or seeds separated by commas"));

@@ -4,8 +4,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/error.h"
+#include "lab/plan.h"
 
 namespace covary::lab {
 namespace {
@@ -22,6 +24,21 @@ void keep(const char* what, const std::vector<std::string>& names, std::vector<E
   std::erase_if(entries, [&](const Entry& e) { return std::find(names.begin(), names.end(), e.name) == names.end(); });
 }
 
+/// The part of a crop around its middle that has kQuickCropPixels at most; anything else as it is.
+std::string quick_crop(const std::string& crop) {
+  const std::vector<int> size = whole_numbers(crop, 'x'), window = whole_numbers(crop, ',');
+  const bool in_the_middle = size.size() == 2;
+  if (!in_the_middle && window.size() != 4) return crop;
+  const int width = in_the_middle ? size[0] : window[2], height = in_the_middle ? size[1] : window[3];
+  const double pixels = static_cast<double>(width) * height;
+  if (pixels <= static_cast<double>(kQuickCropPixels)) return crop;
+  const double factor = std::sqrt(static_cast<double>(kQuickCropPixels) / pixels);
+  const int w = std::max(1, static_cast<int>(std::lround(factor * width))),
+            h = std::max(1, static_cast<int>(std::lround(factor * height)));
+  if (in_the_middle) return fmt::format("{}x{}", w, h);
+  return fmt::format("{},{},{},{}", window[0] + (width - w) / 2, window[1] + (height - h) / 2, w, h);
+}
+
 void make_quick(Suite& suite) {
   constexpr size_t kSeeds = 3;
   constexpr uint32_t kSpp = 192, kReferenceSpp = 1024;
@@ -29,8 +46,10 @@ void make_quick(Suite& suite) {
   std::erase_if(suite.budgets, [&](const Budget& b) { return b.spp > kSpp; });
   if (suite.budgets.empty()) suite.budgets.push_back({kSpp, 0});
   suite.reference.spp = std::min(suite.reference.spp, kReferenceSpp);
-  for (SceneEntry& scene : suite.scenes)
+  for (SceneEntry& scene : suite.scenes) {
     if (scene.reference) scene.reference->spp = std::min(scene.reference->spp, kReferenceSpp);
+    scene.crop = quick_crop(scene.crop);
+  }
 }
 
 }  // namespace

@@ -19,11 +19,12 @@ struct Overrides {
   std::string baseline;
   std::optional<uint32_t> reference_spp;
   std::vector<std::string> reference_files;  ///< of every scene
-  bool quick = false;  ///< at most 3 seeds, 192 samples per pixel, 1024 in each half of a reference
+  /// At most 3 seeds, 192 samples per pixel, 1024 in each half of a reference, crops of kQuickCropPixels.
+  bool quick = false;
 };
 
-/// Frames that the suite neither sizes nor crops have so many pixels at most in a quick experiment.
-inline constexpr int64_t kQuickPixels = 32400;
+/// Frames that the suite neither sizes nor crops have so many pixels at most in a quick experiment, and its crops so many.
+inline constexpr int64_t kQuickPixels = 32400, kQuickCropPixels = 12000;
 
 /// Throws Error(kUsage) where a scene or method named is not in the suite.
 void apply(const Overrides& overrides, Suite& suite);

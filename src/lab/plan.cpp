@@ -15,28 +15,13 @@ namespace {
 
 using Words = std::vector<std::string>;
 
-/// Whole numbers between separators; empty where the text is anything else.
-std::vector<int> numbers(const std::string& text, char separator) {
-  std::vector<int> result;
-  const char *at = text.data(), *end = at + text.size();
-  for (;;) {
-    int value = 0;
-    const auto [next, error] = std::from_chars(at, end, value);
-    if (error != std::errc() || value < 0) return {};
-    result.push_back(value);
-    if (next == end) return result;
-    if (*next != separator) return {};
-    at = next + 1;
-  }
-}
-
 CropWindow crop_window(const SceneInstance& scene) {
   const std::string& text = scene.entry.crop;
   if (text.empty()) return {0, 0, scene.frame_width, scene.frame_height};
   CropWindow window;
-  if (const std::vector<int> c = numbers(text, ','); c.size() == 4) {
+  if (const std::vector<int> c = whole_numbers(text, ','); c.size() == 4) {
     window = {c[0], c[1], c[2], c[3]};
-  } else if (const std::vector<int> size = numbers(text, 'x'); size.size() == 2) {
+  } else if (const std::vector<int> size = whole_numbers(text, 'x'); size.size() == 2) {
     window = {(scene.frame_width - size[0]) / 2, (scene.frame_height - size[1]) / 2, size[0], size[1]};
   } else {
     throw Error(ErrorCode::kUsage,
@@ -104,6 +89,20 @@ Words flattened(const std::vector<Words>& steps) {
 
 }  // namespace
 
+std::vector<int> whole_numbers(const std::string& text, char separator) {
+  std::vector<int> result;
+  const char *at = text.data(), *end = at + text.size();
+  for (;;) {
+    int value = 0;
+    const auto [next, error] = std::from_chars(at, end, value);
+    if (error != std::errc() || value < 0) return {};
+    result.push_back(value);
+    if (next == end) return result;
+    if (*next != separator) return {};
+    at = next + 1;
+  }
+}
+
 Words SceneInstance::options() const {
   Words words;
   for (const std::string& define : entry.defines) words.insert(words.end(), {"-D", define});
@@ -123,7 +122,7 @@ void place(SceneInstance& scene, int width, int height, int64_t max_pixels) {
                                          std::max(1, static_cast<int>(height * factor)));
   }
   if (!scene.entry.resolution.empty()) {
-    const std::vector<int> size = numbers(scene.entry.resolution, 'x');
+    const std::vector<int> size = whole_numbers(scene.entry.resolution, 'x');
     if (size.size() != 2 || size[0] < 1 || size[1] < 1)
       throw Error(ErrorCode::kUsage, fmt::format("scene '{}': resolution '{}': expected WIDTHxHEIGHT, e.g. 1280x720",
                                                  scene.entry.name, scene.entry.resolution));

@@ -22,6 +22,9 @@ struct SceneInstance {
   uint64_t n_pixels() const { return static_cast<uint64_t>(window.width) * window.height; }
 };
 
+/// Numbers >= 0 between separators ("10,20,30", "240x135"); empty where the text is anything else.
+std::vector<int> whole_numbers(const std::string& text, char separator);
+
 /// Frame and window of a scene whose own frame is `width` x `height`. `max_pixels` > 0 scales a frame that the suite neither
 /// sizes nor crops down to so many pixels. Throws Error(kUsage) for texts that are no size or crop, or a crop outside the frame.
 void place(SceneInstance& scene, int width, int height, int64_t max_pixels);

@@ -190,5 +190,24 @@ TEST(Overrides, QuickMakesSmaller) {
   EXPECT_EQ(suite.reference.spp, 1024u);
 }
 
+TEST(Overrides, QuickKeepsTheMiddleOfCrops) {
+  const auto quick = [](const std::string& crop, const std::string& given = "") {
+    Suite suite = two_methods();
+    suite.scenes[0].crop = crop;
+    Overrides overrides;
+    overrides.quick = true;
+    overrides.crop = given;
+    apply(overrides, suite);
+    return suite.scenes[0].crop;
+  };
+  EXPECT_EQ(quick("214,299,240,135"), "261,325,146,82");
+  EXPECT_EQ(quick("227,606,135,240"), "253,653,82,146");
+  EXPECT_EQ(quick("480x270"), "146x82");
+  EXPECT_EQ(quick("10,10,100,100"), "10,10,100,100");
+  EXPECT_EQ(quick(""), "");
+  EXPECT_EQ(quick("nonsense"), "nonsense") << "reported where the scene is placed";
+  EXPECT_EQ(quick("214,299,240,135", "300x200"), "300x200") << "what the command line asks for";
+}
+
 }  // namespace
 }  // namespace covary::lab
