@@ -194,7 +194,7 @@ class Time(RenderTest):
             with self.subTest(estimator):
                 limit, more_than_the_first_samples = 1, False
                 while not more_than_the_first_samples:
-                    facts = self.timed(limit, estimator, *arguments, resolution="200x150")
+                    facts = self.timed(limit, estimator, *arguments, resolution="120x90")
                     seconds = facts["seconds"]
                     more_than_the_first_samples = facts["samples_per_pixel"] > 2 * sum(p["groups"] for p in facts["passes"])
                     limit *= 2
