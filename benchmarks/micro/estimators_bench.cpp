@@ -111,7 +111,7 @@ void one_feedback(benchmark::State& state) {
   const EstimatorResult before = iicv(in.crn, in.pt, options);
   for (auto _ : state) {
     Image estimate = before.estimate;
-    add_feedback(in.h.mean, FeedbackOptions(), in.valid, before.std_error, estimate);
+    add_feedback(in.h, FeedbackOptions(), in.valid, before.std_error, estimate);
     benchmark::DoNotOptimize(estimate.data.data());
   }
   count(state);

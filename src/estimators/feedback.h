@@ -5,9 +5,13 @@
 // ones. The bias E[h - F^] varies slowly over the image, so that a wide mean of h - F^ over pixels like the target is
 // nearly free of noise, and F^, which has little noise, tells which pixels are alike:
 //
-//     F^'_i = F^_i + sum_j w_ij (h_j - F^_j) / sum_j w_ij,   w_ij = exp(-||F^_j - F^_i||^2 / (kappa^2 s_i^2)),
+//     r_i(kappa) = sum_j w_ij (h_j - F^_j) / sum_j w_ij,   w_ij = exp(-||F^_j - F^_i||^2 / (kappa^2 s_i^2)),
 //
-// s_i^2: estimated variance of F^_i, summed over RGB (Eq. (8) of the estimator).
+// s_i^2: estimated variance of F^_i, summed over RGB (Eq. (8) of the estimator). A small kappa leaves the least bias, but where
+// few pixels are alike, its mean is noisy. So two are mixed by the noise v_i of the first, summed over RGB:
+//
+//     F^'_i = F^_i + a_i r_i(kappa) + (1 - a_i) r_i(3 kappa),
+//     a_i = 0.3 s_i^2 / (0.3 s_i^2 + v_i),   v_i = sum_j w_ij^2 var h_j / (sum_j w_ij)^2.
 #pragma once
 
 #include "estimators/planes.h"
@@ -18,14 +22,14 @@ struct FeedbackOptions {
   /// Side of the window; odd, 5 … 125. Default 41 (measured; 61 gains less than 1 %, 21 loses 3 %).
   int window = 41;
   /// kappa: pixels that differ by so many standard errors of the estimate have weight 1 / e; > 0. Less leaves less bias and
-  /// more noise. Default 2.5 (measured, docs/methods/iicv.md: a fifth to a half less squared bias than 8 at 2 % more error).
-  float bandwidth = 2.5f;
+  /// more noise. Default 1.75 (measured, docs/methods/iicv.md).
+  float bandwidth = 1.75f;
 };
 
-/// Adds the feedback to `estimate`, whose standard error is `std_error`. `h`: 3 planes, mean of the PT image. The sums run over cells of 2 x 2 pixels (means of
-/// F^ and of h - F^), aligned with even coordinates. Pixels with 0 in
+/// Adds the feedback to `estimate`, whose standard error is `std_error`. `h`: mean of the PT image and its variance. The sums
+/// run over cells of 2 x 2 pixels (mean of F^, sums of h - F^ and of var h), aligned with even coordinates. Pixels with 0 in
 /// `valid` are left out and left alone.
-void add_feedback(const Planes& h, const FeedbackOptions& options, const std::vector<unsigned char>& valid,
+void add_feedback(const Moments& h, const FeedbackOptions& options, const std::vector<unsigned char>& valid,
                   const Image& std_error, Image& estimate);
 
 }  // namespace covary

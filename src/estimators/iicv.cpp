@@ -105,7 +105,7 @@ EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& pt, const Iicv
     apply_control_variates(input, settings, valid, result);
   }
   if (options.feedback) {
-    add_feedback(h.mean, options.feedback_options, valid, result.std_error, result.estimate);
+    add_feedback(h, options.feedback_options, valid, result.std_error, result.estimate);
     if (!options.std_error) result.std_error = Image();
   }
   fill_invalid(crn, pt, valid, result.estimate);
