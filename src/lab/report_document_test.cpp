@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <limits>
 #include <sstream>
@@ -125,6 +126,27 @@ TEST(ReportTables, PlotsShowPositiveErrorsAndSayWhatTheyShow) {
   EXPECT_EQ(plot["series"][1]["y"], (Json{0.1})) << "a negative error has no place on it";
   EXPECT_TRUE(contains(plot["alt"], "pt: 0.4 to 0.2"));
   EXPECT_TRUE(convergence_plot(Results{.suite = results.suite}, 0).is_null());
+}
+
+TEST(ReportTables, FrontHasMethodsOfAllScenes) {
+  Results results = three_cells();
+  EXPECT_TRUE(front_plot(results, 0).is_null()) << "one seed tells no bias";
+  results.cells.push_back(cell_of(1, 1, 0, 0.1));
+  const double gains[] = {1, 4, 1, 1}, biases[] = {0, 0.02, 0, 0.03};
+  for (size_t i = 0; i < 4; ++i) {
+    Cell& cell = results.cells[i];
+    cell.equal_sample = {gains[i], 0, gains[i], gains[i]};
+    cell.split.relative.squared_bias = {biases[i], 0.01, biases[i] - 0.01, biases[i] + 0.01};
+  }
+  const Json plot = front_plot(results, 0);
+  ASSERT_EQ(plot["series"].size(), 2u);
+  const Json& iicv = plot["series"][1];
+  EXPECT_DOUBLE_EQ(iicv["x"][0], 0.5) << "geometric mean of 1/4 and 1";
+  EXPECT_DOUBLE_EQ(iicv["y"][0], 0.25) << "mean of 20 % and 30 %";
+  EXPECT_NEAR(iicv["high"][0].get<double>() - iicv["y"][0].get<double>(), std::sqrt(2) * 0.1 / 2, 1e-12);
+  EXPECT_TRUE(contains(plot["alt"], "iicv: 0.5, 25 %"));
+  results.cells.pop_back();
+  EXPECT_EQ(front_plot(results, 0)["series"].size(), 1u) << "a method that lacks a scene";
 }
 
 TEST(ReportDocument, SectionsWithoutBlocksAreLeftOut) {

@@ -257,6 +257,9 @@ Json time_plot(const Results& results, size_t scene) {
 
 Json front_plot(const Results& results, size_t budget) {
   const Suite& suite = results.suite;
+  const auto n_scenes = std::count_if(results.cells.begin(), results.cells.end(), [&](const Cell& cell) {
+    return cell.budget == budget && suite.methods[cell.method].name == suite.baseline;
+  });
   Json series = Json::array();
   std::string alt;
   for (size_t m = 0; m < suite.methods.size(); ++m) {
@@ -272,7 +275,8 @@ Json front_plot(const Results& results, size_t budget) {
       const double width = (split.squared_bias.high - split.squared_bias.low) / 2 / split.error.value;
       square += width * width;  // not a number with two seeds, which give no interval
     }
-    if (gains.size() != results.scenes.size()) continue;  // means over other scenes do not compare
+    // Means over fewer scenes do not compare.
+    if (gains.empty() || static_cast<ptrdiff_t>(gains.size()) < n_scenes) continue;
     const auto n = static_cast<double>(gains.size());
     const double error = 1 / geometric_mean(gains).value;
     share /= n;
