@@ -128,7 +128,7 @@ void add_estimator_options(CLI::App& command, EstimatorOptions& o) {
       ->transform(CLI::CheckedTransformer(on_off).description(""))
       ->type_name("on|off");
   add(command.add_option("--feedback-window", o.feedback_window, "Side of the feedback's window; default 41"));
-  add(command.add_option("--feedback-bandwidth", o.feedback_bandwidth, "Bandwidth in standard errors; default 1.75"));
+  add(command.add_option("--feedback-bandwidth", o.feedback_bandwidth, "Bandwidth in standard errors; default 1.25"));
 }
 
 void check_estimator_options(const EstimatorOptions& o) {

@@ -13,35 +13,28 @@ using namespace lanes;
 namespace {
 
 constexpr int kGuide = 0, kResidual = 3, kCount = 6, kVariance = 7, kPlanes = 8;
+/// Side of the cells of the wide mean.
 constexpr int kCell = 2;
+/// Bandwidth of the wide mean over that of the narrow one.
+constexpr float kWidening = 4;
 /// Variance of the narrow mean, relative to that of the estimate, at which both means count equally. 0.1 to 3 trade bias for
 /// error, slowly (docs/methods/iicv.md).
 constexpr float kNoise = 0.3f;
-/// Bandwidth of the wide mean over that of the narrow one.
-constexpr float kWidening = 3;
 
-/// The weight with the narrow bandwidth for a weight with the wide one: its power of kWidening^2. Small weights are left
-/// out before their powers lose precision.
-vfloat to_narrow(vfloat wide_weight) {
-  const vfloat w = wide_weight > splat(1e-4f) ? wide_weight : vfloat{};
-  const vfloat w2 = w * w, w4 = w2 * w2;
-  return w4 * w4 * w;
-}
-
-/// Cells of 2 x 2 pixels, one row of cells per row, repeated horizontally so that column x holds the cell of pixel x:
+/// Cells of side x side pixels, one row of cells per row, repeated horizontally so that column x holds the cell of pixel x:
 /// mean of F^ (kFar for cells without valid pixels), sums of h - F^ and of var h (over RGB), number of valid pixels.
-Planes make_cells(const Moments& h, const std::vector<unsigned char>& valid, const Image& f, int border) {
-  const int width = f.width, height = f.height, cell_rows = (height + kCell - 1) / kCell;
+Planes make_cells(int side, const Moments& h, const std::vector<unsigned char>& valid, const Image& f, int border) {
+  const int width = f.width, height = f.height, cell_rows = (height + side - 1) / side;
   Planes cells(width, cell_rows, kPlanes, border, 0.0f);
   for (int c = 0; c < 3; ++c)
     for (int row = -border; row < cell_rows + border; ++row)
       std::fill_n(cells.row(kGuide + c, row) - border, cells.stride(), kFar);
   tbb::parallel_for(0, cell_rows, [&](int row) {
-    const int y0 = kCell * row, y1 = std::min(height, y0 + kCell);
-    for (int x0 = 0; x0 < width; x0 += kCell) {
+    const int y0 = side * row, y1 = std::min(height, y0 + side);
+    for (int x0 = 0; x0 < width; x0 += side) {
       float guide[3] = {}, residual[3] = {}, variance = 0, count = 0;
       for (int y = y0; y < y1; ++y)
-        for (int x = x0; x < std::min(width, x0 + kCell); ++x) {
+        for (int x = x0; x < std::min(width, x0 + side); ++x) {
           if (!valid[static_cast<size_t>(y) * width + x]) continue;
           count += 1;
           for (int c = 0; c < 3; ++c) {
@@ -52,7 +45,7 @@ Planes make_cells(const Moments& h, const std::vector<unsigned char>& valid, con
         }
       if (count == 0) continue;
       // Beyond the last column, too: from odd columns, a cell is read at its odd column.
-      for (int x = x0; x < x0 + kCell; ++x) {
+      for (int x = x0; x < x0 + side; ++x) {
         for (int c = 0; c < 3; ++c) {
           cells.row(kGuide + c, row)[x] = guide[c] / count;
           cells.row(kResidual + c, row)[x] = residual[c];
@@ -65,24 +58,46 @@ Planes make_cells(const Moments& h, const std::vector<unsigned char>& valid, con
   return cells;
 }
 
-/// Weighted sums of residuals.
-struct Sums {
-  vfloat weights = {}, residuals[3] = {};
+/// Weighted mean of residuals around kLanes pixels.
+struct GuidedMean {
+  vfloat weights = {}, residuals[3] = {}, squares = {};  ///< squares: sum of w^2 var h
   /// Where nothing is alike, there is nothing to give back.
-  vfloat mean(int c) const { return residuals[c] / max(weights, splat(1e-20f)); }
+  vfloat value(int c) const { return residuals[c] / max(weights, splat(1e-20f)); }
 };
+
+/// r of feedback.h at the pixels (x + lane, y) with values f, over (2 radius + 1)^2 cells.
+GuidedMean guided_mean(const Planes& cells, int side, int radius, int x, int y, const vfloat* f,
+                       vfloat squared_bandwidth) {
+  const vfloat factor = -1.0f / max(squared_bandwidth, splat(1e-30f));
+  const int row = y / side, reach = radius * side;
+  GuidedMean mean;
+  for (int dy = -radius; dy <= radius; ++dy) {
+    const float* p[kPlanes];
+    for (int i = 0; i < kPlanes; ++i) p[i] = cells.row(i, row + dy) + x;
+    for (int dx = -reach; dx <= reach; dx += side) {
+      const vfloat d0 = load(p[kGuide] + dx) - f[0], d1 = load(p[kGuide + 1] + dx) - f[1],
+                   d2 = load(p[kGuide + 2] + dx) - f[2];
+      const vfloat w = exp_of_nonpositive((d0 * d0 + d1 * d1 + d2 * d2) * factor);
+      mean.weights += w * load(p[kCount] + dx);
+      mean.squares += w * w * load(p[kVariance] + dx);
+      for (int c = 0; c < 3; ++c) mean.residuals[c] += w * load(p[kResidual + c] + dx);
+    }
+  }
+  return mean;
+}
 
 }  // namespace
 
 void add_feedback(const Moments& h, const FeedbackOptions& options, const std::vector<unsigned char>& valid,
                   const Image& std_error, Image& estimate) {
   const int width = estimate.width, height = estimate.height;
-  // The window's radius in cells, and in pixels for the columns, which are repeated.
-  const int radius = options.window / 2 / kCell, reach = radius * kCell;
-  const Planes cells = make_cells(h, valid, estimate, reach);
+  const int wide_radius = options.window / 2 / kCell, narrow_radius = options.window / 4;
+  const Planes cells = make_cells(kCell, h, valid, estimate, wide_radius * kCell);
+  const Planes pixels = make_cells(1, h, valid, estimate, narrow_radius);
+  const float narrow_factor = options.bandwidth * options.bandwidth,
+              wide_factor = narrow_factor * kWidening * kWidening;
   tbb::parallel_for(tbb::blocked_range<int>(0, height, 4), [&](const tbb::blocked_range<int>& rows) {
     for (int y = rows.begin(); y < rows.end(); ++y) {
-      const int row = y / kCell;
       for (int x = 0; x < width; x += kLanes) {
         vfloat f[3], variance = {};
         for (int c = 0; c < 3; ++c) {
@@ -93,34 +108,14 @@ void add_feedback(const Moments& h, const FeedbackOptions& options, const std::v
           }
           variance += error * error;
         }
-        const float widest = options.bandwidth * kWidening;
-        const vfloat inverse_bandwidth = -1.0f / max(variance * (widest * widest), splat(1e-30f));
-        Sums wide, narrow;
-        vfloat noise = {};
-        for (int dy = -radius; dy <= radius; ++dy) {
-          const float* p[kPlanes];
-          for (int i = 0; i < kPlanes; ++i) p[i] = cells.row(i, row + dy) + x;
-          for (int dx = -reach; dx <= reach; dx += kCell) {
-            const vfloat d0 = load(p[kGuide] + dx) - f[0], d1 = load(p[kGuide + 1] + dx) - f[1],
-                         d2 = load(p[kGuide + 2] + dx) - f[2];
-            const vfloat w = exp_of_nonpositive((d0 * d0 + d1 * d1 + d2 * d2) * inverse_bandwidth), n = to_narrow(w);
-            const vfloat count = load(p[kCount] + dx);
-            wide.weights += w * count;
-            narrow.weights += n * count;
-            noise += n * n * load(p[kVariance] + dx);
-            for (int c = 0; c < 3; ++c) {
-              const vfloat residual = load(p[kResidual + c] + dx);
-              wide.residuals[c] += w * residual;
-              narrow.residuals[c] += n * residual;
-            }
-          }
-        }
+        const GuidedMean narrow = guided_mean(pixels, 1, narrow_radius, x, y, f, variance * narrow_factor);
+        const GuidedMean wide = guided_mean(cells, kCell, wide_radius, x, y, f, variance * wide_factor);
         // Without weights, or beyond the range of floats, the wide mean alone.
         const vfloat tolerated = kNoise * variance * narrow.weights * narrow.weights;
-        const vfloat excess = (noise + splat(1e-30f)) / max(tolerated, splat(1e-37f));
+        const vfloat excess = (narrow.squares + splat(1e-30f)) / max(tolerated, splat(1e-37f));
         const vfloat share = excess >= 0.0f ? 1 / (1 + excess) : vfloat{};
         for (int c = 0; c < 3; ++c) {
-          const vfloat feedback = share * narrow.mean(c) + (1 - share) * wide.mean(c);
+          const vfloat feedback = share * narrow.value(c) + (1 - share) * wide.value(c);
           for (int l = 0; l < std::min(kLanes, width - x); ++l)
             if (valid[static_cast<size_t>(y) * width + x + l]) estimate.pixel(x + l, y)[c] += feedback[l];
         }

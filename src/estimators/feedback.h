@@ -10,8 +10,10 @@
 // s_i^2: estimated variance of F^_i, summed over RGB (Eq. (8) of the estimator). A small kappa leaves the least bias, but where
 // few pixels are alike, its mean is noisy. So two are mixed by the noise v_i of the first, summed over RGB:
 //
-//     F^'_i = F^_i + a_i r_i(kappa) + (1 - a_i) r_i(3 kappa),
+//     F^'_i = F^_i + a_i r_i(kappa) + (1 - a_i) r_i(4 kappa),
 //     a_i = 0.3 s_i^2 / (0.3 s_i^2 + v_i),   v_i = sum_j w_ij^2 var h_j / (sum_j w_ij)^2.
+//
+// The first runs over the pixels of half the window, the second over cells of 2 x 2 pixels of the whole one.
 #pragma once
 
 #include "estimators/planes.h"
@@ -19,16 +21,16 @@
 namespace covary {
 
 struct FeedbackOptions {
-  /// Side of the window; odd, 5 … 125. Default 41 (measured; 61 gains less than 1 %, 21 loses 3 %).
+  /// Side of the window of the wide mean; odd, 5 … 125. Default 41 (measured; 61 gains less than 1 %, 21 loses 3 %).
   int window = 41;
   /// kappa: pixels that differ by so many standard errors of the estimate have weight 1 / e; > 0. Less leaves less bias and
-  /// more noise. Default 1.75 (measured, docs/methods/iicv.md).
-  float bandwidth = 1.75f;
+  /// more noise. Default 1.25 (measured, docs/methods/iicv.md).
+  float bandwidth = 1.25f;
 };
 
-/// Adds the feedback to `estimate`, whose standard error is `std_error`. `h`: mean of the PT image and its variance. The sums
-/// run over cells of 2 x 2 pixels (mean of F^, sums of h - F^ and of var h), aligned with even coordinates. Pixels with 0 in
-/// `valid` are left out and left alone.
+/// Adds the feedback to `estimate`, whose standard error is `std_error`. `h`: mean of the PT image and its variance. Cells
+/// (mean of F^, sums of h - F^ and of var h) are aligned with even coordinates. Pixels with 0 in `valid` are left out and left
+/// alone.
 void add_feedback(const Moments& h, const FeedbackOptions& options, const std::vector<unsigned char>& valid,
                   const Image& std_error, Image& estimate);
 

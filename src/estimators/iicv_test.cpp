@@ -116,7 +116,7 @@ TEST(Iicv, DefaultsAgreeWithTheReference) {
         estimate.push_back(r.estimate);
         std_error.push_back(r.std_error);
       }
-    estimate = reference::feedback(estimate, std_error, h, variance, width, height, 41, 1.75);
+    estimate = reference::feedback(estimate, std_error, h, variance, width, height, 41, 1.25);
     for (int y = 0; y < height; ++y)
       for (int x = 0; x < width; ++x) {
         const Rgb noise = reference::variance_of_mean(crn_view, x, y);
