@@ -106,11 +106,12 @@ EstimatorResult estimate(const PairEstimator& estimator, const GroupedFile& file
     bands.read(0, height);
     return estimator.apply(bands.crn(), bands.pt());
   }
-  // Bands begin at even rows, because the feedback works on cells of two rows.
-  const int step = std::max(16, bands.rows() - 2 * estimator.reach) / 2 * 2;
+  // Bands begin at multiples of a cell of the feedback.
+  const int step = std::max(16, bands.rows() - 2 * estimator.reach) / kFeedbackCell * kFeedbackCell;
   EstimatorResult whole;
   for (int y = 0; y < height; y += step) {
-    const int first = std::max(0, y - estimator.reach) / 2 * 2, last = std::min(height, y + step + estimator.reach);
+    const int first = std::max(0, y - estimator.reach) / kFeedbackCell * kFeedbackCell,
+              last = std::min(height, y + step + estimator.reach);
     bands.read(first, last - first);
     const EstimatorResult part = estimator.apply(bands.crn(), bands.pt());
     // Counts pixels in the overlap of two bands twice; a number above zero is what matters.
@@ -152,7 +153,8 @@ nlohmann::ordered_json explain(const CombineOptions& o, const PairEstimator& est
                                Bands& bands) {
   const CropWindow& window = crn.place().window;
   const int x = o.explain[0] - window.x, y = o.explain[1] - window.y;
-  const int first = std::max(0, y - estimator.reach) / 2 * 2, last = std::min(window.height, y + estimator.reach + 1);
+  const int first = std::max(0, y - estimator.reach) / kFeedbackCell * kFeedbackCell,
+            last = std::min(window.height, y + estimator.reach + 1);
   bands.read(first, last - first);
   const auto mean = [&](const GroupedImage& image, int px, int py) {
     std::array<double, 3> sum{};

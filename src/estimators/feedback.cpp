@@ -5,6 +5,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 
 namespace covary {
 
@@ -15,8 +16,8 @@ namespace {
 constexpr int kGuide = 0, kResidual = 3, kCount = 6, kVariance = 7, kPlanes = 8;
 /// Side of the cells of the wide mean.
 constexpr int kCell = 2;
-/// Bandwidth of the wide mean over that of the narrow one.
-constexpr float kWidening = 4;
+/// Bandwidths of the wide mean and of the second feedback over that of the narrow mean.
+constexpr float kWidening = 4, kSecondWidening = 12;
 /// Variance of the narrow mean, relative to that of the estimate, at which both means count equally. 0.1 to 3 trade bias for
 /// error, slowly (docs/methods/iicv.md).
 constexpr float kNoise = 0.3f;
@@ -86,18 +87,14 @@ GuidedMean guided_mean(const Planes& cells, int side, int radius, int x, int y, 
   return mean;
 }
 
-}  // namespace
-
-void add_feedback(const Moments& h, const FeedbackOptions& options, const std::vector<unsigned char>& valid,
-                  const Image& std_error, Image& estimate) {
-  const int width = estimate.width, height = estimate.height;
-  const int wide_radius = options.window / 2 / kCell, narrow_radius = options.window / 4;
-  const Planes cells = make_cells(kCell, h, valid, estimate, wide_radius * kCell);
-  const Planes pixels = make_cells(1, h, valid, estimate, narrow_radius);
-  const float narrow_factor = options.bandwidth * options.bandwidth,
-              wide_factor = narrow_factor * kWidening * kWidening;
-  tbb::parallel_for(tbb::blocked_range<int>(0, height, 4), [&](const tbb::blocked_range<int>& rows) {
-    for (int y = rows.begin(); y < rows.end(); ++y) {
+/// Adds to each valid pixel what `feedback(x, y, f, variance)` gives, three vfloats for the pixels (x + lane, y) whose values
+/// are f and whose squared standard errors, summed over RGB, are `variance`.
+template <typename Feedback>
+void add_everywhere(const std::vector<unsigned char>& valid, const Image& std_error, const Feedback& feedback,
+                    Image& estimate) {
+  const int width = estimate.width;
+  tbb::parallel_for(tbb::blocked_range<int>(0, estimate.height, 4), [&](const tbb::blocked_range<int>& rows) {
+    for (int y = rows.begin(); y < rows.end(); ++y)
       for (int x = 0; x < width; x += kLanes) {
         vfloat f[3], variance = {};
         for (int c = 0; c < 3; ++c) {
@@ -108,20 +105,45 @@ void add_feedback(const Moments& h, const FeedbackOptions& options, const std::v
           }
           variance += error * error;
         }
-        const GuidedMean narrow = guided_mean(pixels, 1, narrow_radius, x, y, f, variance * narrow_factor);
-        const GuidedMean wide = guided_mean(cells, kCell, wide_radius, x, y, f, variance * wide_factor);
-        // Without weights, or beyond the range of floats, the wide mean alone.
-        const vfloat tolerated = kNoise * variance * narrow.weights * narrow.weights;
-        const vfloat excess = (narrow.squares + splat(1e-30f)) / max(tolerated, splat(1e-37f));
-        const vfloat share = excess >= 0.0f ? 1 / (1 + excess) : vfloat{};
-        for (int c = 0; c < 3; ++c) {
-          const vfloat feedback = share * narrow.value(c) + (1 - share) * wide.value(c);
-          for (int l = 0; l < std::min(kLanes, width - x); ++l)
-            if (valid[static_cast<size_t>(y) * width + x + l]) estimate.pixel(x + l, y)[c] += feedback[l];
-        }
+        const std::array<vfloat, 3> added = feedback(x, y, f, variance);
+        for (int l = 0; l < std::min(kLanes, width - x); ++l)
+          if (valid[static_cast<size_t>(y) * width + x + l])
+            for (int c = 0; c < 3; ++c) estimate.pixel(x + l, y)[c] += added[c][l];
       }
-    }
   });
+}
+
+}  // namespace
+
+void add_feedback(const Moments& h, const FeedbackOptions& options, const std::vector<unsigned char>& valid,
+                  const Image& std_error, Image& estimate) {
+  const float bandwidth = options.bandwidth * options.bandwidth;
+  {
+    const int wide_radius = options.window / 2 / kCell, narrow_radius = options.window / 4;
+    const Planes cells = make_cells(kCell, h, valid, estimate, wide_radius * kCell);
+    const Planes pixels = make_cells(1, h, valid, estimate, narrow_radius);
+    const auto mixed = [&](int x, int y, const vfloat* f, vfloat variance) {
+      const GuidedMean narrow = guided_mean(pixels, 1, narrow_radius, x, y, f, variance * bandwidth);
+      const GuidedMean wide =
+          guided_mean(cells, kCell, wide_radius, x, y, f, variance * (bandwidth * kWidening * kWidening));
+      // Without weights, or beyond the range of floats, the wide mean alone.
+      const vfloat tolerated = kNoise * variance * narrow.weights * narrow.weights;
+      const vfloat excess = (narrow.squares + splat(1e-30f)) / max(tolerated, splat(1e-37f));
+      const vfloat share = excess >= 0.0f ? 1 / (1 + excess) : vfloat{};
+      std::array<vfloat, 3> result;
+      for (int c = 0; c < 3; ++c) result[c] = share * narrow.value(c) + (1 - share) * wide.value(c);
+      return result;
+    };
+    add_everywhere(valid, std_error, mixed, estimate);
+  }
+  const int radius = options.window / 2 / kFeedbackCell;
+  const Planes cells = make_cells(kFeedbackCell, h, valid, estimate, radius * kFeedbackCell);
+  const auto second = [&](int x, int y, const vfloat* f, vfloat variance) {
+    const GuidedMean mean =
+        guided_mean(cells, kFeedbackCell, radius, x, y, f, variance * (bandwidth * kSecondWidening * kSecondWidening));
+    return std::array<vfloat, 3>{mean.value(0), mean.value(1), mean.value(2)};
+  };
+  add_everywhere(valid, std_error, second, estimate);
 }
 
 }  // namespace covary

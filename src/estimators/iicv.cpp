@@ -114,7 +114,7 @@ EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& pt, const Iicv
 
 int iicv_reach(const IicvOptions& options) {
   const int pilot = options.pilot_window / 2 * (options.penalty == Penalty::kSmoothed ? 2 : 1);
-  const int feedback = options.feedback ? options.feedback_options.window / 2 + 1 : 0;
+  const int feedback = options.feedback ? feedback_reach(options.feedback_options) : 0;
   return options.window / 2 + pilot + feedback;
 }
 

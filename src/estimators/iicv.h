@@ -73,8 +73,8 @@ struct IicvOptions {
 /// threads.
 EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& pt, const IicvOptions& options = {});
 
-/// How far from a pixel, in rows or columns, the input can influence it. A part of an image that begins at an even row and
-/// column gives, farther than this from its cut edges, the bits of the whole image.
+/// How far from a pixel, in rows or columns, the input can influence it. A part of an image that begins at a row and column
+/// that are multiples of kFeedbackCell gives, farther than this from its cut edges, the bits of the whole image.
 int iicv_reach(const IicvOptions& options);
 
 }  // namespace covary

@@ -221,7 +221,7 @@ TEST(Iicv, BandsGiveTheSameBits) {
   const EstimatorResult whole = iicv(crn.view(), pt.view(), options);
   const int reach = iicv_reach(options);
   for (int y0 = 0; y0 < 140; y0 += 34) {
-    const int first = std::max(0, (y0 - reach) / 2 * 2), last = std::min(140, y0 + 34 + reach);
+    const int first = std::max(0, (y0 - reach) / kFeedbackCell * kFeedbackCell), last = std::min(140, y0 + 34 + reach);
     const auto band = [&](const GroupedImage& image) {
       return GroupedImage{50, last - first, 6, image.pixel(0, first)};
     };
@@ -268,7 +268,7 @@ TEST(Iicv, WithAnExactPtImageIsThePtImage) {
 /// Bits do not depend on the number of threads, nor on where a pixel lies in a tile or vector: inside a crop, farther
 /// than the windows reach from its border, they are those of the whole image.
 TEST(Iicv, BitsDoNotDependOnThreadsTilesOrCrops) {
-  const test::Grouped crn = test::crn_image(150, 90, 6, 3), pt = test::pt_image(150, 90, 6, 4);
+  const test::Grouped crn = test::crn_image(150, 120, 6, 3), pt = test::pt_image(150, 120, 6, 4);
   IicvOptions options;
   options.std_error = true;
   options.penalty = Penalty::kSmoothed;
@@ -284,7 +284,7 @@ TEST(Iicv, BitsDoNotDependOnThreadsTilesOrCrops) {
     EXPECT_EQ(one.std_error.data, more.std_error.data);
   }
 
-  const int x0 = 12, y0 = 8, width = 101, height = 60;  // feedback cells begin at even coordinates
+  const int x0 = 12, y0 = 8, width = 101, height = 90;  // multiples of kFeedbackCell
   const auto crop = [&](const test::Grouped& image) {
     test::Grouped part = test::constant_image(width, height, image.groups, 0);
     for (int y = 0; y < height; ++y)

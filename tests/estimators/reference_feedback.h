@@ -38,21 +38,30 @@ inline GuidedMean guided_mean(const RgbImage& estimate, const RgbImage& h, const
   return {{sum[0] / weights, sum[1] / weights, sum[2] / weights}, squares / (weights * weights)};
 }
 
-/// F^ + means of h - F^ with bandwidths kappa and 4 kappa.
+/// Twice F^ + means of h - F^: first with bandwidths kappa and 4 kappa, then with 12 kappa.
 inline RgbImage feedback(const RgbImage& estimate, const RgbImage& std_error, const RgbImage& h,
                          const RgbImage& variance_of_h, int width, int height, int window, double kappa) {
-  RgbImage result = estimate;
+  RgbImage first = estimate;
+  const auto mean = [&](const RgbImage& f, int x, int y, int side, int radius, double bandwidth) {
+    const double variance = distance2(std_error[static_cast<size_t>(y) * width + x], {0, 0, 0});
+    return guided_mean(f, h, variance_of_h, width, height, x, y, side, radius, bandwidth * bandwidth * variance);
+  };
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
       const size_t p = static_cast<size_t>(y) * width + x;
-      const double variance = distance2(std_error[p], {0, 0, 0}), bandwidth = kappa * kappa * variance;
-      const GuidedMean narrow = guided_mean(estimate, h, variance_of_h, width, height, x, y, 1, window / 4, bandwidth);
-      const GuidedMean wide =
-          guided_mean(estimate, h, variance_of_h, width, height, x, y, 2, window / 4, 16 * bandwidth);
+      const double variance = distance2(std_error[p], {0, 0, 0});
+      const GuidedMean narrow = mean(estimate, x, y, 1, window / 4, kappa);
+      const GuidedMean wide = mean(estimate, x, y, 2, window / 4, 4 * kappa);
       const double share = 0.3 * variance / (0.3 * variance + narrow.variance);
-      for (int c = 0; c < 3; ++c) result[p][c] += share * narrow.value[c] + (1 - share) * wide.value[c];
+      for (int c = 0; c < 3; ++c) first[p][c] += share * narrow.value[c] + (1 - share) * wide.value[c];
     }
-  return result;
+  RgbImage second = first;
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      const GuidedMean again = mean(first, x, y, 4, window / 8, 12 * kappa);
+      for (int c = 0; c < 3; ++c) second[static_cast<size_t>(y) * width + x][c] += again.value[c];
+    }
+  return second;
 }
 
 }  // namespace covary::reference
