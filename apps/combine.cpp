@@ -4,7 +4,6 @@
 
 #include <tbb/global_control.h>
 #include <algorithm>
-#include <array>
 #include <cstdio>
 #include <functional>
 #include <memory>
@@ -17,6 +16,7 @@
 #include "estimator_options.h"
 #include "estimators/grouped_file.h"
 #include "estimators/input_doctor.h"
+#include "estimators/mean.h"
 #include "estimators/result_file.h"
 #include "film/output_file.h"
 
@@ -81,6 +81,13 @@ class Bands {
     first_ = first;
     n_ = n;
   }
+  /// Reads the rows first … last - 1 with `reach` more on both sides, beginning at a multiple of a cell of the feedback, so that
+  /// bands give the bits of the whole. Returns the row that the band begins with.
+  int read_around(int first, int last, int reach) {
+    const int begin = std::max(0, first - reach) / kFeedbackCell * kFeedbackCell;
+    read(begin, std::min(crn_.height(), last + reach) - begin);
+    return begin;
+  }
   GroupedImage crn() const { return {crn_.width(), n_, crn_.groups(), crn_data_.data()}; }
   GroupedImage pt() const { return {pt_.width(), n_, pt_.groups(), pt_data_.data()}; }
 
@@ -106,13 +113,10 @@ EstimatorResult estimate(const PairEstimator& estimator, const GroupedFile& file
     bands.read(0, height);
     return estimator.apply(bands.crn(), bands.pt());
   }
-  // Bands begin at multiples of a cell of the feedback.
   const int step = std::max(16, bands.rows() - 2 * estimator.reach) / kFeedbackCell * kFeedbackCell;
   EstimatorResult whole;
   for (int y = 0; y < height; y += step) {
-    const int first = std::max(0, y - estimator.reach) / kFeedbackCell * kFeedbackCell,
-              last = std::min(height, y + step + estimator.reach);
-    bands.read(first, last - first);
+    const int first = bands.read_around(y, y + step, estimator.reach);
     const EstimatorResult part = estimator.apply(bands.crn(), bands.pt());
     // Counts pixels in the overlap of two bands twice; a number above zero is what matters.
     whole.nonfinite_pixels += part.nonfinite_pixels;
@@ -153,14 +157,9 @@ nlohmann::ordered_json explain(const CombineOptions& o, const PairEstimator& est
                                Bands& bands) {
   const CropWindow& window = crn.place().window;
   const int x = o.explain[0] - window.x, y = o.explain[1] - window.y;
-  const int first = std::max(0, y - estimator.reach) / kFeedbackCell * kFeedbackCell,
-            last = std::min(window.height, y + estimator.reach + 1);
-  bands.read(first, last - first);
+  const int first = bands.read_around(y, y + 1, estimator.reach);
   const auto mean = [&](const GroupedImage& image, int px, int py) {
-    std::array<double, 3> sum{};
-    for (int t = 0; t < image.groups; ++t)
-      for (int c = 0; c < 3; ++c) sum[c] += image.pixel(px, py)[3 * t + c] / image.groups;
-    return sum;
+    return mean_of_groups({1, 1, image.groups, image.pixel(px, py)}).estimate.data;
   };
   const GroupedImage g = bands.crn(), h = bands.pt();
   nlohmann::ordered_json variates = nlohmann::ordered_json::array();
@@ -234,8 +233,10 @@ void combine(const CombineOptions& o) {
   write(o, crn, pt, result);
   const double write_seconds = watch.lap();
   nlohmann::ordered_json pixel;
-  if (!o.explain.empty()) pixel = explain(o, estimator, crn, bands);
-  if (!o.explain.empty() && o.json != "-") print_explanation(pixel);
+  if (!o.explain.empty()) {
+    pixel = explain(o, estimator, crn, bands);
+    if (o.json != "-") print_explanation(pixel);
+  }
 
   if (!o.quiet)
     std::fprintf(stderr, "%s: %d x %d, %s of %d + %d groups in %.2f s (read and check %.2f s, write %.2f s)\n",
@@ -258,7 +259,7 @@ void combine(const CombineOptions& o) {
         {"crn_pt", json_of(report.crn_pt)}}},
       {"mean", {{"crn", report.crn_mean}, {"pt", report.pt_mean}}},
       {"seconds", {{"read_and_check", check_seconds}, {"estimate", estimate_seconds}, {"write", write_seconds}}}};
-  if (!o.explain.empty()) json["pixel"] = pixel;
+  if (!pixel.is_null()) json["pixel"] = pixel;
   if (o.json == "-")
     std::fputs((json.dump(2) + "\n").c_str(), stdout);
   else

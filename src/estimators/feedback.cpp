@@ -45,7 +45,7 @@ Planes make_cells(int side, const Moments& h, const std::vector<unsigned char>& 
           }
         }
       if (count == 0) continue;
-      // Beyond the last column, too: from odd columns, a cell is read at its odd column.
+      // Beyond the last column, too: neighbouring cells are read a multiple of `side` from any column of a cell.
       for (int x = x0; x < x0 + side; ++x) {
         for (int c = 0; c < 3; ++c) {
           cells.row(kGuide + c, row)[x] = guide[c] / count;
