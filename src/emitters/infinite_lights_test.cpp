@@ -8,6 +8,7 @@
 
 #include "emitters/registry.h"
 #include "support/describe.h"
+#include "support/files.h"
 #include "support/light_scene.h"
 
 namespace covary {

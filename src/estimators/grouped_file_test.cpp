@@ -5,9 +5,8 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include <filesystem>
-
 #include "core/error.h"
+#include "support/files.h"
 
 namespace covary {
 namespace {
@@ -18,13 +17,6 @@ float value(int image, int x, int y, int c) { return static_cast<float>(1000 * i
 
 class GroupedFileTest : public ::testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = std::filesystem::path(::testing::TempDir()) /
-              (std::string("covary_grouped_") + ::testing::UnitTest::GetInstance()->current_test_info()->name());
-    std::filesystem::create_directories(folder_);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
   /// Writes a file whose layer i holds value(first + i, …).
   std::string write(const std::string& name, const std::vector<std::string>& layers, int first = 0,
                     std::map<std::string, std::string> attributes = {}, int width = kWidth) {
@@ -40,7 +32,7 @@ class GroupedFileTest : public ::testing::Test {
       for (size_t c = 0; c < 3; ++c)
         planes.push_back({fmt::format("{}{}{}", layers[i], layers[i].empty() ? "" : ".", "RGB"[c]),
                           ExrPlane::Type::kFloat, images[i].data() + c, 3 * sizeof(float)});
-    const std::string path = (folder_ / name).string();
+    const std::string path = folder_.file(name);
     write_exr(path, {width, kHeight, {0, 0, width, kHeight}}, attributes, planes);
     return path;
   }
@@ -65,13 +57,13 @@ class GroupedFileTest : public ::testing::Test {
       return "no error";
     } catch (const Error& e) {
       std::string text = e.what();
-      for (size_t at; (at = text.find(folder_.string() + "/")) != std::string::npos;)
-        text.erase(at, folder_.string().size() + 1);
+      for (size_t at; (at = text.find(folder_.file(""))) != std::string::npos;)
+        text.erase(at, folder_.file("").size());
       return text;
     }
   }
 
-  std::filesystem::path folder_;
+  test_support::TemporaryFolder folder_;
 };
 
 TEST_F(GroupedFileTest, ReadsLayersInTheOrderOfTheirNumbers) {
@@ -122,7 +114,7 @@ TEST_F(GroupedFileTest, SaysWhatIsWrong) {
       "b.exr: has 6 samples per pixel, the group before it 8; all groups must have the same number");
   std::vector<float> depth(kWidth * kHeight);
   const ExrPlane plane{"Z", ExrPlane::Type::kFloat, depth.data(), sizeof(float)};
-  const std::string z = (folder_ / "z.exr").string();
+  const std::string z = folder_.file("z.exr");
   write_exr(z, {kWidth, kHeight, {0, 0, kWidth, kHeight}}, {}, {&plane, 1});
   EXPECT_EQ(message({z}), "z.exr: no image of channels R, G and B; channels in it: Z");
 }

@@ -11,6 +11,7 @@
 #include "statistics/chi2.h"
 #include "support/base64.h"
 #include "support/describe.h"
+#include "support/files.h"
 #include "textures/registry.h"
 
 namespace covary {

@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "support/describe.h"
+#include "support/files.h"
 
 namespace covary {
 namespace {

@@ -68,8 +68,7 @@ TEST(Determinism, TwentyInterruptions) {
   render_pass(scene.scene(), scene.integrator(), settings, whole);
   n_tiles = tiles;
 
-  const std::string file =
-      (std::filesystem::temp_directory_path() / ("covary_resume_" + std::to_string(getpid()) + ".exr")).string();
+  const std::string file = test_support::test_file("film.exr");
   std::mt19937 random(5);
   Film film = new_film(scene, 12);
   int interruptions = 0;
@@ -85,7 +84,6 @@ TEST(Determinism, TwentyInterruptions) {
     write_film(file, film);
     film = read_film(file);
   }
-  std::filesystem::remove(file);
   EXPECT_EQ(interruptions, 20);
   EXPECT_TRUE(same_bits(film, whole));
 }

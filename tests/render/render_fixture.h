@@ -3,10 +3,8 @@
 #pragma once
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cstring>
-#include <filesystem>
 #include <fstream>
 #include <memory>
 #include <string>
@@ -14,6 +12,7 @@
 #include "integrators/integrator.h"
 #include "integrators/render_pass.h"
 #include "io/load_scene.h"
+#include "support/files.h"
 
 namespace covary {
 
@@ -26,10 +25,7 @@ struct TestScene {
 
 /// `min_depth` as on the command line.
 inline TestScene load_text(const std::string& xml, int min_depth = 0) {
-  const std::filesystem::path folder =
-      std::filesystem::temp_directory_path() / ("covary_render_test_" + std::to_string(getpid()));
-  std::filesystem::create_directories(folder);
-  const std::filesystem::path file = folder / "scene.xml";
+  const std::string file = test_support::test_file("scene.xml");
   std::ofstream(file) << xml;
   LoadOptions options;
   options.make_integrator = [&](Parameters& parameters) -> std::shared_ptr<SceneObject> {
@@ -39,9 +35,7 @@ inline TestScene load_text(const std::string& xml, int min_depth = 0) {
       if (parameters.type() == plugin.name) return plugin.make(parameters, lengths);
     return nullptr;
   };
-  TestScene result{load_scene(file.string(), options)};
-  std::filesystem::remove_all(folder);
-  return result;
+  return {load_scene(file, options)};
 }
 
 /// A scene of the given body: path integrator, box filter, camera at the origin looking along +z unless `sensor` says

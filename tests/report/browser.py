@@ -31,7 +31,8 @@ class Browser:
                    "--force-device-scale-factor=1", f"--user-data-dir={self.folder.name}/profile", "about:blank"]
         self.log = open(os.path.join(self.folder.name, "log"), "w+b")
         self.process = subprocess.Popen(["/bin/sh", "-c", f'exec "$@" 3<&{to_browser} 4>&{from_browser}', "sh", *command],
-                                        pass_fds=(to_browser, from_browser), stdout=self.log, stderr=self.log)
+                                        pass_fds=(to_browser, from_browser), stdout=self.log, stderr=self.log,
+                                        env={**os.environ, "TMPDIR": self.folder.name})
         os.close(to_browser)
         os.close(from_browser)
         self.buffer, self.next_id, self.session, self.errors = b"", 0, None, []

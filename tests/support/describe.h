@@ -83,25 +83,4 @@ Made<T> make_plugin(const Plugins& plugins, const std::string& kind, const std::
   return make_plugin<T>(plugins, kind, type, values, objects, diagnostics);
 }
 
-/// A folder of its own for the files of one test; removed with everything in it.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "covary_test_XXXXXX").string();
-    COVARY_CHECK(mkdtemp(pattern.data()) != nullptr, "no temporary folder");
-    path_ = pattern;
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  /// Path of a file in the folder.
-  std::string file(const std::string& name) const { return (path_ / name).string(); }
-
- private:
-  std::filesystem::path path_;
-};
-
 }  // namespace covary::test_support

@@ -3,10 +3,10 @@
 #pragma once
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
-#include <algorithm>
+#include <cstdlib>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 
@@ -14,15 +14,32 @@
 
 namespace covary::test_support {
 
-/// A folder that only the running test of this process uses; empty at first use.
-inline std::filesystem::path test_folder() {
-  const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-  std::string name =
-      std::string("covary_") + info->test_suite_name() + "_" + info->name() + "_" + std::to_string(getpid());
-  std::replace(name.begin(), name.end(), '/', '_');
-  const std::filesystem::path folder = std::filesystem::path(::testing::TempDir()) / name;
-  std::filesystem::create_directories(folder);
-  return folder;
+/// A new folder, removed with everything in it.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::string pattern = (std::filesystem::temp_directory_path() / "covary_test_XXXXXX").string();
+    COVARY_CHECK(mkdtemp(pattern.data()) != nullptr, "no temporary folder");
+    path_ = pattern;
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  const std::filesystem::path& path() const { return path_; }
+  /// Path of a file in the folder.
+  std::string file(const std::string& name) const { return (path_ / name).string(); }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// A folder that only the running test of this process uses; empty at first use, removed when the process ends.
+inline const std::filesystem::path& test_folder() {
+  static std::map<const ::testing::TestInfo*, TemporaryFolder> folders;
+  return folders[::testing::UnitTest::GetInstance()->current_test_info()].path();
 }
 inline std::string test_file(const std::string& name) { return (test_folder() / name).string(); }
 
