@@ -20,7 +20,7 @@ constexpr int kCell = 2;
 constexpr float kWidening = 4, kSecondWidening = 12;
 /// Variance of the narrow mean, relative to that of the estimate, at which both means count equally. 0.1 to 3 trade bias for
 /// error, slowly (docs/methods/iicv.md).
-constexpr float kNoise = 0.1f;
+constexpr float kNoise = 0.2f;
 
 /// Cells of side x side pixels, one row of cells per row, repeated horizontally so that column x holds the cell of pixel x:
 /// mean of F^ (kFar for cells without valid pixels), sums of h - F^ and of var h (over RGB), number of valid pixels.

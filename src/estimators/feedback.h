@@ -11,7 +11,7 @@
 // few pixels are alike, its mean is noisy. So two are mixed by the noise v_i of the first, summed over RGB:
 //
 //     F^'_i = F^_i + a_i r_i(kappa) + (1 - a_i) r_i(4 kappa),
-//     a_i = 0.1 s_i^2 / (0.1 s_i^2 + v_i),   v_i = sum_j w_ij^2 var h_j / (sum_j w_ij)^2.
+//     a_i = 0.2 s_i^2 / (0.2 s_i^2 + v_i),   v_i = sum_j w_ij^2 var h_j / (sum_j w_ij)^2.
 //
 // The first runs over the pixels of half the window, the second over cells of 2 x 2 pixels of the whole one. Outliers raise
 // their own guide, so that narrow means leave them out, and the image stays a little too dark. A second feedback, of F^' by

@@ -52,7 +52,7 @@ inline RgbImage feedback(const RgbImage& estimate, const RgbImage& std_error, co
       const double variance = distance2(std_error[p], {0, 0, 0});
       const GuidedMean narrow = mean(estimate, x, y, 1, window / 4, kappa);
       const GuidedMean wide = mean(estimate, x, y, 2, window / 4, 4 * kappa);
-      const double share = 0.1 * variance / (0.1 * variance + narrow.variance);
+      const double share = 0.2 * variance / (0.2 * variance + narrow.variance);
       for (int c = 0; c < 3; ++c) first[p][c] += share * narrow.value[c] + (1 - share) * wide.value[c];
     }
   RgbImage second = first;
