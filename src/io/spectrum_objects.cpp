@@ -16,8 +16,9 @@ class NoObjects final : public ObjectFactory {
 };
 
 std::vector<double> numbers(Parameters& p, const std::string& name) {
+  const std::string text = p.require_string(name);
   std::vector<double> result;
-  for (std::string_view token : split_list(p.require_string(name))) result.push_back(parse_number(token));
+  for (std::string_view token : split_list(text)) result.push_back(parse_number(token));
   return result;
 }
 

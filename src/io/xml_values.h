@@ -14,6 +14,7 @@ namespace covary {
 
 /// Splits at blanks and commas.
 std::vector<std::string_view> split_list(std::string_view text);
+std::vector<std::string_view> split_list(std::string&&) = delete;  // the parts are views of the text
 
 /// A finite number; blanks around it are ignored.
 double parse_number(std::string_view text);
