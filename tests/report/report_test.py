@@ -85,6 +85,14 @@ class Page(PageTest):
         self.assertEqual(self.page.evaluate("performance.getEntriesByType('resource').length"), 0)
         self.assertEqual(self.page.evaluate("[...document.querySelectorAll('nav a')].map(a => a.hash)"), ["#results", "#images", "#failures"])
 
+    def test_many_warnings_fold(self):
+        self.open()
+        shown = "[...document.querySelectorAll('#failures .warning li')].filter(e => e.checkVisibility()).map(e => e.innerText)"
+        self.assertEqual(self.page.evaluate(shown), [f"warning {i}" for i in range(1, 6)])
+        self.assertEqual(self.page.text("#failures .warning summary"), "3 more")
+        self.page.press("#failures .warning summary")
+        self.assertEqual(self.page.evaluate(shown), [f"warning {i}" for i in range(1, 9)])
+
     def test_table_has_intervals_marks_and_units(self):
         self.open()
         text = self.page.text(".table tbody")

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <functional>
 #include <limits>
+#include <string>
 
 #include "report/report.h"
 
@@ -121,6 +122,12 @@ Json plots() {
   return {convergence, bars};
 }
 
+Json many_warnings() {
+  Json items = Json::array();
+  for (int i = 1; i <= 8; ++i) items.push_back("warning " + std::to_string(i));
+  return {{"type", "notes"}, {"kind", "warning"}, {"items", items}};
+}
+
 Json document() {
   return {{"title", "Sample report"},
           {"subtitle", "Every kind of block </script> once"},
@@ -133,7 +140,7 @@ Json document() {
             {{"id", "images"}, {"heading", "Images"}, {"blocks", {comparer()}}},
             {{"id", "failures"},
              {"heading", "Failures"},
-             {"blocks", {{{"type", "notes"}, {"kind", "error"}, {"items", {"a scene failed"}}}, grouped_table()}}}}}};
+             {"blocks", {{{"type", "notes"}, {"kind", "error"}, {"items", {"a scene failed"}}}, many_warnings(), grouped_table()}}}}}};
 }
 
 }  // namespace

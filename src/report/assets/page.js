@@ -6,10 +6,16 @@ const store = new ImageStore(report.image_sizes);
 const comparers = [];
 set_error_colours(report.error_colours);
 
+const NOTES_SHOWN = 5;
+
+/** Errors are shown in full; of warnings and other notes the first ones, the others unfold. */
 function draw_notes(block) {
   const names = { error: "Errors", warning: "Warnings", info: "Notes" };
+  const shown = block.kind === "error" || block.items.length <= NOTES_SHOWN + 1 ? block.items.length : NOTES_SHOWN;
+  const list = (items) => el("ul", {}, items.map((item) => el("li", {}, item)));
+  const rest = block.items.slice(shown);
   return el("aside", { class: `notes ${block.kind}`, "aria-label": names[block.kind] }, el("strong", {}, names[block.kind]),
-    el("ul", {}, block.items.map((item) => el("li", {}, item))));
+    list(block.items.slice(0, shown)), rest.length ? el("details", {}, el("summary", {}, `${rest.length} more`), list(rest)) : null);
 }
 
 function draw_comparer(block) {
