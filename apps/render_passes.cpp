@@ -2,7 +2,6 @@
 #include "render_passes.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
@@ -12,6 +11,7 @@
 
 #include "commands.h"
 #include "core/error.h"
+#include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "estimators/grouped_image.h"
 #include "estimators/polynomials.h"
@@ -148,7 +148,7 @@ double samples_per_second(const RenderOptions& options, const LoadedScene& scene
     settings.seed = seed;
     std::atomic<uint64_t> n_samples{0};
     const Stopwatch watch;
-    tbb::parallel_for(0, kCells * kCells, [&](int i) {
+    parallel_for(kCells * kCells, [&](int i) {
       const int x = i % kCells * window.width / kCells, y = i / kCells * window.height / kCells;
       const int width = std::clamp(window.width / kCells, 1, kSide),
                 height = std::clamp(window.height / kCells, 1, kSide);

@@ -7,13 +7,12 @@
 // (Helmert), which have the same inner products: no centring, and systems of T - 1 instead of T rows.
 #include "estimators/control_variates.h"
 
-#include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
 
 #include <array>
 #include <cmath>
 
+#include "core/parallel.h"
 #include "estimators/batch_algebra.h"
 #include "estimators/neighbours.h"
 
@@ -393,17 +392,11 @@ void apply_control_variates(const ControlVariateInput& input, const ControlVaria
   const Regression regression(input, settings, valid, result);
   const int columns = (width + kTileWidth - 1) / kTileWidth, rows = (height + kTileHeight - 1) / kTileHeight;
   tbb::enumerable_thread_specific<Workspace> workspaces;
-  tbb::parallel_for(
-      tbb::blocked_range<int>(0, columns * rows, 1),
-      [&](const tbb::blocked_range<int>& range) {
-        Workspace& workspace = workspaces.local();
-        for (int i = range.begin(); i < range.end(); ++i) {
-          const int x0 = i % columns * kTileWidth, y0 = i / columns * kTileHeight;
-          regression.run_tile({x0, y0, std::min(x0 + kTileWidth, width), std::min(y0 + kTileHeight, height)},
-                              workspace);
-        }
-      },
-      tbb::simple_partitioner());
+  parallel_for(columns * rows, [&](int i) {
+    const int x0 = i % columns * kTileWidth, y0 = i / columns * kTileHeight;
+    regression.run_tile({x0, y0, std::min(x0 + kTileWidth, width), std::min(y0 + kTileHeight, height)},
+                        workspaces.local());
+  });
 }
 
 }  // namespace covary

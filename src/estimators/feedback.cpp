@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "estimators/feedback.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
+
+#include "core/parallel.h"
 
 namespace covary {
 
@@ -30,7 +29,7 @@ Planes make_cells(int side, const Moments& h, const std::vector<unsigned char>& 
   for (int c = 0; c < 3; ++c)
     for (int row = -border; row < cell_rows + border; ++row)
       std::fill_n(cells.row(kGuide + c, row) - border, cells.stride(), kFar);
-  tbb::parallel_for(0, cell_rows, [&](int row) {
+  parallel_for(cell_rows, [&](int row) {
     const int y0 = side * row, y1 = std::min(height, y0 + side);
     for (int x0 = 0; x0 < width; x0 += side) {
       float guide[3] = {}, residual[3] = {}, variance = 0, count = 0;
@@ -93,23 +92,22 @@ template <typename Feedback>
 void add_everywhere(const std::vector<unsigned char>& valid, const Image& std_error, const Feedback& feedback,
                     Image& estimate) {
   const int width = estimate.width;
-  tbb::parallel_for(tbb::blocked_range<int>(0, estimate.height, 4), [&](const tbb::blocked_range<int>& rows) {
-    for (int y = rows.begin(); y < rows.end(); ++y)
-      for (int x = 0; x < width; x += kLanes) {
-        vfloat f[3], variance = {};
-        for (int c = 0; c < 3; ++c) {
-          vfloat error;
-          for (int l = 0; l < kLanes; ++l) {
-            f[c][l] = estimate.pixel(std::min(x + l, width - 1), y)[c];
-            error[l] = std_error.pixel(std::min(x + l, width - 1), y)[c];
-          }
-          variance += error * error;
+  parallel_for(estimate.height, 4, [&](int y) {
+    for (int x = 0; x < width; x += kLanes) {
+      vfloat f[3], variance = {};
+      for (int c = 0; c < 3; ++c) {
+        vfloat error;
+        for (int l = 0; l < kLanes; ++l) {
+          f[c][l] = estimate.pixel(std::min(x + l, width - 1), y)[c];
+          error[l] = std_error.pixel(std::min(x + l, width - 1), y)[c];
         }
-        const std::array<vfloat, 3> added = feedback(x, y, f, variance);
-        for (int l = 0; l < std::min(kLanes, width - x); ++l)
-          if (valid[static_cast<size_t>(y) * width + x + l])
-            for (int c = 0; c < 3; ++c) estimate.pixel(x + l, y)[c] += added[c][l];
+        variance += error * error;
       }
+      const std::array<vfloat, 3> added = feedback(x, y, f, variance);
+      for (int l = 0; l < std::min(kLanes, width - x); ++l)
+        if (valid[static_cast<size_t>(y) * width + x + l])
+          for (int c = 0; c < 3; ++c) estimate.pixel(x + l, y)[c] += added[c][l];
+    }
   });
 }
 

@@ -2,11 +2,10 @@
 #include "estimators/iduw.h"
 
 #include <fmt/format.h>
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 
+#include "core/parallel.h"
 #include "estimators/planes.h"
 
 namespace covary {
@@ -77,11 +76,10 @@ class Iduw {
   std::vector<double> losses(const std::vector<float>& gammas) const {
     const int n = static_cast<int>(gammas.size());
     std::vector<double> per_row(static_cast<size_t>(height_) * n);
-    tbb::parallel_for(tbb::blocked_range<int>(0, height_, 1), [&](const tbb::blocked_range<int>& rows) {
+    parallel_for(height_, [&](int y) {
       std::vector<vfloat> sums(static_cast<size_t>(n) * 2);
-      for (int y = rows.begin(); y < rows.end(); ++y)
-        for (int x = 0; x < width_; x += kLanes)
-          for (int c = 0; c < 3; ++c) add_losses(c, x, y, gammas, sums, per_row.data() + static_cast<size_t>(y) * n);
+      for (int x = 0; x < width_; x += kLanes)
+        for (int c = 0; c < 3; ++c) add_losses(c, x, y, gammas, sums, per_row.data() + static_cast<size_t>(y) * n);
     });
     std::vector<double> total(n);
     for (int y = 0; y < height_; ++y)
@@ -90,21 +88,20 @@ class Iduw {
   }
 
   void reconstruct(float gamma, Image& result) const {
-    tbb::parallel_for(tbb::blocked_range<int>(0, height_, 1), [&](const tbb::blocked_range<int>& rows) {
-      for (int y = rows.begin(); y < rows.end(); ++y)
-        for (int x = 0; x < width_; x += kLanes)
-          for (int c = 0; c < 3; ++c) {
-            const vfloat a = load(z_half_[0].row(c, y) + x), b = load(z_half_[1].row(c, y) + x);
-            const vfloat centre = load(z_.row(c, y) + x) - load(y_.row(c, y) + x);
-            vfloat sum = {};
-            for_each_neighbour(x, y, [&](int qx, int qy) {
-              const vfloat change = (a - load(z_half_[0].row(c, qy) + qx)) - (b - load(z_half_[1].row(c, qy) + qx));
-              const vfloat weight = exp_of_nonpositive(-gamma * n_ * change * change);
-              sum += weight * (centre - (load(z_.row(c, qy) + qx) - load(y_.row(c, qy) + qx)));
-            });
-            const vfloat value = load(y_.row(c, y) + x) + normalise_ * sum;
-            for (int l = 0; l < std::min(kLanes, width_ - x); ++l) result.pixel(x + l, y)[c] = value[l];
-          }
+    parallel_for(height_, [&](int y) {
+      for (int x = 0; x < width_; x += kLanes)
+        for (int c = 0; c < 3; ++c) {
+          const vfloat a = load(z_half_[0].row(c, y) + x), b = load(z_half_[1].row(c, y) + x);
+          const vfloat centre = load(z_.row(c, y) + x) - load(y_.row(c, y) + x);
+          vfloat sum = {};
+          for_each_neighbour(x, y, [&](int qx, int qy) {
+            const vfloat change = (a - load(z_half_[0].row(c, qy) + qx)) - (b - load(z_half_[1].row(c, qy) + qx));
+            const vfloat weight = exp_of_nonpositive(-gamma * n_ * change * change);
+            sum += weight * (centre - (load(z_.row(c, qy) + qx) - load(y_.row(c, qy) + qx)));
+          });
+          const vfloat value = load(y_.row(c, y) + x) + normalise_ * sum;
+          for (int l = 0; l < std::min(kLanes, width_ - x); ++l) result.pixel(x + l, y)[c] = value[l];
+        }
     });
   }
 

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "estimators/pilot.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
+
+#include "core/parallel.h"
 
 namespace covary {
 namespace {
@@ -53,9 +52,8 @@ void store_rgb(Planes& planes, int x, int y, int n, const Rgb& values) {
 
 template <typename Batch>
 void for_each_batch(int width, int height, const Batch& batch) {
-  tbb::parallel_for(tbb::blocked_range<int>(0, height, 4), [&](const tbb::blocked_range<int>& rows) {
-    for (int y = rows.begin(); y < rows.end(); ++y)
-      for (int x = 0; x < width; x += kLanes) batch(x, y, std::min(kLanes, width - x));
+  parallel_for(height, 4, [&](int y) {
+    for (int x = 0; x < width; x += kLanes) batch(x, y, std::min(kLanes, width - x));
   });
 }
 

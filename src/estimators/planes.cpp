@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "estimators/planes.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+
+#include "core/parallel.h"
 
 namespace covary {
 
@@ -15,21 +14,10 @@ Planes::Planes(int width, int height, int count, int border, float value)
   data_.assign(static_cast<size_t>(count) * (height + 2 * border) * stride_ + lanes::kLanes, value);
 }
 
-namespace {
-
-template <typename Row>
-void for_each_row(int height, const Row& row) {
-  tbb::parallel_for(tbb::blocked_range<int>(0, height, 8), [&](const tbb::blocked_range<int>& range) {
-    for (int y = range.begin(); y < range.end(); ++y) row(y);
-  });
-}
-
-}  // namespace
-
 std::vector<unsigned char> finite_pixels(const GroupedImage& a, const GroupedImage& b, long& n_nonfinite) {
   std::vector<unsigned char> valid(static_cast<size_t>(a.width) * a.height, 1);
   std::atomic<long> bad{0};
-  for_each_row(a.height, [&](int y) {
+  parallel_for(a.height, 8, [&](int y) {
     long bad_in_row = 0;
     for (int x = 0; x < a.width; ++x) {
       // 0 * v is NaN for infinite and NaN values and zero otherwise.
@@ -54,7 +42,7 @@ Moments moments(const GroupedImage& image, const std::vector<unsigned char>& val
   Moments m{Planes(image.width, image.height, 3, border, outside),
             Planes(image.width, image.height, 3, border, kUseless)};
   const int n = (image.groups - first + step - 1) / step;
-  for_each_row(image.height, [&](int y) {
+  parallel_for(image.height, 8, [&](int y) {
     float* mean[3] = {m.mean.row(0, y), m.mean.row(1, y), m.mean.row(2, y)};
     float* variance[3] = {m.variance_of_mean.row(0, y), m.variance_of_mean.row(1, y), m.variance_of_mean.row(2, y)};
     for (int x = 0; x < image.width; ++x) {

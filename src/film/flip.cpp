@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "film/flip.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
+
+#include "core/parallel.h"
 
 namespace covary {
 namespace {
@@ -26,14 +26,14 @@ using Planes = std::array<Plane, 3>;
 Plane convolve(const Plane& in, const std::vector<float>& kx, const std::vector<float>& ky) {
   const int rx = static_cast<int>(kx.size() / 2), ry = static_cast<int>(ky.size() / 2);
   Plane horizontal(in.width, in.height), out(in.width, in.height);
-  tbb::parallel_for(0, in.height, [&](int y) {
+  parallel_for(in.height, [&](int y) {
     std::vector<float> padded(in.width + 2 * rx);
     for (int x = -rx; x < in.width + rx; ++x) padded[x + rx] = in.row(y)[std::clamp(x, 0, in.width - 1)];
     float* target = horizontal.row(y);
     for (int k = 0; k <= 2 * rx; ++k)
       for (int x = 0; x < in.width; ++x) target[x] += kx[k] * padded[x + k];
   });
-  tbb::parallel_for(0, in.height, [&](int y) {
+  parallel_for(in.height, [&](int y) {
     float* target = out.row(y);
     for (int k = -ry; k <= ry; ++k) {
       const float* source = horizontal.row(std::clamp(y + k, 0, in.height - 1));
@@ -167,7 +167,7 @@ Perceived perceive(const Image& image, double pixels_per_degree) {
   }
   for (int c = 0; c < 3; ++c) planes[c] = filter_by_sensitivity(planes[c], kSensitivity[c], pixels_per_degree);
   Image lab(image.width, image.height, 3);
-  tbb::parallel_for(0, image.height, [&](int y) {
+  parallel_for(image.height, [&](int y) {
     for (int x = 0; x < image.width; ++x) {
       const Vec3 rgb = rgb_from_opponent({planes[0].row(y)[x], planes[1].row(y)[x], planes[2].row(y)[x]});
       const Vec3 value = hunt_lab({clamp01(rgb.x), clamp01(rgb.y), clamp01(rgb.z)});
@@ -210,7 +210,7 @@ Image flip_ldr(const Image& image, const Image& reference, float pixels_per_degr
                "images of one size with 3 channels");
   const Perceived t = perceive(image, pixels_per_degree), r = perceive(reference, pixels_per_degree);
   Image result(image.width, image.height, 1);
-  tbb::parallel_for(0, image.height, [&](int y) {
+  parallel_for(image.height, [&](int y) {
     for (int x = 0; x < image.width; ++x) {
       const float *a = t.lab.pixel(x, y), *b = r.lab.pixel(x, y);
       const float colour = colour_difference({a[0], a[1], a[2]}, {b[0], b[1], b[2]});

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "integrators/aov.h"
 
-#include <tbb/parallel_for.h>
-
+#include "core/parallel.h"
 #include "integrators/render_pass.h"
 
 namespace covary {
@@ -10,7 +9,7 @@ namespace covary {
 void render_aovs(const Scene& scene, const FilterSettings& filter, Sampling sampling, uint64_t seed, uint32_t pass,
                  uint32_t spp, Film& film) {
   Image albedo(film.width(), film.height(), 3), normal = albedo, position = albedo;
-  tbb::parallel_for(0, film.height(), [&](int y) {
+  parallel_for(film.height(), [&](int y) {
     for (int x = 0; x < film.width(); ++x) {
       const int frame_x = film.crop().x + x, frame_y = film.crop().y + y;
       Spectrum a;

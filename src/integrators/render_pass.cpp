@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "integrators/render_pass.h"
 
-#include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,6 +9,7 @@
 
 #include "core/error.h"
 #include "core/in_place.h"
+#include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "core/warp.h"
 
@@ -197,25 +196,20 @@ PassResult render_pass(const Scene& scene, const Integrator& integrator, const P
     const uint32_t end = settings.estimate ? settings.spp : std::min(settings.spp, wave_end(fewest, film.groups()));
     const Stopwatch round_watch;
     std::atomic<bool> round_over{false};
-    tbb::parallel_for(
-        tbb::blocked_range<size_t>(0, tiles.size(), 1),
-        [&](const tbb::blocked_range<size_t>& range) {
-          for (size_t i = range.begin(); i != range.end(); ++i) {
-            const Tile& tile = tiles[i];
-            const uint32_t begin = count_of(tile);
-            if (begin >= end || ended() || round_over.load(std::memory_order_relaxed)) continue;
-            Worker& worker = workers.local();
-            const Stopwatch tile_watch;
-            render_tile(scene, integrator, settings, tile, begin, end, film, worker);
-            worker.seconds += tile_watch.seconds();
-            if (settings.estimate && round_watch.seconds() >= kRoundSeconds) round_over = true;
-            const auto n_pixels = static_cast<uint64_t>((tile.x1 - tile.x0) * (tile.y1 - tile.y0));
-            const uint64_t now = done.fetch_add(n_pixels * (end - begin)) + n_pixels * (end - begin);
-            if (settings.seconds > 0 && watch.seconds() >= settings.seconds) out_of_time = true;
-            if (settings.progress) settings.progress(now, total);
-          }
-        },
-        tbb::simple_partitioner());
+    parallel_for(tiles.size(), [&](size_t i) {
+      const Tile& tile = tiles[i];
+      const uint32_t begin = count_of(tile);
+      if (begin >= end || ended() || round_over.load(std::memory_order_relaxed)) return;
+      Worker& worker = workers.local();
+      const Stopwatch tile_watch;
+      render_tile(scene, integrator, settings, tile, begin, end, film, worker);
+      worker.seconds += tile_watch.seconds();
+      if (settings.estimate && round_watch.seconds() >= kRoundSeconds) round_over = true;
+      const auto n_pixels = static_cast<uint64_t>((tile.x1 - tile.x0) * (tile.y1 - tile.y0));
+      const uint64_t now = done.fetch_add(n_pixels * (end - begin)) + n_pixels * (end - begin);
+      if (settings.seconds > 0 && watch.seconds() >= settings.seconds) out_of_time = true;
+      if (settings.progress) settings.progress(now, total);
+    });
     if (ended()) break;
     if (!round_over) fewest = end;
     if (settings.checkpoint) settings.checkpoint();

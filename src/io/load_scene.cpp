@@ -4,12 +4,12 @@
 #include "io/load_scene.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <unordered_set>
 
 #include "core/content_hash.h"
+#include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "emitters/area.h"
 #include "io/description_key.h"
@@ -118,7 +118,7 @@ class Loader {
 
   void run_jobs() {
     // Textures first: one of them takes longer than many meshes.
-    tbb::parallel_for(size_t{0}, leaves_.size() + jobs_.size(), [&](size_t i) {
+    parallel_for(leaves_.size() + jobs_.size(), [&](size_t i) {
       if (i < leaves_.size()) {
         SceneFactory factory(made_, files_, leaves_[i]->diagnostics);
         const auto& same = leaves_[i]->descriptions;
@@ -363,7 +363,7 @@ class Loader {
     const auto names = files_.files();
     std::vector<std::pair<std::string, std::string>> files;  // name in the scene, path; afterwards: name, hash
     for (const auto& [path, name] : names) files.emplace_back(name, path);
-    tbb::parallel_for(size_t{0}, files.size(), [&](size_t i) {
+    parallel_for(files.size(), [&](size_t i) {
       try {
         files[i].second = hash_text(hash_bytes(FileView(files[i].second).bytes()));
       } catch (const Error&) {

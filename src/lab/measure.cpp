@@ -2,13 +2,13 @@
 #include "lab/measure.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "core/content_hash.h"
 #include "core/error.h"
+#include "core/parallel.h"
 #include "film/alignment.h"
 #include "film/image_file.h"
 #include "film/metrics.h"
@@ -175,7 +175,7 @@ void measure(Cell& cell, const SceneInstance& scene, const std::vector<Image>& r
              const std::string& reference_key) {
   const size_t n = cell.runs.size();
   std::vector<Image> images(n);
-  tbb::parallel_for(size_t{0}, n, [&](size_t s) {
+  parallel_for(n, [&](size_t s) {
     RunResult& run = cell.runs[s];
     images[s] = read_window(run.record.image, scene);
     const std::string key = hash_text(hash_bytes(run_keys[s] + reference_key)) + hash_text(hash_bytes(reference_key));

@@ -2,7 +2,6 @@
 #include "report/report.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
@@ -11,6 +10,7 @@
 #include <thread>
 
 #include "core/error.h"
+#include "core/parallel.h"
 #include "film/error_map.h"
 #include "film/output_file.h"
 #include "report/embedded.h"
@@ -144,7 +144,7 @@ void write_images(OutputFile& file, const std::vector<ReportImage>& images) {
   std::vector<std::string> elements(at_once);
   for (size_t first = 0; first < images.size(); first += at_once) {
     const size_t n = std::min(at_once, images.size() - first);
-    tbb::parallel_for(size_t{0}, n, [&](size_t i) { elements[i] = image_element(images[first + i]); });
+    parallel_for(n, [&](size_t i) { elements[i] = image_element(images[first + i]); });
     for (size_t i = 0; i < n; ++i) file.write(elements[i].data(), elements[i].size());
   }
 }

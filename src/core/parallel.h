@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#ifdef COVARY_PLAIN_THREADS
+#include <tbb/global_control.h>
+
+#include <atomic>
+#include <exception>
+#include <mutex>
+#include <thread>
+#include <vector>
+#else
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#endif
+
+#include <algorithm>
+#include <type_traits>
+
+namespace covary {
+
+/// Calls body(i) for every i of [0, n), in any order and on as many threads as `tbb::global_control` allows; a thread takes
+/// `chunk` (at least 1) neighbours at a time. Loops may be nested. The first exception of a body is thrown here, once all
+/// threads have stopped; iterations not begun by then are left out.
+#ifndef COVARY_PLAIN_THREADS
+template <typename Index, typename Body>
+void parallel_for(Index n, std::type_identity_t<Index> chunk, const Body& body) {
+  tbb::parallel_for(
+      tbb::blocked_range<Index>(0, std::max(n, Index{0}), chunk),
+      [&body](const tbb::blocked_range<Index>& range) {
+        for (Index i = range.begin(); i != range.end(); ++i) body(i);
+      },
+      tbb::simple_partitioner());
+}
+#else
+// For the thread sanitizer: TBB's library is built without it, so that the hand-overs between its threads look like races.
+template <typename Index, typename Body>
+void parallel_for(Index n, std::type_identity_t<Index> chunk, const Body& body) {
+  std::atomic<Index> next{0};
+  std::atomic<bool> failed{false};
+  std::exception_ptr error;
+  std::mutex error_mutex;
+  const auto work = [&] {
+    try {
+      // Relaxed: the counter must not order the bodies, or it would hide their races.
+      for (Index first;
+           !failed.load(std::memory_order_relaxed) && (first = next.fetch_add(chunk, std::memory_order_relaxed)) < n;)
+        for (Index i = first; i < std::min(n, first + chunk); ++i) body(i);
+    } catch (...) {
+      const std::lock_guard lock(error_mutex);
+      if (!error) error = std::current_exception();
+      failed = true;
+    }
+  };
+  using Control = tbb::global_control;
+  std::vector<std::thread> others(Control::active_value(Control::max_allowed_parallelism) - 1);
+  for (std::thread& other : others) other = std::thread(work);
+  work();
+  for (std::thread& other : others) other.join();
+  if (error) std::rethrow_exception(error);
+}
+#endif
+
+/// The same, one iteration at a time.
+template <typename Index, typename Body>
+void parallel_for(Index n, const Body& body) {
+  parallel_for(n, 1, body);
+}
+
+}  // namespace covary
