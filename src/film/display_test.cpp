@@ -105,8 +105,9 @@ TEST(Display, AViewerThatReadsNothingHoldsUpNobody) {
     updates = Clock::now() - start;
     start = Clock::now();
   }
-  EXPECT_LT(updates, std::chrono::seconds(1));
-  EXPECT_LT(Clock::now() - start, std::chrono::seconds(4)) << "the last image gets two seconds";
+  // Whoever waits for a viewer waits ten seconds; the last image gets two.
+  EXPECT_LT(updates, std::chrono::seconds(5));
+  EXPECT_LT(Clock::now() - start, std::chrono::seconds(8));
   EXPECT_EQ(warnings, 1);
 }
 
