@@ -222,8 +222,9 @@ class Merge(CliTest):
         self.write("b.exr", film(2))
         self.write("o.exr", b"old")
         for limit in (0, 100, 500):
+            # The thread sanitizer writes a file of its own before the program can ignore the signal: it inherits that then.
             self.bad(1, "cannot write o.exr: File too large", "merge", "a.exr", "b.exr", "-o", "o.exr",
-                     preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)))
+                     restore_signals=os.environ.get("SANITIZED") != "tsan", preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)))
         self.assertEqual(sorted(p.name for p in self.path.iterdir()), ["a.exr", "b.exr", "o.exr"])
 
 
