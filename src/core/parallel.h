@@ -6,8 +6,6 @@
 
 #include <atomic>
 #include <exception>
-#include <mutex>
-#include <thread>
 #include <vector>
 #else
 #include <tbb/blocked_range.h>
@@ -15,6 +13,9 @@
 #endif
 
 #include <algorithm>
+#include <map>
+#include <mutex>
+#include <thread>
 #include <type_traits>
 
 namespace covary {
@@ -66,5 +67,25 @@ template <typename Index, typename Body>
 void parallel_for(Index n, const Body& body) {
   parallel_for(n, 1, body);
 }
+
+/// One T for each thread that asks for it.
+template <typename T>
+class PerThread {
+ public:
+  /// That of the calling thread, made when it first asks. It stays where it is. May be called by several threads at once.
+  T& local() {
+    const std::lock_guard lock(mutex_);
+    return values_[std::this_thread::get_id()];
+  }
+  /// Calls f(T&) for each, in any order. Not while threads still use theirs.
+  template <typename Function>
+  void for_each(const Function& f) {
+    for (auto& [thread, value] : values_) f(value);
+  }
+
+ private:
+  std::mutex mutex_;
+  std::map<std::thread::id, T> values_;
+};
 
 }  // namespace covary

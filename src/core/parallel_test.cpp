@@ -41,6 +41,18 @@ TEST(ParallelFor, ThrowsWhatABodyThrew) {
   EXPECT_EQ(running, 0) << "bodies still run after the loop has ended";
 }
 
+TEST(PerThread, AddsUpWhatEachThreadCounted) {
+  struct Count {
+    int n = 0;
+  };
+  PerThread<Count> counts;
+  parallel_for(5000, 16, [&](int) { ++counts.local().n; });
+  int sum = 0;
+  counts.for_each([&](const Count& count) { sum += count.n; });
+  EXPECT_EQ(sum, 5000);
+  EXPECT_EQ(&counts.local(), &counts.local());
+}
+
 TEST(ParallelFor, MakesWritesVisibleToTheCaller) {
   std::vector<int> squares(5000);
   parallel_for(5000, 16, [&](int i) { squares[i] = i * i; });

@@ -7,8 +7,6 @@
 // (Helmert), which have the same inner products: no centring, and systems of T - 1 instead of T rows.
 #include "estimators/control_variates.h"
 
-#include <tbb/enumerable_thread_specific.h>
-
 #include <array>
 #include <cmath>
 
@@ -391,7 +389,7 @@ void apply_control_variates(const ControlVariateInput& input, const ControlVaria
   result.std_error = settings.std_error ? Image(width, height, 3) : Image();
   const Regression regression(input, settings, valid, result);
   const int columns = (width + kTileWidth - 1) / kTileWidth, rows = (height + kTileHeight - 1) / kTileHeight;
-  tbb::enumerable_thread_specific<Workspace> workspaces;
+  PerThread<Workspace> workspaces;
   parallel_for(columns * rows, [&](int i) {
     const int x0 = i % columns * kTileWidth, y0 = i / columns * kTileHeight;
     regression.run_tile({x0, y0, std::min(x0 + kTileWidth, width), std::min(y0 + kTileHeight, height)},

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "integrators/render_pass.h"
 
-#include <tbb/enumerable_thread_specific.h>
-
 #include <algorithm>
 #include <cmath>
 #include <tuple>
@@ -183,7 +181,7 @@ PassResult render_pass(const Scene& scene, const Integrator& integrator, const P
     total += uint64_t{settings.spp - count} * static_cast<uint64_t>((tile.x1 - tile.x0) * (tile.y1 - tile.y0));
   }
 
-  tbb::enumerable_thread_specific<Worker> workers;
+  PerThread<Worker> workers;
   std::atomic<uint64_t> done{0};
   std::atomic<bool> out_of_time{false};
   const auto ended = [&] {
@@ -217,7 +215,7 @@ PassResult render_pass(const Scene& scene, const Integrator& integrator, const P
 
   PassResult result;
   double busy_seconds = 0;
-  for (const Worker& worker : workers) {
+  workers.for_each([&](const Worker& worker) {
     busy_seconds += worker.seconds;
     result.estimate_seconds += worker.estimate_seconds;
     result.n_samples += worker.n_samples;
@@ -225,7 +223,7 @@ PassResult render_pass(const Scene& scene, const Integrator& integrator, const P
     result.n_not_finite += worker.n_not_finite;
     result.n_negative += worker.n_negative;
     result.bad_samples.insert(result.bad_samples.end(), worker.bad_samples.begin(), worker.bad_samples.end());
-  }
+  });
   keep_first(result.bad_samples);
   result.complete =
       std::all_of(tiles.begin(), tiles.end(), [&](const Tile& tile) { return count_of(tile) >= settings.spp; });

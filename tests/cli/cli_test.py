@@ -12,6 +12,8 @@ from pathlib import Path
 from exr_writer import HALF, UINT, exr, film
 
 COVARY = os.environ["COVARY"]
+# About how many times slower the program is under a sanitizer (scripts/sanitized).
+SLOWDOWN = {"tsan": 10, "asan": 3, "ubsan": 2}.get(os.environ.get("SANITIZED"), 1)
 
 
 class CliTest(unittest.TestCase):
@@ -30,7 +32,7 @@ class CliTest(unittest.TestCase):
         return self.write(name, exr({c: [v] * n for c, v in zip("RGB", rgb)}, size, **more))
 
     def run_covary(self, *arguments, **more):
-        result = subprocess.run([COVARY, *arguments], cwd=self.path, capture_output=True, text=True, timeout=60, **more)
+        result = subprocess.run([COVARY, *arguments], cwd=self.path, capture_output=True, text=True, timeout=60 * SLOWDOWN, **more)
         self.assertNotIn("internal error", result.stderr)
         return result
 

@@ -8,7 +8,7 @@ import time
 import unittest
 from pathlib import Path
 
-from cli_test import COVARY, CliTest
+from cli_test import COVARY, SLOWDOWN, CliTest
 from exr_reader import read_exr
 
 SCENES = Path(os.environ["SCENES"])
@@ -19,7 +19,6 @@ SMALL = ("--resolution", "64x48", "--quiet", "--no-preview")
 class RenderTest(CliTest):
     def relmse(self, image, reference):
         return json.loads(self.good("compare", image, "--reference", reference, "--json", "-").stdout)["relmse"]
-
 
     def same(self, a, b):
         self.assertEqual(self.relmse(a, b), 0.0, f"{a} and {b} differ")
@@ -215,7 +214,7 @@ class Time(RenderTest):
         seconds = self.timed(1, "none")["seconds"]
         self.assertEqual(seconds["estimate"], 0)
         self.assertLess(seconds["trial"], 0.01)
-        self.assertTrue(0.9 < seconds["render"] < 3, seconds)
+        self.assertTrue(0.9 < seconds["render"] < 3 * SLOWDOWN, seconds)
 
     def test_every_pixel_has_samples_however_short_the_time(self):
         self.timed(0.001, "none")
@@ -234,15 +233,15 @@ class Time(RenderTest):
     def test_with_until(self):
         facts = self.timed(60, "iicv", "--until", "relmse=0.02", resolution="64x48")
         self.assertLessEqual(facts["predicted_relmse"], 0.02)
-        self.assertLess(facts["seconds"]["render"], 30)
+        self.assertLess(facts["seconds"]["render"], 30 * SLOWDOWN)
         facts = self.timed(1, "iicv", "--until", "relmse=1e-9", resolution="64x48")
         self.assertGreater(facts["predicted_relmse"], 1e-9)
-        self.assertLess(facts["seconds"]["render"] + facts["seconds"]["estimate"], 3)
+        self.assertLess(facts["seconds"]["render"] + facts["seconds"]["estimate"], 3 * SLOWDOWN)
 
     def test_interrupted_and_resumed(self):
         command = [COVARY, "render", ROOM, "--resolution", "128x96", "--no-preview", "-o", "a.exr"]
         process = subprocess.Popen([*command, "--time", "60"], cwd=self.path, stderr=subprocess.PIPE, text=True)
-        time.sleep(1.5)
+        time.sleep(1.5 * SLOWDOWN)
         process.send_signal(signal.SIGINT)
         message = process.communicate(timeout=30)[1]
         self.assertEqual(process.returncode, 1, message)
@@ -272,7 +271,7 @@ class Interruption(RenderTest):
         for attempt in range(40):
             command = [COVARY, *arguments, "-o", "parts.exr", "--resume"]
             process = subprocess.Popen(command, cwd=self.path, stderr=subprocess.PIPE, text=True)
-            time.sleep(0.25 + 0.1 * attempt)
+            time.sleep((0.25 + 0.1 * attempt) * SLOWDOWN)
             process.send_signal(signal.SIGINT)
             message = process.communicate(timeout=60)[1]
             if process.returncode == 0:
