@@ -57,8 +57,7 @@ class GroupedFileTest : public ::testing::Test {
       return "no error";
     } catch (const Error& e) {
       std::string text = e.what();
-      for (size_t at; (at = text.find(folder_.file(""))) != std::string::npos;)
-        text.erase(at, folder_.file("").size());
+      for (size_t at; (at = text.find(folder_.file(""))) != std::string::npos;) text.erase(at, folder_.file("").size());
       return text;
     }
   }

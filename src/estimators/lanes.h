@@ -60,6 +60,17 @@ inline vfloat exp_of_nonpositive(vfloat x) {
   return x > splat(-87.0f) ? p * from_bits(exponent) : vfloat{};
 }
 
+/// Lane l of the result is lane order[l] of a followed by b.
+inline vfloat shuffle(vfloat a, vfloat b, vint order) {
+#ifdef __clang__
+  vfloat result;
+  for (int l = 0; l < kLanes; ++l) result[l] = order[l] < kLanes ? a[order[l]] : b[order[l] - kLanes];
+  return result;
+#else
+  return __builtin_shuffle(a, b, order);
+#endif
+}
+
 /// Transposes a kLanes x kLanes block in place: rows[i][j] <-> rows[j][i].
 inline void transpose(vfloat (&rows)[kLanes]) {
   // Swaps the off-diagonal halves of blocks of size 2, 4, 8, …: after the step for `half`, blocks of twice that size
@@ -73,8 +84,8 @@ inline void transpose(vfloat (&rows)[kLanes]) {
     for (int i = 0; i < kLanes; ++i) {
       if (i & half) continue;
       const vfloat a = r[i], b = r[i + half];
-      r[i] = __builtin_shuffle(a, b, low);
-      r[i + half] = __builtin_shuffle(a, b, high);
+      r[i] = shuffle(a, b, low);
+      r[i + half] = shuffle(a, b, high);
     }
   };
   step.template operator()<1>(rows);
