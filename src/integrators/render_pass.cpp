@@ -203,7 +203,7 @@ PassResult render_pass(const Scene& scene, const Integrator& integrator, const P
       render_tile(scene, integrator, settings, tile, begin, end, film, worker);
       worker.seconds += tile_watch.seconds();
       if (settings.estimate && round_watch.seconds() >= kRoundSeconds) round_over = true;
-      const auto n_pixels = static_cast<uint64_t>((tile.x1 - tile.x0) * (tile.y1 - tile.y0));
+      const uint64_t n_pixels = uint64_t(tile.x1 - tile.x0) * uint64_t(tile.y1 - tile.y0);
       const uint64_t now = done.fetch_add(n_pixels * (end - begin)) + n_pixels * (end - begin);
       if (settings.seconds > 0 && watch.seconds() >= settings.seconds) out_of_time = true;
       if (settings.progress) settings.progress(now, total);
