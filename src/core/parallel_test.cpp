@@ -41,6 +41,12 @@ TEST(ParallelFor, ThrowsWhatABodyThrew) {
   EXPECT_EQ(running, 0) << "bodies still run after the loop has ended";
 }
 
+TEST(ParallelFor, MakesWritesVisibleToTheCaller) {
+  std::vector<int> squares(5000);
+  parallel_for(5000, 16, [&](int i) { squares[i] = i * i; });
+  for (int i = 0; i < 5000; ++i) ASSERT_EQ(squares[i], i * i);
+}
+
 TEST(PerThread, AddsUpWhatEachThreadCounted) {
   struct Count {
     int n = 0;
@@ -51,12 +57,6 @@ TEST(PerThread, AddsUpWhatEachThreadCounted) {
   counts.for_each([&](const Count& count) { sum += count.n; });
   EXPECT_EQ(sum, 5000);
   EXPECT_EQ(&counts.local(), &counts.local());
-}
-
-TEST(ParallelFor, MakesWritesVisibleToTheCaller) {
-  std::vector<int> squares(5000);
-  parallel_for(5000, 16, [&](int i) { squares[i] = i * i; });
-  for (int i = 0; i < 5000; ++i) ASSERT_EQ(squares[i], i * i);
 }
 
 }  // namespace

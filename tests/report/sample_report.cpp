@@ -140,7 +140,10 @@ Json document() {
             {{"id", "images"}, {"heading", "Images"}, {"blocks", {comparer()}}},
             {{"id", "failures"},
              {"heading", "Failures"},
-             {"blocks", {{{"type", "notes"}, {"kind", "error"}, {"items", {"a scene failed"}}}, many_warnings(), grouped_table()}}}}}};
+             {"blocks",
+              {{{"type", "notes"}, {"kind", "error"}, {"items", {"a scene failed"}}},
+               many_warnings(),
+               grouped_table()}}}}}};
 }
 
 }  // namespace
