@@ -92,22 +92,20 @@ template <typename Feedback>
 void add_everywhere(const std::vector<unsigned char>& valid, const Image& std_error, const Feedback& feedback,
                     Image& estimate) {
   const int width = estimate.width;
-  parallel_for(estimate.height, 4, [&](int y) {
-    for (int x = 0; x < width; x += kLanes) {
-      vfloat f[3], variance = {};
-      for (int c = 0; c < 3; ++c) {
-        vfloat error;
-        for (int l = 0; l < kLanes; ++l) {
-          f[c][l] = estimate.pixel(std::min(x + l, width - 1), y)[c];
-          error[l] = std_error.pixel(std::min(x + l, width - 1), y)[c];
-        }
-        variance += error * error;
+  for_each_batch(width, estimate.height, [&](int x, int y, int n) {
+    vfloat f[3], variance = {};
+    for (int c = 0; c < 3; ++c) {
+      vfloat error;
+      for (int l = 0; l < kLanes; ++l) {
+        f[c][l] = estimate.pixel(std::min(x + l, width - 1), y)[c];
+        error[l] = std_error.pixel(std::min(x + l, width - 1), y)[c];
       }
-      const std::array<vfloat, 3> added = feedback(x, y, f, variance);
-      for (int l = 0; l < std::min(kLanes, width - x); ++l)
-        if (valid[static_cast<size_t>(y) * width + x + l])
-          for (int c = 0; c < 3; ++c) estimate.pixel(x + l, y)[c] += added[c][l];
+      variance += error * error;
     }
+    const std::array<vfloat, 3> added = feedback(x, y, f, variance);
+    for (int l = 0; l < n; ++l)
+      if (valid[static_cast<size_t>(y) * width + x + l])
+        for (int c = 0; c < 3; ++c) estimate.pixel(x + l, y)[c] += added[c][l];
   });
 }
 

@@ -88,20 +88,19 @@ class Iduw {
   }
 
   void reconstruct(float gamma, Image& result) const {
-    parallel_for(height_, [&](int y) {
-      for (int x = 0; x < width_; x += kLanes)
-        for (int c = 0; c < 3; ++c) {
-          const vfloat a = load(z_half_[0].row(c, y) + x), b = load(z_half_[1].row(c, y) + x);
-          const vfloat centre = load(z_.row(c, y) + x) - load(y_.row(c, y) + x);
-          vfloat sum = {};
-          for_each_neighbour(x, y, [&](int qx, int qy) {
-            const vfloat change = (a - load(z_half_[0].row(c, qy) + qx)) - (b - load(z_half_[1].row(c, qy) + qx));
-            const vfloat weight = exp_of_nonpositive(-gamma * n_ * change * change);
-            sum += weight * (centre - (load(z_.row(c, qy) + qx) - load(y_.row(c, qy) + qx)));
-          });
-          const vfloat value = load(y_.row(c, y) + x) + normalise_ * sum;
-          for (int l = 0; l < std::min(kLanes, width_ - x); ++l) result.pixel(x + l, y)[c] = value[l];
-        }
+    for_each_batch(width_, height_, [&](int x, int y, int n) {
+      for (int c = 0; c < 3; ++c) {
+        const vfloat a = load(z_half_[0].row(c, y) + x), b = load(z_half_[1].row(c, y) + x);
+        const vfloat centre = load(z_.row(c, y) + x) - load(y_.row(c, y) + x);
+        vfloat sum = {};
+        for_each_neighbour(x, y, [&](int qx, int qy) {
+          const vfloat change = (a - load(z_half_[0].row(c, qy) + qx)) - (b - load(z_half_[1].row(c, qy) + qx));
+          const vfloat weight = exp_of_nonpositive(-gamma * n_ * change * change);
+          sum += weight * (centre - (load(z_.row(c, qy) + qx) - load(y_.row(c, qy) + qx)));
+        });
+        const vfloat value = load(y_.row(c, y) + x) + normalise_ * sum;
+        for (int l = 0; l < n; ++l) result.pixel(x + l, y)[c] = value[l];
+      }
     });
   }
 

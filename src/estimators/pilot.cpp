@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "estimators/pilot.h"
 
-#include <algorithm>
-
-#include "core/parallel.h"
-
 namespace covary {
 namespace {
 
@@ -48,13 +44,6 @@ void store_rgb(Planes& planes, int x, int y, int n, const Rgb& values) {
     else
       for (int l = 0; l < n; ++l) row[l] = (*v[c])[l];
   }
-}
-
-template <typename Batch>
-void for_each_batch(int width, int height, const Batch& batch) {
-  parallel_for(height, 4, [&](int y) {
-    for (int x = 0; x < width; x += kLanes) batch(x, y, std::min(kLanes, width - x));
-  });
 }
 
 }  // namespace

@@ -2,9 +2,11 @@
 // Planar images with a border, so that windows can be read with plain vector loads and no index tests.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <vector>
 
+#include "core/parallel.h"
 #include "estimators/grouped_image.h"
 #include "estimators/lanes.h"
 
@@ -34,6 +36,14 @@ class Planes {
   ptrdiff_t stride_ = 0;
   std::vector<float> data_;
 };
+
+/// Calls batch(x, y, n) for the pixels (x … x + n - 1, y), n <= kLanes, of all batches of an image, rows in parallel.
+template <typename Batch>
+void for_each_batch(int width, int height, const Batch& batch) {
+  parallel_for(height, 4, [&](int y) {
+    for (int x = 0; x < width; x += lanes::kLanes) batch(x, y, std::min(lanes::kLanes, width - x));
+  });
+}
 
 /// Value of guide images outside the frame and at pixels with non-finite input: farther from every real pixel than any
 /// bandwidth, and its square is still finite.
