@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // `bitmap`: a texture from an image file. Values agree with Mitsuba 3's plugin of this name.
 //
-// | parameter   | type      | default  | meaning |
+// | parameter   | type      | default  | meaning                                                                       |
 // |-------------|-----------|----------|-------------------------------------------------------------------------------|
-// | filename    | string    | required | PNG, JPEG, EXR, HDR, PFM, TGA, BMP, … ; alpha is ignored | | raw         |
-// boolean   | false    | values are data, not colours: integers are not decoded from sRGB              | | filter_type
-// | string    | bilinear | `bilinear` or `nearest`                                                       | | wrap_mode
-// | string    | repeat   | outside [0, 1]: `repeat`, `mirror` or `clamp`                                 | | to_uv |
-// transform | identity | from surface parameters to texture coordinates                                | | format |
-// string    | auto     | accepted for compatibility; 8-bit files are stored as bytes, others as floats | | accel |
-// boolean   | true     | accepted for compatibility; no effect                                         |
+// | filename    | string    | required | PNG, JPEG, EXR, HDR, PFM, TGA, BMP, …; alpha is ignored                       |
+// | raw         | boolean   | false    | values are data, not colours: integers are not decoded from sRGB              |
+// | filter_type | string    | bilinear | `bilinear` or `nearest`                                                       |
+// | wrap_mode   | string    | repeat   | outside [0, 1]: `repeat`, `mirror` or `clamp`                                 |
+// | to_uv       | transform | identity | from surface parameters to texture coordinates                                |
+// | format      | string    | auto     | accepted for compatibility; 8-bit files are stored as bytes, others as floats |
+// | accel       | boolean   | true     | accepted for compatibility; no effect                                         |
 //
 // A one-channel lookup gives the grey value, or the luminance of a colour (also of a raw one). Different from Mitsuba 3.9:
 // the gradient follows the chain rule for every to_uv (there, only for square images or diagonal to_uv), 16-bit files
