@@ -18,10 +18,11 @@ struct EmitterSample {
   float distance = kInfinity;  ///< to the light; infinite for environments and directional lights
   Vec3 p, n;                   ///< point and unit geometric normal on the light (unset when infinitely far)
   Vec2 uv;                     ///< surface parameters of p (area lights)
-  Spectrum
-      radiance;  ///< emitted towards the reference point; for delta lights: irradiance on a surface facing wi (already divided by distance squared)
-  float pdf_solid_angle =
-      0;                  ///< at the reference point; 1 (a discrete probability) for delta lights; 0: sampling failed
+  /// Emitted towards the reference point; for delta lights the irradiance on a surface facing wi, already divided by distance
+  /// squared.
+  Spectrum radiance;
+  /// Density of wi at the reference point; 1 (a discrete probability) for delta lights; 0: sampling failed.
+  float pdf_solid_angle = 0;
   bool is_delta = false;  ///< position or direction is a delta; BSDF sampling cannot hit it
 };
 
@@ -30,8 +31,8 @@ struct EmissionSample {
   Ray ray;            ///< leaves the light
   Vec3 n;             ///< unit geometric normal at the origin; the direction itself for point-like lights
   Spectrum radiance;  ///< emitted radiance (area, environment) or intensity (point-like)
-  float pdf_position =
-      0;  ///< per unit area; for infinite lights per unit area of the disk perpendicular to the ray; 1 if delta
+  /// Per unit area; for infinite lights per unit area of the disk perpendicular to the ray; 1 if delta.
+  float pdf_position = 0;
   float pdf_direction = 0;  ///< per unit solid angle; 1 if delta
   bool delta_position = false, delta_direction = false;
 };
