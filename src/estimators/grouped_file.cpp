@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <cctype>
+#include <charconv>
+#include <cmath>
 
 #include "core/error.h"
 
@@ -33,6 +35,17 @@ std::vector<std::string> layer_prefixes(const ExrFile& file) {
 }
 
 std::string layer_name(const std::string& prefix) { return prefix.empty() ? "" : prefix.substr(0, prefix.size() - 1); }
+
+/// Mean number of samples per pixel as covary's films tell it, rounded; 0: not told.
+int64_t samples_per_pixel(const ExrFile& file, const std::string& path) {
+  const std::string text = attribute(file, "covary:samples");
+  if (text.empty()) return 0;
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !(value >= 0 && value < 1e15))
+    fail(path, fmt::format("attribute covary:samples is '{}'; expected is a number of samples per pixel", text));
+  return std::llround(value);
+}
 
 /// "group07" -> ("group", 7); number -1 without digits at the end.
 std::pair<std::string, int> split_number(const std::string& name) {
@@ -132,8 +145,7 @@ void GroupedFile::add_file(const std::string& path, const std::string& layer, bo
     }
 
   // What covary's films tell. Groups must have equal numbers of samples.
-  const std::string samples_text = attribute(file, "covary:samples");
-  const int64_t samples = samples_text.empty() ? 0 : static_cast<int64_t>(std::stod(samples_text) + 0.5);
+  const int64_t samples = samples_per_pixel(file, path);
   if (files_.size() > 1 && samples_ != samples * static_cast<int64_t>(files_.size() - 1))
     fail(path, fmt::format("has {} samples per pixel, the group before it {}; all groups must have the same number",
                            samples, samples_ / static_cast<int64_t>(files_.size() - 1)));

@@ -19,7 +19,7 @@ class GroupedFileTest : public ::testing::Test {
  protected:
   /// Writes a file whose layer i holds value(first + i, …).
   std::string write(const std::string& name, const std::vector<std::string>& layers, int first = 0,
-                    std::map<std::string, std::string> attributes = {}, int width = kWidth) {
+                    const std::map<std::string, std::string>& attributes = {}, int width = kWidth) {
     std::vector<std::vector<float>> images;
     std::vector<ExrPlane> planes;
     for (size_t i = 0; i < layers.size(); ++i) {
@@ -32,7 +32,7 @@ class GroupedFileTest : public ::testing::Test {
       for (size_t c = 0; c < 3; ++c)
         planes.push_back({fmt::format("{}{}{}", layers[i], layers[i].empty() ? "" : ".", "RGB"[c]),
                           ExrPlane::Type::kFloat, images[i].data() + c, 3 * sizeof(float)});
-    const std::string path = folder_.file(name);
+    std::string path = folder_.file(name);
     write_exr(path, {width, kHeight, {0, 0, width, kHeight}}, attributes, planes);
     return path;
   }
@@ -111,6 +111,10 @@ TEST_F(GroupedFileTest, SaysWhatIsWrong) {
   EXPECT_EQ(
       message({write("a.exr", {""}, 0, {{"covary:samples", "8"}}), write("b.exr", {""}, 0, {{"covary:samples", "6"}})}),
       "b.exr: has 6 samples per pixel, the group before it 8; all groups must have the same number");
+  for (const char* samples : {"many", "12 or so", "-4", "nan", "1e30"})
+    EXPECT_EQ(
+        message({write("odd.exr", {""}, 0, {{"covary:samples", samples}})}),
+        fmt::format("odd.exr: attribute covary:samples is '{}'; expected is a number of samples per pixel", samples));
   std::vector<float> depth(kWidth * kHeight);
   const ExrPlane plane{"Z", ExrPlane::Type::kFloat, depth.data(), sizeof(float)};
   const std::string z = folder_.file("z.exr");
