@@ -110,7 +110,8 @@ std::vector<std::string> map_paths(const CompareOptions& options) {
   for (const std::string& image : options.images) {
     const auto named = [&](const std::string& suffix) {
       const std::string stem = std::filesystem::path(image).stem().string();
-      return (path.parent_path() / (path.stem().string() + "-" + stem + suffix + path.extension().string())).string();
+      const std::string file = fmt::format("{}-{}{}{}", path.stem().string(), stem, suffix, path.extension().string());
+      return (path.parent_path() / file).string();
     };
     std::string name = named("");
     for (int n = 2; std::find(result.begin(), result.end(), name) != result.end(); ++n)

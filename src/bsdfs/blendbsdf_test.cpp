@@ -32,7 +32,7 @@ TEST(BlendBsdf, TooManyLobesAreAnError) {
   Json nested = kPlastic;
   for (int i = 0; i < 4; ++i) nested = {{"type", "blendbsdf"}, {"weight", 0.5}, {"a", kPlastic}, {"b", nested}};
   try {
-    Bound(nested, direction(10, 0));
+    const Bound closure(nested, direction(10, 0));
     FAIL();
   } catch (const Error& error) {
     expect_contains(error.what(), "'blendbsdf': the nested models have too many lobes; at most 8 together");

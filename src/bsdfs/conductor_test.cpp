@@ -9,7 +9,7 @@ TEST(Conductor, WithoutMaterialIsAPerfectMirror) {
     const Vec3 wo = direction(theta, 0.5f);
     const Bound closure({{"type", "conductor"}}, wo);
     const BsdfSample s = closure->sample(wo, 0.5f, {0.5f, 0.5f});
-    EXPECT_EQ(s.wi, Vec3(-wo.x, -wo.y, wo.z));
+    EXPECT_EQ(s.wi, (Vec3{-wo.x, -wo.y, wo.z}));
     EXPECT_EQ(s.pdf, 1);
     EXPECT_EQ(s.flags, kDeltaReflection);
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(s.weight[c], 1, 1e-5f);

@@ -196,7 +196,8 @@ TEST(Microfacet, SamplesAreContinuousInTheNumbers) {
     const Microfacet d(c.type, c.alpha_u, c.alpha_v);
     const Vec3 w = direction(0.9f, 0.6f);
     for (int i = 0; i < 400; ++i) {
-      const Vec2 u{(i % 20 + 0.5f) / 20, (i / 20 + 0.5f) / 20}, v{u.x + 1e-4f, u.y - 1e-4f};
+      const int column = i % 20, row = i / 20;
+      const Vec2 u{(column + 0.5f) / 20, (row + 0.5f) / 20}, v{u.x + 1e-4f, u.y - 1e-4f};
       EXPECT_LT(length(d.sample(w, u).m - d.sample(w, v).m), 1e-2f) << u.x << " " << u.y;
     }
     EXPECT_LT(length(d.sample(w, {0, 0.4f}).m - d.sample(w, {kOneMinusEpsilon, 0.4f}).m),

@@ -14,7 +14,6 @@
 namespace covary {
 namespace {
 
-using statistics::Chi2Options;
 using statistics::Chi2Result;
 
 /// An address, and the generators under test as functions of it.

@@ -50,7 +50,7 @@ struct Chart {
 };
 
 /// Chart by (u, v). `at`: the surface point, with pdf_area the inverse of its area per unit (u, v) area.
-Chart surface_chart(const LightScene& scene, std::function<AreaSample(Vec2)> at) {
+Chart surface_chart(const LightScene& scene, const std::function<AreaSample(Vec2)>& at) {
   return {[](const EmitterSample& s) { return s.uv; },
           [&scene, at](Vec2 uv) {
             const AreaSample point = at(uv);

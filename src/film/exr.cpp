@@ -16,6 +16,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdint>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
@@ -59,7 +60,7 @@ Imf::PixelType pixel_type(const ExrPlane& plane) {
 }
 
 Imf::Slice slice(const ExrPlane& plane, const Imath::Box2i& window) {
-  const size_t width = static_cast<size_t>(window.max.x - window.min.x + 1);
+  const size_t width = static_cast<size_t>(int64_t{window.max.x} - window.min.x + 1);
   return Imf::Slice::Make(pixel_type(plane), plane.base, window, plane.pixel_stride, plane.pixel_stride * width);
 }
 
@@ -168,7 +169,7 @@ ExrFile::ExrFile(const std::string& path) : path_(path) {
       if (channel.xSampling != 1 || channel.ySampling != 1)
         fail(path, fmt::format("channel {} is sub-sampled, which is not supported", it.name()));
       std::string name = it.name();
-      if (!name.starts_with(prefix)) name = prefix + name;
+      if (!name.starts_with(prefix)) name.insert(0, prefix);
       channels_.push_back({name, type_name(channel.type)});
       handle_->parts[name] = {part, it.name()};
     }

@@ -49,7 +49,8 @@ void Film::add(int x, int y, uint32_t added_per_group, std::span<const Spectrum>
   if (total > std::numeric_limits<uint32_t>::max())
     throw Error(ErrorCode::kInput, fmt::format("{} samples at pixel ({}, {}); a film holds at most {} per pixel", total,
                                                x + crop_.x, y + crop_.y, std::numeric_limits<uint32_t>::max()));
-  const double before = count / static_cast<uint32_t>(groups_), after = before + added_per_group;
+  const uint32_t per_group = count / static_cast<uint32_t>(groups_);
+  const double before = per_group, after = before + added_per_group;
   float* means = groups_data_.data() + index(x, y) * groups_ * 3;
   for (int g = 0; g < groups_; ++g)
     for (int c = 0; c < 3; ++c) means[g * 3 + c] = static_cast<float>((before * means[g * 3 + c] + sums[g][c]) / after);

@@ -100,7 +100,7 @@ std::vector<std::string> find_layer(const std::vector<ExrFile::Channel>& channel
     return std::string();
   };
   for (const auto& suffixes : {std::array{"r", "g", "b"}, std::array{"x", "y", "z"}}) {
-    const std::vector<std::string> names{find(suffixes[0]), find(suffixes[1]), find(suffixes[2])};
+    std::vector<std::string> names{find(suffixes[0]), find(suffixes[1]), find(suffixes[2])};
     // X Y Z without a layer would be a colour space, not the components of a vector.
     if (!names[0].empty() && !names[1].empty() && !names[2].empty() && (suffixes[0][0] == 'r' || !layer.empty()))
       return names;

@@ -372,7 +372,7 @@ class Loader {
     });
     std::sort(files.begin(), files.end());
     std::string digest = hash_text(xml_.hash) + "\n";
-    for (const auto& [name, hash] : files) digest += name + "\n" + hash + "\n";
+    for (const auto& [name, hash] : files) digest += fmt::format("{}\n{}\n", name, hash);
     result_.content_hash = hash_text(hash_bytes(digest));
   }
 

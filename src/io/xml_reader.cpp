@@ -38,7 +38,7 @@ class Reader {
  public:
   Reader(const std::map<std::string, std::string>& defines, FileResolver& files, Diagnostics& diagnostics)
       : defines_(defines), files_(files), diagnostics_(diagnostics) {
-    for (const auto& [name, value] : defines) digest_ += name + "=" + value + "\n";
+    for (const auto& [name, value] : defines) digest_ += fmt::format("{}={}\n", name, value);
   }
 
   SceneXml read(std::string_view text, const std::string& name) {

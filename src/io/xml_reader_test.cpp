@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/xml_reader.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -319,8 +320,7 @@ TEST(XmlReader, ReportsUndefinedAndUnusedParameters) {
 TEST(XmlReader, BoundsSubstitution) {
   std::string body = "<default name=\"a\" value=\"xxxxxxxxxxxxxxxx\"/>";
   for (char c = 'b'; c <= 'z'; ++c) {
-    const std::string p = std::string("$") + static_cast<char>(c - 1);
-    body += std::string("<default name=\"") + c + "\" value=\"" + p + p + p + p + "\"/>";
+    body += fmt::format("<default name=\"{0}\" value=\"${1}${1}${1}${1}\"/>", c, static_cast<char>(c - 1));
   }
   EXPECT_TRUE(contains(read_scene(body).errors, "an attribute grows beyond 1 MiB by substitution"));
 }

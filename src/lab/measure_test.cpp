@@ -28,7 +28,7 @@ Image constant(float value) {
 /// Writes an image into the test's folder, with standard errors where they are given.
 std::string write(const std::string& name, Image image, std::optional<float> std_error = {},
                   const ImagePlace& place = {kWidth, kHeight, {0, 0, kWidth, kHeight}}) {
-  const std::string path = test_file(name);
+  std::string path = test_file(name);
   std::vector<ExrPlane> planes;
   add_image_planes("", image, planes);
   Image errors = constant(std_error.value_or(0));

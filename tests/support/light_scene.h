@@ -24,7 +24,7 @@ class BlackBsdf final : public Bsdf {
 /// One shape with an area light.
 class LightScene {
  public:
-  LightScene(std::shared_ptr<Shape> shape, TexturePtr radiance) : light_(std::make_shared<AreaLight>(radiance)) {
+  LightScene(std::shared_ptr<Shape> shape, const TexturePtr& radiance) : light_(std::make_shared<AreaLight>(radiance)) {
     light_->attach(shape.get());
     shape->set_emitter(light_);
     shape->set_bsdf(std::make_shared<BlackBsdf>());
