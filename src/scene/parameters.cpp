@@ -174,7 +174,7 @@ std::string Parameters::get_string(const std::string& name, const std::string& f
 
 std::string Parameters::get_choice(const std::string& name, const std::string& fallback,
                                    const std::vector<std::string>& choices) {
-  const std::string value = get_string(name, fallback);
+  std::string value = get_string(name, fallback);
   if (std::find(choices.begin(), choices.end(), value) != choices.end()) return value;
   error_at(name, fmt::format("is '{}'; accepted: {}{}", value, quoted_list(choices), did_you_mean(value, choices)));
   return fallback;

@@ -17,7 +17,6 @@
 namespace covary {
 namespace {
 
-using statistics::Chi2Options;
 using test_support::make_plugin;
 using test_support::TemporaryFolder;
 

@@ -4,6 +4,7 @@
 // Statistical cases: the pixels of one render with independent samples, seed 1, are N independent values with one
 // expectation; Student's t-test at alpha = 5e-7. Each case plants an error of 3 % into the expected value, asserts that
 // its N detects half of that with power 0.99, and that the test rejects it.
+#include <algorithm>
 #include <cmath>
 
 #include "render/render_fixture.h"
@@ -81,7 +82,7 @@ TEST(OwnScenes, WallHasOneValueInAllPixelsUnderCommonRandomNumbers) {
     int n = 0;
     for (int y = 0; y < film.height(); ++y)
       for (int x = 0; x < film.width(); ++x)
-        n += std::memcmp(film.groups_of(x, y), film.groups_of(0, 0), 12 * 3 * sizeof(float)) != 0;
+        n += !std::equal(film.groups_of(x, y), film.groups_of(x, y) + 12 * 3, film.groups_of(0, 0));
     return n;
   };
   EXPECT_EQ(differing_pixels(Sampling::kCrn), 0);
