@@ -54,7 +54,8 @@ struct Worker {
 };
 
 struct Tile {
-  int x0, y0, x1, y1;  // in the film
+  int x0, y0, x1, y1;                                     // in the film
+  int n_pixels() const { return (x1 - x0) * (y1 - y0); }  // at most kTileSize squared
 };
 
 std::vector<Tile> make_tiles(const Film& film) {
@@ -98,7 +99,7 @@ bool is_good(const Spectrum& value, int x, int y, uint64_t sample, Worker& worke
 void render_tile(const Scene& scene, const Integrator& integrator, const PassSettings& settings, const Tile& tile,
                  uint32_t begin, uint32_t end, Film& film, Worker& worker) {
   const auto groups = static_cast<uint32_t>(film.groups());
-  const int tile_width = tile.x1 - tile.x0, n_pixels = tile_width * (tile.y1 - tile.y0);
+  const int tile_width = tile.x1 - tile.x0, n_pixels = tile.n_pixels();
   const uint32_t per_pixel = end - begin;
   const int batch_pixels = std::max(1, kBatchSize / static_cast<int>(per_pixel));
   worker.sums.resize(groups);
@@ -178,7 +179,7 @@ PassResult render_pass(const Scene& scene, const Integrator& integrator, const P
   for (const Tile& tile : tiles) {
     const uint32_t count = std::min(count_of(tile), settings.spp);
     fewest = std::min(fewest, count);
-    total += uint64_t{settings.spp - count} * static_cast<uint64_t>((tile.x1 - tile.x0) * (tile.y1 - tile.y0));
+    total += uint64_t{settings.spp - count} * static_cast<uint64_t>(tile.n_pixels());
   }
 
   PerThread<Worker> workers;
@@ -203,8 +204,8 @@ PassResult render_pass(const Scene& scene, const Integrator& integrator, const P
       render_tile(scene, integrator, settings, tile, begin, end, film, worker);
       worker.seconds += tile_watch.seconds();
       if (settings.estimate && round_watch.seconds() >= kRoundSeconds) round_over = true;
-      const uint64_t n_pixels = uint64_t(tile.x1 - tile.x0) * uint64_t(tile.y1 - tile.y0);
-      const uint64_t now = done.fetch_add(n_pixels * (end - begin)) + n_pixels * (end - begin);
+      const uint64_t n_new = uint64_t{end - begin} * static_cast<uint64_t>(tile.n_pixels());
+      const uint64_t now = done.fetch_add(n_new) + n_new;
       if (settings.seconds > 0 && watch.seconds() >= settings.seconds) out_of_time = true;
       if (settings.progress) settings.progress(now, total);
     });
