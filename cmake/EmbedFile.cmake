@@ -1,6 +1,6 @@
-# Writes SOURCE, which defines covary::ROOM_files::IDENTIFIER as the bytes of FILE. Run by covary_embed().
+# Writes SOURCE, which defines covary::MODULE_files::IDENTIFIER as the bytes of FILE. Run by covary_embed().
 file(READ ${FILE} bytes HEX)
 string(REGEX REPLACE "(................................................................)" "\\1\n" bytes "${bytes}")
 string(REGEX REPLACE "([0-9a-f][0-9a-f])" "'\\\\x\\1'," bytes "${bytes}")
-file(WRITE ${SOURCE} "#include \"${ROOM}/embedded.h\"\n\nnamespace covary::${ROOM}_files {\n"
+file(WRITE ${SOURCE} "#include \"${MODULE}/embedded.h\"\n\nnamespace covary::${MODULE}_files {\n"
   "static const char bytes[] = {\n${bytes}'\\0'};\nconst std::string_view ${IDENTIFIER}{bytes, sizeof(bytes) - 1};\n}\n")

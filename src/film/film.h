@@ -88,7 +88,7 @@ class Film {
   std::vector<float> groups_data_;  // [pixel][group][rgb]
 };
 
-/// Names of attributes with a meaning to this room.
+/// Names of attributes with a meaning to this module.
 namespace film_key {
 inline constexpr const char* kSeed = "seed";             ///< decimal; after a merge all seeds, ascending: "1,2,7"
 inline constexpr const char* kSampling = "sampling";     ///< "independent" or "crn"

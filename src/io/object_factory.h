@@ -25,7 +25,7 @@ class MadeObjects {
   std::unordered_map<const ObjectDescription*, Object> objects_;
 };
 
-/// Makes textures, reflectance models, emitters and the parts of sensors through the registries of their rooms. Each
+/// Makes textures, reflectance models, emitters and the parts of sensors through the registries of their modules. Each
 /// factory reports to one Diagnostics; several may work at the same time on descriptions that share no nested object.
 class SceneFactory final : public ObjectFactory {
  public:

@@ -155,7 +155,7 @@ class ObjectFactory {
   virtual std::optional<std::string> resolve_file(const std::string& name, const SourceLocation& where) = 0;
 };
 
-/// One line of a room's registry: plugin name and how to make it. `make` returns null after recording an error.
+/// One line of a module's registry: plugin name and how to make it. `make` returns null after recording an error.
 template <typename T>
 struct Plugin {
   const char* name;

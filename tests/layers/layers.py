@@ -9,7 +9,7 @@ import os
 import re
 import sys
 
-# What each room may include, the arrows of docs/architecture.md. Entries are direct; everything behind them follows.
+# What each module may include, the arrows of docs/architecture.md. Entries are direct; everything behind them follows.
 ARROWS = {
     "core": [],
     "film": ["core"],
@@ -32,9 +32,9 @@ CITATION = re.compile(r"\[([A-Z][A-Za-z]+\d{4}[a-z]?)\]")
 LONG_FILE = 450
 
 
-def visible_rooms(room):
-    """The room itself and everything its arrows lead to."""
-    seen, todo = {room}, [room]
+def visible_modules(module):
+    """The module itself and everything its arrows lead to."""
+    seen, todo = {module}, [module]
     while todo:
         for target in ARROWS[todo.pop()]:
             if target not in seen:
@@ -66,13 +66,13 @@ def is_test(path):
 
 
 def includes_follow_arrows(root):
-    """A room includes itself and the rooms its arrows lead to. Tests see every room, and alone the helpers of tests/."""
+    """A module includes itself and the modules its arrows lead to. Tests see every module, and alone the helpers of tests/."""
     problems = []
     for path in files(root, ["src", "include", "apps", "python"], CPP):
         parts = path.split(os.sep)
-        room = parts[1] if parts[0] == "src" else parts[0]
-        if parts[0] == "src" and room not in ARROWS:
-            problems.append(f"{path}:1: src/{room} is not a room; known are {', '.join(sorted(ARROWS))}")
+        module = parts[1] if parts[0] == "src" else parts[0]
+        if parts[0] == "src" and module not in ARROWS:
+            problems.append(f"{path}:1: src/{module} is not a module; known are {', '.join(sorted(ARROWS))}")
             continue
         for number, text in lines(root, path):
             match = INCLUDE.match(text)
@@ -82,29 +82,29 @@ def includes_follow_arrows(root):
             here = f"{path}:{number}: "
             folder = target.split("/")[0]
             if ".." in target.split("/"):
-                problems.append(here + f"'{target}' climbs out of its folder; name the room instead")
+                problems.append(here + f"'{target}' climbs out of its folder; name the module instead")
             elif folder == "apps" or ("/" not in target and parts[0] != "apps"):
-                problems.append(here + f"'{target}' does not name a room")
+                problems.append(here + f"'{target}' does not name a module")
             elif folder in ARROWS:
-                if parts[0] == "src" and not is_test(path) and folder not in visible_rooms(room):
-                    problems.append(here + f"{room} may not include '{target}'; it sees {', '.join(sorted(visible_rooms(room)))}")
+                if parts[0] == "src" and not is_test(path) and folder not in visible_modules(module):
+                    problems.append(here + f"{module} may not include '{target}'; it sees {', '.join(sorted(visible_modules(module)))}")
             elif os.path.exists(os.path.join(root, "tests", target)) and not is_test(path):
                 problems.append(here + f"'{target}' is for tests only")
     return problems
 
 
 def links_follow_arrows(root):
-    """The DEPENDS of a room's CMakeLists.txt obey the same arrows."""
+    """The DEPENDS of a module's CMakeLists.txt obey the same arrows."""
     problems = []
-    for room in ARROWS:
-        path = os.path.join("src", room, "CMakeLists.txt")
+    for module in ARROWS:
+        path = os.path.join("src", module, "CMakeLists.txt")
         if not os.path.exists(os.path.join(root, path)):
             continue
         text = "\n".join(text.split("#")[0] for _, text in lines(root, path))
         for names in re.findall(r"\bDEPENDS\b([^)]*?)(?=\bTESTS\b|\bTEST_DEPENDS\b|\bSOURCES\b|\))", text):
             for target in re.findall(r"covary_(\w+)", names):
-                if target in ARROWS and target not in visible_rooms(room):
-                    problems.append(f"{path}:1: {room} may not depend on covary_{target}")
+                if target in ARROWS and target not in visible_modules(module):
+                    problems.append(f"{path}:1: {module} may not depend on covary_{target}")
     return problems
 
 
@@ -158,22 +158,22 @@ REGISTRIES = {
 
 
 def documented_names_match_registries(root):
-    """docs/scene-format.md has a heading for each plugin of each room's registry, and no others.
+    """docs/scene-format.md has a heading for each plugin of each module's registry, and no others.
 
     A registry line is `{"name", make_something}`; in the page, plugins are the names in backquotes in `###` headings
-    below the `##` heading that ends in "(`room`)".
+    below the `##` heading that ends in "(`module`)".
     """
-    documented, room = {}, None
+    documented, module = {}, None
     for _, text in lines(root, os.path.join("docs", "scene-format.md")):
         if text.startswith("## "):
             heading = re.search(r"\(`(\w+)`\)$", text)
-            room = heading[1] if heading else None
-        elif room and text.startswith("### "):
-            documented.setdefault(room, set()).update(re.findall(r"`(\w+)`", text))
+            module = heading[1] if heading else None
+        elif module and text.startswith("### "):
+            documented.setdefault(module, set()).update(re.findall(r"`(\w+)`", text))
     problems = []
-    for room, names in REGISTRIES.items():
+    for module, names in REGISTRIES.items():
         registered = set()
-        for path in (os.path.join("src", room, name) for name in names):
+        for path in (os.path.join("src", module, name) for name in names):
             if not os.path.exists(os.path.join(root, path)):
                 continue
             text = "\n".join(text.split("//")[0] for _, text in lines(root, path))
@@ -181,10 +181,10 @@ def documented_names_match_registries(root):
             registered.update(found)
             if not found:
                 problems.append(f"{path}:1: no plugin found here; is it still written as {{\"name\", make_name}}?")
-        for name in sorted(registered - documented.get(room, set())):
-            problems.append(f"docs/scene-format.md:1: lacks '{name}' of src/{room}")
-        for name in sorted(documented.get(room, set()) - registered):
-            problems.append(f"docs/scene-format.md:1: describes '{name}', which src/{room} does not have")
+        for name in sorted(registered - documented.get(module, set())):
+            problems.append(f"docs/scene-format.md:1: lacks '{name}' of src/{module}")
+        for name in sorted(documented.get(module, set()) - registered):
+            problems.append(f"docs/scene-format.md:1: describes '{name}', which src/{module} does not have")
     return problems
 
 

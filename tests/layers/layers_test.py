@@ -36,7 +36,7 @@ class Planted(unittest.TestCase):
         self.write("src/scene/scene.h", SPDX + '#include "core/vec.h"\n#include <vector>\n')
         self.write("src/integrators/path.cpp", SPDX + '#include "scene/scene.h"\n#include "core/vec.h"\n')
         self.write("src/integrators/path_test.cpp", SPDX + '#include "statistics/chi2.h"\n#include "io/load_scene.h"\n')
-        self.write("src/integrators/CMakeLists.txt", "covary_room(integrators SOURCES path.cpp DEPENDS covary_scene covary_film)\n")
+        self.write("src/integrators/CMakeLists.txt", "covary_module(integrators SOURCES path.cpp DEPENDS covary_scene covary_film)\n")
         self.write("tests/statistics/chi2.h", SPDX)
         self.write("docs/references.bib", "@article{Veach1995,\n}\n")
         self.write("README.md", "# Small\n")
@@ -63,22 +63,22 @@ class Planted(unittest.TestCase):
         self.expect(layers.includes_follow_arrows, "src/film/film.cpp:3: film may not include 'scene/scene.h'")
 
     def test_every_missing_arrow_is_refused(self):
-        """All pairs of rooms: an include is accepted exactly when the arrows lead there."""
-        for room in layers.ARROWS:
+        """All pairs of modules: an include is accepted exactly when the arrows lead there."""
+        for module in layers.ARROWS:
             for target in layers.ARROWS:
-                with self.subTest(room=room, target=target):
-                    self.write(f"src/{room}/x.h", SPDX + f'  #  include "{target}/y.h"\n')
-                    refused = [f"src/{room}/x.h:2"] if target not in layers.visible_rooms(room) else []
+                with self.subTest(module=module, target=target):
+                    self.write(f"src/{module}/x.h", SPDX + f'  #  include "{target}/y.h"\n')
+                    refused = [f"src/{module}/x.h:2"] if target not in layers.visible_modules(module) else []
                     self.expect(layers.includes_follow_arrows, *refused)
-            self.write(f"src/{room}/x.h", SPDX)
+            self.write(f"src/{module}/x.h", SPDX)
 
     def test_arrows_have_no_cycle_and_known_directions(self):
-        for room in layers.ARROWS:
-            for target in layers.visible_rooms(room) - {room}:
-                self.assertNotIn(room, layers.visible_rooms(target))
-        self.assertEqual({"core", "film", "estimators"}, layers.visible_rooms("estimators"))
-        self.assertNotIn("film", layers.visible_rooms("io"))
-        self.assertNotIn("bsdfs", layers.visible_rooms("integrators"))
+        for module in layers.ARROWS:
+            for target in layers.visible_modules(module) - {module}:
+                self.assertNotIn(module, layers.visible_modules(target))
+        self.assertEqual({"core", "film", "estimators"}, layers.visible_modules("estimators"))
+        self.assertNotIn("film", layers.visible_modules("io"))
+        self.assertNotIn("bsdfs", layers.visible_modules("integrators"))
 
     def test_include_by_climbing(self):
         self.write("src/core/a.h", SPDX + '#include "../scene/scene.h"\n')
@@ -86,7 +86,7 @@ class Planted(unittest.TestCase):
 
     def test_include_without_room(self):
         self.write("src/core/a.cpp", SPDX + '#include "vec.h"\n')
-        self.expect(layers.includes_follow_arrows, "src/core/a.cpp:2: 'vec.h' does not name a room")
+        self.expect(layers.includes_follow_arrows, "src/core/a.cpp:2: 'vec.h' does not name a module")
 
     def test_include_of_a_test_helper(self):
         self.write("src/core/a.cpp", SPDX + '#include "statistics/chi2.h"\n')
@@ -94,10 +94,10 @@ class Planted(unittest.TestCase):
 
     def test_unknown_room(self):
         self.write("src/utils/a.cpp", SPDX)
-        self.expect(layers.includes_follow_arrows, "src/utils is not a room")
+        self.expect(layers.includes_follow_arrows, "src/utils is not a module")
 
     def test_link_against_an_arrow(self):
-        self.write("src/film/CMakeLists.txt", "covary_room(film\n  SOURCES film.cpp\n  DEPENDS covary_core covary_io\n  TESTS film_test.cpp)\n")
+        self.write("src/film/CMakeLists.txt", "covary_module(film\n  SOURCES film.cpp\n  DEPENDS covary_core covary_io\n  TESTS film_test.cpp)\n")
         self.expect(layers.links_follow_arrows, "film may not depend on covary_io")
 
     def test_missing_licence(self):

@@ -1,20 +1,20 @@
-# covary_room(<name> SOURCES a.cpp ... DEPENDS room-or-target ... TESTS a_test.cpp ...)
+# covary_module(<name> SOURCES a.cpp ... DEPENDS module-or-target ... TESTS a_test.cpp ...)
 #
-# A room is one folder of src/: a library `covary_<name>` made of SOURCES, which may use only the rooms it DEPENDS on
+# A module is one folder of src/: a library `covary_<name>` made of SOURCES, which may use only the modules it DEPENDS on
 # (tests/layers checks the includes), and one program `<name>_tests` made of the TESTS that lie beside the code.
-function(covary_room name)
-  cmake_parse_arguments(ROOM "" "" "SOURCES;DEPENDS;TESTS;TEST_DEPENDS" ${ARGN})
-  if(ROOM_SOURCES)
-    add_library(covary_${name} STATIC ${ROOM_SOURCES})
+function(covary_module name)
+  cmake_parse_arguments(MODULE "" "" "SOURCES;DEPENDS;TESTS;TEST_DEPENDS" ${ARGN})
+  if(MODULE_SOURCES)
+    add_library(covary_${name} STATIC ${MODULE_SOURCES})
     set(scope PUBLIC)
   else()
     add_library(covary_${name} INTERFACE)
     set(scope INTERFACE)
   endif()
   target_include_directories(covary_${name} ${scope} ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/include)
-  target_link_libraries(covary_${name} ${scope} covary_options ${ROOM_DEPENDS})
-  if(ROOM_TESTS AND COVARY_TESTS)
-    covary_test(${name}_tests SOURCES ${ROOM_TESTS} DEPENDS covary_${name} ${ROOM_TEST_DEPENDS})
+  target_link_libraries(covary_${name} ${scope} covary_options ${MODULE_DEPENDS})
+  if(MODULE_TESTS AND COVARY_TESTS)
+    covary_test(${name}_tests SOURCES ${MODULE_TESTS} DEPENDS covary_${name} ${MODULE_TEST_DEPENDS})
   endif()
 endfunction()
 
