@@ -92,8 +92,8 @@ TEST(Principled, ValuesAreThoseOfMitsuba) {
   EXPECT_GT(n_compared, 10000);
 }
 
-// N = 100 000 in 64 cells, alpha = 5e-7 for each of up to 5 comparisons a direction: detects a density wrong by 3.5 % rms
-// with power 0.99 (statistics/chi2.h). Twin: PlantedBugsAreRejected.
+// N = 100 000 in 64 cells, alpha = 5e-7 for each of up to 5 comparisons a direction: detects a density wrong by 3.5 %
+// rms with power 0.99 (statistics/chi2.h). Planted bug: PlantedBugsAreRejected.
 TEST(Principled, SamplesFollowTheDensities) {
   for (const Json& material : materials()) {
     const BsdfPtr bsdf = make_bsdf(material);
@@ -146,7 +146,7 @@ TEST(Principled, PlantedBugsAreRejected) {
 }
 
 // The mean weight of N = 200 000 samples is the directional albedo by quadrature; alpha = 5e-7. With sigma about the
-// mean the smallest bias seen with power 0.99 is 1.7 %. Twin: the cosine-free value.
+// mean the smallest bias seen with power 0.99 is 1.7 %. Planted bug: the cosine-free value.
 TEST(Principled, WeightsIntegrateToTheAlbedo) {
   for (const Json& material : materials()) {
     const BsdfPtr bsdf = make_bsdf(material);
@@ -159,8 +159,9 @@ TEST(Principled, WeightsIntegrateToTheAlbedo) {
       const Spectrum exact = statistics::smooth_albedo(*closure, wo);
       const auto result = statistics::z_test(sampled.g, variance, exact.g, statistics::test_alpha(), 3e-4);
       EXPECT_TRUE(result.accepted) << material.dump() << " theta " << theta << ": " << result.message;
-      const auto twin = statistics::z_test(sampled.g * 1.03 + 1e-3, variance, exact.g, statistics::test_alpha(), 3e-4);
-      EXPECT_FALSE(twin.accepted) << material.dump() << " theta " << theta << ": " << twin.message;
+      const auto planted =
+          statistics::z_test(sampled.g * 1.03 + 1e-3, variance, exact.g, statistics::test_alpha(), 3e-4);
+      EXPECT_FALSE(planted.accepted) << material.dump() << " theta " << theta << ": " << planted.message;
     }
   }
 }

@@ -25,7 +25,7 @@ const Json& references() {
 
 Vec3 vec3(const Json& a) { return {a.at(0).get<float>(), a.at(1).get<float>(), a.at(2).get<float>()}; }
 
-/// "" or the largest disagreement of one case. `scale` multiplies our values, for the twin that must fail.
+/// "" or the largest disagreement of one case. `scale` multiplies our values, for the planted bug that must fail.
 std::string disagreement(const Json& entry, float scale = 1) {
   std::map<std::string, TexturePtr> textures;
   Json dictionary = entry.at("bsdf");
@@ -82,7 +82,7 @@ TEST(BsdfReferences, AgreeWithMitsuba) {
   for (const Json& entry : references().at("cases")) EXPECT_EQ(disagreement(entry), "");
 }
 
-// Twin: values 2 % too large are seen in every case that has values.
+// Planted bug: values 2 % too large are seen in every case that has values.
 TEST(BsdfReferences, SeeTwoPercent) {
   for (const Json& entry : references().at("cases")) EXPECT_NE(disagreement(entry, 1.02f), "") << entry.at("name");
 }

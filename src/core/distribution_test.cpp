@@ -85,8 +85,8 @@ TEST(Discrete, SampleReturnsWhatPmfSaysAndStretchesTheNumber) {
   }
 }
 
-// N = 300 000, alpha = 5e-7. 17 cells: detects 1.8 % rms with power 0.99, 1000 cells: 3.5 %. Twin: weights changed by
-// 10 % up and down in turn.
+// N = 300 000, alpha = 5e-7. 17 cells: detects 1.8 % rms with power 0.99, 1000 cells: 3.5 %. Planted bug: weights
+// changed by 10 % up and down in turn.
 TEST(Discrete, FrequenciesAreTheWeights) {
   for (const int n : {2, 17, 1000})
     for (const bool planted : {false, true}) {
@@ -104,7 +104,7 @@ TEST(Discrete, FrequenciesAreTheWeights) {
 }
 
 // The remapped number is uniform and independent of the index. N = 200 000 in 128 cells, alpha = 5e-7: detects 2.8 %
-// rms with power 0.99. Twin: the number itself is passed on.
+// rms with power 0.99. Planted bug: the number itself is passed on.
 TEST(Discrete, RemappedNumberIsIndependentOfTheIndex) {
   const std::vector<float> weights{1, 3, 0, 0.5f, 2};
   const Discrete d(weights);
@@ -186,8 +186,8 @@ TEST(PiecewiseConstant2D, RoundingKeepsPointsInTheirCells) {
   }
 }
 
-// N = 200 000, alpha = 5e-7; 5 x 3 cells: detects 1.9 % rms with power 0.99, 33 x 17: 4 %. Twin: width and height of the
-// grid swapped, as if rows were columns.
+// N = 200 000, alpha = 5e-7; 5 x 3 cells: detects 1.9 % rms with power 0.99, 33 x 17: 4 %. Planted bug: width and
+// height of the grid swapped, as if rows were columns.
 TEST(PiecewiseConstant2D, SamplesFollowTheGrid) {
   for (const Size size : {Size{1, 7}, {7, 1}, {5, 3}, {33, 17}})
     for (const bool planted : {false, true}) {
@@ -208,8 +208,8 @@ TEST(PiecewiseConstant2D, SamplesFollowTheGrid) {
     }
 }
 
-// N = 200 000 in 128 cells, alpha = 5e-7: detects 2.8 % rms with power 0.99. Twins: density * 1.02; one number for both
-// coordinates.
+// N = 200 000 in 128 cells, alpha = 5e-7: detects 2.8 % rms with power 0.99. Planted bugs: density * 1.02; one number
+// for both coordinates.
 TEST(PiecewiseConstant2D, SamplesFollowTheDensityWithinCells) {
   const std::vector<float> weights{1, 4, 0, 0, 0, 0, 2, 0, 3};
   const PiecewiseConstant2D d(weights, 3, 3);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Numbers with addresses: uniform along every coordinate of the address, independent between neighbouring addresses, and
-// the pixel, nothing else, left out for common random numbers.
+// Numbers with addresses: uniform along every coordinate of the address, independent between neighbouring addresses,
+// and the pixel, nothing else, left out for common random numbers.
 #include "core/random.h"
 
 #include <gtest/gtest.h>
@@ -85,8 +85,8 @@ Chi2Result test_independent(const Generator& generator, const Walk& walk) {
   });
 }
 
-// N = 200 000 pairs in 1024 cells, alpha = 5e-7 on either side (a sequence may also be too regular): detects, with power
-// 0.99, a density wrong by 4.3 % rms. Twins: numbers on a lattice, and numbers pushed up by 3 %.
+// N = 200 000 pairs in 1024 cells, alpha = 5e-7 on either side (a sequence may also be too regular): detects, with
+// power 0.99, a density wrong by 4.3 % rms. Planted bugs: numbers on a lattice, and numbers pushed up by 3 %.
 TEST(PathRandom, IsUniformAlongEveryCoordinate) {
   const auto accepted = [](const Chi2Result& r) { return r.accepted && r.p_value < 1 - statistics::test_alpha(); };
   const Generator pushed = [](const Address& a) {
@@ -110,7 +110,7 @@ TEST(PathRandom, NeighbouringAddressesAreIndependent) {
   }
 }
 
-// Correlation of N = 200 000 pairs, alpha = 5e-7: detects |r| = 0.0165 with power 0.99. Twin: pairs that share a
+// Correlation of N = 200 000 pairs, alpha = 5e-7: detects |r| = 0.0165 with power 0.99. Planted bug: pairs that share a
 // twentieth of their numbers.
 TEST(PathRandom, NeighbouringAddressesAreUncorrelated) {
   for (const Walk& walk : kWalks)
@@ -129,7 +129,8 @@ TEST(PathRandom, NeighbouringAddressesAreUncorrelated) {
     }
 }
 
-// The two numbers of one event, and numbers of two events. Twin: one event read twice, for a choice and for a sample.
+// The two numbers of one event, and numbers of two events. Planted bug: one event read twice, for a choice and for a
+// sample.
 TEST(PathRandom, EventsAreIndependent) {
   const auto test = [](Event first, Event second) {
     return test_pairs("events", kPairs, [&](int i) {
@@ -142,7 +143,8 @@ TEST(PathRandom, EventsAreIndependent) {
   EXPECT_FALSE(test(Event::kDirection, Event::kDirection).accepted);
 }
 
-// N = 400 000 in 256 cells of the lowest 8 of 24 bits, alpha = 5e-7: detects 2.3 % rms. Twin: numbers of 20 bits.
+// N = 400 000 in 256 cells of the lowest 8 of 24 bits, alpha = 5e-7: detects 2.3 % rms. Planted bug: numbers of 20
+// bits.
 TEST(PathRandom, LowBitsAreUniform) {
   for (const bool planted : {false, true}) {
     std::vector<double> observed(256), probabilities(256, 1.0 / 256);
@@ -197,7 +199,7 @@ TEST(PathRandom, SeedsGiveDifferentNumbers) {
 }
 
 // Every input bit flips every output bit in half of N = 10 000 trials; 4096 comparisons share alpha = 5e-7: |z| > 6.4,
-// which detects a probability off by 0.044 with power 0.99. Twin: one multiplication without the shifts.
+// which detects a probability off by 0.044 with power 0.99. Planted bug: one multiplication without the shifts.
 TEST(Mix64, EveryInputBitFlipsEveryOutputBit) {
   const auto worst_z = [](uint64_t (*mix)(uint64_t)) {
     double worst = 0;

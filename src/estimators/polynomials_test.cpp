@@ -93,7 +93,7 @@ TEST(Polynomials, IntegratesPolynomialsOfDegreeTwoExactly) {
       for (int c = 0; c < 3; ++c)
         EXPECT_NEAR(samples.estimate()[c], expected[c], tolerance) << "d " << d << ", n " << n;
     }
-    // The twin: one degree more is not integrated exactly.
+    // The planted bug: one degree more is not integrated exactly.
     const Samples cubic = sample(200, d, random, [&](const float* u) { return f(u) + Spectrum(u[0] * u[0] * u[0]); });
     EXPECT_GT(std::abs(cubic.estimate().r - expected.r - 0.25), 1e-5);
   }
@@ -210,7 +210,8 @@ Theory theory() {
   return t;
 }
 
-/// K pixels of n samples each. `scale` other than 1 plants a bug: coordinates that are not what the samples were made of.
+/// K pixels of n samples each. `scale` other than 1 plants a bug: coordinates that are not what the samples were made
+/// of.
 statistics::Moments many_pixels(int n, int k, float scale) {
   std::mt19937 random(5);
   statistics::Moments moments;
@@ -225,8 +226,8 @@ statistics::Moments many_pixels(int n, int k, float scale) {
   return moments;
 }
 
-// N = 8000 pixels of 192 samples, alpha = 5e-7. The smallest bias detected with power 0.99 is asserted below to be less than
-// 1 % of the standard deviation of the plain mean; the planted bug shifts the estimate by more.
+// N = 8000 pixels of 192 samples, alpha = 5e-7. The smallest bias detected with power 0.99 is asserted below to be less
+// than 1 % of the standard deviation of the plain mean; the planted bug shifts the estimate by more.
 TEST(Polynomials, NoiseFallsAndTheBiasIsWhatTheorySays) {
   constexpr int kSamples = 192, kPixels = 8000;
   const Theory t = theory();

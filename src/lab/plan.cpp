@@ -175,7 +175,7 @@ std::vector<Run> runs_of_scene(const Suite& suite, size_t index, const SceneInst
                                     : run.key;
         runs.push_back(std::move(run));
       }
-      // Sharers of passes side by side, in the order of the first of them.
+      // Runs that share passes side by side, in the order of the first of them.
       for (auto at = runs.begin() + first; at != runs.end(); ++at)
         std::stable_partition(at, runs.end(), [&, key = at->passes_key](const Run& r) { return r.passes_key == key; });
     }

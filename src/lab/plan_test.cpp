@@ -98,7 +98,7 @@ std::vector<int> sharing(const std::vector<std::vector<std::string>>& options, d
   for (const Run& run : runs) {
     auto known = std::find(keys.begin(), keys.end(), run.passes_key);
     if (known == keys.end()) known = keys.insert(keys.end(), run.passes_key);
-    EXPECT_EQ(known, keys.end() - 1) << "sharers must follow one another";
+    EXPECT_EQ(known, keys.end() - 1) << "runs that share passes must follow one another";
     result[run.method] = static_cast<int>(known - keys.begin());
   }
   return result;

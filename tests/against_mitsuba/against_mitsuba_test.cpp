@@ -2,11 +2,11 @@
 // Whole renders of small scenes against block means of Mitsuba 3's renders, stored as JSON by
 //     benchmarks/against_mitsuba/against_mitsuba.py store scenes/room.xml scenes/materials.xml
 //         tests/against_mitsuba/lights.xml --to tests/against_mitsuba --pixels 2304 --spp 1024 --seeds 16
-// The independent unit is the render. Per scene: N = 32 renders of 32 samples per pixel with seeds 0 ... 31 (2304 to 3456
-// pixels, 54 or 36 blocks), the reference's own noise included; Welch's t-test over renders on the image mean and on the
-// 8 x 8 block means, per channel; alpha = test_alpha() = 5e-7 for each of the two families, Sidak within a family. At
-// power 0.99 that finds 1.5 % of the image mean and 15 % of a typical (median) block; the test asserts these two numbers.
-// Twins: the image scaled by 1.02, and one block 1.3 times as bright, must be rejected.
+// The independent unit is the render. Per scene: N = 32 renders of 32 samples per pixel with seeds 0 ... 31 (2304 to
+// 3456 pixels, 54 or 36 blocks), the reference's own noise included; Welch's t-test over renders on the image mean and
+// on the 8 x 8 block means, per channel; alpha = test_alpha() = 5e-7 for each of the two families, Sidak within a
+// family. At power 0.99 that finds 1.5 % of the image mean and 15 % of a typical (median) block; the test asserts these
+// two numbers. Planted bugs: the image scaled by 1.02, and one block 1.3 times as bright, must be rejected.
 #include <gtest/gtest.h>
 
 #include <algorithm>

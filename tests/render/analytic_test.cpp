@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Renders whose result is known in closed form.
 //
-// Statistical cases: R = 32 renders with seeds 0 … 31, Student's t-test of the image mean at alpha = 5e-7 (|t_31| > 6.3).
-// With the standard error s of the mean of the 32 renders, the test rejects an error of 6.3 s + 2.5 s = 8.8 s with power
-// 0.99; each case asserts that this is below the error its twin plants, so the test cannot pass for lack of samples.
+// Statistical cases: R = 32 renders with seeds 0 … 31, Student's t-test of the image mean at alpha = 5e-7 (|t_31| >
+// 6.3). With the standard error s of the mean of the 32 renders, the test rejects an error of 6.3 s + 2.5 s = 8.8 s
+// with power 0.99; each case asserts that this is below the error that it plants, so the test cannot pass for lack of
+// samples.
 #include <cmath>
 
 #include "render_fixture.h"
@@ -126,8 +127,8 @@ TEST(DirectLight, DiskLight) {
 }
 
 TEST(DirectLight, EachInstanceOfALightShines) {
-  // Two placed copies of a sphere light that emits: the one of SphereLight, and one twice as large at the same direction
-  // and twice the distance, hidden behind nothing: each gives pi L (r/d)^2 cos.
+  // Two placed copies of a sphere light that emits: the one of SphereLight, and one twice as large at the same
+  // direction and twice the distance, hidden behind nothing: each gives pi L (r/d)^2 cos.
   const std::string group =
       "<shape type='shapegroup' id='lamp'><shape type='sphere'><emitter type='area'><rgb "
       "name='radiance' value='7'/></emitter></shape></shape>";

@@ -147,7 +147,7 @@ TEST(CommonRandomNumbers, AFlatUniformlyLitWallIsFlat) {
   for (int y = 0; y < 16; ++y)
     for (int x = 0; x < 24; ++x)
       for (int t = 0; t < 12; ++t) ASSERT_EQ(crn.group_mean(x, y, t), crn.group_mean(0, 0, t));
-  // The twin: independent numbers do not give a flat image.
+  // The planted bug: independent numbers do not give a flat image.
   const Film independent = render(scene, 24, 5, Sampling::kIndependent, 12);
   EXPECT_NE(independent.group_mean(0, 0, 0), independent.group_mean(1, 0, 0));
 }

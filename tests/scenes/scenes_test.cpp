@@ -86,7 +86,7 @@ TEST(OwnScenes, WallHasOneValueInAllPixelsUnderCommonRandomNumbers) {
     return n;
   };
   EXPECT_EQ(differing_pixels(Sampling::kCrn), 0);
-  EXPECT_EQ(differing_pixels(Sampling::kIndependent), 32 * 24 - 1);  // the twin: the wall is not constant by itself
+  EXPECT_EQ(differing_pixels(Sampling::kIndependent), 32 * 24 - 1);  // planted bug: the wall is not constant by itself
 }
 
 TEST(OwnScenes, AllLoadWithoutWarnings) {

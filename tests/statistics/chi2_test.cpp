@@ -89,7 +89,8 @@ TEST(Chi2Sphere, RejectsPlantedBugs) {
 }
 
 // p-values of 60 seeds, N = 40 000 each: Kolmogorov-Smirnov at alpha = 1e-6 sees a deviation of 0.5 of their
-// distribution function with power 0.99. Twin: a density tilted by up to 6 %, less than what one run surely rejects.
+// distribution function with power 0.99. Planted bug: a density tilted by up to 6 %, less than what one run surely
+// rejects.
 TEST(Chi2Sphere, PValuesAreUniformUnderTheHypothesisOnly) {
   for (const double tilt : {0.0, 0.06}) {
     std::vector<double> p_values;
@@ -105,7 +106,7 @@ TEST(Chi2Sphere, PValuesAreUniformUnderTheHypothesisOnly) {
 }
 
 TEST(Chi2Square, AcceptsAndRejects) {
-  // Density 2x by the square root; twin: the root is forgotten.
+  // Density 2x by the square root; planted bug: the root is forgotten.
   const Density<Vec2> pdf = [](const Vec2& p) { return 2 * p.x; };
   const Chi2Result right = chi2_square(
       [](const PathRandom& r) {

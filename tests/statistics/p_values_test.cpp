@@ -65,7 +65,7 @@ TEST(PValues, BinomialTailsAreExact) {
 }
 
 // N = 300 repetitions; alpha = 1e-6 for the Kolmogorov-Smirnov test; smallest deviation of the distribution function of
-// p-values it sees with power 0.99: 0.24. Twin: p-values of a biased mean.
+// p-values it sees with power 0.99: 0.24. Planted bug: p-values of a biased mean.
 TEST(MeanTests, PValuesAreUniformUnderTheHypothesisAndNotUnderABias) {
   for (const bool biased : {false, true}) {
     std::vector<double> t_values, z_values;

@@ -2,9 +2,9 @@
 // What the tests of the reflectance models share: each check binds a model made from a dictionary at flat_hit() and
 // looks at it from several directions.
 //
-// Statistical checks: N = 100 000 samples in 64 cells, alpha = 5e-7 for each comparison; they detect, with power 0.99, a
-// density wrong by 3.4 % rms, and a total mass wrong by 0.15 % where no sample fails (statistics/chi2.h), and a lobe's
-// probability wrong by 1.2 percentage points. Seed fixed.
+// Statistical checks: N = 100 000 samples in 64 cells, alpha = 5e-7 for each comparison; they detect, with power 0.99,
+// a density wrong by 3.4 % rms, and a total mass wrong by 0.15 % where no sample fails (statistics/chi2.h), and a
+// lobe's probability wrong by 1.2 percentage points. Seed fixed.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -97,7 +97,7 @@ inline void expect_sound(const Json& dictionary, const std::vector<float>& theta
   }
 }
 
-/// The twin of expect_sound.
+/// The counterpart of expect_sound: a model with a planted bug is rejected.
 inline void expect_rejected(const Json& dictionary, Planted::Bug bug, float theta = 40, const Textures& textures = {}) {
   const Vec3 wo = direction(theta, 0.7f);
   const Bound closure(dictionary, wo, TransportMode::kRadiance, textures);
@@ -130,8 +130,9 @@ inline int expect_adjoint(const Json& dictionary, const std::vector<float>& thet
   return n_pairs;
 }
 
-/// The directional albedo of all lobes, the mean weight of N = 100 000 samples, lies in [least, most]. alpha = 5e-7 (five
-/// standard deviations of the mean); with weights of standard deviation sigma it detects 7.4 sigma / 316 with power 0.99.
+/// The directional albedo of all lobes, the mean weight of N = 100 000 samples, lies in [least, most]. alpha = 5e-7
+/// (five standard deviations of the mean); with weights of standard deviation sigma it detects 7.4 sigma / 316 with
+/// power 0.99.
 inline void expect_albedo_within(const Json& dictionary, float theta, double least, double most,
                                  TransportMode mode = TransportMode::kRadiance, const Textures& textures = {}) {
   const Vec3 wo = direction(theta, -0.4f);
