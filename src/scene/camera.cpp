@@ -41,6 +41,16 @@ Camera::Camera(const CameraSettings& settings, int width, int height)
   if (std::abs(length(x_) - 1) > tolerance || std::abs(length(y_) - 1) > tolerance ||
       std::abs(length(z_) - 1) > tolerance)
     throw Error(ErrorCode::kInput, "the to_world transformation of a sensor must not scale");
+
+  // The axes need not be orthonormal to the last digit.
+  const Vec3 z_area = cross(x_, y_);
+  const float volume = dot(z_area, z_);
+  to_x_ = cross(y_, z_) * (1 / volume);
+  to_y_ = cross(z_, x_) * (1 / volume);
+  to_z_ = z_area * (1 / volume);
+  lens_normal_ = normalize(to_z_);
+  if (!is_delta()) pdf_position_ = 1 / (kPi * sqr(settings.aperture_radius) * length(z_area));
+  pixels_per_area_ = static_cast<float>(width) * static_cast<float>(height) / (4 * tan_x_ * tan_y_ * std::abs(volume));
 }
 
 Ray Camera::ray(Vec2 film, Vec2 lens) const {
@@ -58,6 +68,59 @@ Ray Camera::ray(Vec2 film, Vec2 lens) const {
   const float near_t = settings_.near_clip / d.z, far_t = settings_.far_clip / d.z;
   o += d * near_t;
   return {origin_ + x_ * o.x + y_ * o.y + z_ * o.z, x_ * d.x + y_ * d.y + z_ * d.z, far_t - near_t};
+}
+
+float Camera::pdf_direction(const Vec3& d) const {
+  // The ray meets the image plane at d / z, where an area fills the solid angle area z^3 (for skewed axes, times volume).
+  const float z = dot(to_z_, d);
+  return z > 0 ? pixels_per_area_ / (z * z * z) : 0;
+}
+
+float Camera::importance(const Vec3& d) const {
+  const float pdf = pdf_direction(d);
+  return pdf > 0 ? pdf * pdf_position_ / dot(lens_normal_, d) : 0;
+}
+
+Vec2 Camera::project(const Vec3& p, const Vec3& d) const {
+  const float inverse_z = 1 / dot(to_z_, d);
+  float x = dot(to_x_, d) * inverse_z, y = dot(to_y_, d) * inverse_z;
+  if (!is_delta()) {
+    // Where the ray meets the plane in focus, seen from the middle of the lens.
+    const Vec3 o = p - origin_;
+    const float z = dot(to_z_, o), inverse_focus = 1 / settings_.focus_distance;
+    x += (dot(to_x_, o) - z * x) * inverse_focus;
+    y += (dot(to_y_, o) - z * y) * inverse_focus;
+  }
+  const Vec2 offset = settings_.principal_point_offset;
+  return {(0.5f * (1 - x / tan_x_) - offset.x) * static_cast<float>(width_),
+          (0.5f * (1 - y / tan_y_) - offset.y) * static_cast<float>(height_)};
+}
+
+LensSample Camera::sample_towards(const Vec3& reference, Vec2 u) const {
+  LensSample sample;
+  const float z = dot(to_z_, reference - origin_);
+  if (!(z > settings_.near_clip && z < settings_.far_clip)) return sample;
+  sample.p = origin_;
+  if (!is_delta()) {
+    const Vec2 on_lens = warp::square_to_disk(u) * settings_.aperture_radius;
+    sample.p += x_ * on_lens.x + y_ * on_lens.y;
+  }
+  const Vec3 d = reference - sample.p;
+  const float distance_squared = length_squared(d);
+  sample.distance = std::sqrt(distance_squared);
+  const Vec3 out = d * (1 / sample.distance);
+  sample.wi = -out;
+  sample.near_p = sample.p + d * (settings_.near_clip / z);
+  sample.film = project(sample.p, out);
+  sample.pdf_direction = pdf_direction(out);
+  if (is_delta()) {
+    sample.importance = sample.pdf_direction / distance_squared;
+    sample.pdf_solid_angle = 1;
+  } else {
+    sample.importance = importance(out);
+    sample.pdf_solid_angle = pdf_position_ * distance_squared / dot(lens_normal_, out);
+  }
+  return sample;
 }
 
 }  // namespace covary

@@ -24,6 +24,21 @@ struct CameraSettings {
   float focus_distance = 1;                  ///< distance along the viewing axis in focus (thin lens)
 };
 
+/// A point of the lens as seen from a reference point in the scene. In EmitterSample's terms the camera is a light that
+/// emits importance: a light path that arrives at the reference point adds throughput * importance / pdf_solid_angle
+/// to the film, once nothing hides the lens.
+struct LensSample {
+  Vec3 wi;             ///< unit direction from the reference point to the lens
+  float distance = 0;  ///< to the lens
+  Vec3 p;              ///< point on the lens; the camera's position for a pinhole
+  Vec3 near_p;         ///< on the near plane between them: what lies before it does not hide the reference point
+  Vec2 film;           ///< where the ray meets the film, in pixels of the full frame, which it may leave
+  /// Camera::importance() in the direction of the reference point; for a pinhole times the cosine over the distance squared.
+  float importance = 0;
+  float pdf_solid_angle = 0;  ///< density of wi at the reference point; 1 for a pinhole; 0: not between the clip planes
+  float pdf_direction = 0;    ///< Camera::pdf_direction() in the direction of the reference point
+};
+
 class Camera : public SceneObject {
  public:
   /// `width`, `height`: the full frame in pixels.
@@ -31,6 +46,24 @@ class Camera : public SceneObject {
   /// Ray through the film position `film` in pixels of the full frame (x right, y down; pixel centres at +0.5); `lens`
   /// uniform in [0,1)^2. The origin lies on the near plane, t_max on the far plane.
   Ray ray(Vec2 film, Vec2 lens) const;
+
+  // What follows describes rays through any point of the film plane, also outside the frame, with density 1 per pixel of
+  // film area: the measurement is that of one pixel. Directions `d` are unit vectors that leave the camera.
+  /// Pinhole: the position of the lens is a delta.
+  bool is_delta() const { return !(settings_.aperture_radius > 0); }
+  /// Density of the lens position, per unit area of the lens; 1 for a pinhole.
+  float pdf_position() const { return pdf_position_; }
+  /// Density of the ray's direction per unit solid angle; the same for every point of the lens. 0 behind the camera.
+  float pdf_direction(const Vec3& d) const;
+  /// Importance We of the direction [Veach1997] §3.7: its integral over directions through a film area, times the cosine
+  /// at the lens, and over the lens (or at the pinhole) is that area in pixels.
+  float importance(const Vec3& d) const;
+  /// The film position, in pixels of the full frame, of a ray through the point `p` in direction `d`; the inverse of ray().
+  /// A pinhole looks at `d` alone. `d` must not lead backwards (pdf_direction() > 0).
+  Vec2 project(const Vec3& p, const Vec3& d) const;
+  /// Samples the lens uniformly as seen from `reference`; `u` uniform in [0,1)^2.
+  LensSample sample_towards(const Vec3& reference, Vec2 u) const;
+
   const CameraSettings& settings() const { return settings_; }
   int width() const { return width_; }
   int height() const { return height_; }
@@ -40,6 +73,10 @@ class Camera : public SceneObject {
   int width_, height_;
   float tan_x_, tan_y_;  // half extents of the image plane at distance 1
   Vec3 origin_, x_, y_, z_;
+  Vec3 to_x_, to_y_, to_z_;  // rows of the inverse of (x_, y_, z_): local coordinates of world vectors
+  Vec3 lens_normal_;         // unit, along the viewing axis
+  float pdf_position_ = 1;
+  float pixels_per_area_;  // film area in pixels over area of the image plane at distance 1, in world units
 };
 
 }  // namespace covary
