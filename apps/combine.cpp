@@ -15,7 +15,7 @@
 #include "core/stopwatch.h"
 #include "estimator_options.h"
 #include "estimators/grouped_file.h"
-#include "estimators/input_doctor.h"
+#include "estimators/input_checks.h"
 #include "estimators/mean.h"
 #include "estimators/result_file.h"
 #include "film/output_file.h"
@@ -98,13 +98,13 @@ class Bands {
 };
 
 InputReport examine(const GroupedFile& crn, const GroupedFile& pt, Bands& bands) {
-  InputDoctor doctor(crn.width(), crn.height(), crn.groups(), pt.groups());
+  InputChecks checks(crn.width(), crn.height(), crn.groups(), pt.groups());
   const int step = std::max(16, bands.rows());
   for (int y = 0; y < crn.height(); y += step) {
     bands.read(y, std::min(step, crn.height() - y));
-    doctor.add_rows(bands.crn(), bands.pt());
+    checks.add_rows(bands.crn(), bands.pt());
   }
-  return doctor.report();
+  return checks.report();
 }
 
 EstimatorResult estimate(const PairEstimator& estimator, const GroupedFile& file, Bands& bands) {

@@ -127,7 +127,7 @@ class Combine(CliTest):
             for b in results[:i]:
                 self.assertNotEqual(a, b)
 
-    def test_doctor_refuses_and_can_be_forced(self):
+    def test_checks_refuse_and_can_be_forced(self):
         inputs = ["--crn", "pt.exr", "--pt", "crn.exr", "-o", "out.exr"]
         result = self.bad(1, "are CRN and PT swapped?", "combine", *inputs)
         self.assertIn("the files say that CRN was rendered with sampling 'independent' and PT with 'crn'", result.stderr)

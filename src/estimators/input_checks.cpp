@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "estimators/input_doctor.h"
+#include "estimators/input_checks.h"
 
 #include <fmt/format.h>
 
@@ -220,7 +220,7 @@ bool InputReport::has_errors() const {
   return std::any_of(findings.begin(), findings.end(), [](const Finding& f) { return f.severity == Severity::kError; });
 }
 
-struct InputDoctor::State {
+struct InputChecks::State {
   State(int w, int h, int crn_groups, int pt_groups)
       : width(w),
         height(h),
@@ -237,11 +237,11 @@ struct InputDoctor::State {
   PairStatistics crn_horizontal, crn_vertical, pt_horizontal, pt_vertical, crn_pt;
 };
 
-InputDoctor::InputDoctor(int width, int height, int crn_groups, int pt_groups)
+InputChecks::InputChecks(int width, int height, int crn_groups, int pt_groups)
     : state_(std::make_unique<State>(width, height, crn_groups, pt_groups)) {}
-InputDoctor::~InputDoctor() = default;
+InputChecks::~InputChecks() = default;
 
-void InputDoctor::add_rows(const GroupedImage& crn, const GroupedImage& pt) {
+void InputChecks::add_rows(const GroupedImage& crn, const GroupedImage& pt) {
   State& s = *state_;
   std::vector<std::string> problems;
   check_inputs(crn, pt, 1, 1, problems);
@@ -257,7 +257,7 @@ void InputDoctor::add_rows(const GroupedImage& crn, const GroupedImage& pt) {
   s.next_row += crn.height;
 }
 
-InputReport InputDoctor::report() const {
+InputReport InputChecks::report() const {
   const State& s = *state_;
   COVARY_CHECK(s.next_row == s.height, "all rows were given");
   const long pixels = static_cast<long>(s.width) * s.height;
@@ -306,9 +306,9 @@ InputReport InputDoctor::report() const {
 }
 
 InputReport examine_inputs(const GroupedImage& crn, const GroupedImage& pt) {
-  InputDoctor doctor(crn.width, crn.height, crn.groups, pt.groups);
-  doctor.add_rows(crn, pt);
-  return doctor.report();
+  InputChecks checks(crn.width, crn.height, crn.groups, pt.groups);
+  checks.add_rows(crn, pt);
+  return checks.report();
 }
 
 }  // namespace covary

@@ -38,12 +38,12 @@ struct InputReport {
 
 /// Measures the images and says what is wrong. Looks at every pixel for its values and at no more than about 250 000
 /// pairs for each correlation. Images can be given in bands of rows, from top to bottom; pairs across bands are left out.
-class InputDoctor {
+class InputChecks {
  public:
   /// The images need not have the same number of groups; with fewer than 3, correlations cannot be measured, which is a
   /// warning.
-  InputDoctor(int width, int height, int crn_groups, int pt_groups);
-  ~InputDoctor();
+  InputChecks(int width, int height, int crn_groups, int pt_groups);
+  ~InputChecks();
   /// The next rows of both images. Throws Error(kUsage) where sizes differ or there is nothing.
   void add_rows(const GroupedImage& crn, const GroupedImage& pt);
   /// After the last row.

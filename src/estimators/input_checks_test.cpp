@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The doctor finds each planted fault and none in good images. Seeds are fixed. With N pairs of T = 12 groups a mean rank
+// The checks find each planted fault and none in good images. Seeds are fixed. With N pairs of T = 12 groups a mean rank
 // correlation has standard error 1 / sqrt(11 N) = 0.0045 for 80 x 60 pixels; faults planted are 20 and more of them, and
 // the false-alarm limit max(0.05, 5 standard errors) is 11.
-#include "estimators/input_doctor.h"
+#include "estimators/input_checks.h"
 
 #include <gtest/gtest.h>
 
@@ -43,7 +43,7 @@ test::Grouped filtered(const test::Grouped& image, float w) {
   return result;
 }
 
-TEST(InputDoctor, GoodImagesPass) {
+TEST(InputChecks, GoodImagesPass) {
   const test::Grouped crn = good_crn(), pt = good_pt();
   const InputReport r = examine_inputs(crn.view(), pt.view());
   EXPECT_TRUE(r.findings.empty()) << r.findings[0].text;
@@ -53,7 +53,7 @@ TEST(InputDoctor, GoodImagesPass) {
   EXPECT_NEAR(r.crn_pt.value, 0, 5 * r.crn_pt.standard_error);
 }
 
-TEST(InputDoctor, FindsWidePixelFilters) {
+TEST(InputChecks, FindsWidePixelFilters) {
   // Mixing in 10 % of both neighbours correlates by 2 * 0.1 * 0.8 / (0.8^2 + 2 * 0.1^2) = 0.24, as a tent filter does.
   const std::string text = findings(good_crn(), filtered(good_pt(), 0.1f));
   EXPECT_NE(text.find("!PT: errors of neighbouring pixels have a rank correlation of +0.2"), std::string::npos) << text;
@@ -61,13 +61,13 @@ TEST(InputDoctor, FindsWidePixelFilters) {
   EXPECT_NE(text.find("scene.cycles.pixel_filter_type = 'BOX'"), std::string::npos) << text;
 }
 
-TEST(InputDoctor, FindsBlueNoise) {
+TEST(InputChecks, FindsBlueNoise) {
   const std::string text = findings(good_crn(), filtered(good_pt(), -0.06f));
   EXPECT_NE(text.find("!PT: errors of neighbouring pixels have a rank correlation of -0.1"), std::string::npos) << text;
   EXPECT_NE(text.find("blue noise"), std::string::npos) << text;
 }
 
-TEST(InputDoctor, FindsSwappedAndNotCommonImages) {
+TEST(InputChecks, FindsSwappedAndNotCommonImages) {
   const std::string swapped = findings(good_pt(), good_crn());
   EXPECT_NE(swapped.find("are CRN and PT swapped?"), std::string::npos) << swapped;
   const std::string independent = findings(test::pt_image(kWidth, kHeight, kGroups, 9), good_pt());
@@ -75,7 +75,7 @@ TEST(InputDoctor, FindsSwappedAndNotCommonImages) {
   EXPECT_NE(independent.find("scrambling_distance = 0"), std::string::npos);
 }
 
-TEST(InputDoctor, FindsImagesThatShareRandomNumbers) {
+TEST(InputChecks, FindsImagesThatShareRandomNumbers) {
   const test::Grouped crn = good_crn();
   test::Grouped pt = good_pt();
   for (size_t i = 0; i < pt.data.size(); ++i) pt.data[i] = 0.8f * pt.data[i] + 0.2f * crn.data[i];
@@ -84,7 +84,7 @@ TEST(InputDoctor, FindsImagesThatShareRandomNumbers) {
       std::string::npos);
 }
 
-TEST(InputDoctor, FindsBadValues) {
+TEST(InputChecks, FindsBadValues) {
   const test::Grouped crn = good_crn();
   test::Grouped pt = good_pt();
   pt.pixel(7, 5)[4] = std::numeric_limits<float>::quiet_NaN();
@@ -98,7 +98,7 @@ TEST(InputDoctor, FindsBadValues) {
   EXPECT_NE(findings(crn, pt).find("!PT: 20 of 4800 pixels are exactly 1"), std::string::npos);
 }
 
-TEST(InputDoctor, FindsRepeatedGroupsAndOtherScenes) {
+TEST(InputChecks, FindsRepeatedGroupsAndOtherScenes) {
   const test::Grouped crn = good_crn();
   test::Grouped pt = good_pt();
   for (int y = 0; y < kHeight; ++y)
@@ -109,16 +109,16 @@ TEST(InputDoctor, FindsRepeatedGroupsAndOtherScenes) {
   EXPECT_NE(findings(crn, pt).find("do not show the same scene"), std::string::npos);
 }
 
-TEST(InputDoctor, BandsGiveTheSameFindings) {
+TEST(InputChecks, BandsGiveTheSameFindings) {
   const test::Grouped crn = good_crn();
   test::Grouped pt = filtered(good_pt(), 0.1f);
   pt.pixel(7, 45)[4] = std::numeric_limits<float>::infinity();
-  InputDoctor doctor(kWidth, kHeight, kGroups, kGroups);
+  InputChecks checks(kWidth, kHeight, kGroups, kGroups);
   for (int y = 0; y < kHeight; y += 25) {
     const int rows = std::min(25, kHeight - y);
-    doctor.add_rows({kWidth, rows, kGroups, crn.view().pixel(0, y)}, {kWidth, rows, kGroups, pt.view().pixel(0, y)});
+    checks.add_rows({kWidth, rows, kGroups, crn.view().pixel(0, y)}, {kWidth, rows, kGroups, pt.view().pixel(0, y)});
   }
-  const InputReport bands = doctor.report(), whole = examine_inputs(crn.view(), pt.view());
+  const InputReport bands = checks.report(), whole = examine_inputs(crn.view(), pt.view());
   EXPECT_EQ(bands.findings[0].text, whole.findings[0].text);
   EXPECT_NE(bands.findings[0].text.find("(7, 45) in group 1"), std::string::npos);
   EXPECT_NEAR(bands.pt_horizontal.value, whole.pt_horizontal.value, 1e-12);
@@ -126,7 +126,7 @@ TEST(InputDoctor, BandsGiveTheSameFindings) {
   EXPECT_NEAR(bands.crn_mean, whole.crn_mean, 1e-12);
 }
 
-TEST(InputDoctor, SaysWhatItCannotCheck) {
+TEST(InputChecks, SaysWhatItCannotCheck) {
   const test::Grouped crn = good_crn(), one = test::pt_image(kWidth, kHeight, 1, 2);
   EXPECT_EQ(findings(crn, one),
             "?PT: with 1 group it cannot be checked whether its pixels are independent; 12 groups are recommended\n");
