@@ -24,8 +24,8 @@ namespace covary {
 namespace {
 
 struct CombineOptions {
-  std::vector<std::string> crn, pt;
-  std::string output, crn_layer, pt_layer, json;
+  std::vector<std::string> crn, independent;
+  std::string output, crn_layer, independent_layer, json;
   EstimatorOptions estimator;
   bool error = false, force = false, quiet = false;
   std::optional<int> samples;
@@ -35,26 +35,28 @@ struct CombineOptions {
 };
 
 /// What the files themselves tell: sizes, kinds of sampling, precision.
-void check_files(const GroupedFile& crn, const GroupedFile& pt, std::vector<Finding>& findings) {
+void check_files(const GroupedFile& crn, const GroupedFile& independent, std::vector<Finding>& findings) {
   using Severity = Finding::Severity;
   const auto size = [](const GroupedFile& f) {
     const CropWindow& w = f.place().window;
     return fmt::format("{} x {} pixels at ({}, {}) of {} x {}", w.width, w.height, w.x, w.y, f.place().frame_width,
                        f.place().frame_height);
   };
-  if (!(crn.place() == pt.place()))
+  if (!(crn.place() == independent.place()))
     throw Error(ErrorCode::kInput, fmt::format("{} has {}, {} has {}; both images must show the same pixels",
-                                               crn.name(), size(crn), pt.name(), size(pt)));
-  if (crn.sampling() == "independent" || pt.sampling() == "crn")
-    findings.push_back({Severity::kError, "the files say that CRN was rendered with sampling '" + crn.sampling() +
-                                              "' and PT with '" + pt.sampling() +
+                                               crn.name(), size(crn), independent.name(), size(independent)));
+  if (crn.sampling() == "independent" || independent.sampling() == "crn")
+    findings.push_back({Severity::kError, "the files say that the CRN image was rendered with sampling '" +
+                                              crn.sampling() + "' and the independent image with '" +
+                                              independent.sampling() +
                                               "'; expected are --sampling crn and --sampling independent"});
-  if (!crn.scene_hash().empty() && !pt.scene_hash().empty() && crn.scene_hash() != pt.scene_hash())
+  if (!crn.scene_hash().empty() && !independent.scene_hash().empty() && crn.scene_hash() != independent.scene_hash())
     findings.push_back({Severity::kError, "the files say that they show different scenes (attribute scene_hash)"});
-  if (!crn.settings().empty() && !pt.settings().empty() && crn.settings() != pt.settings())
-    findings.push_back({Severity::kError, "the files say that they were rendered with different settings: CRN with '" +
-                                              crn.settings() + "', PT with '" + pt.settings() + "'"});
-  for (const auto& [name, file] : {std::pair{"CRN", &crn}, {"PT", &pt}})
+  if (!crn.settings().empty() && !independent.settings().empty() && crn.settings() != independent.settings())
+    findings.push_back(
+        {Severity::kError, "the files say that they were rendered with different settings: the CRN image with '" +
+                               crn.settings() + "', the independent image with '" + independent.settings() + "'"});
+  for (const auto& [name, file] : {std::pair{"CRN image", &crn}, {"independent image", &independent}})
     if (file->has_half())
       findings.push_back(
           {Severity::kWarning,
@@ -67,9 +69,10 @@ void check_files(const GroupedFile& crn, const GroupedFile& pt, std::vector<Find
 /// Both images, some rows at a time.
 class Bands {
  public:
-  Bands(const GroupedFile& crn, const GroupedFile& pt, double memory_mib) : crn_(crn), pt_(pt) {
+  Bands(const GroupedFile& crn, const GroupedFile& independent, double memory_mib)
+      : crn_(crn), independent_(independent) {
     // The values themselves, and about 40 floats per pixel that an estimator works with.
-    const double row_bytes = crn.width() * (12.0 * (crn.groups() + pt.groups()) + 160);
+    const double row_bytes = crn.width() * (12.0 * (crn.groups() + independent.groups()) + 160);
     rows_ = static_cast<int>(std::min<double>(crn.height(), memory_mib * 1048576 / row_bytes));
   }
   /// Rows that fit in memory at once.
@@ -77,32 +80,34 @@ class Bands {
   void read(int first, int n) {
     if (first == first_ && n == n_) return;
     crn_.read_rows(first, n, crn_data_);
-    pt_.read_rows(first, n, pt_data_);
+    independent_.read_rows(first, n, independent_data_);
     first_ = first;
     n_ = n;
   }
-  /// Reads the rows first … last - 1 with `reach` more on both sides, beginning at a multiple of a cell of the feedback, so that
-  /// bands give the bits of the whole. Returns the row that the band begins with.
+  /// Reads the rows first … last - 1 with `reach` more on both sides, beginning at a multiple of a cell of the
+  /// feedback, so that bands give the bits of the whole. Returns the row that the band begins with.
   int read_around(int first, int last, int reach) {
     const int begin = std::max(0, first - reach) / kFeedbackCell * kFeedbackCell;
     read(begin, std::min(crn_.height(), last + reach) - begin);
     return begin;
   }
   GroupedImage crn() const { return {crn_.width(), n_, crn_.groups(), crn_data_.data()}; }
-  GroupedImage pt() const { return {pt_.width(), n_, pt_.groups(), pt_data_.data()}; }
+  GroupedImage independent() const {
+    return {independent_.width(), n_, independent_.groups(), independent_data_.data()};
+  }
 
  private:
-  const GroupedFile &crn_, &pt_;
+  const GroupedFile &crn_, &independent_;
   int rows_, first_ = -1, n_ = 0;
-  std::vector<float> crn_data_, pt_data_;
+  std::vector<float> crn_data_, independent_data_;
 };
 
-InputReport examine(const GroupedFile& crn, const GroupedFile& pt, Bands& bands) {
-  InputChecks checks(crn.width(), crn.height(), crn.groups(), pt.groups());
+InputReport examine(const GroupedFile& crn, const GroupedFile& independent, Bands& bands) {
+  InputChecks checks(crn.width(), crn.height(), crn.groups(), independent.groups());
   const int step = std::max(16, bands.rows());
   for (int y = 0; y < crn.height(); y += step) {
     bands.read(y, std::min(step, crn.height() - y));
-    checks.add_rows(bands.crn(), bands.pt());
+    checks.add_rows(bands.crn(), bands.independent());
   }
   return checks.report();
 }
@@ -111,13 +116,13 @@ EstimatorResult estimate(const PairEstimator& estimator, const GroupedFile& file
   const int height = file.height();
   if (estimator.reach < 0 || bands.rows() >= height) {
     bands.read(0, height);
-    return estimator.apply(bands.crn(), bands.pt());
+    return estimator.apply(bands.crn(), bands.independent());
   }
   const int step = std::max(16, bands.rows() - 2 * estimator.reach) / kFeedbackCell * kFeedbackCell;
   EstimatorResult whole;
   for (int y = 0; y < height; y += step) {
     const int first = bands.read_around(y, y + step, estimator.reach);
-    const EstimatorResult part = estimator.apply(bands.crn(), bands.pt());
+    const EstimatorResult part = estimator.apply(bands.crn(), bands.independent());
     // Counts pixels in the overlap of two bands twice; a number above zero is what matters.
     whole.nonfinite_pixels += part.nonfinite_pixels;
     const auto append = [&](const Image& from, Image& to) {
@@ -132,10 +137,11 @@ EstimatorResult estimate(const PairEstimator& estimator, const GroupedFile& file
   return whole;
 }
 
-void write(const CombineOptions& o, const GroupedFile& crn, const GroupedFile& pt, EstimatorResult& result) {
+void write(const CombineOptions& o, const GroupedFile& crn, const GroupedFile& independent, EstimatorResult& result) {
   std::map<std::string, std::string> attributes = {
       {"covary:estimator", o.estimator.text()}, {"covary:version", COVARY_VERSION}, {"covary:command", command_line()}};
-  if (crn.samples() && pt.samples()) attributes["covary:samples"] = fmt::to_string(crn.samples() + pt.samples());
+  if (crn.samples() && independent.samples())
+    attributes["covary:samples"] = fmt::to_string(crn.samples() + independent.samples());
   std::map<std::string, Image> no_aovs;
   write_result(o.output, crn.place(), attributes, result, no_aovs);
 }
@@ -152,7 +158,7 @@ void check_explain(const CombineOptions& o, const PairEstimator& estimator, cons
                             o.explain[1], window.width, window.height, window.x, window.y));
 }
 
-/// What one pixel is made of: f, and for each control variate its place, coefficients, CRN mean and PT mean.
+/// What one pixel is made of: f, and for each control variate its place, coefficients, CRN mean and independent mean.
 nlohmann::ordered_json explain(const CombineOptions& o, const PairEstimator& estimator, const GroupedFile& crn,
                                Bands& bands) {
   const CropWindow& window = crn.place().window;
@@ -161,18 +167,18 @@ nlohmann::ordered_json explain(const CombineOptions& o, const PairEstimator& est
   const auto mean = [&](const GroupedImage& image, int px, int py) {
     return mean_of_groups({1, 1, image.groups, image.pixel(px, py)}).estimate.data;
   };
-  const GroupedImage g = bands.crn(), h = bands.pt();
+  const GroupedImage g = bands.crn(), h = bands.independent();
   nlohmann::ordered_json variates = nlohmann::ordered_json::array();
   for (const ControlVariate& v : estimator.explain(g, h, x, y - first))
     variates.push_back({{"dx", v.dx},
                         {"dy", v.dy},
                         {"beta", v.beta},
                         {"crn", mean(g, x + v.dx, y - first + v.dy)},
-                        {"pt", mean(h, x + v.dx, y - first + v.dy)}});
+                        {"independent", mean(h, x + v.dx, y - first + v.dy)}});
   return {{"x", o.explain[0]},
           {"y", o.explain[1]},
           {"crn", mean(g, x, y - first)},
-          {"pt", mean(h, x, y - first)},
+          {"independent", mean(h, x, y - first)},
           {"control_variates", variates}};
 }
 
@@ -180,11 +186,11 @@ void print_explanation(const nlohmann::ordered_json& pixel) {
   const auto rgb = [](const nlohmann::ordered_json& v) {
     return fmt::format("{:9.5f} {:9.5f} {:9.5f}", v[0].get<double>(), v[1].get<double>(), v[2].get<double>());
   };
-  fmt::print("pixel ({}, {}): CRN {}, PT {}\n  dx  dy  {:>29}  {:>29}  {:>29}\n", pixel["x"].get<int>(),
-             pixel["y"].get<int>(), rgb(pixel["crn"]), rgb(pixel["pt"]), "coefficients", "CRN", "PT");
+  fmt::print("pixel ({}, {}): CRN {}, independent {}\n  dx  dy  {:>29}  {:>29}  {:>29}\n", pixel["x"].get<int>(),
+             pixel["y"].get<int>(), rgb(pixel["crn"]), rgb(pixel["independent"]), "coefficients", "CRN", "independent");
   for (const auto& v : pixel["control_variates"])
     fmt::print("{:4d}{:4d}  {}  {}  {}\n", v["dx"].get<int>(), v["dy"].get<int>(), rgb(v["beta"]), rgb(v["crn"]),
-               rgb(v["pt"]));
+               rgb(v["independent"]));
 }
 
 nlohmann::ordered_json json_of(const Correlation& c) {
@@ -208,14 +214,14 @@ void combine(const CombineOptions& o) {
   std::optional<tbb::global_control> control;
   if (o.threads > 0) control.emplace(tbb::global_control::max_allowed_parallelism, o.threads);
   Stopwatch watch;
-  const GroupedFile crn(o.crn, o.crn_layer), pt(o.pt, o.pt_layer);
+  const GroupedFile crn(o.crn, o.crn_layer), independent(o.independent, o.independent_layer);
   const PairEstimator estimator = make_pair_estimator(o, crn);
   check_explain(o, estimator, crn);
 
   std::vector<Finding> findings;
-  check_files(crn, pt, findings);
-  Bands bands(crn, pt, o.memory_mib);
-  const InputReport report = examine(crn, pt, bands);
+  check_files(crn, independent, findings);
+  Bands bands(crn, independent, o.memory_mib);
+  const InputReport report = examine(crn, independent, bands);
   findings.insert(findings.end(), report.findings.begin(), report.findings.end());
   std::string errors;
   for (const Finding& f : findings)
@@ -230,7 +236,7 @@ void combine(const CombineOptions& o) {
 
   EstimatorResult result = estimate(estimator, crn, bands);
   const double estimate_seconds = watch.lap();
-  write(o, crn, pt, result);
+  write(o, crn, independent, result);
   const double write_seconds = watch.lap();
   nlohmann::ordered_json pixel;
   if (!o.explain.empty()) {
@@ -240,8 +246,8 @@ void combine(const CombineOptions& o) {
 
   if (!o.quiet)
     std::fprintf(stderr, "%s: %d x %d, %s of %d + %d groups in %.2f s (read and check %.2f s, write %.2f s)\n",
-                 o.output.c_str(), crn.width(), crn.height(), o.estimator.name.c_str(), crn.groups(), pt.groups(),
-                 estimate_seconds, check_seconds, write_seconds);
+                 o.output.c_str(), crn.width(), crn.height(), o.estimator.name.c_str(), crn.groups(),
+                 independent.groups(), estimate_seconds, check_seconds, write_seconds);
   if (o.json.empty()) return;
   nlohmann::ordered_json json = {
       {"output", o.output},
@@ -249,15 +255,15 @@ void combine(const CombineOptions& o) {
       {"width", crn.width()},
       {"height", crn.height()},
       {"crn_groups", crn.groups()},
-      {"pt_groups", pt.groups()},
+      {"independent_groups", independent.groups()},
       {"nonfinite_pixels", result.nonfinite_pixels},
       {"rank_correlation",
        {{"crn_horizontal", json_of(report.crn_horizontal)},
         {"crn_vertical", json_of(report.crn_vertical)},
-        {"pt_horizontal", json_of(report.pt_horizontal)},
-        {"pt_vertical", json_of(report.pt_vertical)},
-        {"crn_pt", json_of(report.crn_pt)}}},
-      {"mean", {{"crn", report.crn_mean}, {"pt", report.pt_mean}}},
+        {"independent_horizontal", json_of(report.independent_horizontal)},
+        {"independent_vertical", json_of(report.independent_vertical)},
+        {"crn_independent", json_of(report.crn_independent)}}},
+      {"mean", {{"crn", report.crn_mean}, {"independent", report.independent_mean}}},
       {"seconds", {{"read_and_check", check_seconds}, {"estimate", estimate_seconds}, {"write", write_seconds}}}};
   if (!pixel.is_null()) json["pixel"] = pixel;
   if (o.json == "-")
@@ -275,10 +281,13 @@ void add_combine(CLI::App& app) {
   command->add_option("--crn", o->crn, "Image with common random numbers: one EXR with all groups, or one per group")
       ->required()
       ->expected(1, 1000);
-  command->add_option("--pt", o->pt, "Image with independent random numbers, likewise")->required()->expected(1, 1000);
+  command->add_option("--independent,--pt", o->independent, "Image with independent random numbers, likewise")
+      ->required()
+      ->expected(1, 1000);
   command->add_option("-o,--output", o->output, "The result (EXR)")->required();
   command->add_option("--crn-layer", o->crn_layer, "Layer of the CRN image where its files hold several");
-  command->add_option("--pt-layer", o->pt_layer, "Layer of the PT image where its files hold several");
+  command->add_option("--independent-layer,--pt-layer", o->independent_layer,
+                      "Layer of the independent image where its files hold several");
   command->add_option("--estimator", o->estimator.name, "iicv, or a comparator")
       ->check(CLI::Validator(
           [](std::string& name) {

@@ -16,11 +16,11 @@ void set(T& target, const std::optional<U>& value) {
 }
 
 template <typename Estimator, typename Options>
-std::vector<ControlVariate> explain(Estimator estimator, const GroupedImage& crn, const GroupedImage& pt,
+std::vector<ControlVariate> explain(Estimator estimator, const GroupedImage& crn, const GroupedImage& independent,
                                     Options options, int x, int y) {
   PixelProbe probe{x, y, {}};
   options.probe = &probe;
-  estimator(crn, pt, options);
+  estimator(crn, independent, options);
   return probe.control_variates;
 }
 
@@ -41,11 +41,12 @@ PairEstimator make_iicv(const EstimatorOptions& o, bool std_error) {
   if (!o.coefficients.empty()) options.shared_coefficients = o.coefficients == "shared";
   options.std_error = std_error;
   throw_if_any(o.name, options.validate());
-  return {[options](const GroupedImage& crn, const GroupedImage& pt) { return iicv(crn, pt, options); },
-          iicv_reach(options),
-          [options](const GroupedImage& crn, const GroupedImage& pt, int x, int y) {
-            return explain(iicv, crn, pt, options, x, y);
-          }};
+  return {
+      [options](const GroupedImage& crn, const GroupedImage& independent) { return iicv(crn, independent, options); },
+      iicv_reach(options),
+      [options](const GroupedImage& crn, const GroupedImage& independent, int x, int y) {
+        return explain(iicv, crn, independent, options, x, y);
+      }};
 }
 
 PairEstimator make_cv_baseline(const EstimatorOptions& o, bool std_error) {
@@ -57,10 +58,12 @@ PairEstimator make_cv_baseline(const EstimatorOptions& o, bool std_error) {
   if (!o.coefficients.empty()) options.shared_coefficients = o.coefficients == "shared";
   options.std_error = std_error;
   throw_if_any(o.name, options.validate());
-  return {[options](const GroupedImage& crn, const GroupedImage& pt) { return cv_baseline(crn, pt, options); },
+  return {[options](const GroupedImage& crn, const GroupedImage& independent) {
+            return cv_baseline(crn, independent, options);
+          },
           options.window / 2,
-          [options](const GroupedImage& crn, const GroupedImage& pt, int x, int y) {
-            return explain(cv_baseline, crn, pt, options, x, y);
+          [options](const GroupedImage& crn, const GroupedImage& independent, int x, int y) {
+            return explain(cv_baseline, crn, independent, options, x, y);
           }};
 }
 
@@ -69,7 +72,10 @@ PairEstimator make_iduw(const EstimatorOptions& o, int64_t crn_samples) {
   set(options.window, o.window);
   options.samples = static_cast<int>(crn_samples);
   throw_if_any(o.name, options.validate());
-  return {[options](const GroupedImage& crn, const GroupedImage& pt) { return iduw(crn, pt, options); }, -1, {}};
+  return {
+      [options](const GroupedImage& crn, const GroupedImage& independent) { return iduw(crn, independent, options); },
+      -1,
+      {}};
 }
 
 }  // namespace
@@ -110,8 +116,9 @@ void add_estimator_options(CLI::App& command, EstimatorOptions& o) {
   add(command.add_flag("--paper", o.paper, "iicv as published: no sample share, no conservation, no feedback"));
   add(command.add_option("--k", o.k, "Number of control variates; default 25"));
   add(command.add_option("--window", o.window, "Side of the window they are chosen from; default 11 (iduw: 15)"));
-  add(command.add_option("--penalty,--variance", o.penalty,
-                         "Error of the PT pixels: pilot, sample, smoothed, homogeneous or cross-fit; default pilot"))
+  add(command.add_option(
+          "--penalty,--variance", o.penalty,
+          "Error of the independent pixels: pilot, sample, smoothed, homogeneous or cross-fit; default pilot"))
       ->transform(CLI::CheckedTransformer(penalties).description(""))
       ->type_name("NAME");
   add(command.add_option("--pilot-window", o.pilot_window, "Side of the pilot's window; default 11"));

@@ -32,10 +32,11 @@ struct EstimatorOptions {
 
 /// An estimator with its options, as a function of a CRN and an independent image.
 struct PairEstimator {
-  std::function<EstimatorResult(const GroupedImage& crn, const GroupedImage& pt)> apply;
+  std::function<EstimatorResult(const GroupedImage& crn, const GroupedImage& independent)> apply;
   int reach = 0;  ///< rows beyond its own that a band needs; -1: the whole image is needed
   /// The control variates of a pixel; empty function where the estimator has none.
-  std::function<std::vector<ControlVariate>(const GroupedImage& crn, const GroupedImage& pt, int x, int y)> explain;
+  std::function<std::vector<ControlVariate>(const GroupedImage& crn, const GroupedImage& independent, int x, int y)>
+      explain;
 };
 
 /// The estimators that take an option, for each option that only the estimator reads: "--k" -> "iicv, cv-baseline".
@@ -50,12 +51,12 @@ bool predicts_error(const std::string& estimator);
 /// Adds the options of all estimators but `--estimator` itself.
 void add_estimator_options(CLI::App& command, EstimatorOptions& options);
 
-/// Throws Error(kUsage) for options of another estimator and for values out of range; for estimators of a single pass, which
-/// take none of the options, too.
+/// Throws Error(kUsage) for options of another estimator and for values out of range; for estimators of a single pass,
+/// which take none of the options, too.
 void check_estimator_options(const EstimatorOptions& options);
 
-/// `std_error`: with the error estimate, where predicts_error(); `crn_samples`: samples per pixel of the CRN image. Throws like
-/// check_estimator_options().
+/// `std_error`: with the error estimate, where predicts_error(); `crn_samples`: samples per pixel of the CRN image.
+/// Throws like check_estimator_options().
 PairEstimator make_estimator(const EstimatorOptions& options, bool std_error, int64_t crn_samples);
 
 }  // namespace covary

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The image-space estimators on a synthetic frame of 1280 x 720 pixels with 12 + 12 groups: the stages of iicv one by one,
-// and whole estimators. Stages run on one thread, estimators on all. items_per_second are pixels per second.
+// The image-space estimators on a synthetic frame of 1280 x 720 pixels with 12 + 12 groups: the stages of iicv one by
+// one, and whole estimators. Stages run on one thread, estimators on all. items_per_second are pixels per second.
 #include <benchmark/benchmark.h>
 #include <tbb/global_control.h>
 
@@ -43,10 +43,11 @@ std::vector<float> make_image(uint64_t seed, float own) {
 }
 
 struct Input {
-  std::vector<float> crn_data = make_image(2, 0.2f), pt_data = make_image(3, 1.0f);
-  GroupedImage crn{kWidth, kHeight, kGroups, crn_data.data()}, pt{kWidth, kHeight, kGroups, pt_data.data()};
+  std::vector<float> crn_data = make_image(2, 0.2f), independent_data = make_image(3, 1.0f);
+  GroupedImage crn{kWidth, kHeight, kGroups, crn_data.data()},
+      independent{kWidth, kHeight, kGroups, independent_data.data()};
   std::vector<unsigned char> valid = std::vector<unsigned char>(static_cast<size_t>(kWidth) * kHeight, 1);
-  Moments g = moments(crn, valid, kBorder, kFar), h = moments(pt, valid, kBorder, 0.0f);
+  Moments g = moments(crn, valid, kBorder, kFar), h = moments(independent, valid, kBorder, 0.0f);
   Planes error = pilot_error(g, h.mean, 11, false, kBorder);
 };
 
@@ -108,7 +109,7 @@ void one_feedback(benchmark::State& state) {
   IicvOptions options;
   options.feedback = false;
   options.std_error = true;
-  const EstimatorResult before = iicv(in.crn, in.pt, options);
+  const EstimatorResult before = iicv(in.crn, in.independent, options);
   for (auto _ : state) {
     Image estimate = before.estimate;
     add_feedback(in.h, FeedbackOptions(), in.valid, before.std_error, estimate);
@@ -132,13 +133,13 @@ void one_polynomials(benchmark::State& state) {
 
 void whole_iicv(benchmark::State& state, const IicvOptions& options) {
   const Input& in = input();
-  for (auto _ : state) benchmark::DoNotOptimize(iicv(in.crn, in.pt, options).estimate.data.data());
+  for (auto _ : state) benchmark::DoNotOptimize(iicv(in.crn, in.independent, options).estimate.data.data());
   count(state);
 }
 
 void whole_cv_baseline(benchmark::State& state) {
   const Input& in = input();
-  for (auto _ : state) benchmark::DoNotOptimize(cv_baseline(in.crn, in.pt).estimate.data.data());
+  for (auto _ : state) benchmark::DoNotOptimize(cv_baseline(in.crn, in.independent).estimate.data.data());
   count(state);
 }
 
@@ -146,7 +147,7 @@ void whole_iduw(benchmark::State& state) {
   const Input& in = input();
   IduwOptions options;
   options.samples = 96;
-  for (auto _ : state) benchmark::DoNotOptimize(iduw(in.crn, in.pt, options).estimate.data.data());
+  for (auto _ : state) benchmark::DoNotOptimize(iduw(in.crn, in.independent, options).estimate.data.data());
   count(state);
 }
 

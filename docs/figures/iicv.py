@@ -43,7 +43,8 @@ def coefficients(explained):
         colour = (255, pale, pale) if v["beta"][0] > 0 else (pale, pale, 255)
         x, y = (v["dx"] + REACH) * CELL, (v["dy"] + REACH) * CELL
         draw.rectangle((x, y, x + CELL - 1, y + CELL - 1), fill=colour, outline="#999999")
-    draw.rectangle((REACH * CELL, REACH * CELL, (REACH + 1) * CELL - 1, (REACH + 1) * CELL - 1), outline="black", width=2)
+    draw.rectangle((REACH * CELL, REACH * CELL, (REACH + 1) * CELL - 1, (REACH + 1) * CELL - 1), outline="black",
+                   width=2)
     return image
 
 
@@ -54,7 +55,8 @@ def main():
         at = pathlib.Path(folder)
         scene, crop_text = ROOT / "scenes" / "room.xml", ",".join(map(str, WINDOW))
         common = [scene, "--quiet", "--rfilter", "box"]
-        run(covary, "render", *common, "-o", at / "iicv.exr", "--spp", 48, "--passes", at / "passes", "--crop", crop_text)
+        run(covary, "render", *common, "-o", at / "iicv.exr", "--spp", 48, "--passes", at / "passes", "--crop",
+            crop_text)
         run(covary, "render", *common, "-o", at / "plain.exr", "--spp", 48, "--estimator", "none", "--crop", crop_text)
         run(covary, "render", *common, "-o", at / "reference.exr", "--spp", 2048, "--estimator", "none", "--seed", 1000,
             "--crop", crop_text)
@@ -62,10 +64,12 @@ def main():
             run(covary, "convert", at / "passes" / f"{name}.exr", at / f"{name}.png")
         run(covary, "compare", at / "iicv.exr", at / "plain.exr", "--reference", at / "reference.exr",
             "--error-map", at / "error.png")  # one scale for both
-        explained = [json.loads(run(covary, "combine", "--crn", at / "passes" / "crn.exr", "--pt", at / "passes" / "independent.exr",
+        explained = [json.loads(run(covary, "combine", "--crn", at / "passes" / "crn.exr", "--independent",
+                                    at / "passes" / "independent.exr",
                                     "-o", at / "o.exr", "--quiet", "--json", "-", "--explain", f"{x},{y}"))["pixel"]
                      for _, x, y in PIXELS]
-        top = [("common random numbers, 24 samples", at / "crn.png"), ("independent, 24 samples", at / "independent.png"),
+        top = [("common random numbers, 24 samples", at / "crn.png"),
+               ("independent, 24 samples", at / "independent.png"),
                ("IICV of the two", at / "iicv.png"), ("path tracing, 48 samples", at / "plain.png")]
         width, height, label = WINDOW[2] * ZOOM, WINDOW[3] * ZOOM, 24
         side = (2 * REACH + 1) * CELL

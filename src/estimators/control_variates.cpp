@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Layout of the work: tiles of the image in parallel; in a tile, kLanes pixels at a time, one per lane. Per pixel, what a
-// neighbour contributes (a "record") lies contiguous in memory, so that a neighbour is a few vector loads and a
+// Layout of the work: tiles of the image in parallel; in a tile, kLanes pixels at a time, one per lane. Per pixel, what
+// a neighbour contributes (a "record") lies contiguous in memory, so that a neighbour is a few vector loads and a
 // transposition.
 //
 // The T centred group means of a pixel span only T - 1 dimensions. They are replaced by T - 1 orthonormal contrasts
@@ -20,7 +20,8 @@ namespace {
 using namespace lanes;
 
 constexpr int kTileWidth = 64, kTileHeight = 32;
-/// Part of the degrees of freedom that a fit leaves at least, for the error estimate; less is the fit of an interpolation.
+/// Part of the degrees of freedom that a fit leaves at least, for the error estimate; less is the fit of an
+/// interpolation.
 constexpr float kFewestFreedom = 0.1f;
 
 /// Offsets in the record of a pixel.
@@ -204,8 +205,8 @@ class Regression {
     return total;
   }
 
-  /// The condition on the coefficients as a row of X and y (one for each channel, like a contrast of the groups), scaled
-  /// by sqrt(conservation (T - 1) S / N).
+  /// The condition on the coefficients as a row of X and y (one for each channel, like a contrast of the groups),
+  /// scaled by sqrt(conservation (T - 1) S / N).
   void scale_condition(int first, int count, Workspace& w) const {
     const int k = s_.k, n_tail = layout_.size - layout_.contrasts;
     vfloat S = {}, N = {};
@@ -262,8 +263,8 @@ class Regression {
   ///   beta = (X^T X + (T - 1) V_h)^-1 X^T y
   /// or, with fewer rows than neighbours, with Z = X V_h^-1/2, as
   ///   V_h^1/2 beta = gamma = Z^T (Z Z^T + (T - 1) I)^-1 y.
-  /// Leaves in gamma the coefficients of what is in x: X, or Z in the second case; in freedom the degrees of freedom that
-  /// the fit takes from the groups, trace(X (X^T X + (T - 1) V_h)^-1 X^T), over their number.
+  /// Leaves in gamma the coefficients of what is in x: X, or Z in the second case; in freedom the degrees of freedom
+  /// that the fit takes from the groups, trace(X (X^T X + (T - 1) V_h)^-1 X^T), over their number.
   void find_coefficients(int first, int count, Workspace& w) const {
     const int k = s_.k, all = layout_.contrasts, step = count == 3 ? 1 : 3, rows = all / step;
     const int group_rows = layout_.group_contrasts / step;
@@ -331,11 +332,11 @@ class Regression {
     const int k = s_.k, n_tail = layout_.size - layout_.contrasts;
     vfloat estimate = load(in_.crn_moments->mean.row(c, y) + x);
     for (int i = 0; i < k; ++i) estimate -= w.beta[i] * tail_value(w.tail.data() + i * n_tail, layout_.difference + c);
-    // Squares of values beyond 10^18 overflow; such pixels show the PT image.
+    // Squares of values beyond 10^18 overflow; such pixels show the independent image.
     for (int l = 0; l < n_lanes; ++l)
       result_.estimate.pixel(x + l, y)[c] = std::isfinite(estimate[l]) ? estimate[l] : in_.h->row(c, y)[x + l];
     if (!s_.std_error) return;
-    const vfloat error = lanes::sqrt(crn_variance(c, w) + pt_variance(c, w));
+    const vfloat error = lanes::sqrt(crn_variance(c, w) + independent_variance(c, w));
     for (int l = 0; l < n_lanes; ++l)
       result_.std_error.pixel(x + l, y)[c] =
           std::isfinite(error[l]) ? error[l] : std::sqrt(in_.variance_of_h->row(c, y)[x + l]);
@@ -355,9 +356,10 @@ class Regression {
     return squares / (static_cast<float>(T_ * (T_ - 1)) * left * left);
   }
 
-  /// The last term of Eq. (8): sum_i beta_i^2 var h_i. Penalties that contain the sample variance give large coefficients
-  /// to pixels whose sample variance happens to be small; to that part, the neighbours' mean variance is used for all.
-  vfloat pt_variance(int c, const Workspace& w) const {
+  /// The last term of Eq. (8): sum_i beta_i^2 var h_i. Penalties that contain the sample variance give large
+  /// coefficients to pixels whose sample variance happens to be small; to that part, the neighbours' mean variance is
+  /// used for all.
+  vfloat independent_variance(int c, const Workspace& w) const {
     const int n_tail = layout_.size - layout_.contrasts;
     vfloat own = {}, variances = {}, squares = {}, count = {};
     for (int i = 0; i < s_.k; ++i) {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The estimator all image-space control variates of Yang & Moon 2025 share: Eq. (7) with the coefficients of Eq. (10),
 //     F^ = f - sum_i beta_i (g_i - h_i),    beta = (X^T X / (T - 1) + V_h)^-1 X^T y / (T - 1),
-// for every pixel, given the error variances V_h. X, y: centred group means of the CRN image at the neighbours and at the
-// target; f, g: their means; h: means of the PT image. What V_h is makes the difference between the methods (iicv.h,
-// cv_baseline.h).
+// for every pixel, given the error variances V_h. X, y: centred group means of the CRN image at the neighbours and at
+// the target; f, g: their means; h: means of the independent image. What V_h is makes the difference between the
+// methods (iicv.h, cv_baseline.h).
 #pragma once
 
 #include "estimators/grouped_image.h"
@@ -13,8 +13,8 @@
 namespace covary {
 
 /// Smallest V_h,i relative to the variance of the CRN groups at i. It bounds the condition number, so that single
-/// precision suffices; PT and CRN estimate the same integrals, so that the true ratio is about one. Values from 1e-5 to
-/// 1e-2 give the same errors within 0.1 % (kitchen, 192 spp).
+/// precision suffices; both images estimate the same integrals, so that the true ratio is about one. Values from 1e-5
+/// to 1e-2 give the same errors within 0.1 % (kitchen, 192 spp).
 inline constexpr float kSmallestPenalty = 1e-4f;
 /// Ridge that stands for zero (minimum norm), relative to the mean diagonal. The system has condition numbers up to
 /// k / ridge, which single precision must hold with its rounding errors.
@@ -32,8 +32,8 @@ struct ControlVariateSettings {
   float sample_share = 0;
   /// Weight of the condition sum_i beta_i g_i = f (in each channel); 0: none. X^T X / (T - 1) gets the additional term
   ///     conservation * (S / N) g g^T,   S, N: means over the neighbours of the group variance and of g_i^2,
-  /// as if errors in proportion to the brightness, `conservation` times as large as the errors there are, were common to
-  /// all pixels. Not in the paper.
+  /// as if errors in proportion to the brightness, `conservation` times as large as the errors there are, were common
+  /// to all pixels. Not in the paper.
   float conservation = 0;
   /// Where positive: V_h = ridge * (mean diagonal of X^T X / (T - 1)) * I instead of `error_of_h`.
   float ridge = 0;
@@ -45,7 +45,7 @@ struct ControlVariateSettings {
 struct ControlVariateInput {
   GroupedImage crn;
   const Moments* crn_moments = nullptr;   ///< mean: kFar outside and at invalid pixels
-  const Planes* h = nullptr;              ///< 3 planes: mean of the PT image; 0 outside and at invalid pixels
+  const Planes* h = nullptr;              ///< 3 planes: mean of the independent image; 0 outside and at invalid pixels
   const Planes* error_of_h = nullptr;     ///< 3 planes: estimated error variance of h; kUseless where there is none
   const Planes* variance_of_h = nullptr;  ///< 3 planes: variance of h; for std_error and sample_share
 };

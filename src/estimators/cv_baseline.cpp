@@ -19,27 +19,29 @@ std::vector<std::string> CvBaselineOptions::validate() const {
   return problems;
 }
 
-EstimatorResult cv_baseline(const GroupedImage& crn, const GroupedImage& pt, const CvBaselineOptions& options) {
+EstimatorResult cv_baseline(const GroupedImage& crn, const GroupedImage& independent,
+                            const CvBaselineOptions& options) {
   std::vector<std::string> problems = options.validate();
-  check_inputs(crn, pt, 3, options.std_error ? 2 : 1, problems);
+  check_inputs(crn, independent, 3, options.std_error ? 2 : 1, problems);
   throw_if_any("cv_baseline", problems);
 
   EstimatorResult result;
-  const std::vector<unsigned char> valid = finite_pixels(crn, pt, result.nonfinite_pixels);
-  const Moments g = moments(crn, valid, options.window / 2, kFar), h = moments(pt, valid, options.window / 2, 0.0f);
+  const std::vector<unsigned char> valid = finite_pixels(crn, independent, result.nonfinite_pixels);
+  const Moments g = moments(crn, valid, options.window / 2, kFar),
+                h = moments(independent, valid, options.window / 2, 0.0f);
   ControlVariateSettings settings;
   settings.k = options.k;
   settings.window = options.window;
   settings.include_target = options.include_target;
   settings.shared = options.shared_coefficients;
-  // [YM2025] Eq. (6) is Eq. (10) with V_h = 0; a ridge on X^T X is one of 1 / (T - 1) times its size on X^T X / (T - 1),
-  // and both are relative to the mean diagonal.
+  // [YM2025] Eq. (6) is Eq. (10) with V_h = 0; a ridge on X^T X is one of 1 / (T - 1) times its size on X^T X / (T -
+  // 1), and both are relative to the mean diagonal.
   settings.ridge = options.ridge;
   settings.std_error = options.std_error;
   settings.probe = options.probe;
   ControlVariateInput input{crn, &g, &h.mean, nullptr, &h.variance_of_mean};
   apply_control_variates(input, settings, valid, result);
-  fill_invalid(crn, pt, valid, result.estimate);
+  fill_invalid(crn, independent, valid, result.estimate);
   return result;
 }
 

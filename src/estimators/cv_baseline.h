@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Image-space control variates that ignore the errors of the PT image: "CV (baseline)" of Yang & Moon 2025 [YM2025],
-// Sec. 3, Eq. (6). A comparator.
+// Image-space control variates that ignore the errors of the independent image: "CV (baseline)" of Yang & Moon 2025
+// [YM2025], Sec. 3, Eq. (6). A comparator.
 #pragma once
 
 #include "estimators/grouped_image.h"
@@ -16,12 +16,12 @@ struct CvBaselineOptions {
   /// Whether the target pixel is one of them. Default true, as in iicv.
   bool include_target = true;
   /// Default per channel: with shared coefficients and the target included, the least-squares solution is the target
-  /// itself, that is the PT image.
+  /// itself, that is the independent image.
   bool shared_coefficients = false;
   /// Ridge added to X^T X, relative to its mean diagonal; >= 0. 0, the default, is the solution of smallest norm, as
   /// X^T X is singular for k >= T. The paper states no ridge, but its published errors need one.
   float ridge = 0;
-  /// Also estimate the standard error by Eq. (8); `pt` then needs 2 groups.
+  /// Also estimate the standard error by Eq. (8); `independent` then needs 2 groups.
   bool std_error = false;
   PixelProbe* probe = nullptr;  ///< optional; inside the image
 
@@ -29,6 +29,7 @@ struct CvBaselineOptions {
 };
 
 /// Throws Error(kUsage) that lists every problem. `crn` needs at least 3 groups.
-EstimatorResult cv_baseline(const GroupedImage& crn, const GroupedImage& pt, const CvBaselineOptions& options = {});
+EstimatorResult cv_baseline(const GroupedImage& crn, const GroupedImage& independent,
+                            const CvBaselineOptions& options = {});
 
 }  // namespace covary

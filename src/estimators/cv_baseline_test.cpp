@@ -16,23 +16,24 @@ using reference::compare, reference::neighbours, reference::pilot_of, reference:
 using test_support::message_of;
 
 TEST(CvBaseline, WithARidgeAgreesWithTheReference) {
-  const test::Grouped crn = test::crn_image(41, 27, 12, 1), pt = test::pt_image(41, 27, 12, 2);
-  const RgbImage unused = pilot_of(crn.view(), pt.view(), 11);
+  const test::Grouped crn = test::crn_image(41, 27, 12, 1), independent = test::independent_image(41, 27, 12, 2);
+  const RgbImage unused = pilot_of(crn.view(), independent.view(), 11);
   for (bool shared : {false, true}) {
     CvBaselineOptions options;
     options.ridge = 0.05f;
     options.shared_coefficients = shared;
-    const EstimatorResult fast = cv_baseline(crn.view(), pt.view(), options);
-    EXPECT_LT(compare(fast, crn.view(), pt.view(), unused, 25, 11, true, {shared, false, 0.05, 0}).estimate, 2e-3);
+    const EstimatorResult fast = cv_baseline(crn.view(), independent.view(), options);
+    EXPECT_LT(compare(fast, crn.view(), independent.view(), unused, 25, 11, true, {shared, false, 0.05, 0}).estimate,
+              2e-3);
   }
 }
 
 /// Minimum norm: against the pseudo-inverse.
 TEST(CvBaseline, WithoutRidgeIsTheMinimumNormSolution) {
-  const test::Grouped crn = test::crn_image(30, 20, 12, 1), pt = test::pt_image(30, 20, 12, 2);
-  const GroupedImage view = crn.view(), pt_view = pt.view();
+  const test::Grouped crn = test::crn_image(30, 20, 12, 1), independent = test::independent_image(30, 20, 12, 2);
+  const GroupedImage view = crn.view(), independent_view = independent.view();
   const auto all = neighbours(view, 25, 11, true);
-  const EstimatorResult fast = cv_baseline(view, pt_view);
+  const EstimatorResult fast = cv_baseline(view, independent_view);
   for (int y = 0; y < view.height; ++y)
     for (int x = 0; x < view.width; ++x)
       for (int c = 0; c < 3; ++c) {
@@ -45,7 +46,7 @@ TEST(CvBaseline, WithoutRidgeIsTheMinimumNormSolution) {
         }
         const double f = target.mean();
         for (int i = 0; i < 25; ++i)
-          difference(i) = X.col(i).mean() - reference::mean(pt_view, near[i].x, near[i].y)[c];
+          difference(i) = X.col(i).mean() - reference::mean(independent_view, near[i].x, near[i].y)[c];
         target.array() -= f;
         X.rowwise() -= X.colwise().mean().eval();
         const Eigen::VectorXd beta = X.completeOrthogonalDecomposition().solve(target);
@@ -55,28 +56,28 @@ TEST(CvBaseline, WithoutRidgeIsTheMinimumNormSolution) {
 }
 
 /// Least squares with shared coefficients and the target among the neighbours: the target itself.
-TEST(CvBaseline, WithSharedCoefficientsIsThePtImage) {
-  const test::Grouped crn = test::crn_image(30, 20, 12, 1), pt = test::pt_image(30, 20, 12, 2);
+TEST(CvBaseline, WithSharedCoefficientsIsTheIndependentImage) {
+  const test::Grouped crn = test::crn_image(30, 20, 12, 1), independent = test::independent_image(30, 20, 12, 2);
   CvBaselineOptions options;
   options.shared_coefficients = true;
-  const EstimatorResult fast = cv_baseline(crn.view(), pt.view(), options);
+  const EstimatorResult fast = cv_baseline(crn.view(), independent.view(), options);
   for (int y = 0; y < 20; ++y)
     for (int x = 0; x < 30; ++x)
       for (int c = 0; c < 3; ++c)
-        EXPECT_NEAR(fast.estimate.pixel(x, y)[c], reference::mean(pt.view(), x, y)[c], 5e-3) << x << ", " << y;
+        EXPECT_NEAR(fast.estimate.pixel(x, y)[c], reference::mean(independent.view(), x, y)[c], 5e-3) << x << ", " << y;
 }
 
 /// A sky: bright, and hardly any noise but that of rounding. The solution of smallest norm must not blow it up.
 TEST(CvBaseline, SmallestNormIsBoundedWherePixelsHardlyVary) {
-  test::Grouped crn = test::crn_image(60, 40, 12, 3), pt = test::pt_image(60, 40, 12, 4);
+  test::Grouped crn = test::crn_image(60, 40, 12, 3), independent = test::independent_image(60, 40, 12, 4);
   for (float noise : {0.0f, 1e-7f, 1e-6f, 1e-4f, 1e-2f}) {
     for (int y = 0; y < 40; ++y)
       for (int x = 0; x < 60; ++x)
         for (int i = 0; i < 36; ++i) {
           crn.pixel(x, y)[i] = 3.0f * (1 + noise * test::noise(7, i, x));
-          pt.pixel(x, y)[i] = 3.0f * (1 + noise * test::noise(8, i + 36 * y, x));
+          independent.pixel(x, y)[i] = 3.0f * (1 + noise * test::noise(8, i + 36 * y, x));
         }
-    const EstimatorResult result = cv_baseline(crn.view(), pt.view());
+    const EstimatorResult result = cv_baseline(crn.view(), independent.view());
     for (float v : result.estimate.data) ASSERT_NEAR(v, 3.0f, 30 * noise + 1e-5f) << noise;
   }
 }

@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 // Residual feedback (ours): gives back, where it is shared, what an estimator took away.
 //
-// Penalties that contain the noise they judge lose energy: bright outliers of the PT image h are penalised more than dark
-// ones. The bias E[h - F^] varies slowly over the image, so that a wide mean of h - F^ over pixels like the target is
-// nearly free of noise, and F^, which has little noise, tells which pixels are alike:
+// Penalties that contain the noise they judge lose energy: bright outliers of the independent image h are penalised
+// more than dark ones. The bias E[h - F^] varies slowly over the image, so that a wide mean of h - F^ over pixels like
+// the target is nearly free of noise, and F^, which has little noise, tells which pixels are alike:
 //
 //     r_i(kappa) = sum_j w_ij (h_j - F^_j) / sum_j w_ij,   w_ij = exp(-||F^_j - F^_i||^2 / (kappa^2 s_i^2)),
 //
-// s_i^2: estimated variance of F^_i, summed over RGB (Eq. (8) of the estimator). A small kappa leaves the least bias, but where
-// few pixels are alike, its mean is noisy. So two are mixed by the noise v_i of the first, summed over RGB:
+// s_i^2: estimated variance of F^_i, summed over RGB (Eq. (8) of the estimator). A small kappa leaves the least bias,
+// but where few pixels are alike, its mean is noisy. So two are mixed by the noise v_i of the first, summed over RGB:
 //
 //     F^'_i = F^_i + a_i r_i(kappa) + (1 - a_i) r_i(4 kappa),
 //     a_i = 0.2 s_i^2 / (0.2 s_i^2 + v_i),   v_i = sum_j w_ij^2 var h_j / (sum_j w_ij)^2.
 //
-// The first runs over the pixels of half the window, the second over cells of 2 x 2 pixels of the whole one. Outliers raise
-// their own guide, so that narrow means leave them out, and the image stays a little too dark. A second feedback, of F^' by
-// means over cells of 4 x 4 pixels, brings that back:
+// The first runs over the pixels of half the window, the second over cells of 2 x 2 pixels of the whole one. Outliers
+// raise their own guide, so that narrow means leave them out, and the image stays a little too dark. A second feedback,
+// of F^' by means over cells of 4 x 4 pixels, brings that back:
 //
 //     F^''_i = F^'_i + r'_i(12 kappa).
 #pragma once
@@ -27,8 +27,8 @@ namespace covary {
 struct FeedbackOptions {
   /// Side of the window of the wide mean; odd, 5 … 125. Default 41 (measured; 61 gains less than 1 %, 21 loses 3 %).
   int window = 41;
-  /// kappa: pixels that differ by so many standard errors of the estimate have weight 1 / e; > 0. Less leaves less bias and
-  /// more noise. Default 1.25 (measured, docs/methods/iicv.md).
+  /// kappa: pixels that differ by so many standard errors of the estimate have weight 1 / e; > 0. Less leaves less bias
+  /// and more noise. Default 1.25 (measured, docs/methods/iicv.md).
   float bandwidth = 1.25f;
 };
 
@@ -37,8 +37,8 @@ inline constexpr int kFeedbackCell = 4;
 /// How far from a pixel, in rows or columns, the input can influence its feedback.
 inline int feedback_reach(const FeedbackOptions& options) { return 2 * (options.window / 2 + kFeedbackCell); }
 
-/// Adds the feedback to `estimate`, whose standard error is `std_error`. `h`: mean of the PT image and its variance. Pixels
-/// with 0 in `valid` are left out and left alone.
+/// Adds the feedback to `estimate`, whose standard error is `std_error`. `h`: mean of the independent image and its
+/// variance. Pixels with 0 in `valid` are left out and left alone.
 void add_feedback(const Moments& h, const FeedbackOptions& options, const std::vector<unsigned char>& valid,
                   const Image& std_error, Image& estimate);
 

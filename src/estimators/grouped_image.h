@@ -10,8 +10,8 @@
 
 namespace covary {
 
-/// T group means of every pixel of a linear RGB image: data[((y * width + x) * groups + t) * 3 + channel]. All groups of
-/// the image hold the same number of independent samples. Does not own the memory.
+/// T group means of every pixel of a linear RGB image: data[((y * width + x) * groups + t) * 3 + channel]. All groups
+/// of the image hold the same number of independent samples. Does not own the memory.
 struct GroupedImage {
   int width = 0, height = 0, groups = 0;
   const float* data = nullptr;
@@ -32,7 +32,7 @@ struct EstimatorResult {
 void throw_if_any(const std::string& name, const std::vector<std::string>& problems);
 
 /// Appends to `problems` what is wrong with the pair (sizes, missing data, fewer than `min_crn_groups` groups …).
-void check_inputs(const GroupedImage& crn, const GroupedImage& pt, int min_crn_groups, int min_pt_groups,
-                  std::vector<std::string>& problems);
+void check_inputs(const GroupedImage& crn, const GroupedImage& independent, int min_crn_groups,
+                  int min_independent_groups, std::vector<std::string>& problems);
 
 }  // namespace covary

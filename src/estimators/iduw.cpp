@@ -55,7 +55,8 @@ Planes means(const GroupedImage& image, const std::vector<unsigned char>& valid,
 
 class Iduw {
  public:
-  Iduw(const GroupedImage& crn, const GroupedImage& pt, const std::vector<unsigned char>& valid, const IduwOptions& o)
+  Iduw(const GroupedImage& crn, const GroupedImage& independent, const std::vector<unsigned char>& valid,
+       const IduwOptions& o)
       : width_(crn.width),
         height_(crn.height),
         radius_(o.window / 2),
@@ -64,12 +65,12 @@ class Iduw {
     // Invalid pixels get opposite values in the two parts that make a weight, so that the weight is zero.
     for (int half : {0, 1}) {
       z_half_[half] = means(crn, valid, radius_, half, 2, half ? -kFar : kFar);
-      y_half_[half] = means(pt, valid, radius_, half, 2, 0);
+      y_half_[half] = means(independent, valid, radius_, half, 2, 0);
       for (int quarter : {0, 1})
         z_quarter_[half][quarter] = means(crn, valid, radius_, half + 2 * quarter, 4, quarter ? -kFar : kFar);
     }
     z_ = means(crn, valid, radius_, 0, 1, 0);
-    y_ = means(pt, valid, radius_, 0, 1, 0);
+    y_ = means(independent, valid, radius_, 0, 1, 0);
   }
 
   /// Mean over the image of the squared relative difference of the two halves' results, for each gamma.
@@ -150,14 +151,15 @@ class Iduw {
 
 }  // namespace
 
-EstimatorResult iduw(const GroupedImage& crn, const GroupedImage& pt, const IduwOptions& options, float* chosen_gamma) {
+EstimatorResult iduw(const GroupedImage& crn, const GroupedImage& independent, const IduwOptions& options,
+                     float* chosen_gamma) {
   std::vector<std::string> problems = options.validate();
-  check_inputs(crn, pt, 4, 4, problems);
+  check_inputs(crn, independent, 4, 4, problems);
   throw_if_any("iduw", problems);
 
   EstimatorResult result;
-  const std::vector<unsigned char> valid = finite_pixels(crn, pt, result.nonfinite_pixels);
-  const Iduw method(crn, pt, valid, options);
+  const std::vector<unsigned char> valid = finite_pixels(crn, independent, result.nonfinite_pixels);
+  const Iduw method(crn, independent, valid, options);
   size_t best = 0;
   if (options.gammas.size() > 1) {
     const std::vector<double> losses = method.losses(options.gammas);
@@ -166,7 +168,7 @@ EstimatorResult iduw(const GroupedImage& crn, const GroupedImage& pt, const Iduw
   if (chosen_gamma) *chosen_gamma = options.gammas[best];
   result.estimate = Image(crn.width, crn.height, 3);
   method.reconstruct(options.gammas[best], result.estimate);
-  fill_invalid(crn, pt, valid, result.estimate);
+  fill_invalid(crn, independent, valid, result.estimate);
   return result;
 }
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Input-dependent uncorrelated weighting. J. Back, B.-S. Hua, T. Hachisuka, B. Moon, SIGGRAPH Asia 2023 [Back2023], in the
-// form of a control variate estimator ([YM2025], supplementary). A comparator.
+// Input-dependent uncorrelated weighting. J. Back, B.-S. Hua, T. Hachisuka, B. Moon, SIGGRAPH Asia 2023 [Back2023], in
+// the form of a control variate estimator ([YM2025], supplementary). A comparator.
 //
 //     F^ = h_c + 1 / (W - 1) sum_{i != c} w_i ((g_c - g_i) - (h_c - h_i)),   W: pixels in the window,
 //     w_i = exp(-gamma n (D_A - D_B)^2) per channel,  D_A, D_B: g_c - g_i from two halves of the CRN samples,
-// g: CRN, h: PT. gamma is chosen for the image: quarters make the weights of each half, and the value whose two results
-// differ least is taken. The image is reflected at its borders.
+// g: CRN, h: independent. gamma is chosen for the image: quarters make the weights of each half, and the value whose
+// two results differ least is taken. The image is reflected at its borders.
 #pragma once
 
 #include "estimators/grouped_image.h"
@@ -15,8 +15,8 @@ namespace covary {
 struct IduwOptions {
   /// Side of the window; default 15, as in the authors' program; odd, 3 … 63.
   int window = 15;
-  /// n: samples per pixel of the CRN image, > 0. It sets the scale of gamma; required. The authors' program uses the same
-  /// n for quarters, and so does this.
+  /// n: samples per pixel of the CRN image, > 0. It sets the scale of gamma; required. The authors' program uses the
+  /// same n for quarters, and so does this.
   int samples = 0;
   /// Candidates for gamma, all > 0; default the ten of the authors' program.
   std::vector<float> gammas = {0.01f, 0.025f, 0.05f, 0.1f, 0.2f, 0.5f, 1.0f, 1.5f, 2.0f, 2.5f};
@@ -24,9 +24,10 @@ struct IduwOptions {
   std::vector<std::string> validate() const;
 };
 
-/// Claim: consistent; biased through the weights. Throws Error(kUsage) that lists every problem; both images need at least
-/// 4 groups (group t belongs to quarter t mod 4 and half t mod 2). `chosen_gamma`, if not null, receives the choice.
-EstimatorResult iduw(const GroupedImage& crn, const GroupedImage& pt, const IduwOptions& options,
+/// Claim: consistent; biased through the weights. Throws Error(kUsage) that lists every problem; both images need at
+/// least 4 groups (group t belongs to quarter t mod 4 and half t mod 2). `chosen_gamma`, if not null, receives the
+/// choice.
+EstimatorResult iduw(const GroupedImage& crn, const GroupedImage& independent, const IduwOptions& options,
                      float* chosen_gamma = nullptr);
 
 }  // namespace covary

@@ -43,18 +43,18 @@ std::vector<std::string> IicvOptions::validate() const {
   return problems;
 }
 
-EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& pt, const IicvOptions& options) {
+EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& independent, const IicvOptions& options) {
   std::vector<std::string> problems = options.validate();
   const bool needs_variance = options.penalty == Penalty::kSample || options.std_error || options.feedback ||
                               (options.sample_share > 0 && options.penalty != Penalty::kHomogeneous);
   const bool halves = options.penalty == Penalty::kCrossFit;
-  check_inputs(crn, pt, 3, halves ? (needs_variance ? 4 : 2) : (needs_variance ? 2 : 1), problems);
+  check_inputs(crn, independent, 3, halves ? (needs_variance ? 4 : 2) : (needs_variance ? 2 : 1), problems);
   throw_if_any("iicv", problems);
 
   EstimatorResult result;
-  const std::vector<unsigned char> valid = finite_pixels(crn, pt, result.nonfinite_pixels);
+  const std::vector<unsigned char> valid = finite_pixels(crn, independent, result.nonfinite_pixels);
   const int border = std::max(options.window, options.pilot_window) / 2;
-  const Moments g = moments(crn, valid, border, kFar), h = moments(pt, valid, border, 0.0f);
+  const Moments g = moments(crn, valid, border, kFar), h = moments(independent, valid, border, 0.0f);
 
   ControlVariateSettings settings;
   settings.k = options.k;
@@ -69,9 +69,10 @@ EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& pt, const Iicv
   ControlVariateInput input{crn, &g};
 
   if (halves) {
-    // Halves: even and odd groups. Each half's pilot judges the other half's values, so that the penalty is independent of
-    // the value it belongs to.
-    const Moments half[2] = {moments(pt, valid, border, 0.0f, 0, 2), moments(pt, valid, border, 0.0f, 1, 2)};
+    // Halves: even and odd groups. Each half's pilot judges the other half's values, so that the penalty is independent
+    // of the value it belongs to.
+    const Moments half[2] = {moments(independent, valid, border, 0.0f, 0, 2),
+                             moments(independent, valid, border, 0.0f, 1, 2)};
     EstimatorResult part[2];
     for (int i : {0, 1}) {
       const Planes error = pilot_error(g, half[1 - i].mean, options.pilot_window, false, border);
@@ -82,7 +83,8 @@ EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& pt, const Iicv
     }
     result.estimate = std::move(part[0].estimate);
     result.std_error = std::move(part[0].std_error);
-    // The two estimates share the CRN image: their errors may be fully correlated, so that standard errors are averaged.
+    // The two estimates share the CRN image: their errors may be fully correlated, so that standard errors are
+    // averaged.
     for (size_t i = 0; i < result.estimate.data.size(); ++i)
       result.estimate.data[i] = 0.5f * (result.estimate.data[i] + part[1].estimate.data[i]);
     for (size_t i = 0; i < result.std_error.data.size(); ++i)
@@ -108,7 +110,7 @@ EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& pt, const Iicv
     add_feedback(h, options.feedback_options, valid, result.std_error, result.estimate);
     if (!options.std_error) result.std_error = Image();
   }
-  fill_invalid(crn, pt, valid, result.estimate);
+  fill_invalid(crn, independent, valid, result.estimate);
   return result;
 }
 

@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // Imperfect image-space control variates. C. Yang, B. Moon, ACM Trans. Graph. 44(6), 2025 [YM2025], Sec. 4.
 //
-// Two images of one scene, each with independent groups of samples: CRN (all pixels use the same random numbers) and PT
-// (independent numbers). Neighbouring pixels of the CRN image are control variates of a pixel; their unknown expectations
-// are taken from the PT image, and the coefficients allow for its errors.
+// Two images of one scene, each of independent groups of samples: the CRN image (all pixels use the same random
+// numbers) and the independent image (each pixel has its own; "PT" in the paper). Neighbouring pixels of the CRN image
+// are control variates of a pixel; their unknown expectations are taken from the independent image, and the
+// coefficients allow for its errors.
 //
 // The defaults go beyond the paper in three places, each an option: errors common to all CRN pixels cancel
-// (`conservation`), the penalty contains the expected beside the realised error of PT pixels (`sample_share`), and what the
-// penalty takes away is given back (`feedback`). IicvOptions::paper() has none of them.
+// (`conservation`), the penalty contains the expected beside the realised error of independent pixels (`sample_share`),
+// and what the penalty takes away is given back (`feedback`). IicvOptions::paper() has none of them.
 //
-// Claim: consistent, not unbiased; coefficients and penalties are estimated from the samples they are applied to. Pixels
-// of the PT image must be independent of each other (box filter), values linear.
+// Claim: consistent, not unbiased; coefficients and penalties are estimated from the samples they are applied to.
+// Pixels of the independent image must be independent of each other (box filter), values linear.
 #pragma once
 
 #include "estimators/feedback.h"
@@ -19,13 +20,13 @@
 
 namespace covary {
 
-/// How the error variances V_h of the PT image are estimated.
+/// How the error variances V_h of the independent image are estimated.
 enum class Penalty {
   kPilot,        ///< squared difference from a cross-bilateral pilot, [YM2025] Eq. (11): the paper's
   kSample,       ///< sample variance of the groups; the paper's ablation
   kSmoothed,     ///< the pilot's squares averaged over the guided window: less energy loss, more error
   kHomogeneous,  ///< the same for all neighbours, `ridge` times the mean diagonal of X^T X / (T - 1): nearly unbiased
-  kCrossFit,     ///< pilot of one half of the PT groups, applied to the other half; average of both
+  kCrossFit,     ///< pilot of one half of the independent groups, applied to the other half; average of both
 };
 
 struct IicvOptions {
@@ -34,8 +35,8 @@ struct IicvOptions {
   int k = 25;
   /// Side of the square they are chosen from. Default 11 ([YM2025] Sec. 4; 21 for k = 50, 100); odd, 3 … 63.
   int window = 11;
-  /// Whether the target pixel is one of its own control variates; without it its PT value is unused. Default true (the
-  /// paper does not say; measured).
+  /// Whether the target pixel is one of its own control variates; without it its independent value is unused. Default
+  /// true (the paper does not say; measured).
   bool include_target = true;
   /// One coefficient per neighbour for all channels (rows stacked) or one per channel. The paper does not say.
   bool shared_coefficients = true;
@@ -46,13 +47,13 @@ struct IicvOptions {
   int pilot_window = 11;
   /// Factor of Penalty::kHomogeneous, > 0. Default 1: both images are estimates of the same integrals.
   float ridge = 1.0f;
-  /// Part of the penalty that is the sample variance of h instead of what `penalty` says (and never symmetric), 0 … 1. The
-  /// realised error of a pilot tells outliers but depends on the value it judges; the sample variance is right on average.
-  /// Not used by kHomogeneous. Default 0.5 (measured); the paper has 0.
+  /// Part of the penalty that is the sample variance of h instead of what `penalty` says (and never symmetric), 0 … 1.
+  /// The realised error of a pilot tells outliers but depends on the value it judges; the sample variance is right on
+  /// average. Not used by kHomogeneous. Default 0.5 (measured); the paper has 0.
   float sample_share = 0.5f;
-  /// Weight of the condition that the coefficients reproduce the CRN mean, sum_i beta_i g_i = f; >= 0. It treats errors in
-  /// proportion to brightness, so many times as large as the errors there are, as common to all pixels of the CRN image,
-  /// and so cancels them. Default 30 (measured); the paper has 0.
+  /// Weight of the condition that the coefficients reproduce the CRN mean, sum_i beta_i g_i = f; >= 0. It treats errors
+  /// in proportion to brightness, so many times as large as the errors there are, as common to all pixels of the CRN
+  /// image, and so cancels them. Default 30 (measured); the paper has 0.
   float conservation = 30.0f;
   /// Residual feedback (feedback.h). Default on; the paper has none.
   bool feedback = true;
@@ -68,13 +69,13 @@ struct IicvOptions {
   std::vector<std::string> validate() const;
 };
 
-/// Throws Error(kUsage) that lists every problem of options and inputs. `crn` needs at least 3 groups, `pt` 2 (4 for
-/// kCrossFit) where its sample variance is used, as with the defaults, and otherwise 1. Bit-identical for any number of
-/// threads.
-EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& pt, const IicvOptions& options = {});
+/// Throws Error(kUsage) that lists every problem of options and inputs. `crn` needs at least 3 groups, `independent` 2
+/// (4 for kCrossFit) where its sample variance is used, as with the defaults, and otherwise 1. Bit-identical for any
+/// number of threads.
+EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& independent, const IicvOptions& options = {});
 
-/// How far from a pixel, in rows or columns, the input can influence it. A part of an image that begins at a row and column
-/// that are multiples of kFeedbackCell gives, farther than this from its cut edges, the bits of the whole image.
+/// How far from a pixel, in rows or columns, the input can influence it. A part of an image that begins at a row and
+/// column that are multiples of kFeedbackCell gives, farther than this from its cut edges, the bits of the whole image.
 int iicv_reach(const IicvOptions& options);
 
 }  // namespace covary

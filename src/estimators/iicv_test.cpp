@@ -33,7 +33,8 @@ TEST(Iicv, AgreesWithTheReference) {
        {Case{25, 11, 12, true, true, true}, Case{25, 11, 12, true, false, true}, Case{25, 11, 12, false, true, false},
         Case{6, 7, 12, true, false, false}, Case{40, 11, 12, true, true, true}, Case{50, 21, 4, true, true, true},
         Case{25, 11, 24, false, false, true}, Case{10, 5, 3, true, true, true}}) {
-    const test::Grouped crn = test::crn_image(41, 27, c.groups, 1), pt = test::pt_image(41, 27, c.groups, 2);
+    const test::Grouped crn = test::crn_image(41, 27, c.groups, 1),
+                        independent = test::independent_image(41, 27, c.groups, 2);
     IicvOptions options = IicvOptions::paper();
     options.k = c.k;
     options.window = c.window;
@@ -41,9 +42,9 @@ TEST(Iicv, AgreesWithTheReference) {
     options.shared_coefficients = c.shared;
     options.symmetric = c.symmetric;
     options.std_error = true;
-    const EstimatorResult fast = iicv(crn.view(), pt.view(), options);
-    const RgbImage error = pilot_of(crn.view(), pt.view(), 11);
-    const Difference d = compare(fast, crn.view(), pt.view(), error, c.k, c.window, c.include_target,
+    const EstimatorResult fast = iicv(crn.view(), independent.view(), options);
+    const RgbImage error = pilot_of(crn.view(), independent.view(), 11);
+    const Difference d = compare(fast, crn.view(), independent.view(), error, c.k, c.window, c.include_target,
                                  {c.shared, c.symmetric, 0, kSmallestPenalty});
     EXPECT_LT(d.estimate, 2e-3) << "k " << c.k << " shared " << c.shared << " groups " << c.groups;
     EXPECT_LT(d.std_error, 2e-3) << "k " << c.k << " shared " << c.shared << " groups " << c.groups;
@@ -51,38 +52,41 @@ TEST(Iicv, AgreesWithTheReference) {
 }
 
 TEST(Iicv, OtherPenaltiesAgreeWithTheReference) {
-  const test::Grouped crn = test::crn_image(41, 27, 12, 1), pt = test::pt_image(41, 27, 12, 2);
-  const GroupedImage pt_view = pt.view();
+  const test::Grouped crn = test::crn_image(41, 27, 12, 1), independent = test::independent_image(41, 27, 12, 2);
+  const GroupedImage independent_view = independent.view();
   IicvOptions options = IicvOptions::paper();
   reference::Settings settings{true, true, 0, kSmallestPenalty};
 
   options.penalty = Penalty::kSample;
-  const RgbImage variance =
-      reference::map_pixels(pt_view, [&](int x, int y) { return reference::variance_of_mean(pt_view, x, y); });
-  EXPECT_LT(
-      compare(iicv(crn.view(), pt.view(), options), crn.view(), pt.view(), variance, 25, 11, true, settings).estimate,
-      2e-3);
+  const RgbImage variance = reference::map_pixels(
+      independent_view, [&](int x, int y) { return reference::variance_of_mean(independent_view, x, y); });
+  EXPECT_LT(compare(iicv(crn.view(), independent.view(), options), crn.view(), independent.view(), variance, 25, 11,
+                    true, settings)
+                .estimate,
+            2e-3);
 
   options.penalty = Penalty::kSmoothed;
-  const RgbImage pilot = pilot_of(crn.view(), pt.view(), 11);
-  const RgbImage smoothed =
-      reference::map_pixels(pt_view, [&](int x, int y) { return reference::guided_mean(crn.view(), pilot, 11, x, y); });
-  EXPECT_LT(
-      compare(iicv(crn.view(), pt.view(), options), crn.view(), pt.view(), smoothed, 25, 11, true, settings).estimate,
-      2e-3);
+  const RgbImage pilot = pilot_of(crn.view(), independent.view(), 11);
+  const RgbImage smoothed = reference::map_pixels(
+      independent_view, [&](int x, int y) { return reference::guided_mean(crn.view(), pilot, 11, x, y); });
+  EXPECT_LT(compare(iicv(crn.view(), independent.view(), options), crn.view(), independent.view(), smoothed, 25, 11,
+                    true, settings)
+                .estimate,
+            2e-3);
 
   options.penalty = Penalty::kHomogeneous;
   options.ridge = 0.7f;
   settings.ridge = 0.7;
-  EXPECT_LT(
-      compare(iicv(crn.view(), pt.view(), options), crn.view(), pt.view(), pilot, 25, 11, true, settings).estimate,
-      2e-3);
+  EXPECT_LT(compare(iicv(crn.view(), independent.view(), options), crn.view(), independent.view(), pilot, 25, 11, true,
+                    settings)
+                .estimate,
+            2e-3);
 }
 
 /// The condition on the coefficients and the mixed penalty.
 TEST(Iicv, ConservationAgreesWithTheReference) {
-  const test::Grouped crn = test::crn_image(41, 27, 12, 1), pt = test::pt_image(41, 27, 12, 2);
-  const RgbImage error = pilot_of(crn.view(), pt.view(), 11);
+  const test::Grouped crn = test::crn_image(41, 27, 12, 1), independent = test::independent_image(41, 27, 12, 2);
+  const RgbImage error = pilot_of(crn.view(), independent.view(), 11);
   for (const auto& [k, shared] : {std::pair{25, true}, {25, false}, {50, true}, {8, false}}) {
     IicvOptions options = IicvOptions::paper();
     options.conservation = 10;
@@ -90,8 +94,8 @@ TEST(Iicv, ConservationAgreesWithTheReference) {
     options.k = k;
     options.shared_coefficients = shared;
     options.std_error = true;
-    const Difference d = compare(iicv(crn.view(), pt.view(), options), crn.view(), pt.view(), error, k, 11, true,
-                                 {shared, true, 0, kSmallestPenalty, 10, 0.25});
+    const Difference d = compare(iicv(crn.view(), independent.view(), options), crn.view(), independent.view(), error,
+                                 k, 11, true, {shared, true, 0, kSmallestPenalty, 10, 0.25});
     EXPECT_LT(d.estimate, 3e-3) << "k " << k << " shared " << shared;
     EXPECT_LT(d.std_error, 3e-3) << "k " << k << " shared " << shared;
   }
@@ -100,13 +104,15 @@ TEST(Iicv, ConservationAgreesWithTheReference) {
 /// Everything the defaults add: mixed penalty, condition, feedback.
 TEST(Iicv, DefaultsAgreeWithTheReference) {
   for (const auto& [width, height] : {std::pair{41, 27}, {60, 6}, {1, 1}, {5, 40}}) {
-    const test::Grouped crn = test::crn_image(width, height, 12, 1), pt = test::pt_image(width, height, 12, 2);
-    const GroupedImage crn_view = crn.view(), pt_view = pt.view();
-    const EstimatorResult fast = iicv(crn_view, pt_view);
-    const RgbImage h = reference::map_pixels(pt_view, [&](int x, int y) { return reference::mean(pt_view, x, y); });
-    const RgbImage variance =
-        reference::map_pixels(pt_view, [&](int x, int y) { return reference::variance_of_mean(pt_view, x, y); });
-    const RgbImage error = pilot_of(crn_view, pt_view, 11);
+    const test::Grouped crn = test::crn_image(width, height, 12, 1),
+                        independent = test::independent_image(width, height, 12, 2);
+    const GroupedImage crn_view = crn.view(), independent_view = independent.view();
+    const EstimatorResult fast = iicv(crn_view, independent_view);
+    const RgbImage h =
+        reference::map_pixels(independent_view, [&](int x, int y) { return reference::mean(independent_view, x, y); });
+    const RgbImage variance = reference::map_pixels(
+        independent_view, [&](int x, int y) { return reference::variance_of_mean(independent_view, x, y); });
+    const RgbImage error = pilot_of(crn_view, independent_view, 11);
     const auto all = neighbours(crn_view, 25, 11, true);
     RgbImage estimate, std_error;
     for (int y = 0; y < height; ++y)
@@ -129,8 +135,8 @@ TEST(Iicv, DefaultsAgreeWithTheReference) {
 
 /// The halves of a cross-fit are the plain estimator on half of the groups with the other half's pilot.
 TEST(Iicv, CrossFitAgreesWithTheReference) {
-  const test::Grouped crn = test::crn_image(41, 27, 12, 1), pt = test::pt_image(41, 27, 12, 2);
-  const GroupedImage view = pt.view();
+  const test::Grouped crn = test::crn_image(41, 27, 12, 1), independent = test::independent_image(41, 27, 12, 2);
+  const GroupedImage view = independent.view();
   RgbImage half[2];
   for (int i : {0, 1})
     half[i] = reference::map_pixels(view, [&](int x, int y) { return reference::mean(view, x, y, i, 2); });
@@ -156,13 +162,13 @@ TEST(Iicv, CrossFitAgreesWithTheReference) {
 
 /// Powers of two scale floats exactly, and the estimator is homogeneous.
 TEST(Iicv, ScalingTheInputsScalesTheResultExactly) {
-  test::Grouped crn = test::crn_image(40, 23, 12, 3), pt = test::pt_image(40, 23, 12, 4);
+  test::Grouped crn = test::crn_image(40, 23, 12, 3), independent = test::independent_image(40, 23, 12, 4);
   IicvOptions options;
   options.std_error = true;
-  const EstimatorResult once = iicv(crn.view(), pt.view(), options);
+  const EstimatorResult once = iicv(crn.view(), independent.view(), options);
   for (float& v : crn.data) v *= 4;
-  for (float& v : pt.data) v *= 4;
-  const EstimatorResult scaled = iicv(crn.view(), pt.view(), options);
+  for (float& v : independent.data) v *= 4;
+  const EstimatorResult scaled = iicv(crn.view(), independent.view(), options);
   for (size_t i = 0; i < once.estimate.data.size(); ++i) {
     ASSERT_EQ(4 * once.estimate.data[i], scaled.estimate.data[i]);
     ASSERT_EQ(4 * once.std_error.data[i], scaled.std_error.data[i]);
@@ -171,7 +177,7 @@ TEST(Iicv, ScalingTheInputsScalesTheResultExactly) {
 
 /// A visible lamp: bright, and nearly without noise. Single precision must hold.
 TEST(Iicv, BrightPixelsWithLittleNoiseAreKept) {
-  test::Grouped crn = test::crn_image(40, 30, 12, 3), pt = test::pt_image(40, 30, 12, 4);
+  test::Grouped crn = test::crn_image(40, 30, 12, 3), independent = test::independent_image(40, 30, 12, 4);
   const auto paint = [](test::Grouped& image, float noise) {
     for (int y = 8; y < 20; ++y)
       for (int x = 10; x < 30; ++x)
@@ -182,50 +188,50 @@ TEST(Iicv, BrightPixelsWithLittleNoiseAreKept) {
   };
   for (float noise : {0.0f, 1e-7f, 1e-5f, 1e-3f}) {
     paint(crn, noise);
-    paint(pt, noise);
-    const EstimatorResult result = iicv(crn.view(), pt.view());
+    paint(independent, noise);
+    const EstimatorResult result = iicv(crn.view(), independent.view());
     for (int y = 8; y < 20; ++y)
       for (int x = 10; x < 30; ++x)
         EXPECT_NEAR(result.estimate.pixel(x, y)[0], 60.0f * (1 + 0.001f * static_cast<float>(x)), 60 * (noise + 2e-6f));
   }
 }
 
-/// Values whose squares overflow: finite results, here those of the PT image.
+/// Values whose squares overflow: finite results, here those of the independent image.
 TEST(Iicv, AbsurdlyLargeValuesGiveFiniteResults) {
-  test::Grouped crn = test::crn_image(40, 30, 12, 3), pt = test::pt_image(40, 30, 12, 4);
+  test::Grouped crn = test::crn_image(40, 30, 12, 3), independent = test::independent_image(40, 30, 12, 4);
   for (int i = 0; i < 36; ++i)
-    crn.pixel(20, 10)[i] = pt.pixel(20, 10)[i] = 1e25f * (1.0f + 0.1f * static_cast<float>(i));
+    crn.pixel(20, 10)[i] = independent.pixel(20, 10)[i] = 1e25f * (1.0f + 0.1f * static_cast<float>(i));
   IicvOptions options;
   options.std_error = true;
-  const EstimatorResult result = iicv(crn.view(), pt.view(), options);
+  const EstimatorResult result = iicv(crn.view(), independent.view(), options);
   for (float v : result.estimate.data) ASSERT_TRUE(std::isfinite(v));
 }
 
 /// No variance in the CRN image: nothing to explain, the result is the CRN mean.
 TEST(Iicv, WithoutCrnVarianceIsTheCrnMean) {
   test::Grouped crn = test::constant_image(30, 20, 12, 0.25f);
-  const test::Grouped pt = test::pt_image(30, 20, 12, 4);
+  const test::Grouped independent = test::independent_image(30, 20, 12, 4);
   for (bool shared : {true, false}) {
     IicvOptions options = IicvOptions::paper();
     options.shared_coefficients = shared;
-    const EstimatorResult result = iicv(crn.view(), pt.view(), options);
+    const EstimatorResult result = iicv(crn.view(), independent.view(), options);
     for (float v : result.estimate.data) EXPECT_NEAR(v, 0.25f, 1e-6f);
   }
 }
 
 /// An image worked on in bands of rows has the bits of the whole.
 TEST(Iicv, BandsGiveTheSameBits) {
-  const test::Grouped crn = test::crn_image(50, 140, 6, 3), pt = test::pt_image(50, 140, 6, 4);
+  const test::Grouped crn = test::crn_image(50, 140, 6, 3), independent = test::independent_image(50, 140, 6, 4);
   IicvOptions options;
   options.std_error = true;
-  const EstimatorResult whole = iicv(crn.view(), pt.view(), options);
+  const EstimatorResult whole = iicv(crn.view(), independent.view(), options);
   const int reach = iicv_reach(options);
   for (int y0 = 0; y0 < 140; y0 += 34) {
     const int first = std::max(0, (y0 - reach) / kFeedbackCell * kFeedbackCell), last = std::min(140, y0 + 34 + reach);
     const auto band = [&](const GroupedImage& image) {
       return GroupedImage{50, last - first, 6, image.pixel(0, first)};
     };
-    const EstimatorResult part = iicv(band(crn.view()), band(pt.view()), options);
+    const EstimatorResult part = iicv(band(crn.view()), band(independent.view()), options);
     for (int y = y0; y < std::min(140, y0 + 34); ++y)
       for (int i = 0; i < 150; ++i) {
         ASSERT_EQ(part.estimate.pixel(0, y - first)[i], whole.estimate.pixel(0, y)[i]) << y;
@@ -247,8 +253,8 @@ TEST(Iicv, BlackIsBlack) {
   }
 }
 
-/// A PT image without error: the coefficient of the target goes to 1 and the result to PT.
-TEST(Iicv, WithAnExactPtImageIsThePtImage) {
+/// An independent image without error: the coefficient of the target goes to 1 and the result to that image.
+TEST(Iicv, WithAnExactIndependentImageIsTheIndependentImage) {
   const test::Grouped crn = test::crn_image(30, 20, 12, 3);
   test::Grouped exact = test::constant_image(30, 20, 12, 0);
   for (int y = 0; y < 20; ++y)
@@ -268,14 +274,14 @@ TEST(Iicv, WithAnExactPtImageIsThePtImage) {
 /// Bits do not depend on the number of threads, nor on where a pixel lies in a tile or vector: inside a crop, farther
 /// than the windows reach from its border, they are those of the whole image.
 TEST(Iicv, BitsDoNotDependOnThreadsTilesOrCrops) {
-  const test::Grouped crn = test::crn_image(150, 120, 6, 3), pt = test::pt_image(150, 120, 6, 4);
+  const test::Grouped crn = test::crn_image(150, 120, 6, 3), independent = test::independent_image(150, 120, 6, 4);
   IicvOptions options;
   options.std_error = true;
   options.penalty = Penalty::kSmoothed;
   options.feedback_options.window = 17;
   const auto with_threads = [&](int n) {
     tbb::global_control control(tbb::global_control::max_allowed_parallelism, n);
-    return iicv(crn.view(), pt.view(), options);
+    return iicv(crn.view(), independent.view(), options);
   };
   const EstimatorResult one = with_threads(1);
   for (int n : {2, 5}) {
@@ -293,7 +299,7 @@ TEST(Iicv, BitsDoNotDependOnThreadsTilesOrCrops) {
   };
   const int reach = iicv_reach(options);
   ASSERT_LT(2 * reach, height);
-  const EstimatorResult part = iicv(crop(crn).view(), crop(pt).view(), options);
+  const EstimatorResult part = iicv(crop(crn).view(), crop(independent).view(), options);
   for (int y = reach; y < height - reach; ++y)
     for (int x = reach; x < width - reach; ++x)
       for (int c = 0; c < 3; ++c)
@@ -302,14 +308,14 @@ TEST(Iicv, BitsDoNotDependOnThreadsTilesOrCrops) {
 
 /// A bad value spoils its own pixel at most, and is counted.
 TEST(Iicv, NonFiniteValuesStayWhereTheyAre) {
-  const test::Grouped crn = test::crn_image(100, 30, 6, 3), pt = test::pt_image(100, 30, 6, 4);
-  const EstimatorResult good = iicv(crn.view(), pt.view());
-  test::Grouped bad_crn = crn, bad_pt = pt;
+  const test::Grouped crn = test::crn_image(100, 30, 6, 3), independent = test::independent_image(100, 30, 6, 4);
+  const EstimatorResult good = iicv(crn.view(), independent.view());
+  test::Grouped bad_crn = crn, bad_independent = independent;
   bad_crn.pixel(10, 12)[4] = std::numeric_limits<float>::quiet_NaN();
-  bad_pt.pixel(30, 5)[0] = std::numeric_limits<float>::infinity();
+  bad_independent.pixel(30, 5)[0] = std::numeric_limits<float>::infinity();
   for (int i = 0; i < 18; ++i)
-    bad_crn.pixel(39, 29)[i] = bad_pt.pixel(39, 29)[i] = std::numeric_limits<float>::quiet_NaN();
-  const EstimatorResult result = iicv(bad_crn.view(), bad_pt.view());
+    bad_crn.pixel(39, 29)[i] = bad_independent.pixel(39, 29)[i] = std::numeric_limits<float>::quiet_NaN();
+  const EstimatorResult result = iicv(bad_crn.view(), bad_independent.view());
   EXPECT_EQ(result.nonfinite_pixels, 3);
   EXPECT_EQ(good.nonfinite_pixels, 0);
   for (float v : result.estimate.data) ASSERT_TRUE(std::isfinite(v));
@@ -318,17 +324,18 @@ TEST(Iicv, NonFiniteValuesStayWhereTheyAre) {
   // The pixel itself: the mean of its finite groups in both images; without any, zero.
   double sum = 0;
   for (int t = 0; t < 6; ++t)
-    sum += (t == 1 ? 0 : crn.view().pixel(10, 12)[3 * t + 1]) + pt.view().pixel(10, 12)[3 * t + 1];
+    sum += (t == 1 ? 0 : crn.view().pixel(10, 12)[3 * t + 1]) + independent.view().pixel(10, 12)[3 * t + 1];
   EXPECT_NEAR(result.estimate.pixel(10, 12)[1], sum / 11, 1e-5);
   EXPECT_EQ(result.estimate.pixel(39, 29)[2], 0.0f);
 }
 
 TEST(Iicv, ImagesSmallerThanTheWindowWork) {
   for (const auto& [width, height] : {std::pair{1, 1}, {3, 2}, {1, 9}, {7, 1}}) {
-    const test::Grouped crn = test::crn_image(width, height, 5, 3), pt = test::pt_image(width, height, 5, 4);
-    const EstimatorResult fast = iicv(crn.view(), pt.view(), IicvOptions::paper());
-    const Difference d = compare(fast, crn.view(), pt.view(), pilot_of(crn.view(), pt.view(), 11), 25, 11, true,
-                                 {true, true, 0, kSmallestPenalty});
+    const test::Grouped crn = test::crn_image(width, height, 5, 3),
+                        independent = test::independent_image(width, height, 5, 4);
+    const EstimatorResult fast = iicv(crn.view(), independent.view(), IicvOptions::paper());
+    const Difference d = compare(fast, crn.view(), independent.view(), pilot_of(crn.view(), independent.view(), 11), 25,
+                                 11, true, {true, true, 0, kSmallestPenalty});
     EXPECT_LT(d.estimate, 2e-3) << width << " x " << height;
   }
 }
@@ -343,17 +350,16 @@ TEST(Iicv, ReportsEveryProblemAtOnce) {
   options.conservation = -1;
   options.feedback_options = {4, 0};
   options.penalty = Penalty::kSample;
-  EXPECT_EQ(
-      message_of([&] { iicv(two.view(), one.view(), options); }, ErrorCode::kUsage),
-      "iicv: pilot_window is 10, expected an odd number from 3 to 63; k is 200, expected 1 to 121, the number of "
-      "pixels "
-      "in a window of 11 x 11; ridge is 0, expected a positive number; "
-      "sample_share is 2, expected a number from 0 to 1; conservation is -1, expected zero or a positive number; "
-      "feedback window is 4, expected an odd number from 5 to 125; feedback bandwidth is 0, expected a positive "
-      "number; "
-      "the CRN image is 8 x 6 and the PT image 8 x 5; "
-      "they must have the same size; the CRN image has 2 groups, at least 3 are needed (12 are recommended); the PT "
-      "image has 1 group, at least 2 are needed with these settings");
+  EXPECT_EQ(message_of([&] { iicv(two.view(), one.view(), options); }, ErrorCode::kUsage),
+            "iicv: pilot_window is 10, expected an odd number from 3 to 63; k is 200, expected 1 to 121, the number of "
+            "pixels "
+            "in a window of 11 x 11; ridge is 0, expected a positive number; "
+            "sample_share is 2, expected a number from 0 to 1; conservation is -1, expected zero or a positive number; "
+            "feedback window is 4, expected an odd number from 5 to 125; feedback bandwidth is 0, expected a positive "
+            "number; "
+            "the CRN image is 8 x 6 and the independent image 8 x 5; "
+            "they must have the same size; the CRN image has 2 groups, at least 3 are needed (12 are recommended); the "
+            "independent image has 1 group, at least 2 are needed with these settings");
 }
 
 }  // namespace

@@ -15,7 +15,7 @@ using Severity = Finding::Severity;
 
 // Limits. Measured rank correlations of neighbours: box filter 0.01 or less, tent 0.24, Mitsuba's Gaussian 0.35; common
 // random numbers 0.5 to 0.9, in the worst textures and caustics still above 0.05.
-constexpr double kMaxPtCorrelation = 0.05;
+constexpr double kMaxIndependentCorrelation = 0.05;
 constexpr double kMinCrnCorrelation = 0.02;
 constexpr double kMaxSigmas = 8;  // for t with about 11 degrees of freedom: false alarm below 1e-5
 constexpr long kMaxPairs = 250000;
@@ -164,41 +164,46 @@ bool significant(const Correlation& c, double limit) {
 }
 
 void check_correlations(const InputReport& r, std::vector<Finding>& findings) {
-  const Correlation& pt =
-      std::abs(r.pt_horizontal.value) > std::abs(r.pt_vertical.value) ? r.pt_horizontal : r.pt_vertical;
-  if (significant(pt, kMaxPtCorrelation)) {
-    if (pt.value > 0.5)
-      findings.push_back(
-          {Severity::kError,
-           fmt::format("PT: errors of neighbouring pixels have a rank correlation of {}; independent pixels "
-                       "have 0. This looks like an image with common random numbers: are CRN and PT swapped?",
-                       signed_value(pt))});
-    else if (pt.value > 0)
+  const Correlation& independent = std::abs(r.independent_horizontal.value) > std::abs(r.independent_vertical.value)
+                                       ? r.independent_horizontal
+                                       : r.independent_vertical;
+  if (significant(independent, kMaxIndependentCorrelation)) {
+    if (independent.value > 0.5)
       findings.push_back(
           {Severity::kError,
            fmt::format(
-               "PT: errors of neighbouring pixels have a rank correlation of {}; independent pixels have 0. The pixel "
+               "independent image: errors of neighbouring pixels have a rank correlation of {}; independent pixels "
+               "have 0. This looks like an image with common random numbers: are CRN and independent image swapped?",
+               signed_value(independent))});
+    else if (independent.value > 0)
+      findings.push_back(
+          {Severity::kError,
+           fmt::format(
+               "independent image: errors of neighbouring pixels have a rank correlation of {}; independent pixels "
+               "have 0. The pixel "
                "filter is wider than a pixel. Render both images with a box filter: in Mitsuba <rfilter "
                "type=\"box\"/>, in pbrt PixelFilter \"box\" \"float xradius\" 0.5 \"float yradius\" 0.5, in Blender "
                "scene.cycles.pixel_filter_type = 'BOX'; and without a denoiser",
-               signed_value(pt))});
+               signed_value(independent))});
     else
       findings.push_back(
           {Severity::kError,
            fmt::format(
-               "PT: errors of neighbouring pixels have a rank correlation of {}; independent pixels have 0. The "
+               "independent image: errors of neighbouring pixels have a rank correlation of {}; independent pixels "
+               "have 0. The "
                "sampler "
                "spreads errors as blue noise. Use independent random numbers: in Mitsuba <sampler "
                "type=\"independent\"/>, in pbrt Sampler \"independent\", in Blender scene.cycles.sampling_pattern = "
                "'TABULATED_SOBOL' with scrambling_distance = 1",
-               signed_value(pt))});
+               signed_value(independent))});
   }
-  if (significant(r.crn_pt, kMaxPtCorrelation))
+  if (significant(r.crn_independent, kMaxIndependentCorrelation))
     findings.push_back(
         {Severity::kError,
-         fmt::format("CRN and PT: errors of the same pixel in both images have a rank correlation of {}; "
-                     "independent images have 0. Render them with different seeds",
-                     signed_value(r.crn_pt))});
+         fmt::format(
+             "CRN and independent image: errors of the same pixel in both images have a rank correlation of {}; "
+             "independent images have 0. Render them with different seeds",
+             signed_value(r.crn_independent))});
   const double crn = std::max(r.crn_horizontal.value, r.crn_vertical.value);
   if (r.crn_horizontal.pairs + r.crn_vertical.pairs > 0 &&
       crn < std::max(kMinCrnCorrelation, 5 * r.crn_horizontal.standard_error)) {
@@ -221,39 +226,39 @@ bool InputReport::has_errors() const {
 }
 
 struct InputChecks::State {
-  State(int w, int h, int crn_groups, int pt_groups)
+  State(int w, int h, int crn_groups, int independent_groups)
       : width(w),
         height(h),
         crn_horizontal(long{w} * h, crn_groups, crn_groups, 1, 0),
         crn_vertical(long{w} * h, crn_groups, crn_groups, 0, 1),
-        pt_horizontal(long{w} * h, pt_groups, pt_groups, 1, 0),
-        pt_vertical(long{w} * h, pt_groups, pt_groups, 0, 1),
-        crn_pt(long{w} * h, crn_groups, pt_groups, 0, 0) {
+        independent_horizontal(long{w} * h, independent_groups, independent_groups, 1, 0),
+        independent_vertical(long{w} * h, independent_groups, independent_groups, 0, 1),
+        crn_independent(long{w} * h, crn_groups, independent_groups, 0, 0) {
     crn.group_means.resize(crn_groups);
-    pt.group_means.resize(pt_groups);
+    independent.group_means.resize(independent_groups);
   }
   int width, height, next_row = 0;
-  Values crn, pt;
-  PairStatistics crn_horizontal, crn_vertical, pt_horizontal, pt_vertical, crn_pt;
+  Values crn, independent;
+  PairStatistics crn_horizontal, crn_vertical, independent_horizontal, independent_vertical, crn_independent;
 };
 
-InputChecks::InputChecks(int width, int height, int crn_groups, int pt_groups)
-    : state_(std::make_unique<State>(width, height, crn_groups, pt_groups)) {}
+InputChecks::InputChecks(int width, int height, int crn_groups, int independent_groups)
+    : state_(std::make_unique<State>(width, height, crn_groups, independent_groups)) {}
 InputChecks::~InputChecks() = default;
 
-void InputChecks::add_rows(const GroupedImage& crn, const GroupedImage& pt) {
+void InputChecks::add_rows(const GroupedImage& crn, const GroupedImage& independent) {
   State& s = *state_;
   std::vector<std::string> problems;
-  check_inputs(crn, pt, 1, 1, problems);
+  check_inputs(crn, independent, 1, 1, problems);
   throw_if_any("inputs", problems);
   COVARY_CHECK(crn.width == s.width && s.next_row + crn.height <= s.height, "rows belong to the image");
   add_values(crn, s.next_row, s.crn);
-  add_values(pt, s.next_row, s.pt);
+  add_values(independent, s.next_row, s.independent);
   s.crn_horizontal.add_rows(crn, crn);
   s.crn_vertical.add_rows(crn, crn);
-  s.pt_horizontal.add_rows(pt, pt);
-  s.pt_vertical.add_rows(pt, pt);
-  s.crn_pt.add_rows(crn, pt);
+  s.independent_horizontal.add_rows(independent, independent);
+  s.independent_vertical.add_rows(independent, independent);
+  s.crn_independent.add_rows(crn, independent);
   s.next_row += crn.height;
 }
 
@@ -261,53 +266,56 @@ InputReport InputChecks::report() const {
   const State& s = *state_;
   COVARY_CHECK(s.next_row == s.height, "all rows were given");
   const long pixels = static_cast<long>(s.width) * s.height;
-  Values crn = s.crn, pt = s.pt;
+  Values crn = s.crn, independent = s.independent;
   finish(crn, pixels);
-  finish(pt, pixels);
+  finish(independent, pixels);
   InputReport r;
   r.crn_mean = crn.mean;
-  r.pt_mean = pt.mean;
-  r.nonfinite_pixels = crn.nonfinite + pt.nonfinite;
-  r.negative_pixels = crn.negative + pt.negative;
-  r.clipped_pixels = crn.clipped + pt.clipped;
+  r.independent_mean = independent.mean;
+  r.nonfinite_pixels = crn.nonfinite + independent.nonfinite;
+  r.negative_pixels = crn.negative + independent.negative;
+  r.clipped_pixels = crn.clipped + independent.clipped;
   check_values("CRN", pixels, crn, r.findings);
-  check_values("PT", pixels, pt, r.findings);
+  check_values("independent image", pixels, independent, r.findings);
 
   r.crn_horizontal = s.crn_horizontal.result();
   r.crn_vertical = s.crn_vertical.result();
-  r.pt_horizontal = s.pt_horizontal.result();
-  r.pt_vertical = s.pt_vertical.result();
-  r.crn_pt = s.crn_pt.result();
+  r.independent_horizontal = s.independent_horizontal.result();
+  r.independent_vertical = s.independent_vertical.result();
+  r.crn_independent = s.crn_independent.result();
   check_correlations(r, r.findings);
-  const size_t crn_groups = crn.group_means.size(), pt_groups = pt.group_means.size();
-  if (pt_groups < 3)
+  const size_t crn_groups = crn.group_means.size(), independent_groups = independent.group_means.size();
+  if (independent_groups < 3)
     r.findings.push_back(
         {Severity::kWarning,
-         fmt::format("PT: with {} group{} it cannot be checked whether its pixels are independent; 12 groups "
-                     "are recommended",
-                     pt_groups, pt_groups == 1 ? "" : "s")});
-  else if (r.pt_horizontal.pairs < kFewPairs)
+         fmt::format(
+             "independent image: with {} group{} it cannot be checked whether its pixels are independent; 12 groups "
+             "are recommended",
+             independent_groups, independent_groups == 1 ? "" : "s")});
+  else if (r.independent_horizontal.pairs < kFewPairs)
     r.findings.push_back(
         {Severity::kNote,
-         fmt::format("PT: only {} pairs of pixels with noise; correlations are little tested", r.pt_horizontal.pairs)});
+         fmt::format("independent image: only {} pairs of pixels with noise; correlations are little tested",
+                     r.independent_horizontal.pairs)});
 
-  if (crn_groups >= 3 && pt_groups >= 3 && r.nonfinite_pixels == 0) {
-    const double deviation = std::sqrt(crn.variance_of_mean + pt.variance_of_mean), difference = crn.mean - pt.mean;
+  if (crn_groups >= 3 && independent_groups >= 3 && r.nonfinite_pixels == 0) {
+    const double deviation = std::sqrt(crn.variance_of_mean + independent.variance_of_mean),
+                 difference = crn.mean - independent.mean;
     if (deviation > 0) r.mean_difference_sigmas = difference / deviation;
-    const double scale = std::max(std::abs(crn.mean), std::abs(pt.mean));
+    const double scale = std::max(std::abs(crn.mean), std::abs(independent.mean));
     if (std::abs(difference) > std::max(kMaxSigmas * deviation, 1e-4 * scale))
       r.findings.push_back(
           {Severity::kError,
-           fmt::format("the image means {:.5g} (CRN) and {:.5g} (PT) differ by {:.1f} standard errors: the "
+           fmt::format("the image means {:.5g} (CRN) and {:.5g} (independent) differ by {:.1f} standard errors: the "
                        "images do not show the same scene with the same settings",
-                       crn.mean, pt.mean, std::abs(r.mean_difference_sigmas))});
+                       crn.mean, independent.mean, std::abs(r.mean_difference_sigmas))});
   }
   return r;
 }
 
-InputReport examine_inputs(const GroupedImage& crn, const GroupedImage& pt) {
-  InputChecks checks(crn.width, crn.height, crn.groups, pt.groups);
-  checks.add_rows(crn, pt);
+InputReport examine_inputs(const GroupedImage& crn, const GroupedImage& independent) {
+  InputChecks checks(crn.width, crn.height, crn.groups, independent.groups);
+  checks.add_rows(crn, independent);
   return checks.report();
 }
 

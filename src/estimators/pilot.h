@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Error of the PT image by a pilot estimate: Yang & Moon 2025, Eq. (11).
+// Error of the independent image by a pilot estimate: Yang & Moon 2025, Eq. (11).
 #pragma once
 
 #include "estimators/planes.h"
@@ -8,9 +8,9 @@ namespace covary {
 
 /// (cross-bilateral mean of h over the window - h)^2 per channel, weights
 ///   w_j = exp(-||g_j - g_i||^2 / variance of g_i),   the norm over RGB, the variance summed over RGB.
-/// `smoothed`: these squares are averaged once more with the same weights. `g`: moments of the CRN image with kFar outside;
-/// `h`: 3 planes, 0 outside. The result's border is `border` wide and kUseless. Bandwidth 0 (all CRN groups equal) gives
-/// weight 1 to pixels with exactly the same value, 0 to others.
+/// `smoothed`: these squares are averaged once more with the same weights. `g`: moments of the CRN image with kFar
+/// outside; `h`: 3 planes, 0 outside. The result's border is `border` wide and kUseless. Bandwidth 0 (all CRN groups
+/// equal) gives weight 1 to pixels with exactly the same value, 0 to others.
 Planes pilot_error(const Moments& g, const Planes& h, int window, bool smoothed, int border);
 
 }  // namespace covary

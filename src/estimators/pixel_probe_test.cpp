@@ -14,11 +14,11 @@ namespace covary {
 namespace {
 
 /// [YM2025] Eq. (7) with the coefficients of the probe.
-reference::Rgb estimate_from(const PixelProbe& probe, const GroupedImage& crn, const GroupedImage& pt) {
+reference::Rgb estimate_from(const PixelProbe& probe, const GroupedImage& crn, const GroupedImage& independent) {
   reference::Rgb f = reference::mean(crn, probe.x, probe.y);
   for (const ControlVariate& v : probe.control_variates) {
     const reference::Rgb g = reference::mean(crn, probe.x + v.dx, probe.y + v.dy);
-    const reference::Rgb h = reference::mean(pt, probe.x + v.dx, probe.y + v.dy);
+    const reference::Rgb h = reference::mean(independent, probe.x + v.dx, probe.y + v.dy);
     for (int c = 0; c < 3; ++c) f[c] -= v.beta[c] * (g[c] - h[c]);
   }
   return f;
@@ -26,13 +26,13 @@ reference::Rgb estimate_from(const PixelProbe& probe, const GroupedImage& crn, c
 
 template <typename Estimator, typename Options>
 void expect_explained(Estimator estimator, Options options, size_t expected_count) {
-  const test::Grouped crn = test::crn_image(40, 21, 12, 5), pt = test::pt_image(40, 21, 12, 5);
+  const test::Grouped crn = test::crn_image(40, 21, 12, 5), independent = test::independent_image(40, 21, 12, 5);
   for (const auto& [x, y] : {std::pair{0, 0}, {17, 9}, {39, 20}, {31, 0}}) {
     PixelProbe probe{x, y, {}};
     options.probe = &probe;
-    const EstimatorResult result = estimator(crn.view(), pt.view(), options);
+    const EstimatorResult result = estimator(crn.view(), independent.view(), options);
     EXPECT_EQ(probe.control_variates.size(), expected_count);
-    const reference::Rgb expected = estimate_from(probe, crn.view(), pt.view());
+    const reference::Rgb expected = estimate_from(probe, crn.view(), independent.view());
     for (int c = 0; c < 3; ++c)
       EXPECT_NEAR(result.estimate.pixel(x, y)[c], expected[c], 1e-4 * std::abs(expected[c]) + 1e-6) << x << ", " << y;
   }
@@ -53,11 +53,11 @@ TEST(PixelProbe, ExplainsTheEstimate) {
 
 TEST(PixelProbe, LeavesOutPlacesOutsideTheFrame) {
   const test::Grouped crn = test::crn_image(4, 3, 12, 5),
-                      pt = test::pt_image(4, 3, 12, 5);  // twelve pixels for 25 control variates
+                      independent = test::independent_image(4, 3, 12, 5);  // twelve pixels for 25 control variates
   IicvOptions options = IicvOptions::paper();
   PixelProbe probe{1, 1, {}};
   options.probe = &probe;
-  iicv(crn.view(), pt.view(), options);
+  iicv(crn.view(), independent.view(), options);
   EXPECT_EQ(probe.control_variates.size(), 12u);
   for (const ControlVariate& v : probe.control_variates) {
     EXPECT_TRUE(probe.x + v.dx >= 0 && probe.x + v.dx < 4 && probe.y + v.dy >= 0 && probe.y + v.dy < 3);
@@ -65,12 +65,12 @@ TEST(PixelProbe, LeavesOutPlacesOutsideTheFrame) {
 }
 
 TEST(PixelProbe, CrossFittedPenaltiesHaveNoSingleAnswer) {
-  const test::Grouped crn = test::crn_image(12, 12, 12, 5), pt = test::pt_image(12, 12, 12, 5);
+  const test::Grouped crn = test::crn_image(12, 12, 12, 5), independent = test::independent_image(12, 12, 12, 5);
   IicvOptions options;
   options.penalty = Penalty::kCrossFit;
   PixelProbe probe{1, 1, {}};
   options.probe = &probe;
-  EXPECT_THROW(iicv(crn.view(), pt.view(), options), Error);
+  EXPECT_THROW(iicv(crn.view(), independent.view(), options), Error);
 }
 
 }  // namespace

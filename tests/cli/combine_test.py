@@ -41,9 +41,10 @@ class Combine(CliTest):
 
     def setUp(self):
         super().setUp()
-        self.crn_images, self.pt_images = noisy(1, True), noisy(2, False)
+        self.crn_images, self.independent_images = noisy(1, True), noisy(2, False)
         self.layers("crn.exr", self.crn_images, sampling="crn", samples="96", scene_hash="a", settings="box")
-        self.layers("pt.exr", self.pt_images, sampling="independent", samples="96", scene_hash="a", settings="box")
+        self.layers("independent.exr", self.independent_images, sampling="independent", samples="96", scene_hash="a",
+                    settings="box")
 
     def read(self, name):
         return read_exr((self.path / name).read_bytes())
@@ -53,63 +54,70 @@ class Combine(CliTest):
                      for i, c in enumerate("RGB") for y in range(HEIGHT) for x in range(WIDTH)])
 
     def test_result_has_less_noise(self):
-        self.good("combine", "--crn", "crn.exr", "--pt", "pt.exr", "-o", "out.exr", "--error", "--quiet")
+        self.good("combine", "--crn", "crn.exr", "--independent", "independent.exr", "-o", "out.exr", "--error",
+                  "--quiet")
         out = self.read("out.exr")
         self.assertEqual(sorted(out), ["B", "G", "R", "StdError.B", "StdError.G", "StdError.R"])
-        pt = {c: [mean([image[c][p] for image in self.pt_images]) for p in range(WIDTH * HEIGHT)] for c in "RGB"}
-        # PT with both halves' samples has half of this error.
-        self.assertLess(self.squared_error(out), 0.2 * self.squared_error(pt))
+        independent = {c: [mean([image[c][p] for image in self.independent_images]) for p in range(WIDTH * HEIGHT)]
+                       for c in "RGB"}
+        # The independent image with both halves' samples has half of this error.
+        self.assertLess(self.squared_error(out), 0.2 * self.squared_error(independent))
         predicted = mean([v * v for c in "RGB" for v in out["StdError." + c]])
         self.assertLess(predicted, 10 * self.squared_error(out))
         self.assertGreater(predicted, 0.1 * self.squared_error(out))
 
     def test_statistics(self):
-        result = self.good("combine", "--crn", "crn.exr", "--pt", "pt.exr", "-o", "out.exr", "--json", "-", "--quiet")
+        result = self.good("combine", "--crn", "crn.exr", "--independent", "independent.exr", "-o", "out.exr", "--json",
+                           "-", "--quiet")
         statistics = json.loads(result.stdout)
         self.assertEqual(statistics["estimator"], "iicv")
         self.assertEqual(statistics["crn_groups"], GROUPS)
         self.assertGreater(statistics["rank_correlation"]["crn_horizontal"]["value"], 0.5)
-        self.assertLess(abs(statistics["rank_correlation"]["pt_horizontal"]["value"]), 0.1)
+        self.assertLess(abs(statistics["rank_correlation"]["independent_horizontal"]["value"]), 0.1)
         self.assertEqual(result.stderr, "")
         info = self.good("info", "out.exr").stdout
         self.assertIn("covary:estimator: iicv", info)
         self.assertIn("covary:samples: 192", info)
 
     def test_explain(self):
-        inputs = ["combine", "--crn", "crn.exr", "--pt", "pt.exr", "-o", "out.exr", "--quiet", "--paper"]
+        inputs = ["combine", "--crn", "crn.exr", "--independent", "independent.exr", "-o", "out.exr", "--quiet",
+                  "--paper"]
         pixel = json.loads(self.good(*inputs, "--explain", "7,19", "--json", "-").stdout)["pixel"]
         self.assertEqual(len(pixel["control_variates"]), 25)
         out = self.read("out.exr")
         for i, c in enumerate("RGB"):
-            expected = pixel["crn"][i] - sum(v["beta"][i] * (v["crn"][i] - v["pt"][i]) for v in pixel["control_variates"])
+            expected = pixel["crn"][i] - sum(v["beta"][i] * (v["crn"][i] - v["independent"][i])
+                                             for v in pixel["control_variates"])
             self.assertAlmostEqual(out[c][19 * WIDTH + 7], expected, 5)
         table = self.good(*inputs, "--explain", "7,19").stdout
         self.assertEqual(len(table.splitlines()), 2 + 25)
         in_bands = self.good(*inputs, "--explain", "7,19", "--memory", "0.01").stdout
         self.assertEqual(in_bands, table)
         self.bad(2, "--explain 24,3 is outside the image: 24 x 20 pixels at (0, 0)", *inputs, "--explain", "24,3")
-        self.bad(2, "iduw has no control variates with coefficients", "combine", "--crn", "crn.exr", "--pt", "pt.exr",
-                 "-o", "out.exr", "--estimator", "iduw", "--explain", "1,1")
+        self.bad(2, "iduw has no control variates with coefficients", "combine", "--crn", "crn.exr", "--independent",
+                 "independent.exr", "-o", "out.exr", "--estimator", "iduw", "--explain", "1,1")
 
     def test_layouts_give_the_same_bits(self):
-        self.good("combine", "--crn", "crn.exr", "--pt", "pt.exr", "-o", "a.exr", "--quiet")
+        self.good("combine", "--crn", "crn.exr", "--independent", "independent.exr", "-o", "a.exr", "--quiet")
         # One file per group: R G B beside another image (pbrt, Mitsuba), and Blender's passes.
         crn = [self.write(f"crn{g}.exr", exr({**image, **{"nn." + c: [0] * WIDTH * HEIGHT for c in "RGB"}}, SIZE))
                for g, image in enumerate(self.crn_images)]
-        pt = [self.write(f"pt{g}.exr", exr({**{"ViewLayer.Combined." + c: image[c] for c in "RGB"},
-                                            **{"ViewLayer.Emit." + c: [0] * WIDTH * HEIGHT for c in "RGB"}}, SIZE))
-              for g, image in enumerate(self.pt_images)]
-        self.good("combine", "--crn", *crn, "--pt", *pt, "-o", "b.exr", "--quiet")
+        black = {"ViewLayer.Emit." + c: [0] * WIDTH * HEIGHT for c in "RGB"}
+        independent = [self.write(f"independent{g}.exr",
+                                  exr({**{"ViewLayer.Combined." + c: image[c] for c in "RGB"}, **black}, SIZE))
+                       for g, image in enumerate(self.independent_images)]
+        self.good("combine", "--crn", *crn, "--independent", *independent, "-o", "b.exr", "--quiet")
         self.assertEqual(self.read("a.exr"), self.read("b.exr"))
         self.layers("named.exr", self.crn_images, stem="pass.")
-        self.good("combine", "--crn", "named.exr", "--crn-layer", "pass.", "--pt", "pt.exr", "-o", "c.exr", "--quiet")
+        self.good("combine", "--crn", "named.exr", "--crn-layer", "pass.", "--independent", "independent.exr", "-o",
+                  "c.exr", "--quiet")
         self.assertEqual(self.read("a.exr"), self.read("c.exr"))
 
     def test_bands_and_threads_give_the_same_bits(self):
         size = (16, 200)
         self.layers("tall_crn.exr", noisy(1, True, 4, size), size)
-        self.layers("tall_pt.exr", noisy(2, False, 4, size), size)
-        common = ["combine", "--crn", "tall_crn.exr", "--pt", "tall_pt.exr", "--error", "--quiet"]
+        self.layers("tall_independent.exr", noisy(2, False, 4, size), size)
+        common = ["combine", "--crn", "tall_crn.exr", "--independent", "tall_independent.exr", "--error", "--quiet"]
         self.good(*common, "-o", "whole.exr")
         # 16 * (12 * 8 + 160) bytes per row: 0.4 MiB holds 102 rows.
         self.good(*common, "-o", "bands.exr", "--memory", "0.4", "--threads", "1")
@@ -117,71 +125,80 @@ class Combine(CliTest):
 
     def test_estimators_differ(self):
         results = []
-        for options in ([], ["--paper"], ["--penalty", "homogeneous"], ["--variance", "sample"], ["--coefficients", "per-channel"],
+        for options in ([], ["--paper"], ["--penalty", "homogeneous"], ["--variance", "sample"],
+                        ["--coefficients", "per-channel"],
                         ["--asymmetric"], ["--exclude-target"], ["--k", "9"], ["--window", "7"], ["--feedback", "off"],
                         ["--estimator", "cv-baseline"], ["--estimator", "cv-baseline", "--ridge", "0.1"],
                         ["--estimator", "iduw"], ["--estimator", "iduw", "--window", "7"]):
-            self.good("combine", "--crn", "crn.exr", "--pt", "pt.exr", "-o", "out.exr", "--quiet", *options)
+            self.good("combine", "--crn", "crn.exr", "--independent", "independent.exr", "-o", "out.exr", "--quiet",
+                      *options)
             results.append(self.read("out.exr"))
         for i, a in enumerate(results):
             for b in results[:i]:
                 self.assertNotEqual(a, b)
 
     def test_checks_refuse_and_can_be_forced(self):
-        inputs = ["--crn", "pt.exr", "--pt", "crn.exr", "-o", "out.exr"]
-        result = self.bad(1, "are CRN and PT swapped?", "combine", *inputs)
-        self.assertIn("the files say that CRN was rendered with sampling 'independent' and PT with 'crn'", result.stderr)
+        inputs = ["--crn", "independent.exr", "--independent", "crn.exr", "-o", "out.exr"]
+        result = self.bad(1, "are CRN and independent image swapped?", "combine", *inputs)
+        self.assertIn("the files say that the CRN image was rendered with sampling 'independent' and the independent "
+                      "image with 'crn'", result.stderr)
         self.assertIn("(--force combines them nevertheless)", result.stderr)
         forced = self.good("combine", *inputs, "--force")
-        self.assertIn("warning: PT: errors of neighbouring pixels", forced.stderr)
+        self.assertIn("warning: independent image: errors of neighbouring pixels", forced.stderr)
         self.assertTrue((self.path / "out.exr").exists())
 
     def test_wide_filter(self):
         wide = []
-        for image in self.pt_images:
-            wide.append({c: [0.1 * v[max(p - 1, 0)] + 0.8 * v[p] + 0.1 * v[min(p + 1, len(v) - 1)] for p in range(len(v))]
+        for image in self.independent_images:
+            wide.append({c: [0.1 * v[max(p - 1, 0)] + 0.8 * v[p] + 0.1 * v[min(p + 1, len(v) - 1)]
+                             for p in range(len(v))]
                          for c, v in image.items()})
         self.layers("wide.exr", wide)
-        self.bad(1, 'in Mitsuba <rfilter type="box"/>', "combine", "--crn", "crn.exr", "--pt", "wide.exr", "-o", "out.exr")
+        self.bad(1, 'in Mitsuba <rfilter type="box"/>', "combine", "--crn", "crn.exr", "--independent", "wide.exr",
+                 "-o", "out.exr")
 
     def test_attributes_that_contradict(self):
-        self.layers("other.exr", self.pt_images, sampling="independent", samples="96", scene_hash="b", settings="tent")
-        result = self.bad(1, "different scenes", "combine", "--crn", "crn.exr", "--pt", "other.exr", "-o", "out.exr")
-        self.assertIn("CRN with 'box', PT with 'tent'", result.stderr)
+        self.layers("other.exr", self.independent_images, sampling="independent", samples="96", scene_hash="b",
+                    settings="tent")
+        result = self.bad(1, "different scenes", "combine", "--crn", "crn.exr", "--independent", "other.exr", "-o",
+                          "out.exr")
+        self.assertIn("the CRN image with 'box', the independent image with 'tent'", result.stderr)
 
     def test_half_floats_are_accepted_with_a_warning(self):
-        self.layers("half.exr", self.pt_images, types=HALF)
-        result = self.good("combine", "--crn", "crn.exr", "--pt", "half.exr", "-o", "out.exr")
-        self.assertIn("warning: PT: values have 16 bits", result.stderr)
+        self.layers("half.exr", self.independent_images, types=HALF)
+        result = self.good("combine", "--crn", "crn.exr", "--independent", "half.exr", "-o", "out.exr")
+        self.assertIn("warning: independent image: values have 16 bits", result.stderr)
 
     def test_not_finite(self):
-        self.pt_images[3]["G"][5] = float("nan")
-        self.layers("nan.exr", self.pt_images)
-        inputs = ["--crn", "crn.exr", "--pt", "nan.exr", "-o", "out.exr"]
-        self.bad(1, "PT: 1 of 480 pixels hold NaN or infinite values, the first at (5, 0) in group 3", "combine", *inputs)
+        self.independent_images[3]["G"][5] = float("nan")
+        self.layers("nan.exr", self.independent_images)
+        inputs = ["--crn", "crn.exr", "--independent", "nan.exr", "-o", "out.exr"]
+        self.bad(1, "independent image: 1 of 480 pixels hold NaN or infinite values, the first at (5, 0) in group 3",
+                 "combine", *inputs)
         result = self.good("combine", *inputs, "--force", "--quiet", "--json", "-")
         self.assertEqual(json.loads(result.stdout)["nonfinite_pixels"], 1)
         self.assertTrue(all(v == v for c in self.read("out.exr").values() for v in c))
 
     def test_wrong_usage(self):
-        inputs = ["combine", "--crn", "crn.exr", "--pt", "pt.exr", "-o", "out.exr"]
+        inputs = ["combine", "--crn", "crn.exr", "--independent", "independent.exr", "-o", "out.exr"]
         self.bad(2, "k is 500, expected 1 to 121", *inputs, "--k", "500")
         self.bad(2, "window is 10, expected an odd number from 3 to 63", *inputs, "--window", "10")
-        self.bad(2, "--penalty is an option of --estimator iicv, not of iduw", *inputs, "--estimator", "iduw", "--penalty", "pilot")
+        self.bad(2, "--penalty is an option of --estimator iicv, not of iduw", *inputs, "--estimator", "iduw",
+                 "--penalty", "pilot")
         self.bad(2, "--samples is an option of --estimator iduw, not of iicv", *inputs, "--samples", "3")
         self.bad(2, "--penalty", *inputs, "--penalty", "none")
-        self.bad(2, "--pt is required", "combine", "--crn", "crn.exr", "-o", "out.exr")
+        self.bad(2, "--independent is required", "combine", "--crn", "crn.exr", "-o", "out.exr")
         self.layers("two.exr", self.crn_images[:2])
-        self.bad(2, "the CRN image has 2 groups, at least 3 are needed", "combine", "--crn", "two.exr", "--pt", "pt.exr",
-                 "-o", "out.exr", "--force")
+        self.bad(2, "the CRN image has 2 groups, at least 3 are needed", "combine", "--crn", "two.exr", "--independent",
+                 "independent.exr", "-o", "out.exr", "--force")
         self.layers("anonymous.exr", self.crn_images)
-        self.bad(2, "needs --samples N", "combine", "--crn", "anonymous.exr", "--pt", "pt.exr", "-o", "out.exr",
-                 "--estimator", "iduw")
+        self.bad(2, "needs --samples N", "combine", "--crn", "anonymous.exr", "--independent", "independent.exr", "-o",
+                 "out.exr", "--estimator", "iduw")
 
     def test_sizes_must_agree(self):
         self.layers("small.exr", noisy(2, False, 4, (8, 6)), (8, 6))
-        self.bad(1, "small.exr has 8 x 6 pixels at (0, 0) of 8 x 6; both images must show the same pixels", "combine", "--crn",
-                 "crn.exr", "--pt", "small.exr", "-o", "out.exr")
+        self.bad(1, "small.exr has 8 x 6 pixels at (0, 0) of 8 x 6; both images must show the same pixels", "combine",
+                 "--crn", "crn.exr", "--independent", "small.exr", "-o", "out.exr")
 
 
 if __name__ == "__main__":

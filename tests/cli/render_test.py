@@ -38,7 +38,7 @@ class Plans(RenderTest):
         for sampling in ("crn", "independent"):
             self.good("render", ROOM, *SMALL, "-o", f"{sampling}.exr", "--sampling", sampling, "--groups", "12", "--spp", "24",
                       "--seed", "3")
-        self.good("combine", "--crn", "crn.exr", "--pt", "independent.exr", "-o", "b.exr", "--error", "--quiet")
+        self.good("combine", "--crn", "crn.exr", "--independent", "independent.exr", "-o", "b.exr", "--error", "--quiet")
         self.same("a.exr", "b.exr")
         info = json.loads(self.good("info", "a.exr", "--json").stdout)
         self.assertEqual(set(info["channels"]), {"R", "G", "B", "StdError.R", "StdError.G", "StdError.B"})
@@ -175,7 +175,7 @@ class Polynomials(RenderTest):
         self.bad(2, "28 samples per pixel are too few to fit the 28 coefficients of 6 dimensions, expected at least 29", *render,
                  "--dimensions", "6", "--spp", "28")
         self.bad(2, "polynomials are fitted to the samples of each pixel, which images do not hold", "combine", "--crn", "a.exr",
-                 "--pt", "b.exr", "-o", "c.exr", "--estimator", "polynomials")
+                 "--independent", "b.exr", "-o", "c.exr", "--estimator", "polynomials")
 
 
 class Time(RenderTest):

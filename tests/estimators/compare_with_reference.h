@@ -36,12 +36,12 @@ struct Difference {
   double estimate = 0, std_error = 0;
 };
 
-inline Difference compare(const EstimatorResult& fast, const GroupedImage& crn, const GroupedImage& pt,
+inline Difference compare(const EstimatorResult& fast, const GroupedImage& crn, const GroupedImage& independent,
                           const RgbImage& error_of_h, int k, int window, bool include_target,
                           const Settings& settings) {
   const auto all = neighbours(crn, k, window, include_target);
-  const RgbImage h = map_pixels(pt, [&](int x, int y) { return mean(pt, x, y); });
-  const RgbImage variance = map_pixels(pt, [&](int x, int y) { return variance_of_mean(pt, x, y); });
+  const RgbImage h = map_pixels(independent, [&](int x, int y) { return mean(independent, x, y); });
+  const RgbImage variance = map_pixels(independent, [&](int x, int y) { return variance_of_mean(independent, x, y); });
   Difference worst;
   for (int y = 0; y < crn.height; ++y)
     for (int x = 0; x < crn.width; ++x) {
@@ -58,9 +58,9 @@ inline Difference compare(const EstimatorResult& fast, const GroupedImage& crn, 
   return worst;
 }
 
-/// The pilot penalty of all pixels of the PT image.
-inline RgbImage pilot_of(const GroupedImage& crn, const GroupedImage& pt, int window) {
-  return pilot_error(crn, map_pixels(pt, [&](int x, int y) { return mean(pt, x, y); }), window);
+/// The pilot penalty of all pixels of the independent image.
+inline RgbImage pilot_of(const GroupedImage& crn, const GroupedImage& independent, int window) {
+  return pilot_error(crn, map_pixels(independent, [&](int x, int y) { return mean(independent, x, y); }), window);
 }
 
 }  // namespace covary::reference

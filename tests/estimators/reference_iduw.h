@@ -13,11 +13,11 @@ inline int reflect(int i, int n) {
 }
 
 struct Iduw {
-  const GroupedImage &crn, &pt;
+  const GroupedImage &crn, &independent;
   int window, samples;
 
-  /// y + 1 / (W - 1) sum w ((z_c - z_i) - (y_c - y_i)) with y, z the means of the groups first, first + step, …, and the
-  /// weights from the groups a, a + a_step, … and b, b + a_step, …
+  /// y + 1 / (W - 1) sum w ((z_c - z_i) - (y_c - y_i)) with y, z the means of the groups first, first + step, …, and
+  /// the weights from the groups a, a + a_step, … and b, b + a_step, …
   double at(int x, int y, int c, double gamma, int first, int step, int a, int b, int ab_step) const {
     double sum = 0;
     for (int dy = -window / 2; dy <= window / 2; ++dy)
@@ -28,9 +28,9 @@ struct Iduw {
         };
         const double d = change(crn, a, ab_step) - change(crn, b, ab_step);
         // The target itself contributes zero.
-        sum += std::exp(-gamma * samples * d * d) * (change(crn, first, step) - change(pt, first, step));
+        sum += std::exp(-gamma * samples * d * d) * (change(crn, first, step) - change(independent, first, step));
       }
-    return mean(pt, x, y, first, step)[c] + sum / (window * window - 1);
+    return mean(independent, x, y, first, step)[c] + sum / (window * window - 1);
   }
   double result(int x, int y, int c, double gamma) const { return at(x, y, c, gamma, 0, 1, 0, 1, 2); }
   double loss(double gamma) const {
@@ -42,7 +42,7 @@ struct Iduw {
           double box = 0;
           for (int dy = -window / 2; dy <= window / 2; ++dy)
             for (int dx = -window / 2; dx <= window / 2; ++dx)
-              box += mean(pt, reflect(x + dx, crn.width), reflect(y + dy, crn.height))[c] / (window * window);
+              box += mean(independent, reflect(x + dx, crn.width), reflect(y + dy, crn.height))[c] / (window * window);
           total += d * d / (box * box + 0.01) / (3.0 * crn.width * crn.height);
         }
     return total;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Synthetic grouped images for tests: a smooth picture with an edge, CRN noise shared by all pixels up to a part of their
-// own, independent PT noise, and rare bright outliers.
+// Synthetic grouped images for tests: a smooth picture with an edge, CRN noise shared by all pixels up to a part of
+// their own, independent noise, and rare bright outliers.
 #pragma once
 
 #include <cmath>
@@ -33,7 +33,7 @@ inline float noise(uint64_t seed, uint64_t a, uint64_t b) {
   return static_cast<float>(mix64(combine64(combine64(seed, a), b)) >> 40) * 0x1p-24f - 0.5f;
 }
 
-/// `own`: part of the noise that is not shared by the pixels; 1 makes an independent (PT) image.
+/// `own`: part of the noise that is not shared by the pixels; 1 makes an independent image.
 inline Grouped noisy_image(int width, int height, int groups, uint64_t seed, float own, float outliers = 0.01f) {
   Grouped image = constant_image(width, height, groups, 0);
   for (int y = 0; y < height; ++y)
@@ -51,7 +51,7 @@ inline Grouped noisy_image(int width, int height, int groups, uint64_t seed, flo
 inline Grouped crn_image(int width, int height, int groups, uint64_t seed) {
   return noisy_image(width, height, groups, seed, 0.2f);
 }
-inline Grouped pt_image(int width, int height, int groups, uint64_t seed) {
+inline Grouped independent_image(int width, int height, int groups, uint64_t seed) {
   return noisy_image(width, height, groups, seed + 1000, 1.0f);
 }
 
