@@ -65,10 +65,17 @@ EmissionSample AreaLight::sample_emission(Vec2 u_position, Vec2 u_direction, flo
   if (!(area.pdf_area > 0) || !(w.z > 0)) return sample;
   sample.ray = {area.p, Frame(area.n).to_world(w)};
   sample.n = area.n;
+  sample.uv = area.uv;
   sample.radiance = radiance_at(area.p, area.n, area.uv);
   sample.pdf_position = area.pdf_area;
   sample.pdf_direction = warp::cosine_hemisphere_pdf_solid_angle(w.z);
   return sample;
+}
+
+EmissionPdf AreaLight::pdf_emission(const SurfaceHit& hit, const Vec3& w) const {
+  const float position =
+      samples_uv_ ? radiance_->pdf_position(hit.uv) * shape_->sample_uv(hit.uv).pdf_area : 1 / shape_->area();
+  return {position, warp::cosine_hemisphere_pdf_solid_angle(dot(hit.ng, w))};
 }
 
 Spectrum AreaLight::power() const {

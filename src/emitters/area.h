@@ -33,6 +33,7 @@ class AreaLight final : public Emitter {
   EmitterSample sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const override;
   float pdf_solid_angle(const Vec3& reference, const SurfaceHit& hit) const override;
   EmissionSample sample_emission(Vec2 u_position, Vec2 u_direction, float u_primitive) const override;
+  EmissionPdf pdf_emission(const SurfaceHit& hit, const Vec3& w) const override;
   /// pi times the integral of the radiance over the surface; for textures by quadrature.
   Spectrum power() const override;
 

@@ -38,6 +38,10 @@ class ConstantLight final : public Emitter {
     return sample;
   }
 
+  EmissionPdf pdf_emission(const SurfaceHit&, const Vec3&) const override {
+    return {1 / scene_.disk_area(), warp::sphere_pdf_solid_angle()};
+  }
+
   Spectrum power() const override { return radiance_ * (4 * kPi * scene_.disk_area()); }
 
  private:

@@ -18,7 +18,7 @@ class DirectionalLight final : public Emitter {
       : direction_(direction), irradiance_(irradiance) {}
 
   void set_scene_bounds(const Bounds3& bounds) override { scene_ = SceneSphere(bounds); }
-  bool is_delta() const override { return true; }
+  bool is_delta_direction() const override { return true; }
 
   EmitterSample sample_towards(const Vec3&, Vec2, float) const override {
     EmitterSample sample;
@@ -39,6 +39,8 @@ class DirectionalLight final : public Emitter {
     sample.delta_direction = true;
     return sample;
   }
+
+  EmissionPdf pdf_emission(const SurfaceHit&, const Vec3&) const override { return {1 / scene_.disk_area(), 1}; }
 
   Spectrum power() const override { return irradiance_ * scene_.disk_area(); }
 

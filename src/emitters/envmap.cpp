@@ -56,6 +56,10 @@ class EnvironmentMap final : public Emitter {
     return sample;
   }
 
+  EmissionPdf pdf_emission(const SurfaceHit&, const Vec3& w) const override {
+    return {1 / scene_.disk_area(), image_.lookup(rotation_.to_local(-w)).pdf_solid_angle};
+  }
+
   Spectrum power() const override { return image_.integral() * scene_.disk_area(); }
 
  private:

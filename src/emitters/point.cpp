@@ -16,7 +16,7 @@ class PointLight final : public Emitter {
  public:
   PointLight(const Vec3& position, const Spectrum& intensity) : position_(position), intensity_(intensity) {}
 
-  bool is_delta() const override { return true; }
+  bool is_delta_position() const override { return true; }
 
   EmitterSample sample_towards(const Vec3& reference, Vec2, float) const override {
     EmitterSample sample;
@@ -41,6 +41,10 @@ class PointLight final : public Emitter {
     sample.pdf_direction = warp::sphere_pdf_solid_angle();
     sample.delta_position = true;
     return sample;
+  }
+
+  EmissionPdf pdf_emission(const SurfaceHit&, const Vec3&) const override {
+    return {1, warp::sphere_pdf_solid_angle()};
   }
 
   Spectrum power() const override { return intensity_ * (4 * kPi); }

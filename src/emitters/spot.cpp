@@ -32,7 +32,7 @@ class SpotLight final : public Emitter {
         cos_beam_(std::cos(s_.beam_width)),
         one_minus_cos_cutoff_(2 * sqr(std::sin(s_.cutoff / 2))) {}
 
-  bool is_delta() const override { return true; }
+  bool is_delta_position() const override { return true; }
 
   EmitterSample sample_towards(const Vec3& reference, Vec2, float) const override {
     EmitterSample sample;
@@ -59,6 +59,11 @@ class SpotLight final : public Emitter {
     sample.pdf_direction = warp::cone_pdf_solid_angle(one_minus_cos_cutoff_);
     sample.delta_position = true;
     return sample;
+  }
+
+  EmissionPdf pdf_emission(const SurfaceHit&, const Vec3& w) const override {
+    const bool inside = s_.rotation.to_local(w).z > cos_cutoff_;
+    return {1, inside ? warp::cone_pdf_solid_angle(one_minus_cos_cutoff_) : 0};
   }
 
   Spectrum power() const override {

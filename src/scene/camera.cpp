@@ -71,7 +71,8 @@ Ray Camera::ray(Vec2 film, Vec2 lens) const {
 }
 
 float Camera::pdf_direction(const Vec3& d) const {
-  // The ray meets the image plane at d / z, where an area fills the solid angle area z^3 (for skewed axes, times volume).
+  // The ray meets the image plane at d / z, where an area fills the solid angle area * z^3 (for skewed axes, times
+  // their volume).
   const float z = dot(to_z_, d);
   return z > 0 ? pixels_per_area_ / (z * z * z) : 0;
 }

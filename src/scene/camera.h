@@ -33,7 +33,8 @@ struct LensSample {
   Vec3 p;              ///< point on the lens; the camera's position for a pinhole
   Vec3 near_p;         ///< on the near plane between them: what lies before it does not hide the reference point
   Vec2 film;           ///< where the ray meets the film, in pixels of the full frame, which it may leave
-  /// Camera::importance() in the direction of the reference point; for a pinhole times the cosine over the distance squared.
+  /// Camera::importance() in the direction of the reference point; for a pinhole already times the cosine at the lens and
+  /// divided by the distance squared.
   float importance = 0;
   float pdf_solid_angle = 0;  ///< density of wi at the reference point; 1 for a pinhole; 0: not between the clip planes
   float pdf_direction = 0;    ///< Camera::pdf_direction() in the direction of the reference point
@@ -47,19 +48,19 @@ class Camera : public SceneObject {
   /// uniform in [0,1)^2. The origin lies on the near plane, t_max on the far plane.
   Ray ray(Vec2 film, Vec2 lens) const;
 
-  // What follows describes rays through any point of the film plane, also outside the frame, with density 1 per pixel of
-  // film area: the measurement is that of one pixel. Directions `d` are unit vectors that leave the camera.
+  // What follows describes rays through any point of the film plane, also outside the frame, with density 1 per pixel
+  // of film area: the measurement is that of one pixel. Directions `d` are unit vectors that leave the camera.
   /// Pinhole: the position of the lens is a delta.
   bool is_delta() const { return !(settings_.aperture_radius > 0); }
   /// Density of the lens position, per unit area of the lens; 1 for a pinhole.
   float pdf_position() const { return pdf_position_; }
   /// Density of the ray's direction per unit solid angle; the same for every point of the lens. 0 behind the camera.
   float pdf_direction(const Vec3& d) const;
-  /// Importance We of the direction [Veach1997] §3.7: its integral over directions through a film area, times the cosine
-  /// at the lens, and over the lens (or at the pinhole) is that area in pixels.
+  /// Importance We of the direction [Veach1997] §3.7: its integral over directions through a film area, times the
+  /// cosine at the lens, and over the lens (or at the pinhole) is that area in pixels.
   float importance(const Vec3& d) const;
-  /// The film position, in pixels of the full frame, of a ray through the point `p` in direction `d`; the inverse of ray().
-  /// A pinhole looks at `d` alone. `d` must not lead backwards (pdf_direction() > 0).
+  /// The film position, in pixels of the full frame, of a ray through the point `p` in direction `d`; the inverse of
+  /// ray(). A pinhole looks at `d` alone. `d` must not lead backwards (pdf_direction() > 0).
   Vec2 project(const Vec3& p, const Vec3& d) const;
   /// Samples the lens uniformly as seen from `reference`; `u` uniform in [0,1)^2.
   LensSample sample_towards(const Vec3& reference, Vec2 u) const;

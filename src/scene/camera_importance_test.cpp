@@ -96,8 +96,8 @@ TEST_P(CameraImportance, DirectionDensityIsTheInverseOfSolidAnglePerPixel) {
   }
 }
 
-// Directions from one point of the lens. N = 400 000: sees 2.3 % rms error of the density with power 0.99. The edges of the
-// frame, where the density jumps, are resolved by the quadrature to 1 %.
+// Directions from one point of the lens. N = 400 000: sees 2.0 % rms error of the density with power 0.99. The edges of
+// the frame, where the density jumps, are resolved by the quadrature to 1 %.
 TEST_P(CameraImportance, DirectionsFollowTheirDensity) {
   const Vec2 lens{0.3f, 0.8f};
   const Vec3 on_lens = camera_.sample_towards(camera_.ray({1, 1}, lens).at(1), lens).p;
@@ -132,8 +132,8 @@ TEST_P(CameraImportance, IntegralOfImportanceIsTheFilmArea) {
   EXPECT_NEAR(found * lens_area, expected, 5e-3 * expected);
 }
 
-// A patch that emits with radiance 1 to all sides, seen by camera rays and by its points sampling the lens, must leave the
-// same mean and the same moments on the film. Both are averages over lattices of 512^2 points (error below 0.2 %).
+// A patch that emits with radiance 1 to all sides, seen by camera rays and by its points sampling the lens, must leave
+// the same mean and the same moments on the film. Both are averages over lattices of 512^2 points (error below 0.2 %).
 TEST_P(CameraImportance, LightTracingMeetsTheCamerasRays) {
   const Transform& to_world = GetParam().settings.to_world;
   const Vec3 corner = to_world.point({-0.3f, -0.2f, 1.4f}), e1 = to_world.vector({0.8f, 0.1f, 0.4f});

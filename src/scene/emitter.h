@@ -29,13 +29,27 @@ struct EmitterSample {
 /// Start of a light path.
 struct EmissionSample {
   Ray ray;            ///< leaves the light
-  Vec3 n;             ///< unit geometric normal at the origin; the direction itself for point-like lights
+  Vec3 n;             ///< unit geometric normal at the origin; the direction itself for point-like and infinite lights
+  Vec2 uv;            ///< surface parameters of the origin (area lights)
   Spectrum radiance;  ///< emitted radiance (area, environment) or intensity (point-like)
   /// Per unit area; for infinite lights per unit area of the disk perpendicular to the ray; 1 if delta.
   float pdf_position = 0;
   float pdf_direction = 0;  ///< per unit solid angle; 1 if delta
   bool delta_position = false, delta_direction = false;
 };
+
+/// Densities of Emitter::sample_emission(), in the units of EmissionSample; 1 for what is a delta.
+struct EmissionPdf {
+  float position = 0;
+  float direction = 0;
+};
+
+/// A point on an area light, with what the densities of Emitter look at.
+inline SurfaceHit point_on_light(const Vec3& p, const Vec3& n, Vec2 uv) {
+  SurfaceHit hit;
+  hit.p = p, hit.ng = n, hit.frame = Frame(n), hit.uv = uv;
+  return hit;
+}
 
 /// Light from infinitely far away in one direction.
 struct EnvironmentLight {
@@ -54,8 +68,14 @@ class Emitter : public SceneObject {
   virtual void set_scene_bounds(const Bounds3& /*bounds*/) {}
   /// Infinitely far lights that a ray leaving the scene can hit (environment map, constant).
   virtual bool is_environment() const { return false; }
+  /// All light comes from one point.
+  virtual bool is_delta_position() const { return false; }
+  /// All light goes in one direction.
+  virtual bool is_delta_direction() const { return false; }
   /// Position or direction is a delta: only sample_towards() finds this light.
-  virtual bool is_delta() const { return false; }
+  bool is_delta() const { return is_delta_position() || is_delta_direction(); }
+  /// Light from infinitely far away: emitted rays start on a disk outside the scene.
+  bool is_infinite() const { return is_environment() || is_delta_direction(); }
 
   /// Radiance an area light emits at a hit on its own shape in world direction `w` (away from the surface).
   virtual Spectrum surface_radiance(const SurfaceHit& /*hit*/, const Vec3& /*w*/) const { return {}; }
@@ -72,6 +92,9 @@ class Emitter : public SceneObject {
 
   /// Samples a ray that leaves the light, for paths that start there.
   virtual EmissionSample sample_emission(Vec2 u_position, Vec2 u_direction, float u_primitive) const = 0;
+  /// Densities of sample_emission() for light that leaves in world direction `w` (unit, away from the light) at the
+  /// point `hit` of an area light; other lights do not look at the point. Parts that are deltas are taken as met.
+  virtual EmissionPdf pdf_emission(const SurfaceHit& hit, const Vec3& w) const = 0;
 
   /// Emitted power, summed over the surface and directions, in RGB; infinite lights: through the scene's bounding sphere.
   virtual Spectrum power() const = 0;
