@@ -3,11 +3,16 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 
+#include "commands.h"
 #include "core/error.h"
 #include "defines.h"
+#include "plans/estimator_plans.h"
+#include "plans/integrator_choice.h"
 
 namespace covary {
 
@@ -55,19 +60,6 @@ FilterSettings filter_named(const std::string& name) {
   return {FilterKind::kGaussian, 2.0f, 0.5f};
 }
 
-const IntegratorPlugin* find_integrator(const std::string& name) {
-  for (const IntegratorPlugin& plugin : integrator_plugins())
-    if (name == plugin.name) return &plugin;
-  return nullptr;
-}
-
-std::string unknown_integrator(const std::string& name) {
-  std::vector<std::string> names;
-  for (const IntegratorPlugin& plugin : integrator_plugins()) names.push_back(plugin.name);
-  return fmt::format("unknown integrator '{}'{}; supported: {}", name, did_you_mean(name, names),
-                     fmt::join(names, ", "));
-}
-
 namespace {
 
 void check_output_writable(const std::string& output) {
@@ -111,6 +103,76 @@ void check_options(RenderOptions& options) {
   if (!options.output.empty()) check_output_writable(options.output);
 }
 
+LoadedScene load(const RenderOptions& options) {
+  LoadOptions load_options;
+  load_options.defines = parse_defines(options.defines);
+  if (!options.resolution.empty()) {
+    const auto size = parse_numbers("--resolution", options.resolution, 'x', 2, "WIDTHxHEIGHT, e.g. 1280x720");
+    if (size[0] < 1 || size[1] < 1 || size[0] > 65536 || size[1] > 65536)
+      throw Error(ErrorCode::kUsage, "--resolution '" + options.resolution + "': each side must be 1 to 65536");
+    load_options.width = static_cast<int>(size[0]), load_options.height = static_cast<int>(size[1]);
+  }
+  load_options.make_integrator = integrator_maker({options.integrator, options.min_depth, options.max_depth});
+  return load_scene(options.scene, load_options);
+}
+
+Plan make_plan(const RenderOptions& options) {
+  if (options.estimates_in_pass()) return polynomials_plan(options.dimensions, options.estimator.text());
+  if (options.has_one_pass())
+    return plain_plan(options.sampling == "crn" ? Sampling::kCrn : Sampling::kIndependent, options.groups);
+  const EstimatorOptions& estimator = options.estimator;
+  PairMethod method;
+  method.name = estimator.name;
+  method.estimator = estimator.text();
+  method.split = parse_split(options.split);
+  method.groups = options.groups;
+  method.fewest_groups = estimator.name == "iduw" || estimator.penalty == Penalty::kCrossFit ? 4 : 3;
+  method.predicts_error = predicts_error(estimator.name);
+  method.estimate = [estimator](const GroupedImage& crn, const GroupedImage& independent, int64_t crn_samples) {
+    return make_estimator(estimator, predicts_error(estimator.name), crn_samples).apply(crn, independent);
+  };
+  return pair_plan(method);
+}
+
+RenderRequest make_request(const RenderOptions& options, const LoadedScene& scene) {
+  RenderRequest request;
+  request.seed = options.seed;
+  if (!options.rfilter.empty()) request.filter = filter_named(options.rfilter);
+  if (!options.crop.empty()) {
+    const auto c = parse_numbers("--crop", options.crop, ',', 4, "X,Y,WIDTH,HEIGHT in pixels, e.g. 240,560,240,160");
+    if (c[2] < 1 || c[3] < 1 || c[0] + c[2] > scene.width || c[1] + c[3] > scene.height)
+      throw Error(ErrorCode::kUsage, fmt::format("--crop '{}' does not fit into the {} x {} frame", options.crop,
+                                                 scene.width, scene.height));
+    request.crop = {static_cast<int>(c[0]), static_cast<int>(c[1]), static_cast<int>(c[2]), static_cast<int>(c[3])};
+  }
+  request.spp = options.spp;
+  request.seconds = options.seconds;
+  if (!options.until.empty()) request.until = parse_until(options.until);
+  request.aovs = options.aovs;
+  request.output = options.output;
+  request.preview = options.preview;
+  request.passes = options.passes;
+  request.resume = options.resume;
+  request.checkpoint_seconds = options.checkpoint_seconds;
+  request.attributes = {{film_key::kVersion, COVARY_VERSION}, {film_key::kCommand, command_line()}};
+  return request;
+}
+
+SampleAddress replayed_sample(const RenderOptions& options) {
+  const bool with_pass = std::count(options.replay.begin(), options.replay.end(), ',') == 3;
+  const auto at = parse_numbers("--replay", options.replay, ',', with_pass ? 4 : 3,
+                                "X,Y,SAMPLE, e.g. 640,360,17, or X,Y,SAMPLE,PASS");
+  if (std::max(at[0], at[1]) > std::numeric_limits<int>::max() ||
+      (with_pass && at[3] > std::numeric_limits<uint32_t>::max()))
+    throw Error(ErrorCode::kUsage, fmt::format("--replay '{}': a number is too large", options.replay));
+  SampleAddress address;
+  address.sampling = options.sampling == "crn" ? Sampling::kCrn : Sampling::kIndependent;
+  address.x = static_cast<int>(at[0]), address.y = static_cast<int>(at[1]);
+  address.sample = static_cast<uint64_t>(at[2]);
+  if (with_pass) address.pass = static_cast<uint32_t>(at[3]);
+  return address;
+}
+
 void add_render_options(CLI::App& command, RenderOptions& o) {
   command.add_option("SCENE", o.scene, "Scene file, Mitsuba XML")->required();
   command.add_option("-o,--output", o.output, "The image (EXR); a PNG preview appears beside it");
@@ -132,7 +194,7 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
   command
       .add_option("--groups", o.groups,
                   "Groups of samples whose means films keep; default 12, 1 for a single independent pass")
-      ->check(CLI::Range(1u, 1024u));
+      ->check(CLI::Range(1, Film::kMaxGroups));
   command.add_option("--display-server", o.display_server,
                      "HOST:PORT of a running tev, which shows the image while it renders");
   command.add_option("--until", o.until, "relmse=X: add samples until the predicted error is X, at most --spp");
@@ -157,7 +219,7 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
       ->check(CLI::NonNegativeNumber);
   add_define_option(command, o.defines);
   command.add_flag("--aovs", o.aovs, "Add the images Albedo, N (normal) and P (position) to the output");
-  command.add_option("--replay", o.replay, "X,Y,SAMPLE: print one sample instead of rendering");
+  command.add_option("--replay", o.replay, "X,Y,SAMPLE[,PASS]: print one sample instead of rendering");
   command.add_option("--json", o.json, "File for statistics; '-': standard output");
   command.add_flag("!--no-preview", o.preview, "Do not write the PNG");
   command.add_flag("--quiet", o.quiet, "No progress and no summary");

@@ -12,8 +12,8 @@
 
 #include "estimator_options.h"
 #include "estimators/polynomials.h"
-#include "integrators/integrator.h"
-#include "scene/scene.h"
+#include "plans/plan.h"
+#include "plans/render.h"
 
 namespace covary {
 
@@ -22,8 +22,8 @@ struct RenderOptions {
   std::string resolution, crop, replay, until, display_server;
   EstimatorOptions estimator;
   std::vector<std::string> defines;
-  std::optional<uint32_t> spp, groups;
-  std::optional<int> min_depth, max_depth;
+  std::optional<uint32_t> spp;
+  std::optional<int> groups, min_depth, max_depth;
   uint64_t seed = 0;
   int threads = 0;
   double seconds = 0, checkpoint_seconds = 300;
@@ -41,6 +41,15 @@ void add_render_options(CLI::App& command, RenderOptions& options);
 /// Everything that can be wrong before the scene is loaded, as Error(kUsage); and --sampling alone means a plain render.
 void check_options(RenderOptions& options);
 
+/// The scene, with the integrator that the options choose. Throws Error.
+LoadedScene load(const RenderOptions& options);
+
+/// What the options ask for, checked by check_options(). Throws Error(kUsage) for a --crop outside the frame.
+Plan make_plan(const RenderOptions& options);
+RenderRequest make_request(const RenderOptions& options, const LoadedScene& scene);
+/// The sample that --replay names.
+SampleAddress replayed_sample(const RenderOptions& options);
+
 /// Whole numbers separated by `separator`; throws Error(kUsage) that names the option.
 std::vector<int64_t> parse_numbers(const std::string& option, const std::string& text, char separator, size_t count,
                                    const std::string& example);
@@ -50,9 +59,5 @@ std::array<double, 2> parse_split(const std::string& text);
 double parse_until(const std::string& text);
 /// --rfilter.
 FilterSettings filter_named(const std::string& name);
-/// --integrator; nullptr where there is none of that name.
-const IntegratorPlugin* find_integrator(const std::string& name);
-/// The message for an unknown name, with the names there are.
-std::string unknown_integrator(const std::string& name);
 
 }  // namespace covary

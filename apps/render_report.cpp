@@ -18,6 +18,8 @@ double peak_memory_bytes() {
   return static_cast<double>(usage.ru_maxrss) * 1024;
 }
 
+const char* sampling_name(const Pass& pass) { return pass.settings.sampling == Sampling::kCrn ? "crn" : "independent"; }
+
 /// Command that repeats one sample of a pass: the user's own, with the sample in place of the outputs.
 std::string replay_command(const RenderOptions& o, const Pass& pass, const BadSample& bad) {
   std::string text = "covary render " + o.scene;
@@ -28,7 +30,9 @@ std::string replay_command(const RenderOptions& o, const Pass& pass, const BadSa
   if (o.max_depth) text += fmt::format(" --max-depth {}", *o.max_depth);
   if (!o.rfilter.empty()) text += " --rfilter " + o.rfilter;
   return text +
-         fmt::format(" --sampling {} --seed {} --replay {},{},{}", pass.name(), o.seed, bad.x, bad.y, bad.sample);
+         fmt::format(" --sampling {} --seed {} --replay {},{},{}", sampling_name(pass), o.seed, bad.x, bad.y,
+                     bad.sample) +
+         (pass.plan.number ? fmt::format(",{}", pass.plan.number) : "");
 }
 
 }  // namespace
@@ -43,15 +47,15 @@ void report_bad_samples(const RenderOptions& options, const Pass& pass) {
                bad.value.g, bad.value.b, replay_command(options, pass, bad));
 }
 
-nlohmann::ordered_json statistics(const RenderOptions& options, const LoadedScene& scene, const Outcome& outcome,
-                                  int threads) {
-  const Film& film = outcome.passes.back().film;
-  const double samples = outcome.sum([](const Pass& p) { return p.result.n_samples; });
-  const double rays = outcome.sum([](const Pass& p) { return p.result.n_rays; });
-  const double rate = 1 / std::max(outcome.render_seconds(), 1e-9);
+nlohmann::ordered_json statistics(const RenderReport& report) {
+  const auto& [options, scene, result, load_seconds, threads] = report;
+  const Film& film = result.passes.back().film;
+  const double samples = result.sum([](const Pass& p) { return p.result.n_samples; });
+  const double rays = result.sum([](const Pass& p) { return p.result.n_rays; });
+  const double rate = 1 / std::max(result.render_seconds(), 1e-9);
   nlohmann::ordered_json passes = nlohmann::json::array(), bad = nlohmann::json::array();
-  for (const Pass& pass : outcome.passes) {
-    passes.push_back({{"sampling", pass.name()},
+  for (const Pass& pass : result.passes) {
+    passes.push_back({{"sampling", sampling_name(pass)},
                       {"samples_per_pixel", pass.film.mean_count()},
                       {"groups", pass.film.groups()},
                       {"samples", pass.result.n_samples},
@@ -69,54 +73,55 @@ nlohmann::ordered_json statistics(const RenderOptions& options, const LoadedScen
       {"width", film.width()},
       {"height", film.height()},
       {"estimator", options.estimator.text()},
-      {"samples_per_pixel", outcome.samples_per_pixel()},
+      {"samples_per_pixel", result.samples_per_pixel()},
       {"seed", options.seed},
       {"threads", threads},
-      {"complete", outcome.complete()},
+      {"complete", result.complete},
       {"passes", passes},
       {"seconds",
-       {{"load", outcome.load_seconds},
+       {{"load", load_seconds},
         {"build", scene.scene->build_seconds()},
-        {"trial", outcome.trial_seconds},
-        {"render", outcome.render_seconds()},
-        {"estimate", outcome.all_estimate_seconds()},
-        {"write", outcome.write_seconds}}},
+        {"trial", result.seconds.trial},
+        {"render", result.render_seconds()},
+        {"estimate", result.estimate_seconds()},
+        {"write", result.seconds.write}}},
       {"samples", samples},
       {"rays", rays},
       {"samples_per_second", samples * rate},
       {"rays_per_second", rays * rate},
       {"triangles", scene.scene->n_triangles()},
       {"peak_memory_bytes", peak_memory_bytes()},
-      {"not_finite_samples", outcome.sum([](const Pass& p) { return p.result.n_not_finite; })},
-      {"negative_samples", outcome.sum([](const Pass& p) { return p.result.n_negative; })},
+      {"not_finite_samples", result.sum([](const Pass& p) { return p.result.n_not_finite; })},
+      {"negative_samples", result.sum([](const Pass& p) { return p.result.n_negative; })},
       {"bad_samples", bad}};
-  if (outcome.predicted_relmse) json["predicted_relmse"] = *outcome.predicted_relmse;
+  if (result.predicted_relmse) json["predicted_relmse"] = *result.predicted_relmse;
   return json;
 }
 
-void print_summary(const RenderOptions& options, const LoadedScene& scene, const Outcome& outcome) {
+void print_summary(const RenderReport& report) {
+  const auto& [options, scene, result, load_seconds, threads] = report;
   std::string samples;
-  for (const Pass& pass : outcome.passes)
-    samples += fmt::format("{}{:g} {}", samples.empty() ? "" : " + ", pass.film.mean_count(), pass.name());
-  const double seconds = std::max(outcome.render_seconds(), 1e-9);
+  for (const Pass& pass : result.passes)
+    samples += fmt::format("{}{:g} {}", samples.empty() ? "" : " + ", pass.film.mean_count(), pass.plan.name);
+  const double seconds = std::max(result.render_seconds(), 1e-9);
   fmt::print(stderr,
              "{}: {} x {}, {} samples per pixel in {:.2f} s (load {:.2f} s, build {:.2f} s, {} samples/s, {} rays/s)\n",
-             options.output, outcome.passes[0].film.width(), outcome.passes[0].film.height(), samples, seconds,
-             outcome.load_seconds, scene.scene->build_seconds(),
-             format_count(outcome.sum([](const Pass& p) { return p.result.n_samples; }) / seconds),
-             format_count(outcome.sum([](const Pass& p) { return p.result.n_rays; }) / seconds));
+             options.output, result.passes[0].film.width(), result.passes[0].film.height(), samples, seconds,
+             load_seconds, scene.scene->build_seconds(),
+             format_count(result.sum([](const Pass& p) { return p.result.n_samples; }) / seconds),
+             format_count(result.sum([](const Pass& p) { return p.result.n_rays; }) / seconds));
   if (options.estimator.name != "none") {
-    fmt::print(stderr, "{} in {:.2f} s", options.estimator.text(), outcome.all_estimate_seconds());
-    if (outcome.predicted_relmse) fmt::print(stderr, ", predicted relMSE {:.3g}", *outcome.predicted_relmse);
+    fmt::print(stderr, "{} in {:.2f} s", options.estimator.text(), result.estimate_seconds());
+    if (result.predicted_relmse) fmt::print(stderr, ", predicted relMSE {:.3g}", *result.predicted_relmse);
     fmt::print(stderr, "\n");
   } else if (!options.until.empty()) {
-    fmt::print(stderr, "predicted relMSE {:.3g}\n", *outcome.predicted_relmse);
+    fmt::print(stderr, "predicted relMSE {:.3g}\n", *result.predicted_relmse);
   }
-  if (options.seconds > 0 && outcome.budget_seconds > 1.05 * options.seconds)
+  if (options.seconds > 0 && result.seconds.limited > 1.05 * options.seconds)
     fmt::print(stderr, "warning: --time {:g} was exceeded: {:.2f} s for at least {} samples per pixel in each pass{}\n",
-               options.seconds, outcome.budget_seconds, outcome.passes[0].film.groups(),
+               options.seconds, result.seconds.limited, result.passes[0].film.groups(),
                options.has_one_pass() ? "" : " and the estimate");
-  if (!options.until.empty() && *outcome.predicted_relmse > parse_until(options.until))
+  if (!options.until.empty() && *result.predicted_relmse > parse_until(options.until))
     fmt::print(stderr, "warning: --until {} was not reached\n", options.until);
 }
 

@@ -24,6 +24,7 @@ ARROWS = {
     "io": ["bsdfs", "emitters"],
     "sampling": ["scene"],
     "integrators": ["sampling", "film"],
+    "plans": ["estimators", "integrators", "io"],
 }
 SOURCE_FOLDERS = ["src", "include", "apps", "python", "tests", "benchmarks"]
 CPP = (".h", ".cpp", ".cu", ".cuh")

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// The plans of the estimators there are. Each has one phase.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "plans/plan.h"
+
+namespace covary {
+
+/// One pass whose film is the result. `groups`: default 12 for common random numbers and for a render to a wanted error, which
+/// is read from the groups, otherwise 1.
+Plan plain_plan(Sampling sampling, std::optional<int> groups = {});
+
+/// One independent pass, whose pixels are polynomials fitted to all their samples (estimators/polynomials.h). `text`: the
+/// estimator with its options, for attributes. Throws Error(kUsage) when rendered with too few samples for `dimensions`.
+Plan polynomials_plan(int dimensions, const std::string& text);
+
+/// An estimator of two images of groups: one with common random numbers, one with independent ones.
+struct PairMethod {
+  std::string name;       ///< for messages
+  std::string estimator;  ///< with its options, for the image's attribute
+  /// Parts of the samples for the CRN and the independent pass; they add up to 1.
+  std::array<double, 2> split = {0.5, 0.5};
+  std::optional<int> groups;  ///< of each pass; default: 12, fewer where there are fewer samples
+  int fewest_groups = 3;      ///< that the estimator works with
+  bool predicts_error = false;
+  /// `crn_samples`: samples per pixel of the CRN image.
+  std::function<EstimatorResult(const GroupedImage& crn, const GroupedImage& independent, int64_t crn_samples)>
+      estimate;
+};
+/// Passes "crn" and "independent" that advance together, and the estimator. Rendering throws Error(kUsage) where `groups` is less
+/// than `fewest_groups`.
+Plan pair_plan(const PairMethod& method);
+
+}  // namespace covary

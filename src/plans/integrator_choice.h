@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which integrator a scene is loaded with: the scene's own, with the changes that a caller asks for.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "integrators/integrator.h"
+#include "io/load_scene.h"
+
+namespace covary {
+
+struct IntegratorChoice {
+  std::string name;              ///< registered name; empty: the scene's
+  std::optional<int> min_depth;  ///< leave out paths with fewer edges
+  std::optional<int> max_depth;  ///< largest number of path edges; < 0: no limit
+};
+
+/// For LoadOptions::make_integrator.
+std::function<std::shared_ptr<SceneObject>(Parameters&)> integrator_maker(const IntegratorChoice& choice);
+
+/// nullptr where there is none of that name.
+const IntegratorPlugin* find_integrator(const std::string& name);
+/// The message for an unknown name, with the names there are.
+std::string unknown_integrator(const std::string& name);
+
+}  // namespace covary

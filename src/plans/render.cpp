@@ -1,0 +1,316 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plans/render.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <set>
+#include <utility>
+
+#include "core/error.h"
+#include "core/stopwatch.h"
+#include "estimators/predicted_error.h"
+#include "film/film_file.h"
+#include "integrators/aov.h"
+#include "plans/budget.h"
+#include "plans/pass_files.h"
+#include "plans/pass_waves.h"
+#include "plans/result_files.h"
+
+namespace covary {
+namespace {
+
+constexpr int kTrialRows = 64;         // at least, where the time of the estimate is found out
+constexpr uint32_t kFirstBudget = 96;  // samples per pixel before a wanted error is looked at for the first time
+constexpr uint32_t kMaxBudget = 1u << 30;
+constexpr uint32_t kAovSamples = 16;  // per pixel of auxiliary images
+
+std::string filter_text(const FilterSettings& filter) {
+  switch (filter.kind) {
+    case FilterKind::kBox:
+      return fmt::format("box radius={}", filter.radius);
+    case FilterKind::kTent:
+      return fmt::format("tent radius={}", filter.radius);
+    case FilterKind::kGaussian:
+      return fmt::format("gaussian radius={} stddev={}", filter.radius, filter.stddev);
+  }
+  throw Error(ErrorCode::kInternal, "unknown reconstruction filter");
+}
+
+std::shared_ptr<const Integrator> integrator_of(const LoadedScene& scene) {
+  auto integrator = std::dynamic_pointer_cast<const Integrator>(scene.integrator);
+  COVARY_CHECK(integrator, "the scene was loaded with an integrator");
+  return integrator;
+}
+
+/// The part of the frame that is rendered.
+CropWindow crop_of(const LoadedScene& scene, const RenderRequest& request) {
+  if (!request.crop) return {scene.crop_x, scene.crop_y, scene.crop_width, scene.crop_height};
+  const CropWindow& c = *request.crop;
+  if (c.x < 0 || c.y < 0 || c.width < 1 || c.height < 1 || c.width > scene.width - c.x || c.height > scene.height - c.y)
+    throw Error(ErrorCode::kUsage, fmt::format("the crop {},{},{},{} does not fit into the {} x {} frame", c.x, c.y,
+                                               c.width, c.height, scene.width, scene.height));
+  return c;
+}
+
+void check(const Plan& plan, const RenderRequest& request) {
+  const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
+  if (request.spp && (*request.spp < 1 || *request.spp > kMaxBudget))
+    usage(fmt::format("{} samples per pixel; expected are 1 to {}", *request.spp, kMaxBudget));
+  if (plan.fixed_samples && (request.seconds > 0 || request.until > 0))
+    usage(plan.name + " needs the number of samples to be known before, so there can be no limit of time or error");
+  if (request.until > 0 && !plan.predicts_error) usage(plan.name + " does not estimate its error");
+}
+
+/// Carries a plan out, once.
+class PlanRun {
+ public:
+  PlanRun(const LoadedScene& scene, const Plan& plan, const RenderRequest& request, const RenderCallbacks& callbacks)
+      : scene_(scene),
+        plan_(plan),
+        request_(request),
+        callbacks_(callbacks),
+        window_(crop_of(scene, request)),
+        filter_(request.filter.value_or(scene.filter)),
+        state_{scene, request, callbacks.stop, integrator_of(scene), 0, 0, {}} {}
+
+  RenderResult run() {
+    result_.interrupted = !render_to_limits();
+    const Stopwatch watch;
+    if (result_.interrupted || !request_.passes.empty()) save_passes(request_, state_.passes, !result_.interrupted);
+    if (!result_.interrupted && request_.aovs) render_auxiliary_images();
+    if (result_.interrupted)
+      result_.kept = output_is_film(plan_, request_) ? request_.output : passes_folder(request_).string();
+    result_.complete = complete();
+    result_.passes = std::move(state_.passes);
+    if (!result_.interrupted) {
+      write_result_files(plan_, request_, result_);
+      remove_passes(plan_, request_, result_.passes);
+    }
+    result_.seconds.write += watch.seconds();
+    return std::move(result_);
+  }
+
+ private:
+  /// Renders and estimates, once or until the predicted error is small enough. False when interrupted.
+  bool render_to_limits();
+  /// Renders a phase, until `share` of the time limit is used. False when interrupted.
+  bool render_phase(size_t index, double share);
+  double seconds_left(size_t phase, double share);
+  void begin_phase(const Phase& phase);
+  Pass begin_pass(const PassPlan& plan) const;
+  void between_waves();
+  void warn_of_other_samples(uint32_t asked) const;
+  void estimate();
+  double time_estimate();
+  void render_auxiliary_images();
+
+  bool timed() const { return request_.seconds > 0; }
+  bool stopped() const { return callbacks_.stop && callbacks_.stop->load(); }
+  /// All passes have the samples they should.
+  bool complete() const {
+    return first_of_phase_.size() == plan_.phases.size() &&
+           std::all_of(state_.passes.begin(), state_.passes.end(),
+                       [](const Pass& p) { return p.count >= p.settings.spp; });
+  }
+  std::span<Pass> passes_of(size_t phase) {
+    const size_t end = phase + 1 < first_of_phase_.size() ? first_of_phase_[phase + 1] : state_.passes.size();
+    return std::span(state_.passes).subspan(first_of_phase_[phase], end - first_of_phase_[phase]);
+  }
+
+  const LoadedScene& scene_;
+  const Plan& plan_;
+  const RenderRequest& request_;
+  const RenderCallbacks& callbacks_;
+  const CropWindow window_;
+  const FilterSettings filter_;
+  PlanState state_;
+  std::vector<size_t> first_of_phase_;  // index of the first pass of each phase that has begun
+  RenderResult result_;
+  uint64_t done_ = 0;  // samples of this call, of earlier phases and rounds
+  Stopwatch watch_, since_checkpoint_;
+  std::optional<double> estimate_seconds_;  // what the next estimate takes
+};
+
+bool PlanRun::render_to_limits() {
+  const bool open_ended = timed() || request_.until > 0;
+  const uint32_t limit = request_.spp.value_or(open_ended ? kMaxBudget : static_cast<uint32_t>(scene_.spp));
+  state_.budget = state_.group_budget = request_.until > 0 ? std::min(limit, kFirstBudget) : limit;
+  if (timed() && plan_.groups_follow_speed) {
+    // What half of the time is enough for, so that no more groups are begun than can be filled.
+    const double samples = 0.5 * request_.seconds * samples_per_second(scene_, *state_.integrator, filter_, window_);
+    state_.group_budget =
+        static_cast<uint32_t>(std::min<double>(state_.budget, samples / window_.width / window_.height));
+  }
+  if (timed()) result_.seconds.trial = watch_.seconds();
+  for (bool first = true;; first = false) {
+    double share = 0;
+    for (size_t i = 0; i < plan_.phases.size(); ++i) {
+      share += plan_.phases[i].share;
+      if (!render_phase(i, first ? share : 1)) return false;
+    }
+    if (!plan_.film_is_image || request_.until > 0) estimate();
+    result_.seconds.limited = watch_.seconds();
+    const bool out_of_time = timed() && seconds_left(plan_.phases.size() - 1, 1) <= 0;
+    if (request_.until == 0 || *result_.predicted_relmse <= request_.until || state_.budget >= limit || out_of_time)
+      return true;
+    state_.budget = next_budget(state_.budget, *result_.predicted_relmse, request_.until, limit);
+  }
+}
+
+double PlanRun::seconds_left(size_t phase, double share) {
+  if (phase + 1 < plan_.phases.size()) return share * request_.seconds - watch_.seconds();
+  if (!estimate_seconds_) estimate_seconds_ = time_estimate();
+  return request_.seconds - watch_.seconds() - *estimate_seconds_;
+}
+
+bool PlanRun::render_phase(size_t index, double share) {
+  const Phase& phase = plan_.phases[index];
+  if (index == first_of_phase_.size()) begin_phase(phase);
+  const std::span<Pass> passes = passes_of(index);
+  if (passes.empty()) return false;  // interrupted before its films were made
+  phase.set_targets(state_, passes);
+  if (index + 1 == plan_.phases.size() && !timed() && request_.until == 0) warn_of_other_samples(state_.budget);
+  WaveLimits limits;
+  if (timed()) limits.seconds_left = [this, index, share] { return seconds_left(index, share); };
+  limits.stop = callbacks_.stop;
+  if (callbacks_.progress)
+    limits.progress = [this](uint64_t done, uint64_t total) { callbacks_.progress(done_ + done, done_ + total); };
+  limits.wave = [this] { between_waves(); };
+  done_ += render_passes(*scene_.scene, passes, limits);
+  return !stopped() || complete();
+}
+
+void PlanRun::begin_phase(const Phase& phase) {
+  first_of_phase_.push_back(state_.passes.size());
+  if (phase.prepare) phase.prepare(state_);
+  if (stopped()) return;
+  const std::vector<PassPlan> plans = phase.passes(state_);
+  COVARY_CHECK(!plans.empty(), "a phase has passes");
+  for (const PassPlan& plan : plans) {
+    for (const Pass& other : state_.passes)
+      COVARY_CHECK(
+          other.plan.id() != plan.id() && (other.plan.sampling != plan.sampling || other.plan.number != plan.number),
+          "passes '" + other.plan.id() + "' and '" + plan.id() + "' of a plan have identities of their own");
+    state_.passes.push_back(begin_pass(plan));
+  }
+}
+
+Pass PlanRun::begin_pass(const PassPlan& plan) const {
+  Pass pass;
+  pass.plan = plan;
+  pass.integrator = state_.integrator;
+  pass.settings.sampling = plan.sampling;
+  pass.settings.seed = request_.seed;
+  pass.settings.pass = plan.number;
+  pass.settings.filter = filter_;
+  pass.settings.estimate = plan.estimate;
+  pass.path = pass_path(plan_, request_, plan);
+  pass.film = Film(scene_.width, scene_.height, window_, plan.groups);
+  const std::string number = plan.number ? fmt::format("; pass {}", plan.number) : "";
+  pass.film.attributes = request_.attributes;
+  pass.film.attributes.insert_or_assign(film_key::kSeed, std::to_string(request_.seed));
+  pass.film.attributes.insert_or_assign(film_key::kSampling, plan.sampling == Sampling::kCrn ? "crn" : "independent");
+  pass.film.attributes.insert_or_assign(film_key::kSceneHash, scene_.content_hash);
+  pass.film.attributes.insert_or_assign(film_key::kSettings, state_.integrator->description() + "; filter " +
+                                                                 filter_text(filter_) + number + plan.settings);
+  pass.film.attributes.insert_or_assign(film_key::kComplete, "false");
+  if (!plan.estimator.empty()) pass.film.attributes.insert_or_assign("estimator", plan.estimator);
+  if (request_.resume && !pass.path.empty() && std::filesystem::exists(pass.path)) resume(request_, pass);
+  return pass;
+}
+
+void PlanRun::between_waves() {
+  if (callbacks_.wave) callbacks_.wave(state_.passes);
+  if (request_.checkpoint_seconds <= 0 || since_checkpoint_.seconds() < request_.checkpoint_seconds) return;
+  const Stopwatch watch;
+  save_passes(request_, state_.passes, false);
+  result_.seconds.write += watch.seconds();
+  since_checkpoint_ = Stopwatch();
+}
+
+void PlanRun::warn_of_other_samples(uint32_t asked) const {
+  double planned = 0;
+  for (const Pass& pass : state_.passes) planned += pass.settings.spp;
+  if (planned != asked && callbacks_.warning)
+    callbacks_.warning(fmt::format("{:g} samples per pixel instead of {}, so that all {} groups have the same size",
+                                   planned, asked, state_.passes[0].film.groups()));
+}
+
+void PlanRun::estimate() {
+  const Stopwatch watch;
+  EstimatorResult image = plan_.estimate(state_.passes, 0, window_.height);
+  if (!image.std_error.data.empty()) result_.predicted_relmse = predicted_relmse(image);
+  if (request_.until > 0 && !result_.predicted_relmse)
+    throw Error(ErrorCode::kUsage, "an error can only be predicted from 2 or more groups");
+  if (!plan_.film_is_image) result_.image = std::move(image);
+  estimate_seconds_ = watch.seconds();
+  result_.seconds.estimate += *estimate_seconds_;
+}
+
+/// Seconds that the estimate will take, from a trial on rows in the middle: it depends on sizes, not on samples.
+double PlanRun::time_estimate() {
+  if (plan_.film_is_image) return 0;  // a mean
+  const Stopwatch watch;
+  const int height = window_.height, n_rows = std::min(height, std::max(kTrialRows, height / 8));
+  plan_.estimate(state_.passes, (height - n_rows) / 2, n_rows);
+  const double seconds = watch.seconds();
+  result_.seconds.trial += seconds;
+  return seconds * height / n_rows;
+}
+
+void PlanRun::render_auxiliary_images() {
+  const Pass& last = state_.passes.back();
+  Film& film = state_.passes.back().film;
+  render_aovs(*scene_.scene, filter_, last.settings.sampling, last.settings.seed, last.settings.pass, kAovSamples,
+              film);
+  result_.aovs = std::exchange(film.aovs, {});
+}
+
+}  // namespace
+
+GroupedImage rows_of(const Film& film, int first_row, int n_rows) {
+  return {film.width(), n_rows, film.groups(), film.groups_of(0, first_row)};
+}
+
+const Pass& PlanState::pass(const std::string& name, uint32_t number) const {
+  for (const Pass& pass : passes)
+    if (pass.plan.name == name && pass.plan.number == number) return pass;
+  throw Error(ErrorCode::kInternal, fmt::format("no pass {} {} has begun", name, number));
+}
+
+Image RenderResult::picture() const { return image.estimate.data.empty() ? preview_of(passes) : image.estimate; }
+
+RenderResult render(const LoadedScene& scene, const Plan& plan, const RenderRequest& request,
+                    const RenderCallbacks& callbacks) {
+  check(plan, request);
+  return PlanRun(scene, plan, request, callbacks).run();
+}
+
+Image preview_of(std::span<const Pass> passes) {
+  if (passes.empty()) return {};
+  Image image = passes[0].film.mean_image();
+  double samples = passes[0].film.mean_count();
+  for (const Pass& pass : passes.subspan(1)) {
+    const Image next = pass.film.mean_image();
+    samples += pass.film.mean_count();
+    const auto part = static_cast<float>(pass.film.mean_count() / std::max(samples, 1.0));
+    for (size_t k = 0; k < image.data.size(); ++k) image.data[k] += part * (next.data[k] - image.data[k]);
+  }
+  return image;
+}
+
+ReplayedSample replay(const LoadedScene& scene, const RenderRequest& request, const SampleAddress& address) {
+  if (address.x < 0 || address.y < 0 || address.x >= scene.width || address.y >= scene.height)
+    throw Error(ErrorCode::kUsage, fmt::format("pixel ({}, {}) is outside the {} x {} frame", address.x, address.y,
+                                               scene.width, scene.height));
+  PassSettings settings;
+  settings.sampling = address.sampling;
+  settings.seed = request.seed;
+  settings.pass = address.pass;
+  settings.filter = request.filter.value_or(scene.filter);
+  return replay_sample(*scene.scene, *integrator_of(scene), settings, address.x, address.y, address.sample);
+}
+
+}  // namespace covary

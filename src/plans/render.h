@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+// Renders a scene by a plan: the one entry point of the command line, of tests and of other programs. Nothing is printed, no
+// signal handled, and nothing global read or set.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "plans/plan.h"
+
+namespace covary {
+
+/// What is asked for, beside the plan.
+struct RenderRequest {
+  uint64_t seed = 0;
+  std::optional<FilterSettings> filter;  ///< default: the scene's
+  std::optional<CropWindow> crop;        ///< default: the scene's; inside the frame
+  /// Samples per pixel of all passes together, 1 … 2^30. Default: the scene's, or no limit where `seconds` or `until` is given.
+  std::optional<uint32_t> spp;
+  double seconds = 0;  ///< > 0: limit for rendering and estimating together
+  double until = 0;    ///< > 0: add samples until the predicted relMSE is this
+  bool aovs = false;   ///< also the images Albedo, N and P
+
+  std::string output;             ///< EXR file of the result; empty: no file is written
+  bool preview = false;           ///< also a PNG beside it
+  std::string passes;             ///< folder that keeps the films; empty: only while they are not finished
+  bool resume = false;            ///< continue films that are there
+  double checkpoint_seconds = 0;  ///< > 0: seconds between writing unfinished films
+  /// Attributes of films and image that only the caller knows, such as film_key::kVersion and kCommand.
+  std::map<std::string, std::string> attributes;
+};
+
+/// What the caller hears of a render. Any of them may be empty.
+struct RenderCallbacks {
+  /// The render ends at the next tile once this is true; may be set from a signal handler.
+  const std::atomic<bool>* stop = nullptr;
+  /// After each tile, from any thread; must be thread-safe. `total` counts the samples of the current phase.
+  std::function<void(uint64_t done, uint64_t total)> progress;
+  /// Between waves, when films may be read, and once in about half a second in passes of a single wave.
+  std::function<void(std::span<const Pass>)> wave;
+  std::function<void(const std::string&)> warning;
+};
+
+struct RenderSeconds {
+  double trial = 0;     ///< of finding out, for a time limit, how fast passes and estimator are
+  double estimate = 0;  ///< after the passes
+  double write = 0;
+  double limited = 0;  ///< of what the time limit counts, in this call
+};
+
+/// What has become of a plan.
+struct RenderResult {
+  std::vector<Pass> passes;
+  EstimatorResult image;  ///< empty where the film is the image, or the render was interrupted
+  std::optional<double> predicted_relmse;
+  std::map<std::string, Image> aovs;
+  RenderSeconds seconds;
+  bool complete = false;     ///< all passes have the samples that were planned
+  bool interrupted = false;  ///< by the stop token
+  std::string kept;          ///< after an interruption: the file or folder that holds the films, empty where none does
+
+  template <typename F>
+  double sum(F value) const {
+    double total = 0;
+    for (const Pass& pass : passes) total += static_cast<double>(value(pass));
+    return total;
+  }
+  double samples_per_pixel() const {
+    return sum([](const Pass& p) { return p.film.mean_count(); });
+  }
+  /// Time of the passes, without what estimates inside them took.
+  double render_seconds() const {
+    return sum([](const Pass& p) { return p.result.seconds - p.result.estimate_seconds; });
+  }
+  /// Time of making the image, inside the passes and of them.
+  double estimate_seconds() const {
+    return seconds.estimate + sum([](const Pass& p) { return p.result.estimate_seconds; });
+  }
+  /// The image, whoever made it; of an interrupted render the mean of all samples so far.
+  Image picture() const;
+};
+
+/// Renders, estimates and, where the request names files, writes. `scene` was loaded with an integrator (integrator_choice.h).
+/// Throws Error(kUsage) for a request that does not fit the scene or plan, Error(kInput) for films that are not those of this
+/// render, Error(kIo).
+RenderResult render(const LoadedScene& scene, const Plan& plan, const RenderRequest& request,
+                    const RenderCallbacks& callbacks = {});
+
+/// The mean of all samples so far: a picture for a viewer while passes go on.
+Image preview_of(std::span<const Pass> passes);
+
+/// One sample of a pass.
+struct SampleAddress {
+  Sampling sampling = Sampling::kIndependent;
+  uint32_t pass = 0;  ///< PassPlan::number
+  int x = 0, y = 0;   ///< pixel in the full frame
+  uint64_t sample = 0;
+};
+/// The value of the sample, as render() adds it to a film with this request's seed and filter. Throws Error(kUsage) for a pixel outside
+/// the frame.
+ReplayedSample replay(const LoadedScene& scene, const RenderRequest& request, const SampleAddress& address);
+
+}  // namespace covary

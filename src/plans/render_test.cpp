@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: Apache-2.0
+// Plans carried out without a command line: results, phases, stop token, resuming, files.
+#include "plans/render.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstring>
+#include <filesystem>
+
+#include "film/film_file.h"
+#include "film/image_file.h"
+#include "plans/budget.h"
+#include "plans/estimator_plans.h"
+#include "plans/integrator_choice.h"
+#include "support/files.h"
+
+namespace covary {
+namespace {
+
+namespace fs = std::filesystem;
+using test_support::TemporaryFolder;
+
+LoadedScene load_room(int width = 40, int height = 30) {
+  LoadOptions options;
+  options.width = width, options.height = height;
+  options.make_integrator = integrator_maker({});
+  return load_scene(std::string(COVARY_SOURCE_DIR) + "/scenes/room.xml", options);
+}
+
+RenderRequest request_of(uint32_t spp) {
+  RenderRequest request;
+  request.spp = spp;
+  request.seed = 5;
+  return request;
+}
+
+/// Mean of both images: quick, and the same whatever rows it is asked for.
+Plan mean_plan() {
+  PairMethod method;
+  method.name = method.estimator = "average";
+  method.estimate = [](const GroupedImage& crn, const GroupedImage& independent, int64_t) {
+    EstimatorResult result;
+    result.estimate = Image(crn.width, crn.height, 3);
+    for (size_t i = 0; i < result.estimate.data.size(); ++i)
+      result.estimate.data[i] =
+          0.5f * (crn.data[i / 3 * crn.groups * 3 + i % 3] + independent.data[i / 3 * independent.groups * 3 + i % 3]);
+    return result;
+  };
+  return pair_plan(method);
+}
+
+bool same_bits(const Film& a, const Film& b) {
+  return a.counts() == b.counts() && a.data().size() == b.data().size() &&
+         std::memcmp(a.data().data(), b.data().data(), a.data().size() * sizeof(float)) == 0;
+}
+
+TEST(Render, OnePassIsTheFilmOfRenderPass) {
+  const LoadedScene scene = load_room();
+  const RenderResult result = render(scene, plain_plan(Sampling::kIndependent), request_of(6));
+  ASSERT_EQ(result.passes.size(), 1u);
+  EXPECT_TRUE(result.complete);
+  EXPECT_FALSE(result.interrupted);
+  PassSettings settings;
+  settings.seed = 5, settings.spp = 6, settings.filter = scene.filter;
+  Film film(40, 30, {0, 0, 40, 30}, 1);
+  render_pass(*scene.scene, dynamic_cast<const Integrator&>(*scene.integrator), settings, film);
+  EXPECT_TRUE(same_bits(result.passes[0].film, film));
+  EXPECT_EQ(result.picture().data, film.mean_image().data);
+}
+
+TEST(Render, ACropOutsideTheFrameAndImpossibleLimitsAreUsageErrors) {
+  const LoadedScene scene = load_room();
+  RenderRequest request = request_of(6);
+  request.crop = CropWindow{30, 0, 11, 10};
+  EXPECT_THROW(render(scene, plain_plan(Sampling::kIndependent), request), Error);
+  request = request_of(6);
+  request.until = 0.1;
+  EXPECT_THROW(render(scene, mean_plan(), request), Error) << "no predicted error";
+  request.until = 0;
+  request.seconds = 1;
+  EXPECT_THROW(render(scene, polynomials_plan(2, "polynomials"), request), Error);
+}
+
+TEST(Render, StoppedAtManyTilesAndResumedGivesTheSameBits) {
+  const LoadedScene scene = load_room();
+  const TemporaryFolder folder;
+  RenderRequest request = request_of(96);
+  const RenderResult whole = render(scene, mean_plan(), request);
+  request.output = folder.file("a.exr");
+  request.resume = true;
+  int interruptions = 0;
+  for (int tiles = 7;; tiles += 31) {
+    std::atomic<bool> stop{false};
+    std::atomic<int> left{tiles};
+    RenderCallbacks callbacks;
+    callbacks.stop = &stop;
+    callbacks.progress = [&](uint64_t, uint64_t) {
+      if (--left <= 0) stop = true;
+    };
+    const RenderResult part = render(scene, mean_plan(), request, callbacks);
+    if (part.complete) {
+      EXPECT_TRUE(same_bits(part.passes[0].film, whole.passes[0].film));
+      EXPECT_TRUE(same_bits(part.passes[1].film, whole.passes[1].film));
+      EXPECT_EQ(part.image.estimate.data, whole.image.estimate.data);
+      break;
+    }
+    EXPECT_TRUE(part.interrupted);
+    EXPECT_EQ(part.kept, folder.file("a.passes"));
+    EXPECT_TRUE(fs::exists(part.kept + "/crn.exr"));
+    ++interruptions;
+  }
+  EXPECT_GE(interruptions, 2);
+  EXPECT_FALSE(fs::exists(folder.file("a.passes")));
+  EXPECT_EQ(read_image(request.output).image.data, whole.image.estimate.data);
+}
+
+TEST(Render, FilmsInMemoryAloneWhenTheRequestNamesNoFile) {
+  const LoadedScene scene = load_room();
+  RenderRequest request = request_of(24);
+  request.checkpoint_seconds = 1e-9;
+  int waves = 0;
+  RenderCallbacks callbacks;
+  callbacks.wave = [&](std::span<const Pass> passes) {
+    ++waves;
+    EXPECT_EQ(preview_of(passes).width, 40);
+  };
+  const RenderResult result = render(scene, mean_plan(), request, callbacks);
+  EXPECT_EQ(waves, 2);
+  EXPECT_TRUE(result.passes[0].path.empty());
+}
+
+TEST(Render, ProgressCountsAllSamplesOfTheCall) {
+  const LoadedScene scene = load_room();
+  std::atomic<uint64_t> last{0};
+  RenderCallbacks callbacks;
+  callbacks.progress = [&](uint64_t done, uint64_t total) {
+    EXPECT_LE(done, total);
+    for (uint64_t seen = last; seen < done && !last.compare_exchange_weak(seen, done);) continue;
+  };
+  render(scene, mean_plan(), request_of(24), callbacks);
+  EXPECT_EQ(last, 24u * 40 * 30);
+}
+
+TEST(Render, ReplayGivesTheSampleOfThePassOfThatNumber) {
+  const LoadedScene scene = load_room();
+  const RenderRequest request = request_of(1);
+  Plan plan = plain_plan(Sampling::kIndependent);
+  plan.phases[0].passes = [](const PlanState&) {
+    PassPlan pass;
+    pass.name = "independent";
+    pass.number = 3;
+    return std::vector{pass};
+  };
+  const Film film = render(scene, plan, request).passes[0].film;
+  EXPECT_EQ(replay(scene, request, {Sampling::kIndependent, 3, 11, 13, 0}).value, film.mean(11, 13));
+  EXPECT_NE(replay(scene, request, {Sampling::kIndependent, 0, 11, 13, 0}).value, film.mean(11, 13));
+  EXPECT_THROW(replay(scene, request, {Sampling::kIndependent, 3, 40, 13, 0}), Error);
+}
+
+/// A CRN pass of 12 samples, then an independent one that has more samples the brighter the first image is.
+Plan two_phases(int& trainings) {
+  Plan plan = mean_plan();
+  plan.phases.resize(2);
+  Phase &first = plan.phases[0], &second = plan.phases[1];
+  first.share = second.share = 0.5;
+  first.passes = [](const PlanState&) {
+    PassPlan pass;
+    pass.name = "crn";
+    pass.sampling = Sampling::kCrn;
+    pass.groups = 4;
+    return std::vector{pass};
+  };
+  first.set_targets = [](const PlanState&, std::span<Pass> passes) { passes[0].settings.spp = 12; };
+  second.prepare = [&trainings](PlanState& state) {
+    EXPECT_EQ(state.passes.size(), 1u);
+    EXPECT_EQ(state.pass("crn").count, 12u);
+    ++trainings;
+  };
+  second.passes = [](const PlanState&) {
+    PassPlan pass;
+    pass.name = "light";
+    pass.number = 1;
+    pass.groups = 4;
+    pass.settings = "; trained 17";
+    return std::vector{pass};
+  };
+  second.set_targets = [](const PlanState& state, std::span<Pass> passes) {
+    const Image image = state.pass("crn").film.mean_image();
+    double sum = 0;
+    for (float value : image.data) sum += value;
+    passes[0].settings.spp = sum > 0 ? 8 : 4;
+  };
+  return plan;
+}
+
+TEST(Phases, ReadWhatEarlierPhasesLeft) {
+  const LoadedScene scene = load_room();
+  const TemporaryFolder folder;
+  RenderRequest request = request_of(20);
+  request.passes = folder.file("films");
+  int trainings = 0;
+  const RenderResult result = render(scene, two_phases(trainings), request);
+  EXPECT_TRUE(result.complete);
+  EXPECT_EQ(trainings, 1);
+  ASSERT_EQ(result.passes.size(), 2u);
+  EXPECT_EQ(result.passes[1].film.count(3, 3), 8u);
+  const auto attributes = read_film_attributes(request.passes + "/light-1.exr");
+  EXPECT_TRUE(attributes.at("settings").ends_with("; pass 1; trained 17")) << attributes.at("settings");
+}
+
+TEST(Phases, AnInterruptedPhaseResumesToTheSameBits) {
+  const LoadedScene scene = load_room();
+  const TemporaryFolder folder;
+  RenderRequest request = request_of(20);
+  int trainings = 0;
+  const RenderResult whole = render(scene, two_phases(trainings), request);
+  request.passes = folder.file("films");
+  request.resume = true;
+  for (int tiles : {3, 20, 1000}) {  // in the first phase, in the second, never
+    std::atomic<bool> stop{false};
+    std::atomic<int> left{tiles};
+    RenderCallbacks callbacks;
+    callbacks.stop = &stop;
+    callbacks.progress = [&](uint64_t, uint64_t) {
+      if (--left <= 0) stop = true;
+    };
+    const RenderResult part = render(scene, two_phases(trainings), request, callbacks);
+    EXPECT_EQ(part.interrupted, tiles < 1000);
+    EXPECT_EQ(part.passes.size(), tiles == 3 ? 1u : 2u);
+    if (part.interrupted) continue;
+    EXPECT_TRUE(same_bits(part.passes[0].film, whole.passes[0].film));
+    EXPECT_TRUE(same_bits(part.passes[1].film, whole.passes[1].film));
+  }
+}
+
+TEST(Phases, PassesWithoutIdentitiesOfTheirOwnAreRefused) {
+  const LoadedScene scene = load_room();
+  Plan plan = mean_plan();
+  plan.phases[0].passes = [](const PlanState&) {
+    std::vector<PassPlan> passes(2);
+    passes[0].name = "a", passes[1].name = "b";  // the same random numbers
+    return passes;
+  };
+  EXPECT_THROW(render(scene, plan, request_of(8)), Error);
+}
+
+TEST(Budget, FollowsThePredictedError) {
+  EXPECT_EQ(next_budget(96, 0.02, 0.01, 1000), 212u) << "1.1 times what 1 / samples says";
+  EXPECT_EQ(next_budget(96, 1, 0.01, 1000), 384u) << "at most four times";
+  EXPECT_EQ(next_budget(96, 0.0101, 0.01, 1000), 120u) << "at least a quarter more";
+  EXPECT_EQ(next_budget(96, 1, 0.01, 300), 300u);
+}
+
+}  // namespace
+}  // namespace covary
