@@ -18,7 +18,7 @@ constexpr int kCell = 2;
 /// Bandwidths of the wide mean and of the second feedback over that of the narrow mean.
 constexpr float kWidening = 4, kSecondWidening = 12;
 /// Variance of the narrow mean, relative to that of the estimate, at which both means count equally. 0.1 to 3 trade bias for
-/// error, slowly (docs/methods/iicv.md).
+/// error, slowly (docs/notes/iicv.md).
 constexpr float kNoise = 0.2f;
 
 /// Cells of side x side pixels, one row of cells per row, repeated horizontally so that column x holds the cell of pixel x:

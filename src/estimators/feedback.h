@@ -28,7 +28,7 @@ struct FeedbackOptions {
   /// Side of the window of the wide mean; odd, 5 … 125. Default 41 (measured; 61 gains less than 1 %, 21 loses 3 %).
   int window = 41;
   /// kappa: pixels that differ by so many standard errors of the estimate have weight 1 / e; > 0. Less leaves less bias
-  /// and more noise. Default 1.25 (measured, docs/methods/iicv.md).
+  /// and more noise. Default 1.25 (measured, docs/notes/iicv.md).
   float bandwidth = 1.25f;
 };
 
