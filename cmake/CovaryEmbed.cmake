@@ -1,8 +1,8 @@
 # covary_embed(<module> a.css b.js ...)
 #
 # Compiles the content of files into covary_<module>. Each becomes a `std::string_view` in the namespace
-# covary::<module>_files, named like the file with '_' for what an identifier cannot hold (page.css: page_css); the module
-# includes "<module>/embedded.h", which declares them.
+# covary::<module>_files, named like the file with '_' for what an identifier cannot hold (page.css: page_css); the
+# module includes "<module>/embedded.h", which declares them.
 function(covary_embed module)
   set(folder ${CMAKE_CURRENT_BINARY_DIR}/embedded)
   set(sources)

@@ -1,7 +1,7 @@
 # covary_module(<name> SOURCES a.cpp ... DEPENDS module-or-target ... TESTS a_test.cpp ...)
 #
-# A module is one folder of src/: a library `covary_<name>` made of SOURCES, which may use only the modules it DEPENDS on
-# (tests/layers checks the includes), and one program `<name>_tests` made of the TESTS that lie beside the code.
+# A module is one folder of src/: a library `covary_<name>` made of SOURCES, which may use only the modules it DEPENDS
+# on (tests/layers checks the includes), and one program `<name>_tests` made of the TESTS that lie beside the code.
 function(covary_module name)
   cmake_parse_arguments(MODULE "" "" "SOURCES;DEPENDS;TESTS;TEST_DEPENDS" ${ARGN})
   if(MODULE_SOURCES)
@@ -25,8 +25,8 @@ function(covary_test program)
   add_executable(${program} ${TEST_SOURCES})
   target_include_directories(${program} PRIVATE ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/tests)
   target_link_libraries(${program} PRIVATE ${TEST_DEPENDS} GTest::gtest_main)
-  # Only files that name it know where the source tree lies: the others compile to the same object in every checkout, so a
-  # compiler cache serves them all.
+  # Only files that name it know where the source tree lies: the others compile to the same object in every checkout, so
+  # a compiler cache serves them all.
   foreach(source ${TEST_SOURCES})
     cmake_path(ABSOLUTE_PATH source BASE_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR} OUTPUT_VARIABLE path)
     file(STRINGS ${path} uses REGEX COVARY_SOURCE_DIR LIMIT_COUNT 1)

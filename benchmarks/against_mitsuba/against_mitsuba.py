@@ -4,7 +4,7 @@
     against_mitsuba.py agree --scenes DIR [NAME...]       exit code 1 where a scene does not agree
     against_mitsuba.py reference --scenes DIR [NAME...]   only fills the cache of Mitsuba renders
     against_mitsuba.py speed --scenes DIR [NAME...]
-    against_mitsuba.py store SCENE.xml... --to DIR        block means of Mitsuba's renders as JSON, for tests/against_mitsuba
+    against_mitsuba.py store SCENE.xml... --to DIR   block means of Mitsuba's renders as JSON, for tests
 
 See ../README.md for what is compared, how, and how to read the tables.
 """
@@ -35,7 +35,7 @@ def parse(arguments):
     common.add_argument("names", nargs="*", metavar="NAME", help="scene names, or .xml files; all scenes when absent")
     common.add_argument("--scenes", metavar="DIR", help="folder with one sub-folder per scene")
     common.add_argument("--spp", type=int, help="samples per pixel (agree: 128 or more, speed: 32)")
-    common.add_argument("--pixels", type=int, help="about so many pixels, aspect ratio kept (agree: 9216, speed: 230400)")
+    common.add_argument("--pixels", type=int, help="about so many pixels, aspect ratio kept (agree 9216, speed 230400)")
     common.add_argument("--max-depth", type=int, help="instead of the scenes' own")
     common.add_argument("--threads", type=int, default=0, help="for both renderers; 0: all cores")
     common.add_argument("--out", default="against_mitsuba_out", metavar="DIR", help="where reports and images go")
@@ -45,7 +45,7 @@ def parse(arguments):
     seeds = argparse.ArgumentParser(add_help=False)
     seeds.add_argument("--seeds", type=int, default=16, help="renders of each side")
     seeds.add_argument("--target-error", type=float, default=0.0015, metavar="E",
-                       help="multiply a scene's spp by 4, at most twice, until the relative standard error of Mitsuba's "
+                       help="multiply a scene's spp by 4, at most twice, until the relative error of Mitsuba's "
                        "image mean is below E (not with --spp)")
     seeds.add_argument("--cache", default=DEFAULT_CACHE, metavar="DIR", help="Mitsuba's renders are kept here")
     agree = commands.add_parser("agree", parents=[common, program, seeds])
@@ -109,7 +109,8 @@ def worst_block(result):
 
 
 AGREE_HEADER = """\
-| scene | frame, spp | ratio of means ± s.e. | p mean | finds mean | p blocks | finds block | worst block | p pixels | p all | verdict |
+| scene | frame, spp | ratio of means ± s.e. | p mean | finds mean | p blocks | finds block \
+| worst block | p pixels | p all | verdict |
 |---|---|---|---|---|---|---|---|---|---|---|"""
 
 
@@ -144,7 +145,8 @@ def agree(options):
     out.mkdir(parents=True, exist_ok=True)
     alpha = agreement.sidak_each(options.suite_alpha, 4 * len(scenes))
     lines = [f"{options.seeds} seeds of each renderer, box filter; alpha {alpha:.2g} per test "
-             f"({options.suite_alpha:g} over {4 * len(scenes)} tests), power 0.99. {covary.version()}", "", AGREE_HEADER]
+             f"({options.suite_alpha:g} over {4 * len(scenes)} tests), power 0.99. {covary.version()}", "",
+             AGREE_HEADER]
     print("\n".join(lines), flush=True)
     report, failed = {"machine": machine(), "covary": covary.version(), "scenes": {}}, False
     for name, scene in scenes.items():
@@ -171,7 +173,8 @@ def agree(options):
 def make_reference(options):
     for name, scene in scene_files.find(options.scenes, options.names).items():
         _, settings, mean, error = reference_stack(name, scene, options)
-        print(f"{name}: {settings.width}x{settings.height}, {settings.spp} spp, mean {mean:.6g}, standard error {error:.3%}",
+        print(f"{name}: {settings.width}x{settings.height}, {settings.spp} spp, mean {mean:.6g}, "
+              f"standard error {error:.3%}",
               flush=True)
     return 0
 

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Do two renderers compute the same image? Tests across independent renders (seeds) of each.
 
-Pixels of one render are not the unit of evidence; whole renders with different seeds are. For each of the image mean, the
-means of 8 x 8 blocks and the pixels (all per colour channel), Welch's t compares R renders of one side with R of the
-other; both sides' noise is in it, and neither variance is trusted to equal the other. Over the many blocks and channels
-the false-positive probability is divided by Sidak's rule. Radiance has rare bright samples, so that t is not exactly
-t-distributed; for equal R the difference of two such means is symmetric, which makes the test conservative.
+Pixels of one render are not the unit of evidence; whole renders with different seeds are. For each of the image mean,
+the means of 8 x 8 blocks and the pixels (all per colour channel), Welch's t compares R renders of one side with R of
+the other; both sides' noise is in it, and neither variance is trusted to equal the other. Over the many blocks and
+channels the false-positive probability is divided by Sidak's rule. Radiance has rare bright samples, so that t is not
+exactly t-distributed; for equal R the difference of two such means is symmetric, which makes the test conservative.
 
 A fourth test looks at all blocks together: the sum over blocks and channels of the between-sides share of the variance,
 against its distribution when the 2R renders are assigned to the two sides at random. It needs no normality and finds
@@ -141,7 +141,8 @@ class Agreement:
 
 
 def agreement(reference, tested, alpha, bound=0.005):
-    """Compares stacks of renders (R, h, w, 3). Pixels that are not finite in a render are dropped from all and counted."""
+    """Compares stacks of renders (R, h, w, 3). Pixels that are not finite in a render are dropped from all and
+    counted."""
     finite = numpy.isfinite(reference).all(axis=(0, 3)) & numpy.isfinite(tested).all(axis=(0, 3))
     reference = numpy.where(finite[None, :, :, None], reference, 0).astype(numpy.float64)
     tested = numpy.where(finite[None, :, :, None], tested, 0).astype(numpy.float64)

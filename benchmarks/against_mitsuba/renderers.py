@@ -112,7 +112,8 @@ def read_channels(path, names):
 def mitsuba_times(variant, scene, settings, threads, renders, empty_kernel_cache):
     """{'load', 'render': [first, second, ...], 'wall', 'peak_bytes'} of one process, seconds.
 
-    `empty_kernel_cache`: with a home directory of its own, so that Dr.Jit finds none of the kernels it keeps on disk."""
+    `empty_kernel_cache`: with a home directory of its own, so that Dr.Jit finds none of the kernels it keeps on
+    disk."""
     with tempfile.TemporaryDirectory() as folder:
         environment = dict(os.environ)
         if empty_kernel_cache:

@@ -87,8 +87,8 @@ def _set_integer(parent, name, value):
 
 
 def _swap_checkerboards_of_one_channel(root):
-    """Mitsuba 3.9.1 shows color1 where color0 belongs when a checkerboard is a weight or an opacity (docs/scene-format.md,
-    differences); exchanged once more, both renderers see the same picture."""
+    """Mitsuba 3.9.1 shows color1 where color0 belongs when a checkerboard is a weight or an opacity
+    (docs/scene-format.md, differences); exchanged once more, both renderers see the same picture."""
     for texture in root.iter("texture"):
         colours = [e for e in texture.findall("float") if e.get("name") in ("color0", "color1")]
         if texture.get("type") == "checkerboard":

@@ -22,7 +22,8 @@ def measure(covary, scene, settings, variants, rounds, threads):
         for who in order if number % 2 == 0 else reversed(order):
             if who == "covary":
                 with tempfile.TemporaryDirectory() as folder:
-                    facts, wall, peak = covary.render(scene, settings, number, pathlib.Path(folder) / "out.exr", threads)
+                    facts, wall, peak = covary.render(scene, settings, number, pathlib.Path(folder) / "out.exr",
+                                                      threads)
                 seconds = facts["seconds"]
                 runs[who].append({"load": seconds["load"] + seconds["build"],
                                   "render": seconds["render"] + seconds["write"], "wall": wall, "peak_bytes": peak})

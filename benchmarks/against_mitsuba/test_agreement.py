@@ -2,8 +2,8 @@
 """Tests of the comparison itself, on synthetic renders with known errors: python -m unittest test_agreement.
 
 Renders are R = 32 stacks of 64 x 64 pixels, pixel noise of relative deviation 3 / sqrt(16 spp), log-normal (heavy
-tails), seeds fixed. With alpha = 2.6e-5 per test the chance that the first test fails although nothing is wrong is about
-4 alpha = 1e-4; the planted errors are all beyond the stated detectable error at power 0.99.
+tails), seeds fixed. With alpha = 2.6e-5 per test the chance that the first test fails although nothing is wrong is
+about 4 alpha = 1e-4; the planted errors are all beyond the stated detectable error at power 0.99.
 """
 import unittest
 

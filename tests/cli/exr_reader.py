@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads the EXR files that covary writes (scan lines, ZIP or uncompressed, 32-bit values) with the standard library alone, so that tests do
-not depend on the code that they test. Layout: https://openexr.com/en/latest/OpenEXRFileLayout.html"""
+"""Reads the EXR files that covary writes (scan lines, ZIP or uncompressed, 32-bit values) with the standard library
+alone, so that tests do not depend on the code that they test. Layout:
+https://openexr.com/en/latest/OpenEXRFileLayout.html"""
 import array
 import struct
 import zlib

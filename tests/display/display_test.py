@@ -23,7 +23,8 @@ class DisplayServer(unittest.TestCase):
         self.path = Path(self.folder.name)
 
     def render(self, name, *options):
-        command = [os.environ["COVARY"], "render", SCENE, "-o", name, "--resolution", "48x32", "--quiet", "--no-preview", *options]
+        command = [os.environ["COVARY"], "render", SCENE, "-o", name, "--resolution", "48x32", "--quiet",
+                   "--no-preview", *options]
         return subprocess.run(command, cwd=self.path, capture_output=True, text=True, timeout=60)
 
     def check_last_image(self, *options):
@@ -72,7 +73,8 @@ class DisplayServer(unittest.TestCase):
             port = free.getsockname()[1]
         result = self.render("a.exr", "--display-server", f"127.0.0.1:{port}", "--spp", "16")
         self.assertEqual(result.returncode, 0)
-        self.assertEqual(result.stderr, f"warning: display server 127.0.0.1:{port}: cannot connect: Connection refused; "
+        self.assertEqual(result.stderr, f"warning: display server 127.0.0.1:{port}: cannot connect: "
+                                        "Connection refused; "
                                         "rendering goes on without it\n")
         self.assertTrue((self.path / "a.exr").exists())
 

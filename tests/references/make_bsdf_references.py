@@ -5,7 +5,8 @@ src/bsdfs/references_test.cpp compares with. Run with any Python that has Mitsub
 
     python make_bsdf_references.py [output file]
 
-File: "mitsuba" version; "pairs": directions [wo, wi] in the local frame, pointing away from the surface; "cases", each with
+File: "mitsuba" version; "pairs": directions [wo, wi] in the local frame, pointing away from the surface; "cases",
+each with
   "name", "bsdf"  a dictionary as Mitsuba's load_dict takes it
   "importance"    true: the value for light paths
   "tolerance"     relative error of the value accepted, and of the density where "density_tolerance" is not given
@@ -13,9 +14,10 @@ File: "mitsuba" version; "pairs": directions [wo, wi] in the local frame, pointi
   "samples"       for models with delta lobes: [wo, u_lobe, wi, weight, pdf, eta]
   "gradient"      value derivatives (dh/du, dh/dv) of the texture named "bump", for bump maps
 
-Tolerance: 1e-3 covers single precision. Mitsuba's masking term for the Beckmann distribution is a rational fit that is off
-by 0.35 % per direction; ours is exact, hence 8e-3 there. Its transmittance table for roughplastic comes from a quadrature
-that is off by 2e-4 for GGX (ours by 2e-5), which is 5e-3 of the small reflectance that the probabilities of lobes come from.
+Tolerance: 1e-3 covers single precision. Mitsuba's masking term for the Beckmann distribution is a rational fit that is
+off by 0.35 % per direction; ours is exact, hence 8e-3 there. Its transmittance table for roughplastic comes from a
+quadrature that is off by 2e-4 for GGX (ours by 2e-5), which is 5e-3 of the small reflectance that the probabilities of
+lobes come from.
 """
 
 import json
@@ -97,9 +99,11 @@ def cases():
 
     # Rough interfaces.
     for distribution, tolerance in [("ggx", EXACT), ("beckmann", BECKMANN)]:
-        for more in [{}, {"alpha": 0.02}, {"alpha": 0.4, "material": "Cu"}, {"alpha_u": 0.1, "alpha_v": 0.35, "material": "Al"},
+        for more in [{}, {"alpha": 0.02}, {"alpha": 0.4, "material": "Cu"},
+                     {"alpha_u": 0.1, "alpha_v": 0.35, "material": "Al"},
                      {"alpha": 0.2, "sample_visible": False, "specular_reflectance": warm},
-                     {"alpha_u": 0.3, "alpha_v": 0.15, "sample_visible": False, "eta": rgb(0.2, 0.9, 1.1), "k": rgb(3.9, 2.4, 2.1)}]:
+                     {"alpha_u": 0.3, "alpha_v": 0.15, "sample_visible": False, "eta": rgb(0.2, 0.9, 1.1),
+                      "k": rgb(3.9, 2.4, 2.1)}]:
             yield case(f"roughconductor {distribution} {list(more)}",
                        {"type": "roughconductor", "distribution": distribution, **more}, tolerance)
         for more in [{}, {"alpha": 0.02}, {"alpha": 0.35}, {"alpha_u": 0.1, "alpha_v": 0.35, "int_ior": "water"},
@@ -112,7 +116,8 @@ def cases():
                      {"alpha": 0.2, "int_ior": 1.9, "specular_reflectance": warm},
                      {"alpha": 0.2, "sample_visible": False, "diffuse_reflectance": blue}]:
             yield case(f"roughplastic {distribution} {list(more)}",
-                       {"type": "roughplastic", "distribution": distribution, **more}, tolerance, density_tolerance=8e-3)
+                       {"type": "roughplastic", "distribution": distribution, **more}, tolerance,
+                       density_tolerance=8e-3)
 
     # Wrappers.
     metal = {"type": "roughconductor", "distribution": "ggx", "alpha": 0.25, "material": "Au"}
@@ -120,7 +125,8 @@ def cases():
     yield case("mask, plastic", {"type": "mask", "opacity": 0.8, "nested": {"type": "plastic"}}, samples=True)
     yield case("mask, twosided", {"type": "mask", "nested": {"type": "twosided", "a": metal}}, samples=True)
     yield case("blendbsdf", {"type": "blendbsdf", "weight": 0.3, "a": diffuse, "b": metal})
-    yield case("twosided blendbsdf", {"type": "twosided", "n": {"type": "blendbsdf", "weight": 0.9, "a": metal, "b": diffuse}})
+    yield case("twosided blendbsdf", {"type": "twosided",
+                                      "n": {"type": "blendbsdf", "weight": 0.9, "a": metal, "b": diffuse}})
     bumps = [(0.3, -0.5), (2.0, 1.0)]
     glass = {"type": "roughdielectric", "distribution": "ggx", "alpha": 0.3}
     for gradient in bumps:

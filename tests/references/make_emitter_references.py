@@ -83,7 +83,8 @@ def main():
         output["spot"] = []
         for cutoff, beam, textured in ((60, 20, False), (75, None, True), (40, 40, False)):
             settings = {"type": "spot", "intensity": {"type": "rgb", "value": [1, 2, 3]}, "cutoff_angle": cutoff,
-                        "to_world": mi.ScalarTransform4f().look_at(origin=[0.1, 0.2, 3], target=[0, 0, 0], up=[0, 1, 0])}
+                        "to_world": mi.ScalarTransform4f().look_at(origin=[0.1, 0.2, 3], target=[0, 0, 0],
+                                                                   up=[0, 1, 0])}
             if beam is not None:
                 settings["beam_width"] = beam
             if textured:

@@ -4,8 +4,8 @@
 
 Usage: make_texture_references.py [textures.json]      (needs the Python packages mitsuba 3.9 and numpy)
 
-The images are random numbers from a fixed seed. The files are stored in the JSON itself (base64), so that the test reads
-the very bytes Mitsuba read.
+The images are random numbers from a fixed seed. The files are stored in the JSON itself (base64), so that the test
+reads the very bytes Mitsuba read.
 """
 import base64
 import json
@@ -130,7 +130,8 @@ def main():
                                                 **query(texture, points, gradient)})
     checkerboard = mi.load_dict({"type": "checkerboard", "color0": {"type": "rgb", "value": [0.9, 0.5, 0.1]},
                                  "color1": {"type": "rgb", "value": [0.2, 0.3, 0.4]},
-                                 "to_uv": mi.ScalarTransform4f([[2, 0, 0, 0.1], [0, 3, 0, 0.2], [0, 0, 1, 0], [0, 0, 0, 1]])})
+                                 "to_uv": mi.ScalarTransform4f([[2, 0, 0, 0.1], [0, 3, 0, 0.2], [0, 0, 1, 0],
+                                                                [0, 0, 0, 1]])})
     output["checkerboard"] = query(checkerboard, points, False)
     with open(target, "w") as file:
         json.dump(output, file, indent=None, separators=(",", ":"))

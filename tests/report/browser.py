@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A headless Chromium, driven over a pipe by the Chrome DevTools protocol with the standard library alone: messages are JSON
-ended by a zero byte, sent to the browser's file descriptor 3 and read from 4. https://chromedevtools.github.io/devtools-protocol/"""
+"""A headless Chromium, driven over a pipe by the Chrome DevTools protocol with the standard library alone: messages are
+JSON ended by a zero byte, sent to the browser's file descriptor 3 and read from 4.
+https://chromedevtools.github.io/devtools-protocol/"""
 import base64
 import json
 import os
@@ -26,11 +27,13 @@ class Browser:
         self.downloads = os.path.join(self.folder.name, "downloads")
         to_browser, self.write_end = os.pipe()
         self.read_end, from_browser = os.pipe()
-        command = [program, "--headless=new", "--remote-debugging-pipe", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage",
-                   "--no-first-run", "--disable-extensions", "--disable-background-networking", "--hide-scrollbars",
-                   "--force-device-scale-factor=1", f"--user-data-dir={self.folder.name}/profile", "about:blank"]
+        command = [program, "--headless=new", "--remote-debugging-pipe", "--no-sandbox", "--disable-gpu",
+                   "--disable-dev-shm-usage", "--no-first-run", "--disable-extensions",
+                   "--disable-background-networking", "--hide-scrollbars", "--force-device-scale-factor=1",
+                   f"--user-data-dir={self.folder.name}/profile", "about:blank"]
         self.log = open(os.path.join(self.folder.name, "log"), "w+b")
-        self.process = subprocess.Popen(["/bin/sh", "-c", f'exec "$@" 3<&{to_browser} 4>&{from_browser}', "sh", *command],
+        self.process = subprocess.Popen(["/bin/sh", "-c", f'exec "$@" 3<&{to_browser} 4>&{from_browser}', "sh",
+                                         *command],
                                         pass_fds=(to_browser, from_browser), stdout=self.log, stderr=self.log,
                                         env={**os.environ, "TMPDIR": self.folder.name})
         os.close(to_browser)
@@ -77,7 +80,8 @@ class Browser:
             data = os.read(self.read_end, 1 << 20) if ready else b""
             if not data:
                 self.log.seek(0)
-                raise TimeoutError("the browser does not answer; its log: " + self.log.read().decode(errors="replace")[-2000:])
+                log = self.log.read().decode(errors="replace")
+                raise TimeoutError("the browser does not answer; its log: " + log[-2000:])
             self.buffer += data
         text, self.buffer = self.buffer.split(b"\0", 1)
         message = json.loads(text)
@@ -86,7 +90,7 @@ class Browser:
             self.errors.append(details.get("exception", {}).get("description", details["text"]))
         return message
 
-    # ---- what a reader does -------------------------------------------------------------------------------------------
+    # ---- what a reader does ------------------------------------------------------------------------------------------
 
     def open(self, address):
         """Opens a page in place of the one shown, also where only the part behind '#' differs."""
@@ -95,7 +99,8 @@ class Browser:
         self.wait("document.readyState === 'complete' && location.href !== 'about:blank'")
 
     def resize(self, width, height, mobile=False):
-        self.command("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=mobile)
+        self.command("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1,
+                     mobile=mobile)
 
     def colour_scheme(self, name):
         self.command("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": name}])
@@ -147,7 +152,8 @@ class Browser:
     def box(self, selector):
         """The rectangle of an element in the window, (left, top, width, height), scrolled into view."""
         return self.evaluate(f"(() => {{ const e = document.querySelector({json.dumps(selector)});"
-                             "e.scrollIntoView({block: 'center', behavior: 'instant'}); const b = e.getBoundingClientRect();"
+                             "e.scrollIntoView({block: 'center', behavior: 'instant'}); "
+                              "const b = e.getBoundingClientRect();"
                              "return [b.left, b.top, b.width, b.height]; })()")
 
     def press(self, selector):
