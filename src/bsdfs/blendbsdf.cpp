@@ -51,6 +51,16 @@ class BlendClosure final : public BsdfClosure {
     nested_[0]->lobe_pdfs(wo, wi, pdfs);
     nested_[1]->lobe_pdfs(wo, wi, pdfs + nested_[0]->n_lobes());
   }
+  float reverse_pdf(const Vec3& wo, const Vec3& wi) const override {
+    return share_[0] * nested_[0]->reverse_pdf(wo, wi) + share_[1] * nested_[1]->reverse_pdf(wo, wi);
+  }
+  float reverse_pmf(const Vec3& wo, const BsdfSample& s) const override {
+    const auto n_first = static_cast<uint32_t>(nested_[0]->n_lobes());
+    const int i = s.lobe < n_first ? 0 : 1;
+    BsdfSample own = s;
+    if (i == 1) own.lobe -= n_first;
+    return share_[i] * nested_[i]->reverse_pmf(wo, own);
+  }
 
  private:
   const BsdfClosure* nested_[2];
@@ -70,6 +80,7 @@ class Blend final : public Bsdf {
       throw Error(ErrorCode::kInput, "'blendbsdf': the nested models have too many lobes; at most 8 together");
     return arena.make<BlendClosure>(first, second, clamp01(weight_.eval(hit)));
   }
+  bool depends_on_side() const override { return first_->depends_on_side() || second_->depends_on_side(); }
   bool needs_derivatives() const override { return first_->needs_derivatives() || second_->needs_derivatives(); }
   Spectrum albedo(const SurfaceHit& hit) const override {
     return lerp(clamp01(weight_.eval(hit)), first_->albedo(hit), second_->albedo(hit));

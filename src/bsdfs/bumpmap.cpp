@@ -31,16 +31,17 @@ class BumpMap final : public Bsdf {
 
   uint32_t flags() const override { return nested_->flags(); }
   const BsdfClosure* bind(const SurfaceHit& hit, bool wo_front, TransportMode mode, Arena& arena) const override {
-    const BsdfClosure* nested = nested_->bind(hit, wo_front, mode, arena);
+    const PerturbedModel model = PerturbedModel::bind(*nested_, flip_invalid_, hit, wo_front, mode, arena);
     const Vec2 gradient = displacement_->grad_1(hit) * scale_;
     const Vec3 tangent = hit.frame.to_local(hit.dp_du), bitangent = hit.frame.to_local(hit.dp_dv);
     Vec3 n = cross({tangent.x, tangent.y, gradient.x}, {bitangent.x, bitangent.y, gradient.y});
     const float l = length(n);
-    if (!(l > 0 && std::isfinite(l))) return nested;  // a surface without (u, v) cannot be displaced
+    if (!(l > 0 && std::isfinite(l))) return model.here;  // a surface without (u, v) cannot be displaced
     n *= 1 / l;
     if (dot(hit.frame.to_local(hit.ng), n) < 0) n = -n;
-    return make_perturbed(nested, {n, tangent, flip_invalid_, shadow_terminator_}, mode, arena);
+    return make_perturbed(model, {n, tangent, flip_invalid_, shadow_terminator_}, mode, arena);
   }
+  bool depends_on_side() const override { return nested_->depends_on_side(); }
   bool needs_derivatives() const override { return true; }
   Spectrum albedo(const SurfaceHit& hit) const override { return nested_->albedo(hit); }
 

@@ -46,6 +46,11 @@ class MaskClosure final : public BsdfClosure {
     nested_->lobe_pdfs(wo, wi, pdfs);
     pdfs[nested_->n_lobes()] = 0;
   }
+  float reverse_pdf(const Vec3& wo, const Vec3& wi) const override { return opacity_ * nested_->reverse_pdf(wo, wi); }
+  float reverse_pmf(const Vec3& wo, const BsdfSample& s) const override {
+    const bool passes = s.lobe == static_cast<uint32_t>(nested_->n_lobes());
+    return passes ? 1 - opacity_ : opacity_ * nested_->reverse_pmf(wo, s);
+  }
 
  private:
   const BsdfClosure* nested_;
@@ -65,6 +70,7 @@ class Mask final : public Bsdf {
       throw Error(ErrorCode::kInput, "'mask': the nested models have too many lobes; at most 8 with the mask's own");
     return arena.make<MaskClosure>(nested, opacity);
   }
+  bool depends_on_side() const override { return nested_->depends_on_side(); }
   bool needs_derivatives() const override { return nested_->needs_derivatives(); }
   Spectrum albedo(const SurfaceHit& hit) const override { return nested_->albedo(hit); }
 

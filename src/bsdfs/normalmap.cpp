@@ -26,16 +26,16 @@ class NormalMap final : public Bsdf {
 
   uint32_t flags() const override { return nested_->flags(); }
   const BsdfClosure* bind(const SurfaceHit& hit, bool wo_front, TransportMode mode, Arena& arena) const override {
-    const BsdfClosure* nested = nested_->bind(hit, wo_front, mode, arena);
+    const PerturbedModel model = PerturbedModel::bind(*nested_, flip_invalid_, hit, wo_front, mode, arena);
     const Spectrum c = normals_->eval(hit);
     const Vec3 stored{2 * c.r - 1, 2 * c.g - 1, 2 * c.b - 1};
     const float l = length(stored);
-    if (!(l > 0)) return nested;
+    if (!(l > 0)) return model.here;
     // From the frame along dp/du to the local shading frame; the same when the two coincide.
     const Frame uv = Frame::from_tangent({0, 0, 1}, hit.frame.to_local(hit.dp_du));
-    return make_perturbed(nested, {uv.to_world(stored * (1 / l)), uv.s, flip_invalid_, shadow_terminator_}, mode,
-                          arena);
+    return make_perturbed(model, {uv.to_world(stored * (1 / l)), uv.s, flip_invalid_, shadow_terminator_}, mode, arena);
   }
+  bool depends_on_side() const override { return nested_->depends_on_side(); }
   bool needs_derivatives() const override { return true; }
   Spectrum albedo(const SurfaceHit& hit) const override { return nested_->albedo(hit); }
 

@@ -6,8 +6,10 @@ namespace {
 
 class PerturbedClosure final : public BsdfClosure {
  public:
-  PerturbedClosure(const BsdfClosure* nested, const Perturbation& p, TransportMode mode)
-      : nested_(nested),
+  PerturbedClosure(const PerturbedModel& model, const Perturbation& p, TransportMode mode)
+      : nested_(model.here),
+        beyond_(model.beyond),
+        front_(model.wo_front),
         mode_(mode),
         flip_invalid_(p.flip_invalid),
         shadow_terminator_(p.shadow_terminator),
@@ -22,9 +24,9 @@ class PerturbedClosure final : public BsdfClosure {
   BsdfValue eval(const Vec3& wo, const Vec3& wi) const override {
     if (wo.z == 0 || wi.z == 0) return {};
     const bool flip = flips(wo);
-    BsdfValue v = eval_in(frame(flip), wo, wi);
-    if (mode_ == TransportMode::kImportance && flips(wi) != flip)
-      v.value = eval_in(frame(!flip), wo, wi).value;  // the camera's direction decides about the value
+    BsdfValue v = eval_in(frame(flip), *nested_, wo, wi);
+    if (mode_ == TransportMode::kImportance && differs_for(wi, flip))  // the camera's direction decides about the value
+      v.value = eval_in(frame(flips(wi)), nested(wi), wo, wi).value;
     return v;
   }
   BsdfSample sample(const Vec3& wo, float u_lobe, Vec2 u) const override {
@@ -41,7 +43,7 @@ class PerturbedClosure final : public BsdfClosure {
     const Vec3 pi = s.wi;
     s.wi = f.to_world(pi);
     if (!(s.wi.z * pi.z > 0)) return {};
-    if (mode_ == TransportMode::kImportance && flips(s.wi) != flip) {
+    if (mode_ == TransportMode::kImportance && differs_for(s.wi, flip)) {
       if (s.is_delta()) return {};
       s.weight = eval(wo, s.wi).value / s.pdf;
     } else {
@@ -60,15 +62,35 @@ class PerturbedClosure final : public BsdfClosure {
     if (!(wi.z * pi.z > 0))
       for (int i = 0; i < nested_->n_lobes(); ++i) pdfs[i] = 0;
   }
+  float reverse_pdf(const Vec3& wo, const Vec3& wi) const override {
+    const Frame& f = frame(flips(wi));
+    const Vec3 po = f.to_local(wo);
+    return wo.z * po.z > 0 ? nested(wi).reverse_pdf(po, f.to_local(wi)) : 0;
+  }
+  float reverse_pmf(const Vec3& wo, const BsdfSample& s) const override {
+    const bool flip = flips(s.wi);
+    const Frame& f = frame(flip);
+    BsdfSample in_frame = s;
+    in_frame.wi = f.to_local(s.wi);
+    const Vec3 po = f.to_local(wo);
+    if (s.flags & kNullTransmission) return nested(s.wi).reverse_pmf(po, in_frame);
+    // A delta pair holds in one frame and one model, and leaves the surface on the side it seems to.
+    return flip == flips(wo) && &nested(wo) == &nested(s.wi) && wo.z * po.z > 0 ? nested_->reverse_pmf(po, in_frame)
+                                                                                : 0;
+  }
 
  private:
   /// Whether the normal is turned about z for the camera's direction w.
   bool flips(const Vec3& w) const { return flip_invalid_ && w.z * dot(w, frame_.n) <= 0; }
   const Frame& frame(bool flip) const { return flip ? flipped_frame_ : frame_; }
+  /// The nested model for a path that arrives from w.
+  const BsdfClosure& nested(const Vec3& w) const { return (w.z > 0) == front_ ? *nested_ : *beyond_; }
+  /// Whether a path that arrives from w meets another frame than `flip` says, or another model than nested_.
+  bool differs_for(const Vec3& w, bool flip) const { return flips(w) != flip || &nested(w) != nested_; }
 
-  BsdfValue eval_in(const Frame& f, const Vec3& wo, const Vec3& wi) const {
+  BsdfValue eval_in(const Frame& f, const BsdfClosure& nested, const Vec3& wo, const Vec3& wi) const {
     const Vec3 po = f.to_local(wo), pi = f.to_local(wi);
-    BsdfValue v = nested_->eval(po, pi);
+    BsdfValue v = nested.eval(po, pi);
     v.value *= factor(wo, wi, po, pi);
     if (!(wi.z * pi.z > 0)) v.pdf_solid_angle = 0;  // sample() drops it
     return v;
@@ -83,7 +105,8 @@ class PerturbedClosure final : public BsdfClosure {
   /// [Estevez2019] GGX shadowing of the light's direction.
   float terminator(const Vec3& w) const { return alpha2_ > 0 ? 2 / (1 + std::sqrt(1 + alpha2_ * tan2_theta(w))) : 1; }
 
-  const BsdfClosure* nested_;
+  const BsdfClosure *nested_, *beyond_;
+  bool front_;
   TransportMode mode_;
   bool flip_invalid_, shadow_terminator_;
   float alpha2_;
@@ -92,9 +115,9 @@ class PerturbedClosure final : public BsdfClosure {
 
 }  // namespace
 
-const BsdfClosure* make_perturbed(const BsdfClosure* nested, const Perturbation& perturbation, TransportMode mode,
+const BsdfClosure* make_perturbed(const PerturbedModel& model, const Perturbation& perturbation, TransportMode mode,
                                   Arena& arena) {
-  return arena.make<PerturbedClosure>(nested, perturbation, mode);
+  return arena.make<PerturbedClosure>(model, perturbation, mode);
 }
 
 }  // namespace covary

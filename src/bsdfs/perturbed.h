@@ -13,7 +13,22 @@ struct Perturbation {
   bool shadow_terminator;  ///< soften the transition to shadow at grazing light
 };
 
-/// `nested` as if the surface had the perturbed normal. Lives in the arena like every closure.
+/// The nested model, bound for the side of wo, and for the other side where that differs and a direction on it can
+/// reach the model: without flip_invalid a path may see the tilted surface from behind.
+struct PerturbedModel {
+  const BsdfClosure* here;
+  const BsdfClosure* beyond;
+  bool wo_front;
+
+  static PerturbedModel bind(const Bsdf& nested, bool flip_invalid, const SurfaceHit& hit, bool wo_front,
+                             TransportMode mode, Arena& arena) {
+    const BsdfClosure* here = nested.bind(hit, wo_front, mode, arena);
+    const bool both = !flip_invalid && nested.depends_on_side();
+    return {here, both ? nested.bind(hit, !wo_front, mode, arena) : here, wo_front};
+  }
+};
+
+/// `model` as if the surface had the perturbed normal. Lives in the arena like every closure.
 ///
 /// flip_invalid after Schüßler et al. 2017, "Microfacet-based Normal Mapping for Robust Monte Carlo Path Tracing";
 /// shadow_terminator after Estevez et al. 2019, "A Microfacet-Based Shadowing Function to Solve the Bump Terminator
@@ -23,8 +38,8 @@ struct Perturbation {
 /// The value is not symmetric: light and camera play different parts. For importance it is the exact adjoint of the
 /// value for radiance, f*(wo, wi) = f(wi, wo), so that light and camera paths estimate the same image. Some pairs of
 /// directions whose two sides choose different flips are found from the camera only: mirror reflections among them carry
-/// no importance.
-const BsdfClosure* make_perturbed(const BsdfClosure* nested, const Perturbation& perturbation, TransportMode mode,
+/// no importance, and the densities of the light's side (reverse_pdf, reverse_pmf) are 0.
+const BsdfClosure* make_perturbed(const PerturbedModel& model, const Perturbation& perturbation, TransportMode mode,
                                   Arena& arena);
 
 }  // namespace covary

@@ -38,7 +38,7 @@ struct ThinRates {
 
 class ThinClosure final : public BsdfClosure {
  public:
-  ThinClosure(const ThinPoint& p, const ThinRates& rates)
+  ThinClosure(const ThinPoint& p, const ThinRates& rates, TransportMode mode)
       : reflection_(principled_distribution(p.roughness, p.anisotropic)),
         transmission_(principled_distribution((0.65f * p.eta - 0.35f) * p.roughness, p.anisotropic)),
         rates_(rates),
@@ -47,7 +47,8 @@ class ThinClosure final : public BsdfClosure {
         flatness_(p.flatness),
         specular_(p.spec_trans),
         spec_tint_(p.spec_tint),
-        specular_transmission_(p.base_color * p.spec_trans) {
+        specular_transmission_(p.base_color * p.spec_trans),
+        mode_(mode) {
     const float reflected = (1 - p.spec_trans) * (1 - 0.5f * p.diff_trans);
     diffuse_reflection_ = p.base_color * (reflected * kInvPi);
     diffuse_transmission_ = p.base_color * ((1 - p.spec_trans) * 0.5f * p.diff_trans * kInvPi);
@@ -64,7 +65,7 @@ class ThinClosure final : public BsdfClosure {
     const Vec3 o = wo.z > 0 ? wo : -wo;
     float pmf[kLobes];
     probabilities(o, pmf);
-    const Terms t = terms(o, wo.z > 0 ? wi : -wi);
+    const Terms t = terms(o, wo.z > 0 ? wi : -wi, mode_);
     return {t.value, t.mixture(pmf)};
   }
   BsdfSample sample(const Vec3& wo, float u_lobe, Vec2 u) const override {
@@ -83,7 +84,7 @@ class ThinClosure final : public BsdfClosure {
                                  : warp::square_to_cosine_hemisphere(u);
     if (!(i.z > 0)) return {};
     if (lobe == kTransmit || lobe == kDiffuseTransmit) i.z = -i.z;
-    const Terms t = terms(o, i);
+    const Terms t = terms(o, i, mode_);
     const float pdf = t.mixture(pmf);
     if (!(t.pdf[lobe] > 0 && pdf > 0)) return {};
     return {
@@ -97,8 +98,16 @@ class ThinClosure final : public BsdfClosure {
       probabilities(wo.z > 0 ? wo : -wo, pmfs);
   }
   void lobe_pdfs(const Vec3& wo, const Vec3& wi, float* pdfs) const override {
-    const Terms t = wo.z == 0 ? Terms{} : terms(wo.z > 0 ? wo : -wo, wo.z > 0 ? wi : -wi);
+    const Terms t = wo.z == 0 ? Terms{} : terms(wo.z > 0 ? wo : -wo, wo.z > 0 ? wi : -wi, mode_);
     std::copy_n(t.pdf, kLobes, pdfs);
+  }
+  float reverse_pdf(const Vec3& wo, const Vec3& wi) const override {
+    if (wi.z == 0) return 0;
+    const Vec3 o = wi.z > 0 ? wi : -wi;
+    float pmf[kLobes];
+    probabilities(o, pmf);
+    const bool radiance = mode_ == TransportMode::kRadiance;
+    return terms(o, wi.z > 0 ? wo : -wo, radiance ? TransportMode::kImportance : TransportMode::kRadiance).mixture(pmf);
   }
 
  private:
@@ -126,7 +135,7 @@ class ThinClosure final : public BsdfClosure {
   }
 
   /// Value and densities of the lobes; `o` and `i` as seen from the side of wo.
-  Terms terms(const Vec3& o, const Vec3& i) const {
+  Terms terms(const Vec3& o, const Vec3& i, TransportMode mode) const {
     Terms t;
     if (i.z > 0) {
       const Vec3 h = normalize(o + i);
@@ -145,8 +154,9 @@ class ThinClosure final : public BsdfClosure {
       t.value = diffuse_transmission_ * -i.z;
       if (!(specular_ > 0)) return t;
       const Vec3 h = normalize(o + Vec3{i.x, i.y, -i.z});
-      // Only rays that also leave on the far side of the microfacet. Not reciprocal; scenes are made with it.
-      if (dot(i, h) >= 0) return t;
+      // Only light that also arrives from the far side of the microfacet. Not reciprocal; scenes are made with it. For
+      // importance the light's direction is o, and i the camera's.
+      if ((mode == TransportMode::kRadiance ? dot(i, h) : dot({o.x, o.y, -o.z}, h)) >= 0) return t;
       const float visible = 0.25f * transmission_.eval(h) * transmission_.smith_g1_over_cos(o);
       t.pdf[1] = visible;
       t.value += specular_transmission_ *
@@ -163,6 +173,7 @@ class ThinClosure final : public BsdfClosure {
   ThinRates rates_;
   float eta_, roughness_, flatness_, specular_, spec_tint_;
   Spectrum specular_transmission_, diffuse_reflection_, diffuse_transmission_, tinted_r0_, sheen_;
+  TransportMode mode_;
 };
 
 class PrincipledThin final : public Bsdf {
@@ -179,7 +190,7 @@ class PrincipledThin final : public Bsdf {
   }
 
   uint32_t flags() const override { return flags_; }
-  const BsdfClosure* bind(const SurfaceHit& hit, bool, TransportMode, Arena& arena) const override {
+  const BsdfClosure* bind(const SurfaceHit& hit, bool, TransportMode mode, Arena& arena) const override {
     const auto number = [&](const NumberInput& n) { return clamp01(n.eval(hit)); };
     const ThinPoint point{in_.base_color.eval(hit),
                           number(in_.roughness),
@@ -191,7 +202,7 @@ class PrincipledThin final : public Bsdf {
                           number(in_.sheen_tint),
                           number(in_.flatness),
                           std::clamp(in_.diff_trans.eval(hit), 0.0f, 2.0f)};
-    return arena.make<ThinClosure>(point, rates_);
+    return arena.make<ThinClosure>(point, rates_, mode);
   }
   bool needs_derivatives() const override { return anisotropic_; }
   Spectrum albedo(const SurfaceHit& hit) const override { return clamp01(in_.base_color.eval(hit)); }

@@ -30,27 +30,89 @@ class MirroredClosure final : public BsdfClosure {
   void lobe_pdfs(const Vec3& wo, const Vec3& wi, float* pdfs) const override {
     nested_->lobe_pdfs(mirror(wo), mirror(wi), pdfs);
   }
+  float reverse_pdf(const Vec3& wo, const Vec3& wi) const override {
+    return nested_->reverse_pdf(mirror(wo), mirror(wi));
+  }
+  float reverse_pmf(const Vec3& wo, const BsdfSample& s) const override {
+    BsdfSample nested = s;
+    nested.wi = mirror(s.wi);
+    return nested_->reverse_pmf(mirror(wo), nested);
+  }
 
  private:
   static Vec3 mirror(const Vec3& w) { return {w.x, w.y, -w.z}; }
   const BsdfClosure* nested_;
 };
 
+/// Two models of which at least one transmits light. The camera's side chooses the model: for radiance that of wo, for
+/// importance that of wi, although directions are then drawn from the model on the side of wo. What the light's model
+/// draws and the camera's does not know (refraction at two different interfaces) is found from the camera only.
+class TransmittingClosure final : public BsdfClosure {
+ public:
+  /// `same`: one model on both sides, so that light passes straight through with the same probability from both.
+  TransmittingClosure(const BsdfClosure* front, const BsdfClosure* back, bool same, TransportMode mode)
+      : front_(front), back_(back), same_(same), importance_(mode == TransportMode::kImportance) {}
+
+  uint32_t flags() const override { return front_->flags() | back_->flags(); }
+  BsdfValue eval(const Vec3& wo, const Vec3& wi) const override {
+    BsdfValue v = side(wo).eval(wo, wi);
+    if (importance_ && crosses(wo, wi)) v.value = side(wi).eval(wo, wi).value;
+    return v;
+  }
+  BsdfSample sample(const Vec3& wo, float u_lobe, Vec2 u) const override {
+    BsdfSample s = side(wo).sample(wo, u_lobe, u);
+    if (!importance_ || !s.valid() || !crosses(wo, s.wi)) return s;
+    if (s.is_delta()) return passes(s) ? s : BsdfSample{};
+    s.weight = side(s.wi).eval(wo, s.wi).value / s.pdf;
+    return s;
+  }
+  int n_lobes() const override { return std::max(front_->n_lobes(), back_->n_lobes()); }
+  void lobe_pmfs(const Vec3& wo, float* pmfs) const override {
+    std::fill_n(pmfs, n_lobes(), 0.0f);
+    side(wo).lobe_pmfs(wo, pmfs);
+  }
+  void lobe_pdfs(const Vec3& wo, const Vec3& wi, float* pdfs) const override {
+    std::fill_n(pdfs, n_lobes(), 0.0f);
+    side(wo).lobe_pdfs(wo, wi, pdfs);
+  }
+  float reverse_pdf(const Vec3& wo, const Vec3& wi) const override { return side(wi).reverse_pdf(wo, wi); }
+  float reverse_pmf(const Vec3& wo, const BsdfSample& s) const override {
+    return !crosses(wo, s.wi) || passes(s) ? side(s.wi).reverse_pmf(wo, s) : 0;
+  }
+
+ private:
+  const BsdfClosure& side(const Vec3& w) const { return w.z > 0 ? *front_ : *back_; }
+  static bool crosses(const Vec3& wo, const Vec3& wi) { return (wo.z > 0) != (wi.z > 0); }
+  /// Whether the delta transmission `s` is found from both sides.
+  bool passes(const BsdfSample& s) const { return same_ && (s.flags & kNullTransmission); }
+
+  const BsdfClosure *front_, *back_;
+  bool same_, importance_;
+};
+
 class TwoSided final : public Bsdf {
  public:
-  TwoSided(BsdfPtr front, BsdfPtr back) : front_(std::move(front)), back_(std::move(back)) {}
+  TwoSided(BsdfPtr front, BsdfPtr back)
+      : front_(std::move(front)), back_(std::move(back)), transmits_((flags() & kTransmission) != 0) {}
 
   uint32_t flags() const override { return front_->flags() | back_->flags(); }
   const BsdfClosure* bind(const SurfaceHit& hit, bool wo_front, TransportMode mode, Arena& arena) const override {
+    if (transmits_) {
+      const BsdfClosure* front = front_->bind(hit, true, mode, arena);
+      const BsdfClosure* back = arena.make<MirroredClosure>(back_->bind(hit, true, mode, arena));
+      return arena.make<TransmittingClosure>(front, back, front_ == back_, mode);
+    }
     if (wo_front) return front_->bind(hit, true, mode, arena);
     return arena.make<MirroredClosure>(back_->bind(hit, true, mode, arena));
   }
+  bool depends_on_side() const override { return !transmits_; }
   bool needs_derivatives() const override { return front_->needs_derivatives() || back_->needs_derivatives(); }
   const Texture* main_texture() const override { return front_->main_texture(); }
   Spectrum albedo(const SurfaceHit& hit) const override { return front_->albedo(hit); }
 
  private:
   BsdfPtr front_, back_;
+  bool transmits_;
 };
 
 }  // namespace

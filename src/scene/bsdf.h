@@ -37,8 +37,20 @@ enum LobeFlags : uint32_t {
 };
 
 /// What the path carries: radiance (traced from the camera) or importance (traced from a light). Refraction scales
-/// radiance by the squared ratio of indices, importance not.
+/// radiance by the squared ratio of indices, importance not. Values for importance are the adjoint of those for
+/// radiance, f*(wo, wi) = f(wi, wo), so that paths from both ends estimate the same image.
 enum class TransportMode : uint8_t { kRadiance, kImportance };
+
+/// Factor on eval() and on the weights of sample() where the shading normal `ns` differs from the geometric normal `ng`:
+/// 1 for radiance. For importance it undoes that eval() has the cosine of wi, towards the camera, where the path from
+/// the camera has that of wo, towards the light, both at `ns` [Veach1997] §5.3. All are unit vectors of one frame; 0
+/// where a direction lies in one of the two planes. Perturbed normals (bump and normal maps) are part of the closure:
+/// `ns` is the frame's normal.
+inline float shading_normal_factor(const Vec3& wo, const Vec3& wi, const Vec3& ns, const Vec3& ng, TransportMode mode) {
+  if (mode == TransportMode::kRadiance) return 1;
+  const float denominator = std::abs(dot(ng, wo) * dot(ns, wi));
+  return denominator > 0 ? std::abs(dot(ns, wo) * dot(ng, wi)) / denominator : 0;
+}
 
 struct BsdfValue {
   Spectrum value;             ///< f(wo, wi) |cos theta_i|; zero for delta lobes
@@ -76,6 +88,19 @@ class BsdfClosure {
   /// Writes n_lobes() densities per unit solid angle of wi; 0 for delta lobes.
   virtual void lobe_pdfs(const Vec3& wo, const Vec3& wi, float* pdfs) const = 0;
 
+  // The other end of a bidirectional path meets the same pair of directions with their parts exchanged and in the
+  // opposite transport mode. Its densities, without binding the model again:
+  /// Density per unit solid angle with which a path of the opposite mode that arrives from wi is sent to wo; delta lobes
+  /// excluded. The reverse of eval(wo, wi).pdf_solid_angle.
+  virtual float reverse_pdf(const Vec3& wo, const Vec3& wi) const { return eval(wi, wo).pdf_solid_angle; }
+  /// The same for `s`, which this closure drew for wo from a delta lobe: the discrete probability that the opposite mode
+  /// draws wo for s.wi from that lobe; 0 where it cannot.
+  virtual float reverse_pmf(const Vec3& /*wo*/, const BsdfSample& s) const {
+    float pmfs[kMaxLobes];
+    lobe_pmfs(s.wi, pmfs);
+    return pmfs[s.lobe];
+  }
+
  protected:
   ~BsdfClosure() = default;
 };
@@ -87,6 +112,8 @@ class Bsdf : public SceneObject {
   /// The model at a point. `wo_front`: whether wo lies on the side of the shading normal (two-sided models choose by
   /// it). The closure lives until the arena is reset.
   virtual const BsdfClosure* bind(const SurfaceHit& hit, bool wo_front, TransportMode mode, Arena& arena) const = 0;
+  /// True when bind() looks at `wo_front`.
+  virtual bool depends_on_side() const { return false; }
   /// True when bind() reads hit.dp_du, hit.dp_dv or needs the frame aligned with dp_du (anisotropy, bump maps).
   virtual bool needs_derivatives() const { return false; }
   /// A texture that bind() looks up, worth asking memory for ahead; or null.
