@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -16,6 +17,7 @@
 
 #include "commands.h"
 #include "core/error.h"
+#include "estimators/predicted_error.h"
 #include "film/alignment.h"
 #include "film/image_file.h"
 #include "film/metrics.h"
@@ -31,6 +33,7 @@ namespace fs = std::filesystem;
 struct ViewOptions {
   std::vector<std::string> images, insets;
   std::string reference, layer, output, title;
+  bool small = false;
 };
 
 /// An image as the page shows it.
@@ -84,15 +87,90 @@ nlohmann::ordered_json parse_inset(const std::string& text, const CropWindow& wi
   return {{"x", x}, {"y", y}, {"w", w}, {"h", h}};
 }
 
-nlohmann::ordered_json image_entry(const Shown& image, const Image& pixels, const std::optional<Image>& reference) {
+/// How the page colours a layer: directions and other vectors are no colours.
+const char* display_of(const std::string& path, const std::vector<ExrFile::Channel>& channels,
+                       const std::string& layer) {
+  const std::vector<std::string> names = layer_channels(path, channels, layer);
+  std::string lower = layer;
+  for (char& c : lower) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  if (names[0] == names[1]) return "range";
+  if (lower == "n" || lower == "nn" || lower.find("normal") != std::string::npos) return "direction";
+  return names[0].ends_with('X') || names[0].ends_with('x') ? "range" : "picture";
+}
+
+/// The layers that the page offers: all but the image itself, alpha and the groups of a film.
+std::vector<std::string> offered_layers(const std::vector<ExrFile::Channel>& channels, const std::string& shown) {
+  std::vector<std::string> layers = image_layers(channels);
+  std::erase_if(layers, [&](const std::string& layer) {
+    const bool is_group =
+        layer.size() > 5 && layer.starts_with("group") && layer.find_first_not_of("0123456789", 5) == std::string::npos;
+    return layer.empty() || layer == shown || layer == "A" || is_group;
+  });
+  return layers;
+}
+
+/// The page in the making.
+struct Page {
+  CropWindow window;
+  bool small = false;
+  std::optional<Image> reference;
+  bool reference_low_range = false;
+  std::vector<ReportImage> images;
+
+  nlohmann::ordered_json add(const Shown& image, const std::string& layer);
+
+ private:
+  void add_layers(const Shown& image, const std::string& shown, nlohmann::ordered_json& entry);
+  std::string label(const Shown& image, const Image& pixels) const;
+};
+
+std::string Page::label(const Shown& image, const Image& pixels) const {
+  if (image.is_reference) return "reference";
+  std::string text;
+  if (reference) text = fmt::format("relMSE {:.3g}", compute_metric(Metric::kRelMse, pixels, {&*reference, 1}).value);
+  const std::string errors = image.path + ":StdError";
+  const auto layer = std::find_if(images.begin(), images.end(), [&](const auto& i) { return i.id == errors; });
+  if (layer == images.end() || layer->pixels.channels != 3) return text;
+  const double predicted = predicted_relmse({pixels, layer->pixels});
+  return text.empty() ? fmt::format("predicted relMSE {:.3g}", predicted)
+                      : fmt::format("{}, predicted {:.3g}", text, predicted);
+}
+
+/// The other layers of the image's file, those of one channel as such.
+void Page::add_layers(const Shown& image, const std::string& shown, nlohmann::ordered_json& entry) {
+  const ImageInfo info = inspect_image(image.path);
+  for (const std::string& layer : offered_layers(info.channels, shown)) {
+    Image pixels = cut(read_image(image.path, layer), window);
+    const std::vector<std::string> names = layer_channels(image.path, info.channels, layer);
+    if (names[0] == names[1]) {
+      Image grey(pixels.width, pixels.height, 1);
+      for (size_t i = 0; i < grey.data.size(); ++i) grey.data[i] = pixels.data[3 * i];
+      pixels = std::move(grey);
+    }
+    const std::string id = image.path + ":" + layer;
+    entry["layers"].push_back(
+        {{"name", layer}, {"image", id}, {"display", display_of(image.path, info.channels, layer)}});
+    images.push_back({id, std::move(pixels)});
+  }
+}
+
+nlohmann::ordered_json Page::add(const Shown& image, const std::string& layer) {
   nlohmann::ordered_json entry{{"name", image.name}, {"image", image.path}};
+  Image pixels = cut(image.source, window);
+  if (!small) add_layers(image, layer, entry);
   if (image.is_reference) {
     entry["role"] = "reference";
-    entry["label"] = "reference";
-  } else if (reference) {
-    const MetricResult error = compute_metric(Metric::kRelMse, pixels, {&*reference, 1});
-    entry["label"] = fmt::format("relMSE {:.3g}", error.value);
+    reference = pixels;
+    reference_low_range = image.source.low_dynamic_range;
+  } else if (reference && !small) {
+    const bool low_range = image.source.low_dynamic_range && reference_low_range;
+    MetricResult flip = compute_metric(Metric::kFlip, pixels, {&*reference, 1}, low_range);
+    entry["flip"] = image.path + ":FLIP";
+    images.push_back({image.path + ":FLIP", std::move(flip.map)});
   }
+  const std::string text = label(image, pixels);
+  if (!text.empty()) entry["label"] = text;
+  images.push_back({image.path, std::move(pixels)});
   return entry;
 }
 
@@ -105,22 +183,15 @@ std::string names_of(const std::vector<Shown>& images) {
 
 void write_page(const ViewOptions& options, const std::string& path) {
   const std::vector<Shown> shown = read_images(options);
-  const CropWindow window = window_of_all(shown);
+  Page page{window_of_all(shown), options.small};
   nlohmann::ordered_json entries = nlohmann::ordered_json::array(), insets = nlohmann::ordered_json::array();
-  std::vector<ReportImage> images;
-  std::optional<Image> reference;
-  for (const Shown& image : shown) {
-    Image pixels = cut(image.source, window);
-    if (image.is_reference) reference = pixels;
-    entries.push_back(image_entry(image, pixels, reference));
-    images.push_back({image.path, std::move(pixels)});
-  }
-  for (const std::string& inset : options.insets) insets.push_back(parse_inset(inset, window));
+  for (const Shown& image : shown) entries.push_back(page.add(image, options.layer));
+  for (const std::string& inset : options.insets) insets.push_back(parse_inset(inset, page.window));
   const std::string title = options.title.empty() ? names_of(shown) : options.title;
   const nlohmann::ordered_json scene{{"name", title}, {"images", entries}, {"insets", insets}};
   const nlohmann::ordered_json block{{"type", "comparer"}, {"id", "view"}, {"scenes", {scene}}};
   const nlohmann::ordered_json section{{"id", "images"}, {"blocks", {block}}};
-  write_report(path, {{"title", title}, {"sections", {section}}}, images);
+  write_report(path, {{"title", title}, {"sections", {section}}}, page.images);
 }
 
 std::string temporary_page() {
@@ -175,6 +246,9 @@ void add_view(CLI::App& app) {
       ->take_all()
       ->expected(1)
       ->allow_extra_args(false);
+  command->add_flag(
+      "--small", o->small,
+      "Leave out FLIP and the other layers of the files (StdError, Albedo, N, …): a smaller page, sooner");
   command->add_option("--title", o->title, "Title of the page; default: the images' names");
   command->callback([o] { view(*o); });
 }

@@ -15,6 +15,7 @@
 #include <cstring>
 #include <filesystem>
 #include <iterator>
+#include <set>
 
 #include "film/output_file.h"
 
@@ -192,6 +193,16 @@ PlacedImage read_image(const std::string& path, const std::string& layer) {
     }
   }
   return result;
+}
+
+std::vector<std::string> image_layers(const std::vector<ExrFile::Channel>& channels) {
+  std::vector<std::string> layers = list_layers(channels);
+  std::set<std::string> used;
+  for (const std::string& layer : layers)
+    for (const std::string& name : find_layer(channels, layer)) used.insert(name);
+  for (const ExrFile::Channel& c : channels)
+    if (!used.contains(c.name)) layers.push_back(c.name);
+  return layers;
 }
 
 void write_png(const std::string& path, const Image& linear) {

@@ -278,5 +278,11 @@ TEST(FilmFile, AbsurdSizesAreErrors) {
   EXPECT_TRUE(contains(message_of([&] { read_film(path); }), path));
 }
 
+TEST(ImageLayers, AreTriplesAndSingleChannels) {
+  const std::vector<ExrFile::Channel> channels{{"B", "half"},   {"G", "half"},   {"R", "half"},   {"A", "half"},
+                                               {"N.X", "half"}, {"N.Y", "half"}, {"N.Z", "half"}, {"depth.Z", "float"}};
+  EXPECT_EQ(image_layers(channels), (std::vector<std::string>{"", "N", "A", "depth.Z"}));
+}
+
 }  // namespace
 }  // namespace covary

@@ -59,7 +59,8 @@ std::string script_json(const Json& json) {
   return result;
 }
 
-using Sizes = std::map<std::string, std::pair<int, int>>;
+/// Width, height and channels of each image by id.
+using Sizes = std::map<std::string, std::array<int, 3>>;
 
 void check_block(const Json& block, const Sizes& sizes) {
   const std::string type = block.value("type", "");
@@ -68,10 +69,17 @@ void check_block(const Json& block, const Sizes& sizes) {
   if (type != "comparer") return;
   for (const Json& scene : block.at("scenes")) {
     std::set<std::pair<int, int>> scene_sizes;
-    for (const Json& image : scene.at("images")) {
-      const auto& id = image.at("image").get_ref<const std::string&>();
+    const auto take = [&](const Json& id_json) {
+      const auto& id = id_json.get_ref<const std::string&>();
       COVARY_CHECK(sizes.contains(id), "the document names an image '" + id + "' that is not there");
-      scene_sizes.insert(sizes.at(id));
+      const auto [width, height, channels] = sizes.at(id);
+      scene_sizes.insert({width, height});
+      return channels;
+    };
+    for (const Json& image : scene.at("images")) {
+      COVARY_CHECK(take(image.at("image")) == 3, "an image of a comparer does not have 3 channels");
+      if (image.contains("flip")) take(image["flip"]);
+      for (const Json& layer : image.value("layers", Json::array())) take(layer.at("image"));
     }
     COVARY_CHECK(scene_sizes.size() == 1, "a scene of a comparer needs images, all of one size");
   }
@@ -80,9 +88,10 @@ void check_block(const Json& block, const Sizes& sizes) {
 void check(const Json& document, const std::vector<ReportImage>& images) {
   Sizes sizes;
   for (const ReportImage& image : images) {
-    const std::pair<int, int> size{image.rgb.width, image.rgb.height};
+    const std::array size{image.pixels.width, image.pixels.height, image.pixels.channels};
     COVARY_CHECK(sizes.emplace(image.id, size).second, "two images are called '" + image.id + "'");
-    COVARY_CHECK(image.rgb.channels == 3, "image '" + image.id + "' does not have 3 channels");
+    COVARY_CHECK(image.pixels.channels == 1 || image.pixels.channels == 3,
+                 "image '" + image.id + "' has neither 1 nor 3 channels");
   }
   for (const Json& section : document.value("sections", Json::array()))
     for (const Json& block : section.value("blocks", Json::array())) check_block(block, sizes);
@@ -98,8 +107,9 @@ std::string styles() {
 std::string scripts() {
   using namespace report_files;
   std::string text;
-  append(text, {"(() => {", "\"use strict\";", dom_js, format_js, colour_js, images_js, link_js, viewport_js, insets_js,
-                figure_js, controls_js, gestures_js, comparer_js, table_js, plot_js, page_js, "})();"});
+  append(text, {"(() => {", "\"use strict\";", dom_js,      format_js,   images_js, tone_js,   colour_js, ssim_js,
+                views_js,   link_js,           viewport_js, painter_js,  stage_js,  insets_js, figure_js, histogram_js,
+                readout_js, controls_js,       gestures_js, comparer_js, table_js,  plot_js,   page_js,   "})();"});
   return text;
 }
 
@@ -108,7 +118,7 @@ std::string fill_page(const Json& document, const std::vector<ReportImage>& imag
   Json data = document;
   data["error_colours"] = error_colours();
   data["image_sizes"] = Json::object();
-  for (const ReportImage& image : images) data["image_sizes"][image.id] = {image.rgb.width, image.rgb.height};
+  for (const auto& [id, pixels] : images) data["image_sizes"][id] = {pixels.width, pixels.height, pixels.channels};
   const std::array<std::pair<std::string_view, std::string>, 6> values{{
       {"title", escaped_html(document.value("title", "covary"))},
       {"styles", styles()},
@@ -135,7 +145,7 @@ std::string fill_page(const Json& document, const std::vector<ReportImage>& imag
 
 std::string image_element(const ReportImage& image) {
   return fmt::format("<script type=\"application/octet-stream\" data-image=\"{}\">{}</script>\n",
-                     escaped_html(image.id), encode_image(image.rgb));
+                     escaped_html(image.id), encode_image(image.pixels));
 }
 
 /// The images stand behind everything else, so that a browser shows the page while it still reads them.

@@ -11,16 +11,16 @@
 
 namespace covary {
 
-/// An image of the page: linear RGB, 3 channels. The page holds it in half floats (11 significant bits, finite values
-/// within ±65504), compressed without further loss, and decodes it when it is first shown.
+/// An image of the page: linear RGB, or numbers of 1 channel. The page holds it in half floats (11 significant bits,
+/// finite values within ±65504), compressed without further loss, and decodes it when it is first shown.
 struct ReportImage {
   std::string id;  ///< the document's name for it; unique
-  Image rgb;
+  Image pixels;
 };
 
 /// Writes the page to `path`; it appears under its name only when complete. Throws Error(kIo) when it cannot be written
-/// and Error(kInternal) when the document has a block of unknown type, names an image that is not among `images`, or
-/// when two images share an id.
+/// and Error(kInternal) when the document has a block of unknown type or names an image that is not among `images`, when
+/// two images share an id, or when an image has neither 1 nor 3 channels.
 void write_report(const std::string& path, const nlohmann::ordered_json& document,
                   const std::vector<ReportImage>& images);
 

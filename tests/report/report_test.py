@@ -2,7 +2,8 @@
 """The report as a reader uses it, in headless Chromium: real pointer and key events, and what the page then shows.
 
 The images of sample_report.cpp are 64 x 32. `ramp/reference` is (x/64, y/64, 1/4), `bright` lies 1/8 above it, `dark` 1/16
-below, `broken` is not a number in its first 8 x 8 pixels. `stripes/reference` is x mod 2, its `bright` is 1/2 everywhere.
+below, `broken` is not a number in its first 8 x 8 pixels. `bright` has FLIP x/64, StdError 1/8, N (0, -1 left and 1 right of
+the middle, 1/2) and samples x/64. `stripes/reference` is x mod 2, its `bright` is 1/2 everywhere, its `white` 4.
 """
 import base64
 import json
@@ -69,7 +70,13 @@ class PageTest(unittest.TestCase):
 
     def at_centre_of_pixel(self, x, y):
         """The fractions of the fitted stage where the middle of an image pixel is."""
-        return (x + 0.5) / 64, (y + 0.5) / 32
+        _, _, width, height = self.page.box(STAGE)
+        zoom = min(width / 64, height / 32)
+        return 0.5 + (x + 0.5 - 32) * zoom / width, 0.5 + (y + 0.5 - 16) * zoom / height
+
+    def label(self):
+        """What the stage shows, in words."""
+        return self.page.evaluate("document.querySelector('#main canvas').ariaLabel")
 
     def picture(self, x, y, offset=0, exposure=0):
         return tuple(srgb((v + offset) * 2 ** exposure) for v in (x / 64, y / 64, 0.25))
@@ -80,7 +87,8 @@ class Page(PageTest):
         self.open()
         self.assertEqual(self.page.evaluate("document.title"), "Sample report")
         self.assertEqual(self.page.text(".subtitle"), "Every kind of block </script> once")
-        self.assertEqual(self.page.text("#results .prose"), "Text <b>as it is</b>.")
+        self.assertEqual(self.page.text("#results .prose"), "Text <b>as it is</b>, code --apart.")
+        self.assertEqual(self.page.text("#results .prose code"), "code --apart")
         self.assertIn("a scene failed", self.page.text("#failures .notes.error"))
         self.assertEqual(self.page.evaluate("performance.getEntriesByType('resource').length"), 0)
         self.assertEqual(self.page.evaluate("[...document.querySelectorAll('nav a')].map(a => a.hash)"), ["#results", "#images", "#failures"])
@@ -121,6 +129,12 @@ class Page(PageTest):
         self.page.press(header % 5)
         self.assertEqual(self.page.evaluate(f"[...{names}].map(e => e.innerText)"), ["IDUW", "IICV", "path tracing"])
 
+    def test_tables_fill_the_width(self):
+        self.open()
+        widths = "[...document.querySelectorAll('#results .table table, #content')].map(e => e.getBoundingClientRect().width)"
+        whole, table = sorted(self.page.evaluate(widths), reverse=True)[:2]
+        self.assertGreater(table, 0.98 * whole)
+
     def test_plot_has_log_axes_error_bars_and_numbers(self):
         self.open()
         self.page.box(".plot canvas")
@@ -159,6 +173,11 @@ class Comparer(PageTest):
         for x, offset in ((10, 1 / 8), (50, -1 / 16)):
             self.assertEqual(self.colour(*self.at_centre_of_pixel(x, 20)), self.picture(x, 20, offset))
 
+    def test_begins_with_the_best_method(self):
+        self.open()
+        self.choose_scene(1)
+        self.assertEqual(self.label(), "stripes & more: white (relMSE 9) left, reference (reference) right; picture, 0 stops")
+
     def test_number_keys_flip(self):
         self.open()
         self.page.move(*self.stage_point(0.25, 0.5))
@@ -169,6 +188,20 @@ class Comparer(PageTest):
             self.assertEqual(self.page.evaluate("[...document.querySelectorAll('.methods button')].findIndex(b => b.ariaPressed === 'true')"), int(key) - 1)
         self.press_key("4")
         self.assertEqual(self.colour(*self.at_centre_of_pixel(3, 6)), (0, 255, 0), "not-a-number is green")
+
+    def test_number_keys_need_neither_pointer_nor_focus(self):
+        self.open()
+        self.press_key("1")
+        self.assertIn("reference (reference) left", self.label())
+
+    def test_number_keys_in_the_grid(self):
+        self.open("#layout=grid")
+        self.press_key("3")
+        self.assertIn("ramp: dark (relMSE 0.02);", self.label(), "alone")
+        self.press_key("2")
+        self.assertIn("ramp: bright (relMSE 0.09);", self.label())
+        self.press_key("2")
+        self.assertIn("ramp: reference (reference), bright", self.label(), "once more: back to the grid")
 
     def test_number_keys_follow_the_pointer_in_split(self):
         self.open()
@@ -200,6 +233,108 @@ class Comparer(PageTest):
         self.assertEqual(self.page.text(".stops output"), "+1.5")
         self.press_key("r")
         self.assertEqual(self.colour(*self.at_centre_of_pixel(4, 5)), self.picture(4, 5, 1 / 8))
+
+    def test_tone_curves(self):
+        self.open("#exposure=1")
+        at = self.at_centre_of_pixel(10, 20)
+        value = [2 * (v + 1 / 8) for v in (10 / 64, 20 / 64, 1 / 4)]
+        self.press_key("t")
+        self.assertEqual(self.page.evaluate("document.querySelector('[aria-label=\"Tone curve\"]').selectedOptions[0].text"), "Reinhard")
+        self.assertEqual(self.colour(*at), tuple(srgb(v / (1 + v)) for v in value))
+        self.press_key("t")
+        aces = [(2.51 * w * w + 0.03 * w) / (2.43 * w * w + 0.59 * w + 0.14) for w in (0.6 * v for v in value)]
+        self.assertEqual(self.colour(*at), tuple(map(srgb, aces)))
+        self.page.wait("location.hash.includes('&tone=aces&')")
+        self.press_key("t")
+        self.assertEqual(self.colour(*at), tuple(map(srgb, value)))
+
+    def test_negative_values_are_black_and_read_as_they_are(self):
+        self.open("#view=main/ramp/dark/reference&layout=single")
+        at = self.at_centre_of_pixel(2, 2)
+        self.assertEqual(self.colour(*at), (0, 0, srgb(3 / 16)))
+        self.page.move(*self.stage_point(*at))
+        self.assertIn("dark −0.03125 −0.03125 0.1875", self.page.text(".pixel"))
+        self.assertEqual(self.page.evaluate("document.querySelectorAll('.pixel .negative').length"), 2)
+        self.press_key("d")
+        r, _, b = self.colour(*at)
+        self.assertGreater(b, r + 40, "too dark is blue")
+
+    def test_flip(self):
+        self.open("#view=main/ramp/bright/reference")
+        self.press_key("l")
+        ramp = self.page.evaluate("JSON.parse(document.getElementById('document').textContent).error_colours")
+        for got, shift in zip(self.colour(*self.at_centre_of_pixel(16, 4)), (16, 8, 0)):
+            self.assertAlmostEqual(got, (ramp[8] >> shift) & 255, delta=3)  # 1/4 of 32 steps
+        self.assertEqual(self.colour(*self.at_centre_of_pixel(50, 4)), (2, 2, 18), "the reference does not differ from itself")
+        self.assertEqual(self.marks(".scale"), ["0", "0.25", "0.5", "0.75", "1"])
+        self.page.move(*self.stage_point(*self.at_centre_of_pixel(16, 8)))
+        self.assertIn("FLIP 0.25", self.page.text(".pixel"))
+        self.assertEqual(self.crop_labels()[0][1], f"FLIP {sum(range(8, 24)) / 16 / 64:.2g}")
+        self.assertEqual(self.crop_labels()[0][2], "no FLIP in dark")
+
+    def marks(self, selector):
+        return self.page.evaluate(f"[...document.querySelectorAll('{selector} .marks span')].map(e => e.innerText)")
+
+    def crop_labels(self):
+        return self.page.evaluate("[...document.querySelectorAll('.crops tbody tr')].map(r => [...r.querySelectorAll('td')].map(e => e.innerText))")
+
+    def test_ssim_is_that_of_the_definition(self):
+        self.open("#view=main/stripes%20%26%20more/bright/reference&mode=ssim")
+        weight = [math.exp(-d * d / 4.5) for d in range(-5, 6)]
+        odd = sum(w for d, w in zip(range(-5, 6), weight) if (20 + d) % 2) / sum(weight)  # mean of the stripes about x = 20
+        mx, my, vx, vy = 188 / 255, odd, 0, odd - odd * odd
+        ssim = (2 * mx * my + 1e-4) * 9e-4 / ((mx * mx + my * my + 1e-4) * (vx + vy + 9e-4))
+        self.page.move(*self.stage_point(*self.at_centre_of_pixel(20, 16)))
+        self.assertIn(f"1 − SSIM {1 - ssim:.2g}", self.page.text(".pixel").replace("1.0", "1"))
+        self.page.move(*self.stage_point(*self.at_centre_of_pixel(40, 16)))
+        self.press_key("2")
+        self.open("#view=main/ramp/bright/dark&mode=ssim&layout=grid")
+        self.assertIn("1 − SSIM", self.label())
+
+    def test_predicted_error(self):
+        self.open("#view=main/ramp/bright/reference&mode=predicted")
+        self.page.move(*self.stage_point(*self.at_centre_of_pixel(16, 8)))
+        grey = (16 / 64 + 8 / 64 + 1 / 4) / 3 + 1 / 8
+        self.assertIn(f"predicted error {(1 / 64) / (grey * grey + 0.01):.2g}", self.page.text(".pixel"))
+        self.assertFalse(self.page.evaluate("document.querySelector('[data-value=predicted]').disabled"))
+        self.choose_scene(1)
+        self.assertTrue(self.page.evaluate("document.querySelector('[data-value=predicted]').disabled"), "no standard errors")
+        self.assertIn("; picture,", self.label())
+
+    def test_layers(self):
+        self.open("#view=main/ramp/bright/reference&layout=single")
+        self.assertEqual(self.page.evaluate("[...document.querySelector('[aria-label=\"Layer of the file\"]').options].map(o => o.value)"),
+                         ["", "StdError", "N", "samples"])
+        self.press_key("v")
+        self.assertEqual(self.colour(*self.at_centre_of_pixel(10, 20)), (srgb(1 / 8),) * 3)
+        self.press_key("v")
+        self.assertEqual(self.colour(*self.at_centre_of_pixel(10, 20)), (128, 0, 191))
+        self.assertEqual(self.colour(*self.at_centre_of_pixel(50, 20)), (128, 255, 191))
+        self.page.move(*self.stage_point(*self.at_centre_of_pixel(10, 20)))
+        self.assertIn("bright 0 −1.000 0.5000", self.page.text(".pixel"))
+        self.press_key("v")
+        self.assertEqual((self.colour(*self.at_centre_of_pixel(0, 20)), self.colour(*self.at_centre_of_pixel(63, 20))), ((0,) * 3, (255,) * 3))
+        self.page.wait("location.hash.includes('mode=layer&layer=samples')")
+        self.press_key("v")
+        self.assertEqual(self.colour(*self.at_centre_of_pixel(10, 20)), self.picture(10, 20, 1 / 8))
+
+    def test_histogram(self):
+        self.open("#view=main/ramp/dark/reference&layout=single")
+        self.press_key("h")
+        self.settle()
+        text = self.page.text(".histogram figcaption")
+        negative = sum(x < 4 or y < 4 for x in range(64) for y in range(32))
+        self.assertIn(f"dark min −0.0625 · mean {(31.5 / 64 + 15.5 / 64 + 0.25) / 3 - 1 / 16:.3f} · max 0.922 · {negative} pixels negative", text)
+        self.page.wait("location.hash.includes('histogram=1')")
+        drawn = ("(() => { const c = document.querySelector('.histogram canvas');"
+                 "const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; let n = 0;"
+                 "for (let i = 3; i < d.length; i += 4) n += d[i] > 200; return n; })()")
+        self.assertGreater(self.page.evaluate(drawn), 300)
+        self.press_key("d")
+        self.assertIn("mean −", self.page.text(".histogram figcaption"))
+        self.assertEqual(self.marks(".histogram"), ["−25.0 %", "−12.5 %", "0 %", "+12.5 %", "+25.0 %"])
+        self.press_key("h")
+        self.assertFalse(self.page.evaluate("document.querySelector('.histograms').checkVisibility()"))
 
     def test_false_colour_error(self):
         self.open()
@@ -264,11 +399,15 @@ class Comparer(PageTest):
             fx, fy = ((column + 0.5) * width / 2 - 1 + 8) / width, ((row + 0.5) * height / 2 - 1 + 8) / height
             self.assertEqual(self.colour(fx, fy), self.picture(28, 18, offset), (column, row))
 
+    def choose_scene(self, index):
+        self.page.evaluate("(() => { const s = document.querySelector('#main select'); s.selectedIndex = %d; s.dispatchEvent(new Event('change')); })()" % index)
+        self.settle()
+
     def test_scenes(self):
         self.open()
-        self.page.evaluate("(() => { const s = document.querySelector('#main select'); s.selectedIndex = 1; s.dispatchEvent(new Event('change')); })()")
-        self.settle()
-        self.assertIn("stripes & more: bright", self.page.evaluate("document.querySelector('#main canvas').ariaLabel"))
+        self.choose_scene(1)
+        self.assertIn("stripes & more: white", self.label())
+        self.press_key("2")
         self.assertEqual(self.colour(0.25, 0.5), (188, 188, 188))
 
     def test_keyboard_alone(self):
@@ -351,6 +490,10 @@ class Links(PageTest):
         self.page.wait("document.querySelector('#main canvas').ariaLabel.includes('squared error')")
         self.assertIn("bright (relMSE 0.09) left, reference (reference) right", self.page.evaluate("document.querySelector('#main canvas').ariaLabel"))
 
+    def test_link_without_names(self):
+        self.open("#layout=grid&mode=error&gain=2")
+        self.assertEqual(self.label(), "ramp: reference (reference), bright (relMSE 0.09), dark (relMSE 0.02), broken (relMSE 0); squared error, +2 stops")
+
     def test_unknown_names_are_passed_over(self):
         self.open("#view=main/no/no/no&layout=no&mode=no&zoom=no&insets=1,2")
         self.assertIn("ramp: bright", self.page.evaluate("document.querySelector('#main canvas').ariaLabel"))
@@ -359,11 +502,22 @@ class Links(PageTest):
 
 
 class SmallScreen(PageTest):
-    size = (390, 800)
+    size = (390, 844)
 
     def test_nothing_sticks_out(self):
-        self.open()
-        self.assertLessEqual(self.page.evaluate("document.documentElement.scrollWidth"), 390)
+        for hash in ("", "#mode=difference&histogram=1", "#layout=grid&mode=layer&layer=N"):
+            self.open(hash)
+            self.assertLessEqual(self.page.evaluate("document.documentElement.scrollWidth"), 390, hash)
+
+    def test_controls_picture_and_values_are_seen_together(self):
+        self.open("#layout=grid&mode=error")
+        self.page.evaluate("document.querySelector('#main').scrollIntoView({block: 'start', behavior: 'instant'})")
+        self.settle()
+        top, bottom, stage = self.page.evaluate("['.head', '.scale', '.stage'].map((q, i) => document.querySelector('#main ' + q)"
+                                                ".getBoundingClientRect()[['top', 'bottom', 'height'][i]])")
+        self.assertGreaterEqual(top, 0)
+        self.assertLessEqual(bottom, 844)
+        self.assertGreaterEqual(stage, 190)
 
     def test_two_fingers_zoom(self):
         self.open()
@@ -385,9 +539,16 @@ class View(PageTest):
     def covary(self, *arguments, **more):
         return subprocess.run([os.environ["COVARY"], "view", *arguments], cwd=self.folder.name, capture_output=True, text=True, timeout=60, **more)
 
-    def write(self, name, value, **more):
-        (Path(self.folder.name) / name).write_bytes(exr({c: [value] * 12 for c in "RGB"}, (4, 3), **more))
+    def write(self, name, value, size=(4, 3), layers=(), **more):
+        channels = {c: [value] * (size[0] * size[1]) for c in "RGB"}
+        for layer, numbers in layers:
+            channels.update({layer: [numbers] * (size[0] * size[1])})
+        (Path(self.folder.name) / name).write_bytes(exr(channels, size, **more))
         return name
+
+    def open_page(self, name, hash=""):
+        self.page.open(f"file://{self.folder.name}/{name}{hash}")
+        self.page.wait("document.querySelector('.stage canvas').ariaBusy === 'false'")
 
     def test_images_at_hand(self):
         self.write("a.exr", 0.5), self.write("b.exr", 0.6), self.write("r.exr", 0.5)
@@ -397,6 +558,55 @@ class View(PageTest):
         self.page.wait("document.querySelector('.crops')")
         self.assertEqual(self.page.evaluate("[...document.querySelectorAll('.methods button')].map(b => b.innerText.replace(/\\s+/g, ' '))"),
                          ["1 r reference", "2 a relMSE 0", "3 b relMSE 0.0385"])
+
+    def test_layers_flip_and_predicted_error(self):
+        errors = [(f"StdError.{c}", 0.05) for c in "RGB"]
+        self.write("a.exr", 0.5, layers=errors + [(f"N.{c}", 0.5) for c in "XYZ"] + [("depth.Z", 3), ("A", 1), ("group00.R", 1),
+                                                                                     ("group00.G", 1), ("group00.B", 1)])
+        self.write("r.exr", 0.4)
+        self.assertEqual(self.covary("a.exr", "-o", "out.html").returncode, 0)
+        self.open_page("out.html", "#mode=predicted")
+        predicted = 0.05 ** 2 / (0.5 ** 2 + 0.01)
+        self.assertIn(f"a (predicted relMSE {predicted:.3g}); predicted error", self.page.evaluate("document.querySelector('canvas').ariaLabel"))
+        self.assertEqual(self.page.evaluate("[...document.querySelector('[aria-label=\"Layer of the file\"]').options].map(o => o.value)"),
+                         ["", "N", "StdError", "depth.Z"])
+        self.page.move(*self.middle())
+        self.assertIn(f"predicted error {predicted:.2g}", self.page.text(".pixel"))
+        self.assertEqual(self.covary("a.exr", "-r", "r.exr", "-o", "both.html").returncode, 0)
+        self.open_page("both.html", "#mode=flip&layout=single")
+        self.page.move(*self.middle())
+        compared = subprocess.run([os.environ["COVARY"], "compare", "a.exr", "-r", "r.exr", "--metric", "flip", "--json", "flip.json"],
+                                  cwd=self.folder.name, capture_output=True, text=True, timeout=60)
+        self.assertEqual(compared.returncode, 0, compared.stderr)
+        flip = float(re.search(r"0\.\d+", compared.stdout)[0])
+        self.assertIn(f"FLIP {flip:.2g}", self.page.text(".pixel"))
+        self.assertIn(f"relMSE {0.1 ** 2 / (0.4 ** 2 + 0.01):.3g}, predicted {predicted:.3g}", self.page.text(".methods"))
+        whole = (Path(self.folder.name) / "both.html").stat().st_size
+        self.assertEqual(self.covary("a.exr", "-r", "r.exr", "-o", "both.html", "--small").returncode, 0)
+        self.assertLess((Path(self.folder.name) / "both.html").stat().st_size, whole)
+        self.open_page("both.html")
+        self.assertEqual(self.page.evaluate("['flip', 'predicted', 'ssim'].map(m => document.querySelector(`[data-value=${m}]`).disabled)"),
+                         [True, True, False])
+
+    def middle(self):
+        left, top, width, height = self.page.box(".stage")
+        return left + width / 2, top + height / 2
+
+    def test_everything_fits_a_desktop_window(self):
+        self.addCleanup(self.page.resize, *self.size)
+        self.page.resize(1400, 900)
+        for size in ((128, 72), (64, 96)):
+            for name, value in (("a.exr", 0.5), ("b.exr", 0.6), ("c.exr", 0.4), ("r.exr", 0.5)):
+                self.write(name, value, size)
+            self.assertEqual(self.covary("a.exr", "b.exr", "c.exr", "--reference", "r.exr", "-o", "fit.html").returncode, 0)
+            for hash in ("", "#mode=error", "#layout=grid&mode=difference"):
+                self.open_page("fit.html", hash)
+                title, values, scale, stage = self.page.evaluate(
+                    "['h1', '.pixel', '.scale', '.stage'].map((q, i) => document.querySelector(q).getBoundingClientRect()[i % 3 ? 'bottom' : 'height'])")
+                self.assertLess(title, 30, "a small title")
+                self.assertLessEqual(max(values, scale), 900, f"{size} {hash}")
+                if "grid" not in hash:
+                    self.assertGreater(stage, 0.7 * 900, f"{size} {hash}: the picture has most of the window")
 
     def test_opens_a_page_of_its_own(self):
         self.write("a.exr", 0.5)

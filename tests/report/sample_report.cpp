@@ -14,6 +14,14 @@ namespace {
 using Json = nlohmann::ordered_json;
 constexpr int kWidth = 64, kHeight = 32;
 
+/// One channel: x / 64.
+Image across() {
+  Image image(kWidth, kHeight, 1);
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x) *image.pixel(x, y) = static_cast<float>(x) / 64;
+  return image;
+}
+
 Image image_of(const std::function<Spectrum(int, int)>& value) {
   Image image(kWidth, kHeight, 3);
   for (int y = 0; y < kHeight; ++y)
@@ -35,8 +43,15 @@ std::vector<ReportImage> images() {
       {"ramp/bright", image_of([](int x, int y) { return ramp(x, y) + Spectrum(0.125f); })},
       {"ramp/dark", image_of([](int x, int y) { return ramp(x, y) - Spectrum(0.0625f); })},
       {"ramp/broken", image_of([&](int x, int y) { return x < 8 && y < 8 ? Spectrum(nan) : ramp(x, y); })},
+      {"ramp/bright:FLIP", across()},
+      {"ramp/bright:StdError", image_of([](int, int) { return Spectrum(0.125f); })},
+      {"ramp/bright:N", image_of([](int x, int) {
+         return Spectrum{0, x < 32 ? -1.f : 1.f, 0.5f};
+       })},
+      {"ramp/bright:samples", across()},
       {"stripes/reference", image_of([](int x, int) { return Spectrum(x % 2 ? 1.f : 0.f); })},
       {"stripes/bright", image_of([](int, int) { return Spectrum(0.5f); })},
+      {"stripes/white", image_of([](int, int) { return Spectrum(4); })},
   };
 }
 
@@ -48,14 +63,20 @@ Json comparer() {
   reference["role"] = stripes["role"] = "reference";
   Json dark = entry("ramp", "dark", "relMSE 0.02");
   dark["role"] = "baseline";
+  Json bright = entry("ramp", "bright", "relMSE 0.09"), white = entry("stripes", "white", "relMSE 9");
+  bright["flip"] = "ramp/bright:FLIP";
+  bright["layers"] = {{{"name", "StdError"}, {"image", "ramp/bright:StdError"}},
+                      {{"name", "N"}, {"image", "ramp/bright:N"}, {"display", "direction"}},
+                      {{"name", "samples"}, {"image", "ramp/bright:samples"}, {"display", "range"}}};
+  white["role"] = "best";
   return {{"type", "comparer"},
           {"id", "main"},
           {"scenes",
            {{{"name", "ramp"},
              {"credit", "Made for a test."},
-             {"images", {reference, entry("ramp", "bright", "relMSE 0.09"), dark, entry("ramp", "broken", "relMSE 0")}},
+             {"images", {reference, bright, dark, entry("ramp", "broken", "relMSE 0")}},
              {"insets", {{{"x", 8}, {"y", 8}, {"w", 16}, {"h", 8}}}}},
-            {{"name", "stripes & more"}, {"images", {stripes, entry("stripes", "bright", "relMSE 1")}}}}}};
+            {{"name", "stripes & more"}, {"images", {stripes, entry("stripes", "bright", "relMSE 1"), white}}}}}};
 }
 
 Json table() {
@@ -135,7 +156,7 @@ Json document() {
           {"sections",
            {{{"id", "results"},
              {"heading", "Results"},
-             {"text", {"Text <b>as it is</b>."}},
+             {"text", {"Text <b>as it is</b>, `code --apart`."}},
              {"blocks", {table(), plots()[0], plots()[1]}}},
             {{"id", "images"}, {"heading", "Images"}, {"blocks", {comparer()}}},
             {{"id", "failures"},

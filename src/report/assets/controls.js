@@ -1,14 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-// Buttons and sliders around the stage, the line of pixel values, the help.
+// Buttons and sliders above the stage, the help.
 
 const STOPS_RANGE = 10;
 
+const VIEW_BUTTONS = Object.keys(VIEWS).filter((mode) => VIEWS[mode].name);
+
 const KEYS = [
-  ["1 … 9, 0", "show an image; in split, on the pointer's side"],
+  ["1 … 9, 0", "show an image: in split on the pointer's side; in the grid alone, and again for the grid"],
   ["Shift + 1 … 0", "image on the right of the split"],
   ["Space", "exchange the two images"],
   ["S, G", "split, grid (again: one image)"],
-  ["I, X, D", "picture, squared error, signed difference"],
+  [VIEW_BUTTONS.map((mode) => VIEWS[mode].key.toUpperCase()).join(", "), VIEW_BUTTONS.map((mode) => VIEWS[mode].name).join(", ")],
+  ["V, Shift + V", "next, previous layer of the file"],
+  ["T", "next tone curve"],
+  ["H", "histogram"],
   ["E, Shift + E", "half a stop brighter, darker"],
   ["R", "reset the exposure"],
   ["+, −, wheel", "zoom (the wheel after a click, or with Ctrl)"],
@@ -19,14 +24,18 @@ const KEYS = [
   ["P", "save the figure with all insets as PNG"],
 ];
 
+const view_hint = ({ hint, key }) => `${hint} (${key.toUpperCase()})`;
+
 class Controls {
   constructor(comparer) {
     this.comparer = comparer;
     const update = (changes) => comparer.update(changes);
     this.scene = el("select", { "aria-label": "Scene", change: () => comparer.choose_scene(this.scene.selectedIndex) },
       comparer.block.scenes.map((scene) => el("option", {}, scene.name)));
-    this.mode = segmented("View", [["image", "Picture", "Picture (I)"], ["error", "Error", "Squared error relative to the reference (X)"],
-      ["difference", "Difference", "Signed difference from the reference (D)"]], (mode) => update({ mode }));
+    this.mode = segmented("View", VIEW_BUTTONS.map((mode) => [mode, VIEWS[mode].name, view_hint(VIEWS[mode])]), (mode) => update({ mode }));
+    this.layer = el("select", { "aria-label": "Layer of the file", title: "Layer of the file (V)", change: () => this.choose_layer(this.layer.value) });
+    this.tone = el("select", { "aria-label": "Tone curve", title: "Tone curve (T)", change: () => update({ tone: this.tone.value }) },
+      Object.entries(TONES).map(([tone, { name, hint }]) => el("option", { value: tone, title: hint }, name)));
     this.layout = segmented("Layout", [["single", "One", "One image"], ["split", "Split", "Two images with a slider (S)"],
       ["grid", "Grid", "All images (G)"]], (layout) => update({ layout }));
     this.stops = el("input", { type: "range", min: -STOPS_RANGE, max: STOPS_RANGE, step: 0.25,
@@ -38,6 +47,7 @@ class Controls {
       button("−", "Zoom out (−)", () => this.zoom(0.5)), button("+", "Zoom in (+)", () => this.zoom(2)),
       button("Fit", "Fit the stage (F)", () => this.fit()), button("1:1", "One pixel to one pixel (O)", () => this.one_to_one()),
       this.inset = button("Inset", "Draw an inset (N)", () => comparer.gestures.toggle_drawing()),
+      this.histogram = button("Histogram", "Histogram (H)", () => this.toggle_histogram()),
       this.figure = button("Figure", "Save a figure with all insets as PNG (P)", () => this.save()),
       button("Link", "Copy a link to this view", () => this.copy_link()),
       button("Full", "Full screen", () => this.full_screen()), button("?", "Keys", () => this.help.showModal()));
@@ -48,28 +58,31 @@ class Controls {
     this.other = el("select", { "aria-label": "Image on the right", change: () => update({ b: this.other.selectedIndex }) });
     this.other_label = el("label", { class: "other" }, "Right: ", this.other);
     this.head = el("div", { class: "head" },
-      el("div", { class: "bar" }, comparer.block.scenes.length > 1 && this.scene || null, this.layout.group, this.mode.group,
-        el("label", { class: "stops" }, this.stops_name, this.stops, this.stops_value), tools),
-      el("div", { class: "bar" }, this.methods, this.other_label), this.help);
+      el("div", { class: "bar" }, comparer.block.scenes.length > 1 && this.scene || null, this.layout.group, this.methods, this.other_label),
+      el("div", { class: "bar" }, this.mode.group, this.layer, this.tone,
+        el("label", { class: "stops" }, this.stops_name, this.stops, this.stops_value), tools), this.help);
     this.handle = el("div", { class: "handle", role: "slider", tabindex: "0", "aria-label": "Split position", "aria-valuemin": 0,
       "aria-valuemax": 100, keydown: (event) => this.move_handle(event) });
     comparer.stage.append(this.handle);
-    this.pixel = el("div", { class: "pixel" });
-    this.scale = el("div", { class: "scale" });
-    this.message = el("div", { class: "message", role: "status" });
-    this.credit = el("p", { class: "credit" });
-    this.foot = el("div", { class: "foot" }, this.pixel, this.scale, this.message, this.credit);
   }
 
   // ---- showing the state ----------------------------------------------------------------------------------------------
 
   show() {
-    const { state, images, scene, reference } = this.comparer;
+    const { state, images, scene, painter } = this.comparer;
     if (this.shown_scene !== scene) this.show_scene(scene, images);
     this.layout.show(state.layout);
     this.mode.show(state.mode);
-    this.mode.buttons.forEach((b) => { b.disabled = b.dataset.value !== "image" && !reference; });
-    this.stops_name.textContent = state.mode === "image" ? "Exposure" : "Gain";
+    this.mode.buttons.forEach((button) => {
+      const view = VIEWS[button.dataset.value];
+      button.disabled = !painter.offers(button.dataset.value);
+      button.title = view_hint(view) + (button.disabled ? `: ${view.missing} in this page` : "");
+    });
+    this.layer.value = state.mode === "layer" ? state.layer : "";
+    this.tone.value = state.tone;
+    this.tone.disabled = VIEWS[state.mode].scale !== undefined && state.mode !== "ssim";
+    this.histogram.setAttribute("aria-pressed", String(Boolean(state.histogram)));
+    this.stops_name.textContent = this.comparer.stops_name === "gain" ? "Gain" : "Exposure";
     this.stops.setAttribute("aria-label", this.stops_name.textContent + " in stops");
     this.stops.value = this.comparer.stops;
     this.stops_value.textContent = stops_text(this.comparer.stops);
@@ -82,71 +95,51 @@ class Controls {
     this.other_label.hidden = this.handle.hidden = state.layout !== "split";
     this.handle.style.left = `${state.split * 100}%`;
     this.handle.setAttribute("aria-valuenow", Math.round(state.split * 100));
-    this.show_scale();
   }
 
   show_scene(scene, images) {
     this.shown_scene = scene;
     this.scene.selectedIndex = this.comparer.state.scene;
-    this.credit.textContent = scene.credit ?? "";
     this.methods.replaceChildren(...images.map((image, i) => el("button",
       { type: "button", title: i < 10 ? `Key ${(i + 1) % 10}` : null, click: (event) => this.choose(i, event.shiftKey) },
       el("kbd", { "aria-hidden": "true" }, i < 10 ? String((i + 1) % 10) : ""), el("span", {}, image.name),
       el("small", {}, image.label ?? (image.role === "reference" ? "reference" : "")))));
     this.other.replaceChildren(...images.map((image) => el("option", {}, image.name)));
-  }
-
-  show_scale() {
-    const { mode, gain } = this.comparer.state;
-    const scale = scale_of(mode, gain);
-    this.scale.hidden = !scale;
-    if (!scale) return;
-    this.scale.replaceChildren(
-      el("div", { class: "ramp", style: `background: ${scale.colours}` }),
-      el("div", { class: "marks" }, scale.marks.map((mark) => el("span", {}, mark))), el("div", {}, scale.text));
-  }
-
-  /** Values of the pixel under the pointer, in the images shown and the reference. */
-  show_pixel() {
-    const { comparer } = this, at = comparer.pointed();
-    if (!at) {
-      this.pixel.textContent = "Point at a pixel to read its values.";
-      return;
-    }
-    const shown = comparer.state.layout === "grid" ? comparer.images : comparer.panes().map((pane) => pane.image);
-    const records = [...new Set([...shown, ...(comparer.reference ? [comparer.reference] : [])])];
-    const reference = comparer.reference && comparer.store.ready(comparer.reference.image);
-    const items = records.map((record) => {
-      const image = comparer.store.ready(record.image);
-      if (!image) return null;
-      const values = pixel_of(image, at.x, at.y).map((v) => significant(v, 4)).join(" ");
-      const error = reference && record !== comparer.reference
-        ? ` · error ${significant(relative_error(image, reference, at.y * image.width + at.x), 2)}` : "";
-      return el("span", {}, el("b", {}, record.name), ` ${values}${error}`);
-    });
-    this.pixel.replaceChildren(el("span", { class: "place" }, `x ${at.x}, y ${at.y}`), ...items.filter(Boolean));
-  }
-
-  say(text) {
-    this.message.textContent = text;
-    clearTimeout(this.silence);
-    this.silence = setTimeout(() => { this.message.textContent = ""; }, 6000);
+    this.layers = [...new Set(images.flatMap((image) => (image.layers ?? []).map((layer) => layer.name)))];
+    this.layer.replaceChildren(el("option", { value: "" }, "Layer: image"), ...this.layers.map((name) => el("option", { value: name }, name)));
+    this.layer.hidden = !this.layers.length;
   }
 
   // ---- what the buttons do --------------------------------------------------------------------------------------------
 
-  /** Shows image `i` at the left, or at the right of the split. */
+  /** Shows image `i` at the left, or at the right of the split. Out of the grid it is shown alone; once more leads back. */
   choose(i, right = false) {
     const { state, images } = this.comparer;
     if (i >= images.length) return;
+    const back = this.from_grid && !right && state.layout === "single" && state.a === i;
+    this.from_grid = state.layout === "grid" || (this.from_grid && state.layout === "single" && !back);
     if (right) this.comparer.update({ b: i, layout: "split" });
-    else this.comparer.update({ a: i, layout: state.layout === "grid" ? "single" : state.layout });
+    else this.comparer.update({ a: i, layout: back ? "grid" : state.layout === "grid" ? "single" : state.layout });
   }
 
-  set_stops(stops) {
-    const name = this.comparer.state.mode === "image" ? "exposure" : "gain";
-    this.comparer.update({ [name]: clamp(stops, -STOPS_RANGE, STOPS_RANGE) });
+  /** A layer by name, "" for the image itself. */
+  choose_layer(layer) { this.comparer.update(layer ? { mode: "layer", layer } : { mode: "image" }); }
+
+  /** The layer that comes `step` after the one shown, the image itself among them. */
+  next_layer(step) {
+    const { mode, layer } = this.comparer.state, all = ["", ...this.layers];
+    const at = mode === "layer" ? all.indexOf(layer) : 0;
+    this.choose_layer(all[(at + step + all.length) % all.length]);
   }
+
+  next_tone() {
+    const all = Object.keys(TONES);
+    this.comparer.update({ tone: all[(all.indexOf(this.comparer.state.tone) + 1) % all.length] });
+  }
+
+  toggle_histogram() { this.comparer.update({ histogram: this.comparer.state.histogram ? 0 : 1 }); }
+
+  set_stops(stops) { this.comparer.update({ [this.comparer.stops_name]: clamp(stops, -STOPS_RANGE, STOPS_RANGE) }); }
 
   zoom(factor) {
     const { comparer } = this;
@@ -168,7 +161,7 @@ class Controls {
 
   async save() {
     this.figure.disabled = true;
-    try { await save_figure(this.comparer); } catch (error) { this.say(error.message); }
+    try { await save_figure(this.comparer); } catch (error) { this.comparer.readout.say(error.message); }
     this.figure.disabled = false;
   }
 
@@ -176,9 +169,9 @@ class Controls {
     this.comparer.on_link(this.comparer.link());
     try {
       await navigator.clipboard.writeText(location.href);
-      this.say("The link is in the clipboard.");
+      this.comparer.readout.say("The link is in the clipboard.");
     } catch {
-      this.say("The address bar holds the link.");
+      this.comparer.readout.say("The address bar holds the link.");
     }
   }
 

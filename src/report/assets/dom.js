@@ -12,6 +12,9 @@ function el(tag, attributes = {}, ...children) {
   return element;
 }
 
+/** Text with `code` between backticks, as nodes. */
+const rich = (text) => text.split(/`([^`]+)`/).map((part, i) => (i % 2 ? el("code", {}, part) : part));
+
 /** A row of buttons of which one is pressed. `choices`: [value, text, hint]. */
 function segmented(label, choices, choose) {
   const buttons = choices.map(([value, text, hint]) =>

@@ -42,12 +42,11 @@ function draw_figure(picture, name, images, rows) {
     if (!rows.length) return;
     text(image.name, x, 0, crop, true);
     rows.forEach(({ colour, crops }, i) => {
-      paste(crops[k].canvas, x, y, crop, heights[i]);
+      if (crops[k].canvas) paste(crops[k].canvas, x, y, crop, heights[i]);
       context.lineWidth = 2;
       context.strokeStyle = colour;
       context.strokeRect(x + 1, y + 1, crop - 2, heights[i] - 2);
-      const error = crops[k].error;
-      text(error === null ? "" : `relMSE ${significant(error, 2)}`, x, y + heights[i], crop);
+      text(crops[k].label, x, y + heights[i], crop);
       y += heights[i] + line + gap;
     });
     text(image.label ?? "", x, y - gap, crop, true);
@@ -57,12 +56,11 @@ function draw_figure(picture, name, images, rows) {
 
 /** Draws the comparer's figure and offers it as a file. */
 async function save_figure(comparer) {
-  const { images, state, scene } = comparer;
+  const { images, state, scene, painter } = comparer;
   const rows = await comparer.strip.rows();
   const record = images[state.a];
-  const image = await comparer.store.load(record.image);
-  const reference = comparer.reference && await comparer.store.load(comparer.reference.image);
-  const picture = painted_for(comparer, record, image, reference);
+  const picture = painter.painting(record);
+  if (!picture) throw new Error(painter.failure(record));
   const canvas = draw_figure(picture, `${scene.name}: ${record.name}`, images, rows);
   const blob = await new Promise((resolve) => canvas.toBlob(resolve, "image/png"));
   download(blob, `${file_name(scene.name)}-${state.mode}.png`);

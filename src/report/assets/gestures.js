@@ -38,7 +38,7 @@ class Gestures {
   point(place) {
     this.comparer.pointer = place;
     if (this.comparer.state.layout === "grid") this.comparer.request_draw();
-    else this.comparer.controls.show_pixel();
+    else this.comparer.readout.show_pixel();
   }
 
   zoom(factor, { px, py }) {
@@ -109,7 +109,7 @@ class Gestures {
     this.rectangle = this.start = null;
     comparer.stage.classList.toggle("drawing", this.drawing);
     comparer.controls.inset.setAttribute("aria-pressed", String(this.drawing));
-    if (this.drawing) comparer.controls.say("Drag over the picture, or press Enter for its middle.");
+    if (this.drawing) comparer.readout.say("Drag over the picture, or press Enter for its middle.");
     comparer.request_draw();
   }
 
@@ -141,8 +141,7 @@ class Gestures {
     const actions = {
       " ": () => comparer.update({ a: state.b, b: state.a }),
       s: () => layout("split"), g: () => layout("grid"),
-      i: () => comparer.update({ mode: "image" }), x: () => comparer.update({ mode: "error" }),
-      d: () => comparer.update({ mode: "difference" }),
+      v: () => controls.next_layer(event.shiftKey ? -1 : 1), t: () => controls.next_tone(), h: () => controls.toggle_histogram(),
       e: () => stops(event.shiftKey ? -0.5 : 0.5), r: () => controls.set_stops(0),
       "+": () => controls.zoom(2), "=": () => controls.zoom(2), "-": () => controls.zoom(0.5), "−": () => controls.zoom(0.5),
       f: () => controls.fit(), o: () => controls.one_to_one(),
@@ -150,6 +149,7 @@ class Gestures {
       "[": () => comparer.update({ split: state.split - 0.02 }), "]": () => comparer.update({ split: state.split + 0.02 }),
       n: () => this.toggle_drawing(), p: () => controls.save(), "?": () => controls.help.showModal(),
     };
+    for (const mode of VIEW_BUTTONS) actions[VIEWS[mode].key] = () => comparer.update({ mode });
     if (this.drawing) {
       actions.escape = () => this.toggle_drawing();
       actions.enter = () => { this.toggle_drawing(); comparer.add_inset(this.middle_inset()); };
@@ -172,8 +172,18 @@ function spanned(from, to, size) {
   return { x, y, w: right - x, h: bottom - y };
 }
 
-// A key goes to the comparer that has the focus or, where nothing has it, the one under the pointer. On buttons the space
-// bar presses them, and in form fields all keys are theirs.
+/** The comparer that keys belong to where nothing has the focus: the one under the pointer, else the only one in sight. */
+function comparer_in_sight() {
+  if (Gestures.hovered) return Gestures.hovered;
+  const seen = Gestures.all.filter(({ comparer }) => {
+    const { top, bottom } = comparer.stage.getBoundingClientRect();
+    return top < window.innerHeight && bottom > 0;
+  });
+  return seen.length === 1 ? seen[0] : null;
+}
+
+// A key goes to the comparer that has the focus or, where nothing has it, the one in sight. On buttons the space bar presses
+// them, and in form fields all keys are theirs. Keys that scroll the page need the focus or the pointer.
 document.addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.metaKey || event.altKey || event.defaultPrevented) return;
   const { target } = event;
@@ -181,6 +191,7 @@ document.addEventListener("keydown", (event) => {
   if (target.closest("input") && event.key.startsWith("Arrow")) return;
   if (target.closest("button, summary, a") && [" ", "Enter"].includes(event.key)) return;
   const focused = Gestures.all.find((g) => g.comparer.element.contains(target));
-  const gestures = focused ?? (target === document.body ? Gestures.hovered : null);
+  const scrolls = event.key === " " || event.key.startsWith("Arrow");
+  const gestures = focused ?? (target !== document.body ? null : scrolls ? Gestures.hovered : comparer_in_sight());
   if (gestures?.key(event)) event.preventDefault();
 });

@@ -22,13 +22,15 @@ function base64_bytes(text) {
   return bytes;
 }
 
-/** Undoes predicted_halves() of src/report/image_block.h; the result has three planes of half-float bits. */
-function unpredicted(bytes, width, height) {
-  const plane = width * height, n = plane * 3;
+const is_nan = (bits) => (bits & 0x7fff) > 0x7c00;
+
+/** Undoes predicted_halves() of src/report/image_block.h; the result has a plane of half-float bits for each channel. */
+function unpredicted(bytes, width, height, channels) {
+  const plane = width * height, n = plane * channels;
   const halves = new Uint16Array(n);
   let row = new Int16Array(width), above = new Int16Array(width);
   let i = 0;
-  for (let channel = 0; channel < 3; channel++)
+  for (let channel = 0; channel < channels; channel++)
     for (let y = 0; y < height; y++) {
       for (let x = 0; x < width; x++, i++) {
         const z = (bytes[i] << 8) | bytes[n + i];
@@ -44,14 +46,14 @@ function unpredicted(bytes, width, height) {
 const ARRIVAL_CHECK = 50;  // milliseconds
 
 class ImageStore {
-  /** `sizes`: id -> [width, height], known before the images have arrived. */
+  /** `sizes`: id -> [width, height, channels], known before the images have arrived. */
   constructor(sizes) {
     this.sizes = sizes;
     this.cache = new Map();  // id -> promise of an image; the least recently used first
     this.loaded = new Map();  // id -> image
   }
 
-  /** The promise of {id, width, height, halves}: `halves` holds the planes R, G, B of half-float bits. */
+  /** The promise of {id, width, height, channels, halves}: `halves` holds the planes of the channels, half-float bits. */
   load(id) {
     const promise = this.cache.get(id) ?? this.decode(id);
     this.cache.delete(id);
@@ -69,10 +71,10 @@ class ImageStore {
       block = this.find(id);
     }
     if (!block) throw new Error(`The page lacks the image '${id}'.`);
-    const [width, height] = this.sizes[id];
+    const [width, height, channels] = this.sizes[id];
     const stream = new Blob([base64_bytes(block.textContent)]).stream().pipeThrough(new DecompressionStream("deflate"));
     const bytes = new Uint8Array(await new Response(stream).arrayBuffer());
-    const image = { id, width, height, halves: unpredicted(bytes, width, height) };
+    const image = { id, width, height, channels, halves: unpredicted(bytes, width, height, channels) };
     this.loaded.set(id, image);
     this.drop_old(id);
     return image;
@@ -94,10 +96,10 @@ class ImageStore {
   }
 }
 
-/** The three values of a pixel. */
+/** The values of a pixel's channels. */
 function pixel_of(image, x, y) {
   const n = image.width * image.height, i = y * image.width + x;
-  return [0, 1, 2].map((c) => half_values[image.halves[c * n + i]]);
+  return Array.from({ length: image.channels }, (_, c) => half_values[image.halves[c * n + i]]);
 }
 
 /** Mean relMSE of a rectangle, over its pixels that are finite in both images. */

@@ -45,19 +45,18 @@ class InsetStrip {
     });
   }
 
-  /** Crops of every inset and image: [{inset, colour, crops: [{record, canvas, error}]}]; decodes what is missing. */
+  /** Crops of every inset and image: [{inset, colour, crops: [{record, canvas, label}]}], canvas null where an image has
+   *  no such view; decodes what is missing. */
   async rows() {
-    const { comparer } = this, { images, insets, reference } = comparer;
-    const loaded = await Promise.all(images.map((record) => comparer.store.load(record.image)));
-    const reference_image = reference && loaded[images.indexOf(reference)];
+    const { images, insets, reference, painter } = this.comparer;
+    await Promise.all([...images, reference].filter(Boolean).flatMap((record) => [painter.prepare(record), painter.load(record.image)]));
     return insets.map((inset, i) => ({
       inset,
       colour: INSET_COLOURS[i % INSET_COLOURS.length],
-      crops: images.map((record, k) => ({
-        record,
-        canvas: crop_of(painted_for(comparer, record, loaded[k], reference_image), inset),
-        error: reference && record !== reference ? relative_mse(loaded[k], reference_image, inset) : null,
-      })),
+      crops: images.map((record) => {
+        const picture = painter.painting(record);
+        return { record, canvas: picture && crop_of(picture, inset), label: painter.crop_label(record, inset) };
+      }),
     }));
   }
 
@@ -65,13 +64,9 @@ class InsetStrip {
     const version = ++this.version;
     if (!this.comparer.insets.length) this.element.replaceChildren();
     else if (this.comparer.visible) {
-      let rows;
-      try { rows = await this.rows(); } catch (error) {
-        rows = null;
-        this.element.replaceChildren(el("p", {}, error.message));
-      }
+      const rows = await this.rows();
       if (version !== this.version) return;  // a later update overtook this one
-      if (rows) this.element.replaceChildren(this.table(rows));
+      this.element.replaceChildren(this.table(rows));
     }
     this.element.setAttribute("aria-busy", "false");
   }
@@ -83,23 +78,13 @@ class InsetStrip {
       el("th", { scope: "row" },
         el("button", { type: "button", class: "remove", title: `Remove inset ${i + 1}`, "aria-label": `Remove inset ${i + 1}`,
           style: `--inset: ${colour}`, click: () => this.comparer.remove_inset(i) }, "×")),
-      crops.map(({ record, canvas, error }) => {
-        const text = error === null ? (record.role === "reference" ? "reference" : "") : `relMSE ${significant(error, 2)}`;
+      crops.map(({ record, canvas, label }) => {
+        if (!canvas) return el("td", {}, this.comparer.painter.failure(record));
         canvas.setAttribute("role", "img");
-        canvas.setAttribute("aria-label", `Inset ${i + 1} at ${inset.x}, ${inset.y}: ${record.name}${text ? ", " + text : ""}`);
+        canvas.setAttribute("aria-label", `Inset ${i + 1} at ${inset.x}, ${inset.y}: ${record.name}${label ? ", " + label : ""}`);
         canvas.style.borderColor = colour;
-        return el("td", {}, canvas, el("div", { class: "error" }, text));
+        return el("td", {}, canvas, el("div", { class: "error" }, label));
       })));
     return el("table", { class: "crops" }, el("thead", {}, head), el("tbody", {}, body));
   }
-}
-
-/** The comparer's painting of an image, made where the stage has not needed it yet. */
-function painted_for(comparer, record, image, reference) {
-  const { mode } = comparer.state, key = `${mode} ${comparer.stops}`;
-  const old = comparer.paintings.get(record.image);
-  if (old?.key === key) return old.canvas;
-  const canvas = painted(image, reference, mode, comparer.stops);
-  comparer.paintings.set(record.image, { key, canvas });
-  return canvas;
 }

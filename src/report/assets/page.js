@@ -26,28 +26,30 @@ function draw_comparer(block) {
 
 const DRAW = { table: draw_table, plot: draw_plot, comparer: draw_comparer, notes: draw_notes };
 
-/** Consecutive plots stand side by side where there is room. */
+const SIDE_BY_SIDE = { plot: "plots", table: "tables" };
+
+/** Consecutive plots, and tables, stand side by side where there is room. */
 function draw_blocks(blocks) {
   const elements = [];
   for (const block of blocks) {
-    const element = DRAW[block.type](block);
-    if (block.type !== "plot") elements.push(element);
-    else if (elements.at(-1)?.className === "plots") elements.at(-1).append(element);
-    else elements.push(el("div", { class: "plots" }, element));
+    const element = DRAW[block.type](block), group = SIDE_BY_SIDE[block.type];
+    if (!group) elements.push(element);
+    else if (elements.at(-1)?.className === group) elements.at(-1).append(element);
+    else elements.push(el("div", { class: group }, element));
   }
   return elements;
 }
 
 function draw_section(section) {
   return el("section", { class: "part", id: section.id }, section.heading ? el("h2", {}, section.heading) : null,
-    (section.text ?? []).map((paragraph) => el("p", { class: "prose" }, paragraph)), draw_blocks(section.blocks ?? []));
+    (section.text ?? []).map((paragraph) => el("p", { class: "prose" }, rich(paragraph))), draw_blocks(section.blocks ?? []));
 }
 
 function draw_head() {
   const meta = Array.isArray(report.meta) ? report.meta : Object.entries(report.meta ?? {});
   const sections = (report.sections ?? []).filter((section) => section.heading);
   return [
-    el("h1", {}, report.title), report.subtitle ? el("p", { class: "subtitle" }, report.subtitle) : "",
+    el("h1", {}, report.title), report.subtitle ? el("p", { class: "subtitle" }, rich(report.subtitle)) : "",
     meta.length ? el("dl", {}, meta.map(([key, value]) => el("div", {}, el("dt", {}, key), el("dd", {}, String(value))))) : "",
     sections.length > 1 ? el("nav", { "aria-label": "Sections" }, sections.map((s) => el("a", { href: `#${s.id}` }, s.heading))) : "",
   ].filter(Boolean);
@@ -60,13 +62,14 @@ function keep_link(hash) {
 
 function follow_link() {
   const link = parse_link(location.hash);
-  const comparer = link && comparers.find((c) => c.block.id === link.comparer);
+  const comparer = link && (link.comparer === undefined ? comparers[0] : comparers.find((c) => c.block.id === link.comparer));
   if (!comparer) return;
   comparer.open(link);
-  comparer.element.scrollIntoView({ block: "start" });
+  if (comparer.element.getBoundingClientRect().top > MOST_LEAD * window.innerHeight) comparer.element.scrollIntoView({ block: "start" });
 }
 
 document.getElementById("head").append(...draw_head());
+document.body.classList.toggle("plain", !report.subtitle && !report.meta);  // a small title leaves the room to the images
 document.getElementById("content").replaceChildren(...(report.sections ?? []).map(draw_section));
 follow_link();
 window.addEventListener("hashchange", follow_link);

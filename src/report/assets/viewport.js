@@ -64,6 +64,13 @@ function layout_panes(stage, state, images) {
   return [{ ...whole, clip: whole, image: images[state.a], side: "a" }];
 }
 
+/** The height of a stage of this width that shows its panes whole with nothing around them, where it is not too high. */
+function natural_height(width, most, layout, n, aspect) {
+  if (layout !== "grid") return Math.min(width / aspect, most);
+  const columns = best_columns({ width, height: most }, n, aspect);
+  return Math.min(Math.ceil(n / columns) * (width / columns / aspect), most);
+}
+
 /** The number of columns with which `n` images of this aspect are largest. */
 function best_columns(stage, n, aspect) {
   let best = 1, best_width = 0;
