@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "film/metrics.h"
 #include "lab/measure.h"
 #include "lab/report_tables.h"
 
@@ -116,6 +117,13 @@ const std::vector<std::string> kHowMeasured = {
     "1 / time; where "
     "a budget is in seconds, the errors are those of that time."};
 
+Image mean_of_references(const SceneResult& result) {
+  Image mean = read_window(result.reference.files.front(), result.scene);
+  const Image other = read_window(result.reference.files.back(), result.scene);
+  for (size_t i = 0; i < mean.data.size(); ++i) mean.data[i] = 0.5f * (mean.data[i] + other.data[i]);
+  return mean;
+}
+
 }  // namespace
 
 size_t shown_budget(const Suite& suite) {
@@ -176,30 +184,48 @@ Json report_document(const Results& results) {
   return document;
 }
 
+std::string best_method(const Results& results, size_t budget) {
+  const Suite& suite = results.suite;
+  const bool samples = suite.budgets[budget].spp > 0;
+  double most = 0;
+  std::string best;
+  for (const Summary& s : results.summaries) {
+    const double ratio = (samples ? s.equal_sample : s.equal_time).value;
+    if (s.budget != budget || suite.methods[s.method].name == suite.baseline || !(ratio > most)) continue;
+    most = ratio;
+    best = suite.methods[s.method].name;
+  }
+  return best;
+}
+
 void add_pictures(const Results& results, Json& document, std::vector<ReportImage>& images) {
   const Suite& suite = results.suite;
   const size_t budget = shown_budget(suite);
+  const std::string best = best_method(results, budget);
   Json scenes = Json::array();
   for (size_t s = 0; s < results.scenes.size(); ++s) {
     const SceneResult& result = results.scenes[s];
+    if (result.reference.files.empty()) continue;
     Json scene{{"name", result.scene.entry.name}, {"credit", result.scene.entry.credit}, {"images", Json::array()}};
+    const Image reference = mean_of_references(result);
     for (size_t m = 0; m < suite.methods.size(); ++m) {
       const Cell* cell = results.find(s, m, budget);
       if (!cell) continue;
       const std::string id = fmt::format("s{}m{}", s, m);
-      images.push_back({id, read_window(cell->runs[0].record.image, result.scene)});
+      Image pixels = read_window(cell->runs[0].record.image, result.scene);
+      images.push_back({id + "flip", compute_metric(Metric::kFlip, pixels, {&reference, 1}).map});
+      images.push_back({id, std::move(pixels)});
       Json image{{"name", suite.methods[m].name},
                  {"image", id},
+                 {"flip", id + "flip"},
                  {"label", fmt::format("relMSE {:.3g}", cell->runs[0].relmse)}};
       if (suite.methods[m].name == suite.baseline) image["role"] = "baseline";
+      if (suite.methods[m].name == best) image["role"] = "best";
       scene["images"].push_back(std::move(image));
     }
     if (scene["images"].empty()) continue;
     const std::string id = fmt::format("s{}r", s);
-    Image reference = read_window(result.reference.files.front(), result.scene);
-    const Image other = read_window(result.reference.files.back(), result.scene);
-    for (size_t i = 0; i < reference.data.size(); ++i) reference.data[i] = 0.5f * (reference.data[i] + other.data[i]);
-    images.push_back({id, std::move(reference)});
+    images.push_back({id, reference});
     scene["images"].push_back({{"name", "reference"}, {"image", id}, {"label", ""}, {"role", "reference"}});
     for (const CropWindow& w : result.scene.entry.insets)
       scene["insets"].push_back(

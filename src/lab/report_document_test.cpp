@@ -198,6 +198,22 @@ TEST(ReportDocument, OddTextsReachThePageUnchanged) {
   EXPECT_TRUE(contains(page, "\\\"quoted\\\""));
 }
 
+TEST(ReportDocument, TheBestMethodHasTheLargestRatioAtTheBudget) {
+  Results results = three_cells();
+  results.suite.methods.push_back({"crn", {}, {}, true});
+  results.suite.budgets = {{24, 0}, {0, 10}};
+  EXPECT_EQ(best_method(results, 0), "");
+  const auto summary = [](size_t method, size_t budget, double sample, double time) {
+    Summary s{method, budget, 2};
+    s.equal_sample.value = sample, s.equal_time.value = time;
+    return s;
+  };
+  results.summaries = {summary(0, 0, 9, 9), summary(1, 0, 4, 2), summary(2, 0, 3, 3), summary(1, 1, kNone, 2),
+                       summary(2, 1, kNone, 3)};
+  EXPECT_EQ(best_method(results, 0), "iicv") << "at equal samples; the baseline is not compared with itself";
+  EXPECT_EQ(best_method(results, 1), "crn") << "a budget in seconds has ratios at equal time only";
+}
+
 TEST(ReportDocument, ShowsTheBudgetOfTheSuite) {
   Suite suite = three_cells().suite;
   suite.budgets = {{24, 0}, {48, 0}, {96, 0}};
