@@ -25,7 +25,8 @@ function set_error_colours(colours) {
 /** Value to place on the scale: 0 at its low end, 1 at its high end; `gain` in stops. */
 function scale_position({ low, high, logarithmic }, gain) {
   const factor = 2 ** gain;
-  return logarithmic ? (v) => Math.log(v * factor / low) / Math.log(high / low) : (v) => (v * factor - low) / (high - low);
+  if (logarithmic) return (v) => Math.log(v * factor / low) / Math.log(high / low);
+  return (v) => (v * factor - low) / (high - low);
 }
 
 /** The values at `n` places from one end of the scale to the other. */
@@ -39,13 +40,14 @@ function scale_values({ low, high, logarithmic }, gain, n) {
 /** Texts of the scale's marks, evenly spaced. */
 function scale_marks(scale, gain) {
   const n = scale.logarithmic ? Math.round(Math.log10(scale.high / scale.low)) + 1 : 5;
-  return scale_values(scale, gain, n).map((v) => scale.percent
-    ? `${v > 0 ? "+" : ""}${significant(v * 100, 3)} %` : String(significant(v, 2)).replace(/(\.\d*?)0+$/, "$1").replace(/\.$/, ""));
+  const plain = (v) => significant(v, 2).replace(/(\.\d*?)0+$/, "$1").replace(/\.$/, "");  // without zeros at the end
+  return scale_values(scale, gain, n).map((v) => (scale.percent ? percent_text(v) : plain(v)));
 }
 
 function css_ramp(ramp) {
-  const colours = [0, 32, 64, 96, 128, 160, 192, 224, 255].map((i) => RAMPS[ramp][i]);
-  return `linear-gradient(90deg, ${colours.map((c) => `rgb(${c & 255} ${(c >> 8) & 255} ${(c >> 16) & 255})`).join(", ")})`;
+  const css = (c) => `rgb(${c & 255} ${(c >> 8) & 255} ${(c >> 16) & 255})`;
+  const colours = [0, 32, 64, 96, 128, 160, 192, 224, 255].map((i) => css(RAMPS[ramp][i]));
+  return `linear-gradient(90deg, ${colours.join(", ")})`;
 }
 
 function paint_values(values, scale, gain, pixels) {
@@ -84,7 +86,8 @@ function range_table(plane) {
 function display_tables(image, display, { tone, exposure }) {
   if (display === "range") {
     const n = image.width * image.height;
-    return [0, 1, 2].map((c) => Math.min(c, image.channels - 1)).map((c) => range_table(image.halves.subarray(c * n, (c + 1) * n)));
+    return [0, 1, 2].map((c) => Math.min(c, image.channels - 1)).map((c) =>
+      range_table(image.halves.subarray(c * n, (c + 1) * n)));
   }
   const table = display === "direction" ? direction_table() : tone_table(tone, exposure);
   return [table, table, table];

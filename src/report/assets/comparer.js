@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The image comparer: its state, and how the state becomes a link. Controls, gestures, insets and what draws are in files
-// of their own; all of them call update().
+// The image comparer: its state, and how the state becomes a link. Controls, gestures, insets and what draws are in
+// files of their own; all of them call update().
 
 const KEEP_LINK_AFTER = 250;  // milliseconds without a change
 const LEAST_STAGE = 190;      // CSS pixels
@@ -27,12 +27,14 @@ class Comparer {
     this.strip = new InsetStrip(this);
     this.histograms = new HistogramPanel(this);
     this.element = el("section", { class: "comparer", id: block.id, "aria-label": "Image comparer" },
-      this.controls.head, this.stage, this.readout.element, this.histograms.element, this.readout.more, this.strip.element);
+      this.controls.head, this.stage, this.readout.element, this.histograms.element, this.readout.more,
+      this.strip.element);
     this.gestures = new Gestures(this);
     this.choose_scene(0);
     const fit = () => { this.fit_stage(); this.request_draw(); };
     const observer = new ResizeObserver(fit);
-    for (const element of [this.element, this.stage, this.controls.head, this.readout.element, this.histograms.element]) observer.observe(element);
+    const { head } = this.controls;
+    [this.element, this.stage, head, this.readout.element, this.histograms.element].forEach((e) => observer.observe(e));
     window.addEventListener("resize", fit);
     new IntersectionObserver((entries, observer) => {
       if (!entries.some((entry) => entry.isIntersecting)) return;
@@ -43,7 +45,7 @@ class Comparer {
     }, { rootMargin: "200px" }).observe(this.element);
   }
 
-  // ---- what is chosen -------------------------------------------------------------------------------------------------
+  // ---- what is chosen ---------------------------------------------------------------------------------------------
 
   get scene() { return this.block.scenes[this.state.scene]; }
   get images() { return this.scene.images; }
@@ -111,10 +113,11 @@ class Comparer {
     this.update();
   }
 
-  // ---- links ----------------------------------------------------------------------------------------------------------
+  // ---- links ------------------------------------------------------------------------------------------------------
 
   link() {
-    const { a, b, layout, mode, layer, tone, exposure, gain, split, histogram } = this.state, { zoom, x, y } = this.viewport;
+    const { a, b, layout, mode, layer, tone, exposure, gain, split, histogram } = this.state;
+    const { zoom, x, y } = this.viewport;
     return format_link({
       comparer: this.block.id, scene: this.scene.name, a: this.images[a].name, b: this.images[b].name, layout, mode,
       layer: mode === "layer" ? layer : null, tone: tone === "srgb" ? null : tone,
@@ -136,7 +139,8 @@ class Comparer {
       const found = this.images.findIndex((image) => image.name === name);
       return found < 0 ? otherwise : found;
     };
-    if (link.zoom > 0) this.viewport.set(link.zoom, link.x ?? this.size.width / 2, link.y ?? this.size.height / 2, this.size);
+    const { size } = this;
+    if (link.zoom > 0) this.viewport.set(link.zoom, link.x ?? size.width / 2, link.y ?? size.height / 2, size);
     if (link.insets) {
       this.set_insets([]);
       link.insets.forEach((inset) => this.add_inset(inset));
@@ -146,7 +150,7 @@ class Comparer {
     this.update({ ...given, a: index(link.a, this.state.a), b: index(link.b, this.state.b) });
   }
 
-  // ---- drawing --------------------------------------------------------------------------------------------------------
+  // ---- drawing ----------------------------------------------------------------------------------------------------
 
   panes() {
     return layout_panes({ width: this.stage.clientWidth, height: this.stage.clientHeight }, this.state, this.images);
@@ -175,7 +179,7 @@ class Comparer {
     if (whole) this.load_others();
   }
 
-  /** Gives the stage the largest height with which controls, stage, pixel values and scale are in the window together. */
+  /** Gives the stage the largest height with which controls, pixel values and scale are in the window with it. */
   fit_stage() {
     const { head } = this.controls, { element: foot } = this.readout, width = this.stage.clientWidth;
     if (!width) return;

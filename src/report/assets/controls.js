@@ -10,7 +10,8 @@ const KEYS = [
   ["Shift + 1 … 0", "image on the right of the split"],
   ["Space", "exchange the two images"],
   ["S, G", "split, grid (again: one image)"],
-  [VIEW_BUTTONS.map((mode) => VIEWS[mode].key.toUpperCase()).join(", "), VIEW_BUTTONS.map((mode) => VIEWS[mode].name).join(", ")],
+  [VIEW_BUTTONS.map((mode) => VIEWS[mode].key.toUpperCase()).join(", "),
+    VIEW_BUTTONS.map((mode) => VIEWS[mode].name).join(", ")],
   ["V, Shift + V", "next, previous layer of the file"],
   ["T", "next tone curve"],
   ["H", "histogram"],
@@ -32,41 +33,50 @@ class Controls {
     const update = (changes) => comparer.update(changes);
     this.scene = el("select", { "aria-label": "Scene", change: () => comparer.choose_scene(this.scene.selectedIndex) },
       comparer.block.scenes.map((scene) => el("option", {}, scene.name)));
-    this.mode = segmented("View", VIEW_BUTTONS.map((mode) => [mode, VIEWS[mode].name, view_hint(VIEWS[mode])]), (mode) => update({ mode }));
-    this.layer = el("select", { "aria-label": "Layer of the file", title: "Layer of the file (V)", change: () => this.choose_layer(this.layer.value) });
-    this.tone = el("select", { "aria-label": "Tone curve", title: "Tone curve (T)", change: () => update({ tone: this.tone.value }) },
+    this.mode = segmented("View", VIEW_BUTTONS.map((mode) => [mode, VIEWS[mode].name, view_hint(VIEWS[mode])]),
+      (mode) => update({ mode }));
+    this.layer = el("select", { "aria-label": "Layer of the file", title: "Layer of the file (V)",
+      change: () => this.choose_layer(this.layer.value) });
+    this.tone = el("select", { "aria-label": "Tone curve", title: "Tone curve (T)",
+      change: () => update({ tone: this.tone.value }) },
       Object.entries(TONES).map(([tone, { name, hint }]) => el("option", { value: tone, title: hint }, name)));
-    this.layout = segmented("Layout", [["single", "One", "One image"], ["split", "Split", "Two images with a slider (S)"],
-      ["grid", "Grid", "All images (G)"]], (layout) => update({ layout }));
+    this.layout = segmented("Layout", [["single", "One", "One image"],
+      ["split", "Split", "Two images with a slider (S)"], ["grid", "Grid", "All images (G)"]],
+      (layout) => update({ layout }));
     this.stops = el("input", { type: "range", min: -STOPS_RANGE, max: STOPS_RANGE, step: 0.25,
       input: () => this.set_stops(Number(this.stops.value)) });
     this.stops_value = el("output");
     this.stops_name = el("span");
-    const button = (text, hint, click) => el("button", { type: "button", title: hint, "aria-label": hint, click }, text);
+    const button = (text, hint, click) =>
+      el("button", { type: "button", title: hint, "aria-label": hint, click }, text);
     const tools = el("div", { class: "tools" },
       button("−", "Zoom out (−)", () => this.zoom(0.5)), button("+", "Zoom in (+)", () => this.zoom(2)),
-      button("Fit", "Fit the stage (F)", () => this.fit()), button("1:1", "One pixel to one pixel (O)", () => this.one_to_one()),
+      button("Fit", "Fit the stage (F)", () => this.fit()),
+      button("1:1", "One pixel to one pixel (O)", () => this.one_to_one()),
       this.inset = button("Inset", "Draw an inset (N)", () => comparer.gestures.toggle_drawing()),
       this.histogram = button("Histogram", "Histogram (H)", () => this.toggle_histogram()),
       this.figure = button("Figure", "Save a figure with all insets as PNG (P)", () => this.save()),
       button("Link", "Copy a link to this view", () => this.copy_link()),
       button("Full", "Full screen", () => this.full_screen()), button("?", "Keys", () => this.help.showModal()));
-    this.help = el("dialog", { class: "keys", "aria-label": "Keys", click: (event) => event.target === this.help && this.help.close() },
+    this.help = el("dialog", { class: "keys", "aria-label": "Keys",
+      click: (event) => event.target === this.help && this.help.close() },
       el("table", {}, KEYS.map(([keys, text]) => el("tr", {}, el("th", { scope: "row" }, keys), el("td", {}, text)))),
       el("form", { method: "dialog" }, el("button", { autofocus: "" }, "Close")));
     this.methods = el("div", { class: "methods", role: "group", "aria-label": "Images" });
-    this.other = el("select", { "aria-label": "Image on the right", change: () => update({ b: this.other.selectedIndex }) });
+    this.other = el("select", { "aria-label": "Image on the right",
+      change: () => update({ b: this.other.selectedIndex }) });
     this.other_label = el("label", { class: "other" }, "Right: ", this.other);
     this.head = el("div", { class: "head" },
-      el("div", { class: "bar" }, comparer.block.scenes.length > 1 && this.scene || null, this.layout.group, this.methods, this.other_label),
+      el("div", { class: "bar" }, comparer.block.scenes.length > 1 && this.scene || null, this.layout.group,
+        this.methods, this.other_label),
       el("div", { class: "bar" }, this.mode.group, this.layer, this.tone,
         el("label", { class: "stops" }, this.stops_name, this.stops, this.stops_value), tools), this.help);
-    this.handle = el("div", { class: "handle", role: "slider", tabindex: "0", "aria-label": "Split position", "aria-valuemin": 0,
-      "aria-valuemax": 100, keydown: (event) => this.move_handle(event) });
+    this.handle = el("div", { class: "handle", role: "slider", tabindex: "0", "aria-label": "Split position",
+      "aria-valuemin": 0, "aria-valuemax": 100, keydown: (event) => this.move_handle(event) });
     comparer.stage.append(this.handle);
   }
 
-  // ---- showing the state ----------------------------------------------------------------------------------------------
+  // ---- showing the state ------------------------------------------------------------------------------------------
 
   show() {
     const { state, images, scene, painter } = this.comparer;
@@ -101,18 +111,20 @@ class Controls {
     this.shown_scene = scene;
     this.scene.selectedIndex = this.comparer.state.scene;
     this.methods.replaceChildren(...images.map((image, i) => el("button",
-      { type: "button", title: i < 10 ? `Key ${(i + 1) % 10}` : null, click: (event) => this.choose(i, event.shiftKey) },
+      { type: "button", title: i < 10 ? `Key ${(i + 1) % 10}` : null,
+        click: (event) => this.choose(i, event.shiftKey) },
       el("kbd", { "aria-hidden": "true" }, i < 10 ? String((i + 1) % 10) : ""), el("span", {}, image.name),
       el("small", {}, image.label ?? (image.role === "reference" ? "reference" : "")))));
     this.other.replaceChildren(...images.map((image) => el("option", {}, image.name)));
     this.layers = [...new Set(images.flatMap((image) => (image.layers ?? []).map((layer) => layer.name)))];
-    this.layer.replaceChildren(el("option", { value: "" }, "Layer: image"), ...this.layers.map((name) => el("option", { value: name }, name)));
+    this.layer.replaceChildren(el("option", { value: "" }, "Layer: image"),
+      ...this.layers.map((name) => el("option", { value: name }, name)));
     this.layer.hidden = !this.layers.length;
   }
 
-  // ---- what the buttons do --------------------------------------------------------------------------------------------
+  // ---- what the buttons do ----------------------------------------------------------------------------------------
 
-  /** Shows image `i` at the left, or at the right of the split. Out of the grid it is shown alone; once more leads back. */
+  /** Shows image `i` at the left, or at the right of the split; from the grid alone, and once more leads back. */
   choose(i, right = false) {
     const { state, images } = this.comparer;
     if (i >= images.length) return;

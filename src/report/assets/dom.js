@@ -34,6 +34,7 @@ function download(blob, name) {
 }
 
 /** A name that is good for a file. */
-const file_name = (text) => text.normalize("NFKD").replace(/[^\w.-]+/g, "-").replace(/^-+|-+$/g, "").toLowerCase() || "image";
+const file_name = (text) => text.normalize("NFKD").replace(/[^\w.-]+/g, "-").replace(/^-+|-+$/g, "").toLowerCase()
+  || "image";
 
 const clamp = (value, low, high) => Math.min(high, Math.max(low, value));

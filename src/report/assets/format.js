@@ -37,5 +37,8 @@ function number_text(value, column) {
   }
 }
 
+/** "+2.5 %": a fraction with its sign. */
+const percent_text = (value, digits = 3) => `${value > 0 ? "+" : ""}${significant(value * 100, digits)} %`;
+
 /** "+1.5", "0", "−2": stops of exposure. */
 const stops_text = (stops) => (stops > 0 ? "+" : stops < 0 ? "−" : "") + String(Math.abs(stops));

@@ -48,15 +48,16 @@ class Gestures {
     comparer.update();
   }
 
+  /** Zooms where the stage has the focus; elsewhere the page scrolls. */
   wheel(event) {
     const { comparer } = this;
-    if (!event.ctrlKey && document.activeElement !== comparer.canvas && !document.fullscreenElement) return;  // the page scrolls
+    if (!event.ctrlKey && document.activeElement !== comparer.canvas && !document.fullscreenElement) return;
     event.preventDefault();
     const pixels = event.deltaY * (event.deltaMode === 1 ? 30 : 1);
     this.zoom(Math.exp(-pixels * WHEEL_RATE), this.place(event));
   }
 
-  // ---- pointers -------------------------------------------------------------------------------------------------------
+  // ---- pointers ---------------------------------------------------------------------------------------------------
 
   down(event) {
     const place = this.place(event);
@@ -75,7 +76,8 @@ class Gestures {
     } else if (before && this.touches.size === 2) {
       const [other] = [...this.touches].filter(([id]) => id !== event.pointerId).map(([, p]) => p);
       const distance = (p) => Math.hypot(p.px - other.px, p.py - other.py);
-      this.zoom(distance(place) / Math.max(distance(before), 1), { px: (place.px + other.px) / 2, py: (place.py + other.py) / 2 });
+      this.zoom(distance(place) / Math.max(distance(before), 1),
+        { px: (place.px + other.px) / 2, py: (place.py + other.py) / 2 });
     } else if (before && !(event.pointerType === "touch" && comparer.viewport.is_fit)) {
       const pane = comparer.pane_at(place.px, place.py) ?? comparer.panes()[0];
       comparer.viewport.pan(pane, comparer.size, place.px - before.px, place.py - before.py);
@@ -121,7 +123,7 @@ class Gestures {
     return { x: x - w / 2, y: y - h / 2, w, h };
   }
 
-  // ---- keys -----------------------------------------------------------------------------------------------------------
+  // ---- keys -------------------------------------------------------------------------------------------------------
 
   /** Does what the key says; false for keys without a meaning. */
   key(event) {
@@ -141,12 +143,15 @@ class Gestures {
     const actions = {
       " ": () => comparer.update({ a: state.b, b: state.a }),
       s: () => layout("split"), g: () => layout("grid"),
-      v: () => controls.next_layer(event.shiftKey ? -1 : 1), t: () => controls.next_tone(), h: () => controls.toggle_histogram(),
+      v: () => controls.next_layer(event.shiftKey ? -1 : 1), t: () => controls.next_tone(),
+      h: () => controls.toggle_histogram(),
       e: () => stops(event.shiftKey ? -0.5 : 0.5), r: () => controls.set_stops(0),
-      "+": () => controls.zoom(2), "=": () => controls.zoom(2), "-": () => controls.zoom(0.5), "−": () => controls.zoom(0.5),
+      "+": () => controls.zoom(2), "=": () => controls.zoom(2), "-": () => controls.zoom(0.5),
+      "−": () => controls.zoom(0.5),
       f: () => controls.fit(), o: () => controls.one_to_one(),
       arrowleft: () => pan(1, 0), arrowright: () => pan(-1, 0), arrowup: () => pan(0, 1), arrowdown: () => pan(0, -1),
-      "[": () => comparer.update({ split: state.split - 0.02 }), "]": () => comparer.update({ split: state.split + 0.02 }),
+      "[": () => comparer.update({ split: state.split - 0.02 }),
+      "]": () => comparer.update({ split: state.split + 0.02 }),
       n: () => this.toggle_drawing(), p: () => controls.save(), "?": () => controls.help.showModal(),
     };
     for (const mode of VIEW_BUTTONS) actions[VIEWS[mode].key] = () => comparer.update({ mode });
@@ -172,7 +177,7 @@ function spanned(from, to, size) {
   return { x, y, w: right - x, h: bottom - y };
 }
 
-/** The comparer that keys belong to where nothing has the focus: the one under the pointer, else the only one in sight. */
+/** Whose keys they are where nothing has the focus: of the comparer under the pointer, or the only one in sight. */
 function comparer_in_sight() {
   if (Gestures.hovered) return Gestures.hovered;
   const seen = Gestures.all.filter(({ comparer }) => {
@@ -182,8 +187,8 @@ function comparer_in_sight() {
   return seen.length === 1 ? seen[0] : null;
 }
 
-// A key goes to the comparer that has the focus or, where nothing has it, the one in sight. On buttons the space bar presses
-// them, and in form fields all keys are theirs. Keys that scroll the page need the focus or the pointer.
+// A key goes to the comparer that has the focus or, where nothing has it, the one in sight. On buttons the space bar
+// presses them, and in form fields all keys are theirs. Keys that scroll the page need the focus or the pointer.
 document.addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.metaKey || event.altKey || event.defaultPrevented) return;
   const { target } = event;

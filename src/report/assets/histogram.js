@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Histograms of what the stage shows: of each channel of a picture on a logarithmic axis, or of a view's numbers on their
-// scale. Counts are logarithmic.
+// Histograms of what the stage shows: of each channel of a picture on a logarithmic axis, or of a view's numbers on
+// their scale. Counts are logarithmic.
 
 const HISTOGRAM = { bins: 160, height: 110, channels: ["#e5484d", "#30a46c", "#3e8fe8"], low: 1e-4, high: 100 };
 const PICTURE_SCALE = { low: HISTOGRAM.low, high: HISTOGRAM.high, logarithmic: true };
@@ -8,8 +8,9 @@ const PICTURE_SCALE = { low: HISTOGRAM.low, high: HISTOGRAM.high, logarithmic: t
 /** Counts of values in the bins of a scale; values beyond its ends are in the first and the last bin. */
 function binned(values, scale, gain) {
   const bins = new Float64Array(HISTOGRAM.bins), place = scale_position(scale, gain);
+  const bin_of = (value) => clamp(Math.floor(place(value) * bins.length), 0, bins.length - 1);
   for (const value of values)
-    if (!Number.isNaN(value)) bins[value <= 0 && scale.logarithmic ? 0 : clamp(Math.floor(place(value) * bins.length), 0, bins.length - 1)]++;
+    if (!Number.isNaN(value)) bins[scale.logarithmic && value <= 0 ? 0 : bin_of(value)]++;
   return bins;
 }
 
@@ -50,7 +51,8 @@ class HistogramPanel {
     if (!state.histogram) return;
     const records = [...new Set(this.comparer.panes().map((pane) => pane.image))];
     const ready = records.map((record) => Boolean(painter.images(record)));
-    const key = [this.comparer.scene.name, state.mode, painter.view.depends(state), state.gain, size.width, records.map((r) => r.name), ready,
+    const key = [this.comparer.scene.name, state.mode, painter.view.depends(state), state.gain, size.width,
+      records.map((r) => r.name), ready,
       this.element.clientWidth, css_value("--ground")].join("|");
     if (key === this.key) return;
     this.key = key;

@@ -24,7 +24,7 @@ function base64_bytes(text) {
 
 const is_nan = (bits) => (bits & 0x7fff) > 0x7c00;
 
-/** Undoes predicted_halves() of src/report/image_block.h; the result has a plane of half-float bits for each channel. */
+/** Undoes predicted_halves() of src/report/image_block.h: a plane of half-float bits for each channel. */
 function unpredicted(bytes, width, height, channels) {
   const plane = width * height, n = plane * channels;
   const halves = new Uint16Array(n);
@@ -53,7 +53,7 @@ class ImageStore {
     this.loaded = new Map();  // id -> image
   }
 
-  /** The promise of {id, width, height, channels, halves}: `halves` holds the planes of the channels, half-float bits. */
+  /** The promise of {id, width, height, channels, halves}; `halves`: the channels' planes of half-float bits. */
   load(id) {
     const promise = this.cache.get(id) ?? this.decode(id);
     this.cache.delete(id);

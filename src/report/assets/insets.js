@@ -45,11 +45,12 @@ class InsetStrip {
     });
   }
 
-  /** Crops of every inset and image: [{inset, colour, crops: [{record, canvas, label}]}], canvas null where an image has
-   *  no such view; decodes what is missing. */
+  /** Crops of every inset and image: [{inset, colour, crops: [{record, canvas, label}]}], canvas null where an image
+   *  has no such view; decodes what is missing. */
   async rows() {
     const { images, insets, reference, painter } = this.comparer;
-    await Promise.all([...images, reference].filter(Boolean).flatMap((record) => [painter.prepare(record), painter.load(record.image)]));
+    await Promise.all([...images, reference].filter(Boolean).flatMap((record) =>
+      [painter.prepare(record), painter.load(record.image)]));
     return insets.map((inset, i) => ({
       inset,
       colour: INSET_COLOURS[i % INSET_COLOURS.length],
@@ -76,12 +77,14 @@ class InsetStrip {
     const head = el("tr", {}, el("td"), images.map((image) => el("th", { scope: "col" }, image.name)));
     const body = rows.map(({ inset, colour, crops }, i) => el("tr", {},
       el("th", { scope: "row" },
-        el("button", { type: "button", class: "remove", title: `Remove inset ${i + 1}`, "aria-label": `Remove inset ${i + 1}`,
+        el("button", { type: "button", class: "remove", title: `Remove inset ${i + 1}`,
+          "aria-label": `Remove inset ${i + 1}`,
           style: `--inset: ${colour}`, click: () => this.comparer.remove_inset(i) }, "×")),
       crops.map(({ record, canvas, label }) => {
         if (!canvas) return el("td", {}, this.comparer.painter.failure(record));
         canvas.setAttribute("role", "img");
-        canvas.setAttribute("aria-label", `Inset ${i + 1} at ${inset.x}, ${inset.y}: ${record.name}${label ? ", " + label : ""}`);
+        const place = `Inset ${i + 1} at ${inset.x}, ${inset.y}`;
+        canvas.setAttribute("aria-label", `${place}: ${record.name}${label ? ", " + label : ""}`);
         canvas.style.borderColor = colour;
         return el("td", {}, canvas, el("div", { class: "error" }, label));
       })));

@@ -10,7 +10,8 @@ const LINK_TEXTS = ["layer", "insets"];
 function parse_link(hash) {
   const parameters = new Map(hash.replace(/^#/, "").split("&").map((part) => part.split("=", 2)));
   const decode = (text) => { try { return decodeURIComponent(text); } catch { return text; } };
-  if (!["view", ...LINK_NUMBERS, ...Object.keys(LINK_WORDS), ...LINK_TEXTS].some((name) => parameters.get(name))) return null;
+  const names = ["view", ...LINK_NUMBERS, ...Object.keys(LINK_WORDS), ...LINK_TEXTS];
+  if (!names.some((name) => parameters.get(name))) return null;
   const [comparer, scene, a, b] = parameters.get("view")?.split("/").map(decode) ?? [];
   const link = { comparer, scene, a, b };
   for (const [name, words] of Object.entries(LINK_WORDS))

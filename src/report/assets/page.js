@@ -14,8 +14,9 @@ function draw_notes(block) {
   const shown = block.kind === "error" || block.items.length <= NOTES_SHOWN + 1 ? block.items.length : NOTES_SHOWN;
   const list = (items) => el("ul", {}, items.map((item) => el("li", {}, item)));
   const rest = block.items.slice(shown);
-  return el("aside", { class: `notes ${block.kind}`, "aria-label": names[block.kind] }, el("strong", {}, names[block.kind]),
-    list(block.items.slice(0, shown)), rest.length ? el("details", {}, el("summary", {}, `${rest.length} more`), list(rest)) : null);
+  return el("aside", { class: `notes ${block.kind}`, "aria-label": names[block.kind] },
+    el("strong", {}, names[block.kind]), list(block.items.slice(0, shown)),
+    rest.length ? el("details", {}, el("summary", {}, `${rest.length} more`), list(rest)) : null);
 }
 
 function draw_comparer(block) {
@@ -42,7 +43,8 @@ function draw_blocks(blocks) {
 
 function draw_section(section) {
   return el("section", { class: "part", id: section.id }, section.heading ? el("h2", {}, section.heading) : null,
-    (section.text ?? []).map((paragraph) => el("p", { class: "prose" }, rich(paragraph))), draw_blocks(section.blocks ?? []));
+    (section.text ?? []).map((paragraph) => el("p", { class: "prose" }, rich(paragraph))),
+    draw_blocks(section.blocks ?? []));
 }
 
 function draw_head() {
@@ -50,8 +52,10 @@ function draw_head() {
   const sections = (report.sections ?? []).filter((section) => section.heading);
   return [
     el("h1", {}, report.title), report.subtitle ? el("p", { class: "subtitle" }, rich(report.subtitle)) : "",
-    meta.length ? el("dl", {}, meta.map(([key, value]) => el("div", {}, el("dt", {}, key), el("dd", {}, String(value))))) : "",
-    sections.length > 1 ? el("nav", { "aria-label": "Sections" }, sections.map((s) => el("a", { href: `#${s.id}` }, s.heading))) : "",
+    meta.length ? el("dl", {}, meta.map(([key, value]) =>
+      el("div", {}, el("dt", {}, key), el("dd", {}, String(value))))) : "",
+    sections.length > 1 ? el("nav", { "aria-label": "Sections" },
+      sections.map((s) => el("a", { href: `#${s.id}` }, s.heading))) : "",
   ].filter(Boolean);
 }
 
@@ -62,14 +66,17 @@ function keep_link(hash) {
 
 function follow_link() {
   const link = parse_link(location.hash);
-  const comparer = link && (link.comparer === undefined ? comparers[0] : comparers.find((c) => c.block.id === link.comparer));
+  const comparer = link && (link.comparer === undefined ? comparers[0]
+    : comparers.find((c) => c.block.id === link.comparer));
   if (!comparer) return;
   comparer.open(link);
-  if (comparer.element.getBoundingClientRect().top > MOST_LEAD * window.innerHeight) comparer.element.scrollIntoView({ block: "start" });
+  const { top } = comparer.element.getBoundingClientRect();
+  if (top > MOST_LEAD * window.innerHeight) comparer.element.scrollIntoView({ block: "start" });
 }
 
 document.getElementById("head").append(...draw_head());
-document.body.classList.toggle("plain", !report.subtitle && !report.meta);  // a small title leaves the room to the images
+// A small title leaves the room to the images.
+document.body.classList.toggle("plain", !report.subtitle && !report.meta);
 document.getElementById("content").replaceChildren(...(report.sections ?? []).map(draw_section));
 follow_link();
 window.addEventListener("hashchange", follow_link);

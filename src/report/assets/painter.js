@@ -35,7 +35,7 @@ class Painter {
     return ids.map((id) => this.failures.get(id)).find(Boolean) ?? null;
   }
 
-  /** The decoded images of the view, or null while one is missing; then `done` is called when there is something new. */
+  /** The decoded images of the view, or null while one is missing; `done` is called when one has come. */
   images(record, done) {
     const { store } = this.comparer, ids = this.ids(record);
     if (!ids) return null;
@@ -70,7 +70,8 @@ class Painter {
     const { view } = this, { state } = this.comparer;
     const images = this.images(record, done);
     if (!images) return null;
-    const key = `${state.mode} ${view.depends(state)} ${view.scale ? state.gain : ""}`, old = this.paintings.get(record.name);
+    const key = `${state.mode} ${view.depends(state)} ${view.scale ? state.gain : ""}`,
+      old = this.paintings.get(record.name);
     if (old?.key === key) return old.canvas;
     const paint = view.scale ? (pixels) => paint_values(this.numbers_of(record).values, view.scale, state.gain, pixels)
       : (pixels) => paint_channels(images[0], display_tables(images[0], this.display(record), state), pixels);
@@ -98,7 +99,8 @@ class Painter {
     const { comparer, view } = this, { reference, store } = comparer;
     if (view.values) {
       const numbers = this.numbers_of(record);
-      return numbers ? `${view.label} ${view_number(view, mean_of(numbers.values, comparer.size.width, rectangle), 2)}` : "";
+      if (!numbers) return "";
+      return `${view.label} ${view_number(view, mean_of(numbers.values, comparer.size.width, rectangle), 2)}`;
     }
     if (!reference || comparer.state.mode === "layer") return "";
     if (record === reference) return "reference";

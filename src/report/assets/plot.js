@@ -32,7 +32,8 @@ const error_bars = {
         const x = points[i].x, low = to_y(point.low), high = to_y(point.high);
         context.beginPath();
         context.moveTo(x, low), context.lineTo(x, high);
-        context.moveTo(x - 4, low), context.lineTo(x + 4, low), context.moveTo(x - 4, high), context.lineTo(x + 4, high);
+        context.moveTo(x - 4, low), context.lineTo(x + 4, low), context.moveTo(x - 4, high),
+        context.lineTo(x + 4, high);
         context.stroke();
       });
       context.restore();
@@ -45,8 +46,8 @@ function points_of(series) {
     .filter((p) => Number.isFinite(p.y));
 }
 
-/** Ticks of a logarithmic axis: the points' own positions where they are few, else powers of ten, with 2 and 5 times these
- *  where the axis spans few of them. */
+/** Ticks of a logarithmic axis: the points' own positions where they are few, else powers of ten, with 2 and 5 times
+ *  these where the axis spans few of them. */
 function log_ticks({ min, max }, values) {
   const own = [...new Set(values)].sort((a, b) => a - b);
   if (own.length > 0 && own.length <= 6 && own.every((v, i) => i === 0 || v / own[i - 1] > 1.3)) return own;
@@ -73,8 +74,10 @@ function dataset_of(series) {
   const index = series_index(series.name), colour = css_value(`--series-${index}`), style = series.style ?? "line";
   return {
     label: series.name, data: points_of(series), type: style === "bars" ? "bar" : "line", borderColor: colour,
-    backgroundColor: style === "bars" ? colour + "99" : colour, borderWidth: style === "bars" ? 1 : 2, showLine: style !== "points",
-    borderDash: style === "dashed" ? [6, 5] : [], pointStyle: POINT_SHAPES[index], pointRadius: style === "dashed" ? 0 : 4,
+    backgroundColor: style === "bars" ? colour + "99" : colour, borderWidth: style === "bars" ? 1 : 2,
+    showLine: style !== "points",
+    borderDash: style === "dashed" ? [6, 5] : [], pointStyle: POINT_SHAPES[index],
+    pointRadius: style === "dashed" ? 0 : 4,
     pointHoverRadius: 6, maxBarThickness: 48,
   };
 }
@@ -84,7 +87,8 @@ function chart_of(block, canvas) {
   const ys = block.series.flatMap((s) => points_of(s).flatMap((p) => [p.y, p.low, p.high])).filter(Number.isFinite);
   const xs = block.series.flatMap((s) => s.x);
   const categories = block.x.scale === "category" ? [...new Set(xs)] : undefined;
-  const value_text = ({ y, low, high }) => significant(y, 3) + (Number.isFinite(low) ? ` (${significant(low, 3)} … ${significant(high, 3)})` : "");
+  const value_text = ({ y, low, high }) =>
+    significant(y, 3) + (Number.isFinite(low) ? ` (${significant(low, 3)} … ${significant(high, 3)})` : "");
   return new Chart(canvas, {
     type: "line",
     data: { labels: categories, datasets: block.series.map(dataset_of) },
@@ -96,7 +100,7 @@ function chart_of(block, canvas) {
       plugins: {
         legend: { labels: { color: text, usePointStyle: true, boxWidth: 10, boxHeight: 6, padding: 14 } },
         tooltip: { callbacks: {
-          title: ([item]) => `${block.x.label ?? ""} ${typeof item.raw.x === "number" ? significant(item.raw.x, 4) : item.raw.x}`.trim(),
+          title: ([{ raw: { x } }]) => `${block.x.label ?? ""} ${typeof x === "number" ? significant(x, 4) : x}`.trim(),
           label: (item) => `${item.dataset.label}: ${value_text(item.raw)}` } },
       },
     },
@@ -107,7 +111,8 @@ function plot_table(block) {
   const columns = [{ key: "series", title: "series", kind: "text" },
     { key: "x", title: block.x.label || "x", kind: block.x.scale === "category" ? "text" : "number", digits: 4 },
     { key: "y", title: block.y.label || "y", kind: "number" }];
-  const rows = block.series.flatMap((s) => points_of(s).map((p) => ({ series: s.name, x: p.x, y: { value: p.y, low: p.low, high: p.high } })));
+  const rows = block.series.flatMap((s) =>
+    points_of(s).map((p) => ({ series: s.name, x: p.x, y: { value: p.y, low: p.low, high: p.high } })));
   return el("details", {}, el("summary", {}, "Numbers"), draw_table({ caption: block.title, columns, rows }));
 }
 
@@ -120,5 +125,6 @@ function draw_plot(block) {
   };
   requestAnimationFrame(draw);  // when it has a size
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
-  return el("figure", { class: "plot" }, el("figcaption", {}, block.title), el("div", { class: "plot-area" }, canvas), plot_table(block));
+  return el("figure", { class: "plot" }, el("figcaption", {}, block.title), el("div", { class: "plot-area" }, canvas),
+    plot_table(block));
 }

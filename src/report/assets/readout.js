@@ -31,7 +31,8 @@ class Readout {
   /** The images whose values are shown: those on the stage and the reference. */
   records() {
     const { state, images, reference } = this.comparer;
-    const shown = state.layout === "grid" ? images : [images[state.a], ...(state.layout === "split" ? [images[state.b]] : [])];
+    const shown = state.layout === "grid" ? images
+      : [images[state.a], ...(state.layout === "split" ? [images[state.b]] : [])];
     return [...new Set([...shown, ...(reference ? [reference] : [])])];
   }
 

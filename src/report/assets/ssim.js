@@ -17,7 +17,8 @@ function shown_luma(image, tone, exposure) {
 /** Gaussian means of a window about each pixel; at the border the weights inside the image are scaled to sum to one. */
 function window_means(values, width, height) {
   const { radius, sigma } = SSIM;
-  const weights = Float32Array.from({ length: 2 * radius + 1 }, (_, k) => Math.exp(-((k - radius) ** 2) / (2 * sigma * sigma)));
+  const weights = Float32Array.from({ length: 2 * radius + 1 },
+    (_, k) => Math.exp(-((k - radius) ** 2) / (2 * sigma * sigma)));
   const along = (source, length, count, step, stride) => {
     const result = new Float32Array(source.length);
     for (let line = 0; line < count; line++)

@@ -13,7 +13,7 @@ function sorted_rows(rows, column, descending) {
   });
 }
 
-/** The cells to mark in a column: the best value, or those of each group of rows that have the same value of `within`. */
+/** The cells to mark in a column: the best value, or that of each group of rows with the same value of `within`. */
 function best_cells(rows, column, within) {
   if (!column.better) return new Set();
   const groups = new Map();
@@ -33,7 +33,8 @@ function best_cells(rows, column, within) {
 function table_cell(cell, column, is_best) {
   const value = cell_value(cell), more = cell !== null && typeof cell === "object" ? cell : {};
   const is_text = column.kind === "text";
-  if (value === null) return el("td", { class: is_text ? null : "number" }, el("span", { class: "missing", title: "no value" }, "–"), note_of(more));
+  const none = el("span", { class: "missing", title: "no value" }, "–");
+  if (value === null) return el("td", { class: is_text ? null : "number" }, none, note_of(more));
   const text = is_text ? String(value) : number_text(value, column);
   const shown = more.link ? el("a", { href: more.link }, text) : text;
   const interval = Number.isFinite(more.low) && Number.isFinite(more.high)
@@ -68,5 +69,6 @@ function draw_table(block) {
   };
   fill(block.rows);
   return el("figure", { class: "table", tabindex: "0", role: "region", "aria-label": block.caption ?? "Table" },
-    el("table", {}, block.caption ? el("caption", {}, block.caption) : null, el("thead", {}, el("tr", {}, heads)), body));
+    el("table", {}, block.caption ? el("caption", {}, block.caption) : null, el("thead", {}, el("tr", {}, heads)),
+      body));
 }

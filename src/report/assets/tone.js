@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tone curves: linear light in, light of the screen in [0, 1] out, before the encoding of sRGB.
+// Tone curves, for each channel alone: linear light in, light of the screen in [0, 1] out, before the encoding of sRGB.
 
 const TONES = {
   srgb: { name: "sRGB", hint: "Values above 1 are white", curve: (v) => v },
-  reinhard: { name: "Reinhard", hint: "v / (1 + v)", curve: (v) => v / (1 + v) },  // [Reinhard2002] Eq. (3), per channel
+  reinhard: { name: "Reinhard", hint: "v / (1 + v)", curve: (v) => v / (1 + v) },  // [Reinhard2002] Eq. (3)
   // The rational approximation that HDR-FLIP uses, too (src/film/flip.cpp), [Andersson2021].
   aces: { name: "ACES", hint: "Approximation of the ACES film curve",
     curve: (v) => (0.9036 * v * v + 0.018 * v) / (0.8748 * v * v + 0.354 * v + 0.14) },

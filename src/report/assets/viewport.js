@@ -11,7 +11,7 @@ class Viewport {
 
   get is_fit() { return this.zoom === null; }
 
-  /** {zoom, x, y} for a pane and an image of these sizes: screen pixels per image pixel, image position in the centre. */
+  /** {zoom, x, y} for a pane and an image: screen pixels per image pixel, image position in the middle. */
   resolve(pane, image) {
     const fit = Math.min(pane.w / image.width, pane.h / image.height);
     const zoom = this.zoom === null ? fit : clamp(this.zoom, Math.min(fit, 1) / 4, MOST_ZOOM);
@@ -64,7 +64,7 @@ function layout_panes(stage, state, images) {
   return [{ ...whole, clip: whole, image: images[state.a], side: "a" }];
 }
 
-/** The height of a stage of this width that shows its panes whole with nothing around them, where it is not too high. */
+/** The height of a stage of this width that its panes fill, `most` where that is less. */
 function natural_height(width, most, layout, n, aspect) {
   if (layout !== "grid") return Math.min(width / aspect, most);
   const columns = best_columns({ width, height: most }, n, aspect);
