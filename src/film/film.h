@@ -94,6 +94,7 @@ inline constexpr const char* kSeed = "seed";             ///< decimal; after a m
 inline constexpr const char* kSampling = "sampling";     ///< "independent" or "crn"
 inline constexpr const char* kSceneHash = "scene_hash";  ///< content of the scene
 inline constexpr const char* kSettings = "settings";     ///< all options that change the samples except the seed
+inline constexpr const char* kLightPaths = "light_paths_per_sample";  ///< light films only (splat_layer.h)
 inline constexpr const char* kVersion = "version";       ///< of the program
 inline constexpr const char* kCommand = "command";       ///< command line
 inline constexpr const char* kComplete = "complete";     ///< "true", or "false" for an interrupted render

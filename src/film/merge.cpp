@@ -67,7 +67,7 @@ Attributes merge_attributes(std::span<const Attributes> films, std::span<const s
                             std::vector<size_t>& order) {
   std::map<uint64_t, size_t> owner;  // seed -> film
   for (size_t i = 0; i < films.size(); ++i) {
-    for (const char* key : {film_key::kSampling, film_key::kSceneHash, film_key::kSettings})
+    for (const char* key : {film_key::kSampling, film_key::kSceneHash, film_key::kSettings, film_key::kLightPaths})
       check_same(key, attribute(films[0], key), attribute(films[i], key), names[0], names[i]);
     for (uint64_t seed : seeds_of(films[i], names[i])) {
       const auto [it, is_new] = owner.emplace(seed, i);

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+// Splats: what light paths add to pixels anywhere on the film.
+//
+// A light film is a Film beside that of the camera, with groups and a count of its own. One of its samples is a bundle
+// of kBundlePaths light paths, numbered through: bundle b holds the paths b * kBundlePaths and following, belongs to
+// group b % groups, and its value at a pixel is the sum of its splats there divided by kBundlePaths. So every pixel has
+// the same count, means are divided by the film's own number of light paths, and reading, writing, merging and
+// estimators are those of any film.
+//
+// The bits do not depend on threads or interruptions: each bundle keeps its splats in a list; after a round of bundles the
+// lists are summed in path order, in double precision, one band of rows at a time, and only then the film changes. Rounds
+// end at the same counts however often a render is interrupted.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "film/film.h"
+
+namespace covary {
+
+inline constexpr uint32_t kBundlePaths = 256;
+
+/// Light paths in a light film.
+inline uint64_t light_paths(const Film& film) {
+  return film.counts().empty() ? 0 : uint64_t{film.count(0, 0)} * kBundlePaths;
+}
+
+/// A splat that is not finite or negative. It is left out and counted.
+struct BadSplat {
+  uint64_t path;
+  int x, y;  ///< pixel in the full frame
+  Spectrum value;
+};
+
+struct SplatCounts {
+  uint64_t n_splats = 0;  ///< in the film's crop, bad ones not counted
+  uint64_t n_not_finite = 0, n_negative = 0;
+  std::vector<BadSplat> bad_splats;  ///< the first few, in path order
+};
+
+class SplatLayer {
+ public:
+  /// Bundles of a round; 2^18 paths, and some 16 MB of splats.
+  static constexpr uint32_t kRoundBundles = 1024;
+
+  /// Continues `film`, which must outlive the layer. Marks it as a light film. Throws Error(kInput) when its pixels differ
+  /// in count, or when it has samples and is not a light film with bundles of this size.
+  explicit SplatLayer(Film& film);
+
+  /// Begins the next round on the way to `target` bundles (a multiple of the film's groups), dropping what an unfinished
+  /// one has gathered; false: the film has as many.
+  bool begin_round(uint32_t target);
+  /// The bundles of the round.
+  uint32_t first_bundle() const { return first_; }
+  uint32_t end_bundle() const { return end_; }
+
+  /// Adds `value` (radiance of one pixel for a single light path, not divided by their number) at the pixel (x, y) of the
+  /// full frame; nothing where that lies outside of the crop. The paths of a bundle come in ascending order and from one
+  /// thread; different bundles may come from different threads.
+  void add(uint64_t path, int x, int y, const Spectrum& value);
+
+  /// Adds the round to the film. All its bundles must be complete.
+  void finish_round();
+  /// Of the finished rounds.
+  const SplatCounts& counts() const { return counts_; }
+
+ private:
+  struct Splat {
+    uint32_t pixel;  // in the film, row by row
+    Spectrum value;
+  };
+  struct Bundle {
+    std::vector<Splat> splats;
+    std::vector<BadSplat> bad;
+  };
+  void add_band(int first_row, int end_row);
+  void count_splats();
+
+  Film& film_;
+  uint32_t first_ = 0, end_ = 0;
+  std::vector<Bundle> bundles_;
+  SplatCounts counts_;
+};
+
+}  // namespace covary
