@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The report as a reader uses it, in headless Chromium: real pointer and key events, and what the page then shows.
 
-The images of sample_report.cpp are 64 x 32. `ramp/reference` is (x/64, y/64, 1/4), `bright` lies 1/8 above it, `dark` 1/16
-below, `broken` is not a number in its first 8 x 8 pixels. `bright` has FLIP x/64, StdError 1/8, N (0, -1 left and 1 right of
-the middle, 1/2) and samples x/64. `stripes/reference` is x mod 2, its `bright` is 1/2 everywhere, its `white` 4.
+The images of sample_report.cpp are 64 x 32. `ramp/reference` is (x/64, y/64, 1/4), `bright` lies 1/8 above it, `dark`
+1/16 below, `broken` is not a number in its first 8 x 8 pixels. `bright` has FLIP x/64, StdError 1/8, N (0, -1 left and
+1 right of the middle, 1/2) and samples x/64. `stripes/reference` is x mod 2, its `bright` is 1/2 everywhere, its
+`white` 4.
 """
 import base64
 import json
@@ -56,8 +57,9 @@ class PageTest(unittest.TestCase):
 
     def colour(self, fx, fy):
         """The stage's colour at a fraction of its width and height."""
-        return tuple(self.page.evaluate(f"(() => {{ const c = document.querySelector('{STAGE} canvas');"
-                                        f"return [...c.getContext('2d').getImageData(c.width * {fx}, c.height * {fy}, 1, 1).data]; }})()")[:3])
+        return tuple(self.page.evaluate(
+            f"(() => {{ const c = document.querySelector('{STAGE} canvas'), place = [c.width * {fx}, c.height * {fy}];"
+            "return [...c.getContext('2d').getImageData(...place, 1, 1).data]; })()")[:3])
 
     def stage_point(self, fx, fy):
         left, top, width, height = self.page.box(STAGE)
@@ -91,11 +93,13 @@ class Page(PageTest):
         self.assertEqual(self.page.text("#results .prose code"), "code --apart")
         self.assertIn("a scene failed", self.page.text("#failures .notes.error"))
         self.assertEqual(self.page.evaluate("performance.getEntriesByType('resource').length"), 0)
-        self.assertEqual(self.page.evaluate("[...document.querySelectorAll('nav a')].map(a => a.hash)"), ["#results", "#images", "#failures"])
+        self.assertEqual(self.page.evaluate("[...document.querySelectorAll('nav a')].map(a => a.hash)"),
+            ["#results", "#images", "#failures"])
 
     def test_many_warnings_fold(self):
         self.open()
-        shown = "[...document.querySelectorAll('#failures .warning li')].filter(e => e.checkVisibility()).map(e => e.innerText)"
+        shown = ("[...document.querySelectorAll('#failures .warning li')]"
+                 ".filter(e => e.checkVisibility()).map(e => e.innerText)")
         self.assertEqual(self.page.evaluate(shown), [f"warning {i}" for i in range(1, 6)])
         self.assertEqual(self.page.text("#failures .warning summary"), "3 more")
         self.page.press("#failures .warning summary")
@@ -106,12 +110,14 @@ class Page(PageTest):
         text = self.page.text(".table tbody")
         for part in ("0.00350 … 0.00390", "published 0.0088", "9.2×", "2.50 min", "4.0 %", "–"):
             self.assertIn(part, text)
-        self.assertEqual(self.page.evaluate("[...document.querySelector('.table').querySelectorAll('.best')].map(e => e.innerText)"),
+        self.assertEqual(self.page.evaluate("[...document.querySelector('.table').querySelectorAll('.best')].map(e => "
+            "e.innerText)"),
                          ["0.00370", "9.2×"])
 
     def test_best_of_each_group(self):
         self.open()
-        self.assertEqual(self.page.evaluate("[...document.querySelectorAll('#failures .best')].map(e => e.innerText)"), ["0.500", "3.50"])
+        self.assertEqual(self.page.evaluate("[...document.querySelectorAll('#failures .best')].map(e => e.innerText)"),
+            ["0.500", "3.50"])
         self.assertEqual(self.page.text("#failures tbody td:last-child"), "2")
 
     def test_table_sorts(self):
@@ -120,7 +126,8 @@ class Page(PageTest):
         self.page.press(header % 2)
         first = self.page.evaluate("[...document.querySelectorAll('.table')][0].querySelector('tbody th').innerText")
         self.assertEqual(first, "IICV")
-        self.assertEqual(self.page.evaluate("document.querySelector('.table thead th:nth-child(2)').ariaSort"), "ascending")
+        self.assertEqual(self.page.evaluate("document.querySelector('.table thead th:nth-child(2)').ariaSort"),
+            "ascending")
         self.page.press(header % 2)
         names = "[...document.querySelectorAll('.table')][0].querySelectorAll('tbody th')"
         self.assertEqual(self.page.evaluate(f"[...{names}].map(e => e.innerText)"), ["path tracing", "IDUW", "IICV"])
@@ -131,7 +138,8 @@ class Page(PageTest):
 
     def test_tables_fill_the_width(self):
         self.open()
-        widths = "[...document.querySelectorAll('#results .table table, #content')].map(e => e.getBoundingClientRect().width)"
+        widths = ("[...document.querySelectorAll('#results .table table, #content')]"
+                  ".map(e => e.getBoundingClientRect().width)")
         whole, table = sorted(self.page.evaluate(widths), reverse=True)[:2]
         self.assertGreater(table, 0.98 * whole)
 
@@ -140,25 +148,30 @@ class Page(PageTest):
         self.page.box(".plot canvas")
         self.settle()
         self.assertIn("nine times below", self.page.evaluate("document.querySelector('.plot canvas').ariaLabel"))
-        self.assertEqual(self.page.evaluate("['x', 'y'].map(a => Chart.getChart(document.querySelector('.plot canvas')).scales[a].type)"),
+        self.assertEqual(self.page.evaluate("['x', 'y'].map(a => Chart.getChart(document.querySelector('.plot "
+            "canvas')).scales[a].type)"),
                          ["logarithmic", "logarithmic"])
         # The upper end of the first error bar: the cap reaches 4 pixels to both sides of the point.
         cap = self.page.evaluate(
             "(() => { const canvas = document.querySelector('.plot canvas'), chart = Chart.getChart(canvas);"
-            "const x = chart.scales.x.getPixelForValue(48), y = chart.scales.y.getPixelForValue(0.18), ratio = chart.currentDevicePixelRatio;"
+            "const x = chart.scales.x.getPixelForValue(48), y = chart.scales.y.getPixelForValue(0.18);"
+            "const ratio = chart.currentDevicePixelRatio;"
             "const area = canvas.getContext('2d').getImageData((x - 3) * ratio, (y - 1) * ratio, 1, 3).data;"
             "return Math.max(area[3], area[7], area[11]); })()")
         self.assertGreater(cap, 100, "no cap of an error bar")
-        self.assertEqual(self.page.evaluate("document.querySelector('.plot tbody').rows.length"), 4 + 3 + 2, "points without a value are left out")
+        self.assertEqual(self.page.evaluate("document.querySelector('.plot tbody').rows.length"), 4 + 3 + 2,
+            "points without a value are left out")
 
     def test_text_can_be_read_in_light_and_dark(self):
         for scheme in ("light", "dark"):
             self.page.colour_scheme(scheme)
             self.open()
             names = ["--ground", "--text", "--text-soft", "--accent", "--error", "--warning"]
-            values = self.page.evaluate(f"{names}.map(n => getComputedStyle(document.documentElement).getPropertyValue(n).trim())")
+            values = self.page.evaluate(f"{names}.map(n => "
+                f"getComputedStyle(document.documentElement).getPropertyValue(n).trim())")
             light = {n: sum(w * (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4) for w, c in
-                            zip((0.2126, 0.7152, 0.0722), (int(v[i:i + 2], 16) / 255 for i in (1, 3, 5)))) for n, v in zip(names, values)}
+                            zip((0.2126, 0.7152, 0.0722),
+                                (int(v[i:i + 2], 16) / 255 for i in (1, 3, 5)))) for n, v in zip(names, values)}
             for name in names[1:]:
                 low, high = sorted((light[name], light["--ground"]))
                 self.assertGreaterEqual((high + 0.05) / (low + 0.05), 4.5, f"{name} in {scheme}")  # WCAG 2, level AA
@@ -176,7 +189,8 @@ class Comparer(PageTest):
     def test_begins_with_the_best_method(self):
         self.open()
         self.choose_scene(1)
-        self.assertEqual(self.label(), "stripes & more: white (relMSE 9) left, reference (reference) right; picture, 0 stops")
+        self.assertEqual(self.label(), "stripes & more: white (relMSE 9) left, reference (reference) right; picture, "
+            "0 stops")
 
     def test_number_keys_flip(self):
         self.open()
@@ -185,7 +199,8 @@ class Comparer(PageTest):
         for key, offset in (("1", 0), ("2", 1 / 8), ("3", -1 / 16)):
             self.press_key(key)
             self.assertEqual(self.colour(*self.at_centre_of_pixel(40, 20)), self.picture(40, 20, offset), key)
-            self.assertEqual(self.page.evaluate("[...document.querySelectorAll('.methods button')].findIndex(b => b.ariaPressed === 'true')"), int(key) - 1)
+            self.assertEqual(self.page.evaluate("[...document.querySelectorAll('.methods button')].findIndex(b => "
+                "b.ariaPressed === 'true')"), int(key) - 1)
         self.press_key("4")
         self.assertEqual(self.colour(*self.at_centre_of_pixel(3, 6)), (0, 255, 0), "not-a-number is green")
 
@@ -239,7 +254,8 @@ class Comparer(PageTest):
         at = self.at_centre_of_pixel(10, 20)
         value = [2 * (v + 1 / 8) for v in (10 / 64, 20 / 64, 1 / 4)]
         self.press_key("t")
-        self.assertEqual(self.page.evaluate("document.querySelector('[aria-label=\"Tone curve\"]').selectedOptions[0].text"), "Reinhard")
+        self.assertEqual(self.page.evaluate("document.querySelector('[aria-label=\"Tone "
+            "curve\"]').selectedOptions[0].text"), "Reinhard")
         self.assertEqual(self.colour(*at), tuple(srgb(v / (1 + v)) for v in value))
         self.press_key("t")
         aces = [(2.51 * w * w + 0.03 * w) / (2.43 * w * w + 0.59 * w + 0.14) for w in (0.6 * v for v in value)]
@@ -265,7 +281,8 @@ class Comparer(PageTest):
         ramp = self.page.evaluate("JSON.parse(document.getElementById('document').textContent).error_colours")
         for got, shift in zip(self.colour(*self.at_centre_of_pixel(16, 4)), (16, 8, 0)):
             self.assertAlmostEqual(got, (ramp[8] >> shift) & 255, delta=3)  # 1/4 of 32 steps
-        self.assertEqual(self.colour(*self.at_centre_of_pixel(50, 4)), (2, 2, 18), "the reference does not differ from itself")
+        self.assertEqual(self.colour(*self.at_centre_of_pixel(50, 4)), (2, 2, 18),
+            "the reference does not differ from itself")
         self.assertEqual(self.marks(".scale"), ["0", "0.25", "0.5", "0.75", "1"])
         self.page.move(*self.stage_point(*self.at_centre_of_pixel(16, 8)))
         self.assertIn("FLIP 0.25", self.page.text(".pixel"))
@@ -276,12 +293,14 @@ class Comparer(PageTest):
         return self.page.evaluate(f"[...document.querySelectorAll('{selector} .marks span')].map(e => e.innerText)")
 
     def crop_labels(self):
-        return self.page.evaluate("[...document.querySelectorAll('.crops tbody tr')].map(r => [...r.querySelectorAll('td')].map(e => e.innerText))")
+        return self.page.evaluate("[...document.querySelectorAll('.crops tbody tr')].map(r => "
+            "[...r.querySelectorAll('td')].map(e => e.innerText))")
 
     def test_ssim_is_that_of_the_definition(self):
         self.open("#view=main/stripes%20%26%20more/bright/reference&mode=ssim")
         weight = [math.exp(-d * d / 4.5) for d in range(-5, 6)]
-        odd = sum(w for d, w in zip(range(-5, 6), weight) if (20 + d) % 2) / sum(weight)  # mean of the stripes about x = 20
+        # The mean of the stripes about x = 20.
+        odd = sum(w for d, w in zip(range(-5, 6), weight) if (20 + d) % 2) / sum(weight)
         mx, my, vx, vy = 188 / 255, odd, 0, odd - odd * odd
         ssim = (2 * mx * my + 1e-4) * 9e-4 / ((mx * mx + my * my + 1e-4) * (vx + vy + 9e-4))
         self.page.move(*self.stage_point(*self.at_centre_of_pixel(20, 16)))
@@ -298,12 +317,14 @@ class Comparer(PageTest):
         self.assertIn(f"predicted error {(1 / 64) / (grey * grey + 0.01):.2g}", self.page.text(".pixel"))
         self.assertFalse(self.page.evaluate("document.querySelector('[data-value=predicted]').disabled"))
         self.choose_scene(1)
-        self.assertTrue(self.page.evaluate("document.querySelector('[data-value=predicted]').disabled"), "no standard errors")
+        self.assertTrue(self.page.evaluate("document.querySelector('[data-value=predicted]').disabled"),
+            "no standard errors")
         self.assertIn("; picture,", self.label())
 
     def test_layers(self):
         self.open("#view=main/ramp/bright/reference&layout=single")
-        self.assertEqual(self.page.evaluate("[...document.querySelector('[aria-label=\"Layer of the file\"]').options].map(o => o.value)"),
+        self.assertEqual(self.page.evaluate("[...document.querySelector('[aria-label=\"Layer of the "
+            "file\"]').options].map(o => o.value)"),
                          ["", "StdError", "N", "samples"])
         self.press_key("v")
         self.assertEqual(self.colour(*self.at_centre_of_pixel(10, 20)), (srgb(1 / 8),) * 3)
@@ -313,10 +334,13 @@ class Comparer(PageTest):
         self.page.move(*self.stage_point(*self.at_centre_of_pixel(10, 20)))
         self.assertIn("bright 0 −1.000 0.5000", self.page.text(".pixel"))
         self.press_key("v")
-        self.assertEqual((self.colour(*self.at_centre_of_pixel(0, 20)), self.colour(*self.at_centre_of_pixel(63, 20))), ((0,) * 3, (255,) * 3))
+        self.assertEqual((self.colour(*self.at_centre_of_pixel(0, 20)), self.colour(*self.at_centre_of_pixel(63, 20))),
+            ((0,) * 3, (255,) * 3))
         self.page.wait("location.hash.includes('mode=layer&layer=samples')")
         self.press_key("v")
         self.assertEqual(self.colour(*self.at_centre_of_pixel(10, 20)), self.picture(10, 20, 1 / 8))
+        self.press_key("3", "v")
+        self.assertIn("ramp: bright", self.label(), "dark has no layers")
 
     def test_histogram(self):
         self.open("#view=main/ramp/dark/reference&layout=single")
@@ -324,7 +348,8 @@ class Comparer(PageTest):
         self.settle()
         text = self.page.text(".histogram figcaption")
         negative = sum(x < 4 or y < 4 for x in range(64) for y in range(32))
-        self.assertIn(f"dark min −0.0625 · mean {(31.5 / 64 + 15.5 / 64 + 0.25) / 3 - 1 / 16:.3f} · max 0.922 · {negative} pixels negative", text)
+        self.assertIn(f"dark min −0.0625 · mean {(31.5 / 64 + 15.5 / 64 + 0.25) / 3 - 1 / 16:.3f} · max 0.922 · "
+            f"{negative} pixels negative", text)
         self.page.wait("location.hash.includes('histogram=1')")
         drawn = ("(() => { const c = document.querySelector('.histogram canvas');"
                  "const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; let n = 0;"
@@ -366,7 +391,8 @@ class Comparer(PageTest):
         self.open()
         self.page.move(*self.stage_point(*self.at_centre_of_pixel(16, 8)))
         text = self.page.text(".pixel")
-        for part in ("x 16, y 8", "bright 0.3750 0.2500 0.3750", "dark 0.1875 0.06250 0.1875", "reference 0.2500 0.1250 0.2500"):
+        for part in ("x 16, y 8", "bright 0.3750 0.2500 0.3750", "dark 0.1875 0.06250 0.1875",
+            "reference 0.2500 0.1250 0.2500"):
             self.assertIn(part, text)
         self.assertIn(f"error {(1 / 64) / ((0.625 / 3) ** 2 + 0.01):.2f}", text)
 
@@ -400,7 +426,8 @@ class Comparer(PageTest):
             self.assertEqual(self.colour(fx, fy), self.picture(28, 18, offset), (column, row))
 
     def choose_scene(self, index):
-        self.page.evaluate("(() => { const s = document.querySelector('#main select'); s.selectedIndex = %d; s.dispatchEvent(new Event('change')); })()" % index)
+        self.page.evaluate("(() => { const s = document.querySelector('#main select'); s.selectedIndex = %d; "
+            "s.dispatchEvent(new Event('change')); })()" % index)
         self.settle()
 
     def test_scenes(self):
@@ -424,13 +451,15 @@ class Comparer(PageTest):
 
 class Insets(PageTest):
     def crops(self):
-        return self.page.evaluate("[...document.querySelectorAll('.crops tbody tr')].map(r => [...r.querySelectorAll('.error')].map(e => e.innerText))")
+        return self.page.evaluate("[...document.querySelectorAll('.crops tbody tr')].map(r => "
+            "[...r.querySelectorAll('.error')].map(e => e.innerText))")
 
     def test_suite_inset_has_the_error_of_each_crop(self):
         self.open()
         rows = self.crops()
         total = [(0.125 ** 2) / (((x + y) / 64 + 0.25) ** 2 / 9 + 0.01) for y in range(8, 16) for x in range(8, 24)]
-        self.assertEqual(rows, [["reference", f"relMSE {sum(total) / len(total):.2g}", f"relMSE {sum(total) / len(total) / 4:.2g}", "relMSE 0"]])
+        self.assertEqual(rows, [["reference", f"relMSE {sum(total) / len(total):.2g}",
+            f"relMSE {sum(total) / len(total) / 4:.2g}", "relMSE 0"]])
 
     def test_drawn_inset_and_figure(self):
         self.open()
@@ -443,8 +472,10 @@ class Insets(PageTest):
         name, data = self.page.downloaded(".png")
         self.assertEqual(name, "ramp-image.png")
         width, height, colours = self.page.evaluate(
-            "(async () => { const blob = await (await fetch('data:image/png;base64,%s')).blob(), image = await createImageBitmap(blob);"
-            "const context = new OffscreenCanvas(image.width, image.height).getContext('2d'); context.drawImage(image, 0, 0);"
+            "(async () => { const blob = await (await fetch('data:image/png;base64,%s')).blob();"
+            "const image = await createImageBitmap(blob);"
+            "const context = new OffscreenCanvas(image.width, image.height).getContext('2d');"
+            "context.drawImage(image, 0, 0);"
             "const data = context.getImageData(0, 0, image.width, image.height).data, colours = new Set();"
             "for (let i = 0; i < data.length; i += 4) colours.add(`${data[i]},${data[i + 1]},${data[i + 2]}`);"
             "return [image.width, image.height, [...colours]]; })()" % base64.b64encode(data).decode())
@@ -473,11 +504,13 @@ class Insets(PageTest):
 
 class Links(PageTest):
     def test_link_opens_exactly_this_view(self):
-        link = "#view=main/stripes%20%26%20more/reference/bright&layout=single&mode=image&exposure=-1&gain=0&zoom=100&x=11.5&y=5"
+        link = ("#view=main/stripes%20%26%20more/reference/bright&layout=single&mode=image"
+                "&exposure=-1&gain=0&zoom=100&x=11.5&y=5")
         self.open(link)
         self.assertEqual(self.colour(0.5, 0.5), (188, 188, 188), "pixel 11 is 1, one stop darker")
         left, top, width, height = self.page.box(STAGE)
-        self.assertEqual(self.colour(0.5 + 100 / width, 0.5), (0, 0, 0), "pixel 12, 100 screen pixels to the right, is 0")
+        self.assertEqual(self.colour(0.5 + 100 / width, 0.5), (0, 0, 0),
+            "pixel 12, 100 screen pixels to the right, is 0")
         self.press_key("r")
         self.page.evaluate("document.querySelector('#main canvas').focus()")
         self.press_key("r")
@@ -488,11 +521,13 @@ class Links(PageTest):
         self.open()
         self.page.press(".table a")
         self.page.wait("document.querySelector('#main canvas').ariaLabel.includes('squared error')")
-        self.assertIn("bright (relMSE 0.09) left, reference (reference) right", self.page.evaluate("document.querySelector('#main canvas').ariaLabel"))
+        self.assertIn("bright (relMSE 0.09) left, reference (reference) right",
+            self.page.evaluate("document.querySelector('#main canvas').ariaLabel"))
 
     def test_link_without_names(self):
         self.open("#layout=grid&mode=error&gain=2")
-        self.assertEqual(self.label(), "ramp: reference (reference), bright (relMSE 0.09), dark (relMSE 0.02), broken (relMSE 0); squared error, +2 stops")
+        self.assertEqual(self.label(), "ramp: reference (reference), bright (relMSE 0.09), dark (relMSE 0.02), broken "
+            "(relMSE 0); squared error, +2 stops")
 
     def test_unknown_names_are_passed_over(self):
         self.open("#view=main/no/no/no&layout=no&mode=no&zoom=no&insets=1,2")
@@ -513,7 +548,8 @@ class SmallScreen(PageTest):
         self.open("#layout=grid&mode=error")
         self.page.evaluate("document.querySelector('#main').scrollIntoView({block: 'start', behavior: 'instant'})")
         self.settle()
-        top, bottom, stage = self.page.evaluate("['.head', '.scale', '.stage'].map((q, i) => document.querySelector('#main ' + q)"
+        top, bottom, stage = self.page.evaluate("['.head', '.scale', '.stage'].map((q, i) => "
+            "document.querySelector('#main ' + q)"
                                                 ".getBoundingClientRect()[['top', 'bottom', 'height'][i]])")
         self.assertGreaterEqual(top, 0)
         self.assertLessEqual(bottom, 844)
@@ -524,7 +560,8 @@ class SmallScreen(PageTest):
         x, y = self.stage_point(0.5, 0.5)
 
         def touch(kind, *points):
-            self.page.command("Input.dispatchTouchEvent", type=kind, touchPoints=[{"x": px, "y": py, "id": i} for i, (px, py) in enumerate(points)])
+            self.page.command("Input.dispatchTouchEvent", type=kind,
+                touchPoints=[{"x": px, "y": py, "id": i} for i, (px, py) in enumerate(points)])
         self.page.command("Emulation.setTouchEmulationEnabled", enabled=True, maxTouchPoints=2)
         touch("touchStart", (x - 20, y + 30), (x + 20, y + 30))
         for spread in (30, 40, 60):
@@ -537,7 +574,8 @@ class SmallScreen(PageTest):
 
 class View(PageTest):
     def covary(self, *arguments, **more):
-        return subprocess.run([os.environ["COVARY"], "view", *arguments], cwd=self.folder.name, capture_output=True, text=True, timeout=60, **more)
+        return subprocess.run([os.environ["COVARY"], "view", *arguments], cwd=self.folder.name, capture_output=True,
+            text=True, timeout=60, **more)
 
     def write(self, name, value, size=(4, 3), layers=(), **more):
         channels = {c: [value] * (size[0] * size[1]) for c in "RGB"}
@@ -552,40 +590,47 @@ class View(PageTest):
 
     def test_images_at_hand(self):
         self.write("a.exr", 0.5), self.write("b.exr", 0.6), self.write("r.exr", 0.5)
-        result = self.covary("a.exr", "b.exr", "--reference", "r.exr", "-o", "out.html", "--inset", "1,1,2,1", "--title", "Two")
+        result = self.covary("a.exr", "b.exr", "--reference", "r.exr", "-o", "out.html", "--inset", "1,1,2,1",
+            "--title", "Two")
         self.assertEqual((result.returncode, result.stdout, result.stderr), (0, "", ""))
         self.page.open(f"file://{self.folder.name}/out.html")
         self.page.wait("document.querySelector('.crops')")
-        self.assertEqual(self.page.evaluate("[...document.querySelectorAll('.methods button')].map(b => b.innerText.replace(/\\s+/g, ' '))"),
+        self.assertEqual(self.page.evaluate("[...document.querySelectorAll('.methods button')].map(b => "
+            "b.innerText.replace(/\\s+/g, ' '))"),
                          ["1 r reference", "2 a relMSE 0", "3 b relMSE 0.0385"])
 
     def test_layers_flip_and_predicted_error(self):
         errors = [(f"StdError.{c}", 0.05) for c in "RGB"]
-        self.write("a.exr", 0.5, layers=errors + [(f"N.{c}", 0.5) for c in "XYZ"] + [("depth.Z", 3), ("A", 1), ("group00.R", 1),
-                                                                                     ("group00.G", 1), ("group00.B", 1)])
+        others = [(f"N.{c}", 0.5) for c in "XYZ"] + [(f"group00.{c}", 1) for c in "RGB"] + [("depth.Z", 3), ("A", 1)]
+        self.write("a.exr", 0.5, layers=errors + others)
         self.write("r.exr", 0.4)
         self.assertEqual(self.covary("a.exr", "-o", "out.html").returncode, 0)
         self.open_page("out.html", "#mode=predicted")
         predicted = 0.05 ** 2 / (0.5 ** 2 + 0.01)
-        self.assertIn(f"a (predicted relMSE {predicted:.3g}); predicted error", self.page.evaluate("document.querySelector('canvas').ariaLabel"))
-        self.assertEqual(self.page.evaluate("[...document.querySelector('[aria-label=\"Layer of the file\"]').options].map(o => o.value)"),
+        self.assertIn(f"a (predicted relMSE {predicted:.3g}); predicted error",
+            self.page.evaluate("document.querySelector('canvas').ariaLabel"))
+        self.assertEqual(self.page.evaluate("[...document.querySelector('[aria-label=\"Layer of the "
+            "file\"]').options].map(o => o.value)"),
                          ["", "N", "StdError", "depth.Z"])
         self.page.move(*self.middle())
         self.assertIn(f"predicted error {predicted:.2g}", self.page.text(".pixel"))
         self.assertEqual(self.covary("a.exr", "-r", "r.exr", "-o", "both.html").returncode, 0)
         self.open_page("both.html", "#mode=flip&layout=single")
         self.page.move(*self.middle())
-        compared = subprocess.run([os.environ["COVARY"], "compare", "a.exr", "-r", "r.exr", "--metric", "flip", "--json", "flip.json"],
+        compared = subprocess.run([os.environ["COVARY"], "compare", "a.exr", "-r", "r.exr", "--metric", "flip",
+            "--json", "flip.json"],
                                   cwd=self.folder.name, capture_output=True, text=True, timeout=60)
         self.assertEqual(compared.returncode, 0, compared.stderr)
         flip = float(re.search(r"0\.\d+", compared.stdout)[0])
         self.assertIn(f"FLIP {flip:.2g}", self.page.text(".pixel"))
-        self.assertIn(f"relMSE {0.1 ** 2 / (0.4 ** 2 + 0.01):.3g}, predicted {predicted:.3g}", self.page.text(".methods"))
+        self.assertIn(f"relMSE {0.1 ** 2 / (0.4 ** 2 + 0.01):.3g}, predicted {predicted:.3g}",
+            self.page.text(".methods"))
         whole = (Path(self.folder.name) / "both.html").stat().st_size
         self.assertEqual(self.covary("a.exr", "-r", "r.exr", "-o", "both.html", "--small").returncode, 0)
         self.assertLess((Path(self.folder.name) / "both.html").stat().st_size, whole)
         self.open_page("both.html")
-        self.assertEqual(self.page.evaluate("['flip', 'predicted', 'ssim'].map(m => document.querySelector(`[data-value=${m}]`).disabled)"),
+        self.assertEqual(self.page.evaluate("['flip', 'predicted', 'ssim'].map(m => "
+            "document.querySelector(`[data-value=${m}]`).disabled)"),
                          [True, True, False])
 
     def middle(self):
@@ -598,11 +643,13 @@ class View(PageTest):
         for size in ((128, 72), (64, 96)):
             for name, value in (("a.exr", 0.5), ("b.exr", 0.6), ("c.exr", 0.4), ("r.exr", 0.5)):
                 self.write(name, value, size)
-            self.assertEqual(self.covary("a.exr", "b.exr", "c.exr", "--reference", "r.exr", "-o", "fit.html").returncode, 0)
+            self.assertEqual(self.covary("a.exr", "b.exr", "c.exr", "--reference", "r.exr", "-o",
+                "fit.html").returncode, 0)
             for hash in ("", "#mode=error", "#layout=grid&mode=difference"):
                 self.open_page("fit.html", hash)
                 title, values, scale, stage = self.page.evaluate(
-                    "['h1', '.pixel', '.scale', '.stage'].map((q, i) => document.querySelector(q).getBoundingClientRect()[i % 3 ? 'bottom' : 'height'])")
+                    "['h1', '.pixel', '.scale', '.stage'].map((q, i) =>"
+                    " document.querySelector(q).getBoundingClientRect()[i % 3 ? 'bottom' : 'height'])")
                 self.assertLess(title, 30, "a small title")
                 self.assertLessEqual(max(values, scale), 900, f"{size} {hash}")
                 if "grid" not in hash:
@@ -624,9 +671,12 @@ class View(PageTest):
     def test_wrong_usage(self):
         self.write("a.exr", 0.5)
         (Path(self.folder.name) / "b.exr").write_bytes(exr({c: [1] * 4 for c in "RGB"}, (2, 2)))
-        for code, message, *arguments in ((2, "must end in .html", "a.exr", "-o", "a.png"), (2, "expected X,Y,WIDTH,HEIGHT", "a.exr", "-o", "o.html", "--inset", "1,2"),
-                                          (2, "does not fit into the 4 x 3 pixels", "a.exr", "-o", "o.html", "--inset", "3,0,2,1"),
-                                          (1, "frame of 4 x 3 pixels, b.exr one of 2 x 2", "a.exr", "b.exr", "-o", "o.html")):
+        page = ("a.exr", "-o", "o.html")
+        for code, message, *arguments in (
+                (2, "must end in .html", "a.exr", "-o", "a.png"),
+                (2, "expected X,Y,WIDTH,HEIGHT", *page, "--inset", "1,2"),
+                (2, "does not fit into the 4 x 3 pixels", *page, "--inset", "3,0,2,1"),
+                (1, "frame of 4 x 3 pixels, b.exr one of 2 x 2", "a.exr", "b.exr", "-o", "o.html")):
             result = self.covary(*arguments)
             self.assertEqual(result.returncode, code, result.stderr)
             self.assertIn(message, result.stderr)

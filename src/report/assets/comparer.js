@@ -77,6 +77,8 @@ class Comparer {
     next.split = clamp(next.split, 0, 1);
     this.state = next;
     if (!this.painter.offers(next.mode)) next.mode = "image";
+    const has = (k) => this.painter.ids(this.images[k]);
+    if ("mode" in changes && !("a" in changes) && !has(next.a)) next.a = this.images.findIndex((_, k) => has(k));
     this.state.aspect = this.size.width / this.size.height;
     this.canvas.style.touchAction = this.viewport.is_fit ? "pan-y" : "none";
     this.controls.show();

@@ -97,7 +97,7 @@ class HistogramPanel {
       context.fillStyle = css_value("--line");
       context.fillRect(0, y, width, 1);
       context.fillStyle = css_value("--text-soft");
-      context.fillText(significant(count, 1), 2, y - 2);
+      if (y > 11) context.fillText(significant(count, 1), 2, y - 2);
     }
     histograms.forEach((counts, c) => {
       const colour = histograms.length === 3 ? HISTOGRAM.channels[c] : css_value("--accent");
