@@ -4,8 +4,8 @@
 // so that a result does not depend on threads, tiles or order, any sample can be replayed alone, and common random
 // numbers differ from independent ones in one thing only: the pixel is left out of the key.
 //
-// The dimension is itself an address (vertex of the path, event at that vertex). Two neighbouring pixels' paths read the
-// same number for the same event although one of them may have drawn fewer numbers before it.
+// The dimension is itself an address (subpath, vertex of it, event at that vertex). Two neighbouring pixels' paths
+// read the same number for the same event although one of them may have drawn fewer numbers before it.
 #pragma once
 
 #include <cstdint>
@@ -42,9 +42,12 @@ enum class Event : uint32_t {
 };
 inline constexpr uint32_t kEventsPerVertex = 16;
 
+/// Where the part of a path begins whose vertices are counted.
+enum class Subpath : uint32_t { kCamera, kLight };
+
 enum class Sampling : uint32_t { kIndependent, kCrn };
 
-/// Stream of the numbers of one path. Copying is cheap; there is no state.
+/// Stream of the numbers of one path, at first those of its camera subpath. Copying is cheap; there is no state.
 class PathRandom {
  public:
   /// Key of a path. `pass` numbers the passes of a plan; `pixel` is y * width + x in the full frame, so that crops see
@@ -54,6 +57,14 @@ class PathRandom {
         sampling_(sampling) {}
 
   Sampling sampling() const { return sampling_; }
+
+  /// The numbers of a subpath of the same path, which share none with another subpath's. Call it on the numbers as
+  /// constructed. `index` tells several of one kind apart.
+  PathRandom subpath(Subpath kind, uint32_t index = 0) const {
+    PathRandom random = *this;
+    random.key_ += ((uint64_t{index} * kSubpathKinds + static_cast<uint32_t>(kind)) << 32) * kStep;
+    return random;
+  }
 
   /// One number in [0, 1), a multiple of 2^-24.
   float get_1d(uint32_t vertex, Event event) const { return to_unit(static_cast<uint32_t>(bits(vertex, event) >> 32)); }
@@ -66,9 +77,11 @@ class PathRandom {
  private:
   static float to_unit(uint32_t u) { return static_cast<float>(u >> 8) * 0x1p-24f; }
   uint64_t bits(uint32_t vertex, Event event) const {
-    const uint64_t dimension = vertex * kEventsPerVertex + static_cast<uint32_t>(event);
-    return mix64(key_ + (dimension + 1) * 0x9e3779b97f4a7c15ull);
+    const uint64_t dimension = vertex * kEventsPerVertex + static_cast<uint32_t>(event);  // less than 2^32
+    return mix64(key_ + (dimension + 1) * kStep);
   }
+  static constexpr uint64_t kStep = 0x9e3779b97f4a7c15ull;  // odd, so no two dimensions share a number
+  static constexpr uint32_t kSubpathKinds = 2;
   uint64_t key_;
   Sampling sampling_;
 };

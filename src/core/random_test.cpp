@@ -23,18 +23,24 @@ struct Address {
   uint32_t pass = 0;
   uint64_t pixel = 1000;
   uint64_t sample = 0;
+  uint64_t subpath = 0;  // 0: camera, n: light subpath n - 1
   uint32_t vertex = 2;
   Event event = Event::kDirection;
 };
 using Generator = std::function<Vec2(const Address&)>;
 
-PathRandom path(const Address& a) { return {a.sampling, a.seed, a.pass, a.pixel, a.sample}; }
+PathRandom path(const Address& a) {
+  const PathRandom random(a.sampling, a.seed, a.pass, a.pixel, a.sample);
+  return a.subpath == 0 ? random.subpath(Subpath::kCamera)
+                        : random.subpath(Subpath::kLight, static_cast<uint32_t>(a.subpath - 1));
+}
 Vec2 covary_numbers(const Address& a) { return path(a).get_2d(a.vertex, a.event); }
 
 /// Planted bug: coordinates are combined by addition of multiples, as if hashing were not needed.
 Vec2 additive_numbers(const Address& a) {
   const double k = a.seed * 0.618033988749895 + a.pass * 0.7548776662466927 + a.pixel * 0.5698402909980532 +
-                   a.sample * 0.8191725133961645 + a.vertex * 0.6710436067037893 + double(a.event) * 0.2865123;
+                   a.sample * 0.8191725133961645 + a.vertex * 0.6710436067037893 + double(a.event) * 0.2865123 +
+                   a.subpath * 0.4503599627370496;
   const double l = k * 1.3247179572;
   return {float(k - std::floor(k)) * kOneMinusEpsilon, float(l - std::floor(l)) * kOneMinusEpsilon};
 }
@@ -50,6 +56,7 @@ const Walk kWalks[] = {
     {"pixels", [](Address& a, uint64_t by) { a.pixel += by; }},
     {"rows", [](Address& a, uint64_t by) { a.pixel += 720 * by; }},
     {"samples", [](Address& a, uint64_t by) { a.sample += by; }},
+    {"subpaths", [](Address& a, uint64_t by) { a.subpath += by; }},
     {"vertices", [](Address& a, uint64_t by) { a.vertex += by; }},
     {"events", [](Address& a, uint64_t by) { a.event = Event(uint32_t(a.event) + by); }},
 };
@@ -188,6 +195,18 @@ TEST(PathRandom, CommonNumbersLeaveOutThePixelAndNothingElse) {
   const PathRandom random = path(crn), copy = random;
   random.get_1d(9, Event::kLobe);
   EXPECT_EQ(random.get_2d(2, Event::kDirection), copy.get_2d(2, Event::kDirection));
+}
+
+// Films that are continued or merged rely on these.
+TEST(PathRandom, AddressesKeepTheirNumbers) {
+  const auto bits = [](float u) { return static_cast<uint32_t>(u * 0x1p24f); };
+  const PathRandom random(Sampling::kIndependent, 7, 1, 1000, 3), crn(Sampling::kCrn, 7, 1, 1000, 3);
+  EXPECT_EQ(bits(random.get_1d(0, Event::kPixel)), 5967396u);
+  EXPECT_EQ(bits(random.get_2d(2, Event::kDirection).y), 7371280u);
+  EXPECT_EQ(bits(crn.get_1d((1u << 20) + 4, Event::kLobe)), 2745078u);
+  EXPECT_EQ(bits(random.subpath(Subpath::kCamera).get_1d(0, Event::kPixel)), 5967396u);
+  EXPECT_EQ(bits(random.subpath(Subpath::kLight).get_1d(0, Event::kPixel)), 10187763u);
+  EXPECT_EQ(bits(random.subpath(Subpath::kLight, 5).get_1d(0, Event::kPixel)), 6422205u);
 }
 
 // Of 10 000 pairs of 24-bit numbers from two seeds 0.0006 are expected to be equal; from one seed all are.
