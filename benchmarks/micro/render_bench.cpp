@@ -79,7 +79,7 @@ void shadow_rays(benchmark::State& state, const std::string& name) {
     const PathRandom random = path_random(loaded, i, 0);
     SurfaceHit hit;
     if (!loaded.scene->intersect(camera_ray(loaded, i, random), hit)) continue;
-    const Emitter& light = select_light(*loaded.scene, random.get_1d(1, Event::kLightChoice));
+    const Emitter& light = UniformLights(*loaded.scene).select(random.get_1d(1, Event::kLightChoice));
     rays.push_back(shadow_ray(hit, light.sample_towards(hit.p, random.get_2d(1, Event::kLightPosition),
                                                         random.get_1d(1, Event::kLightPrimitive))));
   }
@@ -94,7 +94,7 @@ void shadow_rays(benchmark::State& state, const std::string& name) {
 void paths(benchmark::State& state, const std::string& name) {
   const LoadedScene& loaded = scene(name);
   const auto& integrator = dynamic_cast<const Integrator&>(*loaded.integrator);
-  PathContext context;
+  PathContext context(integrator);
   uint64_t sample = 0;
   std::vector<CameraSample> batch;
   for (auto _ : state) {

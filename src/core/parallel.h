@@ -72,10 +72,12 @@ void parallel_for(Index n, const Body& body) {
 template <typename T>
 class PerThread {
  public:
-  /// That of the calling thread, made when it first asks. It stays where it is. May be called by several threads at once.
-  T& local() {
+  /// That of the calling thread, made of the arguments when it first asks. It stays where it is. May be called by several
+  /// threads at once.
+  template <typename... Arguments>
+  T& local(const Arguments&... arguments) {
     const std::lock_guard lock(mutex_);
-    return values_[std::this_thread::get_id()];
+    return values_.try_emplace(std::this_thread::get_id(), arguments...).first->second;
   }
   /// Calls f(T&) for each, in any order. Not while threads still use theirs.
   template <typename Function>

@@ -15,10 +15,27 @@
 
 namespace covary {
 
-/// What one thread keeps while it traces paths.
+/// What an integrator keeps for one thread from call to call of trace(): arrays that would cost time to make anew, and
+/// what samples teach until it is collected.
+class ThreadState {
+ public:
+  virtual ~ThreadState() = default;
+};
+
+class Integrator;
+
+/// What one thread keeps while it traces paths of one integrator.
 struct PathContext {
+  explicit PathContext(const Integrator& integrator);
+  /// The integrator's own state, which must be what its make_thread_state() makes.
+  template <typename State>
+  State& state_as() const {
+    return static_cast<State&>(*state);
+  }
+
   Arena arena;
   uint64_t n_rays = 0;
+  std::unique_ptr<ThreadState> state;
 };
 
 /// One camera ray, the random numbers of its path, and the estimate of the radiance arriving along it.
@@ -28,14 +45,25 @@ struct CameraSample {
   Spectrum radiance;  ///< zero on entry
 };
 
+/// How an integrator lives: it is made from parameters, gets the scene by prepare(), is trained if it learns
+/// (integrators/training.h), and then traces. From prepare() or training on, nothing that all threads see changes.
 class Integrator : public SceneObject {
  public:
+  /// Called once for the scene, before anything but description().
+  virtual void prepare(const Scene& /*scene*/) {}
+  /// A fresh state for a thread; null when trace() keeps nothing. Thread-safe.
+  virtual std::unique_ptr<ThreadState> make_thread_state() const { return nullptr; }
   /// Sets the radiance of each sample. Samples come in batches because hundreds of independent paths keep the machine
   /// busier than one; the value of a sample does not depend on its batch. Thread-safe.
   virtual void trace(const Scene& scene, std::span<CameraSample> samples, PathContext& context) const = 0;
+  /// True when samples may be negative in a correct estimate, as differences are; the film then keeps them, where
+  /// otherwise they count as errors and enter as black.
+  virtual bool allows_negative() const { return false; }
   /// Registered name and settings, as they go into a film's attributes: equal text, equal estimator.
   virtual std::string description() const = 0;
 };
+
+inline PathContext::PathContext(const Integrator& integrator) : state(integrator.make_thread_state()) {}
 
 /// Settings every integrator has; Mitsuba's meaning. The command line overrides those of the scene.
 struct PathLengthSettings {

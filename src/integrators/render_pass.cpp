@@ -10,6 +10,7 @@
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "core/warp.h"
+#include "integrators/training.h"
 
 namespace covary {
 namespace {
@@ -17,10 +18,12 @@ namespace {
 constexpr int kTileSize = 16;
 constexpr int kBatchSize = 256;  // paths traced together; larger ones leave the cache
 constexpr size_t kMaxBadSamples = 10;
+constexpr size_t kLearnerTiles = 128;  // whose records are held at a time
 constexpr double kRoundSeconds = 0.5;  // between checkpoints where pixels are estimated from all their samples
 
 /// Offset from the pixel centre, drawn from a gaussian with the given standard deviation cut off at `radius`, by
-/// inversion of its cumulative distribution (rational start of Giles 2010 for the inverse error function, one Newton step).
+/// inversion of its cumulative distribution (rational start of Giles 2010 for the inverse error function, one Newton
+/// step).
 float interval_to_gaussian(float u, float stddev, float radius) {
   const double tail = std::erf(radius / (stddev * std::sqrt(2.0)));  // mass inside the cut-off
   const double p = std::clamp((2.0 * u - 1.0) * tail, -1 + 1e-15, 1 - 1e-15);
@@ -45,7 +48,10 @@ float interval_to_gaussian(float u, float stddev, float radius) {
 
 /// Everything one thread accumulates.
 struct Worker {
+  explicit Worker(const Integrator& integrator) : context(integrator), allows_negative(integrator.allows_negative()) {}
+
   PathContext context;
+  bool allows_negative;
   std::vector<Spectrum> sums;
   std::vector<CameraSample> samples;
   uint64_t n_samples = 0, n_not_finite = 0, n_negative = 0;
@@ -87,7 +93,7 @@ void keep_first(std::vector<BadSample>& samples) {
 /// True when the sample may enter the film; otherwise it is counted and remembered.
 bool is_good(const Spectrum& value, int x, int y, uint64_t sample, Worker& worker) {
   const bool finite = is_finite(value);
-  if (finite && value.r >= 0 && value.g >= 0 && value.b >= 0) [[likely]]
+  if (finite && ((value.r >= 0 && value.g >= 0 && value.b >= 0) || worker.allows_negative)) [[likely]]
     return true;
   ++(finite ? worker.n_negative : worker.n_not_finite);
   worker.bad_samples.push_back({x, y, sample, value});
@@ -140,6 +146,34 @@ void render_tile(const Scene& scene, const Integrator& integrator, const PassSet
   }
 }
 
+/// Calls render(i) for each of n tiles. A learner gets the tiles' records in their order, some tiles at a time.
+template <typename Render>
+void render_tiles(size_t n, LearningIntegrator* learner, const Integrator& integrator, PerThread<Worker>& workers,
+                  const Render& render) {
+  if (!learner) return parallel_for(n, render);
+  for (size_t first = 0; first < n; first += kLearnerTiles) {
+    std::vector<std::unique_ptr<TrainingRecord>> records(std::min(kLearnerTiles, n - first));
+    parallel_for(records.size(), [&](size_t i) {
+      render(first + i);
+      records[i] = learner->take_record(*workers.local(integrator).context.state);
+    });
+    for (const auto& record : records)
+      if (record) learner->absorb(*record);
+  }
+}
+
+/// An integrator that learns has learnt, or learns from this pass.
+void check_learner(const Integrator& integrator, const PassSettings& settings, const Film& film) {
+  const auto* learning = dynamic_cast<const LearningIntegrator*>(&integrator);
+  const LearningIntegrator* learner = settings.learner;
+  COVARY_CHECK(!learning || learning == learner || learning->frozen(), "the integrator has not been trained");
+  if (!learner) return;
+  COVARY_CHECK(learner == learning && !learner->frozen() && !settings.estimate,
+               "the integrator cannot learn in this pass");
+  for (uint32_t count : film.counts())
+    COVARY_CHECK(count == learner->trained_spp(), "the film has other samples than the integrator has learnt from");
+}
+
 }  // namespace
 
 uint32_t wave_end(uint32_t count, int groups) {
@@ -171,6 +205,7 @@ PassResult render_pass(const Scene& scene, const Integrator& integrator, const P
   COVARY_CHECK(!settings.estimate || film.groups() == 1, "an estimate from all samples of a pixel has no groups");
   COVARY_CHECK(film.frame_width() == scene.camera().width() && film.frame_height() == scene.camera().height(),
                "film and camera differ in size");
+  check_learner(integrator, settings, film);
   const std::vector<Tile> tiles = make_tiles(film);
   const auto count_of = [&](const Tile& tile) { return film.count(tile.x0, tile.y0); };
 
@@ -189,17 +224,17 @@ PassResult render_pass(const Scene& scene, const Integrator& integrator, const P
     return out_of_time.load(std::memory_order_relaxed) ||
            (settings.stop && settings.stop->load(std::memory_order_relaxed));
   };
-  // Waves always end at the same counts, so that interrupted and uninterrupted renders add in the same steps. The one wave of
-  // pixels that are estimated is cut into rounds of some time.
+  // Waves always end at the same counts, so that interrupted and uninterrupted renders add in the same steps. The one
+  // wave of pixels that are estimated is cut into rounds of some time.
   while (fewest < settings.spp && !ended()) {
     const uint32_t end = settings.estimate ? settings.spp : std::min(settings.spp, wave_end(fewest, film.groups()));
     const Stopwatch round_watch;
     std::atomic<bool> round_over{false};
-    parallel_for(tiles.size(), [&](size_t i) {
+    render_tiles(tiles.size(), settings.learner, integrator, workers, [&](size_t i) {
       const Tile& tile = tiles[i];
       const uint32_t begin = count_of(tile);
       if (begin >= end || ended() || round_over.load(std::memory_order_relaxed)) return;
-      Worker& worker = workers.local();
+      Worker& worker = workers.local(integrator);
       const Stopwatch tile_watch;
       render_tile(scene, integrator, settings, tile, begin, end, film, worker);
       worker.seconds += tile_watch.seconds();
@@ -211,6 +246,7 @@ PassResult render_pass(const Scene& scene, const Integrator& integrator, const P
     });
     if (ended()) break;
     if (!round_over) fewest = end;
+    if (settings.learner) settings.learner->end_wave(end);
     if (settings.checkpoint) settings.checkpoint();
   }
 
@@ -235,7 +271,7 @@ PassResult render_pass(const Scene& scene, const Integrator& integrator, const P
 
 ReplayedSample replay_sample(const Scene& scene, const Integrator& integrator, const PassSettings& settings, int x,
                              int y, uint64_t sample) {
-  PathContext context;
+  PathContext context(integrator);
   CameraSample traced = camera_sample(scene, settings, x, y, sample);
   integrator.trace(scene, {&traced, 1}, context);
   return {film_position(settings.filter, x, y, traced.random), traced.radiance, context.n_rays};

@@ -16,6 +16,8 @@
 
 namespace covary {
 
+class LearningIntegrator;
+
 /// The value of a pixel from all its samples together. Called by several threads at once.
 using PixelEstimate = std::function<Spectrum(std::span<const CameraSample>)>;
 
@@ -25,9 +27,12 @@ struct PassSettings {
   uint32_t pass = 0;  ///< position in the plan; passes of one plan never share numbers
   uint32_t spp = 0;   ///< samples per pixel to reach; a multiple of the film's groups
   FilterSettings filter;
-  /// When set, takes the place of the mean. The samples of a pixel are then taken in one go, and a thread holds all spp of them;
-  /// the film has one group, and its pixels are finished or have no samples.
+  /// When set, takes the place of the mean. The samples of a pixel are then taken in one go, and a thread holds all
+  /// spp of them; the film has one group, and its pixels are finished or have no samples.
   PixelEstimate estimate;
+  /// The integrator of this pass where it is to learn from all of these samples (integrators/training.h), otherwise
+  /// null. The film has as many samples in each pixel as were learnt from so far.
+  LearningIntegrator* learner = nullptr;
   double seconds = 0;  ///< stop after this time when > 0, in the middle of a wave
   /// Set from a signal handler to stop at the next tile.
   const std::atomic<bool>* stop = nullptr;
@@ -38,7 +43,8 @@ struct PassSettings {
   std::function<void()> checkpoint;
 };
 
-/// A sample whose value is not finite or negative. It enters the film as black and is counted.
+/// A sample whose value is not finite, or negative where Integrator::allows_negative() is false. It enters the film as
+/// black and is counted.
 struct BadSample {
   int x, y;  ///< pixel in the full frame
   uint64_t sample;
@@ -67,9 +73,9 @@ struct ReplayedSample {
 ReplayedSample replay_sample(const Scene& scene, const Integrator& integrator, const PassSettings& settings, int x,
                              int y, uint64_t sample);
 
-/// Samples per pixel at the end of a wave that begins with `count`, for a film of `groups` groups: twice as many, from one in
-/// each group on, and later the next multiple of about 16. So no pixel has less than half of the samples of another when
-/// time runs out in the middle of a wave.
+/// Samples per pixel at the end of a wave that begins with `count`, for a film of `groups` groups: twice as many, from
+/// one in each group on, and later the next multiple of about 16. So no pixel has less than half of the samples of
+/// another when time runs out in the middle of a wave.
 uint32_t wave_end(uint32_t count, int groups);
 
 /// Position of a sample in pixels of the full frame, distributed around the pixel's centre like the filter.

@@ -66,7 +66,8 @@ std::vector<Means> render(const std::string& scene_path, const nlohmann::json& r
     throw Error(ErrorCode::kInput, "no integrator '" + parameters.type() + "'");
   };
   const LoadedScene loaded = load_scene(scene_path, options);
-  const auto& integrator = dynamic_cast<const Integrator&>(*loaded.integrator);
+  auto& integrator = dynamic_cast<Integrator&>(*loaded.integrator);
+  integrator.prepare(*loaded.scene);
   std::vector<Means> renders;
   for (int seed = 0; seed < kRenders; ++seed) {
     Film film(loaded.width, loaded.height, {0, 0, loaded.width, loaded.height}, 1);

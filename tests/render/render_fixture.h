@@ -6,6 +6,7 @@
 
 #include <cstring>
 #include <fstream>
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -23,19 +24,29 @@ struct TestScene {
   const Integrator& integrator() const { return dynamic_cast<const Integrator&>(*loaded.integrator); }
 };
 
-/// `min_depth` as on the command line.
-inline TestScene load_text(const std::string& xml, int min_depth = 0) {
+/// Loads a scene and prepares its integrator.
+inline TestScene load_file(const std::string& file, const LoadOptions& options) {
+  TestScene scene{load_scene(file, options)};
+  dynamic_cast<Integrator&>(*scene.loaded.integrator).prepare(scene.scene());
+  return scene;
+}
+
+using MakeIntegrator = std::function<std::shared_ptr<Integrator>(const PathLengthSettings&)>;
+
+/// `min_depth` as on the command line. `make`, where given, makes another integrator than the scene's.
+inline TestScene load_text(const std::string& xml, int min_depth = 0, const MakeIntegrator& make = nullptr) {
   const std::string file = test_support::test_file("scene.xml");
   std::ofstream(file) << xml;
   LoadOptions options;
   options.make_integrator = [&](Parameters& parameters) -> std::shared_ptr<SceneObject> {
     PathLengthSettings lengths = PathLengthSettings::from(parameters);
     lengths.min_depth = min_depth;
+    if (make) return make(lengths);
     for (const IntegratorPlugin& plugin : integrator_plugins())
       if (parameters.type() == plugin.name) return plugin.make(parameters, lengths);
     return nullptr;
   };
-  return {load_scene(file, options)};
+  return load_file(file, options);
 }
 
 /// A scene of the given body: path integrator, box filter, camera at the origin looking along +z unless `sensor` says

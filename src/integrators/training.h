@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+// Integrators that learn: from the samples of some waves of a pass they collect what later samples use, e.g. sums in
+// cells of space or mixtures of directions to guide paths by.
+//
+//     wave of 1 sample per pixel, wave of 1 more, of 2, of 4, …          (render_pass.h: wave_end)
+//       trace()        threads record into their states
+//       take_record()  a tile's samples, which one thread takes in a fixed order, become one record
+//       absorb()       records in the order of tiles: sums have the same bits for any number of threads
+//       end_wave()     what the next wave's trace() reads
+//     freeze()         from here on a sample is a function of its address alone, as those of other integrators
+//
+// The samples of a wave read only what earlier waves taught, so their mean is right in expectation and they may stay
+// in the film (PassSettings::learner); train() below throws them away. The hash of the frozen state is part of
+// description() and so of a film's settings: films of different training are not continued or merged.
+#pragma once
+
+#include <memory>
+
+#include "film/film.h"
+#include "integrators/integrator.h"
+#include "integrators/render_pass.h"
+
+namespace covary {
+
+/// What the samples of one tile taught.
+class TrainingRecord {
+ public:
+  virtual ~TrainingRecord() = default;
+};
+
+class LearningIntegrator : public Integrator {
+ public:
+  /// Samples per pixel that it wants to learn from, by its parameters; 0: it is to be frozen as it is.
+  virtual uint32_t training_spp() const = 0;
+  /// PassSettings::seed of the training. Films of different seeds can be merged where this is the same for all.
+  virtual uint64_t training_seed() const { return 0; }
+  /// What trace() has recorded in a thread's state since the last call, or null. Not called when frozen. Thread-safe.
+  virtual std::unique_ptr<TrainingRecord> take_record(ThreadState& state) const = 0;
+  /// Adds a record. Called by one thread at a time, in the order of tiles, never null.
+  virtual void absorb(const TrainingRecord& record) = 0;
+
+  /// Forgets what was learnt, if anything.
+  void restart();
+  /// Ends a wave after which each pixel has taken `spp` samples; called when no thread traces.
+  void end_wave(uint32_t spp);
+  /// Ends the training.
+  void freeze();
+
+  /// Samples per pixel learnt from so far.
+  uint32_t trained_spp() const { return trained_spp_; }
+  bool frozen() const { return frozen_; }
+  /// settings_text() and the hash of the frozen state; "untrained" before.
+  std::string description() const final;
+
+ protected:
+  /// Called by restart(): back to what trace() reads and absorb() adds to before anything was learnt.
+  virtual void on_restart() = 0;
+  /// Makes of all that was absorbed what trace() reads; may use many threads, whose number must not change a bit.
+  virtual void update() = 0;
+  /// Called by freeze(): nothing is recorded from here on, and what only training needs can go.
+  virtual void on_freeze() {}
+  /// Hash (core/content_hash.h) of all that trace() reads of what was learnt.
+  virtual uint64_t state_hash() const = 0;
+  /// Registered name and settings.
+  virtual std::string settings_text() const = 0;
+
+ private:
+  uint32_t trained_spp_ = 0;
+  bool frozen_ = false;
+  uint64_t hash_ = 0;
+};
+
+/// PassSettings::pass of training, so that it shares no numbers with the passes of a plan.
+inline constexpr uint32_t kTrainingPass = 1u << 31;
+
+struct TrainingSettings {
+  CropWindow window;  ///< pixels whose samples teach, a part of the camera's frame
+  FilterSettings filter;
+  const std::atomic<bool>* stop = nullptr;                      ///< as in PassSettings
+  std::function<void(uint64_t done, uint64_t total)> progress;  ///< as in PassSettings
+};
+
+/// Trains a prepared integrator from the beginning, by training_spp() independent samples in each pixel that are used for
+/// nothing else, and freezes it. False when stopped before that; it can be trained again.
+bool train(const Scene& scene, LearningIntegrator& integrator, const TrainingSettings& settings);
+
+}  // namespace covary
