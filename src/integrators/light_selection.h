@@ -1,19 +1,49 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which light to sample: uniformly among all emitters, as [Hua2023] and Mitsuba do.
+// Which light to sample. A selection is made for one scene, which must outlive it; it is read by many threads.
 #pragma once
 
+#include <algorithm>
+#include <unordered_map>
+#include <vector>
+
+#include "core/distribution.h"
 #include "scene/scene.h"
 
 namespace covary {
 
-/// Probability of each light.
-inline float light_pmf(const Scene& scene) { return 1 / static_cast<float>(scene.emitters().size()); }
+/// Uniformly among all lights, as [Hua2023] and Mitsuba do. Costs nothing to make.
+class UniformLights {
+ public:
+  explicit UniformLights(const Scene& scene)
+      : emitters_(scene.emitters()), pmf_(1 / static_cast<float>(emitters_.size())) {}
+  bool empty() const { return emitters_.empty(); }
+  /// The light that `u` in [0, 1) chooses; there must be one.
+  const Emitter& select(float u) const {
+    const size_t n = emitters_.size();
+    return *emitters_[std::min(static_cast<size_t>(u * static_cast<float>(n)), n - 1)];
+  }
+  /// Probability that select() gives this light of the scene.
+  float pmf(const Emitter&) const { return pmf_; }
 
-/// The light that `u` chooses; the scene must have one.
-inline const Emitter& select_light(const Scene& scene, float u) {
-  const size_t n = scene.emitters().size();
-  return *scene.emitters()[std::min(static_cast<size_t>(u * static_cast<float>(n)), n - 1)];
-}
+ private:
+  std::span<const std::shared_ptr<const Emitter>> emitters_;
+  float pmf_;
+};
+
+/// In proportion to the luminance of Emitter::power(). A light without power is never chosen; where none has any, or
+/// one has infinitely much, all are equally likely.
+class PowerLights {
+ public:
+  explicit PowerLights(const Scene& scene);
+  bool empty() const { return emitters_.empty(); }
+  const Emitter& select(float u) const { return *emitters_[distribution_.sample(u).index]; }
+  float pmf(const Emitter& emitter) const { return pmfs_.at(&emitter); }
+
+ private:
+  std::span<const std::shared_ptr<const Emitter>> emitters_;
+  Discrete distribution_;
+  std::unordered_map<const Emitter*, float> pmfs_;
+};
 
 /// Ray from a surface to a light sample, short of the light itself.
 inline Ray shadow_ray(const SurfaceHit& hit, const EmitterSample& light) {

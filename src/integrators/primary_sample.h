@@ -11,17 +11,19 @@
 
 namespace covary {
 
-/// Address of the first vertex on a surface that has more than delta lobes; paths count those from here, and vertices on
-/// mirrors and glass apart.
+/// Address of the first vertex on a surface that has more than delta lobes; paths count those from here, and vertices
+/// on mirrors and glass apart.
 inline constexpr uint32_t kFirstSurfaceVertex = 1;
+/// Address of the first vertex on a surface that has delta lobes only.
+inline constexpr uint32_t kDeltaVertices = 1u << 20;
 
 /// Two numbers that are read together.
 struct PrimaryPair {
   uint32_t vertex;
   Event event;
 };
-/// In the order of reading. Numbers that choose (light, part of a light, lobe) are left out, because a value is not a smooth
-/// function of them, and so is the position on the lens, which most cameras do not read.
+/// In the order of reading. Numbers that choose (light, part of a light, lobe) are left out, because a value is not a
+/// smooth function of them, and so is the position on the lens, which most cameras do not read.
 inline constexpr std::array<PrimaryPair, 3> kPrimaryPairs = {{
     {0, Event::kPixel},
     {kFirstSurfaceVertex, Event::kLightPosition},

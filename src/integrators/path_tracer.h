@@ -1,0 +1,251 @@
+// SPDX-License-Identifier: Apache-2.0
+// Unidirectional path tracing whose parts can be exchanged. At each vertex one light sample (next-event estimation)
+// and one direction sample are combined by multiple importance sampling [Veach1997] §9.2; Russian roulette ends paths.
+//
+// The estimator is unbiased. A surface with a null lobe (mask, null) blocks light samples; light behind it is found by
+// paths that pass straight through, which carry full weight because no light sample could have found it.
+#pragma once
+
+#include <cmath>
+#include <memory>
+#include <string>
+#include <type_traits>
+#include <utility>
+
+#include "core/in_place.h"
+#include "integrators/integrator.h"
+#include "integrators/light_selection.h"
+#include "integrators/mis.h"
+#include "integrators/path_batch.h"
+#include "integrators/primary_sample.h"
+#include "integrators/roulette.h"
+
+namespace covary {
+
+/// The parts of `path`. Others derive from it and hide what they do otherwise; calls are resolved when the template
+/// below is compiled, so exchanging one costs nothing. Many threads use one object; its functions are const but for
+/// prepare().
+struct PathParts {
+  /// Called once, before the first path.
+  void prepare(const Scene&) {}
+
+  /// How to choose a light; see UniformLights for what the result must be able to do.
+  UniformLights lights(const Scene& scene) const { return UniformLights(scene); }
+
+  /// Draws the direction in which a path goes on from `hit`, reading the numbers of `vertex`. Guiding mixes another
+  /// distribution in; pdf is then that of the mixture.
+  BsdfSample sample_direction(const BsdfClosure& bsdf, const SurfaceHit& /*hit*/, const Vec3& wo,
+                              const PathRandom& random, uint32_t vertex) const {
+    return bsdf.sample(wo, random.get_1d(vertex, Event::kLobe), random.get_2d(vertex, Event::kDirection));
+  }
+  /// Value of the surface, and the density with which sample_direction() draws `wi`, delta lobes excluded.
+  BsdfValue eval_direction(const BsdfClosure& bsdf, const SurfaceHit& /*hit*/, const Vec3& wo, const Vec3& wi) const {
+    return bsdf.eval(wo, wi);
+  }
+
+  /// Weight of light that a direction sample of density `pdf` found and light sampling finds with `pdf_light`.
+  float direction_weight(float pdf, float pdf_light) const { return mis::power(pdf, pdf_light); }
+  /// Weight of a light sample, divided by its density `pdf_light`; direction sampling finds it with `pdf`.
+  float light_weight_over_pdf(bool is_delta, float pdf_light, float pdf) const {
+    return is_delta ? 1 / pdf_light : mis::power_over_pdf(pdf_light, pdf);
+  }
+
+  float survival_probability(const Spectrum& throughput, float eta, Sampling sampling) const {
+    return roulette::survival_probability(throughput, eta, sampling);
+  }
+  float survivor_weight(float survival) const { return roulette::survivor_weight(survival); }
+};
+
+/// The integrator made of `Parts`, which has the functions of PathParts.
+template <typename Parts>
+class PathTracer final : public Integrator {
+ public:
+  /// `name`: as registered.
+  PathTracer(std::string name, const PathLengthSettings& lengths, Parts parts = {})
+      : name_(std::move(name)), lengths_(lengths), parts_(std::move(parts)) {}
+
+  void prepare(const Scene& scene) override { parts_.prepare(scene); }
+  std::unique_ptr<ThreadState> make_thread_state() const override { return std::make_unique<PathBatch>(); }
+
+  // All paths of the batch advance together, one edge at a time, in short loops whose iterations do not depend on each
+  // other: while one waits for memory or a division, the processor works on the next.
+  void trace(const Scene& scene, std::span<CameraSample> samples, PathContext& context) const override {
+    if (lengths_.max_depth <= 0) return;
+    PathBatch& batch = context.state_as<PathBatch>();
+    const auto& lights = parts_.lights(scene);
+    batch.start(samples.size());
+    for (uint32_t i = 0; i < samples.size(); ++i) batch.rays[i] = samples[i].ray, batch.paths[i].sample = i;
+
+    for (int depth = 0; !batch.paths.empty(); ++depth) {
+      find_surfaces(scene, depth, batch, context);
+      if (depth + 1 >= lengths_.min_depth)
+        for (size_t i = 0; i < batch.paths.size(); ++i)
+          samples[batch.paths[i].sample].radiance +=
+              emission(scene, lights, batch.paths[i], batch.rays[i], batch.hits[i]);
+      if (depth + 1 >= lengths_.max_depth) break;
+      end_paths_without_surface(batch);
+
+      const bool connect = depth + 2 >= lengths_.min_depth && !lights.empty();
+      if (connect) sample_lights(scene, lights, samples, batch);
+      scatter(lights, depth, connect, samples, batch, context);
+      trace_connections(scene, samples, batch, context);
+    }
+  }
+
+  std::string description() const override { return name_ + " " + lengths_.text(); }
+
+ private:
+  using Path = PathBatch::Path;
+  using Lights = std::remove_cvref_t<decltype(std::declval<const Parts&>().lights(std::declval<const Scene&>()))>;
+
+  /// Nearest hits of all rays.
+  void find_surfaces(const Scene& scene, int depth, PathBatch& batch, PathContext& context) const {
+    const size_t n = batch.paths.size();
+    scene.nearest(batch.rays, batch.ray_hits, depth == 0);
+    context.n_rays += n;
+    for (size_t i = 0; i < n; ++i) {
+      batch.paths[i].found = batch.ray_hits[i].found();
+      if (!batch.paths[i].found) continue;
+      scene.resolve(batch.rays[i], batch.ray_hits[i], batch.hits[i]);
+      if (const Texture* texture = batch.hits[i].shape->main_texture()) texture->prefetch(batch.hits[i].uv);
+    }
+    if (lengths_.hide_emitters && depth == 0)
+      for (size_t i = 0; i < n; ++i) skip_area_lights(scene, batch.paths[i], batch.rays[i], batch.hits[i], context);
+  }
+
+  static void end_paths_without_surface(PathBatch& batch) {
+    size_t n_kept = 0;
+    for (size_t i = 0; i < batch.paths.size(); ++i) {
+      if (!batch.paths[i].found) continue;
+      if (n_kept != i)
+        batch.paths[n_kept] = batch.paths[i], batch.rays[n_kept] = batch.rays[i], batch.hits[n_kept] = batch.hits[i];
+      ++n_kept;
+    }
+    batch.resize(n_kept);
+  }
+
+  /// One light sample for each vertex whose surface can use it. All choices come first, so that memory answers to one
+  /// while the others are made.
+  static void sample_lights(const Scene& scene, const Lights& lights, std::span<const CameraSample> samples,
+                            PathBatch& batch) {
+    for (size_t i = 0; i < batch.paths.size(); ++i) {
+      batch.choices[i].emitter = nullptr;
+      if (!(batch.hits[i].bsdf_flags & kSmooth)) continue;
+      const PathRandom& random = samples[batch.paths[i].sample].random;
+      const uint32_t vertex = kFirstSurfaceVertex + batch.paths[i].n_smooth;
+      const Emitter& emitter = lights.select(random.get_1d(vertex, Event::kLightChoice));
+      const Vec2 u = random.get_2d(vertex, Event::kLightPosition);
+      if (scene.environment()) emitter.prefetch(u, PrefetchStep::kTable);
+      batch.choices[i].emitter = &emitter;
+      batch.choices[i].u = u;
+      batch.choices[i].u_primitive = random.get_1d(vertex, Event::kLightPrimitive);
+    }
+    if (scene.environment())  // the only lights with large tables
+      for (size_t i = 0; i < batch.paths.size(); ++i)
+        if (batch.choices[i].emitter) batch.choices[i].emitter->prefetch(batch.choices[i].u, PrefetchStep::kValues);
+    for (size_t i = 0; i < batch.paths.size(); ++i) {
+      const PathBatch::LightChoice& choice = batch.choices[i];
+      if (!choice.emitter)
+        batch.lights[i].pdf_solid_angle = 0;
+      else
+        make_in_place(batch.lights[i],
+                      [&] { return choice.emitter->sample_towards(batch.hits[i].p, choice.u, choice.u_primitive); });
+    }
+  }
+
+  /// Evaluates the surfaces: connections to the light samples, and the next rays. Paths that end are removed.
+  void scatter(const Lights& lights, int depth, bool connect, std::span<CameraSample> samples, PathBatch& batch,
+               PathContext& context) const {
+    batch.alive.clear();
+    for (uint32_t i = 0; i < batch.paths.size(); ++i) {
+      Path& path = batch.paths[i];
+      const SurfaceHit& hit = batch.hits[i];
+      const PathRandom& random = samples[path.sample].random;
+      const Vec3 wo = hit.frame.to_local(-batch.rays[i].d);
+      // Mirrors and glass have addresses of their own: a path that met one reads, at the surfaces behind it, the same
+      // numbers as its neighbour that did not.
+      const uint32_t vertex = hit.bsdf_flags & kSmooth ? kFirstSurfaceVertex + path.n_smooth++ : kDeltaVertices + depth;
+      context.arena.reset();
+      const BsdfClosure* bsdf = hit.bsdf->bind(hit, wo.z > 0, TransportMode::kRadiance, context.arena);
+      if (connect && batch.lights[i].pdf_solid_angle > 0)
+        connect_light(lights.pmf(*batch.choices[i].emitter), path, hit, wo, *bsdf, batch.lights[i], batch);
+
+      const BsdfSample next = parts_.sample_direction(*bsdf, hit, wo, random, vertex);
+      if (!next.valid() || is_black(next.weight)) continue;
+      path.throughput *= next.weight;
+      path.eta *= next.eta;
+      if (!(next.flags & kNullTransmission)) path.only_null = false;
+      if (depth + 1 >= lengths_.rr_depth) {
+        const float survival = parts_.survival_probability(path.throughput, path.eta, random.sampling());
+        if (!(random.get_1d(vertex, Event::kRoulette) < survival)) {
+          if (std::isnan(survival)) samples[path.sample].radiance = path.throughput;  // a bad sample, not a black one
+          continue;
+        }
+        path.throughput *= parts_.survivor_weight(survival);
+      }
+      const Vec3 wi = hit.frame.to_world(next.wi);
+      path.previous_p = hit.p;
+      path.previous_pdf = next.pdf;
+      path.previous_delta = next.is_delta();
+      make_in_place(batch.rays[i], [&] { return Ray{offset_origin(hit.p, hit.ng, wi), wi, kInfinity}; });
+      batch.alive.push_back(i);
+    }
+    for (size_t n = 0; n < batch.alive.size(); ++n)
+      if (const uint32_t i = batch.alive[n]; i != n) batch.paths[n] = batch.paths[i], batch.rays[n] = batch.rays[i];
+    batch.resize(batch.alive.size());
+  }
+
+  /// Adds the light samples that nothing hides.
+  static void trace_connections(const Scene& scene, std::span<CameraSample> samples, PathBatch& batch,
+                                PathContext& context) {
+    scene.occluded(std::span(batch.shadow_rays).first(batch.n_connections), batch.blocked);
+    context.n_rays += batch.n_connections;
+    for (size_t i = 0; i < batch.n_connections; ++i)
+      if (!batch.blocked[i]) samples[batch.connections[i].sample].radiance += batch.connections[i].radiance;
+    batch.n_connections = 0;
+  }
+
+  /// Contribution of what the path's ray met, weighted against light sampling.
+  Spectrum emission(const Scene& scene, const Lights& lights, const Path& path, const Ray& ray,
+                    const SurfaceHit& hit) const {
+    const Emitter* emitter = path.found ? hit.emitter : scene.environment();
+    if (!emitter || (!path.found && lengths_.hide_emitters && path.only_null)) return {};
+    const EnvironmentLight light =
+        path.found ? EnvironmentLight{emitter->surface_radiance(hit, -ray.d)} : emitter->environment(ray.d);
+    const Spectrum radiance = path.throughput * light.radiance;
+    if (path.previous_delta || is_black(radiance)) return radiance;
+    const float pdf_light = path.found ? emitter->pdf_solid_angle(path.previous_p, hit) : light.pdf_solid_angle;
+    return radiance * parts_.direction_weight(path.previous_pdf, lights.pmf(*emitter) * pdf_light);
+  }
+
+  /// Next-event estimation: f cos L / pdf, weighted against direction sampling, if nothing lies between. `pmf`: with
+  /// which the light was chosen.
+  void connect_light(float pmf, const Path& path, const SurfaceHit& hit, const Vec3& wo, const BsdfClosure& bsdf,
+                     const EmitterSample& light, PathBatch& batch) const {
+    if (is_black(light.radiance)) return;
+    const BsdfValue f = parts_.eval_direction(bsdf, hit, wo, hit.frame.to_local(light.wi));
+    if (is_black(f.value)) return;
+    const float weight = parts_.light_weight_over_pdf(light.is_delta, pmf * light.pdf_solid_angle, f.pdf_solid_angle);
+    const size_t n = batch.n_connections++;
+    make_in_place(batch.connections[n], [&] {
+      return PathBatch::Connection{path.throughput * f.value * light.radiance * weight, path.sample};
+    });
+    make_in_place(batch.shadow_rays[n], [&] { return shadow_ray(hit, light); });
+  }
+
+  /// Follows the camera ray past area lights until something else is hit.
+  static void skip_area_lights(const Scene& scene, Path& path, Ray& ray, SurfaceHit& hit, PathContext& context) {
+    while (path.found && hit.emitter) {
+      ray.o = offset_origin(hit.p, hit.ng, ray.d);
+      ray.t_max -= hit.t;
+      ++context.n_rays;
+      path.found = scene.intersect(ray, hit);
+    }
+  }
+
+  std::string name_;
+  PathLengthSettings lengths_;
+  Parts parts_;
+};
+
+}  // namespace covary
