@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Renders whose result is known in closed form.
+// Renders whose result is known in closed form, by `path` and by path tracers with a planted bug (planted_bugs.h).
 //
 // Statistical cases: R = 32 renders with seeds 0 … 31, Student's t-test of the image mean at alpha = 5e-7 (|t_31| >
 // 6.3). With the standard error s of the mean of the 32 renders, the test rejects an error of 6.3 s + 2.5 s = 8.8 s
-// with power 0.99; each case asserts that this is below the error that it plants, so the test cannot pass for lack of
-// samples.
+// with power 0.99; each case asserts that this is below the relative error that it says it detects. Each bug that a
+// case lists must be rejected.
 #include <cmath>
 
+#include "planted_bugs.h"
 #include "render_fixture.h"
 #include "statistics/p_values.h"
 
@@ -15,21 +16,36 @@ namespace {
 
 constexpr int kRenders = 32;
 
-/// Accepts `expected`, rejects `expected * (1 + planted)` and `expected * (1 - planted)`.
-void expect_image_mean(const TestScene& scene, uint32_t spp, double expected, double planted) {
+MakeIntegrator with(Bug bug) {
+  return [bug](const PathLengthSettings& lengths) { return make_path_with(bug, lengths); };
+}
+
+std::vector<double> image_means(const TestScene& scene, uint32_t spp) {
   std::vector<double> means;
+  for (int seed = 0; seed < kRenders; ++seed) means.push_back(image_mean(render(scene, spp, seed)));
+  return means;
+}
+
+/// The mean of the scene's images is `expected`; relative errors down to `detects` are found, and so are the bugs.
+void expect_image_mean(const std::string& xml, uint32_t spp, double expected, double detects,
+                       std::initializer_list<Bug> bugs) {
+  const std::vector<double> means = image_means(load_text(xml), spp);
   statistics::Moments moments;
-  for (int seed = 0; seed < kRenders; ++seed) {
-    means.push_back(image_mean(render(scene, spp, seed)));
-    moments.add(means.back());
-  }
+  for (const double mean : means) moments.add(mean);
   const double detectable =
       statistics::smallest_detectable(std::sqrt(moments.sample_variance()), kRenders, statistics::test_alpha(), 0.99);
-  EXPECT_LT(1.3 * detectable, planted * expected) << "too few samples to see the planted error";
+  EXPECT_LT(1.3 * detectable, detects * expected) << "too few samples to see the error";
   const statistics::TestResult right = statistics::t_test(means, expected);
   EXPECT_TRUE(right.accepted) << right.message;
-  EXPECT_FALSE(statistics::t_test(means, expected * (1 + planted)).accepted);
-  EXPECT_FALSE(statistics::t_test(means, expected * (1 - planted)).accepted);
+  for (const Bug bug : bugs)
+    EXPECT_FALSE(statistics::t_test(image_means(load_text(xml, 0, with(bug)), spp), expected).accepted) << name_of(bug);
+}
+
+/// The same where all samples have one value.
+void expect_exact(const std::string& xml, double expected, std::initializer_list<Bug> bugs) {
+  EXPECT_NEAR(image_mean(render(load_text(xml), 4, 0)), expected, 1e-4);
+  for (const Bug bug : bugs)
+    EXPECT_GT(std::abs(image_mean(render(load_text(xml, 0, with(bug)), 4, 0)) - expected), 1e-3) << name_of(bug);
 }
 
 std::string furnace(double albedo, int max_depth, const std::string& extra = "") {
@@ -46,8 +62,10 @@ std::string furnace(double albedo, int max_depth, const std::string& extra = "")
 
 // Radiance in a closed box that emits 1 and reflects a: L = 1 + a L.
 TEST(Furnace, UnlimitedDepthGivesTheGeometricSeries) {
-  expect_image_mean(load_text(furnace(0.3, -1)), 16, 1 / (1 - 0.3), 0.02);
-  expect_image_mean(load_text(furnace(0.6, -1)), 32, 1 / (1 - 0.6), 0.03);
+  expect_image_mean(furnace(0.3, -1), 16, 1 / (1 - 0.3), 0.02,
+                    {Bug::kNoDirectionWeight, Bug::kNoLightWeight, Bug::kCosineForgotten});
+  expect_image_mean(furnace(0.6, -1), 32, 1 / (1 - 0.6), 0.03,
+                    {Bug::kNoDirectionWeight, Bug::kNoLightWeight, Bug::kSurvivorsNotRaised});
 }
 
 TEST(Furnace, DepthCutGivesThePartialSum) {
@@ -59,7 +77,7 @@ TEST(Furnace, DepthCutGivesThePartialSum) {
     if (depth == 1)
       EXPECT_FLOAT_EQ(static_cast<float>(image_mean(render(load_text(furnace(a, 1)), 4, 0))), 1.0f);
     else
-      expect_image_mean(load_text(furnace(a, depth)), 16, sum, 0.02);
+      expect_image_mean(furnace(a, depth), 16, sum, 0.02, {Bug::kNoDirectionWeight});
   }
 }
 
@@ -67,7 +85,7 @@ TEST(Furnace, RouletteFromTheFirstEdgeIsUnbiased) {
   const std::string text = furnace(0.5, -1);
   const std::string with_roulette =
       std::string(text).insert(text.find("</integrator>"), "<integer name='rr_depth' value='1'/>");
-  expect_image_mean(load_text(with_roulette), 64, 2, 0.03);
+  expect_image_mean(with_roulette, 64, 2, 0.03, {Bug::kSurvivorsNotRaised});
 }
 
 TEST(PathLengths, SingleLengthsAddUpToTheWhole) {
@@ -84,6 +102,18 @@ TEST(PathLengths, SingleLengthsAddUpToTheWhole) {
 
 TEST(PathLengths, ZeroIsBlack) { EXPECT_EQ(image_mean(render(load_text(furnace(0.5, 0)), 1, 0)), 0); }
 
+// In a dark room without a limit of depth only roulette ends paths; one whose throughput is not a number is a bad sample.
+TEST(PathLengths, AThroughputThatIsNotANumberEnds) {
+  const std::string dark_room =
+      "<shape type='cube'><boolean name='flip_normals' value='true'/><bsdf type='diffuse'/></shape>";
+  const TestScene scene = load_text(scene_text(dark_room, 8, 8), 0, with(Bug::kNotANumber));
+  Film film = new_film(scene);
+  PassSettings settings;
+  settings.spp = 2;
+  EXPECT_EQ(render_pass(scene.scene(), scene.integrator(), settings, film).n_not_finite, 128u);
+  EXPECT_EQ(image_mean(film), 0);
+}
+
 // A diffuse plane z = 4 facing the camera, lit from the camera's side.
 const char* const kPlane =
     "<shape type='rectangle'><transform name='to_world'><scale value='50'/><rotate x='1' angle='180'/><translate "
@@ -91,39 +121,45 @@ const char* const kPlane =
     "</transform><bsdf type='diffuse'><rgb name='reflectance' value='0.6'/></bsdf></shape>";
 const char* const kNarrow = "<float name='fov' value='0.01'/>";  // all pixels see the point (0, 0, 4)
 
+const char* const kPointLight =
+    "<emitter type='point'><point name='position' x='3' y='0' z='0'/><rgb name='intensity' value='10'/></emitter>";
+
 TEST(DirectLight, PointLightOverAPlane) {
   // L = albedo / pi * I cos / d^2 at distance 5 under the angle with cosine 4/5.
-  const TestScene scene = load_text(scene_text(
-      std::string(kPlane) + "<emitter type='point'><point name='position' x='3' y='0' z='0'/><rgb name='intensity' "
-                            "value='10'/></emitter>",
-      4, 4, 2, kNarrow));
-  EXPECT_NEAR(image_mean(render(scene, 4, 0)), 0.6 / M_PI * 10 * 0.8 / 25, 1e-4);
+  expect_exact(scene_text(std::string(kPlane) + kPointLight, 4, 4, 2, kNarrow), 0.6 / M_PI * 10 * 0.8 / 25,
+               {Bug::kCosineForgotten});
 }
 
 TEST(DirectLight, DirectionalLight) {
-  const TestScene scene = load_text(
-      scene_text(std::string(kPlane) + "<emitter type='directional'><vector name='direction' x='0' y='3' z='4'/><rgb "
-                                       "name='irradiance' value='2'/></emitter>",
-                 4, 4, 2, kNarrow));
-  EXPECT_NEAR(image_mean(render(scene, 4, 0)), 0.6 / M_PI * 2 * 0.8, 1e-4);
+  const std::string light =
+      "<emitter type='directional'><vector name='direction' x='0' y='3' z='4'/><rgb name='irradiance' "
+      "value='2'/></emitter>";
+  expect_exact(scene_text(kPlane + light, 4, 4, 2, kNarrow), 0.6 / M_PI * 2 * 0.8, {Bug::kCosineForgotten});
 }
+
+TEST(DirectLight, TwoEqualPointLights) {
+  // The same value whichever light is chosen.
+  expect_exact(scene_text(std::string(kPlane) + kPointLight + kPointLight, 4, 4, 2, kNarrow),
+               2 * 0.6 / M_PI * 10 * 0.8 / 25, {Bug::kLightPmfForgotten, Bug::kCosineForgotten});
+}
+
+const char* const kSphereLight =
+    "<shape type='sphere'><point name='center' x='3' y='0' z='0'/><emitter type='area'><rgb name='radiance' value='7'/>"
+    "</emitter></shape>";
 
 TEST(DirectLight, SphereLight) {
   // Irradiance of a sphere of radiance L and radius r at distance d in direction cos: pi L (r/d)^2 cos.
-  const TestScene scene = load_text(scene_text(
-      std::string(kPlane) + "<shape type='sphere'><point name='center' x='3' y='0' z='0'/><float name='radius' "
-                            "value='1'/><emitter type='area'><rgb name='radiance' value='7'/></emitter></shape>",
-      16, 16, 2, kNarrow));
-  expect_image_mean(scene, 16, 0.6 * 7 * (1.0 / 25) * 0.8, 0.02);
+  expect_image_mean(scene_text(std::string(kPlane) + kSphereLight, 16, 16, 2, kNarrow), 16, 0.6 * 7 * (1.0 / 25) * 0.8,
+                    0.02, {Bug::kNoDirectionWeight, Bug::kCosineForgotten});
 }
 
 TEST(DirectLight, DiskLight) {
   // Irradiance of a coaxial disk of radius r at distance d: pi L r^2 / (r^2 + d^2). The camera looks through it.
-  const TestScene scene = load_text(scene_text(
-      std::string(kPlane) + "<shape type='disk'><transform name='to_world'><scale value='2'/><translate z='-1'/>"
-                            "</transform><emitter type='area'><rgb name='radiance' value='3'/></emitter></shape>",
-      16, 16, 2, kNarrow));
-  expect_image_mean(scene, 16, 0.6 * 3 * 4.0 / (4 + 25), 0.02);
+  const std::string disk =
+      "<shape type='disk'><transform name='to_world'><scale value='2'/><translate z='-1'/></transform>"
+      "<emitter type='area'><rgb name='radiance' value='3'/></emitter></shape>";
+  expect_image_mean(scene_text(kPlane + disk, 16, 16, 2, kNarrow), 16, 0.6 * 3 * 4.0 / (4 + 25), 0.02,
+                    {Bug::kNoDirectionWeight, Bug::kNoLightWeight, Bug::kCosineForgotten});
 }
 
 TEST(DirectLight, EachInstanceOfALightShines) {
@@ -136,27 +172,52 @@ TEST(DirectLight, EachInstanceOfALightShines) {
   std::string instances;
   for (const char* transform : {"<translate x='3'/>", "<scale value='2'/><translate x='-6' z='-4'/>"})
     instances += std::string(place).replace(place.find('%'), 1, transform);
-  const TestScene scene = load_text(scene_text(kPlane + group + instances, 16, 16, 2, kNarrow));
-  EXPECT_EQ(scene.scene().emitters().size(), 2u);
-  expect_image_mean(scene, 32, 2 * 0.6 * 7 * (1.0 / 25) * 0.8, 0.02);
+  const std::string xml = scene_text(kPlane + group + instances, 16, 16, 2, kNarrow);
+  EXPECT_EQ(load_text(xml).scene().emitters().size(), 2u);
+  expect_image_mean(xml, 32, 2 * 0.6 * 7 * (1.0 / 25) * 0.8, 0.02, {Bug::kLightPmfForgotten});
 }
+
+const char* const kDimSky = "<emitter type='constant'><rgb name='radiance' value='0.25'/></emitter>";
 
 TEST(DirectLight, ConstantEnvironment) {
-  const TestScene scene = load_text(
-      scene_text(std::string(kPlane) + "<emitter type='constant'><rgb name='radiance' value='0.25'/></emitter>", 16, 16,
-                 2, kNarrow));
-  expect_image_mean(scene, 32, 0.6 * 0.25, 0.02);
+  expect_image_mean(scene_text(std::string(kPlane) + kDimSky, 16, 16, 2, kNarrow), 32, 0.6 * 0.25, 0.02,
+                    {Bug::kNoDirectionWeight, Bug::kNoLightWeight, Bug::kCosineForgotten});
 }
 
+/// Chooses lights by their power, otherwise as `path`.
+struct PartsWithPowerLights : PathParts {
+  std::shared_ptr<const PowerLights> power_lights;
+  void prepare(const Scene& scene) { power_lights = std::make_shared<PowerLights>(scene); }
+  const PowerLights& lights(const Scene&) const { return *power_lights; }
+};
+
 TEST(DirectLight, TwoLightsAddUp) {
-  const std::string sphere =
-      "<shape type='sphere'><point name='center' x='3' y='0' z='0'/><emitter type='area'><rgb "
-      "name='radiance' value='7'/></emitter></shape>";
-  const TestScene scene = load_text(scene_text(
-      std::string(kPlane) + sphere + "<emitter type='constant'><rgb name='radiance' value='0.25'/></emitter>", 16, 16,
-      2, kNarrow));
+  const std::string xml = scene_text(std::string(kPlane) + kSphereLight + kDimSky, 16, 16, 2, kNarrow);
   // The sphere hides its part of the environment: (7 - 0.25) for its share.
-  expect_image_mean(scene, 32, 0.6 * ((7 - 0.25) * 0.8 / 25 + 0.25), 0.02);
+  const double expected = 0.6 * ((7 - 0.25) * 0.8 / 25 + 0.25);
+  expect_image_mean(xml, 32, expected, 0.02, {Bug::kNoDirectionWeight, Bug::kNoLightWeight, Bug::kLightPmfForgotten});
+
+  const TestScene by_power = load_text(xml, 0, [](const PathLengthSettings& lengths) {
+    return std::make_shared<PathTracer<PartsWithPowerLights>>("path", lengths);
+  });
+  const statistics::TestResult right = statistics::t_test(image_means(by_power, 32), expected);
+  EXPECT_TRUE(right.accepted) << right.message;
+  EXPECT_FALSE(same_bits(render(by_power, 32, 0), render(load_text(xml), 32, 0)));
+}
+
+TEST(Glass, RadianceIsScaledWhereItLeavesAMedium) {
+  // A lamp inside a medium of index 1.5, seen from outside at normal incidence: (1 - F) L / n^2, F = ((n - 1) / (n +
+  // 1))^2.
+  const std::string face =
+      "<shape type='rectangle'><transform name='to_world'><scale value='50'/><rotate x='1' angle='180'/>"
+      "<translate z='%'/></transform>";
+  const std::string glass = std::string(face).replace(face.find('%'), 1, "2") +
+                            "<bsdf type='dielectric'><float name='int_ior' value='1.5'/><float name='ext_ior' "
+                            "value='1'/></bsdf></shape>";
+  const std::string lamp = std::string(face).replace(face.find('%'), 1, "4") +
+                           "<emitter type='area'><rgb name='radiance' value='3'/></emitter></shape>";
+  expect_image_mean(scene_text(glass + lamp, 16, 16, 3, kNarrow), 32, 0.96 * 3 / 2.25, 0.02,
+                    {Bug::kRadianceNotScaled, Bug::kLobePmfForgotten});
 }
 
 TEST(Mask, LightBehindHalfOpaqueSurfaces) {
@@ -167,9 +228,8 @@ TEST(Mask, LightBehindHalfOpaqueSurfaces) {
       "name='reflectance' value='0'/></bsdf></bsdf></shape>";
   std::string two;
   for (const char* z : {"2", "3"}) two += std::string(veil).replace(veil.find('%'), 1, z);
-  const TestScene scene = load_text(
-      scene_text(two + "<emitter type='constant'><rgb name='radiance' value='8'/></emitter>", 16, 16, -1, kNarrow));
-  expect_image_mean(scene, 32, 2, 0.05);
+  const std::string sky = "<emitter type='constant'><rgb name='radiance' value='8'/></emitter>";
+  expect_image_mean(scene_text(two + sky, 16, 16, -1, kNarrow), 32, 2, 0.05, {Bug::kLobePmfForgotten});
 }
 
 TEST(HideEmitters, LightsAreInvisibleButShine) {
@@ -182,10 +242,16 @@ TEST(HideEmitters, LightsAreInvisibleButShine) {
   // factor of four unit squares over a point below their common corner.
   const double a = 1.0 / 3, s = std::sqrt(1 + a * a);
   const double irradiance = 5 * 4 * 0.5 * 2 * (a / s) * std::atan(a / s);
-  expect_image_mean(load_text(scene_text(body, 16, 16, 2, kNarrow, hide)), 16, 0.6 / M_PI * irradiance, 0.02);
+  expect_image_mean(scene_text(body, 16, 16, 2, kNarrow, hide), 16, 0.6 / M_PI * irradiance, 0.02,
+                    {Bug::kNoDirectionWeight, Bug::kNoLightWeight});
   const std::string sky = "<emitter type='constant'/>";
   EXPECT_EQ(image_mean(render(load_text(scene_text(sky, 4, 4, -1, "", hide)), 1, 0)), 0);
   EXPECT_EQ(image_mean(render(load_text(scene_text(sky, 4, 4, -1, "")), 1, 0)), 1);
+}
+
+TEST(PlantedBugs, WithoutOneThePartsGiveTheBitsOfPath) {
+  const std::string xml = scene_text(std::string(kPlane) + kSphereLight + kDimSky, 16, 16, -1, "");
+  EXPECT_TRUE(same_bits(render(load_text(xml), 8, 0), render(load_text(xml, 0, with(Bug::kNone)), 8, 0)));
 }
 
 }  // namespace
