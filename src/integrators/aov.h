@@ -7,9 +7,9 @@
 
 namespace covary {
 
-/// Fills film.aovs with `Albedo` (reflectance in [0, 1]), `N` (shading normal in world space) and `P` (position in world
-/// space), each the mean over `spp` filtered camera rays; rays that leave the scene count as zero. The film positions are
-/// those of the first `spp` samples of the pass with this sampling and seed.
+/// Fills film.aovs with `Albedo` (reflectance in [0, 1]), `N` (shading normal in world space) and `P` (position in
+/// world space), each the mean over `spp` filtered camera rays; rays that leave the scene count as zero. The film
+/// positions are those of the first `spp` samples of the pass with this sampling and seed.
 void render_aovs(const Scene& scene, const FilterSettings& filter, Sampling sampling, uint64_t seed, uint32_t pass,
                  uint32_t spp, Film& film);
 

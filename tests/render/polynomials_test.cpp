@@ -40,7 +40,8 @@ Film render(const TestScene& scene, const Integrator& integrator, const PassSett
   return film;
 }
 
-/// A wall lit by a small rectangle that the camera does not see: direct light is smooth in all numbers of light sampling.
+/// A wall lit by a small rectangle that the camera does not see: direct light is smooth in all numbers of light
+/// sampling.
 TestScene lit_wall(int width, int height) {
   return load_text(scene_text(
       "<shape type='rectangle'><transform name='to_world'><scale value='4'/><rotate y='1' angle='180'/>"
@@ -112,7 +113,7 @@ TEST(PolynomialsInARender, AgreesWithTheReferenceOnRealPixels) {
   options.make_integrator = [](Parameters& parameters) -> std::shared_ptr<SceneObject> {
     return integrator_plugins()[0].make(parameters, PathLengthSettings::from(parameters));
   };
-  const TestScene scene{load_scene(std::string(COVARY_SOURCE_DIR) + "/scenes/room.xml", options)};
+  const TestScene scene = load_file(std::string(COVARY_SOURCE_DIR) + "/scenes/room.xml", options);
   for (const int d : {2, 4, 6}) {
     PassSettings settings = pass(scene, 100, d);
     double largest = 0, largest_correction = 0;
@@ -140,7 +141,7 @@ TEST(PolynomialsInARender, AgreesWithTheReferenceOnRealPixels) {
   }
 }
 
-// ---- bits --------------------------------------------------------------------------------------------------------------
+// ---- bits ----------------------------------------------------------------------------------------------------------
 
 TEST(PolynomialsInARender, BitsDoNotDependOnThreadsOrCrops) {
   const TestScene scene = lit_wall(70, 45);
@@ -201,7 +202,7 @@ TEST(PolynomialsInARender, CheckpointsComeBetweenTiles) {
   EXPECT_LT(result.estimate_seconds, result.seconds);
 }
 
-// ---- noise -------------------------------------------------------------------------------------------------------------
+// ---- noise ---------------------------------------------------------------------------------------------------------
 
 /// Mean squared error of all pixels against `exact`, over 32 renders; and their image means.
 double squared_error(const TestScene& scene, const PassSettings& settings, const Film& exact,
@@ -218,10 +219,10 @@ double squared_error(const TestScene& scene, const PassSettings& settings, const
   return sum / (32.0 * exact.width() * exact.height());
 }
 
-// N = 32 renders of 96 pixels with 64 samples, Student's t-test at alpha = 5e-7 of the difference that the fit makes to the
-// image mean, whose expectation is zero up to the bias of O(1/n). With the standard error s of the 32 differences it detects
-// 8.8 s with power 0.99, which is asserted to be below 1 % of the mean. Planted bugs: the coordinates of another sample, which
-// must not help, and coordinates of another range, which must shift the mean.
+// N = 32 renders of 96 pixels with 64 samples, Student's t-test at alpha = 5e-7 of the difference that the fit makes
+// to the image mean, whose expectation is zero up to the bias of O(1/n). With the standard error s of the 32
+// differences it detects 8.8 s with power 0.99, which is asserted to be below 1 % of the mean. Planted bugs: the
+// coordinates of another sample, which must not help, and coordinates of another range, which must shift the mean.
 TEST(PolynomialsInARender, DirectLightHasLessNoiseAndTheRightMean) {
   const TestScene scene = lit_wall(12, 8);
   const Film exact = render(scene, 1 << 15, 1);
