@@ -49,7 +49,7 @@ struct CameraSample {
 /// (integrators/training.h), and then traces. From prepare() or training on, nothing that all threads see changes.
 class Integrator : public SceneObject {
  public:
-  /// Called once for the scene, before anything but description().
+  /// Called with the scene before anything but description(); again with the same scene it changes nothing.
   virtual void prepare(const Scene& /*scene*/) {}
   /// A fresh state for a thread; null when trace() keeps nothing. Thread-safe.
   virtual std::unique_ptr<ThreadState> make_thread_state() const { return nullptr; }

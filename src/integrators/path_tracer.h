@@ -26,7 +26,7 @@ namespace covary {
 /// below is compiled, so exchanging one costs nothing. Many threads use one object; its functions are const but for
 /// prepare().
 struct PathParts {
-  /// Called once, before the first path.
+  /// Called before the first path.
   void prepare(const Scene&) {}
 
   /// How to choose a light; see UniformLights for what the result must be able to do.

@@ -13,7 +13,7 @@ namespace covary::roulette {
 /// Probability that a path of this throughput goes on, at most 0.95. `eta`: product of the indices crossed, which
 /// undoes the scaling of radiance by refraction. After the brightest channel; with common random numbers its fourth
 /// root: few paths with large weights are what neighbouring pixels share least, so longer paths pay off there
-/// (docs/performance.md, "Roulette").
+/// (docs/notes/performance.md, "Roulette").
 inline float survival_probability(const Spectrum& throughput, float eta, Sampling sampling) {
   const float brightest = max_component(throughput) * sqr(eta);
   return std::min(sampling == Sampling::kCrn ? std::sqrt(std::sqrt(brightest)) : brightest, 0.95f);

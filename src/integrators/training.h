@@ -80,8 +80,8 @@ struct TrainingSettings {
   std::function<void(uint64_t done, uint64_t total)> progress;  ///< as in PassSettings
 };
 
-/// Trains a prepared integrator from the beginning, by training_spp() independent samples in each pixel that are used for
-/// nothing else, and freezes it. False when stopped before that; it can be trained again.
+/// Trains a prepared integrator from the beginning, by training_spp() independent samples in each pixel that are used
+/// for nothing else, and freezes it. False when stopped before that; it can be trained again.
 bool train(const Scene& scene, LearningIntegrator& integrator, const TrainingSettings& settings);
 
 }  // namespace covary

@@ -13,6 +13,7 @@
 #include "estimators/predicted_error.h"
 #include "film/film_file.h"
 #include "integrators/aov.h"
+#include "integrators/training.h"
 #include "plans/budget.h"
 #include "plans/pass_files.h"
 #include "plans/pass_waves.h"
@@ -38,10 +39,18 @@ std::string filter_text(const FilterSettings& filter) {
   throw Error(ErrorCode::kInternal, "unknown reconstruction filter");
 }
 
+/// The scene's integrator, prepared for it.
 std::shared_ptr<const Integrator> integrator_of(const LoadedScene& scene) {
-  auto integrator = std::dynamic_pointer_cast<const Integrator>(scene.integrator);
+  auto integrator = std::dynamic_pointer_cast<Integrator>(scene.integrator);
   COVARY_CHECK(integrator, "the scene was loaded with an integrator");
+  integrator->prepare(*scene.scene);
   return integrator;
+}
+
+/// Trains the scene's integrator if it learns. False when stopped.
+bool train(const LoadedScene& scene, const TrainingSettings& settings) {
+  auto* learning = dynamic_cast<LearningIntegrator*>(scene.integrator.get());
+  return !learning || train(*scene.scene, *learning, settings);
 }
 
 /// The part of the frame that is rendered.
@@ -134,6 +143,7 @@ class PlanRun {
 };
 
 bool PlanRun::render_to_limits() {
+  if (!train(scene_, {window_, filter_, callbacks_.stop, callbacks_.progress})) return false;
   const bool open_ended = timed() || request_.until > 0;
   const uint32_t limit = request_.spp.value_or(open_ended ? kMaxBudget : static_cast<uint32_t>(scene_.spp));
   state_.budget = state_.group_budget = request_.until > 0 ? std::min(limit, kFirstBudget) : limit;
@@ -310,7 +320,9 @@ ReplayedSample replay(const LoadedScene& scene, const RenderRequest& request, co
   settings.seed = request.seed;
   settings.pass = address.pass;
   settings.filter = request.filter.value_or(scene.filter);
-  return replay_sample(*scene.scene, *integrator_of(scene), settings, address.x, address.y, address.sample);
+  const auto integrator = integrator_of(scene);
+  train(scene, {crop_of(scene, request), settings.filter, nullptr, nullptr});
+  return replay_sample(*scene.scene, *integrator, settings, address.x, address.y, address.sample);
 }
 
 }  // namespace covary

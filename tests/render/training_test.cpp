@@ -9,6 +9,8 @@
 #include <atomic>
 
 #include "core/content_hash.h"
+#include "plans/estimator_plans.h"
+#include "plans/render.h"
 #include "render_fixture.h"
 
 namespace covary {
@@ -107,7 +109,8 @@ CellMeans& learner(const TestScene& scene) { return dynamic_cast<CellMeans&>(*sc
 
 /// Trains the scene's integrator in the whole frame.
 bool train_room(const TestScene& scene, const std::atomic<bool>* stop = nullptr) {
-  return train(scene.scene(), learner(scene), {{0, 0, scene.loaded.width, scene.loaded.height}, {}, stop, {}});
+  return train(scene.scene(), learner(scene),
+               {{0, 0, scene.loaded.width, scene.loaded.height}, scene.loaded.filter, stop, {}});
 }
 
 /// Samples for learning that stay in the film.
@@ -215,7 +218,7 @@ TEST(Training, StoppedIsNotTrainedAndCanStartAgain) {
   const TestScene scene = load_room();
   const TestScene other = load_room();
   std::atomic<bool> stop{false};
-  TrainingSettings settings{{0, 0, scene.loaded.width, scene.loaded.height}, {}, &stop, {}};
+  TrainingSettings settings{{0, 0, scene.loaded.width, scene.loaded.height}, scene.loaded.filter, &stop, {}};
   int tiles = 0;
   settings.progress = [&](uint64_t, uint64_t) {
     if (++tiles == 20) stop = true;  // of 15 in each wave
@@ -228,6 +231,36 @@ TEST(Training, StoppedIsNotTrainedAndCanStartAgain) {
   EXPECT_TRUE(train_room(scene));
   EXPECT_TRUE(train_room(other));
   EXPECT_EQ(scene.integrator().description(), other.integrator().description());
+}
+
+TEST(Training, ARenderByAPlanTrainsFirst) {
+  const TestScene scene = load_room(), other = load_room();
+  RenderRequest request;
+  request.spp = 2, request.seed = 7;
+  const RenderResult result = render(scene.loaded, plain_plan(Sampling::kIndependent), request);
+  EXPECT_TRUE(train_room(other));
+  const Film& film = result.passes[0].film;
+  EXPECT_TRUE(same_bits(film, render(other, 2, 7)));
+  EXPECT_TRUE(film.attributes.at(film_key::kSettings).starts_with(other.integrator().description() + ";"));
+
+  const ReplayedSample replayed = replay(scene.loaded, request, {.x = 11, .y = 13, .sample = 1});
+  PassSettings settings;
+  settings.seed = 7, settings.filter = other.loaded.filter;
+  EXPECT_EQ(replayed.value, replay_sample(other.scene(), other.integrator(), settings, 11, 13, 1).value);
+}
+
+TEST(Training, StoppedItLeavesNoFilm) {
+  const TestScene scene = load_room();
+  RenderRequest request;
+  request.spp = 2;
+  std::atomic<bool> stop{false};
+  RenderCallbacks callbacks;
+  callbacks.stop = &stop;
+  callbacks.progress = [&](uint64_t, uint64_t) { stop = true; };
+  const RenderResult result = render(scene.loaded, plain_plan(Sampling::kIndependent), request, callbacks);
+  EXPECT_TRUE(result.interrupted);
+  EXPECT_FALSE(result.complete);
+  EXPECT_TRUE(result.passes.empty());
 }
 
 }  // namespace
