@@ -10,8 +10,9 @@
 //     freeze()         from here on a sample is a function of its address alone, as those of other integrators
 //
 // The samples of a wave read only what earlier waves taught, so their mean is right in expectation and they may stay
-// in the film (PassSettings::learner); train() below throws them away. The hash of the frozen state is part of
-// description() and so of a film's settings: films of different training are not continued or merged.
+// in the film (PassSettings::learner). train() below, with which a render by a plan begins, uses them for nothing else.
+// The hash of the frozen state is part of description() and so of a film's settings: films of different training are
+// not continued or merged.
 #pragma once
 
 #include <memory>
