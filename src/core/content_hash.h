@@ -9,11 +9,15 @@
 
 namespace covary {
 
-/// XXH64 (Y. Collet, seed 0) of the bytes: fast and well mixed, not cryptographic.
+/// XXH64 (seed 0) of the bytes: fast and well mixed, not cryptographic. Films store it for their scene.
 uint64_t hash_bytes(std::span<const std::byte> bytes);
 inline uint64_t hash_bytes(std::string_view text) { return hash_bytes(std::as_bytes(std::span(text))); }
 
 /// 16 lower-case hexadecimal digits.
 std::string hash_text(uint64_t hash);
+
+/// XXH3-128 (seed 0) of the text as 32 lower-case hexadecimal digits: a name for what the text describes, with no
+/// chance of two texts sharing one that matters in practice (10^9 keys: 10^-21).
+std::string key_text(std::string_view text);
 
 }  // namespace covary

@@ -27,6 +27,14 @@ TEST(ContentHash, ChangesWithEveryByteAndLength) {
   EXPECT_EQ(seen.size(), 200u);
 }
 
+TEST(ContentHash, KeysAgreeWithPublishedValuesOfXxh3) {
+  EXPECT_EQ(key_text(""), "99aa06d3014798d86001c324468d497f");
+  std::set<std::string> seen;
+  for (size_t length = 0; length < 300; ++length) seen.insert(key_text(std::string(length, 'x')));
+  EXPECT_EQ(seen.size(), 300u);
+  EXPECT_EQ(seen.begin()->size(), 32u);
+}
+
 TEST(ContentHash, IsWrittenAsSixteenDigits) { EXPECT_EQ(hash_text(0xabcull), "0000000000000abc"); }
 
 }  // namespace

@@ -22,8 +22,8 @@ constexpr size_t kLearnerTiles = 128;  // whose records are held at a time
 constexpr double kRoundSeconds = 0.5;  // between checkpoints where pixels are estimated from all their samples
 
 /// Offset from the pixel centre, drawn from a gaussian with the given standard deviation cut off at `radius`, by
-/// inversion of its cumulative distribution (rational start of Giles 2010 for the inverse error function, one Newton
-/// step).
+/// inversion of its cumulative distribution: the inverse error function of [Giles2012], then one Newton step. Not a
+/// library's function: those differ between versions in the last bits, and with them every image.
 float interval_to_gaussian(float u, float stddev, float radius) {
   const double tail = std::erf(radius / (stddev * std::sqrt(2.0)));  // mass inside the cut-off
   const double p = std::clamp((2.0 * u - 1.0) * tail, -1 + 1e-15, 1 - 1e-15);

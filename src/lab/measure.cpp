@@ -178,7 +178,7 @@ void measure(Cell& cell, const SceneInstance& scene, const std::vector<Image>& r
   parallel_for(n, [&](size_t s) {
     RunResult& run = cell.runs[s];
     images[s] = read_window(run.record.image, scene);
-    const std::string key = hash_text(hash_bytes(run_keys[s] + reference_key)) + hash_text(hash_bytes(reference_key));
+    const std::string key = key_text(run_keys[s] + " " + reference_key);
     const ImageErrors errors = image_errors(images[s], run.record.image, scene, references, cache, key);
     run.mae = errors.mae, run.flip = errors.flip, run.predicted_relmse = errors.predicted_relmse;
   });

@@ -43,8 +43,7 @@ std::string key_of(const std::string& kind, const PlanContext& context, const Sc
     for (const std::string& word : words) text += word + "\n";
     text += "\n";
   }
-  // Two independent hashes: a key must be unique among all results ever kept in a cache.
-  return hash_text(hash_bytes(text)) + hash_text(hash_bytes(text + kind));
+  return key_text(text);
 }
 
 bool is_option(const std::string& word) {

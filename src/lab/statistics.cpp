@@ -2,8 +2,8 @@
 #include "lab/statistics.h"
 
 #include <algorithm>
+#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 
 #include "core/error.h"
@@ -21,30 +21,11 @@ double mean_without(std::span<const double> values, size_t left_out) {
   return sum / static_cast<double>(values.size() - 1);
 }
 
-/// P(|T| <= t), a finite sum for whole numbers of degrees of freedom [AbramowitzStegun1964] (26.7.3), (26.7.4).
-double student_t_central(double t, int dof) {
-  const double theta = std::atan(t / std::sqrt(dof)), c = std::cos(theta), s = std::sin(theta);
-  const bool odd = dof % 2 == 1;
-  double term = odd ? c : 1, sum = 0;
-  for (int i = odd ? 3 : 2; i <= dof; i += 2) {
-    sum += term;
-    term *= c * c * (i - 1) / i;
-  }
-  return odd ? 2 / std::numbers::pi * (theta + s * sum) : s * sum;
-}
-
 }  // namespace
 
 double student_t_quantile(double p, int dof) {
   COVARY_CHECK(p > 0 && p < 1 && dof >= 1, "a probability and at least one degree of freedom");
-  const double central = std::abs(2 * p - 1);
-  double low = 0, high = 1;
-  while (student_t_central(high, dof) < central) high *= 2;
-  for (int i = 0; i < 100; ++i) {
-    const double middle = 0.5 * (low + high);
-    (student_t_central(middle, dof) < central ? low : high) = middle;
-  }
-  return p < 0.5 ? -high : high;
+  return boost::math::quantile(boost::math::students_t(dof), p);
 }
 
 Estimate with_interval(double value, double standard_error, int dof) {

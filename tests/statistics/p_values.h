@@ -19,12 +19,7 @@ double sidak(double suite_alpha, int n_tests);
 /// The alpha every single comparison uses unless it says otherwise: 5e-7, |z| > 5.03.
 double test_alpha();
 
-/// Regularised upper incomplete gamma function Q(a, x).
-double gamma_q(double a, double x);
-/// Regularised incomplete beta function I_x(a, b).
-double beta_inc(double a, double b, double x);
-
-/// Probability of a chi-square statistic at least this large.
+/// Probability of a chi-square statistic at least this large; 0 where the statistic is not a number.
 double chi2_p_value(double statistic, double dof);
 /// Two-sided.
 double normal_p_value(double z);

@@ -19,6 +19,8 @@ TEST(PValues, Chi2MatchesClosedForms) {
     EXPECT_NEAR(chi2_p_value(x, 1), std::erfc(std::sqrt(x / 2)), 1e-13);           // one: squared normal
     EXPECT_NEAR(chi2_p_value(x, 4) / (std::exp(-x / 2) * (1 + x / 2)), 1, 1e-11);  // four: Erlang, tails included
   }
+  EXPECT_EQ(chi2_p_value(0, 3), 1);
+  EXPECT_EQ(chi2_p_value(std::nan(""), 3), 0);
   EXPECT_NEAR(chi2_p_value(149.449, 100), 0.001, 1e-7);
   EXPECT_NEAR(chi2_p_value(70.0649, 100), 0.99, 1e-6);
 }
