@@ -17,6 +17,7 @@ void add_combine(CLI::App& app);
 void add_denoise(CLI::App& app);
 void add_experiment(CLI::App& app);
 void add_view(CLI::App& app);
+void add_help(CLI::App& app);
 
 /// The command line as given, with quotes where a shell needs them; for the `command` attribute of films.
 const std::string& command_line();

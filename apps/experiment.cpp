@@ -13,7 +13,6 @@
 #include <sstream>
 
 #include "commands.h"
-#include "commit.h"
 #include "core/content_hash.h"
 #include "core/error.h"
 #include "estimator_options.h"
@@ -23,6 +22,7 @@
 #include "lab/overrides.h"
 #include "lab/report_document.h"
 #include "progress.h"
+#include "version.h"
 
 namespace covary {
 namespace {
@@ -58,9 +58,8 @@ std::string program_path() { return fs::read_symlink("/proc/self/exe").string();
 
 /// Version and commit; where the commit does not say what was built, the program's own content.
 std::string program_version() {
-  const std::string commit = COVARY_COMMIT;
-  std::string text = fmt::format("{} ({})", COVARY_VERSION, commit);
-  if (commit == "unknown" || commit.ends_with("-dirty")) text += " " + hash_text(hash_bytes(read_file(program_path())));
+  std::string text = version_text();
+  if (!text.ends_with(')') || text.ends_with("-dirty)")) text += " " + hash_text(hash_bytes(read_file(program_path())));
   return text;
 }
 

@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The `covary` program. Exit codes: 0 done, 1 failed, 2 wrong usage.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <csignal>
 #include <cstdio>
@@ -11,6 +14,7 @@
 #include "commands.h"
 #include "core/error.h"
 #include "core/shell_text.h"
+#include "version.h"
 
 namespace covary {
 namespace {
@@ -24,6 +28,20 @@ int report(const char* program, const Error& error) {
   return usage ? 2 : 1;
 }
 
+/// Long options of `command` that `given` may have been meant to be: misspelt or cut short. Compared without dashes, which
+/// would make all short names alike.
+std::vector<std::string> near_options(const CLI::App& command, const std::string& given) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : command.get_options())
+    names.insert(names.end(), option->get_lnames().begin(), option->get_lnames().end());
+  const std::string bare = given.substr(std::min(given.find_first_not_of('-'), given.size()));
+  std::vector<std::string> near = nearest_names(bare, names);
+  if (near.empty() && bare.size() > 1)
+    std::copy_if(names.begin(), names.end(), std::back_inserter(near), [&](auto& n) { return n.starts_with(bare); });
+  for (std::string& name : near) name.insert(0, "--");
+  return near;
+}
+
 /// What is wrong with the first argument that no option takes; "" when there is none.
 std::string describe_extra(const CLI::App& app) {
   const CLI::App& command = app.get_subcommands().empty() ? app : *app.get_subcommands()[0];
@@ -33,15 +51,14 @@ std::string describe_extra(const CLI::App& app) {
   const std::string extra = extras[0].substr(0, extras[0].find('='));
   const std::string help = "; see '" + name + " --help'";
   if (!extra.starts_with('-')) return "too many arguments, beginning with '" + extra + "'" + help;
-  std::vector<std::string> names;
-  for (const CLI::Option* option : command.get_options())
-    for (const std::string& known : option->get_lnames()) names.push_back("--" + known);
-  return "unknown option '" + extra + "'" + did_you_mean(extra, names) + help;
+  const std::vector<std::string> near = near_options(command, extra);
+  const std::string question = near.empty() ? "" : fmt::format("; did you mean '{}'?", fmt::join(near, "' or '"));
+  return "unknown option '" + extra + "'" + question + help;
 }
 
 int run(int argc, char** argv) {
   CLI::App app("covary: Monte Carlo rendering with less noise by control variates and correlated sampling", "covary");
-  app.set_version_flag("--version", "covary " COVARY_VERSION, "Print the version and exit");
+  app.set_version_flag("--version", "covary " + version_text(), "Print version and commit, and exit");
   app.require_subcommand(0, 1);
   app.failure_message(CLI::FailureMessage::simple);
   add_render(app);
@@ -53,6 +70,7 @@ int run(int argc, char** argv) {
   add_denoise(app);
   add_experiment(app);
   add_view(app);
+  add_help(app);
 
   if (argc < 2) {
     std::fputs(app.help().c_str(), stdout);

@@ -67,13 +67,15 @@ class Help(CliTest):
             self.assertIn(f"covary {command}", self.good(command, "--help").stdout)
 
     def test_version(self):
-        self.assertRegex(self.good("--version").stdout, r"^covary \d+\.\d+\.\d+\n$")
+        self.assertRegex(self.good("--version").stdout, r"^covary \d+\.\d+\.\d+( \([0-9a-f]+(-dirty)?\))?\n$")
 
     def test_wrong_usage(self):
         self.bad(2, "unknown command 'compar'; did you mean 'compare'", "compar")
         self.bad(2, "unknown command 'zzzzzzzz'; 'covary --help'", "zzzzzzzz")
         self.bad(2, "unknown option '--verzion'; did you mean '--version'", "--verzion")
         self.bad(2, "unknown option '--refrence'; did you mean '--reference'", "compare", "a.exr", "--refrence", "b.exr")
+        self.bad(2, "unknown option '--sp'; did you mean '--spp'?; see", "render", "a.xml", "--sp", "8")
+        self.bad(2, "unknown option '--resol'; did you mean '--resolution'?", "render", "a.xml", "--resol", "8x8")
         self.bad(2, "--reference is required; see 'covary compare --help'", "compare", "a.exr")
         self.bad(2, "too many arguments, beginning with 'b.exr'", "info", "a.exr", "b.exr")
 

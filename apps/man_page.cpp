@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "command_description.h"
+
+namespace covary {
+namespace {
+
+/// Text for man(7): nothing in it is a request or an escape, and "-" stays the character that shells know.
+std::string escaped(const std::string& text) {
+  std::string result;
+  if (!text.empty() && (text[0] == '.' || text[0] == '\'')) result = "\\&";
+  for (const char c : text) {
+    if (c == '\\')
+      result += "\\e";
+    else if (c == '-')
+      result += "\\-";
+    else
+      result += c;
+  }
+  return result;
+}
+
+/// "-o, --output TEXT" in bold and italics.
+std::string term(const OptionDescription& option) {
+  std::string result;
+  for (const std::string& name : option.names)
+    result += fmt::format("{}\\fB{}\\fR", result.empty() ? "" : ", ", escaped(name));
+  const std::string value = option.choices.empty() ? option.value : fmt::format("{}", fmt::join(option.choices, "|"));
+  if (!value.empty()) result += fmt::format("{}\\fI{}\\fR", result.empty() ? "" : " ", escaped(value));
+  return result;
+}
+
+std::string list(const std::vector<OptionDescription>& options) {
+  std::string result;
+  for (const OptionDescription& option : options)
+    result += fmt::format(".TP\n{}\n{}\n", term(option), escaped(option.text));
+  return result;
+}
+
+}  // namespace
+
+std::string man_page(const CLI::App& app, const std::string& version) {
+  std::string page = fmt::format(
+      ".TH COVARY 1 \"\" \"covary {}\" \"User Commands\"\n.SH NAME\n{}\n.SH SYNOPSIS\n.B covary\n.I COMMAND\n"
+      "[\\fIoptions\\fR]\n.br\n.B covary\n[\\fB\\-\\-help\\fR] [\\fB\\-\\-version\\fR]\n",
+      escaped(version), "covary \\- " + escaped(app.get_description().substr(app.get_description().find(' ') + 1)));
+  page +=
+      ".SH DESCRIPTION\n.B covary\nrenders scenes in the XML format of Mitsuba to images in OpenEXR files, combines "
+      "renders that share random\nnumbers with independent ones into images with less noise, and compares methods.\n"
+      ".SH COMMANDS\n";
+  for (const CommandDescription& command : describe_subcommands(app)) {
+    std::string arguments;
+    for (const OptionDescription& positional : command.positionals)
+      arguments += fmt::format(" \\fI{}\\fR", escaped(positional.value));
+    page += fmt::format(".SS covary {} [options]{}\n{}.\n", command.name, arguments, escaped(command.text));
+    page += list(command.positionals) + list(command.options);
+  }
+  return page +
+         ".SH EXIT STATUS\n.TP\n.B 0\nDone.\n.TP\n.B 1\nFailed; the message says why.\n.TP\n.B 2\nWrong usage.\n"
+         ".SH SEE ALSO\nThe documentation lies in\n.I share/doc/covary\nbeside the program's folder.\n";
+}
+
+}  // namespace covary

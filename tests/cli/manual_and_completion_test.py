@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""covary help: the man page and the completions hold what the help of the commands says, and the tools that read them
+accept them."""
+import re
+import subprocess
+import unittest
+from pathlib import Path
+
+from cli_test import CliTest
+
+
+class HelpTest(CliTest):
+    def setUp(self):
+        super().setUp()
+        names = self.good("help").stdout.split("Subcommands:")[1]
+        self.commands = re.findall(r"^  (\w+) ", names, re.M)
+        self.options = {name: re.findall(r"(?:^  |,)(--[\w-]+)", self.good("help", name).stdout, re.M)
+                        for name in self.commands}
+        self.assertIn("render", self.commands)
+        self.assertIn("--estimator", self.options["render"])
+
+    def script(self, shell):
+        self.write("script", self.good("help", "--completion", shell).stdout.encode())
+        return str(self.path / "script")
+
+    def shell(self, *arguments):
+        result = subprocess.run(arguments, cwd=self.path, capture_output=True, text=True, timeout=60)
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        return result.stdout
+
+
+class Help(HelpTest):
+    def test_of_a_command(self):
+        self.assertEqual(self.good("help", "render").stdout, self.good("render", "--help").stdout)
+        self.assertEqual(self.good("help").stdout, self.good("--help").stdout)
+        self.bad(2, "unknown command 'rendr'; did you mean 'render'?", "help", "rendr")
+        self.bad(2, "--completion", "help", "--completion", "tcsh")
+        self.bad(2, "COMMAND excludes --man", "help", "render", "--man")
+
+
+class Manual(HelpTest):
+    def test_has_every_option(self):
+        page = self.good("help", "--man").stdout
+        for command in self.commands:
+            section = page.split(f".SS covary {command} ")[1].split("\n.S")[0].replace("\\-", "-")
+            for option in self.options[command]:
+                self.assertIn(f"\\fB{option}\\fR", section)
+
+    def test_is_accepted_and_shown(self):
+        self.write("covary.1", self.good("help", "--man").stdout.encode())
+        self.shell("mandoc", "-T", "lint", "-W", "error", "covary.1")
+        text = self.shell("mandoc", "-T", "ascii", "covary.1").replace("_\b", "")
+        text = re.sub(".\b", "", text)
+        self.assertIn("covary render [options] SCENE", text)
+        self.assertIn("'-': standard output", text)
+
+
+class Bash(HelpTest):
+    def complete(self, *words):
+        """What bash offers for the last word, as it splits the line."""
+        quoted = " ".join("'" + word + "'" for word in words)
+        script = self.script("bash")
+        return self.shell("bash", "-c", f"source {script}; COMP_WORDS=(covary {quoted}); COMP_CWORD={len(words)}; _covary; "
+                          'echo "${COMPREPLY[@]}"').split()
+
+    def test_commands(self):
+        self.assertEqual(sorted(self.complete("")), sorted([*self.commands, "--help", "--version"]))
+        self.assertEqual(self.complete("ren"), ["render"])
+
+    def test_options(self):
+        for command in self.commands:
+            self.assertLessEqual(set(self.options[command]), set(self.complete(command, "--")))
+        self.assertEqual(self.complete("render", "a.xml", "--est"), ["--estimator"])
+
+    def test_values(self):
+        estimators = ["iicv", "cv-baseline", "iduw", "polynomials", "none"]
+        self.assertLessEqual(set(estimators), set(self.complete("render", "--estimator", "")))
+        self.assertEqual(self.complete("render", "--estimator", "ii"), ["iicv"])
+        self.assertEqual(self.complete("render", "--estimator", "=", "ii"), ["iicv"])
+        self.assertEqual(self.complete("render", "--spp", ""), [])
+        self.assertEqual(self.complete("render", "-o", ""), [], "files are readline's matter")
+
+
+class OtherShells(HelpTest):
+    def test_zsh(self):
+        self.shell("zsh", "-f", "-n", self.script("zsh"))
+        text = Path(self.script("zsh")).read_text()
+        for command in self.commands:
+            section = text.split(f"    {command})\n")[1].split(";;")[0]
+            for option in self.options[command]:
+                self.assertRegex(section, rf"'\*{option}[=\[]")
+
+    def test_fish(self):
+        script = self.script("fish")
+        def complete(line):
+            lines = self.shell("fish", "--no-config", "-c", f"source {script}; complete -C '{line}'").splitlines()
+            return [entry.split("\t")[0] for entry in lines]
+        self.assertLessEqual(set(self.commands), set(complete("covary ")))
+        for command in self.commands:
+            self.assertLessEqual(set(self.options[command]), set(complete(f"covary {command} --")))
+        self.assertEqual(complete("covary render --estimator ii"), ["iicv"])
+
+
+if __name__ == "__main__":
+    unittest.main()
