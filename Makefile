@@ -1,18 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
-# Entry to the project. `make demo` and `make test` start from a bare Debian 12: they install what is missing, build and run.
+# Entry to the project. `make demo` and `make test` start from a bare Debian 12: they install what is missing, build and
+# run.
 #
 #   make setup            install missing packages (needs root or sudo only when something is missing)
 #   make build            build/release/covary
 #   make demo             render a small scene plainly and with IICV into out/
 #   make test             build and run all tests but the nightly ones      TESTS=regex selects some
+#   make check            all there is: lint of every file, the tests of a build with checks, under each sanitizer and
+#                         by Clang, and a minute of each fuzz target; takes hours      FUZZ=seconds for each target
 #   make bench            build and run the micro benchmarks                BENCH=regex selects some
-#   make lint             formatting, static analysis, layers               ALL=1 analyses every file, not only changed ones
+#   make lint             formatting, static analysis, rules of the tree    ALL=1 analyses all files, not changed ones
 #   make install          install under PREFIX (default /usr/local)
 #   make asan|ubsan|tsan  build and run the tests under a sanitizer
+#   make dev|clang        the same with checks of the standard library; by Clang
 #   make clean            remove build/ and out/
 #
-# ARCH=x86-64-v3 builds for every AVX2 machine instead of this one; WERROR=ON makes warnings errors; JOBS=n limits
-# parallelism (default: processors, fewer when memory is short).
+# ARCH=x86-64-v3 builds for every AVX2 machine instead of this one; WERROR=ON makes warnings errors (dev and clang
+# always do); JOBS=n limits parallelism (default: processors, fewer when memory is short).
 
 ARCH   ?= native
 WERROR ?= OFF
@@ -20,10 +24,11 @@ PREFIX ?= /usr/local
 JOBS   ?= $(shell scripts/jobs)
 TESTS  ?= .
 BENCH  ?= .
+FUZZ   ?= 60
 CTEST   = ctest --output-on-failure --no-tests=error -LE nightly -R '$(TESTS)' -j $(JOBS)
 CONFIGURE = -DCOVARY_ARCH=$(ARCH) -DCOVARY_WERROR=$(WERROR)
 
-.PHONY: all setup configure build demo test nightly bench lint install asan ubsan tsan clean
+.PHONY: all setup configure build demo test check nightly bench lint install dev clang asan ubsan tsan clean
 all: build
 
 setup:
@@ -42,6 +47,12 @@ test: configure
 	@cmake --build build/release -j $(JOBS)
 	@cd build/release && $(CTEST)
 
+check:
+	@scripts/setup check
+	@$(MAKE) --no-print-directory lint ALL=1
+	@for build in dev asan ubsan tsan clang; do $(MAKE) --no-print-directory $$build || exit 1; done
+	@scripts/fuzz $(FUZZ)
+
 nightly: configure
 	@cmake --build build/release -j $(JOBS)
 	@cd build/release && ctest --output-on-failure -j $(JOBS)
@@ -57,6 +68,12 @@ lint:
 
 install: build
 	@cmake --install build/release --prefix $(PREFIX)
+
+dev clang:
+	@scripts/setup $@
+	@cmake --preset $@ -DCOVARY_ARCH=$(ARCH) > /dev/null
+	@cmake --build build/$@ -j $(JOBS)
+	@cd build/$@ && $(CTEST)
 
 asan ubsan tsan: setup
 	@cmake --preset $@ $(CONFIGURE) > /dev/null
