@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """mitsuba_crn.py SCENE.xml FOLDER [--spp 96] [--groups 12] [--variant llvm_ad_rgb] [-D NAME=VALUE]
 
-Renders a scene by Mitsuba 3 (pip install mitsuba; its variants llvm_ad_rgb and cuda_ad_rgb) for `covary combine`: FOLDER/crn_00.exr ... with common random numbers
-and FOLDER/independent_00.exr ... with independent ones, `--spp` samples per pixel of either kind, in `--groups` renders
-with different seeds. Then:
+Renders a scene by Mitsuba 3 (pip install mitsuba; its variants llvm_ad_rgb and cuda_ad_rgb) for `covary combine`:
+FOLDER/crn_00.exr ... with common random numbers and FOLDER/independent_00.exr ... with independent ones, `--spp`
+samples per pixel of either kind, in `--groups` renders with different seeds. Then:
 
     covary combine --crn FOLDER/crn_*.exr --independent FOLDER/independent_*.exr -o out.exr
 """
