@@ -34,7 +34,7 @@ std::string names_of(const std::vector<CommandDescription>& commands) {
   return names;
 }
 
-// ---- bash ------------------------------------------------------------------------------------------------------------
+// ---- bash -----------------------------------------------------------------------------------------------------------
 
 /// Branches "render --spp|render --seed)" for options whose values are numbers, lists or choices.
 std::string bash_values(const CommandDescription& command) {
@@ -90,7 +90,7 @@ std::string bash_script(const std::vector<CommandDescription>& commands) {
          "complete -o default -F _covary covary\n";
 }
 
-// ---- zsh -------------------------------------------------------------------------------------------------------------
+// ---- zsh ------------------------------------------------------------------------------------------------------------
 
 std::string zsh_option(const OptionDescription& option) {
   std::string value;
@@ -139,7 +139,7 @@ std::string zsh_script(const std::vector<CommandDescription>& commands) {
          "if [ \"$funcstack[1]\" = _covary ]; then _covary \"$@\"; else compdef _covary covary; fi\n";
 }
 
-// ---- fish ------------------------------------------------------------------------------------------------------------
+// ---- fish -----------------------------------------------------------------------------------------------------------
 
 std::string fish_option(const CommandDescription& command, const OptionDescription& option) {
   std::string line = fmt::format("complete -c covary -n '__fish_seen_subcommand_from {}'", command.name);

@@ -6,8 +6,8 @@
 // | weight   | number/texture | required | fraction of the second model; clamped to [0, 1]                   |
 // | (nested) | bsdf           |          | exactly two, in the order of the file                             |
 //
-// f = (1 - weight) f_first + weight f_second, sampled with the same probabilities. Lobes: those of the first model, then
-// those of the second.
+// f = (1 - weight) f_first + weight f_second, sampled with the same probabilities. Lobes: those of the first model,
+// then those of the second.
 #include "bsdfs/inputs.h"
 #include "bsdfs/registry.h"
 

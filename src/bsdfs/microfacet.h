@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Distributions of microfacet normals (GGX and Beckmann, anisotropic) after [Walter2007], with Smith's masking and exact
-// sampling of the visible normals ([Heitz2014], [HeitzDEon2014], [Dupuy2023]).
+// Distributions of microfacet normals (GGX and Beckmann, anisotropic) after [Walter2007], with Smith's masking and
+// exact sampling of the visible normals ([Heitz2014], [HeitzDEon2014], [Dupuy2023]).
 //
 //   code            paper
 //   alpha_u/v       alpha_x, alpha_y     roughness along the s and t axis of the shading frame

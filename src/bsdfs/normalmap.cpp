@@ -3,7 +3,7 @@
 //
 // | name                   | type    | default  | meaning                                                        |
 // |------------------------|---------|----------|----------------------------------------------------------------|
-// | normalmap              | texture | required | colour (n + 1) / 2 of the normal n in the shading frame; use a raw (linear) bitmap |
+// | normalmap              | texture | required | (n + 1) / 2 of the normal n in the shading frame, a raw bitmap |
 // | (nested)               | bsdf    |          | exactly one model                                              |
 // | flip_invalid_normals   | bool    | true     | keep the normal on the side of the camera (perturbed.h)        |
 // | use_shadowing_function | bool    | true     | soften the shadow at grazing light (perturbed.h)               |

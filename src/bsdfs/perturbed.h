@@ -37,8 +37,8 @@ struct PerturbedModel {
 ///
 /// The value is not symmetric: light and camera play different parts. For importance it is the exact adjoint of the
 /// value for radiance, f*(wo, wi) = f(wi, wo), so that light and camera paths estimate the same image. Some pairs of
-/// directions whose two sides choose different flips are found from the camera only: mirror reflections among them carry
-/// no importance, and the densities of the light's side (reverse_pdf, reverse_pmf) are 0.
+/// directions whose two sides choose different flips are found from the camera only: mirror reflections among them
+/// carry no importance, and the densities of the light's side (reverse_pdf, reverse_pmf) are 0.
 const BsdfClosure* make_perturbed(const PerturbedModel& model, const Perturbation& perturbation, TransportMode mode,
                                   Arena& arena);
 

@@ -2,21 +2,21 @@
 // principledthin: the thin-surface variant of `principled` ([Burley2015]), for leaves, paper,
 // curtains and panes modelled as a single sheet. Both sides look alike; light passes without being bent.
 //
-// | name                                 | type           | default | meaning                                          |
-// |--------------------------------------|----------------|---------|--------------------------------------------------|
-// | base_color                           | colour/texture | 0.5     | colour of all parts but untinted reflection      |
-// | roughness                            | number/texture | 0.5     | GGX alpha is its square, at least 0.001          |
-// | anisotropic                          | number/texture | 0       | stretches highlights along dp/du                 |
-// | spec_trans                           | number/texture | 0       | blends diffuse and specular parts                |
-// | eta                                  | number/texture | 1.5     | relative index of refraction                     |
-// | spec_tint                            | number/texture | 0       | tints specular reflection by base_color          |
-// | sheen, sheen_tint                    | number/texture | 0       | grazing reflection of cloth, and its tint        |
-// | flatness                             | number/texture | 0       | blends diffuse and subsurface appearance         |
-// | diff_trans                           | number/texture | 0       | share of diffuse light let through; 2: all of it |
-// | specular_reflectance_sampling_rate   | number         | 1       | factors on the probability with which a lobe is  |
-// | specular_transmittance_sampling_rate | number         | 1       |   sampled; they change noise, never the value    |
-// | diffuse_reflectance_sampling_rate    | number         | 1       |                                                  |
-// | diffuse_transmittance_sampling_rate  | number         | 1       |                                                  |
+// | name                                 | type           | default | meaning                                         |
+// |--------------------------------------|----------------|---------|-------------------------------------------------|
+// | base_color                           | colour/texture | 0.5     | colour of all parts but untinted reflection     |
+// | roughness                            | number/texture | 0.5     | GGX alpha is its square, at least 0.001         |
+// | anisotropic                          | number/texture | 0       | stretches highlights along dp/du                |
+// | spec_trans                           | number/texture | 0       | blends diffuse and specular parts               |
+// | eta                                  | number/texture | 1.5     | relative index of refraction                    |
+// | spec_tint                            | number/texture | 0       | tints specular reflection by base_color         |
+// | sheen, sheen_tint                    | number/texture | 0       | grazing reflection of cloth, and its tint       |
+// | flatness                             | number/texture | 0       | blends diffuse and subsurface appearance        |
+// | diff_trans                           | number/texture | 0       | share of diffuse light let through; 2: all      |
+// | specular_reflectance_sampling_rate   | number         | 1       | factors on the probability with which a lobe is |
+// | specular_transmittance_sampling_rate | number         | 1       |   sampled; they change noise, never the value   |
+// | diffuse_reflectance_sampling_rate    | number         | 1       |                                                 |
+// | diffuse_transmittance_sampling_rate  | number         | 1       |                                                 |
 //
 // Lobes: 0 specular reflection, 1 specular transmission (a reflection mirrored about the surface, its roughness scaled
 // by 0.65 eta - 0.35, [Burley2015] section 5.3), 2 diffuse reflection and sheen, 3 diffuse transmission.

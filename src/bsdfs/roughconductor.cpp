@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// roughconductor: a metal with a rough surface, on the side of the normal; black from the other side (Walter et al. 2007,
-// "Microfacet Models for Refraction through Rough Surfaces").
+// roughconductor: a metal with a rough surface, on the side of the normal; black from the other side (Walter et al.
+// 2007, "Microfacet Models for Refraction through Rough Surfaces").
 //
 // | name                 | type           | default | meaning                                                        |
 // |----------------------|----------------|---------|----------------------------------------------------------------|

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Arrays that are read at random places: they begin on a cache line, so that records that fit a line stay in one, and large
-// ones ask for huge pages, so that a read seldom has to look for its page first.
+// Arrays that are read at random places: they begin on a cache line, so that records that fit a line stay in one, and
+// large ones ask for huge pages, so that a read seldom has to look for its page first.
 #pragma once
 
 #include <cstddef>

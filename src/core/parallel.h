@@ -20,9 +20,9 @@
 
 namespace covary {
 
-/// Calls body(i) for every i of [0, n), in any order and on as many threads as `tbb::global_control` allows; a thread takes
-/// `chunk` (at least 1) neighbours at a time. Loops may be nested. The first exception of a body is thrown here, once all
-/// threads have stopped; iterations not begun by then are left out.
+/// Calls body(i) for every i of [0, n), in any order and on as many threads as `tbb::global_control` allows; a thread
+/// takes `chunk` (at least 1) neighbours at a time. Loops may be nested. The first exception of a body is thrown here,
+/// once all threads have stopped; iterations not begun by then are left out.
 #ifndef COVARY_PLAIN_THREADS
 template <typename Index, typename Body>
 void parallel_for(Index n, std::type_identity_t<Index> chunk, const Body& body) {
@@ -34,7 +34,8 @@ void parallel_for(Index n, std::type_identity_t<Index> chunk, const Body& body) 
       tbb::simple_partitioner());
 }
 #else
-// For the thread sanitizer: TBB's library is built without it, so that the hand-overs between its threads look like races.
+// For the thread sanitizer: TBB's library is built without it, so that the hand-overs between its threads look like
+// races.
 template <typename Index, typename Body>
 void parallel_for(Index n, std::type_identity_t<Index> chunk, const Body& body) {
   std::atomic<Index> next{0};
@@ -72,8 +73,8 @@ void parallel_for(Index n, const Body& body) {
 template <typename T>
 class PerThread {
  public:
-  /// That of the calling thread, made of the arguments when it first asks. It stays where it is. May be called by several
-  /// threads at once.
+  /// That of the calling thread, made of the arguments when it first asks. It stays where it is. May be called by
+  /// several threads at once.
   template <typename... Arguments>
   T& local(const Arguments&... arguments) {
     const std::lock_guard lock(mutex_);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sine and cosine together, and the angle of a point, inlined: the maps of sampling need little else. Errors below 1e-7.
+// Sine and cosine together, and the angle of a point, inlined: the maps of sampling need little else. Errors below
+// 1e-7.
 #pragma once
 
 #include <algorithm>

@@ -36,8 +36,8 @@ inline Vec3 square_to_sphere(Vec2 u) {
 }
 inline float sphere_pdf_solid_angle() { return 1 / (4 * kPi); }
 
-/// Uniform in the cone of directions around +z whose cosine is at least `cos_max`; `one_minus_cos_max` is passed because
-/// it is small for distant lights and its difference from 1 would lose digits.
+/// Uniform in the cone of directions around +z whose cosine is at least `cos_max`; `one_minus_cos_max` is passed
+/// because it is small for distant lights and its difference from 1 would lose digits.
 inline Vec3 square_to_cone(Vec2 u, float one_minus_cos_max) {
   const Vec2 d = square_to_disk(u);
   const float r2 = d.x * d.x + d.y * d.y;                                  // uniform in [0, 1)

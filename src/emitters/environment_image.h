@@ -48,8 +48,8 @@ class EnvironmentImage {
     float pdf_solid_angle;  ///< 0 when the image is black
   };
   Sample sample(Vec2 u) const;
-  /// Ask memory for what sample(u) reads, which may lie anywhere in arrays larger than the caches: the entry of the table
-  /// of blocks, and when that has arrived, the texels of the block.
+  /// Ask memory for what sample(u) reads, which may lie anywhere in arrays larger than the caches: the entry of the
+  /// table of blocks, and when that has arrived, the texels of the block.
   void prefetch_table(Vec2 u) const;
   void prefetch_texels(Vec2 u) const;
 

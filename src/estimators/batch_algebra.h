@@ -140,10 +140,10 @@ inline void factor_columns(vfloat* G, const vfloat* shift, int m, int j0, vfloat
 
 }  // namespace detail
 
-/// Solves (G + diag(shift)) x = b for positive semidefinite G and m positive shifts. `G`: packed, m rows, with room for one
-/// more row; on return it holds, below the diagonal, the Cholesky factor L. `bx`: b on entry, x on return. `inverse`:
-/// receives the inverses of the m diagonal elements of L. In exact arithmetic no pivot is below its shift; rounding is
-/// kept from going there.
+/// Solves (G + diag(shift)) x = b for positive semidefinite G and m positive shifts. `G`: packed, m rows, with room for
+/// one more row; on return it holds, below the diagonal, the Cholesky factor L. `bx`: b on entry, x on return.
+/// `inverse`: receives the inverses of the m diagonal elements of L. In exact arithmetic no pivot is below its shift;
+/// rounding is kept from going there.
 inline void solve_shifted(vfloat* G, const vfloat* shift, int m, vfloat* bx, vfloat* inverse) {
   using namespace detail;
   // b is carried along as row m, which then holds L^-1 b.

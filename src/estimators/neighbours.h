@@ -19,10 +19,10 @@ class NeighbourSearch {
   /// Candidates, from the centre outwards.
   const std::vector<Offset>& offsets() const { return offsets_; }
 
-  /// Chooses for the pixels (x + lane, y). chosen[lane * k + i] is an index into offsets(), ascending in i. `guide`: three
-  /// planes with a border of at least window / 2, kFar where there is no pixel; such candidates are taken only when
-  /// nothing else is left. Distances that agree to 14 bits count as equal; of equals the one nearer to the target wins.
-  /// `keys`: scratch for offsets().size() vectors.
+  /// Chooses for the pixels (x + lane, y). chosen[lane * k + i] is an index into offsets(), ascending in i. `guide`:
+  /// three planes with a border of at least window / 2, kFar where there is no pixel; such candidates are taken only
+  /// when nothing else is left. Distances that agree to 14 bits count as equal; of equals the one nearer to the target
+  /// wins. `keys`: scratch for offsets().size() vectors.
   void find(const Planes& guide, int x, int y, lanes::vint* keys, uint16_t* chosen) const;
 
  private:

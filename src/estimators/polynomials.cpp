@@ -73,8 +73,8 @@ Spectrum polynomials(std::span<const Spectrum> values, std::span<const float> co
           for (size_t b = 0; b < kBlock; ++b) products[i][lane] += v[b][i] * v[b][lane];
   }
 
-  // Least squares by eliminating one function after the other. When only the constant one is left, its coefficient is the
-  // quotient of what is left of its products: the integral of the fit, as the integrals of all others are zero.
+  // Least squares by eliminating one function after the other. When only the constant one is left, its coefficient is
+  // the quotient of what is left of its products: the integral of the fit, as the integrals of all others are zero.
   const auto determined = [&](int k) { return products[k][k] > kSmallestPivot * n; };
   int k = 0;
   for (; k < constant && determined(k); ++k) {

@@ -149,7 +149,7 @@ TEST(Polynomials, ReportsWrongSizes) {
   EXPECT_EQ(message(100, 300, 2), "polynomials: 300 coordinates for 100 samples, expected 2 of each");
 }
 
-// ---- noise and bias --------------------------------------------------------------------------------------------------
+// ---- noise and bias -------------------------------------------------------------------------------------------------
 
 constexpr int kD = 4;
 

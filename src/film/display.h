@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Live preview in tev (https://github.com/Tom94/tev) by its network protocol. A render never waits for the viewer: images
-// are handed to a thread, which sends the newest one; what the viewer is too slow for is left out.
+// Live preview in tev (https://github.com/Tom94/tev) by its network protocol. A render never waits for the viewer:
+// images are handed to a thread, which sends the newest one; what the viewer is too slow for is left out.
 #pragma once
 
 #include <cstdint>
@@ -27,8 +27,8 @@ std::vector<uint8_t> update_image(const std::string& name, const Image& image, i
 
 class Display {
  public:
-  /// `address`: "HOST:PORT" or "[IPv6]:PORT". `name`: of the image in the viewer. Connects in a thread; `warn` is called
-  /// from there, at most once, when the viewer cannot be reached or is lost; then nothing more is sent. Throws
+  /// `address`: "HOST:PORT" or "[IPv6]:PORT". `name`: of the image in the viewer. Connects in a thread; `warn` is
+  /// called from there, at most once, when the viewer cannot be reached or is lost; then nothing more is sent. Throws
   /// Error(kUsage) when the address is not of this form.
   Display(const std::string& address, std::string name, std::function<void(const std::string&)> warn);
   /// Waits for the last image to be sent, at most two seconds.

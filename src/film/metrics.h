@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Errors of an image F against a reference R. N pixels, 3 channels c; R' is the mean of a pixel's three reference values.
-// With two independent references R1, R2 of equal quality, R is their mean, and where a formula is quadratic in F - R the
-// product (F - R1)(F - R2) takes the place of the square, so that the references' own noise cancels on average [the value
-// can then be negative].
+// Errors of an image F against a reference R. N pixels, 3 channels c; R' is the mean of a pixel's three reference
+// values. With two independent references R1, R2 of equal quality, R is their mean, and where a formula is quadratic in
+// F - R the product (F - R1)(F - R2) takes the place of the square, so that the references' own noise cancels on
+// average [the value can then be negative].
 #pragma once
 
 #include <cstdint>

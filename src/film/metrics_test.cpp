@@ -58,9 +58,9 @@ TEST(Metrics, TwoReferencesWorkedOutByHand) {
   EXPECT_EQ(value(Metric::kRelMse, f, {r1, r1}), value(Metric::kRelMse, f, {r1}));
 }
 
-// F differs from the truth by 0.1 everywhere; the references have noise of 0.2. The products' mean over N = 3 * 64^2 values
-// has standard deviation s = sqrt(2 * 0.1^2 * 0.2^2 + 0.2^4) / sqrt(N) = 4.4e-4. alpha = 1e-5: |z| < 4.42; an error of
-// (4.42 + 2.33) s = 3.0e-3 is found with power 0.99. The squares' bias, 0.2^2 = 0.04, is 91 s.
+// F differs from the truth by 0.1 everywhere; the references have noise of 0.2. The products' mean over N = 3 * 64^2
+// values has standard deviation s = sqrt(2 * 0.1^2 * 0.2^2 + 0.2^4) / sqrt(N) = 4.4e-4. alpha = 1e-5: |z| < 4.42; an
+// error of (4.42 + 2.33) s = 3.0e-3 is found with power 0.99. The squares' bias, 0.2^2 = 0.04, is 91 s.
 TEST(Metrics, ProductFormIsFreeOfTheReferencesNoise) {
   const Image f = noisy(64, 0.1, 0, 1), r1 = noisy(64, 0, 0.2, 2), r2 = noisy(64, 0, 0.2, 3);
   const double s = std::sqrt(2 * 0.01 * 0.04 + 0.0016) / std::sqrt(3.0 * 64 * 64);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Triangle meshes from files. The readers are pure functions of the file's bytes; anything wrong throws Error(kInput) and
-// says where in the file. Nothing is allocated on the word of a header alone: counts are checked against the file's size.
+// Triangle meshes from files. The readers are pure functions of the file's bytes; anything wrong throws Error(kInput)
+// and says where in the file. Nothing is allocated on the word of a header alone: counts are checked against the file's
+// size.
 #pragma once
 
 #include <cstddef>
@@ -22,9 +23,9 @@ struct MeshFile {
   std::vector<uint32_t> points;
 };
 
-/// Stanford PLY: ascii, binary little and big endian. Polygons become fans around their first vertex. Reads x y z, nx ny
-/// nz, texture coordinates ("u v", "s t", "texture_u texture_v") and colours ("r g b", "red green blue", "color_r …";
-/// integers are divided by their largest value); skips everything else.
+/// Stanford PLY: ascii, binary little and big endian. Polygons become fans around their first vertex. Reads x y z, nx
+/// ny nz, texture coordinates ("u v", "s t", "texture_u texture_v") and colours ("r g b", "red green blue", "color_r
+/// …"; integers are divided by their largest value); skips everything else.
 MeshFile read_ply(std::span<const std::byte> bytes);
 
 /// Wavefront OBJ: v, vt, vn, f (negative indices count from the end); other statements are skipped. All groups and
@@ -46,9 +47,9 @@ struct MeshPlacement {
 };
 
 /// Moves a mesh into the scene, Mitsuba's way: a mirroring transformation reverses the order of vertices, so that
-/// geometric normals stay on the side of the given ones; without normals in the file smooth ones are computed, each face
-/// weighted by its angle at the vertex (Thürmer & Wüthrich 1998). `n_repaired`: how many normals of the file had no
-/// direction and were computed instead.
+/// geometric normals stay on the side of the given ones; without normals in the file smooth ones are computed, each
+/// face weighted by its angle at the vertex (Thürmer & Wüthrich 1998). `n_repaired`: how many normals of the file had
+/// no direction and were computed instead.
 MeshData place_mesh(MeshFile file, const MeshPlacement& placement, size_t& n_repaired);
 
 }  // namespace covary

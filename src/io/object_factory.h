@@ -47,8 +47,8 @@ class SceneFactory final : public ObjectFactory {
 void report_unknown_type(const ObjectDescription& description, std::vector<std::string> supported,
                          Diagnostics& diagnostics);
 
-/// The plugin `type` of a registry, or null after recording an error that lists what is supported. `kind` and `extra` (more
-/// supported names) are for the message.
+/// The plugin `type` of a registry, or null after recording an error that lists what is supported. `kind` and `extra`
+/// (more supported names) are for the message.
 template <typename T>
 const Plugin<T>* find_plugin(std::span<const Plugin<T>> plugins, const ObjectDescription& description,
                              Diagnostics& diagnostics, std::vector<std::string> extra = {}) {

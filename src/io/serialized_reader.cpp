@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Mitsuba 0.x ".serialized": a sequence of meshes, each a 4-byte header followed by a zlib stream; at the end of the file
-// the offsets of all meshes and their number.
+// Mitsuba 0.x ".serialized": a sequence of meshes, each a 4-byte header followed by a zlib stream; at the end of the
+// file the offsets of all meshes and their number.
 #include <fmt/format.h>
 #include <zlib.h>
 

@@ -8,8 +8,8 @@
 
 namespace covary {
 
-/// All shapes that have a surface of their own, sorted by name ("shapegroup" and "instance" are made by the loader). What
-/// they make has no material and emits nothing; the loader adds both.
+/// All shapes that have a surface of their own, sorted by name ("shapegroup" and "instance" are made by the loader).
+/// What they make has no material and emits nothing; the loader adds both.
 std::span<const Plugin<Shape>> shape_plugins();
 
 }  // namespace covary

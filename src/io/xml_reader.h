@@ -19,8 +19,9 @@ struct SceneXml {
   uint64_t hash = 0;
 };
 
-/// Reads the XML `text` and every file it includes. `name` stands for the text in messages, and its folder is where files
-/// are looked for first. Problems go to `diagnostics`; `files` gets the folders in which the scene's files are searched.
+/// Reads the XML `text` and every file it includes. `name` stands for the text in messages, and its folder is where
+/// files are looked for first. Problems go to `diagnostics`; `files` gets the folders in which the scene's files are
+/// searched.
 SceneXml read_scene_xml(std::string_view text, const std::string& name,
                         const std::map<std::string, std::string>& defines, FileResolver& files,
                         Diagnostics& diagnostics);

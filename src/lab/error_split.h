@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// The error of many renders of one scene, divided into squared bias and variance, with uncertainties, and signs that the
-// renders and the references do not belong together.
+// The error of many renders of one scene, divided into squared bias and variance, with uncertainties, and signs that
+// the renders and the references do not belong together.
 //
-// K renders F_s with seeds of their own, references R1, R2 with samples of their own, R = (R1 + R2)/2. Means <x> are over
-// pixels and channels, weighted by 1/(R'^2 + 0.01) for relMSE (R': mean of a pixel's channels) and by 1 for MSE.
+// K renders F_s with seeds of their own, references R1, R2 with samples of their own, R = (R1 + R2)/2. Means <x> are
+// over pixels and channels, weighted by 1/(R'^2 + 0.01) for relMSE (R': mean of a pixel's channels) and by 1 for MSE.
 //     error         mean over s of <(F_s - R1)(F_s - R2)>
 //     variance      sum over s of <(F_s - F)^2> / (K - 1), F: mean of the renders
 //     squared bias  mean over pairs s != t of <(F_s - R1)(F_t - R2)> = error - variance
-// All three are unbiased; error and squared bias can come out negative. Standard errors: jackknife over the seeds, and for
-// error and squared bias the references' share, <2 (F - R)(R1 - R2)/2> squared pixel by pixel.
+// All three are unbiased; error and squared bias can come out negative. Standard errors: jackknife over the seeds, and
+// for error and squared bias the references' share, <2 (F - R)(R1 - R2)/2> squared pixel by pixel.
 #pragma once
 
 #include <cstdint>
@@ -43,12 +43,13 @@ struct ErrorSplit {
   std::vector<double> reference_lean_of_render;
 };
 
-/// At least one render; one reference or two of the size of the renders, linear RGB. With one reference, its noise counts as squared
-/// bias and there is nothing to say about leans. Throws Error(kInput) when sizes differ or no pixel is left.
+/// At least one render; one reference or two of the size of the renders, linear RGB. With one reference, its noise
+/// counts as squared bias and there is nothing to say about leans. Throws Error(kInput) when sizes differ or no pixel
+/// is left.
 ErrorSplit split_error(std::span<const Image> renders, std::span<const Image> references);
 
-/// What is suspicious about a split, in sentences; empty when nothing is. `unbiased`: the renders are expected to have no
-/// bias (plain path tracing), so that a squared bias is a sign of a reference that is not of this scene.
+/// What is suspicious about a split, in sentences; empty when nothing is. `unbiased`: the renders are expected to have
+/// no bias (plain path tracing), so that a squared bias is a sign of a reference that is not of this scene.
 std::vector<std::string> suspicions(const ErrorSplit& split, bool unbiased);
 
 }  // namespace covary::lab

@@ -88,9 +88,9 @@ TEST(ErrorSplit, AgreesWithTheMetrics) {
 // The split of MSE; in relMSE the weights hold the references' noise, too, which matters only where references are bad.
 // N = 300 experiments of K = 8 renders. Each interval must hold the true value in 95 % of them: binomial standard
 // deviation 1.26 %. alpha = 1e-5 in all (six comparisons, |z| < 4.8): within 6 %; a true coverage of 87 % or less is
-// found with power 0.84.
-// The means over the experiments: relative standard deviation of the variance 0.9 / sqrt(7 * 1728 * 300) = 0.05 %; of the
-// squared bias with v = 0.043 and r = 0.011: sqrt(2 (v/K + r)^2 + 4 b^2 (v/K + r)) / sqrt(1728 * 300) < 3.7e-5.
+// found with power 0.84. The means over the experiments: relative standard deviation of the variance 0.9 / sqrt(7 *
+// 1728 * 300) = 0.05 %; of the squared bias with v = 0.043 and r = 0.011: sqrt(2 (v/K + r)^2 + 4 b^2 (v/K + r)) /
+// sqrt(1728 * 300) < 3.7e-5.
 TEST(ErrorSplit, IntervalsHoldTheTruth) {
   constexpr int kExperiments = 300, kRenders = 8;
   for (const double bias : {0.0, 0.05}) {

@@ -19,8 +19,8 @@ struct LocatedJson {
 /// Throws Error(kInput) with the line where the text is not JSON, or a key stands twice in an object.
 LocatedJson parse_located(const std::string& text, const std::string& name);
 
-/// Reads one object member by member. Mistakes are added to `problems` as "file:line: where: what"; a member nobody asked
-/// for is one of them.
+/// Reads one object member by member. Mistakes are added to `problems` as "file:line: where: what"; a member nobody
+/// asked for is one of them.
 class ObjectReader {
  public:
   ObjectReader(const LocatedJson& document, std::string pointer, std::vector<std::string>& problems);

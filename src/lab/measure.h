@@ -12,8 +12,8 @@ namespace covary::lab {
 Image read_window(const std::string& path, const SceneInstance& scene, const std::string& layer = "");
 
 /// Fills in everything of a cell that follows from its own runs; their records and seeds are given. MAE and FLIP are
-/// against the mean of the references. `unbiased`: see suspicions(). Errors of single images are kept in the cache under keys
-/// made of `run_keys`, one for each run, and `reference_key`.
+/// against the mean of the references. `unbiased`: see suspicions(). Errors of single images are kept in the cache
+/// under keys made of `run_keys`, one for each run, and `reference_key`.
 void measure(Cell& cell, const SceneInstance& scene, const std::vector<Image>& references, bool unbiased,
              const Budget& budget, const Cache& cache, const std::vector<std::string>& run_keys,
              const std::string& reference_key);

@@ -23,7 +23,8 @@ struct Overrides {
   bool quick = false;
 };
 
-/// Frames that the suite neither sizes nor crops have so many pixels at most in a quick experiment, and its crops so many.
+/// Frames that the suite neither sizes nor crops have so many pixels at most in a quick experiment, and its crops so
+/// many.
 inline constexpr int64_t kQuickPixels = 32400, kQuickCropPixels = 12000;
 
 /// Throws Error(kUsage) where a scene or method named is not in the suite.

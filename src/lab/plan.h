@@ -25,8 +25,9 @@ struct SceneInstance {
 /// Numbers >= 0 between separators ("10,20,30", "240x135"); empty where the text is anything else.
 std::vector<int> whole_numbers(const std::string& text, char separator);
 
-/// Frame and window of a scene whose own frame is `width` x `height`. `max_pixels` > 0 scales a frame that the suite neither
-/// sizes nor crops down to so many pixels. Throws Error(kUsage) for texts that are no size or crop, or a crop outside the frame.
+/// Frame and window of a scene whose own frame is `width` x `height`. `max_pixels` > 0 scales a frame that the suite
+/// neither sizes nor crops down to so many pixels. Throws Error(kUsage) for texts that are no size or crop, or a crop
+/// outside the frame.
 void place(SceneInstance& scene, int width, int height, int64_t max_pixels);
 
 /// One child process to run: a render and the commands that follow it.
@@ -53,8 +54,8 @@ struct PlanContext {
 /// Both halves of the reference that is to be rendered for a scene.
 std::vector<Run> reference_runs(const Suite& suite, const SceneInstance& scene, const PlanContext& context);
 
-/// All runs of scene number `index`: seeds outermost, so that an interrupted experiment has every method; runs that share
-/// passes follow one another.
+/// All runs of scene number `index`: seeds outermost, so that an interrupted experiment has every method; runs that
+/// share passes follow one another.
 std::vector<Run> runs_of_scene(const Suite& suite, size_t index, const SceneInstance& scene,
                                const PlanContext& context);
 

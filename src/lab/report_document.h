@@ -14,13 +14,13 @@ namespace covary::lab {
 /// The document without pictures: they cost reading.
 nlohmann::ordered_json report_document(const Results& results);
 
-/// Appends the comparer to the document and its images to `images`: for each scene the reference (mean of its halves) and
-/// the first seed of each method at the budget that the suite shows, each with its FLIP. It opens on best_method() beside
-/// the baseline. Throws Error where an image cannot be read.
+/// Appends the comparer to the document and its images to `images`: for each scene the reference (mean of its halves)
+/// and the first seed of each method at the budget that the suite shows, each with its FLIP. It opens on best_method()
+/// beside the baseline. Throws Error where an image cannot be read.
 void add_pictures(const Results& results, nlohmann::ordered_json& document, std::vector<ReportImage>& images);
 
-/// The method, other than the baseline, with the largest ratio to it at this budget (geometric mean over scenes; at equal
-/// samples, or at equal time where the budget is in seconds). Empty where there is none.
+/// The method, other than the baseline, with the largest ratio to it at this budget (geometric mean over scenes; at
+/// equal samples, or at equal time where the budget is in seconds). Empty where there is none.
 std::string best_method(const Results& results, size_t budget);
 
 /// Index of the budget that pictures and single tables show: the suite's `show`, or the last.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Blocks of the report: tables and plots of results. Each is the JSON that docs/report.md describes; null where there is
-// nothing to show.
+// Blocks of the report: tables and plots of results. Each is the JSON that docs/report.md describes; null where there
+// is nothing to show.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -25,8 +25,8 @@ nlohmann::ordered_json slope_table(const Results& results);
 /// relMSE against samples per pixel, and against the seconds of the method.
 nlohmann::ordered_json convergence_plot(const Results& results, size_t scene);
 nlohmann::ordered_json time_plot(const Results& results, size_t scene);
-/// Which method pays for less error with how much bias, at one budget: error over that of the baseline (geometric mean over
-/// scenes) against squared bias as a share of the method's own error (mean over scenes). Needs two seeds.
+/// Which method pays for less error with how much bias, at one budget: error over that of the baseline (geometric mean
+/// over scenes) against squared bias as a share of the method's own error (mean over scenes). Needs two seeds.
 nlohmann::ordered_json front_plot(const Results& results, size_t budget);
 
 }  // namespace covary::lab

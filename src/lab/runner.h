@@ -24,8 +24,8 @@ namespace covary::lab {
 struct RunRecord {
   std::string image;    ///< path of the EXR
   std::string command;  ///< as typed in a shell
-  /// load: reading the scene and building the hierarchy; render: with the trials of a time budget; then: commands after the
-  /// render, wall clock.
+  /// load: reading the scene and building the hierarchy; render: with the trials of a time budget; then: commands after
+  /// the render, wall clock.
   double load_seconds = 0, render_seconds = 0, estimate_seconds = 0, then_seconds = 0;
   double samples_per_pixel = 0, peak_memory_bytes = 0;
   std::string messages;  ///< what the run wrote to standard error

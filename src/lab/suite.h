@@ -71,7 +71,8 @@ struct Suite {
 /// Seeds of the two halves of a reference; no run may use them.
 inline constexpr uint64_t kReferenceSeeds[2] = {900000001, 900000002};
 
-/// Reads a suite. `name` stands for the file in messages. Throws Error(kInput) that lists all problems with their lines.
+/// Reads a suite. `name` stands for the file in messages. Throws Error(kInput) that lists all problems with their
+/// lines.
 Suite parse_suite(const std::string& text, const std::string& name);
 
 /// Every problem of the suite as a whole, after all settings were overridden; empty when it can be run.

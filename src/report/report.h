@@ -19,8 +19,8 @@ struct ReportImage {
 };
 
 /// Writes the page to `path`; it appears under its name only when complete. Throws Error(kIo) when it cannot be written
-/// and Error(kInternal) when the document has a block of unknown type or names an image that is not among `images`, when
-/// two images share an id, or when an image has neither 1 nor 3 channels.
+/// and Error(kInternal) when the document has a block of unknown type or names an image that is not among `images`,
+/// when two images share an id, or when an image has neither 1 nor 3 channels.
 void write_report(const std::string& path, const nlohmann::ordered_json& document,
                   const std::vector<ReportImage>& images);
 

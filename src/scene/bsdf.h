@@ -41,10 +41,10 @@ enum LobeFlags : uint32_t {
 /// radiance, f*(wo, wi) = f(wi, wo), so that paths from both ends estimate the same image.
 enum class TransportMode : uint8_t { kRadiance, kImportance };
 
-/// Factor on eval() and on the weights of sample() where the shading normal `ns` differs from the geometric normal `ng`:
-/// 1 for radiance. For importance it undoes that eval() has the cosine of wi, towards the camera, where the path from
-/// the camera has that of wo, towards the light, both at `ns` [Veach1997] §5.3. All are unit vectors of one frame; 0
-/// where a direction lies in one of the two planes. Perturbed normals (bump and normal maps) are part of the closure:
+/// Factor on eval() and on the weights of sample() where the shading normal `ns` differs from the geometric normal
+/// `ng`: 1 for radiance. For importance it undoes that eval() has the cosine of wi, towards the camera, where the path
+/// from the camera has that of wo, towards the light, both at `ns` [Veach1997] §5.3. All are unit vectors of one frame;
+/// 0 where a direction lies in one of the two planes. Perturbed normals (bump and normal maps) are part of the closure:
 /// `ns` is the frame's normal.
 inline float shading_normal_factor(const Vec3& wo, const Vec3& wi, const Vec3& ns, const Vec3& ng, TransportMode mode) {
   if (mode == TransportMode::kRadiance) return 1;
@@ -90,11 +90,11 @@ class BsdfClosure {
 
   // The other end of a bidirectional path meets the same pair of directions with their parts exchanged and in the
   // opposite transport mode. Its densities, without binding the model again:
-  /// Density per unit solid angle with which a path of the opposite mode that arrives from wi is sent to wo; delta lobes
-  /// excluded. The reverse of eval(wo, wi).pdf_solid_angle.
+  /// Density per unit solid angle with which a path of the opposite mode that arrives from wi is sent to wo; delta
+  /// lobes excluded. The reverse of eval(wo, wi).pdf_solid_angle.
   virtual float reverse_pdf(const Vec3& wo, const Vec3& wi) const { return eval(wi, wo).pdf_solid_angle; }
-  /// The same for `s`, which this closure drew for wo from a delta lobe: the discrete probability that the opposite mode
-  /// draws wo for s.wi from that lobe; 0 where it cannot.
+  /// The same for `s`, which this closure drew for wo from a delta lobe: the discrete probability that the opposite
+  /// mode draws wo for s.wi from that lobe; 0 where it cannot.
   virtual float reverse_pmf(const Vec3& /*wo*/, const BsdfSample& s) const {
     float pmfs[kMaxLobes];
     lobe_pmfs(s.wi, pmfs);

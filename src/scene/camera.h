@@ -33,8 +33,8 @@ struct LensSample {
   Vec3 p;              ///< point on the lens; the camera's position for a pinhole
   Vec3 near_p;         ///< on the near plane between them: what lies before it does not hide the reference point
   Vec2 film;           ///< where the ray meets the film, in pixels of the full frame, which it may leave
-  /// Camera::importance() in the direction of the reference point; for a pinhole already times the cosine at the lens and
-  /// divided by the distance squared.
+  /// Camera::importance() in the direction of the reference point; for a pinhole already times the cosine at the lens
+  /// and divided by the distance squared.
   float importance = 0;
   float pdf_solid_angle = 0;  ///< density of wi at the reference point; 1 for a pinhole; 0: not between the clip planes
   float pdf_direction = 0;    ///< Camera::pdf_direction() in the direction of the reference point

@@ -18,8 +18,8 @@ struct EmitterSample {
   float distance = kInfinity;  ///< to the light; infinite for environments and directional lights
   Vec3 p, n;                   ///< point and unit geometric normal on the light (unset when infinitely far)
   Vec2 uv;                     ///< surface parameters of p (area lights)
-  /// Emitted towards the reference point; for delta lights the irradiance on a surface facing wi, already divided by distance
-  /// squared.
+  /// Emitted towards the reference point; for delta lights the irradiance on a surface facing wi, already divided by
+  /// distance squared.
   Spectrum radiance;
   /// Density of wi at the reference point; 1 (a discrete probability) for delta lights; 0: sampling failed.
   float pdf_solid_angle = 0;
@@ -96,7 +96,8 @@ class Emitter : public SceneObject {
   /// point `hit` of an area light; other lights do not look at the point. Parts that are deltas are taken as met.
   virtual EmissionPdf pdf_emission(const SurfaceHit& hit, const Vec3& w) const = 0;
 
-  /// Emitted power, summed over the surface and directions, in RGB; infinite lights: through the scene's bounding sphere.
+  /// Emitted power, summed over the surface and directions, in RGB; infinite lights: through the scene's bounding
+  /// sphere.
   virtual Spectrum power() const = 0;
 };
 

@@ -72,7 +72,8 @@ std::string quoted_list(const std::vector<std::string>& names) {
   return text;
 }
 
-/// "lie in [0, 1]", "be at least 0", …: what must be true of a value, where the largest number of a type means no limit.
+/// "lie in [0, 1]", "be at least 0", …: what must be true of a value, where the largest number of a type means no
+/// limit.
 template <typename T>
 std::string range_text(T lowest, T highest) {
   const bool bounded_below = lowest > std::numeric_limits<T>::lowest();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The description of one object of a scene file, and typed access to its parameters. Plugins (BSDFs, textures, …) are
-// made from Parameters only; they never see XML. Whatever a plugin does not ask for is reported as an unknown parameter,
-// with the names it did ask for as suggestions.
+// made from Parameters only; they never see XML. Whatever a plugin does not ask for is reported as an unknown
+// parameter, with the names it did ask for as suggestions.
 #pragma once
 
 #include <cstdint>
@@ -62,8 +62,8 @@ struct ColourValue {
 struct ObjectDescription;
 using ObjectPtr = std::shared_ptr<const ObjectDescription>;
 
-/// A null ObjectPtr stands for a value that could not be read; the reason is in the diagnostics, and getters then behave
-/// as if the parameter were absent.
+/// A null ObjectPtr stands for a value that could not be read; the reason is in the diagnostics, and getters then
+/// behave as if the parameter were absent.
 using Value =
     std::variant<bool, int64_t, double, std::string, Vec3, ColourValue, SampledSpectrum, Transform, ObjectPtr>;
 
@@ -163,8 +163,8 @@ struct Plugin {
 };
 
 /// Linear Rec. 709 RGB of a sampled spectrum (CIE 1931 2° observer), negative components clamped to 0. A reflectance or
-/// index of 1 everywhere maps to (1,1,1), within 0.2 % when it is sampled. An emission of 1
-/// everywhere has Y = 1 and the chromaticity of illuminant E, which is not neutral in this space: (1.205, 0.948, 0.909).
+/// index of 1 everywhere maps to (1,1,1), within 0.2 % when it is sampled. An emission of 1 everywhere has Y = 1 and
+/// the chromaticity of illuminant E, which is not neutral in this space: (1.205, 0.948, 0.909).
 Spectrum spectrum_to_rgb(const SampledSpectrum& spectrum, SpectrumRole role);
 
 }  // namespace covary

@@ -1,19 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 // `bitmap`: a texture from an image file. Values agree with Mitsuba 3's plugin of this name.
 //
-// | parameter   | type      | default  | meaning                                                                       |
-// |-------------|-----------|----------|-------------------------------------------------------------------------------|
-// | filename    | string    | required | PNG, JPEG, EXR, HDR, PFM, TGA, BMP, …; alpha is ignored                       |
-// | raw         | boolean   | false    | values are data, not colours: integers are not decoded from sRGB              |
-// | filter_type | string    | bilinear | `bilinear` or `nearest`                                                       |
-// | wrap_mode   | string    | repeat   | outside [0, 1]: `repeat`, `mirror` or `clamp`                                 |
-// | to_uv       | transform | identity | from surface parameters to texture coordinates                                |
-// | format      | string    | auto     | accepted for compatibility; 8-bit files are stored as bytes, others as floats |
-// | accel       | boolean   | true     | accepted for compatibility; no effect                                         |
+// | parameter   | type      | default  | meaning                                                                      |
+// |-------------|-----------|----------|------------------------------------------------------------------------------|
+// | filename    | string    | required | PNG, JPEG, EXR, HDR, PFM, TGA, BMP, …; alpha is ignored                      |
+// | raw         | boolean   | false    | values are data, not colours: integers are not decoded from sRGB             |
+// | filter_type | string    | bilinear | `bilinear` or `nearest`                                                      |
+// | wrap_mode   | string    | repeat   | outside [0, 1]: `repeat`, `mirror` or `clamp`                                |
+// | to_uv       | transform | identity | from surface parameters to texture coordinates                               |
+// | format      | string    | auto     | accepted for compatibility; bytes stay bytes, other files become floats      |
+// | accel       | boolean   | true     | accepted for compatibility; no effect                                        |
 //
-// A one-channel lookup gives the grey value, or the luminance of a colour (also of a raw one). Different from Mitsuba 3.9:
-// the gradient follows the chain rule for every to_uv (there, only for square images or diagonal to_uv), 16-bit files
-// keep all their digits, and lights sample positions uniformly where to_uv does not keep the unit square (an error there).
+// A one-channel lookup gives the grey value, or the luminance of a colour (also of a raw one). Different from Mitsuba
+// 3.9: the gradient follows the chain rule for every to_uv (there, only for square images or diagonal to_uv), 16-bit
+// files keep all their digits, and lights sample positions uniformly where to_uv does not keep the unit square (an
+// error there).
 #include "textures/bitmap.h"
 
 #include <array>
@@ -56,8 +57,8 @@ LargeVector<T> in_blocks(const std::vector<T>& values, const TexelImage& image, 
   return result;
 }
 
-// Four ways to keep texels. Each has Value (what a lookup gives), value(index) and prefetch(index), with the index of the
-// layout.
+// Four ways to keep texels. Each has Value (what a lookup gives), value(index) and prefetch(index), with the index of
+// the layout.
 
 class FloatGrey {
  public:

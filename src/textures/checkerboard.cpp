@@ -7,8 +7,8 @@
 // | color1    | colour, texture  | 0.2      | the other squares                              |
 // | to_uv     | transform        | identity | from surface parameters to texture coordinates |
 //
-// Different from Mitsuba 3.9: one-channel lookups (opacity, roughness, …) see the same squares as colour lookups; there,
-// color0 and color1 change places.
+// Different from Mitsuba 3.9: one-channel lookups (opacity, roughness, …) see the same squares as colour lookups;
+// there, color0 and color1 change places.
 #include "textures/registry.h"
 #include "textures/uv_transform.h"
 

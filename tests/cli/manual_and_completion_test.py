@@ -60,7 +60,8 @@ class Bash(HelpTest):
         """What bash offers for the last word, as it splits the line."""
         quoted = " ".join("'" + word + "'" for word in words)
         script = self.script("bash")
-        return self.shell("bash", "-c", f"source {script}; COMP_WORDS=(covary {quoted}); COMP_CWORD={len(words)}; _covary; "
+        return self.shell("bash", "-c", f"source {script}; COMP_WORDS=(covary {quoted}); COMP_CWORD={len(words)}; "
+                          "_covary; "
                           'echo "${COMPREPLY[@]}"').split()
 
     def test_commands(self):

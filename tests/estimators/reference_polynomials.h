@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Polynomial control variates as their formula is written: raw monomials and their integrals over the unit cube, least squares
-// with an intercept by a rank-revealing QR factorisation, in double precision, with no regard for speed.
+// Polynomial control variates as their formula is written: raw monomials and their integrals over the unit cube, least
+// squares with an intercept by a rank-revealing QR factorisation, in double precision, with no regard for speed.
 #pragma once
 
 #include <Eigen/Dense>

@@ -85,20 +85,27 @@ void replay(bool (*target)(fuzz::Bytes), const std::vector<std::string>& seeds, 
 
 TEST(FuzzReplay, Scene) {
   const std::string scene = R"(<?xml version="1.0"?>
-<scene version="3.0.0"><default name="n" value="4"/><integrator type="path"><integer name="max_depth" value="$n"/></integrator>
-<sensor type="perspective"><float name="fov" value="40"/><transform name="to_world"><lookat origin="0 0 5" target="0 0 0" up="0 1 0"/>
-</transform><film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="8"/><rfilter type="box"/></film></sensor>
-<bsdf type="twosided" id="m"><bsdf type="roughconductor"><spectrum name="eta" value="400:1.5, 700:1.2"/><rgb name="k" value="3, 2, 1"/>
+<scene version="3.0.0"><default name="n" value="4"/><integrator type="path"><integer name="max_depth" value="$n"/>
+</integrator>
+<sensor type="perspective"><float name="fov" value="40"/><transform name="to_world">
+<lookat origin="0 0 5" target="0 0 0" up="0 1 0"/>
+</transform><film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="8"/>
+<rfilter type="box"/></film></sensor>
+<bsdf type="twosided" id="m"><bsdf type="roughconductor"><spectrum name="eta" value="400:1.5, 700:1.2"/>
+<rgb name="k" value="3, 2, 1"/>
 <float name="alpha" value="0.2"/></bsdf></bsdf><alias id="m" as="n"/>
 <shape type="sphere"><point name="center" x="0" y="1" z="0"/><ref id="n"/></shape>
 <shape type="cube"><transform name="to_world"><rotate y="1" angle="20"/><scale value="2"/><translate x="1"/></transform>
-<bsdf type="plastic"><texture name="diffuse_reflectance" type="checkerboard"><rgb name="color0" value="#ff8000"/></texture></bsdf></shape>
-<shape type="rectangle"><emitter type="area"><blackbody name="radiance" temperature="5000K" scale="0.001"/></emitter></shape>
+<bsdf type="plastic"><texture name="diffuse_reflectance" type="checkerboard"><rgb name="color0" value="#ff8000"/>
+</texture></bsdf></shape>
+<shape type="rectangle"><emitter type="area"><blackbody name="radiance" temperature="5000K" scale="0.001"/></emitter>
+</shape>
 <shape type="shapegroup" id="g"><shape type="disk"/></shape><shape type="instance"><ref id="g"/></shape></scene>)";
   const std::string old =
       R"(<scene version="0.6.0"><sensor type="thinlens"><float name="apertureRadius" value="0.1"/></sensor>
 <bsdf type="diffuse" id="a"><srgb name="diffuseReflectance" value="0.5"/></bsdf><shape type="cylinder"><ref id="a"/>
-<boolean name="flipNormals" value="true"/></shape><texture type="checkerboard"><float name="uscale" value="2"/></texture>
+<boolean name="flipNormals" value="true"/></shape><texture type="checkerboard"><float name="uscale" value="2"/>
+</texture>
 <emitter type="spot"><spectrum name="intensity" value="2"/></emitter></scene>)";
   replay(fuzz::scene, {scene, old},
          {"<ref id=\"m\"/>", "<ref id=\"g\"/>", "<bsdf type=\"mask\">", "</bsdf>", "$n", "\\$", "<scale value=\"0\"/>",

@@ -102,7 +102,8 @@ TEST(PathLengths, SingleLengthsAddUpToTheWhole) {
 
 TEST(PathLengths, ZeroIsBlack) { EXPECT_EQ(image_mean(render(load_text(furnace(0.5, 0)), 1, 0)), 0); }
 
-// In a dark room without a limit of depth only roulette ends paths; one whose throughput is not a number is a bad sample.
+// In a dark room without a limit of depth only roulette ends paths; one whose throughput is not a number is a bad
+// sample.
 TEST(PathLengths, AThroughputThatIsNotANumberEnds) {
   const std::string dark_room =
       "<shape type='cube'><boolean name='flip_normals' value='true'/><bsdf type='diffuse'/></shape>";

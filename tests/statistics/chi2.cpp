@@ -54,8 +54,8 @@ Rule lobatto(const SquareDensity& f, const Box& b) {
 }
 
 /// Cuts the box in four until the integral changes by less than `tolerance`, and at least 6 times around an edge. The
-/// tolerance is halved, not quartered, at each level: edges are curves, which meet twice as many boxes. The cuts are not
-/// in the middle but jittered, so that the errors along an edge parallel to the axes do not add up.
+/// tolerance is halved, not quartered, at each level: edges are curves, which meet twice as many boxes. The cuts are
+/// not in the middle but jittered, so that the errors along an edge parallel to the axes do not add up.
 double integrate(const SquareDensity& f, const Box& b, const Rule& whole, double tolerance, int level) {
   const uint64_t bits = combine64(std::bit_cast<uint64_t>(b.x0 + b.x1), std::bit_cast<uint64_t>(b.y0 + b.y1));
   const double rx = 0.4 + 0.2 * (bits >> 40) * 0x1p-24, ry = 0.4 + 0.2 * (bits & 0xffffff) * 0x1p-24;

@@ -7,8 +7,8 @@
 // Boxes with expected count below 5 are pooled. The fraction of samples that do not fail (and are not left out on
 // purpose, such as those of delta lobes) is compared with the total mass of the density.
 //
-// Smallest errors detected with power 0.99 at alpha = 5e-7 (non-central chi-square distribution), as rms relative error of
-// the density over the domain, and as relative error in a single cell:
+// Smallest errors detected with power 0.99 at alpha = 5e-7 (non-central chi-square distribution), as rms relative error
+// of the density over the domain, and as relative error in a single cell:
 //     N = 400 000, 128 cells (default)   2.0 %   23 %
 //     N = 100 000,  64 cells             3.5 %   28 %
 //     N =  40 000,  32 cells             5.0 %   28 %

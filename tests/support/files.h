@@ -43,7 +43,8 @@ inline const std::filesystem::path& test_folder() {
 }
 inline std::string test_file(const std::string& name) { return (test_folder() / name).string(); }
 
-/// The message of the Error that `call` throws, which must have the code where one is given; "no error" when it throws none.
+/// The message of the Error that `call` throws, which must have the code where one is given; "no error" when it throws
+/// none.
 template <typename Call>
 std::string message_of(Call&& call, std::optional<ErrorCode> code = {}) {
   try {
