@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Below the stage: values of the pixel under the pointer, the colour scale, messages.
 
-const READOUT_WIDTH = 344;  // pixels that one image's values need
+const READOUT_WIDTH = 384;  // pixels that one image's values need
 const PLACE_WIDTH = 106;
 const MOST_LINES = 5;
 
