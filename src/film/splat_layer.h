@@ -7,9 +7,9 @@
 // the same count, means are divided by the film's own number of light paths, and reading, writing, merging and
 // estimators are those of any film.
 //
-// The bits do not depend on threads or interruptions: each bundle keeps its splats in a list; after a round of bundles the
-// lists are summed in path order, in double precision, one band of rows at a time, and only then the film changes. Rounds
-// end at the same counts however often a render is interrupted.
+// The bits do not depend on threads or interruptions: each bundle keeps its splats in a list; after a round of bundles
+// the lists are summed in path order, in double precision, one band of rows at a time, and only then the film changes.
+// Rounds end at the same counts however often a render is interrupted.
 #pragma once
 
 #include <cstdint>
@@ -44,8 +44,8 @@ class SplatLayer {
   /// Bundles of a round; 2^18 paths, and some 16 MB of splats.
   static constexpr uint32_t kRoundBundles = 1024;
 
-  /// Continues `film`, which must outlive the layer. Marks it as a light film. Throws Error(kInput) when its pixels differ
-  /// in count, or when it has samples and is not a light film with bundles of this size.
+  /// Continues `film`, which must outlive the layer. Marks it as a light film. Throws Error(kInput) when its pixels
+  /// differ in count, or when it has samples and is not a light film with bundles of this size.
   explicit SplatLayer(Film& film);
 
   /// Begins the next round on the way to `target` bundles (a multiple of the film's groups), dropping what an unfinished
@@ -55,9 +55,9 @@ class SplatLayer {
   uint32_t first_bundle() const { return first_; }
   uint32_t end_bundle() const { return end_; }
 
-  /// Adds `value` (radiance of one pixel for a single light path, not divided by their number) at the pixel (x, y) of the
-  /// full frame; nothing where that lies outside of the crop. The paths of a bundle come in ascending order and from one
-  /// thread; different bundles may come from different threads.
+  /// Adds `value` (radiance of one pixel for a single light path, not divided by their number) at the pixel (x, y) of
+  /// the full frame; nothing where that lies outside of the crop. The paths of a bundle come in ascending order and from
+  /// one thread; different bundles may come from different threads.
   void add(uint64_t path, int x, int y, const Spectrum& value);
 
   /// Adds the round to the film. All its bundles must be complete.

@@ -37,8 +37,8 @@ struct Splat {
   Spectrum value;
 };
 
-/// Up to three splats of a light path, half of them on few pixels; values span six powers of ten, so that sums in another
-/// order have other bits. Some lie outside of the crop.
+/// Up to three splats of a light path, half of them on few pixels; values span six powers of ten, so that sums in
+/// another order have other bits. Some lie outside of the crop.
 std::vector<Splat> splats_of(uint64_t path, uint64_t seed) {
   const PathRandom random(Sampling::kIndependent, seed, 0, 0, path);
   std::vector<Splat> splats(static_cast<size_t>(random.get_1d(0, Event::kLobe) * 4));
