@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -18,7 +19,9 @@
 #include "estimators/input_checks.h"
 #include "estimators/mean.h"
 #include "estimators/result_file.h"
-#include "film/output_file.h"
+#include "film/outputs.h"
+#include "json_output.h"
+#include "numbers.h"
 
 namespace covary {
 namespace {
@@ -210,7 +213,30 @@ PairEstimator make_pair_estimator(const CombineOptions& o, const GroupedFile& cr
   return make_estimator(o.estimator, o.error, samples);
 }
 
+/// A file used twice would be a control variate of itself, or a group without information of its own.
+void check_distinct(const CombineOptions& o) {
+  std::vector<std::pair<const char*, std::string>> files;
+  for (const std::string& path : o.crn) files.emplace_back("--crn", path);
+  for (const std::string& path : o.independent) files.emplace_back("--independent", path);
+  for (size_t i = 0; i < files.size(); ++i)
+    for (size_t k = 0; k < i; ++k)
+      if (is_same_file(files[i].second, files[k].second))
+        throw Error(ErrorCode::kUsage,
+                    fmt::format("{} '{}' and {} '{}' are the same file; each image, or group of one, is needed once",
+                                files[k].first, files[k].second, files[i].first, files[i].second));
+}
+
+void check_files_of_command(const CombineOptions& o) {
+  check_distinct(o);
+  Outputs outputs;
+  outputs.reads(o.crn);
+  outputs.reads(o.independent);
+  outputs.writes("-o", o.output, OutputKind::kFilm);
+  outputs.writes("--json", o.json, OutputKind::kText);
+}
+
 void combine(const CombineOptions& o) {
+  check_files_of_command(o);
   std::optional<tbb::global_control> control;
   if (o.threads > 0) control.emplace(tbb::global_control::max_allowed_parallelism, o.threads);
   Stopwatch watch;
@@ -266,10 +292,7 @@ void combine(const CombineOptions& o) {
       {"mean", {{"crn", report.crn_mean}, {"independent", report.independent_mean}}},
       {"seconds", {{"read_and_check", check_seconds}, {"estimate", estimate_seconds}, {"write", write_seconds}}}};
   if (!pixel.is_null()) json["pixel"] = pixel;
-  if (o.json == "-")
-    std::fputs((json.dump(2) + "\n").c_str(), stdout);
-  else
-    write_text_file(o.json, json.dump(2) + "\n");
+  write_text_output(o.json, json_text(json));
 }
 
 }  // namespace
@@ -296,23 +319,24 @@ void add_combine(CLI::App& app) {
                                            "hold; use 'covary render SCENE --estimator polynomials'";
           },
           ""))
-      ->check(CLI::IsMember({"iicv", "cv-baseline", "iduw"}))
+      ->check(one_of({"iicv", "cv-baseline", "iduw"}))
       ->capture_default_str();
   add_estimator_options(*command, o->estimator);
-  command->add_option("--samples", o->samples,
-                      "iduw: samples per pixel of the CRN image; default: what its file tells");
+  command->add_option("--samples", o->samples, "iduw: samples per pixel of the CRN image; default: what its file tells")
+      ->transform(whole_number(1, std::numeric_limits<int>::max()));
   command->add_flag("--error", o->error, "Add the standard error as channels StdError.R, .G, .B");
   command->add_option("--explain", o->explain, "X,Y: print the control variates of this pixel and their coefficients")
       ->delimiter(',')
       ->expected(2)
+      ->transform(whole_number(0, std::numeric_limits<int>::max()))
       ->type_name("X,Y");
   command->add_flag("--force", o->force, "Combine even where the check of the inputs finds errors");
   command
       ->add_option("--memory", o->memory_mib,
                    "MiB to work in: larger images are worked on in bands, with the same bits")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str();
-  command->add_option("--threads", o->threads, "Number of threads; default: all")->check(CLI::Range(1, 4096));
+  add_threads_option(*command, o->threads);
   command->add_option("--json", o->json, "File for statistics; '-': standard output");
   command->add_flag("--quiet", o->quiet, "Warnings and errors only");
   command->callback([o] { combine(*o); });

@@ -8,14 +8,19 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "commands.h"
 #include "film/alignment.h"
 #include "film/error_map.h"
 #include "film/image_file.h"
+#include "film/image_writer.h"
 #include "film/metrics.h"
-#include "film/output_file.h"
+#include "film/outputs.h"
+#include "film/provenance.h"
+#include "json_output.h"
+#include "numbers.h"
 
 namespace covary {
 namespace {
@@ -73,7 +78,8 @@ Comparison compare_one(const CompareOptions& options, const std::vector<PlacedIm
   return comparison;
 }
 
-nlohmann::ordered_json json_of(const CompareOptions& options, const std::string& path, const Comparison& c) {
+nlohmann::ordered_json json_of(const CompareOptions& options, const std::string& path, const Comparison& c,
+                               const std::vector<std::string>& warnings) {
   nlohmann::ordered_json object{{"image", path}, {"reference", options.reference}};
   if (!options.reference2.empty()) object["reference2"] = options.reference2;
   object["window"] = {c.window.x, c.window.y, c.window.width, c.window.height};
@@ -82,6 +88,7 @@ nlohmann::ordered_json json_of(const CompareOptions& options, const std::string&
   object["mean"] = c.mean;
   object["reference_mean"] = c.reference_mean;
   for (size_t m = 0; m < options.metrics.size(); ++m) object[options.metrics[m]] = c.results[m].value;
+  object["warnings"] = warnings;
   return object;
 }
 
@@ -144,8 +151,6 @@ void check_options(const CompareOptions& options) {
     if (std::count(options.metrics.begin(), options.metrics.end(), name) > 1)
       usage("--metric names '" + name + "' more than once");
   }
-  if (!options.error_map.empty() && std::filesystem::path(options.error_map).extension() != ".png")
-    usage("--error-map '" + options.error_map + "': the name must end in .png");
   if (!options.error_range.empty()) {
     if (options.error_map.empty()) usage("--error-range needs --error-map");
     const bool positive = options.metrics[0] == "flip" || options.error_range[0] > 0;
@@ -153,14 +158,48 @@ void check_options(const CompareOptions& options) {
       usage(fmt::format("--error-range {},{}: expected are two rising positive numbers", options.error_range[0],
                         options.error_range[1]));
   }
-  // "--json a.exr" would take the image for the name of the JSON file.
-  for (const char* extension : {".exr", ".png", ".hdr", ".pfm", ".jpg"})
-    if (options.json && std::filesystem::path(*options.json).extension() == extension)
-      usage("--json '" + *options.json + "' names an image; give --json=- for standard output, or a file");
+}
+
+void check_files(const CompareOptions& options) {
+  Outputs outputs;
+  // First, because "--json a.exr" takes the image for the name of the JSON file.
+  if (options.json) outputs.writes("--json", *options.json, OutputKind::kText);
+  outputs.reads(options.images);
+  outputs.reads(options.reference);
+  if (!options.reference2.empty()) outputs.reads(options.reference2);
+  if (options.error_map.empty()) return;
+  if (options.images.size() == 1) return outputs.writes("--error-map", options.error_map, OutputKind::kPng);
+  for (const std::string& path : map_paths(options))
+    outputs.writes_derived_png("--error-map", path, "give it another name");
+}
+
+/// What the files say that makes their errors doubtful, for each image; what is wrong with the references stands first.
+std::vector<std::vector<std::string>> find_warnings(const CompareOptions& options) {
+  std::vector<ImageFacts> references{read_facts(options.reference)};
+  std::vector<std::string> of_references;
+  if (!options.reference2.empty()) {
+    references.push_back(read_facts(options.reference2));
+    of_references = comparison_warnings(references[0], references[1]);
+  }
+  std::vector<std::vector<std::string>> result;
+  for (const std::string& path : options.images) {
+    const ImageFacts image = read_facts(path);
+    result.push_back(of_references);
+    for (const ImageFacts& reference : references) {
+      const std::vector<std::string> found = comparison_warnings(image, reference);
+      result.back().insert(result.back().end(), found.begin(), found.end());
+    }
+  }
+  std::set<std::string> printed;
+  for (const auto& warnings : result)
+    for (const std::string& warning : warnings)
+      if (printed.insert(warning).second) fmt::print(stderr, "warning: {}\n", warning);
+  return result;
 }
 
 void compare(const CompareOptions& options) {
   check_options(options);
+  check_files(options);
   std::vector<PlacedImage> references{read_image(options.reference, options.layer)};
   if (!options.reference2.empty()) references.push_back(read_image(options.reference2, options.layer));
 
@@ -177,16 +216,14 @@ void compare(const CompareOptions& options) {
       for (MetricResult& result : comparisons.back().results) result.map = Image();
   }
 
+  const std::vector<std::vector<std::string>> warnings = find_warnings(options);
   const bool json_to_output = options.json && (options.json->empty() || *options.json == "-");
   std::string json;
   if (options.json)
     for (size_t i = 0; i < comparisons.size(); ++i)
-      json += json_of(options, options.images[i], comparisons[i]).dump() + "\n";
-  if (json_to_output)
-    std::fputs(json.c_str(), stdout);
-  else
-    print_table(options, comparisons);
-  if (options.json && !json_to_output) write_text_file(*options.json, json);
+      json += json_text(json_of(options, options.images[i], comparisons[i], warnings[i]), -1);
+  if (!json_to_output) print_table(options, comparisons);
+  if (options.json) write_text_output(*options.json, json);
   if (!options.error_map.empty()) write_error_maps(options, comparisons);
 }
 
@@ -212,7 +249,8 @@ void add_compare(CLI::App& app) {
   command->add_option("--error-map", o->error_map, "PNG of the first metric's error per pixel; its scale is printed");
   command->add_option("--error-range", o->error_range, "LOW,HIGH: ends of the error map's scale")
       ->delimiter(',')
-      ->expected(2);
+      ->expected(2)
+      ->check(finite_number());
   command->callback([o] { compare(*o); });
 }
 

@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-// covary convert: a PNG to look at, from any image or layer of a film, or from several side by side.
+// covary convert: any image or layer of a film, or several side by side, in another format.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <memory>
 #include <vector>
 
 #include "commands.h"
 #include "core/error.h"
-#include "film/image_file.h"
+#include "film/image_writer.h"
+#include "film/outputs.h"
+#include "film/provenance.h"
+#include "numbers.h"
 
 namespace covary {
 namespace {
@@ -36,31 +40,57 @@ Image side_by_side(const std::vector<Image>& images) {
   return result;
 }
 
+/// What is true of the new image: of several, nothing that one of them says.
+std::map<std::string, std::string> attributes_of(const ConvertOptions& options) {
+  std::map<std::string, std::string> attributes;
+  if (options.files.size() == 2) attributes = inherited_attributes(inspect_image(options.files[0]).attributes);
+  const auto earlier = attributes.find(kExposureAttribute);
+  const double exposure =
+      options.exposure + (earlier == attributes.end() ? 0 : parse_real(earlier->second).value_or(0));
+  attributes.erase(kExposureAttribute);
+  if (exposure != 0) attributes[kExposureAttribute] = fmt::format("{:g}", exposure);
+  if (!options.layer.empty()) attributes["covary:layer"] = options.layer;
+  attributes["covary:version"] = COVARY_VERSION;
+  attributes["covary:command"] = command_line();
+  return attributes;
+}
+
 void convert(const ConvertOptions& options) {
-  if (options.files.size() < 2) throw Error(ErrorCode::kUsage, "convert needs an image to read and a PNG to write");
+  if (options.files.size() < 2) throw Error(ErrorCode::kUsage, "convert needs an image to read and one to write");
+  const std::vector<std::string> inputs(options.files.begin(), options.files.end() - 1);
   const std::string& output = options.files.back();
-  if (std::filesystem::path(output).extension() != ".png")
-    throw Error(ErrorCode::kUsage, "cannot convert to '" + output + "': the name must end in .png");
-  if (!(std::abs(options.exposure) <= 100)) throw Error(ErrorCode::kUsage, "--exposure accepts stops from -100 to 100");
+  Outputs outputs;
+  outputs.reads(inputs);
+  outputs.writes("the output", output, OutputKind::kImage);
   std::vector<Image> images;
-  for (size_t i = 0; i + 1 < options.files.size(); ++i)
-    images.push_back(read_image(options.files[i], options.layer).image);
+  ImagePlace place;
+  for (const std::string& input : inputs) {
+    PlacedImage image = read_image(input, options.layer);
+    place = image.place;
+    images.push_back(std::move(image.image));
+  }
   Image image = images.size() == 1 ? std::move(images[0]) : side_by_side(images);
+  if (inputs.size() > 1) place = {image.width, image.height, {0, 0, image.width, image.height}};
   const float factor = static_cast<float>(std::exp2(options.exposure));
   for (float& value : image.data) value *= factor;
-  write_png(output, image);
+  write_image(output, image, place, attributes_of(options));
 }
 
 }  // namespace
 
 void add_convert(CLI::App& app) {
   const auto o = std::make_shared<ConvertOptions>();
-  CLI::App* command = app.add_subcommand("convert", "Convert images, or layers of films, to an sRGB PNG");
+  CLI::App* command =
+      app.add_subcommand("convert", "Convert images, or layers of films, to EXR, PNG, HDR, PFM, JPEG or TIFF");
   command
-      ->add_option("FILES", o->files, "Images of any renderer (EXR, HDR, PFM, …), put side by side, and last the PNG")
-      ->option_text("IN... OUT.png")
+      ->add_option("FILES", o->files,
+                   "Images of any renderer (EXR, HDR, PFM, …), put side by side, and last the new one: its name "
+                   "tells the format (.exr .pfm .tif: 32-bit linear, .hdr: linear, .png .jpg: 8-bit sRGB)")
+      ->option_text("IN... OUT")
       ->required();
-  command->add_option("-e,--exposure", o->exposure, "Stops: the image is multiplied by 2^E")->capture_default_str();
+  command->add_option("-e,--exposure", o->exposure, "Stops: the image is multiplied by 2^E")
+      ->check(real_number(-100, 100))
+      ->capture_default_str();
   command->add_option("--layer", o->layer, "Layer (N, group03, …) or single channel (samples) in place of R G B");
   command->callback([o] { convert(*o); });
 }

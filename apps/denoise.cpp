@@ -11,6 +11,8 @@
 #include "core/error.h"
 #include "core/stopwatch.h"
 #include "film/image_file.h"
+#include "film/outputs.h"
+#include "film/provenance.h"
 
 namespace covary {
 namespace {
@@ -31,6 +33,9 @@ std::optional<Image> guide(const std::string& path, const ImageInfo& info, const
 
 void run(const Options& o) {
   const Stopwatch watch;
+  Outputs outputs;
+  outputs.reads(o.input);
+  outputs.writes("-o", o.output, OutputKind::kFilm);
   const ImageInfo info = inspect_image(o.input);
   const PlacedImage image = read_image(o.input);
   std::optional<Image> albedo, normal;
@@ -39,7 +44,7 @@ void run(const Options& o) {
     if (albedo) normal = guide(o.input, info, "N");
   }
   Image result = denoise(image.image, albedo ? &*albedo : nullptr, normal ? &*normal : nullptr, o.denoise);
-  std::map<std::string, std::string> attributes = info.attributes;
+  std::map<std::string, std::string> attributes = inherited_attributes(info.attributes);
   attributes["covary:version"] = COVARY_VERSION;
   attributes["covary:command"] = command_line();
   attributes["covary:denoiser"] = "Open Image Denoise";
@@ -62,7 +67,9 @@ void add_denoise(CLI::App& app) {
   CLI::App* command = app.add_subcommand("denoise", "Denoise an image with Open Image Denoise (biased)");
   command->add_option("IN", o->input, "Linear image (EXR); its layers Albedo and N are guides")->required();
   command->add_option("-o,--output", o->output, "The result (EXR)")->required();
-  command->add_option("--oidn", o->denoise.library, "Open Image Denoise's library, or its folder");
+  command->add_option("--oidn", o->denoise.library,
+                      "Open Image Denoise's library, its folder, the folder of Python's package pyoidn, or of an "
+                      "environment that holds it");
   command->add_flag("--no-guides", o->no_guides, "Do not use the layers Albedo and N");
   command->add_flag("--quiet", o->quiet, "No summary");
   command->callback([o] { run(*o); });

@@ -3,9 +3,15 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <utility>
+
 #include "core/error.h"
 #include "estimators/cv_baseline.h"
 #include "estimators/iduw.h"
+#include "numbers.h"
 
 namespace covary {
 namespace {
@@ -22,6 +28,24 @@ std::vector<ControlVariate> explain(Estimator estimator, const GroupedImage& crn
   options.probe = &probe;
   estimator(crn, independent, options);
   return probe.control_variates;
+}
+
+constexpr std::array<std::pair<const char*, Penalty>, 5> kPenalties = {{{"pilot", Penalty::kPilot},
+                                                                        {"sample", Penalty::kSample},
+                                                                        {"smoothed", Penalty::kSmoothed},
+                                                                        {"homogeneous", Penalty::kHomogeneous},
+                                                                        {"cross-fit", Penalty::kCrossFit}}};
+
+std::vector<std::string> penalty_names() {
+  std::vector<std::string> names;
+  for (const auto& [name, penalty] : kPenalties) names.emplace_back(name);
+  return names;
+}
+
+/// `name` is one of penalty_names().
+Penalty penalty_named(const std::string& name) {
+  return std::find_if(kPenalties.begin(), kPenalties.end(), [&](const auto& known) { return name == known.first; })
+      ->second;
 }
 
 PairEstimator make_iicv(const EstimatorOptions& o, bool std_error) {
@@ -107,35 +131,37 @@ bool predicts_error(const std::string& estimator) { return estimator == "iicv" |
 void add_estimator_options(CLI::App& command, EstimatorOptions& o) {
   o.command = &command;
   const auto add = [&](CLI::Option* option) { return option->group(kEstimatorGroup); };
-  const std::map<std::string, Penalty> penalties = {{"pilot", Penalty::kPilot},
-                                                    {"sample", Penalty::kSample},
-                                                    {"smoothed", Penalty::kSmoothed},
-                                                    {"homogeneous", Penalty::kHomogeneous},
-                                                    {"cross-fit", Penalty::kCrossFit}};
-  const std::map<std::string, bool> on_off = {{"on", true}, {"off", false}};
+  // Whole and other numbers; their ranges are the estimators' to know.
+  const auto whole = [&](const char* name, std::optional<int>& value, const char* help) {
+    using Limits = std::numeric_limits<int>;
+    add(command.add_option(name, value, help))->transform(whole_number(Limits::min(), Limits::max()));
+  };
+  const auto real = [&](const char* name, std::optional<float>& value, const char* help) {
+    add(command.add_option(name, value, help))->check(finite_number());
+  };
   add(command.add_flag("--paper", o.paper, "iicv as published: no sample share, no conservation, no feedback"));
-  add(command.add_option("--k", o.k, "Number of control variates; default 25"));
-  add(command.add_option("--window", o.window, "Side of the window they are chosen from; default 11 (iduw: 15)"));
-  add(command.add_option(
-          "--penalty,--variance", o.penalty,
+  whole("--k", o.k, "Number of control variates; default 25");
+  whole("--window", o.window, "Side of the window they are chosen from; default 11 (iduw: 15)");
+  add(command.add_option_function<std::string>(
+          "--penalty,--variance", [&o](const std::string& name) { o.penalty = penalty_named(name); },
           "Error of the independent pixels: pilot, sample, smoothed, homogeneous or cross-fit; default pilot"))
-      ->transform(CLI::CheckedTransformer(penalties).description(""))
+      ->check(one_of(penalty_names()).description(""))
       ->type_name("NAME");
-  add(command.add_option("--pilot-window", o.pilot_window, "Side of the pilot's window; default 11"));
-  add(command.add_option("--ridge", o.ridge,
-                         "Factor of the homogeneous penalty (default 1), or ridge of cv-baseline (0)"));
+  whole("--pilot-window", o.pilot_window, "Side of the pilot's window; default 11");
+  real("--ridge", o.ridge, "Factor of the homogeneous penalty (default 1), or ridge of cv-baseline (0)");
   add(command.add_flag("--asymmetric", o.asymmetric, "Penalty of the neighbour alone, not averaged with the target's"));
   add(command.add_flag("--exclude-target", o.exclude_target, "Leave the target out of its own control variates"));
   add(command.add_option("--coefficients", o.coefficients, "One coefficient for all channels, or one per channel"))
-      ->check(CLI::IsMember({"shared", "per-channel"}));
-  add(command.add_option("--sample-share", o.sample_share,
-                         "Part of the penalty that is the sample variance; default 0.5"));
-  add(command.add_option("--conservation", o.conservation, "Weight of the condition sum beta g = f; default 30"));
-  add(command.add_option("--feedback", o.feedback, "on or off: give back what the penalty takes away; default on"))
-      ->transform(CLI::CheckedTransformer(on_off).description(""))
+      ->check(one_of({"shared", "per-channel"}));
+  real("--sample-share", o.sample_share, "Part of the penalty that is the sample variance; default 0.5");
+  real("--conservation", o.conservation, "Weight of the condition sum beta g = f; default 30");
+  add(command.add_option_function<std::string>(
+          "--feedback", [&o](const std::string& text) { o.feedback = text == "on"; },
+          "on or off: give back what the penalty takes away; default on"))
+      ->check(one_of({"on", "off"}).description(""))
       ->type_name("on|off");
-  add(command.add_option("--feedback-window", o.feedback_window, "Side of the feedback's window; default 41"));
-  add(command.add_option("--feedback-bandwidth", o.feedback_bandwidth, "Bandwidth in standard errors; default 1.25"));
+  whole("--feedback-window", o.feedback_window, "Side of the feedback's window; default 41");
+  real("--feedback-bandwidth", o.feedback_bandwidth, "Bandwidth in standard errors; default 1.25");
 }
 
 void check_estimator_options(const EstimatorOptions& o) {

@@ -17,10 +17,13 @@
 #include "core/error.h"
 #include "estimator_options.h"
 #include "film/output_file.h"
+#include "film/outputs.h"
+#include "json_output.h"
 #include "lab/builtin_suites.h"
 #include "lab/experiment.h"
 #include "lab/overrides.h"
 #include "lab/report_document.h"
+#include "numbers.h"
 #include "progress.h"
 #include "version.h"
 
@@ -46,6 +49,13 @@ extern "C" void stop_experiment(int signal) {
   std::signal(signal, SIG_DFL);  // a second one ends the program at once
 }
 
+/// Ctrl-C, a request to end, the end of the terminal; whoever started the program may have it ignore some (nohup).
+void catch_signals() {
+  g_stop = false;
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP})
+    if (std::signal(signal, stop_experiment) == SIG_IGN) std::signal(signal, SIG_IGN);
+}
+
 std::string read_file(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   if (!file) throw Error(ErrorCode::kIo, "cannot open '" + path + "'");
@@ -63,7 +73,8 @@ std::string program_version() {
   return text;
 }
 
-// ---- the suite -------------------------------------------------------------------------------------------------------
+// ---- the suite
+// -------------------------------------------------------------------------------------------------------
 
 void list_suites() {
   for (const auto& [name, text] : lab::builtin_suites()) {
@@ -124,10 +135,11 @@ std::vector<uint64_t> parse_seeds(const std::string& text) {
   std::vector<uint64_t> seeds;
   std::stringstream words(text);
   for (std::string word; std::getline(words, word, ',');) {
-    if (word.empty() || word.size() > 18 || word.find_first_not_of("0123456789") != std::string::npos)
+    const std::optional<uint64_t> seed = parse_whole<uint64_t>(word);
+    if (!seed)
       throw Error(ErrorCode::kUsage,
                   "--seeds '" + text + "': expected a number of seeds, or seeds separated by commas");
-    seeds.push_back(std::stoull(word));
+    seeds.push_back(*seed);
   }
   if (seeds.size() != 1 || text.find(',') != std::string::npos) return seeds;
   const uint64_t n = seeds[0];
@@ -137,7 +149,8 @@ std::vector<uint64_t> parse_seeds(const std::string& text) {
   return seeds;
 }
 
-// ---- progress --------------------------------------------------------------------------------------------------------
+// ---- progress
+// --------------------------------------------------------------------------------------------------------
 
 /// One line on a terminal, drawn again and again; elsewhere a line every ten seconds. Failures stay.
 class ProgressPrinter {
@@ -171,7 +184,8 @@ class ProgressPrinter {
   std::chrono::steady_clock::time_point next_{};
 };
 
-// ---- the command -----------------------------------------------------------------------------------------------------
+// ---- the command
+// -----------------------------------------------------------------------------------------------------
 
 lab::PlanContext plan_context() {
   lab::PlanContext context;
@@ -182,14 +196,43 @@ lab::PlanContext plan_context() {
   return context;
 }
 
+constexpr const char *kResults = "/results.json", *kTable = "/results.csv", *kReport = "/report.html";
+
+/// Whether the file is the results of an experiment: "format" is the first key.
+bool is_results(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string text(200, '\0');
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  return text.find(lab::kResultsFormat) != std::string::npos;
+}
+
+/// Before the experiment begins: nothing that it reads, and nothing of somebody else's, is overwritten by its results.
+void check_files(const ExperimentCommand& command, const lab::Suite& suite, const std::string& scenes) {
+  Outputs outputs;
+  outputs.reads(command.suite);
+  for (const lab::SceneEntry& scene : suite.scenes) {
+    outputs.reads((fs::path(scenes) / scene.file).string());
+    for (const std::string& file : suite.reference_of(scene).files) outputs.reads((fs::path(scenes) / file).string());
+  }
+  outputs.writes("-o", command.output + kResults, OutputKind::kText);
+  outputs.writes("-o", command.output + kTable, OutputKind::kText);
+  outputs.writes("-o", command.output + kReport, OutputKind::kPage);
+  for (const char* name : {kResults, kTable, kReport})
+    if (fs::exists(command.output + name) && !is_results(command.output + kResults))
+      throw Error(
+          ErrorCode::kUsage,
+          fmt::format("-o '{0}': {0}{1} is there and no experiment made it; give another folder, or one that an "
+                      "experiment has written to",
+                      command.output, name));
+}
+
 void write_results(const lab::Results& results, const std::string& folder) {
-  write_text_file(folder + "/results.json",
-                  to_json(results).dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
-  write_text_file(folder + "/results.csv", to_csv(results));
+  write_text_file(folder + kResults, json_text(to_json(results), 1));
+  write_text_file(folder + kTable, to_csv(results));
   nlohmann::ordered_json document = lab::report_document(results);
   std::vector<ReportImage> images;
   lab::add_pictures(results, document, images);
-  write_report(folder + "/report.html", document, images);
+  write_report(folder + kReport, document, images);
 }
 
 void print_summary(const lab::Results& results, const std::string& folder) {
@@ -214,26 +257,26 @@ void experiment(ExperimentCommand command) {
   for (uint32_t spp : command.spp) command.overrides.budgets.push_back({spp, 0});
   for (double seconds : command.seconds) command.overrides.budgets.push_back({0, seconds});
   const lab::Suite suite = load_suite(command);
-  if (command.print) return fmt::print("{}\n", lab::to_json(suite).dump(2));
+  if (command.print) return write_text_output("-", json_text(lab::to_json(suite)));
   if (command.output.empty()) throw Error(ErrorCode::kUsage, "no folder for the results given; use -o DIR");
   std::error_code error;
   fs::create_directories(command.output, error);
   if (error) throw Error(ErrorCode::kIo, fmt::format("cannot make the folder {}: {}", command.output, error.message()));
 
+  const std::string scenes = scenes_folder(command, suite);
+  check_files(command, suite, scenes);
   ProgressPrinter printer(command.quiet);
   lab::ExperimentOptions options;
   options.program = program_path();
   options.cache_folder = fs::absolute(command.cache.empty() ? command.output + "/cache" : command.cache).string();
-  options.scenes_folder = scenes_folder(command, suite);
+  options.scenes_folder = scenes;
   options.context = plan_context();
   options.max_pixels = command.overrides.quick ? lab::kQuickPixels : 0;
   options.threads = command.threads;
   options.keep_passes = command.keep_passes;
   options.stop = &g_stop;
   options.progress = [&](const lab::Progress& p) { printer.print(p); };
-  g_stop = false;
-  std::signal(SIGINT, stop_experiment);
-  std::signal(SIGTERM, stop_experiment);
+  catch_signals();
   lab::Results results = lab::run_experiment(suite, options);
   printer.clear();
   results.version = options.context.program_version;
@@ -265,18 +308,20 @@ void add_experiment(CLI::App& app) {
   const auto list = [](CLI::Option* option) { option->delimiter(',')->group("In place of the suite's"); };
   const auto single = [](CLI::Option* option) { option->group("In place of the suite's"); };
   single(command->add_option("--seeds", o->seeds, "A number of seeds, or seeds separated by commas"));
-  list(command->add_option("--spp", o->spp, "Budgets in samples per pixel")->check(CLI::Range(1u, 1u << 30)));
-  list(command->add_option("--time", o->seconds, "Budgets in seconds")->check(CLI::PositiveNumber));
+  list(command->add_option("--spp", o->spp, "Budgets in samples per pixel")->transform(whole_number(1u, 1u << 30)));
+  list(command->add_option("--time", o->seconds, "Budgets in seconds")->check(positive_number()));
   single(command->add_option("--crop", o->overrides.crop, "X,Y,WIDTH,HEIGHT, or WIDTHxHEIGHT in the middle"));
   single(command->add_option("--resolution", o->overrides.resolution, "WIDTHxHEIGHT of the frames"));
   list(command->add_option("--scenes-only", o->overrides.scenes, "Only these of its scenes"));
   list(command->add_option("--methods-only", o->overrides.methods, "Only these of its methods, and the baseline"));
   single(command->add_option("--baseline", o->overrides.baseline, "Method that ratios refer to"));
-  single(command->add_option("--reference-spp", o->overrides.reference_spp,
-                             "Samples per pixel of each of the two halves of the references"));
+  single(command
+             ->add_option("--reference-spp", o->overrides.reference_spp,
+                          "Samples per pixel of each of the two halves of the references")
+             ->transform(whole_number(1u, 1u << 30)));
   single(
       command->add_option("--reference", o->overrides.reference_files, "One or two references (EXR)")->expected(1, 2));
-  command->add_option("--threads", o->threads, "Threads of each render; default: all")->check(CLI::Range(1, 4096));
+  add_threads_option(*command, o->threads, "Threads of each render");
   command->add_flag("--keep-passes", o->keep_passes, "Keep the films of all passes in the cache");
   command->add_flag("--quiet", o->quiet, "Failures only");
   command->callback([o] { experiment(*o); });

@@ -11,6 +11,7 @@
 #include "defines.h"
 #include "film/image_file.h"
 #include "io/load_scene.h"
+#include "json_output.h"
 
 namespace covary {
 namespace {
@@ -29,8 +30,7 @@ void print_json(const ImageInfo& info, const std::string& path) {
   object["compression"] = info.compression;
   for (const ExrFile::Channel& c : info.channels) object["channels"][c.name] = c.type;
   object["attributes"] = info.attributes;
-  // Text in files need not be valid UTF-8, which JSON must be.
-  fmt::print("{}\n", object.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+  write_text_output("-", json_text(object, -1));
 }
 
 /// Channels by layer: "group00 (R G B, float)".
@@ -62,8 +62,7 @@ void scene_info(const InfoOptions& options) {
                                         {"integrator", scene.integrator_type},
                                         {"triangles", scene.scene->n_triangles()},
                                         {"scene_hash", scene.content_hash}};
-    fmt::print("{}\n", object.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
-    return;
+    return write_text_output("-", json_text(object, -1));
   }
   fmt::print("{}: {} x {} pixels, {} samples per pixel, integrator {}\n{} triangles\nscene_hash: {}\n", options.path,
              scene.width, scene.height, scene.spp, scene.integrator_type.empty() ? "not named" : scene.integrator_type,

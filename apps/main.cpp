@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The `covary` program. Exit codes: 0 done, 1 failed, 2 wrong usage.
+// The `covary` program. Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -13,6 +13,7 @@
 
 #include "commands.h"
 #include "core/error.h"
+#include "core/interrupted.h"
 #include "core/shell_text.h"
 #include "version.h"
 
@@ -22,14 +23,14 @@ namespace {
 std::string g_command_line;
 
 int report(const char* program, const Error& error) {
-  const bool usage = error.code() == ErrorCode::kUsage;
   std::fprintf(stderr, "%s: %s%s\n", program, error.code() == ErrorCode::kInternal ? "internal error: " : "",
                error.what());
-  return usage ? 2 : 1;
+  if (dynamic_cast<const Interrupted*>(&error)) return 130;
+  return error.code() == ErrorCode::kUsage ? 2 : 1;
 }
 
-/// Long options of `command` that `given` may have been meant to be: misspelt or cut short. Compared without dashes, which
-/// would make all short names alike.
+/// Long options of `command` that `given` may have been meant to be: misspelt or cut short. Compared without dashes,
+/// which would make all short names alike.
 std::vector<std::string> near_options(const CLI::App& command, const std::string& given) {
   std::vector<std::string> names;
   for (const CLI::Option* option : command.get_options())

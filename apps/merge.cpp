@@ -6,6 +6,7 @@
 #include "commands.h"
 #include "film/film_file.h"
 #include "film/merge.h"
+#include "film/outputs.h"
 
 namespace covary {
 namespace {
@@ -16,6 +17,9 @@ struct MergeOptions {
 };
 
 void merge(const MergeOptions& options) {
+  Outputs outputs;
+  outputs.reads(options.inputs);
+  outputs.writes("-o", options.output, OutputKind::kFilm);
   Film merged = merge_film_files(options.inputs);
   merged.attributes[film_key::kVersion] = COVARY_VERSION;
   merged.attributes[film_key::kCommand] = command_line();

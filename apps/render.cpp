@@ -15,10 +15,14 @@
 
 #include "commands.h"
 #include "core/error.h"
+#include "core/interrupted.h"
 #include "core/stopwatch.h"
 #include "film/display.h"
 #include "film/output_file.h"
+#include "film/outputs.h"
+#include "json_output.h"
 #include "plans/render.h"
+#include "plans/result_files.h"
 #include "progress.h"
 #include "render_options.h"
 #include "render_report.h"
@@ -73,24 +77,44 @@ RenderResult render_watched(const RenderOptions& options, const LoadedScene& sce
 void report(const RenderReport& report) {
   const auto& [options, scene, result, load_seconds, threads] = report;
   for (const Pass& pass : result.passes) report_bad_samples(options, pass);
-  if (!options.json.empty()) {
-    const std::string text = statistics(report).dump(2) + "\n";
-    if (options.json == "-")
-      fmt::print("{}", text);
-    else
-      write_text_file(options.json, text);
-  }
+  if (!options.json.empty()) write_text_output(options.json, json_text(statistics(report)));
   if (result.interrupted)
-    throw Error(
-        ErrorCode::kIo,
+    throw Interrupted(
         fmt::format("interrupted after {:.1f} of {:g} samples per pixel; '{}' holds what was rendered, the "
                     "same command with --resume continues",
                     result.samples_per_pixel(), result.sum([](const Pass& p) { return p.settings.spp; }), result.kept));
   if (!options.quiet) print_summary(report);
 }
 
+/// What the command reads and writes, as far as it is known before the scene is loaded.
+Outputs files_of(const RenderOptions& options) {
+  Outputs outputs;
+  outputs.reads(options.scene);
+  outputs.writes("--json", options.json, OutputKind::kText);
+  if (!options.replay.empty()) return outputs;
+  outputs.writes("-o", options.output, OutputKind::kFilm);
+  if (output_target(options.output).is_special)
+    throw Error(ErrorCode::kUsage, fmt::format("-o '{}' is no regular file, which a render needs to continue after an "
+                                               "interruption",
+                                               options.output));
+  if (!options.passes.empty()) {
+    if (std::filesystem::exists(options.passes) && !std::filesystem::is_directory(options.passes))
+      throw Error(ErrorCode::kUsage, "--passes '" + options.passes + "' is a file; expected is a folder");
+    if (std::filesystem::is_directory(options.passes))
+      for (const char* name : {"crn", "independent"}) {
+        const std::string path = (std::filesystem::path(options.passes) / name).string();
+        outputs.writes("--passes", path + ".exr", OutputKind::kFilm);
+        outputs.writes("--passes", path + ".json", OutputKind::kText);
+      }
+  }
+  if (options.preview)
+    outputs.writes_derived_png("the preview", preview_path(options.output), "use --no-preview, or another name for -o");
+  return outputs;
+}
+
 void render(RenderOptions options) {
   check_options(options);
+  Outputs outputs = files_of(options);
   const int threads = options.threads > 0 ? options.threads : static_cast<int>(std::thread::hardware_concurrency());
   const tbb::global_control control(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(threads));
 
@@ -104,6 +128,7 @@ void render(RenderOptions options) {
   const Stopwatch load_watch;
   const LoadedScene scene = load(options);
   const double load_seconds = load_watch.seconds() - scene.scene->build_seconds();
+  outputs.reads(scene.files);
   for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", warning);
   if (!options.replay.empty()) return print_replay(options, scene);
   const RenderResult result = render_watched(options, scene, display ? &*display : nullptr);

@@ -4,33 +4,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
-#include <filesystem>
 #include <limits>
 
 #include "commands.h"
 #include "core/error.h"
 #include "defines.h"
+#include "numbers.h"
 #include "plans/estimator_plans.h"
 #include "plans/integrator_choice.h"
 
 namespace covary {
-
-std::vector<int64_t> parse_numbers(const std::string& option, const std::string& text, char separator, size_t count,
-                                   const std::string& example) {
-  std::vector<int64_t> numbers;
-  size_t begin = 0;
-  while (begin <= text.size()) {
-    const size_t end = std::min(text.find(separator, begin), text.size());
-    const std::string word = text.substr(begin, end - begin);
-    if (word.empty() || word.size() > 18 || word.find_first_not_of("0123456789") != std::string::npos) break;
-    numbers.push_back(std::stoll(word));
-    begin = end + 1;
-  }
-  if (numbers.size() != count || begin <= text.size())
-    throw Error(ErrorCode::kUsage, option + " '" + text + "': expected " + example);
-  return numbers;
-}
 
 std::array<double, 2> parse_split(const std::string& text) {
   const auto parts = parse_numbers("--split", text, ':', 2, "CRN:INDEPENDENT in whole numbers, e.g. 1:1");
@@ -42,16 +25,11 @@ std::array<double, 2> parse_split(const std::string& text) {
 
 double parse_until(const std::string& text) {
   const std::string key = "relmse=";
-  size_t end = 0;
-  double value = 0;
-  if (text.starts_with(key)) try {
-      value = std::stod(text.substr(key.size()), &end);
-    } catch (const std::exception&) {
-      end = 0;
-    }
-  if (end == 0 || key.size() + end != text.size() || !(value > 0) || !std::isfinite(value))
+  const std::optional<double> value =
+      text.starts_with(key) ? parse_real(std::string_view(text).substr(key.size())) : std::nullopt;
+  if (!value || *value <= 0)
     throw Error(ErrorCode::kUsage, "--until '" + text + "': expected relmse=X with X > 0, e.g. relmse=0.005");
-  return value;
+  return *value;
 }
 
 FilterSettings filter_named(const std::string& name) {
@@ -59,16 +37,6 @@ FilterSettings filter_named(const std::string& name) {
   if (name == "tent") return {FilterKind::kTent, 1.0f, 0};
   return {FilterKind::kGaussian, 2.0f, 0.5f};
 }
-
-namespace {
-
-void check_output_writable(const std::string& output) {
-  const std::filesystem::path folder = std::filesystem::absolute(output).parent_path();
-  if (!std::filesystem::is_directory(folder))
-    throw Error(ErrorCode::kIo, "cannot write '" + output + "': the folder '" + folder.string() + "' does not exist");
-}
-
-}  // namespace
 
 void check_options(RenderOptions& options) {
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
@@ -100,7 +68,6 @@ void check_options(RenderOptions& options) {
     if (name == "none" && options.groups.value_or(2) < 2) usage("--until needs --groups 2 or more");
   }
   check_estimator_options(options.estimator);
-  if (!options.output.empty()) check_output_writable(options.output);
 }
 
 LoadedScene load(const RenderOptions& options) {
@@ -177,46 +144,48 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
   command.add_option("SCENE", o.scene, "Scene file, Mitsuba XML")->required();
   command.add_option("-o,--output", o.output, "The image (EXR); a PNG preview appears beside it");
   command.add_option("--spp", o.spp, "Samples per pixel of all passes together; default: the scene's")
-      ->check(CLI::Range(1u, 1u << 30));
+      ->transform(whole_number(1u, 1u << 30));
   command.add_option("--integrator", o.integrator, "Integrator instead of the scene's: path");
   command
       .add_option("--estimator", o.estimator.name,
                   "How passes become the image: iicv, cv-baseline or iduw of a pass with common random numbers and an "
                   "independent one; of a single pass polynomials, for direct light, or none, the mean")
-      ->check(CLI::IsMember({"iicv", "cv-baseline", "iduw", "polynomials", "none"}))
+      ->check(one_of({"iicv", "cv-baseline", "iduw", "polynomials", "none"}))
       ->capture_default_str();
   command.add_option("--split", o.split, "CRN:INDEPENDENT, parts of the samples for the two passes")
       ->capture_default_str();
   command
       .add_option("--sampling", o.sampling,
                   "Random numbers per pixel, or common to all; a single pass (estimator none)")
-      ->check(CLI::IsMember({"independent", "crn"}));
+      ->check(one_of({"independent", "crn"}));
   command
       .add_option("--groups", o.groups,
                   "Groups of samples whose means films keep; default 12, 1 for a single independent pass")
-      ->check(CLI::Range(1, Film::kMaxGroups));
+      ->transform(whole_number(1, Film::kMaxGroups));
   command.add_option("--display-server", o.display_server,
                      "HOST:PORT of a running tev, which shows the image while it renders");
   command.add_option("--until", o.until, "relmse=X: add samples until the predicted error is X, at most --spp");
-  command.add_option("--seed", o.seed, "Seed of the random numbers")->capture_default_str();
+  command.add_option("--seed", o.seed, "Seed of the random numbers")
+      ->transform(whole_number(uint64_t{0}, std::numeric_limits<uint64_t>::max()))
+      ->capture_default_str();
   command.add_option("--resolution", o.resolution, "WIDTHxHEIGHT of the full frame; default: the scene's");
   command.add_option("--crop", o.crop, "X,Y,WIDTH,HEIGHT: render only these pixels of the frame");
   command.add_option("--min-depth", o.min_depth, "Leave out paths with fewer edges than this")
-      ->check(CLI::Range(0, 1 << 30));
+      ->transform(whole_number(0, 1 << 30));
   command.add_option("--max-depth", o.max_depth, "Largest number of path edges; -1: no limit; default: the scene's")
-      ->check(CLI::Range(-1, 1 << 30));
+      ->transform(whole_number(-1, 1 << 30));
   command.add_option("--rfilter", o.rfilter, "Reconstruction filter instead of the scene's")
-      ->check(CLI::IsMember({"box", "tent", "gaussian"}));
-  command.add_option("--threads", o.threads, "Number of threads; default: all")->check(CLI::Range(1, 4096));
+      ->check(one_of({"box", "tent", "gaussian"}));
+  add_threads_option(command, o.threads);
   command
       .add_option("--time", o.seconds,
                   "Seconds for rendering and estimating together; loading and writing are not counted")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   command.add_option("--passes,--save-passes", o.passes, "Folder that keeps the film of every pass");
   command.add_flag("--resume", o.resume, "Continue the films of an interrupted render, or those in --passes");
   command.add_option("--checkpoint", o.checkpoint_seconds, "Seconds between writing unfinished films; 0: never")
       ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
+      ->check(real_number(0, std::numeric_limits<double>::infinity()));
   add_define_option(command, o.defines);
   command.add_flag("--aovs", o.aovs, "Add the images Albedo, N (normal) and P (position) to the output");
   command.add_option("--replay", o.replay, "X,Y,SAMPLE[,PASS]: print one sample instead of rendering");
@@ -227,7 +196,7 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
   command
       .add_option("--dimensions", o.dimensions,
                   "polynomials: how many of a path's first random numbers they are functions of")
-      ->check(CLI::Range(1, PolynomialsOptions::kMaxDimensions))
+      ->transform(whole_number(1, PolynomialsOptions::kMaxDimensions))
       ->capture_default_str()
       ->group(kEstimatorGroup);
 }

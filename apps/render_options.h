@@ -38,7 +38,8 @@ struct RenderOptions {
 
 void add_render_options(CLI::App& command, RenderOptions& options);
 
-/// Everything that can be wrong before the scene is loaded, as Error(kUsage); and --sampling alone means a plain render.
+/// Everything that can be wrong before the scene is loaded, as Error(kUsage); and --sampling alone means a plain
+/// render.
 void check_options(RenderOptions& options);
 
 /// The scene, with the integrator that the options choose. Throws Error.
@@ -50,9 +51,6 @@ RenderRequest make_request(const RenderOptions& options, const LoadedScene& scen
 /// The sample that --replay names.
 SampleAddress replayed_sample(const RenderOptions& options);
 
-/// Whole numbers separated by `separator`; throws Error(kUsage) that names the option.
-std::vector<int64_t> parse_numbers(const std::string& option, const std::string& text, char separator, size_t count,
-                                   const std::string& example);
 /// --split "1:3": parts of the samples for the CRN and the independent pass; they add up to 1.
 std::array<double, 2> parse_split(const std::string& text);
 /// --until "relmse=0.005".

@@ -21,6 +21,8 @@
 #include "film/alignment.h"
 #include "film/image_file.h"
 #include "film/metrics.h"
+#include "film/outputs.h"
+#include "numbers.h"
 #include "report/report.h"
 
 extern char** environ;
@@ -77,14 +79,11 @@ CropWindow window_of_all(const std::vector<Shown>& images) {
 
 /// "X,Y,WIDTH,HEIGHT" in pixels of the page's images.
 nlohmann::ordered_json parse_inset(const std::string& text, const CropWindow& window) {
-  int x = 0, y = 0, w = 0, h = 0;
-  char rest = 0;
-  if (std::sscanf(text.c_str(), "%d,%d,%d,%d%c", &x, &y, &w, &h, &rest) != 4)
-    throw Error(ErrorCode::kUsage, "--inset '" + text + "': expected X,Y,WIDTH,HEIGHT in pixels, e.g. 240,160,80,60");
-  if (x < 0 || y < 0 || w < 1 || h < 1 || x > window.width - w || y > window.height - h)
+  const auto v = parse_numbers("--inset", text, ',', 4, "X,Y,WIDTH,HEIGHT in pixels, e.g. 240,160,80,60");
+  if (v[2] < 1 || v[3] < 1 || v[0] + v[2] > window.width || v[1] + v[3] > window.height)
     throw Error(ErrorCode::kUsage, fmt::format("--inset '{}' does not fit into the {} x {} pixels of the images", text,
                                                window.width, window.height));
-  return {{"x", x}, {"y", y}, {"w", w}, {"h", h}};
+  return {{"x", v[0]}, {"y", v[1]}, {"w", v[2]}, {"h", v[3]}};
 }
 
 /// How the page colours a layer: directions and other vectors are no colours.
@@ -214,10 +213,11 @@ bool open_in_browser(const std::string& path) {
 }
 
 void view(const ViewOptions& options) {
+  Outputs outputs;
+  outputs.reads(options.images);
+  if (!options.reference.empty()) outputs.reads(options.reference);
   if (!options.output.empty()) {
-    const std::string extension = fs::path(options.output).extension().string();
-    if (extension != ".html" && extension != ".htm")
-      throw Error(ErrorCode::kUsage, "-o '" + options.output + "': the page's name must end in .html");
+    outputs.writes("-o", options.output, OutputKind::kPage);
     return write_page(options, options.output);
   }
   const std::string path = temporary_page();
@@ -229,7 +229,9 @@ void view(const ViewOptions& options) {
   }
   fmt::print("{}\n", path);
   std::fflush(stdout);
-  if (!open_in_browser(path)) fmt::print(stderr, "covary: no browser could be opened; open the file above in one\n");
+  if (!open_in_browser(path))
+    throw Error(ErrorCode::kIo, "no browser could be opened; open " + path +
+                                    " in one, or give the page a name by -o PAGE.html, which opens none");
 }
 
 }  // namespace

@@ -11,7 +11,7 @@ std::vector<std::string> CvBaselineOptions::validate() const {
   std::vector<std::string> problems;
   if (window < 3 || window > 63 || window % 2 == 0)
     problems.push_back(fmt::format("window is {}, expected an odd number from 3 to 63", window));
-  const int candidates = window * window - (include_target ? 0 : 1);
+  const int64_t candidates = int64_t{window} * window - (include_target ? 0 : 1);
   if (k < 1 || k > candidates)
     problems.push_back(fmt::format("k is {}, expected 1 to {}, the number of {}pixels in a window of {} x {}", k,
                                    candidates, include_target ? "" : "neighbouring ", window, window));

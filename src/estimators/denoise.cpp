@@ -5,10 +5,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
+#include <string_view>
 #include <vector>
 
 #include "core/error.h"
@@ -36,16 +38,37 @@ struct Api {
   void (*release_filter)(void* filter) = nullptr;
 };
 
-/// Folders of the wheel `pyoidn` below a Python prefix.
-void add_wheel_folders(const fs::path& prefix, std::vector<fs::path>& folders) {
+/// Where Python's wheel `pyoidn` puts the library, from the root of an environment down; a star is any ending.
+constexpr std::array<const char*, 6> kWheelFolders = {"lib", "python3*", "*-packages", "pyoidn", "oidn", "lib"};
+
+bool matches(const std::string& name, std::string_view pattern) {
+  const size_t star = pattern.find('*');
+  if (star == std::string_view::npos) return name == pattern;
+  const std::string_view before = pattern.substr(0, star), after = pattern.substr(star + 1);
+  return name.size() >= before.size() + after.size() && name.starts_with(before) && name.ends_with(after);
+}
+
+/// The library in `folder` if it holds it, or else below it, along the wheel's folders from number `first` on.
+void find_along_wheel(const fs::path& folder, size_t first, std::vector<std::string>& found) {
   std::error_code ignored;
-  std::vector<fs::path> found;
-  for (const fs::directory_entry& entry : fs::directory_iterator(prefix / "lib", ignored))
-    if (entry.path().filename().string().starts_with("python3"))
-      for (const char* packages : {"site-packages", "dist-packages"})
-        found.push_back(entry.path() / packages / "pyoidn" / "oidn" / "lib");
-  std::sort(found.begin(), found.end());
-  folders.insert(folders.end(), found.begin(), found.end());
+  if (first == kWheelFolders.size()) {
+    if (fs::exists(folder / kLibrary, ignored)) found.push_back((folder / kLibrary).string());
+    return;
+  }
+  std::vector<fs::path> below;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored))
+    if (matches(entry.path().filename().string(), kWheelFolders[first])) below.push_back(entry.path());
+  std::sort(below.begin(), below.end());
+  for (const fs::path& next : below) find_along_wheel(next, first + 1, found);
+}
+
+/// What a user's path may mean: the library, its folder, any folder of the wheel above it up to the environment's root.
+std::vector<std::string> libraries_at(const std::string& path) {
+  std::vector<std::string> found;
+  if (!fs::is_directory(path)) return {path};
+  for (size_t first = kWheelFolders.size() + 1; first-- > 0;) find_along_wheel(path, first, found);
+  if (found.empty()) found.push_back((fs::path(path) / kLibrary).string());  // for the message
+  return found;
 }
 
 std::string environment(const char* name) {
@@ -55,18 +78,13 @@ std::string environment(const char* name) {
 
 /// Where the library may be, in order. A name without a folder is left to the loader.
 std::vector<std::string> candidates(const DenoiseOptions& options) {
-  const auto in = [](const fs::path& path) { return (fs::is_directory(path) ? path / kLibrary : path).string(); };
-  if (!options.library.empty()) return {in(options.library)};
-  if (const std::string path = environment("COVARY_OIDN"); !path.empty()) return {in(path)};
+  if (!options.library.empty()) return libraries_at(options.library);
+  if (const std::string path = environment("COVARY_OIDN"); !path.empty()) return libraries_at(path);
   std::vector<std::string> all = {kLibrary};
-  std::vector<fs::path> folders;
-  if (const std::string path = environment("VIRTUAL_ENV"); !path.empty()) add_wheel_folders(path, folders);
-  if (const std::string home = environment("HOME"); !home.empty())
-    add_wheel_folders(fs::path(home) / ".local", folders);
-  add_wheel_folders("/usr/local", folders);
-  add_wheel_folders("/usr", folders);
-  for (const fs::path& folder : folders)
-    if (fs::exists(folder / kLibrary)) all.push_back((folder / kLibrary).string());
+  if (const std::string path = environment("VIRTUAL_ENV"); !path.empty()) find_along_wheel(path, 0, all);
+  if (const std::string home = environment("HOME"); !home.empty()) find_along_wheel(fs::path(home) / ".local", 0, all);
+  find_along_wheel("/usr/local", 0, all);
+  find_along_wheel("/usr", 0, all);
   return all;
 }
 
@@ -98,9 +116,10 @@ Api load(const DenoiseOptions& options) {
   if (!library.handle)
     throw Error(
         ErrorCode::kUsage,
-        fmt::format("Open Image Denoise is not there ({}); install it with `pip install pyoidn`, or name {} or its "
-                    "folder with --oidn or the environment variable COVARY_OIDN",
-                    why, kLibrary));
+        fmt::format(
+            "Open Image Denoise is not there ({}); install it with `pip install pyoidn`, or name {}, its "
+            "folder or the Python environment that holds it with --oidn or the environment variable COVARY_OIDN",
+            why, kLibrary));
   Api api;
   bind(library, "oidnNewDevice", api.new_device);
   bind(library, "oidnCommitDevice", api.commit_device);

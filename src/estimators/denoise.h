@@ -12,16 +12,17 @@
 namespace covary {
 
 struct DenoiseOptions {
-  /// The library's file or its folder; "": the environment variable COVARY_OIDN (likewise), the loader's path, and the
-  /// places where Python's wheel `pyoidn` puts it (of $VIRTUAL_ENV, the user, the system).
+  /// The library's file, its folder, or a folder above it in Python's wheel `pyoidn`, up to the root of the environment
+  /// that holds the wheel; "": the environment variable COVARY_OIDN (likewise), the loader's path, and the places where
+  /// the wheel puts it (of $VIRTUAL_ENV, the user, the system).
   std::string library;
 };
 
-/// Denoises `rgb` (linear, 3 channels, high dynamic range) on the processor. `albedo` in [0, 1] and `normal` in [-1, 1] (3
-/// channels, the same size; the normal only together with the albedo) or null: guides that keep texture and edges; they
-/// may be noisy. Values that are not finite become zero before. The same input gives the same bits on one machine.
-/// Throws Error(kUsage) when the library is missing, with how to get it, Error(kInput) when sizes differ, and Error(kIo) when the
-/// library refuses to work.
+/// Denoises `rgb` (linear, 3 channels, high dynamic range) on the processor. `albedo` in [0, 1] and `normal` in [-1, 1]
+/// (3 channels, the same size; the normal only together with the albedo) or null: guides that keep texture and edges;
+/// they may be noisy. Values that are not finite become zero before. The same input gives the same bits on one machine.
+/// Throws Error(kUsage) when the library is missing, with how to get it, Error(kInput) when sizes differ, and
+/// Error(kIo) when the library refuses to work.
 Image denoise(const Image& rgb, const Image* albedo, const Image* normal, const DenoiseOptions& options = {});
 
 /// Path of the library that denoise() would load; "" when there is none.

@@ -7,15 +7,21 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <functional>
 #include <limits>
 #include <string>
 
 #include "core/error.h"
 #include "estimators/test_images.h"
+#include "support/files.h"
 
 namespace covary {
 namespace {
+
+namespace fs = std::filesystem;
+using test_support::test_folder;
 
 std::string message_of(const std::function<void()>& call) {
   try {
@@ -62,14 +68,39 @@ TEST(Denoise, LowersNoiseOrSaysHowToGetTheLibrary) {
   for (float value : denoise(image, nullptr, nullptr).data) ASSERT_TRUE(std::isfinite(value));
 }
 
+/// Every folder of the wheel leads to the library. It is a file without content here, which the loader refuses by its
+/// name.
+TEST(Denoise, FindsTheWheelFromEveryFolderOfIt) {
+  fs::path folder = test_folder() / "venv";
+  std::vector<std::string> above = {folder.string()};
+  for (const char* next : {"lib", "python3.11", "site-packages", "pyoidn", "oidn", "lib"}) {
+    folder /= next;
+    above.push_back(folder.string());
+  }
+  fs::create_directories(folder);
+  const std::string library = (folder / "libOpenImageDenoise.so.2").string();
+  std::ofstream(library).close();
+  above.push_back(library);
+  for (const std::string& path : above) {
+    const std::string message = message_of([&] { denoise(Image(4, 3, 3), nullptr, nullptr, {path}); });
+    EXPECT_NE(message.find("Open Image Denoise is not there (" + library), std::string::npos) << path << "\n"
+                                                                                              << message;
+  }
+  // A folder that leads nowhere is named itself.
+  const std::string elsewhere = (test_folder() / "venv" / "lib" / "python3.11" / "site-packages" / "other").string();
+  fs::create_directories(elsewhere);
+  const std::string message = message_of([&] { denoise(Image(4, 3, 3), nullptr, nullptr, {elsewhere}); });
+  EXPECT_NE(message.find("(" + elsewhere + "/libOpenImageDenoise.so.2: "), std::string::npos) << message;
+}
+
 TEST(Denoise, SaysWhatIsMissing) {
   const Image image(4, 3, 3), other(4, 2, 3), grey(4, 3, 1);
   const std::string message =
       message_of([&] { denoise(image, nullptr, nullptr, {"/nowhere/libOpenImageDenoise.so.2"}); });
   EXPECT_NE(message.find("Open Image Denoise is not there (/nowhere/libOpenImageDenoise.so.2: "), std::string::npos)
       << message;
-  EXPECT_NE(message.find("; install it with `pip install pyoidn`, or name libOpenImageDenoise.so.2 or its folder with "
-                         "--oidn or the environment variable COVARY_OIDN"),
+  EXPECT_NE(message.find("; install it with `pip install pyoidn`, or name libOpenImageDenoise.so.2, its folder or "
+                         "the Python environment that holds it with --oidn or the environment variable COVARY_OIDN"),
             std::string::npos)
       << message;
   EXPECT_EQ(message_of([&] { denoise(image, &other, nullptr); }),

@@ -24,7 +24,7 @@ std::vector<std::string> IicvOptions::validate() const {
   };
   check_window("window", window);
   check_window("pilot_window", pilot_window);
-  const int candidates = window * window - (include_target ? 0 : 1);
+  const int64_t candidates = int64_t{window} * window - (include_target ? 0 : 1);
   if (k < 1 || k > candidates)
     problems.push_back(fmt::format("k is {}, expected 1 to {}, the number of {}pixels in a window of {} x {}", k,
                                    candidates, include_target ? "" : "neighbouring ", window, window));

@@ -12,6 +12,7 @@
 #include <OpenEXR/ImfStringAttribute.h>
 #include <OpenEXR/ImfThreading.h>
 #include <fmt/format.h>
+#include <tbb/global_control.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -21,7 +22,6 @@
 #include <cstring>
 #include <filesystem>
 #include <mutex>
-#include <thread>
 
 #include "film/output_file.h"
 
@@ -47,12 +47,16 @@ class Stream : public Imf::OStream {
   OutputFile& file_;
 };
 
-void start_threads() {
-  static std::once_flag once;
-  std::call_once(once, [] {
-    Imf::setGlobalThreadCount(static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1u, 64u)));
-    Imf::Header::setMaxImageSize(kMaxSize, kMaxSize);
-  });
+/// Sets OpenEXR up: limits, and as many threads as the rest of the program may use now.
+void prepare_library() {
+  static std::mutex mutex;
+  static int current = -1;
+  const std::lock_guard lock(mutex);
+  if (current < 0) Imf::Header::setMaxImageSize(kMaxSize, kMaxSize);
+  const auto allowed =
+      static_cast<int>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
+  const int wanted = allowed > 1 ? allowed : 0;  // 0: the calling thread works itself
+  if (wanted != current) Imf::setGlobalThreadCount(current = wanted);
 }
 
 Imf::PixelType pixel_type(const ExrPlane& plane) {
@@ -90,7 +94,7 @@ void add_image_planes(const std::string& name, Image& image, std::vector<ExrPlan
 
 void write_exr(const std::string& path, const ImagePlace& place, const std::map<std::string, std::string>& attributes,
                std::span<const ExrPlane> planes, ExrCompression compression) {
-  start_threads();
+  prepare_library();
   const CropWindow& w = place.window;
   const Imath::Box2i window({w.x, w.y}, {w.x + w.width - 1, w.y + w.height - 1});
   Imf::Header header(Imath::Box2i({0, 0}, {place.frame_width - 1, place.frame_height - 1}), window);
@@ -125,7 +129,7 @@ struct ExrFile::Handle {
 ExrFile::~ExrFile() = default;
 
 ExrFile::ExrFile(const std::string& path) : path_(path) {
-  start_threads();
+  prepare_library();
   // OpenEXR's own messages do not tell a missing file from a damaged one.
   std::FILE* probe = std::fopen(path.c_str(), "rb");
   if (!probe) throw Error(ErrorCode::kIo, fmt::format("cannot read {}: {}", path, std::strerror(errno)));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // OpenEXR files in and out. Input from any renderer: scan lines or tiles, half, float or uint, one or several parts.
-// Output: scan lines, ZIP on all processors, or not compressed.
+// Output: scan lines, ZIP or not compressed. Both on as many threads as `tbb::global_control` allows.
 #pragma once
 
 #include <map>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "film/image_file.h"
 
-#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
 #include <unistd.h>
@@ -10,14 +9,11 @@
 #include <array>
 #include <cctype>
 #include <cerrno>
-#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <iterator>
 #include <set>
-
-#include "film/output_file.h"
 
 namespace covary {
 namespace {
@@ -203,27 +199,6 @@ std::vector<std::string> image_layers(const std::vector<ExrFile::Channel>& chann
   for (const ExrFile::Channel& c : channels)
     if (!used.contains(c.name)) layers.push_back(c.name);
   return layers;
-}
-
-void write_png(const std::string& path, const Image& linear) {
-  COVARY_CHECK(linear.channels == 3, "a PNG of 3 channels");
-  std::vector<uint8_t> encoded(linear.data.size());
-  for (size_t i = 0; i < encoded.size(); ++i) {
-    const float value = std::isnan(linear.data[i]) ? 0 : clamp01(linear.data[i]);
-    encoded[i] = static_cast<uint8_t>(std::lround(linear_to_srgb(value) * 255));
-  }
-  std::vector<unsigned char> file_content;
-  OIIO::Filesystem::IOVecOutput proxy(file_content);
-  OIIO::ImageSpec spec(linear.width, linear.height, 3, OIIO::TypeDesc::UINT8);
-  spec.attribute("oiio:ColorSpace", "sRGB");
-  const auto output = OIIO::ImageOutput::create("png", &proxy);
-  if (!output || !output->open("image.png", spec) || !output->write_image(OIIO::TypeDesc::UINT8, encoded.data()) ||
-      !output->close())
-    throw Error(ErrorCode::kIo,
-                fmt::format("cannot write {}: {}", path, output ? output->geterror() : OIIO::geterror()));
-  OutputFile file(path);
-  file.write(file_content.data(), file_content.size());
-  file.commit();
 }
 
 }  // namespace covary

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Images of any renderer: EXR by OpenEXR, all other formats by OpenImageIO; PNG output.
+// Images of any renderer: EXR by OpenEXR, all other formats by OpenImageIO.
 #pragma once
 
 #include <string>
@@ -38,11 +38,8 @@ PlacedImage read_image(const std::string& path, const std::string& layer = "");
 std::vector<std::string> layer_channels(const std::string& path, const std::vector<ExrFile::Channel>& channels,
                                         const std::string& layer);
 
-/// Every layer that read_image takes from these channels, in their order: "" for R G B, names of three channels that belong
-/// together ("N"), then each channel that is in none of these by its whole name.
+/// Every layer that read_image takes from these channels, in their order: "" for R G B, names of three channels that
+/// belong together ("N"), then each channel that is in none of these by its whole name.
 std::vector<std::string> image_layers(const std::vector<ExrFile::Channel>& channels);
-
-/// Writes linear RGB as 8-bit sRGB, values clamped to [0, 1], not-a-number as black. Throws Error(kIo).
-void write_png(const std::string& path, const Image& linear);
 
 }  // namespace covary

@@ -10,8 +10,10 @@
 #include <OpenEXR/ImfOutputPart.h>
 #include <OpenEXR/ImfPartType.h>
 #include <OpenEXR/ImfRgbaFile.h>
+#include <OpenEXR/ImfThreading.h>
 #include <OpenEXR/ImfTiledRgbaFile.h>
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
 #include <cmath>
 #include <fstream>
@@ -20,6 +22,7 @@
 
 #include "core/random.h"
 #include "film/film_file.h"
+#include "film/image_writer.h"
 #include "support/files.h"
 
 namespace covary {
@@ -146,20 +149,19 @@ TEST(ImageFile, SrgbRoundTrip) {
   EXPECT_NEAR(linear_to_srgb(0.5f), 0.735357f, 1e-6);  // 1.055 * 0.5^(1/2.4) - 0.055
 }
 
-TEST(ImageFile, PngKeepsEveryCode) {
-  Image image(256, 2, 3);
-  for (int i = 0; i < 256; ++i)
-    for (int c = 0; c < 3; ++c) image.pixel(i, 0)[c] = srgb_to_linear(static_cast<float>(i) / 255);
-  image.pixel(0, 1)[0] = std::numeric_limits<float>::quiet_NaN();
-  image.pixel(0, 1)[1] = -std::numeric_limits<float>::infinity();
-  image.pixel(0, 1)[2] = std::numeric_limits<float>::infinity();
-  const std::string path = test_file("image.png");
-  write_png(path, image);
-  const PlacedImage read = read_image(path);
-  EXPECT_TRUE(read.low_dynamic_range);
-  EXPECT_EQ(read.place, (ImagePlace{256, 2, {0, 0, 256, 2}}));
-  for (int i = 0; i < 256; ++i) ASSERT_NEAR(read.image.rgb(i, 0).g, image.rgb(i, 0).g, 1e-6f) << i;
-  EXPECT_EQ(read.image.rgb(0, 1), Spectrum(0, 0, 1));
+/// OpenEXR's threads are as many as the rest of the program may use, one meaning none beside the caller.
+TEST(ImageFile, ExrFilesUseTheThreadsThatAreAllowed) {
+  const std::string path = test_file("a.exr");
+  std::vector<float> values(64 * 64);
+  const std::vector<ExrPlane> planes = {{"Y", ExrPlane::Type::kFloat, values.data(), 4}};
+  for (const size_t n : {size_t{1}, size_t{3}, size_t{2}}) {
+    const tbb::global_control control(tbb::global_control::max_allowed_parallelism, n);
+    write_exr(path, {64, 64, {0, 0, 64, 64}}, {}, planes);
+    EXPECT_EQ(Imf::globalThreadCount(), n == 1 ? 0 : static_cast<int>(n));
+  }
+  const tbb::global_control control(tbb::global_control::max_allowed_parallelism, 1);
+  const ExrFile file(path);
+  EXPECT_EQ(Imf::globalThreadCount(), 0);
 }
 
 TEST(ImageFile, ReadsPortableFloatMaps) {

@@ -3,43 +3,108 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <utility>
 
 #include "core/error.h"
 
 namespace covary {
 namespace fs = std::filesystem;
+namespace {
 
-OutputFile::OutputFile(const std::string& path) : path_(path), target_(path) {
-  std::error_code ignored;
-  if (fs::is_symlink(path, ignored)) {
-    const fs::path real = fs::canonical(path, ignored);
-    if (!ignored) target_ = real.string();
+constexpr int kMaxLinks = 40;  // as many as Linux follows
+
+[[noreturn]] void fail_to_write(const std::string& path, const std::string& why) {
+  throw Error(ErrorCode::kIo, fmt::format("cannot write {}: {}", path, why));
+}
+
+std::string follow_links(const std::string& given) {
+  fs::path path = given;
+  std::error_code error;
+  for (int i = 0; fs::is_symlink(path, error); ++i) {
+    const fs::path next = fs::read_symlink(path, error);
+    if (error || i == kMaxLinks) fail_to_write(given, "a symbolic link that leads nowhere");
+    path = next.is_absolute() ? next : path.parent_path() / next;
   }
-  const fs::file_status status = fs::status(target_, ignored);
-  if (fs::exists(status) && !fs::is_regular_file(status))
-    throw Error(ErrorCode::kIo, fmt::format("cannot write {}: it exists and is not a regular file", path));
-  const fs::path name = fs::path(target_).filename(), folder = fs::path(target_).parent_path();
+  return path.string();
+}
+
+/// The descriptor of standard output or error when that is the file `status` tells of; -1 when not.
+int standard_stream(const struct stat& status) {
+  for (const int stream : {STDOUT_FILENO, STDERR_FILENO}) {
+    struct stat other {};
+    if (fstat(stream, &other) == 0 && other.st_dev == status.st_dev && other.st_ino == status.st_ino) return stream;
+  }
+  return -1;
+}
+
+/// An open descriptor of a special file.
+int open_special(const std::string& path) {
+  struct stat status {};
+  const int stream = stat(path.c_str(), &status) == 0 ? standard_stream(status) : -1;
+  return stream >= 0 ? fcntl(stream, F_DUPFD_CLOEXEC, 3) : open(path.c_str(), O_WRONLY | O_CLOEXEC);
+}
+
+/// errno, or 0 when everything was written.
+int write_all(int descriptor, const char* data, size_t size) {
+  while (size > 0) {
+    const ssize_t n = write(descriptor, data, size);
+    if (n < 0 && errno != EINTR) return errno;
+    if (n > 0) data += n, size -= static_cast<size_t>(n);
+  }
+  return 0;
+}
+
+}  // namespace
+
+OutputTarget output_target(const std::string& path) {
+  struct stat status {};
+  if (stat(path.c_str(), &status) == 0) {
+    if (S_ISDIR(status.st_mode)) fail_to_write(path, "it is a folder");
+    if (!S_ISREG(status.st_mode) || standard_stream(status) >= 0) return {path, true};
+  }
+  OutputTarget target{follow_links(path)};
+  const fs::path name = fs::path(target.path).filename(), folder = fs::path(target.path).parent_path();
   if (name.empty()) throw Error(ErrorCode::kIo, fmt::format("cannot write '{}': it names no file", path));
+  std::error_code ignored;
   if (!folder.empty() && !fs::is_directory(folder, ignored))
-    throw Error(ErrorCode::kIo, fmt::format("cannot write {}: there is no folder {}", path, folder.string()));
-  // The name is unique among processes and threads; a long file name is cut so that the temporary one is valid, too.
-  static std::atomic<unsigned> counter{0};
-  temporary_ = (folder / fmt::format(".{}.{}-{}.part", name.string().substr(0, 200), getpid(), counter++)).string();
-  const int descriptor = open(temporary_.c_str(), O_CREAT | O_EXCL | O_RDWR | O_CLOEXEC, 0666);
-  if (descriptor < 0) throw Error(ErrorCode::kIo, fmt::format("cannot write {}: {}", path, std::strerror(errno)));
+    fail_to_write(path, "there is no folder " + folder.string());
+  if (access(folder.empty() ? "." : folder.c_str(), W_OK | X_OK) != 0) fail_to_write(path, std::strerror(errno));
+  return target;
+}
+
+OutputFile::OutputFile(const std::string& path) : path_(path), target_(output_target(path)) {
+  int descriptor = -1;
+  if (target_.is_special) {
+    descriptor = memfd_create("covary", MFD_CLOEXEC);
+  } else {
+    // The name is unique among processes and threads; a long file name is cut so that the temporary one is valid, too.
+    static std::atomic<unsigned> counter{0};
+    const fs::path target = target_.path;
+    const std::string name = target.filename().string().substr(0, 200);
+    temporary_ = (target.parent_path() / fmt::format(".{}.{}-{}.part", name, getpid(), counter++)).string();
+    descriptor = open(temporary_.c_str(), O_CREAT | O_EXCL | O_RDWR | O_CLOEXEC, 0666);
+  }
+  if (descriptor < 0) fail_to_write(path, std::strerror(errno));
   file_ = fdopen(descriptor, "w+b");
+  if (file_) return;
+  const int error = errno;
+  close(descriptor);
+  if (!temporary_.empty()) unlink(temporary_.c_str());
+  fail_to_write(path, std::strerror(error));
 }
 
 OutputFile::~OutputFile() {
-  if (!file_) return;
-  std::fclose(file_);
-  unlink(temporary_.c_str());
+  if (file_) std::fclose(file_);
+  if (!temporary_.empty()) unlink(temporary_.c_str());
 }
 
 void OutputFile::fail(const char* what) {
@@ -64,14 +129,34 @@ void OutputFile::seek(uint64_t position) {
   if (fseeko(file_, static_cast<off_t>(position), SEEK_SET) != 0) fail("write");
 }
 
+void OutputFile::close_file() {
+  if (std::fclose(std::exchange(file_, nullptr)) != 0) fail("write");
+}
+
+void OutputFile::send() {
+  std::fflush(stdout);
+  const int descriptor = open_special(path_);
+  if (descriptor < 0) fail("write");
+  std::array<char, 65536> buffer{};
+  size_t n = 0;
+  std::rewind(file_);
+  while (!failure_ && (n = std::fread(buffer.data(), 1, buffer.size(), file_)) > 0)
+    failure_ = write_all(descriptor, buffer.data(), n);
+  if (close(descriptor) != 0 && !failure_) failure_ = errno;
+  if (failure_) fail("write");
+  close_file();
+}
+
 void OutputFile::commit() {
   errno = failure_;
-  if (failure_ || std::fflush(file_) != 0 || fsync(fileno(file_)) != 0) fail("write");
-  if (std::rename(temporary_.c_str(), target_.c_str()) != 0) fail("put in place");
-  std::fclose(file_);
-  file_ = nullptr;
+  if (failure_ || std::fflush(file_) != 0) fail("write");
+  if (target_.is_special) return send();
+  if (fsync(fileno(file_)) != 0) fail("write");
+  close_file();  // some network file systems tell of a failed write only here
+  if (std::rename(temporary_.c_str(), target_.path.c_str()) != 0) fail("put in place");
+  temporary_.clear();
   // Makes the rename itself durable; a file system that cannot do this is no reason to fail.
-  const std::string folder = fs::path(target_).parent_path().string();
+  const std::string folder = fs::path(target_.path).parent_path().string();
   const int descriptor = open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor >= 0) {
     fsync(descriptor);

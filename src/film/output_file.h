@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Files that appear under their name only when complete: written to a temporary name in the same folder, flushed to the
-// device, then renamed.
+// device, then renamed. Devices, pipes and standard output get all bytes at once at the end.
 #pragma once
 
 #include <cstddef>
@@ -10,10 +10,18 @@
 
 namespace covary {
 
+/// Where an output goes.
+struct OutputTarget {
+  std::string path;         ///< symbolic links followed, also to a file that is not there yet
+  bool is_special = false;  ///< a device, a pipe, a socket, or the file that is this program's standard output
+};
+
+/// Throws Error(kIo) when the folder is missing or not writable, or `path` names a folder or nothing at all.
+OutputTarget output_target(const std::string& path);
+
 class OutputFile {
  public:
-  /// Creates the temporary file. Throws Error(kIo) when the folder is missing or not writable, or `path` names
-  /// something that is not a regular file. A symbolic link is followed: the file it points to is replaced.
+  /// Creates the temporary file; special files are kept in memory until commit(). Throws like output_target().
   explicit OutputFile(const std::string& path);
   /// Removes the temporary file unless commit() succeeded.
   ~OutputFile();
@@ -23,12 +31,16 @@ class OutputFile {
   void write(const void* data, size_t size);
   uint64_t position();
   void seek(uint64_t position);
-  /// Flushes to the device and renames. Throws Error(kIo) when any write failed, also an earlier one.
+  /// Flushes to the device and renames, or sends everything to the special file. Throws Error(kIo) when any write
+  /// failed, also an earlier one.
   void commit();
 
  private:
   [[noreturn]] void fail(const char* what);
-  std::string path_, target_, temporary_;
+  void close_file();
+  void send();
+  std::string path_, temporary_;
+  OutputTarget target_;
   std::FILE* file_ = nullptr;
   int failure_ = 0;  // errno of the first failed write
 };

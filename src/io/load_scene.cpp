@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// From a scene file to a Scene: the XML is read, then everything that reads files (textures, environment maps, meshes) is
-// made in parallel, then the rest is put together in file order. Problems are collected throughout and thrown once.
+// From a scene file to a Scene: the XML is read, then everything that reads files (textures, environment maps, meshes)
+// is made in parallel, then the rest is put together in file order. Problems are collected throughout and thrown once.
 #include "io/load_scene.h"
 
 #include <fmt/format.h>
@@ -362,7 +362,7 @@ class Loader {
   void hash_files() {
     const auto names = files_.files();
     std::vector<std::pair<std::string, std::string>> files;  // name in the scene, path; afterwards: name, hash
-    for (const auto& [path, name] : names) files.emplace_back(name, path);
+    for (const auto& [path, name] : names) files.emplace_back(name, path), result_.files.push_back(path);
     parallel_for(files.size(), [&](size_t i) {
       try {
         files[i].second = hash_text(hash_bytes(FileView(files[i].second).bytes()));

@@ -30,13 +30,15 @@ struct LoadedScene {
   std::string integrator_type;  ///< "" when the file names none
   std::shared_ptr<SceneObject> integrator;
   std::vector<std::string> warnings;
-  double read_seconds = 0;   ///< parsing and reading files; Scene::build_seconds() comes on top
-  std::string content_hash;  ///< hex; over the scene's XML, defines and all files it reads
+  std::vector<std::string> files;  ///< paths of all files that the scene's file names and that were read
+  double read_seconds = 0;         ///< parsing and reading files; Scene::build_seconds() comes on top
+  std::string content_hash;        ///< hex; over the scene's XML, defines and all files it reads
 };
 
 /// Reads a Mitsuba XML scene. Throws Error(kInput) with every problem of the file, or Error(kIo).
 LoadedScene load_scene(const std::string& path, const LoadOptions& options = {});
-/// The same for XML in memory. `name` stands for the file in messages; files the scene names are looked up in its folder.
+/// The same for XML in memory. `name` stands for the file in messages; files the scene names are looked up in its
+/// folder.
 LoadedScene load_scene_text(std::string_view xml, const std::string& name, const LoadOptions& options = {});
 
 }  // namespace covary

@@ -10,9 +10,12 @@
 
 #include "core/content_hash.h"
 #include "core/error.h"
+#include "core/interrupted.h"
 #include "core/shell_text.h"
 #include "core/stopwatch.h"
 #include "film/image_file.h"
+#include "film/outputs.h"
+#include "film/provenance.h"
 #include "lab/measure.h"
 #include "lab/process.h"
 #include "lab/runner.h"
@@ -57,8 +60,7 @@ class Experiment {
     for (size_t s = 0; s < n && !stopped(); ++s)
       if (usable_[s] && make_reference(s)) make_runs(s);
     if (stopped())
-      throw Error(ErrorCode::kIo,
-                  fmt::format("interrupted after {} of {} runs; the same command continues", done_, total_));
+      throw Interrupted(fmt::format("interrupted after {} of {} runs; the same command continues", done_, total_));
     for (size_t s = 0; s < n; ++s)
       if (usable_[s]) measure_scene(s);
     compare_cells(results_);
@@ -127,6 +129,7 @@ class Experiment {
       clock_.took(run.work, watch.seconds());
       if (result.failure) *failure = *result.failure;
       record = result.record;
+      if (!result.record && !result.failure) return record;  // stopped
     }
     ++done_, clock_.remove_planned(run.work);
     return record;
@@ -197,6 +200,7 @@ class Experiment {
     try {
       for (const std::string& file : scene.reference.files) references.push_back(read_window(file, scene.scene));
       check_seeds(scene);
+      if (references_[s].empty()) warn_of_given_references(s);
     } catch (const std::exception& error) {
       fail({scene.scene.entry.name, "reference", "", "", error.what(), 1, 0});
       return;
@@ -237,16 +241,35 @@ class Experiment {
     return text;
   }
 
+  /// References that were given: what their files say that makes errors against them doubtful.
+  void warn_of_given_references(size_t s) {
+    const SceneResult& scene = results_.scenes[s];
+    std::vector<ImageFacts> references;
+    for (const std::string& file : scene.reference.files) references.push_back(read_facts(file));
+    std::vector<std::string> found;
+    const auto add = [&](const ImageFacts& image, const ImageFacts& reference) {
+      for (const std::string& text : comparison_warnings(image, reference))
+        found.push_back(scene.scene.entry.name + ": " + text);
+    };
+    if (references.size() == 2) add(references[0], references[1]);
+    std::set<size_t> seen;  // methods: all runs of one tell the same
+    for (const Run& run : runs_[s])
+      if (const auto record = records_.find(run.key); record != records_.end() && seen.insert(run.method).second)
+        for (const ImageFacts& reference : references)
+          add(read_facts(record->second.image, "renders of " + results_.suite.methods[run.method].name), reference);
+    results_.warnings.insert(results_.warnings.end(), found.begin(), found.end());
+  }
+
   /// References that were given and tell their seeds must not share one with a run or with each other.
   void check_seeds(const SceneResult& scene) {
+    if (scene.reference.files.size() == 2 && is_same_file(scene.reference.files[0], scene.reference.files[1]))
+      throw Error(ErrorCode::kInput,
+                  fmt::format("{} is given as both halves of the reference, which must be independent",
+                              scene.reference.files[0]));
     std::set<std::string> used;
     for (uint64_t seed : results_.suite.seeds) used.insert(fmt::format("{}", seed));
     for (const std::string& file : scene.reference.files) {
       const auto attributes = inspect_image(file).attributes;
-      const auto hash = attributes.find("covary:scene_hash");
-      if (hash != attributes.end() && hash->second != scene.scene.hash)
-        results_.warnings.push_back(
-            fmt::format("{}: the reference {} is of another version of the scene", scene.scene.entry.name, file));
       const auto seeds = attributes.find("covary:seed");
       if (seeds == attributes.end()) continue;
       for (size_t begin = 0; begin <= seeds->second.size();) {

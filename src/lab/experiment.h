@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs a suite: scenes are looked at, references and runs made where the cache lacks them, and everything is measured. One
-// failing run does not stop the rest.
+// Runs a suite: scenes are looked at, references and runs made where the cache lacks them, and everything is measured.
+// One failing run does not stop the rest.
 #pragma once
 
 #include <atomic>
@@ -30,8 +30,8 @@ struct ExperimentOptions {
   std::function<void(const Progress&)> progress;
 };
 
-/// Throws Error(kUsage) with every problem of the suite, Error(kIo) where the cache cannot be used and when stopped; all
-/// else is in Results::failures.
+/// Throws Error(kUsage) with every problem of the suite, Error(kIo) where the cache cannot be used, Interrupted when
+/// stopped; all else is in Results::failures.
 Results run_experiment(const Suite& suite, const ExperimentOptions& options);
 
 }  // namespace covary::lab

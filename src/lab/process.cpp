@@ -13,6 +13,7 @@
 #include <cerrno>
 #include <csignal>
 #include <cstring>
+#include <functional>
 
 #include "core/error.h"
 #include "core/stopwatch.h"
@@ -42,18 +43,50 @@ struct Pipe {
   }
 };
 
-/// In the child, between fork and exec: only calls that are safe there.
-[[noreturn]] void become(char* const* arguments, int output, int errors, pid_t parent) {
+/// Signals that end a program, held back while it lives: those that come between fork and exec must neither run the
+/// parent's handlers in the child nor be lost.
+class HeldSignals {
+ public:
+  HeldSignals() {
+    sigset_t held;
+    sigemptyset(&held);
+    for (const int signal : kSignals) sigaddset(&held, signal);
+    sigprocmask(SIG_BLOCK, &held, &before_);
+  }
+  ~HeldSignals() { restore(); }
+  HeldSignals(const HeldSignals&) = delete;
+  HeldSignals& operator=(const HeldSignals&) = delete;
+  void restore() const { sigprocmask(SIG_SETMASK, &before_, nullptr); }
+  static constexpr std::array kSignals = {SIGINT, SIGTERM, SIGHUP};
+
+ private:
+  sigset_t before_{};
+};
+
+/// In the child, between fork and exec: only calls that are safe there. It leaves the terminal's group of processes:
+/// Ctrl-C there is for the parent, which passes it on once; a second signal would end the child before it has saved its
+/// work.
+[[noreturn]] void become(char* const* arguments, int output, int errors, pid_t parent, const HeldSignals& held) {
+  setpgid(0, 0);
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) _exit(127);  // the parent died before the line above
   const int nothing = open("/dev/null", O_RDONLY);
   dup2(nothing, 0);
   dup2(output, 1);
   dup2(errors, 2);
-  std::signal(SIGINT, SIG_DFL);
-  std::signal(SIGTERM, SIG_DFL);
+  for (const int signal : HeldSignals::kSignals) std::signal(signal, SIG_DFL);
+  held.restore();
   execv(arguments[0], arguments);
   _exit(127);
+}
+
+/// Forks; `run` is the child and does not return.
+pid_t start(const std::function<void(const HeldSignals&)>& run) {
+  const HeldSignals held;
+  const pid_t child = fork();
+  if (child < 0) throw Error(ErrorCode::kIo, fmt::format("cannot start a process: {}", std::strerror(errno)));
+  if (child == 0) run(held);
+  return child;
 }
 
 /// Appends what can be read; false at the end of the stream.
@@ -73,9 +106,9 @@ ProcessResult run_process(const std::vector<std::string>& command, const std::at
   arguments.push_back(nullptr);
   Pipe output, errors;
   const Stopwatch watch;
-  const pid_t parent = getpid(), child = fork();
-  if (child < 0) throw Error(ErrorCode::kIo, fmt::format("cannot start a process: {}", std::strerror(errno)));
-  if (child == 0) become(arguments.data(), output.write, errors.write, parent);
+  const pid_t parent = getpid(), child = start([&](const HeldSignals&held) {
+                                   become(arguments.data(), output.write, errors.write, parent, held);
+                                 });
   output.close_write(), errors.close_write();
 
   ProcessResult result;

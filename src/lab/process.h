@@ -19,8 +19,9 @@ struct ProcessResult {
   bool ok() const { return exit_code == 0; }
 };
 
-/// Runs `command` (path of the program, then its arguments) to its end. When *stop becomes true the child gets SIGINT once. The child
-/// is killed when the calling process dies, however that happens. Throws Error(kIo) when no process can be started.
+/// Runs `command` (path of the program, then its arguments) to its end. When *stop becomes true the child gets SIGINT
+/// once; Ctrl-C at the terminal does not reach it by itself. The child is killed when the calling process dies, however
+/// that happens. Throws Error(kIo) when no process can be started.
 ProcessResult run_process(const std::vector<std::string>& command, const std::atomic<bool>* stop = nullptr);
 
 }  // namespace covary::lab

@@ -51,12 +51,26 @@ TEST(Process, SaysThatAProgramCannotBeRun) {
   EXPECT_EQ(result.errors, "cannot run /nowhere/program");
 }
 
-/// Both pipes are emptied while the child runs: one that fills a pipe must not wait for ever. Of errors the end is kept.
+/// Both pipes are emptied while the child runs: one that fills a pipe must not wait for ever. Of errors the end is
+/// kept.
 TEST(Process, TakesMoreThanAPipeHolds) {
   const ProcessResult result = shell("head -c 1000000 /dev/zero; head -c 1000000 /dev/zero >&2; echo last >&2");
   EXPECT_EQ(result.output.size(), 1000000u);
   EXPECT_LE(result.errors.size(), 2 * 65536u + 4096u);
   EXPECT_TRUE(result.errors.ends_with("last\n"));
+}
+
+/// Signals from a terminal go to its foreground group, in which the child is not.
+TEST(Process, IsAGroupOfItsOwn) {
+  EXPECT_EQ(shell("test \"$(cut -d' ' -f5 /proc/$$/stat)\" = $$ && echo own").output, "own\n");
+}
+
+/// A signal that comes between fork and exec neither is lost nor runs the parent's handler in the child.
+TEST(Process, IsInterruptedFromTheFirstMomentOn) {
+  const std::atomic<bool> stop{true};
+  const auto before = std::signal(SIGINT, [](int) {});
+  for (int i = 0; i < 50; ++i) EXPECT_EQ(run_process({"/bin/sleep", "60"}, &stop).signal, SIGINT);
+  std::signal(SIGINT, before);
 }
 
 TEST(Process, HasNothingToRead) { EXPECT_EQ(shell("cat; echo end").output, "end\n"); }

@@ -132,8 +132,12 @@ const Cell* Results::find(size_t scene, size_t method, size_t budget) const {
 
 Json to_json(const Results& results) {
   const Suite& suite = results.suite;
-  Json json{{"format", "covary-experiment 1"}, {"complete", results.complete}, {"version", results.version},
-            {"command", results.command},      {"date", results.date},         {"machine", results.machine},
+  Json json{{"format", fmt::format("{} 1", kResultsFormat)},
+            {"complete", results.complete},
+            {"version", results.version},
+            {"command", results.command},
+            {"date", results.date},
+            {"machine", results.machine},
             {"suite", to_json(suite)}};
   for (const char* list : {"scenes", "cells", "slopes", "summary", "failures"}) json[list] = Json::array();
   for (const SceneResult& scene : results.scenes) json["scenes"].push_back(json_of(scene));

@@ -89,6 +89,8 @@ struct Results {
   const Cell* find(size_t scene, size_t method, size_t budget) const;
 };
 
+/// First word of the value of "format", the first key.
+inline constexpr const char* kResultsFormat = "covary-experiment";
 nlohmann::ordered_json to_json(const Results& results);
 /// Long format: scene, method, budget, unit, seed, quantity, value, standard_error, low, high.
 std::string to_csv(const Results& results);

@@ -8,7 +8,7 @@
 
 #include "estimators/result_file.h"
 #include "film/film_file.h"
-#include "film/image_file.h"
+#include "film/image_writer.h"
 
 namespace covary {
 

@@ -25,9 +25,14 @@ void append(std::string& text, std::initializer_list<std::string_view> parts) {
   for (const std::string_view part : parts) text += part, text += '\n';
 }
 
-std::string escaped_html(std::string_view text) {
+/// The text with replacement characters for what is not UTF-8, such as a file name.
+std::string valid_utf8(const std::string& text) {
+  return Json::parse(Json(text).dump(-1, ' ', false, Json::error_handler_t::replace)).get<std::string>();
+}
+
+std::string escaped_html(const std::string& text) {
   std::string result;
-  for (const char c : text) switch (c) {
+  for (const char c : valid_utf8(text)) switch (c) {
       case '&':
         result += "&amp;";
         break;

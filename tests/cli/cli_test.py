@@ -218,8 +218,7 @@ class Merge(CliTest):
         self.write("a.exr", film(1))
         self.write("b.exr", film(2))
         self.bad(1, "cannot write no/o.exr: there is no folder no", "merge", "a.exr", "b.exr", "-o", "no/o.exr")
-        self.bad(1, "cannot write .: it exists and is not a regular file", "merge", "a.exr", "b.exr", "-o", ".")
-        self.bad(1, "cannot write /dev/null", "merge", "a.exr", "b.exr", "-o", "/dev/null")
+        self.bad(1, "cannot write .: it is a folder", "merge", "a.exr", "b.exr", "-o", ".")
 
     def test_full_disk_keeps_the_old_file(self):
         self.write("a.exr", film(1))
@@ -290,8 +289,8 @@ class Convert(CliTest):
 
     def test_errors(self):
         self.image("a.exr", (1, 1, 1))
-        self.bad(2, "cannot convert to 'a.jpg': the name must end in .png", "convert", "a.exr", "a.jpg")
-        self.bad(2, "--exposure accepts stops from -100 to 100", "convert", "a.exr", "a.png", "--exposure", "nan")
+        self.bad(2, "--exposure: '101': expected a number from -100 to 100", "convert", "a.exr",
+                 "a.png", "--exposure", "101")
         self.bad(2, "--exposure", "convert", "a.exr", "a.png", "--exposure", "bright")
         self.bad(1, "cannot write no/a.png: there is no folder no", "convert", "a.exr", "no/a.png")
 

@@ -109,6 +109,74 @@ class Plans(RenderTest):
         self.bad(2, "window", *render, "--window", "4")
 
 
+class Files(RenderTest):
+    RENDER = ("render", ROOM, *SMALL[:-1], "--spp", "6")
+
+    def test_names_say_what_is_written(self):
+        for name in ("a.png", "a.jpg", "a.hdr", "a", ROOM):
+            self.bad(2, f"-o '{name}': the name must end in .exr", *self.RENDER, "-o", name)
+        self.bad(2, "--json 'a.exr' names an image", *self.RENDER, "-o", "b.exr", "--json", "a.exr")
+        self.bad(2, "--json 'b.png' names an image", *self.RENDER, "-o", "b.exr", "--json", "b.png")
+        self.bad(2, "-o '/dev/null' is no regular file", *self.RENDER, "-o", "/dev/null")
+        self.write("file", b"")
+        self.bad(2, "--passes 'file' is a file; expected is a folder", *self.RENDER, "-o", "a.exr", "--passes", "file")
+
+    def test_no_file_of_the_scene_is_overwritten(self):
+        self.image("sky.exr", (1, 1, 1), size=(8, 4))
+        self.write("scene.xml",
+                   b"<scene version='3.0.0'><emitter type='envmap'><string name='filename' value='sky.exr'/></emitter>"
+                   b"<sensor type='perspective'/></scene>")
+        os.symlink("scene.xml", self.path / "scene.exr")
+        render = ("render", "scene.xml", "--resolution", "8x8", "--spp", "3", "--quiet")
+        for name in ("sky.exr", "./sky.exr", "scene.exr"):
+            self.bad(2, f"-o '{name}' is a file that the same command reads", *render, "-o", name)
+        os.symlink("scene.xml", self.path / "statistics")
+        self.bad(2, "--json 'statistics' is a file that the same command reads", *render, "-o", "a.exr", "--json",
+                 "statistics")
+        self.good(*render, "-o", "a.exr")
+
+    def test_the_preview_replaces_only_its_own(self):
+        self.good(*self.RENDER, "-o", "a.exr")
+        self.good(*self.RENDER, "-o", "a.exr")
+        self.write("a.png", b"a photograph")
+        self.bad(2,
+                 "the preview would replace 'a.png', which covary did not make; use --no-preview, or another name "
+                 "for -o", *self.RENDER, "-o", "a.exr")
+        self.good(*self.RENDER, "-o", "a.exr", "--no-preview")
+        self.assertEqual((self.path / "a.png").read_bytes(), b"a photograph")
+
+    def test_films_of_passes_are_outputs_too(self):
+        (self.path / "films").mkdir()
+        self.bad(2, "-o 'films/crn.exr' and --passes 'films/crn.exr' are the same file", *self.RENDER, "-o",
+                 "films/crn.exr",
+                 "--passes", "films")
+        self.good(*self.RENDER, "-o", "films/image.exr", "--passes", "films")
+
+    def test_statistics_of_a_name_that_is_not_utf_8(self):
+        output = b"caf\xe9.exr"
+        done = subprocess.run([COVARY, *self.RENDER, "-o", output, "--json", "-"], cwd=self.path, capture_output=True,
+                              timeout=60)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(json.loads(done.stdout.decode("utf-8"))["output"], "caf\ufffd.exr")
+
+    def test_numbers(self):
+        render = (*self.RENDER, "-o", "a.exr", "--no-preview")
+        facts = json.loads(self.good(*render, "--seed", "010", "--json", "-").stdout)
+        self.assertEqual(facts["seed"], 10)
+        facts = json.loads(self.good(*render, "--seed", "18446744073709551615", "--json", "-").stdout)
+        self.assertEqual(facts["seed"], 18446744073709551615)
+        for text in ("-1", "18446744073709551616", "0x10", "1.0", "ten"):
+            self.bad(2, f"--seed: '{text}': expected a whole number from 0 to 18446744073709551615", *render,
+                     f"--seed={text}")
+        for option in ("spp", "groups", "min-depth", "max-depth", "threads", "k"):
+            for text in ("0x20", "99999999999999999999", "1e3"):
+                self.bad(2, f"--{option}: '{text}': expected a whole number", *render, f"--{option}={text}")
+        for text in ("nan", "inf", "1e400"):
+            self.bad(2, f"--time: '{text}': expected a positive number", *render, f"--time={text}")
+            self.bad(2, f"--checkpoint: '{text}': expected a number of at least 0", *render, f"--checkpoint={text}")
+            self.bad(2, f"--until 'relmse={text}': expected relmse=X", *render, f"--until=relmse={text}")
+
+
 class Polynomials(RenderTest):
     OPTIONS = ("--estimator", "polynomials", "--spp", "48", "--max-depth", "2")
 
@@ -171,7 +239,7 @@ class Polynomials(RenderTest):
         self.bad(2, "--k is an option of --estimator iicv, cv-baseline, not of polynomials", *render, "--k", "3")
         self.bad(2, "--dimensions is an option of --estimator polynomials, not of iicv", "render", ROOM, "-o", "a.exr",
                  "--dimensions", "2")
-        self.bad(2, "7 not in range", *render, "--dimensions", "7")
+        self.bad(2, "--dimensions: '7': expected a whole number from 1 to 6", *render, "--dimensions", "7")
         self.bad(2, "28 samples per pixel are too few to fit the 28 coefficients of 6 dimensions, expected at least 29", *render,
                  "--dimensions", "6", "--spp", "28")
         self.bad(2, "polynomials are fitted to the samples of each pixel, which images do not hold", "combine", "--crn", "a.exr",
@@ -244,7 +312,7 @@ class Time(RenderTest):
         time.sleep(1.5 * SLOWDOWN)
         process.send_signal(signal.SIGINT)
         message = process.communicate(timeout=30)[1]
-        self.assertEqual(process.returncode, 1, message)
+        self.assertEqual(process.returncode, 130, message)
         self.assertIn("interrupted after", message)
         before = json.loads(self.good("info", "a.passes/crn.exr", "--json").stdout)["attributes"]
         # Whatever the number of groups that the shorter time would choose.
@@ -276,8 +344,9 @@ class Interruption(RenderTest):
             message = process.communicate(timeout=60)[1]
             if process.returncode == 0:
                 break
-            self.assertIn(process.returncode, (1, -signal.SIGINT), message)  # the signal itself before the render begins
-            if process.returncode == 1:
+            self.assertIn(process.returncode, (130, -signal.SIGINT),
+                          message)  # the signal itself before the render begins
+            if process.returncode == 130:
                 interrupted += 1
                 self.assertIn("interrupted after", message)
                 self.assertIn(film.split("/")[0], message)

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// Numbers on the command line, the same in all commands: decimal digits ("010" is ten, "0x10" is none), nothing behind
+// them, within the range of what they are for, never not-a-number.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace covary {
+
+/// The whole number that the text is, with an optional sign; nothing where it is none or T does not hold it.
+template <typename T>
+std::optional<T> parse_whole(std::string_view text) {
+  if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
+  T value{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+/// The finite number that the text is, with an optional sign, fraction and exponent.
+std::optional<double> parse_real(std::string_view text);
+
+/// For CLI::Option::transform(): a whole number from `low` to `high`.
+template <typename T>
+CLI::Validator whole_number(T low, T high) {
+  const auto check = [low, high](std::string& text) -> std::string {
+    const std::optional<T> value = parse_whole<T>(text);
+    if (!value || *value < low || *value > high)
+      return "'" + text + "': expected a whole number from " + std::to_string(low) + " to " + std::to_string(high);
+    text = std::to_string(*value);  // without zeros in front, which CLI11 would take for octal
+    return "";
+  };
+  return {check, "", "whole number"};
+}
+
+/// Likewise, for check(): a finite number from `low` to `high`, which may be infinite.
+CLI::Validator real_number(double low, double high);
+/// A finite number above 0; any finite number.
+CLI::Validator positive_number();
+CLI::Validator finite_number();
+
+/// For CLI::Option::check(): one of these names.
+CLI::Validator one_of(const std::vector<std::string>& names);
+
+/// Whole numbers from 0 on, separated by `separator`; throws Error(kUsage) that names the option.
+std::vector<int64_t> parse_numbers(const std::string& option, const std::string& text, char separator, size_t count,
+                                   const std::string& example);
+
+/// Adds --threads; 0 means all.
+void add_threads_option(CLI::App& command, int& threads, const std::string& what = "Number of threads");
+
+}  // namespace covary

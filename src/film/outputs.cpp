@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "film/outputs.h"
+
+#include <fmt/format.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "core/error.h"
+#include "film/image_writer.h"
+#include "film/output_file.h"
+
+namespace covary {
+namespace fs = std::filesystem;
+namespace {
+
+[[noreturn]] void usage(const std::string& message) { throw Error(ErrorCode::kUsage, message); }
+
+bool ends_in(const std::string& path, const std::vector<std::string>& extensions) {
+  return std::find(extensions.begin(), extensions.end(), lower_extension(path)) != extensions.end();
+}
+
+void check_extension(const std::string& option, const std::string& path, OutputKind kind) {
+  const auto require = [&](const std::vector<std::string>& extensions, const std::string& more) {
+    if (!ends_in(path, extensions))
+      usage(fmt::format("{} '{}': the name must end in {}{}", option, path, fmt::join(extensions, ", "), more));
+  };
+  switch (kind) {
+    case OutputKind::kFilm:
+      return require({".exr"}, "; 'covary convert' makes PNG, HDR, PFM, JPEG and TIFF of it");
+    case OutputKind::kImage:
+      return require(image_extensions(), "");
+    case OutputKind::kPng:
+      return require({".png"}, "");
+    case OutputKind::kPage:
+      return require({".html", ".htm"}, "");
+    case OutputKind::kText:
+      if (ends_in(path, image_extensions()) || ends_in(path, {".xml", ".html", ".htm", ".ply", ".obj", ".serialized"}))
+        usage(
+            fmt::format("{0} '{1}' names an image, a page or part of a scene; give {0}=- for standard output, or the "
+                        "name of a text file",
+                        option, path));
+  }
+}
+
+}  // namespace
+
+bool Outputs::identify(const std::string& path, Identity& identity) {
+  struct stat status {};
+  if (stat(path.c_str(), &status) == 0) {
+    identity = {status.st_dev, status.st_ino, ""};
+    return !S_ISCHR(status.st_mode);  // /dev/null may be named twice
+  }
+  const fs::path target = output_target(path).path;
+  if (stat(target.has_parent_path() ? target.parent_path().c_str() : ".", &status) != 0) return false;
+  identity = {status.st_dev, status.st_ino, target.filename().string()};
+  return true;
+}
+
+void Outputs::reads(const std::string& path) {
+  std::error_code ignored;
+  Entry entry{"", path, {}};
+  if (!fs::exists(path, ignored) || !identify(path, entry.identity)) return;
+  for (const Entry& output : outputs_)
+    if (output.identity == entry.identity)
+      usage(
+          fmt::format("{} '{}' is a file that the same command reads; give another name", output.option, output.path));
+  inputs_.push_back(entry);
+}
+
+void Outputs::reads(const std::vector<std::string>& paths) {
+  for (const std::string& path : paths) reads(path);
+}
+
+void Outputs::writes(const std::string& option, const std::string& path, OutputKind kind) {
+  if (kind == OutputKind::kText && (path.empty() || path == "-")) return;
+  const OutputTarget target = output_target(path);
+  if (!target.is_special) check_extension(option, path, kind);
+  Entry entry{option, path, {}};
+  if (!identify(path, entry.identity)) return;
+  for (const Entry& input : inputs_)
+    if (input.identity == entry.identity)
+      usage(fmt::format("{} '{}' is a file that the same command reads; give another name", option, path));
+  for (const Entry& output : outputs_)
+    if (output.identity == entry.identity)
+      usage(fmt::format("{} '{}' and {} '{}' are the same file", output.option, output.path, option, path));
+  outputs_.push_back(entry);
+}
+
+void Outputs::writes_derived_png(const std::string& option, const std::string& path, const std::string& remedy) {
+  writes(option, path, OutputKind::kPng);
+  std::error_code ignored;
+  if (fs::exists(path, ignored) && !is_own_png(path))
+    usage(fmt::format("{} would replace '{}', which covary did not make; {}", option, path, remedy));
+}
+
+bool is_same_file(const std::string& a, const std::string& b) {
+  std::error_code ignored;
+  return fs::equivalent(a, b, ignored) && !ignored;
+}
+
+}  // namespace covary

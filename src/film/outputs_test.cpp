@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+// No command overwrites what it reads, writes one file twice, or gives a file a name that hides what it is.
+#include "film/outputs.h"
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "film/image_writer.h"
+#include "film/output_file.h"
+#include "support/files.h"
+
+namespace covary {
+namespace {
+
+namespace fs = std::filesystem;
+using test_support::contains, test_support::message_of, test_support::test_file, test_support::test_folder;
+
+TEST(Outputs, AnInputIsNoOutput) {
+  const std::string path = test_file("a.exr"), link = test_file("link.exr"), hard = test_file("hard.exr");
+  write_text_file(path, "film");
+  fs::create_symlink("a.exr", link);
+  fs::create_hard_link(path, hard);
+  for (const std::string& other : {path, link, hard, (test_folder() / "." / "a.exr").string()}) {
+    Outputs outputs;
+    outputs.reads(path);
+    EXPECT_EQ(message_of([&] { outputs.writes("-o", other, OutputKind::kFilm); }, ErrorCode::kUsage),
+              "-o '" + other + "' is a file that the same command reads; give another name");
+    Outputs in_the_other_order;
+    in_the_other_order.writes("-o", other, OutputKind::kFilm);
+    EXPECT_TRUE(contains(message_of(
+                             [&] {
+                               in_the_other_order.reads({test_file("b.exr"), path});
+                             },
+                             ErrorCode::kUsage),
+                         "that the same command reads"));
+  }
+}
+
+TEST(Outputs, AnInputThatIsMissingIsLeftToItsReader) {
+  Outputs outputs;
+  outputs.reads(test_file("missing.exr"));
+  outputs.writes("-o", test_file("a.exr"), OutputKind::kFilm);
+}
+
+TEST(Outputs, TwoOutputsAreTwoFiles) {
+  const std::string path = test_file("a.txt");
+  fs::create_symlink(test_folder(), test_file("folder"));
+  fs::create_symlink("a.txt", test_file("link.txt"));  // to a file that is not there
+  for (const std::string& other : {path, test_file("folder/a.txt"), test_file("link.txt")}) {
+    Outputs outputs;
+    outputs.writes("--json", path, OutputKind::kText);
+    EXPECT_EQ(message_of([&] { outputs.writes("--more", other, OutputKind::kText); }, ErrorCode::kUsage),
+              "--json '" + path + "' and --more '" + other + "' are the same file");
+  }
+}
+
+TEST(Outputs, SpecialFilesTakeAnything) {
+  Outputs outputs;
+  outputs.reads("/dev/null");
+  outputs.writes("-o", "/dev/null", OutputKind::kFilm);
+  outputs.writes("--json", "/dev/null", OutputKind::kText);
+  const std::string pipe = test_file("pipe");
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  outputs.writes("--map", pipe, OutputKind::kPng);
+  EXPECT_TRUE(contains(message_of([&] { outputs.writes("--other", pipe, OutputKind::kPng); }), "are the same file"));
+}
+
+TEST(Outputs, NamesSayWhatFilesHold) {
+  Outputs outputs;
+  const auto message = [&](const char* name, OutputKind kind) {
+    return message_of([&] { outputs.writes("-o", test_file(name), kind); }, ErrorCode::kUsage);
+  };
+  for (const char* name : {"a.png", "a.exrr", "a", "a.exr.gz"})
+    EXPECT_TRUE(contains(message(name, OutputKind::kFilm), "the name must end in .exr; 'covary convert' makes PNG"));
+  EXPECT_TRUE(
+      contains(message("a.bmp", OutputKind::kImage), "must end in .exr, .png, .hdr, .pfm, .jpg, .jpeg, .tif, .tiff"));
+  EXPECT_TRUE(contains(message("a.jpg", OutputKind::kPng), "must end in .png"));
+  EXPECT_TRUE(contains(message("a.exr", OutputKind::kPage), "must end in .html, .htm"));
+  for (const char* name : {"a.exr", "a.JPG", "a.xml", "a.ply", "a.html"})
+    EXPECT_TRUE(contains(message(name, OutputKind::kText), "names an image, a page or part of a scene; give -o=- for"));
+  for (const char* name : {"a.EXR", "b.exr"}) EXPECT_EQ(message(name, OutputKind::kFilm), "no error");
+  for (const char* name : {"a.json", "a", "a.txt"}) EXPECT_EQ(message(name, OutputKind::kText), "no error");
+  outputs.writes("--json", "-", OutputKind::kText);
+  outputs.writes("--json", "", OutputKind::kText);
+}
+
+TEST(Outputs, SayBeforeTheWorkThatNothingCanBeWritten) {
+  Outputs outputs;
+  EXPECT_TRUE(contains(message_of([&] { outputs.writes("-o", "/nowhere/a.exr", OutputKind::kFilm); }, ErrorCode::kIo),
+                       "cannot write /nowhere/a.exr: there is no folder /nowhere"));
+  EXPECT_TRUE(contains(message_of([&] { outputs.writes("-o", test_folder(), OutputKind::kFilm); }, ErrorCode::kIo),
+                       "it is a folder"));
+}
+
+TEST(Outputs, DerivedPicturesReplaceOnlyOnesOfOurs) {
+  const std::string path = test_file("a.png");
+  const auto message = [&] {
+    Outputs outputs;
+    return message_of([&] { outputs.writes_derived_png("the preview", path, "use --no-preview"); }, ErrorCode::kUsage);
+  };
+  EXPECT_EQ(message(), "no error");
+  write_png(path, Image(2, 2, 3));
+  EXPECT_EQ(message(), "no error");
+  write_text_file(path, "another picture");
+  EXPECT_EQ(message(), "the preview would replace '" + path + "', which covary did not make; use --no-preview");
+}
+
+TEST(Outputs, SameFiles) {
+  const std::string path = test_file("a.exr"), link = test_file("link.exr"), copy = test_file("copy.exr");
+  write_text_file(path, "film");
+  write_text_file(copy, "film");
+  fs::create_symlink("a.exr", link);
+  EXPECT_TRUE(is_same_file(path, path));
+  EXPECT_TRUE(is_same_file(path, link));
+  EXPECT_FALSE(is_same_file(path, copy));
+  EXPECT_FALSE(is_same_file("missing.exr", "missing.exr"));
+}
+
+}  // namespace
+}  // namespace covary

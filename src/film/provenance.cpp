@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "film/provenance.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+#include <sstream>
+
+#include "film/outputs.h"
+
+namespace covary {
+namespace {
+
+constexpr const char* kPrefix = "covary:";
+
+std::string attribute(const ImageFacts& image, const std::string& key, const std::string& otherwise = "") {
+  const auto it = image.info.attributes.find(kPrefix + key);
+  return it == image.info.attributes.end() ? otherwise : it->second;
+}
+
+/// Integrator and its parameters, and the pixel filter, of the attribute `settings`: "path …; filter …; …".
+struct Settings {
+  std::string integrator, filter;
+  explicit Settings(const std::string& text) {
+    std::stringstream parts(text);
+    for (std::string part; std::getline(parts, part, ';');) {
+      part.erase(0, part.find_first_not_of(' '));
+      if (part.starts_with("filter "))
+        filter = part.substr(7);
+      else if (integrator.empty())
+        integrator = part;
+    }
+  }
+};
+
+std::set<std::string> seeds_of(const ImageFacts& image) {
+  std::set<std::string> seeds;
+  std::stringstream words(attribute(image, "seed"));
+  for (std::string seed; std::getline(words, seed, ',');) seeds.insert(seed);
+  return seeds;
+}
+
+bool is_integer(const ImageFacts& image) {
+  const auto& channels = image.info.channels;
+  return image.info.format != "openexr" && std::any_of(channels.begin(), channels.end(), [](const ExrFile::Channel& c) {
+           return c.type.find("int") != std::string::npos;
+         });
+}
+
+}  // namespace
+
+std::map<std::string, std::string> inherited_attributes(const std::map<std::string, std::string>& attributes) {
+  static const std::set<std::string> of_films = {"covary:film", "covary:groups", "covary:checksum"};
+  std::map<std::string, std::string> result;
+  for (const auto& [name, value] : attributes)
+    if (name.starts_with(kPrefix) && !of_films.count(name)) result[name] = value;
+  return result;
+}
+
+ImageFacts read_facts(const std::string& path, const std::string& name) {
+  return {path, name.empty() ? path : name, inspect_image(path)};
+}
+
+std::vector<std::string> comparison_warnings(const ImageFacts& image, const ImageFacts& reference) {
+  if (is_same_file(image.path, reference.path))
+    return {fmt::format("{} and {} are the same file", image.name, reference.name)};
+  std::vector<std::string> warnings;
+  const auto warn = [&](const std::string& what) {
+    warnings.push_back(fmt::format("{} and {} {}", image.name, reference.name, what));
+  };
+  const auto compare = [&](const std::string& what, const std::string& a, const std::string& b) {
+    if (!a.empty() && !b.empty() && a != b) warn(fmt::format("{}: '{}' and '{}'", what, a, b));
+  };
+  const std::set<std::string> seeds = seeds_of(image), other_seeds = seeds_of(reference);
+  std::vector<std::string> common;
+  std::set_intersection(seeds.begin(), seeds.end(), other_seeds.begin(), other_seeds.end(), std::back_inserter(common));
+  // Passes of common and of independent random numbers share no samples, whatever their seeds.
+  const std::string sampling = attribute(image, "sampling"), other_sampling = attribute(reference, "sampling");
+  if (!common.empty() && (sampling.empty() || other_sampling.empty() || sampling == other_sampling))
+    warn(fmt::format("have seed {} in common and so share samples, which makes errors between them wrong",
+                     fmt::join(common, ", ")));
+  if (const std::string a = attribute(image, "scene_hash"), b = attribute(reference, "scene_hash");
+      !a.empty() && !b.empty() && a != b)
+    warn("show different scenes, or versions of one (attribute covary:scene_hash)");
+  const Settings settings(attribute(image, "settings")), other(attribute(reference, "settings"));
+  compare("were rendered with different settings", settings.integrator, other.integrator);
+  compare("were rendered with different pixel filters", settings.filter, other.filter);
+  // An exposure of 0 is not written.
+  compare("have different exposures in stops", attribute(image, "exposure", "0"),
+          attribute(reference, "exposure", "0"));
+  if (is_integer(image) != is_integer(reference)) {
+    const ImageFacts& rounded = is_integer(image) ? image : reference;
+    warn(fmt::format("differ in precision: {} holds {} values, rounded and cut off at white", rounded.name,
+                     rounded.info.channels[0].type));
+  }
+  return warnings;
+}
+
+}  // namespace covary
