@@ -81,11 +81,11 @@ void report(const RenderReport& report) {
       write_text_file(options.json, text);
   }
   if (result.interrupted)
-    throw Error(
-        ErrorCode::kIo,
-        fmt::format("interrupted after {:.1f} of {:g} samples per pixel; '{}' holds what was rendered, the "
-                    "same command with --resume continues",
-                    result.samples_per_pixel(), result.sum([](const Pass& p) { return p.settings.spp; }), result.kept));
+    throw Error(ErrorCode::kIo,
+                fmt::format("interrupted after {:.1f} of {:g} samples per pixel; '{}' holds what was rendered, the "
+                            "same command with --resume continues",
+                            result.samples_per_pixel(),
+                            result.sum([](const Pass& p) { return p.settings.spp.largest(); }), result.kept));
   if (!options.quiet) print_summary(report);
 }
 
