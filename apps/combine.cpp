@@ -4,6 +4,7 @@
 
 #include <tbb/global_control.h>
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <functional>
 #include <limits>
@@ -82,8 +83,8 @@ class Bands {
   int rows() const { return rows_; }
   void read(int first, int n) {
     if (first == first_ && n == n_) return;
-    crn_.read_rows(first, n, crn_data_);
-    independent_.read_rows(first, n, independent_data_);
+    crn_.read_rows(first, n, crn_rows_);
+    independent_.read_rows(first, n, independent_rows_);
     first_ = first;
     n_ = n;
   }
@@ -94,15 +95,13 @@ class Bands {
     read(begin, std::min(crn_.height(), last + reach) - begin);
     return begin;
   }
-  GroupedImage crn() const { return {crn_.width(), n_, crn_.groups(), crn_data_.data()}; }
-  GroupedImage independent() const {
-    return {independent_.width(), n_, independent_.groups(), independent_data_.data()};
-  }
+  GroupedImage crn() const { return crn_.view(crn_rows_, n_); }
+  GroupedImage independent() const { return independent_.view(independent_rows_, n_); }
 
  private:
   const GroupedFile &crn_, &independent_;
   int rows_, first_ = -1, n_ = 0;
-  std::vector<float> crn_data_, independent_data_;
+  GroupedFile::Rows crn_rows_, independent_rows_;
 };
 
 InputReport examine(const GroupedFile& crn, const GroupedFile& independent, Bands& bands) {
@@ -168,7 +167,8 @@ nlohmann::ordered_json explain(const CombineOptions& o, const PairEstimator& est
   const int x = o.explain[0] - window.x, y = o.explain[1] - window.y;
   const int first = bands.read_around(y, y + 1, estimator.reach);
   const auto mean = [&](const GroupedImage& image, int px, int py) {
-    return mean_of_groups({1, 1, image.groups, image.pixel(px, py)}).estimate.data;
+    const uint32_t count = image.count(px, py);
+    return mean_of_groups({1, 1, image.groups, image.pixel(px, py), &count}).estimate.data;
   };
   const GroupedImage g = bands.crn(), h = bands.independent();
   nlohmann::ordered_json variates = nlohmann::ordered_json::array();
@@ -207,7 +207,7 @@ PairEstimator make_pair_estimator(const CombineOptions& o, const GroupedFile& cr
   if (o.samples && !is_iduw) usage("--samples is an option of --estimator iduw, not of " + o.estimator.name);
   if (o.error && !predicts_error(o.estimator.name))
     usage("--error: " + o.estimator.name + " does not estimate its error");
-  const int64_t samples = o.samples.value_or(crn.samples());
+  const int64_t samples = o.samples ? *o.samples : std::llround(crn.samples());
   if (is_iduw && samples == 0) usage("--estimator iduw needs --samples N, the samples per pixel of the CRN image");
   check_estimator_options(o.estimator);
   return make_estimator(o.estimator, o.error, samples);
@@ -283,6 +283,7 @@ void combine(const CombineOptions& o) {
       {"crn_groups", crn.groups()},
       {"independent_groups", independent.groups()},
       {"nonfinite_pixels", result.nonfinite_pixels},
+      {"negative_pixels", count_negative_pixels(result.estimate)},
       {"rank_correlation",
        {{"crn_horizontal", json_of(report.crn_horizontal)},
         {"crn_vertical", json_of(report.crn_vertical)},

@@ -237,14 +237,15 @@ void write_results(const lab::Results& results, const std::string& folder) {
 
 void print_summary(const lab::Results& results, const std::string& folder) {
   const lab::Suite& suite = results.suite;
-  fmt::print(stderr, "{:20} {:>10} {:>12} {:>14} {:>14}\n", "method", "budget", "relMSE", "equal samples",
-             "equal time");
+  fmt::print(stderr, "{:20} {:>10} {:>10} {:>12} {:>14} {:>14}\n", "method", "budget", "spp taken", "relMSE",
+             "equal samples", "equal time");
   const auto factor = [](double value) {
     return std::isfinite(value) ? fmt::format("{:.2f}x", value) : std::string("-");
   };
   for (const lab::Summary& s : results.summaries)
-    fmt::print(stderr, "{:20} {:>10} {:>12.4g} {:>14} {:>14}\n", suite.methods[s.method].name,
-               suite.budgets[s.budget].label(), s.relmse, factor(s.equal_sample.value), factor(s.equal_time.value));
+    fmt::print(stderr, "{:20} {:>10} {:>10.4g} {:>12.4g} {:>14} {:>14}\n", suite.methods[s.method].name,
+               suite.budgets[s.budget].label(), s.samples_per_pixel, s.relmse, factor(s.equal_sample.value),
+               factor(s.equal_time.value));
   for (const std::string& warning : results.warnings) fmt::print(stderr, "warning: {}\n", warning);
   fmt::print(stderr, "{}/report.html, results.json, results.csv\n", folder);
 }

@@ -82,7 +82,8 @@ void report(const RenderReport& report) {
     throw Interrupted(
         fmt::format("interrupted after {:.1f} of {:g} samples per pixel; '{}' holds what was rendered, the "
                     "same command with --resume continues",
-                    result.samples_per_pixel(), result.sum([](const Pass& p) { return p.settings.spp; }), result.kept));
+                    result.samples_per_pixel(),
+                    result.sum([](const Pass& p) { return p.settings.spp.largest(); }), result.kept));
   if (!options.quiet) print_summary(report);
 }
 

@@ -143,7 +143,9 @@ SampleAddress replayed_sample(const RenderOptions& options) {
 void add_render_options(CLI::App& command, RenderOptions& o) {
   command.add_option("SCENE", o.scene, "Scene file, Mitsuba XML")->required();
   command.add_option("-o,--output", o.output, "The image (EXR); a PNG preview appears beside it");
-  command.add_option("--spp", o.spp, "Samples per pixel of all passes together; default: the scene's")
+  command
+      .add_option("--spp", o.spp,
+                  "Samples per pixel of all passes together, at least 4 in each of two; default: the scene's")
       ->transform(whole_number(1u, 1u << 30));
   command.add_option("--integrator", o.integrator, "Integrator instead of the scene's: path");
   command
@@ -159,8 +161,10 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
                   "Random numbers per pixel, or common to all; a single pass (estimator none)")
       ->check(one_of({"independent", "crn"}));
   command
-      .add_option("--groups", o.groups,
-                  "Groups of samples whose means films keep; default 12, 1 for a single independent pass")
+      .add_option(
+          "--groups", o.groups,
+          "Groups of samples whose means films keep; default: the largest from 12 to 8 that divides the samples, "
+          "else 12, or as many as samples; 1 for a single independent pass")
       ->transform(whole_number(1, Film::kMaxGroups));
   command.add_option("--display-server", o.display_server,
                      "HOST:PORT of a running tev, which shows the image while it renders");

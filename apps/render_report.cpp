@@ -91,6 +91,7 @@ nlohmann::ordered_json statistics(const RenderReport& report) {
       {"rays_per_second", rays * rate},
       {"triangles", scene.scene->n_triangles()},
       {"peak_memory_bytes", peak_memory_bytes()},
+      {"negative_pixels", count_negative_pixels(result.picture())},
       {"not_finite_samples", result.sum([](const Pass& p) { return p.result.n_not_finite; })},
       {"negative_samples", result.sum([](const Pass& p) { return p.result.n_negative; })},
       {"bad_samples", bad}};

@@ -13,6 +13,7 @@
 #include "core/parallel.h"
 #include "estimators/batch_algebra.h"
 #include "estimators/neighbours.h"
+#include "film/groups.h"
 
 namespace covary {
 namespace {
@@ -108,6 +109,38 @@ class Regression {
     w.gamma.resize(k);
   }
 
+  /// Contrast j: (x_0 + … + x_{j-1} - j x_j) / sqrt(j (j + 1)). `squares`: sums of their squares per channel.
+  void make_contrasts(const float* p, const std::vector<float>& weights, float* record, float* squares) const {
+    float sum[3] = {p[0], p[1], p[2]};
+    for (int j = 1; j < T_; ++j)
+      for (int c = 0; c < 3; ++c) {
+        const float value = p[3 * j + c];
+        const float contrast = (sum[c] - static_cast<float>(j) * value) * weights[j];
+        sum[c] += value;
+        squares[c] += contrast * contrast;
+        record[3 * (j - 1) + c] = contrast;
+      }
+  }
+
+  /// The same for groups of unequal sizes, with weights w_t = size T / count of mean 1: with W = w_0 + … + w_{j-1},
+  /// ((w_0 x_0 + … + w_{j-1} x_{j-1}) / W - x_j) sqrt(w_j W / (W + w_j)). The squares add up to sum w_t (x_t - mean)^2.
+  void make_weighted_contrasts(const float* p, uint32_t count, float* record, float* squares) const {
+    const auto weight = [&, unit = static_cast<float>(T_) / static_cast<float>(count)](int t) {
+      return unit * static_cast<float>(group_size(count, T_, t));
+    };
+    float total = weight(0), sum[3] = {total * p[0], total * p[1], total * p[2]};
+    for (int j = 1; j < T_; ++j) {
+      const float w = weight(j), factor = std::sqrt(w * total / (total + w));
+      for (int c = 0; c < 3; ++c) {
+        const float value = p[3 * j + c], contrast = (sum[c] / total - value) * factor;
+        sum[c] += w * value;
+        squares[c] += contrast * contrast;
+        record[3 * (j - 1) + c] = contrast;
+      }
+      total += w;
+    }
+  }
+
   void make_records(const Tile& tile, Workspace& w) const {
     std::vector<float> weights(T_);
     for (int j = 1; j < T_; ++j) weights[j] = 1.0f / std::sqrt(static_cast<float>(j) * static_cast<float>(j + 1));
@@ -120,17 +153,11 @@ class Regression {
           for (int c = 0; c < 3; ++c) record[layout_.error + c] = kUseless;
           continue;
         }
-        // Contrast j: (x_0 + … + x_{j-1} - j x_j) / sqrt(j (j + 1)).
-        const float* p = in_.crn.pixel(x, y);
-        float sum[3] = {p[0], p[1], p[2]}, squares[3] = {};
-        for (int j = 1; j < T_; ++j)
-          for (int c = 0; c < 3; ++c) {
-            const float value = p[3 * j + c];
-            const float contrast = (sum[c] - static_cast<float>(j) * value) * weights[j];
-            sum[c] += value;
-            squares[c] += contrast * contrast;
-            record[3 * (j - 1) + c] = contrast;
-          }
+        float squares[3] = {};
+        if (in_.crn.has_equal_groups(x, y))
+          make_contrasts(in_.crn.pixel(x, y), weights, record, squares);
+        else
+          make_weighted_contrasts(in_.crn.pixel(x, y), in_.crn.count(x, y), record, squares);
         if (layout_.contrasts > layout_.group_contrasts)
           for (int c = 0; c < 3; ++c) record[layout_.group_contrasts + c] = in_.crn_moments->mean.row(c, y)[x];
         for (int c = 0; c < 3; ++c) {

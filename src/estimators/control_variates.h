@@ -4,6 +4,13 @@
 // for every pixel, given the error variances V_h. X, y: centred group means of the CRN image at the neighbours and at
 // the target; f, g: their means; h: means of the independent image. What V_h is makes the difference between the
 // methods (iicv.h, cv_baseline.h).
+//
+// Unequal group sizes n_t of a pixel: the row of group t in X and y is weighted by sqrt(n_t T / N), N = sum n_t, so
+// that all rows have the same variance, and X^T X / (T - 1) estimates T times the covariance of the means as with equal
+// sizes. Unequal counts of the CRN image: two pixels share the random numbers of the smaller of their counts, group by
+// group, and the covariance of their means follows from that of their group means just so; where their group sizes
+// differ from one another by the remainders modulo T, it is too small or too large by about the part that one sample is
+// of a group. Unequal counts of the independent image enter through V_h and Eq. (8).
 #pragma once
 
 #include "estimators/grouped_image.h"

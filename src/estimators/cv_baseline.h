@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Image-space control variates that ignore the errors of the independent image: "CV (baseline)" of Yang & Moon 2025
 // [YM2025], Sec. 3, Eq. (6). A comparator.
+//
+// Unequal group sizes and counts: control_variates.h; with no penalty, the counts of the independent image matter to
+// the standard error alone. Every group of every pixel needs a sample.
 #pragma once
 
 #include "estimators/grouped_image.h"

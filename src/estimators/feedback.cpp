@@ -12,7 +12,7 @@ using namespace lanes;
 
 namespace {
 
-constexpr int kGuide = 0, kResidual = 3, kCount = 6, kVariance = 7, kPlanes = 8;
+constexpr int kGuide = 0, kResidual = 3, kWeight = 6, kVariance = 7, kPlanes = 8;
 /// Side of the cells of the wide mean.
 constexpr int kCell = 2;
 /// Bandwidths of the wide mean and of the second feedback over that of the narrow mean.
@@ -21,8 +21,9 @@ constexpr float kWidening = 4, kSecondWidening = 12;
 /// error, slowly (docs/notes/iicv.md).
 constexpr float kNoise = 0.2f;
 
-/// Cells of side x side pixels, one row of cells per row, repeated horizontally so that column x holds the cell of pixel x:
-/// mean of F^ (kFar for cells without valid pixels), sums of h - F^ and of var h (over RGB), number of valid pixels.
+/// Cells of side x side pixels, one row of cells per row, repeated horizontally so that column x holds the cell of
+/// pixel x: mean of F^ (kFar for cells without valid pixels), sums over the valid pixels of n (h - F^), n and n^2 var h
+/// (over RGB), with n the pixel's count over the image's mean.
 Planes make_cells(int side, const Moments& h, const std::vector<unsigned char>& valid, const Image& f, int border) {
   const int width = f.width, height = f.height, cell_rows = (height + side - 1) / side;
   Planes cells(width, cell_rows, kPlanes, border, 0.0f);
@@ -32,15 +33,17 @@ Planes make_cells(int side, const Moments& h, const std::vector<unsigned char>& 
   parallel_for(cell_rows, [&](int row) {
     const int y0 = side * row, y1 = std::min(height, y0 + side);
     for (int x0 = 0; x0 < width; x0 += side) {
-      float guide[3] = {}, residual[3] = {}, variance = 0, count = 0;
+      float guide[3] = {}, residual[3] = {}, variance = 0, weight = 0, count = 0;
       for (int y = y0; y < y1; ++y)
         for (int x = x0; x < std::min(width, x0 + side); ++x) {
           if (!valid[static_cast<size_t>(y) * width + x]) continue;
+          const float n = h.relative_count ? h.relative_count->row(0, y)[x] : 1.0f;
           count += 1;
+          weight += n;
           for (int c = 0; c < 3; ++c) {
             guide[c] += f.pixel(x, y)[c];
-            residual[c] += h.mean.row(c, y)[x] - f.pixel(x, y)[c];
-            variance += h.variance_of_mean.row(c, y)[x];
+            residual[c] += n * (h.mean.row(c, y)[x] - f.pixel(x, y)[c]);
+            variance += n * n * h.variance_of_mean.row(c, y)[x];
           }
         }
       if (count == 0) continue;
@@ -50,7 +53,7 @@ Planes make_cells(int side, const Moments& h, const std::vector<unsigned char>& 
           cells.row(kGuide + c, row)[x] = guide[c] / count;
           cells.row(kResidual + c, row)[x] = residual[c];
         }
-        cells.row(kCount, row)[x] = count;
+        cells.row(kWeight, row)[x] = weight;
         cells.row(kVariance, row)[x] = variance;
       }
     }
@@ -78,7 +81,7 @@ GuidedMean guided_mean(const Planes& cells, int side, int radius, int x, int y, 
       const vfloat d0 = load(p[kGuide] + dx) - f[0], d1 = load(p[kGuide + 1] + dx) - f[1],
                    d2 = load(p[kGuide + 2] + dx) - f[2];
       const vfloat w = exp_of_nonpositive((d0 * d0 + d1 * d1 + d2 * d2) * factor);
-      mean.weights += w * load(p[kCount] + dx);
+      mean.weights += w * load(p[kWeight] + dx);
       mean.squares += w * w * load(p[kVariance] + dx);
       for (int c = 0; c < 3; ++c) mean.residuals[c] += w * load(p[kResidual + c] + dx);
     }

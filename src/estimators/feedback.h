@@ -18,6 +18,8 @@
 // of F^' by means over cells of 4 x 4 pixels, brings that back:
 //
 //     F^''_i = F^'_i + r'_i(12 kappa).
+//
+// Where pixels of the PT image have unequal counts n_j, weights are n_j w_ij.
 #pragma once
 
 #include "estimators/planes.h"

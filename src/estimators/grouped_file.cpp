@@ -14,6 +14,8 @@
 namespace covary {
 namespace {
 
+constexpr const char* kCounts = "samples";  // channel of covary's films
+
 [[noreturn]] void fail(const std::string& path, const std::string& what) {
   throw Error(ErrorCode::kInput, path + ": " + what);
 }
@@ -36,15 +38,15 @@ std::vector<std::string> layer_prefixes(const ExrFile& file) {
 
 std::string layer_name(const std::string& prefix) { return prefix.empty() ? "" : prefix.substr(0, prefix.size() - 1); }
 
-/// Mean number of samples per pixel as covary's films tell it, rounded; 0: not told.
-int64_t samples_per_pixel(const ExrFile& file, const std::string& path) {
+/// Mean number of samples per pixel as covary's films tell it; 0: not told.
+double samples_per_pixel(const ExrFile& file, const std::string& path) {
   const std::string text = attribute(file, "covary:samples");
   if (text.empty()) return 0;
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size() || !(value >= 0 && value < 1e15))
     fail(path, fmt::format("attribute covary:samples is '{}'; expected is a number of samples per pixel", text));
-  return std::llround(value);
+  return value;
 }
 
 /// "group07" -> ("group", 7); number -1 without digits at the end.
@@ -144,12 +146,16 @@ void GroupedFile::add_file(const std::string& path, const std::string& layer, bo
       has_half_ |= type == "half";
     }
 
-  // What covary's films tell. Groups must have equal numbers of samples.
-  const int64_t samples = samples_per_pixel(file, path);
-  if (files_.size() > 1 && samples_ != samples * static_cast<int64_t>(files_.size() - 1))
+  // What covary's films tell. The groups of one film follow from its counts; others must have equal numbers of samples.
+  const double samples = samples_per_pixel(file, path);
+  if (files_.size() > 1 && samples != samples_of_group_)
     fail(path, fmt::format("has {} samples per pixel, the group before it {}; all groups must have the same number",
-                           samples, samples_ / static_cast<int64_t>(files_.size() - 1)));
+                           samples, samples_of_group_));
+  samples_of_group_ = samples;
   samples_ += samples;
+  const ExrFile::Channel* counts = file.find(kCounts);
+  has_counts_ =
+      only_file && numbered.size() > 1 && !attribute(file, "covary:film").empty() && counts && counts->type == "uint";
   const auto agree = [&](const char* key, std::string& value) {
     const std::string here = attribute(file, std::string("covary:") + key);
     if (files_.size() > 1 && here != value)
@@ -161,19 +167,25 @@ void GroupedFile::add_file(const std::string& path, const std::string& layer, bo
   agree("settings", settings_);
 }
 
-void GroupedFile::read_rows(int first_row, int n_rows, std::vector<float>& data) const {
-  const size_t per_pixel = groups_.size() * 3;
-  data.resize(static_cast<size_t>(width()) * n_rows * per_pixel);
+void GroupedFile::read_rows(int first_row, int n_rows, Rows& rows) const {
+  const size_t per_pixel = groups_.size() * 3, n_pixels = static_cast<size_t>(width()) * n_rows;
+  rows.data.resize(n_pixels * per_pixel);
+  rows.counts.resize(has_counts_ ? n_pixels : 0);
   for (size_t f = 0; f < files_.size(); ++f) {
     std::vector<ExrPlane> planes;
     for (size_t g = 0; g < groups_.size(); ++g) {
       if (groups_[g].file != f) continue;
       for (size_t c = 0; c < 3; ++c)
-        planes.push_back(
-            {groups_[g].prefix + "RGB"[c], ExrPlane::Type::kFloat, data.data() + 3 * g + c, per_pixel * sizeof(float)});
+        planes.push_back({groups_[g].prefix + "RGB"[c], ExrPlane::Type::kFloat, rows.data.data() + 3 * g + c,
+                          per_pixel * sizeof(float)});
     }
+    if (has_counts_) planes.push_back({kCounts, ExrPlane::Type::kUint, rows.counts.data(), sizeof(uint32_t)});
     files_[f]->read_rows(planes, first_row, n_rows);
   }
+}
+
+GroupedImage GroupedFile::view(const Rows& rows, int n_rows) const {
+  return {width(), n_rows, groups(), rows.data.data(), rows.counts.empty() ? nullptr : rows.counts.data(), samples_};
 }
 
 }  // namespace covary

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "estimators/grouped_image.h"
 #include "film/exr.h"
 
 namespace covary {
@@ -24,8 +25,8 @@ class GroupedFile {
   int height() const { return place_.window.height; }
   const ImagePlace& place() const { return place_; }
   int groups() const { return static_cast<int>(groups_.size()); }
-  /// Samples per pixel of all groups together, 0 where the files do not tell.
-  int64_t samples() const { return samples_; }
+  /// Samples per pixel of all groups together, their mean where pixels differ; 0 where the files do not tell.
+  double samples() const { return samples_; }
   /// Attribute of covary's films: "crn", "independent"; "" for other files.
   const std::string& sampling() const { return sampling_; }
   /// Attributes of covary's films, "" for other files.
@@ -36,8 +37,15 @@ class GroupedFile {
   /// For messages.
   const std::string& name() const { return name_; }
 
-  /// Rows [first_row, first_row + n_rows) in the layout of GroupedImage.
-  void read_rows(int first_row, int n_rows, std::vector<float>& data) const;
+  /// Rows of both arrays of a GroupedImage.
+  struct Rows {
+    std::vector<float> data;
+    std::vector<uint32_t> counts;  ///< of a film of covary in one file; empty otherwise, where groups must be equal
+  };
+  /// Rows [first_row, first_row + n_rows).
+  void read_rows(int first_row, int n_rows, Rows& rows) const;
+  /// These rows as an image.
+  GroupedImage view(const Rows& rows, int n_rows) const;
 
  private:
   struct Group {
@@ -49,9 +57,9 @@ class GroupedFile {
   std::vector<std::unique_ptr<ExrFile>> files_;
   std::vector<Group> groups_;
   ImagePlace place_;
-  int64_t samples_ = 0;
+  double samples_ = 0, samples_of_group_ = 0;
   std::string sampling_, scene_hash_, settings_, name_;
-  bool has_half_ = false;
+  bool has_half_ = false, has_counts_ = false;
 };
 
 }  // namespace covary

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "core/error.h"
+#include "film/film_file.h"
 #include "support/files.h"
 
 namespace covary {
@@ -40,9 +41,11 @@ class GroupedFileTest : public ::testing::Test {
   void expect_groups(const GroupedFile& file, const std::vector<int>& images) {
     ASSERT_EQ(file.groups(), static_cast<int>(images.size()));
     for (const auto& [first, n] : {std::pair{0, kHeight}, {0, 2}, {2, 1}, {3, 2}}) {
-      std::vector<float> data;
-      file.read_rows(first, n, data);
+      GroupedFile::Rows rows;
+      file.read_rows(first, n, rows);
+      const std::vector<float>& data = rows.data;
       ASSERT_EQ(data.size(), static_cast<size_t>(kWidth) * n * images.size() * 3);
+      EXPECT_EQ(file.view(rows, n).counts, nullptr);
       size_t i = 0;
       for (int y = first; y < first + n; ++y)
         for (int x = 0; x < kWidth; ++x)
@@ -97,6 +100,23 @@ TEST_F(GroupedFileTest, ReadsAttributesOfFilms) {
   const GroupedFile two({write("a.exr", {""}, 0, attributes), write("b.exr", {""}, 0, attributes)});
   EXPECT_EQ(two.samples(), 48);
   EXPECT_EQ(GroupedFile({write("c.exr", {""})}).samples(), 0);
+}
+
+TEST_F(GroupedFileTest, ReadsTheCountsOfAFilm) {
+  Film film(kWidth, kHeight, {0, 0, kWidth, kHeight}, 2);
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x)
+      for (int s = 0; s < 3 + (y == 2 ? x : 0); ++s) film.add(x, y, Spectrum(static_cast<float>(s)));
+  const std::string path = folder_.file("counted.exr");
+  write_film(path, film);
+  const GroupedFile file({path});
+  GroupedFile::Rows rows;
+  file.read_rows(1, 3, rows);
+  const GroupedImage image = file.view(rows, 3);
+  ASSERT_NE(image.counts, nullptr);
+  EXPECT_EQ(image.count(5, 0), 3u);
+  EXPECT_EQ(image.count(5, 1), 8u);
+  EXPECT_NEAR(image.mean_count, film.mean_count(), 1e-9) << "of the whole film, not of these rows";
 }
 
 TEST_F(GroupedFileTest, SaysWhatIsWrong) {

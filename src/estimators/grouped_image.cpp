@@ -3,9 +3,26 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "core/error.h"
 
 namespace covary {
+namespace {
+
+/// Every group must have samples, or it has no mean.
+void check_counts(const char* name, const GroupedImage& image, std::vector<std::string>& problems) {
+  if (!image.counts) return;
+  const size_t n_pixels = static_cast<size_t>(image.width) * image.height;
+  const auto groups = static_cast<uint32_t>(image.groups);
+  const uint32_t* few = std::find_if(image.counts, image.counts + n_pixels, [&](uint32_t n) { return n < groups; });
+  if (few == image.counts + n_pixels) return;
+  const auto pixel = static_cast<int>(few - image.counts);
+  problems.push_back(fmt::format("pixel ({}, {}) of the {} image has {} sample{}, fewer than the {} groups",
+                                 pixel % image.width, pixel / image.width, name, *few, *few == 1 ? "" : "s", groups));
+}
+
+}  // namespace
 
 void throw_if_any(const std::string& name, const std::vector<std::string>& problems) {
   if (problems.empty()) return;
@@ -29,6 +46,9 @@ void check_inputs(const GroupedImage& crn, const GroupedImage& independent, int 
   if (independent.groups < min_independent_groups)
     problems.push_back(fmt::format("the independent image has {} group{}, at least {} are needed with these settings",
                                    independent.groups, independent.groups == 1 ? "" : "s", min_independent_groups));
+  if (!problems.empty()) return;
+  check_counts("CRN", crn, problems);
+  check_counts("independent", independent, problems);
 }
 
 }  // namespace covary

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -10,12 +11,24 @@
 
 namespace covary {
 
-/// T group means of every pixel of a linear RGB image: data[((y * width + x) * groups + t) * 3 + channel]. All groups
-/// of the image hold the same number of independent samples. Does not own the memory.
+/// T group means of every pixel of a linear RGB image: data[((y * width + x) * groups + t) * 3 + channel], each of
+/// independent samples. Does not own the memory.
+///
+/// Without `counts`, all groups of all pixels hold the same number of samples. With them, pixels differ, and a pixel's
+/// groups have the sizes of film/groups.h, which differ by one at most. Estimators then weight a pixel's groups by
+/// their sizes; with equal sizes they give the same bits as without counts. What they do where pixels differ, each
+/// says. For all of them, counts must not follow from the values of the same samples, or results are biased.
 struct GroupedImage {
   int width = 0, height = 0, groups = 0;
   const float* data = nullptr;
+  const uint32_t* counts = nullptr;  ///< samples of each pixel, row by row; or null
+  double mean_count = 0;             ///< of the whole image where this is a part of it; 0: of this
   const float* pixel(int x, int y) const { return data + (static_cast<size_t>(y) * width + x) * groups * 3; }
+  /// Samples of a pixel; without counts, one in each group.
+  uint32_t count(int x, int y) const {
+    return counts ? counts[static_cast<size_t>(y) * width + x] : static_cast<uint32_t>(groups);
+  }
+  bool has_equal_groups(int x, int y) const { return count(x, y) % static_cast<uint32_t>(groups) == 0; }
 };
 
 /// What an estimator returns. `estimate` has the three channels R, G, B. `std_error` has them too, or is empty where no
@@ -31,7 +44,8 @@ struct EstimatorResult {
 /// Throws Error(kUsage) that lists `problems` unless there are none. `name`: of the estimator.
 void throw_if_any(const std::string& name, const std::vector<std::string>& problems);
 
-/// Appends to `problems` what is wrong with the pair (sizes, missing data, fewer than `min_crn_groups` groups …).
+/// Appends to `problems` what is wrong with the pair (sizes, missing data, fewer than `min_crn_groups` groups, pixels
+/// with fewer samples than groups …).
 void check_inputs(const GroupedImage& crn, const GroupedImage& independent, int min_crn_groups,
                   int min_independent_groups, std::vector<std::string>& problems);
 

@@ -6,6 +6,10 @@
 //     w_i = exp(-gamma n (D_A - D_B)^2) per channel,  D_A, D_B: g_c - g_i from two halves of the CRN samples,
 // g: CRN, h: independent. gamma is chosen for the image: quarters make the weights of each half, and the value whose
 // two results differ least is taken. The image is reflected at its borders.
+//
+// Groups of unequal sizes are weighted by them in every mean: of the image, halves and quarters. Where pixels have
+// unequal counts, n is one number all the same, and the sum over the window gives all pixels the weights of the method:
+// pixels with fewer samples than n are trusted too little, others too much. Every group of every pixel needs a sample.
 #pragma once
 
 #include "estimators/grouped_image.h"
@@ -15,8 +19,8 @@ namespace covary {
 struct IduwOptions {
   /// Side of the window; default 15, as in the authors' program; odd, 3 … 63.
   int window = 15;
-  /// n: samples per pixel of the CRN image, > 0. It sets the scale of gamma; required. The authors' program uses the
-  /// same n for quarters, and so does this.
+  /// n: samples per pixel of the CRN image, their mean where pixels differ, > 0. It sets the scale of gamma; required.
+  /// The authors' program uses the same n for quarters, and so does this.
   int samples = 0;
   /// Candidates for gamma, all > 0; default the ten of the authors' program.
   std::vector<float> gammas = {0.01f, 0.025f, 0.05f, 0.1f, 0.2f, 0.5f, 1.0f, 1.5f, 2.0f, 2.5f};

@@ -75,7 +75,7 @@ EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& independent, c
                              moments(independent, valid, border, 0.0f, 1, 2)};
     EstimatorResult part[2];
     for (int i : {0, 1}) {
-      const Planes error = pilot_error(g, half[1 - i].mean, options.pilot_window, false, border);
+      const Planes error = pilot_error(g, half[1 - i], options.pilot_window, false, border);
       input.h = &half[i].mean;
       input.error_of_h = &error;
       input.variance_of_h = &half[i].variance_of_mean;
@@ -101,7 +101,7 @@ EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& independent, c
         settings.ridge = options.ridge;
         break;
       default:
-        error = pilot_error(g, h.mean, options.pilot_window, options.penalty == Penalty::kSmoothed, border);
+        error = pilot_error(g, h, options.pilot_window, options.penalty == Penalty::kSmoothed, border);
         input.error_of_h = &error;
     }
     apply_control_variates(input, settings, valid, result);

@@ -12,6 +12,10 @@
 //
 // Claim: consistent, not unbiased; coefficients and penalties are estimated from the samples they are applied to.
 // Pixels of the independent image must be independent of each other (box filter), values linear.
+//
+// Groups of unequal sizes are weighted by their sizes (control_variates.h). Where pixels of the independent image have
+// unequal counts, the pilot and the feedback weight them by their counts, as if all had the same variance per sample.
+// Every group of every pixel needs a sample.
 #pragma once
 
 #include "estimators/feedback.h"

@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "core/error.h"
+#include "film/groups.h"
 
 namespace covary {
 namespace {
@@ -90,8 +92,8 @@ class PairStatistics {
 /// Counts of values, and grey image means of the groups.
 struct Values {
   long nonfinite = 0, negative = 0, clipped = 0;
-  int bad_x = -1, bad_y = -1, bad_group = -1;  ///< first non-finite value
-  std::vector<double> group_means;
+  int bad_x = -1, bad_y = -1, bad_group = -1;      ///< first non-finite value
+  std::vector<double> group_means, group_samples;  ///< sums of values and of samples until finish()
   double mean = 0, variance_of_mean = 0;
 };
 
@@ -112,18 +114,25 @@ void add_values(const GroupedImage& image, int first_row, Values& v) {
       v.negative += negative;
       v.clipped += clipped;
       if (nonfinite) continue;
-      for (int t = 0; t < image.groups; ++t) v.group_means[t] += grey(p + 3 * t);
+      for (int t = 0; t < image.groups; ++t) {
+        v.group_means[t] += grey(p + 3 * t);
+        v.group_samples[t] += group_size(image.count(x, y), image.groups, t);
+      }
     }
 }
 
 void finish(Values& v, long pixels) {
-  const double T = static_cast<double>(v.group_means.size());
-  for (double& m : v.group_means) {
-    m /= static_cast<double>(pixels);
-    v.mean += m / T;
+  const size_t T = v.group_means.size();
+  // Weights of mean 1: groups of more samples tell more.
+  const double total = std::accumulate(v.group_samples.begin(), v.group_samples.end(), 0.0);
+  for (double& samples : v.group_samples) samples = samples > 0 ? samples * static_cast<double>(T) / total : 1;
+  for (size_t t = 0; t < T; ++t) {
+    v.group_means[t] /= static_cast<double>(pixels);
+    v.mean += v.group_samples[t] * v.group_means[t] / static_cast<double>(T);
   }
-  for (double m : v.group_means) v.variance_of_mean += (m - v.mean) * (m - v.mean);
-  v.variance_of_mean /= std::max(1.0, T * (T - 1));
+  for (size_t t = 0; t < T; ++t)
+    v.variance_of_mean += v.group_samples[t] * (v.group_means[t] - v.mean) * (v.group_means[t] - v.mean);
+  v.variance_of_mean /= std::max(1.0, static_cast<double>(T) * (static_cast<double>(T) - 1));
 }
 
 void check_values(const char* name, long pixels, const Values& v, std::vector<Finding>& findings) {
@@ -234,8 +243,8 @@ struct InputChecks::State {
         independent_horizontal(long{w} * h, independent_groups, independent_groups, 1, 0),
         independent_vertical(long{w} * h, independent_groups, independent_groups, 0, 1),
         crn_independent(long{w} * h, crn_groups, independent_groups, 0, 0) {
-    crn.group_means.resize(crn_groups);
-    independent.group_means.resize(independent_groups);
+    crn.group_means.resize(crn_groups), crn.group_samples.resize(crn_groups);
+    independent.group_means.resize(independent_groups), independent.group_samples.resize(independent_groups);
   }
   int width, height, next_row = 0;
   Values crn, independent;

@@ -41,7 +41,8 @@ struct InputReport {
 /// out.
 class InputChecks {
  public:
-  /// The images need not have the same number of groups; with fewer than 3, correlations cannot be measured, which is a
+  /// Groups of unequal sizes: ranks of values do not look at sizes, means of groups are weighted by their samples. The
+  /// images need not have the same number of groups; with fewer than 3, correlations cannot be measured, which is a
   /// warning.
   InputChecks(int width, int height, int crn_groups, int independent_groups);
   ~InputChecks();

@@ -2,8 +2,37 @@
 #include "estimators/mean.h"
 
 #include <cmath>
+#include <limits>
+
+#include "film/groups.h"
 
 namespace covary {
+namespace {
+
+struct ChannelMean {
+  double mean = 0, std_error = 0;
+};
+
+/// Of T values, three apart, from equal numbers of samples.
+ChannelMean mean_of_equal(const float* groups, int T) {
+  double sum = 0, squares = 0;
+  for (int t = 0; t < T; ++t) sum += groups[3 * t];
+  for (int t = 0; t < T; ++t) squares += std::pow(groups[3 * t] - sum / T, 2);
+  return {sum / T, T > 1 ? std::sqrt(squares / (T - 1) / T) : 0};
+}
+
+/// The same from `count` samples in groups of sizes that differ; groups without samples do not count.
+ChannelMean mean_of_unequal(const float* groups, int T, uint32_t count) {
+  const auto used = static_cast<int>(std::min<uint32_t>(T, count));
+  double sum = 0, squares = 0;
+  for (int t = 0; t < used; ++t) sum += static_cast<double>(group_size(count, T, t)) * groups[3 * t];
+  const double mean = used > 0 ? sum / count : 0;
+  if (used < 2) return {mean, std::numeric_limits<double>::infinity()};
+  for (int t = 0; t < used; ++t) squares += group_size(count, T, t) * std::pow(groups[3 * t] - mean, 2);
+  return {mean, std::sqrt(squares / (used - 1) / count)};
+}
+
+}  // namespace
 
 EstimatorResult mean_of_groups(const GroupedImage& image) {
   const int T = image.groups;
@@ -11,15 +40,16 @@ EstimatorResult mean_of_groups(const GroupedImage& image) {
   result.estimate = Image(image.width, image.height, 3);
   if (T > 1) result.std_error = Image(image.width, image.height, 3);
   for (int y = 0; y < image.height; ++y)
-    for (int x = 0; x < image.width; ++x)
+    for (int x = 0; x < image.width; ++x) {
+      const uint32_t count = image.count(x, y);
+      const bool equal = count > 0 && image.has_equal_groups(x, y);
       for (int c = 0; c < 3; ++c) {
         const float* groups = image.pixel(x, y) + c;
-        double sum = 0, squares = 0;
-        for (int t = 0; t < T; ++t) sum += groups[3 * t];
-        for (int t = 0; t < T; ++t) squares += std::pow(groups[3 * t] - sum / T, 2);
-        result.estimate.pixel(x, y)[c] = static_cast<float>(sum / T);
-        if (T > 1) result.std_error.pixel(x, y)[c] = static_cast<float>(std::sqrt(squares / (T - 1) / T));
+        const ChannelMean m = equal ? mean_of_equal(groups, T) : mean_of_unequal(groups, T, count);
+        result.estimate.pixel(x, y)[c] = static_cast<float>(m.mean);
+        if (T > 1) result.std_error.pixel(x, y)[c] = static_cast<float>(m.std_error);
       }
+    }
   return result;
 }
 

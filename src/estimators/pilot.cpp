@@ -14,8 +14,9 @@ Rgb load_rgb(const Planes& p, int x, int y) {
   return {load(p.row(0, y) + x), load(p.row(1, y) + x), load(p.row(2, y) + x)};
 }
 
-/// Cross-bilateral mean of `image` at (x + lane, y).
-Rgb guided_mean(const Moments& g, const Planes& image, int radius, int x, int y) {
+/// Cross-bilateral mean of `image` at (x + lane, y), weighted by `counts` unless null.
+template <bool kCounted>
+Rgb guided_mean(const Moments& g, const Planes& image, const Planes* counts, int radius, int x, int y) {
   const Rgb centre = load_rgb(g.mean, x, y), variance = load_rgb(g.variance_of_mean, x, y);
   const vfloat inverse_bandwidth = -1.0f / max(variance.r + variance.g + variance.b, splat(1e-30f));
   vfloat weights = {};
@@ -24,13 +25,14 @@ Rgb guided_mean(const Moments& g, const Planes& image, int radius, int x, int y)
     for (int dx = -radius; dx <= radius; ++dx) {
       const Rgb q = load_rgb(g.mean, x + dx, y + dy), v = load_rgb(image, x + dx, y + dy);
       const vfloat dr = q.r - centre.r, dg = q.g - centre.g, db = q.b - centre.b;
-      const vfloat w = exp_of_nonpositive((dr * dr + dg * dg + db * db) * inverse_bandwidth);
+      vfloat w = exp_of_nonpositive((dr * dr + dg * dg + db * db) * inverse_bandwidth);
+      if constexpr (kCounted) w *= load(counts->row(0, y + dy) + x + dx);
       weights += w;
       sum.r += w * v.r;
       sum.g += w * v.g;
       sum.b += w * v.b;
     }
-  const vfloat inverse = 1.0f / weights;  // the pixel itself has weight 1
+  const vfloat inverse = 1.0f / weights;  // the pixel itself has weight 1, or its count
   return {sum.r * inverse, sum.g * inverse, sum.b * inverse};
 }
 
@@ -48,19 +50,26 @@ void store_rgb(Planes& planes, int x, int y, int n, const Rgb& values) {
 
 }  // namespace
 
-Planes pilot_error(const Moments& g, const Planes& h, int window, bool smoothed, int border) {
-  const int radius = window / 2, width = h.width(), height = h.height();
+Planes pilot_error(const Moments& g, const Moments& h, int window, bool smoothed, int border) {
+  const int radius = window / 2, width = h.mean.width(), height = h.mean.height();
+  const Planes* counts = h.relative_count ? &*h.relative_count : nullptr;
   // Smoothing reads windows of the squares; outside the frame its weights are zero, and the values must be finite.
   Planes squares(width, height, 3, smoothed ? radius : border, smoothed ? 0.0f : kUseless);
   for_each_batch(width, height, [&](int x, int y, int n) {
-    const Rgb pilot = guided_mean(g, h, radius, x, y), value = load_rgb(h, x, y);
+    const Rgb pilot = counts ? guided_mean<true>(g, h.mean, counts, radius, x, y)
+                             : guided_mean<false>(g, h.mean, nullptr, radius, x, y);
+    const Rgb value = load_rgb(h.mean, x, y);
     const vfloat r = pilot.r - value.r, gg = pilot.g - value.g, b = pilot.b - value.b;
-    store_rgb(squares, x, y, n, {r * r, gg * gg, b * b});
+    const vfloat count = counts && smoothed ? load(counts->row(0, y) + x) : splat(1.0f);
+    store_rgb(squares, x, y, n, {r * r * count, gg * gg * count, b * b * count});
   });
   if (!smoothed) return squares;
   Planes result(width, height, 3, border, kUseless);
-  for_each_batch(width, height,
-                 [&](int x, int y, int n) { store_rgb(result, x, y, n, guided_mean(g, squares, radius, x, y)); });
+  for_each_batch(width, height, [&](int x, int y, int n) {
+    const Rgb mean = guided_mean<false>(g, squares, nullptr, radius, x, y);
+    const vfloat count = counts ? load(counts->row(0, y) + x) : splat(1.0f);
+    store_rgb(result, x, y, n, {mean.r / count, mean.g / count, mean.b / count});
+  });
   return result;
 }
 

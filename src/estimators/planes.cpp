@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <numeric>
 
 #include "core/parallel.h"
+#include "film/groups.h"
 
 namespace covary {
 
@@ -37,26 +39,75 @@ std::vector<unsigned char> finite_pixels(const GroupedImage& a, const GroupedIma
   return valid;
 }
 
+namespace {
+
+/// Mean of the groups first, first + step, … of one pixel and its variance, per channel.
+struct PixelMoments {
+  float mean[3] = {}, variance[3] = {};
+};
+
+/// Groups of equal sizes.
+PixelMoments equal_moments(const float* p, int groups, int first, int step) {
+  const int n = (groups - first + step - 1) / step;
+  PixelMoments m;
+  float squares[3] = {};
+  for (int t = first; t < groups; t += step)
+    for (int c = 0; c < 3; ++c) m.mean[c] += p[3 * t + c];
+  for (float& s : m.mean) s /= static_cast<float>(n);
+  for (int t = first; t < groups; t += step)
+    for (int c = 0; c < 3; ++c) squares[c] += (p[3 * t + c] - m.mean[c]) * (p[3 * t + c] - m.mean[c]);
+  for (int c = 0; c < 3; ++c)
+    m.variance[c] = n > 1 ? squares[c] / (static_cast<float>(n) * static_cast<float>(n - 1)) : 0.0f;
+  return m;
+}
+
+/// Groups of `count` samples, weighted by their sizes n_t: m = sum n_t m_t / N, sum n_t (m_t - m)^2 / ((n - 1) N).
+PixelMoments weighted_moments(const float* p, int groups, uint32_t count, int first, int step) {
+  const int n = (groups - first + step - 1) / step;
+  const auto size = [&](int t) { return static_cast<float>(group_size(count, groups, t)); };
+  PixelMoments m;
+  float samples = 0, squares[3] = {};
+  for (int t = first; t < groups; t += step) {
+    samples += size(t);
+    for (int c = 0; c < 3; ++c) m.mean[c] += size(t) * p[3 * t + c];
+  }
+  for (float& s : m.mean) s /= samples;
+  for (int t = first; t < groups; t += step)
+    for (int c = 0; c < 3; ++c) squares[c] += size(t) * (p[3 * t + c] - m.mean[c]) * (p[3 * t + c] - m.mean[c]);
+  for (int c = 0; c < 3; ++c) m.variance[c] = n > 1 ? squares[c] / (samples * static_cast<float>(n - 1)) : 0.0f;
+  return m;
+}
+
+/// Moments::relative_count.
+std::optional<Planes> relative_counts(const GroupedImage& image, int border) {
+  if (!image.counts) return std::nullopt;
+  const uint32_t* end = image.counts + static_cast<size_t>(image.width) * image.height;
+  const double mean = image.mean_count > 0
+                          ? image.mean_count
+                          : std::accumulate(image.counts, end, 0.0) / static_cast<double>(end - image.counts);
+  if (std::all_of(image.counts, end, [&](uint32_t n) { return n == mean; })) return std::nullopt;
+  Planes planes(image.width, image.height, 1, border, 1.0f);
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x) planes.row(0, y)[x] = static_cast<float>(image.count(x, y) / mean);
+  return planes;
+}
+
+}  // namespace
+
 Moments moments(const GroupedImage& image, const std::vector<unsigned char>& valid, int border, float outside,
                 int first, int step) {
   Moments m{Planes(image.width, image.height, 3, border, outside),
-            Planes(image.width, image.height, 3, border, kUseless)};
-  const int n = (image.groups - first + step - 1) / step;
+            Planes(image.width, image.height, 3, border, kUseless), relative_counts(image, border)};
   parallel_for(image.height, 8, [&](int y) {
-    float* mean[3] = {m.mean.row(0, y), m.mean.row(1, y), m.mean.row(2, y)};
-    float* variance[3] = {m.variance_of_mean.row(0, y), m.variance_of_mean.row(1, y), m.variance_of_mean.row(2, y)};
     for (int x = 0; x < image.width; ++x) {
       if (!valid[static_cast<size_t>(y) * image.width + x]) continue;
       const float* p = image.pixel(x, y);
-      float sum[3] = {}, squares[3] = {};
-      for (int t = first; t < image.groups; t += step)
-        for (int c = 0; c < 3; ++c) sum[c] += p[3 * t + c];
-      for (float& s : sum) s /= static_cast<float>(n);
-      for (int t = first; t < image.groups; t += step)
-        for (int c = 0; c < 3; ++c) squares[c] += (p[3 * t + c] - sum[c]) * (p[3 * t + c] - sum[c]);
+      const PixelMoments pixel = image.has_equal_groups(x, y)
+                                     ? equal_moments(p, image.groups, first, step)
+                                     : weighted_moments(p, image.groups, image.count(x, y), first, step);
       for (int c = 0; c < 3; ++c) {
-        mean[c][x] = sum[c];
-        variance[c][x] = n > 1 ? squares[c] / (static_cast<float>(n) * static_cast<float>(n - 1)) : 0.0f;
+        m.mean.row(c, y)[x] = pixel.mean[c];
+        m.variance_of_mean.row(c, y)[x] = pixel.variance[c];
       }
     }
   });

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "core/parallel.h"
@@ -51,10 +52,12 @@ inline constexpr float kFar = 1e18f;
 /// Error variance of such pixels: no coefficient.
 inline constexpr float kUseless = 1e30f;
 
-/// Mean and variance of a grouped image as planes.
+/// Mean and variance of a grouped image as planes. Groups of unequal sizes are weighted by them.
 struct Moments {
   Planes mean;              ///< 3 planes; `outside` beyond the frame and at invalid pixels
   Planes variance_of_mean;  ///< 3 planes: sample variance of the groups / T; kUseless outside; zero where T = 1
+  /// 1 plane: samples of the pixel over the image's mean, 1 outside; null where pixels all have the same number.
+  std::optional<Planes> relative_count;
 };
 
 /// Marks pixels whose values are all finite in both images (1) or not (0).

@@ -10,6 +10,8 @@
 // The residuals of such a fit add up to zero, so f = a + sum_i beta_i m_i with the intercept a, and F^ is the integral of
 // the fitted polynomial. That depends on the space of polynomials alone and not on its basis. Ours is of products of
 // Legendre polynomials on [0, 1], orthonormal, which keeps the normal equations well-conditioned; all M_i are zero.
+//
+// It has no groups, and every pixel stands alone: counts may differ between pixels where each has enough samples.
 #pragma once
 
 #include <cstdint>

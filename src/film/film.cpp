@@ -4,10 +4,43 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <limits>
 #include <numeric>
 
+#include "film/groups.h"
+
 namespace covary {
+namespace {
+
+/// From this size of a group on, its mean is rounded up or down in turns.
+constexpr uint32_t kDitheredSize = 4096;
+
+/// A running mean of `size` samples and one more, as float. A sample that differs from a mean of many by little does
+/// not move it to the next float: rounded to the nearest, all such samples would be lost, and rare ones that differ by
+/// more would not. So a large group's mean is rounded up as often as its fraction says, by the multiples of the golden
+/// ratio.
+float rounded(double mean, uint32_t size) {
+  if (size < kDitheredSize) return static_cast<float>(mean);
+  constexpr int kDropped = 29;  // bits that a double has more than a float
+  const uint64_t threshold = (size * 0x9e3779b9u) >> (32 - kDropped);
+  const uint64_t bits = (std::bit_cast<uint64_t>(mean) + threshold) >> kDropped << kDropped;
+  return static_cast<float>(std::bit_cast<double>(bits));
+}
+
+[[noreturn]] void fail_full(uint64_t samples, int x, int y) {
+  throw Error(ErrorCode::kInput, fmt::format("{} samples at pixel ({}, {}); a film holds at most {} per pixel", samples,
+                                             x, y, std::numeric_limits<uint32_t>::max()));
+}
+
+}  // namespace
+
+size_t count_negative_pixels(const Image& image) {
+  size_t count = 0;
+  for (size_t i = 0; i < image.data.size(); i += image.channels)
+    count += std::any_of(&image.data[i], &image.data[i] + image.channels, [](float value) { return value < 0; });
+  return count;
+}
 
 Film::Film(int frame_width, int frame_height, const CropWindow& crop, int groups)
     : frame_width_(frame_width), frame_height_(frame_height), crop_(crop), groups_(groups) {
@@ -35,24 +68,37 @@ Spectrum Film::mean(int x, int y) const {
   const float* p = groups_of(x, y);
   if (groups_ == 1) return {p[0], p[1], p[2]};
   double sum[3] = {0, 0, 0};
+  if (const uint32_t n = count(x, y); n % static_cast<uint32_t>(groups_) != 0) {
+    for (int g = 0; g < groups_ && group_size(n, groups_, g) > 0; ++g)
+      for (int c = 0; c < 3; ++c) sum[c] += static_cast<double>(group_size(n, groups_, g)) * p[g * 3 + c];
+    return {static_cast<float>(sum[0] / n), static_cast<float>(sum[1] / n), static_cast<float>(sum[2] / n)};
+  }
   for (int i = 0; i < groups_ * 3; i += 3)
     for (int c = 0; c < 3; ++c) sum[c] += p[i + c];
   return {static_cast<float>(sum[0] / groups_), static_cast<float>(sum[1] / groups_),
           static_cast<float>(sum[2] / groups_)};
 }
 
-void Film::add(int x, int y, uint32_t added_per_group, std::span<const Spectrum> sums) {
-  COVARY_CHECK(sums.size() == static_cast<size_t>(groups_), "one sum per group");
-  if (added_per_group == 0) return;
+void Film::add(int x, int y, const Spectrum& sample) {
   uint32_t& count = counts_[index(x, y)];
-  const uint64_t total = count + uint64_t{added_per_group} * groups_;
-  if (total > std::numeric_limits<uint32_t>::max())
-    throw Error(ErrorCode::kInput, fmt::format("{} samples at pixel ({}, {}); a film holds at most {} per pixel", total,
-                                               x + crop_.x, y + crop_.y, std::numeric_limits<uint32_t>::max()));
-  const uint32_t per_group = count / static_cast<uint32_t>(groups_);
-  const double before = per_group, after = before + added_per_group;
-  float* means = groups_data_.data() + index(x, y) * groups_ * 3;
-  for (int g = 0; g < groups_; ++g)
+  if (count == std::numeric_limits<uint32_t>::max()) fail_full(uint64_t{count} + 1, x + crop_.x, y + crop_.y);
+  const uint32_t group = count % static_cast<uint32_t>(groups_), size = count / static_cast<uint32_t>(groups_);
+  const double before = size, after = before + 1;
+  float* mean = groups_data_.data() + (index(x, y) * groups_ + group) * 3;
+  for (int c = 0; c < 3; ++c) mean[c] = rounded((before * mean[c] + (&sample.r)[c]) / after, size);
+  ++count;
+}
+
+void Film::add_sums(int x, int y, uint32_t added_per_group, std::span<const Spectrum> sums) {
+  const auto groups = static_cast<uint32_t>(groups_);
+  uint32_t& count = counts_[index(x, y)];
+  COVARY_CHECK(sums.size() == groups && count % groups == 0, "one sum per group, and groups of equal sizes");
+  if (added_per_group == 0) return;
+  const uint64_t total = count + uint64_t{added_per_group} * groups;
+  if (total > std::numeric_limits<uint32_t>::max()) fail_full(total, x + crop_.x, y + crop_.y);
+  const double before = count / groups, after = before + added_per_group;
+  float* means = groups_data_.data() + index(x, y) * groups * 3;
+  for (uint32_t g = 0; g < groups; ++g)
     for (int c = 0; c < 3; ++c) means[g * 3 + c] = static_cast<float>((before * means[g * 3 + c] + sums[g][c]) / after);
   count = static_cast<uint32_t>(total);
 }

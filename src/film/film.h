@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // A film: what a render pass leaves behind. For each pixel the number of samples and the means of T groups of samples,
 // which estimators need to measure variance and covariance; memory does not depend on the number of samples.
+//
+// A pixel may have any number of samples, and pixels need not have the same. Sample s belongs to group s mod T, so that
+// group sizes follow from the count alone and differ by one at most (groups.h).
 #pragma once
 
 #include <cstdint>
@@ -28,6 +31,9 @@ struct Image {
   }
 };
 
+/// Pixels with a value below zero in any channel: linear combinations of images have some.
+size_t count_negative_pixels(const Image& image);
+
 /// Position of an image's pixels in the full frame.
 struct CropWindow {
   int x = 0, y = 0, width = 0, height = 0;
@@ -50,14 +56,20 @@ class Film {
   const CropWindow& crop() const { return crop_; }
   int groups() const { return groups_; }
 
-  /// Samples of the pixel; always a multiple of groups(): all groups of a pixel have the same size.
+  /// Samples of the pixel, all groups together.
   uint32_t count(int x, int y) const { return counts_[index(x, y)]; }
+  /// Zero where the group has no samples.
   Spectrum group_mean(int x, int y, int group) const;
-  /// Mean of all samples.
+  /// Mean of all samples: the groups weighted by their sizes. Zero where there are none.
   Spectrum mean(int x, int y) const;
-  /// Adds `added_per_group` samples to each of the pixel's groups; `sums` holds groups() sums of the new samples.
-  /// Different pixels may be added to from different threads.
-  void add(int x, int y, uint32_t added_per_group, std::span<const Spectrum> sums);
+  /// Adds the next sample of the pixel, number count(x, y), to the group it belongs to. The bits of a pixel follow from
+  /// its samples in their order and from nothing else. Different pixels may be added to from different threads. Throws
+  /// Error(kInput) where the pixel has 2^32 - 1 samples.
+  void add(int x, int y, const Spectrum& sample);
+  /// Adds `added_per_group` samples to each of the pixel's groups, which have equal sizes, in one step: `sums` holds
+  /// groups() sums of them. For layers that sum many samples at once; the bits then depend on their steps. Otherwise
+  /// like add().
+  void add_sums(int x, int y, uint32_t added_per_group, std::span<const Spectrum> sums);
   /// Gives a pixel that has no samples the value that `count` samples together led to. For films with one group.
   void set(int x, int y, uint32_t count, const Spectrum& value);
   /// The T group means of a pixel, contiguous: groups() x RGB.
@@ -85,7 +97,7 @@ class Film {
   CropWindow crop_;
   int groups_ = 1;
   std::vector<uint32_t> counts_;    // per pixel
-  std::vector<float> groups_data_;  // [pixel][group][rgb]
+  std::vector<float> groups_data_;  // [pixel][group][rgb], zero where a group has no samples
 };
 
 /// Names of attributes with a meaning to this module.

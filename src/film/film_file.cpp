@@ -16,12 +16,14 @@ constexpr const char* kPrefix = "covary:";
 constexpr const char* kFormat = "film";  // attribute covary:film, version of the format
 constexpr const char* kFormatVersion = "1";
 constexpr const char* kGroups = "groups";
-constexpr const char* kChecksum = "checksum";  // CRC-32 of counts, group means and auxiliary images
-constexpr const char* kSamples = "samples";    // attribute covary:samples and channel `samples`
+constexpr const char* kChecksum = "checksum";      // CRC-32 of counts, group means and auxiliary images
+constexpr const char* kSamples = "samples";        // attribute covary:samples and channel `samples`
+constexpr const char* kFewest = "samples_fewest";  // of any pixel; only where pixels differ
+constexpr const char* kMost = "samples_most";
 
 /// Attributes that follow from the film's numbers: written, and not kept in Film::attributes when read.
 bool is_derived(const std::string& key) {
-  return key == kFormat || key == kGroups || key == kSamples || key == kChecksum;
+  return key == kFormat || key == kGroups || key == kSamples || key == kFewest || key == kMost || key == kChecksum;
 }
 
 std::string group_name(int group) { return fmt::format("group{:02d}", group); }
@@ -108,6 +110,11 @@ void write_film(const std::string& path, const Film& film) {
   derive(kFormat, kFormatVersion);
   derive(kGroups, fmt::to_string(film.groups()));
   derive(kSamples, fmt::to_string(film.mean_count()));
+  const auto [fewest, most] = std::minmax_element(film.counts().begin(), film.counts().end());
+  if (*fewest < *most) {
+    derive(kFewest, fmt::to_string(*fewest));
+    derive(kMost, fmt::to_string(*most));
+  }
   derive(kChecksum, checksum(film));
 
   Image means = film.groups() > 1 ? film.mean_image() : Image();
@@ -156,12 +163,6 @@ Film read_film(const std::string& path) {
     fail(path, fmt::format("the pixels have the checksum {}, not {} as the attribute covary:checksum says: the file is "
                            "damaged, or another program changed it",
                            found, stored));
-
-  for (int y = 0; y < film.height(); ++y)
-    for (int x = 0; x < film.width(); ++x)
-      if (film.count(x, y) % static_cast<uint32_t>(groups) != 0)
-        fail(path, fmt::format("{} samples at pixel ({}, {}); with {} groups expected is a multiple of {}",
-                               film.count(x, y), film.crop().x + x, film.crop().y + y, groups, groups));
   return film;
 }
 

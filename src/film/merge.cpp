@@ -6,9 +6,11 @@
 #include <algorithm>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <set>
 
 #include "film/film_file.h"
+#include "film/groups.h"
 
 namespace covary {
 namespace {
@@ -96,6 +98,53 @@ Attributes merge_attributes(std::span<const Attributes> films, std::span<const s
   return merged;
 }
 
+/// Sums of n_i m_i for the groups of each pixel.
+class GroupSums {
+ public:
+  /// `before`: samples of each pixel in the films that were added already.
+  void add(const Film& film, std::span<const uint32_t> before) {
+    const int T = film.groups();
+    sums_.resize(film.data().size());
+    for (size_t p = 0; p < before.size(); ++p)
+      for (int g = 0; g < T; ++g) {
+        const size_t from = (p * T + g) * 3, to = (p * T + (before[p] % T + g) % T) * 3;
+        // Times T: where groups have equal sizes, these are the weights of whole pixels.
+        const double weight = static_cast<double>(group_size(film.counts()[p], T, g)) * T;
+        for (size_t c = 0; c < 3; ++c) sums_[to + c] += weight * film.data()[from + c];
+      }
+  }
+  /// Divides by the sizes of the merged groups; groups without samples stay zero.
+  void mean(Film& film) const {
+    const int T = film.groups();
+    for (size_t p = 0; p < film.counts().size(); ++p)
+      for (int g = 0; g < T; ++g) {
+        const double weight = static_cast<double>(group_size(film.counts()[p], T, g)) * T;
+        const size_t at = (p * T + g) * 3;
+        for (size_t c = 0; weight > 0 && c < 3; ++c) film.data()[at + c] = static_cast<float>(sums_[at + c] / weight);
+      }
+  }
+
+ private:
+  std::vector<double> sums_;
+};
+
+/// Groups of pixels of a film of common random numbers must all move by the same number.
+void check_shared_numbers(const Film& film, const Film& merged, const std::string& name) {
+  const auto T = static_cast<uint32_t>(film.groups());
+  std::optional<uint32_t> first;
+  for (size_t p = 0; p < film.counts().size(); ++p) {
+    if (film.counts()[p] == 0) continue;
+    const uint32_t moved = merged.counts()[p] % T;
+    if (first.value_or(moved) != moved)
+      throw Error(ErrorCode::kInput,
+                  fmt::format("films of common random numbers cannot be merged where pixels have different numbers of "
+                              "samples modulo their {} groups, here {} and {} before {} is added: groups of different "
+                              "pixels would not hold the same random numbers any more",
+                              T, *first, moved, name));
+    first = moved;
+  }
+}
+
 /// Sums of n_i m_i for an array with the same number of values for each pixel.
 class WeightedSum {
  public:
@@ -124,7 +173,7 @@ Film merge(std::span<const Attributes> attributes, std::span<const std::string> 
   std::vector<size_t> order;
   Attributes merged_attributes = merge_attributes(attributes, names, order);
   Film merged;
-  WeightedSum groups;
+  GroupSums groups;
   std::map<std::string, WeightedSum> aovs;
   const std::string& first = names[order[0]];
   const auto add = [&](const Film& film, const std::string& name) {
@@ -135,7 +184,8 @@ Film merge(std::span<const Attributes> attributes, std::span<const std::string> 
     check_same("the size", size_text(merged), size_text(film), first, name);
     check_same("the number of groups", fmt::to_string(merged.groups()), fmt::to_string(film.groups()), first, name);
     check_same("the list of auxiliary images", aov_names(merged), aov_names(film), first, name);
-    groups.add(film.data(), film.counts());
+    if (attribute(film.attributes, film_key::kSampling) == "crn") check_shared_numbers(film, merged, name);
+    groups.add(film, merged.counts());
     for (const auto& [aov, image] : film.aovs) aovs[aov].add(image.data, film.counts());
     for (size_t p = 0; p < film.counts().size(); ++p) {
       const uint64_t total = uint64_t{merged.counts()[p]} + film.counts()[p];
@@ -148,7 +198,7 @@ Film merge(std::span<const Attributes> attributes, std::span<const std::string> 
     }
   };
   for (size_t i : order) with_film(i, [&](const Film& film) { add(film, names[i]); });
-  groups.mean(merged.counts(), merged.data());
+  groups.mean(merged);
   for (auto& [aov, image] : merged.aovs) aovs[aov].mean(merged.counts(), image.data);
   merged.attributes = std::move(merged_attributes);
   return merged;

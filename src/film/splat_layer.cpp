@@ -95,7 +95,7 @@ void SplatLayer::add_band(int first_row, int end_row) {
     for (uint32_t g = 0; g < groups; ++g)
       for (int c = 0; c < 3; ++c)
         means[g][c] = static_cast<float>(sums[static_cast<size_t>(pixel - first_pixel) * groups + g][c] / kBundlePaths);
-    film_.add(static_cast<int>(pixel % width), static_cast<int>(pixel / width), (end_ - first_) / groups, means);
+    film_.add_sums(static_cast<int>(pixel % width), static_cast<int>(pixel / width), (end_ - first_) / groups, means);
   }
 }
 

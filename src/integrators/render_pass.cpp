@@ -46,22 +46,27 @@ float interval_to_gaussian(float u, float stddev, float radius) {
   return static_cast<float>(x * stddev * std::sqrt(2.0));
 }
 
+/// Samples begin … end - 1 of the pixel (x, y) of the film are to be taken.
+struct PixelWork {
+  int x, y;
+  uint32_t begin, end;
+};
+
 /// Everything one thread accumulates.
 struct Worker {
   explicit Worker(const Integrator& integrator) : context(integrator), allows_negative(integrator.allows_negative()) {}
 
   PathContext context;
   bool allows_negative;
-  std::vector<Spectrum> sums;
-  std::vector<CameraSample> samples;
+  std::vector<PixelWork> pixels;
+  std::vector<CameraSample> samples;  // of these pixels, one after another
   uint64_t n_samples = 0, n_not_finite = 0, n_negative = 0;
   std::vector<BadSample> bad_samples;
   double seconds = 0, estimate_seconds = 0;  // in tiles, and in settings.estimate
 };
 
 struct Tile {
-  int x0, y0, x1, y1;                                     // in the film
-  int n_pixels() const { return (x1 - x0) * (y1 - y0); }  // at most kTileSize squared
+  int x0, y0, x1, y1;  // in the film
 };
 
 std::vector<Tile> make_tiles(const Film& film) {
@@ -101,49 +106,68 @@ bool is_good(const Spectrum& value, int x, int y, uint64_t sample, Worker& worke
   return false;
 }
 
-/// Takes samples begin … end - 1 of all pixels of a tile, whole pixels together.
-void render_tile(const Scene& scene, const Integrator& integrator, const PassSettings& settings, const Tile& tile,
-                 uint32_t begin, uint32_t end, Film& film, Worker& worker) {
-  const auto groups = static_cast<uint32_t>(film.groups());
-  const int tile_width = tile.x1 - tile.x0, n_pixels = tile.n_pixels();
-  const uint32_t per_pixel = end - begin;
-  const int batch_pixels = std::max(1, kBatchSize / static_cast<int>(per_pixel));
-  worker.sums.resize(groups);
-  for (int first = 0; first < n_pixels; first += batch_pixels) {
-    const int last = std::min(first + batch_pixels, n_pixels);
-    const auto film_x = [&](int pixel) { return tile.x0 + pixel % tile_width; };
-    const auto film_y = [&](int pixel) { return tile.y0 + pixel / tile_width; };
-    const size_t n_samples = static_cast<size_t>(last - first) * per_pixel;
-    worker.samples.resize(n_samples, CameraSample{{}, PathRandom(settings.sampling, 0, 0, 0, 0), {}});
-    CameraSample* next = worker.samples.data();
-    for (int pixel = first; pixel < last; ++pixel)
-      for (uint32_t s = begin; s < end; ++s)
-        make_in_place(*next++, [&] {
-          return camera_sample(scene, settings, film.crop().x + film_x(pixel), film.crop().y + film_y(pixel), s);
-        });
-    for (size_t i = 0; i < n_samples; i += kBatchSize)
-      integrator.trace(scene, std::span(worker.samples).subspan(i, std::min<size_t>(kBatchSize, n_samples - i)),
-                       worker.context);
-
-    CameraSample* sample = worker.samples.data();
-    for (int pixel = first; pixel < last; ++pixel) {
-      const int x = film_x(pixel), y = film_y(pixel);
-      const std::span<const CameraSample> of_pixel(sample, per_pixel);
-      std::fill(worker.sums.begin(), worker.sums.end(), Spectrum(0));
-      for (uint32_t s = begin; s < end; ++s, ++sample) {
-        if (!is_good(sample->radiance, film.crop().x + x, film.crop().y + y, s, worker)) sample->radiance = Spectrum(0);
-        worker.sums[s % groups] += sample->radiance;
-      }
-      if (settings.estimate) {
-        const Stopwatch watch;
-        film.set(x, y, per_pixel, settings.estimate(of_pixel));
-        worker.estimate_seconds += watch.seconds();
-      } else {
-        film.add(x, y, per_pixel / groups, worker.sums);
-      }
-    }
-    worker.n_samples += worker.samples.size();
+/// Up to which sample the pixels of a film are to be taken.
+struct Wave {
+  const SampleTarget& target;
+  uint32_t end;  // no pixel beyond
+  PixelWork work(const Film& film, int x, int y) const {
+    const uint32_t begin = film.count(x, y);
+    return {x, y, begin, std::max(begin, std::min(end, target.at(static_cast<size_t>(y) * film.width() + x)))};
   }
+};
+
+/// Traces the samples of worker.pixels and adds them to the film.
+void trace_pixels(const Scene& scene, const Integrator& integrator, const PassSettings& settings, Film& film,
+                  Worker& worker) {
+  size_t n_samples = 0;
+  for (const PixelWork& pixel : worker.pixels) n_samples += pixel.end - pixel.begin;
+  worker.samples.resize(n_samples, CameraSample{{}, PathRandom(settings.sampling, 0, 0, 0, 0), {}});
+  CameraSample* next = worker.samples.data();
+  for (const PixelWork& pixel : worker.pixels)
+    for (uint32_t s = pixel.begin; s < pixel.end; ++s)
+      make_in_place(
+          *next++, [&] { return camera_sample(scene, settings, film.crop().x + pixel.x, film.crop().y + pixel.y, s); });
+  for (size_t i = 0; i < n_samples; i += kBatchSize)
+    integrator.trace(scene, std::span(worker.samples).subspan(i, std::min<size_t>(kBatchSize, n_samples - i)),
+                     worker.context);
+
+  CameraSample* sample = worker.samples.data();
+  for (const PixelWork& pixel : worker.pixels) {
+    const std::span<const CameraSample> of_pixel(sample, pixel.end - pixel.begin);
+    for (uint32_t s = pixel.begin; s < pixel.end; ++s, ++sample) {
+      if (!is_good(sample->radiance, film.crop().x + pixel.x, film.crop().y + pixel.y, s, worker))
+        sample->radiance = Spectrum(0);
+      if (!settings.estimate) film.add(pixel.x, pixel.y, sample->radiance);
+    }
+    if (!settings.estimate) continue;
+    const Stopwatch watch;
+    film.set(pixel.x, pixel.y, pixel.end, settings.estimate(of_pixel));
+    worker.estimate_seconds += watch.seconds();
+  }
+  worker.n_samples += n_samples;
+}
+
+/// Takes what the wave still wants of a tile, whole pixels together; returns the number of samples.
+uint64_t render_tile(const Scene& scene, const Integrator& integrator, const PassSettings& settings, const Tile& tile,
+                     const Wave& wave, Film& film, Worker& worker) {
+  const uint64_t before = worker.n_samples;
+  size_t n_samples = 0;
+  const auto flush = [&] {
+    if (n_samples > 0) trace_pixels(scene, integrator, settings, film, worker);
+    worker.pixels.clear();
+    n_samples = 0;
+  };
+  for (int y = tile.y0; y < tile.y1; ++y)
+    for (int x = tile.x0; x < tile.x1; ++x) {
+      const PixelWork pixel = wave.work(film, x, y);
+      const size_t n = pixel.end - pixel.begin;
+      if (n == 0) continue;
+      if (n_samples + n > kBatchSize) flush();
+      worker.pixels.push_back(pixel);
+      n_samples += n;
+    }
+  flush();
+  return worker.n_samples - before;
 }
 
 /// Calls render(i) for each of n tiles. A learner gets the tiles' records in their order, some tiles at a time.
@@ -201,21 +225,16 @@ Vec2 film_position(const FilterSettings& filter, int x, int y, const PathRandom&
 
 PassResult render_pass(const Scene& scene, const Integrator& integrator, const PassSettings& settings, Film& film) {
   const Stopwatch watch;
-  COVARY_CHECK(settings.spp % film.groups() == 0, "samples per pixel must be a multiple of the number of groups");
+  COVARY_CHECK(settings.spp.fits(film), "the map of samples has another size than the film");
   COVARY_CHECK(!settings.estimate || film.groups() == 1, "an estimate from all samples of a pixel has no groups");
   COVARY_CHECK(film.frame_width() == scene.camera().width() && film.frame_height() == scene.camera().height(),
                "film and camera differ in size");
   check_learner(integrator, settings, film);
   const std::vector<Tile> tiles = make_tiles(film);
-  const auto count_of = [&](const Tile& tile) { return film.count(tile.x0, tile.y0); };
-
-  uint64_t total = 0;
-  uint32_t fewest = settings.spp;
-  for (const Tile& tile : tiles) {
-    const uint32_t count = std::min(count_of(tile), settings.spp);
-    fewest = std::min(fewest, count);
-    total += uint64_t{settings.spp - count} * static_cast<uint64_t>(tile.n_pixels());
-  }
+  const uint32_t limit = settings.estimate ? UINT32_MAX : settings.limit;
+  const uint32_t largest = std::min(settings.spp.largest(), limit);
+  const uint64_t total = settings.spp.missing(film, limit);
+  uint32_t reached = settings.spp.reached(film);
 
   PerThread<Worker> workers;
   std::atomic<uint64_t> done{0};
@@ -224,29 +243,27 @@ PassResult render_pass(const Scene& scene, const Integrator& integrator, const P
     return out_of_time.load(std::memory_order_relaxed) ||
            (settings.stop && settings.stop->load(std::memory_order_relaxed));
   };
-  // Waves always end at the same counts, so that interrupted and uninterrupted renders add in the same steps. The one
-  // wave of pixels that are estimated is cut into rounds of some time.
-  while (fewest < settings.spp && !ended()) {
-    const uint32_t end = settings.estimate ? settings.spp : std::min(settings.spp, wave_end(fewest, film.groups()));
+  // In waves, so that all pixels advance together. The one wave of pixels that are estimated is cut into rounds of some
+  // time.
+  while (reached < largest && !ended()) {
+    const Wave wave{settings.spp, settings.estimate ? largest : std::min(largest, wave_end(reached, film.groups()))};
     const Stopwatch round_watch;
     std::atomic<bool> round_over{false};
     render_tiles(tiles.size(), settings.learner, integrator, workers, [&](size_t i) {
-      const Tile& tile = tiles[i];
-      const uint32_t begin = count_of(tile);
-      if (begin >= end || ended() || round_over.load(std::memory_order_relaxed)) return;
+      if (ended() || round_over.load(std::memory_order_relaxed)) return;
       Worker& worker = workers.local(integrator);
       const Stopwatch tile_watch;
-      render_tile(scene, integrator, settings, tile, begin, end, film, worker);
+      const uint64_t n_new = render_tile(scene, integrator, settings, tiles[i], wave, film, worker);
+      if (n_new == 0) return;
       worker.seconds += tile_watch.seconds();
       if (settings.estimate && round_watch.seconds() >= kRoundSeconds) round_over = true;
-      const uint64_t n_new = uint64_t{end - begin} * static_cast<uint64_t>(tile.n_pixels());
       const uint64_t now = done.fetch_add(n_new) + n_new;
       if (settings.seconds > 0 && watch.seconds() >= settings.seconds) out_of_time = true;
       if (settings.progress) settings.progress(now, total);
     });
     if (ended()) break;
-    if (!round_over) fewest = end;
-    if (settings.learner) settings.learner->end_wave(end);
+    if (!round_over) reached = wave.end;
+    if (settings.learner) settings.learner->end_wave(wave.end);
     if (settings.checkpoint) settings.checkpoint();
   }
 
@@ -262,8 +279,7 @@ PassResult render_pass(const Scene& scene, const Integrator& integrator, const P
     result.bad_samples.insert(result.bad_samples.end(), worker.bad_samples.begin(), worker.bad_samples.end());
   });
   keep_first(result.bad_samples);
-  result.complete =
-      std::all_of(tiles.begin(), tiles.end(), [&](const Tile& tile) { return count_of(tile) >= settings.spp; });
+  result.complete = settings.spp.missing(film, limit) == 0;
   result.seconds = watch.seconds();
   if (busy_seconds > 0) result.estimate_seconds *= result.seconds / busy_seconds;  // its share of the time
   return result;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // A pass: renders samples of one scene into a film. The film's own counts say what is still to do, so starting,
 // resuming and adding samples are the same operation, and the result has the same bits however the work was split:
-// every sample is a function of its address (core/random.h), and a pixel's samples are added in a fixed order, wave by
-// wave, by whichever thread.
+// every sample is a function of its address (core/random.h), and a pixel's samples are added one by one in their order.
+// Pixels may have and want different numbers of samples.
 #pragma once
 
 #include <atomic>
@@ -13,6 +13,7 @@
 
 #include "film/film.h"
 #include "integrators/integrator.h"
+#include "integrators/sample_target.h"
 
 namespace covary {
 
@@ -25,10 +26,12 @@ struct PassSettings {
   Sampling sampling = Sampling::kIndependent;
   uint64_t seed = 0;
   uint32_t pass = 0;  ///< position in the plan; passes of one plan never share numbers
-  uint32_t spp = 0;   ///< samples per pixel to reach; a multiple of the film's groups
+  SampleTarget spp;   ///< samples per pixel to reach
+  /// No pixel is taken beyond so many samples; what it wants more is left for later calls.
+  uint32_t limit = UINT32_MAX;
   FilterSettings filter;
   /// When set, takes the place of the mean. The samples of a pixel are then taken in one go, and a thread holds all
-  /// spp of them; the film has one group, and its pixels are finished or have no samples.
+  /// spp of them; the film has one group, its pixels are finished or have no samples, and `limit` is not used.
   PixelEstimate estimate;
   /// The integrator of this pass where it is to learn from all of these samples (integrators/training.h), otherwise
   /// null. The film has as many samples in each pixel as were learnt from so far.
@@ -56,12 +59,13 @@ struct PassResult {
   uint64_t n_rays = 0;     ///< camera, BSDF and shadow rays
   uint64_t n_not_finite = 0, n_negative = 0;
   std::vector<BadSample> bad_samples;  ///< the first few, ordered by pixel and sample
-  bool complete = false;               ///< every pixel has settings.spp samples
+  bool complete = false;               ///< every pixel has the smaller of settings.spp and settings.limit
   double seconds = 0;
   double estimate_seconds = 0;  ///< part of `seconds`: what settings.estimate took of the threads' time
 };
 
-/// Renders until every pixel of `film` has settings.spp samples, or time or the stop flag ends it.
+/// Renders until every pixel of `film` has settings.spp samples, at most settings.limit, or time or the stop flag ends
+/// it.
 PassResult render_pass(const Scene& scene, const Integrator& integrator, const PassSettings& settings, Film& film);
 
 /// The value of one sample, with the film position it was taken at: what render_pass() adds for (x, y, sample).

@@ -36,7 +36,7 @@ bool train(const Scene& scene, LearningIntegrator& integrator, const TrainingSet
     pass.learner = &integrator;
     Film film(scene.camera().width(), scene.camera().height(), settings.window, 1);
     render_pass(scene, integrator, pass, film);
-    if (integrator.trained_spp() != pass.spp) return false;
+    if (integrator.trained_spp() != integrator.training_spp()) return false;
   }
   integrator.freeze();
   return true;

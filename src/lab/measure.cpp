@@ -148,6 +148,13 @@ Summary summary_of(const Results& results, size_t method, size_t budget) {
       published_ratio.push_back({cell->published_ratio, kNone, kNone, kNone});
     }
   Summary summary{method, budget};
+  std::vector<double> samples;
+  for (size_t s = 0; s < results.scenes.size(); ++s)
+    if (const Cell* cell = results.find(s, method, budget)) {
+      samples.push_back(cell->samples_per_pixel);
+      summary.equal_sample_normalised = summary.equal_sample_normalised || cell->equal_sample_normalised;
+    }
+  summary.samples_per_pixel = mean(samples);
   summary.equal_sample = geometric_mean(equal_sample);
   summary.equal_time = geometric_mean(equal_time, &summary.n_scenes);  // exists for samples and for seconds
   summary.relmse = geometric_mean(error).value;
@@ -228,7 +235,12 @@ void compare_cells(Results& results) {
       cell.equal_time = errors;
       continue;
     }
-    cell.equal_sample = errors;
+    const double taken = cell.samples_per_pixel, taken_by_base = base->samples_per_pixel;
+    cell.equal_sample_normalised = std::abs(taken - taken_by_base) > kSameSamples * std::min(taken, taken_by_base);
+    cell.equal_sample =
+        cell.equal_sample_normalised
+            ? ratio(*base, cell, [](const RunResult& r) { return r.relmse * r.record.samples_per_pixel; })
+            : errors;
     cell.equal_time = ratio(*base, cell, [](const RunResult& r) { return r.relmse * seconds(r); });
   }
   for (size_t s = 0; s < results.scenes.size(); ++s)
@@ -236,7 +248,14 @@ void compare_cells(Results& results) {
       if (Slope slope = slope_of(results, s, m); std::isfinite(slope.exponent.value)) results.slopes.push_back(slope);
   for (size_t b = 0; b < suite.budgets.size(); ++b)
     for (size_t m = 0; m < suite.methods.size(); ++m)
-      if (Summary summary = summary_of(results, m, b); summary.n_scenes > 0) results.summaries.push_back(summary);
+      if (Summary summary = summary_of(results, m, b); summary.n_scenes > 0) {
+        results.summaries.push_back(summary);
+        if (summary.equal_sample_normalised)
+          results.warnings.push_back(fmt::format(
+              "{} took {:g} samples per pixel and {} another number at {}: their ratio for equal samples is of error × "
+              "samples, as if errors fell like 1 / samples",
+              suite.methods[m].name, summary.samples_per_pixel, suite.baseline, suite.budgets[b].label()));
+      }
 }
 
 }  // namespace covary::lab

@@ -199,6 +199,30 @@ TEST(CompareCells, RatiosAreAgainstTheBaselineWithTheSameBudget) {
   EXPECT_EQ(results.summaries[1].n_scenes, 1u);
 }
 
+/// With 48 samples where the baseline took 32, a third of the error is a half for equal samples.
+TEST(CompareCells, OtherNumbersOfSamplesAreNormalised) {
+  Results results = two_methods({0.3, 0.36, 0.3}, {0.1, 0.12, 0.1});
+  for (Cell& cell : results.cells) {
+    cell.samples_per_pixel = cell.method == 0 ? 32 : 48;
+    for (RunResult& run : cell.runs) run.record.samples_per_pixel = cell.samples_per_pixel;
+  }
+  compare_cells(results);
+  const Cell& cell = *results.find(0, 1, 0);
+  EXPECT_NEAR(cell.equal_sample.value, 2, 1e-9);
+  EXPECT_TRUE(cell.equal_sample_normalised);
+  EXPECT_FALSE(results.find(0, 0, 0)->equal_sample_normalised);
+  EXPECT_TRUE(results.summaries[1].equal_sample_normalised);
+  EXPECT_EQ(results.summaries[1].samples_per_pixel, 48);
+  ASSERT_EQ(results.warnings.size(), 2u) << "for each budget";
+  EXPECT_TRUE(contains(results.warnings[0], "iicv took 48 samples per pixel and pt another number at 24 spp"));
+
+  Results close = two_methods({0.3, 0.36, 0.3}, {0.1, 0.12, 0.1});
+  close.cells[2].samples_per_pixel = 24.2;
+  compare_cells(close);
+  EXPECT_NEAR(close.find(0, 1, 0)->equal_sample.value, 3, 1e-9) << "the same within 1 %";
+  EXPECT_FALSE(close.find(0, 1, 0)->equal_sample_normalised);
+}
+
 /// A run that failed leaves its seed out on both sides, and no ratio where nothing is left.
 TEST(CompareCells, MissingRunsLeaveGaps) {
   Results fewer = two_methods({0.3, 0.6, 0.3}, {0.1, 0.1});

@@ -111,8 +111,9 @@ const std::vector<std::string> kHowMeasured = {
     "noise cancels; the squared bias is the same product over pairs of different seeds. Both can come out negative "
     "where they are "
     "too small to be seen. MAE and FLIP are against the mean of the references and contain its noise.",
-    "Equal samples: error of the baseline over error of the method with the same number of samples. Equal time: the "
-    "same with each "
+    "Equal samples: error of the baseline over error of the method with the same number of samples; where the numbers "
+    "taken differ by more than 1 %, each error is multiplied by its samples, as if errors fell like 1 / samples. Equal "
+    "time: the same with each "
     "error multiplied by the method's time (render, estimate and later steps, without loading), as if errors fell like "
     "1 / time; where "
     "a budget is in seconds, the errors are those of that time."};

@@ -113,6 +113,19 @@ TEST(ReportTables, ColumnsAppearWhereTheyHaveSomethingToSay) {
   EXPECT_TRUE(has(time_table(results, 0), "ratio"));
 }
 
+TEST(ReportTables, ShowTheSamplesThatWereTaken) {
+  Results results = three_cells();
+  results.suite.budgets = {{24, 0}};
+  results.summaries = {{.method = 1, .budget = 0, .samples_per_pixel = 36}};
+  EXPECT_EQ(error_table(results, 0)["columns"][1]["title"], "pt");
+  EXPECT_EQ(error_table(results, 0)["columns"][2]["title"], "iicv (36 spp)");
+  EXPECT_EQ(summary_table(results, 0)["rows"][0]["spp"], 36);
+  EXPECT_FALSE(contains(ratio_table(results, 0)["caption"], "other numbers of samples"));
+  results.cells[1].equal_sample_normalised = true, results.cells[1].samples_per_pixel = 36;
+  EXPECT_TRUE(contains(ratio_table(results, 0)["caption"], "other numbers of samples"));
+  EXPECT_EQ(ratio_table(results, 0)["rows"][1]["spp"], 36);
+}
+
 TEST(ReportTables, PlotsShowPositiveErrorsAndSayWhatTheyShow) {
   Results results = three_cells();
   results.suite.budgets = {{24, 0}, {48, 0}};

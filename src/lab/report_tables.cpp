@@ -41,6 +41,22 @@ bool any_cell(const Results& results, size_t budget, bool (*has)(const Cell&)) {
 
 bool every_cell(const Cell&) { return true; }
 
+/// Title of a method's column, with the samples that it took where that is not the budget.
+std::string method_title(const Results& results, size_t method, size_t budget) {
+  const std::string& name = results.suite.methods[method].name;
+  const double asked = results.suite.budgets[budget].spp;
+  for (const Summary& s : results.summaries)
+    if (s.method == method && s.budget == budget && asked > 0 && s.samples_per_pixel != asked)
+      return fmt::format("{} ({:.4g} spp)", name, s.samples_per_pixel);
+  return name;
+}
+
+/// What a caption adds where ratios for equal samples are of errors at other numbers of samples.
+std::string normalised_note(const Results& results, size_t budget) {
+  const bool any = any_cell(results, budget, [](const Cell& c) { return c.equal_sample_normalised; });
+  return any ? "; where methods took other numbers of samples, equal samples: ratio of error × samples" : "";
+}
+
 /// Rows of the cells at a budget that `use` takes; scene and method come first.
 template <typename Fill>
 Json cell_rows(const Results& results, size_t budget, Fill&& fill, bool (*use)(const Cell&) = every_cell) {
@@ -111,26 +127,28 @@ Json summary_table(const Results& results, size_t budget) {
     published = published || std::isfinite(s.published_ratio);
     rows.push_back({{"method", results.suite.methods[s.method].name},
                     {"n", fmt::format("{}", s.n_scenes)},
+                    {"spp", number(s.samples_per_pixel)},
                     {"relmse", number(s.relmse)},
                     {"sample", value_of(s.equal_sample)},
                     {"time", value_of(s.equal_time)},
                     {"published", number(s.published_ratio)}});
   }
-  Json columns{column("method", "Method", "text"), column("n", "Scenes", "text"),
+  Json columns{column("method", "Method", "text"), column("n", "Scenes", "text"), column("spp", "spp taken", "number"),
                column("relmse", "relMSE", "number", "low")};
   if (samples) columns.push_back(column("sample", "Equal samples", "ratio", "high"));
   if (published) columns.push_back(column("published", "Published", "ratio"));
   columns.push_back(column("time", "Equal time", "ratio", "high"));
-  return table(fmt::format("{}: geometric means over scenes; ratios are error of {} / error of the method",
-                           results.suite.budgets[budget].label(), results.suite.baseline),
-               columns, rows);
+  return table(
+      fmt::format("{}: geometric means over scenes; ratios are error of {} / error of the method{}",
+                  results.suite.budgets[budget].label(), results.suite.baseline, normalised_note(results, budget)),
+      columns, rows);
 }
 
 Json error_table(const Results& results, size_t budget) {
   const Suite& suite = results.suite;
   Json columns = Json::array({column("scene", "Scene", "text")}), rows = Json::array();
   for (size_t m = 0; m < suite.methods.size(); ++m)
-    columns.push_back(column(fmt::format("m{}", m), suite.methods[m].name, "number"));
+    columns.push_back(column(fmt::format("m{}", m), method_title(results, m, budget), "number"));
   for (size_t s = 0; s < suite.scenes.size(); ++s) {
     Json row{{"scene", suite.scenes[s].name}};
     for (size_t m = 0; m < suite.methods.size(); ++m)
@@ -162,18 +180,21 @@ Json ratio_table(const Results& results, size_t budget) {
   const Suite& suite = results.suite;
   const bool samples = suite.budgets[budget].spp > 0;
   const bool published = any_cell(results, budget, [](const Cell& c) { return std::isfinite(c.published_ratio); });
-  Json columns{column("scene", "Scene", "text"), column("method", "Method", "text")};
+  Json columns{column("scene", "Scene", "text"), column("method", "Method", "text"),
+               column("spp", "spp taken", "number")};
   if (samples) columns.push_back(column("sample", "Equal samples", "ratio"));
   if (published) columns.push_back(column("published", "Published", "ratio"));
   columns.push_back(column("time", "Equal time", "ratio"));
   columns.push_back(column("efficiency", "1 / (relMSE × s)", "number"));
   Json rows = cell_rows(results, budget, [](const Cell& cell, Json& row) {
+    row["spp"] = cell.samples_per_pixel;
     row["sample"] = value_of(cell.equal_sample);
     row["published"] = number(cell.published_ratio);
     row["time"] = value_of(cell.equal_time);
     row["efficiency"] = value_of(cell.efficiency);
   });
-  return table(fmt::format("Error of {} / error of the method, {}", suite.baseline, suite.budgets[budget].label()),
+  return table(fmt::format("Error of {} / error of the method, {}{}", suite.baseline, suite.budgets[budget].label(),
+                           normalised_note(results, budget)),
                columns, rows);
 }
 

@@ -76,6 +76,7 @@ Json json_of(const Cell& cell, const Results& results) {
           {"flip", flip},
           {"mean_ratio", json_of(cell.split.mean_ratio)},
           {"equal_sample", json_of(cell.equal_sample)},
+          {"equal_sample_normalised", cell.equal_sample_normalised},
           {"equal_time", json_of(cell.equal_time)},
           {"seconds",
            {{"load", json_of(cell.load_seconds)},
@@ -150,8 +151,10 @@ Json to_json(const Results& results) {
     json["summary"].push_back({{"method", suite.methods[s.method].name},
                                {"budget", json_of(suite.budgets[s.budget])},
                                {"scenes", s.n_scenes},
+                               {"samples_per_pixel", number(s.samples_per_pixel)},
                                {"relmse", number(s.relmse)},
                                {"equal_sample", json_of(s.equal_sample)},
+                               {"equal_sample_normalised", s.equal_sample_normalised},
                                {"equal_time", json_of(s.equal_time)},
                                {"published_ratio", number(s.published_ratio)}});
   for (const Failure& f : results.failures)

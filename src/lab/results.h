@@ -22,6 +22,9 @@ struct RunResult {
   double predicted_relmse = kNone;  ///< from the run's own standard errors, where it has them
 };
 
+/// Numbers of samples that differ by this part at most count as the same.
+inline constexpr double kSameSamples = 0.01;
+
 /// All runs of one scene, method and budget.
 struct Cell {
   size_t scene = 0, method = 0, budget = 0;  ///< indices into the suite
@@ -33,8 +36,10 @@ struct Cell {
   Estimate method_seconds;  ///< render + estimate + then
   double samples_per_pixel = 0, peak_memory_bytes = 0;
   Estimate efficiency;  ///< 1 / (relMSE x method seconds)
-  /// Error of the baseline over error of this method: with the same budget; with the same time.
+  /// Error of the baseline over error of this method: with the same samples; with the same time.
   Estimate equal_sample, equal_time;
+  /// Both took numbers of samples that differ by more than kSameSamples, so that equal_sample compares error x samples.
+  bool equal_sample_normalised = false;
   /// For time budgets: method seconds / budget.
   double time_ratio = kNone;
   Estimate predicted_over_true;  ///< predicted relMSE / relMSE
@@ -70,6 +75,8 @@ struct Slope {
 /// Geometric means over scenes.
 struct Summary {
   size_t method = 0, budget = 0, n_scenes = 0;
+  double samples_per_pixel = kNone;      ///< taken, mean over scenes
+  bool equal_sample_normalised = false;  ///< in any scene
   Estimate equal_sample, equal_time;
   double relmse = kNone, published_ratio = kNone;
 };

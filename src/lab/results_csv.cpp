@@ -52,6 +52,7 @@ void add_cell(Table& table, const Cell& cell) {
   table.add("flip_of_mean", cell.flip_of_mean);
   table.add("mean_ratio", cell.split.mean_ratio);
   table.add("equal_sample", cell.equal_sample);
+  if (cell.equal_sample_normalised) table.add("equal_sample_normalised", 1);
   table.add("equal_time", cell.equal_time);
   table.add("efficiency", cell.efficiency);
   table.add("predicted_over_true", cell.predicted_over_true);

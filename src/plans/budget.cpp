@@ -1,35 +1,37 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "plans/budget.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <numeric>
 
-#include "core/error.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
+#include "film/groups.h"
+#include "plans/render.h"
 
 namespace covary {
 
-int number_of_groups(const std::string& name, std::optional<int> asked, int fewest, double smallest_part,
-                     uint32_t budget) {
-  const auto samples = static_cast<int>(smallest_part * budget);
-  const int groups = asked.value_or(std::clamp(samples, fewest, kUsualGroups));
-  if (groups < fewest)
-    throw Error(ErrorCode::kUsage,
-                fmt::format("{} groups are too few: {} needs at least {} groups to measure how pixels vary together",
-                            groups, name, fewest));
-  return groups;
+std::vector<uint32_t> samples_of_passes(const Shares& shares, uint32_t budget) {
+  return split_samples(budget, shares.parts, shares.fewest);
 }
 
-void set_budget(std::span<const double> parts, uint32_t total, std::span<Pass> passes) {
-  for (size_t i = 0; i < passes.size(); ++i) {
-    const auto groups = static_cast<uint32_t>(passes[i].film.groups());
-    const auto wanted = static_cast<uint32_t>(std::ceil(parts[i] * total - 1e-9));
-    passes[i].settings.spp = (std::max(wanted, 1u) + groups - 1) / groups * groups;
+int number_of_groups(const Shares& shares, const PlanState& state) {
+  constexpr uint32_t kMost = 12;
+  const std::vector<uint32_t> samples = samples_of_passes(shares, state.group_budget);
+  if (state.request.seconds <= 0) return choose_groups(samples);
+  return static_cast<int>(std::min(kMost, *std::min_element(samples.begin(), samples.end())));
+}
+
+void set_budget(const Shares& shares, const PlanState& state, std::span<Pass> passes) {
+  std::vector<uint32_t> samples = samples_of_passes(shares, state.budget);
+  if (state.request.until > 0) {
+    const std::vector<uint32_t> whole = split_into_whole_groups(state.budget, shares.parts, passes[0].film.groups());
+    const uint64_t sum = std::accumulate(whole.begin(), whole.end(), uint64_t{0});
+    if (!state.request.spp || sum <= *state.request.spp) samples = whole;
   }
+  for (size_t i = 0; i < passes.size(); ++i) passes[i].settings.spp = samples[i];
 }
 
 double samples_per_second(const LoadedScene& scene, const Integrator& integrator, const FilterSettings& filter,

@@ -3,25 +3,31 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <span>
-#include <string>
+#include <vector>
 
 #include "plans/plan.h"
 
 namespace covary {
 
-/// Groups of a pass where nothing else is asked for, [YM2025] Sec. 5.
-inline constexpr int kUsualGroups = 12;
+/// How passes share a budget of samples per pixel.
+struct Shares {
+  std::vector<double> parts;  ///< of the passes; they add up to 1
+  /// Samples that each pass takes at least: as many as it has groups, so that each has one.
+  uint32_t fewest = 1;
+};
 
-/// How many groups each pass of an estimator keeps: `asked`, or kUsualGroups, or as many as the smallest pass has samples where
-/// these are fewer, at least `fewest`. `smallest_part`: of that pass, of the budget. Throws Error(kUsage) where fewer than
-/// `fewest` are asked for; `name` is the estimator's.
-int number_of_groups(const std::string& name, std::optional<int> asked, int fewest, double smallest_part,
-                     uint32_t budget);
+/// Samples per pixel of each pass that add up to `budget`, or more where that is less than the passes need.
+std::vector<uint32_t> samples_of_passes(const Shares& shares, uint32_t budget);
 
-/// Sets the samples per pixel of each pass for a budget of `total`, rounded up to whole groups. `parts`: of the passes.
-void set_budget(std::span<const double> parts, uint32_t total, std::span<Pass> passes);
+/// How many groups each pass keeps that the estimator reads, where nobody asked for a number: choose_groups() of
+/// film/groups.h for the state's group_budget. With a limit of time, when the number of samples is only known roughly
+/// and nothing is gained by a divisor of it: 12, or fewer where there are fewer samples.
+int number_of_groups(const Shares& shares, const PlanState& state);
+
+/// Sets the samples per pixel of each pass for the state's budget: exactly, or on the way to a wanted error, which asks
+/// for no number, rounded up to whole groups unless that is more than the request allows.
+void set_budget(const Shares& shares, const PlanState& state, std::span<Pass> passes);
 
 /// Samples per second, from trials all over the window: some ten milliseconds.
 double samples_per_second(const LoadedScene& scene, const Integrator& integrator, const FilterSettings& filter,

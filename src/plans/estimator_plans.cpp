@@ -33,9 +33,17 @@ EstimatorResult mean_of_first(std::span<const Pass> passes, int first_row, int n
   return mean_of_groups(rows_of(passes[0].film, first_row, n_rows));
 }
 
+/// A single pass of `groups` groups takes the whole budget.
+Shares whole_budget(int groups) { return {{1.0}, static_cast<uint32_t>(groups)}; }
+
 void set_only_target(const PlanState& state, std::span<Pass> passes) {
-  const double all[] = {1.0};
-  set_budget(all, state.budget, passes);
+  set_budget(whole_budget(passes[0].plan.groups), state, passes);
+}
+
+/// The same for all methods, so that they can share films: at least four groups, which each of them can use.
+Shares shares_of(const PairMethod& method) {
+  constexpr int kEnough = 4;
+  return {{method.split.begin(), method.split.end()}, static_cast<uint32_t>(method.groups.value_or(kEnough))};
 }
 
 }  // namespace
@@ -50,8 +58,10 @@ Plan plain_plan(Sampling sampling, std::optional<int> groups) {
     PassPlan pass;
     pass.name = sampling == Sampling::kCrn ? "crn" : "independent";
     pass.sampling = sampling;
-    pass.groups = groups.value_or(sampling == Sampling::kCrn || state.request.until > 0 ? kUsualGroups : 1);
-    pass.fewest_groups = groups ? 0 : 1;
+    const bool reads_groups = sampling == Sampling::kCrn || state.request.until > 0;
+    const int fewest = state.request.until > 0 ? 2 : 1;  // for its error
+    pass.groups = groups.value_or(reads_groups ? number_of_groups(whole_budget(fewest), state) : 1);
+    pass.fewest_groups = groups ? 0 : fewest;
     return std::vector{pass};
   };
   phase.set_targets = set_only_target;
@@ -94,8 +104,11 @@ Plan pair_plan(const PairMethod& method) {
   };
   Phase phase;
   phase.passes = [method](const PlanState& state) {
-    const double smaller = std::min(method.split[0], method.split[1]);
-    const int groups = number_of_groups(method.name, method.groups, method.fewest_groups, smaller, state.group_budget);
+    const int groups = method.groups.value_or(number_of_groups(shares_of(method), state));
+    if (groups < method.fewest_groups)
+      throw Error(ErrorCode::kUsage, fmt::format("{} groups are too few: {} needs at least {} groups to measure how "
+                                                 "pixels vary together",
+                                                 groups, method.name, method.fewest_groups));
     std::vector<PassPlan> passes(2);
     passes[0].name = "crn", passes[0].sampling = Sampling::kCrn;
     passes[1].name = "independent";
@@ -105,8 +118,8 @@ Plan pair_plan(const PairMethod& method) {
     }
     return passes;
   };
-  phase.set_targets = [split = method.split](const PlanState& state, std::span<Pass> passes) {
-    set_budget(split, state.budget, passes);
+  phase.set_targets = [shares = shares_of(method)](const PlanState& state, std::span<Pass> passes) {
+    set_budget(shares, state, passes);
   };
   plan.phases = {phase};
   return plan;

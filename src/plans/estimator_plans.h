@@ -12,8 +12,8 @@
 
 namespace covary {
 
-/// One pass whose film is the result. `groups`: default 12 for common random numbers and for a render to a wanted error, which
-/// is read from the groups, otherwise 1.
+/// One pass whose film is the result. `groups`: by default as number_of_groups() of budget.h has it for common random
+/// numbers and for a render to a wanted error, which is read from the groups, otherwise 1.
 Plan plain_plan(Sampling sampling, std::optional<int> groups = {});
 
 /// One independent pass, whose pixels are polynomials fitted to all their samples (estimators/polynomials.h). `text`: the
@@ -26,8 +26,9 @@ struct PairMethod {
   std::string estimator;  ///< with its options, for the image's attribute
   /// Parts of the samples for the CRN and the independent pass; they add up to 1.
   std::array<double, 2> split = {0.5, 0.5};
-  std::optional<int> groups;  ///< of each pass; default: 12, fewer where there are fewer samples
-  int fewest_groups = 3;      ///< that the estimator works with
+  /// Of each pass; default: number_of_groups() of budget.h, 4 to 12. A pass takes at least one sample for each.
+  std::optional<int> groups;
+  int fewest_groups = 3;  ///< that the estimator works with
   bool predicts_error = false;
   /// `crn_samples`: samples per pixel of the CRN image.
   std::function<EstimatorResult(const GroupedImage& crn, const GroupedImage& independent, int64_t crn_samples)>

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -68,14 +67,13 @@ void resume(const RenderRequest& request, Pass& pass) {
   };
   if (frame_text(film) != frame_text(empty)) differs("frame", frame_text(film), frame_text(empty));
   const int fewest = pass.plan.fewest_groups;
-  const bool any_groups = request.seconds > 0 && fewest > 0 && film.groups() >= fewest;
+  const bool any_groups = fewest > 0 && film.groups() >= fewest;
   if (film.groups() != empty.groups() && !any_groups)
     differs("groups", std::to_string(film.groups()), std::to_string(empty.groups()));
   for (const char* key : {film_key::kSceneHash, film_key::kSampling, film_key::kSeed, film_key::kSettings})
     if (film.attributes[key] != empty.attributes.at(key)) differs(key, film.attributes[key], empty.attributes.at(key));
   film.attributes = empty.attributes;
   film.aovs.clear();
-  pass.count = *std::min_element(film.counts().begin(), film.counts().end());
   if (!request.passes.empty() && fs::exists(costs_path(pass))) read_costs(pass);
 }
 

@@ -17,28 +17,21 @@ void add(const PassResult& from, PassResult& to) {
 }
 
 /// Part of the pass that is done.
-double fraction(const Pass& pass) { return static_cast<double>(pass.count) / pass.settings.spp; }
-
-uint64_t samples_left(const Pass& pass) {
-  uint64_t left = 0;
-  for (uint32_t count : pass.film.counts()) left += pass.settings.spp - std::min(count, pass.settings.spp);
-  return left;
-}
+double fraction(const Pass& pass) { return static_cast<double>(pass.count) / pass.settings.spp.largest(); }
 
 }  // namespace
 
 uint64_t render_passes(const Scene& scene, std::span<Pass> passes, const WaveLimits& limits) {
   uint64_t total = 0;
-  for (const Pass& pass : passes) total += samples_left(pass);
+  for (const Pass& pass : passes) total += pass.settings.spp.missing(pass.film);
   uint64_t done = 0;
   const auto stopped = [&] { return limits.stop && limits.stop->load(); };
   for (;;) {
     Pass& pass = *std::min_element(passes.begin(), passes.end(),
                                    [](const Pass& a, const Pass& b) { return fraction(a) < fraction(b); });
-    if (pass.count >= pass.settings.spp || stopped()) return done;
+    if (pass.count >= pass.settings.spp.largest() || stopped()) return done;
     PassSettings wave = pass.settings;
-    wave.spp =
-        wave.estimate ? pass.settings.spp : std::min(pass.settings.spp, wave_end(pass.count, pass.film.groups()));
+    if (!wave.estimate) wave.limit = wave_end(pass.count, pass.film.groups());
     wave.stop = limits.stop;
     wave.checkpoint = wave.estimate ? limits.wave : nullptr;  // that wave is all there is
     wave.progress = [&](uint64_t now, uint64_t) {
@@ -52,8 +45,8 @@ uint64_t render_passes(const Scene& scene, std::span<Pass> passes, const WaveLim
     add(result, pass.result);
     done += result.n_samples;
     if (!result.complete) return done;  // interrupted, or out of time
-    pass.count = wave.spp;
-    pass.result.complete = pass.count >= pass.settings.spp;
+    pass.count = pass.settings.spp.reached(pass.film);
+    pass.result.complete = pass.count >= pass.settings.spp.largest();
     if (limits.wave) limits.wave();
   }
 }

@@ -30,8 +30,8 @@ struct PassPlan {
   uint32_t number = 0;  ///< PassSettings::pass
   Sampling sampling = Sampling::kIndependent;
   int groups = 1;  ///< of the film
-  /// With a time limit the number of groups follows from the speed; a film that is continued may then have any number from
-  /// this on. 0: exactly `groups`.
+  /// The number of groups follows from the samples, or from the speed; a film that is continued may have any number
+  /// from this on. 0: exactly `groups`.
   int fewest_groups = 0;
   PixelEstimate estimate;  ///< PassSettings::estimate
   std::string
@@ -49,7 +49,7 @@ struct Pass {
   PassSettings settings;  ///< spp: samples per pixel to reach
   Film film;
   std::string path;    ///< the file that keeps the film; empty where none does
-  uint32_t count = 0;  ///< samples that every pixel has
+  uint32_t count = 0;  ///< samples that every pixel has which is to have so many
   PassResult result;   ///< of all calls together, earlier ones included where a folder of passes keeps them
 };
 
@@ -76,7 +76,7 @@ struct Phase {
   std::function<void(PlanState&)> prepare;
   /// The passes, at least one. Called once, after prepare().
   std::function<std::vector<PassPlan>(const PlanState&)> passes;
-  /// Says how many samples each pass of the phase is to have for state.budget (settings.spp, a multiple of the film's groups).
+  /// Says how many samples each pass of the phase is to have for state.budget: settings.spp, a number or a map.
   /// Called before the phase is rendered, again each time the budget has grown.
   std::function<void(const PlanState&, std::span<Pass>)> set_targets;
 };
@@ -94,7 +94,7 @@ struct Plan {
   bool groups_follow_speed = false;
 };
 
-/// Group means of some rows of a film.
+/// Group means and counts of some rows of a film.
 GroupedImage rows_of(const Film& film, int first_row, int n_rows);
 
 }  // namespace covary

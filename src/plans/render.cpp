@@ -121,7 +121,7 @@ class PlanRun {
   bool complete() const {
     return first_of_phase_.size() == plan_.phases.size() &&
            std::all_of(state_.passes.begin(), state_.passes.end(),
-                       [](const Pass& p) { return p.count >= p.settings.spp; });
+                       [](const Pass& p) { return p.count >= p.settings.spp.largest(); });
   }
   std::span<Pass> passes_of(size_t phase) {
     const size_t end = phase + 1 < first_of_phase_.size() ? first_of_phase_[phase + 1] : state_.passes.size();
@@ -181,6 +181,7 @@ bool PlanRun::render_phase(size_t index, double share) {
   const std::span<Pass> passes = passes_of(index);
   if (passes.empty()) return false;  // interrupted before its films were made
   phase.set_targets(state_, passes);
+  for (Pass& pass : passes) pass.count = pass.settings.spp.reached(pass.film);
   if (index + 1 == plan_.phases.size() && !timed() && request_.until == 0) warn_of_other_samples(state_.budget);
   WaveLimits limits;
   if (timed()) limits.seconds_left = [this, index, share] { return seconds_left(index, share); };
@@ -242,9 +243,9 @@ void PlanRun::between_waves() {
 
 void PlanRun::warn_of_other_samples(uint32_t asked) const {
   double planned = 0;
-  for (const Pass& pass : state_.passes) planned += pass.settings.spp;
+  for (const Pass& pass : state_.passes) planned += pass.settings.spp.largest();
   if (planned != asked && callbacks_.warning)
-    callbacks_.warning(fmt::format("{:g} samples per pixel instead of {}, so that all {} groups have the same size",
+    callbacks_.warning(fmt::format("{:g} samples per pixel instead of {}: each of {} groups needs one in every pass",
                                    planned, asked, state_.passes[0].film.groups()));
 }
 
@@ -281,7 +282,12 @@ void PlanRun::render_auxiliary_images() {
 }  // namespace
 
 GroupedImage rows_of(const Film& film, int first_row, int n_rows) {
-  return {film.width(), n_rows, film.groups(), film.groups_of(0, first_row)};
+  return {film.width(),
+          n_rows,
+          film.groups(),
+          film.groups_of(0, first_row),
+          film.counts().data() + static_cast<size_t>(first_row) * film.width(),
+          film.mean_count()};
 }
 
 const Pass& PlanState::pass(const std::string& name, uint32_t number) const {

@@ -245,6 +245,71 @@ TEST(Phases, PassesWithoutIdentitiesOfTheirOwnAreRefused) {
   EXPECT_THROW(render(scene, plan, request_of(8)), Error);
 }
 
+/// Samples and groups of each pass.
+std::vector<std::pair<uint32_t, int>> taken(const Plan& plan, const RenderRequest& request) {
+  static const LoadedScene scene = load_room(3, 2);
+  std::vector<std::pair<uint32_t, int>> result;
+  for (const Pass& pass : render(scene, plan, request).passes)
+    result.emplace_back(pass.film.count(2, 1), pass.film.groups());
+  return result;
+}
+
+TEST(Budget, IsTakenToTheSample) {
+  using Taken = std::vector<std::pair<uint32_t, int>>;
+  PairMethod method;
+  method.name = "average", method.estimate = [](const GroupedImage&, const GroupedImage&, int64_t) {
+    return EstimatorResult{Image(3, 2, 3), {}, 0};
+  };
+  const auto pair = [&](uint32_t spp) { return taken(pair_plan(method), request_of(spp)); };
+  EXPECT_EQ(pair(192), (Taken{{96, 12}, {96, 12}}));
+  EXPECT_EQ(pair(96), (Taken{{48, 12}, {48, 12}}));
+  EXPECT_EQ(pair(32), (Taken{{16, 8}, {16, 8}}));
+  EXPECT_EQ(pair(25), (Taken{{13, 12}, {12, 12}}));
+  EXPECT_EQ(pair(9), (Taken{{5, 4}, {4, 4}}));
+  EXPECT_EQ(pair(7), (Taken{{4, 4}, {4, 4}})) << "as few as every method can use";
+  method.fewest_groups = 4;
+  for (uint32_t spp : {6u, 7u, 8u, 9u, 13u, 25u}) {
+    const Taken more = pair(spp);
+    method.fewest_groups = 3;
+    EXPECT_EQ(pair(spp), more) << "methods that share films agree";
+    method.fewest_groups = 4;
+  }
+  method.fewest_groups = 3, method.groups = 3;
+  EXPECT_EQ(pair(7), (Taken{{4, 3}, {3, 3}}));
+  method.split = {0.25, 0.75};
+  EXPECT_EQ(pair(33), (Taken{{8, 3}, {25, 3}}));
+  EXPECT_EQ(taken(plain_plan(Sampling::kIndependent), request_of(7)), (Taken{{7, 1}}));
+  EXPECT_EQ(taken(plain_plan(Sampling::kCrn), request_of(32)), (Taken{{32, 8}}));
+  EXPECT_EQ(taken(plain_plan(Sampling::kCrn), request_of(17)), (Taken{{17, 12}}));
+  EXPECT_EQ(taken(plain_plan(Sampling::kIndependent, 12), request_of(32)), (Taken{{32, 12}}));
+  EXPECT_EQ(taken(plain_plan(Sampling::kIndependent, 12), request_of(7)), (Taken{{12, 12}}));
+}
+
+TEST(Budget, OnTheWayToAnErrorGroupsAreEqualUpToTheLimit) {
+  RenderRequest request = request_of(150);
+  request.until = 1e-9;
+  const auto all = taken(plain_plan(Sampling::kIndependent), request);
+  EXPECT_EQ(all[0], (std::pair<uint32_t, int>{150, 12})) << "the limit itself";
+  request.until = 1e9;
+  request.spp = 95;
+  EXPECT_EQ(taken(plain_plan(Sampling::kIndependent), request)[0], (std::pair<uint32_t, int>{95, 12}));
+}
+
+/// A larger number of samples would have another number of groups, had it been asked for at once.
+TEST(Budget, AContinuedFilmKeepsItsGroups) {
+  const LoadedScene scene = load_room();
+  const TemporaryFolder folder;
+  RenderRequest request = request_of(96);
+  request.passes = folder.file("films");
+  request.resume = true;
+  EXPECT_EQ(render(scene, mean_plan(), request).passes[0].film.groups(), 12);
+  request.spp = 100;
+  const RenderResult more = render(scene, mean_plan(), request);
+  EXPECT_EQ(more.passes[0].film.groups(), 12);
+  EXPECT_EQ(more.passes[0].film.count(7, 7), 50u);
+  EXPECT_EQ(more.passes[1].film.count(7, 7), 50u);
+}
+
 TEST(Budget, FollowsThePredictedError) {
   EXPECT_EQ(next_budget(96, 0.02, 0.01, 1000), 212u) << "1.1 times what 1 / samples says";
   EXPECT_EQ(next_budget(96, 1, 0.01, 1000), 384u) << "at most four times";

@@ -9,6 +9,7 @@ import unittest
 import zlib
 from pathlib import Path
 
+from exr_reader import read_exr
 from exr_writer import HALF, UINT, exr, film
 
 COVARY = os.environ["COVARY"]
@@ -316,14 +317,20 @@ class Damage(CliTest):
             for command in (["info", "huge.exr"], ["convert", "huge.exr", "o.png"]):
                 self.bad(1, "huge.exr: ", *command, preexec_fn=None if "SANITIZED" in os.environ else limits)
 
-    def test_wrong_counts(self):
-        channels = {c: [1] for c in "RGB"} | {f"group{g:02d}.{c}": [1] for g in range(2) for c in "RGB"} | {"samples": [3]}
-        facts = {"film": "1", "groups": "2", "seed": "1", "sampling": "crn", "scene_hash": "abc", "settings": "path"}
-        data = exr(channels, (1, 1), attributes={f"covary:{k}": v for k, v in facts.items()}, types={"samples": UINT})
-        self.write("a.exr", data)
-        self.write("b.exr", film(2, size=(1, 1)))
-        self.bad(1, "a.exr: 3 samples at pixel (0, 0); with 2 groups expected is a multiple of 2",
-                 "merge", "a.exr", "b.exr", "-o", "o.exr")
+    def test_groups_of_unequal_sizes(self):
+        # Groups of 2 and 1 samples with the means 1 and 4, and two samples 5 and 7: the third film sample is the
+        # second's first.
+        for name, seed, n, means in (("a.exr", 1, 3, (1, 4)), ("b.exr", 2, 2, (5, 7))):
+            channels = {c: [0] for c in "RGB"} | {f"group{g:02d}.{c}": [means[g]] for g in range(2) for c in "RGB"}
+            facts = {"film": "1", "groups": "2", "seed": str(seed), "sampling": "crn", "scene_hash": "abc",
+                     "settings": "path"}
+            attributes = {f"covary:{k}": v for k, v in facts.items()}
+            self.write(name, exr(channels | {"samples": [n]}, (1, 1), attributes=attributes, types={"samples": UINT}))
+        self.good("merge", "b.exr", "a.exr", "-o", "o.exr")
+        merged = read_exr((self.path / "o.exr").read_bytes())
+        self.assertEqual(merged["samples"], [5])
+        self.assertEqual((merged["group00.R"], merged["group01.R"]), ([(2 * 1 + 7) / 3], [(4 + 5) / 2]))
+        self.assertAlmostEqual(merged["R"][0], 18 / 5, 6)
 
     def test_other_formats(self):
         for name in ("a.png", "a.hdr", "a.pfm", "a.jpg", "a.tga", "a.xyz"):

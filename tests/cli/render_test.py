@@ -73,9 +73,38 @@ class Plans(RenderTest):
         facts = self.statistics("-o", "a.exr", "--spp", "8")
         self.assertEqual([(p["samples_per_pixel"], p["groups"]) for p in facts["passes"]], [(4, 4), (4, 4)])
         facts = self.statistics("-o", "a.exr", "--spp", "1")
-        self.assertEqual([(p["samples_per_pixel"], p["groups"]) for p in facts["passes"]], [(3, 3), (3, 3)])
-        facts = self.statistics("-o", "a.exr", "--spp", "1", "--estimator", "iduw")
         self.assertEqual([(p["samples_per_pixel"], p["groups"]) for p in facts["passes"]], [(4, 4), (4, 4)])
+        facts = self.statistics("-o", "a.exr", "--spp", "7", "--groups", "3")
+        self.assertEqual([(p["samples_per_pixel"], p["groups"]) for p in facts["passes"]], [(4, 3), (3, 3)])
+
+    def test_samples_are_those_that_were_asked_for(self):
+        for spp, options, passes in (("32", [], [(16, 8), (16, 8)]), ("25", [], [(13, 12), (12, 12)]),
+                                     ("32", ["--sampling", "crn"], [(32, 8)]),
+                                     ("32", ["--estimator", "none"], [(32, 1)]),
+                                     ("32", ["--estimator", "none", "--groups", "12"], [(32, 12)])):
+            facts = self.statistics("-o", "a.exr", "--spp", spp, *options)
+            self.assertEqual([(p["samples_per_pixel"], p["groups"]) for p in facts["passes"]], passes)
+        result = self.good("render", ROOM, *SMALL, "-o", "a.exr", "--spp", "7")
+        self.assertIn("8 samples per pixel instead of 7: each of 4 groups needs one in every pass", result.stderr)
+
+    def test_methods_share_films_of_few_samples(self):
+        for spp in ("6", "7", "9", "13"):
+            self.statistics("-o", "a.exr", "--spp", spp, "--passes", "films" + spp)
+            for estimator in ("iduw", "cv-baseline", "iicv"):
+                facts = self.statistics("-o", "b.exr", "--spp", spp, "--passes", "films" + spp, "--resume", "--estimator",
+                                        estimator)
+            self.same("a.exr", "b.exr")
+
+    def test_any_split_gives_the_bits_of_one_go(self):
+        for options in (["--estimator", "none"], ["--estimator", "none", "--groups", "5"], []):
+            self.statistics("-o", "whole.exr", "--spp", "200", "--passes", "whole", *options)
+            for spp in ("70", "100", "113", "200"):
+                self.statistics("-o", "part.exr", "--spp", spp, "--passes", "part", "--resume", *options,
+                                *([] if options else ["--groups", "10"]))
+            self.same("part.exr", "whole.exr")
+            for folder in ("whole", "part"):
+                for file in (self.path / folder).iterdir():
+                    file.unlink()
 
     def test_until(self):
         facts = self.statistics("-o", "a.exr", "--until", "relmse=0.0015")

@@ -60,7 +60,8 @@ inline Difference compare(const EstimatorResult& fast, const GroupedImage& crn, 
 
 /// The pilot penalty of all pixels of the independent image.
 inline RgbImage pilot_of(const GroupedImage& crn, const GroupedImage& independent, int window) {
-  return pilot_error(crn, map_pixels(independent, [&](int x, int y) { return mean(independent, x, y); }), window);
+  return pilot_error(crn, map_pixels(independent, [&](int x, int y) { return mean(independent, x, y); }), window,
+                     independent);
 }
 
 }  // namespace covary::reference

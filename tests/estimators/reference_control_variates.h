@@ -18,11 +18,19 @@ struct Pixel {
 using Rgb = std::array<double, 3>;
 using RgbImage = std::vector<Rgb>;
 
+/// Size of a group.
+inline double size(const GroupedImage& image, int x, int y, int t) {
+  const double N = image.count(x, y);
+  return std::ceil((N - t) / image.groups);
+}
+
 inline Rgb mean(const GroupedImage& image, int x, int y, int first = 0, int step = 1) {
   Rgb m{};
-  int n = 0;
-  for (int t = first; t < image.groups; t += step, ++n)
-    for (int c = 0; c < 3; ++c) m[c] += image.pixel(x, y)[3 * t + c];
+  double n = 0;
+  for (int t = first; t < image.groups; t += step) {
+    n += size(image, x, y, t);
+    for (int c = 0; c < 3; ++c) m[c] += size(image, x, y, t) * image.pixel(x, y)[3 * t + c];
+  }
   for (double& v : m) v /= n;
   return m;
 }
@@ -30,10 +38,13 @@ inline Rgb mean(const GroupedImage& image, int x, int y, int first = 0, int step
 inline Rgb variance_of_mean(const GroupedImage& image, int x, int y, int first = 0, int step = 1) {
   const Rgb m = mean(image, x, y, first, step);
   Rgb v{};
+  double samples = 0;
   int n = 0;
-  for (int t = first; t < image.groups; t += step, ++n)
-    for (int c = 0; c < 3; ++c) v[c] += std::pow(image.pixel(x, y)[3 * t + c] - m[c], 2);
-  for (double& s : v) s /= n * (n - 1.0);
+  for (int t = first; t < image.groups; t += step, ++n) {
+    samples += size(image, x, y, t);
+    for (int c = 0; c < 3; ++c) v[c] += size(image, x, y, t) * std::pow(image.pixel(x, y)[3 * t + c] - m[c], 2);
+  }
+  for (double& s : v) s /= samples * (n - 1.0);
   return v;
 }
 
@@ -51,8 +62,10 @@ RgbImage map_pixels(const GroupedImage& image, const Function& function) {
   return result;
 }
 
-/// Cross-bilateral mean of `values` at (x, y), guided by the CRN image; the weights of Eq. (11).
-inline Rgb guided_mean(const GroupedImage& crn, const RgbImage& values, int window, int x, int y) {
+/// Cross-bilateral mean of `values` at (x, y), guided by the CRN image; the weights of Eq. (11), times the counts of
+/// the image that values are of.
+inline Rgb guided_mean(const GroupedImage& crn, const RgbImage& values, int window, int x, int y,
+                       const GroupedImage& counted = {}) {
   const int r = window / 2;
   const Rgb centre = mean(crn, x, y), variance = variance_of_mean(crn, x, y);
   const double bandwidth = variance[0] + variance[1] + variance[2];
@@ -60,7 +73,8 @@ inline Rgb guided_mean(const GroupedImage& crn, const RgbImage& values, int wind
   double weights = 0;
   for (int qy = std::max(0, y - r); qy <= std::min(crn.height - 1, y + r); ++qy)
     for (int qx = std::max(0, x - r); qx <= std::min(crn.width - 1, x + r); ++qx) {
-      const double w = std::exp(-distance2(mean(crn, qx, qy), centre) / bandwidth);
+      const double count = counted.counts ? counted.count(qx, qy) : 1;
+      const double w = count * std::exp(-distance2(mean(crn, qx, qy), centre) / bandwidth);
       weights += w;
       for (int c = 0; c < 3; ++c) sum[c] += w * values[qy * crn.width + qx][c];
     }
@@ -68,10 +82,10 @@ inline Rgb guided_mean(const GroupedImage& crn, const RgbImage& values, int wind
   return sum;
 }
 
-/// Eq. (11) for the mean image `h`.
-inline RgbImage pilot_error(const GroupedImage& crn, const RgbImage& h, int window) {
+/// Eq. (11) for the mean image `h`, of `counted` where that has counts.
+inline RgbImage pilot_error(const GroupedImage& crn, const RgbImage& h, int window, const GroupedImage& counted = {}) {
   return map_pixels(crn, [&](int x, int y) {
-    Rgb e = guided_mean(crn, h, window, x, y);
+    Rgb e = guided_mean(crn, h, window, x, y, counted);
     for (int c = 0; c < 3; ++c) e[c] = std::pow(e[c] - h[y * crn.width + x][c], 2);
     return e;
   });
@@ -100,11 +114,14 @@ inline Result control_variates(const GroupedImage& crn, const RgbImage& h, const
   for (int c = 0; c < 3; ++c) {
     X[c].resize(T, k);
     y[c].resize(T);
+    // Rows of equal variance.
+    const auto centred = [&](Pixel p, int t) {
+      const double weight = size(crn, p.x, p.y, t) * T / crn.count(p.x, p.y);
+      return std::sqrt(weight) * (crn.pixel(p.x, p.y)[3 * t + c] - mean(crn, p.x, p.y)[c]);
+    };
     for (int t = 0; t < T; ++t) {
-      y[c](t) = crn.pixel(target.x, target.y)[3 * t + c] - mean(crn, target.x, target.y)[c];
-      for (int i = 0; i < k; ++i)
-        X[c](t, i) =
-            crn.pixel(neighbours[i].x, neighbours[i].y)[3 * t + c] - mean(crn, neighbours[i].x, neighbours[i].y)[c];
+      y[c](t) = centred(target, t);
+      for (int i = 0; i < k; ++i) X[c](t, i) = centred(neighbours[i], t);
     }
   }
   // V_h for the groups: a group mean has T times the variance of the mean. It is not taken to be smaller than a small part

@@ -14,7 +14,8 @@ namespace covary::test {
 struct Grouped {
   int width, height, groups;
   std::vector<float> data;
-  GroupedImage view() const { return {width, height, groups, data.data()}; }
+  std::vector<uint32_t> counts = {};  // empty: the same everywhere
+  GroupedImage view() const { return {width, height, groups, data.data(), counts.empty() ? nullptr : counts.data()}; }
   float* pixel(int x, int y) { return data.data() + (static_cast<size_t>(y) * width + x) * groups * 3; }
 };
 

@@ -2,6 +2,7 @@
 // The same scene, seed and settings give the same bits: for any number of threads, any crop, any interruption.
 #include <tbb/global_control.h>
 
+#include <numeric>
 #include <random>
 #include <thread>
 
@@ -86,6 +87,111 @@ TEST(Determinism, TwentyInterruptions) {
   }
   EXPECT_EQ(interruptions, 20);
   EXPECT_TRUE(same_bits(film, whole));
+}
+
+/// What a sample of the stand-in below is worth: many digits, so that any other order of additions shows.
+Spectrum value_of(const CameraSample& sample) {
+  const Vec2 u = sample.random.get_2d(1, Event::kLightPosition);
+  return Spectrum(1 / (u.x + 1e-3f), u.y, sample.random.get_1d(1, Event::kLobe) / 3);
+}
+
+/// An integrator that traces nothing, for tests of how samples reach the film.
+class Numbers final : public Integrator {
+ public:
+  void trace(const Scene&, std::span<CameraSample> samples, PathContext&) const override {
+    for (CameraSample& sample : samples) sample.radiance = value_of(sample);
+  }
+  std::string description() const override { return "numbers"; }
+};
+
+/// A map of counts that looks like noise, 0 … most.
+std::vector<uint32_t> uneven_map(const Film& film, uint32_t most) {
+  std::vector<uint32_t> map(film.counts().size());
+  for (size_t i = 0; i < map.size(); ++i) map[i] = static_cast<uint32_t>(mix64(i) % (most + 1));
+  return map;
+}
+
+// However many groups, however large the steps, and wherever a wave is cut.
+TEST(Determinism, AnySplitGivesTheBitsOfOneGo) {
+  const TestScene scene = load_room(40, 21);
+  const Numbers numbers;
+  for (const int groups : {1, 2, 3, 5, 12}) {
+    PassSettings settings = pass(scene, Sampling::kIndependent, 200);
+    Film whole = new_film(scene, groups);
+    for (const bool map : {false, true}) {
+      if (map) settings.spp = SampleTarget(uneven_map(whole, 200)), whole = new_film(scene, groups);
+      EXPECT_TRUE(render_pass(scene.scene(), numbers, settings, whole).complete);
+      for (size_t i = 0; i < whole.counts().size(); ++i) ASSERT_EQ(whole.counts()[i], settings.spp.at(i));
+      for (const std::vector<uint32_t>& steps :
+           std::vector<std::vector<uint32_t>>{{100}, {1, 2, 3, 5, 7, 11, 13, 17}, {199}, {25, 96, 97, 150}, {16, 17}}) {
+        Film film = new_film(scene, groups);
+        for (uint32_t limit : steps) {
+          settings.limit = limit;
+          EXPECT_TRUE(render_pass(scene.scene(), numbers, settings, film).complete);
+          for (size_t i = 0; i < film.counts().size(); ++i)
+            ASSERT_EQ(film.counts()[i], std::min(limit, settings.spp.at(i)));
+        }
+        settings.limit = UINT32_MAX;
+        render_pass(scene.scene(), numbers, settings, film);
+        EXPECT_TRUE(same_bits(film, whole)) << groups << " groups, first step " << steps[0];
+      }
+    }
+  }
+}
+
+// Stopped in the middle of waves, with counts that differ from pixel to pixel.
+TEST(Determinism, StopsInWavesOfAMapLeaveTheBits) {
+  const TestScene scene = load_room(70, 45);
+  const Numbers numbers;
+  for (const int groups : {1, 3, 12}) {
+    PassSettings settings = pass(scene, Sampling::kCrn, 0);
+    Film whole = new_film(scene, groups), film = whole;
+    settings.spp = SampleTarget(uneven_map(whole, 90));
+    uint64_t total = 0, last = 0;
+    settings.progress = [&](uint64_t done, uint64_t of) { last = std::max(last, done), total = of; };
+    const tbb::global_control control(tbb::global_control::max_allowed_parallelism, 1);
+    EXPECT_EQ(render_pass(scene.scene(), numbers, settings, whole).n_samples, total);
+    EXPECT_EQ(last, total);
+    EXPECT_EQ(total, std::accumulate(whole.counts().begin(), whole.counts().end(), uint64_t{0}));
+
+    std::mt19937 random(5);
+    uint64_t n_samples = 0;
+    for (bool complete = false; !complete;) {
+      std::atomic<bool> stop{false};
+      int left = 1 + static_cast<int>(random() % 25);
+      settings.stop = &stop;
+      settings.progress = [&](uint64_t, uint64_t of) {
+        EXPECT_EQ(of, total - n_samples) << "what was still to be done when the call began";
+        if (--left <= 0) stop = true;
+      };
+      const PassResult result = render_pass(scene.scene(), numbers, settings, film);
+      n_samples += result.n_samples;
+      complete = result.complete;
+    }
+    EXPECT_EQ(n_samples, total);
+    EXPECT_TRUE(same_bits(film, whole)) << groups;
+  }
+}
+
+TEST(Determinism, AMapsPixelsAreThoseOfUniformFilms) {
+  const TestScene scene = load_room(33, 20);
+  Film film = new_film(scene, 5);
+  PassSettings settings = pass(scene, Sampling::kIndependent, 0);
+  settings.spp = SampleTarget(uneven_map(film, 12));
+  EXPECT_TRUE(render_pass(scene.scene(), scene.integrator(), settings, film).complete);
+  for (uint32_t spp : {1u, 7u, 12u}) {
+    const Film uniform = render(scene, spp, 7, Sampling::kIndependent, 5);
+    for (int y = 0; y < 20; ++y)
+      for (int x = 0; x < 33; ++x) {
+        if (film.count(x, y) != spp) continue;
+        ASSERT_EQ(film.mean(x, y), uniform.mean(x, y));
+        for (int g = 0; g < 5; ++g) ASSERT_EQ(film.group_mean(x, y, g), uniform.group_mean(x, y, g));
+      }
+  }
+  Film other(33, 20, {3, 2, 10, 10}, 5);
+  EXPECT_TRUE(test_support::contains(
+      test_support::message_of([&] { render_pass(scene.scene(), scene.integrator(), settings, other); }),
+      "another size than the film"));
 }
 
 TEST(Determinism, WavesDoubleUntilAboutSixteenSamples) {

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "film/groups.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace covary {
+
+int choose_groups(std::span<const uint32_t> counts) {
+  constexpr uint32_t kMost = 12, kFewestEqual = 8;
+  for (uint32_t groups = kMost; groups >= kFewestEqual; --groups)
+    if (std::all_of(counts.begin(), counts.end(), [&](uint32_t n) { return n > 0 && n % groups == 0; }))
+      return static_cast<int>(groups);
+  uint32_t groups = kMost;
+  for (uint32_t n : counts) groups = std::min(groups, n);
+  return static_cast<int>(std::max(groups, 1u));
+}
+
+std::vector<uint32_t> split_samples(uint32_t total, std::span<const double> parts, uint32_t fewest) {
+  std::vector<uint32_t> samples;
+  double parts_left = std::accumulate(parts.begin(), parts.end(), 0.0);
+  uint64_t left = total;
+  for (size_t i = 0; i < parts.size(); ++i) {
+    // Enough must be left for the rest. 1e-9: parts are rounded.
+    const uint64_t later = uint64_t{fewest} * (parts.size() - 1 - i);
+    const uint64_t most = std::max<uint64_t>(left > later ? left - later : 0, fewest);
+    const auto share = static_cast<uint64_t>(static_cast<double>(left) * parts[i] / parts_left + 0.5 + 1e-9);
+    const uint64_t n = i + 1 == parts.size() ? most : std::clamp<uint64_t>(share, fewest, most);
+    samples.push_back(static_cast<uint32_t>(n));
+    left -= std::min(n, left);
+    parts_left -= parts[i];
+  }
+  return samples;
+}
+
+std::vector<uint32_t> split_into_whole_groups(uint32_t total, std::span<const double> parts, int groups) {
+  const auto T = static_cast<uint32_t>(groups);
+  std::vector<uint32_t> samples;
+  for (double part : parts) {
+    const auto share = static_cast<uint32_t>(std::ceil(part * total - 1e-9));
+    samples.push_back((std::max(share, 1u) + T - 1) / T * T);
+  }
+  return samples;
+}
+
+}  // namespace covary
