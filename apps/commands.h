@@ -6,6 +6,8 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
+#include "core/error.h"
+
 namespace covary {
 
 void add_render(CLI::App& app);
@@ -18,6 +20,18 @@ void add_denoise(CLI::App& app);
 void add_experiment(CLI::App& app);
 void add_view(CLI::App& app);
 void add_help(CLI::App& app);
+
+/// Work that ended before it was as wanted; what there is was written. Exit codes: 3 for a wanted error that was not
+/// reached, after a signal 128 + its number, as shells have it (130 for Ctrl-C).
+class Unfinished : public Error {
+ public:
+  Unfinished(int exit_code, const std::string& message) : Error(ErrorCode::kIo, message), exit_code_(exit_code) {}
+  int exit_code() const { return exit_code_; }
+
+ private:
+  int exit_code_;
+};
+inline constexpr int kTargetMissed = 3;
 
 /// The command line as given, with quotes where a shell needs them; for the `command` attribute of films.
 const std::string& command_line();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The `covary` program. Exit codes: 0 done, 1 failed, 2 wrong usage.
+// The `covary` program. Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but not as well as wanted (--until), and
+// after a signal 128 + its number: 130 for Ctrl-C.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -22,10 +23,10 @@ namespace {
 std::string g_command_line;
 
 int report(const char* program, const Error& error) {
-  const bool usage = error.code() == ErrorCode::kUsage;
   std::fprintf(stderr, "%s: %s%s\n", program, error.code() == ErrorCode::kInternal ? "internal error: " : "",
                error.what());
-  return usage ? 2 : 1;
+  if (const auto* unfinished = dynamic_cast<const Unfinished*>(&error)) return unfinished->exit_code();
+  return error.code() == ErrorCode::kUsage ? 2 : 1;
 }
 
 /// Long options of `command` that `given` may have been meant to be: misspelt or cut short. Compared without dashes, which

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -61,6 +62,17 @@ FilterSettings filter_named(const std::string& name) {
 }
 
 namespace {
+
+/// A finite number of seconds from `lowest` on, which is 0 or the smallest number above it.
+CLI::Validator duration(double lowest) {
+  const auto check = [lowest](const std::string& text) -> std::string {
+    double value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error == std::errc() && end == text.data() + text.size() && std::isfinite(value) && value >= lowest) return "";
+    return fmt::format("'{}': expected a number of seconds {}", text, lowest > 0 ? "above 0" : "from 0 on");
+  };
+  return {check, "", "duration"};
+}
 
 void check_output_writable(const std::string& output) {
   const std::filesystem::path folder = std::filesystem::absolute(output).parent_path();
@@ -131,6 +143,7 @@ Plan make_plan(const RenderOptions& options) {
   method.estimate = [estimator](const GroupedImage& crn, const GroupedImage& independent, int64_t crn_samples) {
     return make_estimator(estimator, predicts_error(estimator.name), crn_samples).apply(crn, independent);
   };
+  method.bytes_per_pixel = make_estimator(estimator, method.predicts_error, 1).bytes_per_pixel;
   return pair_plan(method);
 }
 
@@ -153,6 +166,7 @@ RenderRequest make_request(const RenderOptions& options, const LoadedScene& scen
   request.preview = options.preview;
   request.passes = options.passes;
   request.resume = options.resume;
+  request.overwrite = options.overwrite;
   request.checkpoint_seconds = options.checkpoint_seconds;
   request.attributes = {{film_key::kVersion, COVARY_VERSION}, {film_key::kCommand, command_line()}};
   return request;
@@ -211,12 +225,17 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
   command
       .add_option("--time", o.seconds,
                   "Seconds for rendering and estimating together; loading and writing are not counted")
-      ->check(CLI::PositiveNumber);
-  command.add_option("--passes,--save-passes", o.passes, "Folder that keeps the film of every pass");
-  command.add_flag("--resume", o.resume, "Continue the films of an interrupted render, or those in --passes");
+      ->check(duration(std::numeric_limits<double>::min()));
+  CLI::Option* passes =
+      command.add_option("--passes,--save-passes", o.passes, "Folder that keeps the film of every pass");
+  CLI::Option* resume =
+      command.add_flag("--resume", o.resume, "Continue the films of an interrupted render, or those in --passes");
+  command.add_flag("--overwrite", o.overwrite, "Replace films that are in --passes already")
+      ->excludes(resume)
+      ->needs(passes);
   command.add_option("--checkpoint", o.checkpoint_seconds, "Seconds between writing unfinished films; 0: never")
       ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
+      ->check(duration(0));
   add_define_option(command, o.defines);
   command.add_flag("--aovs", o.aovs, "Add the images Albedo, N (normal) and P (position) to the output");
   command.add_option("--replay", o.replay, "X,Y,SAMPLE[,PASS]: print one sample instead of rendering");

@@ -28,7 +28,7 @@ struct RenderOptions {
   int threads = 0;
   double seconds = 0, checkpoint_seconds = 300;
   int dimensions = PolynomialsOptions().dimensions;
-  bool resume = false, aovs = false, quiet = false, preview = true;
+  bool resume = false, overwrite = false, aovs = false, quiet = false, preview = true;
 
   /// One pass, whose film is the result.
   bool has_one_pass() const { return !combines_pair(estimator.name); }
@@ -38,7 +38,8 @@ struct RenderOptions {
 
 void add_render_options(CLI::App& command, RenderOptions& options);
 
-/// Everything that can be wrong before the scene is loaded, as Error(kUsage); and --sampling alone means a plain render.
+/// Everything that can be wrong before the scene is loaded, as Error(kUsage); and --sampling alone means a plain
+/// render.
 void check_options(RenderOptions& options);
 
 /// The scene, with the integrator that the options choose. Throws Error.

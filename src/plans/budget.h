@@ -14,9 +14,20 @@ namespace covary {
 /// Groups of a pass where nothing else is asked for, [YM2025] Sec. 5.
 inline constexpr int kUsualGroups = 12;
 
-/// How many groups each pass of an estimator keeps: `asked`, or kUsualGroups, or as many as the smallest pass has samples where
-/// these are fewer, at least `fewest`. `smallest_part`: of that pass, of the budget. Throws Error(kUsage) where fewer than
-/// `fewest` are asked for; `name` is the estimator's.
+/// Samples per pixel that no render exceeds.
+inline constexpr uint32_t kMaxBudget = 1u << 30;
+
+/// The part of the frame that is rendered. Throws Error(kUsage) where the request's is not inside the frame.
+CropWindow window_of(const LoadedScene& scene, const RenderRequest& request);
+
+/// The most samples per pixel of all passes together that may be taken.
+uint32_t largest_budget(const LoadedScene& scene, const RenderRequest& request);
+/// Those to begin with, before a wanted error is looked at for the first time.
+uint32_t first_budget(const LoadedScene& scene, const RenderRequest& request);
+
+/// How many groups each pass of an estimator keeps: `asked`, or kUsualGroups, or as many as the smallest pass has
+/// samples where these are fewer, at least `fewest`. `smallest_part`: of that pass, of the budget. Throws Error(kUsage)
+/// where fewer than `fewest` are asked for; `name` is the estimator's.
 int number_of_groups(const std::string& name, std::optional<int> asked, int fewest, double smallest_part,
                      uint32_t budget);
 
