@@ -19,6 +19,7 @@
 #include "estimators/grouped_file.h"
 #include "estimators/input_checks.h"
 #include "estimators/mean.h"
+#include "estimators/planes.h"
 #include "estimators/result_file.h"
 #include "film/outputs.h"
 #include "json_output.h"
@@ -125,8 +126,12 @@ EstimatorResult estimate(const PairEstimator& estimator, const GroupedFile& file
   for (int y = 0; y < height; y += step) {
     const int first = bands.read_around(y, y + step, estimator.reach);
     const EstimatorResult part = estimator.apply(bands.crn(), bands.independent());
-    // Counts pixels in the overlap of two bands twice; a number above zero is what matters.
-    whole.nonfinite_pixels += part.nonfinite_pixels;
+    long n_nonfinite = 0;  // without the rows around, which other bands count
+    const auto own = [&](const GroupedImage& band) {
+      return GroupedImage{band.width, std::min(height, y + step) - y, band.groups, band.pixel(0, y - first)};
+    };
+    finite_pixels(own(bands.crn()), own(bands.independent()), n_nonfinite);
+    whole.nonfinite_pixels += n_nonfinite;
     const auto append = [&](const Image& from, Image& to) {
       if (from.data.empty()) return;
       if (to.data.empty()) to = Image(from.width, height, 3);

@@ -6,6 +6,8 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
+#include "core/error.h"
+
 namespace covary {
 
 void add_render(CLI::App& app);
@@ -18,6 +20,9 @@ void add_denoise(CLI::App& app);
 void add_experiment(CLI::App& app);
 void add_view(CLI::App& app);
 void add_help(CLI::App& app);
+
+/// Exit code where a wanted error was not reached.
+inline constexpr int kTargetMissed = 3;
 
 /// The command line as given, with quotes where a shell needs them; for the `command` attribute of films.
 const std::string& command_line();

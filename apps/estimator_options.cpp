@@ -70,7 +70,8 @@ PairEstimator make_iicv(const EstimatorOptions& o, bool std_error) {
       iicv_reach(options),
       [options](const GroupedImage& crn, const GroupedImage& independent, int x, int y) {
         return explain(iicv, crn, independent, options, x, y);
-      }};
+      },
+      iicv_bytes_per_pixel(options)};
 }
 
 PairEstimator make_cv_baseline(const EstimatorOptions& o, bool std_error) {
@@ -88,7 +89,8 @@ PairEstimator make_cv_baseline(const EstimatorOptions& o, bool std_error) {
           options.window / 2,
           [options](const GroupedImage& crn, const GroupedImage& independent, int x, int y) {
             return explain(cv_baseline, crn, independent, options, x, y);
-          }};
+          },
+          kCvBaselineBytesPerPixel};
 }
 
 PairEstimator make_iduw(const EstimatorOptions& o, int64_t crn_samples) {
@@ -99,7 +101,8 @@ PairEstimator make_iduw(const EstimatorOptions& o, int64_t crn_samples) {
   return {
       [options](const GroupedImage& crn, const GroupedImage& independent) { return iduw(crn, independent, options); },
       -1,
-      {}};
+      {},
+      kIduwBytesPerPixel};
 }
 
 }  // namespace

@@ -37,6 +37,7 @@ struct PairEstimator {
   /// The control variates of a pixel; empty function where the estimator has none.
   std::function<std::vector<ControlVariate>(const GroupedImage& crn, const GroupedImage& independent, int x, int y)>
       explain;
+  double bytes_per_pixel = 0;  ///< memory that `apply` takes beside its input, about
 };
 
 /// The estimators that take an option, for each option that only the estimator reads: "--k" -> "iicv, cv-baseline".

@@ -3,15 +3,20 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "commands.h"
 #include "core/error.h"
 #include "defines.h"
+#include "estimators/iicv.h"
 #include "film/image_file.h"
 #include "io/load_scene.h"
 #include "json_output.h"
+#include "plans/estimator_plans.h"
+#include "plans/memory.h"
+#include "plans/render.h"
 
 namespace covary {
 namespace {
@@ -48,11 +53,20 @@ std::string describe_channels(const std::vector<ExrFile::Channel>& channels) {
   return text;
 }
 
+/// Memory that a render of the scene with the usual settings takes, by estimator.
+std::map<std::string, double> memory_of_renders(const LoadedScene& scene) {
+  PairMethod iicv;
+  iicv.bytes_per_pixel = iicv_bytes_per_pixel({});
+  return {{"iicv", render_memory(scene, pair_plan(iicv), {}).total()},
+          {"none", render_memory(scene, plain_plan(Sampling::kIndependent), {}).total()}};
+}
+
 void scene_info(const InfoOptions& options) {
   LoadOptions load_options;
   load_options.defines = parse_defines(options.defines);
   const LoadedScene scene = load_scene(options.path, load_options);
   for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", warning);
+  const std::map<std::string, double> memory = memory_of_renders(scene);
   if (options.json) {
     const nlohmann::ordered_json object{{"file", options.path},
                                         {"format", "scene"},
@@ -61,12 +75,15 @@ void scene_info(const InfoOptions& options) {
                                         {"samples_per_pixel", scene.spp},
                                         {"integrator", scene.integrator_type},
                                         {"triangles", scene.scene->n_triangles()},
+                                        {"memory_bytes", memory},
                                         {"scene_hash", scene.content_hash}};
     return write_text_output("-", json_text(object, -1));
   }
-  fmt::print("{}: {} x {} pixels, {} samples per pixel, integrator {}\n{} triangles\nscene_hash: {}\n", options.path,
-             scene.width, scene.height, scene.spp, scene.integrator_type.empty() ? "not named" : scene.integrator_type,
-             scene.scene->n_triangles(), scene.content_hash);
+  fmt::print("{}: {} x {} pixels, {} samples per pixel, integrator {}\n{} triangles\n", options.path, scene.width,
+             scene.height, scene.spp, scene.integrator_type.empty() ? "not named" : scene.integrator_type,
+             scene.scene->n_triangles());
+  fmt::print("memory of a render beside the scene: {} with --estimator iicv, {} with none\nscene_hash: {}\n",
+             bytes_text(memory.at("iicv")), bytes_text(memory.at("none")), scene.content_hash);
 }
 
 void info(const InfoOptions& options) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The `covary` program. Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted.
+// The `covary` program. Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but not as well as wanted (--until), and
+// after a signal 128 + its number: 130 for Ctrl-C.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -13,8 +14,8 @@
 
 #include "commands.h"
 #include "core/error.h"
-#include "core/interrupted.h"
 #include "core/shell_text.h"
+#include "core/unfinished.h"
 #include "version.h"
 
 namespace covary {
@@ -25,7 +26,7 @@ std::string g_command_line;
 int report(const char* program, const Error& error) {
   std::fprintf(stderr, "%s: %s%s\n", program, error.code() == ErrorCode::kInternal ? "internal error: " : "",
                error.what());
-  if (dynamic_cast<const Interrupted*>(&error)) return 130;
+  if (const auto* unfinished = dynamic_cast<const Unfinished*>(&error)) return unfinished->exit_code();
   return error.code() == ErrorCode::kUsage ? 2 : 1;
 }
 

@@ -15,8 +15,8 @@
 
 #include "commands.h"
 #include "core/error.h"
-#include "core/interrupted.h"
 #include "core/stopwatch.h"
+#include "core/unfinished.h"
 #include "film/display.h"
 #include "film/output_file.h"
 #include "film/outputs.h"
@@ -33,10 +33,19 @@ namespace {
 constexpr double kPreviewSeconds = 0.5;  // between images for a viewer
 
 std::atomic<bool> g_stop{false};
+volatile std::sig_atomic_t g_signal = 0;
 
 extern "C" void on_signal(int signal) {
+  g_signal = signal;
   g_stop = true;
   std::signal(signal, SIG_DFL);  // a second one ends the program at once
+}
+
+/// Ctrl-C, a request to end, the end of the terminal; whoever started the program may have it ignore some (nohup).
+void catch_signals() {
+  g_stop = false;
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP})
+    if (std::signal(signal, on_signal) == SIG_IGN) std::signal(signal, SIG_IGN);
 }
 
 void print_replay(const RenderOptions& options, const LoadedScene& scene) {
@@ -65,26 +74,34 @@ RenderResult render_watched(const RenderOptions& options, const LoadedScene& sce
     progress.finish();
     fmt::print(stderr, "warning: {}\n", text);
   };
-  g_stop = false;
-  std::signal(SIGINT, on_signal);
-  std::signal(SIGTERM, on_signal);
+  catch_signals();
   RenderResult result = covary::render(scene, make_plan(options), make_request(options, scene), callbacks);
   progress.finish();
-  if (display) display->update(result.picture());
+  if (display && !result.passes.empty()) display->update(result.picture());
   return result;
+}
+
+std::string interruption(const RenderOptions& options, const RenderResult& result) {
+  if (result.kept.empty()) return "interrupted before the first sample; nothing was written";
+  return fmt::format(
+      "interrupted after {:.1f} of {:g} samples per pixel; '{}' is the image so far{}; the same command "
+      "with --resume continues",
+      result.samples_per_pixel(), result.sum([](const Pass& p) { return p.settings.spp.largest(); }), options.output,
+      result.kept == options.output ? "" : ", '" + result.kept + "' holds its films");
 }
 
 void report(const RenderReport& report) {
   const auto& [options, scene, result, load_seconds, threads] = report;
   for (const Pass& pass : result.passes) report_bad_samples(options, pass);
   if (!options.json.empty()) write_text_output(options.json, json_text(statistics(report)));
-  if (result.interrupted)
-    throw Interrupted(
-        fmt::format("interrupted after {:.1f} of {:g} samples per pixel; '{}' holds what was rendered, the "
-                    "same command with --resume continues",
-                    result.samples_per_pixel(),
-                    result.sum([](const Pass& p) { return p.settings.spp.largest(); }), result.kept));
+  if (result.interrupted) throw Unfinished(128 + g_signal, interruption(options, result));
   if (!options.quiet) print_summary(report);
+  if (!result.until_reached.value_or(true))
+    throw Unfinished(
+        kTargetMissed,
+        fmt::format("--until {} was not reached: '{}' has a predicted relMSE of {:.3g} after {:g} samples per "
+                    "pixel",
+                    options.until, options.output, *result.predicted_relmse, result.samples_per_pixel()));
 }
 
 /// What the command reads and writes, as far as it is known before the scene is loaded.

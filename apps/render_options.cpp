@@ -98,6 +98,7 @@ Plan make_plan(const RenderOptions& options) {
   method.estimate = [estimator](const GroupedImage& crn, const GroupedImage& independent, int64_t crn_samples) {
     return make_estimator(estimator, predicts_error(estimator.name), crn_samples).apply(crn, independent);
   };
+  method.bytes_per_pixel = make_estimator(estimator, method.predicts_error, 1).bytes_per_pixel;
   return pair_plan(method);
 }
 
@@ -120,6 +121,7 @@ RenderRequest make_request(const RenderOptions& options, const LoadedScene& scen
   request.preview = options.preview;
   request.passes = options.passes;
   request.resume = options.resume;
+  request.overwrite = options.overwrite;
   request.checkpoint_seconds = options.checkpoint_seconds;
   request.attributes = {{film_key::kVersion, COVARY_VERSION}, {film_key::kCommand, command_line()}};
   return request;
@@ -185,11 +187,16 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
       .add_option("--time", o.seconds,
                   "Seconds for rendering and estimating together; loading and writing are not counted")
       ->check(positive_number());
-  command.add_option("--passes,--save-passes", o.passes, "Folder that keeps the film of every pass");
-  command.add_flag("--resume", o.resume, "Continue the films of an interrupted render, or those in --passes");
+  CLI::Option* passes =
+      command.add_option("--passes,--save-passes", o.passes, "Folder that keeps the film of every pass");
+  CLI::Option* resume =
+      command.add_flag("--resume", o.resume, "Continue the films of an interrupted render, or those in --passes");
+  command.add_flag("--overwrite", o.overwrite, "Replace films that are in --passes already")
+      ->excludes(resume)
+      ->needs(passes);
   command.add_option("--checkpoint", o.checkpoint_seconds, "Seconds between writing unfinished films; 0: never")
       ->capture_default_str()
-      ->check(real_number(0, std::numeric_limits<double>::infinity()));
+      ->check(real_number(0, std::numeric_limits<double>::max()));
   add_define_option(command, o.defines);
   command.add_flag("--aovs", o.aovs, "Add the images Albedo, N (normal) and P (position) to the output");
   command.add_option("--replay", o.replay, "X,Y,SAMPLE[,PASS]: print one sample instead of rendering");

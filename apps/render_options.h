@@ -28,7 +28,7 @@ struct RenderOptions {
   int threads = 0;
   double seconds = 0, checkpoint_seconds = 300;
   int dimensions = PolynomialsOptions().dimensions;
-  bool resume = false, aovs = false, quiet = false, preview = true;
+  bool resume = false, overwrite = false, aovs = false, quiet = false, preview = true;
 
   /// One pass, whose film is the result.
   bool has_one_pass() const { return !combines_pair(estimator.name); }

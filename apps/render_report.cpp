@@ -5,8 +5,13 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <string>
+#include <vector>
 
 #include "commands.h"
+#include "core/shell_text.h"
+#include "plans/budget.h"
+#include "plans/memory.h"
 #include "progress.h"
 
 namespace covary {
@@ -22,17 +27,19 @@ const char* sampling_name(const Pass& pass) { return pass.settings.sampling == S
 
 /// Command that repeats one sample of a pass: the user's own, with the sample in place of the outputs.
 std::string replay_command(const RenderOptions& o, const Pass& pass, const BadSample& bad) {
-  std::string text = "covary render " + o.scene;
-  for (const std::string& define : o.defines) text += " -D " + define;
-  if (!o.resolution.empty()) text += " --resolution " + o.resolution;
-  if (!o.integrator.empty()) text += " --integrator " + o.integrator;
-  if (o.min_depth) text += fmt::format(" --min-depth {}", *o.min_depth);
-  if (o.max_depth) text += fmt::format(" --max-depth {}", *o.max_depth);
-  if (!o.rfilter.empty()) text += " --rfilter " + o.rfilter;
-  return text +
-         fmt::format(" --sampling {} --seed {} --replay {},{},{}", sampling_name(pass), o.seed, bad.x, bad.y,
-                     bad.sample) +
-         (pass.plan.number ? fmt::format(",{}", pass.plan.number) : "");
+  std::vector<std::string> words = {"covary", "render", o.scene};
+  const auto add = [&](const char* option, const std::string& value) { words.insert(words.end(), {option, value}); };
+  for (const std::string& define : o.defines) add("-D", define);
+  if (!o.resolution.empty()) add("--resolution", o.resolution);
+  if (!o.integrator.empty()) add("--integrator", o.integrator);
+  if (o.min_depth) add("--min-depth", std::to_string(*o.min_depth));
+  if (o.max_depth) add("--max-depth", std::to_string(*o.max_depth));
+  if (!o.rfilter.empty()) add("--rfilter", o.rfilter);
+  add("--sampling", sampling_name(pass));
+  add("--seed", std::to_string(o.seed));
+  add("--replay", fmt::format("{},{},{}", bad.x, bad.y, bad.sample) +
+                      (pass.plan.number ? fmt::format(",{}", pass.plan.number) : ""));
+  return shell_text(words);
 }
 
 }  // namespace
@@ -49,7 +56,8 @@ void report_bad_samples(const RenderOptions& options, const Pass& pass) {
 
 nlohmann::ordered_json statistics(const RenderReport& report) {
   const auto& [options, scene, result, load_seconds, threads] = report;
-  const Film& film = result.passes.back().film;
+  const RenderRequest request = make_request(options, scene);
+  const CropWindow window = window_of(scene, request);
   const double samples = result.sum([](const Pass& p) { return p.result.n_samples; });
   const double rays = result.sum([](const Pass& p) { return p.result.n_rays; });
   const double rate = 1 / std::max(result.render_seconds(), 1e-9);
@@ -70,13 +78,14 @@ nlohmann::ordered_json statistics(const RenderReport& report) {
       {"output", options.output},
       {"scene", options.scene},
       {"scene_hash", scene.content_hash},
-      {"width", film.width()},
-      {"height", film.height()},
+      {"width", window.width},
+      {"height", window.height},
       {"estimator", options.estimator.text()},
       {"samples_per_pixel", result.samples_per_pixel()},
       {"seed", options.seed},
       {"threads", threads},
       {"complete", result.complete},
+      {"interrupted", result.interrupted},
       {"passes", passes},
       {"seconds",
        {{"load", load_seconds},
@@ -90,12 +99,14 @@ nlohmann::ordered_json statistics(const RenderReport& report) {
       {"samples_per_second", samples * rate},
       {"rays_per_second", rays * rate},
       {"triangles", scene.scene->n_triangles()},
+      {"planned_memory_bytes", render_memory(scene, make_plan(options), request).total()},
       {"peak_memory_bytes", peak_memory_bytes()},
       {"negative_pixels", count_negative_pixels(result.picture())},
       {"not_finite_samples", result.sum([](const Pass& p) { return p.result.n_not_finite; })},
       {"negative_samples", result.sum([](const Pass& p) { return p.result.n_negative; })},
       {"bad_samples", bad}};
   if (result.predicted_relmse) json["predicted_relmse"] = *result.predicted_relmse;
+  if (result.until_reached) json["until_reached"] = *result.until_reached;
   return json;
 }
 
@@ -122,8 +133,6 @@ void print_summary(const RenderReport& report) {
     fmt::print(stderr, "warning: --time {:g} was exceeded: {:.2f} s for at least {} samples per pixel in each pass{}\n",
                options.seconds, result.seconds.limited, result.passes[0].film.groups(),
                options.has_one_pass() ? "" : " and the estimate");
-  if (!options.until.empty() && *result.predicted_relmse > parse_until(options.until))
-    fmt::print(stderr, "warning: --until {} was not reached\n", options.until);
 }
 
 }  // namespace covary

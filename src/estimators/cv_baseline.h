@@ -35,4 +35,7 @@ struct CvBaselineOptions {
 EstimatorResult cv_baseline(const GroupedImage& crn, const GroupedImage& independent,
                             const CvBaselineOptions& options = {});
 
+/// Memory that cv_baseline() takes beside its input, its result included: bytes per pixel, about.
+inline constexpr double kCvBaselineBytesPerPixel = (2 * 6 + 6) * sizeof(float) + 1;
+
 }  // namespace covary

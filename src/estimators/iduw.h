@@ -34,4 +34,7 @@ struct IduwOptions {
 EstimatorResult iduw(const GroupedImage& crn, const GroupedImage& independent, const IduwOptions& options,
                      float* chosen_gamma = nullptr);
 
+/// Memory that iduw() takes beside its input, its result included: bytes per pixel, about.
+inline constexpr double kIduwBytesPerPixel = (10 * 3 + 6 + 3) * sizeof(float) + 1;
+
 }  // namespace covary

@@ -120,4 +120,14 @@ int iicv_reach(const IicvOptions& options) {
   return options.window / 2 + pilot + feedback;
 }
 
+double iicv_bytes_per_pixel(const IicvOptions& options) {
+  const bool halves = options.penalty == Penalty::kCrossFit;
+  // Planes of floats: moments of both images, the result and its error, the pilot's error, residuals for the feedback.
+  int planes = 2 * 6 + 6 + 3;
+  if (options.penalty == Penalty::kSmoothed) planes += 3;
+  if (halves) planes += 2 * 6 + 6;
+  if (options.feedback) planes += 8 + 4;
+  return planes * sizeof(float) + 1;
+}
+
 }  // namespace covary

@@ -82,4 +82,7 @@ EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& independent, c
 /// column that are multiples of kFeedbackCell gives, farther than this from its cut edges, the bits of the whole image.
 int iicv_reach(const IicvOptions& options);
 
+/// Memory that iicv() takes beside its input, its result included: bytes per pixel, about.
+double iicv_bytes_per_pixel(const IicvOptions& options);
+
 }  // namespace covary

@@ -7,9 +7,11 @@
 namespace covary {
 
 void render_aovs(const Scene& scene, const FilterSettings& filter, Sampling sampling, uint64_t seed, uint32_t pass,
-                 uint32_t spp, Film& film) {
+                 uint32_t spp, Film& film, const std::atomic<bool>* stop) {
   Image albedo(film.width(), film.height(), 3), normal = albedo, position = albedo;
+  const auto stopped = [&] { return stop && stop->load(std::memory_order_relaxed); };
   parallel_for(film.height(), [&](int y) {
+    if (stopped()) return;
     for (int x = 0; x < film.width(); ++x) {
       const int frame_x = film.crop().x + x, frame_y = film.crop().y + y;
       Spectrum a;
@@ -32,6 +34,7 @@ void render_aovs(const Scene& scene, const FilterSettings& filter, Sampling samp
         for (int c = 0; c < 3; ++c) images[i]->pixel(x, y)[c] = values[i][c] * scale;
     }
   });
+  if (stopped()) return;
   film.aovs["Albedo"] = std::move(albedo);
   film.aovs["N"] = std::move(normal);
   film.aovs["P"] = std::move(position);

@@ -10,9 +10,9 @@
 
 #include "core/content_hash.h"
 #include "core/error.h"
-#include "core/interrupted.h"
 #include "core/shell_text.h"
 #include "core/stopwatch.h"
+#include "core/unfinished.h"
 #include "film/image_file.h"
 #include "film/outputs.h"
 #include "film/provenance.h"
@@ -60,7 +60,8 @@ class Experiment {
     for (size_t s = 0; s < n && !stopped(); ++s)
       if (usable_[s] && make_reference(s)) make_runs(s);
     if (stopped())
-      throw Interrupted(fmt::format("interrupted after {} of {} runs; the same command continues", done_, total_));
+      throw Unfinished(kInterrupted,
+                       fmt::format("interrupted after {} of {} runs; the same command continues", done_, total_));
     for (size_t s = 0; s < n; ++s)
       if (usable_[s]) measure_scene(s);
     compare_cells(results_);

@@ -30,7 +30,7 @@ struct ExperimentOptions {
   std::function<void(const Progress&)> progress;
 };
 
-/// Throws Error(kUsage) with every problem of the suite, Error(kIo) where the cache cannot be used, Interrupted when
+/// Throws Error(kUsage) with every problem of the suite, Error(kIo) where the cache cannot be used, Unfinished when
 /// stopped; all else is in Results::failures.
 Results run_experiment(const Suite& suite, const ExperimentOptions& options);
 

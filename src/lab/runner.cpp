@@ -116,14 +116,16 @@ Runner::Result Runner::execute(const Run& run, const SceneInstance& scene) const
   std::string output = run.then.empty() ? image : folder + "/step0.exr";
   render.insert(render.end(), {"--passes", cache_.path("passes", run.passes_key), "--quiet", "--no-preview", "--json",
                                stats, "-o", output});
-  if (!run.timed) render.emplace_back("--resume");
+  render.emplace_back(run.timed ? "--overwrite" : "--resume");
   const auto failed = [&](const std::string& command, const ProcessResult& process) -> Result {
     if (stop_ && stop_->load()) return {};
     const std::string signal = process.signal ? fmt::format("ended by signal {}; ", process.signal) : "";
     return {std::nullopt, RunFailure{command, process.exit_code, signal + process.errors}};
   };
   const ProcessResult process = run_process(render, stop_);
-  if (!process.ok()) return failed(typed_command, process);
+  // An image that is not as good as wanted is an image.
+  constexpr int kTargetMissed = 3;
+  if (!process.ok() && process.exit_code != kTargetMissed) return failed(typed_command, process);
   const std::optional<nlohmann::json> json = read_json_file(stats);
   if (!json) return {std::nullopt, RunFailure{typed_command, 0, "the render wrote no statistics"}};
   RunRecord record = record_of(*json);

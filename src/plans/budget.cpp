@@ -1,17 +1,44 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "plans/budget.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <numeric>
 
+#include "core/error.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "film/groups.h"
 #include "plans/render.h"
 
 namespace covary {
+namespace {
+
+constexpr uint32_t kFirstBudget = 96;
+
+}  // namespace
+
+CropWindow window_of(const LoadedScene& scene, const RenderRequest& request) {
+  if (!request.crop) return {scene.crop_x, scene.crop_y, scene.crop_width, scene.crop_height};
+  const CropWindow& c = *request.crop;
+  if (c.x < 0 || c.y < 0 || c.width < 1 || c.height < 1 || c.width > scene.width - c.x || c.height > scene.height - c.y)
+    throw Error(ErrorCode::kUsage, fmt::format("the crop {},{},{},{} does not fit into the {} x {} frame", c.x, c.y,
+                                               c.width, c.height, scene.width, scene.height));
+  return c;
+}
+
+uint32_t largest_budget(const LoadedScene& scene, const RenderRequest& request) {
+  const bool open_ended = request.seconds > 0 || request.until > 0;
+  return request.spp.value_or(open_ended ? kMaxBudget : static_cast<uint32_t>(scene.spp));
+}
+
+uint32_t first_budget(const LoadedScene& scene, const RenderRequest& request) {
+  const uint32_t largest = largest_budget(scene, request);
+  return request.until > 0 ? std::min(largest, kFirstBudget) : largest;
+}
 
 std::vector<uint32_t> samples_of_passes(const Shares& shares, uint32_t budget) {
   return split_samples(budget, shares.parts, shares.fewest);

@@ -20,6 +20,17 @@ struct Shares {
 /// Samples per pixel of each pass that add up to `budget`, or more where that is less than the passes need.
 std::vector<uint32_t> samples_of_passes(const Shares& shares, uint32_t budget);
 
+/// Samples per pixel that no render exceeds.
+inline constexpr uint32_t kMaxBudget = 1u << 30;
+
+/// The part of the frame that is rendered. Throws Error(kUsage) where the request's is not inside the frame.
+CropWindow window_of(const LoadedScene& scene, const RenderRequest& request);
+
+/// The most samples per pixel of all passes together that may be taken.
+uint32_t largest_budget(const LoadedScene& scene, const RenderRequest& request);
+/// Those to begin with, before a wanted error is looked at for the first time.
+uint32_t first_budget(const LoadedScene& scene, const RenderRequest& request);
+
 /// How many groups each pass keeps that the estimator reads, where nobody asked for a number: choose_groups() of
 /// film/groups.h for the state's group_budget. With a limit of time, when the number of samples is only known roughly
 /// and nothing is gained by a divisor of it: 12, or fewer where there are fewer samples.

@@ -97,6 +97,7 @@ Plan pair_plan(const PairMethod& method) {
   plan.estimator = method.estimator;
   plan.predicts_error = method.predicts_error;
   plan.groups_follow_speed = !method.groups;
+  plan.estimate_bytes_per_pixel = method.bytes_per_pixel;
   plan.estimate = [estimate = method.estimate](std::span<const Pass> passes, int first_row, int n_rows) {
     const auto crn_samples = static_cast<int64_t>(std::llround(passes[0].film.mean_count()));
     return estimate(rows_of(passes[0].film, first_row, n_rows), rows_of(passes[1].film, first_row, n_rows),

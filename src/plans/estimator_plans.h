@@ -16,8 +16,9 @@ namespace covary {
 /// numbers and for a render to a wanted error, which is read from the groups, otherwise 1.
 Plan plain_plan(Sampling sampling, std::optional<int> groups = {});
 
-/// One independent pass, whose pixels are polynomials fitted to all their samples (estimators/polynomials.h). `text`: the
-/// estimator with its options, for attributes. Throws Error(kUsage) when rendered with too few samples for `dimensions`.
+/// One independent pass, whose pixels are polynomials fitted to all their samples (estimators/polynomials.h). `text`:
+/// the estimator with its options, for attributes. Throws Error(kUsage) when rendered with too few samples for
+/// `dimensions`.
 Plan polynomials_plan(int dimensions, const std::string& text);
 
 /// An estimator of two images of groups: one with common random numbers, one with independent ones.
@@ -30,12 +31,13 @@ struct PairMethod {
   std::optional<int> groups;
   int fewest_groups = 3;  ///< that the estimator works with
   bool predicts_error = false;
+  double bytes_per_pixel = 0;  ///< memory that `estimate` takes beside its input, about
   /// `crn_samples`: samples per pixel of the CRN image.
   std::function<EstimatorResult(const GroupedImage& crn, const GroupedImage& independent, int64_t crn_samples)>
       estimate;
 };
-/// Passes "crn" and "independent" that advance together, and the estimator. Rendering throws Error(kUsage) where `groups` is less
-/// than `fewest_groups`.
+/// Passes "crn" and "independent" that advance together, and the estimator. Rendering throws Error(kUsage) where
+/// `groups` is less than `fewest_groups`.
 Plan pair_plan(const PairMethod& method);
 
 }  // namespace covary

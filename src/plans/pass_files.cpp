@@ -3,8 +3,12 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <type_traits>
 #include <utility>
 
 #include "core/error.h"
@@ -16,6 +20,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr uintmax_t kMaxCostsSize = 4096;
+
 std::string costs_path(const Pass& pass) { return fs::path(pass.path).replace_extension(".json").string(); }
 
 std::string frame_text(const Film& film) {
@@ -23,15 +29,33 @@ std::string frame_text(const Film& film) {
   return fmt::format("{} x {}, crop {},{},{},{}", film.frame_width(), film.frame_height(), c.x, c.y, c.width, c.height);
 }
 
-/// Reads what the samples of a kept film cost.
-void read_costs(Pass& pass) {
-  std::ifstream file(costs_path(pass));
-  const nlohmann::json costs = nlohmann::json::parse(file, nullptr, false);
-  if (costs.is_discarded()) return;
-  pass.result.n_samples = costs.value("samples", uint64_t{0});
-  pass.result.n_rays = costs.value("rays", uint64_t{0});
-  pass.result.seconds = costs.value("seconds", 0.0);
-  pass.result.estimate_seconds = costs.value("estimate_seconds", 0.0);
+/// The member of `costs`, which must be a finite number from 0 on.
+template <typename T>
+T amount(const nlohmann::json& costs, const char* key) {
+  const nlohmann::json& value = costs.at(key);
+  const bool fits = std::is_integral_v<T> ? value.is_number_unsigned() : value.is_number();
+  if (!fits || !(value.get<double>() >= 0) || !std::isfinite(value.get<double>()))
+    throw std::out_of_range(fmt::format("'{}' is {}, expected is a number from 0 on", key, value.dump()));
+  return value.get<T>();
+}
+
+/// Reads what the samples of a kept film cost; what cannot be right is left out.
+void read_costs(const std::function<void(const std::string&)>& warn, Pass& pass) {
+  const std::string path = costs_path(pass);
+  try {
+    if (fs::file_size(path) > kMaxCostsSize) throw std::out_of_range("the file is too large");
+    std::ifstream file(path);
+    const nlohmann::json costs = nlohmann::json::parse(file);
+    PassResult result;
+    result.n_samples = amount<uint64_t>(costs, "samples");
+    result.n_rays = amount<uint64_t>(costs, "rays");
+    result.seconds = amount<double>(costs, "seconds");
+    if (costs.contains("estimate_seconds")) result.estimate_seconds = amount<double>(costs, "estimate_seconds");
+    if (result.estimate_seconds > result.seconds) throw std::out_of_range("'estimate_seconds' is above 'seconds'");
+    pass.result = result;
+  } catch (const std::exception& problem) {
+    if (warn) warn(fmt::format("'{}' is not used, so that times count this run alone: {}", path, problem.what()));
+  }
 }
 
 void write_costs(const Pass& pass) {
@@ -39,6 +63,28 @@ void write_costs(const Pass& pass) {
       {"samples", pass.result.n_samples}, {"rays", pass.result.n_rays}, {"seconds", pass.result.seconds}};
   if (pass.settings.estimate) costs["estimate_seconds"] = pass.result.estimate_seconds;
   write_text_file(costs_path(pass), costs.dump(2) + "\n");
+}
+
+/// Puts the film at pass.path in the place of the empty one, which it must match.
+void resume(const RenderRequest& request, Pass& pass) {
+  const std::string frame = frame_text(pass.film);
+  const int groups = pass.film.groups(), fewest = pass.plan.fewest_groups;
+  const std::map<std::string, std::string> attributes = std::move(pass.film.attributes);
+  pass.film = Film();  // two of them might not fit into memory
+  Film film = read_film(pass.path);
+  const auto differs = [&](const std::string& what, const std::string& old_value, const std::string& new_value) {
+    throw Error(ErrorCode::kInput,
+                fmt::format("--resume: '{}' was rendered with {} {}, this command asks for {}{}", pass.path, what,
+                            old_value, new_value, request.passes.empty() ? "" : "; --overwrite replaces it"));
+  };
+  if (frame_text(film) != frame) differs("frame", frame_text(film), frame);
+  const bool any_groups = fewest > 0 && film.groups() >= fewest;
+  if (film.groups() != groups && !any_groups) differs("groups", std::to_string(film.groups()), std::to_string(groups));
+  for (const char* key : {film_key::kSceneHash, film_key::kSampling, film_key::kSeed, film_key::kSettings})
+    if (film.attributes[key] != attributes.at(key)) differs(key, film.attributes[key], attributes.at(key));
+  film.attributes = attributes;
+  film.aovs.clear();
+  pass.film = std::move(film);
 }
 
 }  // namespace
@@ -58,23 +104,18 @@ std::string pass_path(const Plan& plan, const RenderRequest& request, const Pass
   return folder.empty() ? "" : (folder / (pass.id() + ".exr")).string();
 }
 
-void resume(const RenderRequest& request, Pass& pass) {
-  const Film empty = std::exchange(pass.film, read_film(pass.path));
-  Film& film = pass.film;
-  const auto differs = [&](const std::string& what, const std::string& old_value, const std::string& new_value) {
-    throw Error(ErrorCode::kInput, fmt::format("--resume: '{}' was rendered with {} {}, this command asks for {}",
-                                               pass.path, what, old_value, new_value));
-  };
-  if (frame_text(film) != frame_text(empty)) differs("frame", frame_text(film), frame_text(empty));
-  const int fewest = pass.plan.fewest_groups;
-  const bool any_groups = fewest > 0 && film.groups() >= fewest;
-  if (film.groups() != empty.groups() && !any_groups)
-    differs("groups", std::to_string(film.groups()), std::to_string(empty.groups()));
-  for (const char* key : {film_key::kSceneHash, film_key::kSampling, film_key::kSeed, film_key::kSettings})
-    if (film.attributes[key] != empty.attributes.at(key)) differs(key, film.attributes[key], empty.attributes.at(key));
-  film.attributes = empty.attributes;
-  film.aovs.clear();
-  if (!request.passes.empty() && fs::exists(costs_path(pass))) read_costs(pass);
+void take_film_on_disk(const RenderRequest& request, const std::function<void(const std::string&)>& warn, Pass& pass) {
+  if (pass.path.empty() || !fs::exists(pass.path)) return;
+  const bool kept = !request.passes.empty();
+  if (request.resume) {
+    resume(request, pass);
+    if (kept && fs::exists(costs_path(pass))) read_costs(warn, pass);
+  } else if (kept && !request.overwrite) {
+    throw Error(ErrorCode::kInput,
+                fmt::format("'{}' is there already; --resume continues it, or takes it as it is where "
+                            "it has enough samples, and --overwrite replaces it",
+                            pass.path));
+  }
 }
 
 void save_passes(const RenderRequest& request, std::span<Pass> passes, bool complete) {

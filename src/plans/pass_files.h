@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <span>
 #include <string>
 
@@ -20,11 +21,13 @@ std::filesystem::path passes_folder(const RenderRequest& request);
 /// Where the film of a pass is; empty where the request names no file.
 std::string pass_path(const Plan& plan, const RenderRequest& request, const PassPlan& pass);
 
-/// Puts the film at pass.path in the place of the empty one, which it must match, and where a folder keeps them the costs so far.
-/// Throws Error(kInput) where it does not match.
-void resume(const RenderRequest& request, Pass& pass);
+/// Looks for a film at pass.path. To resume, it takes the place of the empty one, which it must match, and where a
+/// folder keeps films their costs so far are read, too; costs that make no sense are left out with a warning. Throws
+/// Error(kInput) for a film that does not match, and in the folder that the request names for any film that it neither
+/// resumes nor overwrites.
+void take_film_on_disk(const RenderRequest& request, const std::function<void(const std::string&)>& warn, Pass& pass);
 
-/// Keeps the films, so that resume() can go on from here.
+/// Keeps the films, so that the render can be resumed.
 void save_passes(const RenderRequest& request, std::span<Pass> passes, bool complete);
 
 /// Removes films that were kept for an interruption alone.

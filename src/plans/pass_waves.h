@@ -19,8 +19,8 @@ struct WaveLimits {
   std::function<void()> wave;                                   ///< called between waves
 };
 
-/// Renders all passes up to their settings.spp. The pass with the smallest part of its samples is next, one wave at a time,
-/// so that the passes advance together. Returns the samples taken.
+/// Renders all passes up to their settings.spp. The pass with the smallest part of its samples is next, one wave at a
+/// time, so that the passes advance together. Returns the samples taken.
 uint64_t render_passes(const Scene& scene, std::span<Pass> passes, const WaveLimits& limits);
 
 }  // namespace covary

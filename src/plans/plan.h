@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A plan says what a method renders: phases one after the other, each with passes that advance together, and how the image
-// is made of the films. A phase may read whatever earlier phases left: films, numbers of samples made of them, a trained
-// integrator. render() in plans/render.h carries plans out.
+// A plan says what a method renders: phases one after the other, each with passes that advance together, and how the
+// image is made of the films. A phase may read whatever earlier phases left: films, numbers of samples made of them, a
+// trained integrator. render() in plans/render.h carries plans out.
 #pragma once
 
 #include <atomic>
@@ -23,8 +23,8 @@ namespace covary {
 
 struct RenderRequest;
 
-/// What a plan says of one pass. Name and number are its identity: they are in the name of its file, and the number enters
-/// its random numbers. No two passes of a plan have the same identity, or both sampling and number in common.
+/// What a plan says of one pass. Name and number are its identity: they are in the name of its file, and the number
+/// enters its random numbers. No two passes of a plan have the same identity, or both sampling and number in common.
 struct PassPlan {
   std::string name;     ///< letters, digits, '_'
   uint32_t number = 0;  ///< PassSettings::pass
@@ -58,8 +58,8 @@ struct PlanState {
   const LoadedScene& scene;
   const RenderRequest& request;
   const std::atomic<bool>* stop;  ///< may be null; prepare() returns soon once it is true
-  /// Traces the passes that are begun from now on. A phase may put another one in its place, such as a trained one, whose
-  /// description() then distinguishes the films.
+  /// Traces the passes that are begun from now on. A phase may put another one in its place, such as a trained one,
+  /// whose description() then distinguishes the films.
   std::shared_ptr<const Integrator> integrator;
   uint32_t budget = 0;  ///< samples per pixel of all passes together that are wanted now; grows towards a wanted error
   uint32_t group_budget = 0;  ///< the budget that decides how many groups there are; stays
@@ -85,11 +85,13 @@ struct Plan {
   std::string name;       ///< of the estimator, for messages
   std::string estimator;  ///< the same with its options, for the image's attribute
   std::vector<Phase> phases;
-  /// The image of rows first_row … first_row + n_rows - 1 of the films so far. Its cost depends on the size, not on counts.
+  /// The image of rows first_row … first_row + n_rows - 1 of the films so far. Its cost depends on the size, not on
+  /// counts.
   std::function<EstimatorResult(std::span<const Pass>, int first_row, int n_rows)> estimate;
-  bool film_is_image = false;   ///< the film of the one pass is the result; estimate() only serves its error
-  bool predicts_error = false;  ///< estimate() gives a standard error
-  bool fixed_samples = false;   ///< the number of samples must be known before: no limits of time or error
+  double estimate_bytes_per_pixel = 0;  ///< memory that estimate() takes beside the films, about
+  bool film_is_image = false;           ///< the film of the one pass is the result; estimate() only serves its error
+  bool predicts_error = false;          ///< estimate() gives a standard error
+  bool fixed_samples = false;           ///< the number of samples must be known before: no limits of time or error
   /// With a time limit, the speed is measured before the passes begin, so that there are no more groups than samples.
   bool groups_follow_speed = false;
 };

@@ -4,17 +4,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
-#include <set>
 #include <utility>
 
 #include "core/error.h"
 #include "core/stopwatch.h"
 #include "estimators/predicted_error.h"
-#include "film/film_file.h"
 #include "integrators/aov.h"
 #include "integrators/training.h"
 #include "plans/budget.h"
+#include "plans/folder_lock.h"
+#include "plans/memory.h"
 #include "plans/pass_files.h"
 #include "plans/pass_waves.h"
 #include "plans/result_files.h"
@@ -22,9 +21,7 @@
 namespace covary {
 namespace {
 
-constexpr int kTrialRows = 64;         // at least, where the time of the estimate is found out
-constexpr uint32_t kFirstBudget = 96;  // samples per pixel before a wanted error is looked at for the first time
-constexpr uint32_t kMaxBudget = 1u << 30;
+constexpr int kTrialRows = 64;        // at least, where the time of the estimate is found out
 constexpr uint32_t kAovSamples = 16;  // per pixel of auxiliary images
 
 std::string filter_text(const FilterSettings& filter) {
@@ -53,16 +50,6 @@ bool train(const LoadedScene& scene, const TrainingSettings& settings) {
   return !learning || train(*scene.scene, *learning, settings);
 }
 
-/// The part of the frame that is rendered.
-CropWindow crop_of(const LoadedScene& scene, const RenderRequest& request) {
-  if (!request.crop) return {scene.crop_x, scene.crop_y, scene.crop_width, scene.crop_height};
-  const CropWindow& c = *request.crop;
-  if (c.x < 0 || c.y < 0 || c.width < 1 || c.height < 1 || c.width > scene.width - c.x || c.height > scene.height - c.y)
-    throw Error(ErrorCode::kUsage, fmt::format("the crop {},{},{},{} does not fit into the {} x {} frame", c.x, c.y,
-                                               c.width, c.height, scene.width, scene.height));
-  return c;
-}
-
 void check(const Plan& plan, const RenderRequest& request) {
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
   if (request.spp && (*request.spp < 1 || *request.spp > kMaxBudget))
@@ -80,26 +67,11 @@ class PlanRun {
         plan_(plan),
         request_(request),
         callbacks_(callbacks),
-        window_(crop_of(scene, request)),
+        window_(window_of(scene, request)),
         filter_(request.filter.value_or(scene.filter)),
         state_{scene, request, callbacks.stop, integrator_of(scene), 0, 0, {}} {}
 
-  RenderResult run() {
-    result_.interrupted = !render_to_limits();
-    const Stopwatch watch;
-    if (result_.interrupted || !request_.passes.empty()) save_passes(request_, state_.passes, !result_.interrupted);
-    if (!result_.interrupted && request_.aovs) render_auxiliary_images();
-    if (result_.interrupted)
-      result_.kept = output_is_film(plan_, request_) ? request_.output : passes_folder(request_).string();
-    result_.complete = complete();
-    result_.passes = std::move(state_.passes);
-    if (!result_.interrupted) {
-      write_result_files(plan_, request_, result_);
-      remove_passes(plan_, request_, result_.passes);
-    }
-    result_.seconds.write += watch.seconds();
-    return std::move(result_);
-  }
+  RenderResult run();
 
  private:
   /// Renders and estimates, once or until the predicted error is small enough. False when interrupted.
@@ -114,14 +86,24 @@ class PlanRun {
   void estimate();
   double time_estimate();
   void render_auxiliary_images();
+  void write_files();
 
   bool timed() const { return request_.seconds > 0; }
   bool stopped() const { return callbacks_.stop && callbacks_.stop->load(); }
+  /// The passes of every phase are there.
+  bool all_begun() const {
+    return first_of_phase_.size() == plan_.phases.size() && first_of_phase_.back() < state_.passes.size();
+  }
   /// All passes have the samples they should.
   bool complete() const {
-    return first_of_phase_.size() == plan_.phases.size() &&
-           std::all_of(state_.passes.begin(), state_.passes.end(),
-                       [](const Pass& p) { return p.count >= p.settings.spp.largest(); });
+    return all_begun() && std::all_of(state_.passes.begin(), state_.passes.end(),
+                                      [](const Pass& p) { return p.count >= p.settings.spp.largest(); });
+  }
+  /// Every pixel of every film has samples, so that an estimator can work.
+  bool can_estimate() const {
+    return all_begun() && std::all_of(state_.passes.begin(), state_.passes.end(), [](const Pass& p) {
+             return std::all_of(p.film.counts().begin(), p.film.counts().end(), [](uint32_t n) { return n > 0; });
+           });
   }
   std::span<Pass> passes_of(size_t phase) {
     const size_t end = phase + 1 < first_of_phase_.size() ? first_of_phase_[phase + 1] : state_.passes.size();
@@ -142,11 +124,35 @@ class PlanRun {
   std::optional<double> estimate_seconds_;  // what the next estimate takes
 };
 
+RenderResult PlanRun::run() {
+  std::optional<FolderLock> lock;
+  if (!request_.passes.empty()) lock.emplace(request_.passes);
+  result_.interrupted = !render_to_limits();
+  result_.complete = complete();
+  if (result_.interrupted && !plan_.film_is_image && can_estimate()) estimate();
+  const Stopwatch watch;
+  write_files();
+  result_.seconds.write += watch.seconds();
+  return std::move(result_);
+}
+
+void PlanRun::write_files() {
+  const bool is_film = output_is_film(plan_, request_);
+  result_.passes = std::move(state_.passes);
+  if (result_.interrupted && result_.samples_per_pixel() == 0) return;
+  if (!request_.passes.empty() || (result_.interrupted && !is_film))
+    save_passes(request_, result_.passes, !result_.interrupted);
+  write_result_files(plan_, request_, result_);
+  if (result_.interrupted)
+    result_.kept = is_film ? request_.output : passes_folder(request_).string();
+  else
+    remove_passes(plan_, request_, result_.passes);
+}
+
 bool PlanRun::render_to_limits() {
   if (!train(scene_, {window_, filter_, callbacks_.stop, callbacks_.progress})) return false;
-  const bool open_ended = timed() || request_.until > 0;
-  const uint32_t limit = request_.spp.value_or(open_ended ? kMaxBudget : static_cast<uint32_t>(scene_.spp));
-  state_.budget = state_.group_budget = request_.until > 0 ? std::min(limit, kFirstBudget) : limit;
+  const uint32_t limit = largest_budget(scene_, request_);
+  state_.budget = state_.group_budget = first_budget(scene_, request_);
   if (timed() && plan_.groups_follow_speed) {
     // What half of the time is enough for, so that no more groups are begun than can be filled.
     const double samples = 0.5 * request_.seconds * samples_per_second(scene_, *state_.integrator, filter_, window_);
@@ -162,9 +168,9 @@ bool PlanRun::render_to_limits() {
     }
     if (!plan_.film_is_image || request_.until > 0) estimate();
     result_.seconds.limited = watch_.seconds();
+    if (request_.until > 0) result_.until_reached = *result_.predicted_relmse <= request_.until;
     const bool out_of_time = timed() && seconds_left(plan_.phases.size() - 1, 1) <= 0;
-    if (request_.until == 0 || *result_.predicted_relmse <= request_.until || state_.budget >= limit || out_of_time)
-      return true;
+    if (result_.until_reached.value_or(true) || state_.budget >= limit || out_of_time) return true;
     state_.budget = next_budget(state_.budget, *result_.predicted_relmse, request_.until, limit);
   }
 }
@@ -180,6 +186,7 @@ bool PlanRun::render_phase(size_t index, double share) {
   if (index == first_of_phase_.size()) begin_phase(phase);
   const std::span<Pass> passes = passes_of(index);
   if (passes.empty()) return false;  // interrupted before its films were made
+  if (index + 1 == plan_.phases.size() && request_.aovs && result_.aovs.empty()) render_auxiliary_images();
   phase.set_targets(state_, passes);
   for (Pass& pass : passes) pass.count = pass.settings.spp.reached(pass.film);
   if (index + 1 == plan_.phases.size() && !timed() && request_.until == 0) warn_of_other_samples(state_.budget);
@@ -199,6 +206,9 @@ void PlanRun::begin_phase(const Phase& phase) {
   if (stopped()) return;
   const std::vector<PassPlan> plans = phase.passes(state_);
   COVARY_CHECK(!plans.empty(), "a phase has passes");
+  std::vector<PassPlan> all = plans;
+  for (const Pass& pass : state_.passes) all.push_back(pass.plan);
+  check_memory(render_memory(plan_, all, window_.width, window_.height, request_.aovs), window_.width, window_.height);
   for (const PassPlan& plan : plans) {
     for (const Pass& other : state_.passes)
       COVARY_CHECK(
@@ -228,7 +238,7 @@ Pass PlanRun::begin_pass(const PassPlan& plan) const {
                                                                  filter_text(filter_) + number + plan.settings);
   pass.film.attributes.insert_or_assign(film_key::kComplete, "false");
   if (!plan.estimator.empty()) pass.film.attributes.insert_or_assign("estimator", plan.estimator);
-  if (request_.resume && !pass.path.empty() && std::filesystem::exists(pass.path)) resume(request_, pass);
+  take_film_on_disk(request_, callbacks_.warning, pass);
   return pass;
 }
 
@@ -272,11 +282,12 @@ double PlanRun::time_estimate() {
 }
 
 void PlanRun::render_auxiliary_images() {
-  const Pass& last = state_.passes.back();
-  Film& film = state_.passes.back().film;
+  const Stopwatch watch;
+  Pass& last = state_.passes.back();
   render_aovs(*scene_.scene, filter_, last.settings.sampling, last.settings.seed, last.settings.pass, kAovSamples,
-              film);
-  result_.aovs = std::exchange(film.aovs, {});
+              last.film, callbacks_.stop);
+  result_.aovs = std::exchange(last.film.aovs, {});
+  result_.seconds.auxiliary = watch.seconds();
 }
 
 }  // namespace
@@ -307,13 +318,16 @@ RenderResult render(const LoadedScene& scene, const Plan& plan, const RenderRequ
 Image preview_of(std::span<const Pass> passes) {
   if (passes.empty()) return {};
   Image image = passes[0].film.mean_image();
-  double samples = passes[0].film.mean_count();
-  for (const Pass& pass : passes.subspan(1)) {
-    const Image next = pass.film.mean_image();
-    samples += pass.film.mean_count();
-    const auto part = static_cast<float>(pass.film.mean_count() / std::max(samples, 1.0));
-    for (size_t k = 0; k < image.data.size(); ++k) image.data[k] += part * (next.data[k] - image.data[k]);
-  }
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x) {
+      double samples = passes[0].film.count(x, y);
+      for (const Pass& pass : passes.subspan(1)) {
+        const Spectrum next = pass.film.mean(x, y);
+        samples += pass.film.count(x, y);
+        const auto part = static_cast<float>(pass.film.count(x, y) / std::max(samples, 1.0));
+        for (int c = 0; c < 3; ++c) image.pixel(x, y)[c] += part * (next[c] - image.pixel(x, y)[c]);
+      }
+    }
   return image;
 }
 
@@ -327,7 +341,7 @@ ReplayedSample replay(const LoadedScene& scene, const RenderRequest& request, co
   settings.pass = address.pass;
   settings.filter = request.filter.value_or(scene.filter);
   const auto integrator = integrator_of(scene);
-  train(scene, {crop_of(scene, request), settings.filter, nullptr, nullptr});
+  train(scene, {window_of(scene, request), settings.filter, nullptr, nullptr});
   return replay_sample(*scene.scene, *integrator, settings, address.x, address.y, address.sample);
 }
 

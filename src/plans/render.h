@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Renders a scene by a plan: the one entry point of the command line, of tests and of other programs. Nothing is printed, no
-// signal handled, and nothing global read or set.
+// Renders a scene by a plan: the one entry point of the command line, of tests and of other programs. Nothing is
+// printed, no signal handled, and nothing global read or set.
 #pragma once
 
 #include <atomic>
@@ -20,16 +20,18 @@ struct RenderRequest {
   uint64_t seed = 0;
   std::optional<FilterSettings> filter;  ///< default: the scene's
   std::optional<CropWindow> crop;        ///< default: the scene's; inside the frame
-  /// Samples per pixel of all passes together, 1 … 2^30. Default: the scene's, or no limit where `seconds` or `until` is given.
+  /// Samples per pixel of all passes together, 1 … 2^30. Default: the scene's, or no limit where `seconds` or `until`
+  /// is given.
   std::optional<uint32_t> spp;
   double seconds = 0;  ///< > 0: limit for rendering and estimating together
   double until = 0;    ///< > 0: add samples until the predicted relMSE is this
   bool aovs = false;   ///< also the images Albedo, N and P
 
-  std::string output;             ///< EXR file of the result; empty: no file is written
-  bool preview = false;           ///< also a PNG beside it
-  std::string passes;             ///< folder that keeps the films; empty: only while they are not finished
-  bool resume = false;            ///< continue films that are there
+  std::string output;      ///< EXR file of the result; empty: no file is written
+  bool preview = false;    ///< also a PNG beside it
+  std::string passes;      ///< folder that keeps the films; empty: only while they are not finished
+  bool resume = false;     ///< continue films that are there
+  bool overwrite = false;  ///< films that are in `passes` may be replaced; without it and `resume` they are an error
   double checkpoint_seconds = 0;  ///< > 0: seconds between writing unfinished films
   /// Attributes of films and image that only the caller knows, such as film_key::kVersion and kCommand.
   std::map<std::string, std::string> attributes;
@@ -47,8 +49,9 @@ struct RenderCallbacks {
 };
 
 struct RenderSeconds {
-  double trial = 0;     ///< of finding out, for a time limit, how fast passes and estimator are
-  double estimate = 0;  ///< after the passes
+  double auxiliary = 0;  ///< of rendering auxiliary images
+  double trial = 0;      ///< of finding out, for a time limit, how fast passes and estimator are
+  double estimate = 0;   ///< after the passes
   double write = 0;
   double limited = 0;  ///< of what the time limit counts, in this call
 };
@@ -56,13 +59,16 @@ struct RenderSeconds {
 /// What has become of a plan.
 struct RenderResult {
   std::vector<Pass> passes;
-  EstimatorResult image;  ///< empty where the film is the image, or the render was interrupted
+  /// Empty where the film is the image, and of a render that was interrupted before every pixel of every film had
+  /// samples.
+  EstimatorResult image;
   std::optional<double> predicted_relmse;
   std::map<std::string, Image> aovs;
   RenderSeconds seconds;
-  bool complete = false;     ///< all passes have the samples that were planned
-  bool interrupted = false;  ///< by the stop token
-  std::string kept;          ///< after an interruption: the file or folder that holds the films, empty where none does
+  bool complete = false;              ///< all passes have the samples that were planned
+  std::optional<bool> until_reached;  ///< whether the predicted error is at most the wanted one, where one was
+  bool interrupted = false;           ///< by the stop token
+  std::string kept;  ///< after an interruption: the file or folder that holds the films, empty where none does
 
   template <typename F>
   double sum(F value) const {
@@ -73,9 +79,9 @@ struct RenderResult {
   double samples_per_pixel() const {
     return sum([](const Pass& p) { return p.film.mean_count(); });
   }
-  /// Time of the passes, without what estimates inside them took.
+  /// Time of the passes and auxiliary images, without what estimates inside passes took.
   double render_seconds() const {
-    return sum([](const Pass& p) { return p.result.seconds - p.result.estimate_seconds; });
+    return seconds.auxiliary + sum([](const Pass& p) { return p.result.seconds - p.result.estimate_seconds; });
   }
   /// Time of making the image, inside the passes and of them.
   double estimate_seconds() const {
@@ -85,9 +91,11 @@ struct RenderResult {
   Image picture() const;
 };
 
-/// Renders, estimates and, where the request names files, writes. `scene` was loaded with an integrator (integrator_choice.h).
-/// Throws Error(kUsage) for a request that does not fit the scene or plan, Error(kInput) for films that are not those of this
-/// render, Error(kIo).
+/// Renders, estimates and, where the request names files, writes. `scene` was loaded with an integrator
+/// (integrator_choice.h). An interrupted render leaves what there is: films that can be continued and, where any sample
+/// was taken, the image of these, marked by the attribute covary:complete=false. Throws Error(kUsage) for a request
+/// that does not fit the scene or plan or needs more memory than the machine has, Error(kInput) for films that are not
+/// those of this render, and Error(kIo).
 RenderResult render(const LoadedScene& scene, const Plan& plan, const RenderRequest& request,
                     const RenderCallbacks& callbacks = {});
 
@@ -101,8 +109,8 @@ struct SampleAddress {
   int x = 0, y = 0;   ///< pixel in the full frame
   uint64_t sample = 0;
 };
-/// The value of the sample, as render() adds it to a film with this request's seed and filter. Throws Error(kUsage) for a pixel outside
-/// the frame.
+/// The value of the sample, as render() adds it to a film with this request's seed and filter. Throws Error(kUsage) for
+/// a pixel outside the frame.
 ReplayedSample replay(const LoadedScene& scene, const RenderRequest& request, const SampleAddress& address);
 
 }  // namespace covary

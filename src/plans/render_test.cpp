@@ -5,15 +5,14 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
-#include <cstring>
 #include <filesystem>
 
 #include "film/film_file.h"
 #include "film/image_file.h"
 #include "plans/budget.h"
 #include "plans/estimator_plans.h"
-#include "plans/integrator_choice.h"
 #include "support/files.h"
+#include "support/plans.h"
 
 namespace covary {
 namespace {
@@ -21,42 +20,10 @@ namespace {
 namespace fs = std::filesystem;
 using test_support::TemporaryFolder;
 
-LoadedScene load_room(int width = 40, int height = 30) {
-  LoadOptions options;
-  options.width = width, options.height = height;
-  options.make_integrator = integrator_maker({});
-  return load_scene(std::string(COVARY_SOURCE_DIR) + "/scenes/room.xml", options);
-}
-
-RenderRequest request_of(uint32_t spp) {
-  RenderRequest request;
-  request.spp = spp;
-  request.seed = 5;
-  return request;
-}
-
-/// Mean of both images: quick, and the same whatever rows it is asked for.
-Plan mean_plan() {
-  PairMethod method;
-  method.name = method.estimator = "average";
-  method.estimate = [](const GroupedImage& crn, const GroupedImage& independent, int64_t) {
-    EstimatorResult result;
-    result.estimate = Image(crn.width, crn.height, 3);
-    for (size_t i = 0; i < result.estimate.data.size(); ++i)
-      result.estimate.data[i] =
-          0.5f * (crn.data[i / 3 * crn.groups * 3 + i % 3] + independent.data[i / 3 * independent.groups * 3 + i % 3]);
-    return result;
-  };
-  return pair_plan(method);
-}
-
-bool same_bits(const Film& a, const Film& b) {
-  return a.counts() == b.counts() && a.data().size() == b.data().size() &&
-         std::memcmp(a.data().data(), b.data().data(), a.data().size() * sizeof(float)) == 0;
-}
+const std::string kRoom = std::string(COVARY_SOURCE_DIR) + "/scenes/room.xml";
 
 TEST(Render, OnePassIsTheFilmOfRenderPass) {
-  const LoadedScene scene = load_room();
+  const LoadedScene scene = load_sized(kRoom);
   const RenderResult result = render(scene, plain_plan(Sampling::kIndependent), request_of(6));
   ASSERT_EQ(result.passes.size(), 1u);
   EXPECT_TRUE(result.complete);
@@ -70,23 +37,23 @@ TEST(Render, OnePassIsTheFilmOfRenderPass) {
 }
 
 TEST(Render, ACropOutsideTheFrameAndImpossibleLimitsAreUsageErrors) {
-  const LoadedScene scene = load_room();
+  const LoadedScene scene = load_sized(kRoom);
   RenderRequest request = request_of(6);
   request.crop = CropWindow{30, 0, 11, 10};
   EXPECT_THROW(render(scene, plain_plan(Sampling::kIndependent), request), Error);
   request = request_of(6);
   request.until = 0.1;
-  EXPECT_THROW(render(scene, mean_plan(), request), Error) << "no predicted error";
+  EXPECT_THROW(render(scene, average_plan(), request), Error) << "no predicted error";
   request.until = 0;
   request.seconds = 1;
   EXPECT_THROW(render(scene, polynomials_plan(2, "polynomials"), request), Error);
 }
 
 TEST(Render, StoppedAtManyTilesAndResumedGivesTheSameBits) {
-  const LoadedScene scene = load_room();
+  const LoadedScene scene = load_sized(kRoom);
   const TemporaryFolder folder;
   RenderRequest request = request_of(96);
-  const RenderResult whole = render(scene, mean_plan(), request);
+  const RenderResult whole = render(scene, average_plan(), request);
   request.output = folder.file("a.exr");
   request.resume = true;
   int interruptions = 0;
@@ -98,7 +65,7 @@ TEST(Render, StoppedAtManyTilesAndResumedGivesTheSameBits) {
     callbacks.progress = [&](uint64_t, uint64_t) {
       if (--left <= 0) stop = true;
     };
-    const RenderResult part = render(scene, mean_plan(), request, callbacks);
+    const RenderResult part = render(scene, average_plan(), request, callbacks);
     if (part.complete) {
       EXPECT_TRUE(same_bits(part.passes[0].film, whole.passes[0].film));
       EXPECT_TRUE(same_bits(part.passes[1].film, whole.passes[1].film));
@@ -116,7 +83,7 @@ TEST(Render, StoppedAtManyTilesAndResumedGivesTheSameBits) {
 }
 
 TEST(Render, FilmsInMemoryAloneWhenTheRequestNamesNoFile) {
-  const LoadedScene scene = load_room();
+  const LoadedScene scene = load_sized(kRoom);
   RenderRequest request = request_of(24);
   request.checkpoint_seconds = 1e-9;
   int waves = 0;
@@ -125,25 +92,25 @@ TEST(Render, FilmsInMemoryAloneWhenTheRequestNamesNoFile) {
     ++waves;
     EXPECT_EQ(preview_of(passes).width, 40);
   };
-  const RenderResult result = render(scene, mean_plan(), request, callbacks);
+  const RenderResult result = render(scene, average_plan(), request, callbacks);
   EXPECT_EQ(waves, 2);
   EXPECT_TRUE(result.passes[0].path.empty());
 }
 
 TEST(Render, ProgressCountsAllSamplesOfTheCall) {
-  const LoadedScene scene = load_room();
+  const LoadedScene scene = load_sized(kRoom);
   std::atomic<uint64_t> last{0};
   RenderCallbacks callbacks;
   callbacks.progress = [&](uint64_t done, uint64_t total) {
     EXPECT_LE(done, total);
     for (uint64_t seen = last; seen < done && !last.compare_exchange_weak(seen, done);) continue;
   };
-  render(scene, mean_plan(), request_of(24), callbacks);
+  render(scene, average_plan(), request_of(24), callbacks);
   EXPECT_EQ(last, 24u * 40 * 30);
 }
 
 TEST(Render, ReplayGivesTheSampleOfThePassOfThatNumber) {
-  const LoadedScene scene = load_room();
+  const LoadedScene scene = load_sized(kRoom);
   const RenderRequest request = request_of(1);
   Plan plan = plain_plan(Sampling::kIndependent);
   plan.phases[0].passes = [](const PlanState&) {
@@ -160,7 +127,7 @@ TEST(Render, ReplayGivesTheSampleOfThePassOfThatNumber) {
 
 /// A CRN pass of 12 samples, then an independent one that has more samples the brighter the first image is.
 Plan two_phases(int& trainings) {
-  Plan plan = mean_plan();
+  Plan plan = average_plan();
   plan.phases.resize(2);
   Phase &first = plan.phases[0], &second = plan.phases[1];
   first.share = second.share = 0.5;
@@ -195,7 +162,7 @@ Plan two_phases(int& trainings) {
 }
 
 TEST(Phases, ReadWhatEarlierPhasesLeft) {
-  const LoadedScene scene = load_room();
+  const LoadedScene scene = load_sized(kRoom);
   const TemporaryFolder folder;
   RenderRequest request = request_of(20);
   request.passes = folder.file("films");
@@ -210,7 +177,7 @@ TEST(Phases, ReadWhatEarlierPhasesLeft) {
 }
 
 TEST(Phases, AnInterruptedPhaseResumesToTheSameBits) {
-  const LoadedScene scene = load_room();
+  const LoadedScene scene = load_sized(kRoom);
   const TemporaryFolder folder;
   RenderRequest request = request_of(20);
   int trainings = 0;
@@ -235,8 +202,8 @@ TEST(Phases, AnInterruptedPhaseResumesToTheSameBits) {
 }
 
 TEST(Phases, PassesWithoutIdentitiesOfTheirOwnAreRefused) {
-  const LoadedScene scene = load_room();
-  Plan plan = mean_plan();
+  const LoadedScene scene = load_sized(kRoom);
+  Plan plan = average_plan();
   plan.phases[0].passes = [](const PlanState&) {
     std::vector<PassPlan> passes(2);
     passes[0].name = "a", passes[1].name = "b";  // the same random numbers
@@ -247,7 +214,7 @@ TEST(Phases, PassesWithoutIdentitiesOfTheirOwnAreRefused) {
 
 /// Samples and groups of each pass.
 std::vector<std::pair<uint32_t, int>> taken(const Plan& plan, const RenderRequest& request) {
-  static const LoadedScene scene = load_room(3, 2);
+  static const LoadedScene scene = load_sized(kRoom, 3, 2);
   std::vector<std::pair<uint32_t, int>> result;
   for (const Pass& pass : render(scene, plan, request).passes)
     result.emplace_back(pass.film.count(2, 1), pass.film.groups());
@@ -297,14 +264,14 @@ TEST(Budget, OnTheWayToAnErrorGroupsAreEqualUpToTheLimit) {
 
 /// A larger number of samples would have another number of groups, had it been asked for at once.
 TEST(Budget, AContinuedFilmKeepsItsGroups) {
-  const LoadedScene scene = load_room();
+  const LoadedScene scene = load_sized(kRoom);
   const TemporaryFolder folder;
   RenderRequest request = request_of(96);
   request.passes = folder.file("films");
   request.resume = true;
-  EXPECT_EQ(render(scene, mean_plan(), request).passes[0].film.groups(), 12);
+  EXPECT_EQ(render(scene, average_plan(), request).passes[0].film.groups(), 12);
   request.spp = 100;
-  const RenderResult more = render(scene, mean_plan(), request);
+  const RenderResult more = render(scene, average_plan(), request);
   EXPECT_EQ(more.passes[0].film.groups(), 12);
   EXPECT_EQ(more.passes[0].film.count(7, 7), 50u);
   EXPECT_EQ(more.passes[1].film.count(7, 7), 50u);

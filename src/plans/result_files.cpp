@@ -20,7 +20,7 @@ void write_result_files(const Plan& plan, const RenderRequest& request, RenderRe
   if (request.output.empty()) return;
   Film& film = result.passes.back().film;
   if (plan.film_is_image) {
-    film.attributes[film_key::kComplete] = "true";
+    film.attributes[film_key::kComplete] = result.interrupted ? "false" : "true";
     film.aovs = result.aovs;
     write_film(request.output, film);
   } else {
@@ -28,10 +28,14 @@ void write_result_files(const Plan& plan, const RenderRequest& request, RenderRe
     for (const char* key :
          {film_key::kSeed, film_key::kSceneHash, film_key::kSettings, film_key::kVersion, film_key::kCommand})
       if (film.attributes.count(key)) attributes[std::string("covary:") + key] = film.attributes.at(key);
-    attributes["covary:estimator"] = plan.estimator;
+    const bool estimated = !result.image.estimate.data.empty();
+    attributes["covary:estimator"] = estimated ? plan.estimator : "none";
+    if (result.interrupted) attributes[std::string("covary:") + film_key::kComplete] = "false";
     attributes["covary:samples"] = fmt::format("{:g}", result.samples_per_pixel());
     const ImagePlace place{film.frame_width(), film.frame_height(), film.crop()};
-    write_result(request.output, place, attributes, result.image, result.aovs);
+    EstimatorResult mean;  // of an interrupted render whose films are too young for the estimator
+    if (!estimated) mean.estimate = result.picture();
+    write_result(request.output, place, attributes, estimated ? result.image : mean, result.aovs);
   }
   if (request.preview) write_png(preview_path(request.output), result.picture());
 }

@@ -123,6 +123,18 @@ class Combine(CliTest):
         self.good(*common, "-o", "bands.exr", "--memory", "0.4", "--threads", "1")
         self.assertEqual(self.read("whole.exr"), self.read("bands.exr"))
 
+    def test_bands_count_each_pixel_once(self):
+        size = (16, 200)
+        crn, independent = noisy(1, True, 4, size), noisy(2, False, 4, size)
+        for y in range(5, 200, 10):
+            crn[1]["R"][y * 16 + 3] = float("inf")
+        self.layers("tall_crn.exr", crn, size)
+        self.layers("tall_independent.exr", independent, size)
+        for memory in ("0.4", "100"):
+            result = self.good("combine", "--crn", "tall_crn.exr", "--independent", "tall_independent.exr", "--force",
+                               "--quiet", "-o", "out.exr", "--json", "-", "--memory", memory)
+            self.assertEqual(json.loads(result.stdout)["nonfinite_pixels"], 20)
+
     def test_estimators_differ(self):
         results = []
         for options in ([], ["--paper"], ["--penalty", "homogeneous"], ["--variance", "sample"],

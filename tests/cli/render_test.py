@@ -112,8 +112,6 @@ class Plans(RenderTest):
         self.assertGreater(facts["samples_per_pixel"], 96)
         self.good("render", ROOM, *SMALL, "-o", "b.exr", "--spp", str(int(facts["samples_per_pixel"])))
         self.same("a.exr", "b.exr")
-        result = self.good("render", ROOM, "--resolution", "64x48", "-o", "c.exr", "--until", "relmse=1e-9", "--spp", "48")
-        self.assertIn("warning: --until relmse=1e-9 was not reached", result.stderr)
         facts = self.statistics("-o", "d.exr", "--until", "relmse=0.02", "--estimator", "none")
         self.assertLessEqual(facts["predicted_relmse"], 0.02)
 
@@ -225,7 +223,7 @@ class Polynomials(RenderTest):
                          [("independent", 48, 1)])
         seconds = facts["seconds"]
         self.assertGreater(seconds["estimate"], 0)
-        self.assertAlmostEqual(seconds["render"] + seconds["estimate"], facts["passes"][0]["seconds"], 6)
+        self.assertGreater(seconds["render"] + seconds["estimate"], facts["passes"][0]["seconds"], "auxiliary images")
         attributes = self.attributes("a.exr")
         self.assertEqual(attributes["covary:estimator"], "polynomials --dimensions 2")
         self.assertIn("polynomials dimensions=2 samples=48", attributes["covary:settings"])
@@ -278,10 +276,12 @@ class Polynomials(RenderTest):
 class Time(RenderTest):
     """Bars are wide, because other programs may use the machine: they tell what is counted from what is not."""
 
-    def timed(self, seconds, estimator, *arguments, resolution="400x300"):
+    def timed(self, seconds, estimator, *arguments, resolution="400x300", code=0):
         start = time.monotonic()
-        facts = json.loads(self.good("render", ROOM, "--resolution", resolution, "--quiet", "--no-preview", "-o", "a.exr",
-                                     "--time", str(seconds), "--estimator", estimator, "--json", "-", *arguments).stdout)
+        result = self.run_covary("render", ROOM, "--resolution", resolution, "--quiet", "--no-preview", "-o", "a.exr",
+                                 "--time", str(seconds), "--estimator", estimator, "--json", "-", *arguments)
+        self.assertEqual(result.returncode, code, result.stderr)
+        facts = json.loads(result.stdout)
         self.assertLess(sum(facts["seconds"].values()), time.monotonic() - start)
         return facts
 
@@ -331,7 +331,7 @@ class Time(RenderTest):
         facts = self.timed(60, "iicv", "--until", "relmse=0.02", resolution="64x48")
         self.assertLessEqual(facts["predicted_relmse"], 0.02)
         self.assertLess(facts["seconds"]["render"], 30 * SLOWDOWN)
-        facts = self.timed(1, "iicv", "--until", "relmse=1e-9", resolution="64x48")
+        facts = self.timed(1, "iicv", "--until", "relmse=1e-9", resolution="64x48", code=3)
         self.assertGreater(facts["predicted_relmse"], 1e-9)
         self.assertLess(facts["seconds"]["render"] + facts["seconds"]["estimate"], 3 * SLOWDOWN)
 
@@ -373,9 +373,8 @@ class Interruption(RenderTest):
             message = process.communicate(timeout=60)[1]
             if process.returncode == 0:
                 break
-            self.assertIn(process.returncode, (130, -signal.SIGINT),
-                          message)  # the signal itself before the render begins
-            if process.returncode == 130:
+            self.assertIn(process.returncode, (130, -signal.SIGINT), message)  # the signal itself before the render begins
+            if process.returncode == 130 and "before the first sample" not in message:
                 interrupted += 1
                 self.assertIn("interrupted after", message)
                 self.assertIn(film.split("/")[0], message)

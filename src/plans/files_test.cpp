@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: Apache-2.0
+// What renders find, keep and leave on disk, and what memory they may take.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <filesystem>
+#include <fstream>
+
+#include "film/film_file.h"
+#include "film/image_file.h"
+#include "integrators/aov.h"
+#include "plans/estimator_plans.h"
+#include "plans/folder_lock.h"
+#include "plans/memory.h"
+#include "plans/render.h"
+#include "support/files.h"
+#include "support/plans.h"
+
+namespace covary {
+namespace {
+
+namespace fs = std::filesystem;
+using test_support::contains;
+using test_support::message_of;
+using test_support::TemporaryFolder;
+
+const std::string kRoom = std::string(COVARY_SOURCE_DIR) + "/scenes/room.xml";
+
+/// Stops a render after a number of tiles.
+struct StopAfter {
+  explicit StopAfter(int tiles) : left(tiles) {
+    callbacks.stop = &stop;
+    callbacks.progress = [this](uint64_t, uint64_t) {
+      if (--left <= 0) stop = true;
+    };
+  }
+  std::atomic<bool> stop{false};
+  std::atomic<int> left;
+  RenderCallbacks callbacks;
+};
+
+std::string attribute(const std::string& path, const std::string& name) {
+  const ImageInfo info = inspect_image(path);
+  for (const auto& [key, value] : info.attributes)
+    if (key == "covary:" + name) return value;
+  return "none";
+}
+
+TEST(Interrupted, AnImageOfAllSamplesSoFar) {
+  const LoadedScene scene = load_sized(kRoom);
+  const TemporaryFolder folder;
+  RenderRequest request = request_of(96);
+  request.output = folder.file("a.exr");
+  request.preview = true;
+  StopAfter old_enough(40);  // 12 tiles are one wave of one pass
+  RenderResult result = render(scene, average_plan(), request, old_enough.callbacks);
+  ASSERT_TRUE(result.interrupted);
+  EXPECT_EQ(attribute(request.output, "complete"), "false");
+  EXPECT_EQ(attribute(request.output, "estimator"), "average");
+  EXPECT_EQ(read_image(request.output).image.data, result.image.estimate.data);
+  EXPECT_TRUE(fs::exists(folder.file("a.png")));
+  EXPECT_TRUE(fs::exists(folder.file("a.passes/crn.exr")));
+}
+
+TEST(Interrupted, TheMeanWhereFilmsAreTooYoungForTheEstimator) {
+  const LoadedScene scene = load_sized(kRoom);
+  const TemporaryFolder folder;
+  RenderRequest request = request_of(96);
+  request.output = folder.file("a.exr");
+  StopAfter young(3);  // of 12 tiles of the first wave
+  const RenderResult result = render(scene, average_plan(), request, young.callbacks);
+  ASSERT_TRUE(result.interrupted);
+  EXPECT_TRUE(result.image.estimate.data.empty());
+  EXPECT_EQ(attribute(request.output, "estimator"), "none");
+  const Image image = read_image(request.output).image;
+  const Film& film = result.passes[0].film;
+  int seen = 0;
+  for (int y = 0; y < 30; ++y)
+    for (int x = 0; x < 40; ++x) {
+      seen += film.count(x, y) > 0;
+      ASSERT_EQ(image.rgb(x, y), film.mean(x, y)) << "the second pass has no samples, and takes no part";
+    }
+  EXPECT_GT(seen, 0);
+}
+
+TEST(Interrupted, NothingIsWrittenBeforeTheFirstSample) {
+  const LoadedScene scene = load_sized(kRoom);
+  const TemporaryFolder folder;
+  RenderRequest request = request_of(96);
+  request.output = folder.file("a.exr");
+  request.aovs = true;
+  StopAfter at_once(0);
+  at_once.stop = true;
+  const RenderResult result = render(scene, average_plan(), request, at_once.callbacks);
+  EXPECT_TRUE(result.interrupted);
+  EXPECT_EQ(result.kept, "");
+  EXPECT_TRUE(fs::is_empty(folder.path()));
+}
+
+TEST(Interrupted, AFilmThatIsTheOutputSaysThatItIsNotComplete) {
+  const LoadedScene scene = load_sized(kRoom);
+  const TemporaryFolder folder;
+  RenderRequest request = request_of(96);
+  request.output = folder.file("a.exr");
+  request.aovs = true;
+  StopAfter stop(20);
+  const RenderResult result = render(scene, plain_plan(Sampling::kIndependent), request, stop.callbacks);
+  ASSERT_TRUE(result.interrupted);
+  EXPECT_EQ(result.kept, request.output);
+  EXPECT_EQ(read_film_attributes(request.output).at("complete"), "false");
+  EXPECT_EQ(read_film(request.output).aovs.size(), 3u);
+  request.resume = true;
+  EXPECT_TRUE(render(scene, plain_plan(Sampling::kIndependent), request).complete);
+  EXPECT_EQ(read_film_attributes(request.output).at("complete"), "true");
+}
+
+TEST(AuxiliaryImages, AreTimedAsRenderingAndEndWithTheRender) {
+  const LoadedScene scene = load_sized(kRoom);
+  RenderRequest request = request_of(12);
+  request.aovs = true;
+  RenderResult result = render(scene, average_plan(), request);
+  EXPECT_GT(result.seconds.auxiliary, 0);
+  EXPECT_GE(result.render_seconds(), result.seconds.auxiliary + result.passes[0].result.seconds);
+  EXPECT_EQ(result.aovs.size(), 3u);
+  EXPECT_TRUE(result.passes[1].film.aovs.empty());
+  request.seconds = 1e-6;
+  request.spp.reset();
+  const RenderResult timed = render(scene, plain_plan(Sampling::kIndependent), request);
+  EXPECT_GE(timed.seconds.limited, timed.seconds.auxiliary);
+  EXPECT_EQ(timed.passes[0].film.mean_count(), 1)
+      << "no time was left after the auxiliary images and the first samples";
+}
+
+TEST(AuxiliaryImages, EndAtOnceWhenStopped) {
+  const LoadedScene scene = load_sized(kRoom);
+  Film film(40, 30, {0, 0, 40, 30}, 1);
+  std::atomic<bool> stop{true};
+  render_aovs(*scene.scene, scene.filter, Sampling::kIndependent, 0, 0, 4, film, &stop);
+  EXPECT_TRUE(film.aovs.empty());
+  stop = false;
+  render_aovs(*scene.scene, scene.filter, Sampling::kIndependent, 0, 0, 4, film, &stop);
+  EXPECT_EQ(film.aovs.size(), 3u);
+}
+
+TEST(Passes, FilmsThatAreThereAreNeitherUsedNorReplacedUnasked) {
+  const LoadedScene scene = load_sized(kRoom);
+  const TemporaryFolder folder;
+  RenderRequest request = request_of(24);
+  request.passes = folder.file("films");
+  render(scene, average_plan(), request);
+  const Film film = read_film(request.passes + "/crn.exr");
+  for (uint32_t spp : {12, 24, 48}) {
+    request.spp = spp;
+    const std::string message = message_of([&] { render(scene, average_plan(), request); }, ErrorCode::kInput);
+    EXPECT_TRUE(contains(message, "films/crn.exr' is there already; --resume continues it"));
+    EXPECT_TRUE(contains(message, "--overwrite replaces it"));
+  }
+  request.resume = true;
+  request.seed = 6;
+  EXPECT_TRUE(contains(message_of([&] { render(scene, average_plan(), request); }, ErrorCode::kInput),
+                       "was rendered with seed 5, this command asks for 6; --overwrite replaces it"));
+  EXPECT_EQ(read_film(request.passes + "/crn.exr").data(), film.data());
+  request.resume = false;
+  request.overwrite = true;
+  render(scene, average_plan(), request);
+  EXPECT_EQ(read_film_attributes(request.passes + "/crn.exr").at("seed"), "6");
+}
+
+TEST(Passes, CostsThatMakeNoSenseAreLeftOutWithAWarning) {
+  const LoadedScene scene = load_sized(kRoom);
+  const TemporaryFolder folder;
+  RenderRequest request = request_of(24);
+  request.passes = folder.file("films");
+  const double seconds = render(scene, average_plan(), request).passes[0].result.seconds;
+  request.resume = true;
+  EXPECT_EQ(render(scene, average_plan(), request).passes[0].result.seconds, seconds);
+  for (const char* text :
+       {R"({"samples": "many", "rays": 1, "seconds": 1})", R"({"samples": 1, "rays": 1, "seconds": -1})",
+        R"({"samples": 1, "rays": -1, "seconds": 1})", R"({"samples": 1.5, "rays": 1, "seconds": 1})",
+        R"({"samples": 1, "rays": 1, "seconds": 1e999})", R"({"samples": 1, "rays": 1, "seconds": null})",
+        R"({"samples": 1, "rays": 1, "seconds": 1, "estimate_seconds": 2})", R"({"samples": 1, "rays": 1})", "[1, 2]",
+        "7", "", "{"}) {
+    std::ofstream(request.passes + "/crn.json") << text;
+    std::vector<std::string> warnings;
+    RenderCallbacks callbacks;
+    callbacks.warning = [&](const std::string& warning) { warnings.push_back(warning); };
+    const RenderResult result = render(scene, average_plan(), request, callbacks);
+    ASSERT_EQ(warnings.size(), 1u) << text;
+    EXPECT_TRUE(contains(warnings[0], "films/crn.json' is not used, so that times count this run alone: ")) << text;
+    EXPECT_EQ(result.passes[0].result.seconds, 0) << text;
+    EXPECT_EQ(result.passes[0].result.n_samples, 0u) << text;
+  }
+}
+
+TEST(Passes, AFileInPlaceOfTheFolderIsNamed) {
+  const LoadedScene scene = load_sized(kRoom);
+  const TemporaryFolder folder;
+  RenderRequest request = request_of(24);
+  request.passes = folder.file("films");
+  std::ofstream(request.passes) << "text";
+  EXPECT_TRUE(contains(message_of([&] { render(scene, average_plan(), request); }, ErrorCode::kIo),
+                       "films' is not a folder; films of passes are kept in one"));
+}
+
+TEST(FolderLock, NamesTheProcessThatHoldsTheFolder) {
+  const TemporaryFolder folder;
+  std::array<int, 2> ready{}, done{};
+  ASSERT_EQ(pipe(ready.data()) + pipe(done.data()), 0);
+  const pid_t child = fork();
+  if (child == 0) {
+    const FolderLock lock(folder.file("films"));
+    char byte = 'x';
+    if (write(ready[1], &byte, 1) != 1 || read(done[0], &byte, 1) != 1) _exit(1);
+    _exit(0);  // as if killed: the file stays behind
+  }
+  char byte = 'x';
+  ASSERT_EQ(read(ready[0], &byte, 1), 1);
+  EXPECT_TRUE(contains(message_of([&] { FolderLock(folder.file("films")); }, ErrorCode::kIo),
+                       "process " + std::to_string(child) + " renders into the folder"));
+  ASSERT_EQ(write(done[1], &byte, 1), 1);
+  int status = 1;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  EXPECT_EQ(status, 0);
+  EXPECT_TRUE(fs::exists(folder.file("films/.lock")));
+  { const FolderLock lock(folder.file("films")); }
+  EXPECT_TRUE(fs::is_empty(folder.file("films"))) << "removed at the end";
+  for (const int file : {ready[0], ready[1], done[0], done[1]}) close(file);
+}
+
+TEST(Memory, CountsFilmsAuxiliaryImagesAndEstimator) {
+  const LoadedScene scene = load_sized(kRoom, 100, 50);
+  RenderRequest request = request_of(48);
+  Plan plan = average_plan();
+  plan.estimate_bytes_per_pixel = 100;
+  const RenderMemory memory = render_memory(scene, plan, request);
+  EXPECT_EQ(memory.films, 2 * 5000 * (12 * 12 + 4));
+  EXPECT_EQ(memory.estimate, 5000 * (100 + 12));
+  request.aovs = true;
+  EXPECT_EQ(render_memory(scene, plan, request).films - memory.films, 5000 * 36);
+  request.crop = CropWindow{0, 0, 10, 10};
+  EXPECT_EQ(render_memory(scene, plain_plan(Sampling::kIndependent), request).films, 100 * (12 + 4 + 36));
+}
+
+TEST(Memory, MoreThanTheMachineHasIsRefusedBeforeItIsTaken) {
+  const LoadedScene scene = load_sized(kRoom);
+  Plan plan = average_plan();
+  plan.estimate_bytes_per_pixel = 2 * physical_memory();
+  EXPECT_TRUE(
+      contains(message_of([&] { render(scene, plan, request_of(24)); }, ErrorCode::kUsage), "40 x 30 pixels need "));
+}
+
+}  // namespace
+}  // namespace covary

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plans/memory.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "core/error.h"
+#include "plans/budget.h"
+#include "plans/render.h"
+
+namespace covary {
+namespace {
+
+constexpr double kImageBytes = 3 * sizeof(float);  // per pixel
+constexpr int kAuxiliaryImages = 3;
+
+}  // namespace
+
+RenderMemory render_memory(const Plan& plan, std::span<const PassPlan> passes, int width, int height, bool aovs) {
+  const double n_pixels = static_cast<double>(width) * height;
+  RenderMemory memory;
+  for (const PassPlan& pass : passes) memory.films += n_pixels * (pass.groups * kImageBytes + sizeof(uint32_t));
+  if (aovs) memory.films += n_pixels * kAuxiliaryImages * kImageBytes;
+  // A picture for a viewer or the preview.
+  memory.estimate = n_pixels * (plan.estimate_bytes_per_pixel + kImageBytes);
+  return memory;
+}
+
+RenderMemory render_memory(const LoadedScene& scene, const Plan& plan, const RenderRequest& request) {
+  PlanState state{scene, request, nullptr, nullptr, 0, 0, {}};
+  state.budget = state.group_budget = first_budget(scene, request);
+  const CropWindow window = window_of(scene, request);
+  return render_memory(plan, plan.phases.at(0).passes(state), window.width, window.height, request.aovs);
+}
+
+double physical_memory() {
+  return static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGE_SIZE));
+}
+
+void check_memory(const RenderMemory& memory, int width, int height) {
+  if (memory.total() <= physical_memory()) return;
+  throw Error(ErrorCode::kUsage,
+              fmt::format("{} x {} pixels need {} of memory ({} for films, {} for the estimator) and this machine has "
+                          "{}; render fewer pixels, a part of the frame, or with fewer groups",
+                          width, height, bytes_text(memory.total()), bytes_text(memory.films),
+                          bytes_text(memory.estimate), bytes_text(physical_memory())));
+}
+
+std::string bytes_text(double bytes) {
+  if (bytes >= 1e12) return fmt::format("{:.1f} TB", bytes / 1e12);
+  if (bytes >= 1e9) return fmt::format("{:.1f} GB", bytes / 1e9);
+  if (bytes >= 1e6) return fmt::format("{:.1f} MB", bytes / 1e6);
+  return fmt::format("{:.1f} kB", bytes / 1e3);
+}
+
+}  // namespace covary

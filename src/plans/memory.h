@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// How much memory a render takes, known before it is taken.
+#pragma once
+
+#include <span>
+#include <string>
+
+#include "plans/plan.h"
+
+namespace covary {
+
+struct RenderMemory {
+  double films = 0;     ///< bytes: samples of all passes, auxiliary images
+  double estimate = 0;  ///< bytes: what the estimator adds, the image included
+  double total() const { return films + estimate; }
+};
+
+/// Of a render of width x height pixels with these passes; the scene is not counted.
+RenderMemory render_memory(const Plan& plan, std::span<const PassPlan> passes, int width, int height, bool aovs);
+
+/// The same for the passes of the plan's first phase, which the scene and the request alone determine.
+RenderMemory render_memory(const LoadedScene& scene, const Plan& plan, const RenderRequest& request);
+
+/// Bytes of the machine.
+double physical_memory();
+
+/// Throws Error(kUsage) where the render needs more than the machine has.
+void check_memory(const RenderMemory& memory, int width, int height);
+
+/// "1.5 GB".
+std::string bytes_text(double bytes);
+
+}  // namespace covary

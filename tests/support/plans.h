@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// Small scenes and quick plans.
+#pragma once
+
+#include <cstring>
+#include <string>
+
+#include "plans/estimator_plans.h"
+#include "plans/integrator_choice.h"
+#include "plans/render.h"
+
+namespace covary {
+
+/// The scene at `path` in another size, with its own integrator.
+inline LoadedScene load_sized(const std::string& path, int width = 40, int height = 30) {
+  LoadOptions options;
+  options.width = width, options.height = height;
+  options.make_integrator = integrator_maker({});
+  return load_scene(path, options);
+}
+
+inline RenderRequest request_of(uint32_t spp) {
+  RenderRequest request;
+  request.spp = spp;
+  request.seed = 5;
+  return request;
+}
+
+/// CRN and independent pass; the image is the average of the first groups of both.
+inline Plan average_plan() {
+  PairMethod method;
+  method.name = method.estimator = "average";
+  method.estimate = [](const GroupedImage& crn, const GroupedImage& independent, int64_t) {
+    EstimatorResult result;
+    result.estimate = Image(crn.width, crn.height, 3);
+    for (int y = 0; y < crn.height; ++y)
+      for (int x = 0; x < crn.width; ++x)
+        for (int c = 0; c < 3; ++c)
+          result.estimate.pixel(x, y)[c] = 0.5f * (crn.pixel(x, y)[c] + independent.pixel(x, y)[c]);
+    return result;
+  };
+  return pair_plan(method);
+}
+
+inline bool same_bits(const Film& a, const Film& b) {
+  return a.counts() == b.counts() && a.data().size() == b.data().size() &&
+         std::memcmp(a.data().data(), b.data().data(), a.data().size() * sizeof(float)) == 0;
+}
+
+}  // namespace covary
