@@ -10,7 +10,8 @@ namespace covary {
 /// Whether the file begins as every EXR file does, whatever it is called. Throws Error(kIo) when it cannot be opened.
 bool is_exr(const std::string& path);
 
-/// Throws Error(kInput) where an attribute of an EXR file claims more bytes than the file has, or the header does not end.
+/// Throws Error(kInput) where an attribute of an EXR file claims more bytes than the file has, or the header does not
+/// end.
 void check_exr_header(const std::string& path);
 
 }  // namespace covary

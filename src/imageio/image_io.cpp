@@ -66,8 +66,8 @@ void check_size(const ImageHeader& header, size_t file_bytes, const std::string&
                             path, header.width, header.height, n_channels, file_bytes, kMaxPixels, kMaxCompression));
 }
 
-/// Portable float map, which OpenImageIO 2.4 cannot write: three lines of text, then rows of little-endian floats from the
-/// bottom to the top.
+/// Portable float map, which OpenImageIO 2.4 cannot write: three lines of text, then rows of little-endian floats from
+/// the bottom to the top.
 std::vector<unsigned char> encode_pfm(const ImageToEncode& image) {
   static_assert(std::endian::native == std::endian::little);
   const std::string head =

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Image files in every format OpenImageIO knows. OpenImageIO brings some 250 shared libraries, which take longer to load
-// than a small scene to render. So it lies behind a shared module, libcovary_imageio.so, which the first call of a
+// Image files in every format OpenImageIO knows. OpenImageIO brings some 250 shared libraries, which take longer to
+// load than a small scene to render. So it lies behind a shared module, libcovary_imageio.so, which the first call of a
 // function of this header loads. EXR films and PNG files do not need it: film/exr.h, imageio/png.h.
 #pragma once
 
@@ -33,8 +33,8 @@ class ImageReader {
   const ImageHeader& header() const { return header_; }
   size_t n_pixels() const { return static_cast<size_t>(header_.width) * static_cast<size_t>(header_.height); }
 
-  /// Channels [first, last) of all pixels, interleaved, row by row from the top; integers scaled to [0, 1]. Colours are as
-  /// stored: not multiplied by alpha. Throws Error(kInput) when the file is damaged.
+  /// Channels [first, last) of all pixels, interleaved, row by row from the top; integers scaled to [0, 1]. Colours are
+  /// as stored: not multiplied by alpha. Throws Error(kInput) when the file is damaged.
   std::vector<float> read_floats(int first, int last);
   /// The same as bytes; for files of the type "uint8".
   std::vector<uint8_t> read_bytes(int first, int last);
@@ -54,12 +54,12 @@ class ImageReader {
 /// Colours that a file does not store as RGB, such as CMYK.
 enum class OtherColours { kConvert, kKeep };
 
-/// Opens the first picture of a file. Throws Error with the file's name: kIo when it cannot be opened, kInput when it is
-/// not an image, damaged, empty, a volume, deep, or claims more pixels than a file of its size can hold.
+/// Opens the first picture of a file. Throws Error with the file's name: kIo when it cannot be opened, kInput when it
+/// is not an image, damaged, empty, a volume, deep, or claims more pixels than a file of its size can hold.
 std::unique_ptr<ImageReader> open_image(const std::string& path, OtherColours colours = OtherColours::kConvert);
 
-/// Pixels to be written: `channels` (1: grey, 3: RGB) interleaved values a pixel, row by row from the top. Exactly one of
-/// `bytes` and `floats` is set; it is only read.
+/// Pixels to be written: `channels` (1: grey, 3: RGB) interleaved values a pixel, row by row from the top. Exactly one
+/// of `bytes` and `floats` is set; it is only read.
 struct ImageToEncode {
   int width = 0, height = 0, channels = 3;
   const uint8_t* bytes = nullptr;                 ///< encoded with the sRGB curve

@@ -20,8 +20,8 @@ class ImageModule {
                                             std::string& problem) const = 0;
 };
 
-/// Name of the module's only function, which returns a `const ImageModule*` that lives as long as the program. The number
-/// changes with the classes of these headers, so that a program never uses a module of another build.
+/// Name of the module's only function, which returns a `const ImageModule*` that lives as long as the program. The
+/// number changes with the classes of these headers, so that a program never uses a module of another build.
 inline constexpr const char* kImageModuleEntry = "covary_image_module_1";
 inline constexpr const char* kImageModuleFile = "libcovary_imageio.so";
 

@@ -10,8 +10,8 @@
 namespace covary {
 
 /// The content of a PNG file of `width` x `height` pixels, three bytes each from the top left on, encoded with the sRGB
-/// curve. `texts` become text chunks: keywords of 1 to 79 Latin-1 characters, UTF-8 values. Throws Error(kIo) when libpng
-/// refuses the size or a keyword.
+/// curve. `texts` become text chunks: keywords of 1 to 79 Latin-1 characters, UTF-8 values. Throws Error(kIo) when
+/// libpng refuses the size or a keyword.
 std::vector<unsigned char> encode_png(int width, int height, const std::vector<uint8_t>& rgb,
                                       const std::map<std::string, std::string>& texts = {});
 

@@ -22,8 +22,8 @@ struct TexelImage {
 };
 
 /// Reads the first picture of a file in any format OpenImageIO knows (PNG, JPEG, EXR, HDR, PFM, TGA, BMP, PPM, TIFF).
-/// Throws like open_image() (imageio/image_io.h), and Error(kInput) when the file is damaged, has neither red, green and
-/// blue nor grey channels, or holds a value that is not finite.
+/// Throws like open_image() (imageio/image_io.h), and Error(kInput) when the file is damaged, has neither red, green
+/// and blue nor grey channels, or holds a value that is not finite.
 TexelImage read_texels(const std::string& path);
 
 /// The image as linear RGB floats, three per pixel; throws like read_texels.
