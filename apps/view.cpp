@@ -120,19 +120,21 @@ struct Page {
 
  private:
   void add_layers(const Shown& image, const std::string& shown, nlohmann::ordered_json& entry);
-  std::string label(const Shown& image, const Image& pixels) const;
+  /// Label and note: relMSE and what the standard errors predict of it.
+  void add_errors(const Shown& image, const Image& pixels, nlohmann::ordered_json& entry) const;
 };
 
-std::string Page::label(const Shown& image, const Image& pixels) const {
-  if (image.is_reference) return "reference";
-  std::string text;
-  if (reference) text = fmt::format("relMSE {:.3g}", compute_metric(Metric::kRelMse, pixels, {&*reference, 1}).value);
+void Page::add_errors(const Shown& image, const Image& pixels, nlohmann::ordered_json& entry) const {
+  if (reference)
+    entry["label"] = fmt::format("relMSE {:.3g}", compute_metric(Metric::kRelMse, pixels, {&*reference, 1}).value);
   const std::string errors = image.path + ":StdError";
   const auto layer = std::find_if(images.begin(), images.end(), [&](const auto& i) { return i.id == errors; });
-  if (layer == images.end() || layer->pixels.channels != 3) return text;
+  if (layer == images.end() || layer->pixels.channels != 3) return;
   const double predicted = predicted_relmse({pixels, layer->pixels});
-  return text.empty() ? fmt::format("predicted relMSE {:.3g}", predicted)
-                      : fmt::format("{}, predicted {:.3g}", text, predicted);
+  if (reference)
+    entry["note"] = fmt::format("predicted {:.3g}", predicted);
+  else
+    entry["label"] = fmt::format("predicted relMSE {:.3g}", predicted);
 }
 
 /// The other layers of the image's file, those of one channel as such.
@@ -167,8 +169,10 @@ nlohmann::ordered_json Page::add(const Shown& image, const std::string& layer) {
     entry["flip"] = image.path + ":FLIP";
     images.push_back({image.path + ":FLIP", std::move(flip.map)});
   }
-  const std::string text = label(image, pixels);
-  if (!text.empty()) entry["label"] = text;
+  if (image.is_reference)
+    entry["label"] = "reference";
+  else
+    add_errors(image, pixels, entry);
   images.push_back({image.path, std::move(pixels)});
   return entry;
 }

@@ -188,7 +188,7 @@ TEST(EnvironmentMap, ReportsWrongParameters) {
                                     {"file_name", std::string("x")}});
   EXPECT_EQ(made.object, nullptr);
   for (const char* message :
-       {"test.xml:2:1: parameter 'filename' of emitter 'envmap' cannot be used: cannot read image '",
+       {"test.xml:2:1: parameter 'filename' of emitter 'envmap' cannot be used: ",
         "test.xml:3:1: parameter 'scale' of emitter 'envmap' is -1; it must be at least 0",
         "test.xml:4:1: parameter 'to_world' of emitter 'envmap' distorts directions",
         "test.xml:5:1: unknown parameter 'file_name' of emitter 'envmap'; did you mean 'filename'?"})

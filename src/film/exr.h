@@ -67,6 +67,8 @@ class ExrFile {
 
  private:
   struct Handle;
+  /// Throws where the header promises more pixels than fit in memory or than the file can hold.
+  void check_pixels() const;
   std::string path_;
   std::unique_ptr<Handle> handle_;
   ImagePlace place_;

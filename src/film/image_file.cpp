@@ -1,19 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "film/image_file.h"
 
-#include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <cerrno>
-#include <cstdio>
-#include <cstring>
 #include <filesystem>
 #include <iterator>
+#include <memory>
 #include <set>
+
+#include "imageio/exr_header.h"
+#include "imageio/image_io.h"
 
 namespace covary {
 namespace {
@@ -22,66 +21,23 @@ namespace {
   throw Error(ErrorCode::kInput, path + ": " + what);
 }
 
-/// The first bytes of a file, which tell EXR from other formats whatever the file is called.
-bool is_exr(const std::string& path) {
+/// Whether OpenEXR reads the file, whatever it is called.
+bool is_film_or_exr(const std::string& path) {
+  if (is_exr(path)) return true;
   std::error_code ignored;
-  if (std::filesystem::is_directory(path, ignored))
-    throw Error(ErrorCode::kIo, fmt::format("cannot read {}: it is a folder", path));
-  std::FILE* file = std::fopen(path.c_str(), "rb");
-  if (!file) throw Error(ErrorCode::kIo, fmt::format("cannot read {}: {}", path, std::strerror(errno)));
-  unsigned char magic[4] = {0, 0, 0, 0};
-  const size_t n_read = std::fread(magic, 1, 4, file);
-  std::fclose(file);
-  if (n_read == 0) fail(path, "the file is empty");
-  return magic[0] == 0x76 && magic[1] == 0x2f && magic[2] == 0x31 && magic[3] == 0x01;
+  if (std::filesystem::file_size(path, ignored) == 0) fail(path, "the file is empty");
+  return false;
 }
 
-/// OpenImageIO's last message, without line breaks at its end.
-std::string oiio_error(std::string text) {
-  text.erase(text.find_last_not_of(" \n") + 1);
-  return text;
+ImagePlace place_of(const ImageHeader& header) {
+  return {header.frame_width, header.frame_height, {header.x, header.y, header.width, header.height}};
 }
 
-/// An image that OpenImageIO can read; EXR never comes here.
-class OtherFile {
- public:
-  explicit OtherFile(const std::string& path) : path_(path) {
-    OIIO::ImageSpec config;
-    config["oiio:UnassociatedAlpha"] = 1;  // colours as stored: alpha is not used
-    input_ = OIIO::ImageInput::open(path, &config);
-    if (!input_) fail(path, fmt::format("not an image that can be read: {}", oiio_error(OIIO::geterror())));
-    const OIIO::ImageSpec& s = spec();
-    const double memory = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
-    if (s.width < 1 || s.height < 1 || s.nchannels < 1 || s.depth > 1 || s.deep ||
-        static_cast<double>(s.width) * s.height * s.nchannels * sizeof(float) > memory)
-      fail(path, fmt::format("{} x {} pixels of {} channels cannot be read", s.width, s.height, s.nchannels));
-  }
-
-  const OIIO::ImageSpec& spec() const { return input_->spec(); }
-  const char* format() const { return input_->format_name(); }
-
-  ImagePlace place() const {
-    const OIIO::ImageSpec& s = spec();
-    return {s.full_width, s.full_height, {s.x - s.full_x, s.y - s.full_y, s.width, s.height}};
-  }
-
-  std::vector<ExrFile::Channel> channels() const {
-    std::vector<ExrFile::Channel> result;
-    for (const std::string& name : spec().channelnames) result.push_back({name, spec().format.c_str()});
-    return result;
-  }
-
-  std::vector<float> read() {
-    std::vector<float> values(static_cast<size_t>(spec().width) * spec().height * spec().nchannels);
-    if (!input_->read_image(0, 0, 0, spec().nchannels, OIIO::TypeDesc::FLOAT, values.data()))
-      fail(path_, fmt::format("damaged or incomplete image: {}", oiio_error(input_->geterror())));
-    return values;
-  }
-
- private:
-  std::string path_;
-  std::unique_ptr<OIIO::ImageInput> input_;
-};
+std::vector<ExrFile::Channel> channels_of(const ImageHeader& header) {
+  std::vector<ExrFile::Channel> result;
+  for (const std::string& name : header.channels) result.push_back({name, header.type});
+  return result;
+}
 
 std::string lower(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
@@ -142,22 +98,17 @@ std::vector<std::string> layer_channels(const std::string& path, const std::vect
 }
 
 ImageInfo inspect_image(const std::string& path) {
-  if (is_exr(path)) {
+  if (is_film_or_exr(path)) {
     const ExrFile file(path);
     return {"openexr", file.compression(), file.place(), file.channels(), file.attributes()};
   }
-  const OtherFile file(path);
-  ImageInfo info{file.format(), "", file.place(), file.channels(), {}};
-  for (const OIIO::ParamValue& value : file.spec().extra_attribs) {
-    if (value.name() == "compression") info.compression = value.get_string();
-    if (value.type() == OIIO::TypeDesc::STRING) info.attributes[value.name().string()] = value.get_string();
-  }
-  return info;
+  const ImageHeader header = open_image(path)->header();
+  return {header.format, header.compression, place_of(header), channels_of(header), header.attributes};
 }
 
 PlacedImage read_image(const std::string& path, const std::string& layer) {
   PlacedImage result;
-  if (is_exr(path)) {
+  if (is_film_or_exr(path)) {
     const ExrFile file(path);
     const std::vector<std::string> names = layer_channels(path, file.channels(), layer);
     result.place = file.place();
@@ -173,18 +124,18 @@ PlacedImage read_image(const std::string& path, const std::string& layer) {
     return result;
   }
 
-  OtherFile file(path);
-  const std::vector<std::string> names = layer_channels(path, file.channels(), layer);
-  const OIIO::ImageSpec& spec = file.spec();
-  result.place = file.place();
-  result.low_dynamic_range = !spec.format.is_floating_point();
-  const std::vector<float> values = file.read();
-  result.image = Image(spec.width, spec.height, 3);
+  const std::unique_ptr<ImageReader> file = open_image(path);
+  const ImageHeader& header = file->header();
+  const std::vector<std::string> names = layer_channels(path, channels_of(header), layer);
+  result.place = place_of(header);
+  result.low_dynamic_range = !header.floating_point;
+  const size_t n_channels = header.channels.size();
+  const std::vector<float> values = file->read_floats(0, static_cast<int>(n_channels));
+  result.image = Image(header.width, header.height, 3);
   for (size_t c = 0; c < 3; ++c) {
-    const size_t source =
-        std::find(spec.channelnames.begin(), spec.channelnames.end(), names[c]) - spec.channelnames.begin();
+    const size_t source = std::find(header.channels.begin(), header.channels.end(), names[c]) - header.channels.begin();
     for (size_t p = 0; p < result.image.data.size() / 3; ++p) {
-      const float value = values[p * spec.nchannels + source];
+      const float value = values[p * n_channels + source];
       result.image.data[p * 3 + c] = result.low_dynamic_range ? srgb_to_linear(value) : value;
     }
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Images of any renderer: EXR by OpenEXR, all other formats by OpenImageIO.
+// Images of any renderer: EXR by OpenEXR, all other formats by imageio/image_io.h.
 #pragma once
 
 #include <string>

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "film/image_writer.h"
 
-#include <OpenImageIO/filesystem.h>
-#include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -15,46 +13,44 @@
 #include "core/error.h"
 #include "core/srgb.h"
 #include "film/output_file.h"
+#include "imageio/image_io.h"
+#include "imageio/png.h"
 
 namespace covary {
 namespace {
 
+constexpr const char* kSoftwareKey = "Software";
 constexpr const char* kSoftware = "covary";
-constexpr int kJpegQuality = 95;
 constexpr float kLargestRgbe = 0x1.fep126f;  // 255 / 256 times the power of 2 of the largest exponent
 
-/// Writes `pixels` in one of OpenImageIO's formats into memory and from there to the file, so that every failed write
-/// is seen.
-void write_with_oiio(const std::string& path, const char* format, const OIIO::ImageSpec& spec, const void* pixels) {
-  std::vector<unsigned char> file_content;
-  OIIO::Filesystem::IOVecOutput proxy(file_content);
-  const auto output = OIIO::ImageOutput::create(format, &proxy);
-  if (!output || !output->open(std::string("image.") + format, spec) || !output->write_image(spec.format, pixels) ||
-      !output->close())
-    throw Error(ErrorCode::kIo,
-                fmt::format("cannot write {}: {}", path, output ? output->geterror() : OIIO::geterror()));
+void write_content(const std::string& path, const std::vector<unsigned char>& content) {
   OutputFile file(path);
-  file.write(file_content.data(), file_content.size());
+  file.write(content.data(), content.size());
   file.commit();
 }
 
-void write_display(const std::string& path, const char* format, const Image& linear) {
+/// Encoded with the sRGB curve; negative values and not-a-number are black.
+std::vector<uint8_t> display_bytes(const Image& linear) {
   std::vector<uint8_t> encoded(linear.data.size());
   for (size_t i = 0; i < encoded.size(); ++i) {
     const float value = std::isnan(linear.data[i]) ? 0 : clamp01(linear.data[i]);
     encoded[i] = static_cast<uint8_t>(std::lround(linear_to_srgb(value) * 255));
   }
-  OIIO::ImageSpec spec(linear.width, linear.height, 3, OIIO::TypeDesc::UINT8);
-  spec.attribute("oiio:ColorSpace", "sRGB");
-  spec.attribute("Software", kSoftware);
-  spec.attribute("CompressionQuality", kJpegQuality);
-  write_with_oiio(path, format, spec, encoded.data());
+  return encoded;
+}
+
+void write_jpeg(const std::string& path, const Image& linear) {
+  const std::vector<uint8_t> encoded = display_bytes(linear);
+  ImageToEncode image{linear.width, linear.height};
+  image.bytes = encoded.data();
+  image.attributes = {{kSoftwareKey, kSoftware}};
+  write_content(path, encode_image("jpg", image));
 }
 
 void write_float(const std::string& path, const char* format, const Image& linear) {
-  OIIO::ImageSpec spec(linear.width, linear.height, 3, OIIO::TypeDesc::FLOAT);
-  spec.attribute("oiio:ColorSpace", "Linear");
-  write_with_oiio(path, format, spec, linear.data.data());
+  ImageToEncode image{linear.width, linear.height};
+  image.floats = linear.data.data();
+  write_content(path, encode_image(format, image));
 }
 
 /// Radiance's format holds no sign.
@@ -103,22 +99,25 @@ void write_image(const std::string& path, const Image& linear, const ImagePlace&
   } else if (extension == ".pfm") {
     write_pfm(path, linear);
   } else if (extension == ".tif" || extension == ".tiff") {
-    write_float(path, "tiff", linear);
+    write_float(path, "tif", linear);
+  } else if (extension == ".jpg" || extension == ".jpeg") {
+    write_jpeg(path, linear);
   } else {
-    write_display(path, extension == ".jpg" || extension == ".jpeg" ? "jpeg" : "png", linear);
+    write_png(path, linear);
   }
 }
 
 void write_png(const std::string& path, const Image& linear) {
   COVARY_CHECK(linear.channels == 3, "a PNG of 3 channels");
-  write_display(path, "png", linear);
+  const std::vector<unsigned char> content =
+      encode_png(linear.width, linear.height, display_bytes(linear), {{kSoftwareKey, kSoftware}});
+  write_content(path, content);
 }
 
 bool is_own_png(const std::string& path) {
-  const auto input = OIIO::ImageInput::open(path);
-  if (input) return std::string(input->format_name()) == "png" && input->spec()["Software"].get() == kSoftware;
-  OIIO::geterror();  // what is not an image, is not ours
-  return false;
+  const std::map<std::string, std::string> texts = read_png_texts(path);
+  const auto software = texts.find(kSoftwareKey);
+  return software != texts.end() && software->second == kSoftware;
 }
 
 }  // namespace covary

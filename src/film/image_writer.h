@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures out, in the format that their name tells: EXR by OpenEXR, PFM here, all others by OpenImageIO.
+// Pictures out, in the format that their name tells: EXR by OpenEXR, PNG and all others by
+// imageio, PFM here.
 #pragma once
 
 #include <map>

@@ -48,16 +48,16 @@ class SplatLayer {
   /// differ in count, or when it has samples and is not a light film with bundles of this size.
   explicit SplatLayer(Film& film);
 
-  /// Begins the next round on the way to `target` bundles (a multiple of the film's groups), dropping what an unfinished
-  /// one has gathered; false: the film has as many.
+  /// Begins the next round on the way to `target` bundles (a multiple of the film's groups), dropping what an
+  /// unfinished one has gathered; false: the film has as many.
   bool begin_round(uint32_t target);
   /// The bundles of the round.
   uint32_t first_bundle() const { return first_; }
   uint32_t end_bundle() const { return end_; }
 
   /// Adds `value` (radiance of one pixel for a single light path, not divided by their number) at the pixel (x, y) of
-  /// the full frame; nothing where that lies outside of the crop. The paths of a bundle come in ascending order and from
-  /// one thread; different bundles may come from different threads.
+  /// the full frame; nothing where that lies outside of the crop. The paths of a bundle come in ascending order and
+  /// from one thread; different bundles may come from different threads.
   void add(uint64_t path, int x, int y, const Spectrum& value);
 
   /// Adds the round to the film. All its bundles must be complete.

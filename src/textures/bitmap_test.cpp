@@ -226,10 +226,9 @@ TEST(Bitmap, ReportsWrongParameters) {
                                           {"wrap_mode", std::string("repeated")},
                                           {"filter", std::string("bilinear")}});
   EXPECT_EQ(made.object, nullptr);
-  EXPECT_NE(
-      made.errors.find("test.xml:2:1: parameter 'filename' of texture 'bitmap' cannot be used: cannot read image '" +
-                       folder.file("a.png") + "'"),
-      std::string::npos)
+  EXPECT_NE(made.errors.find("test.xml:2:1: parameter 'filename' of texture 'bitmap' cannot be used: " +
+                             folder.file("a.png") + ": "),
+            std::string::npos)
       << made.errors;
   EXPECT_NE(
       made.errors.find("test.xml:3:1: parameter 'wrap_mode' of texture 'bitmap' is 'repeated'; accepted: 'repeat', "

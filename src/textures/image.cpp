@@ -1,65 +1,41 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "textures/image.h"
 
-#include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
+#include <strings.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <filesystem>
+#include <memory>
 
 #include "core/error.h"
 #include "core/srgb.h"
+#include "imageio/image_io.h"
 
 namespace covary {
 namespace {
 
-constexpr size_t kMaxPixels = size_t{1} << 30;
-/// No format packs an image tighter than this many bytes of pixels into one byte of file (deflate: about 1032).
-constexpr size_t kMaxCompression = 10000;
-
 /// Which channels of the file hold grey or red, green, blue.
-std::vector<int> choose_channels(const OIIO::ImageSpec& spec, const std::string& path) {
+std::vector<int> choose_channels(const ImageHeader& header, const std::string& path) {
+  const std::vector<std::string>& names = header.channels;
   const auto find = [&](const char* name) {
-    const auto& names = spec.channelnames;
-    const auto it =
-        std::find_if(names.begin(), names.end(), [&](const std::string& n) { return OIIO::Strutil::iequals(n, name); });
+    const auto it = std::find_if(names.begin(), names.end(),
+                                 [&](const std::string& n) { return strcasecmp(n.c_str(), name) == 0; });
     return it == names.end() ? -1 : static_cast<int>(it - names.begin());
   };
   const std::array<int, 3> rgb = {find("R"), find("G"), find("B")};
   if (std::all_of(rgb.begin(), rgb.end(), [](int c) { return c >= 0; })) return {rgb.begin(), rgb.end()};
-  if (spec.nchannels <= 2 && spec.alpha_channel != 0) return {0};
+  if (names.size() <= 2 && header.alpha_channel != 0) return {0};
   if (find("Y") >= 0 && find("RY") < 0 && find("BY") < 0 && find("X") < 0) return {find("Y")};
-  throw Error(ErrorCode::kInput, fmt::format("image '{}' has the channels {}; a texture needs R, G, B or a grey one",
-                                             path, fmt::join(spec.channelnames, ", ")));
+  throw Error(ErrorCode::kInput, fmt::format("{} has the channels {}; a texture needs R, G, B or a grey one", path,
+                                             fmt::join(names, ", ")));
 }
 
-void check_size(const OIIO::ImageSpec& spec, const std::string& path) {
-  if (spec.width < 1 || spec.height < 1 || spec.nchannels < 1)
-    throw Error(ErrorCode::kInput, fmt::format("image '{}' is empty: {} x {} pixels, {} channels", path, spec.width,
-                                               spec.height, spec.nchannels));
-  if (spec.depth > 1)
-    throw Error(ErrorCode::kInput, fmt::format("image '{}' is a volume of depth {}, not a picture", path, spec.depth));
-  std::error_code ignored;
-  const size_t file_bytes = std::filesystem::file_size(path, ignored);
-  const size_t n_pixels = static_cast<size_t>(spec.width) * spec.height;
-  if (n_pixels > kMaxPixels || n_pixels / kMaxCompression > file_bytes)
-    throw Error(ErrorCode::kInput, fmt::format("image '{}' claims {} x {} pixels in {} bytes; at most {} pixels are "
-                                               "accepted, and {} per byte of the file",
-                                               path, spec.width, spec.height, file_bytes, kMaxPixels, kMaxCompression));
-}
-
-/// Reads all pixels and keeps the channels in `keep`.
+/// Of pixels with the channels from `first` on, those in `keep`.
 template <typename T>
-std::vector<T> read_channels(OIIO::ImageInput& input, const OIIO::ImageSpec& spec, const std::vector<int>& keep,
-                             OIIO::TypeDesc type, const std::string& path) {
-  const int first = *std::min_element(keep.begin(), keep.end());
-  const int last = *std::max_element(keep.begin(), keep.end()) + 1;
-  const size_t n_read = last - first, n_pixels = static_cast<size_t>(spec.width) * spec.height;
-  std::vector<T> all(n_pixels * n_read);
-  if (!input.read_image(0, 0, first, last, type, all.data()))
-    throw Error(ErrorCode::kInput, fmt::format("image '{}' is broken: {}", path, input.geterror()));
+std::vector<T> keep_channels(std::vector<T> all, size_t n_pixels, int first, const std::vector<int>& keep) {
+  const size_t n_read = all.size() / n_pixels;
   if (n_read == keep.size() && std::is_sorted(keep.begin(), keep.end())) return all;
   std::vector<T> kept(n_pixels * keep.size());
   for (size_t i = 0; i < n_pixels; ++i)
@@ -67,28 +43,30 @@ std::vector<T> read_channels(OIIO::ImageInput& input, const OIIO::ImageSpec& spe
   return kept;
 }
 
+/// Throws where a value is not finite.
+void check_finite(const TexelImage& image, const std::string& path) {
+  const auto it = std::find_if(image.floats.begin(), image.floats.end(), [](float v) { return !std::isfinite(v); });
+  if (it == image.floats.end()) return;
+  const size_t pixel = static_cast<size_t>(it - image.floats.begin()) / image.channels;
+  throw Error(ErrorCode::kInput, fmt::format("{} holds the value {} at pixel ({}, {}); all must be finite", path, *it,
+                                             pixel % image.width, pixel / image.width));
+}
+
 }  // namespace
 
 TexelImage read_texels(const std::string& path) {
-  OIIO::ImageSpec config;
-  config.attribute("oiio:UnassociatedAlpha", 1);  // do not multiply colours by alpha
-  config.attribute("oiio:RawColor", 1);
-  std::error_code status;
-  if (!std::filesystem::is_regular_file(path, status))
-    throw Error(ErrorCode::kIo, fmt::format("cannot open image '{}': not a file", path));
-  const auto input = OIIO::ImageInput::open(path, &config);
-  if (!input) throw Error(ErrorCode::kInput, fmt::format("cannot read image '{}': {}", path, OIIO::geterror()));
-  const OIIO::ImageSpec spec = input->spec();
-  check_size(spec, path);
-
-  const std::vector<int> channels = choose_channels(spec, path);
+  const std::unique_ptr<ImageReader> file = open_image(path, OtherColours::kKeep);
+  const ImageHeader& header = file->header();
+  const std::vector<int> channels = choose_channels(header, path);
+  const auto [first, last] = std::minmax_element(channels.begin(), channels.end());
   TexelImage image;
-  image.width = spec.width, image.height = spec.height, image.channels = static_cast<int>(channels.size());
-  image.srgb = !spec.format.is_floating_point();
-  if (spec.format == OIIO::TypeDesc::UINT8)
-    image.bytes = read_channels<uint8_t>(*input, spec, channels, OIIO::TypeDesc::UINT8, path);
+  image.width = header.width, image.height = header.height, image.channels = static_cast<int>(channels.size());
+  image.srgb = !header.floating_point;
+  if (header.type == "uint8")
+    image.bytes = keep_channels(file->read_bytes(*first, *last + 1), image.n_pixels(), *first, channels);
   else
-    image.floats = read_channels<float>(*input, spec, channels, OIIO::TypeDesc::FLOAT, path);
+    image.floats = keep_channels(file->read_floats(*first, *last + 1), image.n_pixels(), *first, channels);
+  check_finite(image, path);
   return image;
 }
 
@@ -100,10 +78,6 @@ TexelImage read_linear_rgb(const std::string& path) {
   result.floats.resize(source.n_pixels() * 3);
   for (size_t i = 0; i < n_values; ++i) {
     float value = source.bytes.empty() ? source.floats[i] : static_cast<float>(source.bytes[i]) / 255;
-    if (!std::isfinite(value))
-      throw Error(ErrorCode::kInput,
-                  fmt::format("image '{}' holds the value {} at pixel ({}, {}); all must be finite", path, value,
-                              i / source.channels % source.width, i / source.channels / source.width));
     if (source.srgb) value = srgb_to_linear(value);
     if (source.channels == 3)
       result.floats[i] = value;

@@ -22,12 +22,11 @@ struct TexelImage {
 };
 
 /// Reads the first picture of a file in any format OpenImageIO knows (PNG, JPEG, EXR, HDR, PFM, TGA, BMP, PPM, TIFF).
-/// Throws Error with the file's name: kIo when it cannot be opened, kInput when it is broken, empty, not an image,
-/// absurdly large, or has neither red, green and blue nor grey channels.
+/// Throws like open_image() (imageio/image_io.h), and Error(kInput) when the file is damaged, has neither red, green
+/// and blue nor grey channels, or holds a value that is not finite.
 TexelImage read_texels(const std::string& path);
 
-/// The image as linear RGB floats, three per pixel; throws like read_texels, and Error(kInput) for a value that is not
-/// finite.
+/// The image as linear RGB floats, three per pixel; throws like read_texels.
 TexelImage read_linear_rgb(const std::string& path);
 
 }  // namespace covary

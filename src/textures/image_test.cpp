@@ -41,7 +41,7 @@ void write_noise(const std::string& path, int width, int height, const std::vect
 }
 
 TEST(Image, NamesAFileThatDoesNotExist) {
-  EXPECT_EQ(error_of("/no/such/file.png"), "cannot open image '/no/such/file.png': not a file");
+  EXPECT_EQ(error_of("/no/such/file.png"), "cannot read /no/such/file.png: no such file");
 }
 
 TEST(Image, RejectsWhatIsNotAnImage) {
@@ -49,9 +49,9 @@ TEST(Image, RejectsWhatIsNotAnImage) {
   for (const char* name : {"a.png", "a.jpg", "a.exr", "a.hdr", "a.pfm", "a.tga", "a.xyz"}) {
     const std::string path = folder.file(name);
     write(path, "plain text is not a picture, however long it may be");
-    EXPECT_NE(error_of(path).find("'" + path + "'"), std::string::npos) << name << ": " << error_of(path);
+    EXPECT_NE(error_of(path).find(path), std::string::npos) << name << ": " << error_of(path);
     write(path, "");
-    EXPECT_NE(error_of(path).find("'" + path + "'"), std::string::npos) << name << ": " << error_of(path);
+    EXPECT_NE(error_of(path).find(path), std::string::npos) << name << ": " << error_of(path);
   }
 }
 
@@ -63,7 +63,7 @@ TEST(Image, RejectsTruncatedFiles) {
     const TexelImage whole = read_texels(path);
     EXPECT_EQ(whole.width, 64) << name;
     std::filesystem::resize_file(path, std::filesystem::file_size(path) / 2);
-    EXPECT_NE(error_of(path).find("image '" + path + "' is broken"), std::string::npos)
+    EXPECT_NE(error_of(path).find(path + ": damaged or incomplete image: "), std::string::npos)
         << name << ": " << error_of(path);
   }
 }
@@ -72,7 +72,7 @@ TEST(Image, RejectsEmptyAndAbsurdSizes) {
   const TemporaryFolder folder;
   const std::string empty = folder.file("empty.pfm");
   write(empty, "PF\n0 0\n-1.0\n");
-  EXPECT_NE(error_of(empty).find("'" + empty + "'"), std::string::npos) << error_of(empty);
+  EXPECT_NE(error_of(empty).find(empty), std::string::npos) << error_of(empty);
 
   const std::string png = folder.file("huge.png");
   write_noise(png, 8, 8, {"R", "G", "B"});
@@ -80,11 +80,11 @@ TEST(Image, RejectsEmptyAndAbsurdSizes) {
   file.seekp(16);  // width and height in the header; its checksum is wrong now, which is an error as well
   file << std::string("\x00\x0f\x00\x00\x00\x0f\x00\x00", 8);
   file.close();
-  EXPECT_NE(error_of(png).find("'" + png + "'"), std::string::npos) << error_of(png);
+  EXPECT_NE(error_of(png).find(png), std::string::npos) << error_of(png);
 
   const std::string pfm = folder.file("huge.pfm");
   write(pfm, "PF\n40000 40000\n-1.0\nabcdefgh");
-  EXPECT_NE(error_of(pfm).find("image '" + pfm + "' claims 40000 x 40000 pixels in 28 bytes"), std::string::npos)
+  EXPECT_NE(error_of(pfm).find(pfm + ": claims 40000 x 40000 pixels of 3 channels in 28 bytes"), std::string::npos)
       << error_of(pfm);
 }
 
@@ -92,7 +92,7 @@ TEST(Image, RejectsChannelsThatAreNotColours) {
   const TemporaryFolder folder;
   const std::string path = folder.file("xyz.exr");
   write_noise(path, 4, 4, {"X", "Y", "Z"});
-  EXPECT_EQ(error_of(path), "image '" + path + "' has the channels X, Y, Z; a texture needs R, G, B or a grey one");
+  EXPECT_EQ(error_of(path), path + " has the channels X, Y, Z; a texture needs R, G, B or a grey one");
 }
 
 TEST(Image, FindsColoursAmongOtherChannels) {
@@ -110,20 +110,14 @@ TEST(Image, FindsColoursAmongOtherChannels) {
   }
 }
 
-TEST(Image, LinearImagesRejectValuesThatAreNotFinite) {
+TEST(Image, RejectsValuesThatAreNotFinite) {
   const TemporaryFolder folder;
   const std::string path = folder.file("bad.pfm");
   std::string bytes = "Pf\n2 2\n-1.0\n";
   const float values[4] = {1, 2, 3, std::numeric_limits<float>::infinity()};  // bottom row first
   bytes.append(reinterpret_cast<const char*>(values), sizeof(values));
   write(path, bytes);
-  try {
-    read_linear_rgb(path);
-    FAIL() << "accepted";
-  } catch (const Error& error) {
-    EXPECT_EQ(std::string(error.what()),
-              "image '" + path + "' holds the value inf at pixel (1, 0); all must be finite");
-  }
+  EXPECT_EQ(error_of(path), path + " holds the value inf at pixel (1, 0); all must be finite");
 }
 
 }  // namespace

@@ -12,13 +12,14 @@ import sys
 # What each module may include, the arrows of docs/architecture.md. Entries are direct; everything behind them follows.
 ARROWS = {
     "core": [],
-    "film": ["core"],
+    "imageio": ["core"],
+    "film": ["imageio"],
     "estimators": ["film"],
     "lab": ["report"],
     "cuda": ["estimators"],
     "report": ["film"],
     "scene": ["core"],
-    "textures": ["scene"],
+    "textures": ["scene", "imageio"],
     "bsdfs": ["textures"],
     "emitters": ["textures"],
     "io": ["bsdfs", "emitters"],

@@ -92,7 +92,7 @@ class Comparer {
 
   /** In words, what the stage shows. */
   description() {
-    const named = (image) => image.name + (image.label ? ` (${image.label})` : "");
+    const named = (image) => image.name + (label_with_note(image) ? ` (${label_with_note(image)})` : "");
     const { a, b, layout, mode, layer } = this.state;
     const what = layout === "grid" ? this.images.map(named).join(", ")
       : layout === "split" ? `${named(this.images[a])} left, ${named(this.images[b])} right` : named(this.images[a]);

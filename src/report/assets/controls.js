@@ -25,6 +25,7 @@ const KEYS = [
   ["P", "save the figure with all insets as PNG"],
 ];
 
+const label_with_note = ({ label, note }) => [label, note].filter(Boolean).join(", ");
 const view_hint = ({ hint, key }) => `${hint} (${key.toUpperCase()})`;
 
 class Controls {
@@ -114,7 +115,7 @@ class Controls {
       { type: "button", title: i < 10 ? `Key ${(i + 1) % 10}` : null,
         click: (event) => this.choose(i, event.shiftKey) },
       el("kbd", { "aria-hidden": "true" }, i < 10 ? String((i + 1) % 10) : ""), el("span", {}, image.name),
-      el("small", {}, image.label ?? (image.role === "reference" ? "reference" : "")))));
+      el("small", {}, label_with_note(image) || (image.role === "reference" ? "reference" : "")))));
     this.other.replaceChildren(...images.map((image) => el("option", {}, image.name)));
     this.layers = [...new Set(images.flatMap((image) => (image.layers ?? []).map((layer) => layer.name)))];
     this.layer.replaceChildren(el("option", { value: "" }, "Layer: image"),

@@ -46,7 +46,7 @@ function draw_figure(picture, name, images, rows) {
       context.lineWidth = 2;
       context.strokeStyle = colour;
       context.strokeRect(x + 1, y + 1, crop - 2, heights[i] - 2);
-      text(crops[k].label, x, y + heights[i], crop);
+      text(image.role === "reference" ? "" : crops[k].label, x, y + heights[i], crop);
       y += heights[i] + line + gap;
     });
     text(image.label ?? "", x, y - gap, crop, true);

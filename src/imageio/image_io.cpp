@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "imageio/image_io.h"
+
+#include <dlfcn.h>
+#include <fmt/format.h>
+
+#include <bit>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <memory>
+
+#include "core/error.h"
+#include "imageio/exr_header.h"
+#include "imageio/image_module.h"
+
+namespace covary {
+namespace {
+
+constexpr size_t kMaxPixels = size_t{1} << 30;
+/// No format packs images tighter than this many values into one byte of file (deflate: about 1032).
+constexpr size_t kMaxCompression = 10000;
+
+/// Loads the module: from the folders in the program's DT_RPATH, which are the build folder or, installed,
+/// ../lib/covary; the loader's usual places follow.
+const ImageModule& image_module() {
+  static const ImageModule& loaded = []() -> const ImageModule& {
+    void* library = dlopen(kImageModuleFile, RTLD_NOW | RTLD_LOCAL);
+    if (!library)
+      throw Error(ErrorCode::kIo,
+                  fmt::format("images of this format need the module {}: {}", kImageModuleFile, dlerror()));
+    using Entry = const ImageModule* (*)();
+    const auto entry = reinterpret_cast<Entry>(dlsym(library, kImageModuleEntry));
+    if (!entry)
+      throw Error(ErrorCode::kIo, fmt::format("the module {} belongs to another version of covary", kImageModuleFile));
+    return *entry();
+  }();
+  return loaded;
+}
+
+/// Bytes of the file; throws where it is not a regular file that can be opened.
+size_t size_of_readable(const std::string& path) {
+  std::error_code status;
+  if (!std::filesystem::is_regular_file(path, status)) {
+    const bool exists = std::filesystem::exists(path, status);
+    throw Error(ErrorCode::kIo,
+                fmt::format("cannot read {}: {}", path, exists ? "not a regular file" : "no such file"));
+  }
+  std::FILE* file = std::fopen(path.c_str(), "rb");
+  if (!file) throw Error(ErrorCode::kIo, fmt::format("cannot read {}: {}", path, std::strerror(errno)));
+  std::fclose(file);
+  return std::filesystem::file_size(path, status);
+}
+
+void check_size(const ImageHeader& header, size_t file_bytes, const std::string& path) {
+  const size_t n_channels = header.channels.size();
+  if (header.width < 1 || header.height < 1 || n_channels < 1)
+    throw Error(ErrorCode::kInput, fmt::format("{}: an empty image: {} x {} pixels, {} channels", path, header.width,
+                                               header.height, n_channels));
+  const size_t n_pixels = static_cast<size_t>(header.width) * static_cast<size_t>(header.height);
+  if (n_pixels > kMaxPixels || n_pixels * n_channels / kMaxCompression > file_bytes)
+    throw Error(ErrorCode::kInput,
+                fmt::format("{}: claims {} x {} pixels of {} channels in {} bytes; at most {} pixels are "
+                            "accepted, and {} values per byte of the file",
+                            path, header.width, header.height, n_channels, file_bytes, kMaxPixels, kMaxCompression));
+}
+
+/// Portable float map, which OpenImageIO 2.4 cannot write: three lines of text, then rows of little-endian floats from
+/// the bottom to the top.
+std::vector<unsigned char> encode_pfm(const ImageToEncode& image) {
+  static_assert(std::endian::native == std::endian::little);
+  const std::string head =
+      fmt::format("{}\n{} {}\n-1.0\n", image.channels == 1 ? "Pf" : "PF", image.width, image.height);
+  std::vector<unsigned char> content(head.begin(), head.end());
+  const size_t n_values = static_cast<size_t>(image.width) * static_cast<size_t>(image.channels);
+  for (int y = image.height - 1; y >= 0; --y) {
+    const auto* row = reinterpret_cast<const unsigned char*>(image.floats + n_values * static_cast<size_t>(y));
+    content.insert(content.end(), row, row + n_values * sizeof(float));
+  }
+  return content;
+}
+
+}  // namespace
+
+template <typename T>
+std::vector<T> ImageReader::read_all(int first, int last) {
+  COVARY_CHECK(first >= 0 && first < last && last <= static_cast<int>(header_.channels.size()), "channels exist");
+  std::vector<T> values(n_pixels() * static_cast<size_t>(last - first));
+  std::string problem;
+  if (!read(first, last, values.data(), problem))
+    throw Error(ErrorCode::kInput, fmt::format("{}: damaged or incomplete image: {}", path_, problem));
+  return values;
+}
+
+std::vector<float> ImageReader::read_floats(int first, int last) { return read_all<float>(first, last); }
+std::vector<uint8_t> ImageReader::read_bytes(int first, int last) { return read_all<uint8_t>(first, last); }
+
+std::unique_ptr<ImageReader> open_image(const std::string& path, OtherColours colours) {
+  const size_t file_bytes = size_of_readable(path);
+  if (is_exr(path)) check_exr_header(path);
+  std::string problem;
+  std::unique_ptr<ImageReader> reader = image_module().open(path, colours, problem);
+  if (!reader) throw Error(ErrorCode::kInput, fmt::format("{}: not an image that can be read: {}", path, problem));
+  check_size(reader->header(), file_bytes, path);
+  return reader;
+}
+
+std::vector<unsigned char> encode_image(const std::string& extension, const ImageToEncode& image) {
+  COVARY_CHECK(!image.bytes != !image.floats && image.width > 0 && image.height > 0, "an image to encode");
+  if (extension == "pfm" && image.floats) return encode_pfm(image);
+  std::string problem;
+  std::vector<unsigned char> content = image_module().encode(extension, image, problem);
+  if (!problem.empty())
+    throw Error(ErrorCode::kIo, fmt::format("cannot write images with the extension '.{}': {}", extension, problem));
+  return content;
+}
+
+}  // namespace covary

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+// The module libcovary_imageio.so: image_io.h by OpenImageIO.
+#include <OpenImageIO/imageio.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <exception>
+#include <fstream>
+#include <iterator>
+#include <system_error>
+
+#include "imageio/image_module.h"
+
+namespace covary {
+namespace {
+
+/// OpenImageIO's message as one line.
+std::string one_line(std::string text) {
+  text.erase(text.find_last_not_of(" \n") + 1);
+  for (size_t at = text.find('\n'); at != std::string::npos; at = text.find('\n', at)) text.replace(at, 1, "; ");
+  return text.empty() ? "OpenImageIO gives no reason" : text;
+}
+
+class OiioReader final : public ImageReader {
+ public:
+  OiioReader(const std::string& path, std::unique_ptr<OIIO::ImageInput> input) : input_(std::move(input)) {
+    path_ = path;
+    const OIIO::ImageSpec& spec = input_->spec();
+    header_.format = input_->format_name();
+    header_.width = spec.width, header_.height = spec.height;
+    header_.x = spec.x - spec.full_x, header_.y = spec.y - spec.full_y;
+    header_.frame_width = spec.full_width, header_.frame_height = spec.full_height;
+    header_.type = spec.format.c_str();
+    header_.floating_point = spec.format.is_floating_point();
+    header_.channels.assign(spec.channelnames.begin(), spec.channelnames.end());
+    header_.alpha_channel = spec.alpha_channel;
+    for (const OIIO::ParamValue& value : spec.extra_attribs) {
+      if (value.name() == "compression") header_.compression = value.get_string();
+      if (value.type() == OIIO::TypeDesc::STRING) header_.attributes[value.name().string()] = value.get_string();
+    }
+  }
+
+ private:
+  bool read(int first, int last, float* values, std::string& problem) override {
+    return read_as(first, last, OIIO::TypeDesc::FLOAT, values, problem);
+  }
+  bool read(int first, int last, uint8_t* values, std::string& problem) override {
+    return read_as(first, last, OIIO::TypeDesc::UINT8, values, problem);
+  }
+  bool read_as(int first, int last, OIIO::TypeDesc type, void* values, std::string& problem) {
+    try {
+      if (input_->read_image(0, 0, first, last, type, values)) return true;
+      problem = one_line(input_->geterror());
+    } catch (const std::exception& error) {
+      problem = error.what();
+    }
+    return false;
+  }
+
+  std::unique_ptr<OIIO::ImageInput> input_;
+};
+
+/// A file without a place on a device. (OpenImageIO's own files in memory do not work for TIFF.)
+class MemoryFile {
+ public:
+  explicit MemoryFile(const std::string& name) : file_(memfd_create(name.c_str(), MFD_CLOEXEC)) {
+    if (file_ < 0) throw std::system_error(errno, std::generic_category(), "no file in memory");
+  }
+  ~MemoryFile() { close(file_); }
+  MemoryFile(const MemoryFile&) = delete;
+  MemoryFile& operator=(const MemoryFile&) = delete;
+
+  std::string path() const { return "/proc/self/fd/" + std::to_string(file_); }
+  std::vector<unsigned char> content() const {
+    std::ifstream stream(path(), std::ios::binary);
+    return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+  }
+
+ private:
+  int file_;
+};
+
+class OiioModule final : public ImageModule {
+ public:
+  std::unique_ptr<ImageReader> open(const std::string& path, OtherColours colours,
+                                    std::string& problem) const override {
+    try {
+      OIIO::ImageSpec config;
+      config.attribute("oiio:UnassociatedAlpha", 1);  // do not multiply colours by alpha
+      if (colours == OtherColours::kKeep) config.attribute("oiio:RawColor", 1);
+      auto input = OIIO::ImageInput::open(path, &config);
+      if (!input) {
+        problem = one_line(OIIO::geterror());
+      } else if (input->spec().depth > 1 || input->spec().deep) {
+        problem = input->spec().deep ? "it has deep pixels" : "it is a volume, not a picture";
+      } else {
+        return std::make_unique<OiioReader>(path, std::move(input));
+      }
+    } catch (const std::exception& error) {
+      problem = error.what();
+    }
+    return nullptr;
+  }
+
+  std::vector<unsigned char> encode(const std::string& extension, const ImageToEncode& image,
+                                    std::string& problem) const override {
+    try {
+      const auto output = OIIO::ImageOutput::create("image." + extension);
+      if (!output) {
+        problem = one_line(OIIO::geterror());
+        return {};
+      }
+      const OIIO::TypeDesc type = image.bytes ? OIIO::TypeDesc::UINT8 : OIIO::TypeDesc::FLOAT;
+      OIIO::ImageSpec spec(image.width, image.height, image.channels, type);
+      spec.attribute("oiio:ColorSpace", image.bytes ? "sRGB" : "Linear");
+      spec.attribute("CompressionQuality", image.quality);
+      for (const auto& [key, value] : image.attributes) spec.attribute(key, value);
+      const void* values = image.bytes ? static_cast<const void*>(image.bytes) : image.floats;
+      const MemoryFile file("image." + extension);
+      if (!output->open(file.path(), spec) || !output->write_image(type, values) || !output->close())
+        problem = one_line(output->geterror());
+      return file.content();
+    } catch (const std::exception& error) {
+      problem = error.what();
+      return {};
+    }
+  }
+};
+
+}  // namespace
+}  // namespace covary
+
+extern "C" __attribute__((visibility("default"))) const covary::ImageModule* covary_image_module_1() {
+  static const covary::OiioModule module;
+  return &module;
+}

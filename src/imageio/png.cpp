@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "imageio/png.h"
+
+#include <png.h>
+
+#include <cstdio>
+#include <memory>
+#include <new>
+
+#include "core/error.h"
+
+namespace covary {
+namespace {
+
+// libpng leaves by its error function, which must not return. The exception passes through libpng, which holds nothing
+// that would have to be released on the way; the destructors below release its structures.
+[[noreturn]] void throw_png_error(png_structp, png_const_charp message) {
+  throw Error(ErrorCode::kIo, std::string("PNG: ") + message);
+}
+void ignore_warning(png_structp, png_const_charp) {}
+
+void append(png_structp png, png_bytep data, size_t size) {
+  auto& content = *static_cast<std::vector<unsigned char>*>(png_get_io_ptr(png));
+  content.insert(content.end(), data, data + size);
+}
+void no_flush(png_structp) {}
+
+struct Writer {
+  Writer() : png(png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, throw_png_error, ignore_warning)) {
+    if (png) info = png_create_info_struct(png);
+    if (!info) throw std::bad_alloc();
+  }
+  ~Writer() { png_destroy_write_struct(&png, &info); }
+  Writer(const Writer&) = delete;
+  Writer& operator=(const Writer&) = delete;
+  png_structp png = nullptr;
+  png_infop info = nullptr;
+};
+
+struct Reader {
+  Reader() : png(png_create_read_struct(PNG_LIBPNG_VER_STRING, nullptr, throw_png_error, ignore_warning)) {
+    if (png) info = png_create_info_struct(png);
+    if (!info) throw std::bad_alloc();
+  }
+  ~Reader() { png_destroy_read_struct(&png, &info, nullptr); }
+  Reader(const Reader&) = delete;
+  Reader& operator=(const Reader&) = delete;
+  png_structp png = nullptr;
+  png_infop info = nullptr;
+};
+
+}  // namespace
+
+std::vector<unsigned char> encode_png(int width, int height, const std::vector<uint8_t>& rgb,
+                                      const std::map<std::string, std::string>& texts) {
+  COVARY_CHECK(width > 0 && height > 0 && rgb.size() == size_t{3} * width * height, "three bytes a pixel");
+  std::vector<unsigned char> content;
+  const Writer writer;
+  png_set_write_fn(writer.png, &content, append, no_flush);
+  png_set_IHDR(writer.png, writer.info, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), 8,
+               PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  png_set_sRGB(writer.png, writer.info, PNG_sRGB_INTENT_PERCEPTUAL);
+  for (const auto& [key, value] : texts) {
+    std::string keyword = key, text = value;  // libpng wants texts it may write to
+    png_text chunk{};
+    chunk.compression = PNG_ITXT_COMPRESSION_NONE;
+    chunk.key = keyword.data(), chunk.text = text.data(), chunk.itxt_length = text.size();
+    png_set_text(writer.png, writer.info, &chunk, 1);  // copies
+  }
+  png_write_info(writer.png, writer.info);
+  for (int y = 0; y < height; ++y) png_write_row(writer.png, rgb.data() + size_t{3} * width * y);
+  png_write_end(writer.png, nullptr);
+  return content;
+}
+
+std::map<std::string, std::string> read_png_texts(const std::string& path) {
+  std::map<std::string, std::string> texts;
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), &std::fclose);
+  if (!file) return texts;
+  try {
+    const Reader reader;
+    png_init_io(reader.png, file.get());
+    png_read_info(reader.png, reader.info);
+    png_textp chunks = nullptr;
+    int n = 0;
+    png_get_text(reader.png, reader.info, &chunks, &n);
+    for (int i = 0; i < n; ++i) texts[chunks[i].key] = chunks[i].text ? chunks[i].text : "";
+  } catch (const Error&) {
+    texts.clear();
+  }
+  return texts;
+}
+
+}  // namespace covary
