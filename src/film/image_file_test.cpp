@@ -228,7 +228,7 @@ TEST(FilmFile, RejectsFilesThatAreNoFilms) {
   for (const char* name : {"group00.R", "group00.G", "group00.B", "group01.R", "group01.G", "group01.B"})
     planes.push_back({name, ExrPlane::Type::kFloat, values.data(), 4});
   write_exr(path, place, {{"covary:film", "1"}, {"covary:groups", "2"}}, planes);
-  EXPECT_TRUE(contains(message(), "3 samples at pixel (0, 0); with 2 groups expected is a multiple of 2"));
+  EXPECT_EQ(message(), "no error") << "groups may have different sizes";
 }
 
 // Every length of the file, and bytes changed at random, give the film or an Error; never anything else.

@@ -103,9 +103,9 @@ TEST(ImageWriter, KnowsItsOwnPngs) {
     std::ifstream file(path, std::ios::binary);
     bytes.assign(std::istreambuf_iterator<char>(file), {});
   }
-  const std::string chunk("tEXtSoftware\0covary", 19);
-  ASSERT_TRUE(contains(bytes, chunk));
-  bytes.replace(bytes.find(chunk) + 13, 6, "gimp 2");  // its checksum is wrong now, as after any damage
+  const size_t keyword = bytes.find("Software"), value = bytes.find("covary", keyword);
+  ASSERT_TRUE(keyword != std::string::npos && value != std::string::npos);
+  bytes.replace(value, 6, "gimp 2");  // its checksum is wrong now, as after any damage
   std::ofstream(path, std::ios::binary) << bytes;
   EXPECT_FALSE(is_own_png(path));
   write_image(test_file("a.jpg"), picture(), {}, {});
