@@ -18,8 +18,8 @@ using test_support::message_of;
 const std::string kSensor = R"(<sensor type="perspective"><float name="fov" value="40"/>
 <transform name="to_world"><lookat origin="0 0 5" target="0 0 0" up="0 1 0"/></transform>
 <sampler type="independent"><integer name="sample_count" value="16"/></sampler>
-<film type="hdrfilm"><integer name="width" value="32"/><integer name="height" value="24"/><rfilter type="box"/></film>
-</sensor>)";
+<film type="hdrfilm"><integer name="width" value="32"/><integer name="height" value="24"/><rfilter type="box"/>)"
+                            R"(</film></sensor>)";
 
 const std::string kTrianglePly =
     "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
@@ -85,12 +85,12 @@ TEST_F(LoadScene, ReadsCropFilterAndThinLens) {
   const LoadedScene s = load(
       R"(<sensor type="thinlens"><float name="aperture_radius" value="0.5"/><float name="focus_distance" value="7"/>
 <string name="focal_length" value="35mm"/><float name="near_clip" value="0.1"/><float name="far_clip" value="100"/>
-<film type="hdrfilm"><integer name="width" value="100"/><integer name="height" value="50"/>
-<integer name="crop_offset_x" value="10"/>
-<integer name="crop_offset_y" value="20"/><integer name="crop_width" value="30"/>
-<integer name="crop_height" value="25"/>
-<string name="pixel_format" value="rgb"/><string name="file_format" value="openexr"/>
-<string name="component_format" value="float16"/>
+<film type="hdrfilm"><integer name="width" value="100"/><integer name="height" value="50"/>)"
+      R"(<integer name="crop_offset_x" value="10"/>
+<integer name="crop_offset_y" value="20"/><integer name="crop_width" value="30"/>)"
+      R"(<integer name="crop_height" value="25"/>
+<string name="pixel_format" value="rgb"/><string name="file_format" value="openexr"/>)"
+      R"(<string name="component_format" value="float16"/>
 <boolean name="banner" value="false"/><boolean name="high_quality_edges" value="false"/>
 <rfilter type="tent"><float name="radius" value="1.5"/></rfilter></film></sensor>)");
   EXPECT_EQ(s.crop_x, 10);
@@ -108,8 +108,8 @@ TEST_F(LoadScene, OverridesTheFilmSizeAndDropsTheCrop) {
   LoadOptions options;
   options.width = 64, options.height = 16;
   const LoadedScene s = load(R"(<sensor type="perspective"><film type="hdrfilm"><integer name="width" value="100"/>
-<integer name="height" value="50"/><integer name="crop_offset_x" value="10"/><integer name="crop_width" value="30"/>
-</film></sensor>)",
+<integer name="height" value="50"/><integer name="crop_offset_x" value="10"/><integer name="crop_width" value="30"/>)"
+                             R"(</film></sensor>)",
                              options);
   EXPECT_EQ(s.width, 64);
   EXPECT_EQ(s.height, 16);
@@ -179,8 +179,8 @@ TEST_F(LoadScene, MakesEveryShape) {
   write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   const LoadedScene s = load(kSensor + R"(<shape type="ply"><string name="filename" value="a.ply"/></shape>
 <shape type="obj"><string name="filename" value="a.obj"/></shape><shape type="rectangle"/><shape type="cube"/>
-<shape type="sphere"><point name="center" x="0" y="0" z="9"/><float name="radius" value="2"/></shape>
-<shape type="disk"/>
+<shape type="sphere"><point name="center" x="0" y="0" z="9"/><float name="radius" value="2"/></shape>)"
+                                       R"(<shape type="disk"/>
 <shape type="cylinder"><point name="p1" x="0" y="0" z="4"/><float name="radius" value="0.5"/></shape>)");
   EXPECT_EQ(s.scene->n_shapes(), 7u);
   EXPECT_EQ(s.scene->n_triangles(), 1u + 1 + 2 + 12);
@@ -280,8 +280,8 @@ TEST_F(LoadScene, ReportsEveryProblemOfShapesAtOnce) {
 
 TEST_F(LoadScene, SharesReferencedMaterialsAndGivesShapesADefault) {
   const LoadedScene s = load(kSensor + R"(<bsdf type="diffuse" id="m"><rgb name="reflectance" value="0.2"/></bsdf>
-<shape type="rectangle"><ref id="m"/></shape><shape type="rectangle"><ref id="m"/><transform name="to_world">
-<translate x="10"/></transform></shape>
+<shape type="rectangle"><ref id="m"/></shape><shape type="rectangle"><ref id="m"/><transform name="to_world">)"
+                                       R"(<translate x="10"/></transform></shape>
 <shape type="rectangle"><transform name="to_world"><translate x="20"/></transform></shape>)");
   ASSERT_TRUE(hits(s, {0, 0, 3}, {0, 0, -1}));
   const Bsdf* first = hit_.bsdf;
@@ -329,8 +329,8 @@ TEST_F(LoadScene, PlacesInstances) {
   const LoadedScene s =
       load(kSensor +
            R"(<shape type="instance"><ref id="g"/><transform name="to_world"><translate x="10"/></transform></shape>
-<shape type="shapegroup" id="g"><shape type="rectangle"><bsdf type="diffuse"><rgb name="reflectance" value="0.3"/>
-</bsdf></shape>
+<shape type="shapegroup" id="g"><shape type="rectangle"><bsdf type="diffuse"><rgb name="reflectance" value="0.3"/>)"
+           R"(</bsdf></shape>
 <shape type="sphere"><point name="center" x="0" y="0" z="-5"/></shape></shape>
 <shape type="instance"><ref id="g"/><transform name="to_world"><translate x="20"/></transform></shape>)");
   EXPECT_FALSE(hits(s, {0, 0, 3}, {0, 0, -1}));  // the group itself is not in the scene

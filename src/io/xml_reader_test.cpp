@@ -93,8 +93,8 @@ TEST(XmlReader, ReadsSpectrumObjects) {
   const Read r = read_scene(R"(<spectrum type="uniform" id="half"><float name="value" value="0.5"/></spectrum>
 <emitter type="area">
   <ref name="a" id="half"/>
-  <spectrum name="b" type="irregular"><string name="wavelengths" value="400, 500"/><string name="values" value="1, 2"/>
-</spectrum>
+  <spectrum name="b" type="irregular"><string name="wavelengths" value="400, 500"/>)"
+                            R"(<string name="values" value="1, 2"/></spectrum>
   <spectrum name="c" type="regular"><float name="wavelength_min" value="400"/><float name="wavelength_max" value="600"/>
     <string name="values" value="1, 2, 3"/></spectrum>
   <spectrum name="d" type="blackbody"><float name="temperature" value="3000"/></spectrum>
@@ -116,8 +116,8 @@ TEST(XmlReader, ReportsWrongSpectrumObjects) {
   const Read r = read_scene(R"(<emitter type="area">
 <spectrum name="a" type="blackbdy"/>
 <spectrum name="b" type="blackbody"/>
-<spectrum name="c" type="irregular"><string name="wavelengths" value="400, 500"/><string name="values" value="1"/>
-</spectrum>
+<spectrum name="c" type="irregular"><string name="wavelengths" value="400, 500"/><string name="values" value="1"/>)"
+                            R"(</spectrum>
 <spectrum name="d" type="uniform"><float name="valu" value="1"/></spectrum>
 </emitter>)");
   EXPECT_EQ(r.errors,
