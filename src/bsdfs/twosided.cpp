@@ -97,11 +97,8 @@ class TwoSided final : public Bsdf {
 
   uint32_t flags() const override { return front_->flags() | back_->flags(); }
   const BsdfClosure* bind(const SurfaceHit& hit, bool wo_front, TransportMode mode, Arena& arena) const override {
-    if (transmits_) {
-      const BsdfClosure* front = front_->bind(hit, true, mode, arena);
-      const BsdfClosure* back = arena.make<MirroredClosure>(back_->bind(hit, true, mode, arena));
-      return arena.make<TransmittingClosure>(front, back, front_ == back_, mode);
-    }
+    if (transmits_) [[unlikely]]
+      return bind_both(hit, mode, arena);
     if (wo_front) return front_->bind(hit, true, mode, arena);
     return arena.make<MirroredClosure>(back_->bind(hit, true, mode, arena));
   }
@@ -111,6 +108,13 @@ class TwoSided final : public Bsdf {
   Spectrum albedo(const SurfaceHit& hit) const override { return front_->albedo(hit); }
 
  private:
+  /// Apart from bind(), which is short and called for every hit.
+  [[gnu::noinline]] const BsdfClosure* bind_both(const SurfaceHit& hit, TransportMode mode, Arena& arena) const {
+    const BsdfClosure* front = front_->bind(hit, true, mode, arena);
+    const BsdfClosure* back = arena.make<MirroredClosure>(back_->bind(hit, true, mode, arena));
+    return arena.make<TransmittingClosure>(front, back, front_ == back_, mode);
+  }
+
   BsdfPtr front_, back_;
   bool transmits_;
 };
