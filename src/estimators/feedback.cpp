@@ -17,8 +17,8 @@ constexpr int kGuide = 0, kResidual = 3, kWeight = 6, kVariance = 7, kPlanes = 8
 constexpr int kCell = 2;
 /// Bandwidths of the wide mean and of the second feedback over that of the narrow mean.
 constexpr float kWidening = 4, kSecondWidening = 12;
-/// Variance of the narrow mean, relative to that of the estimate, at which both means count equally. 0.1 to 3 trade bias for
-/// error, slowly (docs/notes/iicv.md).
+/// Variance of the narrow mean, relative to that of the estimate, at which both means count equally. 0.1 to 3 trade
+/// bias for error, slowly (docs/notes/iicv.md).
 constexpr float kNoise = 0.2f;
 
 /// Cells of side x side pixels, one row of cells per row, repeated horizontally so that column x holds the cell of
@@ -89,8 +89,8 @@ GuidedMean guided_mean(const Planes& cells, int side, int radius, int x, int y, 
   return mean;
 }
 
-/// Adds to each valid pixel what `feedback(x, y, f, variance)` gives, three vfloats for the pixels (x + lane, y) whose values
-/// are f and whose squared standard errors, summed over RGB, are `variance`.
+/// Adds to each valid pixel what `feedback(x, y, f, variance)` gives, three vfloats for the pixels (x + lane, y) whose
+/// values are f and whose squared standard errors, summed over RGB, are `variance`.
 template <typename Feedback>
 void add_everywhere(const std::vector<unsigned char>& valid, const Image& std_error, const Feedback& feedback,
                     Image& estimate) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Grouped images in EXR files of any renderer: films of covary, one file with a layer per group, or one file per group as
-// Mitsuba 3, pbrt-v4 and Blender write them. Rows are read on demand, so that memory does not depend on the image height.
+// Grouped images in EXR files of any renderer: films of covary, one file with a layer per group, or one file per group
+// as Mitsuba 3, pbrt-v4 and Blender write them. Rows are read on demand, so that memory does not depend on the image
+// height.
 #pragma once
 
 #include <cstdint>
@@ -15,10 +16,10 @@ namespace covary {
 
 class GroupedFile {
  public:
-  /// One path: all groups, as layers that differ in a number (group00.R, group00.G, …), or a single image. Several paths:
-  /// one image each, the groups in the order given. An image is R, G, B, or NAME.R, NAME.G, NAME.B; where a file holds
-  /// several, Blender's "Combined" pass is taken if there is one, and `layer` names it otherwise (or the layers of the
-  /// groups without their number). Throws Error(kIo), and Error(kInput) with the layers there are.
+  /// One path: all groups, as layers that differ in a number (group00.R, group00.G, …), or a single image. Several
+  /// paths: one image each, the groups in the order given. An image is R, G, B, or NAME.R, NAME.G, NAME.B; where a file
+  /// holds several, Blender's "Combined" pass is taken if there is one, and `layer` names it otherwise (or the layers
+  /// of the groups without their number). Throws Error(kIo), and Error(kInput) with the layers there are.
   explicit GroupedFile(const std::vector<std::string>& paths, const std::string& layer = "");
 
   int width() const { return place_.window.width; }

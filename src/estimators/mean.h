@@ -6,8 +6,8 @@
 
 namespace covary {
 
-/// Mean of the groups and, with two or more of them, its standard error: unbiased and sqrt of unbiased, in that order. For
-/// groups of independent samples; errors of a CRN image are of this size too, but correlated between pixels.
+/// Mean of the groups and, with two or more of them, its standard error: unbiased and sqrt of unbiased, in that order.
+/// For groups of independent samples; errors of a CRN image are of this size too, but correlated between pixels.
 ///
 /// Groups of unequal sizes n_t, N together, are weighted by them: mean m = sum n_t m_t / N, and its squared error
 /// sum n_t (m_t - m)^2 / ((T - 1) N), unbiased as well. A pixel with fewer samples than groups has the T of its groups

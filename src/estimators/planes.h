@@ -13,8 +13,8 @@
 
 namespace covary {
 
-/// `count` images of width x height floats, each with `border` more pixels on every side (and room to read kLanes floats
-/// from any column inside). The border keeps the value it was made with.
+/// `count` images of width x height floats, each with `border` more pixels on every side (and room to read kLanes
+/// floats from any column inside). The border keeps the value it was made with.
 class Planes {
  public:
   Planes() = default;

@@ -81,7 +81,8 @@ std::string compression_name(Imf::Compression compression) {
 }
 
 /// Bytes of pixels per byte of file that a compression does not exceed: run lengths of 128 in two bytes, deflate's 1032
-/// (pxr24 drops a quarter before). For the others, which pack a black block into a few bytes, nothing so sharp is known.
+/// (pxr24 drops a quarter before). For the others, which pack a black block into a few bytes, nothing so sharp is
+/// known.
 double largest_ratio(const std::string& compression) {
   if (compression == "none") return 1;
   if (compression == "rle") return 64;

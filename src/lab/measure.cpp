@@ -21,7 +21,8 @@ struct ImageErrors {
   double mae = 0, flip = 0, predicted_relmse = kNone;
 };
 
-/// relMSE that the file's standard errors predict, with the references in the denominator; none where it has no such layer.
+/// relMSE that the file's standard errors predict, with the references in the denominator; none where it has no such
+/// layer.
 double predicted_relmse(const std::string& path, const SceneInstance& scene, const std::vector<Image>& references) {
   const ImageInfo info = inspect_image(path);
   const bool has_errors = std::any_of(info.channels.begin(), info.channels.end(),

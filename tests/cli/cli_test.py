@@ -33,7 +33,8 @@ class CliTest(unittest.TestCase):
         return self.write(name, exr({c: [v] * n for c, v in zip("RGB", rgb)}, size, **more))
 
     def run_covary(self, *arguments, **more):
-        result = subprocess.run([COVARY, *arguments], cwd=self.path, capture_output=True, text=True, timeout=60 * SLOWDOWN, **more)
+        result = subprocess.run([COVARY, *arguments], cwd=self.path, capture_output=True, text=True,
+                                timeout=60 * SLOWDOWN, **more)
         self.assertNotIn("internal error", result.stderr)
         return result
 
@@ -74,7 +75,8 @@ class Help(CliTest):
         self.bad(2, "unknown command 'compar'; did you mean 'compare'", "compar")
         self.bad(2, "unknown command 'zzzzzzzz'; 'covary --help'", "zzzzzzzz")
         self.bad(2, "unknown option '--verzion'; did you mean '--version'", "--verzion")
-        self.bad(2, "unknown option '--refrence'; did you mean '--reference'", "compare", "a.exr", "--refrence", "b.exr")
+        self.bad(2, "unknown option '--refrence'; did you mean '--reference'", "compare", "a.exr", "--refrence",
+                 "b.exr")
         self.bad(2, "unknown option '--sp'; did you mean '--spp'?; see", "render", "a.xml", "--sp", "8")
         self.bad(2, "unknown option '--resol'; did you mean '--resolution'?", "render", "a.xml", "--resol", "8x8")
         self.bad(2, "--reference is required; see 'covary compare --help'", "compare", "a.exr")
@@ -83,7 +85,8 @@ class Help(CliTest):
     def test_full_standard_output(self):
         name = self.image("a.exr", (1, 2, 3))
         with open("/dev/full", "w") as full:
-            result = subprocess.run([COVARY, "info", name], cwd=self.path, stdout=full, stderr=subprocess.PIPE, text=True)
+            result = subprocess.run([COVARY, "info", name], cwd=self.path, stdout=full, stderr=subprocess.PIPE,
+                                    text=True)
         self.assertEqual((result.returncode, result.stderr), (1, "covary: cannot write to standard output\n"))
 
 
@@ -156,7 +159,8 @@ class Compare(CliTest):
         for name in ("half.exr", "layer.exr"):
             self.assertEqual(self.errors(name, "--reference", "a.exr")[0]["relmse"], 0)
         self.write("f.exr", film(1))
-        self.bad(1, "f.exr: no layer 'grup00'; did you mean 'group00'", "compare", "f.exr", "-r", "f.exr", "--layer", "grup00")
+        self.bad(1, "f.exr: no layer 'grup00'; did you mean 'group00'", "compare", "f.exr", "-r", "f.exr", "--layer",
+                 "grup00")
         self.assertEqual(self.errors("f.exr", "-r", "f.exr", "--layer", "group01")[0]["mean"], 2)
 
     def test_error_map(self):
@@ -165,16 +169,18 @@ class Compare(CliTest):
         self.assertEqual((self.path / "e.png").read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
         (self.path / "sub").mkdir()
         (self.path / "sub" / "a.exr").write_bytes((self.path / "a.exr").read_bytes())
-        self.good("compare", "a.exr", "ref.exr", "sub/a.exr", "-r", "ref.exr", "--error-map", "m.png", "--error-range", "0.1,1")
+        self.good("compare", "a.exr", "ref.exr", "sub/a.exr", "-r", "ref.exr", "--error-map", "m.png", "--error-range",
+                  "0.1,1")
         for name in ("m-a.png", "m-ref.png", "m-a-2.png"):
             self.assertTrue((self.path / name).exists(), name)
         self.bad(2, "must end in .png", "compare", "a.exr", "-r", "ref.exr", "--error-map", "e.jpg")
-        self.bad(2, "--error-range 1,0.1: expected are two rising", "compare", "a.exr", "-r", "ref.exr", "--error-map", "e.png",
-                 "--error-range", "1,0.1")
+        self.bad(2, "--error-range 1,0.1: expected are two rising", "compare", "a.exr", "-r", "ref.exr", "--error-map",
+                 "e.png", "--error-range", "1,0.1")
         self.bad(2, "--error-range needs --error-map", "compare", "a.exr", "-r", "ref.exr", "--error-range", "1,2")
 
     def test_wrong_metric(self):
-        self.bad(2, "unknown metric 'relmes'; did you mean 'relmse'", "compare", "a.exr", "-r", "ref.exr", "-m", "relmes")
+        self.bad(2, "unknown metric 'relmes'; did you mean 'relmse'", "compare", "a.exr", "-r", "ref.exr", "-m",
+                 "relmes")
         self.bad(2, "--metric names 'mse' more than once", "compare", "a.exr", "-r", "ref.exr", "-m", "mse,mse")
 
     def test_missing_files(self):
@@ -194,7 +200,8 @@ class Merge(CliTest):
         # Group means 2.5 and 5: (2 * 1 + 6 * 3) / 8, and twice that.
         self.write("expected.exr", film(9, samples=8, value=2.5))
         for layer in ("", "group00", "group01", "samples"):
-            result = self.good("compare", "ab.exr", "-r", "expected.exr", "-m", "mse", "--json", *(["--layer", layer] if layer else []))
+            result = self.good("compare", "ab.exr", "-r", "expected.exr", "-m", "mse", "--json",
+                               *(["--layer", layer] if layer else []))
             self.assertEqual(json.loads(result.stdout)["mse"], 0, layer)
         self.good("merge", "a.exr", "b.exr", "-o", "ba.exr")
         for layer in ("group00", "group01"):
@@ -226,9 +233,11 @@ class Merge(CliTest):
         self.write("b.exr", film(2))
         self.write("o.exr", b"old")
         for limit in (0, 100, 500):
-            # The thread sanitizer writes a file of its own before the program can ignore the signal: it inherits that then.
+            # The thread sanitizer writes a file of its own before the program can ignore the signal: it inherits that
+            # then.
             self.bad(1, "cannot write o.exr: File too large", "merge", "a.exr", "b.exr", "-o", "o.exr",
-                     restore_signals=os.environ.get("SANITIZED") != "tsan", preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)))
+                     restore_signals=os.environ.get("SANITIZED") != "tsan",
+                     preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)))
         self.assertEqual(sorted(p.name for p in self.path.iterdir()), ["a.exr", "b.exr", "o.exr"])
 
 
@@ -236,7 +245,8 @@ class Info(CliTest):
     def test_film(self):
         self.write("f.exr", film(7, frame=(10, 20), window=(2, 3, 4, 3)))
         output = self.good("info", "f.exr").stdout
-        for text in ("4 x 3 pixels at (2, 3) of a frame of 10 x 20", "group01: B G R (float)", "covary:seed: 7", "samples"):
+        for text in ("4 x 3 pixels at (2, 3) of a frame of 10 x 20", "group01: B G R (float)", "covary:seed: 7",
+                     "samples"):
             self.assertIn(text, output)
         info = json.loads(self.good("info", "f.exr", "--json").stdout)
         self.assertEqual((info["frame"], info["window"]), ([10, 20], [2, 3, 4, 3]))
@@ -286,7 +296,8 @@ class Convert(CliTest):
         self.assertEqual(self.pixels("g.png"), [[188] * 12] * 3)
         self.good("convert", "f.exr", "s.png", "--layer", "samples", "--exposure=-3")
         self.assertEqual(self.pixels("s.png"), [[188] * 12] * 3)  # 4 samples / 8
-        self.bad(1, "no layer 'N' (layers: R G B, group00, group01; channels: B G R", "convert", "f.exr", "n.png", "--layer", "N")
+        self.bad(1, "no layer 'N' (layers: R G B, group00, group01; channels: B G R", "convert", "f.exr", "n.png",
+                 "--layer", "N")
 
     def test_errors(self):
         self.image("a.exr", (1, 1, 1))
@@ -334,7 +345,8 @@ class Damage(CliTest):
 
     def test_other_formats(self):
         for name in ("a.png", "a.hdr", "a.pfm", "a.jpg", "a.tga", "a.xyz"):
-            for data in (b"\0" * 100, b"\x89PNG\r\n\x1a\n" + b"\0" * 50, b"PF\n1000000 1000000\n-1\n\0\0\0\0", b"#?RADIANCE\n\n-Y 9 +X 9\n"):
+            for data in (b"\0" * 100, b"\x89PNG\r\n\x1a\n" + b"\0" * 50, b"PF\n1000000 1000000\n-1\n\0\0\0\0",
+                         b"#?RADIANCE\n\n-Y 9 +X 9\n"):
                 self.write(name, data)
                 result = self.run_covary("convert", name, "o.png")  # libpng adds a line of its own
                 self.assertEqual(result.returncode, 1, (name, data[:8], result.stderr))

@@ -36,9 +36,10 @@ class Plans(RenderTest):
         self.assertEqual(facts["samples_per_pixel"], 48)
         self.assertGreater(facts["predicted_relmse"], 0)
         for sampling in ("crn", "independent"):
-            self.good("render", ROOM, *SMALL, "-o", f"{sampling}.exr", "--sampling", sampling, "--groups", "12", "--spp", "24",
-                      "--seed", "3")
-        self.good("combine", "--crn", "crn.exr", "--independent", "independent.exr", "-o", "b.exr", "--error", "--quiet")
+            self.good("render", ROOM, *SMALL, "-o", f"{sampling}.exr", "--sampling", sampling, "--groups", "12",
+                      "--spp", "24", "--seed", "3")
+        self.good("combine", "--crn", "crn.exr", "--independent", "independent.exr", "-o", "b.exr", "--error",
+                  "--quiet")
         self.same("a.exr", "b.exr")
         info = json.loads(self.good("info", "a.exr", "--json").stdout)
         self.assertEqual(set(info["channels"]), {"R", "G", "B", "StdError.R", "StdError.G", "StdError.B"})
@@ -57,9 +58,10 @@ class Plans(RenderTest):
                          ["crn.exr", "crn.json", "independent.exr", "independent.json"])
         films = {p.name: p.stat().st_mtime_ns for p in (self.path / "films").iterdir() if p.suffix == ".exr"}
         for estimator in ("cv-baseline", "iduw", "iicv"):
-            facts = self.statistics("-o", f"{estimator}.exr", "--spp", "48", "--passes", "films", "--resume", "--estimator",
-                                    estimator)
-            self.assertEqual(facts["seconds"]["render"], first["seconds"]["render"], "the cost of shared passes is known")
+            facts = self.statistics("-o", f"{estimator}.exr", "--spp", "48", "--passes", "films", "--resume",
+                                    "--estimator", estimator)
+            self.assertEqual(facts["seconds"]["render"], first["seconds"]["render"],
+                             "the cost of shared passes is known")
             self.assertEqual(facts["samples"], first["samples"])
         self.same("a.exr", "iicv.exr")
         self.assertGreater(self.relmse("iduw.exr", "a.exr"), 0)
@@ -91,8 +93,8 @@ class Plans(RenderTest):
         for spp in ("6", "7", "9", "13"):
             self.statistics("-o", "a.exr", "--spp", spp, "--passes", "films" + spp)
             for estimator in ("iduw", "cv-baseline", "iicv"):
-                facts = self.statistics("-o", "b.exr", "--spp", spp, "--passes", "films" + spp, "--resume", "--estimator",
-                                        estimator)
+                facts = self.statistics("-o", "b.exr", "--spp", spp, "--passes", "films" + spp, "--resume",
+                                        "--estimator", estimator)
             self.same("a.exr", "b.exr")
 
     def test_any_split_gives_the_bits_of_one_go(self):
@@ -123,13 +125,14 @@ class Plans(RenderTest):
     def test_wrong_options(self):
         render = ("render", ROOM, "-o", "a.exr")
         self.bad(2, "--sampling is an option of --estimator none", *render, "--estimator", "iicv", "--sampling", "crn")
-        self.bad(2, "--split is an option of estimators with two passes", *render, "--estimator", "none", "--split", "1:2")
+        self.bad(2, "--split is an option of estimators with two passes", *render, "--estimator", "none", "--split",
+                 "1:2")
         self.bad(2, "expected CRN:INDEPENDENT", *render, "--split", "half")
         self.bad(2, "expected relmse=X", *render, "--until", "0.01")
         self.bad(2, "expected relmse=X", *render, "--until", "relmse=0.01x")
         self.bad(2, "iduw does not estimate its error", *render, "--until", "relmse=0.01", "--estimator", "iduw")
-        self.bad(2, "--paper is an option of --estimator iicv, not of cv-baseline", *render, "--estimator", "cv-baseline",
-                 "--paper")
+        self.bad(2, "--paper is an option of --estimator iicv, not of cv-baseline", *render, "--estimator",
+                 "cv-baseline", "--paper")
         self.bad(2, "--k is an option of", *render, "--estimator", "none", "--k", "3")
         self.bad(2, "at least 3 groups", *render, "--groups", "2")
         self.bad(2, "at least 4 groups", *render, "--groups", "3", "--estimator", "iduw")
@@ -213,7 +216,8 @@ class Polynomials(RenderTest):
     def test_less_error_than_plain_at_equal_samples(self):
         for name, *options in (("r.exr", "none", "--spp", "2048", "--seed", "9"), ("plain.exr", "none", "--spp", "96"),
                                ("p.exr", "polynomials", "--spp", "96")):
-            self.good("render", str(SCENES / "wall.xml"), *SMALL, "-o", name, "--max-depth", "2", "--estimator", *options)
+            self.good("render", str(SCENES / "wall.xml"), *SMALL, "-o", name, "--max-depth", "2", "--estimator",
+                      *options)
         self.assertLess(self.relmse("p.exr", "r.exr"), 0.9 * self.relmse("plain.exr", "r.exr"))
 
     def test_statistics_and_attributes(self):
@@ -247,14 +251,15 @@ class Polynomials(RenderTest):
         self.assertEqual(facts["seconds"]["render"], first["seconds"]["render"])
         self.assertEqual(facts["seconds"]["estimate"], first["seconds"]["estimate"])
         self.same("a.exr", "b.exr")
-        for options, seen in ((["--dimensions", "2"], "dimensions=2 samples=48"), (["--spp", "96"], "dimensions=4 samples=96")):
+        for options, seen in ((["--dimensions", "2"], "dimensions=2 samples=48"),
+                              (["--spp", "96"], "dimensions=4 samples=96")):
             arguments = [v for v in again if not (options[0] == "--spp" and v in ("--spp", "48"))]
-            result = self.bad(1, "--resume: 'films/independent.exr' was rendered with settings", "render", ROOM, *SMALL, "-o",
-                              "c.exr", *arguments, *options)
+            result = self.bad(1, "--resume: 'films/independent.exr' was rendered with settings", "render", ROOM, *SMALL,
+                              "-o", "c.exr", *arguments, *options)
             self.assertIn("dimensions=4 samples=48, this command asks for", result.stderr)
             self.assertIn(seen, result.stderr)
-        self.bad(1, "was rendered with settings", "render", ROOM, *SMALL, "-o", "a.exr", "--resume", "--estimator", "none",
-                 "--spp", "48", "--max-depth", "2")
+        self.bad(1, "was rendered with settings", "render", ROOM, *SMALL, "-o", "a.exr", "--resume", "--estimator",
+                 "none", "--spp", "48", "--max-depth", "2")
 
     def test_wrong_options(self):
         render = ("render", ROOM, *SMALL, "-o", "a.exr", "--estimator", "polynomials")
@@ -267,10 +272,10 @@ class Polynomials(RenderTest):
         self.bad(2, "--dimensions is an option of --estimator polynomials, not of iicv", "render", ROOM, "-o", "a.exr",
                  "--dimensions", "2")
         self.bad(2, "--dimensions: '7': expected a whole number from 1 to 6", *render, "--dimensions", "7")
-        self.bad(2, "28 samples per pixel are too few to fit the 28 coefficients of 6 dimensions, expected at least 29", *render,
-                 "--dimensions", "6", "--spp", "28")
-        self.bad(2, "polynomials are fitted to the samples of each pixel, which images do not hold", "combine", "--crn", "a.exr",
-                 "--independent", "b.exr", "-o", "c.exr", "--estimator", "polynomials")
+        self.bad(2, "28 samples per pixel are too few to fit the 28 coefficients of 6 dimensions, expected at least 29",
+                 *render, "--dimensions", "6", "--spp", "28")
+        self.bad(2, "polynomials are fitted to the samples of each pixel, which images do not hold", "combine", "--crn",
+                 "a.exr", "--independent", "b.exr", "-o", "c.exr", "--estimator", "polynomials")
 
 
 class Time(RenderTest):
@@ -286,8 +291,8 @@ class Time(RenderTest):
         return facts
 
     def test_rendering_leaves_time_for_the_estimate(self):
-        # Slow ones, so that the time left for the estimate is more than the noise of a busy machine; a render that leaves none
-        # ends after the limit in every attempt.
+        # Slow ones, so that the time left for the estimate is more than the noise of a busy machine; a render that
+        # leaves none         # ends after the limit in every attempt.
         slow = ("--k", "100", "--window", "21")
         for estimator, *arguments in (("iicv", *slow), ("cv-baseline", *slow), ("iduw", "--window", "21")):
             with self.subTest(estimator):
@@ -358,7 +363,8 @@ class Interruption(RenderTest):
                 self.interrupt_and_resume(estimator)
 
     def interrupt_and_resume(self, estimator):
-        """Interrupted at several moments, resumed each time: the bits of an uninterrupted render, and no film left over."""
+        """Interrupted at several moments, resumed each time: the bits of an uninterrupted render, and no film left
+        over."""
         spp = {"iicv": "600", "polynomials": "200"}[estimator]
         arguments = ["render", ROOM, "--resolution", "64x48", "--spp", spp, "--no-preview", "--estimator", estimator]
         self.good(*arguments, "--quiet", "-o", "whole.exr")
@@ -373,7 +379,8 @@ class Interruption(RenderTest):
             message = process.communicate(timeout=60)[1]
             if process.returncode == 0:
                 break
-            self.assertIn(process.returncode, (130, -signal.SIGINT), message)  # the signal itself before the render begins
+            self.assertIn(process.returncode, (130, -signal.SIGINT),
+                          message)  # the signal itself before the render begins
             if process.returncode == 130 and "before the first sample" not in message:
                 interrupted += 1
                 self.assertIn("interrupted after", message)

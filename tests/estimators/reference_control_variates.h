@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The image-space control variates of Yang & Moon 2025 as written in the paper, in double precision, one pixel at a time,
-// with no regard for speed. Eq. numbers are the paper's.
+// The image-space control variates of Yang & Moon 2025 as written in the paper, in double precision, one pixel at a
+// time, with no regard for speed. Eq. numbers are the paper's.
 #pragma once
 
 #include <Eigen/Dense>
@@ -124,8 +124,8 @@ inline Result control_variates(const GroupedImage& crn, const RgbImage& h, const
       for (int i = 0; i < k; ++i) X[c](t, i) = centred(neighbours[i], t);
     }
   }
-  // V_h for the groups: a group mean has T times the variance of the mean. It is not taken to be smaller than a small part
-  // of the variance of the CRN groups.
+  // V_h for the groups: a group mean has T times the variance of the mean. It is not taken to be smaller than a small
+  // part of the variance of the CRN groups.
   const auto group_variance = [&](Pixel p, int c) { return T * variance_of_mean(crn, p.x, p.y)[c]; };
   const auto penalty = [&](int first, int last, double condition) {
     const auto sum = [&](const auto& element) {

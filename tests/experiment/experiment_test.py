@@ -64,7 +64,8 @@ def wait_for(condition):
 
 def without_times(value):
     """Results without what depends on the clock, the machine's load and the folder."""
-    dropped = {"seconds", "efficiency", "equal_time", "date", "command", "files", "origin", "image", "peak_memory_bytes"}
+    dropped = {"seconds", "efficiency", "equal_time", "date", "command", "files", "origin", "image",
+               "peak_memory_bytes"}
     if isinstance(value, dict):
         return {k: without_times(v) for k, v in value.items() if k not in dropped}
     return [without_times(v) for v in value] if isinstance(value, list) else value
@@ -150,7 +151,8 @@ class Results(ExperimentTest):
         # The command line is one that can be typed, and gives the same image.
         again = self.run_covary(run["command"].replace("covary", COVARY, 1).split() + ["-o", "again.exr", "--quiet"])
         self.assertEqual(again.returncode, 0, again.stderr)
-        compared = self.run_covary([COVARY, "compare", run["image"], "--reference", "again.exr", "--metric", "mse", "--json"])
+        compared = self.run_covary([COVARY, "compare", run["image"], "--reference", "again.exr", "--metric", "mse",
+                                    "--json"])
         self.assertEqual(json.loads(compared.stdout)["mse"], 0)
 
     def test_csv(self):
@@ -198,8 +200,9 @@ class Kinds(ExperimentTest):
             self.assertEqual(bool(flagged), abs(spent - 1) > 0.05, flagged)
 
     def test_later_commands(self):
-        more = self.run_covary([COVARY, "render", str(SCENES / "room.xml"), "--resolution", "32x24", "--rfilter", "box", "--spp", "24",
-                                "--estimator", "none", "--seed", "99", "-o", "more.exr", "--quiet", "--no-preview"])
+        more = self.run_covary([COVARY, "render", str(SCENES / "room.xml"), "--resolution", "32x24", "--rfilter", "box",
+                                "--spp", "24", "--estimator", "none", "--seed", "99", "-o", "more.exr", "--quiet",
+                                "--no-preview"])
         self.assertEqual(more.returncode, 0, more.stderr)
         merge = ["merge", str(self.path / "more.exr")]
         self.suite["methods"][1] = {"name": "merged", "options": ["--estimator", "none"], "then": [merge]}
@@ -262,9 +265,11 @@ class Resume(ExperimentTest):
         self.assertEqual(without_times(self.results(*long)), expected)
 
     def test_passes_are_shared(self):
-        self.suite["methods"] += [{"name": "paper", "options": ["--paper", "--k", "9"]}, {"name": "iduw", "options": ["--estimator=iduw"]},
+        self.suite["methods"] += [{"name": "paper", "options": ["--paper", "--k", "9"]},
+                                  {"name": "iduw", "options": ["--estimator=iduw"]},
                                   {"name": "other split", "options": ["--split", "3:1"]},
-                                  *({"name": f"polynomials {d}", "options": ["--estimator", "polynomials", "--dimensions", d]}
+                                  *({"name": f"polynomials {d}",
+                                     "options": ["--estimator", "polynomials", "--dimensions", d]}
                                     for d in ("2", "3"))]
         self.suite["budgets"] = [{"spp": 24}]
         self.suite["seeds"] = 1
@@ -291,7 +296,8 @@ class Failures(ExperimentTest):
     def test_the_rest_goes_on(self):
         self.suite["scenes"].append({"name": "gone", "file": "gone.xml"})
         self.suite["methods"].append({"name": "wrong", "options": ["--k", "-3"]})
-        self.suite["methods"].append({"name": "late", "options": ["--estimator", "none"], "then": [["merge", "nothing.exr"]]})
+        self.suite["methods"].append({"name": "late", "options": ["--estimator", "none"],
+                                      "then": [["merge", "nothing.exr"]]})
         self.suite["budgets"] = [{"spp": 24}]
         results = self.results(code=1)
         self.assertFalse(results["complete"])
@@ -334,8 +340,10 @@ class Mistakes(ExperimentTest):
         self.bad(2, "--seeds 'x': expected a number of seeds", "--seeds", "x")
         self.bad(2, "the seed 900000001 is reserved for references", "--seeds", "3,900000001")
         self.bad(1, "crop '99x99' does not fit into the 32 x 24 frame", "--crop", "99x99")
-        for arguments, message in ((["qiuck"], "no suite is named 'qiuck'; did you mean 'quick'"), ([], "no suite given"),
-                                   (["iicv-table1", "-o", "out"], "needs --scenes DIR, the folder that holds bathroom2/scene_v3.xml")):
+        for arguments, message in ((["qiuck"], "no suite is named 'qiuck'; did you mean 'quick'"),
+                                   ([], "no suite given"),
+                                   (["iicv-table1", "-o", "out"],
+                                    "needs --scenes DIR, the folder that holds bathroom2/scene_v3.xml")):
             done = self.run_covary([COVARY, "experiment", *arguments])
             self.assertEqual(done.returncode, 2, done.stderr)
             self.assertIn(message, done.stderr)
@@ -386,36 +394,40 @@ class References(ExperimentTest):
         self.suite["scenes"][0]["resolution"] = "64x48"
         names = []
         for name, seed in (("a", 77), ("b", 2)):
-            done = self.run_covary([COVARY, "render", str(SCENES / "room.xml"), "--resolution", "64x48", "--rfilter", "box", "--estimator",
-                                    "none", "--seed", str(seed), "--spp", "128", "-o", name + ".exr", "--quiet", "--no-preview"])
+            done = self.run_covary([COVARY, "render", str(SCENES / "room.xml"), "--resolution", "64x48", "--rfilter",
+                                    "box", "--estimator", "none", "--seed", str(seed), "--spp", "128", "-o",
+                                    name + ".exr", "--quiet", "--no-preview"])
             self.assertEqual(done.returncode, 0, done.stderr)
             path = self.path / (name + ".exr")
             # The attribute's name made unknown, in place.
             path.write_bytes(path.read_bytes().replace(b"covary:seed", b"covary:s33d"))
             names.append(str(path))
         results = self.results("--reference", *names)
-        self.assertTrue(any("pt, 48 spp: render 2 leans to the second reference" in w for w in results["warnings"]), results["warnings"])
+        self.assertTrue(any("pt, 48 spp: render 2 leans to the second reference" in w for w in results["warnings"]),
+                        results["warnings"])
 
 
 class BuiltIn(ExperimentTest):
     def test_list(self):
         names = [line.split()[0] for line in self.run_covary([COVARY, "experiment", "--list"]).stdout.splitlines()]
         self.assertEqual(set(names), {path.stem for path in SUITES.glob("*.json")})
-        done = self.run_covary([COVARY, "experiment", "iicv-table1", "--print", "--scenes-only", "house", "--seeds", "2"])
+        done = self.run_covary([COVARY, "experiment", "iicv-table1", "--print", "--scenes-only", "house", "--seeds",
+                                "2"])
         suite = json.loads(done.stdout)
         self.assertEqual(([s["name"] for s in suite["scenes"]], suite["seeds"]), (["house"], [1, 2]))
 
     def test_one_scene(self):
-        done = self.run_covary([COVARY, "experiment", str(SCENES / "room.xml"), "--quick", "-o", "out", "--resolution", "24x16", "--seeds", "1",
-                                "--spp", "24", "--reference-spp", "32", "--quiet"])
+        done = self.run_covary([COVARY, "experiment", str(SCENES / "room.xml"), "--quick", "-o", "out", "--resolution",
+                                "24x16", "--seeds", "1", "--spp", "24", "--reference-spp", "32", "--quiet"])
         self.assertEqual(done.returncode, 0, done.stderr)
         results = json.loads((self.path / "out" / "results.json").read_text())
-        self.assertEqual({c["method"] for c in results["cells"]}, {"pt", "crn", "iicv", "iicv-paper", "cv-baseline", "iduw"})
+        self.assertEqual({c["method"] for c in results["cells"]},
+                         {"pt", "crn", "iicv", "iicv-paper", "cv-baseline", "iduw"})
         self.assertEqual(results["scenes"][0]["name"], "room")
 
     def test_quick_scales_frames_down(self):
-        done = self.run_covary([COVARY, "experiment", str(SCENES / "room.xml"), "--quick", "--methods-only", "pt", "--spp", "4", "--seeds", "1",
-                                "--reference-spp", "4", "-o", "out"])
+        done = self.run_covary([COVARY, "experiment", str(SCENES / "room.xml"), "--quick", "--methods-only", "pt",
+                                "--spp", "4", "--seeds", "1", "--reference-spp", "4", "-o", "out"])
         self.assertEqual(done.returncode, 0, done.stderr)
         width, height = json.loads((self.path / "out" / "results.json").read_text())["scenes"][0]["frame"]
         self.assertEqual((width, height), (220, 146))

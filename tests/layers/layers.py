@@ -7,6 +7,7 @@ over this project and over trees with planted violations. On the command line: l
 """
 import os
 import re
+import subprocess
 import sys
 
 # What each module may include, the arrows of docs/architecture.md. Entries are direct; everything behind them follows.
@@ -32,6 +33,8 @@ CPP = (".h", ".cpp", ".cu", ".cuh")
 INCLUDE = re.compile(r'^\s*#\s*include\s*"([^"]+)"')
 CITATION = re.compile(r"\[([A-Z][A-Za-z]+\d{4}[a-z]?)\]")
 LONG_FILE = 450
+COLUMNS = 120  # of code and prose
+WRAPPED = (".h", ".cpp", ".cu", ".cuh", ".py", ".md", ".js", ".cmake", "CMakeLists.txt")
 
 
 def visible_modules(module):
@@ -68,7 +71,8 @@ def is_test(path):
 
 
 def includes_follow_arrows(root):
-    """A module includes itself and the modules its arrows lead to. Tests see every module, and alone the helpers of tests/."""
+    """A module includes itself and the modules its arrows lead to. Tests see every module, and alone the helpers of
+    tests/."""
     problems = []
     for path in files(root, ["src", "include", "apps", "python"], CPP):
         parts = path.split(os.sep)
@@ -89,7 +93,8 @@ def includes_follow_arrows(root):
                 problems.append(here + f"'{target}' does not name a module")
             elif folder in ARROWS:
                 if parts[0] == "src" and not is_test(path) and folder not in visible_modules(module):
-                    problems.append(here + f"{module} may not include '{target}'; it sees {', '.join(sorted(visible_modules(module)))}")
+                    seen = ", ".join(sorted(visible_modules(module)))
+                    problems.append(here + f"{module} may not include '{target}'; it sees {seen}")
             elif os.path.exists(os.path.join(root, "tests", target)) and not is_test(path):
                 problems.append(here + f"'{target}' is for tests only")
     return problems
@@ -200,7 +205,8 @@ def documented_parameters(root):
     for path in files(root, ["src"], (".cpp", ".h")):
         if not is_test(path):
             problems += [f"docs/scene-format.md:1: lacks the parameter '{name}' of {path}:{number}"
-                         for number, text in lines(root, path) for name in PARAMETER.findall(text) if f"`{name}`" not in page]
+                         for number, text in lines(root, path)
+                         for name in PARAMETER.findall(text) if f"`{name}`" not in page]
     return problems
 
 
@@ -212,14 +218,27 @@ def documented_commands(root):
             for name in re.findall(r'add_subcommand\("(\w+)"', text) if f"`covary {name} " not in readme]
 
 
-CHECKS = [includes_follow_arrows, links_follow_arrows, licence_lines, no_leftovers, citations_have_entries,
+def lines_fit(root):
+    """No line of code or prose has more than COLUMNS characters, but for addresses, which cannot be broken. Tracked
+    files only, where the tree is a repository."""
+    listed = subprocess.run(["git", "ls-files"], cwd=root, capture_output=True, text=True).stdout.splitlines()
+    problems = []
+    for path in listed or files(root, ["."], WRAPPED):
+        if path.endswith(WRAPPED) and os.path.exists(os.path.join(root, path)):
+            problems += [f"{path}:{number}: {len(text)} columns; at most {COLUMNS}"
+                         for number, text in lines(root, path) if len(text) > COLUMNS and "://" not in text]
+    return problems
+
+
+CHECKS = [lines_fit, includes_follow_arrows, links_follow_arrows, licence_lines, no_leftovers, citations_have_entries,
           documented_names_match_registries, documented_parameters, documented_commands]
 
 
 def length_report(root):
     """Files over LONG_FILE lines, longest first: each might be two files."""
     counted = [(len(lines(root, path)), path) for path in files(root, SOURCE_FOLDERS, (*CPP, ".py"))]
-    return [f"{path}: {count} lines; would it be two files?" for count, path in sorted(counted, reverse=True) if count > LONG_FILE]
+    return [f"{path}: {count} lines; would it be two files?"
+            for count, path in sorted(counted, reverse=True) if count > LONG_FILE]
 
 
 def main():

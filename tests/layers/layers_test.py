@@ -36,7 +36,8 @@ class Planted(unittest.TestCase):
         self.write("src/scene/scene.h", SPDX + '#include "core/vec.h"\n#include <vector>\n')
         self.write("src/integrators/path.cpp", SPDX + '#include "scene/scene.h"\n#include "core/vec.h"\n')
         self.write("src/integrators/path_test.cpp", SPDX + '#include "statistics/chi2.h"\n#include "io/load_scene.h"\n')
-        self.write("src/integrators/CMakeLists.txt", "covary_module(integrators SOURCES path.cpp DEPENDS covary_scene covary_film)\n")
+        self.write("src/integrators/CMakeLists.txt",
+                   "covary_module(integrators SOURCES path.cpp DEPENDS covary_scene covary_film)\n")
         self.write("tests/statistics/chi2.h", SPDX)
         self.write("docs/references.bib", "@article{Veach1995,\n}\n")
         self.write("README.md", "# Small\n")
@@ -58,6 +59,11 @@ class Planted(unittest.TestCase):
         for check in layers.CHECKS:
             self.expect(check)
 
+    def test_long_line(self):
+        self.write("docs/page.md", f"{'word ' * 24}\n{'word ' * 24}x\nhttps://{'x' * 200}\n")
+        self.write("docs/page.bib", "x" * 200)
+        self.expect(layers.lines_fit, "docs/page.md:2: 121 columns; at most 120")
+
     def test_include_against_an_arrow(self):
         self.write("src/film/film.cpp", SPDX + '#include "core/vec.h"\n#include "scene/scene.h"\n')
         self.expect(layers.includes_follow_arrows, "src/film/film.cpp:3: film may not include 'scene/scene.h'")
@@ -76,7 +82,7 @@ class Planted(unittest.TestCase):
         for module in layers.ARROWS:
             for target in layers.visible_modules(module) - {module}:
                 self.assertNotIn(module, layers.visible_modules(target))
-        self.assertEqual({"core", "film", "estimators"}, layers.visible_modules("estimators"))
+        self.assertEqual({"core", "imageio", "film", "estimators"}, layers.visible_modules("estimators"))
         self.assertNotIn("film", layers.visible_modules("io"))
         self.assertNotIn("bsdfs", layers.visible_modules("integrators"))
 
@@ -97,7 +103,8 @@ class Planted(unittest.TestCase):
         self.expect(layers.includes_follow_arrows, "src/utils is not a module")
 
     def test_link_against_an_arrow(self):
-        self.write("src/film/CMakeLists.txt", "covary_module(film\n  SOURCES film.cpp\n  DEPENDS covary_core covary_io\n  TESTS film_test.cpp)\n")
+        self.write("src/film/CMakeLists.txt", "covary_module(film\n  SOURCES film.cpp\n"
+                   "  DEPENDS covary_core covary_io\n  TESTS film_test.cpp)\n")
         self.expect(layers.links_follow_arrows, "film may not depend on covary_io")
 
     def test_missing_licence(self):
@@ -109,19 +116,24 @@ class Planted(unittest.TestCase):
         self.write("src/core/a.cpp", SPDX + "#if 0\n#endif\n// TODO tidy\n// TODO(#12) tidy\n")
         self.write("src/core/a_test.cpp", SPDX + "TEST(A, DISABLED_b) {\n  GTEST_SKIP();\n}\n")
         self.expect(layers.no_leftovers, "src/core/a.cpp:2: disabled code", "src/core/a.cpp:4: a note for later",
-                    "src/core/a_test.cpp:2: a test that does not run", "src/core/a_test.cpp:3: a test that does not run")
+                    "src/core/a_test.cpp:2: a test that does not run",
+                    "src/core/a_test.cpp:3: a test that does not run")
 
     def test_citation_without_entry(self):
         self.write("src/core/a.cpp", SPDX + "// [Veach1995] Eq. (3)\n// [Heitz2018] listing 1\n")
         self.expect(layers.citations_have_entries, "src/core/a.cpp:3: [Heitz2018]")
 
     def test_registry_and_page_differ(self):
-        self.write("src/bsdfs/registry.cpp", SPDX + '{"diffuse", make_diffuse}, {"plastic", make_plastic},  // {"old", x}\n')
-        self.write("docs/scene-format.md", "## Reflectance (`bsdfs`)\n### `diffuse`\n### `velvet`, `cloth`\n## Other\n### `plastic`\n")
-        self.expect(layers.documented_names_match_registries, "lacks 'plastic'", "describes 'cloth'", "describes 'velvet'")
+        self.write("src/bsdfs/registry.cpp", SPDX + '{"diffuse", make_diffuse}, {"plastic", make_plastic},  '
+                   '// {"old", x}\n')
+        self.write("docs/scene-format.md", "## Reflectance (`bsdfs`)\n### `diffuse`\n### `velvet`, `cloth`\n"
+                   "## Other\n### `plastic`\n")
+        self.expect(layers.documented_names_match_registries, "lacks 'plastic'", "describes 'cloth'",
+                    "describes 'velvet'")
 
     def test_parameter_without_documentation(self):
-        self.write("src/bsdfs/diffuse.cpp", SPDX + 'f(parameters.get_texture("reflectance", 1), parameters.get_bool("new", 1));\n')
+        self.write("src/bsdfs/diffuse.cpp", SPDX +
+                   'f(parameters.get_texture("reflectance", 1), parameters.get_bool("new", 1));\n')
         self.write("docs/scene-format.md", "| `reflectance` |\n")
         self.expect(layers.documented_parameters, "lacks the parameter 'new' of src/bsdfs/diffuse.cpp:2")
 
@@ -133,7 +145,8 @@ class Planted(unittest.TestCase):
 
     def test_long_file_is_reported(self):
         self.write("src/core/a.cpp", SPDX + "\n" * layers.LONG_FILE)
-        self.assertEqual([f"src/core/a.cpp: {layers.LONG_FILE + 1} lines; would it be two files?"], layers.length_report(self.folder.name))
+        self.assertEqual([f"src/core/a.cpp: {layers.LONG_FILE + 1} lines; would it be two files?"],
+                         layers.length_report(self.folder.name))
 
 
 if __name__ == "__main__":
