@@ -59,6 +59,8 @@ std::string man_page(const CLI::App& app, const std::string& version) {
   }
   return page +
          ".SH EXIT STATUS\n.TP\n.B 0\nDone.\n.TP\n.B 1\nFailed; the message says why.\n.TP\n.B 2\nWrong usage.\n"
+         ".TP\n.B 3\nDone, but the error wanted by \\fB\\-\\-until\\fR was not reached.\n"
+         ".TP\n.B 130\nInterrupted by Ctrl\\-C; what was rendered so far is kept.\n"
          ".SH SEE ALSO\nThe documentation lies in\n.I share/doc/covary\nbeside the program's folder.\n";
 }
 
