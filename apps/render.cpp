@@ -115,16 +115,12 @@ Outputs files_of(const RenderOptions& options) {
     throw Error(ErrorCode::kUsage, fmt::format("-o '{}' is no regular file, which a render needs to continue after an "
                                                "interruption",
                                                options.output));
-  if (!options.passes.empty()) {
-    if (std::filesystem::exists(options.passes) && !std::filesystem::is_directory(options.passes))
-      throw Error(ErrorCode::kUsage, "--passes '" + options.passes + "' is a file; expected is a folder");
-    if (std::filesystem::is_directory(options.passes))
-      for (const char* name : {"crn", "independent"}) {
-        const std::string path = (std::filesystem::path(options.passes) / name).string();
-        outputs.writes("--passes", path + ".exr", OutputKind::kFilm);
-        outputs.writes("--passes", path + ".json", OutputKind::kText);
-      }
-  }
+  if (std::filesystem::is_directory(options.passes))
+    for (const char* name : {"crn", "independent"}) {
+      const std::string path = (std::filesystem::path(options.passes) / name).string();
+      outputs.writes("--passes", path + ".exr", OutputKind::kFilm);
+      outputs.writes("--passes", path + ".json", OutputKind::kText);
+    }
   if (options.preview)
     outputs.writes_derived_png("the preview", preview_path(options.output), "use --no-preview, or another name for -o");
   return outputs;

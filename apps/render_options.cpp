@@ -196,7 +196,7 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
       ->needs(passes);
   command.add_option("--checkpoint", o.checkpoint_seconds, "Seconds between writing unfinished films; 0: never")
       ->capture_default_str()
-      ->check(real_number(0, std::numeric_limits<double>::max()));
+      ->check(real_number(0, std::numeric_limits<double>::infinity()));
   add_define_option(command, o.defines);
   command.add_flag("--aovs", o.aovs, "Add the images Albedo, N (normal) and P (position) to the output");
   command.add_option("--replay", o.replay, "X,Y,SAMPLE[,PASS]: print one sample instead of rendering");

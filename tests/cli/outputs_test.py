@@ -132,7 +132,7 @@ class Formats(OutputsTest):
     def test_pictures_say_who_made_them(self):
         self.image("a.exr", (1, 1, 1))
         self.good("convert", "a.exr", "a.png")
-        self.assertIn(b"tEXtSoftware\0covary", (self.path / "a.png").read_bytes())
+        self.assertRegex((self.path / "a.png").read_bytes(), rb"iTXtSoftware\0{5}covary")
 
     def test_a_denoised_film_is_no_film(self):
         done = self.run_covary("denoise", self.write("f.exr", film(1)), "-o", "o.exr")
