@@ -4,10 +4,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
 #include <cctype>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 
 #include "core/error.h"
@@ -21,6 +19,7 @@ namespace {
 
 constexpr const char* kSoftwareKey = "Software";
 constexpr const char* kSoftware = "covary";
+constexpr int kLargestJpeg = 65500;          // of libjpeg
 constexpr float kLargestRgbe = 0x1.fep126f;  // 255 / 256 times the power of 2 of the largest exponent
 
 void write_content(const std::string& path, const std::vector<unsigned char>& content) {
@@ -39,18 +38,33 @@ std::vector<uint8_t> display_bytes(const Image& linear) {
   return encoded;
 }
 
+/// Formats other than EXR and PNG.
+void write_encoded(const std::string& path, const char* format, const ImageToEncode& image) {
+  std::vector<unsigned char> content;
+  try {
+    content = encode_image(format, image);
+  } catch (const Error& error) {
+    throw Error(ErrorCode::kIo, "cannot write " + path + ": " + error.what());
+  }
+  write_content(path, content);
+}
+
 void write_jpeg(const std::string& path, const Image& linear) {
+  // Larger ones would make libjpeg end the program.
+  if (std::max(linear.width, linear.height) > kLargestJpeg)
+    throw Error(ErrorCode::kIo, fmt::format("cannot write {}: {} x {} pixels; a JPEG holds up to {} in each direction",
+                                            path, linear.width, linear.height, kLargestJpeg));
   const std::vector<uint8_t> encoded = display_bytes(linear);
   ImageToEncode image{linear.width, linear.height};
   image.bytes = encoded.data();
   image.attributes = {{kSoftwareKey, kSoftware}};
-  write_content(path, encode_image("jpg", image));
+  write_encoded(path, "jpg", image);
 }
 
 void write_float(const std::string& path, const char* format, const Image& linear) {
   ImageToEncode image{linear.width, linear.height};
   image.floats = linear.data.data();
-  write_content(path, encode_image(format, image));
+  write_encoded(path, format, image);
 }
 
 /// Radiance's format holds no sign.
@@ -58,17 +72,6 @@ void write_hdr(const std::string& path, Image linear) {
   for (float& value : linear.data)
     value = value > 0 ? std::min(value, kLargestRgbe) : 0;  // not-a-number is not above 0
   write_float(path, "hdr", linear);
-}
-
-/// Portable float map: a header of text, then the rows from the lowest to the highest.
-void write_pfm(const std::string& path, const Image& linear) {
-  const char* scale = std::endian::native == std::endian::little ? "-1.0" : "1.0";  // the sign tells the order of bytes
-  const std::string header = fmt::format("PF\n{} {}\n{}\n", linear.width, linear.height, scale);
-  OutputFile file(path);
-  file.write(header.data(), header.size());
-  for (int y = linear.height - 1; y >= 0; --y)
-    file.write(linear.pixel(0, y), static_cast<size_t>(linear.width) * 3 * sizeof(float));
-  file.commit();
 }
 
 }  // namespace
@@ -97,7 +100,7 @@ void write_image(const std::string& path, const Image& linear, const ImagePlace&
   } else if (extension == ".hdr") {
     write_hdr(path, linear);
   } else if (extension == ".pfm") {
-    write_pfm(path, linear);
+    write_float(path, "pfm", linear);
   } else if (extension == ".tif" || extension == ".tiff") {
     write_float(path, "tif", linear);
   } else if (extension == ".jpg" || extension == ".jpeg") {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures out, in the format that their name tells: EXR by OpenEXR, PNG and all others by
-// imageio, PFM here.
+// Pictures out, in the format that their name tells: EXR by OpenEXR, all others by src/imageio.
 #pragma once
 
 #include <map>

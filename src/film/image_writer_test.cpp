@@ -116,6 +116,9 @@ TEST(ImageWriter, KnowsItsOwnPngs) {
 }
 
 TEST(ImageWriter, SaysWhatItCannotWrite) {
+  const Image wide(65501, 1, 3);
+  EXPECT_TRUE(contains(message_of([&] { write_image(test_file("wide.jpg"), wide, {}, {}); }, ErrorCode::kIo),
+                       "cannot write " + test_file("wide.jpg") + ": 65501 x 1 pixels; a JPEG holds up to 65500"));
   EXPECT_TRUE(contains(message_of([] { write_image("/nowhere/a.tif", picture(), {}, {}); }, ErrorCode::kIo),
                        "cannot write /nowhere/a.tif: there is no folder /nowhere"));
   EXPECT_TRUE(

@@ -91,7 +91,8 @@ void Outputs::writes(const std::string& option, const std::string& path, OutputK
 void Outputs::writes_derived_png(const std::string& option, const std::string& path, const std::string& remedy) {
   writes(option, path, OutputKind::kPng);
   std::error_code ignored;
-  if (fs::exists(path, ignored) && !is_own_png(path))
+  // Only regular files are looked into: a pipe would wait for a writer.
+  if (fs::exists(path, ignored) && !(fs::is_regular_file(path, ignored) && is_own_png(path)))
     usage(fmt::format("{} would replace '{}', which covary did not make; {}", option, path, remedy));
 }
 

@@ -106,6 +106,9 @@ TEST(Outputs, DerivedPicturesReplaceOnlyOnesOfOurs) {
   EXPECT_EQ(message(), "no error");
   write_text_file(path, "another picture");
   EXPECT_EQ(message(), "the preview would replace '" + path + "', which covary did not make; use --no-preview");
+  fs::remove(path);
+  ASSERT_EQ(mkfifo(path.c_str(), 0600), 0);  // must not be opened
+  EXPECT_TRUE(contains(message(), "the preview would replace"));
 }
 
 TEST(Outputs, SameFiles) {
