@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // covary combine: image-space control variates for images made by any renderer.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <tbb/global_control.h>
 #include <algorithm>
@@ -16,6 +17,7 @@
 #include "commands.h"
 #include "core/stopwatch.h"
 #include "estimator_options.h"
+#include "estimators/feedback.h"
 #include "estimators/grouped_file.h"
 #include "estimators/input_checks.h"
 #include "estimators/mean.h"
@@ -115,17 +117,18 @@ InputReport examine(const GroupedFile& crn, const GroupedFile& independent, Band
   return checks.report();
 }
 
-EstimatorResult estimate(const PairEstimator& estimator, const GroupedFile& file, Bands& bands) {
+EstimatorResult estimate(const Estimator& estimator, const PairSettings& settings, const GroupedFile& file,
+                         Bands& bands) {
   const int height = file.height();
   if (estimator.reach < 0 || bands.rows() >= height) {
     bands.read(0, height);
-    return estimator.apply(bands.crn(), bands.independent());
+    return estimator.apply(bands.crn(), bands.independent(), settings);
   }
   const int step = std::max(16, bands.rows() - 2 * estimator.reach) / kFeedbackCell * kFeedbackCell;
   EstimatorResult whole;
   for (int y = 0; y < height; y += step) {
     const int first = bands.read_around(y, y + step, estimator.reach);
-    const EstimatorResult part = estimator.apply(bands.crn(), bands.independent());
+    const EstimatorResult part = estimator.apply(bands.crn(), bands.independent(), settings);
     long n_nonfinite = 0;  // without the rows around, which other bands count
     const auto own = [&](const GroupedImage& band) {
       return GroupedImage{band.width, std::min(height, y + step) - y, band.groups, band.pixel(0, y - first)};
@@ -145,15 +148,16 @@ EstimatorResult estimate(const PairEstimator& estimator, const GroupedFile& file
 }
 
 void write(const CombineOptions& o, const GroupedFile& crn, const GroupedFile& independent, EstimatorResult& result) {
-  std::map<std::string, std::string> attributes = {
-      {"covary:estimator", o.estimator.text()}, {"covary:version", COVARY_VERSION}, {"covary:command", command_line()}};
+  std::map<std::string, std::string> attributes = {{"covary:estimator", make_estimator(o.estimator).text},
+                                                   {"covary:version", COVARY_VERSION},
+                                                   {"covary:command", command_line()}};
   if (crn.samples() && independent.samples())
     attributes["covary:samples"] = fmt::to_string(crn.samples() + independent.samples());
   std::map<std::string, Image> no_aovs;
   write_result(o.output, crn.place(), attributes, result, no_aovs);
 }
 
-void check_explain(const CombineOptions& o, const PairEstimator& estimator, const GroupedFile& file) {
+void check_explain(const CombineOptions& o, const Estimator& estimator, const GroupedFile& file) {
   if (o.explain.empty()) return;
   const CropWindow& window = file.place().window;
   const int x = o.explain[0] - window.x, y = o.explain[1] - window.y;
@@ -166,7 +170,7 @@ void check_explain(const CombineOptions& o, const PairEstimator& estimator, cons
 }
 
 /// What one pixel is made of: f, and for each control variate its place, coefficients, CRN mean and independent mean.
-nlohmann::ordered_json explain(const CombineOptions& o, const PairEstimator& estimator, const GroupedFile& crn,
+nlohmann::ordered_json explain(const CombineOptions& o, const Estimator& estimator, const GroupedFile& crn,
                                Bands& bands) {
   const CropWindow& window = crn.place().window;
   const int x = o.explain[0] - window.x, y = o.explain[1] - window.y;
@@ -206,16 +210,34 @@ nlohmann::ordered_json json_of(const Correlation& c) {
   return {{"value", c.value}, {"standard_error", c.standard_error}, {"pairs", c.pairs}};
 }
 
-PairEstimator make_pair_estimator(const CombineOptions& o, const GroupedFile& crn) {
+/// Estimators that need the number of samples of the CRN image.
+std::vector<std::string> estimators_with_samples() {
+  return estimators_where([](const Estimator& e) { return e.needs_sample_count; });
+}
+
+PairSettings settings_of(const CombineOptions& o, const Estimator& estimator, const GroupedFile& crn) {
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
-  const bool is_iduw = o.estimator.name == "iduw";
-  if (o.samples && !is_iduw) usage("--samples is an option of --estimator iduw, not of " + o.estimator.name);
-  if (o.error && !predicts_error(o.estimator.name))
-    usage("--error: " + o.estimator.name + " does not estimate its error");
+  const std::string& name = estimator.name;
+  const bool counts = estimator.needs_sample_count;
+  if (o.samples && !counts)
+    usage(fmt::format("--samples is an option of --estimator {}, not of {}", fmt::join(estimators_with_samples(), ", "),
+                      name));
+  if (o.error && !estimator.predicts_error) usage("--error: " + name + " does not estimate its error");
   const int64_t samples = o.samples ? *o.samples : std::llround(crn.samples());
-  if (is_iduw && samples == 0) usage("--estimator iduw needs --samples N, the samples per pixel of the CRN image");
-  check_estimator_options(o.estimator);
-  return make_estimator(o.estimator, o.error, samples);
+  if (counts && samples == 0)
+    usage("--estimator " + name + " needs --samples N, the samples per pixel of the CRN image");
+  return {samples, o.error};
+}
+
+/// Says of an estimator that reads samples why images are not enough.
+std::string check_has_images(std::string& name) {
+  for (const EstimatorPlugin& plugin : estimator_plugins())
+    if (name == plugin.name && make_estimator(name).passes == EstimatorPasses::kSamples)
+      return fmt::format(
+          "{0} are fitted to the samples of each pixel, which images do not hold; use 'covary render "
+          "SCENE --estimator {0}'",
+          name);
+  return "";
 }
 
 /// A file used twice would be a control variate of itself, or a group without information of its own.
@@ -246,7 +268,8 @@ void combine(const CombineOptions& o) {
   if (o.threads > 0) control.emplace(tbb::global_control::max_allowed_parallelism, o.threads);
   Stopwatch watch;
   const GroupedFile crn(o.crn, o.crn_layer), independent(o.independent, o.independent_layer);
-  const PairEstimator estimator = make_pair_estimator(o, crn);
+  const Estimator estimator = make_estimator(o.estimator);
+  const PairSettings settings = settings_of(o, estimator, crn);
   check_explain(o, estimator, crn);
 
   std::vector<Finding> findings;
@@ -265,7 +288,7 @@ void combine(const CombineOptions& o) {
   }
   const double check_seconds = watch.lap();
 
-  EstimatorResult result = estimate(estimator, crn, bands);
+  EstimatorResult result = estimate(estimator, settings, crn, bands);
   const double estimate_seconds = watch.lap();
   write(o, crn, independent, result);
   const double write_seconds = watch.lap();
@@ -282,7 +305,7 @@ void combine(const CombineOptions& o) {
   if (o.json.empty()) return;
   nlohmann::ordered_json json = {
       {"output", o.output},
-      {"estimator", o.estimator.text()},
+      {"estimator", estimator.text},
       {"width", crn.width()},
       {"height", crn.height()},
       {"crn_groups", crn.groups()},
@@ -318,17 +341,14 @@ void add_combine(CLI::App& app) {
   command->add_option("--independent-layer,--pt-layer", o->independent_layer,
                       "Layer of the independent image where its files hold several");
   command->add_option("--estimator", o->estimator.name, "iicv, or a comparator")
-      ->check(CLI::Validator(
-          [](std::string& name) {
-            return name != "polynomials" ? std::string()
-                                         : "polynomials are fitted to the samples of each pixel, which images do not "
-                                           "hold; use 'covary render SCENE --estimator polynomials'";
-          },
-          ""))
-      ->check(one_of({"iicv", "cv-baseline", "iduw"}))
+      ->check(CLI::Validator(check_has_images, ""))
+      ->check(one_of(pair_estimator_names()))
       ->capture_default_str();
-  add_estimator_options(*command, o->estimator);
-  command->add_option("--samples", o->samples, "iduw: samples per pixel of the CRN image; default: what its file tells")
+  add_estimator_options(*command, o->estimator, pair_estimator_names());
+  command
+      ->add_option("--samples", o->samples,
+                   fmt::format("{}: samples per pixel of the CRN image; default: what its file tells",
+                               fmt::join(estimators_with_samples(), ", ")))
       ->transform(whole_number(1, std::numeric_limits<int>::max()));
   command->add_flag("--error", o->error, "Add the standard error as channels StdError.R, .G, .B");
   command->add_option("--explain", o->explain, "X,Y: print the control variates of this pixel and their coefficients")

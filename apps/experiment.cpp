@@ -2,8 +2,10 @@
 // covary experiment: scenes x methods x budgets x seeds, measured, as results and a report.
 #include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <csignal>
@@ -15,7 +17,6 @@
 #include "commands.h"
 #include "core/content_hash.h"
 #include "core/error.h"
-#include "estimator_options.h"
 #include "film/output_file.h"
 #include "film/outputs.h"
 #include "json_output.h"
@@ -25,6 +26,7 @@
 #include "lab/report_document.h"
 #include "numbers.h"
 #include "progress.h"
+#include "render_options.h"
 #include "version.h"
 
 namespace covary {
@@ -190,9 +192,13 @@ class ProgressPrinter {
 lab::PlanContext plan_context() {
   lab::PlanContext context;
   context.program_version = program_version();
-  for (const auto& [option, estimators] : estimators_of_option()) context.estimator_options.insert(option);
-  context.estimator_options.insert("--variance");  // the other name of --penalty
-  context.pair_estimators = {"iicv", "cv-baseline", "iduw"};
+  for (const std::string& name : pair_estimator_names()) {
+    context.pair_estimators.insert(name);
+    for (const EstimatorOption& option : options_of_estimator(name)) {
+      context.estimator_options.insert("--" + option.name);
+      for (const std::string& alias : option.aliases) context.estimator_options.insert("--" + alias);
+    }
+  }
   return context;
 }
 
@@ -224,6 +230,27 @@ void check_files(const ExperimentCommand& command, const lab::Suite& suite, cons
           fmt::format("-o '{0}': {0}{1} is there and no experiment made it; give another folder, or one that an "
                       "experiment has written to",
                       command.output, name));
+}
+
+/// Reads the options of each method as `covary render` will, so that nothing runs before all of them are right.
+void check_methods(const lab::Suite& suite) {
+  std::vector<std::string> problems;
+  for (const lab::MethodEntry& method : suite.methods) {
+    CLI::App command;
+    RenderOptions options;
+    add_render_options(command, options);
+    std::vector<std::string> words = {"scene.xml", "-o", "out.exr"};
+    words.insert(words.end(), suite.common_options.begin(), suite.common_options.end());
+    words.insert(words.end(), method.options.begin(), method.options.end());
+    std::reverse(words.begin(), words.end());
+    try {
+      command.parse(words);
+      check_options(options);
+    } catch (const std::runtime_error& error) {
+      problems.push_back(fmt::format("method '{}': {}", method.name, error.what()));
+    }
+  }
+  if (!problems.empty()) throw Error(ErrorCode::kUsage, fmt::format("{}", fmt::join(problems, "\n")));
 }
 
 void write_results(const lab::Results& results, const std::string& folder) {
@@ -258,6 +285,7 @@ void experiment(ExperimentCommand command) {
   for (uint32_t spp : command.spp) command.overrides.budgets.push_back({spp, 0});
   for (double seconds : command.seconds) command.overrides.budgets.push_back({0, seconds});
   const lab::Suite suite = load_suite(command);
+  check_methods(suite);
   if (command.print) return write_text_output("-", json_text(lab::to_json(suite)));
   if (command.output.empty()) throw Error(ErrorCode::kUsage, "no folder for the results given; use -o DIR");
   std::error_code error;

@@ -10,7 +10,7 @@
 #include "commands.h"
 #include "core/error.h"
 #include "defines.h"
-#include "estimators/iicv.h"
+#include "estimators/registry.h"
 #include "film/image_file.h"
 #include "io/load_scene.h"
 #include "json_output.h"
@@ -55,10 +55,10 @@ std::string describe_channels(const std::vector<ExrFile::Channel>& channels) {
 
 /// Memory that a render of the scene with the usual settings takes, by estimator.
 std::map<std::string, double> memory_of_renders(const LoadedScene& scene) {
-  PairMethod iicv;
-  iicv.bytes_per_pixel = iicv_bytes_per_pixel({});
-  return {{"iicv", render_memory(scene, pair_plan(iicv), {}).total()},
-          {"none", render_memory(scene, plain_plan(Sampling::kIndependent), {}).total()}};
+  std::map<std::string, double> memory;
+  for (const char* name : {kDefaultEstimator, kNoEstimator})
+    memory[name] = render_memory(scene, estimator_plan(make_estimator(name)), {}).total();
+  return memory;
 }
 
 void scene_info(const InfoOptions& options) {
@@ -82,8 +82,9 @@ void scene_info(const InfoOptions& options) {
   fmt::print("{}: {} x {} pixels, {} samples per pixel, integrator {}\n{} triangles\n", options.path, scene.width,
              scene.height, scene.spp, scene.integrator_type.empty() ? "not named" : scene.integrator_type,
              scene.scene->n_triangles());
-  fmt::print("memory of a render beside the scene: {} with --estimator iicv, {} with none\nscene_hash: {}\n",
-             bytes_text(memory.at("iicv")), bytes_text(memory.at("none")), scene.content_hash);
+  fmt::print("memory of a render beside the scene: {} with --estimator {}, {} with {}\nscene_hash: {}\n",
+             bytes_text(memory.at(kDefaultEstimator)), kDefaultEstimator, bytes_text(memory.at(kNoEstimator)),
+             kNoEstimator, scene.content_hash);
 }
 
 void info(const InfoOptions& options) {

@@ -38,6 +38,19 @@ FilterSettings filter_named(const std::string& name) {
   return {FilterKind::kGaussian, 2.0f, 0.5f};
 }
 
+namespace {
+
+/// "polynomials, for direct light, or none, the mean".
+std::string single_pass_estimators() {
+  std::vector<std::string> texts;
+  for (const std::string& name : estimator_names())
+    if (const Estimator e = make_estimator(name); e.passes != EstimatorPasses::kPair)
+      texts.push_back(name + ", " + e.summary);
+  return list_text(texts, ", or ");
+}
+
+}  // namespace
+
 void check_options(RenderOptions& options) {
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
   if (options.replay.empty() && options.output.empty())
@@ -46,28 +59,27 @@ void check_options(RenderOptions& options) {
     usage("--integrator: " + unknown_integrator(options.integrator));
   const std::string& name = options.estimator.name;
   const auto given = [&](const char* option) { return options.estimator.command->count(option) > 0; };
-  if (given("--sampling") && given("--estimator") && name != "none")
-    usage(fmt::format("--sampling is an option of --estimator none; {} renders one pass {}", name,
-                      options.has_one_pass() ? "with independent random numbers"
-                                             : "with common random numbers and one with independent ones"));
-  if (given("--sampling")) options.estimator.name = "none";
-  if (options.has_one_pass() && given("--split"))
+  if (given("--sampling") && !given("--estimator")) options.estimator.name = kNoEstimator;
+  const Estimator estimator = make_estimator(options.estimator);
+  const EstimatorPasses passes = estimator.passes;
+  if (given("--sampling") && passes != EstimatorPasses::kAny)
+    usage(fmt::format("--sampling is an option of --estimator {}; {} renders one pass {}", kNoEstimator, name,
+                      passes == EstimatorPasses::kSamples
+                          ? "with independent random numbers"
+                          : "with common random numbers and one with independent ones"));
+  if (passes != EstimatorPasses::kPair && given("--split"))
     usage("--split is an option of estimators with two passes, not of " + name);
-  // Not in estimators_of_option(), whose options leave passes as they are.
-  if (!options.estimates_in_pass() && given("--dimensions"))
-    usage("--dimensions is an option of --estimator polynomials, not of " + name);
-  if (options.estimates_in_pass() && given("--groups"))
-    usage("--groups: polynomials are fitted to the samples of a pixel themselves, not to means of groups");
-  if (options.estimates_in_pass() && given("--time"))
-    usage(
-        "--time: polynomials are fitted to all samples of a pixel together, so their number must be known; use --spp");
+  if (passes == EstimatorPasses::kSamples && given("--groups"))
+    usage(fmt::format("--groups: {} are fitted to the samples of a pixel themselves, not to means of groups", name));
+  if (passes == EstimatorPasses::kSamples && given("--time"))
+    usage(fmt::format(
+        "--time: {} are fitted to all samples of a pixel together, so their number must be known; use --spp", name));
   parse_split(options.split);
   if (!options.until.empty()) {
     parse_until(options.until);
-    if (name != "none" && !predicts_error(name)) usage("--until: " + name + " does not estimate its error");
-    if (name == "none" && options.groups.value_or(2) < 2) usage("--until needs --groups 2 or more");
+    if (!estimator.predicts_error) usage("--until: " + name + " does not estimate its error");
+    if (passes == EstimatorPasses::kAny && options.groups.value_or(2) < 2) usage("--until needs --groups 2 or more");
   }
-  check_estimator_options(options.estimator);
 }
 
 LoadedScene load(const RenderOptions& options) {
@@ -84,22 +96,11 @@ LoadedScene load(const RenderOptions& options) {
 }
 
 Plan make_plan(const RenderOptions& options) {
-  if (options.estimates_in_pass()) return polynomials_plan(options.dimensions, options.estimator.text());
-  if (options.has_one_pass())
-    return plain_plan(options.sampling == "crn" ? Sampling::kCrn : Sampling::kIndependent, options.groups);
-  const EstimatorOptions& estimator = options.estimator;
-  PairMethod method;
-  method.name = estimator.name;
-  method.estimator = estimator.text();
-  method.split = parse_split(options.split);
-  method.groups = options.groups;
-  method.fewest_groups = estimator.name == "iduw" || estimator.penalty == Penalty::kCrossFit ? 4 : 3;
-  method.predicts_error = predicts_error(estimator.name);
-  method.estimate = [estimator](const GroupedImage& crn, const GroupedImage& independent, int64_t crn_samples) {
-    return make_estimator(estimator, predicts_error(estimator.name), crn_samples).apply(crn, independent);
-  };
-  method.bytes_per_pixel = make_estimator(estimator, method.predicts_error, 1).bytes_per_pixel;
-  return pair_plan(method);
+  PassChoice choice;
+  choice.sampling = options.sampling == "crn" ? Sampling::kCrn : Sampling::kIndependent;
+  choice.groups = options.groups;
+  if (options.estimator.command->count("--split")) choice.split = parse_split(options.split);
+  return estimator_plan(make_estimator(options.estimator), choice);
 }
 
 RenderRequest make_request(const RenderOptions& options, const LoadedScene& scene) {
@@ -152,9 +153,10 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
   command.add_option("--integrator", o.integrator, "Integrator instead of the scene's: path");
   command
       .add_option("--estimator", o.estimator.name,
-                  "How passes become the image: iicv, cv-baseline or iduw of a pass with common random numbers and an "
-                  "independent one; of a single pass polynomials, for direct light, or none, the mean")
-      ->check(one_of({"iicv", "cv-baseline", "iduw", "polynomials", "none"}))
+                  fmt::format("How passes become the image: {} of a pass with common random numbers and an "
+                              "independent one; of a single pass {}",
+                              list_text(pair_estimator_names()), single_pass_estimators()))
+      ->check(one_of(estimator_names()))
       ->capture_default_str();
   command.add_option("--split", o.split, "CRN:INDEPENDENT, parts of the samples for the two passes")
       ->capture_default_str();
@@ -203,13 +205,7 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
   command.add_option("--json", o.json, "File for statistics; '-': standard output");
   command.add_flag("!--no-preview", o.preview, "Do not write the PNG");
   command.add_flag("--quiet", o.quiet, "No progress and no summary");
-  add_estimator_options(command, o.estimator);
-  command
-      .add_option("--dimensions", o.dimensions,
-                  "polynomials: how many of a path's first random numbers they are functions of")
-      ->transform(whole_number(1, PolynomialsOptions::kMaxDimensions))
-      ->capture_default_str()
-      ->group(kEstimatorGroup);
+  add_estimator_options(command, o.estimator, estimator_names());
 }
 
 }  // namespace covary

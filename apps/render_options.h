@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "estimator_options.h"
-#include "estimators/polynomials.h"
 #include "plans/plan.h"
 #include "plans/render.h"
 
@@ -27,13 +26,7 @@ struct RenderOptions {
   uint64_t seed = 0;
   int threads = 0;
   double seconds = 0, checkpoint_seconds = 300;
-  int dimensions = PolynomialsOptions().dimensions;
   bool resume = false, overwrite = false, aovs = false, quiet = false, preview = true;
-
-  /// One pass, whose film is the result.
-  bool has_one_pass() const { return !combines_pair(estimator.name); }
-  /// The pass makes pixels of all their samples, instead of means of groups of them.
-  bool estimates_in_pass() const { return estimator.name == "polynomials"; }
 };
 
 void add_render_options(CLI::App& command, RenderOptions& options);

@@ -80,7 +80,7 @@ nlohmann::ordered_json statistics(const RenderReport& report) {
       {"scene_hash", scene.content_hash},
       {"width", window.width},
       {"height", window.height},
-      {"estimator", options.estimator.text()},
+      {"estimator", make_estimator(options.estimator).text},
       {"samples_per_pixel", result.samples_per_pixel()},
       {"seed", options.seed},
       {"threads", threads},
@@ -122,8 +122,9 @@ void print_summary(const RenderReport& report) {
              load_seconds, scene.scene->build_seconds(),
              format_count(result.sum([](const Pass& p) { return p.result.n_samples; }) / seconds),
              format_count(result.sum([](const Pass& p) { return p.result.n_rays; }) / seconds));
-  if (options.estimator.name != "none") {
-    fmt::print(stderr, "{} in {:.2f} s", options.estimator.text(), result.estimate_seconds());
+  const Estimator estimator = make_estimator(options.estimator);
+  if (estimator.passes != EstimatorPasses::kAny) {
+    fmt::print(stderr, "{} in {:.2f} s", estimator.text, result.estimate_seconds());
     if (result.predicted_relmse) fmt::print(stderr, ", predicted relMSE {:.3g}", *result.predicted_relmse);
     fmt::print(stderr, "\n");
   } else if (!options.until.empty()) {
@@ -132,7 +133,7 @@ void print_summary(const RenderReport& report) {
   if (options.seconds > 0 && result.seconds.limited > 1.05 * options.seconds)
     fmt::print(stderr, "warning: --time {:g} was exceeded: {:.2f} s for at least {} samples per pixel in each pass{}\n",
                options.seconds, result.seconds.limited, result.passes[0].film.groups(),
-               options.has_one_pass() ? "" : " and the estimate");
+               estimator.passes == EstimatorPasses::kPair ? " and the estimate" : "");
 }
 
 }  // namespace covary

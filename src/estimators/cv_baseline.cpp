@@ -3,7 +3,9 @@
 
 #include <fmt/format.h>
 
+#include "estimators/common_options.h"
 #include "estimators/control_variates.h"
+#include "estimators/registry.h"
 
 namespace covary {
 
@@ -43,6 +45,31 @@ EstimatorResult cv_baseline(const GroupedImage& crn, const GroupedImage& indepen
   apply_control_variates(input, settings, valid, result);
   fill_invalid(crn, independent, valid, result.estimate);
   return result;
+}
+
+Estimator make_cv_baseline(EstimatorParameters& parameters) {
+  EstimatorParameters& p = parameters;
+  CvBaselineOptions o;
+  p.whole("k", o.k, kVariatesRange, kVariatesHelp);
+  p.whole("window", o.window, kWindowRange, kWindowHelp);
+  p.real("ridge", o.ridge, {.low = 0}, "ridge relative to the mean diagonal");
+  if (p.flag("exclude-target", kExcludeTargetHelp)) o.include_target = false;
+  p.choice<bool>("coefficients", o.shared_coefficients, kCoefficients, kCoefficientsHelp);
+  throw_if_any("cv-baseline", o.validate());
+
+  Estimator estimator;
+  estimator.summary = "control variates that ignore the errors of the independent image";
+  estimator.predicts_error = true;
+  estimator.fewest_groups = 3;
+  estimator.reach = o.window / 2;
+  estimator.bytes_per_pixel = kCvBaselineBytesPerPixel;
+  estimator.apply = [o](const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings) {
+    CvBaselineOptions options = o;
+    options.std_error = settings.std_error;
+    return cv_baseline(crn, independent, options);
+  };
+  estimator.explain = explain_by_probe(cv_baseline, o);
+  return estimator;
 }
 
 }  // namespace covary

@@ -6,7 +6,9 @@
 #include <algorithm>
 
 #include "core/parallel.h"
+#include "estimators/common_options.h"
 #include "estimators/planes.h"
+#include "estimators/registry.h"
 
 namespace covary {
 
@@ -170,6 +172,26 @@ EstimatorResult iduw(const GroupedImage& crn, const GroupedImage& independent, c
   method.reconstruct(options.gammas[best], result.estimate);
   fill_invalid(crn, independent, valid, result.estimate);
   return result;
+}
+
+Estimator make_iduw(EstimatorParameters& parameters) {
+  IduwOptions o;
+  o.samples = 1;  // until an image is there
+  parameters.whole("window", o.window, kWindowRange, kWindowHelp);
+  throw_if_any("iduw", o.validate());
+
+  Estimator estimator;
+  estimator.summary = "input-dependent uncorrelated weighting";
+  estimator.needs_sample_count = true;
+  estimator.fewest_groups = 4;
+  estimator.reach = -1;
+  estimator.bytes_per_pixel = kIduwBytesPerPixel;
+  estimator.apply = [o](const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings) {
+    IduwOptions options = o;
+    options.samples = static_cast<int>(settings.crn_samples);
+    return iduw(crn, independent, options);
+  };
+  return estimator;
 }
 
 }  // namespace covary

@@ -3,8 +3,10 @@
 
 #include <fmt/format.h>
 
+#include "estimators/common_options.h"
 #include "estimators/control_variates.h"
 #include "estimators/pilot.h"
+#include "estimators/registry.h"
 
 namespace covary {
 
@@ -128,6 +130,50 @@ double iicv_bytes_per_pixel(const IicvOptions& options) {
   if (halves) planes += 2 * 6 + 6;
   if (options.feedback) planes += 8 + 4;
   return planes * sizeof(float) + 1;
+}
+
+Estimator make_iicv(EstimatorParameters& parameters) {
+  static constexpr std::pair<const char*, Penalty> kPenalties[] = {{"pilot", Penalty::kPilot},
+                                                                   {"sample", Penalty::kSample},
+                                                                   {"smoothed", Penalty::kSmoothed},
+                                                                   {"homogeneous", Penalty::kHomogeneous},
+                                                                   {"cross-fit", Penalty::kCrossFit}};
+  static constexpr std::pair<const char*, bool> kOnOff[] = {{"on", true}, {"off", false}};
+  EstimatorParameters& p = parameters;
+  IicvOptions o = p.flag("paper", "iicv as published: no sample share, no conservation, no feedback")
+                      ? IicvOptions::paper()
+                      : IicvOptions();
+  p.whole("k", o.k, kVariatesRange, kVariatesHelp);
+  p.whole("window", o.window, kWindowRange, kWindowHelp);
+  p.choice<Penalty>("penalty", o.penalty, kPenalties, "How the error of the independent pixels is estimated",
+                    {"variance"});
+  p.whole("pilot-window", o.pilot_window, kWindowRange, "Side of the pilot's window");
+  p.real("ridge", o.ridge, {.low = 0, .above_low = true}, "Factor of the homogeneous penalty");
+  if (p.flag("asymmetric", "Penalty of the neighbour alone, not averaged with the target's")) o.symmetric = false;
+  if (p.flag("exclude-target", kExcludeTargetHelp)) o.include_target = false;
+  p.choice<bool>("coefficients", o.shared_coefficients, kCoefficients, kCoefficientsHelp);
+  p.real("sample-share", o.sample_share, {.low = 0, .high = 1}, "Part of the penalty that is the sample variance");
+  p.real("conservation", o.conservation, {.low = 0}, "Weight of the condition sum beta g = f");
+  p.choice<bool>("feedback", o.feedback, kOnOff, "Give back what the penalty takes away");
+  p.whole("feedback-window", o.feedback_options.window, {.low = 5, .high = 125, .odd = true},
+          "Side of the feedback's window");
+  p.real("feedback-bandwidth", o.feedback_options.bandwidth, {.low = 0, .above_low = true},
+         "Bandwidth of the feedback in standard errors");
+  throw_if_any("iicv", o.validate());
+
+  Estimator estimator;
+  estimator.summary = "imperfect image-space control variates";
+  estimator.predicts_error = true;
+  estimator.fewest_groups = o.penalty == Penalty::kCrossFit ? 4 : 3;
+  estimator.reach = iicv_reach(o);
+  estimator.bytes_per_pixel = iicv_bytes_per_pixel(o);
+  estimator.apply = [o](const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings) {
+    IicvOptions options = o;
+    options.std_error = settings.std_error;
+    return iicv(crn, independent, options);
+  };
+  estimator.explain = explain_by_probe(iicv, o);
+  return estimator;
 }
 
 }  // namespace covary

@@ -6,6 +6,8 @@
 
 #include "film/groups.h"
 
+#include "estimators/registry.h"
+
 namespace covary {
 namespace {
 
@@ -51,6 +53,14 @@ EstimatorResult mean_of_groups(const GroupedImage& image) {
       }
     }
   return result;
+}
+
+Estimator make_none(EstimatorParameters& /*parameters*/) {
+  Estimator estimator;
+  estimator.passes = EstimatorPasses::kAny;
+  estimator.summary = "the mean";
+  estimator.predicts_error = true;
+  return estimator;
 }
 
 }  // namespace covary

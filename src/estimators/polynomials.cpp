@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "estimators/grouped_image.h"
+#include "estimators/registry.h"
 
 namespace covary {
 namespace {
@@ -89,6 +91,25 @@ Spectrum polynomials(std::span<const Spectrum> values, std::span<const float> co
   if (k == constant && determined(constant))
     for (int c = 0; c < 3; ++c) mean[c] += products[constant + 1 + c][constant] / products[constant][constant];
   return {static_cast<float>(mean[0]), static_cast<float>(mean[1]), static_cast<float>(mean[2])};
+}
+
+Estimator make_polynomials(EstimatorParameters& parameters) {
+  PolynomialsOptions o;
+  parameters.whole("dimensions", o.dimensions, {.low = 1, .high = PolynomialsOptions::kMaxDimensions},
+                   "polynomials: how many of a path's first random numbers they are functions of");
+  o.samples = std::numeric_limits<uint32_t>::max();  // until they are known
+  throw_if_any("polynomials", o.validate());
+
+  Estimator estimator;
+  estimator.passes = EstimatorPasses::kSamples;
+  estimator.summary = "for direct light";
+  estimator.dimensions = o.dimensions;
+  estimator.film_settings = fmt::format("polynomials dimensions={}", o.dimensions);
+  estimator.estimate_pixel = [d = o.dimensions](std::span<const Spectrum> values, std::span<const float> coordinates) {
+    return polynomials(values, coordinates, d);
+  };
+  estimator.check_samples = [d = o.dimensions](uint32_t samples) { return PolynomialsOptions{d, samples}.validate(); };
+  return estimator;
 }
 
 }  // namespace covary

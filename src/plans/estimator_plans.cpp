@@ -8,7 +8,6 @@
 
 #include "core/error.h"
 #include "estimators/mean.h"
-#include "estimators/polynomials.h"
 #include "integrators/primary_sample.h"
 #include "plans/budget.h"
 #include "plans/render.h"
@@ -16,16 +15,15 @@
 namespace covary {
 namespace {
 
-/// Fits polynomials to the samples of a pixel.
-PixelEstimate polynomial_estimate(int dimensions) {
-  static_assert(PolynomialsOptions::kMaxDimensions <= kPrimaryDimensions);
-  return [dimensions](std::span<const CameraSample> samples) {
+PixelEstimate pixel_estimate(const PixelFunction& estimate, int dimensions) {
+  COVARY_CHECK(dimensions <= kPrimaryDimensions, "an estimator reads more random numbers than samples begin with");
+  return [=](std::span<const CameraSample> samples) {
     thread_local std::vector<Spectrum> values;
     thread_local std::vector<float> coordinates;
     values.clear();
     for (const CameraSample& sample : samples) values.push_back(sample.radiance);
     primary_coordinates(samples, dimensions, coordinates);
-    return polynomials(values, coordinates, dimensions);
+    return estimate(values, coordinates);
   };
 }
 
@@ -69,21 +67,21 @@ Plan plain_plan(Sampling sampling, std::optional<int> groups) {
   return plan;
 }
 
-Plan polynomials_plan(int dimensions, const std::string& text) {
+Plan samples_plan(const Estimator& estimator) {
   Plan plan;
-  plan.name = "polynomials";
-  plan.estimator = text;
+  plan.name = estimator.name;
+  plan.estimator = estimator.text;
   plan.film_is_image = plan.fixed_samples = true;
   plan.estimate = mean_of_first;
   Phase phase;
   phase.passes = [=](const PlanState& state) {
-    throw_if_any("polynomials", PolynomialsOptions{dimensions, state.group_budget}.validate());
+    throw_if_any(estimator.name, estimator.check_samples(state.group_budget));
     PassPlan pass;
     pass.name = "independent";
-    pass.estimate = polynomial_estimate(dimensions);
-    pass.estimator = text;
+    pass.estimate = pixel_estimate(estimator.estimate_pixel, estimator.dimensions);
+    pass.estimator = estimator.text;
     // The number of samples belongs to the settings: an estimate of few samples cannot become one of more.
-    pass.settings = fmt::format("; polynomials dimensions={} samples={}", dimensions, state.group_budget);
+    pass.settings = fmt::format("; {} samples={}", estimator.film_settings, state.group_budget);
     return std::vector{pass};
   };
   phase.set_targets = set_only_target;
@@ -124,6 +122,24 @@ Plan pair_plan(const PairMethod& method) {
   };
   plan.phases = {phase};
   return plan;
+}
+
+Plan estimator_plan(const Estimator& estimator, const PassChoice& choice) {
+  if (estimator.passes == EstimatorPasses::kAny) return plain_plan(choice.sampling, choice.groups);
+  if (estimator.passes == EstimatorPasses::kSamples) return samples_plan(estimator);
+  PairMethod method;
+  method.name = estimator.name;
+  method.estimator = estimator.text;
+  method.split = choice.split.value_or(estimator.split);
+  method.groups = choice.groups;
+  method.fewest_groups = estimator.fewest_groups;
+  method.predicts_error = estimator.predicts_error;
+  method.bytes_per_pixel = estimator.bytes_per_pixel;
+  method.estimate = [apply = estimator.apply, std_error = estimator.predicts_error](
+                        const GroupedImage& crn, const GroupedImage& independent, int64_t crn_samples) {
+    return apply(crn, independent, {crn_samples, std_error});
+  };
+  return pair_plan(method);
 }
 
 }  // namespace covary

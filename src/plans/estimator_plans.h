@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The plans of the estimators there are. Each has one phase.
+// The plans of the estimators there are (estimators/registry.h). Each has one phase.
 #pragma once
 
 #include <array>
@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 
+#include "estimators/estimator.h"
 #include "plans/plan.h"
 
 namespace covary {
@@ -16,10 +17,9 @@ namespace covary {
 /// numbers and for a render to a wanted error, which is read from the groups, otherwise 1.
 Plan plain_plan(Sampling sampling, std::optional<int> groups = {});
 
-/// One independent pass, whose pixels are polynomials fitted to all their samples (estimators/polynomials.h). `text`:
-/// the estimator with its options, for attributes. Throws Error(kUsage) when rendered with too few samples for
-/// `dimensions`.
-Plan polynomials_plan(int dimensions, const std::string& text);
+/// One independent pass, whose pixels an estimator makes of all their samples (EstimatorPasses::kSamples). Throws
+/// Error(kUsage) when rendered with a number of samples that the estimator does not take.
+Plan samples_plan(const Estimator& estimator);
 
 /// An estimator of two images of groups: one with common random numbers, one with independent ones.
 struct PairMethod {
@@ -39,5 +39,14 @@ struct PairMethod {
 /// Passes "crn" and "independent" that advance together, and the estimator. Rendering throws Error(kUsage) where
 /// `groups` is less than `fewest_groups`.
 Plan pair_plan(const PairMethod& method);
+
+/// What a render may choose of an estimator's passes.
+struct PassChoice {
+  Sampling sampling = Sampling::kIndependent;  ///< of estimators whose one pass may be of either kind
+  std::optional<int> groups;                   ///< default: as the plans above have it
+  std::optional<std::array<double, 2>> split;  ///< default: Estimator::split
+};
+/// The one of these plans that the estimator needs.
+Plan estimator_plan(const Estimator& estimator, const PassChoice& choice = {});
 
 }  // namespace covary

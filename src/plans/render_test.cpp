@@ -7,6 +7,7 @@
 #include <atomic>
 #include <filesystem>
 
+#include "estimators/registry.h"
 #include "film/film_file.h"
 #include "film/image_file.h"
 #include "plans/budget.h"
@@ -46,7 +47,7 @@ TEST(Render, ACropOutsideTheFrameAndImpossibleLimitsAreUsageErrors) {
   EXPECT_THROW(render(scene, average_plan(), request), Error) << "no predicted error";
   request.until = 0;
   request.seconds = 1;
-  EXPECT_THROW(render(scene, polynomials_plan(2, "polynomials"), request), Error);
+  EXPECT_THROW(render(scene, samples_plan(make_estimator("polynomials", {{"dimensions", "2"}})), request), Error);
 }
 
 TEST(Render, StoppedAtManyTilesAndResumedGivesTheSameBits) {

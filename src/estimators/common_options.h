@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// Options that several estimators have: the same range and the same words.
+#pragma once
+
+#include <utility>
+
+#include "estimators/estimator_parameters.h"
+
+namespace covary {
+
+/// Largest k: the pixels of the window; validate() knows.
+inline constexpr OptionRange kVariatesRange{.low = 1};
+inline constexpr const char* kVariatesHelp = "Number of control variates";
+inline constexpr OptionRange kWindowRange{.low = 3, .high = 63, .odd = true};
+inline constexpr const char* kWindowHelp = "Side of the window of neighbours";
+inline constexpr const char* kExcludeTargetHelp = "Leave the target out of its own control variates";
+/// Whether coefficients are shared.
+inline constexpr std::pair<const char*, bool> kCoefficients[] = {{"shared", true}, {"per-channel", false}};
+inline constexpr const char* kCoefficientsHelp = "One coefficient for all channels, or one per channel";
+
+}  // namespace covary

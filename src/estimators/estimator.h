@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+// An estimator with its options, as everything else sees it: what it needs of a render, what it can do, and how.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/spectrum.h"
+#include "estimators/grouped_image.h"
+#include "estimators/pixel_probe.h"
+
+namespace covary {
+
+/// The passes that an estimator makes its image of.
+enum class EstimatorPasses {
+  kPair,     ///< one with common random numbers and one with independent ones: Estimator::apply
+  kSamples,  ///< an independent one, whose pixels are made of all their samples: Estimator::estimate_pixel
+  kAny,      ///< one of either kind, whose mean is the image: the film needs no estimator
+};
+
+/// What an estimator of a pair is told beside the images.
+struct PairSettings {
+  int64_t crn_samples = 1;  ///< samples per pixel of the CRN image, > 0; read where needs_sample_count says so
+  bool std_error = false;   ///< estimate the standard error, too; where predicts_error says that it can
+};
+
+/// Samples of a pixel, and of each the first random numbers that it was made of: [sample][dimension].
+using PixelFunction = std::function<Spectrum(std::span<const Spectrum> values, std::span<const float> coordinates)>;
+
+struct Estimator {
+  EstimatorPasses passes = EstimatorPasses::kPair;
+  std::string name;     ///< registered one
+  std::string summary;  ///< a few words, for lists
+  std::string text;     ///< name and options as given: "iicv --paper --k 50"
+
+  bool predicts_error = false;      ///< that of its result
+  bool needs_sample_count = false;  ///< PairSettings::crn_samples
+  /// Groups of samples that it needs in each pass. All estimators take groups that differ in size by a sample.
+  int fewest_groups = 1;
+  /// Parts of the samples for the CRN and the independent pass where nothing else is asked for; they add up to 1.
+  std::array<double, 2> split = {0.5, 0.5};
+
+  // Of a pair.
+  std::function<EstimatorResult(const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings)>
+      apply;
+  int reach = 0;               ///< rows beyond its own that a band of rows needs; -1: the whole image is needed
+  double bytes_per_pixel = 0;  ///< memory that `apply` takes beside its input, about
+  /// The control variates of a pixel; empty function where the estimator has none.
+  std::function<std::vector<ControlVariate>(const GroupedImage& crn, const GroupedImage& independent, int x, int y)>
+      explain;
+
+  // Of the samples of a pixel.
+  PixelFunction estimate_pixel;
+  int dimensions = 0;  ///< random numbers of each sample that estimate_pixel() reads
+  /// Name and all options that change its pixels, for the film's settings: "polynomials dimensions=4".
+  std::string film_settings;
+  /// What is wrong with so many samples per pixel; empty if nothing is.
+  std::function<std::vector<std::string>(uint32_t samples)> check_samples;
+};
+
+/// Estimator::explain for an estimator of grouped images whose options have a probe.
+template <typename Function, typename Options>
+auto explain_by_probe(Function function, const Options& options) {
+  return [function, options](const GroupedImage& crn, const GroupedImage& independent, int x, int y) {
+    PixelProbe probe{x, y, {}};
+    Options probing = options;
+    probing.probe = &probe;
+    function(crn, independent, probing);
+    return probe.control_variates;
+  };
+}
+
+}  // namespace covary
