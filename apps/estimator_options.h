@@ -21,8 +21,8 @@ struct EstimatorOptions {
   const CLI::App* command = nullptr;  ///< knows which options were given
 };
 
-/// Adds the options of these estimators, but `--estimator` itself. Equal names are one option, whose help has the defaults
-/// of all.
+/// Adds the options of these estimators, but `--estimator` itself. Equal names are one option, whose help has all
+/// defaults.
 void add_estimator_options(CLI::App& command, EstimatorOptions& options, const std::vector<std::string>& estimators);
 
 /// make_estimator() of the registry: throws Error(kUsage) for options of another estimator and values out of range.

@@ -232,8 +232,10 @@ void check_files(const ExperimentCommand& command, const lab::Suite& suite, cons
                       command.output, name));
 }
 
-/// Reads the options of each method as `covary render` will, so that nothing runs before all of them are right.
+/// Reads the options of each method as `covary render` will, so that nothing runs before all of them are right. Other
+/// mistakes of the suite are left to run_experiment().
 void check_methods(const lab::Suite& suite) {
+  if (!lab::validate(suite).empty()) return;
   std::vector<std::string> problems;
   for (const lab::MethodEntry& method : suite.methods) {
     CLI::App command;
@@ -285,9 +287,9 @@ void experiment(ExperimentCommand command) {
   for (uint32_t spp : command.spp) command.overrides.budgets.push_back({spp, 0});
   for (double seconds : command.seconds) command.overrides.budgets.push_back({0, seconds});
   const lab::Suite suite = load_suite(command);
-  check_methods(suite);
   if (command.print) return write_text_output("-", json_text(lab::to_json(suite)));
   if (command.output.empty()) throw Error(ErrorCode::kUsage, "no folder for the results given; use -o DIR");
+  check_methods(suite);
   std::error_code error;
   fs::create_directories(command.output, error);
   if (error) throw Error(ErrorCode::kIo, fmt::format("cannot make the folder {}: {}", command.output, error.message()));

@@ -48,8 +48,8 @@ class EstimatorParameters {
 
   /// Whether the flag was given.
   bool flag(const std::string& name, const std::string& help);
-  /// Each of these sets `value` where the option was given; before the call it holds the default. Throws Error(kUsage) for
-  /// text that is no such value. The range is described here and checked with all else by the options' validate().
+  /// Each of these sets `value` where the option was given; before the call it holds the default. Throws Error(kUsage)
+  /// for text that is no such value. The range is described here and checked with all else by the options' validate().
   void whole(const std::string& name, int& value, const OptionRange& range, const std::string& help);
   void real(const std::string& name, float& value, const OptionRange& range, const std::string& help);
   template <typename T>

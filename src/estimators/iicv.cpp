@@ -145,8 +145,7 @@ Estimator make_iicv(EstimatorParameters& parameters) {
                       : IicvOptions();
   p.whole("k", o.k, kVariatesRange, kVariatesHelp);
   p.whole("window", o.window, kWindowRange, kWindowHelp);
-  p.choice<Penalty>("penalty", o.penalty, kPenalties, "How the error of the independent pixels is estimated",
-                    {"variance"});
+  p.choice<Penalty>("penalty", o.penalty, kPenalties, "Error of the independent pixels", {"variance"});
   p.whole("pilot-window", o.pilot_window, kWindowRange, "Side of the pilot's window");
   p.real("ridge", o.ridge, {.low = 0, .above_low = true}, "Factor of the homogeneous penalty");
   if (p.flag("asymmetric", "Penalty of the neighbour alone, not averaged with the target's")) o.symmetric = false;

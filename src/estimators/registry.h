@@ -29,8 +29,8 @@ Estimator make_none(EstimatorParameters& parameters);
 inline constexpr const char* kDefaultEstimator = "iicv";
 inline constexpr const char* kNoEstimator = "none";  ///< the film is the image
 
-/// Throws Error(kUsage) for a name that there is not, with the names there are; for an option that the estimator does not
-/// have, with those that have it; and for values out of range.
+/// Throws Error(kUsage) for a name that there is not, with the names there are; for an option that the estimator does
+/// not have, with those that have it; and for values out of range.
 Estimator make_estimator(const std::string& name, const OptionValues& values = {});
 
 /// Names of the estimators that `accepts` says yes to, with their default options.

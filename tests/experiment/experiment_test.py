@@ -295,7 +295,7 @@ class Resume(ExperimentTest):
 class Failures(ExperimentTest):
     def test_the_rest_goes_on(self):
         self.suite["scenes"].append({"name": "gone", "file": "gone.xml"})
-        self.suite["methods"].append({"name": "wrong", "options": ["--k", "-3"]})
+        self.suite["methods"].append({"name": "wrong", "options": ["--groups", "2"]})
         self.suite["methods"].append({"name": "late", "options": ["--estimator", "none"],
                                       "then": [["merge", "nothing.exr"]]})
         self.suite["budgets"] = [{"spp": 24}]
@@ -307,12 +307,24 @@ class Failures(ExperimentTest):
         self.assertIn("gone.xml", failures["gone", ""]["message"])
         self.assertEqual(failures["room", "wrong"]["exit_code"], 2)
         self.assertEqual(failures["room", "wrong"]["runs_not_tried"], 1)
-        self.assertIn("k is -3", failures["room", "wrong"]["message"])
+        self.assertIn("2 groups are too few", failures["room", "wrong"]["message"])
         self.assertIn("nothing.exr", failures["room", "late"]["message"])
         self.assertIn("failed: gone", self.stderr)
 
 
 class Mistakes(ExperimentTest):
+    def test_methods_that_render_refuses(self):
+        refused = ((["--estimator", "iidw"], "'iidw'; did you mean 'iduw' or 'iicv'?: expected iicv, cv-baseline"),
+                   (["--windwo", "3"], "--windwo"),
+                   (["--estimator", "iduw", "--k", "3"], "--k is an option of --estimator iicv, cv-baseline"),
+                   (["--k", "-3"], "k is -3, expected 1 to 121"))
+        for options, message in refused:
+            with self.subTest(options):
+                self.suite["methods"] = [*SUITE["methods"], {"name": "wrong", "options": options}]
+                self.bad(2, message)
+                self.bad(2, "method 'wrong': ")
+                self.assertFalse((self.path / "out").exists())
+
     def test_all_at_once_with_lines(self):
         (self.path / "suite.json").write_text('{\n "name": "x",\n "scene": [],\n "methods": [{"nam": "a"}]\n}')
         done = self.run_covary([COVARY, "experiment", "suite.json", "-o", "out"])
