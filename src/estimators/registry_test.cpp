@@ -208,7 +208,7 @@ std::string row_of(const EstimatorOption& o) {
                              : o.type == Type::kWhole  ? "whole, " + o.range.text()
                                                        : o.range.text();
   std::string names = "`--" + o.name + "`";
-  for (const std::string& alias : o.aliases) names += ", `--" + alias + "`";
+  for (const std::string& alias : o.aliases) names += "/`--" + alias + "`";
   return fmt::format("| {} | {} | {} | {} |", names, values, o.type == Type::kFlag ? "off" : o.default_value, o.help);
 }
 
