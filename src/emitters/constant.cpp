@@ -15,7 +15,11 @@ class ConstantLight final : public Emitter {
  public:
   explicit ConstantLight(const Spectrum& radiance) : radiance_(radiance) {}
 
-  void set_scene_bounds(const Bounds3& bounds) override { scene_ = SceneSphere(bounds); }
+  std::shared_ptr<const Emitter> in_scene(const Bounds3& bounds) const override {
+    auto placed = std::make_shared<ConstantLight>(*this);
+    placed->scene_ = SceneSphere(bounds);
+    return placed;
+  }
   bool is_environment() const override { return true; }
   EnvironmentLight environment(const Vec3&) const override { return {radiance_, warp::sphere_pdf_solid_angle()}; }
 

@@ -17,7 +17,11 @@ class DirectionalLight final : public Emitter {
   DirectionalLight(const Vec3& direction, const Spectrum& irradiance)
       : direction_(direction), irradiance_(irradiance) {}
 
-  void set_scene_bounds(const Bounds3& bounds) override { scene_ = SceneSphere(bounds); }
+  std::shared_ptr<const Emitter> in_scene(const Bounds3& bounds) const override {
+    auto placed = std::make_shared<DirectionalLight>(*this);
+    placed->scene_ = SceneSphere(bounds);
+    return placed;
+  }
   bool is_delta_direction() const override { return true; }
 
   EmitterSample sample_towards(const Vec3&, Vec2, float) const override {

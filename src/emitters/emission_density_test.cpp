@@ -230,15 +230,13 @@ TEST(Emission, SpotLight) {
 }
 
 TEST(Emission, DirectionalLight) {
-  const auto light = make("directional", {{"direction", Vec3{0.3f, -0.4f, 0.5f}}}).object;
-  light->set_scene_bounds(kBounds);
+  const auto light = make("directional", {{"direction", Vec3{0.3f, -0.4f, 0.5f}}}).object->in_scene(kBounds);
   EXPECT_TRUE(light->is_delta_direction() && light->is_delta() && !light->is_delta_position() && light->is_infinite());
   expect_samples_carry_densities(*light);
 }
 
 TEST(Emission, ConstantLight) {
-  const auto light = make("constant", {}).object;
-  light->set_scene_bounds(kBounds);
+  const auto light = make("constant", {}).object->in_scene(kBounds);
   EXPECT_TRUE(!light->is_delta() && light->is_infinite());
   expect_samples_carry_densities(*light);
   expect_directions_follow_density(*light, "constant");
@@ -255,8 +253,7 @@ TEST(Emission, EnvironmentMap) {
     const auto light = make("envmap", {{"filename", folder.file("sun.exr")},
                                        {"mis_compensation", compensated},
                                        {"to_world", Transform::rotate({1, 2, 3}, 40) * Transform::scale({1, -1, 1})}})
-                           .object;
-    light->set_scene_bounds(kBounds);
+                           .object->in_scene(kBounds);
     EXPECT_TRUE(!light->is_delta() && light->is_infinite());
     expect_samples_carry_densities(*light);
     expect_directions_follow_density(*light, "envmap");
@@ -268,9 +265,9 @@ TEST(Emission, EnvironmentMap) {
 TEST(Emission, InfiniteLightsLightASurfaceEvenly) {
   const Vec3 corner{-0.5f, -1.2f, -2}, e1{2.6f, 0.4f, 0}, e2{-0.2f, 2.4f, 0.6f}, area = cross(e1, e2);
   const Vec3 n = normalize(area);
-  for (const auto& light :
+  for (const auto& made :
        {make("constant", {}).object, make("directional", {{"direction", Vec3{0.3f, -0.4f, -0.5f}}}).object}) {
-    light->set_scene_bounds(kBounds);
+    const auto light = made->in_scene(kBounds);
     const double expected = light->is_delta() ? dot(n, normalize(Vec3{-0.3f, 0.4f, 0.5f})) : M_PI;
     const auto estimate = [&](const PathRandom& random) -> double {
       const EmissionSample s = draw_emission(*light, random);

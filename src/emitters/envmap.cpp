@@ -19,24 +19,29 @@ namespace {
 
 class EnvironmentMap final : public Emitter {
  public:
-  EnvironmentMap(EnvironmentImage image, const Rotation& rotation) : image_(std::move(image)), rotation_(rotation) {}
+  EnvironmentMap(EnvironmentImage image, const Rotation& rotation)
+      : image_(std::make_shared<const EnvironmentImage>(std::move(image))), rotation_(rotation) {}
 
-  void set_scene_bounds(const Bounds3& bounds) override { scene_ = SceneSphere(bounds); }
+  std::shared_ptr<const Emitter> in_scene(const Bounds3& bounds) const override {
+    auto placed = std::make_shared<EnvironmentMap>(*this);
+    placed->scene_ = SceneSphere(bounds);
+    return placed;
+  }
   bool is_environment() const override { return true; }
 
   EnvironmentLight environment(const Vec3& d) const override {
-    const EnvironmentImage::Lookup found = image_.lookup(rotation_.to_local(d));
+    const EnvironmentImage::Lookup found = image_->lookup(rotation_.to_local(d));
     return {found.value, found.pdf_solid_angle};
   }
   void prefetch(Vec2 u, PrefetchStep step) const override {
     if (step == PrefetchStep::kTable)
-      image_.prefetch_table(u);
+      image_->prefetch_table(u);
     else
-      image_.prefetch_texels(u);
+      image_->prefetch_texels(u);
   }
 
   EmitterSample sample_towards(const Vec3&, Vec2 u, float) const override {
-    const EnvironmentImage::Sample from = image_.sample(u);
+    const EnvironmentImage::Sample from = image_->sample(u);
     EmitterSample sample;
     sample.wi = rotation_.to_world(from.d);
     sample.radiance = from.value;
@@ -45,7 +50,7 @@ class EnvironmentMap final : public Emitter {
   }
 
   EmissionSample sample_emission(Vec2 u_position, Vec2 u_direction, float) const override {
-    const EnvironmentImage::Sample from = image_.sample(u_direction);
+    const EnvironmentImage::Sample from = image_->sample(u_direction);
     EmissionSample sample;
     const Vec3 d = -rotation_.to_world(from.d);
     sample.ray = {scene_.disk_point(d, u_position), d};
@@ -57,13 +62,13 @@ class EnvironmentMap final : public Emitter {
   }
 
   EmissionPdf pdf_emission(const SurfaceHit&, const Vec3& w) const override {
-    return {1 / scene_.disk_area(), image_.lookup(rotation_.to_local(-w)).pdf_solid_angle};
+    return {1 / scene_.disk_area(), image_->lookup(rotation_.to_local(-w)).pdf_solid_angle};
   }
 
-  Spectrum power() const override { return image_.integral() * scene_.disk_area(); }
+  Spectrum power() const override { return image_->integral() * scene_.disk_area(); }
 
  private:
-  EnvironmentImage image_;
+  std::shared_ptr<const EnvironmentImage> image_;  // large, and shared by copies
   Rotation rotation_;
   SceneSphere scene_;
 };

@@ -75,8 +75,7 @@ void expect_rays_cover_the_scene(const Emitter& emitter) {
 }
 
 TEST(ConstantLight, SamplesTheSphereUniformlyAndLightsItEvenly) {
-  const auto light = make("constant", {{"radiance", ColourValue{{1, 2, 3}}}}).object;
-  light->set_scene_bounds(kBounds);
+  const auto light = make("constant", {{"radiance", ColourValue{{1, 2, 3}}}}).object->in_scene(kBounds);
   EXPECT_TRUE(light->is_environment());
   EXPECT_EQ(light->environment({0, 1, 0}).radiance, Spectrum(1, 2, 3));
   const double radiance = luminance({1, 2, 3});
@@ -97,8 +96,8 @@ TEST(ConstantLight, SamplesTheSphereUniformlyAndLightsItEvenly) {
 
 TEST(DirectionalLight, AgreesWithMitsubaAndCoversTheScene) {
   const auto light =
-      make("directional", {{"direction", Vec3{0.3f, -0.4f, 0.5f}}, {"irradiance", ColourValue{{1, 2, 3}}}}).object;
-  light->set_scene_bounds(kBounds);
+      make("directional", {{"direction", Vec3{0.3f, -0.4f, 0.5f}}, {"irradiance", ColourValue{{1, 2, 3}}}})
+          .object->in_scene(kBounds);
   EXPECT_TRUE(light->is_delta());
   const EmitterSample s = light->sample_towards({1, 2, 3}, {0.1f, 0.2f}, 0.3f);
   const auto& expected = references()["directional"][0];
@@ -149,8 +148,7 @@ TEST(EnvironmentMap, AgreesWithMitsuba) {
 
 TEST(EnvironmentMap, SamplesWhatItClaimsInWorldSpace) {
   const TemporaryFolder folder;
-  const auto light = sun(folder);
-  light->set_scene_bounds(kBounds);
+  const auto light = sun(folder)->in_scene(kBounds);
   const auto result = statistics::chi2_sphere(
       [&](const PathRandom& random) -> std::optional<Vec3> { return draw_towards(*light, {}, random).wi; },
       [&](const Vec3& d) { return light->environment(d).pdf_solid_angle; }, {.name = "envmap"});

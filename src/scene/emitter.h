@@ -64,8 +64,9 @@ enum class PrefetchStep {
 
 class Emitter : public SceneObject {
  public:
-  /// Called once by the scene before rendering, with the bounds of everything that can be hit (never empty radius).
-  virtual void set_scene_bounds(const Bounds3& /*bounds*/) {}
+  /// The light as it shines in a scene with these bounds of everything that can be hit (never an empty radius). Lights
+  /// infinitely far away return a copy that knows where the scene lies; null: the light itself.
+  virtual std::shared_ptr<const Emitter> in_scene(const Bounds3& /*bounds*/) const { return nullptr; }
   /// Infinitely far lights that a ray leaving the scene can hit (environment map, constant).
   virtual bool is_environment() const { return false; }
   /// All light comes from one point.

@@ -27,9 +27,8 @@ Scene::Scene(SceneParts parts) : parts_(std::move(parts)) {
   if (bounds_.empty()) bounds_ = {{-1, -1, -1}, {1, 1, 1}};  // lights at infinity still need a sphere to shine through
   tracer_ = std::make_unique<RayTracer>(parts_.shapes, parts_.instances);
 
-  for (const auto& emitter : parts_.emitters) {
-    // Emitters are shared as const by the loader; this is the one moment they learn the scene's size.
-    const_cast<Emitter&>(*emitter).set_scene_bounds(bounds_);
+  for (auto& emitter : parts_.emitters) {
+    if (auto placed = emitter->in_scene(bounds_)) emitter = std::move(placed);
     if (emitter->is_environment()) {
       if (environment_) throw Error(ErrorCode::kInput, "a scene can have only one environment light");
       environment_ = emitter.get();
