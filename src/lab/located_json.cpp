@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <iterator>
+#include <utility>
 
 #include "core/error.h"
+#include "core/json_depth.h"
 
 namespace covary::lab {
 namespace {
@@ -128,12 +130,22 @@ std::string path_text(const std::string& pointer) {
 }  // namespace
 
 LocatedJson parse_located(const std::string& text, const std::string& name) {
+  if (const int deep = line_nested_too_deep(text))
+    throw Error(ErrorCode::kInput,
+                fmt::format("{}:{}: arrays and objects nest deeper than {}", name, deep, kMaxJsonDepth));
   LocatedJson document;
   document.name = name;
   int line = 1;
   Builder builder(document, line);
   Json::sax_parse(CountingIterator(text.data(), &line), CountingIterator(text.data() + text.size(), &line), &builder);
   return document;
+}
+
+std::string shown(const Json& value) {
+  constexpr size_t kMost = 60;
+  // All in ASCII, so that no character is cut in two.
+  std::string text = value.dump(-1, ' ', true, Json::error_handler_t::replace);
+  return text.size() > kMost ? text.substr(0, kMost - 3) + "..." : text;
 }
 
 ObjectReader::ObjectReader(const LocatedJson& document, std::string pointer, std::vector<std::string>& problems)
@@ -149,10 +161,10 @@ const Json* ObjectReader::find(const std::string& name) {
 }
 
 template <typename Is>
-const Json* ObjectReader::typed(const std::string& name, Is&& is, const char* expected) {
+const Json* ObjectReader::typed(const std::string& name, Is&& is, const std::string& expected) {
   const Json* value = find(name);
   if (!value || is(*value)) return value;
-  problem(name, fmt::format("expected {}, found {}", expected, value->dump()));
+  problem(name, fmt::format("expected {}, found {}", expected, shown(*value)));
   return nullptr;
 }
 
@@ -175,10 +187,13 @@ std::optional<double> ObjectReader::positive(const std::string& name) {
   return value ? std::optional(value->get<double>()) : std::nullopt;
 }
 
-std::optional<int64_t> ObjectReader::whole(const std::string& name, int64_t lowest) {
-  const Json* value = typed(
-      name, [&](const Json& v) { return v.is_number_integer() && v.get<int64_t>() >= lowest; },
-      lowest == 1 ? "a whole number from 1 on" : "a whole number");
+std::optional<int64_t> ObjectReader::whole(const std::string& name, int64_t lowest, int64_t highest) {
+  const auto is_in_range = [&](const Json& v) {
+    // Numbers above the largest int64_t are unsigned ones.
+    return v.is_number_integer() && (!v.is_number_unsigned() || std::in_range<int64_t>(v.get<uint64_t>())) &&
+           v.get<int64_t>() >= lowest && v.get<int64_t>() <= highest;
+  };
+  const Json* value = typed(name, is_in_range, fmt::format("a whole number from {} to {}", lowest, highest));
   return value ? std::optional(value->get<int64_t>()) : std::nullopt;
 }
 

@@ -16,8 +16,12 @@ struct LocatedJson {
   std::map<std::string, int> lines;  ///< of each value by JSON pointer: "/scenes/0/file"; "" is the whole
 };
 
-/// Throws Error(kInput) with the line where the text is not JSON, or a key stands twice in an object.
+/// Throws Error(kInput) with the line where the text is not JSON, nests deeper than kMaxJsonDepth, or a key stands twice
+/// in an object.
 LocatedJson parse_located(const std::string& text, const std::string& name);
+
+/// The value as JSON text, shortened for messages.
+std::string shown(const nlohmann::ordered_json& value);
 
 /// Reads one object member by member. Mistakes are added to `problems` as "file:line: where: what"; a member nobody
 /// asked for is one of them.
@@ -31,7 +35,8 @@ class ObjectReader {
   /// As text(), and missing or empty is a mistake.
   std::string required_text(const std::string& name);
   std::optional<double> positive(const std::string& name);
-  std::optional<int64_t> whole(const std::string& name, int64_t lowest);
+  /// A whole number in [lowest, highest].
+  std::optional<int64_t> whole(const std::string& name, int64_t lowest, int64_t highest);
   std::vector<std::string> texts(const std::string& name);
   /// Pointers to the elements of an array member; empty where it is missing. An element of another type is a mistake.
   std::vector<std::string> objects(const std::string& name);
@@ -45,7 +50,7 @@ class ObjectReader {
 
  private:
   template <typename Is>
-  const nlohmann::ordered_json* typed(const std::string& name, Is&& is, const char* expected);
+  const nlohmann::ordered_json* typed(const std::string& name, Is&& is, const std::string& expected);
 
   const LocatedJson& document_;
   std::string pointer_;

@@ -2,6 +2,8 @@
 // Suite files: JSON to Suite.
 #include <fmt/format.h>
 
+#include <limits>
+
 #include "core/error.h"
 #include "lab/located_json.h"
 #include "lab/suite.h"
@@ -10,6 +12,10 @@ namespace covary::lab {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+constexpr int64_t kLargestInt = std::numeric_limits<int>::max();
+constexpr int64_t kLargestSpp = 1 << 30;  // as of `covary render --spp`
+constexpr size_t kMostSeeds = 100000;     // as of `covary experiment --seeds`
 
 class SuiteReader {
  public:
@@ -48,7 +54,7 @@ class SuiteReader {
     scene.file = reader.required_text("file");
     scene.resolution = reader.text("resolution").value_or("");
     scene.crop = reader.text("crop").value_or("");
-    scene.max_depth = reader.whole("max_depth", -1);
+    scene.max_depth = reader.whole("max_depth", -1, kLargestInt);
     scene.defines = reader.texts("defines");
     scene.credit = reader.text("credit").value_or("");
     for (const std::string& inset : reader.objects("insets")) scene.insets.push_back(window(inset));
@@ -60,7 +66,7 @@ class SuiteReader {
   CropWindow window(const std::string& pointer) {
     ObjectReader reader = at(pointer);
     const auto number = [&](const char* name, int64_t lowest) {
-      const std::optional<int64_t> value = reader.whole(name, lowest);
+      const std::optional<int64_t> value = reader.whole(name, lowest, kLargestInt);
       if (!value) reader.problem("", fmt::format("lacks '{}', in pixels", name));
       return static_cast<int>(value.value_or(lowest));
     };
@@ -78,7 +84,7 @@ class SuiteReader {
       if (value->is_boolean())
         method.unbiased = value->get<bool>();
       else
-        reader.problem("unbiased", "expected true or false, found " + value->dump());
+        reader.problem("unbiased", "expected true or false, found " + shown(*value));
     }
     if (const Json* steps = reader.find("then")) {
       const auto is_step = [](const Json& step) {
@@ -100,7 +106,7 @@ class SuiteReader {
 
   Budget budget(const std::string& pointer) {
     ObjectReader reader = at(pointer);
-    const std::optional<int64_t> spp = reader.whole("spp", 1);
+    const std::optional<int64_t> spp = reader.whole("spp", 1, kLargestSpp);
     const std::optional<double> seconds = reader.positive("seconds");
     if (spp.has_value() == seconds.has_value()) reader.problem("", "expected either 'spp' or 'seconds'");
     reader.finish();
@@ -110,7 +116,7 @@ class SuiteReader {
   ReferencePlan reference(const std::string& pointer) {
     ObjectReader reader = at(pointer);
     ReferencePlan plan;
-    const std::optional<int64_t> spp = reader.whole("spp", 1);
+    const std::optional<int64_t> spp = reader.whole("spp", 1, kLargestSpp);
     plan.spp = static_cast<uint32_t>(spp.value_or(0));
     plan.files = reader.texts("files");
     if (spp.has_value() == !plan.files.empty())
@@ -125,12 +131,17 @@ class SuiteReader {
     const Json* value = top.find("seeds");
     if (!value) return {1};
     if (value->is_number_unsigned()) {
-      for (uint64_t s = 1; s <= value->get<uint64_t>(); ++s) result.push_back(s);
-    } else if (value->is_array() &&
+      const uint64_t n = value->get<uint64_t>();
+      if (n < 1 || n > kMostSeeds)
+        top.problem("seeds", fmt::format("expected 1 to {} seeds, found {}", kMostSeeds, n));
+      else
+        for (uint64_t s = 1; s <= n; ++s) result.push_back(s);
+    } else if (value->is_array() && value->size() <= kMostSeeds &&
                std::all_of(value->begin(), value->end(), [](const Json& s) { return s.is_number_unsigned(); })) {
       result = value->get<std::vector<uint64_t>>();
     } else {
-      top.problem("seeds", "expected a number of seeds or a list of seeds, found " + value->dump());
+      top.problem("seeds", fmt::format("expected a number of seeds or a list of at most {} seeds, found {}", kMostSeeds,
+                                       shown(*value)));
     }
     return result;
   }

@@ -87,8 +87,8 @@ TEST(Suite, ReportsAllMistakesWithTheirLines) {
         "bad.json:5: methods[0].options: expected a list of texts, found \"--k 5\"",
         "bad.json:6: methods[1].then: expected a list of commands",
         "bad.json:8: budgets[0]: expected either 'spp' or 'seconds'",
-        "bad.json:8: budgets[1].spp: expected a whole number from 1 on, found 0",
-        "bad.json:9: seeds: expected a number of seeds or a list of seeds, found \"ten\"",
+        "bad.json:8: budgets[1].spp: expected a whole number from 1 to 1073741824, found 0",
+        "bad.json:9: seeds: expected a number of seeds or a list of at most 100000 seeds, found \"ten\"",
         "bad.json:10: referenec: unknown key; did you mean 'reference'"})
     EXPECT_TRUE(contains(message, part));
 }
@@ -99,6 +99,37 @@ TEST(Suite, ReportsWhatIsNotJson) {
   EXPECT_TRUE(contains(message_of([] { parse_suite("{\"name\": 1,\n\"name\": 2}", "bad.json"); }),
                        "bad.json:2: the key 'name' stands twice"));
   EXPECT_TRUE(contains(message_of([] { parse_suite("[]", "bad.json"); }), "bad.json:1: expected an object"));
+}
+
+TEST(Suite, ReportsNumbersThatDoNotFit) {
+  const std::string message = message_of([] {
+    parse_suite(R"({
+  "name": "x", "scenes": [{"name": "r", "file": "r.xml", "max_depth": 18446744073709551615}],
+  "methods": [{"name": "a"}],
+  "budgets": [{"spp": 4294967297}],
+  "seeds": 4000000000,
+  "reference": {"spp": 99999999999999999999}
+})",
+                "bad.json");
+  });
+  for (const char* part :
+       {"bad.json:2: scenes[0].max_depth: expected a whole number from -1 to 2147483647, found 18446744073709551615",
+        "bad.json:4: budgets[0].spp: expected a whole number from 1 to 1073741824, found 4294967297",
+        "bad.json:5: seeds: expected 1 to 100000 seeds, found 4000000000",
+        "bad.json:6: reference.spp: expected a whole number from 1 to 1073741824, found 1e+20"})
+    EXPECT_TRUE(contains(message, part));
+}
+
+TEST(Suite, ReportsDeepNesting) {
+  EXPECT_EQ(message_of([] { parse_suite("{\n\"a\":" + std::string(200000, '['), "bad.json"); }),
+            "bad.json:2: arrays and objects nest deeper than 64");
+}
+
+TEST(Suite, ShortensLongValuesInMessages) {
+  const std::string message =
+      message_of([] { parse_suite("{\"name\": [\"" + std::string(10000, 'x') + "\"]}", "bad.json"); });
+  EXPECT_TRUE(contains(message, "bad.json:1: name: expected a text, found [\"xxxx"));
+  EXPECT_LT(message.size(), 1000u);
 }
 
 TEST(Suite, ValidatesAsAWhole) {
