@@ -20,12 +20,21 @@ std::string FileResolver::resolve(const std::string& name, const SourceLocation&
     candidates.push_back(fs::path(where.file).parent_path() / name);
   }
   std::error_code ignored;
-  for (const fs::path& candidate : candidates)
+  std::string other;  // something of that name which is no file
+  for (const fs::path& candidate : candidates) {
     if (fs::is_regular_file(candidate, ignored)) {
       const std::lock_guard lock(mutex_);
       files_.emplace(candidate.string(), name);
       return candidate.string();
     }
+    if (other.empty() && fs::exists(candidate, ignored)) other = candidate.string();
+  }
+  if (!other.empty()) {
+    const bool folder = fs::is_directory(other, ignored);
+    diagnostics.error(
+        where, fmt::format("'{}' is {}; expected a regular file", other, folder ? "a folder" : "a pipe or device"));
+    return "";
+  }
 
   // Suggest what lies in the folder the name points into.
   std::vector<std::string> neighbours;

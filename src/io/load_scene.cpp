@@ -88,11 +88,17 @@ class Loader {
       if (!object || !*object || (*object)->kind != "shape") continue;
       if ((*object)->type == "shapegroup") {
         for (const Property& member : (*object)->properties)
-          if (const ObjectPtr* shape = std::get_if<ObjectPtr>(&member.value)) add_shape_job(*shape, true);
-      } else if ((*object)->type != "instance") {
+          if (const ObjectPtr* shape = std::get_if<ObjectPtr>(&member.value); shape && *shape && has_surface(**shape))
+            add_shape_job(*shape, true);
+      } else if (has_surface(**object)) {
         add_shape_job(*object, false);
       }
     }
+  }
+
+  /// False for the shapes that only place others.
+  static bool has_surface(const ObjectDescription& shape) {
+    return shape.type != "instance" && shape.type != "shapegroup";
   }
 
   void collect_leaves(const ObjectPtr& object, std::unordered_set<const ObjectDescription*>& seen) {
@@ -259,7 +265,12 @@ class Loader {
       if (member && !*member) continue;
       const auto job = member ? jobs_by_description_.find(member->get()) : jobs_by_description_.end();
       if (job == jobs_by_description_.end()) {
-        diagnostics_.error(property.where, "a shapegroup can hold shapes only");
+        const bool shape = member && (*member)->kind == "shape";
+        diagnostics_.error(property.where, shape
+                                               ? fmt::format("a shapegroup cannot hold a shape '{}', only shapes that "
+                                                             "have a surface of their own",
+                                                             (*member)->type)
+                                               : "a shapegroup can hold shapes only");
         continue;
       }
       finish_shape(*job->second);

@@ -265,6 +265,15 @@ TEST(ObjReader, CountsNegativeIndicesFromTheEnd) {
   EXPECT_TRUE(file.mesh.uvs.empty());
 }
 
+TEST(ObjReader, JoinsLinesThatABackslashEnds) {
+  const MeshFile file = read_obj("v 0 0 0\nv 1 \\\n0 0\nv 0 1 0\r\nf 1 \\\r\n2 \\\n3\\");
+  EXPECT_EQ(file.mesh.positions, (std::vector<Vec3>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}));
+  EXPECT_EQ(file.mesh.triangles, (std::vector<Triangle>{{0, 1, 2}}));
+  EXPECT_EQ(message_of([] { read_obj("v 0 \\\n0 0\n\nv a 0 0\n"); }), "OBJ: line 4: 'a' is not a number");
+  EXPECT_EQ(message_of([] { read_obj("v 0 0 0\nf 1 \\\n\\\n7\n"); }),
+            "OBJ: line 2: vertex 7 does not exist; there are 1");
+}
+
 TEST(ObjReader, ReportsProblemsWithTheirLine) {
   const auto error = [](const std::string& text) { return message_of([&] { read_obj(text); }); };
   const std::string triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";

@@ -79,11 +79,10 @@ class Line {
 class ObjReader {
  public:
   MeshFile read(std::string_view text) {
-    size_t start = 0;
-    for (size_t number = 1; start < text.size(); ++number) {
-      const size_t end = std::min(text.find('\n', start), text.size());
-      Line line(text.substr(start, end - start), number);
-      start = end + 1;
+    std::string joined;
+    for (size_t start = 0, number = 1; start < text.size();) {
+      const size_t first = number;
+      Line line(next_line(text, start, number, joined), first);
       const std::string_view keyword = line.word();
       if (keyword == "v") {
         const float x = line.number(), y = line.number(), z = line.number();
@@ -106,6 +105,26 @@ class ObjReader {
   }
 
  private:
+  /// The line at `start`, and those that follow while a backslash ends the line before; `joined` holds them then. `start`
+  /// and `number` go on to the next line.
+  static std::string_view next_line(std::string_view text, size_t& start, size_t& number, std::string& joined) {
+    joined.clear();
+    while (true) {
+      const size_t end = std::min(text.find('\n', start), text.size());
+      std::string_view line = text.substr(start, end - start);
+      start = end + 1;
+      ++number;
+      if (line.ends_with('\r')) line.remove_suffix(1);
+      const bool goes_on = line.ends_with('\\');
+      if (goes_on) line.remove_suffix(1);
+      const bool last = !goes_on || start >= text.size();
+      if (last && joined.empty()) return line;
+      joined += line;
+      if (last) return joined;
+      joined += ' ';
+    }
+  }
+
   /// A vertex made so far; those of one position form a chain.
   struct Vertex {
     uint32_t uv, normal, next;

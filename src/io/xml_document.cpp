@@ -52,7 +52,8 @@ void XmlDefines::add_default(const std::string& name, const std::string& value) 
 }
 
 std::string XmlDefines::substitute(std::string_view text) {
-  constexpr size_t kLongest = 1 << 20;  // a few nested defaults could otherwise grow without bound
+  // A few nested defaults could otherwise grow without bound, and many attributes with them.
+  constexpr size_t kLongest = size_t{1} << 20, kAll = size_t{1} << 24;
   std::string result;
   for (size_t i = 0; i < text.size();) {
     if (text[i] == '\\' && i + 1 < text.size() && text[i + 1] == '$') {
@@ -79,7 +80,10 @@ std::string XmlDefines::substitute(std::string_view text) {
     best->used = true;
     result += best->value;
     i += 1 + best_length;
-    if (result.size() > kLongest) throw Error(ErrorCode::kInput, "an attribute grows beyond 1 MiB by substitution");
+    n_substituted_ += best->value.size();
+    if (result.size() > kLongest) throw Error(ErrorCode::kInput, "it grows beyond 1 MiB by substitution");
+    if (n_substituted_ > kAll)
+      throw Error(ErrorCode::kInput, "more than 16 MiB have been substituted for parameters of this scene");
   }
   return result;
 }

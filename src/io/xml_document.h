@@ -41,7 +41,7 @@ class XmlDefines {
   /// <default>: sets `name` unless it is set already.
   void add_default(const std::string& name, const std::string& value);
   /// `text` with every $name replaced by its value, the longest name that matches first; "\$" stands for "$". Throws
-  /// Error(kInput) when a name is not defined.
+  /// Error(kInput) when a name is not defined, or when values have been put in that are too long, alone or together.
   std::string substitute(std::string_view text);
   /// Records an error for each define from outside that nothing used.
   void report_unused(const std::string& file, Diagnostics& diagnostics) const;
@@ -52,6 +52,7 @@ class XmlDefines {
     bool external = false, has_default = false, used = false;
   };
   std::map<std::string, Entry> entries_;
+  size_t n_substituted_ = 0;  // characters put in so far
 };
 
 /// Attributes of one element after substitution.

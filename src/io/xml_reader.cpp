@@ -7,7 +7,6 @@
 #include <charconv>
 #include <filesystem>
 #include <unordered_map>
-#include <unordered_set>
 
 #include "core/content_hash.h"
 #include "io/file_view.h"
@@ -20,8 +19,14 @@ namespace covary {
 namespace fs = std::filesystem;
 namespace {
 
+// Limits far above what scenes need, and low enough that no small file takes long or much memory.
 constexpr int kMaxIncludeDepth = 15;
-constexpr int kMaxNesting = 64;
+constexpr int kMaxIncludes = 1000;
+constexpr size_t kMaxTextBytes = size_t{1} << 28;  // of all files together
+constexpr size_t kMaxObjects = 1000000;
+constexpr size_t kMaxNesting = 64;
+constexpr size_t kMaxExpanded = 4096;  // objects that one holds when every reference is followed
+constexpr int kNewestVersion = 3;
 
 const std::vector<std::string> kObjectTags = {"scene",  "bsdf",  "texture", "emitter",    "shape",
                                               "sensor", "film",  "rfilter", "integrator", "sampler",
@@ -45,11 +50,15 @@ class Reader {
     const std::string folder = fs::path(name).parent_path().string();
     files_.add_folder(folder.empty() ? "." : folder);
     auto holder = std::make_shared<ObjectDescription>();
-    read_document(text, name, *holder, 0);
     SceneXml result;
+    try {
+      read_document(text, name, *holder, 0);
+    } catch (const Stop&) {
+      return result;
+    }
     if (!holder->properties.empty()) {
       resolve_references();
-      break_cycles();
+      limit_expansion(break_cycles());
       evaluate_spectra();
       defines_.report_unused(name, diagnostics_);
       result.scene = std::get<ObjectPtr>(holder->properties[0].value);
@@ -63,14 +72,24 @@ class Reader {
     XmlDocument xml;
     bool old;  // of version 0.x or 1.x
   };
+  /// A limit was passed: reading ends at once, because going on would take the time and memory that the limit is for.
+  struct Stop {};
   struct Alias {
     std::string id, as;
     SourceLocation where;
   };
 
+  [[noreturn]] void stop(const SourceLocation& where, const std::string& message) {
+    diagnostics_.error(where, message);
+    throw Stop();
+  }
+
   // ---- files ----
 
   void read_document(std::string_view text, const std::string& name, ObjectDescription& parent, int depth) {
+    n_text_bytes_ += text.size();
+    if (n_text_bytes_ > kMaxTextBytes)
+      stop({name}, fmt::format("the scene and what it includes have more than {} bytes of text", kMaxTextBytes));
     digest_ += hash_text(hash_bytes(text)) + "\n";
     Document document{{text, name, diagnostics_}, false};
     const pugi::xml_node root = document.xml.root();
@@ -93,7 +112,7 @@ class Reader {
     }
   }
 
-  /// Major version of the file format; 3 after an error.
+  /// Major version of the file format; the newest after an error.
   int read_version(pugi::xml_node root, const SourceLocation& where) {
     const pugi::xml_attribute attribute = root.attribute("version");
     if (!attribute) {
@@ -101,7 +120,7 @@ class Reader {
                          fmt::format("<{}> has no attribute 'version'; add version=\"3.0.0\", or \"0.6.0\" if the "
                                      "file uses names like 'toWorld'",
                                      root.name()));
-      return 3;
+      return kNewestVersion;
     }
     const std::string_view text = attribute.value();
     int parts[3] = {0, 0, 0};
@@ -117,7 +136,12 @@ class Reader {
     }
     if (!valid) {
       diagnostics_.error(where, fmt::format("version '{}' is not of the form 3.0.0", text));
-      return 3;
+      return kNewestVersion;
+    }
+    if (parts[0] > kNewestVersion) {
+      diagnostics_.error(where,
+                         fmt::format("version '{}' is not known; accepted are 0.x to {}.x", text, kNewestVersion));
+      return kNewestVersion;
     }
     return parts[0];
   }
@@ -136,6 +160,7 @@ class Reader {
     }
     const std::string path = files_.resolve(attributes.get("filename"), where, diagnostics_);
     if (path.empty()) return;
+    if (++n_includes_ > kMaxIncludes) stop(where, fmt::format("more than {} includes", kMaxIncludes));
     try {
       const FileView file(path);
       const size_t before = parent.properties.size();
@@ -149,7 +174,8 @@ class Reader {
 
   // ---- elements ----
 
-  void read_children(const Document& document, pugi::xml_node node, ObjectDescription& object, int depth, int nesting) {
+  void read_children(const Document& document, pugi::xml_node node, ObjectDescription& object, int depth,
+                     size_t nesting) {
     for (const pugi::xml_node child : node.children()) {
       if (child.type() == pugi::node_pcdata || child.type() == pugi::node_cdata) {
         diagnostics_.error(document.xml.where(node),
@@ -168,7 +194,7 @@ class Reader {
     }
   }
 
-  void read_object(const Document& document, pugi::xml_node node, ObjectDescription& parent, int depth, int nesting,
+  void read_object(const Document& document, pugi::xml_node node, ObjectDescription& parent, int depth, size_t nesting,
                    bool root) {
     const SourceLocation where = document.xml.where(node);
     if (nesting > kMaxNesting) {
@@ -190,6 +216,7 @@ class Reader {
     object->id = attributes.get("id");
     object->where = where;
     objects_.push_back(object);
+    if (objects_.size() > kMaxObjects) stop(where, fmt::format("more than {} objects", kMaxObjects));
     if (!object->id.empty()) {
       const auto [other, inserted] = ids_.emplace(object->id, object);
       if (!inserted)
@@ -315,38 +342,77 @@ class Reader {
     }
   }
 
-  /// Records an error for every reference that leads back to an object it is part of, and cuts it.
-  void break_cycles() {
-    std::unordered_set<const ObjectDescription*> done;
-    std::unordered_set<const ObjectDescription*> open;
-    // Depth of the recursion: chains of references can be long, so it works with a stack of its own.
+  // References can make long chains, and a few objects that hold each other twice stand for very many. Both are found
+  // without recursion, and cut, so that everything later may follow references one by one.
+
+  /// Records an error for every reference that leads back to an object it is part of, and cuts it. Returns all objects,
+  /// each after everything it holds.
+  std::vector<ObjectDescription*> break_cycles() {
+    std::unordered_map<const ObjectDescription*, ObjectDescription*> writable;
+    for (const auto& object : objects_) writable[object.get()] = object.get();
+    std::vector<ObjectDescription*> done;
+    enum class State { kOpen, kDone };
+    std::unordered_map<const ObjectDescription*, State> states;
     struct Step {
       ObjectDescription* object;
       size_t next;
     };
     for (const auto& start : objects_) {
-      if (done.contains(start.get())) continue;
+      if (!states.emplace(start.get(), State::kOpen).second) continue;
       std::vector<Step> stack = {{start.get(), 0}};
-      open.insert(start.get());
       while (!stack.empty()) {
         Step& step = stack.back();
         if (step.next == step.object->properties.size()) {
-          open.erase(step.object);
-          done.insert(step.object);
+          states[step.object] = State::kDone;
+          done.push_back(step.object);
           stack.pop_back();
           continue;
         }
         Property& property = step.object->properties[step.next++];
         ObjectPtr* child = std::get_if<ObjectPtr>(&property.value);
-        if (!child || !*child || done.contains(child->get())) continue;
-        if (open.contains(child->get())) {
+        if (!child || !*child) continue;
+        const auto [state, fresh] = states.emplace(child->get(), State::kOpen);
+        if (fresh) {
+          stack.push_back({writable.at(child->get()), 0});
+        } else if (state->second == State::kOpen) {
           diagnostics_.error(property.where, fmt::format("'{}' refers to itself", (*child)->id));
           child->reset();
-          continue;
         }
-        open.insert(child->get());
-        stack.push_back({const_cast<ObjectDescription*>(child->get()), 0});
       }
+    }
+    return done;
+  }
+
+  /// Records an error for objects that hold too many others, or too deep ones, when every reference is followed, and
+  /// takes these out. `objects`: each after everything it holds.
+  void limit_expansion(const std::vector<ObjectDescription*>& objects) {
+    struct Expanded {
+      size_t count = 1, depth = 1;
+    };
+    std::unordered_map<const ObjectDescription*, Expanded> expanded;
+    for (ObjectDescription* object : objects) {
+      Expanded& whole = expanded[object];
+      if (object->kind == "scene") continue;
+      for (const Property& property : object->properties)
+        if (const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value); child && *child) {
+          const Expanded part = expanded.at(child->get());
+          whole.count += part.count;
+          whole.depth = std::max(whole.depth, part.depth + 1);
+        }
+      if (object->kind == "shape") whole.count = 1;  // a group may be large: shapes are looked at once
+      if (object->kind == "bsdf" && object->type == "twosided") whole.count = 2 * whole.count - 1;  // both sides look
+      const bool too_deep = whole.depth > kMaxNesting;
+      if (!too_deep && whole.count <= kMaxExpanded) continue;
+      diagnostics_.error(object->where,
+                         too_deep ? fmt::format("{} '{}' holds {} objects inside each other when every reference is "
+                                                "followed; at most {} are accepted",
+                                                object->kind, object->type, whole.depth, kMaxNesting)
+                                  : fmt::format("{} '{}' holds {} objects when every reference is followed; at most {} "
+                                                "are accepted",
+                                                object->kind, object->type, whole.count, kMaxExpanded));
+      for (Property& property : object->properties)
+        if (ObjectPtr* child = std::get_if<ObjectPtr>(&property.value)) child->reset();
+      whole = {};
     }
   }
 
@@ -368,6 +434,8 @@ class Reader {
   std::vector<std::shared_ptr<ObjectDescription>> objects_;  // all of them
   std::unordered_map<std::string, std::shared_ptr<ObjectDescription>> ids_;
   std::vector<Alias> aliases_;
+  size_t n_text_bytes_ = 0;
+  int n_includes_ = 0;
 };
 
 }  // namespace

@@ -324,7 +324,7 @@ TEST(XmlReader, BoundsSubstitution) {
   for (char c = 'b'; c <= 'z'; ++c) {
     body += fmt::format("<default name=\"{0}\" value=\"${1}${1}${1}${1}\"/>", c, static_cast<char>(c - 1));
   }
-  EXPECT_TRUE(contains(read_scene(body).errors, "an attribute grows beyond 1 MiB by substitution"));
+  EXPECT_TRUE(contains(read_scene(body).errors, "it grows beyond 1 MiB by substitution"));
 }
 
 // ---- references ----

@@ -14,6 +14,12 @@ std::string SourceLocation::text() const {
   return fmt::format("{}:{}:{}", file, line, column);
 }
 
+namespace {
+
+constexpr size_t kMostShown = 100;  // errors in one message
+
+}  // namespace
+
 // ---- Diagnostics ----------------------------------------------------------------------------------------------------
 
 void Diagnostics::error(const SourceLocation& where, const std::string& message) {
@@ -34,12 +40,15 @@ void Diagnostics::throw_if_errors() const {
   std::vector<Entry> sorted = errors_;
   const auto key = [](const Entry& e) { return std::tie(e.where.file, e.where.line, e.where.column, e.message); };
   std::stable_sort(sorted.begin(), sorted.end(), [&](const Entry& a, const Entry& b) { return key(a) < key(b); });
+  sorted.erase(
+      std::unique(sorted.begin(), sorted.end(), [&](const Entry& a, const Entry& b) { return key(a) == key(b); }),
+      sorted.end());
   std::string text;
-  for (size_t i = 0; i < sorted.size(); ++i) {
-    if (i > 0 && key(sorted[i]) == key(sorted[i - 1])) continue;
+  for (size_t i = 0; i < std::min(sorted.size(), kMostShown); ++i) {
     if (!text.empty()) text += '\n';
     text += sorted[i].where.file.empty() ? sorted[i].message : sorted[i].where.text() + ": " + sorted[i].message;
   }
+  if (sorted.size() > kMostShown) text += fmt::format("\n… and {} more errors", sorted.size() - kMostShown);
   throw Error(ErrorCode::kInput, text);
 }
 

@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Small files that stand for very much: every command ends within a second of processor time and 200 MB of memory, with a
+message that tells the limit."""
+import json
+import os
+import resource
+import signal
+import struct
+import subprocess
+import tempfile
+import unittest
+from pathlib import Path
+
+COVARY = os.environ["COVARY"]
+SANITIZED = "SANITIZED" in os.environ
+CPU_SECONDS = 60 if SANITIZED else 1
+MEMORY = 200e6
+
+SENSOR = """<sensor type="perspective"><film type="hdrfilm"><integer name="width" value="16"/>
+<integer name="height" value="9"/><rfilter type="box"/></film></sensor>"""
+
+
+def scene(body):
+    return f'<scene version="3.0.0">{SENSOR}\n{body}\n</scene>'
+
+
+def limit():
+    resource.setrlimit(resource.RLIMIT_CPU, (CPU_SECONDS, CPU_SECONDS))
+    if not SANITIZED:  # which reserve terabytes
+        resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
+
+
+class Limits(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+        self.path = Path(self.folder.name)
+
+    def write(self, name, content):
+        (self.path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+        return name
+
+    def run_limited(self, *arguments):
+        """Exit code and what stands on stderr."""
+        errors = self.path / "stderr"
+        with open(errors, "wb") as stderr:
+            child = subprocess.Popen([COVARY, *arguments, *(["--threads", "1"] if arguments[0] == "render" else [])],
+                                     cwd=self.path, stdout=subprocess.DEVNULL, stderr=stderr, preexec_fn=limit)
+            _, status, usage = os.wait4(child.pid, 0)
+        child.returncode = os.waitstatus_to_exitcode(status)
+        text = errors.read_text(errors="replace")
+        self.assertNotIn(child.returncode, (-signal.SIGXCPU, -signal.SIGKILL), f"more than {CPU_SECONDS} s: {arguments}")
+        self.assertIn(child.returncode, (0, 1, 2), text)
+        self.assertNotIn("internal error", text)
+        if not SANITIZED:
+            self.assertLess(usage.ru_maxrss * 1024, MEMORY, arguments)
+        return child.returncode, text
+
+    def refused(self, message, *arguments):
+        code, text = self.run_limited(*arguments)
+        self.assertEqual(code, 1, text)
+        self.assertIn(message, text)
+
+    def refused_scene(self, message, file):
+        self.refused(message, "info", file)
+        self.refused(message, "render", file, "-o", "out.exr", "--spp", "4", "--quiet")
+
+    def test_blends_of_blends(self):
+        body = '<bsdf type="diffuse" id="b0"/>'
+        for i in range(1, 31):
+            body += (f'<bsdf type="blendbsdf" id="b{i}"><float name="weight" value="0.5"/>'
+                     f'<ref id="b{i - 1}"/><ref id="b{i - 1}"/></bsdf>')
+        self.write("s.xml", scene(body + '<shape type="sphere"><ref id="b30"/></shape>'))
+        self.refused_scene("holds 8191 objects when every reference is followed; at most 4096", "s.xml")
+
+    def test_chains_of_references(self):
+        body = '<bsdf type="diffuse" id="b0"/>\n'
+        for i in range(1, 20000):
+            body += f'<bsdf type="mask" id="b{i}"><float name="opacity" value="1"/><ref id="b{i - 1}"/></bsdf>\n'
+        self.write("s.xml", scene(body))
+        self.refused_scene("objects inside each other when every reference is followed; at most 64", "s.xml")
+
+    def test_groups_of_groups(self):
+        body = '<shape type="shapegroup" id="g0"><shape type="sphere"/></shape>'
+        for i in range(1, 9):
+            body += f'<shape type="shapegroup" id="g{i}">' + f'<shape type="instance"><ref id="g{i - 1}"/></shape>' * 10
+            body += "</shape>"
+        self.write("s.xml", scene(body + '<shape type="instance"><ref id="g8"/></shape>'))
+        self.refused_scene("a shapegroup cannot hold a shape 'instance'", "s.xml")
+
+    def test_includes_of_includes(self):
+        self.write("i0.xml", '<scene version="3.0.0"><shape type="sphere"/></scene>')
+        for i in range(1, 9):
+            self.write(f"i{i}.xml", f'<scene version="3.0.0">{10 * f"""<include filename="i{i - 1}.xml"/>"""}</scene>')
+        self.write("s.xml", scene('<include filename="i8.xml"/>'))
+        self.refused_scene("more than 1000 includes", "s.xml")
+
+    def test_substitutions(self):
+        body = '<default name="a0" value="0123456789abcdef"/>'
+        for i in range(1, 16):
+            body += f'<default name="a{chr(96 + i)}" value="{2 * ("$a0" if i == 1 else "$a" + chr(95 + i))}"/>'
+        body += "".join(f'<bsdf type="diffuse" id="{i}$ao"/>' for i in range(1000))
+        self.write("s.xml", scene(body))
+        self.refused_scene("more than 16 MiB have been substituted", "s.xml")
+
+    def test_a_pipe_for_a_mesh(self):
+        os.mkfifo(self.path / "pipe")
+        self.write("s.xml", scene('<shape type="ply"><string name="filename" value="pipe"/></shape>'))
+        self.refused_scene("is a pipe or device; expected a regular file", "s.xml")
+
+    def test_a_pipe_for_an_image(self):
+        os.mkfifo(self.path / "pipe.exr")
+        self.refused("pipe.exr: not a regular file", "info", "pipe.exr")
+
+    def test_continued_lines(self):
+        self.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 \\\n2 3\n")
+        self.write("s.xml", scene('<shape type="obj"><string name="filename" value="a.obj"/></shape>'))
+        self.assertEqual(self.run_limited("info", "s.xml"), (0, ""))
+
+    def exr(self, attributes, body=b""):
+        """An EXR file of 4 x 4 pixels with these attributes besides the required ones."""
+        def attribute(name, kind, value, size=None):
+            return name + b"\0" + kind + b"\0" + struct.pack("<I", len(value) if size is None else size) + value
+        channels = b"".join(c + b"\0" + struct.pack("<iiii", 2, 0, 1, 1) for c in (b"B", b"G", b"R")) + b"\0"
+        size = attributes.pop("size", (4, 4))
+        window = struct.pack("<iiii", 0, 0, size[0] - 1, size[1] - 1)
+        header = b"".join([
+            attribute(b"channels", b"chlist", channels), attribute(b"compression", b"compression", b"\3"),
+            attribute(b"dataWindow", b"box2i", window), attribute(b"displayWindow", b"box2i", window),
+            attribute(b"lineOrder", b"lineOrder", b"\0"), attribute(b"pixelAspectRatio", b"float", struct.pack("<f", 1)),
+            attribute(b"screenWindowCenter", b"v2f", bytes(8)),
+            attribute(b"screenWindowWidth", b"float", struct.pack("<f", 1)),
+            *[attribute(n.encode(), *v) for n, v in attributes.items()]])
+        return b"\x76\x2f\x31\x01\2\0\0\0" + header + b"\0" + body
+
+    def test_attributes_that_claim_too_much(self):
+        self.write("a.exr", self.exr({"owner": (b"string", b"me", 1980000000)}, bytes(4000)))
+        self.write("b.exr", self.exr({"size": (200000, 200000)}, bytes(4000)))
+        for command in (["info"], ["convert"], ["compare", "-r", "a.exr"]):
+            more = ["out.png"] if command[0] == "convert" else []
+            self.refused("the attribute 'owner' claims 1980000000 bytes", *command, "a.exr", *more)
+        self.refused("b.exr: ", "info", "b.exr")
+        for name in ("a.exr", "b.exr"):
+            self.write("s.xml", scene(f'<emitter type="envmap"><string name="filename" value="{name}"/></emitter>'))
+            self.refused_scene(f"{name}", "s.xml")
+
+    def test_images_that_claim_too_much(self):
+        self.write("a.pfm", "PF\n30000 30000\n-1\n1234")
+        self.refused("claims 30000 x 30000 pixels of 3 channels in 22 bytes", "info", "a.pfm")
+
+    def test_suites(self):
+        suite = {"name": "x", "scenes": [{"name": "c", "file": "c.xml"}], "methods": [{"name": "pt"}],
+                 "budgets": [{"spp": 24}], "reference": {"spp": 64}, "seeds": 4000000000}
+        self.write("seeds.json", json.dumps(suite))
+        self.refused("seeds: expected 1 to 100000 seeds, found 4000000000", "experiment", "seeds.json", "-o", "out")
+        self.write("deep.json", '{"name": ' + "[" * 200000)
+        self.refused("deep.json:1: arrays and objects nest deeper than 64", "experiment", "deep.json", "-o", "out")
+
+
+if __name__ == "__main__":
+    unittest.main()
