@@ -3,17 +3,16 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
+#include <exception>
 #include <fstream>
+#include <iterator>
 #include <map>
-#include <nlohmann/json.hpp>
-#include <stdexcept>
-#include <type_traits>
 #include <utility>
 
 #include "core/error.h"
 #include "film/film_file.h"
 #include "film/output_file.h"
+#include "plans/pass_costs.h"
 
 namespace covary {
 namespace {
@@ -29,40 +28,26 @@ std::string frame_text(const Film& film) {
   return fmt::format("{} x {}, crop {},{},{},{}", film.frame_width(), film.frame_height(), c.x, c.y, c.width, c.height);
 }
 
-/// The member of `costs`, which must be a finite number from 0 on.
-template <typename T>
-T amount(const nlohmann::json& costs, const char* key) {
-  const nlohmann::json& value = costs.at(key);
-  const bool fits = std::is_integral_v<T> ? value.is_number_unsigned() : value.is_number();
-  if (!fits || !(value.get<double>() >= 0) || !std::isfinite(value.get<double>()))
-    throw std::out_of_range(fmt::format("'{}' is {}, expected is a number from 0 on", key, value.dump()));
-  return value.get<T>();
-}
-
 /// Reads what the samples of a kept film cost; what cannot be right is left out.
 void read_costs(const std::function<void(const std::string&)>& warn, Pass& pass) {
   const std::string path = costs_path(pass);
   try {
-    if (fs::file_size(path) > kMaxCostsSize) throw std::out_of_range("the file is too large");
-    std::ifstream file(path);
-    const nlohmann::json costs = nlohmann::json::parse(file);
-    PassResult result;
-    result.n_samples = amount<uint64_t>(costs, "samples");
-    result.n_rays = amount<uint64_t>(costs, "rays");
-    result.seconds = amount<double>(costs, "seconds");
-    if (costs.contains("estimate_seconds")) result.estimate_seconds = amount<double>(costs, "estimate_seconds");
-    if (result.estimate_seconds > result.seconds) throw std::out_of_range("'estimate_seconds' is above 'seconds'");
-    pass.result = result;
+    if (fs::file_size(path) > kMaxCostsSize) throw Error(ErrorCode::kInput, "the file is too large");
+    std::ifstream file(path, std::ios::binary);
+    const std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+    const PassCosts costs = parse_pass_costs(text);
+    pass.result = {};
+    pass.result.n_samples = costs.samples, pass.result.n_rays = costs.rays;
+    pass.result.seconds = costs.seconds, pass.result.estimate_seconds = costs.estimate_seconds;
   } catch (const std::exception& problem) {
     if (warn) warn(fmt::format("'{}' is not used, so that times count this run alone: {}", path, problem.what()));
   }
 }
 
 void write_costs(const Pass& pass) {
-  nlohmann::ordered_json costs = {
-      {"samples", pass.result.n_samples}, {"rays", pass.result.n_rays}, {"seconds", pass.result.seconds}};
-  if (pass.settings.estimate) costs["estimate_seconds"] = pass.result.estimate_seconds;
-  write_text_file(costs_path(pass), costs.dump(2) + "\n");
+  const PassResult& result = pass.result;
+  write_text_file(costs_path(pass), to_text({result.n_samples, result.n_rays, result.seconds,
+                                             pass.settings.estimate ? result.estimate_seconds : 0}));
 }
 
 /// Puts the film at pass.path in the place of the empty one, which it must match.
