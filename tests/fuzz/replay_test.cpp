@@ -5,6 +5,9 @@
 
 #include <algorithm>
 #include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -180,6 +183,51 @@ TEST(FuzzReplay, Serialized) {
   }
   replay(fuzz::serialized, seeds, {std::string("\xff\xff\xff\xff", 4), std::string(8, '\0'), "\x1c\x04"}, 2000);
 }
+
+/// The files of a target's corpus: where fuzzing starts, and every finding of before.
+std::vector<std::string> corpus(const std::string& target) {
+  std::vector<std::string> contents;
+  for (const auto& entry :
+       std::filesystem::directory_iterator(std::string(COVARY_SOURCE_DIR "/tests/fuzz/corpus/") + target)) {
+    std::ifstream file(entry.path(), std::ios::binary);
+    contents.emplace_back(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
+  }
+  return contents;
+}
+
+TEST(FuzzReplay, Corpora) {
+  for (const fuzz::Target& target : fuzz::targets()) {
+    SCOPED_TRACE(target.name);
+    int n_accepted = 0;
+    for (const std::string& input : corpus(target.name))
+      ASSERT_NO_THROW(n_accepted += target.run(std::as_bytes(std::span(input))));
+    EXPECT_GE(n_accepted, 1);
+  }
+}
+
+/// The accepted files of a corpus and their mutations.
+void replay_corpus(const char* name, const std::vector<std::string>& pieces, int n) {
+  const auto targets = fuzz::targets();
+  const auto target =
+      std::find_if(targets.begin(), targets.end(), [&](const auto& t) { return t.name == std::string(name); });
+  std::vector<std::string> seeds = corpus(name);
+  std::erase_if(seeds, [&](const std::string& seed) { return !target->run(std::as_bytes(std::span(seed))); });
+  std::sort(seeds.begin(), seeds.end());
+  replay(target->run, seeds, pieces, n);
+}
+
+const std::vector<std::string> kExrPieces = {std::string(4, '\0'),       "\xff\xff\xff\xff",
+                                             std::string("R\0", 2),      "group00.R",
+                                             std::string("string\0", 7), std::string("tiledesc\0\x09\0\0\0", 13)};
+
+TEST(FuzzReplay, Film) { replay_corpus("film", kExrPieces, 400); }
+TEST(FuzzReplay, Grouped) { replay_corpus("grouped", kExrPieces, 400); }
+TEST(FuzzReplay, Image) { replay_corpus("image", kExrPieces, 50); }
+TEST(FuzzReplay, Suite) {
+  replay_corpus("suite", {"[", "{", "}", "null", "true", "\"seeds\": 4000000000,", "\"name\": \"a\",", "\\u0000", "{}"},
+                2000);
+}
+TEST(FuzzReplay, Costs) { replay_corpus("costs", {"[", "{", "null", "\"rays\": 1,", "{}", "-", "\""}, 2000); }
 
 }  // namespace
 }  // namespace covary

@@ -1,11 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "fuzz/targets.h"
 
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <string>
 #include <string_view>
 
 #include "core/error.h"
+#include "estimators/grouped_file.h"
+#include "film/film_file.h"
+#include "film/image_file.h"
 #include "io/load_scene.h"
 #include "io/mesh_file.h"
+#include "lab/suite.h"
+#include "plans/pass_costs.h"
+#include "textures/image.h"
 
 namespace covary::fuzz {
 namespace {
@@ -16,12 +27,27 @@ bool accepts(Read&& read) {
     read();
     return true;
   } catch (const Error& error) {
-    if (error.code() != ErrorCode::kInput && error.code() != ErrorCode::kIo) throw;
+    if (error.code() == ErrorCode::kInternal) throw;
     return false;
   }
 }
 
 std::string_view text_of(Bytes input) { return {reinterpret_cast<const char*>(input.data()), input.size()}; }
+
+/// A file in memory with this content.
+class InputFile {
+ public:
+  explicit InputFile(Bytes input) : file_(memfd_create("input", MFD_CLOEXEC)) {
+    COVARY_CHECK(file_ >= 0 && write(file_, input.data(), input.size()) == std::ssize(input), "a file in memory");
+  }
+  ~InputFile() { close(file_); }
+  InputFile(const InputFile&) = delete;
+  InputFile& operator=(const InputFile&) = delete;
+  std::string path() const { return "/proc/self/fd/" + std::to_string(file_); }
+
+ private:
+  int file_;
+};
 
 /// What a mesh goes through on its way into the scene.
 void place(MeshFile file) {
@@ -44,6 +70,40 @@ bool serialized(Bytes input) {
   const bool first = accepts([&] { place(read_serialized(input, 0)); });
   const bool second = accepts([&] { place(read_serialized(input, 1)); });
   return first && second;
+}
+bool film(Bytes input) {
+  const InputFile file(input);
+  return accepts([&] { read_film(file.path()); });
+}
+bool grouped(Bytes input) {
+  const InputFile file(input);
+  return accepts([&] {
+    const GroupedFile groups({file.path()});
+    GroupedFile::Rows rows;
+    groups.read_rows(0, groups.height(), rows);
+  });
+}
+bool image(Bytes input) {
+  const InputFile file(input);
+  const bool texture = accepts([&] { read_texels(file.path()); });
+  const bool image = accepts([&] {
+    inspect_image(file.path());
+    read_image(file.path());
+  });
+  return texture && image;
+}
+bool suite(Bytes input) {
+  return accepts([&] { lab::validate(lab::parse_suite(std::string(text_of(input)), "suite.json")); });
+}
+bool costs(Bytes input) {
+  return accepts([&] { parse_pass_costs(text_of(input)); });
+}
+
+std::span<const Target> targets() {
+  static constexpr Target kTargets[] = {{"scene", scene}, {"ply", ply},     {"obj", obj},
+                                        {"film", film},   {"image", image}, {"serialized", serialized},
+                                        {"suite", suite}, {"costs", costs}, {"grouped", grouped}};
+  return kTargets;
 }
 
 }  // namespace covary::fuzz

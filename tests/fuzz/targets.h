@@ -15,5 +15,22 @@ bool scene(Bytes input);
 bool ply(Bytes input);
 bool obj(Bytes input);
 bool serialized(Bytes input);
+/// An EXR file as a film of covary.
+bool film(Bytes input);
+/// An EXR file of any renderer as groups of samples, as `covary combine` reads it.
+bool grouped(Bytes input);
+/// An image file in any format: as a texture, and as images are read for comparison.
+bool image(Bytes input);
+/// A suite of experiments.
+bool suite(Bytes input);
+/// What the samples of a kept film cost.
+bool costs(Bytes input);
+
+/// Name and function of every target; the name is also that of its folder in tests/fuzz/corpus.
+struct Target {
+  const char* name;
+  bool (*run)(Bytes input);
+};
+std::span<const Target> targets();
 
 }  // namespace covary::fuzz
