@@ -373,7 +373,7 @@ TEST_F(LoadScene, ReportsFilesThatCannotBeRead) {
             "cannot read '" + folder_.file("") + "': not a regular file");
   std::filesystem::create_directory(folder_.file("sub"));
   EXPECT_TRUE(contains(errors(kSensor + "<shape type=\"ply\"><string name=\"filename\" value=\"sub\"/></shape>"),
-                       "file 'sub' not found in"));
+                       "'sub' is a folder; expected a regular file"));
   write("empty.xml", "");
   EXPECT_TRUE(contains(message_of([&] { load_scene(folder_.file("empty.xml")); }), "empty.xml:1:1: malformed XML: "));
 }

@@ -105,8 +105,8 @@ class ObjReader {
   }
 
  private:
-  /// The line at `start`, and those that follow while a backslash ends the line before; `joined` holds them then. `start`
-  /// and `number` go on to the next line.
+  /// The line at `start`, and those that follow while a backslash ends the line before; `joined` holds them then.
+  /// `start` and `number` go on to the next line.
   static std::string_view next_line(std::string_view text, size_t& start, size_t& number, std::string& joined) {
     joined.clear();
     while (true) {

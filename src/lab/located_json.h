@@ -16,8 +16,8 @@ struct LocatedJson {
   std::map<std::string, int> lines;  ///< of each value by JSON pointer: "/scenes/0/file"; "" is the whole
 };
 
-/// Throws Error(kInput) with the line where the text is not JSON, nests deeper than kMaxJsonDepth, or a key stands twice
-/// in an object.
+/// Throws Error(kInput) with the line where the text is not JSON, nests deeper than kMaxJsonDepth, or a key stands
+/// twice in an object.
 LocatedJson parse_located(const std::string& text, const std::string& name);
 
 /// The value as JSON text, shortened for messages.

@@ -36,8 +36,8 @@ class Diagnostics {
   /// Takes over everything `other` holds; for objects that are made in parallel.
   void append(const Diagnostics& other);
   bool has_errors() const { return !errors_.empty(); }
-  /// Throws Error(kInput) with all errors, sorted by file and line, one a line "file:line:column: message"; of more than
-  /// 100 their number stands in place of the rest.
+  /// Throws Error(kInput) with all errors, sorted by file and line, one a line "file:line:column: message"; of more
+  /// than 100 their number stands in place of the rest.
   void throw_if_errors() const;
   const std::vector<std::string>& warnings() const { return warnings_; }
 

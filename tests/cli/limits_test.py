@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Small files that stand for very much: every command ends within a second of processor time and 200 MB of memory, with a
-message that tells the limit."""
+"""Small files that stand for very much: every command ends within a second of processor time and 200 MB of memory, with
+a message that tells the limit."""
 import json
 import os
 import resource
@@ -49,7 +49,8 @@ class Limits(unittest.TestCase):
             _, status, usage = os.wait4(child.pid, 0)
         child.returncode = os.waitstatus_to_exitcode(status)
         text = errors.read_text(errors="replace")
-        self.assertNotIn(child.returncode, (-signal.SIGXCPU, -signal.SIGKILL), f"more than {CPU_SECONDS} s: {arguments}")
+        too_long = (-signal.SIGXCPU, -signal.SIGKILL)
+        self.assertNotIn(child.returncode, too_long, f"more than {CPU_SECONDS} s: {arguments}")
         self.assertIn(child.returncode, (0, 1, 2), text)
         self.assertNotIn("internal error", text)
         if not SANITIZED:
@@ -127,7 +128,8 @@ class Limits(unittest.TestCase):
         header = b"".join([
             attribute(b"channels", b"chlist", channels), attribute(b"compression", b"compression", b"\3"),
             attribute(b"dataWindow", b"box2i", window), attribute(b"displayWindow", b"box2i", window),
-            attribute(b"lineOrder", b"lineOrder", b"\0"), attribute(b"pixelAspectRatio", b"float", struct.pack("<f", 1)),
+            attribute(b"lineOrder", b"lineOrder", b"\0"),
+            attribute(b"pixelAspectRatio", b"float", struct.pack("<f", 1)),
             attribute(b"screenWindowCenter", b"v2f", bytes(8)),
             attribute(b"screenWindowWidth", b"float", struct.pack("<f", 1)),
             *[attribute(n.encode(), *v) for n, v in attributes.items()]])
