@@ -99,10 +99,11 @@ class PlanRun {
     return all_begun() && std::all_of(state_.passes.begin(), state_.passes.end(),
                                       [](const Pass& p) { return p.count >= p.settings.spp.largest(); });
   }
-  /// Every pixel of every film has samples, so that an estimator can work.
+  /// Every group of every pixel has samples, so that an estimator can work.
   bool can_estimate() const {
     return all_begun() && std::all_of(state_.passes.begin(), state_.passes.end(), [](const Pass& p) {
-             return std::all_of(p.film.counts().begin(), p.film.counts().end(), [](uint32_t n) { return n > 0; });
+             return std::all_of(p.film.counts().begin(), p.film.counts().end(),
+                                [T = static_cast<uint32_t>(p.film.groups())](uint32_t n) { return n >= T; });
            });
   }
   std::span<Pass> passes_of(size_t phase) {

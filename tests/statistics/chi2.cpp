@@ -361,12 +361,11 @@ Chi2Result chi2_square(const Sampler<Vec2>& sample, const Density<Vec2>& pdf, co
 
 Chi2Result chi2_discrete(std::span<const double> observed, std::span<const double> probabilities,
                          const Chi2Options& options) {
-  double n = 0, mass = 0;
+  double n = 0;
   for (const double o : observed) n += o;
   std::vector<double> expected;
   double zero_density_samples = 0;
   for (size_t i = 0; i < probabilities.size(); ++i) {
-    mass += probabilities[i];
     expected.push_back(n * probabilities[i]);
     if (probabilities[i] == 0) zero_density_samples += n * (observed[i] > 0);
   }
