@@ -665,8 +665,8 @@ class View(PageTest):
         self.assertEqual((Path(self.folder.name) / "opened").read_text(), result.stdout)
         self.assertIn("<title>a</title>", Path(result.stdout.strip()).read_text())
         result = self.covary("a.exr", env={"PATH": "/nowhere", "TMPDIR": self.folder.name})
-        self.assertEqual(result.returncode, 0)
-        self.assertIn("open the file above", result.stderr)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("no browser could be opened; open ", result.stderr)
 
     def test_wrong_usage(self):
         self.write("a.exr", 0.5)
