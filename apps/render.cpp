@@ -99,7 +99,7 @@ void report(const RenderReport& report) {
   if (!result.until_reached.value_or(true))
     throw Unfinished(
         kTargetMissed,
-        fmt::format("--until {} was not reached: '{}' has a predicted relMSE of {:.3g} after {:g} samples per "
+        fmt::format("--until {} was not reached: '{}' has a predicted relMSE of {:.3g} after {:.4g} samples per "
                     "pixel",
                     options.until, options.output, *result.predicted_relmse, result.samples_per_pixel()));
 }

@@ -110,7 +110,7 @@ class Until(RenderTest):
                                      "-")
             self.assertEqual(result.returncode, 3, result.stderr)
             self.assertRegex(result.stderr, r"^covary: --until relmse=1e-9 was not reached: 'a.exr' has a predicted "
-                                            r"relMSE of \S+ after \d+ samples per pixel\n$")
+                                            r"relMSE of \S+ after [\d.]+ samples per pixel\n$")
             facts = json.loads(result.stdout)
             self.assertIs(facts["until_reached"], False)
             self.assertGreater(facts["predicted_relmse"], 1e-9)
