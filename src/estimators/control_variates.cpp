@@ -4,7 +4,8 @@
 // transposition.
 //
 // The T centred group means of a pixel span only T - 1 dimensions. They are replaced by T - 1 orthonormal contrasts
-// (Helmert), which have the same inner products: no centring, and systems of T - 1 instead of T rows.
+// (Helmert), which have the same inner products: no centring, and systems of T - 1 instead of T rows. Weights of groups
+// (control_variates.h) turn that space; where they differ between pixels, the T weighted and centred means are kept.
 #include "estimators/control_variates.h"
 
 #include <array>
@@ -27,15 +28,15 @@ constexpr float kFewestFreedom = 0.1f;
 
 /// Offsets in the record of a pixel.
 struct RecordLayout {
-  RecordLayout(int groups, bool condition)
-      : group_contrasts(3 * (groups - 1)),
+  RecordLayout(int rows, bool condition)
+      : group_contrasts(3 * rows),
         contrasts(group_contrasts + (condition ? 3 : 0)),
         difference(contrasts),
         error(contrasts + 3),
         group_variance(contrasts + 6),
         h_variance(contrasts + 9),
         size(contrasts + 12) {}
-  int group_contrasts;  ///< number of contrasts of the groups, all channels: [contrast][rgb], at 0
+  int group_contrasts;  ///< number of contrasts (or centred means) of the groups, all channels: [contrast][rgb], at 0
   int contrasts;        ///< the same with the row of the condition, which acts like one more contrast
   int difference;       ///< g - h
   int error;            ///< error variance of h for the penalty, times T
@@ -72,7 +73,8 @@ class Regression {
         valid_(valid),
         result_(result),
         T_(input.crn.groups),
-        layout_(T_, settings.conservation > 0),
+        weights_differ_(input.crn_moments->relative_count.has_value()),
+        layout_(weights_differ_ ? T_ : T_ - 1, settings.conservation > 0),
         search_(settings.k, settings.window, settings.include_target),
         radius_(settings.window / 2) {}
 
@@ -141,6 +143,19 @@ class Regression {
     }
   }
 
+  /// For pixels whose weights w_t differ from their neighbours': sqrt(w_t) (x_t - mean).
+  void make_centred_means(const float* p, uint32_t count, const float* mean, float* record, float* squares) const {
+    for (int t = 0; t < T_; ++t) {
+      const float weight =
+          static_cast<float>(T_) * static_cast<float>(group_size(count, T_, t)) / static_cast<float>(count);
+      for (int c = 0; c < 3; ++c) {
+        const float value = std::sqrt(weight) * (p[3 * t + c] - mean[c]);
+        squares[c] += value * value;
+        record[3 * t + c] = value;
+      }
+    }
+  }
+
   void make_records(const Tile& tile, Workspace& w) const {
     std::vector<float> weights(T_);
     for (int j = 1; j < T_; ++j) weights[j] = 1.0f / std::sqrt(static_cast<float>(j) * static_cast<float>(j + 1));
@@ -153,15 +168,18 @@ class Regression {
           for (int c = 0; c < 3; ++c) record[layout_.error + c] = kUseless;
           continue;
         }
-        float squares[3] = {};
-        if (in_.crn.has_equal_groups(x, y))
+        float squares[3] = {}, mean[3];
+        for (int c = 0; c < 3; ++c) mean[c] = in_.crn_moments->mean.row(c, y)[x];
+        if (weights_differ_)
+          make_centred_means(in_.crn.pixel(x, y), in_.crn.count(x, y), mean, record, squares);
+        else if (in_.crn.has_equal_groups(x, y))
           make_contrasts(in_.crn.pixel(x, y), weights, record, squares);
         else
           make_weighted_contrasts(in_.crn.pixel(x, y), in_.crn.count(x, y), record, squares);
         if (layout_.contrasts > layout_.group_contrasts)
-          for (int c = 0; c < 3; ++c) record[layout_.group_contrasts + c] = in_.crn_moments->mean.row(c, y)[x];
+          for (int c = 0; c < 3; ++c) record[layout_.group_contrasts + c] = mean[c];
         for (int c = 0; c < 3; ++c) {
-          record[layout_.difference + c] = in_.crn_moments->mean.row(c, y)[x] - in_.h->row(c, y)[x];
+          record[layout_.difference + c] = mean[c] - in_.h->row(c, y)[x];
           record[layout_.error + c] = in_.error_of_h ? static_cast<float>(T_) * in_.error_of_h->row(c, y)[x] : 0.0f;
           record[layout_.group_variance + c] = squares[c] / static_cast<float>(T_ - 1);
           record[layout_.h_variance + c] = in_.variance_of_h ? in_.variance_of_h->row(c, y)[x] : 0.0f;
@@ -340,7 +358,7 @@ class Regression {
                     batch::inverse_trace(w.gram.data(), w.inverse.data(), w.shift.data(), rows, w.b.data());
       }
     }
-    w.freedom /= static_cast<float>(group_rows);
+    w.freedom /= static_cast<float>((T_ - 1) * count);
   }
 
   static vfloat dot(const vfloat* a, const vfloat* b, int step, int n) {
@@ -404,6 +422,7 @@ class Regression {
   const std::vector<unsigned char>& valid_;
   EstimatorResult& result_;
   const int T_;
+  const bool weights_differ_;  // between pixels
   const RecordLayout layout_;
   const NeighbourSearch search_;
   const int radius_;

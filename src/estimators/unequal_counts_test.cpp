@@ -88,15 +88,16 @@ Expected reference_result(const GroupedImage& crn, const GroupedImage& independe
   return expected;
 }
 
-// Groups of sizes 1 and 2, in both images; counts that differ between pixels of the independent one. (Where counts of
-// the CRN image differ between pixels, which no plan asks for, the two weight groups differently: not compared.)
+// Groups of sizes 1 and 2, in both images; counts that differ between pixels of the independent image, of both, and of
+// the CRN image only.
 TEST(UnequalCounts, IicvAgreesWithTheReference) {
   const test::Grouped crn = crn_image(), independent = independent_image();
   struct Case {
     test::Grouped crn, independent;
   };
   for (const Case& c :
-       {Case{with_counts(crn, 13), with_counts(independent, 19)}, Case{crn, with_counts(independent, 12, 200)}}) {
+       {Case{with_counts(crn, 13), with_counts(independent, 19)}, Case{crn, with_counts(independent, 12, 200)},
+        Case{with_counts(crn, 12, 40), with_counts(independent, 12, 40)}, Case{with_counts(crn, 96, 5), independent}}) {
     for (const bool paper : {true, false}) {
       IicvOptions options = paper ? IicvOptions::paper() : IicvOptions();
       options.std_error = true;
