@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+// Light tracing: what paths from the lights add to the film. An integrator that traces light (bidirectional path
+// tracing) splits its strategies: camera samples hold those that end in their own pixel; those that join a light path
+// to the lens land on any pixel, and a pass of its own traces light paths for them, into a light film
+// (film/splat_layer.h) beside the films of camera samples. The image is what is made of the camera's films, plus the
+// light film.
+//
+// Light paths are numbered through, and every random number of one is a function of (seed, pass, path): the film has
+// the same bits for any number of threads and after interruptions.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "film/film.h"
+#include "integrators/integrator.h"
+#include "integrators/render_pass.h"
+#include "integrators/splat_filter.h"
+
+namespace covary {
+
+enum class LightTracing {
+  kAuto,  ///< on, but not beside a pass with common random numbers
+  kOn,
+  kOff,
+};
+
+struct LightTracingSettings {
+  LightTracing mode = LightTracing::kAuto;
+  double paths_per_sample = 1;  ///< light paths for each camera sample, > 0
+  /// Reads light_tracing ("auto", "on", "off") and light_paths (1e-3 … 1e3).
+  static LightTracingSettings from(Parameters& parameters);
+};
+
+/// PassSettings::pass of light passes begin here, so that they share no numbers with passes of camera samples.
+inline constexpr uint32_t kLightPass = 3u << 30;
+
+/// Light paths to trace.
+struct LightPaths {
+  uint64_t seed = 0;
+  uint32_t pass = kLightPass;
+  uint64_t first = 0;  ///< number of the first path
+  uint32_t count = 0;
+  SplatFilter filter;
+  CropWindow window;  ///< pixels that are rendered
+
+  /// The numbers of a path. Its walk reads those of subpath(Subpath::kLight), as the light subpath of a camera sample
+  /// does. What joins vertex v of the walk to the lens reads these themselves at vertex v: kLens for the point on the
+  /// lens, kPixel for pixel_at().
+  PathRandom random(uint64_t path) const { return {Sampling::kIndependent, seed, pass, 0, path}; }
+  /// The pixel of a splat at the film position; weight 0 where none that is rendered gets it, so that nothing more
+  /// need be traced. `u`: kPixel.
+  SplatPixel pixel_at(Vec2 film, Vec2 u) const;
+};
+
+/// What a light path adds to the pixel (x, y) of the full frame.
+struct LightSplat {
+  uint64_t path;
+  int x, y;
+  /// Radiance of the pixel that this path alone would give: throughput * Camera importance / density * weight of the
+  /// strategy * SplatPixel::weight; not divided by the number of light paths.
+  Spectrum value;
+};
+
+/// An integrator that traces light. From fix_light_tracing() on nothing changes that all threads see.
+class LightTracingIntegrator : public Integrator {
+ public:
+  /// Says how the integrator is used: `n_pixels` are rendered, and `beside_crn` says whether some of them with common
+  /// random numbers. Called after prepare() and before description() or any tracing; without it, no light is traced.
+  void fix_light_tracing(uint64_t n_pixels, bool beside_crn);
+  /// Whether there is a light pass beside the camera's. Where not, strategies that join a light path to the lens have
+  /// weight 0.
+  bool traces_light() const { return paths_per_spp_ > 0; }
+  /// Light paths for one sample in each of the pixels that are rendered: how many samples of the strategies that join
+  /// to the lens a pixel has, for one of each of the others (film density 1 per pixel area). For the weights. 0 where
+  /// no light is traced.
+  double light_paths_per_spp() const { return paths_per_spp_; }
+
+  /// Appends the splats of the paths, those of a path one after another in an order that follows from the path alone;
+  /// the paths may come in any order. A path's splats do not depend on which others are traced with it. Values that
+  /// are not finite or negative are handed on, too: the pass counts them. Thread-safe.
+  virtual void trace_light_paths(const Scene& scene, const LightPaths& paths, std::vector<LightSplat>& splats,
+                                 PathContext& context) const = 0;
+
+ protected:
+  explicit LightTracingIntegrator(const LightTracingSettings& settings) : settings_(settings) {}
+  /// For description(): "light_tracing=on light_paths_per_spp=3072". The number is there because weights depend on it,
+  /// those of camera samples as well.
+  std::string light_tracing_text() const;
+
+ private:
+  LightTracingSettings settings_;
+  double paths_per_spp_ = 0;
+};
+
+/// The integrator if it traces light, otherwise null.
+const LightTracingIntegrator* light_tracer(const Integrator& integrator);
+
+/// Traces light paths into `film` until it has settings.spp samples, at most settings.limit, or the stop flag or
+/// settings.seconds end it. A sample of a light film is a bundle of kBundlePaths light paths, and these numbers are
+/// multiples of the film's groups; settings.pass is kLightPass or more. `sampling`, `estimate` and `learner` have no
+/// meaning here. Bundles come in rounds: what an interrupted round has gathered is dropped. In the result, `n_samples`
+/// counts light paths, and a BadSample's `sample` is the number of one; so does `progress`.
+PassResult render_light_pass(const Scene& scene, const LightTracingIntegrator& integrator, const PassSettings& settings,
+                             Film& film);
+
+/// Samples of a light film at the end of the round that begins with `count`, for a film of `groups` groups: one in each
+/// group, then four times as many each time, later the next multiple of SplatLayer's rounds.
+uint32_t light_round_end(uint32_t count, int groups);
+
+/// What one light path adds to a film with this crop window, by render_light_pass().
+struct ReplayedLightPath {
+  std::vector<LightSplat> splats;
+  uint64_t n_rays = 0;
+};
+ReplayedLightPath replay_light_path(const Scene& scene, const LightTracingIntegrator& integrator,
+                                    const PassSettings& settings, const CropWindow& window, uint64_t path);
+
+}  // namespace covary
