@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "film/groups.h"
+#include "film/sample_variance.h"
 
 namespace covary {
 namespace {
@@ -26,6 +27,16 @@ float rounded(double mean, uint32_t size) {
   const uint64_t threshold = (size * 0x9e3779b9u) >> (32 - kDropped);
   const uint64_t bits = (std::bit_cast<uint64_t>(mean) + threshold) >> kDropped << kDropped;
   return static_cast<float>(std::bit_cast<double>(bits));
+}
+
+/// Adds a sample to the mean squared deviation of `count` samples from the means of their groups. Its group's mean moves
+/// towards it, so that of the squared deviation from the mean before only the part `share` counts [Welford1962].
+void add_deviation(double share, const float* mean, const Spectrum& sample, uint32_t count, float* deviation) {
+  for (int c = 0; c < 3; ++c) {
+    const double difference = static_cast<double>((&sample.r)[c]) - mean[c];
+    const double value = (static_cast<double>(count) * deviation[c] + share * difference * difference) / (count + 1.0);
+    deviation[c] = rounded(std::min<double>(value, std::numeric_limits<float>::max()), count);
+  }
 }
 
 [[noreturn]] void fail_full(uint64_t samples, int x, int y) {
@@ -79,12 +90,24 @@ Spectrum Film::mean(int x, int y) const {
           static_cast<float>(sum[2] / groups_)};
 }
 
+void Film::keep_sample_variance() {
+  COVARY_CHECK(std::all_of(counts_.begin(), counts_.end(), [](uint32_t n) { return n == 0; }),
+               "a film keeps the variance of all its samples");
+  variance_in_groups_.assign(counts_.size() * 3, 0.0f);
+}
+
+Spectrum Film::sample_variance(int x, int y) const {
+  const float* in_groups = keeps_sample_variance() ? &variance_in_groups_[index(x, y) * 3] : nullptr;
+  return covary::sample_variance(groups_of(x, y), in_groups, groups_, count(x, y));
+}
+
 void Film::add(int x, int y, const Spectrum& sample) {
   uint32_t& count = counts_[index(x, y)];
   if (count == std::numeric_limits<uint32_t>::max()) fail_full(uint64_t{count} + 1, x + crop_.x, y + crop_.y);
   const uint32_t group = count % static_cast<uint32_t>(groups_), size = count / static_cast<uint32_t>(groups_);
   const double before = size, after = before + 1;
   float* mean = groups_data_.data() + (index(x, y) * groups_ + group) * 3;
+  if (keeps_sample_variance()) add_deviation(before / after, mean, sample, count, &variance_in_groups_[index(x, y) * 3]);
   for (int c = 0; c < 3; ++c) mean[c] = rounded((before * mean[c] + (&sample.r)[c]) / after, size);
   ++count;
 }
@@ -92,6 +115,7 @@ void Film::add(int x, int y, const Spectrum& sample) {
 void Film::add_sums(int x, int y, uint32_t added_per_group, std::span<const Spectrum> sums) {
   const auto groups = static_cast<uint32_t>(groups_);
   uint32_t& count = counts_[index(x, y)];
+  COVARY_CHECK(!keeps_sample_variance(), "sums of samples do not tell their variance");
   COVARY_CHECK(sums.size() == groups && count % groups == 0, "one sum per group, and groups of equal sizes");
   if (added_per_group == 0) return;
   const uint64_t total = count + uint64_t{added_per_group} * groups;
@@ -104,6 +128,7 @@ void Film::add_sums(int x, int y, uint32_t added_per_group, std::span<const Spec
 }
 
 void Film::set(int x, int y, uint32_t count, const Spectrum& value) {
+  COVARY_CHECK(!keeps_sample_variance(), "a value of many samples does not tell their variance");
   COVARY_CHECK(groups_ == 1 && counts_[index(x, y)] == 0, "only a pixel without samples and groups can be set");
   std::copy_n(&value.r, 3, groups_data_.data() + index(x, y) * 3);
   counts_[index(x, y)] = count;

@@ -70,6 +70,13 @@ class Film {
   /// groups() sums of them. For layers that sum many samples at once; the bits then depend on their steps. Otherwise
   /// like add().
   void add_sums(int x, int y, uint32_t added_per_group, std::span<const Spectrum> sums);
+  /// From now on keeps what sample_variance() needs to count every sample: 3 more floats per pixel. For films without
+  /// samples; add_sums() and set() cannot be used then.
+  void keep_sample_variance();
+  bool keeps_sample_variance() const { return !variance_in_groups_.empty(); }
+  /// Unbiased estimate of the variance of one sample (film/sample_variance.h): from all samples where the film keeps
+  /// their variance, otherwise from its groups; zero where these tell nothing.
+  Spectrum sample_variance(int x, int y) const;
   /// Gives a pixel that has no samples the value that `count` samples together led to. For films with one group.
   void set(int x, int y, uint32_t count, const Spectrum& value);
   /// The T group means of a pixel, contiguous: groups() x RGB.
@@ -90,6 +97,9 @@ class Film {
   const std::vector<uint32_t>& counts() const { return counts_; }
   std::vector<float>& data() { return groups_data_; }
   const std::vector<float>& data() const { return groups_data_; }
+  /// Mean squared deviation of a pixel's samples from the means of their groups, [pixel][rgb]; empty where not kept.
+  std::vector<float>& variance_in_groups() { return variance_in_groups_; }
+  const std::vector<float>& variance_in_groups() const { return variance_in_groups_; }
 
  private:
   size_t index(int x, int y) const { return static_cast<size_t>(y) * crop_.width + x; }
@@ -98,6 +108,7 @@ class Film {
   int groups_ = 1;
   std::vector<uint32_t> counts_;    // per pixel
   std::vector<float> groups_data_;  // [pixel][group][rgb], zero where a group has no samples
+  std::vector<float> variance_in_groups_;
 };
 
 /// Names of attributes with a meaning to this module.

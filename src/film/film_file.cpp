@@ -16,8 +16,9 @@ constexpr const char* kPrefix = "covary:";
 constexpr const char* kFormat = "film";  // attribute covary:film, version of the format
 constexpr const char* kFormatVersion = "1";
 constexpr const char* kGroups = "groups";
-constexpr const char* kChecksum = "checksum";      // CRC-32 of counts, group means and auxiliary images
+constexpr const char* kChecksum = "checksum";      // CRC-32 of counts, group means, auxiliary images and variances
 constexpr const char* kSamples = "samples";        // attribute covary:samples and channel `samples`
+constexpr const char* kVariance = "variance_in_groups";  // channels .R .G .B, in some films
 constexpr const char* kFewest = "samples_fewest";  // of any pixel; only where pixels differ
 constexpr const char* kMost = "samples_most";
 
@@ -36,6 +37,7 @@ std::string checksum(const Film& film) {
   add(film.counts());
   add(film.data());
   for (const auto& [name, image] : film.aovs) add(image.data);
+  if (film.keeps_sample_variance()) add(film.variance_in_groups());  // of no bytes, zlib starts anew
   return fmt::format("{:08x}", crc);
 }
 
@@ -57,6 +59,10 @@ std::vector<ExrPlane> film_planes(Film& film, Image& means) {
       add_rgb({name + ".R", name + ".G", name + ".B"}, film.data().data() + g * 3, stride);
     }
   }
+  if (film.keeps_sample_variance()) {
+    const std::string name = kVariance;
+    add_rgb({name + ".R", name + ".G", name + ".B"}, film.variance_in_groups().data(), 3);
+  }
   planes.push_back({kSamples, ExrPlane::Type::kUint, film.counts().data(), sizeof(uint32_t)});
   for (auto& [name, image] : film.aovs) {
     COVARY_CHECK(image.width == film.width() && image.height == film.height(),
@@ -70,13 +76,13 @@ std::vector<ExrPlane> film_planes(Film& film, Image& means) {
   throw Error(ErrorCode::kInput, path + ": " + what);
 }
 
-/// The names of the auxiliary images: every triple of channels that is neither a group nor the mean.
+/// The names of the auxiliary images: every triple of channels that is no group, mean or variance.
 std::vector<std::string> find_aovs(const ExrFile& file, int groups) {
   std::vector<std::string> names;
   for (const ExrFile::Channel& channel : file.channels()) {
     const size_t dot = channel.name.rfind('.');
     const std::string name = channel.name.substr(0, dot == std::string::npos ? 0 : dot);
-    if (name.empty() || (name.starts_with("group") && groups > 1)) continue;
+    if (name.empty() || name == kVariance || (name.starts_with("group") && groups > 1)) continue;
     if (names.empty() || names.back() != name) names.push_back(name);
   }
   return names;
@@ -144,6 +150,7 @@ Film read_film(const std::string& path) {
   }
   for (const auto& [key, value] : attributes)
     if (!is_derived(key)) film.attributes[key] = value;
+  if (file.find(std::string(kVariance) + ".R")) film.keep_sample_variance();
   for (const std::string& name : find_aovs(file, groups)) film.aovs[name] = Image(film.width(), film.height(), 3);
 
   Image means = groups > 1 ? Image(film.width(), film.height(), 3) : Image();

@@ -167,6 +167,34 @@ class WeightedSum {
   std::vector<double> sums_;
 };
 
+/// The mean squared deviation V of a pixel's samples from the means m_g of their groups, for films that keep it: from
+/// the sum of the squares of all samples, N V + sum_g N_g m_g^2, which adds up over films.
+class SquareSums {
+ public:
+  void add(const Film& film) {
+    sums_.resize(film.variance_in_groups().size());
+    for (size_t i = 0; i < sums_.size(); ++i)
+      sums_[i] += static_cast<double>(film.counts()[i / 3]) * film.variance_in_groups()[i] + squared_means(film, i);
+  }
+  /// Of the merged film, whose groups have their means already.
+  void variance(Film& film) const {
+    for (size_t i = 0; i < sums_.size(); ++i)
+      if (const uint32_t n = film.counts()[i / 3]; n > 0)
+        film.variance_in_groups()[i] = static_cast<float>(std::max(0.0, sums_[i] - squared_means(film, i)) / n);
+  }
+
+ private:
+  /// sum_g N_g m_g^2 of a channel of a pixel, `i` = 3 pixel + channel.
+  static double squared_means(const Film& film, size_t i) {
+    const float* means = film.data().data() + i / 3 * film.groups() * 3 + i % 3;
+    double sum = 0;
+    for (int g = 0; g < film.groups(); ++g)
+      sum += group_size(film.counts()[i / 3], film.groups(), g) * static_cast<double>(means[3 * g]) * means[3 * g];
+    return sum;
+  }
+  std::vector<double> sums_;
+};
+
 /// Merges films that `with_film(i, use)` hands out one after another.
 Film merge(std::span<const Attributes> attributes, std::span<const std::string> names,
            const std::function<void(size_t, const std::function<void(const Film&)>&)>& with_film) {
@@ -174,18 +202,23 @@ Film merge(std::span<const Attributes> attributes, std::span<const std::string> 
   Attributes merged_attributes = merge_attributes(attributes, names, order);
   Film merged;
   GroupSums groups;
+  SquareSums squares;
   std::map<std::string, WeightedSum> aovs;
   const std::string& first = names[order[0]];
   const auto add = [&](const Film& film, const std::string& name) {
     if (merged.counts().empty()) {
       merged = Film(film.frame_width(), film.frame_height(), film.crop(), film.groups());
       for (const auto& [aov, image] : film.aovs) merged.aovs[aov] = Image(film.width(), film.height(), 3);
+      if (film.keeps_sample_variance()) merged.keep_sample_variance();
     }
     check_same("the size", size_text(merged), size_text(film), first, name);
     check_same("the number of groups", fmt::to_string(merged.groups()), fmt::to_string(film.groups()), first, name);
     check_same("the list of auxiliary images", aov_names(merged), aov_names(film), first, name);
+    const auto keeps = [](const Film& f) { return f.keeps_sample_variance() ? "kept" : "not kept"; };
+    check_same("the variance of samples", keeps(merged), keeps(film), first, name);
     if (attribute(film.attributes, film_key::kSampling) == "crn") check_shared_numbers(film, merged, name);
     groups.add(film, merged.counts());
+    squares.add(film);
     for (const auto& [aov, image] : film.aovs) aovs[aov].add(image.data, film.counts());
     for (size_t p = 0; p < film.counts().size(); ++p) {
       const uint64_t total = uint64_t{merged.counts()[p]} + film.counts()[p];
@@ -199,6 +232,7 @@ Film merge(std::span<const Attributes> attributes, std::span<const std::string> 
   };
   for (size_t i : order) with_film(i, [&](const Film& film) { add(film, names[i]); });
   groups.mean(merged);
+  squares.variance(merged);
   for (auto& [aov, image] : merged.aovs) aovs[aov].mean(merged.counts(), image.data);
   merged.attributes = std::move(merged_attributes);
   return merged;
