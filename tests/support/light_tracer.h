@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+// A small integrator that traces light, for tests of everything around such ones. Weights do not depend on the path:
+// camera samples are `path`'s times 1 - share, light paths are joined to the lens at each vertex and weighted by
+// `share`. So the image is that of `path` where light paths find everything: pinholes, no mirrors in view, area and
+// point lights. Slow and simple, one path at a time.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "integrators/light_pass.h"
+#include "integrators/path_tracer.h"
+
+namespace covary::test_support {
+
+class LightTracer final : public LightTracingIntegrator {
+ public:
+  /// lengths.max_depth should be small: there is no roulette for light paths.
+  LightTracer(const LightTracingSettings& settings, const PathLengthSettings& lengths, float share)
+      : LightTracingIntegrator(settings), path_("path", lengths), longest_(lengths.max_depth), share_(share) {}
+
+  void prepare(const Scene& scene) override { path_.prepare(scene); }
+  std::unique_ptr<ThreadState> make_thread_state() const override { return path_.make_thread_state(); }
+  void trace(const Scene& scene, std::span<CameraSample> samples, PathContext& context) const override {
+    path_.trace(scene, samples, context);
+    if (traces_light())
+      for (CameraSample& sample : samples) sample.radiance *= 1 - share_;
+  }
+  std::string description() const override {
+    return "test light tracer on " + path_.description() + " " + light_tracing_text();
+  }
+
+  void trace_light_paths(const Scene& scene, const LightPaths& paths, std::vector<LightSplat>& splats,
+                         PathContext& context) const override {
+    for (uint64_t path = paths.first; path < paths.first + paths.count; ++path) {
+      const PathRandom root = paths.random(path);
+      const Join join{scene, paths, path, root, splats, context};
+      trace_light_path(join, root.subpath(Subpath::kLight));
+    }
+  }
+
+ private:
+  struct Join {
+    const Scene& scene;
+    const LightPaths& paths;
+    uint64_t path;
+    const PathRandom& random;
+    std::vector<LightSplat>& splats;
+    PathContext& context;
+  };
+
+  void trace_light_path(const Join& join, const PathRandom& walk) const {
+    const auto emitters = join.scene.emitters();
+    const auto choice = static_cast<size_t>(walk.get_1d(0, Event::kLightChoice) * static_cast<float>(emitters.size()));
+    const EmissionSample e =
+        emitters[choice]->sample_emission(walk.get_2d(0, Event::kLightPosition), walk.get_2d(0, Event::kLightDirection),
+                                          walk.get_1d(0, Event::kLightPrimitive));
+    const float cosine = e.delta_position ? 1 : dot(e.n, e.ray.d);
+    Spectrum throughput = e.radiance * (static_cast<float>(emitters.size()) / e.pdf_position);
+    if (!e.delta_position)
+      add(join, 0, 1, e.ray.o, e.n, throughput, [&](const Vec3& wi) { return std::max(0.0f, dot(e.n, wi)); });
+    throughput *= cosine / e.pdf_direction;
+    Ray ray = e.ray;
+    if (!e.delta_position) ray.o = offset_origin(ray.o, e.n, ray.d);
+    SurfaceHit hit;
+    for (int edges = 1; edges + 1 <= longest_; ++edges) {
+      ++join.context.n_rays;
+      if (!join.scene.intersect(ray, hit)) return;
+      join.context.arena.reset();
+      const Vec3 wo = hit.frame.to_local(-ray.d), ng = hit.frame.to_local(hit.ng), ns{0, 0, 1};
+      const BsdfClosure* bsdf = hit.bsdf->bind(hit, wo.z > 0, TransportMode::kImportance, join.context.arena);
+      const auto vertex = static_cast<uint32_t>(edges);
+      add(join, vertex, edges + 1, hit.p, hit.ng, throughput, [&](const Vec3& wi_world) {
+        const Vec3 wi = hit.frame.to_local(wi_world);
+        return bsdf->eval(wo, wi).value * shading_normal_factor(wo, wi, ns, ng, TransportMode::kImportance);
+      });
+      const BsdfSample next =
+          bsdf->sample(wo, walk.get_1d(vertex, Event::kLobe), walk.get_2d(vertex, Event::kDirection));
+      if (!next.valid()) return;
+      throughput *= next.weight * shading_normal_factor(wo, next.wi, ns, ng, TransportMode::kImportance);
+      const Vec3 wi = hit.frame.to_world(next.wi);
+      ray = {offset_origin(hit.p, hit.ng, wi), wi, kInfinity};
+    }
+  }
+
+  /// Joins a vertex to the lens: `f` of the direction to it.
+  template <typename F>
+  void add(const Join& join, uint32_t vertex, int edges, const Vec3& p, const Vec3& ng, const Spectrum& throughput,
+           const F& f) const {
+    if (edges > longest_) return;
+    const LensSample lens = join.scene.camera().sample_towards(p, join.random.get_2d(vertex, Event::kLens));
+    if (!(lens.pdf_solid_angle > 0 && lens.importance > 0)) return;
+    const SplatPixel pixel = join.paths.pixel_at(lens.film, join.random.get_2d(vertex, Event::kPixel));
+    if (pixel.weight == 0) return;
+    const Spectrum value = throughput * f(lens.wi) * (share_ * pixel.weight * lens.importance / lens.pdf_solid_angle);
+    if (is_black(value)) return;
+    const Vec3 o = offset_origin(p, ng, lens.wi);
+    const Vec3 d = lens.near_p - o;
+    const float distance = length(d);
+    ++join.context.n_rays;
+    if (!join.scene.occluded({o, d * (1 / distance), distance}))
+      join.splats.push_back({join.path, pixel.x, pixel.y, value});
+  }
+
+  PathTracer<PathParts> path_;
+  int longest_;
+  float share_;
+};
+
+}  // namespace covary::test_support
