@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+// Coefficients of a control variate that is made of the sampling densities themselves [Hua2023] (Sec. 4 and 6.2), in
+// balance weights. A vertex takes samples by several techniques; technique k is expected to take N_k of them with
+// density lambda_k, and p = Σ N_k lambda_k is the density of all. With r_k = N_k lambda_k / p, so that Σ_k r_k = 1 at
+// every sample, the controlled estimate of F = ∫ f is
+//
+//     F ≈ Σ_s f/p  +  Σ_k N_k β_k − Σ_s Σ_k β_k r_k(s)              [Hua2023] Eq. (17), β_k = α_k / N_k
+//     A β = b,   A_jk = Σ_s w r_j r_k,   b_k = Σ_s w (f/p) r_k      [Hua2023] Eq. (21), (25), (29)
+//
+// where the sums of A and b go over the samples of all vertices that share the coefficients, and w is their weight in
+// the error of the image. Equal β cancel: the plain estimate is one of those among which the best is sought.
+//
+// The first techniques are lights (or clusters of them), of which a sample knows one at most, so their part of A is a
+// diagonal; the others (directions by the BSDF or its lobes, the environment) form a small dense block.
+//
+// What is ours: a system's solution is drawn towards that of its surroundings (the *prior*), by a pull worth some
+// samples of each technique. So a technique without samples keeps the prior's value and leaves the others alone, a
+// singular system has a solution, and with little data the plain estimate remains.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/spectrum.h"
+
+namespace covary {
+
+/// Where the numbers of a system lie in flat arrays: one head for the cell, and one row for each light seen there.
+struct SystemLayout {
+  static constexpr uint32_t kMaxDense = 64;
+  uint32_t n_dense = 0;  ///< techniques of the dense block, at most kMaxDense
+
+  // Head. Σ is over samples, each with the weight w of its vertex; three numbers are RGB.
+  static constexpr uint32_t kSamples = 0;       ///< number of samples
+  static constexpr uint32_t kWeight = 1;        ///< Σ w
+  static constexpr uint32_t kValue = 2;         ///< Σ w f/p, RGB
+  static constexpr uint32_t kHeldOut = 5;       ///< number of held-out vertices
+  static constexpr uint32_t kPlainControl = 6;  ///< Σ w e c over held-out vertices, RGB: plain estimate times control
+  static constexpr uint32_t kControlSquared = 9;  ///< Σ w c² over held-out vertices, RGB
+  static constexpr uint32_t kDense = 12;
+  /// Of dense technique j: number of samples with r_j > 0, then b_j (RGB).
+  uint32_t dense(uint32_t j) const { return kDense + 4 * j; }
+  /// A of two dense techniques.
+  uint32_t matrix(uint32_t i, uint32_t j) const {
+    return kDense + 4 * n_dense + (i >= j ? i * (i + 1) / 2 + j : j * (j + 1) / 2 + i);
+  }
+  uint32_t head_size() const { return kDense + 4 * n_dense + n_dense * (n_dense + 1) / 2; }
+
+  // Row of a light k.
+  static constexpr uint32_t kRowSamples = 0;  ///< number of samples with r_k > 0
+  static constexpr uint32_t kDiagonal = 1;    ///< A_kk
+  static constexpr uint32_t kRowValue = 2;    ///< b_k, RGB
+  static constexpr uint32_t kRowDense = 5;    ///< A_kj for each dense technique j
+  uint32_t row_size() const { return kRowDense + n_dense; }
+};
+
+/// The sums of one cell; it does not own them.
+struct SystemView {
+  SystemLayout layout;
+  std::span<const double> head;      ///< layout.head_size() numbers
+  std::span<const uint32_t> lights;  ///< lights with samples, in increasing order
+  std::span<const double> rows;      ///< layout.row_size() numbers for each of them
+};
+
+/// Coefficients β of a system's lights (in the order of its rows) and dense techniques.
+struct Coefficients {
+  std::vector<Spectrum> lights, dense;
+};
+
+struct SolveSettings {
+  /// Strength of the pull towards the prior, in samples of each technique: a technique with as many samples lies about
+  /// halfway. At least 0; with 0 the prior decides only what the samples leave open.
+  double prior_samples = 0;
+  bool monochrome = false;  ///< one coefficient for all channels: the best in the mean over RGB
+};
+
+/// Solves the system in time linear in the number of lights, [Hua2023] Eq. (32) and (33).
+///
+/// `prior` holds the coefficients that the solution is drawn to, up to a constant: the constant that makes the prior's
+/// residuals vanish in the mean is added, and not part of the result (equal coefficients have no effect, so prior and
+/// result can be compared and inherited). A technique without samples keeps its prior. A prior of zeros and no samples
+/// give zeros, the plain estimate. The result is finite whenever the sums are.
+Coefficients solve_block_arrow(const SystemView& system, const Coefficients& prior, const SolveSettings& settings);
+
+/// The same by a factorisation of the whole matrix, to check the former; cubic in the number of lights.
+Coefficients solve_dense(const SystemView& system, const Coefficients& prior, const SolveSettings& settings);
+
+/// How much of a system's control to use, per channel in [0, 1]: the share s for which the mixture of plain and
+/// controlled estimate, plain + s · control, had the least second moment over vertices that the coefficients had not
+/// been made of. `parent` counts as as many vertices as `prior_vertices`; with no data it is the result. The channels
+/// share one s when `monochrome`.
+Spectrum best_share(const SystemView& system, const Spectrum& parent, double prior_vertices, bool monochrome);
+
+/// Weight of a vertex's samples in the sums: the mean over RGB of (throughput · importance)². `throughput` is that of
+/// the path before the vertex ([Hua2023] Eq. 29), `importance` is 1 / (value of the pixel, about, + 0.01) for the
+/// relative variance (Eq. 25) and 1 for the absolute one.
+inline float variance_weight(const Spectrum& throughput, const Spectrum& importance) {
+  const Spectrum factor = throughput * importance;
+  return mean(factor * factor);
+}
+
+}  // namespace covary

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+// Coefficients of control variates for every place of a scene, as paths look them up: cells of a grid by position and
+// normal, each with its own lights, and coarser cells for what finer ones have not seen.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/ray.h"
+#include "sampling/system_sums.h"
+
+namespace covary {
+
+/// Which cell a point lies in. The cells are cubes, `resolution` of them along the longest side of the bounds.
+class CellGrid {
+ public:
+  static constexpr uint32_t kMaxResolution = 1u << 16;
+  static constexpr uint32_t kEveryNormal = 6;  ///< CellKey::kind() where normals are not told apart
+  CellGrid() = default;
+  /// Throws Error(kUsage) when the resolution is 0 or above kMaxResolution. `by_normal` tells apart the six directions
+  /// to which normals can be nearest.
+  CellGrid(const Bounds3& bounds, uint32_t resolution, bool by_normal);
+  /// Points outside of the bounds belong to the nearest cell. `normal` need not have unit length.
+  CellKey key(const Vec3& position, const Vec3& normal) const;
+  uint32_t resolution() const { return resolution_; }
+  bool by_normal() const { return by_normal_; }
+  /// The grid with cells twice as wide.
+  CellGrid coarser() const;
+  float cell_width() const { return cell_width_; }
+  uint32_t level() const { return level_; }  ///< of its keys: how often coarser() was called
+
+ private:
+  friend class CoefficientTable;
+  Vec3 origin_;
+  float cell_width_ = 1;
+  uint32_t resolution_ = 1, level_ = 0;
+  bool by_normal_ = true;
+};
+
+/// Immutable once made; look-ups are thread-safe. The control of a vertex is
+///
+///     control = light_sum + Σ_j N_j dense_j − Σ_s ( light(s) r_light(s) + Σ_j dense_j r_j(s) ),
+///
+/// and plain + scale · control is the controlled estimate.
+class CoefficientTable {
+ public:
+  static constexpr uint32_t kNone = ~0u;
+  CoefficientTable() = default;
+  CoefficientTable(const CellGrid& grid, SystemLayout layout) : grid_(grid), layout_(layout) {}
+
+  const CellGrid& grid() const { return grid_; }
+  /// The finest cell that holds coefficients for the place, or kNone: plain sampling.
+  uint32_t find(CellKey key) const;
+  /// Asks memory for what find(key) reads.
+  void prefetch(CellKey key) const;
+
+  /// Share of the control to use in `cell`, in [0, 1]; is_black() where the cell is switched off.
+  Spectrum scale(uint32_t cell) const { return cells_[cell].scale; }
+  /// Σ_k N_k β_k over all lights.
+  Spectrum light_sum(uint32_t cell) const { return cells_[cell].light_sum; }
+  /// β of a dense technique.
+  Spectrum dense(uint32_t cell, uint32_t j) const { return dense_[size_t{cell} * layout_.n_dense + j]; }
+  /// β of a light: that of the finest of the cell and its ancestors which have seen the light, otherwise zero.
+  Spectrum light(uint32_t cell, uint32_t light) const;
+
+  uint32_t n_cells() const { return static_cast<uint32_t>(cells_.size()); }
+  uint32_t n_switched_off() const;
+  size_t bytes() const;
+  uint64_t hash() const;
+
+  /// Adds a cell; its parent (or kNone) must have been added before. The cell with root_key() serves every place for
+  /// which no other is found. `lights` are those of `coefficients`, in increasing order; lights that are not among them
+  /// have the parent's coefficients. Returns its number.
+  uint32_t add_cell(CellKey key, uint32_t parent, const Spectrum& scale, const Spectrum& light_sum,
+                    std::span<const uint32_t> lights, const Coefficients& coefficients);
+  static CellKey root_key() { return {0, 0, 0, 0, 255}; }
+
+  /// All of the table as bytes, little-endian: see docs/file-formats.md. `key` names what the coefficients belong to
+  /// (scene and settings).
+  std::string to_bytes(const std::string& key) const;
+  /// Reads to_bytes(). `where` names the source in messages. Throws Error(kInput) when the bytes are truncated, damaged,
+  /// of a newer version, or made with another key.
+  static CoefficientTable from_bytes(std::string_view bytes, const std::string& key, const std::string& where);
+
+ private:
+  struct Cell {
+    Spectrum scale, light_sum;
+    uint32_t parent = kNone;
+    uint32_t first_entry = 0, n_entries = 0;  // a power of two of entries_, open addressing; 0: no lights
+  };
+  struct Entry {
+    uint32_t light = kNone;
+    Spectrum value;
+  };
+  const Entry* entry(const Cell& cell, uint32_t light) const;
+  CellGrid grid_;
+  SystemLayout layout_;
+  uint32_t last_level_ = 0;  // highest level of a cell but for the root
+  uint32_t root_ = kNone;
+  KeyIndex index_;
+  std::vector<Cell> cells_;
+  std::vector<Spectrum> dense_;
+  std::vector<Entry> entries_;
+};
+
+}  // namespace covary

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sampling/system_sums.h"
+
+#include <cmath>
+
+#include "core/error.h"
+
+namespace covary {
+namespace {
+
+void add_to(std::span<double> sums, std::span<const double> numbers) {
+  for (size_t i = 0; i < numbers.size(); ++i) sums[i] += numbers[i];
+}
+
+}  // namespace
+
+uint32_t KeyIndex::insert(uint64_t key) {
+  if (slots_.size() <= 2 * keys_.size()) grow();
+  for (size_t i = slot_of(key);; i = (i + 1) & (slots_.size() - 1)) {
+    Slot& slot = slots_[i];
+    if (slot.number == kNone) {
+      slot = {key, static_cast<uint32_t>(keys_.size())};
+      keys_.push_back(key);
+      return slot.number;
+    }
+    if (slot.key == key) return slot.number;
+  }
+}
+
+uint32_t KeyIndex::find(uint64_t key) const {
+  if (slots_.empty()) return kNone;
+  for (size_t i = slot_of(key);; i = (i + 1) & (slots_.size() - 1)) {
+    const Slot& slot = slots_[i];
+    if (slot.number == kNone || slot.key == key) return slot.number;
+  }
+}
+
+void KeyIndex::grow() {
+  const size_t size = std::max<size_t>(64, 2 * slots_.size());
+  slots_.assign(size, Slot{});
+  for (size_t number = 0; number < keys_.size(); ++number) {
+    size_t i = slot_of(keys_[number]);
+    while (slots_[i].number != kNone) i = (i + 1) & (size - 1);
+    slots_[i] = {keys_[number], static_cast<uint32_t>(number)};
+  }
+}
+
+void KeyIndex::clear() {
+  keys_.clear();
+  slots_.assign(slots_.size(), Slot{});
+}
+
+uint32_t SystemSums::cell(CellKey key) {
+  const uint32_t number = cells_.insert(key.bits);
+  heads_.resize(cells_.keys().size() * layout_.head_size());
+  return number;
+}
+
+void SystemSums::add(uint32_t cell, float weight, const ControlledSample& sample) {
+  const Spectrum weighted = sample.value * weight;
+  if (!(weight >= 0 && std::isfinite(weight)) || !is_finite(weighted)) {
+    ++n_rejected_;
+    return;
+  }
+  double* head = &heads_[size_t{cell} * layout_.head_size()];
+  head[SystemLayout::kSamples] += 1;
+  head[SystemLayout::kWeight] += weight;
+  for (int c = 0; c < 3; ++c) head[SystemLayout::kValue + static_cast<uint32_t>(c)] += weighted[c];
+  for (uint32_t j = 0; j < layout_.n_dense; ++j) {
+    const double r = sample.r_dense[j];
+    if (r == 0) continue;
+    double* own = head + layout_.dense(j);
+    own[0] += 1;
+    for (int c = 0; c < 3; ++c) own[1 + c] += r * weighted[c];
+    for (uint32_t i = 0; i <= j; ++i) head[layout_.matrix(i, j)] += weight * r * sample.r_dense[i];
+  }
+  if (sample.light == ControlledSample::kNoLight || sample.r_light == 0) return;
+  const uint32_t number = rows_index_.insert(uint64_t{cell} << 32 | sample.light);
+  rows_.resize(rows_index_.keys().size() * layout_.row_size());
+  double* row = &rows_[size_t{number} * layout_.row_size()];
+  const double r = sample.r_light;
+  row[SystemLayout::kRowSamples] += 1;
+  row[SystemLayout::kDiagonal] += weight * r * r;
+  for (int c = 0; c < 3; ++c) row[SystemLayout::kRowValue + static_cast<uint32_t>(c)] += r * weighted[c];
+  for (uint32_t j = 0; j < layout_.n_dense; ++j) row[SystemLayout::kRowDense + j] += weight * r * sample.r_dense[j];
+}
+
+void SystemSums::add_held_out(uint32_t cell, float weight, const Spectrum& plain, const Spectrum& control) {
+  const Spectrum both = plain * control * weight, squared = control * control * weight;
+  if (!is_finite(both) || !is_finite(squared)) return;
+  double* head = &heads_[size_t{cell} * layout_.head_size()];
+  head[SystemLayout::kHeldOut] += 1;
+  for (int c = 0; c < 3; ++c) {
+    head[SystemLayout::kPlainControl + static_cast<uint32_t>(c)] += both[c];
+    head[SystemLayout::kControlSquared + static_cast<uint32_t>(c)] += squared[c];
+  }
+}
+
+void SystemSums::merge(const SystemSums& other) {
+  COVARY_CHECK(other.level_ <= level_ && other.layout_.n_dense == layout_.n_dense, "sums of other cells");
+  std::vector<uint32_t> own_cell(other.n_cells());
+  for (uint32_t i = 0; i < other.n_cells(); ++i) {
+    own_cell[i] = cell(other.key(i).coarser(level_ - other.level_));
+    add_to({&heads_[size_t{own_cell[i]} * layout_.head_size()], layout_.head_size()}, other.head(i));
+  }
+  for (size_t i = 0; i < other.n_rows(); ++i) {
+    const uint64_t key = uint64_t{own_cell[other.row_cell(i)]} << 32 | other.row_light(i);
+    const uint32_t number = rows_index_.insert(key);
+    rows_.resize(rows_index_.keys().size() * layout_.row_size());
+    add_to({&rows_[size_t{number} * layout_.row_size()], layout_.row_size()}, other.row(i));
+  }
+  n_rejected_ += other.n_rejected_;
+}
+
+void SystemSums::scale_held_out(double factor) {
+  for (uint32_t i = 0; i < n_cells(); ++i)
+    for (uint32_t j = SystemLayout::kHeldOut; j < SystemLayout::kDense; ++j)
+      heads_[size_t{i} * layout_.head_size() + j] *= factor;
+}
+
+void SystemSums::clear() {
+  cells_.clear(), rows_index_.clear();
+  heads_.clear(), rows_.clear();
+  n_rejected_ = 0;
+}
+
+CellKey SystemSums::key(uint32_t cell) const {
+  CellKey key;
+  key.bits = cells_.keys()[cell];
+  return key;
+}
+
+std::span<const double> SystemSums::head(uint32_t cell) const {
+  return std::span(heads_).subspan(size_t{cell} * layout_.head_size(), layout_.head_size());
+}
+
+std::span<const double> SystemSums::row(size_t row) const {
+  return std::span(rows_).subspan(row * layout_.row_size(), layout_.row_size());
+}
+
+size_t SystemSums::bytes() const {
+  return cells_.bytes() + rows_index_.bytes() + (heads_.capacity() + rows_.capacity()) * sizeof(double);
+}
+
+}  // namespace covary

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+// Sums of the normal equations (coefficient_solver.h) of many cells, sparse in cells and lights. A thread adds the
+// samples of a tile to sums of its own; sums are then merged in the order of tiles, so that the totals have the same
+// bits for any number of threads.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/random.h"
+#include "sampling/coefficient_solver.h"
+
+namespace covary {
+
+/// A cell of a regular grid: coordinates below 2^17, a class of normals (its kind, below 32), and its level, by how many
+/// halvings its grid is coarser than the finest (below 256).
+struct CellKey {
+  static constexpr uint32_t kMaxCoordinate = (1u << 17) - 1;
+  uint64_t bits = 0;
+
+  CellKey() = default;
+  CellKey(uint32_t x, uint32_t y, uint32_t z, uint32_t kind, uint32_t level)
+      : bits(x | (uint64_t{y} << 17) | (uint64_t{z} << 34) | (uint64_t{kind} << 51) | (uint64_t{level} << 56)) {}
+  uint32_t x() const { return static_cast<uint32_t>(bits) & kMaxCoordinate; }
+  uint32_t y() const { return static_cast<uint32_t>(bits >> 17) & kMaxCoordinate; }
+  uint32_t z() const { return static_cast<uint32_t>(bits >> 34) & kMaxCoordinate; }
+  uint32_t kind() const { return static_cast<uint32_t>(bits >> 51) & 31; }
+  uint32_t level() const { return static_cast<uint32_t>(bits >> 56); }
+  /// The cell of a grid whose cells are 2^n times as wide. Cells of different kinds stay apart.
+  CellKey coarser(uint32_t n) const { return {x() >> n, y() >> n, z() >> n, kind(), level() + n}; }
+  bool operator==(const CellKey&) const = default;
+};
+
+/// What is known of one sample: f/p and the balance weight of each technique that could have taken it.
+///
+/// Every sample counts, zero ones too: r of a light sample that is blocked is 1 for its light, of a direction that was
+/// not found (a failed BSDF sample) 1 for the BSDF. r_light and r_dense add up to 1.
+struct ControlledSample {
+  static constexpr uint32_t kNoLight = ~0u;
+  Spectrum value;                  ///< f/p, without the throughput before the vertex
+  uint32_t light = kNoLight;       ///< the light (or cluster) that could have been sampled here, or kNoLight
+  float r_light = 0;               ///< its balance weight
+  std::span<const float> r_dense;  ///< balance weights of the dense techniques, as many as the sums have
+};
+
+/// From 64-bit keys to 0, 1, 2, … in the order of first use.
+class KeyIndex {
+ public:
+  static constexpr uint32_t kNone = ~0u;
+  /// The number of `key`, a new one if it has none yet.
+  uint32_t insert(uint64_t key);
+  /// The number of `key`, or kNone.
+  uint32_t find(uint64_t key) const;
+  std::span<const uint64_t> keys() const { return keys_; }
+  void clear();
+  void prefetch(uint64_t key) const {
+    if (!slots_.empty()) __builtin_prefetch(&slots_[slot_of(key)]);
+  }
+  size_t bytes() const { return slots_.capacity() * sizeof(Slot) + keys_.capacity() * sizeof(uint64_t); }
+
+ private:
+  struct Slot {
+    uint64_t key;
+    uint32_t number = kNone;
+  };
+  size_t slot_of(uint64_t key) const { return mix64(key) & (slots_.size() - 1); }
+  void grow();
+  std::vector<Slot> slots_;  // open addressing, their number a power of two; number kNone where empty
+  std::vector<uint64_t> keys_;
+};
+
+class SystemSums {
+ public:
+  /// `level`: that of the keys.
+  explicit SystemSums(SystemLayout layout = {}, uint32_t level = 0) : layout_(layout), level_(level) {}
+
+  /// The number of a cell, for add(); it holds until clear().
+  uint32_t cell(CellKey key);
+  /// Adds one sample of a vertex in `cell`. A sample whose value or weight is not finite, or whose weight is negative,
+  /// is left out and counted. Weights r must lie in [0, 1].
+  void add(uint32_t cell, float weight, const ControlledSample& sample);
+  /// Adds what a vertex tells about the coefficients in use: `plain`, the sum of its f/p, and `control`, the unscaled
+  /// control added to it. The coefficients must not be made of this vertex.
+  void add_held_out(uint32_t cell, float weight, const Spectrum& plain, const Spectrum& control);
+  /// Adds all sums of `other`, whose level is at most that of these.
+  void merge(const SystemSums& other);
+  /// Multiplies the sums of held-out vertices, with which older coefficients were judged.
+  void scale_held_out(double factor);
+  void clear();
+
+  const SystemLayout& layout() const { return layout_; }
+  uint32_t level() const { return level_; }
+  uint32_t n_cells() const { return static_cast<uint32_t>(cells_.keys().size()); }
+  size_t n_rows() const { return rows_index_.keys().size(); }
+  CellKey key(uint32_t cell) const;
+  std::span<const double> head(uint32_t cell) const;
+  /// Cell and light of a row, rows in the order of their first samples.
+  uint32_t row_cell(size_t row) const { return static_cast<uint32_t>(rows_index_.keys()[row] >> 32); }
+  uint32_t row_light(size_t row) const { return static_cast<uint32_t>(rows_index_.keys()[row]); }
+  std::span<const double> row(size_t row) const;
+  uint64_t n_rejected() const { return n_rejected_; }  ///< samples left out because they were not finite
+  size_t bytes() const;
+
+ private:
+  SystemLayout layout_;
+  uint32_t level_;
+  KeyIndex cells_, rows_index_;  // rows: cell number << 32 | light
+  std::vector<double> heads_, rows_;
+  uint64_t n_rejected_ = 0;
+};
+
+}  // namespace covary
