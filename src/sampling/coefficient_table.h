@@ -79,11 +79,11 @@ class CoefficientTable {
                     std::span<const uint32_t> lights, const Coefficients& coefficients);
   static CellKey root_key() { return {0, 0, 0, 0, 255}; }
 
-  /// All of the table as bytes, little-endian: see docs/file-formats.md. `key` names what the coefficients belong to
+  /// All of the table as bytes, as docs/file-formats.md describes them. `key` names what the coefficients belong to
   /// (scene and settings).
   std::string to_bytes(const std::string& key) const;
-  /// Reads to_bytes(). `where` names the source in messages. Throws Error(kInput) when the bytes are truncated, damaged,
-  /// of a newer version, or made with another key.
+  /// Reads to_bytes(). `where` names the source in messages. Throws Error(kInput) when the bytes are truncated,
+  /// damaged, of another version, or made with another key.
   static CoefficientTable from_bytes(std::string_view bytes, const std::string& key, const std::string& where);
 
  private:

@@ -13,8 +13,8 @@
 
 namespace covary {
 
-/// A cell of a regular grid: coordinates below 2^17, a class of normals (its kind, below 32), and its level, by how many
-/// halvings its grid is coarser than the finest (below 256).
+/// A cell of a regular grid: coordinates below 2^17, a class of normals (its kind, below 32), and its level, by how
+/// many halvings its grid is coarser than the finest (below 256).
 struct CellKey {
   static constexpr uint32_t kMaxCoordinate = (1u << 17) - 1;
   uint64_t bits = 0;
