@@ -242,7 +242,7 @@ TEST(ControlledMixture, IsNeverWorseThanTheBalanceHeuristic) {
   }
 }
 
-/// [Kondapaneni2019]: the techniques of multiple importance sampling alone, each as a whole. Their optimal coefficients
+/// [Kondapaneni2019]: the techniques of multiple importance sampling alone, each as a whole. Their best coefficients
 /// solve Σ_j α_j ∫ p_i p_j / p = ∫ f p_i / p (Eq. 16 there); here β_j = α_j / n_j up to a constant.
 TEST(ControlledMixture, OptimalMultipleImportanceSamplingIsASpecialCase) {
   Problem problem = many_lights();
@@ -277,8 +277,9 @@ TEST(ControlledMixture, OptimalMultipleImportanceSamplingIsASpecialCase) {
   EXPECT_NEAR(beta[2] - beta[0], found.dense[2].r - found.dense[0].r, 1e-4);
 }
 
-/// [Vevoda2018]: a control for light samples alone, the mean of their weighted contributions for each light. It is what
-/// comes of samples that know of no technique but their own: α_k = N_k β_k is the part of F that light k's samples find.
+/// [Vevoda2018]: a control for light samples alone, the mean of their weighted contributions for each light. It is
+/// what comes of samples that know of no technique but their own: α_k = N_k β_k is the part of F that light k's samples
+/// find.
 TEST(ControlledMixture, MeanContributionsOfLightsAreASpecialCase) {
   const Problem problem = many_lights();
   SystemSums sums(SystemLayout{0});

@@ -135,6 +135,7 @@ class Builder {
     const double turned = 1 - std::cos(node.half_angle);
     node.cost = node.power * (static_cast<double>(length_squared(node.bounds.upper - node.bounds.lower)) +
                               scene_diagonal_squared_ * turned * turned);
+    if (!(node.cost >= 0)) node.cost = std::numeric_limits<double>::infinity();
     return node;
   }
 
