@@ -26,10 +26,11 @@ Spectrum AreaLight::surface_radiance(const SurfaceHit& hit, const Vec3& w) const
   return textured_ ? radiance_->eval(hit) : constant_;
 }
 
-Spectrum AreaLight::radiance_at(const Vec3& p, const Vec3& n, Vec2 uv) const {
+Spectrum AreaLight::radiance_at(const AreaSample& at) const {
   if (!textured_) return constant_;
   SurfaceHit hit;
-  hit.p = p, hit.ng = n, hit.frame = Frame(n), hit.uv = uv, hit.shape = shape_;
+  hit.p = at.p, hit.ng = at.n, hit.frame = Frame(at.n), hit.uv = at.uv, hit.shape = shape_;
+  hit.primitive = at.primitive, hit.barycentric = at.barycentric;
   return radiance_->eval(hit);
 }
 
@@ -42,11 +43,34 @@ AreaSample AreaLight::sample_position(Vec2 u, float u_primitive) const {
 }
 
 EmitterSample AreaLight::sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const {
-  EmitterSample sample = samples_uv_ ? Shape::towards(reference, sample_position(u, u_primitive))
-                                     : shape_->sample_towards(reference, u, u_primitive);
+  // Meshes with colours are sampled by area, and the colour is that of a triangle, which an EmitterSample has not.
+  if (samples_uv_ || (textured_ && shape_->has_vertex_colour()))
+    return towards(reference, sample_position(u, u_primitive));
+  EmitterSample sample = shape_->sample_towards(reference, u, u_primitive);
   if (sample.pdf_solid_angle > 0 && dot(sample.n, sample.wi) < 0)
-    sample.radiance = radiance_at(sample.p, sample.n, sample.uv);
+    sample.radiance = radiance_at({sample.p, sample.n, sample.uv});
   return sample;
+}
+
+EmitterSample AreaLight::towards(const Vec3& reference, const AreaSample& at) const {
+  EmitterSample sample = Shape::towards(reference, at);
+  if (sample.pdf_solid_angle > 0 && dot(sample.n, sample.wi) < 0) sample.radiance = radiance_at(at);
+  return sample;
+}
+
+EmitterSample AreaLight::sample_part_towards(uint32_t part, const Vec3& reference, Vec2 u, float u_primitive) const {
+  if (n_parts() == 1) return sample_towards(reference, u, u_primitive);
+  return towards(reference, shape_->sample_part(part, u));
+}
+
+float AreaLight::pdf_part_solid_angle(const Vec3& reference, const SurfaceHit& hit) const {
+  if (n_parts() == 1) return pdf_solid_angle(reference, hit);
+  const Vec3 d = hit.p - reference;
+  const float distance_squared = length_squared(d);
+  const float cosine = std::abs(dot(d, hit.ng)) / std::sqrt(distance_squared);
+  return distance_squared > 0 && cosine > Shape::kGrazing
+             ? distance_squared / (cosine * shape_->part_area(part_of(hit)))
+             : 0;
 }
 
 float AreaLight::pdf_solid_angle(const Vec3& reference, const SurfaceHit& hit) const {
@@ -66,7 +90,7 @@ EmissionSample AreaLight::sample_emission(Vec2 u_position, Vec2 u_direction, flo
   sample.ray = {area.p, Frame(area.n).to_world(w)};
   sample.n = area.n;
   sample.uv = area.uv;
-  sample.radiance = radiance_at(area.p, area.n, area.uv);
+  sample.radiance = radiance_at(area);
   sample.pdf_position = area.pdf_area;
   sample.pdf_direction = warp::cosine_hemisphere_pdf_solid_angle(w.z);
   return sample;
@@ -78,14 +102,13 @@ EmissionPdf AreaLight::pdf_emission(const SurfaceHit& hit, const Vec3& w) const 
   return {position, warp::cosine_hemisphere_pdf_solid_angle(dot(hit.ng, w))};
 }
 
-Spectrum AreaLight::power() const {
-  if (!textured_) return constant_ * (kPi * shape_->area());
+template <typename Position>
+Spectrum AreaLight::power_of(int n_points, const Position& position) const {
   // Mean of radiance over density, at points of the plastic-number lattice in three dimensions (Roberts 2018), which
   // cover the cube evenly.
-  constexpr int kPoints = 4096;
   constexpr double kPlastic = 1.22074408460575947536;  // positive root of x^4 = x + 1
   double sum[3] = {0, 0, 0};
-  for (int i = 0; i < kPoints; ++i) {
+  for (int i = 0; i < n_points; ++i) {
     double x[3], step = 1;
     for (double& coordinate : x) {
       step /= kPlastic;
@@ -93,13 +116,24 @@ Spectrum AreaLight::power() const {
       coordinate -= std::floor(coordinate);
     }
     const Vec2 u = {static_cast<float>(x[0]) * kOneMinusEpsilon, static_cast<float>(x[1]) * kOneMinusEpsilon};
-    const AreaSample at = sample_position(u, static_cast<float>(x[2]) * kOneMinusEpsilon);
+    const AreaSample at = position(u, static_cast<float>(x[2]) * kOneMinusEpsilon);
     if (!(at.pdf_area > 0)) continue;
-    const Spectrum radiance = radiance_at(at.p, at.n, at.uv);
+    const Spectrum radiance = radiance_at(at);
     for (int c = 0; c < 3; ++c) sum[c] += radiance[c] / at.pdf_area;
   }
-  const double scale = static_cast<double>(kPi) / kPoints;
+  const double scale = static_cast<double>(kPi) / n_points;
   return {static_cast<float>(sum[0] * scale), static_cast<float>(sum[1] * scale), static_cast<float>(sum[2] * scale)};
+}
+
+Spectrum AreaLight::power() const {
+  if (!textured_) return constant_ * (kPi * shape_->area());
+  return power_of(4096, [&](Vec2 u, float u_primitive) { return sample_position(u, u_primitive); });
+}
+
+Spectrum AreaLight::part_power(uint32_t part) const {
+  if (n_parts() == 1) return power();
+  if (!textured_) return constant_ * (kPi * shape_->part_area(part));
+  return power_of(64, [&](Vec2 u, float) { return shape_->sample_part(part, u); });
 }
 
 std::shared_ptr<Emitter> make_area(Parameters& parameters) {

@@ -25,13 +25,18 @@ class AreaLight final : public Emitter {
   void attach(const Shape* shape);
   /// The same light without a shape.
   std::shared_ptr<AreaLight> clone() const { return std::make_shared<AreaLight>(radiance_); }
-  const Shape* shape() const { return shape_; }
+  const Shape* shape() const override { return shape_; }
 
   Spectrum surface_radiance(const SurfaceHit& hit, const Vec3& w) const override;
   /// Textured lights on shapes whose (u, v) cover the unit square (Shape::sample_uv): positions in proportion to the
   /// texture's luminance. All others: as the shape likes best from the reference point.
   EmitterSample sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const override;
   float pdf_solid_angle(const Vec3& reference, const SurfaceHit& hit) const override;
+  uint32_t n_parts() const override { return shape_->n_parts(); }
+  uint32_t part_of(const SurfaceHit& hit) const override { return n_parts() > 1 ? hit.primitive : 0; }
+  EmitterSample sample_part_towards(uint32_t part, const Vec3& reference, Vec2 u, float u_primitive) const override;
+  float pdf_part_solid_angle(const Vec3& reference, const SurfaceHit& hit) const override;
+  Spectrum part_power(uint32_t part) const override;
   EmissionSample sample_emission(Vec2 u_position, Vec2 u_direction, float u_primitive) const override;
   EmissionPdf pdf_emission(const SurfaceHit& hit, const Vec3& w) const override;
   /// pi times the integral of the radiance over the surface; for textures by quadrature.
@@ -40,7 +45,13 @@ class AreaLight final : public Emitter {
  private:
   /// A point chosen by position only, with its density per unit area.
   AreaSample sample_position(Vec2 u, float u_primitive) const;
-  Spectrum radiance_at(const Vec3& p, const Vec3& n, Vec2 uv) const;
+  Spectrum radiance_at(const AreaSample& at) const;
+  /// The point as seen from `reference`.
+  EmitterSample towards(const Vec3& reference, const AreaSample& at) const;
+
+  /// Power by quadrature with so many points that position(u, u_primitive) gives.
+  template <typename Position>
+  Spectrum power_of(int n_points, const Position& position) const;
 
   TexturePtr radiance_;
   Spectrum constant_;  // the radiance where it does not vary

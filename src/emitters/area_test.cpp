@@ -12,6 +12,7 @@
 #include "support/describe.h"
 #include "support/light_scene.h"
 #include "textures/bitmap.h"
+#include "textures/registry.h"
 
 namespace covary {
 namespace {
@@ -128,10 +129,26 @@ Chart stretched_chart(const LightScene& scene) {
   return chart;
 }
 
+/// The mesh with a colour of its own at each vertex, from few to many times as bright.
+std::shared_ptr<TriangleMesh> coloured(const TriangleMesh& mesh) {
+  MeshData data;
+  for (const auto& vertex : mesh.vertices()) {
+    const auto i = static_cast<float>(data.positions.size());
+    data.positions.push_back(vertex.p), data.uvs.push_back(vertex.uv);
+    data.colours.push_back({1 + 3 * i, 7 - i, i == 2 ? 9.0f : 0.5f});
+  }
+  data.triangles = mesh.triangles();
+  return std::make_shared<TriangleMesh>(std::move(data));
+}
+
+TexturePtr vertex_colours() { return make_plugin<Texture>(texture_plugins(), "texture", "vertexcolor", {}).object; }
+
 const Case kCases[] = {
     {"rectangle", [] { return LightScene(rectangle(kPlaced), constant()); }, rectangle_chart},
     {"textured_rectangle", [] { return LightScene(rectangle(kPlaced), picture()); }, rectangle_chart},
     {"textured_mesh", [] { return LightScene(stretched(), picture()); }, stretched_chart},
+    {"coloured_rectangle", [] { return LightScene(coloured(*rectangle(kPlaced)), vertex_colours()); }, rectangle_chart},
+    {"coloured_mesh", [] { return LightScene(coloured(*stretched()), vertex_colours()); }, stretched_chart},
     {"disk", [] { return LightScene(std::make_shared<Disk>(kPlaced, false), constant()); },
      [](const LightScene& scene) { return surface_chart(scene, on_disk); }},
     {"sphere",

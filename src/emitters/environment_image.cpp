@@ -42,7 +42,6 @@ EnvironmentImage::EnvironmentImage(const TexelImage& image, float scale, bool mi
   // Values, and the integral over the sphere: each row's tent against the sine.
   const double step = static_cast<double>(M_PI) / (height_ - 1);
   double integral[3] = {0, 0, 0}, luminance_integral = 0;
-  float largest = 0;
   for (int y = 0; y < height_; ++y) {
     double row_weight = 0;
     if (y > 0) row_weight += tent_times_sine(y * step, step, -1);
@@ -54,20 +53,34 @@ EnvironmentImage::EnvironmentImage(const TexelImage& image, float scale, bool mi
       texels_[layout_.index(x, y)].value = value;
       for (int c = 0; c < 3; ++c) integral[c] += per_texel * value[c];
       luminance_integral += per_texel * luminance(value);
-      largest = std::max(largest, luminance(value));
+      largest_ = std::max(largest_, luminance(value));
     }
   }
   for (int c = 0; c < 3; ++c) integral_[c] = static_cast<float>(integral[c]);
 
+  mean_luminance_ = static_cast<float>(luminance_integral / (4 * M_PI));
+  make_tables(mis_compensation);
+}
+
+EnvironmentImage EnvironmentImage::compensated() const {
+  EnvironmentImage result = *this;
+  result.make_tables(true);
+  return result;
+}
+
+void EnvironmentImage::make_tables(bool mis_compensation) {
+  compensated_ = mis_compensation;
   // [Karlik2019] Sec. 4: the mean over the sphere is subtracted; a constant map keeps its weights.
-  float offset = mis_compensation ? static_cast<float>(luminance_integral / (4 * M_PI)) : 0.0f;
-  if (largest <= 1.01f * offset) offset = 0;
-  black_ = !(largest > 0);
+  float offset = mis_compensation ? mean_luminance_ : 0.0f;
+  if (largest_ <= 1.01f * offset) offset = 0;
+  black_ = !(largest_ > 0);
   if (black_) return;
 
+  const double step = static_cast<double>(M_PI) / (height_ - 1);
   std::vector<float> row_sums(layout_.blocks_y()), row(layout_.blocks_x());
   const std::vector<float> ones(layout_.blocks_x(), 1.0f);
   double z = 0;
+  block_columns_.clear();
   block_columns_.reserve(layout_.blocks_y());
   for (int block_y = 0; block_y < layout_.blocks_y(); ++block_y) {
     std::fill(row.begin(), row.end(), 0.0f);

@@ -35,6 +35,9 @@ class EnvironmentImage {
   /// `mis_compensation`: subtract the mean luminance from the sampling weights (Karlík et al. 2019), for use together
   /// with a technique that covers all directions.
   EnvironmentImage(const TexelImage& image, float scale, bool mis_compensation);
+  /// The same light, sampled as with `mis_compensation`.
+  EnvironmentImage compensated() const;
+  bool is_compensated() const { return compensated_; }
 
   struct Lookup {
     Spectrum value;
@@ -84,12 +87,16 @@ class EnvironmentImage {
   /// The share of a row's tent that lies inside the image.
   float tent_mass(int row) const { return row == 0 || row == height_ - 1 ? 0.5f : 1.0f; }
 
+  /// Sampling weights and tables of the values.
+  void make_tables(bool mis_compensation);
+
   int width_, height_;
   BlockLayout layout_;
   LargeVector<Texel> texels_;
   Discrete block_rows_;  // empty when nothing is to be sampled
   std::vector<AliasTable> block_columns_;
-  bool black_ = true;
+  bool black_ = true, compensated_ = false;
+  float mean_luminance_ = 0, largest_ = 0;  // of the values: over the sphere, and at a texel
   float inverse_z_ = 0;
   Spectrum integral_;
 };

@@ -132,6 +132,18 @@ TEST(EnvironmentImage, CompensationLeavesOutWhatIsDarkerThanTheMean) {
   EXPECT_GT(EnvironmentImage(image, 1, true).lookup({0, 0, 1}).pdf_solid_angle, 0);
 }
 
+TEST(EnvironmentImage, CanBeCompensatedLater) {
+  const TexelImage image = test_image(12, 6, 5);
+  const EnvironmentImage plain(image, 1, false), at_once(image, 1, true), later = plain.compensated();
+  EXPECT_FALSE(plain.is_compensated());
+  EXPECT_TRUE(later.is_compensated());
+  for (int i = 0; i < 200; ++i) {
+    const Vec2 u = PathRandom(Sampling::kIndependent, 2, 0, 0, i).get_2d(0, Event::kLightPosition);
+    EXPECT_EQ(later.sample(u).d, at_once.sample(u).d);
+    EXPECT_EQ(later.sample(u).pdf_solid_angle, at_once.sample(u).pdf_solid_angle);
+  }
+}
+
 TEST(EnvironmentImage, ABlackMapIsNeverSampled) {
   TexelImage image = test_image(4, 3, 0);
   std::fill(image.floats.begin(), image.floats.end(), 0.0f);

@@ -28,6 +28,12 @@ class EnvironmentMap final : public Emitter {
     return placed;
   }
   bool is_environment() const override { return true; }
+  std::shared_ptr<const Emitter> mis_compensated() const override {
+    if (image_->is_compensated()) return nullptr;
+    auto result = std::make_shared<EnvironmentMap>(*this);
+    result->image_ = std::make_shared<const EnvironmentImage>(image_->compensated());
+    return result;
+  }
 
   EnvironmentLight environment(const Vec3& d) const override {
     const EnvironmentImage::Lookup found = image_->lookup(rotation_.to_local(d));

@@ -91,6 +91,29 @@ class Emitter : public SceneObject {
   /// Density of sample_towards() per unit solid angle at `reference` for the point `hit` on this area light.
   virtual float pdf_solid_angle(const Vec3& /*reference*/, const SurfaceHit& /*hit*/) const { return 0; }
 
+  // Lights of several parts, such as the triangles of a mesh, can be sampled part by part.
+  /// Parts that can be sampled one by one.
+  virtual uint32_t n_parts() const { return 1; }
+  /// The part on which a point of this area light lies.
+  virtual uint32_t part_of(const SurfaceHit& /*hit*/) const { return 0; }
+  /// sample_towards() of one part.
+  virtual EmitterSample sample_part_towards(uint32_t /*part*/, const Vec3& reference, Vec2 u, float u_primitive) const {
+    return sample_towards(reference, u, u_primitive);
+  }
+  /// Density of sample_part_towards() per unit solid angle at `reference` for the point `hit` of this area light and
+  /// the part on which it lies.
+  virtual float pdf_part_solid_angle(const Vec3& reference, const SurfaceHit& hit) const {
+    return pdf_solid_angle(reference, hit);
+  }
+  /// power() of one part.
+  virtual Spectrum part_power(uint32_t /*part*/) const { return power(); }
+  /// The surface of an area light, or null.
+  virtual const Shape* shape() const { return nullptr; }
+
+  /// This environment with a density from which the mean was taken off, for use together with a technique that covers
+  /// all directions [Karlik2019]; null where that is the light itself.
+  virtual std::shared_ptr<const Emitter> mis_compensated() const { return nullptr; }
+
   /// Samples a ray that leaves the light, for paths that start there.
   virtual EmissionSample sample_emission(Vec2 u_position, Vec2 u_direction, float u_primitive) const = 0;
   /// Densities of sample_emission() for light that leaves in world direction `w` (unit, away from the light) at the

@@ -94,7 +94,21 @@ TriangleMesh::Parallelogram TriangleMesh::find_parallelogram() const {
 
 AreaSample TriangleMesh::sample_uv(Vec2 uv) const {
   const Parallelogram& q = parallelogram_;
-  return {q.origin + q.dp_du * uv.x + q.dp_dv * uv.y, q.n, uv, q.inverse_area};
+  AreaSample at = {q.origin + q.dp_du * uv.x + q.dp_dv * uv.y, q.n, uv, q.inverse_area};
+  if (!colours_.empty() && is_parallelogram()) find_triangle(at);
+  return at;
+}
+
+void TriangleMesh::find_triangle(AreaSample& at) const {
+  float deepest = -kInfinity;  // the smallest weight of a vertex: not negative inside, but for rounding
+  for (uint32_t i = 0; i < triangles_.size(); ++i) {
+    const auto& t = triangles_[i];
+    const Vec2 uv0 = vertices_[t[0]].uv, d1 = vertices_[t[1]].uv - uv0, d2 = vertices_[t[2]].uv - uv0, d = at.uv - uv0;
+    const float inverse = 1 / (d1.x * d2.y - d1.y * d2.x);
+    const Vec2 b = {(d.x * d2.y - d.y * d2.x) * inverse, (d1.x * d.y - d1.y * d.x) * inverse};
+    const float smallest = std::min({b.x, b.y, 1 - b.x - b.y});
+    if (smallest > deepest) deepest = smallest, at.primitive = i, at.barycentric = b;
+  }
 }
 
 void TriangleMesh::prepare_sampling() {
@@ -144,11 +158,32 @@ void TriangleMesh::fill(const Ray& /*ray*/, SurfaceHit& hit, bool with_derivativ
 
 AreaSample TriangleMesh::sample_area(Vec2 u, float u_primitive) const {
   // One map for the whole parallelogram is cheaper than a choice of triangle, and continuous.
-  if (parallelogram_.inverse_area > 0) return TriangleMesh::sample_uv(u);
-  const Facet& facet = facets_[areas_.sample(u_primitive).index];
+  if (is_parallelogram()) return TriangleMesh::sample_uv(u);
+  const uint32_t triangle = areas_.sample(u_primitive).index;
+  const Facet& facet = facets_[triangle];
   const Vec2 b = warp::square_to_triangle(u);
-  return {facet.point(b), facet.n, facet.uv_at(b), inverse_area_};
+  return {facet.point(b), facet.n, facet.uv_at(b), inverse_area_, triangle, b};
 }
+
+float TriangleMesh::part_area(uint32_t part) const {
+  return is_parallelogram() ? area() : 0.5f * length(cross(facets_[part].e1, facets_[part].e2));
+}
+
+AreaSample TriangleMesh::sample_part(uint32_t part, Vec2 u) const {
+  if (is_parallelogram()) return TriangleMesh::sample_uv(u);
+  const Facet& facet = facets_[part];
+  const Vec2 b = warp::square_to_triangle(u);
+  return {facet.point(b), facet.n, facet.uv_at(b), 1 / part_area(part), part, b};
+}
+
+Bounds3 TriangleMesh::part_bounds(uint32_t part) const {
+  if (is_parallelogram()) return bounds_;
+  Bounds3 bounds;
+  for (const uint32_t index : triangles_[part]) bounds.extend(vertices_[index].p);
+  return bounds;
+}
+
+Vec3 TriangleMesh::part_normal(uint32_t part) const { return is_parallelogram() ? parallelogram_.n : facets_[part].n; }
 
 EmitterSample TriangleMesh::sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const {
   return towards(reference, TriangleMesh::sample_area(u, u_primitive));

@@ -31,13 +31,21 @@ class TriangleMesh final : public Shape {
   float area() const override { return static_cast<float>(areas_.sum()); }
   size_t n_primitives() const override { return triangles_.size(); }
   AreaSample sample_area(Vec2 u, float u_primitive) const override;
+  // Parts of a parallelogram with (u, v) over the unit square: one; of other meshes: each triangle.
+  uint32_t n_parts() const override { return is_parallelogram() ? 1 : static_cast<uint32_t>(triangles_.size()); }
+  uint32_t triangles_per_part() const override { return is_parallelogram() ? 2 : 1; }
+  float part_area(uint32_t part) const override;
+  AreaSample sample_part(uint32_t part, Vec2 u) const override;
+  Bounds3 part_bounds(uint32_t part) const override;
+  Vec3 part_normal(uint32_t part) const override;
   EmitterSample sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const override;
   /// Only for two triangles that make a parallelogram whose (u, v) cover the unit square, such as `rectangle`.
   AreaSample sample_uv(Vec2 uv) const override;
   std::shared_ptr<Shape> transformed(const Transform& to_world) const override;
   Spectrum vertex_colour(const SurfaceHit& hit) const override;
   bool has_vertex_colour() const override { return !colours_.empty(); }
-  /// Makes sample_area() and area() ready; called by the scene for meshes that emit. Not needed otherwise.
+  /// Makes sample_area(), area() and all about parts ready; called by the scene for meshes that emit. Not needed
+  /// otherwise.
   void prepare_sampling();
 
   /// Vertices lie in one record each, so that a hit touches few cache lines and the ray tracer shares the array.
@@ -74,6 +82,9 @@ class TriangleMesh final : public Shape {
     float inverse_area = 0;
   };
   Parallelogram find_parallelogram() const;
+  bool is_parallelogram() const { return parallelogram_.inverse_area > 0; }
+  /// Sets the triangle and the barycentric coordinates of a point that was made from its (u, v).
+  void find_triangle(AreaSample& at) const;
   Parallelogram parallelogram_;
 };
 

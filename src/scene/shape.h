@@ -17,7 +17,9 @@ namespace covary {
 struct AreaSample {
   Vec3 p, n;  ///< point and unit geometric normal
   Vec2 uv;
-  float pdf_area = 0;  ///< per unit area
+  float pdf_area = 0;      ///< per unit area
+  uint32_t primitive = 0;  ///< triangle index within a mesh
+  Vec2 barycentric;        ///< weights of the triangle's 2nd and 3rd vertex
 };
 
 class Shape : public SceneObject {
@@ -30,6 +32,17 @@ class Shape : public SceneObject {
   virtual size_t n_primitives() const { return 1; }
   /// Uniform by area. `u_primitive` chooses among parts (triangles).
   virtual AreaSample sample_area(Vec2 u, float u_primitive) const = 0;
+  /// Parts that are sampled one by one: the triangles of a mesh; 1 where the shape is sampled as a whole.
+  virtual uint32_t n_parts() const { return 1; }
+  /// Triangles that a part stands for; 1 where there are none.
+  virtual uint32_t triangles_per_part() const { return 1; }
+  virtual float part_area(uint32_t /*part*/) const { return area(); }
+  /// Uniform by area on one part.
+  virtual AreaSample sample_part(uint32_t /*part*/, Vec2 u) const { return sample_area(u, 0); }
+  /// Bounds of one part, for those that group parts by their places.
+  virtual Bounds3 part_bounds(uint32_t /*part*/) const { return bounds(); }
+  /// Unit geometric normal of a part that is flat; zero where it varies.
+  virtual Vec3 part_normal(uint32_t /*part*/) const { return {}; }
   /// Point by surface parameters (for textured lights): only shapes whose (u, v) cover the unit square once.
   /// Returns pdf_area for a density of 1 per unit (u, v) area; pdf_area == 0: not supported by this shape.
   virtual AreaSample sample_uv(Vec2 /*uv*/) const { return {}; }
