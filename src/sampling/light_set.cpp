@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sampling/light_set.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+
+namespace covary {
+namespace {
+
+constexpr uint32_t kSteps = 1u << 24;  // of random numbers
+constexpr uint32_t kMaxLights = 1u << 22;
+
+/// Weight of a light by area or count, before normalisation.
+double weight_of(const Light& light, LightSelection selection) {
+  const Shape* shape = light.emitter->shape();
+  switch (selection) {
+    case LightSelection::kTriangle:
+      return shape ? shape->triangles_per_part() : 1;
+    case LightSelection::kShape:
+      return shape && shape->n_parts() > 1 ? static_cast<double>(shape->part_area(light.part)) / shape->area() : 1;
+    case LightSelection::kPower:
+      return luminance(light.emitter->part_power(light.part));
+  }
+  throw Error(ErrorCode::kInternal, "unknown selection of lights");
+}
+
+/// Multiples of 2^-24 near the weights' parts of the whole, at least one for each positive weight, so that the
+/// probability with which a random number selects a light is exactly what the light's density is multiplied with.
+std::vector<float> whole_steps(const std::vector<double>& weights) {
+  const auto n_positive =
+      static_cast<double>(std::count_if(weights.begin(), weights.end(), [](double weight) { return weight > 0; }));
+  double sum = 0, rest = 0;
+  for (const double weight : weights) sum += weight;
+  std::vector<float> steps;
+  size_t largest = 0;
+  double n_used = 0;
+  for (size_t i = 0; i < weights.size(); ++i) {
+    double n = 0;
+    if (weights[i] > 0) {
+      const double exact = weights[i] / sum * (kSteps - n_positive) + rest;  // what rounding left goes to the next
+      n = std::floor(std::max(exact, 0.0));
+      rest = exact - n;
+      n += 1;
+    }
+    steps.push_back(static_cast<float>(n));
+    n_used += n;
+    if (weights[i] > weights[largest]) largest = i;
+  }
+  steps[largest] += static_cast<float>(kSteps - n_used);
+  return steps;
+}
+
+}  // namespace
+
+std::string name_of(LightSelection selection) {
+  switch (selection) {
+    case LightSelection::kTriangle:
+      return "triangle";
+    case LightSelection::kShape:
+      return "shape";
+    case LightSelection::kPower:
+      return "power";
+  }
+  throw Error(ErrorCode::kInternal, "unknown selection of lights");
+}
+
+LightSet::LightSet(const Scene& scene, LightSelection selection) {
+  for (const auto& emitter : scene.emitters()) {
+    if (emitter->is_environment()) continue;
+    first_[emitter.get()] = size();
+    const uint32_t n = emitter->n_parts();
+    if (n > kMaxLights - size())
+      throw Error(ErrorCode::kInput, "the scene has more than " + std::to_string(kMaxLights) +
+                                         " lights, which controlled-path cannot tell "
+                                         "apart; use the integrator path");
+    for (uint32_t part = 0; part < n; ++part) lights_.push_back({emitter.get(), part, 0});
+  }
+  if (lights_.empty()) return;
+  std::vector<double> weights;
+  for (const Light& light : lights_) weights.push_back(weight_of(light, selection));
+  const bool finite = std::all_of(weights.begin(), weights.end(), [](double weight) { return std::isfinite(weight); });
+  const bool black = std::all_of(weights.begin(), weights.end(), [](double weight) { return !(weight > 0); });
+  if (!finite || black) std::fill(weights.begin(), weights.end(), 1.0);
+  selection_ = Discrete(whole_steps(weights));
+  for (uint32_t i = 0; i < size(); ++i) lights_[i].pmf = selection_.pmf(i);
+}
+
+}  // namespace covary

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sampling/light_set.h"
+
+#include <gtest/gtest.h>
+
+#include "emitters/registry.h"
+#include "scene/analytic_shape.h"
+#include "scene/mesh.h"
+#include "support/describe.h"
+#include "support/light_scene.h"
+
+namespace covary {
+namespace {
+
+using namespace test_support;
+
+/// Triangles over the square [0, 1]^2 at height z with the given first corners; areas 1/2 and 1/8.
+std::shared_ptr<TriangleMesh> two_triangles(float z) {
+  MeshData data;
+  for (const Vec3& p : {Vec3{0, 0, z}, {0, 1, z}, {1, 0, z}, {2, 0, z}, {2, 0.5f, z}, {2.5f, 0, z}})
+    data.positions.push_back(p);
+  data.triangles = {{0, 1, 2}, {3, 4, 5}};
+  return std::make_shared<TriangleMesh>(std::move(data));
+}
+
+std::shared_ptr<TriangleMesh> parallelogram(float z) {
+  MeshData data;
+  for (const Vec3& p : {Vec3{-3, 0, z}, {-2, 0, z}, {-2, 1, z}, {-3, 1, z}}) data.positions.push_back(p);
+  data.uvs = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+  data.triangles = {{1, 0, 2}, {3, 2, 0}};
+  return std::make_shared<TriangleMesh>(std::move(data));
+}
+
+/// A mesh of two triangles, a parallelogram, a sphere, a point light and an environment, all seen from below.
+struct ManyLights {
+  ManyLights() {
+    const auto add = [&](std::shared_ptr<Shape> shape, float radiance) {
+      auto light = std::make_shared<AreaLight>(std::make_shared<ConstantTexture>(Spectrum(radiance)));
+      light->attach(shape.get());
+      shape->set_emitter(light);
+      shape->set_bsdf(std::make_shared<BlackBsdf>());
+      parts.shapes.push_back(std::move(shape));
+      parts.emitters.push_back(light);
+    };
+    add(two_triangles(2), 4);
+    add(parallelogram(2), 1);
+    parts.emitters.push_back(make_plugin<Emitter>(emitter_plugins(), "emitter", "constant", {}).object);
+    add(std::make_shared<Sphere>(Transform(), Vec3{0, -3, 3}, 0.5f, false), 2);
+    parts.emitters.push_back(make_plugin<Emitter>(emitter_plugins(), "emitter", "point", {}).object);
+    parts.camera = std::make_shared<Camera>(CameraSettings{}, 4, 4);
+    scene = std::make_unique<Scene>(std::move(parts));
+  }
+  SceneParts parts;
+  std::unique_ptr<Scene> scene;
+};
+
+constexpr uint32_t kTriangles = 0, kParallelogram = 2, kSphere = 3, kPoint = 4;
+
+TEST(LightSet, NumbersTrianglesParallelogramsShapesAndPointsButNoEnvironment) {
+  const ManyLights lights;
+  const LightSet set(*lights.scene, LightSelection::kShape);
+  ASSERT_EQ(set.size(), 5u);
+  EXPECT_EQ(set[1].emitter, set[0].emitter);
+  EXPECT_EQ(set[1].part, 1u);
+  EXPECT_TRUE(set[kPoint].emitter->is_delta());
+}
+
+TEST(LightSet, SelectsByTriangleShapeOrPower) {
+  const ManyLights lights;
+  const auto expect = [&](LightSelection selection, std::vector<double> weights) {
+    const LightSet set(*lights.scene, selection);
+    double sum = 0, total = 0;
+    for (const double weight : weights) sum += weight;
+    for (uint32_t i = 0; i < set.size(); ++i) {
+      EXPECT_NEAR(set[i].pmf, weights[i] / sum, 1e-6) << name_of(selection) << ' ' << i;
+      total += set[i].pmf;
+    }
+    EXPECT_EQ(total, 1);
+  };
+  expect(LightSelection::kTriangle, {1, 1, 2, 1, 1});
+  expect(LightSelection::kShape, {0.8, 0.2, 1, 1, 1});
+  expect(LightSelection::kPower, {kPi * 4 / 2, kPi * 4 / 8, kPi, kPi * 2 * 4 * kPi * 0.25, 4 * kPi});
+}
+
+TEST(LightSet, SelectsWithExactlyTheProbabilitiesItSays) {
+  const ManyLights lights;
+  const LightSet set(*lights.scene, LightSelection::kPower);
+  std::vector<uint32_t> counts(set.size());
+  for (uint32_t i = 0; i < 1u << 24; ++i) ++counts[set.select(static_cast<float>(i) * 0x1p-24f)];
+  for (uint32_t i = 0; i < set.size(); ++i) EXPECT_EQ(static_cast<float>(counts[i]) * 0x1p-24f, set[i].pmf) << i;
+}
+
+TEST(LightSet, FindsNumberAndDensityOfASampleAtItsHit) {
+  const ManyLights lights;
+  const LightSet set(*lights.scene, LightSelection::kTriangle);
+  const Vec3 reference = {0.1f, -0.2f, 0};
+  for (uint32_t number : {kTriangles, kTriangles + 1, kParallelogram, kSphere})
+    for (int i = 0; i < 50; ++i) {
+      const PathRandom random(Sampling::kIndependent, 3, 0, number, i);
+      const EmitterSample s = set.sample(number, reference, random.get_2d(0, Event::kLightPosition),
+                                         random.get_1d(0, Event::kLightPrimitive));
+      ASSERT_GT(s.pdf_solid_angle, 0);
+      SurfaceHit hit;
+      ASSERT_TRUE(lights.scene->intersect({reference, s.wi}, hit));
+      EXPECT_EQ(set.number_of(hit), number);
+      EXPECT_NEAR(LightSet::pdf_solid_angle(reference, hit), s.pdf_solid_angle, 2e-3 * s.pdf_solid_angle);
+      EXPECT_EQ(s.radiance, set[number].emitter->surface_radiance(hit, -s.wi));
+    }
+}
+
+// The parts' densities, weighted like `path` chooses among triangles, add up to that of the whole light.
+TEST(LightSet, PartsByAreaMakeUpTheWhole) {
+  const ManyLights lights;
+  const LightSet set(*lights.scene, LightSelection::kShape);
+  for (const float x : {0.3f, 2.1f}) {
+    SurfaceHit hit;
+    ASSERT_TRUE(lights.scene->intersect({{x, 0.2f, 0}, {0, 0, 1}}, hit));
+    const float whole = hit.emitter->pdf_solid_angle({1, 1, 0}, hit);
+    EXPECT_NEAR(set[set.number_of(hit)].pmf * 4 * LightSet::pdf_solid_angle({1, 1, 0}, hit), whole, 1e-5 * whole);
+  }
+}
+
+TEST(LightSet, PartsCarryThePowerOfTheWhole) {
+  const ManyLights lights;
+  const Emitter& mesh = *lights.scene->emitters()[0];
+  EXPECT_NEAR(luminance(mesh.part_power(0) + mesh.part_power(1)), luminance(mesh.power()), 1e-5);
+}
+
+TEST(LightSet, IsEmptyWithAnEnvironmentAlone) {
+  SceneParts parts;
+  parts.emitters.push_back(make_plugin<Emitter>(emitter_plugins(), "emitter", "constant", {}).object);
+  parts.camera = std::make_shared<Camera>(CameraSettings{}, 4, 4);
+  EXPECT_TRUE(LightSet(Scene(std::move(parts)), LightSelection::kPower).empty());
+}
+
+}  // namespace
+}  // namespace covary
