@@ -25,9 +25,12 @@ class Arena {
     return object;
   }
   void reset() { used_ = 0; }
+  /// Bytes in use, and how many there are.
+  size_t used() const { return used_; }
+  static constexpr size_t kCapacity = 4096;
 
  private:
-  alignas(std::max_align_t) std::byte store_[4096];
+  alignas(std::max_align_t) std::byte store_[kCapacity];
   size_t used_ = 0;
 };
 

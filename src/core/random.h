@@ -57,6 +57,8 @@ class PathRandom {
         sampling_(sampling) {}
 
   Sampling sampling() const { return sampling_; }
+  /// Equal: all numbers are.
+  bool operator==(const PathRandom&) const = default;
 
   /// The numbers of a subpath of the same path, which share none with another subpath's. Call it on the numbers as
   /// constructed. `index` tells several of one kind apart.

@@ -43,6 +43,8 @@ struct CameraSample {
   Ray ray;
   PathRandom random;  ///< the integrator reads numbers at vertices >= 1 only
   Spectrum radiance;  ///< zero on entry
+  /// Where the numbers of a light subpath come from, if there is one: subpath(Subpath::kLight) of these.
+  PathRandom light_random = random;
 };
 
 /// How an integrator lives: it is made from parameters, gets the scene by prepare(), is trained if it learns

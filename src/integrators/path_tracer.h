@@ -16,7 +16,7 @@
 #include "integrators/integrator.h"
 #include "integrators/light_selection.h"
 #include "integrators/mis.h"
-#include "integrators/path_batch.h"
+#include "integrators/path_steps.h"
 #include "integrators/primary_sample.h"
 #include "integrators/roulette.h"
 
@@ -77,7 +77,7 @@ class PathTracer final : public Integrator {
     for (uint32_t i = 0; i < samples.size(); ++i) batch.rays[i] = samples[i].ray, batch.paths[i].sample = i;
 
     for (int depth = 0; !batch.paths.empty(); ++depth) {
-      find_surfaces(scene, depth, batch, context);
+      find_surfaces(scene, depth, lengths_.hide_emitters, batch, context);
       if (depth + 1 >= lengths_.min_depth)
         for (size_t i = 0; i < batch.paths.size(); ++i)
           samples[batch.paths[i].sample].radiance +=
@@ -97,61 +97,6 @@ class PathTracer final : public Integrator {
  private:
   using Path = PathBatch::Path;
   using Lights = std::remove_cvref_t<decltype(std::declval<const Parts&>().lights(std::declval<const Scene&>()))>;
-
-  /// Nearest hits of all rays.
-  void find_surfaces(const Scene& scene, int depth, PathBatch& batch, PathContext& context) const {
-    const size_t n = batch.paths.size();
-    scene.nearest(batch.rays, batch.ray_hits, depth == 0);
-    context.n_rays += n;
-    for (size_t i = 0; i < n; ++i) {
-      batch.paths[i].found = batch.ray_hits[i].found();
-      if (!batch.paths[i].found) continue;
-      scene.resolve(batch.rays[i], batch.ray_hits[i], batch.hits[i]);
-      if (const Texture* texture = batch.hits[i].shape->main_texture()) texture->prefetch(batch.hits[i].uv);
-    }
-    if (lengths_.hide_emitters && depth == 0)
-      for (size_t i = 0; i < n; ++i) skip_area_lights(scene, batch.paths[i], batch.rays[i], batch.hits[i], context);
-  }
-
-  static void end_paths_without_surface(PathBatch& batch) {
-    size_t n_kept = 0;
-    for (size_t i = 0; i < batch.paths.size(); ++i) {
-      if (!batch.paths[i].found) continue;
-      if (n_kept != i)
-        batch.paths[n_kept] = batch.paths[i], batch.rays[n_kept] = batch.rays[i], batch.hits[n_kept] = batch.hits[i];
-      ++n_kept;
-    }
-    batch.resize(n_kept);
-  }
-
-  /// One light sample for each vertex whose surface can use it. All choices come first, so that memory answers to one
-  /// while the others are made.
-  static void sample_lights(const Scene& scene, const Lights& lights, std::span<const CameraSample> samples,
-                            PathBatch& batch) {
-    for (size_t i = 0; i < batch.paths.size(); ++i) {
-      batch.choices[i].emitter = nullptr;
-      if (!(batch.hits[i].bsdf_flags & kSmooth)) continue;
-      const PathRandom& random = samples[batch.paths[i].sample].random;
-      const uint32_t vertex = kFirstSurfaceVertex + batch.paths[i].n_smooth;
-      const Emitter& emitter = lights.select(random.get_1d(vertex, Event::kLightChoice));
-      const Vec2 u = random.get_2d(vertex, Event::kLightPosition);
-      if (scene.environment()) emitter.prefetch(u, PrefetchStep::kTable);
-      batch.choices[i].emitter = &emitter;
-      batch.choices[i].u = u;
-      batch.choices[i].u_primitive = random.get_1d(vertex, Event::kLightPrimitive);
-    }
-    if (scene.environment())  // the only lights with large tables
-      for (size_t i = 0; i < batch.paths.size(); ++i)
-        if (batch.choices[i].emitter) batch.choices[i].emitter->prefetch(batch.choices[i].u, PrefetchStep::kValues);
-    for (size_t i = 0; i < batch.paths.size(); ++i) {
-      const PathBatch::LightChoice& choice = batch.choices[i];
-      if (!choice.emitter)
-        batch.lights[i].pdf_solid_angle = 0;
-      else
-        make_in_place(batch.lights[i],
-                      [&] { return choice.emitter->sample_towards(batch.hits[i].p, choice.u, choice.u_primitive); });
-    }
-  }
 
   /// Evaluates the surfaces: connections to the light samples, and the next rays. Paths that end are removed.
   void scatter(const Lights& lights, int depth, bool connect, std::span<CameraSample> samples, PathBatch& batch,
@@ -231,16 +176,6 @@ class PathTracer final : public Integrator {
       return PathBatch::Connection{path.throughput * f.value * light.radiance * weight, path.sample};
     });
     make_in_place(batch.shadow_rays[n], [&] { return shadow_ray(hit, light); });
-  }
-
-  /// Follows the camera ray past area lights until something else is hit.
-  static void skip_area_lights(const Scene& scene, Path& path, Ray& ray, SurfaceHit& hit, PathContext& context) {
-    while (path.found && hit.emitter) {
-      ray.o = offset_origin(hit.p, hit.ng, ray.d);
-      ray.t_max -= hit.t;
-      ++context.n_rays;
-      path.found = scene.intersect(ray, hit);
-    }
   }
 
   std::string name_;

@@ -1,0 +1,369 @@
+// SPDX-License-Identifier: Apache-2.0
+// Bidirectional path tracing whose parts can be exchanged [Veach1997] §10. A camera sample traces a subpath from the
+// light and one from the camera, and joins each vertex of one to each vertex of the other; the weights of multiple
+// importance sampling (bdpt_weights.h) share out each path among the techniques (s, t) that find it, s vertices from
+// the light and t from the camera:
+//     s = 0   the camera subpath meets a light;
+//     s = 1   a light sample, with the numbers and densities that `path` has for it;
+//     s >= 2  the subpaths are joined;
+//     t = 1   a light subpath is joined to the lens: a pass of its own (light_pass.h), if light is traced.
+// (1, 1) is left out, since s = 0 finds directly visible lights without noise.
+//
+// It estimates what `path` estimates. As there, null surfaces are vertices that block connections.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "integrators/bdpt_weights.h"
+#include "integrators/light_pass.h"
+#include "integrators/light_subpaths.h"
+#include "integrators/path_steps.h"
+#include "integrators/roulette.h"
+
+namespace covary {
+
+struct BidirectionalSettings {
+  PathLengthSettings lengths;
+  LightTracingSettings light_tracing;
+  Heuristic heuristic = Heuristic::kPower;
+};
+
+/// The parts of `bdpt`; tests exchange them as those of `path` (path_tracer.h).
+struct BidirectionalParts {
+  /// Largest number of vertices of a light subpath, at least 1. Techniques with more have weight 0.
+  int max_light_vertices() const { return PathLengthSettings::kUnlimited; }
+  /// What light subpaths carry.
+  TransportMode light_mode() const { return TransportMode::kImportance; }
+  /// Factor on what a vertex of a light subpath reflects from wo to wi, in its shading frame, where the geometric normal
+  /// is `ng`.
+  float adjoint_factor(const Vec3& wo, const Vec3& wi, const Vec3& ng) const {
+    return shading_normal_factor(wo, wi, {0, 0, 1}, ng, TransportMode::kImportance);
+  }
+  /// Probability that a light subpath starts at this light, as its throughput counts it.
+  float emission_pmf(const PowerLights& lights, const Emitter& emitter) const { return lights.pmf(emitter); }
+  float survival_probability(const Spectrum& throughput, float eta, Sampling sampling) const {
+    return roulette::survival_probability(throughput, eta, sampling);
+  }
+  float survivor_weight(float survival) const { return roulette::survivor_weight(survival); }
+  /// Factor on what joins a light subpath to the lens.
+  float splat_factor() const { return 1; }
+
+  /// Whether record() is called: for what each technique (s, t) adds to a sample, before its weight.
+  static constexpr bool kRecords = false;
+  void record(const CameraSample& /*sample*/, int /*s*/, int /*t*/, const Spectrum& /*value*/,
+              double /*weight*/) const {}
+};
+
+/// What bidirectional path tracing keeps for a thread.
+struct BidirectionalBatch final : ThreadState {
+  /// What is added to a sample if nothing lies on the ray of the same place in `rays`.
+  struct Connection {
+    Spectrum value;
+    float weight;
+    uint32_t sample;
+    int s, t;
+  };
+  PathBatch camera;
+  std::vector<SubpathSums> sums;  ///< of the camera subpaths, by sample
+  LightSubpaths light;
+  std::vector<PathRandom> light_randoms;
+  std::vector<Connection> connections;
+  std::vector<Ray> rays;
+  std::vector<uint8_t> blocked;
+};
+
+template <typename Parts>
+class BidirectionalTracer final : public LightTracingIntegrator {
+ public:
+  explicit BidirectionalTracer(const BidirectionalSettings& settings, Parts parts = {})
+      : LightTracingIntegrator(settings.light_tracing),
+        settings_(settings),
+        lengths_(settings.lengths),
+        mis_(settings.heuristic),
+        parts_(std::move(parts)) {}
+
+  void prepare(const Scene& scene) override {
+    emission_lights_.emplace(scene);
+    to_camera_ = scene.camera().settings().to_world.inverse();
+  }
+  std::unique_ptr<ThreadState> make_thread_state() const override { return std::make_unique<BidirectionalBatch>(); }
+
+  void trace(const Scene& scene, std::span<CameraSample> samples, PathContext& context) const override {
+    if (lengths_.max_depth <= 0) return;
+    auto& state = context.state_as<BidirectionalBatch>();
+    trace_light_subpaths(scene, samples, state, context);
+    PathBatch& batch = state.camera;
+    batch.start(samples.size());
+    state.sums.resize(samples.size());
+    for (uint32_t i = 0; i < samples.size(); ++i) start_path(scene, samples[i], i, state);
+
+    const UniformLights lights(scene);
+    for (int depth = 0; !batch.paths.empty(); ++depth) {
+      find_surfaces(scene, depth, lengths_.hide_emitters, batch, context);
+      if (depth + 1 >= lengths_.min_depth)
+        for (size_t i = 0; i < batch.paths.size(); ++i)
+          samples[batch.paths[i].sample].radiance +=
+              emission(scene, lights, depth, samples, batch.paths[i], batch.rays[i], batch.hits[i], state);
+      if (depth + 1 >= lengths_.max_depth) break;
+      end_paths_without_surface(batch);
+      const bool use_light_samples = depth + 2 >= lengths_.min_depth && !lights.empty();
+      if (use_light_samples) sample_lights(scene, lights, samples, batch);
+      scatter(lights, depth, use_light_samples, samples, state, context);
+      trace_connections(scene, samples, state, context);
+    }
+  }
+
+  void trace_light_paths(const Scene& scene, const LightPaths& paths, std::vector<LightSplat>& splats,
+                         PathContext& context) const override {
+    auto& state = context.state_as<BidirectionalBatch>();
+    state.light_randoms.clear();
+    for (uint32_t i = 0; i < paths.count; ++i)
+      state.light_randoms.push_back(paths.random(paths.first + i).subpath(Subpath::kLight));
+    state.light.trace(parts_, scene, *emission_lights_, mis_, state.light_randoms, max_surfaces(1), lengths_.rr_depth,
+                      context);
+    for (uint32_t i = 0; i < paths.count; ++i)
+      for (const LightVertex& end : state.light.path(i))
+        join_to_lens(scene, paths, paths.first + i, end, splats, context);
+  }
+
+  std::string description() const override {
+    return "bdpt " + lengths_.text() +
+           " heuristic=" + (settings_.heuristic == Heuristic::kPower ? "power " : "balance ") + light_tracing_text();
+  }
+
+ private:
+  using Path = PathBatch::Path;
+  using State = BidirectionalBatch;
+  /// A vertex of a camera subpath with its surface bound.
+  struct CameraVertex {
+    const SurfaceHit& hit;
+    const Vec3& wo;
+    const BsdfClosure& bsdf;
+    const Path& path;
+    const SubpathSums& sums;
+    int t;
+  };
+
+  /// Most surfaces that a light subpath needs if it is joined to t vertices from the camera.
+  int max_surfaces(int t) const { return std::min(lengths_.max_depth - t, parts_.max_light_vertices() - 1); }
+
+  void trace_light_subpaths(const Scene& scene, std::span<const CameraSample> samples, State& state,
+                            PathContext& context) const {
+    state.light_randoms.clear();
+    for (const CameraSample& sample : samples)
+      state.light_randoms.push_back(sample.light_random.subpath(Subpath::kLight));
+    state.light.trace(parts_, scene, *emission_lights_, mis_, state.light_randoms, max_surfaces(2), lengths_.rr_depth,
+                      context);
+  }
+
+  void start_path(const Scene& scene, const CameraSample& sample, uint32_t i, State& state) const {
+    Path& path = state.camera.paths[i];
+    state.camera.rays[i] = sample.ray;
+    path.sample = i;
+    state.sums[i] = {};
+    if (!traces_light()) return;
+    // The ray begins on the near plane, but densities count from the lens.
+    const Vec3& d = sample.ray.d;
+    path.previous_p = sample.ray.o - d * (scene.camera().settings().near_clip / to_camera_.vector(d).z);
+    state.sums[i].vcm = mis_.raised(light_paths_per_spp() / scene.camera().pdf_direction(d));
+  }
+
+  /// s = 0: contribution of what the path's ray met.
+  Spectrum emission(const Scene& scene, const UniformLights& lights, int depth, std::span<const CameraSample> samples,
+                    const Path& path, const Ray& ray, const SurfaceHit& hit, const State& state) const {
+    const Emitter* emitter = path.found ? hit.emitter : scene.environment();
+    if (!emitter || (!path.found && lengths_.hide_emitters && path.only_null)) return {};
+    const EnvironmentLight light =
+        path.found ? EnvironmentLight{emitter->surface_radiance(hit, -ray.d)} : emitter->environment(ray.d);
+    const Spectrum radiance = path.throughput * light.radiance;
+    if (is_black(radiance)) return {};
+    const SubpathSums& left = state.sums[path.sample];
+    double weight = 1;
+    if (depth > 0 && (left.vcm > 0 || left.vc > 0)) {
+      const float pdf_light = path.found ? emitter->pdf_solid_angle(path.previous_p, hit) : light.pdf_solid_angle;
+      const LightPdfs pdfs =
+          light_pdfs(*emitter, lights.pmf(*emitter), pdf_light, emission_lights_->pmf(*emitter),
+                     emitter->pdf_emission(hit, -ray.d), hit.ng, ray.d, length_squared(hit.p - path.previous_p));
+      weight = 1 / (1 + mis_.others_of_hit(left, pdfs));
+    }
+    parts_.record(samples[path.sample], 0, depth + 2, radiance, weight);
+    return radiance * static_cast<float>(weight);
+  }
+
+  /// Evaluates the surfaces: connections to lights and light subpaths, and the next rays. Paths that end are removed.
+  void scatter(const UniformLights& lights, int depth, bool use_light_samples, std::span<CameraSample> samples,
+               State& state, PathContext& context) const {
+    PathBatch& batch = state.camera;
+    batch.alive.clear();
+    for (uint32_t i = 0; i < batch.paths.size(); ++i) {
+      Path& path = batch.paths[i];
+      const SurfaceHit& hit = batch.hits[i];
+      const Vec3 wo = hit.frame.to_local(-batch.rays[i].d);
+      SubpathSums& sums = state.sums[path.sample];
+      sums = mis_.arrive(sums, mis_cosine(hit.ng, batch.rays[i].d), length_squared(hit.p - path.previous_p));
+      // Addresses as those of `path`.
+      const uint32_t vertex = hit.bsdf_flags & kSmooth ? kFirstSurfaceVertex + path.n_smooth++ : kDeltaVertices + depth;
+      context.arena.reset();
+      const BsdfClosure* bsdf = hit.bsdf->bind(hit, wo.z > 0, TransportMode::kRadiance, context.arena);
+      const CameraVertex end{hit, wo, *bsdf, path, sums, depth + 2};
+      if (use_light_samples && batch.lights[i].pdf_solid_angle > 0)
+        join_to_light(lights.pmf(*batch.choices[i].emitter), *batch.choices[i].emitter, batch.lights[i], end, state);
+      if (hit.bsdf_flags & kSmooth)
+        for (const LightVertex& light : state.light.path(path.sample)) join(light, end, state);
+
+      if (!go_on(depth, vertex, samples[path.sample], hit, wo, *bsdf, path, sums, batch.rays[i])) continue;
+      batch.alive.push_back(i);
+    }
+    for (size_t n = 0; n < batch.alive.size(); ++n)
+      if (const uint32_t i = batch.alive[n]; i != n) batch.paths[n] = batch.paths[i], batch.rays[n] = batch.rays[i];
+    batch.resize(batch.alive.size());
+  }
+
+  /// Draws the next ray of a camera subpath; false where it ends.
+  bool go_on(int depth, uint32_t vertex, CameraSample& sample, const SurfaceHit& hit, const Vec3& wo,
+             const BsdfClosure& bsdf, Path& path, SubpathSums& sums, Ray& ray) const {
+    const PathRandom& random = sample.random;
+    const BsdfSample next =
+        bsdf.sample(wo, random.get_1d(vertex, Event::kLobe), random.get_2d(vertex, Event::kDirection));
+    if (!next.valid() || is_black(next.weight)) return false;
+    path.throughput *= next.weight;
+    path.eta *= next.eta;
+    if (!(next.flags & kNullTransmission)) path.only_null = false;
+    if (depth + 1 >= lengths_.rr_depth) {
+      const float survival = parts_.survival_probability(path.throughput, path.eta, random.sampling());
+      if (!(random.get_1d(vertex, Event::kRoulette) < survival)) {
+        if (std::isnan(survival)) sample.radiance = path.throughput;  // a bad sample, not a black one
+        return false;
+      }
+      path.throughput *= parts_.survivor_weight(survival);
+    }
+    const Vec3 wi = hit.frame.to_world(next.wi);
+    sums = mis_.leave(sums, mis_cosine(hit.ng, wi), scatter_pdfs(bsdf, wo, next));
+    if (parts_.max_light_vertices() == 1) sums.vc = 0;
+    path.previous_p = hit.p;
+    make_in_place(ray, [&] { return Ray{offset_origin(hit.p, hit.ng, wi), wi, kInfinity}; });
+    return true;
+  }
+
+  /// s = 1.
+  void join_to_light(float pmf, const Emitter& emitter, const EmitterSample& light, const CameraVertex& end,
+                     State& state) const {
+    if (is_black(light.radiance)) return;
+    const Vec3 wi = end.hit.frame.to_local(light.wi);
+    const BsdfValue f = end.bsdf.eval(end.wo, wi);
+    if (is_black(f.value)) return;
+    const EmissionPdf emission = emitter.pdf_emission(point_on_light(light.p, light.n, light.uv), -light.wi);
+    const LightPdfs pdfs = light_pdfs(emitter, pmf, light.pdf_solid_angle, emission_lights_->pmf(emitter), emission,
+                                      light.n, light.wi, sqr(light.distance));
+    SubpathSums sums = end.sums;
+    if (parts_.max_light_vertices() == 1) sums = {};
+    const double reverse = sums.vc > 0 ? end.bsdf.reverse_pdf(end.wo, wi) : 0;
+    const double others =
+        mis_.others_of_light_sample(sums, pdfs, mis_cosine(end.hit.ng, light.wi), f.pdf_solid_angle, reverse);
+    const Spectrum value = end.path.throughput * f.value * light.radiance * (1 / (pmf * light.pdf_solid_angle));
+    connect(value, 1 / (1 + others), shadow_ray(end.hit, light), 1, end, state);
+  }
+
+  /// s >= 2.
+  void join(const LightVertex& light, const CameraVertex& end, State& state) const {
+    const int n_edges = static_cast<int>(light.n_vertices) + end.t - 1;
+    if (n_edges > lengths_.max_depth || n_edges < lengths_.min_depth) return;
+    const Vec3 between = light.p - end.hit.p;
+    const float distance_squared = length_squared(between);
+    if (!(distance_squared > 0)) return;
+    const Vec3 w = between * (1 / std::sqrt(distance_squared));
+    const Vec3 wi_camera = end.hit.frame.to_local(w), wi_light = light.frame.to_local(-w);
+    const BsdfValue camera_f = end.bsdf.eval(end.wo, wi_camera);
+    if (is_black(camera_f.value)) return;
+    const BsdfValue light_f = light.bsdf->eval(light.wo, wi_light);
+    if (is_black(light_f.value)) return;
+    const double others =
+        mis_.others(light.sums, camera_f.pdf_solid_angle * mis_cosine(light.ng, wi_light) / distance_squared,
+                    light.bsdf->reverse_pdf(light.wo, wi_light)) +
+        mis_.others(end.sums, light_f.pdf_solid_angle * mis_cosine(end.hit.ng, w) / distance_squared,
+                    end.bsdf.reverse_pdf(end.wo, wi_camera));
+    const float factor = parts_.adjoint_factor(light.wo, wi_light, light.ng) / distance_squared;
+    const Spectrum value = end.path.throughput * camera_f.value * (light.throughput * light_f.value * factor);
+    const Vec3 o = offset_origin(end.hit.p, end.hit.ng, w);
+    const Vec3 target = offset_origin(light.p, light.frame.to_world(light.ng), -w);
+    const float distance = length(target - o);
+    const Ray ray{o, (target - o) * (1 / distance), distance * (1 - kRayEpsilon)};
+    connect(value, 1 / (1 + others), ray, static_cast<int>(light.n_vertices), end, state);
+  }
+
+  static void connect(const Spectrum& value, double weight, const Ray& ray, int s, const CameraVertex& end,
+                      State& state) {
+    state.connections.push_back({value, static_cast<float>(weight), end.path.sample, s, end.t});
+    state.rays.push_back(ray);
+  }
+
+  /// Adds the connections that nothing hides.
+  void trace_connections(const Scene& scene, std::span<CameraSample> samples, State& state,
+                         PathContext& context) const {
+    state.blocked.resize(state.rays.size());
+    scene.occluded(state.rays, state.blocked);
+    context.n_rays += state.rays.size();
+    for (size_t i = 0; i < state.rays.size(); ++i) {
+      if (state.blocked[i]) continue;
+      const State::Connection& c = state.connections[i];
+      parts_.record(samples[c.sample], c.s, c.t, c.value, c.weight);
+      samples[c.sample].radiance += c.value * c.weight;
+    }
+    state.connections.clear(), state.rays.clear();
+  }
+
+  /// t = 1: adds the splat of a vertex of a light subpath.
+  void join_to_lens(const Scene& scene, const LightPaths& paths, uint64_t path, const LightVertex& end,
+                    std::vector<LightSplat>& splats, PathContext& context) const {
+    const int n_edges = static_cast<int>(end.n_vertices);
+    if (n_edges < lengths_.min_depth || (end.on_light && lengths_.hide_emitters)) return;
+    const PathRandom random = paths.random(path);
+    const LensSample lens = scene.camera().sample_towards(end.p, random.get_2d(end.address, Event::kLens));
+    if (!(lens.pdf_solid_angle > 0)) return;
+    const SplatPixel pixel = paths.pixel_at(lens.film, random.get_2d(end.address, Event::kPixel));
+    if (!(pixel.weight > 0)) return;
+    const Vec3 wi = end.frame.to_local(lens.wi);
+    const BsdfValue f = end.bsdf->eval(end.wo, wi);
+    if (is_black(f.value)) return;
+    const double cosine = mis_cosine(end.ng, wi), distance_squared = sqr(static_cast<double>(lens.distance));
+    const double others =
+        mis_.others(end.sums, lens.pdf_direction * cosine / (distance_squared * light_paths_per_spp()),
+                    end.bsdf->reverse_pdf(end.wo, wi));
+    if (!reaches_lens(scene, end, lens, context)) return;
+    const float factor = parts_.adjoint_factor(end.wo, wi, end.ng) * lens.importance / lens.pdf_solid_angle;
+    const Spectrum value = end.throughput * f.value * factor;
+    const double weight = 1 / (1 + others);
+    splats.push_back(
+        {path, pixel.x, pixel.y, value * (static_cast<float>(weight) * pixel.weight * parts_.splat_factor())});
+  }
+
+  /// Whether the camera sees the vertex, past area lights where these are hidden.
+  bool reaches_lens(const Scene& scene, const LightVertex& end, const LensSample& lens, PathContext& context) const {
+    const Vec3 o = offset_origin(end.p, end.frame.to_world(end.ng), lens.wi);
+    const float distance = length(lens.near_p - o);
+    Ray ray{o, (lens.near_p - o) * (1 / distance), distance};
+    ++context.n_rays;
+    if (!lengths_.hide_emitters) return !scene.occluded(ray);
+    SurfaceHit hit;
+    while (scene.intersect(ray, hit)) {
+      if (!hit.emitter) return false;
+      ray.o = offset_origin(hit.p, hit.ng, ray.d);
+      ray.t_max -= hit.t;
+      ++context.n_rays;
+    }
+    return true;
+  }
+
+  BidirectionalSettings settings_;
+  PathLengthSettings lengths_;
+  BidirectionalMis mis_;
+  Parts parts_;
+  std::optional<PowerLights> emission_lights_;
+  Transform to_camera_;
+};
+
+}  // namespace covary
