@@ -38,8 +38,8 @@ struct BidirectionalParts {
   int max_light_vertices() const { return PathLengthSettings::kUnlimited; }
   /// What light subpaths carry.
   TransportMode light_mode() const { return TransportMode::kImportance; }
-  /// Factor on what a vertex of a light subpath reflects from wo to wi, in its shading frame, where the geometric normal
-  /// is `ng`.
+  /// Factor on what a vertex of a light subpath reflects from wo to wi, in its shading frame; `ng`: its geometric
+  /// normal there.
   float adjoint_factor(const Vec3& wo, const Vec3& wi, const Vec3& ng) const {
     return shading_normal_factor(wo, wi, {0, 0, 1}, ng, TransportMode::kImportance);
   }
