@@ -2,7 +2,7 @@
 #include "sampling/coefficient_cache.h"
 
 #include <algorithm>
-#include <numeric>
+#include <bit>
 
 #include "core/error.h"
 #include "core/parallel.h"
@@ -13,18 +13,41 @@ namespace {
 constexpr uint32_t kCoarsest = 4;  // cells along the longest side of the pyramid's last grid, below its root
 constexpr uint32_t kChunk = 32;    // cells that a thread takes at a time
 
-/// One cell while it is solved.
-struct CellSystem {
-  CellKey key;
+/// The cells of one grid while they are solved, neighbours along a curve through space: arrays over cells, and over
+/// lights seen in cells.
+struct Level {
   SystemLayout layout;
-  std::vector<double> head, rows;
+  std::vector<CellKey> keys;
+  std::vector<double> heads;
+  std::vector<size_t> first;  // of each cell's lights, and their number
   std::vector<uint32_t> lights;
-  uint32_t parent = CoefficientTable::kNone;  // in the level above
-  Coefficients solution;
-  Spectrum scale{1}, light_sum{0};
-  SystemView view() const { return {layout, head, lights, rows}; }
+  std::vector<float> rows;
+  std::vector<uint32_t> parents;  // in the level above; empty where there is none
+  std::vector<Spectrum> light_values, dense_values, scales, light_sums;
+
+  uint32_t n_cells() const { return static_cast<uint32_t>(keys.size()); }
+  size_t n_lights(uint32_t cell) const { return first[cell + 1] - first[cell]; }
+  std::span<const uint32_t> lights_of(uint32_t cell) const { return {&lights[0] + first[cell], n_lights(cell)}; }
+  CoefficientsView coefficients(uint32_t cell) {
+    return {{light_values.data() + first[cell], n_lights(cell)},
+            {dense_values.data() + size_t{cell} * layout.n_dense, layout.n_dense}};
+  }
+  SystemView system(uint32_t cell) const {
+    return {layout,
+            {heads.data() + size_t{cell} * layout.head_size(), layout.head_size()},
+            {lights.data() + first[cell], n_lights(cell)},
+            {rows.data() + first[cell] * layout.row_size(), n_lights(cell) * layout.row_size()}};
+  }
+  /// Room for cells and, once first is known, for lights.
+  void resize_cells(size_t n) {
+    keys.resize(n), first.resize(n + 1), heads.resize(n * layout.head_size());
+    dense_values.resize(n * layout.n_dense), scales.resize(n, Spectrum(1)), light_sums.resize(n);
+  }
+  void resize_lights() {
+    for (size_t i = 1; i < first.size(); ++i) first[i] += first[i - 1];
+    lights.resize(first.back()), rows.resize(first.back() * layout.row_size()), light_values.resize(first.back());
+  }
 };
-using Level = std::vector<CellSystem>;
 
 /// Order in which the children of each cell of every coarser grid are neighbours: the bits of x, y, z interleaved.
 uint64_t curve_position(CellKey key) {
@@ -38,95 +61,141 @@ uint64_t curve_position(CellKey key) {
   return uint64_t{key.kind()} << 51 | spread(key.z()) << 2 | spread(key.y()) << 1 | spread(key.x());
 }
 
-/// Rows of `cells`, sorted by light, those of one light added up in the order of the cells.
-void gather_rows(std::span<const CellSystem> cells, CellSystem& sum) {
-  std::vector<std::pair<uint32_t, const double*>> rows;
-  const size_t size = sum.layout.row_size();
-  for (const CellSystem& cell : cells)
-    for (size_t i = 0; i < cell.lights.size(); ++i) rows.emplace_back(cell.lights[i], &cell.rows[i * size]);
-  std::stable_sort(rows.begin(), rows.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-  for (const auto& [light, row] : rows) {
-    if (sum.lights.empty() || sum.lights.back() != light) {
-      sum.lights.push_back(light);
-      sum.rows.resize(sum.rows.size() + size);
-    }
-    double* own = &sum.rows[sum.rows.size() - size];
-    for (size_t i = 0; i < size; ++i) own[i] += row[i];
+/// A set of lights that is read in increasing order.
+class LightSetBits {
+ public:
+  explicit LightSetBits(size_t n_lights) : words_((n_lights + 63) / 64) {}
+  void insert(uint32_t light) { words_[light / 64] |= uint64_t{1} << light % 64; }
+  template <typename F>
+  void take_each(const F& f) {
+    for (size_t w = 0; w < words_.size(); ++w)
+      for (; words_[w] != 0; words_[w] &= words_[w] - 1)
+        f(static_cast<uint32_t>(64 * w + static_cast<size_t>(std::countr_zero(words_[w]))));
   }
+
+ private:
+  std::vector<uint64_t> words_;
+};
+
+/// Calls body(first, last) for parts of [0, n).
+template <typename Body>
+void parallel_parts(uint32_t n, const Body& body) {
+  parallel_for((n + kChunk - 1) / kChunk,
+               [&](uint32_t part) { body(part * kChunk, std::min(n, (part + 1) * kChunk)); });
 }
 
-Level finest_level(const SystemSums& sums) {
+Level finest_level(const SystemSums& sums, size_t n_lights) {
+  Level level{sums.layout()};
   const uint32_t n = sums.n_cells();
-  std::vector<uint32_t> order(n), place(n);
-  std::iota(order.begin(), order.end(), 0u);
-  std::sort(order.begin(), order.end(),
-            [&](uint32_t a, uint32_t b) { return curve_position(sums.key(a)) < curve_position(sums.key(b)); });
-  for (uint32_t i = 0; i < n; ++i) place[order[i]] = i;
-  std::vector<std::vector<uint32_t>> rows(n);
-  for (size_t i = 0; i < sums.n_rows(); ++i) rows[place[sums.row_cell(i)]].push_back(static_cast<uint32_t>(i));
-  Level level(n);
-  parallel_for(n, kChunk, [&](uint32_t i) {
-    CellSystem& cell = level[i];
-    cell.key = sums.key(order[i]), cell.layout = sums.layout();
-    const auto head = sums.head(order[i]);
-    cell.head.assign(head.begin(), head.end());
-    std::sort(rows[i].begin(), rows[i].end(),
-              [&](uint32_t a, uint32_t b) { return sums.row_light(a) < sums.row_light(b); });
-    for (uint32_t row : rows[i]) {
-      cell.lights.push_back(sums.row_light(row));
-      cell.rows.insert(cell.rows.end(), sums.row(row).begin(), sums.row(row).end());
+  level.resize_cells(n);
+  std::vector<std::pair<uint64_t, uint32_t>> order(n);
+  for (uint32_t i = 0; i < n; ++i) order[i] = {curve_position(sums.key(i)), i};
+  std::sort(order.begin(), order.end());
+  std::vector<uint32_t> place(n);
+  for (uint32_t i = 0; i < n; ++i) place[order[i].second] = i;
+
+  // Rows of a cell together, in any order; then by light.
+  for (size_t i = 0; i < sums.n_rows(); ++i) ++level.first[place[sums.row_cell(i)] + 1];
+  level.resize_lights();
+  std::vector<uint32_t> rows(sums.n_rows());
+  std::vector<size_t> next(level.first.begin(), level.first.end() - 1);
+  for (size_t i = 0; i < sums.n_rows(); ++i) rows[next[place[sums.row_cell(i)]]++] = static_cast<uint32_t>(i);
+  parallel_parts(n, [&](uint32_t begin, uint32_t end) {
+    LightSetBits seen(n_lights);
+    std::vector<uint32_t> row_of(n_lights);
+    for (uint32_t i = begin; i < end; ++i) {
+      level.keys[i] = sums.key(order[i].second);
+      std::ranges::copy(sums.head(order[i].second), level.heads.data() + size_t{i} * level.layout.head_size());
+      for (size_t r = level.first[i]; r < level.first[i + 1]; ++r)
+        seen.insert(sums.row_light(rows[r])), row_of[sums.row_light(rows[r])] = rows[r];
+      size_t r = level.first[i];
+      seen.take_each([&](uint32_t light) {
+        level.lights[r] = light;
+        std::ranges::copy(sums.row(row_of[light]), level.rows.data() + r++ * level.layout.row_size());
+      });
     }
   });
   return level;
 }
 
 /// The level above: cells twice as wide, or a single one, the root, that knows no normals.
-Level coarser_level(Level& finer, bool root) {
-  const auto parent_key = [&](const CellSystem& cell) {
-    return root ? CoefficientTable::root_key() : cell.key.coarser(1);
-  };
-  std::vector<uint32_t> first;
-  for (uint32_t i = 0; i < finer.size(); ++i) {
-    if (i == 0 || !(parent_key(finer[i]) == parent_key(finer[i - 1]))) first.push_back(i);
-    finer[i].parent = static_cast<uint32_t>(first.size() - 1);
+Level coarser_level(Level& finer, size_t n_lights, bool root) {
+  const auto parent_key = [&](uint32_t i) { return root ? CoefficientTable::root_key() : finer.keys[i].coarser(1); };
+  std::vector<uint32_t> child;  // the first of each parent
+  finer.parents.resize(finer.n_cells());
+  for (uint32_t i = 0; i < finer.n_cells(); ++i) {
+    if (i == 0 || !(parent_key(i) == parent_key(i - 1))) child.push_back(i);
+    finer.parents[i] = static_cast<uint32_t>(child.size() - 1);
   }
-  first.push_back(static_cast<uint32_t>(finer.size()));
-  Level level(first.size() - 1);
-  parallel_for(static_cast<uint32_t>(level.size()), kChunk, [&](uint32_t i) {
-    const std::span<const CellSystem> children(&finer[first[i]], &finer[0] + first[i + 1]);
-    CellSystem& cell = level[i];
-    cell.key = parent_key(children[0]), cell.layout = children[0].layout;
-    cell.head.resize(cell.layout.head_size());
-    for (const CellSystem& child : children)
-      for (size_t j = 0; j < cell.head.size(); ++j) cell.head[j] += child.head[j];
-    gather_rows(children, cell);
+  const auto n = static_cast<uint32_t>(child.size());
+  child.push_back(finer.n_cells());
+  Level level{finer.layout};
+  level.resize_cells(n);
+  const size_t head_size = level.layout.head_size(), row_size = level.layout.row_size();
+  const auto insert_lights = [&](uint32_t i, LightSetBits& seen) {
+    for (size_t r = finer.first[child[i]]; r < finer.first[child[i + 1]]; ++r) seen.insert(finer.lights[r]);
+  };
+  parallel_parts(n, [&](uint32_t begin, uint32_t end) {
+    LightSetBits seen(n_lights);
+    for (uint32_t i = begin; i < end; ++i) {
+      insert_lights(i, seen);
+      seen.take_each([&](uint32_t) { ++level.first[i + 1]; });
+    }
+  });
+  level.resize_lights();
+  parallel_parts(n, [&](uint32_t begin, uint32_t end) {
+    LightSetBits seen(n_lights);
+    std::vector<size_t> row_of(n_lights);
+    for (uint32_t i = begin; i < end; ++i) {
+      level.keys[i] = parent_key(child[i]);
+      double* head = level.heads.data() + i * head_size;
+      for (size_t h = child[i] * head_size; h < child[i + 1] * head_size; ++h) head[h % head_size] += finer.heads[h];
+      insert_lights(i, seen);
+      size_t next = level.first[i];
+      seen.take_each([&](uint32_t light) { level.lights[next] = light, row_of[light] = next++; });
+      for (size_t r = finer.first[child[i]]; r < finer.first[child[i + 1]]; ++r) {
+        float* row = level.rows.data() + row_of[finer.lights[r]] * row_size;
+        for (size_t j = 0; j < row_size; ++j) row[j] += finer.rows[r * row_size + j];
+      }
+    }
   });
   return level;
 }
 
-/// The parent's coefficients for the lights of a cell, all of which the parent has seen.
-Coefficients prior_of(const CellSystem& cell, const CellSystem* parent) {
-  Coefficients prior;
-  prior.lights.resize(cell.lights.size());
-  prior.dense.resize(cell.layout.n_dense);
-  if (!parent) return prior;
-  prior.dense = parent->solution.dense;
-  for (size_t k = 0, p = 0; k < cell.lights.size(); ++k) {
-    while (parent->lights[p] != cell.lights[k]) ++p;
-    prior.lights[k] = parent->solution.lights[p];
+void solve_cell(Level& level, uint32_t i, const Level* above, const std::vector<float>& light_counts,
+                const CacheSettings& settings) {
+  const CoefficientsView own = level.coefficients(i);
+  const std::span<const uint32_t> lights = level.lights_of(i);
+  Spectrum& sum = level.light_sums[i];
+  if (above) {
+    // The prior: what the parent has for the lights of the cell, all of which it has seen.
+    const uint32_t parent = level.parents[i];
+    const size_t m = level.layout.n_dense;
+    std::copy_n(above->dense_values.data() + parent * m, m, own.dense.begin());
+    size_t p = above->first[parent];
+    sum = above->light_sums[parent], level.scales[i] = above->scales[parent];
+    for (size_t k = 0; k < lights.size(); ++k) {
+      while (above->lights[p] != lights[k]) ++p;
+      own.lights[k] = above->light_values[p];
+      sum += own.lights[k] * -light_counts[lights[k]];  // lights that the cell has not seen keep their part of the sum
+    }
   }
-  return prior;
+  solve_block_arrow(level.system(i), {settings.prior_samples, settings.monochrome}, own);
+  for (size_t k = 0; k < lights.size(); ++k) sum += own.lights[k] * light_counts[lights[k]];
+  if (settings.held_out)
+    level.scales[i] = best_share(level.system(i), level.scales[i], settings.prior_vertices, settings.monochrome);
 }
 
-void solve_cell(CellSystem& cell, const CellSystem* parent, const std::vector<float>& light_counts,
-                const CacheSettings& settings) {
-  const Coefficients prior = prior_of(cell, parent);
-  cell.solution = solve_block_arrow(cell.view(), prior, {settings.prior_samples, settings.monochrome});
-  // Lights that the cell has not seen count with what they have in the parent's sum.
-  if (parent) cell.light_sum = parent->light_sum, cell.scale = parent->scale;
-  for (size_t k = 0; k < cell.lights.size(); ++k)
-    cell.light_sum += (cell.solution.lights[k] - prior.lights[k]) * light_counts[cell.lights[k]];
-  if (settings.held_out) cell.scale = best_share(cell.view(), cell.scale, settings.prior_vertices, settings.monochrome);
+/// Adds the cells of a level to a table; `first_above` is the number of the first cell of the level above there.
+void add_to_table(Level& level, uint32_t first_above, CoefficientTable& table) {
+  std::vector<CoefficientTable::NewCell> cells(level.n_cells());
+  for (uint32_t i = 0; i < level.n_cells(); ++i) {
+    const CoefficientsView values = level.coefficients(i);
+    const uint32_t parent = level.parents.empty() ? CoefficientTable::kNone : first_above + level.parents[i];
+    cells[i] = {level.keys[i],      parent,        level.scales[i], level.light_sums[i],
+                level.lights_of(i), values.lights, values.dense};
+  }
+  table.add_cells(cells);
 }
 
 }  // namespace
@@ -152,13 +221,13 @@ CoefficientCache::CoefficientCache(const Bounds3& bounds, std::vector<float> lig
 void CoefficientCache::restart() {
   level_ = 0, n_rejected_ = 0;
   sums_ = SystemSums(layout_);
-  table_ = CoefficientTable(finest_, layout_);
+  table_ = CoefficientTable(finest_, static_cast<uint32_t>(light_counts_.size()), layout_.n_dense);
 }
 
 void CoefficientCache::absorb(const SystemSums& sums) {
   sums_.merge(sums);
-  const uint32_t last = CellKey::kMaxCoordinate;
-  while (sums_.bytes() > settings_.memory_limit && (settings_.resolution & last) >> sums_.level() > 0) {
+  const auto needed = [&] { return sums_.bytes() + CoefficientTable::expected_bytes(sums_.n_cells(), sums_.n_rows()); };
+  while (needed() > settings_.memory_limit && settings_.resolution >> sums_.level() > 0) {
     SystemSums coarser(layout_, sums_.level() + 1);
     coarser.merge(sums_);
     sums_ = std::move(coarser);
@@ -168,29 +237,22 @@ void CoefficientCache::absorb(const SystemSums& sums) {
 void CoefficientCache::update() {
   CellGrid grid = finest_;
   for (level_ = 0; level_ < sums_.level(); ++level_) grid = grid.coarser();
-  table_ = CoefficientTable(grid, layout_);
+  table_ = CoefficientTable(grid, static_cast<uint32_t>(light_counts_.size()), layout_.n_dense);
   if (sums_.n_cells() == 0) return;
 
   std::vector<Level> levels;  // finest first
-  levels.push_back(finest_level(sums_));
+  levels.push_back(finest_level(sums_, light_counts_.size()));
   if (settings_.pyramid) {
     for (uint32_t resolution = grid.resolution(); resolution > kCoarsest; resolution = (resolution + 1) / 2)
-      levels.push_back(coarser_level(levels.back(), false));
-    levels.push_back(coarser_level(levels.back(), true));
+      levels.push_back(coarser_level(levels.back(), light_counts_.size(), false));
+    levels.push_back(coarser_level(levels.back(), light_counts_.size(), true));
   }
-  std::vector<uint32_t> numbers, parent_numbers;  // in the table
-  for (size_t l = levels.size(); l-- > 0;) {
-    Level& level = levels[l];
+  uint32_t first_above = 0, first = 0;
+  for (size_t l = levels.size(); l-- > 0; first_above = first, first = table_.n_cells()) {
     const Level* above = l + 1 < levels.size() ? &levels[l + 1] : nullptr;
-    const auto n = static_cast<uint32_t>(level.size());
-    parallel_for(n, kChunk, [&](uint32_t i) {
-      solve_cell(level[i], above ? &(*above)[level[i].parent] : nullptr, light_counts_, settings_);
-    });
-    std::swap(numbers, parent_numbers);
-    numbers.clear();
-    for (const CellSystem& cell : level)
-      numbers.push_back(table_.add_cell(cell.key, above ? parent_numbers[cell.parent] : CoefficientTable::kNone,
-                                        cell.scale, cell.light_sum, cell.lights, cell.solution));
+    parallel_for(levels[l].n_cells(), kChunk,
+                 [&](uint32_t i) { solve_cell(levels[l], i, above, light_counts_, settings_); });
+    add_to_table(levels[l], first_above, table_);
   }
   sums_.scale_held_out(0);
 }

@@ -20,7 +20,6 @@
 
 #include <cstdint>
 #include <span>
-#include <vector>
 
 #include "core/spectrum.h"
 
@@ -60,12 +59,12 @@ struct SystemView {
   SystemLayout layout;
   std::span<const double> head;      ///< layout.head_size() numbers
   std::span<const uint32_t> lights;  ///< lights with samples, in increasing order
-  std::span<const double> rows;      ///< layout.row_size() numbers for each of them
+  std::span<const float> rows;       ///< layout.row_size() numbers for each of them
 };
 
-/// Coefficients β of a system's lights (in the order of its rows) and dense techniques.
-struct Coefficients {
-  std::vector<Spectrum> lights, dense;
+/// Coefficients β of a system's lights (in the order of its rows) and dense techniques; it does not own them.
+struct CoefficientsView {
+  std::span<Spectrum> lights, dense;
 };
 
 struct SolveSettings {
@@ -75,16 +74,17 @@ struct SolveSettings {
   bool monochrome = false;  ///< one coefficient for all channels: the best in the mean over RGB
 };
 
-/// Solves the system in time linear in the number of lights, [Hua2023] Eq. (32) and (33).
+/// Solves the system in time linear in the number of lights, [Hua2023] Eq. (32) and (33). `coefficients` hold the prior
+/// on entry and the solution on return.
 ///
-/// `prior` holds the coefficients that the solution is drawn to, up to a constant: the constant that makes the prior's
-/// residuals vanish in the mean is added, and not part of the result (equal coefficients have no effect, so prior and
-/// result can be compared and inherited). A technique without samples keeps its prior. A prior of zeros and no samples
-/// give zeros, the plain estimate. The result is finite whenever the sums are.
-Coefficients solve_block_arrow(const SystemView& system, const Coefficients& prior, const SolveSettings& settings);
+/// The solution is drawn to the prior up to a constant: the constant that makes the prior's residuals vanish in the
+/// mean is added, and not part of the result (equal coefficients have no effect, so prior and result can be compared
+/// and inherited). A technique without samples keeps its prior. A prior of zeros and no samples give zeros, the plain
+/// estimate. The result is finite whenever the sums are.
+void solve_block_arrow(const SystemView& system, const SolveSettings& settings, CoefficientsView coefficients);
 
 /// The same by a factorisation of the whole matrix, to check the former; cubic in the number of lights.
-Coefficients solve_dense(const SystemView& system, const Coefficients& prior, const SolveSettings& settings);
+void solve_dense(const SystemView& system, const SolveSettings& settings, CoefficientsView coefficients);
 
 /// How much of a system's control to use, per channel in [0, 1]: the share s for which the mixture of plain and
 /// controlled estimate, plain + s · control, had the least second moment over vertices that the coefficients had not

@@ -3,11 +3,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 #include <cstring>
+#include <numeric>
 
 #include "core/content_hash.h"
 #include "core/error.h"
+#include "core/parallel.h"
 
 namespace covary {
 namespace {
@@ -28,6 +31,7 @@ void append(std::string& bytes, const T& value) {
 
 constexpr std::string_view kMagic = "covary coefficients\n";
 constexpr uint32_t kVersion = 1;
+constexpr size_t kChunk = 64;  // cells that a thread fills at a time
 
 class Reader {
  public:
@@ -94,19 +98,15 @@ uint32_t CoefficientTable::find(CellKey key) const {
 
 void CoefficientTable::prefetch(CellKey key) const { index_.prefetch(key.bits); }
 
-const CoefficientTable::Entry* CoefficientTable::entry(const Cell& cell, uint32_t light) const {
-  if (cell.n_entries == 0) return nullptr;
-  const Entry* entries = &entries_[cell.first_entry];
-  const uint32_t mask = cell.n_entries - 1;
-  for (uint32_t i = light & mask;; i = (i + 1) & mask) {
-    if (entries[i].light == light) return &entries[i];
-    if (entries[i].light == kNone) return nullptr;
+Spectrum CoefficientTable::light_of(uint32_t cell, uint32_t light) const {
+  for (; cell != kNone; cell = cells_[cell].parent) {
+    const Cell& own = cells_[cell];
+    if (own.n_slots == kEveryLight) return values_[own.first + light];
+    if (own.n_slots == 0) continue;
+    const uint32_t* slots = &slots_[own.first_slot];
+    for (uint32_t i = light & (own.n_slots - 1); slots[i] != kNone; i = (i + 1) & (own.n_slots - 1))
+      if (slots[i] == light) return values_[own.first + i];
   }
-}
-
-Spectrum CoefficientTable::light(uint32_t cell, uint32_t light) const {
-  for (; cell != kNone; cell = cells_[cell].parent)
-    if (const Entry* found = entry(cells_[cell], light)) return found->value;
   return Spectrum(0);
 }
 
@@ -117,50 +117,82 @@ uint32_t CoefficientTable::n_switched_off() const {
 }
 
 size_t CoefficientTable::bytes() const {
-  return index_.bytes() + cells_.capacity() * sizeof(Cell) + dense_.capacity() * sizeof(Spectrum) +
-         entries_.capacity() * sizeof(Entry);
+  return index_.bytes() + cells_.capacity() * sizeof(Cell) +
+         (dense_.capacity() + values_.capacity()) * sizeof(Spectrum) + slots_.capacity() * sizeof(uint32_t);
 }
 
 uint64_t CoefficientTable::hash() const { return hash_bytes(to_bytes("")); }
 
-uint32_t CoefficientTable::add_cell(CellKey key, uint32_t parent, const Spectrum& scale, const Spectrum& light_sum,
-                                    std::span<const uint32_t> lights, const Coefficients& coefficients) {
-  const uint32_t number = index_.insert(key.bits);
-  COVARY_CHECK(number == cells_.size() && (parent == kNone || parent < number), "a cell twice or before its parent");
-  if (key == root_key())
-    root_ = number;
-  else
-    last_level_ = std::max(last_level_, key.level());
-  Cell& cell = cells_.emplace_back(Cell{scale, light_sum, parent, static_cast<uint32_t>(entries_.size()), 0});
-  dense_.insert(dense_.end(), coefficients.dense.begin(), coefficients.dense.end());
-  if (lights.empty()) return number;
-  // At least one entry stays empty, so that a search ends.
-  cell.n_entries = std::bit_ceil(static_cast<uint32_t>(lights.size() + lights.size() / 2 + 1));
-  entries_.resize(entries_.size() + cell.n_entries);
-  Entry* entries = &entries_[cell.first_entry];
-  for (size_t k = 0; k < lights.size(); ++k) {
-    uint32_t i = lights[k] & (cell.n_entries - 1);
-    while (entries[i].light != kNone) i = (i + 1) & (cell.n_entries - 1);
-    entries[i] = {lights[k], coefficients.lights[k]};
+uint32_t CoefficientTable::slots_for(size_t n_lights) const {
+  if (n_lights == 0) return 0;
+  // At least one slot stays empty, so that a search ends. A value for every light needs 12 bytes, a slot 16.
+  const uint32_t slots = std::bit_ceil(static_cast<uint32_t>(n_lights + n_lights / 2 + 1));
+  return 4 * uint64_t{slots} < 3 * uint64_t{n_lights_} ? slots : kEveryLight;
+}
+
+void CoefficientTable::add_cells(std::span<const NewCell> cells) {
+  const size_t first = cells_.size();
+  size_t n_values = values_.size(), n_slots = slots_.size();
+  for (const NewCell& cell : cells) {
+    const uint32_t number = index_.insert(cell.key.bits);
+    COVARY_CHECK(number == cells_.size() && (cell.parent == kNone || cell.parent < first), "a cell before its parent");
+    COVARY_CHECK(cell.lights.size() == cell.light_values.size() && cell.dense_values.size() == n_dense_,
+                 "coefficients of another system");
+    if (cell.key == root_key())
+      root_ = number;
+    else
+      last_level_ = std::max(last_level_, cell.key.level());
+    const uint32_t slots = slots_for(cell.lights.size());
+    cells_.push_back({cell.scale, cell.light_sum, cell.parent, slots, n_values, n_slots});
+    n_values += slots == kEveryLight ? n_lights_ : slots, n_slots += slots == kEveryLight ? 0 : slots;
+    dense_.insert(dense_.end(), cell.dense_values.begin(), cell.dense_values.end());
   }
-  return number;
+  values_.resize(n_values), slots_.resize(n_slots, kNone);
+  parallel_for(cells.size(), kChunk, [&](size_t i) { fill(cells_[first + i], cells[i]); });
+}
+
+void CoefficientTable::fill(const Cell& cell, const NewCell& from) {
+  Spectrum* values = values_.data() + cell.first;
+  if (cell.n_slots == kEveryLight) {
+    for (uint32_t light = 0, k = 0; light < n_lights_; ++light)
+      values[light] = k < from.lights.size() && from.lights[k] == light ? from.light_values[k++]
+                      : from.parent != kNone                            ? this->light(from.parent, light)
+                                                                        : Spectrum(0);
+    return;
+  }
+  uint32_t* slots = slots_.data() + cell.first_slot;
+  for (size_t k = 0; k < from.lights.size(); ++k) {
+    uint32_t i = from.lights[k] & (cell.n_slots - 1);
+    while (slots[i] != kNone) i = (i + 1) & (cell.n_slots - 1);
+    slots[i] = from.lights[k], values[i] = from.light_values[k];
+  }
+}
+
+std::vector<uint32_t> CoefficientTable::lights_of(const Cell& cell) const {
+  std::vector<uint32_t> lights;
+  if (cell.n_slots == kEveryLight) {
+    lights.resize(n_lights_);
+    std::iota(lights.begin(), lights.end(), 0u);
+    return lights;
+  }
+  for (uint32_t i = 0; i < cell.n_slots; ++i)
+    if (const uint32_t light = slots_[cell.first_slot + i]; light != kNone) lights.push_back(light);
+  std::sort(lights.begin(), lights.end());
+  return lights;
 }
 
 std::string CoefficientTable::to_bytes(const std::string& key) const {
   std::string body;
   append(body, grid_.origin_), append(body, grid_.cell_width_), append(body, grid_.resolution_);
   append(body, grid_.level_), append(body, uint32_t{grid_.by_normal_});
-  append(body, layout_.n_dense), append(body, n_cells());
+  append(body, n_lights_), append(body, n_dense_), append(body, n_cells());
   for (uint32_t i = 0; i < n_cells(); ++i) {
     const Cell& cell = cells_[i];
     append(body, index_.keys()[i]), append(body, cell.parent), append(body, cell.scale), append(body, cell.light_sum);
-    for (uint32_t j = 0; j < layout_.n_dense; ++j) append(body, dense(i, j));
-    std::vector<Entry> lights;
-    for (uint32_t e = 0; e < cell.n_entries; ++e)
-      if (const Entry& own = entries_[cell.first_entry + e]; own.light != kNone) lights.push_back(own);
-    std::sort(lights.begin(), lights.end(), [](const Entry& a, const Entry& b) { return a.light < b.light; });
+    for (uint32_t j = 0; j < n_dense_; ++j) append(body, dense(i, j));
+    const std::vector<uint32_t> lights = lights_of(cell);
     append(body, static_cast<uint32_t>(lights.size()));
-    for (const Entry& own : lights) append(body, own.light), append(body, own.value);
+    for (uint32_t own : lights) append(body, own), append(body, light(i, own));
   }
   std::string bytes(kMagic);
   append(bytes, kVersion), append(bytes, uint64_t{key.size()}), bytes += key;
@@ -190,25 +222,25 @@ CoefficientTable CoefficientTable::from_bytes(std::string_view bytes, const std:
   grid.origin_ = reader.read<Vec3>(), grid.cell_width_ = reader.read<float>();
   grid.resolution_ = reader.read<uint32_t>(), grid.level_ = reader.read<uint32_t>();
   grid.by_normal_ = reader.read<uint32_t>() != 0;
-  CoefficientTable table(grid, SystemLayout{reader.read<uint32_t>()});
-  if (grid.resolution_ < 1 || table.layout_.n_dense > SystemLayout::kMaxDense)
-    reader.fail("is damaged: impossible numbers");
-  const auto n_cells = reader.read<uint32_t>();
-  Coefficients coefficients;
-  coefficients.dense.resize(table.layout_.n_dense);
+  const auto n_lights = reader.read<uint32_t>(), n_dense = reader.read<uint32_t>();
+  if (grid.resolution_ < 1 || n_dense > SystemLayout::kMaxDense) reader.fail("is damaged: impossible numbers");
+  CoefficientTable table(grid, n_lights, n_dense);
+  std::vector<Spectrum> dense(n_dense), values;
   std::vector<uint32_t> lights;
-  for (uint32_t i = 0; i < n_cells; ++i) {
-    CellKey cell;
-    cell.bits = reader.read<uint64_t>();
-    const auto parent = reader.read<uint32_t>();
-    const auto scale = reader.read<Spectrum>(), light_sum = reader.read<Spectrum>();
-    for (Spectrum& value : coefficients.dense) value = reader.read<Spectrum>();
-    lights.clear(), coefficients.lights.clear();
+  for (auto n_cells = reader.read<uint32_t>(); n_cells > 0; --n_cells) {
+    NewCell cell;
+    cell.key.bits = reader.read<uint64_t>();
+    cell.parent = reader.read<uint32_t>();
+    cell.scale = reader.read<Spectrum>(), cell.light_sum = reader.read<Spectrum>();
+    for (Spectrum& value : dense) value = reader.read<Spectrum>();
+    lights.clear(), values.clear();
     for (auto n = reader.read<uint32_t>(); n > 0; --n) {
       lights.push_back(reader.read<uint32_t>());
-      coefficients.lights.push_back(reader.read<Spectrum>());
+      values.push_back(reader.read<Spectrum>());
+      if (lights.back() >= n_lights) reader.fail("is damaged: impossible numbers");
     }
-    table.add_cell(cell, parent, scale, light_sum, lights, coefficients);
+    cell.lights = lights, cell.light_values = values, cell.dense_values = dense;
+    table.add_cells({&cell, 1});
   }
   return table;
 }

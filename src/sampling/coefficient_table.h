@@ -50,7 +50,9 @@ class CoefficientTable {
  public:
   static constexpr uint32_t kNone = ~0u;
   CoefficientTable() = default;
-  CoefficientTable(const CellGrid& grid, SystemLayout layout) : grid_(grid), layout_(layout) {}
+  /// An empty table for lights 0 … n_lights − 1.
+  CoefficientTable(const CellGrid& grid, uint32_t n_lights, uint32_t n_dense)
+      : grid_(grid), n_lights_(n_lights), n_dense_(n_dense) {}
 
   const CellGrid& grid() const { return grid_; }
   /// The finest cell that holds coefficients for the place, or kNone: plain sampling.
@@ -63,20 +65,32 @@ class CoefficientTable {
   /// Σ_k N_k β_k over all lights.
   Spectrum light_sum(uint32_t cell) const { return cells_[cell].light_sum; }
   /// β of a dense technique.
-  Spectrum dense(uint32_t cell, uint32_t j) const { return dense_[size_t{cell} * layout_.n_dense + j]; }
+  Spectrum dense(uint32_t cell, uint32_t j) const { return dense_[size_t{cell} * n_dense_ + j]; }
   /// β of a light: that of the finest of the cell and its ancestors which have seen the light, otherwise zero.
-  Spectrum light(uint32_t cell, uint32_t light) const;
+  Spectrum light(uint32_t cell, uint32_t light) const {
+    const Cell& own = cells_[cell];
+    return own.n_slots == kEveryLight ? values_[own.first + light] : light_of(cell, light);
+  }
 
   uint32_t n_cells() const { return static_cast<uint32_t>(cells_.size()); }
   uint32_t n_switched_off() const;
   size_t bytes() const;
+  /// About the bytes of a table of so many cells that hold so many coefficients of lights.
+  static size_t expected_bytes(size_t n_cells, size_t n_values) { return n_cells * 2 * sizeof(Cell) + n_values * 24; }
   uint64_t hash() const;
 
-  /// Adds a cell; its parent (or kNone) must have been added before. The cell with root_key() serves every place for
-  /// which no other is found. `lights` are those of `coefficients`, in increasing order; lights that are not among them
-  /// have the parent's coefficients. Returns its number.
-  uint32_t add_cell(CellKey key, uint32_t parent, const Spectrum& scale, const Spectrum& light_sum,
-                    std::span<const uint32_t> lights, const Coefficients& coefficients);
+  /// A cell to be added. Lights that are not in `lights` have the parent's coefficients.
+  struct NewCell {
+    CellKey key;
+    uint32_t parent = kNone;  ///< number of the parent, which was added before, or kNone
+    Spectrum scale, light_sum;
+    std::span<const uint32_t> lights;        ///< in increasing order
+    std::span<const Spectrum> light_values;  ///< β of `lights`
+    std::span<const Spectrum> dense_values;  ///< β of the dense techniques
+  };
+  /// Adds cells, in parallel; they get the next numbers. The cell with root_key() serves every place for which no other
+  /// is found.
+  void add_cells(std::span<const NewCell> cells);
   static CellKey root_key() { return {0, 0, 0, 0, 255}; }
 
   /// All of the table as bytes, as docs/file-formats.md describes them. `key` names what the coefficients belong to
@@ -87,24 +101,28 @@ class CoefficientTable {
   static CoefficientTable from_bytes(std::string_view bytes, const std::string& key, const std::string& where);
 
  private:
+  // A cell that has seen many of the lights holds a value for each light there is, inherited ones too; others hold an
+  // open-addressing table of those they have seen.
+  static constexpr uint32_t kEveryLight = kNone;
   struct Cell {
     Spectrum scale, light_sum;
     uint32_t parent = kNone;
-    uint32_t first_entry = 0, n_entries = 0;  // a power of two of entries_, open addressing; 0: no lights
+    uint32_t n_slots = 0;              // a power of two, 0 for no lights, or kEveryLight
+    size_t first = 0, first_slot = 0;  // of values_ and of slots_
   };
-  struct Entry {
-    uint32_t light = kNone;
-    Spectrum value;
-  };
-  const Entry* entry(const Cell& cell, uint32_t light) const;
+  Spectrum light_of(uint32_t cell, uint32_t light) const;
+  uint32_t slots_for(size_t n_lights) const;
+  void fill(const Cell& cell, const NewCell& from);
+  std::vector<uint32_t> lights_of(const Cell& cell) const;
+
   CellGrid grid_;
-  SystemLayout layout_;
+  uint32_t n_lights_ = 0, n_dense_ = 0;
   uint32_t last_level_ = 0;  // highest level of a cell but for the root
   uint32_t root_ = kNone;
   KeyIndex index_;
   std::vector<Cell> cells_;
-  std::vector<Spectrum> dense_;
-  std::vector<Entry> entries_;
+  std::vector<Spectrum> dense_, values_;
+  std::vector<uint32_t> slots_;  // lights of the slots, kNone where empty
 };
 
 }  // namespace covary

@@ -14,6 +14,10 @@ namespace {
 
 constexpr uint32_t kNoLight = ControlledSample::kNoLight;
 
+struct Coefficients {
+  std::vector<Spectrum> lights, dense;
+};
+
 /// A technique of sampling: expected number of samples, density at each node.
 struct Technique {
   double count;
@@ -41,7 +45,7 @@ struct Problem {
   }
   double r(const Technique& t, size_t x) const { return t.count * t.density[x] / p(x); }
 
-  Coefficients solve(bool monochrome = false, bool dense_solver = false) const {
+  Coefficients solve(bool monochrome = false) const {
     SystemSums sums(SystemLayout{static_cast<uint32_t>(dense.size())});
     const uint32_t cell = sums.cell({});
     for (uint32_t k = 0; k <= lights.size(); ++k)  // light by light, so that rows are sorted
@@ -57,15 +61,17 @@ struct Problem {
                   light == kNoLight ? 0 : static_cast<float>(r(lights[light], x)), weights});
       }
     std::vector<uint32_t> numbers;
-    std::vector<double> rows;
+    std::vector<float> rows;
     for (size_t i = 0; i < sums.n_rows(); ++i) {
       numbers.push_back(sums.row_light(i));
       rows.insert(rows.end(), sums.row(i).begin(), sums.row(i).end());
     }
     const SystemView view{sums.layout(), sums.head(cell), numbers, rows};
-    const Coefficients zeros{std::vector<Spectrum>(numbers.size()), std::vector<Spectrum>(dense.size())};
-    const SolveSettings settings{0, monochrome};
-    return dense_solver ? solve_dense(view, zeros, settings) : solve_block_arrow(view, zeros, settings);
+    Coefficients found = equal(Spectrum(0));
+    found.lights.resize(numbers.size());
+    const CoefficientsView coefficients{found.lights, found.dense};
+    solve_block_arrow(view, {0, monochrome}, coefficients);
+    return found;
   }
 
   /// Variance of the estimate that takes the samples of each strategy, with coefficients β.
@@ -293,13 +299,13 @@ TEST(ControlledMixture, MeanContributionsOfLightsAreASpecialCase) {
       sums.add(cell, static_cast<float>(own), {problem.integrand[x] / static_cast<float>(problem.p(x)), k, 1, {}});
       contribution[k] += own * problem.integrand[x].r / problem.p(x);
     }
-  std::vector<double> rows;
+  std::vector<float> rows;
   for (size_t i = 0; i < 3; ++i) rows.insert(rows.end(), sums.row(i).begin(), sums.row(i).end());
-  const Coefficients found =
-      solve_block_arrow({sums.layout(), sums.head(cell), lights, rows}, {std::vector<Spectrum>(3), {}}, {});
+  std::vector<Spectrum> found(3);
+  solve_block_arrow({sums.layout(), sums.head(cell), lights, rows}, {}, {found, {}});
   for (size_t k = 1; k < 3; ++k)
     EXPECT_NEAR(contribution[k] / problem.lights[k].count - contribution[0] / problem.lights[0].count,
-                found.lights[k].r - found.lights[0].r, 1e-4);
+                found[k].r - found[0].r, 1e-4);
 }
 
 /// Sec. 5 speaks of mixtures: one sample, of a component chosen at random.

@@ -8,46 +8,43 @@
 namespace covary {
 namespace {
 
-void add_to(std::span<double> sums, std::span<const double> numbers) {
+template <typename T>
+void add_to(T* sums, std::span<const T> numbers) {
   for (size_t i = 0; i < numbers.size(); ++i) sums[i] += numbers[i];
 }
 
 }  // namespace
 
 uint32_t KeyIndex::insert(uint64_t key) {
-  if (slots_.size() <= 2 * keys_.size()) grow();
+  if (3 * slots_.size() <= 4 * keys_.size()) grow();
   for (size_t i = slot_of(key);; i = (i + 1) & (slots_.size() - 1)) {
-    Slot& slot = slots_[i];
-    if (slot.number == kNone) {
-      slot = {key, static_cast<uint32_t>(keys_.size())};
+    if (slots_[i] == kNone) {
+      slots_[i] = static_cast<uint32_t>(keys_.size());
       keys_.push_back(key);
-      return slot.number;
+      return slots_[i];
     }
-    if (slot.key == key) return slot.number;
+    if (keys_[slots_[i]] == key) return slots_[i];
   }
 }
 
 uint32_t KeyIndex::find(uint64_t key) const {
   if (slots_.empty()) return kNone;
-  for (size_t i = slot_of(key);; i = (i + 1) & (slots_.size() - 1)) {
-    const Slot& slot = slots_[i];
-    if (slot.number == kNone || slot.key == key) return slot.number;
-  }
+  for (size_t i = slot_of(key);; i = (i + 1) & (slots_.size() - 1))
+    if (slots_[i] == kNone || keys_[slots_[i]] == key) return slots_[i];
 }
 
 void KeyIndex::grow() {
-  const size_t size = std::max<size_t>(64, 2 * slots_.size());
-  slots_.assign(size, Slot{});
+  slots_.assign(std::max<size_t>(64, 2 * slots_.size()), kNone);
   for (size_t number = 0; number < keys_.size(); ++number) {
     size_t i = slot_of(keys_[number]);
-    while (slots_[i].number != kNone) i = (i + 1) & (size - 1);
-    slots_[i] = {keys_[number], static_cast<uint32_t>(number)};
+    while (slots_[i] != kNone) i = (i + 1) & (slots_.size() - 1);
+    slots_[i] = static_cast<uint32_t>(number);
   }
 }
 
 void KeyIndex::clear() {
   keys_.clear();
-  slots_.assign(slots_.size(), Slot{});
+  slots_.assign(slots_.size(), kNone);
 }
 
 uint32_t SystemSums::cell(CellKey key) {
@@ -77,8 +74,8 @@ void SystemSums::add(uint32_t cell, float weight, const ControlledSample& sample
   if (sample.light == ControlledSample::kNoLight || sample.r_light == 0) return;
   const uint32_t number = rows_index_.insert(uint64_t{cell} << 32 | sample.light);
   rows_.resize(rows_index_.keys().size() * layout_.row_size());
-  double* row = &rows_[size_t{number} * layout_.row_size()];
-  const double r = sample.r_light;
+  float* row = &rows_[size_t{number} * layout_.row_size()];
+  const float r = sample.r_light;
   row[SystemLayout::kRowSamples] += 1;
   row[SystemLayout::kDiagonal] += weight * r * r;
   for (int c = 0; c < 3; ++c) row[SystemLayout::kRowValue + static_cast<uint32_t>(c)] += r * weighted[c];
@@ -101,13 +98,13 @@ void SystemSums::merge(const SystemSums& other) {
   std::vector<uint32_t> own_cell(other.n_cells());
   for (uint32_t i = 0; i < other.n_cells(); ++i) {
     own_cell[i] = cell(other.key(i).coarser(level_ - other.level_));
-    add_to({&heads_[size_t{own_cell[i]} * layout_.head_size()], layout_.head_size()}, other.head(i));
+    add_to(&heads_[size_t{own_cell[i]} * layout_.head_size()], other.head(i));
   }
   for (size_t i = 0; i < other.n_rows(); ++i) {
     const uint64_t key = uint64_t{own_cell[other.row_cell(i)]} << 32 | other.row_light(i);
     const uint32_t number = rows_index_.insert(key);
     rows_.resize(rows_index_.keys().size() * layout_.row_size());
-    add_to({&rows_[size_t{number} * layout_.row_size()], layout_.row_size()}, other.row(i));
+    add_to(&rows_[size_t{number} * layout_.row_size()], other.row(i));
   }
   n_rejected_ += other.n_rejected_;
 }
@@ -134,12 +131,12 @@ std::span<const double> SystemSums::head(uint32_t cell) const {
   return std::span(heads_).subspan(size_t{cell} * layout_.head_size(), layout_.head_size());
 }
 
-std::span<const double> SystemSums::row(size_t row) const {
+std::span<const float> SystemSums::row(size_t row) const {
   return std::span(rows_).subspan(row * layout_.row_size(), layout_.row_size());
 }
 
 size_t SystemSums::bytes() const {
-  return cells_.bytes() + rows_index_.bytes() + (heads_.capacity() + rows_.capacity()) * sizeof(double);
+  return cells_.bytes() + rows_index_.bytes() + heads_.capacity() * sizeof(double) + rows_.capacity() * sizeof(float);
 }
 
 }  // namespace covary

@@ -57,16 +57,12 @@ class KeyIndex {
   void prefetch(uint64_t key) const {
     if (!slots_.empty()) __builtin_prefetch(&slots_[slot_of(key)]);
   }
-  size_t bytes() const { return slots_.capacity() * sizeof(Slot) + keys_.capacity() * sizeof(uint64_t); }
+  size_t bytes() const { return slots_.capacity() * sizeof(uint32_t) + keys_.capacity() * sizeof(uint64_t); }
 
  private:
-  struct Slot {
-    uint64_t key;
-    uint32_t number = kNone;
-  };
   size_t slot_of(uint64_t key) const { return mix64(key) & (slots_.size() - 1); }
   void grow();
-  std::vector<Slot> slots_;  // open addressing, their number a power of two; number kNone where empty
+  std::vector<uint32_t> slots_;  // places of keys_ by open addressing, a power of two of them; kNone where empty
   std::vector<uint64_t> keys_;
 };
 
@@ -98,7 +94,7 @@ class SystemSums {
   /// Cell and light of a row, rows in the order of their first samples.
   uint32_t row_cell(size_t row) const { return static_cast<uint32_t>(rows_index_.keys()[row] >> 32); }
   uint32_t row_light(size_t row) const { return static_cast<uint32_t>(rows_index_.keys()[row]); }
-  std::span<const double> row(size_t row) const;
+  std::span<const float> row(size_t row) const;
   uint64_t n_rejected() const { return n_rejected_; }  ///< samples left out because they were not finite
   size_t bytes() const;
 
@@ -106,7 +102,8 @@ class SystemSums {
   SystemLayout layout_;
   uint32_t level_;
   KeyIndex cells_, rows_index_;  // rows: cell number << 32 | light
-  std::vector<double> heads_, rows_;
+  std::vector<double> heads_;
+  std::vector<float> rows_;  // many: single precision, whose error lies far below that of the samples
   uint64_t n_rejected_ = 0;
 };
 
