@@ -42,6 +42,12 @@ std::string replay_command(const RenderOptions& o, const Pass& pass, const BadSa
   return shell_text(words);
 }
 
+/// The samples per pixel that the predicted error would need to be reliable; 0 where it is, or where there is none.
+uint32_t fewest_reliable_samples(const RenderReport& report) {
+  const uint32_t fewest = make_estimator(report.options.estimator).reliable_samples;
+  return report.result.predicted_relmse && report.result.samples_per_pixel() < fewest ? fewest : 0;
+}
+
 }  // namespace
 
 void report_bad_samples(const RenderOptions& options, const Pass& pass) {
@@ -105,7 +111,10 @@ nlohmann::ordered_json statistics(const RenderReport& report) {
       {"not_finite_samples", result.sum([](const Pass& p) { return p.result.n_not_finite; })},
       {"negative_samples", result.sum([](const Pass& p) { return p.result.n_negative; })},
       {"bad_samples", bad}};
-  if (result.predicted_relmse) json["predicted_relmse"] = *result.predicted_relmse;
+  if (result.predicted_relmse) {
+    json["predicted_relmse"] = *result.predicted_relmse;
+    json["predicted_relmse_reliable"] = fewest_reliable_samples(report) == 0;
+  }
   if (result.until_reached) json["until_reached"] = *result.until_reached;
   return json;
 }
@@ -126,6 +135,8 @@ void print_summary(const RenderReport& report) {
   if (estimator.passes != EstimatorPasses::kAny) {
     fmt::print(stderr, "{} in {:.2f} s", estimator.text, result.estimate_seconds());
     if (result.predicted_relmse) fmt::print(stderr, ", predicted relMSE {:.3g}", *result.predicted_relmse);
+    if (const uint32_t fewest = fewest_reliable_samples(report))
+      fmt::print(stderr, " (unreliable with fewer than {} samples per pixel)", fewest);
     fmt::print(stderr, "\n");
   } else if (!options.until.empty()) {
     fmt::print(stderr, "predicted relMSE {:.3g}\n", *result.predicted_relmse);

@@ -60,6 +60,7 @@ Estimator make_cv_baseline(EstimatorParameters& parameters) {
   Estimator estimator;
   estimator.summary = "control variates that ignore the errors of the independent image";
   estimator.predicts_error = true;
+  estimator.reliable_samples = kReliableSamples;
   estimator.fewest_groups = 3;
   estimator.reach = o.window / 2;
   estimator.bytes_per_pixel = kCvBaselineBytesPerPixel;

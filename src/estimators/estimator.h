@@ -37,7 +37,9 @@ struct Estimator {
   std::string summary;  ///< a few words, for lists
   std::string text;     ///< name and options as given: "iicv --paper --k 50"
 
-  bool predicts_error = false;      ///< that of its result
+  bool predicts_error = false;  ///< that of its result
+  /// Samples per pixel, of all passes together, below which the predicted error was measured to be unreliable.
+  uint32_t reliable_samples = 0;
   bool needs_sample_count = false;  ///< PairSettings::crn_samples
   /// Groups of samples that it needs in each pass. All estimators take groups that differ in size by a sample.
   int fewest_groups = 1;

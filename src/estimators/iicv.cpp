@@ -163,6 +163,7 @@ Estimator make_iicv(EstimatorParameters& parameters) {
   Estimator estimator;
   estimator.summary = "imperfect image-space control variates";
   estimator.predicts_error = true;
+  estimator.reliable_samples = kReliableSamples;
   estimator.fewest_groups = o.penalty == Penalty::kCrossFit ? 4 : 3;
   estimator.reach = iicv_reach(o);
   estimator.bytes_per_pixel = iicv_bytes_per_pixel(o);
