@@ -166,22 +166,27 @@ void solve_cell(Level& level, uint32_t i, const Level* above, const std::vector<
                 const CacheSettings& settings) {
   const CoefficientsView own = level.coefficients(i);
   const std::span<const uint32_t> lights = level.lights_of(i);
-  Spectrum& sum = level.light_sums[i];
+  double sum[3] = {};
+  const auto add_to_sum = [&](const Spectrum& value, double count) {
+    for (int c = 0; c < 3; ++c) sum[c] += count * value[c];
+  };
   if (above) {
     // The prior: what the parent has for the lights of the cell, all of which it has seen.
     const uint32_t parent = level.parents[i];
     const size_t m = level.layout.n_dense;
     std::copy_n(above->dense_values.data() + parent * m, m, own.dense.begin());
     size_t p = above->first[parent];
-    sum = above->light_sums[parent], level.scales[i] = above->scales[parent];
+    add_to_sum(above->light_sums[parent], 1);
+    level.scales[i] = above->scales[parent];
     for (size_t k = 0; k < lights.size(); ++k) {
       while (above->lights[p] != lights[k]) ++p;
       own.lights[k] = above->light_values[p];
-      sum += own.lights[k] * -light_counts[lights[k]];  // lights that the cell has not seen keep their part of the sum
+      add_to_sum(own.lights[k], -light_counts[lights[k]]);  // lights not seen keep their part of the sum
     }
   }
   solve_block_arrow(level.system(i), {settings.prior_samples, settings.monochrome}, own);
-  for (size_t k = 0; k < lights.size(); ++k) sum += own.lights[k] * light_counts[lights[k]];
+  for (size_t k = 0; k < lights.size(); ++k) add_to_sum(own.lights[k], light_counts[lights[k]]);
+  for (int c = 0; c < 3; ++c) level.light_sums[i][c] = static_cast<float>(sum[c]);
   if (settings.held_out)
     level.scales[i] = best_share(level.system(i), level.scales[i], settings.prior_vertices, settings.monochrome);
 }
