@@ -28,6 +28,7 @@ enum class Heuristic { kPower, kBalance };
 struct SubpathSums {
   double vcm = 0;  ///< dVCM: of the technique whose other subpath ends here
   double vc = 0;   ///< dVC: of those whose other subpath is longer still
+  bool any() const { return vcm > 0 || vc > 0; }
 };
 
 /// Density of what a vertex did, or could do in the opposite direction.

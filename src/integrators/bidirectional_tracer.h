@@ -70,7 +70,8 @@ struct BidirectionalBatch final : ThreadState {
   PathBatch camera;
   std::vector<SubpathSums> sums;  ///< of the camera subpaths, by sample
   LightSubpaths light;
-  std::vector<PathRandom> light_randoms;
+  std::vector<PathRandom> light_randoms;  ///< numbers of the light subpaths in `light`
+  std::vector<uint32_t> light_path;       ///< which of them a sample has
   std::vector<Connection> connections;
   std::vector<Ray> rays;
   std::vector<uint8_t> blocked;
@@ -151,13 +152,36 @@ class BidirectionalTracer final : public LightTracingIntegrator {
   /// Most surfaces that a light subpath needs if it is joined to t vertices from the camera.
   int max_surfaces(int t) const { return std::min(lengths_.max_depth - t, parts_.max_light_vertices() - 1); }
 
+  /// With common random numbers all pixels have the same light subpath in a sample: it is traced once, and kept for
+  /// the batches that follow.
   void trace_light_subpaths(const Scene& scene, std::span<const CameraSample> samples, State& state,
                             PathContext& context) const {
-    state.light_randoms.clear();
-    for (const CameraSample& sample : samples)
-      state.light_randoms.push_back(sample.light_random.subpath(Subpath::kLight));
-    state.light.trace(parts_, scene, *emission_lights_, mis_, state.light_randoms, max_surfaces(2), lengths_.rr_depth,
-                      context);
+    std::vector<PathRandom>& kept = state.light_randoms;
+    state.light_path.clear();
+    for (const CameraSample& sample : samples) {
+      const uint32_t guess = state.light_path.empty() ? 0 : state.light_path.back() + 1;
+      const uint32_t place = place_of(sample.light_random.subpath(Subpath::kLight), guess, kept);
+      if (place == kept.size()) break;
+      state.light_path.push_back(place);
+    }
+    if (state.light_path.size() == samples.size()) return;
+    kept.clear(), state.light_path.clear();
+    for (const CameraSample& sample : samples) {
+      const PathRandom random = sample.light_random.subpath(Subpath::kLight);
+      const uint32_t guess = state.light_path.empty() ? 0 : state.light_path.back() + 1;
+      const uint32_t place = place_of(random, guess, kept);
+      if (place == kept.size()) kept.push_back(random);
+      state.light_path.push_back(place);
+    }
+    state.light.trace(parts_, scene, *emission_lights_, mis_, kept, max_surfaces(2), lengths_.rr_depth, context);
+  }
+
+  /// The place of a light subpath among those that are kept, or their number. The samples of a pixel come in their
+  /// order, and then those of the next.
+  static uint32_t place_of(const PathRandom& random, size_t guess, const std::vector<PathRandom>& kept) {
+    if (random.sampling() != Sampling::kCrn) return static_cast<uint32_t>(kept.size());
+    if (guess < kept.size() && kept[guess] == random) return static_cast<uint32_t>(guess);
+    return static_cast<uint32_t>(std::find(kept.begin(), kept.end(), random) - kept.begin());
   }
 
   void start_path(const Scene& scene, const CameraSample& sample, uint32_t i, State& state) const {
@@ -183,7 +207,7 @@ class BidirectionalTracer final : public LightTracingIntegrator {
     if (is_black(radiance)) return {};
     const SubpathSums& left = state.sums[path.sample];
     double weight = 1;
-    if (depth > 0 && (left.vcm > 0 || left.vc > 0)) {
+    if (depth > 0 && left.any()) {
       const float pdf_light = path.found ? emitter->pdf_solid_angle(path.previous_p, hit) : light.pdf_solid_angle;
       const LightPdfs pdfs =
           light_pdfs(*emitter, lights.pmf(*emitter), pdf_light, emission_lights_->pmf(*emitter),
@@ -213,7 +237,7 @@ class BidirectionalTracer final : public LightTracingIntegrator {
       if (use_light_samples && batch.lights[i].pdf_solid_angle > 0)
         join_to_light(lights.pmf(*batch.choices[i].emitter), *batch.choices[i].emitter, batch.lights[i], end, state);
       if (hit.bsdf_flags & kSmooth)
-        for (const LightVertex& light : state.light.path(path.sample)) join(light, end, state);
+        for (const LightVertex& light : state.light.path(state.light_path[path.sample])) join(light, end, state);
 
       if (!go_on(depth, vertex, samples[path.sample], hit, wo, *bsdf, path, sums, batch.rays[i])) continue;
       batch.alive.push_back(i);
@@ -256,14 +280,16 @@ class BidirectionalTracer final : public LightTracingIntegrator {
     const Vec3 wi = end.hit.frame.to_local(light.wi);
     const BsdfValue f = end.bsdf.eval(end.wo, wi);
     if (is_black(f.value)) return;
-    const EmissionPdf emission = emitter.pdf_emission(point_on_light(light.p, light.n, light.uv), -light.wi);
-    const LightPdfs pdfs = light_pdfs(emitter, pmf, light.pdf_solid_angle, emission_lights_->pmf(emitter), emission,
-                                      light.n, light.wi, sqr(light.distance));
-    SubpathSums sums = end.sums;
-    if (parts_.max_light_vertices() == 1) sums = {};
-    const double reverse = sums.vc > 0 ? end.bsdf.reverse_pdf(end.wo, wi) : 0;
-    const double others =
-        mis_.others_of_light_sample(sums, pdfs, mis_cosine(end.hit.ng, light.wi), f.pdf_solid_angle, reverse);
+    double others = 0;
+    if (parts_.max_light_vertices() > 1 && end.sums.any()) {
+      const EmissionPdf emission = emitter.pdf_emission(point_on_light(light.p, light.n, light.uv), -light.wi);
+      const LightPdfs pdfs = light_pdfs(emitter, pmf, light.pdf_solid_angle, emission_lights_->pmf(emitter), emission,
+                                        light.n, light.wi, sqr(light.distance));
+      others = mis_.others_of_light_sample(end.sums, pdfs, mis_cosine(end.hit.ng, light.wi), f.pdf_solid_angle,
+                                           end.bsdf.reverse_pdf(end.wo, wi));
+    } else if (!light.is_delta) {
+      others = mis_.raised(f.pdf_solid_angle / (static_cast<double>(pmf) * light.pdf_solid_angle));
+    }
     const Spectrum value = end.path.throughput * f.value * light.radiance * (1 / (pmf * light.pdf_solid_angle));
     connect(value, 1 / (1 + others), shadow_ray(end.hit, light), 1, end, state);
   }
@@ -281,15 +307,15 @@ class BidirectionalTracer final : public LightTracingIntegrator {
     if (is_black(camera_f.value)) return;
     const BsdfValue light_f = light.bsdf->eval(light.wo, wi_light);
     if (is_black(light_f.value)) return;
-    const double others =
-        mis_.others(light.sums, camera_f.pdf_solid_angle * mis_cosine(light.ng, wi_light) / distance_squared,
-                    light.bsdf->reverse_pdf(light.wo, wi_light)) +
-        mis_.others(end.sums, light_f.pdf_solid_angle * mis_cosine(end.hit.ng, w) / distance_squared,
-                    end.bsdf.reverse_pdf(end.wo, wi_camera));
-    const float factor = parts_.adjoint_factor(light.wo, wi_light, light.ng) / distance_squared;
+    double others = mis_.others(light.sums, camera_f.pdf_solid_angle * mis_cosine(light.ng, w) / distance_squared,
+                                light.bsdf->reverse_pdf(light.wo, wi_light));
+    if (end.sums.any())
+      others += mis_.others(end.sums, light_f.pdf_solid_angle * mis_cosine(end.hit.ng, w) / distance_squared,
+                            end.bsdf.reverse_pdf(end.wo, wi_camera));
+    const float factor = parts_.adjoint_factor(light.wo, wi_light, light.ng_local) / distance_squared;
     const Spectrum value = end.path.throughput * camera_f.value * (light.throughput * light_f.value * factor);
     const Vec3 o = offset_origin(end.hit.p, end.hit.ng, w);
-    const Vec3 target = offset_origin(light.p, light.frame.to_world(light.ng), -w);
+    const Vec3 target = offset_origin(light.p, light.ng, -w);
     const float distance = length(target - o);
     const Ray ray{o, (target - o) * (1 / distance), distance * (1 - kRayEpsilon)};
     connect(value, 1 / (1 + others), ray, static_cast<int>(light.n_vertices), end, state);
@@ -329,12 +355,12 @@ class BidirectionalTracer final : public LightTracingIntegrator {
     const Vec3 wi = end.frame.to_local(lens.wi);
     const BsdfValue f = end.bsdf->eval(end.wo, wi);
     if (is_black(f.value)) return;
-    const double cosine = mis_cosine(end.ng, wi), distance_squared = sqr(static_cast<double>(lens.distance));
+    const double cosine = mis_cosine(end.ng, lens.wi), distance_squared = sqr(static_cast<double>(lens.distance));
     const double others =
         mis_.others(end.sums, lens.pdf_direction * cosine / (distance_squared * light_paths_per_spp()),
                     end.bsdf->reverse_pdf(end.wo, wi));
     if (!reaches_lens(scene, end, lens, context)) return;
-    const float factor = parts_.adjoint_factor(end.wo, wi, end.ng) * lens.importance / lens.pdf_solid_angle;
+    const float factor = parts_.adjoint_factor(end.wo, wi, end.ng_local) * lens.importance / lens.pdf_solid_angle;
     const Spectrum value = end.throughput * f.value * factor;
     const double weight = 1 / (1 + others);
     splats.push_back(
@@ -343,7 +369,7 @@ class BidirectionalTracer final : public LightTracingIntegrator {
 
   /// Whether the camera sees the vertex, past area lights where these are hidden.
   bool reaches_lens(const Scene& scene, const LightVertex& end, const LensSample& lens, PathContext& context) const {
-    const Vec3 o = offset_origin(end.p, end.frame.to_world(end.ng), lens.wi);
+    const Vec3 o = offset_origin(end.p, end.ng, lens.wi);
     const float distance = length(lens.near_p - o);
     Ray ray{o, (lens.near_p - o) * (1 / distance), distance};
     ++context.n_rays;

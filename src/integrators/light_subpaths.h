@@ -20,8 +20,9 @@ namespace covary {
 /// A vertex of a light subpath that can be connected: on a surface with more than delta lobes.
 struct LightVertex {
   Vec3 p;
+  Vec3 ng;                  ///< unit geometric normal
   Frame frame;              ///< shading frame
-  Vec3 ng;                  ///< unit geometric normal in the frame
+  Vec3 ng_local;            ///< ng in the frame
   Vec3 wo;                  ///< towards the vertex before, in the frame
   const BsdfClosure* bsdf;  ///< bound for importance
   Spectrum throughput;      ///< of the subpath up to here, densities of emission included
@@ -77,6 +78,7 @@ class LightSubpaths {
     Vec3 previous_p;
     uint32_t index;         ///< among those that are traced together
     uint32_t n_smooth = 0;  ///< vertices so far on surfaces with more than delta lobes
+    bool ends = false;      ///< at its next vertex
   };
   /// How a path begins.
   struct Start {
@@ -163,9 +165,8 @@ void LightSubpaths::trace(const Parts& parts, const Scene& scene, const PowerLig
       const double cosine = mis_cosine(hit.ng, ray.d);
       path.sums = depth == 0 ? first_sums(scene, mis, starts_[path.index], path, ray, hit, cosine)
                              : mis.arrive(path.sums, cosine, length_squared(hit.p - path.previous_p));
-      if (!scatter(parts, mis, randoms[path.index], depth, depth + 1 >= max_surfaces, depth + 1 >= rr_depth, hit, path,
-                   ray))
-        continue;
+      const bool last = path.ends || depth + 1 >= max_surfaces;
+      if (!scatter(parts, mis, randoms[path.index], depth, last, depth + 1 >= rr_depth, hit, path, ray)) continue;
       paths_[n_kept] = path, rays_[n_kept] = ray;
       ++n_kept;
     }
@@ -184,7 +185,7 @@ bool LightSubpaths::scatter(const Parts& parts, const BidirectionalMis& mis, con
   if (last && !smooth) return false;
   const BsdfClosure* bsdf = closures_.bind(hit, wo.z > 0, parts.light_mode());
   if (smooth)
-    vertices_.append(path.index, {hit.p, hit.frame, ng, wo, bsdf, path.throughput, path.sums,
+    vertices_.append(path.index, {hit.p, hit.ng, hit.frame, ng, wo, bsdf, path.throughput, path.sums,
                                   static_cast<uint32_t>(depth) + 2, vertex, hit.emitter != nullptr});
   if (last) return false;
   const BsdfSample next =
@@ -193,8 +194,12 @@ bool LightSubpaths::scatter(const Parts& parts, const BidirectionalMis& mis, con
   path.throughput *= next.weight * parts.adjoint_factor(wo, next.wi, ng);
   if (roulette) {
     const float survival = parts.survival_probability(path.throughput * path.scale, 1, random.sampling());
-    if (!(random.get_1d(vertex, Event::kRoulette) < survival)) return false;
-    path.throughput *= parts.survivor_weight(survival);
+    if (random.get_1d(vertex, Event::kRoulette) < survival)
+      path.throughput *= parts.survivor_weight(survival);
+    else if (std::isnan(survival))
+      path.ends = true;  // joined once more, so that the samples are bad ones, not black
+    else
+      return false;
   }
   const Vec3 wi = hit.frame.to_world(next.wi);
   path.sums = mis.leave(path.sums, mis_cosine(hit.ng, wi), scatter_pdfs(*bsdf, wo, next));

@@ -187,6 +187,24 @@ TEST_P(Bdpt, SplatsEqualDensitiesWrittenOut) {
   EXPECT_LE(by_pixel.size(), 1.01 * agreement.n);
 }
 
+// Samples of a batch, with common random numbers those that share a light subpath, are what each is alone.
+TEST_P(Bdpt, SamplesDoNotDependOnTheirBatch) {
+  const TestScene scene = load_text(text(-1), 0, [](const PathLengthSettings& lengths) {
+    return std::make_shared<BidirectionalTracer<BidirectionalParts>>(BidirectionalSettings{lengths, {}, {}});
+  });
+  for (const Sampling sampling : {Sampling::kIndependent, Sampling::kCrn}) {
+    PassSettings settings;
+    settings.sampling = sampling, settings.spp = 5, settings.filter = scene.loaded.filter;
+    Film film = new_film(scene, 5);
+    render_pass(scene.scene(), scene.integrator(), settings, film);
+    for (int y = 0; y < kSize; y += 3)
+      for (int x = 0; x < kSize; ++x)
+        for (int sample = 0; sample < 5; ++sample)
+          ASSERT_EQ(film.group_mean(x, y, sample),
+                    replay_sample(scene.scene(), scene.integrator(), settings, x, y, sample).value);
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Scenes, Bdpt, ::testing::ValuesIn(kSceneries),
                          [](const auto& test) { return std::string(test.param.name); });
 
