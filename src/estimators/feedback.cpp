@@ -5,6 +5,7 @@
 #include <array>
 
 #include "core/parallel.h"
+#include "estimators/planes.h"
 
 namespace covary {
 

@@ -22,9 +22,13 @@
 // Where pixels of the PT image have unequal counts n_j, weights are n_j w_ij.
 #pragma once
 
-#include "estimators/planes.h"
+#include <vector>
+
+#include "film/film.h"
 
 namespace covary {
+
+struct Moments;
 
 struct FeedbackOptions {
   /// Side of the window of the wide mean; odd, 5 … 125. Default 41 (measured; 61 gains less than 1 %, 21 loses 3 %).
