@@ -17,7 +17,6 @@ ARROWS = {
     "film": ["imageio"],
     "estimators": ["film"],
     "lab": ["report"],
-    "cuda": ["estimators"],
     "report": ["film"],
     "scene": ["core"],
     "textures": ["scene", "imageio"],
@@ -112,6 +111,24 @@ def links_follow_arrows(root):
             for target in re.findall(r"covary_(\w+)", names):
                 if target in ARROWS and target not in visible_modules(module):
                     problems.append(f"{path}:1: {module} may not depend on covary_{target}")
+    return problems
+
+
+DRAWN = re.compile(r"^ {8}(\w+)/(?: +──► ([\w, ]+))?$")
+
+
+def architecture_draws_the_arrows(root):
+    """The folder tree in docs/architecture.md has every module with its arrows, those of ARROWS, and no others."""
+    page = os.path.join("docs", "architecture.md")
+    drawn = {match[1]: (number, re.findall(r"\w+", match[2] or ""))
+             for number, text in lines(root, page) if (match := DRAWN.match(text))}
+    folders = sorted(entry.name for entry in os.scandir(os.path.join(root, "src")) if entry.is_dir())
+    problems = [f"{page}:1: lacks src/{module}" for module in folders if module not in drawn]
+    for module, (number, targets) in drawn.items():
+        if module not in folders:
+            problems.append(f"{page}:{number}: draws src/{module}, which there is not")
+        elif sorted(targets) != sorted(ARROWS.get(module, [])):
+            problems.append(f"{page}:{number}: {module} has arrows to {', '.join(ARROWS[module]) or 'nothing'}")
     return problems
 
 
@@ -230,7 +247,8 @@ def lines_fit(root):
     return problems
 
 
-CHECKS = [lines_fit, includes_follow_arrows, links_follow_arrows, licence_lines, no_leftovers, citations_have_entries,
+CHECKS = [lines_fit, includes_follow_arrows, links_follow_arrows, architecture_draws_the_arrows,
+          licence_lines, no_leftovers, citations_have_entries,
           documented_names_match_registries, documented_parameters, documented_commands]
 
 
