@@ -1,9 +1,10 @@
-# covary_module(<name> SOURCES a.cpp ... DEPENDS module-or-target ... TESTS a_test.cpp ...)
+# covary_module(<name> SOURCES a.cpp ... HEADERS a.h ... DEPENDS module-or-target ... TESTS a_test.cpp ...)
 #
 # A module is one folder of src/: a library `covary_<name>` made of SOURCES, which may use only the modules it DEPENDS
 # on (tests/layers checks the includes), and one program `<name>_tests` made of the TESTS that lie beside the code.
+# HEADERS are those for other programs, installed with all that they include (CovaryLibrary.cmake).
 function(covary_module name)
-  cmake_parse_arguments(MODULE "" "" "SOURCES;DEPENDS;TESTS;TEST_DEPENDS" ${ARGN})
+  cmake_parse_arguments(MODULE "" "" "SOURCES;HEADERS;DEPENDS;TESTS;TEST_DEPENDS" ${ARGN})
   if(MODULE_SOURCES)
     add_library(covary_${name} STATIC ${MODULE_SOURCES})
     set(scope PUBLIC)
@@ -13,6 +14,9 @@ function(covary_module name)
   endif()
   target_include_directories(covary_${name} ${scope} ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/include)
   target_link_libraries(covary_${name} ${scope} covary_options ${MODULE_DEPENDS})
+  set_property(GLOBAL APPEND PROPERTY COVARY_MODULES ${name})
+  list(TRANSFORM MODULE_HEADERS PREPEND ${name}/)
+  set_property(GLOBAL APPEND PROPERTY COVARY_HEADERS ${MODULE_HEADERS})
   if(MODULE_TESTS AND COVARY_TESTS)
     covary_test(${name}_tests SOURCES ${MODULE_TESTS} DEPENDS covary_${name} ${MODULE_TEST_DEPENDS})
   endif()

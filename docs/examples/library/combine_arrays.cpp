@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// Images of any renderer, as plain arrays, become one with less noise.
+//
+//     combine_arrays WIDTH HEIGHT GROUPS CRN INDEPENDENT OUT
+//
+// CRN and INDEPENDENT are files of floats, [y][x][group][rgb]: of each pixel the means of GROUPS groups of samples, in
+// the first with the same random numbers in all pixels, in the second with each pixel's own. OUT is [y][x][rgb].
+#include <covary/core/error.h>
+#include <covary/estimators/iicv.h>
+#include <covary/estimators/predicted_error.h>
+
+#include <cstdio>
+#include <fstream>
+#include <string>
+#include <vector>
+
+std::vector<float> read_floats(const char* path, size_t count) {
+  std::vector<float> values(count);
+  std::ifstream file(path, std::ios::binary);
+  if (!file.read(reinterpret_cast<char*>(values.data()), static_cast<std::streamsize>(count * sizeof(float))))
+    throw covary::Error(covary::ErrorCode::kIo, std::string(path) + ": less than " + std::to_string(count) + " floats");
+  return values;
+}
+
+int main(int argc, char** argv) try {
+  if (argc != 7) return std::fprintf(stderr, "combine_arrays WIDTH HEIGHT GROUPS CRN INDEPENDENT OUT\n"), 2;
+  const int width = std::stoi(argv[1]), height = std::stoi(argv[2]), groups = std::stoi(argv[3]);
+  const size_t count = static_cast<size_t>(width) * height * groups * 3;
+  const std::vector<float> crn_means = read_floats(argv[4], count), independent_means = read_floats(argv[5], count);
+
+  const covary::GroupedImage crn{width, height, groups, crn_means.data()};
+  const covary::GroupedImage independent{width, height, groups, independent_means.data()};
+  covary::IicvOptions options;
+  options.std_error = true;
+  const covary::EstimatorResult result = covary::iicv(crn, independent, options);
+
+  std::printf("predicted relMSE %.3g\n", covary::predicted_relmse(result));
+  const std::vector<float>& image = result.estimate.data;
+  std::ofstream out(argv[6], std::ios::binary);
+  out.write(reinterpret_cast<const char*>(image.data()), static_cast<std::streamsize>(image.size() * sizeof(float)));
+  return out.flush() ? 0 : 1;
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "combine_arrays: %s\n", error.what());
+  return 1;
+}
