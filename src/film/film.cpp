@@ -29,8 +29,8 @@ float rounded(double mean, uint32_t size) {
   return static_cast<float>(std::bit_cast<double>(bits));
 }
 
-/// Adds a sample to the mean squared deviation of `count` samples from the means of their groups. Its group's mean moves
-/// towards it, so that of the squared deviation from the mean before only the part `share` counts [Welford1962].
+/// Adds a sample to the mean squared deviation of `count` samples from the means of their groups. Its group's mean
+/// moves towards it, so that of the squared deviation from the mean before only the part `share` counts [Welford1962].
 void add_deviation(double share, const float* mean, const Spectrum& sample, uint32_t count, float* deviation) {
   for (int c = 0; c < 3; ++c) {
     const double difference = static_cast<double>((&sample.r)[c]) - mean[c];
@@ -107,7 +107,8 @@ void Film::add(int x, int y, const Spectrum& sample) {
   const uint32_t group = count % static_cast<uint32_t>(groups_), size = count / static_cast<uint32_t>(groups_);
   const double before = size, after = before + 1;
   float* mean = groups_data_.data() + (index(x, y) * groups_ + group) * 3;
-  if (keeps_sample_variance()) add_deviation(before / after, mean, sample, count, &variance_in_groups_[index(x, y) * 3]);
+  if (keeps_sample_variance())
+    add_deviation(before / after, mean, sample, count, &variance_in_groups_[index(x, y) * 3]);
   for (int c = 0; c < 3; ++c) mean[c] = rounded((before * mean[c] + (&sample.r)[c]) / after, size);
   ++count;
 }
