@@ -52,10 +52,10 @@ struct BidirectionalParts {
   /// Factor on what joins a light subpath to the lens.
   float splat_factor() const { return 1; }
 
-  /// Whether record() is called: for what each technique (s, t) adds to a sample, before its weight.
-  static constexpr bool kRecords = false;
-  void record(const CameraSample& /*sample*/, int /*s*/, int /*t*/, const Spectrum& /*value*/,
-              double /*weight*/) const {}
+  // For tests and images of techniques: what a technique (s, t) adds, before its weight, to the sample that is traced,
+  // and to a pixel by a single light path.
+  void record(int /*s*/, int /*t*/, const Spectrum& /*value*/, double /*weight*/) const {}
+  void record_splat(int /*s*/, const SplatPixel& /*pixel*/, const Spectrum& /*value*/, double /*weight*/) const {}
 };
 
 /// What bidirectional path tracing keeps for a thread.
@@ -108,7 +108,7 @@ class BidirectionalTracer final : public LightTracingIntegrator {
       if (depth + 1 >= lengths_.min_depth)
         for (size_t i = 0; i < batch.paths.size(); ++i)
           samples[batch.paths[i].sample].radiance +=
-              emission(scene, lights, depth, samples, batch.paths[i], batch.rays[i], batch.hits[i], state);
+              emission(scene, lights, depth, batch.paths[i], batch.rays[i], batch.hits[i], state);
       if (depth + 1 >= lengths_.max_depth) break;
       end_paths_without_surface(batch);
       const bool use_light_samples = depth + 2 >= lengths_.min_depth && !lights.empty();
@@ -131,6 +131,7 @@ class BidirectionalTracer final : public LightTracingIntegrator {
         join_to_lens(scene, paths, paths.first + i, end, splats, context);
   }
 
+  const BidirectionalSettings& settings() const { return settings_; }
   std::string description() const override {
     return "bdpt " + lengths_.text() +
            " heuristic=" + (settings_.heuristic == Heuristic::kPower ? "power " : "balance ") + light_tracing_text();
@@ -197,8 +198,8 @@ class BidirectionalTracer final : public LightTracingIntegrator {
   }
 
   /// s = 0: contribution of what the path's ray met.
-  Spectrum emission(const Scene& scene, const UniformLights& lights, int depth, std::span<const CameraSample> samples,
-                    const Path& path, const Ray& ray, const SurfaceHit& hit, const State& state) const {
+  Spectrum emission(const Scene& scene, const UniformLights& lights, int depth, const Path& path, const Ray& ray,
+                    const SurfaceHit& hit, const State& state) const {
     const Emitter* emitter = path.found ? hit.emitter : scene.environment();
     if (!emitter || (!path.found && lengths_.hide_emitters && path.only_null)) return {};
     const EnvironmentLight light =
@@ -214,7 +215,7 @@ class BidirectionalTracer final : public LightTracingIntegrator {
                      emitter->pdf_emission(hit, -ray.d), hit.ng, ray.d, length_squared(hit.p - path.previous_p));
       weight = 1 / (1 + mis_.others_of_hit(left, pdfs));
     }
-    parts_.record(samples[path.sample], 0, depth + 2, radiance, weight);
+    parts_.record(0, depth + 2, radiance, weight);
     return radiance * static_cast<float>(weight);
   }
 
@@ -336,7 +337,7 @@ class BidirectionalTracer final : public LightTracingIntegrator {
     for (size_t i = 0; i < state.rays.size(); ++i) {
       if (state.blocked[i]) continue;
       const State::Connection& c = state.connections[i];
-      parts_.record(samples[c.sample], c.s, c.t, c.value, c.weight);
+      parts_.record(c.s, c.t, c.value, c.weight);
       samples[c.sample].radiance += c.value * c.weight;
     }
     state.connections.clear(), state.rays.clear();
@@ -361,10 +362,10 @@ class BidirectionalTracer final : public LightTracingIntegrator {
                     end.bsdf->reverse_pdf(end.wo, wi));
     if (!reaches_lens(scene, end, lens, context)) return;
     const float factor = parts_.adjoint_factor(end.wo, wi, end.ng_local) * lens.importance / lens.pdf_solid_angle;
-    const Spectrum value = end.throughput * f.value * factor;
+    const Spectrum value = end.throughput * f.value * (factor * pixel.weight * parts_.splat_factor());
     const double weight = 1 / (1 + others);
-    splats.push_back(
-        {path, pixel.x, pixel.y, value * (static_cast<float>(weight) * pixel.weight * parts_.splat_factor())});
+    parts_.record_splat(n_edges, pixel, value, weight);
+    splats.push_back({path, pixel.x, pixel.y, value * static_cast<float>(weight)});
   }
 
   /// Whether the camera sees the vertex, past area lights where these are hidden.

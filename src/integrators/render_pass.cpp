@@ -77,14 +77,12 @@ std::vector<Tile> make_tiles(const Film& film) {
   return tiles;
 }
 
-PathRandom sample_random(const PassSettings& settings, const Camera& camera, int x, int y, uint64_t sample) {
+/// `common`: whether the numbers are those of the pass's sampling; otherwise each pixel has its own.
+PathRandom sample_random(const PassSettings& settings, const Camera& camera, int x, int y, uint64_t sample,
+                         bool common) {
   const uint64_t pixel = static_cast<uint64_t>(y) * camera.width() + x;
+  if (!common) return {Sampling::kIndependent, settings.seed, settings.pass | kOwnNumbers, pixel, sample};
   return {settings.sampling, settings.seed, settings.pass, pixel, sample};
-}
-
-CameraSample camera_sample(const Scene& scene, const PassSettings& settings, int x, int y, uint64_t sample) {
-  const PathRandom random = sample_random(settings, scene.camera(), x, y, sample);
-  return {scene.camera().ray(film_position(settings.filter, x, y, random), random.get_2d(0, Event::kLens)), random, {}};
 }
 
 /// Sorts by pixel and sample and keeps the first few; which ones does not depend on the order they came in.
@@ -221,6 +219,14 @@ Vec2 film_position(const FilterSettings& filter, int x, int y, const PathRandom&
                            interval_to_gaussian(u.y, filter.stddev, filter.radius)};
   }
   throw Error(ErrorCode::kInternal, "unknown reconstruction filter");
+}
+
+CameraSample camera_sample(const Scene& scene, const PassSettings& settings, int x, int y, uint64_t sample) {
+  const CrnPart part = settings.sampling == Sampling::kCrn ? settings.crn_part : CrnPart::kBoth;
+  const PathRandom random = sample_random(settings, scene.camera(), x, y, sample, part != CrnPart::kLight);
+  const Ray ray = scene.camera().ray(film_position(settings.filter, x, y, random), random.get_2d(0, Event::kLens));
+  if (part == CrnPart::kBoth) return {ray, random, {}};
+  return {ray, random, {}, sample_random(settings, scene.camera(), x, y, sample, part != CrnPart::kCamera)};
 }
 
 PassResult render_pass(const Scene& scene, const Integrator& integrator, const PassSettings& settings, Film& film) {

@@ -22,8 +22,16 @@ class LearningIntegrator;
 /// The value of a pixel from all its samples together. Called by several threads at once.
 using PixelEstimate = std::function<Spectrum(std::span<const CameraSample>)>;
 
+/// What the pixels of a pass with common random numbers have in common, where samples have a light subpath as well.
+enum class CrnPart { kBoth, kCamera, kLight };
+
+/// Bit of PassSettings::pass in the keys of what pixels of a CRN pass do not have in common, so that it shares no
+/// numbers with the independent pass of the same number.
+inline constexpr uint32_t kOwnNumbers = 1u << 29;
+
 struct PassSettings {
   Sampling sampling = Sampling::kIndependent;
+  CrnPart crn_part = CrnPart::kBoth;  ///< of Sampling::kCrn
   uint64_t seed = 0;
   uint32_t pass = 0;  ///< position in the plan; passes of one plan never share numbers
   SampleTarget spp;   ///< samples per pixel to reach
@@ -67,6 +75,9 @@ struct PassResult {
 /// Renders until every pixel of `film` has settings.spp samples, at most settings.limit, or time or the stop flag ends
 /// it.
 PassResult render_pass(const Scene& scene, const Integrator& integrator, const PassSettings& settings, Film& film);
+
+/// The sample that render_pass() takes for (x, y, sample), before it is traced; x, y in the full frame.
+CameraSample camera_sample(const Scene& scene, const PassSettings& settings, int x, int y, uint64_t sample);
 
 /// The value of one sample, with the film position it was taken at: what render_pass() adds for (x, y, sample).
 struct ReplayedSample {

@@ -20,8 +20,7 @@ struct WithoutLightSubpaths : BidirectionalParts {
 /// Writes down what each technique adds.
 struct RecordingParts : BidirectionalParts {
   Contributions* contributions = nullptr;
-  static constexpr bool kRecords = true;
-  void record(const CameraSample&, int s, int t, const Spectrum& value, double weight) const {
+  void record(int s, int t, const Spectrum& value, double weight) const {
     const bool fresh = contributions->emplace(std::pair{s, t}, Contribution{value, weight}).second;
     EXPECT_TRUE(fresh) << "technique (" << s << ", " << t << ") twice";
   }
