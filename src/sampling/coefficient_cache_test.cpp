@@ -361,5 +361,34 @@ TEST_F(TrainingFile, IsRefusedWhenItIsSomethingElse) {
   EXPECT_EQ("a.training: is damaged: its content does not match its checksum", refused(bytes_ + "x", "scene 1"));
 }
 
+/// Contents that a checksum would let through: refused or harmless.
+TEST(TrainingFileBody, ManyMutationsAreRefusedOrHarmless) {
+  const Room room(4, smooth_light);
+  CacheSettings settings;
+  settings.resolution = 2;
+  CoefficientCache cache = make_cache(room, settings);
+  room.train(cache, 0, 1);
+  const std::string body = cache.table().body();
+  int n_accepted = 0;
+  for (uint64_t i = 0; i < 3000; ++i) {
+    std::string mutated = body;
+    for (uint64_t n = 0; n <= i % 3; ++n) {
+      const uint64_t dice = mix64(7 * i + n);
+      // Numbers at the head and in the first cells decide over sizes.
+      mutated[dice % std::min<size_t>(mutated.size(), i % 2 ? 100 : 600)] ^= static_cast<char>(1 << (dice >> 32) % 8);
+    }
+    if (i % 5 == 0) mutated.resize(mix64(i) % mutated.size());
+    try {
+      const CoefficientTable table = CoefficientTable::from_body(mutated, "a.training");
+      ++n_accepted;
+      const uint32_t cell = table.find(table.grid().key({0.3f, 0.3f, 0}, kUp));
+      if (cell != CoefficientTable::kNone && table.n_lights() > 3) table.light(cell, 3);
+    } catch (const Error& error) {
+      ASSERT_EQ(ErrorCode::kInput, error.code()) << error.what();
+    }
+  }
+  EXPECT_GT(n_accepted, 100);
+}
+
 }  // namespace
 }  // namespace covary

@@ -121,7 +121,7 @@ size_t CoefficientTable::bytes() const {
          (dense_.capacity() + values_.capacity()) * sizeof(Spectrum) + slots_.capacity() * sizeof(uint32_t);
 }
 
-uint64_t CoefficientTable::hash() const { return hash_bytes(to_bytes("")); }
+uint64_t CoefficientTable::hash() const { return hash_bytes(body()); }
 
 uint32_t CoefficientTable::slots_for(size_t n_lights) const {
   if (n_lights == 0) return 0;
@@ -181,7 +181,7 @@ std::vector<uint32_t> CoefficientTable::lights_of(const Cell& cell) const {
   return lights;
 }
 
-std::string CoefficientTable::to_bytes(const std::string& key) const {
+std::string CoefficientTable::body() const {
   std::string body;
   append(body, grid_.origin_), append(body, grid_.cell_width_), append(body, grid_.resolution_);
   append(body, grid_.level_), append(body, uint32_t{grid_.by_normal_});
@@ -194,6 +194,11 @@ std::string CoefficientTable::to_bytes(const std::string& key) const {
     append(body, static_cast<uint32_t>(lights.size()));
     for (uint32_t own : lights) append(body, own), append(body, light(i, own));
   }
+  return body;
+}
+
+std::string CoefficientTable::to_bytes(const std::string& key) const {
+  const std::string body = this->body();
   std::string bytes(kMagic);
   append(bytes, kVersion), append(bytes, uint64_t{key.size()}), bytes += key;
   append(bytes, uint64_t{body.size()}), append(bytes, hash_bytes(body)), bytes += body;
@@ -217,13 +222,20 @@ CoefficientTable CoefficientTable::from_bytes(std::string_view bytes, const std:
     reader.fail("is damaged: its content does not match its checksum");
   if (found != key)
     reader.fail(fmt::format("was trained for another scene or with other settings: '{}'; '{}' is needed", found, key));
+  return from_body(reader.rest(), where);
+}
 
+CoefficientTable CoefficientTable::from_body(std::string_view bytes, const std::string& where) {
+  Reader reader(bytes, where);
+  const auto check = [&](bool possible) {
+    if (!possible) reader.fail("is damaged: it has impossible numbers");
+  };
   CellGrid grid;
   grid.origin_ = reader.read<Vec3>(), grid.cell_width_ = reader.read<float>();
   grid.resolution_ = reader.read<uint32_t>(), grid.level_ = reader.read<uint32_t>();
   grid.by_normal_ = reader.read<uint32_t>() != 0;
   const auto n_lights = reader.read<uint32_t>(), n_dense = reader.read<uint32_t>();
-  if (grid.resolution_ < 1 || n_dense > SystemLayout::kMaxDense) reader.fail("is damaged: impossible numbers");
+  check(grid.resolution_ >= 1 && n_dense <= SystemLayout::kMaxDense);
   CoefficientTable table(grid, n_lights, n_dense);
   std::vector<Spectrum> dense(n_dense), values;
   std::vector<uint32_t> lights;
@@ -231,17 +243,20 @@ CoefficientTable CoefficientTable::from_bytes(std::string_view bytes, const std:
     NewCell cell;
     cell.key.bits = reader.read<uint64_t>();
     cell.parent = reader.read<uint32_t>();
+    check(table.index_.find(cell.key.bits) == KeyIndex::kNone);
+    check(cell.parent == kNone || cell.parent < table.n_cells());
     cell.scale = reader.read<Spectrum>(), cell.light_sum = reader.read<Spectrum>();
     for (Spectrum& value : dense) value = reader.read<Spectrum>();
     lights.clear(), values.clear();
     for (auto n = reader.read<uint32_t>(); n > 0; --n) {
       lights.push_back(reader.read<uint32_t>());
       values.push_back(reader.read<Spectrum>());
-      if (lights.back() >= n_lights) reader.fail("is damaged: impossible numbers");
+      check(lights.back() < n_lights && (lights.size() < 2 || lights[lights.size() - 2] < lights.back()));
     }
     cell.lights = lights, cell.light_values = values, cell.dense_values = dense;
     table.add_cells({&cell, 1});
   }
+  check(reader.rest().empty());
   return table;
 }
 

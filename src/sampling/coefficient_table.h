@@ -55,6 +55,8 @@ class CoefficientTable {
       : grid_(grid), n_lights_(n_lights), n_dense_(n_dense) {}
 
   const CellGrid& grid() const { return grid_; }
+  uint32_t n_lights() const { return n_lights_; }
+  uint32_t n_dense() const { return n_dense_; }
   /// The finest cell that holds coefficients for the place, or kNone: plain sampling.
   uint32_t find(CellKey key) const;
   /// Asks memory for what find(key) reads.
@@ -99,6 +101,9 @@ class CoefficientTable {
   /// Reads to_bytes(). `where` names the source in messages. Throws Error(kInput) when the bytes are truncated,
   /// damaged, of another version, or made with another key.
   static CoefficientTable from_bytes(std::string_view bytes, const std::string& key, const std::string& where);
+  /// What to_bytes() has behind its header, and back. Throws Error(kInput) for bytes that are not such.
+  std::string body() const;
+  static CoefficientTable from_body(std::string_view bytes, const std::string& where);
 
  private:
   // A cell that has seen many of the lights holds a value for each light there is, inherited ones too; others hold an
