@@ -28,9 +28,19 @@ Spectrum spectrum(const Rgb& v) {
   return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
 }
 
-double pull(double n_samples, const SolveSettings& settings) {
-  return n_samples > 0 ? settings.prior_samples / n_samples + kLeastPull : 1;
-}
+/// What the pull adds to the diagonal of A. The weight of one sample is that of a typical one, Σw² / Σw: where a few
+/// samples have nearly all of the weight, these few are what the pull is compared with.
+class Pull {
+ public:
+  Pull(const SystemView& system, const SolveSettings& settings) {
+    const double weight = system.head[Layout::kWeight];
+    if (weight > 0) pull_ = settings.prior_samples * system.head[Layout::kWeightSquared] / weight;
+  }
+  double diagonal(double a) const { return a * (1 + kLeastPull) + pull_; }
+
+ private:
+  double pull_ = 0;
+};
 
 /// Right-hand sides of (A + pull) difference = b − A (prior + constant), whose solution is the difference between
 /// solution and prior.
@@ -52,7 +62,7 @@ Residuals residuals(const SystemView& system, const CoefficientsView& prior, boo
   double dense_sums[Layout::kMaxDense];
   Rgb total = rgb(head + Layout::kValue);
   for (uint32_t j = 0; j < m; ++j) {
-    Rgb r = rgb(head + layout.dense(j) + 1);
+    Rgb r = rgb(head + layout.dense(j));
     dense_sums[j] = 0;
     for (uint32_t i = 0; i < m; ++i) {
       const double a = head[layout.matrix(i, j)];
@@ -123,18 +133,19 @@ void solve_block_arrow(const SystemView& system, const SolveSettings& settings, 
   const uint32_t m = layout.n_dense;
   Residuals right = residuals(system, coefficients, settings.monochrome);
 
+  const Pull pull(system, settings);
   DenseMatrix matrix(m, m);
   double diagonal[Layout::kMaxDense];
   for (uint32_t j = 0; j < m; ++j) {
     for (uint32_t i = 0; i < m; ++i) matrix(i, j) = system.head[layout.matrix(i, j)];
-    matrix(j, j) *= 1 + pull(system.head[layout.dense(j)], settings);
+    matrix(j, j) = pull.diagonal(matrix(j, j));
     diagonal[j] = matrix(j, j);
   }
   // The lights' rows, put into the others: [Hua2023] Eq. (32).
   std::vector<double> inverse(system.lights.size());
   for (size_t k = 0; k < system.lights.size(); ++k) {
     const float* row = &system.rows[k * layout.row_size()];
-    const double own = row[Layout::kDiagonal] * (1 + pull(row[Layout::kRowSamples], settings));
+    const double own = pull.diagonal(row[Layout::kDiagonal]);
     inverse[k] = own > 0 ? 1 / own : 0;
     for (uint32_t j = 0; j < m; ++j) {
       const double factor = row[Layout::kRowDense + j] * inverse[k];
@@ -158,18 +169,19 @@ void solve_dense(const SystemView& system, const SolveSettings& settings, Coeffi
   const Layout& layout = system.layout;
   const auto n = static_cast<Eigen::Index>(system.lights.size()), m = static_cast<Eigen::Index>(layout.n_dense);
   Residuals parts = residuals(system, coefficients, settings.monochrome);
+  const Pull pull(system, settings);
   Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(n + m, n + m);
   Eigen::Matrix<double, 3, Eigen::Dynamic> right(3, n + m);
   for (Eigen::Index k = 0; k < n; ++k) {
     const float* row = &system.rows[static_cast<size_t>(k) * layout.row_size()];
-    matrix(k, k) = row[Layout::kDiagonal] * (1 + pull(row[Layout::kRowSamples], settings));
+    matrix(k, k) = pull.diagonal(row[Layout::kDiagonal]);
     for (Eigen::Index j = 0; j < m; ++j) matrix(k, n + j) = matrix(n + j, k) = row[Layout::kRowDense + j];
     right.col(k) = parts.lights[static_cast<size_t>(k)];
   }
   for (Eigen::Index j = 0; j < m; ++j) {
     const auto own = static_cast<uint32_t>(j);
     for (uint32_t i = 0; i < layout.n_dense; ++i) matrix(n + i, n + j) = system.head[layout.matrix(i, own)];
-    matrix(n + j, n + j) *= 1 + pull(system.head[layout.dense(own)], settings);
+    matrix(n + j, n + j) = pull.diagonal(matrix(n + j, n + j));
     right.col(n + j) = parts.dense.col(j);
   }
   const Eigen::VectorXd diagonal = matrix.diagonal();

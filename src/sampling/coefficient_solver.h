@@ -31,26 +31,25 @@ struct SystemLayout {
   uint32_t n_dense = 0;  ///< techniques of the dense block, at most kMaxDense
 
   // Head. Σ is over samples, each with the weight w of its vertex; three numbers are RGB.
-  static constexpr uint32_t kSamples = 0;       ///< number of samples
-  static constexpr uint32_t kWeight = 1;        ///< Σ w
-  static constexpr uint32_t kValue = 2;         ///< Σ w f/p, RGB
-  static constexpr uint32_t kHeldOut = 5;       ///< number of held-out vertices
-  static constexpr uint32_t kPlainControl = 6;  ///< Σ w e c over held-out vertices, RGB: plain estimate times control
+  static constexpr uint32_t kWeight = 0;         ///< Σ w
+  static constexpr uint32_t kWeightSquared = 1;  ///< Σ w²
+  static constexpr uint32_t kValue = 2;          ///< Σ w f/p, RGB
+  static constexpr uint32_t kHeldOut = 5;        ///< number of held-out vertices
+  static constexpr uint32_t kPlainControl = 6;   ///< Σ w e c over held-out vertices, RGB: plain estimate times control
   static constexpr uint32_t kControlSquared = 9;  ///< Σ w c² over held-out vertices, RGB
   static constexpr uint32_t kDense = 12;
-  /// Of dense technique j: number of samples with r_j > 0, then b_j (RGB).
-  uint32_t dense(uint32_t j) const { return kDense + 4 * j; }
+  /// b_j of dense technique j, RGB.
+  uint32_t dense(uint32_t j) const { return kDense + 3 * j; }
   /// A of two dense techniques.
   uint32_t matrix(uint32_t i, uint32_t j) const {
-    return kDense + 4 * n_dense + (i >= j ? i * (i + 1) / 2 + j : j * (j + 1) / 2 + i);
+    return kDense + 3 * n_dense + (i >= j ? i * (i + 1) / 2 + j : j * (j + 1) / 2 + i);
   }
-  uint32_t head_size() const { return kDense + 4 * n_dense + n_dense * (n_dense + 1) / 2; }
+  uint32_t head_size() const { return kDense + 3 * n_dense + n_dense * (n_dense + 1) / 2; }
 
   // Row of a light k.
-  static constexpr uint32_t kRowSamples = 0;  ///< number of samples with r_k > 0
-  static constexpr uint32_t kDiagonal = 1;    ///< A_kk
-  static constexpr uint32_t kRowValue = 2;    ///< b_k, RGB
-  static constexpr uint32_t kRowDense = 5;    ///< A_kj for each dense technique j
+  static constexpr uint32_t kDiagonal = 0;  ///< A_kk
+  static constexpr uint32_t kRowValue = 1;  ///< b_k, RGB
+  static constexpr uint32_t kRowDense = 4;  ///< A_kj for each dense technique j
   uint32_t row_size() const { return kRowDense + n_dense; }
 };
 
@@ -68,8 +67,9 @@ struct CoefficientsView {
 };
 
 struct SolveSettings {
-  /// Strength of the pull towards the prior, in samples of each technique: a technique with as many samples lies about
-  /// halfway. At least 0; with 0 the prior decides only what the samples leave open.
+  /// Strength of the pull towards the prior, as if each technique had been seen in so many more samples that no other
+  /// technique could have taken (r = 1) and that had the prior as value. At least 0; with 0 the prior decides only what
+  /// the samples leave open, and techniques whose weights r are always small have coefficients of any size.
   double prior_samples = 0;
   bool monochrome = false;  ///< one coefficient for all channels: the best in the mean over RGB
 };

@@ -166,7 +166,8 @@ TEST(CoefficientSolver, RowsAddUpToTheWeightsOfTheirTechnique) {
   for (uint32_t k = 0; k < 4; ++k) {
     const auto row = view.rows.subspan(k * view.layout.row_size(), view.layout.row_size());
     double sum = row[SystemLayout::kDiagonal];
-    for (uint32_t j = 0; j < 3; ++j) sum += row[SystemLayout::kRowDense + j], dense_rows[j] += row[5 + j];
+    for (uint32_t j = 0; j < 3; ++j)
+      sum += row[SystemLayout::kRowDense + j], dense_rows[j] += row[SystemLayout::kRowDense + j];
     EXPECT_NEAR(lights[k], sum, 1e-5);
   }
   for (uint32_t j = 0; j < 3; ++j) {
@@ -185,6 +186,26 @@ TEST(CoefficientSolver, LittleDataStaysNearThePrior) {
   EXPECT_NEAR(4, free.lights[0].r - free.lights[1].r, 1e-5);
   const Coefficients drawn = fast(cell.view(), cell.zeros(), {4});
   EXPECT_NEAR(2, drawn.lights[0].r - drawn.lights[1].r, 1e-5);
+}
+
+/// A light that directions find now and then, and light samples never: its weights r are tiny, and without a pull its
+/// coefficient would be as large as they are small.
+TEST(CoefficientSolver, TinyWeightsGiveNoLargeCoefficients) {
+  OneCell cell(1);
+  const float always = 1, nearly = 1 - 1e-4f;
+  for (int s = 0; s < 50; ++s) cell.add(1, Spectrum(1), ControlledSample::kNoLight, 0, {&always, 1});
+  cell.add(1, Spectrum(9), 0, 1e-4f, {&nearly, 1});
+  EXPECT_GT(fast(cell.view(), cell.zeros()).lights[0].r, 1e3f);
+  EXPECT_LT(std::abs(fast(cell.view(), cell.zeros(), {4}).lights[0].r), 0.01f);
+}
+
+/// A sample that has nearly all of the weight is one sample.
+TEST(CoefficientSolver, OneHeavySampleIsNotMuchData) {
+  OneCell cell(0);
+  for (int s = 0; s < 100; ++s) cell.add(1e-3f, Spectrum(1), s % 2, 1, {});
+  cell.add(100, Spectrum(50), 0, 1, {});
+  const Coefficients drawn = fast(cell.view(), cell.zeros(), {4});
+  EXPECT_NEAR(0, drawn.lights[0].r - drawn.lights[1].r, 0.1f);
 }
 
 TEST(CoefficientSolver, ShareOfTheControlIsWhatHeldOutVerticesSay) {

@@ -60,15 +60,14 @@ void SystemSums::add(uint32_t cell, float weight, const ControlledSample& sample
     return;
   }
   double* head = &heads_[size_t{cell} * layout_.head_size()];
-  head[SystemLayout::kSamples] += 1;
   head[SystemLayout::kWeight] += weight;
+  head[SystemLayout::kWeightSquared] += static_cast<double>(weight) * weight;
   for (int c = 0; c < 3; ++c) head[SystemLayout::kValue + static_cast<uint32_t>(c)] += weighted[c];
   for (uint32_t j = 0; j < layout_.n_dense; ++j) {
     const double r = sample.r_dense[j];
     if (r == 0) continue;
     double* own = head + layout_.dense(j);
-    own[0] += 1;
-    for (int c = 0; c < 3; ++c) own[1 + c] += r * weighted[c];
+    for (int c = 0; c < 3; ++c) own[c] += r * weighted[c];
     for (uint32_t i = 0; i <= j; ++i) head[layout_.matrix(i, j)] += weight * r * sample.r_dense[i];
   }
   if (sample.light == ControlledSample::kNoLight || sample.r_light == 0) return;
@@ -76,7 +75,6 @@ void SystemSums::add(uint32_t cell, float weight, const ControlledSample& sample
   rows_.resize(rows_index_.keys().size() * layout_.row_size());
   float* row = &rows_[size_t{number} * layout_.row_size()];
   const float r = sample.r_light;
-  row[SystemLayout::kRowSamples] += 1;
   row[SystemLayout::kDiagonal] += weight * r * r;
   for (int c = 0; c < 3; ++c) row[SystemLayout::kRowValue + static_cast<uint32_t>(c)] += r * weighted[c];
   for (uint32_t j = 0; j < layout_.n_dense; ++j) row[SystemLayout::kRowDense + j] += weight * r * sample.r_dense[j];
