@@ -75,6 +75,7 @@ void check_options(RenderOptions& options) {
     usage(fmt::format(
         "--time: {} are fitted to all samples of a pixel together, so their number must be known; use --spp", name));
   parse_split(options.split);
+  control_options(options.control);
   if (!options.until.empty()) {
     parse_until(options.until);
     if (!estimator.predicts_error) usage("--until: " + name + " does not estimate its error");
@@ -91,7 +92,8 @@ LoadedScene load(const RenderOptions& options) {
       throw Error(ErrorCode::kUsage, "--resolution '" + options.resolution + "': each side must be 1 to 65536");
     load_options.width = static_cast<int>(size[0]), load_options.height = static_cast<int>(size[1]);
   }
-  load_options.make_integrator = integrator_maker({options.integrator, options.min_depth, options.max_depth});
+  load_options.make_integrator =
+      integrator_maker({options.integrator, options.min_depth, options.max_depth, control_options(options.control)});
   return load_scene(options.scene, load_options);
 }
 
@@ -150,7 +152,7 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
       .add_option("--spp", o.spp,
                   "Samples per pixel of all passes together, at least 4 in each of two; default: the scene's")
       ->transform(whole_number(1u, 1u << 30));
-  command.add_option("--integrator", o.integrator, "Integrator instead of the scene's: path");
+  command.add_option("--integrator", o.integrator, "Integrator instead of the scene's: bdpt, controlled-path or path");
   command
       .add_option("--estimator", o.estimator.name,
                   fmt::format("How passes become the image: {} of a pass with common random numbers and an "
@@ -205,6 +207,7 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
   command.add_option("--json", o.json, "File for statistics; '-': standard output");
   command.add_flag("!--no-preview", o.preview, "Do not write the PNG");
   command.add_flag("--quiet", o.quiet, "No progress and no summary");
+  add_control_options(command, o.control);
   add_estimator_options(command, o.estimator, estimator_names());
 }
 

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "control_options.h"
 #include "estimator_options.h"
 #include "plans/plan.h"
 #include "plans/render.h"
@@ -20,6 +21,7 @@ struct RenderOptions {
   std::string scene, output, integrator, sampling, split = "1:1", rfilter, json, passes;
   std::string resolution, crop, replay, until, display_server;
   EstimatorOptions estimator;
+  ControlTexts control;
   std::vector<std::string> defines;
   std::optional<uint32_t> spp;
   std::optional<int> groups, min_depth, max_depth;

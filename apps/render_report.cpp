@@ -10,6 +10,7 @@
 
 #include "commands.h"
 #include "core/shell_text.h"
+#include "integrators/controlled_path.h"
 #include "plans/budget.h"
 #include "plans/memory.h"
 #include "progress.h"
@@ -32,6 +33,7 @@ std::string replay_command(const RenderOptions& o, const Pass& pass, const BadSa
   for (const std::string& define : o.defines) add("-D", define);
   if (!o.resolution.empty()) add("--resolution", o.resolution);
   if (!o.integrator.empty()) add("--integrator", o.integrator);
+  for (const std::string& word : command_words(o.control)) words.push_back(word);
   if (o.min_depth) add("--min-depth", std::to_string(*o.min_depth));
   if (o.max_depth) add("--max-depth", std::to_string(*o.max_depth));
   if (!o.rfilter.empty()) add("--rfilter", o.rfilter);
@@ -46,6 +48,12 @@ std::string replay_command(const RenderOptions& o, const Pass& pass, const BadSa
 uint32_t fewest_reliable_samples(const RenderReport& report) {
   const uint32_t fewest = make_estimator(report.options.estimator).reliable_samples;
   return report.result.predicted_relmse && report.result.samples_per_pixel() < fewest ? fewest : 0;
+}
+
+/// The scene's integrator where it uses control variates, or null.
+const ControlledPath* trained_integrator(const LoadedScene& scene) {
+  const auto* controlled = dynamic_cast<const ControlledPath*>(scene.integrator.get());
+  return controlled && controlled->settings().on() ? controlled : nullptr;
 }
 
 }  // namespace
@@ -96,6 +104,7 @@ nlohmann::ordered_json statistics(const RenderReport& report) {
       {"seconds",
        {{"load", load_seconds},
         {"build", scene.scene->build_seconds()},
+        {"train", result.seconds.train},
         {"trial", result.seconds.trial},
         {"render", result.render_seconds()},
         {"estimate", result.estimate_seconds()},
@@ -111,6 +120,15 @@ nlohmann::ordered_json statistics(const RenderReport& report) {
       {"not_finite_samples", result.sum([](const Pass& p) { return p.result.n_not_finite; })},
       {"negative_samples", result.sum([](const Pass& p) { return p.result.n_negative; })},
       {"bad_samples", bad}};
+  if (const ControlledPath* controlled = trained_integrator(scene))
+    json["control_variates"] = {{"lights", controlled->lights().size()},
+                                {"clusters", controlled->n_clusters()},
+                                {"cells", controlled->table().n_cells()},
+                                {"cells_switched_off", controlled->table().n_switched_off()},
+                                {"grid", controlled->table().grid().resolution()},
+                                {"times_coarsened", controlled->cache().n_coarsened()},
+                                {"samples_not_finite", controlled->cache().n_rejected()},
+                                {"memory_bytes", controlled->training_bytes()}};
   if (result.predicted_relmse) {
     json["predicted_relmse"] = *result.predicted_relmse;
     json["predicted_relmse_reliable"] = fewest_reliable_samples(report) == 0;
@@ -131,6 +149,10 @@ void print_summary(const RenderReport& report) {
              load_seconds, scene.scene->build_seconds(),
              format_count(result.sum([](const Pass& p) { return p.result.n_samples; }) / seconds),
              format_count(result.sum([](const Pass& p) { return p.result.n_rays; }) / seconds));
+  if (const ControlledPath* controlled = trained_integrator(scene))
+    fmt::print(stderr, "control variates in {} cells, {} of them switched off, from {} samples per pixel in {:.2f} s\n",
+               controlled->table().n_cells(), controlled->table().n_switched_off(), controlled->training_spp(),
+               result.seconds.train);
   const Estimator estimator = make_estimator(options.estimator);
   if (estimator.passes != EstimatorPasses::kAny) {
     fmt::print(stderr, "{} in {:.2f} s", estimator.text, result.estimate_seconds());

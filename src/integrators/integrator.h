@@ -36,6 +36,8 @@ struct PathContext {
   Arena arena;
   uint64_t n_rays = 0;
   std::unique_ptr<ThreadState> state;
+  /// PassSettings::importance of the pixel of each sample that trace() is called with; empty where there is none.
+  std::span<const Spectrum> importance;
 };
 
 /// One camera ray, the random numbers of its path, and the estimate of the radiance arriving along it.

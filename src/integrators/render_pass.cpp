@@ -60,6 +60,7 @@ struct Worker {
   bool allows_negative;
   std::vector<PixelWork> pixels;
   std::vector<CameraSample> samples;  // of these pixels, one after another
+  std::vector<Spectrum> importance;   // of the pixels of these samples, where there is one
   uint64_t n_samples = 0, n_not_finite = 0, n_negative = 0;
   std::vector<BadSample> bad_samples;
   double seconds = 0, estimate_seconds = 0;  // in tiles, and in settings.estimate
@@ -125,9 +126,17 @@ void trace_pixels(const Scene& scene, const Integrator& integrator, const PassSe
     for (uint32_t s = pixel.begin; s < pixel.end; ++s)
       make_in_place(
           *next++, [&] { return camera_sample(scene, settings, film.crop().x + pixel.x, film.crop().y + pixel.y, s); });
-  for (size_t i = 0; i < n_samples; i += kBatchSize)
-    integrator.trace(scene, std::span(worker.samples).subspan(i, std::min<size_t>(kBatchSize, n_samples - i)),
-                     worker.context);
+  worker.importance.clear();
+  if (!settings.importance.empty())
+    for (const PixelWork& pixel : worker.pixels)
+      worker.importance.insert(worker.importance.end(), pixel.end - pixel.begin,
+                               settings.importance[static_cast<size_t>(pixel.y) * film.width() + pixel.x]);
+  for (size_t i = 0; i < n_samples; i += kBatchSize) {
+    const size_t n = std::min<size_t>(kBatchSize, n_samples - i);
+    worker.context.importance =
+        std::span(worker.importance).subspan(worker.importance.empty() ? 0 : i, worker.importance.empty() ? 0 : n);
+    integrator.trace(scene, std::span(worker.samples).subspan(i, n), worker.context);
+  }
 
   CameraSample* sample = worker.samples.data();
   for (const PixelWork& pixel : worker.pixels) {

@@ -44,6 +44,9 @@ struct PassSettings {
   /// The integrator of this pass where it is to learn from all of these samples (integrators/training.h), otherwise
   /// null. The film has as many samples in each pixel as were learnt from so far.
   LearningIntegrator* learner = nullptr;
+  /// How much an error counts in each channel of each pixel of the film, row by row, for a learner; empty: 1. May be
+  /// set between waves, by `checkpoint`.
+  std::span<const Spectrum> importance;
   double seconds = 0;  ///< stop after this time when > 0, in the middle of a wave
   /// Set from a signal handler to stop at the next tile.
   const std::atomic<bool>* stop = nullptr;

@@ -35,6 +35,12 @@ bool train(const Scene& scene, LearningIntegrator& integrator, const TrainingSet
     pass.filter = settings.filter, pass.stop = settings.stop, pass.progress = settings.progress;
     pass.learner = &integrator;
     Film film(scene.camera().width(), scene.camera().height(), settings.window, 1);
+    std::vector<Spectrum> importance;
+    pass.checkpoint = [&] {
+      if (!settings.importance || integrator.trained_spp() != integrator.pilot_spp()) return;
+      importance = settings.importance(film);
+      pass.importance = importance;
+    };
     render_pass(scene, integrator, pass, film);
     if (integrator.trained_spp() != integrator.training_spp()) return false;
   }

@@ -35,6 +35,9 @@ class LearningIntegrator : public Integrator {
   virtual uint32_t training_spp() const = 0;
   /// PassSettings::seed of the training. Films of different seeds can be merged where this is the same for all.
   virtual uint64_t training_seed() const { return 0; }
+  /// Samples per pixel of the training after which the importance of each pixel (PassSettings::importance) is made of
+  /// the image so far; 0: it is not asked for.
+  virtual uint32_t pilot_spp() const { return 0; }
   /// What trace() has recorded in a thread's state since the last call, or null. Not called when frozen. Thread-safe.
   virtual std::unique_ptr<TrainingRecord> take_record(ThreadState& state) const = 0;
   /// Adds a record. Called by one thread at a time, in the order of tiles, never null.
@@ -79,6 +82,8 @@ struct TrainingSettings {
   FilterSettings filter;
   const std::atomic<bool>* stop = nullptr;                      ///< as in PassSettings
   std::function<void(uint64_t done, uint64_t total)> progress;  ///< as in PassSettings
+  /// Makes the importance of each pixel from the film after pilot_spp() samples; empty: 1 everywhere.
+  std::function<std::vector<Spectrum>(const Film&)> importance;
 };
 
 /// Trains a prepared integrator from the beginning, by training_spp() independent samples in each pixel that are used

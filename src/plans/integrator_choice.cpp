@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "integrators/controlled_path.h"
 
 namespace covary {
 
@@ -16,9 +17,20 @@ std::function<std::shared_ptr<SceneObject>(Parameters&)> integrator_maker(const 
     if (choice.max_depth)
       lengths.max_depth = *choice.max_depth < 0 ? PathLengthSettings::kUnlimited : *choice.max_depth;
     const IntegratorPlugin* plugin = find_integrator(choice.name.empty() ? parameters.type() : choice.name);
-    if (plugin) return plugin->make(parameters, lengths);
-    parameters.error(unknown_integrator(parameters.type()));
-    return nullptr;
+    if (!plugin) {
+      parameters.error(unknown_integrator(parameters.type()));
+      return nullptr;
+    }
+    const std::shared_ptr<Integrator> integrator = plugin->make(parameters, lengths);
+    if (choice.control) {
+      auto* controlled = dynamic_cast<ControlledPath*>(integrator.get());
+      if (!controlled)
+        throw Error(ErrorCode::kUsage, fmt::format("options of control variates (--cv, --lights and others) are of "
+                                                   "--integrator controlled-path, not of {}",
+                                                   plugin->name));
+      controlled->change(*choice.control);
+    }
+    return integrator;
   };
 }
 

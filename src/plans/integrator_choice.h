@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "integrators/control_settings.h"
 #include "integrators/integrator.h"
 #include "io/load_scene.h"
 
@@ -15,6 +16,8 @@ struct IntegratorChoice {
   std::string name;              ///< registered name; empty: the scene's
   std::optional<int> min_depth;  ///< leave out paths with fewer edges
   std::optional<int> max_depth;  ///< largest number of path edges; < 0: no limit
+  /// For `controlled-path`; an error with another integrator where anything is given.
+  std::optional<ControlOptions> control;
 };
 
 /// For LoadOptions::make_integrator.

@@ -16,6 +16,7 @@
 #include "plans/memory.h"
 #include "plans/pass_files.h"
 #include "plans/pass_waves.h"
+#include "plans/pixel_importance.h"
 #include "plans/result_files.h"
 
 namespace covary {
@@ -45,8 +46,11 @@ std::shared_ptr<const Integrator> integrator_of(const LoadedScene& scene) {
 }
 
 /// Trains the scene's integrator if it learns. False when stopped.
-bool train(const LoadedScene& scene, const TrainingSettings& settings) {
+bool train(const LoadedScene& scene, TrainingSettings settings) {
   auto* learning = dynamic_cast<LearningIntegrator*>(scene.integrator.get());
+  settings.importance = [&](const Film& film) {
+    return pixel_importance(*scene.scene, settings.filter, film, settings.stop);
+  };
   return !learning || train(*scene.scene, *learning, settings);
 }
 
@@ -151,7 +155,9 @@ void PlanRun::write_files() {
 }
 
 bool PlanRun::render_to_limits() {
-  if (!train(scene_, {window_, filter_, callbacks_.stop, callbacks_.progress})) return false;
+  const Stopwatch training;
+  if (!train(scene_, {window_, filter_, callbacks_.stop, callbacks_.progress, {}})) return false;
+  result_.seconds.train = training.seconds();
   const uint32_t limit = largest_budget(scene_, request_);
   state_.budget = state_.group_budget = first_budget(scene_, request_);
   if (timed() && plan_.groups_follow_speed) {
@@ -342,7 +348,7 @@ ReplayedSample replay(const LoadedScene& scene, const RenderRequest& request, co
   settings.pass = address.pass;
   settings.filter = request.filter.value_or(scene.filter);
   const auto integrator = integrator_of(scene);
-  train(scene, {window_of(scene, request), settings.filter, nullptr, nullptr});
+  train(scene, {window_of(scene, request), settings.filter, nullptr, nullptr, {}});
   return replay_sample(*scene.scene, *integrator, settings, address.x, address.y, address.sample);
 }
 

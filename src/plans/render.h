@@ -50,6 +50,7 @@ struct RenderCallbacks {
 
 struct RenderSeconds {
   double auxiliary = 0;  ///< of rendering auxiliary images
+  double train = 0;      ///< of the integrator's training
   double trial = 0;      ///< of finding out, for a time limit, how fast passes and estimator are
   double estimate = 0;   ///< after the passes
   double write = 0;

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "control_options.h"
+
+#include "numbers.h"
+
+namespace covary {
+namespace {
+
+constexpr const char* kGroup = "Controlled path";
+constexpr uint32_t kMaxNumber = 1u << 30;
+
+}  // namespace
+
+void add_control_options(CLI::App& command, ControlTexts& texts) {
+  command.add_option("--cv", texts.kind, "Control variates: one coefficient for each colour, for all, or none")
+      ->check(one_of({"rgb", "mono", "off"}))
+      ->group(kGroup);
+  command
+      .add_flag("--cv-paper", texts.paper,
+                "The published method: --lights triangle --cv-grid 64 --cv-train 16, cells by position alone")
+      ->group(kGroup);
+  command
+      .add_option("--lights", texts.lights,
+                  "How lights are chosen: uniformly over emissive triangles, over shapes, or by power")
+      ->check(one_of({"triangle", "shape", "power"}))
+      ->group(kGroup);
+  command
+      .add_option("--cv-grid", texts.grid, "Cells along the longest side of the scene, or auto: by the size of pixels")
+      ->group(kGroup);
+  command
+      .add_option("--cv-train", texts.train_spp,
+                  "Samples per pixel to learn from, beside those of the image; default: 16")
+      ->transform(whole_number(1u, ControlSettings::kMaxTrainingSpp))
+      ->group(kGroup);
+  command.add_option("--cv-clusters", texts.clusters, "Most clusters of lights; default: 5000")
+      ->transform(whole_number(1u, kMaxNumber))
+      ->group(kGroup);
+  command.add_option("--cv-variance", texts.variance, "What is made least: relative or absolute variance")
+      ->check(one_of({"relative", "absolute"}))
+      ->group(kGroup);
+  command
+      .add_option("--cv-prefix", texts.prefix,
+                  "Whether samples weigh by the throughput of the path before them; default: on")
+      ->check(one_of({"on", "off"}))
+      ->group(kGroup);
+  command
+      .add_option("--cv-memory", texts.memory_mib,
+                  "MiB of sums and coefficients while learning, then cells become wider; default: 256")
+      ->transform(whole_number(1u, kMaxNumber))
+      ->group(kGroup);
+}
+
+std::optional<ControlOptions> control_options(const ControlTexts& texts) {
+  if (command_words(texts).empty()) return {};
+  ControlOptions options;
+  options.paper = texts.paper;
+  if (!texts.kind.empty()) options.kind = control_kind(texts.kind);
+  if (!texts.lights.empty()) options.lights = light_selection(texts.lights);
+  if (texts.grid == "auto") {
+    options.grid = ControlSettings::kAutomaticGrid;
+  } else if (!texts.grid.empty()) {
+    options.grid = parse_whole<uint32_t>(texts.grid);
+    if (options.grid.value_or(0) < 1 || *options.grid > CellGrid::kMaxResolution)
+      throw Error(ErrorCode::kUsage, "--cv-grid '" + texts.grid + "': expected auto or a whole number from 1 to " +
+                                         std::to_string(CellGrid::kMaxResolution));
+  }
+  options.train_spp = texts.train_spp, options.clusters = texts.clusters, options.memory_mib = texts.memory_mib;
+  if (!texts.variance.empty()) options.relative = texts.variance == "relative";
+  if (!texts.prefix.empty()) options.prefix = texts.prefix == "on";
+  return options;
+}
+
+std::vector<std::string> command_words(const ControlTexts& texts) {
+  std::vector<std::string> words;
+  if (texts.paper) words.emplace_back("--cv-paper");
+  const auto add = [&](const char* option, const std::string& value) {
+    if (!value.empty()) words.insert(words.end(), {option, value});
+  };
+  const auto number = [](const std::optional<uint32_t>& value) { return value ? std::to_string(*value) : ""; };
+  add("--cv", texts.kind);
+  add("--lights", texts.lights);
+  add("--cv-grid", texts.grid);
+  add("--cv-train", number(texts.train_spp));
+  add("--cv-clusters", number(texts.clusters));
+  add("--cv-variance", texts.variance);
+  add("--cv-prefix", texts.prefix);
+  add("--cv-memory", number(texts.memory_mib));
+  return words;
+}
+
+}  // namespace covary

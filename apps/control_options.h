@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// The options of --integrator controlled-path on the command line.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "integrators/control_settings.h"
+
+namespace covary {
+
+/// As given; empty: not given.
+struct ControlTexts {
+  std::string kind, lights, grid, variance, prefix;
+  std::optional<uint32_t> train_spp, clusters, memory_mib;
+  bool paper = false;
+};
+
+void add_control_options(CLI::App& command, ControlTexts& texts);
+
+/// What they say; nothing where none was given. Throws Error(kUsage).
+std::optional<ControlOptions> control_options(const ControlTexts& texts);
+
+/// The options as words of a command line.
+std::vector<std::string> command_words(const ControlTexts& texts);
+
+}  // namespace covary

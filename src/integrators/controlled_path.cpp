@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+// `controlled-path`: see controlled_path.h.
+//
+// | parameter     | type    | default  | meaning                                                               |
+// |---------------|---------|----------|-----------------------------------------------------------------------|
+// | max_depth     | integer | -1       | largest number of path edges; -1: no limit                            |
+// | rr_depth      | integer | 5        | number of edges after which roulette may end a path                   |
+// | hide_emitters | boolean | false    | lights are invisible to the camera                                    |
+// | cv            | string  | rgb      | control variates: `off`, `rgb`, `mono`                                |
+// | cv_paper      | boolean | false    | the published method; other parameters change it                      |
+// | lights        | string  | power    | how lights are chosen: `triangle`, `shape`, `power`                   |
+// | cv_grid       | integer | 0        | cells along the longest side of the scene; 0: by the size of pixels   |
+// | cv_train      | integer | 16       | samples per pixel to learn from                                       |
+// | cv_clusters   | integer | 5000     | most clusters of lights                                               |
+// | cv_variance   | string  | relative | what is made least: `relative` or `absolute` variance                 |
+// | cv_prefix     | boolean | true     | samples weigh by the throughput of the path before them               |
+// | cv_memory     | integer | 256      | MiB of sums and coefficients while training; then cells become wider  |
+#include "integrators/controlled_path.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "core/content_hash.h"
+#include "sampling/light_clusters.h"
+
+namespace covary {
+namespace {
+
+/// What the samples of one tile taught.
+struct SumsRecord final : TrainingRecord {
+  SystemSums sums;
+};
+
+ClusterLight cluster_light(const Light& light, const Bounds3& scene) {
+  ClusterLight result;
+  result.power = luminance(light.emitter->part_power(light.part));
+  if (const Shape* shape = light.emitter->shape()) {
+    result.bounds = shape->part_bounds(light.part);
+    const Vec3 normal = shape->part_normal(light.part);
+    if (length_squared(normal) > 0) result.axis = normal, result.cos_half_angle = 1;
+    return result;
+  }
+  const Vec3 centre = scene.center();
+  const EmitterSample sample = light.emitter->sample_towards(centre, {0.5f, 0.5f}, 0.5f);
+  if (sample.distance == kInfinity) {
+    result.bounds = scene, result.axis = -sample.wi, result.cos_half_angle = 1;
+  } else {
+    const Vec3 p = centre + sample.wi * sample.distance;
+    result.bounds = {p, p};
+  }
+  return result;
+}
+
+}  // namespace
+
+void ControlledPath::prepare(const Scene& scene) {
+  if (scene_ == &scene) return;
+  scene_ = &scene;
+  lights_ = LightSet(scene, settings_.lights);
+  compensated_ = scene.environment() ? scene.environment()->mis_compensated() : nullptr;
+  const Emitter* environment = compensated_ ? compensated_.get() : scene.environment();
+  controlled_ = {&lights_, {}, environment, &table(), settings_.prefix};
+  std::vector<float> counts = make_clusters();
+  controlled_.cluster_of = cluster_of_;
+  if (settings_.on())
+    cache_ = CoefficientCache(scene.bounds(), std::move(counts), controlled_.n_dense(), settings_.cache(resolution()));
+}
+
+/// Groups the lights; returns the expected number of samples that a vertex takes of each cluster.
+std::vector<float> ControlledPath::make_clusters() {
+  cluster_of_.resize(lights_.size());
+  std::iota(cluster_of_.begin(), cluster_of_.end(), 0u);
+  n_clusters_ = lights_.size();
+  if (settings_.on() && lights_.size() > settings_.clusters) {
+    std::vector<ClusterLight> lights;
+    for (uint32_t i = 0; i < lights_.size(); ++i) lights.push_back(cluster_light(lights_[i], scene_->bounds()));
+    const Bounds3& bounds = scene_->bounds();
+    LightClusters clusters = cluster_lights(lights, settings_.clusters, 2 * bounds.radius());
+    cluster_of_ = std::move(clusters.cluster_of), n_clusters_ = clusters.n_clusters;
+  }
+  std::vector<double> counts(n_clusters_);
+  for (uint32_t i = 0; i < lights_.size(); ++i) counts[cluster_of_[i]] += lights_[i].pmf;
+  return {counts.begin(), counts.end()};
+}
+
+/// By what the camera sees: cells as wide as 16 pixels in the mean over the image, where that gives 16 to 256 cells; 64
+/// where it sees nothing.
+uint32_t ControlledPath::resolution() const {
+  if (settings_.grid != ControlSettings::kAutomaticGrid) return settings_.grid;
+  constexpr int kSide = 16;
+  const Camera& camera = scene_->camera();
+  double sum = 0;
+  int n = 0;
+  for (int i = 0; i < kSide * kSide; ++i) {
+    const Vec2 at = {(static_cast<float>(i % kSide) + 0.5f) / kSide * static_cast<float>(camera.width()),
+                     (static_cast<float>(i / kSide) + 0.5f) / kSide * static_cast<float>(camera.height())};
+    const Ray ray = camera.ray(at, {0.5f, 0.5f}), next = camera.ray({at.x + 1, at.y}, {0.5f, 0.5f});
+    SurfaceHit hit;
+    if (!scene_->intersect(ray, hit)) continue;
+    sum += length(ray.o + ray.d * hit.t - next.o - next.d * hit.t), ++n;
+  }
+  if (!(sum > 0)) return 64;
+  const Vec3 size = scene_->bounds().upper - scene_->bounds().lower;
+  return static_cast<uint32_t>(std::clamp(max_component(size) / (16 * sum / n), 16.0, 256.0));
+}
+
+void ControlledPath::use(CoefficientTable table) {
+  COVARY_CHECK(scene_ && settings_.on(), "coefficients belong to a scene and to control variates");
+  given_ = std::move(table);
+  controlled_.table = &*given_;
+}
+
+void ControlledPath::begin_batch(ControlledBatch& batch) const {
+  batch.recording = !frozen() && settings_.on() && trained_spp() >= pilot_spp();
+  if (batch.recording && batch.sums.n_cells() == 0) batch.sums = cache_.new_sums();
+}
+
+std::unique_ptr<TrainingRecord> ControlledPath::take_record(ThreadState& state) const {
+  SystemSums& sums = static_cast<ControlledBatch&>(state).sums;
+  if (sums.n_cells() == 0) return nullptr;
+  auto record = std::make_unique<SumsRecord>();
+  std::swap(record->sums, sums);
+  return record;
+}
+
+void ControlledPath::absorb(const TrainingRecord& record) {
+  cache_.absorb(static_cast<const SumsRecord&>(record).sums);
+}
+
+void ControlledPath::update() {
+  if (trained_spp() >= pilot_spp()) cache_.update();
+}
+
+std::string ControlledPath::settings_text() const {
+  return "controlled-path " + lengths_.text() + " " + settings_.text();
+}
+
+std::shared_ptr<Integrator> make_controlled_path(Parameters& parameters, const PathLengthSettings& lengths) {
+  return std::make_shared<ControlledPath>(lengths, ControlSettings().with(ControlOptions::from(parameters)));
+}
+
+}  // namespace covary

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+// `controlled-path`: path tracing with control variates made of the sampling densities, learned in cells of space
+// [Hua2023]. controlled_tracer.h has the estimator, sampling/coefficient_cache.h the learning.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "integrators/control_settings.h"
+#include "integrators/controlled_batch.h"
+#include "integrators/controlled_tracer.h"
+#include "integrators/training.h"
+
+namespace covary {
+
+class ControlledPath : public LearningIntegrator {
+ public:
+  ControlledPath(const PathLengthSettings& lengths, const ControlSettings& settings)
+      : lengths_(lengths), settings_(settings) {}
+
+  const ControlSettings& settings() const { return settings_; }
+  /// Changes settings; before prepare().
+  void change(const ControlOptions& options) { settings_ = settings_.with(options); }
+  const CoefficientCache& cache() const { return cache_; }
+  /// The coefficients in use.
+  const CoefficientTable& table() const { return given_ ? *given_ : cache_.table(); }
+  /// Takes coefficients that were learnt before, in place of a training; after prepare(), before the training.
+  void use(CoefficientTable table);
+  const LightSet& lights() const { return lights_; }
+  uint32_t n_clusters() const { return n_clusters_; }
+  /// Bytes of sums and coefficients at the end of the training.
+  size_t training_bytes() const { return training_bytes_; }
+
+  void prepare(const Scene& scene) override;
+  std::unique_ptr<ThreadState> make_thread_state() const override { return std::make_unique<ControlledBatch>(); }
+  void trace(const Scene& scene, std::span<CameraSample> samples, PathContext& context) const override {
+    trace_with<ControlledParts>(scene, samples, context);
+  }
+  bool allows_negative() const override { return settings_.on(); }
+  /// 0 once coefficients were given.
+  uint32_t training_spp() const override { return given_ ? 0 : settings_.training_spp(); }
+  uint32_t pilot_spp() const override { return settings_.pilot_spp(); }
+  std::unique_ptr<TrainingRecord> take_record(ThreadState& state) const override;
+  void absorb(const TrainingRecord& record) override;
+
+ protected:
+  template <typename Parts>
+  void trace_with(const Scene& scene, std::span<CameraSample> samples, PathContext& context) const {
+    begin_batch(context.state_as<ControlledBatch>());
+    ControlledTracer<Parts>(scene, controlled_, lengths_, samples, context).trace();
+  }
+
+  void on_restart() override { cache_.restart(); }
+  void update() override;
+  void on_freeze() override {
+    training_bytes_ = cache_.bytes();
+    cache_.freeze();
+  }
+  uint64_t state_hash() const override { return table().hash(); }
+  std::string settings_text() const override;
+
+ private:
+  void begin_batch(ControlledBatch& batch) const;
+  std::vector<float> make_clusters();
+  uint32_t resolution() const;
+
+  PathLengthSettings lengths_;
+  ControlSettings settings_;
+  const Scene* scene_ = nullptr;  // that of prepare()
+  LightSet lights_;
+  std::vector<uint32_t> cluster_of_;  // for each light
+  uint32_t n_clusters_ = 0;
+  std::shared_ptr<const Emitter> compensated_;  // the environment as it is sampled, where it is not the scene's own
+  CoefficientCache cache_;
+  std::optional<CoefficientTable> given_;
+  ControlledScene controlled_{};
+  size_t training_bytes_ = 0;
+};
+
+}  // namespace covary

@@ -1,0 +1,373 @@
+// SPDX-License-Identifier: Apache-2.0
+// Path tracing with control variates made of the sampling densities [Hua2023]. A vertex takes one sample of a light,
+// one of the environment if there is one, and one direction from its BSDF. With p the sum of the densities with which
+// they find a point, and r_k the part of technique k in it (the balance heuristic), its estimate is
+//
+//     Σ_s f/p + Σ_k N_k β_k − Σ_s Σ_k β_k r_k(s),                                       [Hua2023] Eq. (17)
+//
+// see sampling/coefficient_solver.h. The second and third term have the same expectation whatever the coefficients β
+// are, as long as they do not depend on the samples; f is the light that reaches the vertex from emitters, and what
+// other surfaces reflect is left to the path. The estimate is unbiased, and can be negative.
+//
+// For Σ_s r_k(s) to have the expectation N_k, each sample must have its r, found or not:
+// - Σ_k r_k = 1 at every sample. A direction that fails, or comes from a delta lobe, or meets no light, cannot be found
+//   by other techniques: its own r is 1. So is that of a delta light, and of a light sample that something hides.
+// - A light sample of a point that reflects or emits nothing towards the vertex needs no ray: its r is 1. A direction
+//   sample that meets such a point treats it as no light, its own r is 1. That splits the point in two, one for each
+//   technique, neither of which adds light. The rule depends on vertex and direction alone, or it would be biased.
+// - Σ_k N_k β_k is added where, and only where, the samples are taken: not at surfaces of delta lobes, and not for
+//   lengths of paths that are left out.
+// - Russian roulette comes after the next surface is found, which is the last that a vertex asks for: it would otherwise
+//   have to return the rest of the control of those it ends.
+//
+// `Parts` says what tests exchange to plant bugs; see ControlledParts.
+#pragma once
+
+#include <cmath>
+#include <span>
+
+#include "core/in_place.h"
+#include "integrators/controlled_batch.h"
+#include "integrators/light_selection.h"
+#include "integrators/mis.h"
+#include "integrators/primary_sample.h"
+#include "integrators/roulette.h"
+#include "sampling/coefficient_table.h"
+#include "sampling/light_set.h"
+
+namespace covary {
+
+/// What does not change while paths are traced.
+struct ControlledScene {
+  const LightSet* lights;
+  std::span<const uint32_t> cluster_of;  ///< for each light
+  const Emitter* environment;            ///< sampled apart; or null
+  const CoefficientTable* table;         ///< the coefficients; without cells: no control
+  bool prefix = true;                    ///< samples are weighed by the throughput before them
+  /// Dense techniques: directions by the BSDF, then the environment.
+  static constexpr uint32_t kBsdf = 0, kEnvironment = 1;
+  uint32_t n_dense() const { return environment ? 2 : 1; }
+};
+
+/// The correct ones.
+struct ControlledParts {
+  /// Whether a direction that failed counts as a sample.
+  static constexpr bool kCountFailed = true;
+  /// Whether the control of vertices at which paths end is added.
+  static constexpr bool kCloseEnded = true;
+  /// Balance weight of a direction of density `pdf` that met light that other techniques find with `pdf_light`.
+  static float direction_weight(float pdf, float pdf_light, bool /*of_environment*/) {
+    return mis::balance(pdf, pdf_light);
+  }
+};
+
+/// Addresses of the numbers of environment samples: those of the vertex, apart from all others.
+inline constexpr uint32_t kEnvironmentVertices = 1u << 21;
+
+template <typename Parts>
+class ControlledTracer {
+ public:
+  ControlledTracer(const Scene& scene, const ControlledScene& control, const PathLengthSettings& lengths,
+                   std::span<CameraSample> samples, PathContext& context)
+      : scene_(scene),
+        control_(control),
+        table_(*control.table),
+        lengths_(lengths),
+        samples_(samples),
+        context_(context),
+        batch_(context.state_as<ControlledBatch>()) {}
+
+  // All paths of the batch advance together, in short loops, as in PathTracer.
+  void trace() {
+    if (lengths_.max_depth <= 0) return;
+    batch_.start(samples_.size());
+    for (uint32_t i = 0; i < samples_.size(); ++i) batch_.rays[i] = samples_[i].ray, batch_.paths[i].sample = i;
+    const bool any_light = !control_.lights->empty() || control_.environment;
+    for (int depth = 0; !batch_.paths.empty(); ++depth) {
+      find_surfaces(depth);
+      for (size_t i = 0; i < batch_.paths.size(); ++i)
+        meet_light(depth, batch_.paths[i], batch_.rays[i], batch_.hits[i]);
+      if (depth + 1 >= lengths_.max_depth) break;
+      keep_paths(depth);
+      const bool connect = depth + 2 >= lengths_.min_depth && any_light;
+      choose_lights(connect);
+      for (size_t i = 0; i < batch_.paths.size(); ++i) sample_lights(i);
+      scatter(depth);
+      trace_connections();
+      if constexpr (Parts::kCloseEnded)
+        for (const uint32_t sample : batch_.ended) close(sample);
+    }
+  }
+
+ private:
+  using Path = ControlledBatch::Path;
+  static constexpr uint32_t kNoLight = ControlledSample::kNoLight;
+
+  /// Nearest hits of all rays.
+  void find_surfaces(int depth) {
+    const size_t n = batch_.paths.size();
+    scene_.nearest(batch_.rays, batch_.ray_hits, depth == 0);
+    context_.n_rays += n;
+    for (size_t i = 0; i < n; ++i) {
+      Path& path = batch_.paths[i];
+      path.found = batch_.ray_hits[i].found();
+      if (!path.found) continue;
+      scene_.resolve(batch_.rays[i], batch_.ray_hits[i], batch_.hits[i]);
+      if (const Texture* texture = batch_.hits[i].shape->main_texture()) texture->prefetch(batch_.hits[i].uv);
+    }
+    if (lengths_.hide_emitters && depth == 0)
+      for (size_t i = 0; i < n; ++i) skip_area_lights(batch_.paths[i], batch_.rays[i], batch_.hits[i]);
+  }
+
+  /// Follows the camera ray past area lights until something else is hit.
+  void skip_area_lights(Path& path, Ray& ray, SurfaceHit& hit) {
+    while (path.found && hit.emitter) {
+      ray.o = offset_origin(hit.p, hit.ng, ray.d);
+      ray.t_max -= hit.t;
+      ++context_.n_rays;
+      path.found = scene_.intersect(ray, hit);
+    }
+  }
+
+  /// Adds the emission of what the path's ray met, which closes the vertex from which the ray came.
+  void meet_light(int depth, const Path& path, const Ray& ray, const SurfaceHit& hit) {
+    EnvironmentLight light;
+    const Emitter* emitter = path.found ? hit.emitter : control_.environment;
+    if (emitter && depth + 1 >= lengths_.min_depth && (path.found || !lengths_.hide_emitters || !path.only_null))
+      light = path.found ? EnvironmentLight{emitter->surface_radiance(hit, -ray.d)}
+                         : control_.environment->environment(ray.d);
+    ControlledVertex& vertex = batch_.vertices[path.sample];
+    float r = 1;
+    uint32_t cluster = kNoLight;
+    if (vertex.open && !path.previous_delta && !is_black(light.radiance)) {
+      float pdf_light = light.pdf_solid_angle;
+      if (path.found) {
+        const uint32_t number = control_.lights->number_of(hit);
+        cluster = control_.cluster_of[number];
+        pdf_light = (*control_.lights)[number].pmf * LightSet::pdf_solid_angle(path.previous_p, hit);
+      }
+      r = Parts::direction_weight(path.previous_pdf, pdf_light, !path.found);
+    }
+    if (!is_black(light.radiance)) samples_[path.sample].radiance += path.throughput * light.radiance * r;
+    if (!vertex.open) return;
+    take(vertex, vertex.direction_weight * light.radiance * r, cluster, 1 - r);
+    close(path.sample);
+  }
+
+  /// Ends paths that met no surface, and some of the others by Russian roulette.
+  void keep_paths(int depth) {
+    size_t n_kept = 0;
+    for (size_t i = 0; i < batch_.paths.size(); ++i) {
+      Path& path = batch_.paths[i];
+      if (!path.found || (depth >= lengths_.rr_depth && !survives(path))) continue;
+      if (n_kept != i)
+        batch_.paths[n_kept] = path, batch_.rays[n_kept] = batch_.rays[i], batch_.hits[n_kept] = batch_.hits[i];
+      ++n_kept;
+    }
+    batch_.resize(n_kept);
+  }
+
+  bool survives(Path& path) {
+    CameraSample& sample = samples_[path.sample];
+    const float survival = roulette::survival_probability(path.throughput, path.eta, sample.random.sampling());
+    if (sample.random.get_1d(path.last_vertex, Event::kRoulette) < survival) {
+      path.throughput *= roulette::survivor_weight(survival);
+      return true;
+    }
+    if (std::isnan(survival)) sample.radiance = path.throughput;  // a bad sample, not a black one
+    return false;
+  }
+
+  /// What each vertex is to sample. All choices come first, so that memory answers to one while the others are made.
+  void choose_lights(bool connect) {
+    for (size_t i = 0; i < batch_.paths.size(); ++i) {
+      ControlledBatch::LightChoice& choice = batch_.choices[i];
+      choice.open = connect && (batch_.hits[i].bsdf_flags & kSmooth);
+      if (!choice.open) continue;
+      const PathRandom& random = samples_[batch_.paths[i].sample].random;
+      const uint32_t vertex = kFirstSurfaceVertex + batch_.paths[i].n_smooth;
+      if (!control_.lights->empty()) {
+        choice.light = control_.lights->select(random.get_1d(vertex, Event::kLightChoice));
+        choice.u = random.get_2d(vertex, Event::kLightPosition);
+        choice.u_primitive = random.get_1d(vertex, Event::kLightPrimitive);
+      }
+      if (control_.environment) {
+        choice.u_environment = random.get_2d(kEnvironmentVertices + vertex, Event::kLightPosition);
+        control_.environment->prefetch(choice.u_environment, PrefetchStep::kTable);
+      }
+      if (uses_cells()) {
+        const SurfaceHit& hit = batch_.hits[i];
+        const bool front = dot(hit.frame.n, batch_.rays[i].d) < 0;
+        choice.key = table_.grid().key(hit.p, front ? hit.frame.n : -hit.frame.n);
+        table_.prefetch(choice.key);
+      }
+    }
+    if (control_.environment)
+      for (size_t i = 0; i < batch_.paths.size(); ++i)
+        if (batch_.choices[i].open)
+          control_.environment->prefetch(batch_.choices[i].u_environment, PrefetchStep::kValues);
+  }
+
+  bool uses_cells() const { return batch_.recording || table_.n_cells() > 0; }
+
+  void sample_lights(size_t i) {
+    const ControlledBatch::LightChoice& choice = batch_.choices[i];
+    batch_.lights[i].pdf_solid_angle = batch_.environments[i].pdf_solid_angle = 0;
+    if (!choice.open) return;
+    const Vec3& p = batch_.hits[i].p;
+    if (!control_.lights->empty())
+      make_in_place(batch_.lights[i],
+                    [&] { return control_.lights->sample(choice.light, p, choice.u, choice.u_primitive); });
+    if (control_.environment)
+      make_in_place(batch_.environments[i],
+                    [&] { return control_.environment->sample_towards(p, choice.u_environment, 0); });
+  }
+
+  /// Evaluates the surfaces: connections to the light samples, and the next rays. Paths that end are removed.
+  void scatter(int depth) {
+    batch_.alive.clear(), batch_.ended.clear();
+    for (uint32_t i = 0; i < batch_.paths.size(); ++i) {
+      Path& path = batch_.paths[i];
+      const SurfaceHit& hit = batch_.hits[i];
+      const PathRandom& random = samples_[path.sample].random;
+      const Vec3 wo = hit.frame.to_local(-batch_.rays[i].d);
+      path.last_vertex = hit.bsdf_flags & kSmooth ? kFirstSurfaceVertex + path.n_smooth++ : kDeltaVertices + depth;
+      context_.arena.reset();
+      const BsdfClosure* bsdf = hit.bsdf->bind(hit, wo.z > 0, TransportMode::kRadiance, context_.arena);
+      ControlledVertex& vertex = batch_.vertices[path.sample];
+      vertex.open = batch_.choices[i].open;
+      if (vertex.open) {
+        open(vertex, path, batch_.choices[i].key);
+        if (!control_.lights->empty())
+          connect(path, hit, wo, *bsdf, batch_.lights[i], control_.cluster_of[batch_.choices[i].light],
+                  (*control_.lights)[batch_.choices[i].light].pmf);
+        if (control_.environment) connect(path, hit, wo, *bsdf, batch_.environments[i], kNoLight, 1);
+      }
+
+      const BsdfSample next = bsdf->sample(wo, random.get_1d(path.last_vertex, Event::kLobe),
+                                           random.get_2d(path.last_vertex, Event::kDirection));
+      if (!next.valid() || is_black(next.weight)) {
+        if (!vertex.open) continue;
+        if constexpr (Parts::kCountFailed) take(vertex, Spectrum(), kNoLight, 0);
+        batch_.ended.push_back(path.sample);
+        continue;
+      }
+      vertex.direction_weight = next.weight;
+      path.throughput *= next.weight;
+      path.eta *= next.eta;
+      if (!(next.flags & kNullTransmission)) path.only_null = false;
+      const Vec3 wi = hit.frame.to_world(next.wi);
+      path.previous_p = hit.p;
+      path.previous_pdf = next.pdf;
+      path.previous_delta = next.is_delta();
+      make_in_place(batch_.rays[i], [&] { return Ray{offset_origin(hit.p, hit.ng, wi), wi, kInfinity}; });
+      batch_.alive.push_back(i);
+    }
+    for (size_t n = 0; n < batch_.alive.size(); ++n)
+      if (const uint32_t i = batch_.alive[n]; i != n)
+        batch_.paths[n] = batch_.paths[i], batch_.rays[n] = batch_.rays[i];
+    batch_.resize(batch_.alive.size());
+  }
+
+  /// Begins the estimate of a vertex: Σ N β of its control.
+  void open(ControlledVertex& vertex, const Path& path, CellKey key) {
+    vertex.throughput = path.throughput;
+    vertex.cell = table_.n_cells() > 0 ? table_.find(key) : CoefficientTable::kNone;
+    if (vertex.cell != CoefficientTable::kNone) {
+      if (!batch_.recording && is_black(table_.scale(vertex.cell)))
+        vertex.cell = CoefficientTable::kNone;
+      else
+        begin_control(vertex);
+    }
+    if (!batch_.recording) return;
+    const Spectrum importance = context_.importance.empty() ? Spectrum(1) : context_.importance[path.sample];
+    vertex.weight = variance_weight(control_.prefix ? path.throughput : Spectrum(1), importance);
+    vertex.sums_cell = batch_.sums.cell(key);
+    vertex.plain = Spectrum();
+  }
+
+  void begin_control(ControlledVertex& vertex) {
+    vertex.control = table_.light_sum(vertex.cell);
+    for (uint32_t j = 0; j < control_.n_dense(); ++j) vertex.control += table_.dense(vertex.cell, j);
+  }
+
+  /// β of a light's cluster, or of the environment for kNoLight.
+  Spectrum coefficient(uint32_t cell, uint32_t cluster) const {
+    return cluster == kNoLight ? table_.dense(cell, ControlledScene::kEnvironment) : table_.light(cell, cluster);
+  }
+
+  /// One sample of a vertex, its value f/p, and balance weights: `r_light` of a light's cluster, or of the environment
+  /// for kNoLight, and 1 − r_light of the BSDF.
+  void take(ControlledVertex& vertex, const Spectrum& value, uint32_t cluster, float r_light) {
+    if (vertex.cell != CoefficientTable::kNone) {
+      Spectrum sum = table_.dense(vertex.cell, ControlledScene::kBsdf) * (1 - r_light);
+      if (r_light > 0) sum += coefficient(vertex.cell, cluster) * r_light;
+      vertex.control = vertex.control - sum;
+    }
+    if (batch_.recording) record(vertex, value, cluster, r_light);
+  }
+
+  void record(ControlledVertex& vertex, const Spectrum& value, uint32_t cluster, float r_light) {
+    const bool of_light = cluster != kNoLight;
+    const float r_dense[2] = {1 - r_light, of_light ? 0 : r_light};
+    batch_.sums.add(vertex.sums_cell, vertex.weight,
+                    {value, r_light > 0 ? cluster : kNoLight, of_light ? r_light : 0, {r_dense, control_.n_dense()}});
+    vertex.plain += value;
+  }
+
+  /// Next-event estimation: f cos L / p, if nothing lies between. `pmf`: with which the light was chosen.
+  void connect(const Path& path, const SurfaceHit& hit, const Vec3& wo, const BsdfClosure& bsdf,
+               const EmitterSample& light, uint32_t cluster, float pmf) {
+    if (light.pdf_solid_angle > 0 && !is_black(light.radiance)) {
+      const BsdfValue f = bsdf.eval(wo, hit.frame.to_local(light.wi));
+      if (!is_black(f.value)) {
+        const float pdf = pmf * light.pdf_solid_angle, pdf_direction = light.is_delta ? 0 : f.pdf_solid_angle;
+        const size_t n = batch_.n_connections++;
+        make_in_place(batch_.connections[n], [&] {
+          return ControlledBatch::Connection{f.value * light.radiance * (1 / (pdf + pdf_direction)), path.sample,
+                                             cluster, mis::balance(pdf, pdf_direction)};
+        });
+        make_in_place(batch_.shadow_rays[n], [&] { return shadow_ray(hit, light); });
+        return;
+      }
+    }
+    take(batch_.vertices[path.sample], Spectrum(), cluster, 1);
+  }
+
+  /// Finishes the light samples, now that it is known which are hidden.
+  void trace_connections() {
+    const size_t n = batch_.n_connections;
+    scene_.occluded(std::span(batch_.shadow_rays).first(n), batch_.blocked);
+    context_.n_rays += n;
+    for (size_t i = 0; i < n; ++i) {
+      const ControlledBatch::Connection& connection = batch_.connections[i];
+      ControlledVertex& vertex = batch_.vertices[connection.sample];
+      if (batch_.blocked[i]) {
+        take(vertex, Spectrum(), connection.cluster, 1);
+      } else {
+        samples_[connection.sample].radiance += vertex.throughput * connection.value;
+        take(vertex, connection.value, connection.cluster, connection.r_technique);
+      }
+    }
+    batch_.n_connections = 0;
+  }
+
+  /// Ends the estimate of a vertex.
+  void close(uint32_t sample) {
+    ControlledVertex& vertex = batch_.vertices[sample];
+    vertex.open = false;
+    if (vertex.cell == CoefficientTable::kNone) return;
+    samples_[sample].radiance += vertex.throughput * table_.scale(vertex.cell) * vertex.control;
+    if (batch_.recording) batch_.sums.add_held_out(vertex.sums_cell, vertex.weight, vertex.plain, vertex.control);
+  }
+
+  const Scene& scene_;
+  const ControlledScene& control_;
+  const CoefficientTable& table_;
+  const PathLengthSettings& lengths_;
+  std::span<CameraSample> samples_;
+  PathContext& context_;
+  ControlledBatch& batch_;
+};
+
+}  // namespace covary

@@ -1,0 +1,360 @@
+// SPDX-License-Identifier: Apache-2.0
+// `controlled-path` estimates the same image as `path`, whatever its coefficients are.
+//
+// Statistical cases: 16 renders with seeds 0 … 15 or more; Student's t-test on the means of 16 blocks of the image and of
+// the whole, each at alpha = 5e-7. Two renders of one seed share all their numbers, so that their difference is the
+// control variate alone, which must have the mean zero.
+#include "integrators/controlled_path.h"
+
+#include <tbb/global_control.h>
+
+#include <optional>
+#include <type_traits>
+
+#include "render_fixture.h"
+#include "statistics/p_values.h"
+
+namespace covary {
+namespace {
+
+constexpr int kSide = 32, kBlocks = 4;
+const std::string kWide = "<float name='fov' value='75'/>";
+
+std::string rectangle(const char* transform, const char* content) {
+  return std::string("<shape type='rectangle'><transform name='to_world'>") + transform + "</transform>" + content +
+         "</shape>";
+}
+
+std::string sphere(const char* centre, const char* content) {
+  return std::string("<shape type='sphere'><point name='center' ") + centre + "/>" + content + "</shape>";
+}
+
+const std::string kFloor = rectangle("<scale value='6'/><rotate x='1' angle='-90'/><translate y='-2' z='5'/>",
+                                     "<bsdf type='diffuse'><rgb name='reflectance' value='0.6,0.5,0.3'/></bsdf>");
+const std::string kMeshLight =
+    "<shape type='cube'><transform name='to_world'><scale value='0.4'/><translate x='2' y='2' z='5'/></transform>"
+    "<emitter type='area'><rgb name='radiance' value='8,2,1'/></emitter></shape>";
+
+/// Lights of every kind, and surfaces of many.
+std::string everything(const std::string& integrator = "<integer name='rr_depth' value='3'/>") {
+  return scene_text(
+      kFloor + kMeshLight +
+          rectangle("<scale value='6'/><rotate x='1' angle='180'/><translate z='9'/>",
+                    "<bsdf type='roughconductor'><float name='alpha' value='0.3'/></bsdf>") +
+          rectangle("<rotate x='1' angle='90'/><translate y='3' z='4'/>",
+                    "<emitter type='area'><texture name='radiance' type='checkerboard'>"
+                    "<rgb name='color0' value='0'/><rgb name='color1' value='1,5,8'/></texture></emitter>") +
+          rectangle("<scale value='0.7'/><rotate y='1' angle='180'/><translate x='-1.5' y='0.5' z='3'/>",
+                    "<bsdf type='mask'><float name='opacity' value='0.5'/><bsdf type='twosided'><bsdf type='diffuse'/>"
+                    "</bsdf></bsdf>") +
+          sphere("x='-3' y='-1' z='5'", "<bsdf type='plastic'/>") +
+          sphere("x='0' y='-1' z='5'", "<bsdf type='dielectric'/>") +
+          sphere("x='3' y='-1' z='5'", "<bsdf type='roughplastic'><float name='alpha' value='0.2'/></bsdf>") +
+          sphere("x='-4' y='2' z='4'",
+                 "<float name='radius' value='0.5'/><emitter type='area'><rgb name='radiance' value='4'/></emitter>") +
+          "<emitter type='constant'><rgb name='radiance' value='0.3,0.4,0.6'/></emitter>"
+          "<emitter type='point'><point name='position' x='1' y='2' z='3'/></emitter>"
+          "<emitter type='spot'><transform name='to_world'><lookat origin='-2,3,2' target='0,-2,5' up='0,0,1'/>"
+          "</transform></emitter>"
+          "<emitter type='directional'><vector name='direction' x='1' y='-2' z='1'/></emitter>",
+      kSide, kSide, 5, kWide, integrator);
+}
+
+/// A surface on which many direction samples fail, below it.
+const std::string kRoughMetal =
+    scene_text(rectangle("<scale value='8'/><rotate x='1' angle='-80'/><translate y='-2' z='5'/>",
+                         "<bsdf type='roughconductor'><float name='alpha' value='0.9'/></bsdf>") +
+                   kMeshLight + "<emitter type='constant'><rgb name='radiance' value='0.5'/></emitter>",
+               kSide, kSide, 3, kWide);
+
+/// A diffuse floor under lights of different colours.
+std::string coloured_lights() {
+  std::string lights;
+  for (int i = 0; i < 6; ++i)
+    lights += sphere(("x='" + std::to_string(2 * i - 5) + "' y='6' z='5'").c_str(),
+                     i % 2 ? "<float name='radius' value='0.3'/><emitter type='area'><rgb name='radiance' "
+                             "value='9,1,1'/></emitter>"
+                           : "<float name='radius' value='0.3'/><emitter type='area'><rgb name='radiance' "
+                             "value='1,2,9'/></emitter>");
+  return scene_text(kFloor + lights, kSide, kSide, 2, kWide);
+}
+
+struct NotClosed : ControlledParts {
+  static constexpr bool kCloseEnded = false;
+};
+struct FailedForgotten : ControlledParts {
+  static constexpr bool kCountFailed = false;
+};
+struct EnvironmentTwice : ControlledParts {
+  static float direction_weight(float pdf, float pdf_light, bool of_environment) {
+    return of_environment ? 1 : ControlledParts::direction_weight(pdf, pdf_light, of_environment);
+  }
+};
+struct NegativeClipped : ControlledParts {};
+
+/// With a planted bug.
+template <typename Parts>
+class WithBug final : public ControlledPath {
+ public:
+  using ControlledPath::ControlledPath;
+  void trace(const Scene& scene, std::span<CameraSample> samples, PathContext& context) const override {
+    trace_with<Parts>(scene, samples, context);
+    if constexpr (std::is_same_v<Parts, NegativeClipped>)
+      for (CameraSample& sample : samples)
+        for (int c = 0; c < 3; ++c) sample.radiance[c] = std::max(sample.radiance[c], 0.0f);
+  }
+};
+
+ControlOptions options(ControlKind kind, LightSelection lights = LightSelection::kPower) {
+  ControlOptions result;
+  result.kind = kind, result.lights = lights, result.train_spp = 8, result.grid = 8;
+  return result;
+}
+
+template <typename Parts = ControlledParts>
+TestScene controlled(const std::string& xml, const ControlOptions& options) {
+  return load_text(xml, 0, [&](const PathLengthSettings& lengths) -> std::shared_ptr<Integrator> {
+    return std::make_shared<WithBug<Parts>>(lengths, ControlSettings().with(options));
+  });
+}
+
+ControlledPath& integrator_of(const TestScene& scene) {
+  return dynamic_cast<ControlledPath&>(*scene.loaded.integrator);
+}
+
+constexpr uint32_t kFirstDense = 1000;
+
+/// One cell for all of space, in which the coefficients of lights and dense techniques are what `value` says.
+template <typename Value>
+CoefficientTable one_cell(const TestScene& scene, uint32_t n_dense, const Value& value) {
+  const LightSet& lights = integrator_of(scene).lights();
+  Coefficients coefficients;
+  std::vector<uint32_t> numbers;
+  Spectrum sum;
+  for (uint32_t i = 0; i < lights.size(); ++i) {
+    numbers.push_back(i);
+    coefficients.lights.push_back(value(i));
+    sum += coefficients.lights.back() * lights[i].pmf;
+  }
+  for (uint32_t j = 0; j < n_dense; ++j) coefficients.dense.push_back(value(kFirstDense + j));
+  CoefficientTable table(CellGrid(scene.scene().bounds(), 4, true), SystemLayout{n_dense});
+  table.add_cell(CoefficientTable::root_key(), CoefficientTable::kNone, Spectrum(1), sum, numbers, coefficients);
+  return table;
+}
+
+Spectrum random_colour(uint32_t i) {
+  const auto number = [&](int c) { return static_cast<float>(mix64(3 * i + c + 1) >> 40) * 0x1p-24f; };
+  const float shift = i == kFirstDense ? 3 : -1;
+  return {4 * number(0) + shift, 4 * number(1) + shift, 4 * number(2) + shift};
+}
+
+/// A controlled-path with random coefficients, or with control off, ready to trace.
+template <typename Parts = ControlledParts>
+TestScene with_coefficients(const std::string& xml, bool random) {
+  TestScene scene = controlled<Parts>(xml, options(random ? ControlKind::kRgb : ControlKind::kOff));
+  if (random) integrator_of(scene).use(one_cell(scene, 2, random_colour));
+  EXPECT_TRUE(train(scene.scene(), integrator_of(scene), {}));
+  return scene;
+}
+
+/// Trained as a render trains it, but for the importance of pixels.
+TestScene trained(const std::string& xml, const ControlOptions& options) {
+  TestScene scene = controlled(xml, options);
+  const LoadedScene& l = scene.loaded;
+  EXPECT_TRUE(
+      train(scene.scene(), integrator_of(scene), {{l.crop_x, l.crop_y, l.crop_width, l.crop_height}, l.filter}));
+  return scene;
+}
+
+/// Differences of block means, and at the end of the mean of the image, for each of 16 seeds.
+using Differences = std::vector<std::vector<double>>;
+
+double block_mean(const Film& film, int block) {
+  if (block == kBlocks * kBlocks) return image_mean(film);
+  const int size = kSide / kBlocks, x0 = block % kBlocks * size, y0 = block / kBlocks * size;
+  double sum = 0;
+  for (int y = y0; y < y0 + size; ++y)
+    for (int x = x0; x < x0 + size; ++x) sum += mean(film.mean(x, y));
+  return sum / (size * size);
+}
+
+/// `shift`: by how much the seeds of b differ from those of a.
+Differences differences(const TestScene& a, const TestScene& b, uint32_t spp, uint64_t shift) {
+  Differences result(kBlocks * kBlocks + 1);
+  for (uint64_t seed = 0; seed < 16; ++seed) {
+    const Film image_a = render(a, spp, seed), image_b = render(b, spp, seed + shift);
+    for (size_t block = 0; block < result.size(); ++block)
+      result[block].push_back(block_mean(image_a, static_cast<int>(block)) -
+                              block_mean(image_b, static_cast<int>(block)));
+  }
+  return result;
+}
+
+/// Blocks whose difference has another mean than zero.
+int n_biased(const Differences& blocks) {
+  int n = 0;
+  for (const std::vector<double>& values : blocks) n += !statistics::t_test(values, 0).accepted;
+  return n;
+}
+
+/// The smallest difference of the image's means that is found with power 0.99.
+double detectable(const Differences& blocks) {
+  statistics::Moments moments;
+  for (const double difference : blocks.back()) moments.add(difference);
+  return statistics::smallest_detectable(std::sqrt(moments.sample_variance()), 16, statistics::test_alpha(), 0.99);
+}
+
+// Σ_k r_k = 1 at every sample, so equal coefficients have no effect: a test without chance.
+TEST(ControlledPath, EqualCoefficientsCancel) {
+  const TestScene off = with_coefficients(everything(), false);
+  const Film plain = render(off, 4, 1);
+  const auto largest_difference = [&](const TestScene& scene) {
+    integrator_of(scene).use(one_cell(scene, 2, [](uint32_t) { return Spectrum(2, 1, 3); }));
+    EXPECT_TRUE(train(scene.scene(), integrator_of(scene), {}));
+    const Film film = render(scene, 4, 1);
+    double largest = 0;
+    for (int y = 0; y < kSide; ++y)
+      for (int x = 0; x < kSide; ++x)
+        for (int c = 0; c < 3; ++c)
+          largest = std::max<double>(largest, std::abs(film.mean(x, y)[c] - plain.mean(x, y)[c]));
+    return largest;
+  };
+  EXPECT_LT(largest_difference(controlled(everything(), options(ControlKind::kRgb))), 1e-4);
+  EXPECT_GT(largest_difference(controlled<FailedForgotten>(everything(), options(ControlKind::kRgb))), 0.01);
+}
+
+TEST(ControlledPath, CoefficientsOfAnySizeAreUnbiased) {
+  const TestScene off = with_coefficients(everything(), false), on = with_coefficients(everything(), true);
+  const Differences right = differences(on, off, 16, 0);
+  EXPECT_EQ(n_biased(right), 0);
+  EXPECT_LT(detectable(right), 0.05 * image_mean(render(off, 16, 0)));
+  EXPECT_GT(n_biased(differences(with_coefficients<NegativeClipped>(everything(), true), off, 4, 0)), 0);
+}
+
+TEST(ControlledPath, FailedDirectionsAreSamplesToo) {
+  const TestScene off = with_coefficients(kRoughMetal, false);
+  const Differences right = differences(with_coefficients(kRoughMetal, true), off, 16, 0);
+  EXPECT_EQ(n_biased(right), 0);
+  EXPECT_GT(n_biased(differences(with_coefficients<NotClosed>(kRoughMetal, true), off, 16, 0)), 0);
+  EXPECT_GT(n_biased(differences(with_coefficients<FailedForgotten>(kRoughMetal, true), off, 16, 0)), 0);
+}
+
+TEST(ControlledPath, WithoutControlAgreesWithPath) {
+  const TestScene path = load_text(everything());
+  for (const LightSelection lights : {LightSelection::kTriangle, LightSelection::kShape, LightSelection::kPower}) {
+    TestScene off = controlled(everything(), options(ControlKind::kOff, lights));
+    ASSERT_TRUE(train(off.scene(), integrator_of(off), {}));
+    const Differences right = differences(off, path, 16, 100);
+    EXPECT_EQ(n_biased(right), 0) << name_of(lights);
+    EXPECT_LT(detectable(right), 0.05 * image_mean(render(path, 16, 0)));
+  }
+  TestScene twice = controlled<EnvironmentTwice>(everything(), options(ControlKind::kOff));
+  ASSERT_TRUE(train(twice.scene(), integrator_of(twice), {}));
+  EXPECT_GT(n_biased(differences(twice, path, 16, 100)), 0);
+}
+
+TEST(ControlledPath, TrainedAgreesWithPath) {
+  const TestScene path = load_text(everything()), off = with_coefficients(everything(), false);
+  const TestScene on = trained(everything(), options(ControlKind::kRgb));
+  EXPECT_GT(integrator_of(on).table().n_cells(), 10u);
+  EXPECT_EQ(n_biased(differences(on, off, 16, 0)), 0);
+  EXPECT_EQ(n_biased(differences(on, path, 16, 100)), 0);
+  EXPECT_EQ(n_biased(differences(trained(everything(), options(ControlKind::kMono)), off, 16, 0)), 0);
+}
+
+/// Sum of squared differences of two renders with other numbers: twice the variance.
+double noise(const TestScene& scene) {
+  const Film a = render(scene, 8, 1), b = render(scene, 8, 2);
+  double sum = 0;
+  for (int y = 0; y < kSide; ++y)
+    for (int x = 0; x < kSide; ++x)
+      for (int c = 0; c < 3; ++c) sum += sqr(a.mean(x, y)[c] - b.mean(x, y)[c]);
+  return sum;
+}
+
+TEST(ControlledPath, HasLessNoiseWhereLightsDiffer) {
+  const double plain = noise(with_coefficients(coloured_lights(), false));
+  const double mono = noise(trained(coloured_lights(), options(ControlKind::kMono)));
+  const double rgb = noise(trained(coloured_lights(), options(ControlKind::kRgb)));
+  EXPECT_LT(mono, 1.1 * plain);
+  EXPECT_LT(rgb, 0.5 * plain);
+}
+
+TEST(ControlledPath, TakesTheRaysOfThePlainEstimate) {
+  const std::string no_roulette = everything("<integer name='rr_depth' value='100'/>");
+  const TestScene off = with_coefficients(no_roulette, false), on = with_coefficients(no_roulette, true);
+  const auto n_rays = [](const TestScene& scene) {
+    Film film = new_film(scene);
+    PassSettings settings;
+    settings.spp = 4;
+    return render_pass(scene.scene(), scene.integrator(), settings, film).n_rays;
+  };
+  EXPECT_EQ(n_rays(on), n_rays(off));
+}
+
+TEST(ControlledPath, SameBitsForAnyNumberOfThreads) {
+  std::string description;
+  std::optional<Film> film;
+  for (const size_t threads : {1, 2, 5}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    const TestScene scene = trained(everything(), options(ControlKind::kRgb));
+    const Film next = render(scene, 4, 3);
+    if (!film) film.emplace(next), description = scene.integrator().description();
+    EXPECT_TRUE(same_bits(next, *film)) << threads;
+    EXPECT_EQ(scene.integrator().description(), description);
+  }
+}
+
+/// Trains and renders; the mean of the image.
+double trained_mean(const std::string& xml, const ControlOptions& wanted = options(ControlKind::kRgb)) {
+  return image_mean(render(trained(xml, wanted), 2, 0));
+}
+
+TEST(ControlledPath, TakesScenesThatHaveLittleToLearn) {
+  const std::string point = "<emitter type='point'><point name='position' x='0' y='2' z='4'/></emitter>";
+  const std::string sky = "<emitter type='constant'/>";
+  EXPECT_EQ(trained_mean(scene_text(kFloor, 16, 16, 4, kWide)), 0);                      // no lights
+  EXPECT_GT(trained_mean(scene_text(kFloor + point, 16, 16, 4, kWide)), 0.001);          // delta lights only
+  EXPECT_GT(trained_mean(scene_text(kFloor + sky, 16, 16, 4, kWide)), 0.1);              // an environment only
+  EXPECT_NEAR(trained_mean(scene_text(sky, 16, 16, 4, kWide)), 1, 1e-4);                 // nothing to light
+  EXPECT_GT(trained_mean(scene_text(kFloor + kMeshLight + sky, 1, 1, 4, kWide)), 0.01);  // one pixel
+  const std::string mirrors =
+      rectangle("<scale value='6'/><rotate x='1' angle='-90'/><translate y='-2' z='5'/>", "<bsdf type='conductor'/>");
+  const TestScene scene = trained(scene_text(mirrors + sky, 16, 16, 4, kWide), options(ControlKind::kRgb));
+  EXPECT_EQ(integrator_of(scene).table().n_cells(), 0u);
+  EXPECT_GT(image_mean(render(scene, 2, 0)), 0.1);
+}
+
+TEST(ControlledPath, LeavesOutTrainingSamplesThatAreNotFinite) {
+  TestScene scene = controlled(everything(), options(ControlKind::kRgb));
+  TrainingSettings settings{{0, 0, kSide, kSide}, scene.loaded.filter};
+  settings.importance = [](const Film& film) {
+    EXPECT_EQ(film.count(0, 0), 2u);
+    std::vector<Spectrum> importance(kSide * kSide, Spectrum(1));
+    for (size_t i = 0; i < importance.size(); i += 2) importance[i] = Spectrum(std::nanf(""));
+    return importance;
+  };
+  ASSERT_TRUE(train(scene.scene(), integrator_of(scene), settings));
+  EXPECT_GT(integrator_of(scene).cache().n_rejected(), 100u);
+  EXPECT_GT(image_mean(render(scene, 2, 0)), 0.1);  // and no sample is bad
+}
+
+TEST(ControlledPath, KeepsToItsMemoryByWiderCells) {
+  ControlOptions little = options(ControlKind::kRgb);
+  little.grid = 4096, little.memory_mib = 1;
+  const TestScene scene = trained(everything(), little);
+  EXPECT_GT(integrator_of(scene).cache().n_coarsened(), 0u);
+  EXPECT_EQ(n_biased(differences(scene, with_coefficients(everything(), false), 2, 0)), 0);
+}
+
+TEST(ControlledPath, IsToldApartByItsTraining) {
+  ControlOptions longer = options(ControlKind::kRgb);
+  longer.train_spp = 4;
+  const TestScene scene = controlled(everything(), options(ControlKind::kRgb));
+  EXPECT_NE(scene.integrator().description().find("untrained"), std::string::npos);
+  EXPECT_NE(trained(everything(), longer).integrator().description(),
+            trained(everything(), options(ControlKind::kRgb)).integrator().description());
+}
+
+}  // namespace
+}  // namespace covary
