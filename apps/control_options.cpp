@@ -6,7 +6,6 @@
 namespace covary {
 namespace {
 
-constexpr const char* kGroup = "Controlled path";
 constexpr uint32_t kMaxNumber = 1u << 30;
 
 }  // namespace
@@ -14,40 +13,40 @@ constexpr uint32_t kMaxNumber = 1u << 30;
 void add_control_options(CLI::App& command, ControlTexts& texts) {
   command.add_option("--cv", texts.kind, "Control variates: one coefficient for each colour, for all, or none")
       ->check(one_of({"rgb", "mono", "off"}))
-      ->group(kGroup);
+      ->group(kControlGroup);
   command
       .add_flag("--cv-paper", texts.paper,
                 "The published method: --lights triangle --cv-grid 64 --cv-train 16, cells by position alone")
-      ->group(kGroup);
+      ->group(kControlGroup);
   command
       .add_option("--lights", texts.lights,
                   "How lights are chosen: uniformly over emissive triangles, over shapes, or by power")
       ->check(one_of({"triangle", "shape", "power"}))
-      ->group(kGroup);
+      ->group(kControlGroup);
   command
       .add_option("--cv-grid", texts.grid, "Cells along the longest side of the scene, or auto: by the size of pixels")
-      ->group(kGroup);
+      ->group(kControlGroup);
   command
       .add_option("--cv-train", texts.train_spp,
-                  "Samples per pixel to learn from, beside those of the image; default: 16")
+                  "Samples per pixel to learn from, a part of --spp that is not in the image; default: 16")
       ->transform(whole_number(1u, ControlSettings::kMaxTrainingSpp))
-      ->group(kGroup);
+      ->group(kControlGroup);
   command.add_option("--cv-clusters", texts.clusters, "Most clusters of lights; default: 5000")
       ->transform(whole_number(1u, kMaxNumber))
-      ->group(kGroup);
+      ->group(kControlGroup);
   command.add_option("--cv-variance", texts.variance, "What is made least: relative or absolute variance")
       ->check(one_of({"relative", "absolute"}))
-      ->group(kGroup);
+      ->group(kControlGroup);
   command
       .add_option("--cv-prefix", texts.prefix,
                   "Whether samples weigh by the throughput of the path before them; default: on")
       ->check(one_of({"on", "off"}))
-      ->group(kGroup);
+      ->group(kControlGroup);
   command
       .add_option("--cv-memory", texts.memory_mib,
                   "MiB of sums and coefficients while learning, then cells become wider; default: 256")
       ->transform(whole_number(1u, kMaxNumber))
-      ->group(kGroup);
+      ->group(kControlGroup);
 }
 
 std::optional<ControlOptions> control_options(const ControlTexts& texts) {

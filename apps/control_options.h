@@ -11,6 +11,9 @@
 
 namespace covary {
 
+/// Group of the options in the help.
+inline constexpr const char* kControlGroup = "Controlled path";
+
 /// As given; empty: not given.
 struct ControlTexts {
   std::string kind, lights, grid, variance, prefix;

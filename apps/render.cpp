@@ -109,6 +109,7 @@ Outputs files_of(const RenderOptions& options) {
   Outputs outputs;
   outputs.reads(options.scene);
   outputs.writes("--json", options.json, OutputKind::kText);
+  if (!options.save_training.empty()) outputs.writes("--save-training", options.save_training, OutputKind::kText);
   if (!options.replay.empty()) return outputs;
   outputs.writes("-o", options.output, OutputKind::kFilm);
   if (output_target(options.output).is_special)

@@ -9,6 +9,7 @@
 #include "commands.h"
 #include "core/error.h"
 #include "defines.h"
+#include "integrators/training.h"
 #include "numbers.h"
 #include "plans/estimator_plans.h"
 #include "plans/integrator_choice.h"
@@ -47,6 +48,24 @@ std::string single_pass_estimators() {
     if (const Estimator e = make_estimator(name); e.passes != EstimatorPasses::kPair)
       texts.push_back(name + ", " + e.summary);
   return list_text(texts, ", or ");
+}
+
+/// Samples per pixel of the integrator's training.
+uint32_t training_samples(const LoadedScene& scene) {
+  const auto* learning = dynamic_cast<const LearningIntegrator*>(scene.integrator.get());
+  return learning ? learning->training_spp() : 0;
+}
+
+/// Takes the samples of training off those of the passes, where their number is given.
+void take_training(uint32_t training, const LoadedScene& scene, RenderRequest& request) {
+  const bool open_ended = request.seconds > 0 || request.until > 0;
+  if (!request.spp && open_ended) return;
+  const uint32_t all = request.spp.value_or(static_cast<uint32_t>(scene.spp));
+  if (all <= training)
+    throw Error(ErrorCode::kUsage, fmt::format("{} samples per pixel, of which the training takes {}, leave none for "
+                                               "the image; use a larger --spp or a smaller --cv-train",
+                                               all, training));
+  request.spp = all - training;
 }
 
 }  // namespace
@@ -119,9 +138,13 @@ RenderRequest make_request(const RenderOptions& options, const LoadedScene& scen
   request.spp = options.spp;
   request.seconds = options.seconds;
   if (!options.until.empty()) request.until = parse_until(options.until);
+  if (const uint32_t training = training_samples(scene);
+      training > 0 && options.replay.empty() && options.load_training.empty())
+    take_training(training, scene, request);
   request.aovs = options.aovs;
   request.output = options.output;
   request.preview = options.preview;
+  request.save_training = options.save_training, request.load_training = options.load_training;
   request.passes = options.passes;
   request.resume = options.resume;
   request.overwrite = options.overwrite;
@@ -208,6 +231,10 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
   command.add_flag("!--no-preview", o.preview, "Do not write the PNG");
   command.add_flag("--quiet", o.quiet, "No progress and no summary");
   add_control_options(command, o.control);
+  command.add_option("--save-training", o.save_training, "File that keeps the coefficients learnt")
+      ->group(kControlGroup);
+  command.add_option("--load-training", o.load_training, "File of coefficients to use in place of a training")
+      ->group(kControlGroup);
   add_estimator_options(command, o.estimator, estimator_names());
 }
 

@@ -34,6 +34,7 @@ std::string replay_command(const RenderOptions& o, const Pass& pass, const BadSa
   if (!o.resolution.empty()) add("--resolution", o.resolution);
   if (!o.integrator.empty()) add("--integrator", o.integrator);
   for (const std::string& word : command_words(o.control)) words.push_back(word);
+  if (!o.load_training.empty()) add("--load-training", o.load_training);
   if (o.min_depth) add("--min-depth", std::to_string(*o.min_depth));
   if (o.max_depth) add("--max-depth", std::to_string(*o.max_depth));
   if (!o.rfilter.empty()) add("--rfilter", o.rfilter);

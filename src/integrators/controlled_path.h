@@ -24,6 +24,7 @@ class ControlledPath : public LearningIntegrator {
   /// Changes settings; before prepare().
   void change(const ControlOptions& options) { settings_ = settings_.with(options); }
   const CoefficientCache& cache() const { return cache_; }
+  std::string settings_text() const override;
   /// The coefficients in use.
   const CoefficientTable& table() const { return given_ ? *given_ : cache_.table(); }
   /// Takes coefficients that were learnt before, in place of a training; after prepare(), before the training.
@@ -59,7 +60,6 @@ class ControlledPath : public LearningIntegrator {
     cache_.freeze();
   }
   uint64_t state_hash() const override { return table().hash(); }
-  std::string settings_text() const override;
 
  private:
   void begin_batch(ControlledBatch& batch) const;

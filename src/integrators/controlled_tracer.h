@@ -17,8 +17,8 @@
 //   technique, neither of which adds light. The rule depends on vertex and direction alone, or it would be biased.
 // - Σ_k N_k β_k is added where, and only where, the samples are taken: not at surfaces of delta lobes, and not for
 //   lengths of paths that are left out.
-// - Russian roulette comes after the next surface is found, which is the last that a vertex asks for: it would otherwise
-//   have to return the rest of the control of those it ends.
+// - Russian roulette comes after the next surface is found, which is the last that a vertex asks for: it would
+//   otherwise have to return the rest of the control of those it ends.
 //
 // `Parts` says what tests exchange to plant bugs; see ControlledParts.
 #pragma once

@@ -18,6 +18,7 @@
 #include "plans/pass_waves.h"
 #include "plans/pixel_importance.h"
 #include "plans/result_files.h"
+#include "plans/training_file.h"
 
 namespace covary {
 namespace {
@@ -46,12 +47,15 @@ std::shared_ptr<const Integrator> integrator_of(const LoadedScene& scene) {
 }
 
 /// Trains the scene's integrator if it learns. False when stopped.
-bool train(const LoadedScene& scene, TrainingSettings settings) {
+bool train(const LoadedScene& scene, const RenderRequest& request, TrainingSettings settings) {
   auto* learning = dynamic_cast<LearningIntegrator*>(scene.integrator.get());
   settings.importance = [&](const Film& film) {
     return pixel_importance(*scene.scene, settings.filter, film, settings.stop);
   };
-  return !learning || train(*scene.scene, *learning, settings);
+  if (!request.load_training.empty()) load_training(scene, request.load_training);
+  if (learning && !train(*scene.scene, *learning, settings)) return false;
+  if (!request.save_training.empty()) save_training(scene, request.save_training);
+  return true;
 }
 
 void check(const Plan& plan, const RenderRequest& request) {
@@ -156,7 +160,7 @@ void PlanRun::write_files() {
 
 bool PlanRun::render_to_limits() {
   const Stopwatch training;
-  if (!train(scene_, {window_, filter_, callbacks_.stop, callbacks_.progress, {}})) return false;
+  if (!train(scene_, request_, {window_, filter_, callbacks_.stop, callbacks_.progress, {}})) return false;
   result_.seconds.train = training.seconds();
   const uint32_t limit = largest_budget(scene_, request_);
   state_.budget = state_.group_budget = first_budget(scene_, request_);
@@ -348,7 +352,7 @@ ReplayedSample replay(const LoadedScene& scene, const RenderRequest& request, co
   settings.pass = address.pass;
   settings.filter = request.filter.value_or(scene.filter);
   const auto integrator = integrator_of(scene);
-  train(scene, {window_of(scene, request), settings.filter, nullptr, nullptr, {}});
+  train(scene, request, {window_of(scene, request), settings.filter, nullptr, nullptr, {}});
   return replay_sample(*scene.scene, *integrator, settings, address.x, address.y, address.sample);
 }
 

@@ -27,8 +27,11 @@ struct RenderRequest {
   double until = 0;    ///< > 0: add samples until the predicted relMSE is this
   bool aovs = false;   ///< also the images Albedo, N and P
 
-  std::string output;      ///< EXR file of the result; empty: no file is written
-  bool preview = false;    ///< also a PNG beside it
+  std::string output;    ///< EXR file of the result; empty: no file is written
+  bool preview = false;  ///< also a PNG beside it
+  /// Files that keep what the integrator learns (training_file.h), written after the training and read in place of it;
+  /// empty: none.
+  std::string save_training, load_training;
   std::string passes;      ///< folder that keeps the films; empty: only while they are not finished
   bool resume = false;     ///< continue films that are there
   bool overwrite = false;  ///< films that are in `passes` may be replaced; without it and `resume` they are an error

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // `controlled-path` estimates the same image as `path`, whatever its coefficients are.
 //
-// Statistical cases: 16 renders with seeds 0 … 15 or more; Student's t-test on the means of 16 blocks of the image and of
-// the whole, each at alpha = 5e-7. Two renders of one seed share all their numbers, so that their difference is the
-// control variate alone, which must have the mean zero.
+// Statistical cases: 16 renders with seeds 0 … 15; Student's t-test on the means of 16 blocks of the image and of the
+// whole, each at alpha = 5e-7. Two renders of one seed share all their numbers, so that their difference is the control
+// variate alone, which must have the mean zero.
 #include "integrators/controlled_path.h"
 
 #include <tbb/global_control.h>
@@ -128,17 +128,19 @@ constexpr uint32_t kFirstDense = 1000;
 template <typename Value>
 CoefficientTable one_cell(const TestScene& scene, uint32_t n_dense, const Value& value) {
   const LightSet& lights = integrator_of(scene).lights();
-  Coefficients coefficients;
+  std::vector<Spectrum> light_values, dense_values;
   std::vector<uint32_t> numbers;
   Spectrum sum;
   for (uint32_t i = 0; i < lights.size(); ++i) {
     numbers.push_back(i);
-    coefficients.lights.push_back(value(i));
-    sum += coefficients.lights.back() * lights[i].pmf;
+    light_values.push_back(value(i));
+    sum += light_values.back() * lights[i].pmf;
   }
-  for (uint32_t j = 0; j < n_dense; ++j) coefficients.dense.push_back(value(kFirstDense + j));
-  CoefficientTable table(CellGrid(scene.scene().bounds(), 4, true), SystemLayout{n_dense});
-  table.add_cell(CoefficientTable::root_key(), CoefficientTable::kNone, Spectrum(1), sum, numbers, coefficients);
+  for (uint32_t j = 0; j < n_dense; ++j) dense_values.push_back(value(kFirstDense + j));
+  CoefficientTable table(CellGrid(scene.scene().bounds(), 4, true), lights.size(), n_dense);
+  const CoefficientTable::NewCell cell = {
+      CoefficientTable::root_key(), CoefficientTable::kNone, Spectrum(1), sum, numbers, light_values, dense_values};
+  table.add_cells({&cell, 1});
   return table;
 }
 
