@@ -11,8 +11,10 @@ constexpr uint32_t kMaxNumber = 1u << 30;
 }  // namespace
 
 void add_control_options(CLI::App& command, ControlTexts& texts) {
-  command.add_option("--cv", texts.kind, "Control variates: one coefficient for each colour, for all, or none")
-      ->check(one_of({"rgb", "mono", "off"}))
+  command
+      .add_option("--cv", texts.kind,
+                  "Control variates: one coefficient for each colour, for all, of light samples alone, or none")
+      ->check(one_of({"rgb", "mono", "vevoda", "off"}))
       ->group(kControlGroup);
   command
       .add_flag("--cv-paper", texts.paper,

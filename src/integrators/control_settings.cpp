@@ -6,7 +6,7 @@
 namespace covary {
 namespace {
 
-constexpr ControlKind kKinds[] = {ControlKind::kOff, ControlKind::kRgb, ControlKind::kMono};
+constexpr ControlKind kKinds[] = {ControlKind::kOff, ControlKind::kRgb, ControlKind::kMono, ControlKind::kVevoda};
 constexpr LightSelection kSelections[] = {LightSelection::kTriangle, LightSelection::kShape, LightSelection::kPower};
 constexpr int kMaxInt = 1 << 30;
 
@@ -30,6 +30,8 @@ std::string name_of(ControlKind kind) {
       return "rgb";
     case ControlKind::kMono:
       return "mono";
+    case ControlKind::kVevoda:
+      return "vevoda";
   }
   throw Error(ErrorCode::kInternal, "unknown kind of control variate");
 }

@@ -13,9 +13,10 @@
 namespace covary {
 
 enum class ControlKind {
-  kOff,   ///< no control variate: the plain estimate with the balance heuristic
-  kRgb,   ///< one coefficient for each colour channel
-  kMono,  ///< one coefficient for all
+  kOff,     ///< no control variate: the plain estimate with the balance heuristic
+  kRgb,     ///< one coefficient for each colour channel
+  kMono,    ///< one coefficient for all
+  kVevoda,  ///< for light samples alone, one coefficient for each colour channel, after [Vevoda2018]
 };
 
 /// Settings given one by one; those that are not keep their values.
@@ -58,7 +59,7 @@ struct ControlSettings {
   std::string text() const;
 };
 
-/// "off", "rgb", "mono".
+/// "off", "rgb", "mono", "vevoda".
 std::string name_of(ControlKind kind);
 /// The one of that name, or nothing.
 std::optional<ControlKind> control_kind(const std::string& name);

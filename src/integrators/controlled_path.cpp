@@ -6,7 +6,7 @@
 // | max_depth     | integer | -1       | largest number of path edges; -1: no limit                            |
 // | rr_depth      | integer | 5        | number of edges after which roulette may end a path                   |
 // | hide_emitters | boolean | false    | lights are invisible to the camera                                    |
-// | cv            | string  | rgb      | control variates: `off`, `rgb`, `mono`                                |
+// | cv            | string  | rgb      | control variates: `off`, `rgb`, `mono`, `vevoda`                      |
 // | cv_paper      | boolean | false    | the published method; other parameters change it                      |
 // | lights        | string  | power    | how lights are chosen: `triangle`, `shape`, `power`                   |
 // | cv_grid       | integer | 0        | cells along the longest side of the scene; 0: by the size of pixels   |
@@ -60,7 +60,7 @@ void ControlledPath::prepare(const Scene& scene) {
   lights_ = LightSet(scene, settings_.lights);
   compensated_ = scene.environment() ? scene.environment()->mis_compensated() : nullptr;
   const Emitter* environment = compensated_ ? compensated_.get() : scene.environment();
-  controlled_ = {&lights_, {}, environment, &table(), settings_.prefix};
+  controlled_ = {&lights_, {}, environment, &table(), settings_.prefix, settings_.kind == ControlKind::kVevoda};
   std::vector<float> counts = make_clusters();
   controlled_.cluster_of = cluster_of_;
   if (settings_.on())

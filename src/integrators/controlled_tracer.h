@@ -44,6 +44,9 @@ struct ControlledScene {
   const Emitter* environment;            ///< sampled apart; or null
   const CoefficientTable* table;         ///< the coefficients; without cells: no control
   bool prefix = true;                    ///< samples are weighed by the throughput before them
+  /// The control knows light samples alone, as if no other technique found their points [Vevoda2018]: r is 1 for each
+  /// of them, and direction samples have no part in it.
+  bool light_samples_only = false;
   /// Dense techniques: directions by the BSDF, then the environment.
   static constexpr uint32_t kBsdf = 0, kEnvironment = 1;
   uint32_t n_dense() const { return environment ? 2 : 1; }
@@ -150,7 +153,7 @@ class ControlledTracer {
     }
     if (!is_black(light.radiance)) samples_[path.sample].radiance += path.throughput * light.radiance * r;
     if (!vertex.open) return;
-    take(vertex, vertex.direction_weight * light.radiance * r, cluster, 1 - r);
+    if (!control_.light_samples_only) take(vertex, vertex.direction_weight * light.radiance * r, cluster, 1 - r);
     close(path.sample);
   }
 
@@ -248,7 +251,7 @@ class ControlledTracer {
                                            random.get_2d(path.last_vertex, Event::kDirection));
       if (!next.valid() || is_black(next.weight)) {
         if (!vertex.open) continue;
-        if constexpr (Parts::kCountFailed) take(vertex, Spectrum(), kNoLight, 0);
+        if (Parts::kCountFailed && !control_.light_samples_only) take(vertex, Spectrum(), kNoLight, 0);
         batch_.ended.push_back(path.sample);
         continue;
       }
@@ -288,7 +291,8 @@ class ControlledTracer {
 
   void begin_control(ControlledVertex& vertex) {
     vertex.control = table_.light_sum(vertex.cell);
-    for (uint32_t j = 0; j < control_.n_dense(); ++j) vertex.control += table_.dense(vertex.cell, j);
+    if (control_.environment) vertex.control += table_.dense(vertex.cell, ControlledScene::kEnvironment);
+    if (!control_.light_samples_only) vertex.control += table_.dense(vertex.cell, ControlledScene::kBsdf);
   }
 
   /// β of a light's cluster, or of the environment for kNoLight.
@@ -346,7 +350,7 @@ class ControlledTracer {
         take(vertex, Spectrum(), connection.cluster, 1);
       } else {
         samples_[connection.sample].radiance += vertex.throughput * connection.value;
-        take(vertex, connection.value, connection.cluster, connection.r_technique);
+        take(vertex, connection.value, connection.cluster, control_.light_samples_only ? 1 : connection.r_technique);
       }
     }
     batch_.n_connections = 0;

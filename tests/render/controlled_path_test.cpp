@@ -261,7 +261,8 @@ TEST(ControlledPath, TrainedAgreesWithPath) {
   EXPECT_GT(integrator_of(on).table().n_cells(), 10u);
   EXPECT_EQ(n_biased(differences(on, off, 16, 0)), 0);
   EXPECT_EQ(n_biased(differences(on, path, 16, 100)), 0);
-  EXPECT_EQ(n_biased(differences(trained(everything(), options(ControlKind::kMono)), off, 16, 0)), 0);
+  for (const ControlKind kind : {ControlKind::kMono, ControlKind::kVevoda})
+    EXPECT_EQ(n_biased(differences(trained(everything(), options(kind)), off, 16, 0)), 0) << name_of(kind);
 }
 
 /// Sum of squared differences of two renders with other numbers: twice the variance.
@@ -279,6 +280,7 @@ TEST(ControlledPath, HasLessNoiseWhereLightsDiffer) {
   const double mono = noise(trained(coloured_lights(), options(ControlKind::kMono)));
   const double rgb = noise(trained(coloured_lights(), options(ControlKind::kRgb)));
   EXPECT_LT(mono, 1.1 * plain);
+  EXPECT_LT(noise(trained(coloured_lights(), options(ControlKind::kVevoda))), 0.7 * plain);
   EXPECT_LT(rgb, 0.5 * plain);
 }
 
