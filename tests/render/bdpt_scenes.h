@@ -55,6 +55,42 @@ inline std::string materials() {
          rectangle("<scale x='1.5' y='2' z='1'/><rotate y='1' angle='-120'/><translate x='4' z='6'/>", kBumps);
 }
 
+inline const char* const kNormals =
+    "<bsdf type='normalmap'><texture type='checkerboard' name='normalmap'>"
+    "<rgb name='color0' value='0.5, 0.5, 1'/><rgb name='color1' value='0.7, 0.4, 0.9'/></texture>"
+    "<bsdf type='roughplastic'><float name='alpha' value='0.3'/></bsdf></bsdf>";
+inline const char* const kThinGlass = "<bsdf type='thindielectric'/>";
+inline const char* const kPrincipled =
+    "<bsdf type='principled'><float name='roughness' value='0.4'/><float name='spec_trans' value='0.3'/>"
+    "<float name='metallic' value='0.2'/></bsdf>";
+inline const char* const kThinSheet =
+    "<bsdf type='principledthin'><float name='roughness' value='0.4'/><float name='diff_trans' value='1'/></bsdf>";
+inline const char* const kTwoSides =
+    "<bsdf type='twosided'><boolean name='allow_transmission' value='true'/><bsdf type='roughdielectric'>"
+    "<float name='alpha' value='0.4'/></bsdf><bsdf type='diffuse'/></bsdf>";
+
+/// Models, lights and placements that the room above lacks.
+inline std::string more_materials() {
+  const std::string textured =
+      "<emitter type='area'><texture type='checkerboard' name='radiance'><rgb name='color0' value='6'/>"
+      "<rgb name='color1' value='1'/></texture></emitter>";
+  const std::string group =
+      "<shape type='shapegroup' id='balls'>" + sphere("0", "0", "0", "0.5", kPrincipled) + "</shape>";
+  const auto placed = [](const std::string& translate) {
+    return "<shape type='instance'><ref id='balls'/><transform name='to_world'><scale x='1.2' y='0.9' "
+           "z='1'/><translate " +
+           translate + "/></transform></shape>";
+  };
+  return leaning_floor(kNormals) +
+         rectangle("<scale value='6'/><rotate x='1' angle='180'/><translate z='9'/>", diffuse(0.7)) + group +
+         placed("x='-1' y='-1.2' z='4'") + placed("x='1.2' y='-1.2' z='5'") +
+         rectangle("<rotate y='1' angle='160'/><translate x='-2' y='0.4' z='5'/>", kThinSheet) +
+         rectangle("<rotate y='1' angle='200'/><translate x='0.5' y='0.6' z='4'/>", kTwoSides) +
+         rectangle("<rotate y='1' angle='170'/><translate x='2.4' y='0.4' z='4'/>", kThinGlass) +
+         rectangle("<rotate y='1' angle='170'/><translate x='0' y='-1' z='3'/>", "<bsdf type='null'/>") +
+         rectangle("<rotate x='1' angle='90'/><translate y='3' z='4'/>", textured);
+}
+
 inline std::string area_lights() {
   return rectangle("<rotate x='1' angle='90'/><translate y='3' z='4'/>", diffuse(0.3) + area_light(5)) +
          sphere("-3", "2", "4", "0.5", area_light(4));

@@ -37,6 +37,7 @@ void PrintTo(const Scenery& scenery, std::ostream* out) { *out << scenery.name; 
 
 const Scenery kSceneries[] = {
     {"area_lights", [] { return materials() + area_lights(); }},
+    {"more_materials", [] { return more_materials() + kPoint; }},
     {"all_lights", [] { return materials() + area_lights() + kConstant + kPoint + kSpot + kDirectional; }},
     {"delta_lights", [] { return materials() + kPoint + kSpot + kDirectional; }},
     {"environment", [] { return materials() + kConstant; }, Heuristic::kPower, false, kThinLens},
