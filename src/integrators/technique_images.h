@@ -20,8 +20,8 @@ struct TechniqueImage {
 /// Longest paths that are shown, in edges.
 inline constexpr int kTechniqueEdges = 6;
 
-/// All techniques for paths of up to kTechniqueEdges edges, ordered by length, then s, but for those that found nothing.
-/// Reads settings.spp (its largest number), sampling, seed, pass, filter and stop; light paths as many as the
+/// All techniques for paths of up to kTechniqueEdges edges that found something, ordered by length, then s. Reads
+/// settings.spp (its largest number), sampling, seed, pass, filter and stop; light paths as many as the
 /// integrator has for these samples, in whole bundles. `window`: the pixels rendered, which are those of the images.
 /// Throws Error(kUsage) where `integrator` is not bidirectional.
 std::vector<TechniqueImage> render_techniques(const Scene& scene, const Integrator& integrator,
