@@ -16,7 +16,7 @@ PLAIN = (*RENDER, "--estimator", "none", "--cv-train", "4")
 
 class Options(CliTest):
     def test_refuses_options_of_another_integrator(self):
-        self.bad(2, "--integrator controlled-path, not of path", "render", ROOM, "-o", "a.exr", "--cv", "off")
+        self.bad(1, "--integrator controlled-path, not of path", "render", ROOM, "-o", "a.exr", "--cv", "off")
 
     def test_refuses_grids_of_no_cells(self):
         for grid in ("0", "-1", "half", "65537"):
@@ -57,8 +57,9 @@ class Films(CliTest):
         self.good(*RENDER, "--cv-train", "4", "--spp", "20", "-o", "a.exr", "--passes", "films", "--threads", "1")
         self.good(*RENDER, "--cv-train", "4", "--spp", "20", "-o", "b.exr")
         self.assertEqual(self.pixels("a.exr"), self.pixels("b.exr"))
-        settings = {json.loads(self.good("info", "films/" + film.name, "--json").stdout)["attributes"]["settings"]
-                    for film in (self.path / "films").glob("*.exr")}
+        attributes = [json.loads(self.good("info", "films/" + film.name, "--json").stdout)["attributes"]
+                      for film in (self.path / "films").glob("*.exr")]
+        settings = {attribute["covary:settings"] for attribute in attributes}
         self.assertEqual(len({text.split(";")[0] for text in settings}), 1)
         self.assertIn("training=", settings.pop())
 
