@@ -51,6 +51,14 @@ uint32_t fewest_reliable_samples(const RenderReport& report) {
   return report.result.predicted_relmse && report.result.samples_per_pixel() < fewest ? fewest : 0;
 }
 
+void print_training_warnings(const ControlledPath& controlled) {
+  if (const uint32_t n = controlled.cache().n_coarsened(); n > 0)
+    fmt::print(stderr, "warning: {} MiB for control variates (--cv-memory) were reached; cells are {} times as wide\n",
+               controlled.settings().memory_mib, uint64_t{1} << n);
+  if (const uint64_t n = controlled.cache().n_rejected(); n > 0)
+    fmt::print(stderr, "warning: {} samples of the training were not finite and are left out\n", n);
+}
+
 /// The scene's integrator where it uses control variates, or null.
 const ControlledPath* trained_integrator(const LoadedScene& scene) {
   const auto* controlled = dynamic_cast<const ControlledPath*>(scene.integrator.get());
@@ -150,10 +158,12 @@ void print_summary(const RenderReport& report) {
              load_seconds, scene.scene->build_seconds(),
              format_count(result.sum([](const Pass& p) { return p.result.n_samples; }) / seconds),
              format_count(result.sum([](const Pass& p) { return p.result.n_rays; }) / seconds));
-  if (const ControlledPath* controlled = trained_integrator(scene))
+  if (const ControlledPath* controlled = trained_integrator(scene)) {
     fmt::print(stderr, "control variates in {} cells, {} of them switched off, from {} samples per pixel in {:.2f} s\n",
                controlled->table().n_cells(), controlled->table().n_switched_off(), controlled->training_spp(),
                result.seconds.train);
+    print_training_warnings(*controlled);
+  }
   const Estimator estimator = make_estimator(options.estimator);
   if (estimator.passes != EstimatorPasses::kAny) {
     fmt::print(stderr, "{} in {:.2f} s", estimator.text, result.estimate_seconds());

@@ -38,6 +38,10 @@ class Options(CliTest):
         self.assertEqual(report["samples_per_pixel"], 12)
         self.assertNotIn("control_variates", report)
 
+    def test_warns_of_cells_that_grew(self):
+        result = self.good(*PLAIN, "--spp", "6", "-o", "a.exr", "--cv-grid", "4096", "--cv-memory", "1")
+        self.assertRegex(result.stderr, r"warning: 1 MiB .*--cv-memory.* were reached; cells are \d+ times as wide")
+
 
 class Films(CliTest):
     def pixels(self, name):
