@@ -26,13 +26,14 @@
 #include "film/outputs.h"
 #include "json_output.h"
 #include "numbers.h"
+#include "stages.h"
 
 namespace covary {
 namespace {
 
 struct CombineOptions {
   std::vector<std::string> crn, independent;
-  std::string output, crn_layer, independent_layer, json;
+  std::string output, crn_layer, independent_layer, stages, json;
   EstimatorOptions estimator;
   bool error = false, force = false, quiet = false;
   std::optional<int> samples;
@@ -271,6 +272,7 @@ void combine(const CombineOptions& o) {
   const Estimator estimator = make_estimator(o.estimator);
   const PairSettings settings = settings_of(o, estimator, crn);
   check_explain(o, estimator, crn);
+  check_stages(o.stages, estimator);
 
   std::vector<Finding> findings;
   check_files(crn, independent, findings);
@@ -291,6 +293,10 @@ void combine(const CombineOptions& o) {
   EstimatorResult result = estimate(estimator, settings, crn, bands);
   const double estimate_seconds = watch.lap();
   write(o, crn, independent, result);
+  if (!o.stages.empty()) {
+    bands.read(0, crn.height());
+    save_stages(o.stages, estimator, bands.crn(), bands.independent(), crn.place());
+  }
   const double write_seconds = watch.lap();
   nlohmann::ordered_json pixel;
   if (!o.explain.empty()) {
@@ -344,7 +350,8 @@ void add_combine(CLI::App& app) {
       ->check(CLI::Validator(check_has_images, ""))
       ->check(one_of(pair_estimator_names()))
       ->capture_default_str();
-  add_estimator_options(*command, o->estimator, pair_estimator_names());
+  add_estimator_options(*command, o->estimator, pair_estimator_names(), kAdaptiveOptions);
+  add_stages_option(*command, o->stages);
   command
       ->add_option("--samples", o->samples,
                    fmt::format("{}: samples per pixel of the CRN image; default: what its file tells",

@@ -28,7 +28,7 @@ std::vector<SharedOption> shared_options(const std::vector<std::string>& estimat
       if (known == shared.end())
         shared.push_back({option, option.help + (standard.empty() ? "" : "; default " + standard)});
       else if (known->option.help != option.help)
-        known->help += fmt::format("; {}: {}, default {}", estimator, option.help, standard);
+        known->help += fmt::format("; {}: {}{}", estimator, option.help, standard.empty() ? "" : ", default " + standard);
       else if (known->option.default_value != standard)
         known->help += fmt::format(" ({}: {})", estimator, standard);
     }
@@ -51,10 +51,12 @@ void check_numbers(CLI::Option& option, const EstimatorOption& what) {
 
 }  // namespace
 
-void add_estimator_options(CLI::App& command, EstimatorOptions& o, const std::vector<std::string>& estimators) {
+void add_estimator_options(CLI::App& command, EstimatorOptions& o, const std::vector<std::string>& estimators,
+                           std::span<const char* const> left_out) {
   o.command = &command;
   for (const SharedOption& shared : shared_options(estimators)) {
     const EstimatorOption& what = shared.option;
+    if (std::find(left_out.begin(), left_out.end(), what.name) != left_out.end()) continue;
     std::string names = "--" + what.name;
     for (const std::string& alias : what.aliases) names += ",--" + alias;
     const auto set = [&o, name = what.name](const std::string& text) { o.values[name] = text; };

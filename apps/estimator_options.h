@@ -4,6 +4,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -23,7 +24,9 @@ struct EstimatorOptions {
 
 /// Adds the options of these estimators, but `--estimator` itself. Equal names are one option, whose help has all
 /// defaults.
-void add_estimator_options(CLI::App& command, EstimatorOptions& options, const std::vector<std::string>& estimators);
+/// `left_out`: names of options that the command does not have.
+void add_estimator_options(CLI::App& command, EstimatorOptions& options, const std::vector<std::string>& estimators,
+                           std::span<const char* const> left_out = {});
 
 /// make_estimator() of the registry: throws Error(kUsage) for options of another estimator and values out of range.
 inline Estimator make_estimator(const EstimatorOptions& options) {

@@ -193,10 +193,13 @@ lab::PlanContext plan_context() {
   lab::PlanContext context;
   context.program_version = program_version();
   for (const std::string& name : pair_estimator_names()) {
-    context.pair_estimators.insert(name);
+    const Estimator estimator = make_estimator(name);
+    if (!estimator.adaptive) context.pair_estimators.insert(name);
+    std::set<std::string>& own = context.estimator_options[name];
     for (const EstimatorOption& option : options_of_estimator(name)) {
-      context.estimator_options.insert("--" + option.name);
-      for (const std::string& alias : option.aliases) context.estimator_options.insert("--" + alias);
+      if (estimator.pass_options.contains(option.name)) continue;
+      own.insert("--" + option.name);
+      for (const std::string& alias : option.aliases) own.insert("--" + alias);
     }
   }
   return context;

@@ -26,6 +26,7 @@
 #include "progress.h"
 #include "render_options.h"
 #include "render_report.h"
+#include "stages.h"
 
 namespace covary {
 namespace {
@@ -81,12 +82,20 @@ RenderResult render_watched(const RenderOptions& options, const LoadedScene& sce
   return result;
 }
 
+/// --save-stages, of films of two passes.
+void write_stages(const RenderOptions& options, const RenderResult& result) {
+  if (options.stages.empty()) return;
+  const Film &crn = result.passes[0].film, &independent = result.passes[1].film;
+  save_stages(options.stages, make_estimator(options.estimator), rows_of(crn, 0, crn.height()),
+              rows_of(independent, 0, independent.height()), {crn.frame_width(), crn.frame_height(), crn.crop()});
+}
+
 std::string interruption(const RenderOptions& options, const RenderResult& result) {
   if (result.kept.empty()) return "interrupted before the first sample; nothing was written";
   return fmt::format(
       "interrupted after {:.1f} of {:g} samples per pixel; '{}' is the image so far{}; the same command "
       "with --resume continues",
-      result.samples_per_pixel(), result.sum([](const Pass& p) { return p.settings.spp.largest(); }), options.output,
+      result.samples_per_pixel(), result.sum([](const Pass& p) { return p.settings.spp.mean(); }), options.output,
       result.kept == options.output ? "" : ", '" + result.kept + "' holds its films");
 }
 
@@ -117,7 +126,7 @@ Outputs files_of(const RenderOptions& options) {
                                                "interruption",
                                                options.output));
   if (std::filesystem::is_directory(options.passes))
-    for (const char* name : {"crn", "independent"}) {
+    for (const char* name : {"crn", "independent", "pilot-1"}) {
       const std::string path = (std::filesystem::path(options.passes) / name).string();
       outputs.writes("--passes", path + ".exr", OutputKind::kFilm);
       outputs.writes("--passes", path + ".json", OutputKind::kText);
@@ -147,6 +156,7 @@ void render(RenderOptions options) {
   for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", warning);
   if (!options.replay.empty()) return print_replay(options, scene);
   const RenderResult result = render_watched(options, scene, display ? &*display : nullptr);
+  if (result.complete) write_stages(options, result);
   report({options, scene, result, load_seconds, threads});
 }
 

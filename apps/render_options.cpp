@@ -13,6 +13,7 @@
 #include "numbers.h"
 #include "plans/estimator_plans.h"
 #include "plans/integrator_choice.h"
+#include "stages.h"
 
 namespace covary {
 
@@ -86,6 +87,11 @@ void check_options(RenderOptions& options) {
                       passes == EstimatorPasses::kSamples
                           ? "with independent random numbers"
                           : "with common random numbers and one with independent ones"));
+  check_stages(options.stages, estimator);
+  if (estimator.adaptive && given("--split"))
+    usage(fmt::format("--split: the first pass of {} has its own number of samples, --dependent-spp", name));
+  if (estimator.adaptive && given("--sampling"))
+    usage("--sampling: --adaptive always takes independent random numbers");
   if (passes != EstimatorPasses::kPair && given("--split"))
     usage("--split is an option of estimators with two passes, not of " + name);
   if (passes == EstimatorPasses::kSamples && given("--groups"))
@@ -97,7 +103,8 @@ void check_options(RenderOptions& options) {
   control_options(options.control);
   if (!options.until.empty()) {
     parse_until(options.until);
-    if (!estimator.predicts_error) usage("--until: " + name + " does not estimate its error");
+    if (!estimator.predicts_error)
+      usage("--until: " + name + " does not estimate its error" + (estimator.adaptive ? "; see --relative-error" : ""));
     if (passes == EstimatorPasses::kAny && options.groups.value_or(2) < 2) usage("--until needs --groups 2 or more");
   }
 }
@@ -224,6 +231,7 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
   command.add_option("--checkpoint", o.checkpoint_seconds, "Seconds between writing unfinished films; 0: never")
       ->capture_default_str()
       ->check(real_number(0, std::numeric_limits<double>::infinity()));
+  add_stages_option(command, o.stages);
   add_define_option(command, o.defines);
   command.add_flag("--aovs", o.aovs, "Add the images Albedo, N (normal) and P (position) to the output");
   command.add_option("--replay", o.replay, "X,Y,SAMPLE[,PASS]: print one sample instead of rendering");

@@ -19,7 +19,7 @@ namespace covary {
 
 struct RenderOptions {
   std::string scene, output, integrator, sampling, split = "1:1", rfilter, json, passes;
-  std::string resolution, crop, replay, until, display_server, save_training, load_training;
+  std::string stages, resolution, crop, replay, until, display_server, save_training, load_training;
   EstimatorOptions estimator;
   ControlTexts control;
   std::vector<std::string> defines;

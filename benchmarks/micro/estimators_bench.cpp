@@ -10,6 +10,7 @@
 #include "core/random.h"
 #include "estimators/control_variates.h"
 #include "estimators/cv_baseline.h"
+#include "estimators/dependent_tests.h"
 #include "estimators/feedback.h"
 #include "estimators/iduw.h"
 #include "estimators/iicv.h"
@@ -151,6 +152,33 @@ void whole_iduw(benchmark::State& state) {
   count(state);
 }
 
+/// Means and variances as films have them, one group: what the filters of dependent tests read.
+const FilterInput& filter_inputs() {
+  static const FilterInput instance = filter_input(input().crn, input().independent, input().valid, Norm::kL1,
+                                                   VarianceSource::kBoth, 7, 16);
+  return instance;
+}
+
+void filter_paper(benchmark::State& state) {
+  const FilterInput& in = filter_inputs();
+  for (auto _ : state) benchmark::DoNotOptimize(region_filter(in, RegionOptions()).colour.data.data());
+  count(state);
+}
+
+void filter_exact(benchmark::State& state) {
+  const FilterInput& in = filter_inputs();
+  for (auto _ : state)
+    benchmark::DoNotOptimize(bound_filter(in, {static_cast<int>(state.range(0))}).colour.data.data());
+  count(state);
+}
+
+void whole_dependent_tests(benchmark::State& state, const DependentTestsOptions& options) {
+  const Input& in = input();
+  for (auto _ : state)
+    benchmark::DoNotOptimize(dependent_tests(in.crn, in.independent, options).estimate.data.data());
+  count(state);
+}
+
 BENCHMARK(one_moments)->Unit(benchmark::kMillisecond);
 BENCHMARK(one_pilot)->Unit(benchmark::kMillisecond);
 BENCHMARK(one_neighbours)->Unit(benchmark::kMillisecond);
@@ -159,6 +187,14 @@ BENCHMARK(one_feedback)->Unit(benchmark::kMillisecond);
 BENCHMARK(one_polynomials)->ArgsProduct({{2, 4, 6}, {48, 192}});
 BENCHMARK_CAPTURE(whole_iicv, default, IicvOptions())->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK_CAPTURE(whole_iicv, paper, IicvOptions::paper())->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(filter_paper)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(filter_exact)->Arg(7)->Arg(15)->Arg(31)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK_CAPTURE(whole_dependent_tests, default, DependentTestsOptions())
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+BENCHMARK_CAPTURE(whole_dependent_tests, paper, DependentTestsOptions::paper())
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
 BENCHMARK(whole_cv_baseline)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(whole_iduw)->Unit(benchmark::kMillisecond)->UseRealTime();
 

@@ -5,6 +5,9 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <map>
+#include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -12,6 +15,7 @@
 #include "core/spectrum.h"
 #include "estimators/grouped_image.h"
 #include "estimators/pixel_probe.h"
+#include "estimators/sample_counts.h"
 
 namespace covary {
 
@@ -46,6 +50,9 @@ struct Estimator {
   /// Parts of the samples for the CRN and the independent pass where nothing else is asked for; they add up to 1.
   std::array<double, 2> split = {0.5, 0.5};
 
+  std::optional<AdaptiveSampling> adaptive;  ///< not of estimators of the samples of a pixel
+  std::set<std::string> pass_options;        ///< its options that change the samples of its passes
+
   // Of a pair.
   std::function<EstimatorResult(const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings)>
       apply;
@@ -54,6 +61,9 @@ struct Estimator {
   /// The control variates of a pixel; empty function where the estimator has none.
   std::function<std::vector<ControlVariate>(const GroupedImage& crn, const GroupedImage& independent, int x, int y)>
       explain;
+
+  /// Images of single steps by name, for files; empty function where the estimator has none.
+  std::function<std::map<std::string, Image>(const GroupedImage& crn, const GroupedImage& independent)> stages;
 
   // Of the samples of a pixel.
   PixelFunction estimate_pixel;

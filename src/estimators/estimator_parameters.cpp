@@ -60,6 +60,18 @@ void EstimatorParameters::real(const std::string& name, float& value, const Opti
   if (const std::string* text = find(options_.back())) value = parse<float>(name, *text, "a number");
 }
 
+void EstimatorParameters::whole(const std::string& name, std::optional<int>& value, const OptionRange& range,
+                                const std::string& help, const std::vector<std::string>& aliases) {
+  options_.push_back({name, aliases, EstimatorOption::Type::kWhole, "", range, {}, help});
+  if (const std::string* text = find(options_.back())) value = parse<int>(name, *text, "a whole number");
+}
+
+void EstimatorParameters::real(const std::string& name, std::optional<float>& value, const OptionRange& range,
+                               const std::string& help) {
+  options_.push_back({name, {}, EstimatorOption::Type::kReal, "", range, {}, help});
+  if (const std::string* text = find(options_.back())) value = parse<float>(name, *text, "a number");
+}
+
 size_t EstimatorParameters::choose(const std::string& name, const std::vector<std::string>& aliases,
                                    const std::vector<std::string>& names, size_t standard, const std::string& help) {
   options_.push_back({name, aliases, EstimatorOption::Type::kChoice, names[standard], {}, names, help});

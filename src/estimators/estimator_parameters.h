@@ -5,6 +5,7 @@
 
 #include <limits>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -29,7 +30,7 @@ struct EstimatorOption {
   std::string name;                  ///< without dashes: "pilot-window"
   std::vector<std::string> aliases;  ///< other names
   Type type = Type::kFlag;
-  std::string default_value;  ///< as text; empty for flags, which are off
+  std::string default_value;  ///< as text; empty for flags, which are off, and where there is none
   OptionRange range;          ///< of numbers
   std::vector<std::string> choices;
   std::string help;
@@ -52,6 +53,10 @@ class EstimatorParameters {
   /// for text that is no such value. The range is described here and checked with all else by the options' validate().
   void whole(const std::string& name, int& value, const OptionRange& range, const std::string& help);
   void real(const std::string& name, float& value, const OptionRange& range, const std::string& help);
+  /// The same for options without a default.
+  void whole(const std::string& name, std::optional<int>& value, const OptionRange& range, const std::string& help,
+             const std::vector<std::string>& aliases = {});
+  void real(const std::string& name, std::optional<float>& value, const OptionRange& range, const std::string& help);
   template <typename T>
   void choice(const std::string& name, T& value, Choices<T> choices, const std::string& help,
               const std::vector<std::string>& aliases = {}) {
@@ -64,6 +69,8 @@ class EstimatorParameters {
     value = choices[choose(name, aliases, names, chosen, help)].second;
   }
 
+  /// Whether any value was given at all.
+  bool any_given() const { return !values_.empty(); }
   /// All that were asked for, in this order.
   const std::vector<EstimatorOption>& options() const { return options_; }
 

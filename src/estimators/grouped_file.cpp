@@ -15,6 +15,7 @@ namespace covary {
 namespace {
 
 constexpr const char* kCounts = "samples";  // channel of covary's films
+constexpr const char* kVariance = "variance_in_groups";  // channels .R .G .B of some of them
 
 [[noreturn]] void fail(const std::string& path, const std::string& what) {
   throw Error(ErrorCode::kInput, path + ": " + what);
@@ -154,8 +155,9 @@ void GroupedFile::add_file(const std::string& path, const std::string& layer, bo
   samples_of_group_ = samples;
   samples_ += samples;
   const ExrFile::Channel* counts = file.find(kCounts);
-  has_counts_ =
-      only_file && numbered.size() > 1 && !attribute(file, "covary:film").empty() && counts && counts->type == "uint";
+  const bool is_film = only_file && (numbered.size() > 1 || layer.empty()) && !attribute(file, "covary:film").empty();
+  has_counts_ = is_film && counts && counts->type == "uint";
+  has_variance_ = has_counts_ && file.find(std::string(kVariance) + ".R");
   const auto agree = [&](const char* key, std::string& value) {
     const std::string here = attribute(file, std::string("covary:") + key);
     if (files_.size() > 1 && here != value)
@@ -171,6 +173,7 @@ void GroupedFile::read_rows(int first_row, int n_rows, Rows& rows) const {
   const size_t per_pixel = groups_.size() * 3, n_pixels = static_cast<size_t>(width()) * n_rows;
   rows.data.resize(n_pixels * per_pixel);
   rows.counts.resize(has_counts_ ? n_pixels : 0);
+  rows.variance_in_groups.resize(has_variance_ ? n_pixels * 3 : 0);
   for (size_t f = 0; f < files_.size(); ++f) {
     std::vector<ExrPlane> planes;
     for (size_t g = 0; g < groups_.size(); ++g) {
@@ -179,13 +182,22 @@ void GroupedFile::read_rows(int first_row, int n_rows, Rows& rows) const {
         planes.push_back({groups_[g].prefix + "RGB"[c], ExrPlane::Type::kFloat, rows.data.data() + 3 * g + c,
                           per_pixel * sizeof(float)});
     }
+    for (size_t c = 0; has_variance_ && c < 3; ++c)
+      planes.push_back({std::string(kVariance) + "." + "RGB"[c], ExrPlane::Type::kFloat,
+                        rows.variance_in_groups.data() + c, 3 * sizeof(float)});
     if (has_counts_) planes.push_back({kCounts, ExrPlane::Type::kUint, rows.counts.data(), sizeof(uint32_t)});
     files_[f]->read_rows(planes, first_row, n_rows);
   }
 }
 
 GroupedImage GroupedFile::view(const Rows& rows, int n_rows) const {
-  return {width(), n_rows, groups(), rows.data.data(), rows.counts.empty() ? nullptr : rows.counts.data(), samples_};
+  return {width(),
+          n_rows,
+          groups(),
+          rows.data.data(),
+          rows.counts.empty() ? nullptr : rows.counts.data(),
+          samples_,
+          rows.variance_in_groups.empty() ? nullptr : rows.variance_in_groups.data()};
 }
 
 }  // namespace covary

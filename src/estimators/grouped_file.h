@@ -42,6 +42,7 @@ class GroupedFile {
   struct Rows {
     std::vector<float> data;
     std::vector<uint32_t> counts;  ///< of a film of covary in one file; empty otherwise, where groups must be equal
+    std::vector<float> variance_in_groups;  ///< GroupedImage::variance_in_groups, of films that keep it
   };
   /// Rows [first_row, first_row + n_rows).
   void read_rows(int first_row, int n_rows, Rows& rows) const;
@@ -60,7 +61,7 @@ class GroupedFile {
   ImagePlace place_;
   double samples_ = 0, samples_of_group_ = 0;
   std::string sampling_, scene_hash_, settings_, name_;
-  bool has_half_ = false, has_counts_ = false;
+  bool has_half_ = false, has_counts_ = false, has_variance_ = false;
 };
 
 }  // namespace covary

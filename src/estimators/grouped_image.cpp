@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "core/error.h"
+#include "film/sample_variance.h"
 
 namespace covary {
 namespace {
@@ -23,6 +24,12 @@ void check_counts(const char* name, const GroupedImage& image, std::vector<std::
 }
 
 }  // namespace
+
+Spectrum GroupedImage::sample_variance(int x, int y) const {
+  const size_t index = static_cast<size_t>(y) * width + x;
+  return covary::sample_variance(pixel(x, y), variance_in_groups ? variance_in_groups + index * 3 : nullptr, groups,
+                                 count(x, y));
+}
 
 void throw_if_any(const std::string& name, const std::vector<std::string>& problems) {
   if (problems.empty()) return;

@@ -23,11 +23,17 @@ struct GroupedImage {
   const float* data = nullptr;
   const uint32_t* counts = nullptr;  ///< samples of each pixel, row by row; or null
   double mean_count = 0;             ///< of the whole image where this is a part of it; 0: of this
+  /// Mean squared deviation of a pixel's samples from the means of their groups, RGB, as films may keep it; or null.
+  /// It is only read together with `counts`.
+  const float* variance_in_groups = nullptr;
   const float* pixel(int x, int y) const { return data + (static_cast<size_t>(y) * width + x) * groups * 3; }
   /// Samples of a pixel; without counts, one in each group.
   uint32_t count(int x, int y) const {
     return counts ? counts[static_cast<size_t>(y) * width + x] : static_cast<uint32_t>(groups);
   }
+  /// Estimated variance of one sample (film/sample_variance.h); of a group where no counts are known. Zero where less
+  /// than two samples or groups tell.
+  Spectrum sample_variance(int x, int y) const;
   bool has_equal_groups(int x, int y) const { return count(x, y) % static_cast<uint32_t>(groups) == 0; }
 };
 

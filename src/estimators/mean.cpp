@@ -6,6 +6,7 @@
 
 #include "film/groups.h"
 
+#include "estimators/common_options.h"
 #include "estimators/registry.h"
 
 namespace covary {
@@ -34,29 +35,49 @@ ChannelMean mean_of_unequal(const float* groups, int T, uint32_t count) {
   return {mean, std::sqrt(squares / (used - 1) / count)};
 }
 
+/// Standard error of the mean of `count` samples.
+double error_of_samples(double variance, uint32_t count) {
+  return count > 1 ? std::sqrt(variance / count) : std::numeric_limits<double>::infinity();
+}
+
 }  // namespace
 
 EstimatorResult mean_of_groups(const GroupedImage& image) {
   const int T = image.groups;
   EstimatorResult result;
   result.estimate = Image(image.width, image.height, 3);
-  if (T > 1) result.std_error = Image(image.width, image.height, 3);
+  const bool has_error = T > 1 || image.variance_in_groups;
+  if (has_error) result.std_error = Image(image.width, image.height, 3);
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x) {
       const uint32_t count = image.count(x, y);
       const bool equal = count > 0 && image.has_equal_groups(x, y);
+      const Spectrum variance = image.variance_in_groups ? image.sample_variance(x, y) : Spectrum(0);
       for (int c = 0; c < 3; ++c) {
         const float* groups = image.pixel(x, y) + c;
         const ChannelMean m = equal ? mean_of_equal(groups, T) : mean_of_unequal(groups, T, count);
         result.estimate.pixel(x, y)[c] = static_cast<float>(m.mean);
-        if (T > 1) result.std_error.pixel(x, y)[c] = static_cast<float>(m.std_error);
+        if (has_error)
+          result.std_error.pixel(x, y)[c] = static_cast<float>(
+              image.variance_in_groups ? error_of_samples(variance[c], count) : m.std_error);
       }
     }
   return result;
 }
 
-Estimator make_none(EstimatorParameters& /*parameters*/) {
+Estimator make_none(EstimatorParameters& parameters) {
+  EstimatorParameters& p = parameters;
   Estimator estimator;
+  AdaptiveSampling adaptive;
+  const bool is_adaptive = p.flag("adaptive", "As many samples in each pixel as a first pass says that is not averaged in");
+  adaptive.least_min_spp = 1;  // a mean needs a sample
+  ask_for(p, adaptive);
+  p.choice<Norm>("norm", adaptive.counts.norm, kNorms, kNormHelp);
+  adaptive.counts.first_pass_counts = false;
+  std::vector<std::string> problems = adaptive.validate();
+  if (!is_adaptive && p.any_given()) problems.emplace_back("options of samples per pixel need --adaptive");
+  throw_if_any("none", problems);
+  if (is_adaptive) estimator.adaptive = adaptive;
   estimator.passes = EstimatorPasses::kAny;
   estimator.summary = "the mean";
   estimator.predicts_error = true;

@@ -12,7 +12,8 @@ namespace covary {
 /// Groups of unequal sizes n_t, N together, are weighted by them: mean m = sum n_t m_t / N, and its squared error
 /// sum n_t (m_t - m)^2 / ((T - 1) N), unbiased as well. A pixel with fewer samples than groups has the T of its groups
 /// with samples, and an infinite standard error where that is one or none. Every pixel stands alone, whatever the
-/// counts of others.
+/// counts of others. Of images that keep the variance of samples, the standard error is from that, for any number of
+/// groups; infinite with less than two samples.
 EstimatorResult mean_of_groups(const GroupedImage& image);
 
 }  // namespace covary

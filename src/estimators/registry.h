@@ -23,6 +23,7 @@ std::span<const EstimatorPlugin> estimator_plugins();
 Estimator make_iicv(EstimatorParameters& parameters);
 Estimator make_cv_baseline(EstimatorParameters& parameters);
 Estimator make_iduw(EstimatorParameters& parameters);
+Estimator make_dependent_tests(EstimatorParameters& parameters);
 Estimator make_polynomials(EstimatorParameters& parameters);
 Estimator make_none(EstimatorParameters& parameters);
 

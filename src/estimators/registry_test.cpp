@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "estimators/cv_baseline.h"
+#include "estimators/dependent_tests.h"
 #include "estimators/iduw.h"
 #include "estimators/iicv.h"
 #include "estimators/polynomials.h"
@@ -69,6 +70,9 @@ TEST(EstimatorRegistry, DefaultsAreThoseOfTheOptions) {
   IduwOptions iduw_options;
   iduw_options.samples = 48;
   EXPECT_EQ(made("iduw", {}), iduw(g, h, iduw_options).estimate.data);
+  EXPECT_EQ(made("dependent-tests", {}), dependent_tests(g, h).estimate.data);
+  EXPECT_EQ(made("dependent-tests", {{"paper", ""}}),
+            dependent_tests(g, h, DependentTestsOptions::paper()).estimate.data);
   EXPECT_EQ(make_estimator("polynomials").dimensions, PolynomialsOptions().dimensions);
 }
 
@@ -76,7 +80,7 @@ TEST(EstimatorRegistry, DefaultsAreThoseOfTheOptions) {
 TEST(EstimatorRegistry, ListsTheDefaults) {
   for (const std::string& name : pair_estimator_names())
     for (const EstimatorOption& option : options_of_estimator(name)) {
-      if (option.type == Type::kFlag) continue;
+      if (option.default_value.empty()) continue;
       EXPECT_EQ(made(name, {{option.name, option.default_value}}), made(name, {})) << name << " " << option.name;
     }
 }
@@ -109,6 +113,21 @@ TEST(EstimatorRegistry, ValuesReachTheOptions) {
   EXPECT_EQ(made("cv-baseline",
                  {{"k", "9"}, {"window", "5"}, {"ridge", "0.001"}, {"exclude-target", ""}, {"coefficients", "shared"}}),
             cv_baseline(g, h, baseline).estimate.data);
+  DependentTestsOptions tests;
+  tests.filter = DependentFilter::kPaper, tests.norm = Norm::kL2, tests.weights = CombinationWeights::kCounts;
+  tests.regions = {6, 0.001f, Pyramid::kCount}, tests.variance = VarianceSource::kDependent, tests.smoothing = 3;
+  EXPECT_EQ(made("dependent-tests", {{"filter", "paper"},
+                                     {"norm", "l2"},
+                                     {"weights", "counts"},
+                                     {"max-region", "6"},
+                                     {"min-centre-drop", "0.001"},
+                                     {"pyramid", "count"},
+                                     {"sigma", "dependent"},
+                                     {"sigma-window", "3"}}),
+            dependent_tests(g, h, tests).estimate.data);
+  DependentTestsOptions exact;
+  exact.bound.window = 7, exact.guard = 0;
+  EXPECT_EQ(made("dependent-tests", {{"window", "7"}, {"guard", "off"}}), dependent_tests(g, h, exact).estimate.data);
   EXPECT_EQ(make_estimator("polynomials", {{"dimensions", "2"}}).film_settings, "polynomials dimensions=2");
   EXPECT_EQ(make_estimator("iicv", {{"paper", ""}, {"k", "50"}}).text, "iicv --paper --k 50");
 }
@@ -136,6 +155,42 @@ TEST(EstimatorRegistry, EachEstimatorDoesWhatItSays) {
   EXPECT_EQ(make_estimator("iicv", {{"penalty", "cross-fit"}}).fewest_groups, 4);
 }
 
+TEST(EstimatorRegistry, AdaptiveEstimatorsHaveTheirNumbers) {
+  const Estimator usual = make_estimator("dependent-tests");
+  ASSERT_TRUE(usual.adaptive);
+  EXPECT_EQ(usual.adaptive->counts.allocation, Allocation::kLeastError);
+  EXPECT_FALSE(usual.adaptive->counts.classes);
+  const Estimator paper = make_estimator("dependent-tests", {{"paper", ""}});
+  EXPECT_EQ(paper.adaptive->counts.allocation, Allocation::kEqualError);
+  EXPECT_TRUE(paper.adaptive->counts.classes);
+  EXPECT_EQ(paper.adaptive->counts.min_spp, 0);
+  EXPECT_FALSE(make_estimator("none").adaptive);
+  const Estimator plain = make_estimator("none", {{"adaptive", ""},
+                                                  {"dependent-spp", "7"},
+                                                  {"allocation", "uniform"},
+                                                  {"relative-error", "0.25"},
+                                                  {"min-spp", "3"},
+                                                  {"max-spp", "30"},
+                                                  {"norm", "l2"}});
+  ASSERT_TRUE(plain.adaptive);
+  EXPECT_EQ(plain.adaptive->first_spp, 7);
+  const CountOptions& counts = plain.adaptive->counts;
+  EXPECT_EQ(counts.allocation, Allocation::kUniform);
+  EXPECT_EQ(counts.relative_error, 0.25f);
+  EXPECT_EQ(counts.min_spp, 3);
+  EXPECT_EQ(counts.max_spp, 30);
+  EXPECT_EQ(counts.norm, Norm::kL2);
+  EXPECT_FALSE(counts.first_pass_counts);
+  const auto message = [](const std::string& name, const OptionValues& values) {
+    return message_of([&] { make_estimator(name, values); }, ErrorCode::kUsage);
+  };
+  EXPECT_TRUE(contains(message("none", {{"max-spp", "9"}}), "need --adaptive"));
+  EXPECT_TRUE(contains(message("none", {{"adaptive", ""}, {"min-spp", "0"}}), "min-spp is 0, expected 1 or more"));
+  EXPECT_TRUE(contains(message("dependent-tests", {{"relative-error", "-1"}}), "relative error is -1"));
+  EXPECT_TRUE(contains(message("dependent-tests", {{"min-spp", "9"}, {"max-spp", "8"}}), "more than max-spp"));
+  EXPECT_TRUE(contains(message("iicv", {{"relative-error", "1"}}), "is an option of --estimator dependent-tests, none"));
+}
+
 TEST(EstimatorRegistry, SamplesOfAPixel) {
   const Estimator estimator = make_estimator("polynomials", {{"dimensions", "1"}});
   ASSERT_EQ(estimator.passes, EstimatorPasses::kSamples);
@@ -146,6 +201,10 @@ TEST(EstimatorRegistry, SamplesOfAPixel) {
   EXPECT_FALSE(estimator.check_samples(3).empty());
 }
 
+bool has(const std::vector<EstimatorOption>& options, const std::string& name) {
+  return std::any_of(options.begin(), options.end(), [&](const EstimatorOption& o) { return o.name == name; });
+}
+
 TEST(EstimatorRegistry, RangesAreThoseThatAreChecked) {
   for (const std::string& name : estimator_names())
     for (const EstimatorOption& option : options_of_estimator(name)) {
@@ -153,12 +212,14 @@ TEST(EstimatorRegistry, RangesAreThoseThatAreChecked) {
       SCOPED_TRACE(name + " " + option.name);
       const auto accepts = [&](double value) {
         OptionValues values{{option.name, fmt::format("{:g}", value)}};
-        if (option.name == "window" && name != "iduw") values["k"] = "1";  // as the smallest window has few pixels
+        const std::vector<EstimatorOption> all = options_of_estimator(name);
+        if (option.name == "window" && has(all, "k")) values["k"] = "1";  // of few pixels
+        if (has(all, "adaptive")) values["adaptive"] = "";
         return message_of([&] { make_estimator(name, values); }) == "no error";
       };
       const OptionRange& range = option.range;
       const double step = option.type == Type::kWhole ? (range.odd ? 2 : 1) : 0.25;
-      EXPECT_TRUE(range.contains(std::stod(option.default_value)));
+      if (!option.default_value.empty()) EXPECT_TRUE(range.contains(std::stod(option.default_value)));
       EXPECT_EQ(accepts(range.low), !range.above_low);
       EXPECT_TRUE(accepts(range.low + step));
       EXPECT_FALSE(accepts(range.low - step));

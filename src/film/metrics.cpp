@@ -55,6 +55,11 @@ double pixel_error(Metric metric, const Pixel& p) {
     case Metric::kMape:
       for (size_t c = 0; c < 3; ++c) sum += std::abs(p.f[c] - p.r[c]) / (std::abs(p.r[c]) + kRelativeOffset) / 3;
       return sum;
+    case Metric::kAbove5: {
+      double brightness = 0;
+      for (size_t c = 0; c < 3; ++c) sum += std::abs(p.f[c] - p.r[c]), brightness += std::abs(p.r[c]);
+      return sum > kPerceptible * brightness ? 1 : 0;
+    }
     case Metric::kFlip:
       break;
   }
@@ -90,6 +95,8 @@ const std::vector<MetricInfo>& metrics() {
        "1/(3N) sum |F - R| / (|R| + 0.01), R = (R1 + R2)/2"},
       {Metric::kFlip, "flip", "1/N sum FLIP, 67 pixels per degree",
        "1/N sum FLIP against (R1 + R2)/2, 67 pixels per degree"},
+      {Metric::kAbove5, "above5", "share of pixels with sum |F - R| > 0.05 sum |R| over RGB",
+       "share of pixels with sum |F - R| > 0.05 sum |R| over RGB, R = (R1 + R2)/2"},
   };
   return all;
 }

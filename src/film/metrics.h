@@ -16,8 +16,10 @@ namespace covary {
 
 /// Keeps relative errors finite at black pixels.
 inline constexpr double kRelativeOffset = 0.01;
+/// Relative error of a pixel that kAbove5 counts, as perceptible [Csonka2002] Sec. 6.
+inline constexpr double kPerceptible = 0.05;
 
-enum class Metric { kRelMse, kMse, kMae, kMape, kFlip };
+enum class Metric { kRelMse, kMse, kMae, kMape, kFlip, kAbove5 };
 
 struct MetricInfo {
   Metric metric;

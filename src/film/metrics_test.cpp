@@ -49,6 +49,18 @@ TEST(Metrics, WorkedOutByHand) {
   EXPECT_EQ(result.n_pixels, 2u);
 }
 
+TEST(Metrics, CountsPixelsAboveFivePercent) {
+  // Sums of differences: 0.04 of 1, 0.06 of 1, none of black, something of black, 0.25 of 5 in different channels.
+  const Image r = image_of({0.5f, 0.5f, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 2, 2, 1});
+  const Image f = image_of({0.52f, 0.48f, 0, 1, 0.06f, 0, 0, 0, 0, 0, 1e-6f, 0, 2.2f, 1.9f, 1});
+  const MetricResult result = compute_metric(Metric::kAbove5, f, std::vector{r});
+  EXPECT_EQ(result.map.data, (std::vector<float>{0, 1, 0, 1, 1}));
+  EXPECT_NEAR(result.value, 3.0 / 5, 1e-12);
+  const Image above = image_of({1.2f, 1, 1}), low = image_of({1, 1, 1}), high = image_of({1.2f, 1, 1});
+  EXPECT_EQ(value(Metric::kAbove5, above, {low}), 1);
+  EXPECT_EQ(value(Metric::kAbove5, above, {low, high}), 0) << "0.1 of 3.1";
+}
+
 TEST(Metrics, TwoReferencesWorkedOutByHand) {
   const Image f = image_of({2, 2, 2}), r1 = image_of({1, 2, 4}), r2 = image_of({1.5f, 3, 3});
   const double products = 1 * 0.5 + 0 * -1 + -2 * -1, grey = (1.25 + 2.5 + 3.5) / 3;

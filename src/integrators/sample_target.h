@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -22,6 +23,12 @@ class SampleTarget {
   uint32_t at(size_t pixel) const { return map_.empty() ? largest_ : map_[pixel]; }
   /// The largest number of any pixel.
   uint32_t largest() const { return largest_; }
+  bool is_map() const { return !map_.empty(); }
+  /// Of all pixels.
+  double mean() const {
+    return map_.empty() ? largest_
+                        : std::accumulate(map_.begin(), map_.end(), 0.0) / static_cast<double>(map_.size());
+  }
   /// Whether it is a number, or a map of the film's size.
   bool fits(const Film& film) const { return map_.empty() || map_.size() == film.counts().size(); }
 

@@ -81,6 +81,7 @@ TEST_F(Measure, ErrorsAndTimesAreThoseOfTheRuns) {
   EXPECT_NEAR(cell.split.absolute.squared_bias.value, 0.2 * 0.1, 1e-6);
   EXPECT_NEAR(cell.mae.value, 0.15, 1e-6);
   EXPECT_NEAR(cell.mae_of_mean, 0.15, 1e-6);
+  EXPECT_EQ(cell.above5.value, 1);
   EXPECT_NEAR(cell.runs[0].mean_ratio, 1.2, 1e-6);
   EXPECT_DOUBLE_EQ(cell.load_seconds.value, 100);
   EXPECT_DOUBLE_EQ(cell.method_seconds.value, 4) << "without load";

@@ -50,22 +50,39 @@ bool is_option(const std::string& word) {
   return word.size() > 1 && word[0] == '-' && !(word[1] >= '0' && word[1] <= '9') && word[1] != '.';
 }
 
-/// The method's options that change the passes: without those of estimators, and one word for all pair estimators.
-Words pass_options(const Words& options, const PlanContext& context) {
-  Words kept;
+/// One option with its values, or a value without an option.
+struct Option {
+  std::string name;
+  Words values, words;
+};
+
+std::vector<Option> parsed(const Words& words) {
+  std::vector<Option> options;
+  for (size_t i = 0; i < words.size();) {
+    const size_t first = i++, equals = words[first].find('=');
+    Option option{words[first].substr(0, equals), {}, {}};
+    if (equals != std::string::npos) option.values.push_back(words[first].substr(equals + 1));
+    while (i < words.size() && !is_option(words[i])) option.values.push_back(words[i++]);
+    option.words.assign(words.begin() + static_cast<std::ptrdiff_t>(first),
+                        words.begin() + static_cast<std::ptrdiff_t>(i));
+    options.push_back(option);
+  }
+  return options;
+}
+
+/// The method's options that change the passes: without those that only its estimator reads, and one word for all
+/// estimators of the same pair of passes.
+Words pass_options(const Words& words, const PlanContext& context) {
+  const std::vector<Option> options = parsed(words);
   std::string estimator = *context.pair_estimators.begin();
-  for (size_t i = 0; i < options.size(); ++i) {
-    const size_t equals = options[i].find('=');
-    const std::string name = options[i].substr(0, equals);
-    Words values;
-    if (equals != std::string::npos) values.push_back(options[i].substr(equals + 1));
-    const size_t first = i;
-    while (i + 1 < options.size() && !is_option(options[i + 1])) values.push_back(options[++i]);
-    if (name == "--estimator" && !values.empty())
-      estimator = values[0];
-    else if (!context.estimator_options.contains(name))
-      kept.insert(kept.end(), options.begin() + static_cast<std::ptrdiff_t>(first),
-                  options.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+  for (const Option& option : options)
+    if (option.name == "--estimator" && !option.values.empty()) estimator = option.values[0];
+  const auto own = context.estimator_options.find(estimator);
+  Words kept;
+  for (const Option& option : options) {
+    const bool is_own = own != context.estimator_options.end() && own->second.contains(option.name);
+    if (option.name == "--estimator" || is_own) continue;
+    kept.insert(kept.end(), option.words.begin(), option.words.end());
   }
   kept.push_back(context.pair_estimators.contains(estimator) ? "pair" : estimator);
   return kept;

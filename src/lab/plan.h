@@ -2,6 +2,7 @@
 // From a suite to command lines: what to run, in which order, and under which keys results are kept.
 #pragma once
 
+#include <map>
 #include <set>
 #include <string>
 #include <vector>
@@ -45,8 +46,8 @@ struct Run {
 /// What does not change from run to run.
 struct PlanContext {
   std::string program_version;  ///< part of every key
-  /// Options that only estimators read ("--k"): they leave the passes as they are.
-  std::set<std::string> estimator_options;
+  /// Options that only estimators read ("--k"), of each of them: they leave its passes as they are.
+  std::map<std::string, std::set<std::string>> estimator_options;
   /// Estimators that need the same pair of passes.
   std::set<std::string> pair_estimators;
 };

@@ -28,7 +28,8 @@ Suite two_methods() {
   return suite;
 }
 
-const PlanContext kContext{"1.0", {"--k", "--paper"}, {"iicv", "iduw"}};
+const PlanContext kContext{
+    "1.0", {{"iicv", {"--k", "--paper"}}, {"iduw", {"--k"}}, {"dependent-tests", {"--k"}}}, {"iicv", "iduw"}};
 
 SceneInstance instance(SceneEntry entry = {"room", "room.xml"}, int width = 640, int height = 480,
                        int64_t max_pixels = 0) {
@@ -109,6 +110,12 @@ TEST(Plan, EstimatorsShareThePassesTheyHaveInCommon) {
             (std::vector<int>{0, 1, 0, 0, 2}));
   // An option that is not the estimator's, between those that are.
   EXPECT_EQ(sharing({{"--k", "5", "--groups", "4", "--paper"}, {"--groups", "4"}, {"--groups", "5"}, {}}),
+            (std::vector<int>{0, 0, 1, 2}));
+  // The same option leaves the passes of one estimator as they are and changes those of another.
+  EXPECT_EQ(sharing({{"--estimator", "dependent-tests"},
+                     {"--estimator", "dependent-tests", "--k", "7"},
+                     {"--estimator", "dependent-tests", "--paper"},
+                     {}}),
             (std::vector<int>{0, 0, 1, 2}));
   // What fits into a time budget depends on the method.
   EXPECT_EQ(sharing({{}, {"--paper"}}, 10), (std::vector<int>{0, 1}));

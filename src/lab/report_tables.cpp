@@ -208,6 +208,7 @@ Json quality_table(const Results& results, size_t budget) {
                column("mean", "Image mean / reference", "number"),
                column("mae", "MAE", "number"),
                column("flip", "FLIP", "number"),
+               column("above5", "Pixels above 5 %", "percent"),
                column("predicted", "Predicted / true error", "ratio")};
   columns[6]["digits"] = 4;
   Json rows = cell_rows(results, budget, [](const Cell& cell, Json& row) {
@@ -219,6 +220,7 @@ Json quality_table(const Results& results, size_t budget) {
     row["mean"] = value_of(cell.split.mean_ratio);
     row["mae"] = value_of(cell.mae);
     row["flip"] = value_of(cell.flip);
+    row["above5"] = number(cell.above5.value);
     row["predicted"] = value_of(cell.predicted_over_true);
   });
   return table("Errors divided, " + results.suite.budgets[budget].label(), columns, rows);

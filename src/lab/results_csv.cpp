@@ -50,6 +50,7 @@ void add_cell(Table& table, const Cell& cell) {
   table.add("mae_of_mean", cell.mae_of_mean);
   table.add("flip", cell.flip);
   table.add("flip_of_mean", cell.flip_of_mean);
+  table.add("above5", cell.above5);
   table.add("mean_ratio", cell.split.mean_ratio);
   table.add("equal_sample", cell.equal_sample);
   if (cell.equal_sample_normalised) table.add("equal_sample_normalised", 1);
@@ -73,6 +74,7 @@ void add_run(Table& table, const RunResult& run) {
   table.add("mse", run.mse);
   table.add("mae", run.mae);
   table.add("flip", run.flip);
+  table.add("above5", run.above5);
   table.add("mean_ratio", run.mean_ratio);
   table.add("predicted_relmse", run.predicted_relmse);
   table.add("seconds_load", run.record.load_seconds);

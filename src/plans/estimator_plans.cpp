@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "estimators/mean.h"
 #include "integrators/primary_sample.h"
+#include "plans/adaptive_plan.h"
 #include "plans/budget.h"
 #include "plans/render.h"
 
@@ -125,6 +126,7 @@ Plan pair_plan(const PairMethod& method) {
 }
 
 Plan estimator_plan(const Estimator& estimator, const PassChoice& choice) {
+  if (estimator.adaptive) return adaptive_plan(estimator, choice.groups);
   if (estimator.passes == EstimatorPasses::kAny) return plain_plan(choice.sampling, choice.groups);
   if (estimator.passes == EstimatorPasses::kSamples) return samples_plan(estimator);
   PairMethod method;

@@ -19,7 +19,8 @@ constexpr int kAuxiliaryImages = 3;
 RenderMemory render_memory(const Plan& plan, std::span<const PassPlan> passes, int width, int height, bool aovs) {
   const double n_pixels = static_cast<double>(width) * height;
   RenderMemory memory;
-  for (const PassPlan& pass : passes) memory.films += n_pixels * (pass.groups * kImageBytes + sizeof(uint32_t));
+  for (const PassPlan& pass : passes)
+    memory.films += n_pixels * ((pass.groups + (pass.sample_variance ? 1 : 0)) * kImageBytes + sizeof(uint32_t));
   if (aovs) memory.films += n_pixels * kAuxiliaryImages * kImageBytes;
   // A picture for a viewer or the preview.
   memory.estimate = n_pixels * (plan.estimate_bytes_per_pixel + kImageBytes);
@@ -30,7 +31,10 @@ RenderMemory render_memory(const LoadedScene& scene, const Plan& plan, const Ren
   PlanState state{scene, request, nullptr, nullptr, 0, 0, {}};
   state.budget = state.group_budget = first_budget(scene, request);
   const CropWindow window = window_of(scene, request);
-  return render_memory(plan, plan.phases.at(0).passes(state), window.width, window.height, request.aovs);
+  std::vector<PassPlan> passes;
+  for (const Phase& phase : plan.phases)
+    for (const PassPlan& pass : phase.passes(state)) passes.push_back(pass);
+  return render_memory(plan, passes, window.width, window.height, request.aovs);
 }
 
 double physical_memory() {

@@ -65,6 +65,8 @@ void resume(const RenderRequest& request, Pass& pass) {
   if (frame_text(film) != frame) differs("frame", frame_text(film), frame);
   const bool any_groups = fewest > 0 && film.groups() >= fewest;
   if (film.groups() != groups && !any_groups) differs("groups", std::to_string(film.groups()), std::to_string(groups));
+  if (pass.plan.sample_variance && !film.keeps_sample_variance())
+    differs("variances of samples", "not kept", "kept ones");
   for (const char* key : {film_key::kSceneHash, film_key::kSampling, film_key::kSeed, film_key::kSettings})
     if (film.attributes[key] != attributes.at(key)) differs(key, film.attributes[key], attributes.at(key));
   film.attributes = attributes;

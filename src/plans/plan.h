@@ -33,7 +33,8 @@ struct PassPlan {
   /// The number of groups follows from the samples, or from the speed; a film that is continued may have any number
   /// from this on. 0: exactly `groups`.
   int fewest_groups = 0;
-  PixelEstimate estimate;  ///< PassSettings::estimate
+  bool sample_variance = false;  ///< the film keeps the variance of samples
+  PixelEstimate estimate;        ///< PassSettings::estimate
   std::string
       settings;  ///< of the pass, added to the integrator's in the film's attribute: all that changes its samples
   std::string estimator;  ///< attribute of the film where the pass itself makes the image; may be empty
@@ -63,6 +64,8 @@ struct PlanState {
   std::shared_ptr<const Integrator> integrator;
   uint32_t budget = 0;  ///< samples per pixel of all passes together that are wanted now; grows towards a wanted error
   uint32_t group_budget = 0;  ///< the budget that decides how many groups there are; stays
+  /// With a limit of time, what is left of it when a phase's targets are set, for all that follows.
+  std::optional<double> seconds_left;
   std::vector<Pass> passes;   ///< of this phase and all before it, in the order of the plan
 
   /// The pass of this name and number. Throws Error(kInternal) where none has begun.
@@ -89,6 +92,7 @@ struct Plan {
   /// counts.
   std::function<EstimatorResult(std::span<const Pass>, int first_row, int n_rows)> estimate;
   double estimate_bytes_per_pixel = 0;  ///< memory that estimate() takes beside the films, about
+  bool takes_unfinished = false;        ///< estimate() works where pixels of a film still have no samples
   bool film_is_image = false;           ///< the film of the one pass is the result; estimate() only serves its error
   bool predicts_error = false;          ///< estimate() gives a standard error
   bool fixed_samples = false;           ///< the number of samples must be known before: no limits of time or error

@@ -109,8 +109,9 @@ class PlanRun {
   }
   /// Every group of every pixel has samples, so that an estimator can work.
   bool can_estimate() const {
-    return all_begun() && std::all_of(state_.passes.begin(), state_.passes.end(), [](const Pass& p) {
-             return std::all_of(p.film.counts().begin(), p.film.counts().end(),
+    return all_begun() && std::all_of(state_.passes.begin(), state_.passes.end(), [this](const Pass& p) {
+             return plan_.takes_unfinished ||
+                    std::all_of(p.film.counts().begin(), p.film.counts().end(),
                                 [T = static_cast<uint32_t>(p.film.groups())](uint32_t n) { return n >= T; });
            });
   }
@@ -198,6 +199,7 @@ bool PlanRun::render_phase(size_t index, double share) {
   const std::span<Pass> passes = passes_of(index);
   if (passes.empty()) return false;  // interrupted before its films were made
   if (index + 1 == plan_.phases.size() && request_.aovs && result_.aovs.empty()) render_auxiliary_images();
+  if (timed()) state_.seconds_left = request_.seconds - watch_.seconds();
   phase.set_targets(state_, passes);
   for (Pass& pass : passes) pass.count = pass.settings.spp.reached(pass.film);
   if (index + 1 == plan_.phases.size() && !timed() && request_.until == 0) warn_of_other_samples(state_.budget);
@@ -240,6 +242,7 @@ Pass PlanRun::begin_pass(const PassPlan& plan) const {
   pass.settings.estimate = plan.estimate;
   pass.path = pass_path(plan_, request_, plan);
   pass.film = Film(scene_.width, scene_.height, window_, plan.groups);
+  if (plan.sample_variance) pass.film.keep_sample_variance();
   const std::string number = plan.number ? fmt::format("; pass {}", plan.number) : "";
   pass.film.attributes = request_.attributes;
   pass.film.attributes.insert_or_assign(film_key::kSeed, std::to_string(request_.seed));
@@ -264,7 +267,10 @@ void PlanRun::between_waves() {
 
 void PlanRun::warn_of_other_samples(uint32_t asked) const {
   double planned = 0;
-  for (const Pass& pass : state_.passes) planned += pass.settings.spp.largest();
+  for (const Pass& pass : state_.passes) {
+    if (pass.settings.spp.is_map()) return;  // its numbers are about what was asked for, or limited by other options
+    planned += pass.settings.spp.largest();
+  }
   if (planned != asked && callbacks_.warning)
     callbacks_.warning(fmt::format("{:g} samples per pixel instead of {}: each of {} groups needs one in every pass",
                                    planned, asked, state_.passes[0].film.groups()));
@@ -309,7 +315,10 @@ GroupedImage rows_of(const Film& film, int first_row, int n_rows) {
           film.groups(),
           film.groups_of(0, first_row),
           film.counts().data() + static_cast<size_t>(first_row) * film.width(),
-          film.mean_count()};
+          film.mean_count(),
+          film.keeps_sample_variance()
+              ? film.variance_in_groups().data() + static_cast<size_t>(first_row) * film.width() * 3
+              : nullptr};
 }
 
 const Pass& PlanState::pass(const std::string& name, uint32_t number) const {

@@ -132,8 +132,8 @@ class Plans(RenderTest):
         self.bad(2, "expected relmse=X", *render, "--until", "0.01")
         self.bad(2, "expected relmse=X", *render, "--until", "relmse=0.01x")
         self.bad(2, "iduw does not estimate its error", *render, "--until", "relmse=0.01", "--estimator", "iduw")
-        self.bad(2, "--paper is an option of --estimator iicv, not of cv-baseline", *render, "--estimator",
-                 "cv-baseline", "--paper")
+        self.bad(2, "--paper is an option of --estimator iicv, dependent-tests, not of cv-baseline", *render,
+                 "--estimator", "cv-baseline", "--paper")
         self.bad(2, "--k is an option of", *render, "--estimator", "none", "--k", "3")
         self.bad(2, "at least 3 groups", *render, "--groups", "2")
         self.bad(2, "at least 4 groups", *render, "--groups", "3", "--estimator", "iduw")

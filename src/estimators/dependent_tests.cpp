@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "estimators/dependent_tests.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "estimators/common_options.h"
+#include "estimators/registry.h"
+
+namespace covary {
+namespace {
+
+/// Factors for the differences of the CRN image: where few of its samples found the light, all of it is too dark, and
+/// so are its differences. Brightness over brightness of the windows' means, at least 1; kFar where only the
+/// independent image has light.
+Planes difference_scale(const FilterInput& input, const std::vector<unsigned char>& valid, int window) {
+  const auto brightness = [&](const Planes& colours) {
+    Planes planes(input.width(), input.height(), 1, 0, 0);
+    parallel_for(input.height(), 8, [&](int y) {
+      for (int x = 0; x < input.width(); ++x)
+        planes.row(0, y)[x] = length(input.norm, {colours.row(0, y)[x], colours.row(1, y)[x], colours.row(2, y)[x]});
+    });
+    return planes;
+  };
+  // Pixels without independent samples have no brightness to compare.
+  std::vector<unsigned char> both = valid;
+  for (int y = 0; y < input.height(); ++y)
+    for (int x = 0; x < input.width(); ++x)
+      if (input.count.row(0, y)[x] <= 0) both[static_cast<size_t>(y) * input.width() + x] = 0;
+  Planes scale = box_mean(brightness(input.independent), both, window, 0, 1);
+  const Planes dependent = box_mean(brightness(input.dependent), both, window, 0, 1);
+  parallel_for(input.height(), 8, [&](int y) {
+    for (int x = 0; x < input.width(); ++x) {
+      const float independent = scale.row(0, y)[x];
+      scale.row(0, y)[x] =
+          independent <= dependent.row(0, y)[x] ? 1.0f : std::min(kFar, independent / dependent.row(0, y)[x]);
+    }
+  });
+  return scale;
+}
+
+/// The mean of both images, weighted by samples, [Csonka2002] Sec. 5: C = (n C_d + N C_i') / (n + N).
+Image combine(const GroupedImage& crn, const FilterInput& input, const FilteredImage& filtered,
+              CombinationWeights weights) {
+  Image result(crn.width, crn.height, 3);
+  parallel_for(crn.height, 8, [&](int y) {
+    for (int x = 0; x < crn.width; ++x) {
+      const auto n = static_cast<double>(crn.count(x, y));
+      const double N = weights == CombinationWeights::kCounts ? input.count.row(0, y)[x]
+                                                              : filtered.effective_samples.pixel(x, y)[0];
+      const double part = n + N > 0 ? N / (n + N) : 0;
+      for (int c = 0; c < 3; ++c)
+        result.pixel(x, y)[c] = static_cast<float>((1 - part) * input.dependent.row(c, y)[x] +
+                                                   part * filtered.colour.pixel(x, y)[c]);
+    }
+  });
+  return result;
+}
+
+Image image_of(const Planes& planes) {
+  Image image(planes.width(), planes.height(), planes.count());
+  for (int y = 0; y < planes.height(); ++y)
+    for (int x = 0; x < planes.width(); ++x)
+      for (int c = 0; c < planes.count(); ++c) image.pixel(x, y)[c] = planes.row(c, y)[x];
+  return image;
+}
+
+void check(const GroupedImage& crn, const GroupedImage& independent, std::vector<std::string>& problems) {
+  // Pixels may lack samples, which check_inputs() looks for where counts are given.
+  GroupedImage without_counts[2] = {crn, independent};
+  for (GroupedImage& image : without_counts) image.counts = nullptr;
+  check_inputs(without_counts[0], without_counts[1], 1, 1, problems);
+  if (problems.empty() && crn.groups < 2 && !crn.variance_in_groups)
+    problems.push_back("the CRN image has 1 group, at least 2 are needed where films do not keep sample variances");
+}
+
+}  // namespace
+
+DependentTestsOptions DependentTestsOptions::paper() {
+  DependentTestsOptions options;
+  options.filter = DependentFilter::kPaper;
+  options.weights = CombinationWeights::kCounts;
+  options.variance = VarianceSource::kDependent;
+  options.smoothing = 1;
+  options.guard = 0;
+  return options;
+}
+
+std::vector<std::string> DependentTestsOptions::validate() const {
+  std::vector<std::string> problems;
+  const auto check_window = [&](const char* name, int value) {
+    if (value < 1 || value > 63 || value % 2 == 0)
+      problems.push_back(fmt::format("{} is {}, expected an odd number from 1 to 63", name, value));
+  };
+  if (regions.max_region < 1 || regions.max_region > 63)
+    problems.push_back(fmt::format("max-region is {}, expected 1 to 63", regions.max_region));
+  if (!(regions.min_centre_drop >= 0))
+    problems.push_back(
+        fmt::format("min-centre-drop is {}, expected zero or a positive number", regions.min_centre_drop));
+  check_window("window", bound.window);
+  check_window("sigma-window", smoothing);
+  if (guard != 0) check_window("guard-window", guard);
+  return problems;
+}
+
+EstimatorResult dependent_tests(const GroupedImage& crn, const GroupedImage& independent,
+                                const DependentTestsOptions& options, DependentTestsStages* stages) {
+  std::vector<std::string> problems = options.validate();
+  check(crn, independent, problems);
+  throw_if_any("dependent-tests", problems);
+
+  EstimatorResult result;
+  const std::vector<unsigned char> valid = finite_pixels(crn, independent, result.nonfinite_pixels);
+  const bool exact = options.filter == DependentFilter::kExact;
+  const int border = exact ? options.bound.window / 2 : options.regions.max_region;
+  const FilterInput input =
+      filter_input(crn, independent, valid, options.norm, options.variance, options.smoothing, border);
+  std::optional<Planes> scale;
+  if (exact && options.guard > 0) scale = difference_scale(input, valid, options.guard);
+  FilteredImage filtered = exact ? bound_filter(input, options.bound, scale ? &*scale : nullptr)
+                                 : region_filter(input, options.regions);
+  result.estimate = combine(crn, input, filtered, options.weights);
+  fill_invalid(crn, independent, valid, result.estimate);
+  if (!stages) return result;
+  *stages = {{"dependent", image_of(input.dependent)}, {"independent", image_of(input.independent)},
+             {"combined", result.estimate},            {"samples", image_of(input.count)},
+             {"filtered", std::move(filtered.colour)}, {"region", std::move(filtered.region)},
+             {"bound", std::move(filtered.bound)},     {"centre_weight", std::move(filtered.centre_weight)}};
+  return result;
+}
+
+int dependent_tests_reach(const DependentTestsOptions& options) {
+  const int smoothing = options.smoothing / 2;
+  if (options.filter == DependentFilter::kPaper) return options.regions.max_region / 2 + smoothing;
+  return std::max(options.bound.window / 2 + smoothing, options.guard / 2);
+}
+
+Estimator make_dependent_tests(EstimatorParameters& parameters) {
+  static constexpr std::pair<const char*, DependentFilter> kFilters[] = {{"exact", DependentFilter::kExact},
+                                                                         {"paper", DependentFilter::kPaper}};
+  static constexpr std::pair<const char*, Pyramid> kPyramids[] = {{"side", Pyramid::kSide}, {"count", Pyramid::kCount}};
+  static constexpr std::pair<const char*, CombinationWeights> kWeights[] = {
+      {"effective", CombinationWeights::kEffective}, {"counts", CombinationWeights::kCounts}};
+  static constexpr std::pair<const char*, VarianceSource> kSources[] = {{"both", VarianceSource::kBoth},
+                                                                        {"dependent", VarianceSource::kDependent}};
+  static constexpr std::pair<const char*, int> kGuards[] = {{"on", DependentTestsOptions().guard}, {"off", 0}};
+  EstimatorParameters& p = parameters;
+  const bool paper = p.flag("paper", "dependent-tests as published: its filter, weights and allocation");
+  DependentTestsOptions o = paper ? DependentTestsOptions::paper() : DependentTestsOptions();
+  AdaptiveSampling adaptive;
+  if (paper) adaptive.counts.allocation = Allocation::kEqualError, adaptive.counts.min_spp = 0;
+  if (paper) adaptive.counts.smoothing = 1;
+  ask_for(p, adaptive);
+  p.choice<DependentFilter>("filter", o.filter, kFilters, "Weights that minimise the error bound, or the published ones");
+  p.choice<Norm>("norm", o.norm, kNorms, kNormHelp);
+  p.whole("window", o.bound.window, kWindowRange, kWindowHelp);
+  p.choice<VarianceSource>("sigma", o.variance, kSources, "Passes that tell the noise of a sample");
+  p.whole("sigma-window", o.smoothing, {.low = 1, .high = 63, .odd = true}, "Side of the window that averages the noise");
+  p.choice<int>("guard", o.guard, kGuards, "Trust the CRN image less where it is too dark");
+  p.whole("max-region", o.regions.max_region, {.low = 1, .high = 63}, "Largest side of a region of --filter paper");
+  p.real("min-centre-drop", o.regions.min_centre_drop, {.low = 0},
+         "Regions grow while the weight of their centre falls by so much");
+  p.choice<Pyramid>("pyramid", o.regions.pyramid, kPyramids, "Height of the pyramid: side of the region, or its pixels");
+  p.choice<CombinationWeights>("weights", o.weights, kWeights,
+                               "Weight of the filtered image: samples it is worth, or has");
+  adaptive.counts.norm = o.norm;
+  adaptive.counts.classes = o.filter == DependentFilter::kPaper;
+  std::vector<std::string> problems = o.validate();
+  const std::vector<std::string> of_counts = adaptive.validate();
+  problems.insert(problems.end(), of_counts.begin(), of_counts.end());
+  throw_if_any("dependent-tests", problems);
+
+  Estimator estimator;
+  estimator.summary = "dependent tests driven filtering";
+  estimator.fewest_groups = 2;
+  estimator.adaptive = adaptive;
+  estimator.pass_options = {"paper",   "dependent-spp", "pilot-spp", "allocation", "relative-error",
+                            "min-spp", "max-spp",       "filter",    "norm"};
+  estimator.reach = dependent_tests_reach(o);
+  estimator.bytes_per_pixel = kDependentTestsBytesPerPixel;
+  estimator.apply = [o](const GroupedImage& crn, const GroupedImage& independent, const PairSettings&) {
+    return dependent_tests(crn, independent, o);
+  };
+  estimator.stages = [o](const GroupedImage& crn, const GroupedImage& independent) {
+    DependentTestsStages stages;
+    dependent_tests(crn, independent, o, &stages);
+    return stages;
+  };
+  return estimator;
+}
+
+}  // namespace covary

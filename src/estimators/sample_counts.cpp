@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "estimators/sample_counts.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "core/error.h"
+
+namespace covary {
+namespace {
+
+constexpr uint32_t kMost = 1u << 30;  // samples of any pixel
+constexpr double kOffset = 0.01;      // of squared brightness
+constexpr double kLeastShare = 0.5, kLargestShare = 4;
+constexpr int kBisections = 60;
+
+/// Rounding up must not follow from the last bits of a power or a logarithm.
+double rounded_up(double samples) { return std::ceil(samples - 1e-6); }
+
+/// What pixels want for a factor s: demand s - already, before limits and rounding.
+struct Demand {
+  std::vector<double> of_pixel;
+  double already = 0;  ///< samples that count, too
+  double for_error = 0;  ///< factor that leads to the relative error, where one is given
+};
+
+/// (3 sigma)^2 / |C|^2 of each pixel, with `offset` added to |C|^2.
+std::vector<double> squared_errors(const GroupedImage& image, const CountOptions& options, double offset) {
+  long n_nonfinite = 0;
+  const std::vector<unsigned char> valid = finite_pixels(image, image, n_nonfinite);
+  const FilterInput input =
+      filter_input(image, image, valid, options.norm, VarianceSource::kDependent, options.smoothing, 0);
+  std::vector<double> errors(valid.size());
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x) {
+      const size_t pixel = static_cast<size_t>(y) * image.width + x;
+      const double variance = 9.0 * input.variance.row(0, y)[x];
+      if (!valid[pixel] || variance <= 0) continue;
+      const Spectrum mean(input.dependent.row(0, y)[x], input.dependent.row(1, y)[x], input.dependent.row(2, y)[x]);
+      errors[pixel] = variance / std::max(std::pow(static_cast<double>(length(options.norm, mean)), 2) + offset, 1e-30);
+    }
+  return errors;
+}
+
+double mean_of(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
+double mean_count(const GroupedImage& image) {
+  if (!image.counts) return image.groups;
+  const size_t n_pixels = static_cast<size_t>(image.width) * image.height;
+  return std::accumulate(image.counts, image.counts + n_pixels, 0.0) / static_cast<double>(n_pixels);
+}
+
+Demand demand_of(const GroupedImage& image, const CountOptions& options) {
+  const double error = options.relative_error.value_or(1), per_error = 1 / (error * error);
+  Demand demand;
+  if (options.allocation == Allocation::kEqualError) {
+    demand.of_pixel = squared_errors(image, options, 0);
+    if (options.first_pass_counts) demand.already = mean_count(image);
+    demand.for_error = per_error;
+    return demand;
+  }
+  std::vector<double> errors = squared_errors(image, options, kOffset);
+  const double mean_square = mean_of(errors);
+  for (double& e : errors) e = options.allocation == Allocation::kUniform ? 1 : std::sqrt(e);
+  if (const double mean = mean_of(errors); mean > 0)
+    for (double& e : errors) e = std::clamp(e / mean, kLeastShare, kLargestShare);
+  else
+    std::fill(errors.begin(), errors.end(), 1.0);
+  demand.of_pixel = std::move(errors);
+  // Mean of squared error / (s share), the share being one on average; exact for uniform counts.
+  demand.for_error = mean_square * per_error;
+  return demand;
+}
+
+/// Turns demands into numbers.
+class Rounding {
+ public:
+  Rounding(const CountOptions& options, uint32_t multiple) : options_(options), multiple_(multiple) {}
+
+  uint32_t operator()(double samples) const {
+    const double most = options_.max_spp ? std::min<double>(*options_.max_spp, kMost) : kMost;
+    const double wanted = std::clamp(samples, 0.0, most);
+    const auto whole = options_.classes ? class_of(wanted) : static_cast<uint32_t>(rounded_up(wanted));
+    const auto limited = std::clamp(whole, static_cast<uint32_t>(options_.min_spp), static_cast<uint32_t>(most));
+    return static_cast<uint32_t>((uint64_t{limited} + multiple_ - 1) / multiple_ * multiple_);
+  }
+
+ private:
+  const CountOptions& options_;
+  uint32_t multiple_;
+};
+
+std::vector<uint32_t> counts_for(const Demand& demand, double factor, const Rounding& rounding) {
+  std::vector<uint32_t> counts(demand.of_pixel.size());
+  for (size_t i = 0; i < counts.size(); ++i) counts[i] = rounding(factor * demand.of_pixel[i] - demand.already);
+  return counts;
+}
+
+double sum_of(const std::vector<uint32_t>& counts) {
+  return static_cast<double>(std::accumulate(counts.begin(), counts.end(), uint64_t{0}));
+}
+
+/// Numbers that add up to `total`, or come as near as limits allow.
+std::vector<uint32_t> counts_within(const Demand& demand, double total, const Rounding& rounding) {
+  double low = -30 * std::log(10.0), high = 40 * std::log(10.0);
+  std::vector<uint32_t> fewer = counts_for(demand, std::exp(low), rounding), more;
+  if (sum_of(fewer) >= total) return fewer;
+  more = counts_for(demand, std::exp(high), rounding);
+  if (sum_of(more) <= total) return more;
+  for (int i = 0; i < kBisections; ++i) {
+    const double middle = 0.5 * (low + high);
+    std::vector<uint32_t> counts = counts_for(demand, std::exp(middle), rounding);
+    const bool too_many = sum_of(counts) > total;
+    (too_many ? high : low) = middle;
+    (too_many ? more : fewer) = std::move(counts);
+  }
+  // Pixels of equal demand step together. As many of them as the total allows take the step, spread evenly.
+  const double part = (total - sum_of(fewer)) / (sum_of(more) - sum_of(fewer));
+  double due = 0;
+  for (size_t i = 0; i < fewer.size(); ++i) {
+    if (more[i] == fewer[i]) continue;
+    due += part;
+    if (due < 0.5) continue;
+    fewer[i] = more[i];
+    due -= 1;
+  }
+  return fewer;
+}
+
+}  // namespace
+
+uint32_t class_of(double samples) {
+  if (samples <= 1) return samples > 1e-6 ? 1 : 0;
+  for (uint64_t decade = 10; decade < kMost; decade *= 10)
+    for (const uint64_t step : {1, 2, 5})
+      if (samples <= static_cast<double>(decade * step)) return static_cast<uint32_t>(decade * step);
+  return kMost;
+}
+
+std::vector<std::string> CountOptions::validate() const {
+  std::vector<std::string> problems;
+  if (relative_error && !(*relative_error > 0))
+    problems.push_back(fmt::format("relative error is {}, expected a number above 0", *relative_error));
+  if (min_spp < 0) problems.push_back(fmt::format("min-spp is {}, expected 0 or more", min_spp));
+  if (max_spp && *max_spp < 1) problems.push_back(fmt::format("max-spp is {}, expected 1 or more", *max_spp));
+  if (max_spp && *max_spp >= 1 && *max_spp < min_spp)
+    problems.push_back(fmt::format("min-spp is {}, more than max-spp, which is {}", min_spp, *max_spp));
+  if (smoothing < 1 || smoothing > 63 || smoothing % 2 == 0)
+    problems.push_back(fmt::format("the window that smooths variances is {}, expected an odd number from 1 to 63",
+                                   smoothing));
+  return problems;
+}
+
+std::vector<uint32_t> sample_counts(const GroupedImage& first_pass, double budget, const CountOptions& options,
+                                    uint32_t multiple) {
+  throw_if_any("numbers of samples", options.validate());
+  COVARY_CHECK(multiple >= 1 && budget >= 0 && (std::isfinite(budget) || options.relative_error),
+               "counts follow from a budget or a relative error");
+  const Demand demand = demand_of(first_pass, options);
+  const Rounding rounding(options, multiple);
+  const double total = budget * static_cast<double>(demand.of_pixel.size());
+  if (options.relative_error) {
+    std::vector<uint32_t> counts = counts_for(demand, demand.for_error, rounding);
+    if (sum_of(counts) <= total) return counts;
+  }
+  return counts_within(demand, total, rounding);
+}
+
+std::vector<std::string> AdaptiveSampling::validate() const {
+  std::vector<std::string> problems = counts.validate();
+  if (counts.min_spp < least_min_spp && counts.min_spp >= 0)
+    problems.push_back(fmt::format("min-spp is {}, expected {} or more", counts.min_spp, least_min_spp));
+  if (first_spp && *first_spp < 1)
+    problems.push_back(fmt::format("dependent-spp is {}, expected 1 or more", *first_spp));
+  return problems;
+}
+
+void ask_for(EstimatorParameters& parameters, AdaptiveSampling& sampling) {
+  static constexpr std::pair<const char*, Allocation> kAllocations[] = {{"equal-error", Allocation::kEqualError},
+                                                                        {"least-error", Allocation::kLeastError},
+                                                                        {"uniform", Allocation::kUniform}};
+  EstimatorParameters& p = parameters;
+  CountOptions& o = sampling.counts;
+  p.whole("dependent-spp", sampling.first_spp, {.low = 1},
+          "Samples of the first pass; else half of --spp, up to 50", {"pilot-spp"});
+  p.choice<Allocation>("allocation", o.allocation, kAllocations, "How pixels share the samples of the last pass");
+  p.real("relative-error", o.relative_error, {.low = 0, .above_low = true},
+         "Error that pixels shall have, as three standard deviations; --spp then is a limit");
+  p.whole("min-spp", o.min_spp, {.low = static_cast<double>(sampling.least_min_spp)},
+          "Samples that each pixel of the last pass has at least");
+  p.whole("max-spp", o.max_spp, {.low = 1}, "Samples that each pixel of the last pass has at most");
+}
+
+}  // namespace covary

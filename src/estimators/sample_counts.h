@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+// How many samples each pixel of an image gets, from the means C and variances sigma^2 of a first pass over it.
+//
+//   equal-error   all pixels the same relative error eps, [Csonka2002] Sec. 5: N = (3 sigma / (eps |C|))^2 - n, n being
+//                 the samples of the first pass. Dark and noisy pixels take nearly everything.
+//   least-error   the least sum of squared relative errors for a number of samples: N in proportion to
+//                 sigma / sqrt(|C|^2 + 0.01), at least half and at most 4 times its mean.
+//   uniform       all pixels the same.
+//
+// With a relative error, `equal-error` has it in every pixel, and the others on average: the root of the mean of
+// (3 sigma)^2 / (N (|C|^2 + 0.01)) is eps. Without, or where that needs more than the budget, the one free factor is
+// found such that the numbers add up to the budget. Numbers are rounded up before: to whole ones, or to classes 0, 1,
+// 10, 20, 50, 100, 200, 500, … (the paper has "a few categories, e.g. 1, 10, 20, 50, 100, etc.").
+//
+// Pixels that are not finite are treated as having no noise.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "estimators/estimator_parameters.h"
+#include "estimators/filter_input.h"
+#include "estimators/grouped_image.h"
+
+namespace covary {
+
+enum class Allocation { kEqualError, kLeastError, kUniform };
+
+struct CountOptions {
+  Allocation allocation = Allocation::kLeastError;
+  Norm norm = Norm::kL1;
+  std::optional<float> relative_error;  ///< eps > 0
+  int min_spp = 1;                      ///< samples that each pixel gets at least, >= 0
+  std::optional<int> max_spp;           ///< and at most, >= min_spp and 1; default: no limit
+  bool classes = false;                 ///< round up to classes
+  bool first_pass_counts = true;        ///< its samples are part of the image
+  int smoothing = 7;                    ///< side of the window over which sigma^2 is averaged, odd, 1 … 63
+
+  /// Everything that is wrong with the options; empty if nothing is.
+  std::vector<std::string> validate() const;
+};
+
+/// The number for each pixel, row by row. `budget`: of samples per pixel on average, >= 0; infinite for no limit, which
+/// needs a relative error. Numbers are multiples of `multiple` >= 1. They add up to the budget to 1 %, unless min_spp,
+/// max_spp or `multiple` do not allow it, or where no pixel has noise: `least-error` then gives all the same, and
+/// `equal-error` min_spp. Throws Error(kUsage) for options that are wrong.
+std::vector<uint32_t> sample_counts(const GroupedImage& first_pass, double budget, const CountOptions& options,
+                                    uint32_t multiple = 1);
+
+/// The smallest class that is at least `samples`.
+uint32_t class_of(double samples);
+
+/// Of estimators whose last pass has as many samples in each pixel as an earlier one says. A pair's CRN pass tells;
+/// otherwise a pilot, an independent pass that is not part of the image, so that the mean stays unbiased.
+struct AdaptiveSampling {
+  CountOptions counts;
+  std::optional<int> first_spp;  ///< of the first pass, >= 1; default: half of the budget, at most 50
+  int least_min_spp = 0;         ///< smallest value of counts.min_spp that the estimator takes
+
+  std::vector<std::string> validate() const;
+};
+
+/// Options that only say how passes are rendered.
+inline constexpr const char* kAdaptiveOptions[] = {"dependent-spp", "allocation", "relative-error", "min-spp",
+                                                   "max-spp"};
+/// Asks for these.
+void ask_for(EstimatorParameters& parameters, AdaptiveSampling& sampling);
+
+}  // namespace covary

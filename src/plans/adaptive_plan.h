@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// Plans of two phases, where the first pass says how many samples each pixel of the last one gets
+// (estimators/sample_counts.h).
+#pragma once
+
+#include <optional>
+
+#include "estimators/estimator.h"
+#include "plans/plan.h"
+
+namespace covary {
+
+/// For an estimator with `adaptive`. Of a pair, the first pass is the CRN pass, "crn"; otherwise a pilot, "pilot-1", of
+/// random numbers of its own that is not part of the image, so that numbers of samples do not depend on their values.
+/// The last pass is "independent". Films keep the variance of samples.
+///
+/// The budget is that of both passes; a relative error takes its place where the request names no number of samples,
+/// and is otherwise limited by it. With a limit of time, the first pass gets at most half of it, and the last as many
+/// samples as a trial of its speed promises for what is left, and a tenth more, so that none is left over; pixels
+/// advance together, so that those with most samples lack some where the promise was not kept.
+///
+/// `groups`: of both films; default: 1, or as many as the estimator needs. Numbers of the last pass are multiples of it.
+/// Rendering throws Error(kUsage) where the budget leaves less than one sample, or options.min_spp, for the last pass.
+Plan adaptive_plan(const Estimator& estimator, std::optional<int> groups = {});
+
+}  // namespace covary

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: Apache-2.0
+"""covary render --estimator dependent-tests and --estimator none --adaptive, as a user runs them."""
+import json
+import signal
+import subprocess
+import unittest
+
+from cli_test import COVARY
+from exr_reader import read_exr
+from render_test import ROOM, SMALL, RenderTest
+
+METHOD = ("--estimator", "dependent-tests")
+STAGES = ("dependent", "independent", "filtered", "combined", "samples", "region", "centre_weight", "bound")
+
+
+class DependentTests(RenderTest):
+    def test_passes_and_statistics(self):
+        facts = self.statistics("-o", "a.exr", *METHOD, "--spp", "48")
+        self.assertEqual(facts["estimator"], "dependent-tests")
+        self.assertEqual([p["sampling"] for p in facts["passes"]], ["crn", "independent"])
+        self.assertEqual(facts["passes"][0]["samples_per_pixel"], 24)
+        self.assertAlmostEqual(facts["samples_per_pixel"], 48, delta=0.5)
+        info = json.loads(self.good("info", "a.exr", "--json").stdout)
+        self.assertEqual(info["attributes"]["covary:estimator"], "dependent-tests")
+        self.assertFalse(list(self.path.glob("*.passes")), "passes are not left behind")
+
+    def test_less_error_than_plain_and_than_published(self):
+        self.good("render", ROOM, *SMALL, "-o", "r.exr", "--estimator", "none", "--spp", "768", "--seed", "9")
+        errors = {}
+        for name, options in (("plain", ("--estimator", "none")), ("paper", (*METHOD, "--paper")), ("exact", METHOD)):
+            self.good("render", ROOM, *SMALL, "-o", f"{name}.exr", *options, "--spp", "48", "--seed", "3")
+            errors[name] = self.relmse(f"{name}.exr", "r.exr")
+        self.assertLess(errors["exact"], 0.7 * errors["plain"])
+        self.assertLess(errors["exact"], errors["paper"])
+
+    def test_combine_of_kept_films_gives_the_same_bits(self):
+        for options in ((), ("--filter", "paper", "--pyramid", "count")):
+            self.good("render", ROOM, *SMALL, "-o", "a.exr", *METHOD, *options, "--spp", "32", "--passes", "films",
+                      "--overwrite")
+            self.good("combine", "--crn", "films/crn.exr", "--independent", "films/independent.exr", "-o", "b.exr",
+                      *METHOD, *options, "--quiet")
+            self.same("a.exr", "b.exr")
+            self.good("combine", "--crn", "films/crn.exr", "--independent", "films/independent.exr", "-o", "c.exr",
+                      *METHOD, *options, "--quiet", "--memory", "0.2")
+            self.same("a.exr", "c.exr")
+
+    def test_stages(self):
+        self.good("render", ROOM, *SMALL, "-o", "a.exr", *METHOD, "--spp", "24", "--save-stages", "steps", "--passes",
+                  "films")
+        self.assertEqual(sorted(p.name for p in (self.path / "steps").iterdir()),
+                         sorted(f"{name}.{end}" for name in STAGES for end in ("exr", "png")))
+        self.same("steps/combined.exr", "a.exr")
+        samples = read_exr((self.path / "steps/samples.exr").read_bytes())["Y"]
+        self.assertAlmostEqual(sum(samples) / len(samples), 12, delta=0.12)
+        self.good("combine", "--crn", "films/crn.exr", "--independent", "films/independent.exr", "-o", "b.exr",
+                  *METHOD, "--quiet", "--save-stages", "again")
+        self.same("again/filtered.exr", "steps/filtered.exr")
+
+    def test_interrupted_and_resumed(self):
+        arguments = ("render", ROOM, "--resolution", "160x120", "--quiet", "--no-preview", *METHOD, "--spp", "64",
+                     "--seed", "4")
+        self.good(*arguments, "-o", "whole.exr")
+        process = subprocess.Popen([COVARY, *arguments, "-o", "a.exr", "--checkpoint", "0.05"], cwd=self.path,
+                                   stderr=subprocess.DEVNULL)
+        try:
+            process.wait(timeout=0.7)
+        except subprocess.TimeoutExpired:
+            process.send_signal(signal.SIGINT)
+        process.wait()
+        self.good(*arguments, "-o", "a.exr", "--resume")
+        self.same("a.exr", "whole.exr")
+
+    def test_relative_error_and_time(self):
+        coarse = self.statistics("-o", "a.exr", *METHOD, "--relative-error", "1")
+        fine = self.statistics("-o", "a.exr", *METHOD, "--relative-error", "0.5", "--max-spp", "300")
+        self.assertGreater(fine["samples_per_pixel"], coarse["samples_per_pixel"])
+        timed = self.statistics("-o", "a.exr", *METHOD, "--time", "0.3")
+        self.assertTrue(timed["complete"] or timed["samples_per_pixel"] > 1)
+
+    def test_wrong_options(self):
+        render = ("render", ROOM, *SMALL, "-o", "a.exr", *METHOD)
+        self.bad(2, "--split: the first pass of dependent-tests has its own number", *render, "--split", "1:2")
+        self.bad(2, "does not estimate its error; see --relative-error", *render, "--until", "relmse=0.1")
+        self.bad(2, "relative error is 0, expected a number above 0", *render, "--relative-error", "0")
+        self.bad(2, "expected a whole number from 1 to 63", *render, "--max-region", "0")
+        self.bad(2, "min-spp is 9, more than max-spp, which is 8", *render, "--min-spp", "9", "--max-spp", "8")
+        self.bad(2, "dependent-spp is 0, expected 1 or more", *render, "--dependent-spp", "0")
+        self.bad(2, "20 samples per pixel are too few for dependent-tests: its first pass takes 20", *render, "--spp",
+                 "20", "--dependent-spp", "20")
+        self.bad(2, "--k is an option of --estimator iicv, cv-baseline, not of dependent-tests", *render, "--k", "3")
+        self.bad(2, "--max-region is an option of --estimator dependent-tests, not of iicv", "render", ROOM, "-o",
+                 "a.exr", "--max-region", "3")
+        self.bad(2, "--save-stages: iicv has no single steps", "render", ROOM, "-o", "a.exr", "--save-stages", "s")
+        self.bad(2, "--save-stages: none has no single steps", "render", ROOM, "-o", "a.exr", "--save-stages", "s",
+                 "--estimator", "none", "--adaptive")
+
+
+class Adaptive(RenderTest):
+    def test_an_unbiased_mean_of_the_last_pass(self):
+        facts = self.statistics("-o", "a.exr", "--estimator", "none", "--adaptive", "--spp", "40", "--passes", "films")
+        self.assertEqual(facts["passes"][0]["samples_per_pixel"], 20)
+        self.assertEqual(sorted(p.name for p in (self.path / "films").glob("*.exr")),
+                         ["independent.exr", "pilot-1.exr"])
+        self.same("a.exr", "films/independent.exr")
+        info = json.loads(self.good("info", "a.exr", "--json").stdout)
+        self.assertEqual(info["attributes"]["covary:estimator"], "none --adaptive")
+
+    def test_until(self):
+        first = self.statistics("-o", "a.exr", "--estimator", "none", "--adaptive", "--min-spp", "2", "--spp", "96")
+        facts = self.statistics("-o", "b.exr", "--estimator", "none", "--adaptive", "--min-spp", "2", "--until",
+                                f"relmse={0.6 * first['predicted_relmse']}")
+        self.assertTrue(facts["until_reached"])
+
+    def test_wrong_options(self):
+        render = ("render", ROOM, *SMALL, "-o", "a.exr", "--estimator", "none")
+        self.bad(2, "need --adaptive", *render, "--max-spp", "8")
+        self.bad(2, "--adaptive always takes independent random numbers", *render, "--adaptive", "--sampling", "crn")
+        self.bad(2, "min-spp is 0, expected 1 or more", *render, "--adaptive", "--min-spp", "0")
+
+
+if __name__ == "__main__":
+    unittest.main()
