@@ -108,11 +108,23 @@ class Bands {
   GroupedFile::Rows crn_rows_, independent_rows_;
 };
 
-InputReport examine(const GroupedFile& crn, const GroupedFile& independent, Bands& bands) {
+/// Whether a group of a pixel has no samples, so that images cannot be checked.
+bool lacks_samples(const GroupedImage& image) {
+  const auto groups = static_cast<uint32_t>(image.groups);
+  return image.counts && std::any_of(image.counts, image.counts + static_cast<size_t>(image.width) * image.height,
+                                     [groups](uint32_t n) { return n < groups; });
+}
+
+InputReport examine(const Estimator& estimator, const GroupedFile& crn, const GroupedFile& independent, Bands& bands) {
   InputChecks checks(crn.width(), crn.height(), crn.groups(), independent.groups());
   const int step = std::max(16, bands.rows());
   for (int y = 0; y < crn.height(); y += step) {
     bands.read(y, std::min(step, crn.height() - y));
+    if (estimator.adaptive && (lacks_samples(bands.crn()) || lacks_samples(bands.independent()))) {
+      InputReport report;
+      report.findings.push_back({Finding::Severity::kNote, "images in which pixels lack samples are not checked"});
+      return report;
+    }
     checks.add_rows(bands.crn(), bands.independent());
   }
   return checks.report();
@@ -277,7 +289,7 @@ void combine(const CombineOptions& o) {
   std::vector<Finding> findings;
   check_files(crn, independent, findings);
   Bands bands(crn, independent, o.memory_mib);
-  const InputReport report = examine(crn, independent, bands);
+  const InputReport report = examine(estimator, crn, independent, bands);
   findings.insert(findings.end(), report.findings.begin(), report.findings.end());
   std::string errors;
   for (const Finding& f : findings)

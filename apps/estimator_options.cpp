@@ -28,7 +28,8 @@ std::vector<SharedOption> shared_options(const std::vector<std::string>& estimat
       if (known == shared.end())
         shared.push_back({option, option.help + (standard.empty() ? "" : "; default " + standard)});
       else if (known->option.help != option.help)
-        known->help += fmt::format("; {}: {}{}", estimator, option.help, standard.empty() ? "" : ", default " + standard);
+        known->help +=
+            fmt::format("; {}: {}{}", estimator, option.help, standard.empty() ? "" : ", default " + standard);
       else if (known->option.default_value != standard)
         known->help += fmt::format(" ({}: {})", estimator, standard);
     }

@@ -192,6 +192,7 @@ class ProgressPrinter {
 lab::PlanContext plan_context() {
   lab::PlanContext context;
   context.program_version = program_version();
+  context.default_estimator = kDefaultEstimator;
   for (const std::string& name : pair_estimator_names()) {
     const Estimator estimator = make_estimator(name);
     if (!estimator.adaptive) context.pair_estimators.insert(name);

@@ -154,8 +154,8 @@ void whole_iduw(benchmark::State& state) {
 
 /// Means and variances as films have them, one group: what the filters of dependent tests read.
 const FilterInput& filter_inputs() {
-  static const FilterInput instance = filter_input(input().crn, input().independent, input().valid, Norm::kL1,
-                                                   VarianceSource::kBoth, 7, 16);
+  static const FilterInput instance =
+      filter_input(input().crn, input().independent, input().valid, Norm::kL1, VarianceSource::kBoth, 7, 16);
   return instance;
 }
 
@@ -174,8 +174,7 @@ void filter_exact(benchmark::State& state) {
 
 void whole_dependent_tests(benchmark::State& state, const DependentTestsOptions& options) {
   const Input& in = input();
-  for (auto _ : state)
-    benchmark::DoNotOptimize(dependent_tests(in.crn, in.independent, options).estimate.data.data());
+  for (auto _ : state) benchmark::DoNotOptimize(dependent_tests(in.crn, in.independent, options).estimate.data.data());
   count(state);
 }
 

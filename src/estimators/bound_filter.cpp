@@ -10,49 +10,59 @@ namespace {
 using namespace lanes;
 
 constexpr int kNewtonSteps = 24;
-constexpr float kTolerance = 1e-5f;  // of the left side of the equation, whose right side is 9
+constexpr float kTolerance = 1e-5f;  // of both sides of the equation, relative
 /// Variances are at least this, relative to the square of the brightness that has no noise.
 constexpr float kLeastVariance = 1e-12f;
 
-/// 1 / v_q and 3 sqrt(v_q) of every pixel; pixels without samples have weight 0 and are no beginning.
+/// 1 / v_q and 3 sqrt(v_q) of every pixel, for sigma_q = 1 where the sigma of the centre is that of all; pixels without
+/// samples have weight 0 and are no beginning.
 struct Precision {
   Planes weight, radius;
 
-  explicit Precision(const FilterInput& input)
+  Precision(const FilterInput& input, bool common_sigma)
       : weight(input.width(), input.height(), 1, input.count.border(), 0),
         radius(input.width(), input.height(), 1, input.count.border(), kFar) {
     parallel_for(input.height(), 8, [&](int y) {
       for (int x = 0; x < input.width(); ++x) {
         const float count = input.count.row(0, y)[x];
         if (count <= 0) continue;
-        const Spectrum colour(input.dependent.row(0, y)[x], input.dependent.row(1, y)[x],
-                              input.dependent.row(2, y)[x]);
-        const float brightness = length(input.norm, colour);
-        const float least = kLeastVariance * (brightness * brightness + kLeastVariance);
-        const float v = std::max(input.variance.row(0, y)[x], least) / count;
+        const float v = (common_sigma ? 1.0f : positive_variance(input, x, y)) / count;
         weight.row(0, y)[x] = 1 / v;
         radius.row(0, y)[x] = 3 * std::sqrt(v);
       }
     });
+  }
+
+  /// sigma^2 of a pixel, or nearly nothing.
+  static float positive_variance(const FilterInput& input, int x, int y) {
+    const Spectrum colour(input.dependent.row(0, y)[x], input.dependent.row(1, y)[x], input.dependent.row(2, y)[x]);
+    const float brightness = std::min(length(input.norm, colour), 1e6f);
+    return std::max(input.variance.row(0, y)[x], kLeastVariance * (brightness * brightness + kLeastVariance));
   }
 };
 
 /// The window of one batch of pixels: differences, then weights.
 class Window {
  public:
-  Window(const FilterInput& input, const Precision& precision, int radius)
-      : input_(input), precision_(precision), radius_(radius), differences_((2 * radius + 1) * (2 * radius + 1)) {}
+  Window(const FilterInput& input, const Precision& precision, const BoundOptions& options)
+      : input_(input),
+        precision_(precision),
+        common_sigma_(options.common_sigma),
+        radius_(options.window / 2),
+        differences_((2 * radius_ + 1) * (2 * radius_ + 1)) {}
 
   /// Writes the first n pixels of the batch at (x, y).
   void apply(int x, int y, int n, const Planes* scale, FilteredImage& result) {
     x_ = x, y_ = y;
+    for (int l = 0; common_sigma_ && l < n; ++l) variance_[l] = Precision::positive_variance(input_, x + l, y);
+    const vfloat right_side = 9.0f * variance_;
     vfloat lambda = read_differences(scale ? load(scale->row(0, y) + x) : splat(1));
     // Newton from above: the left side is convex, so that each step stays above the solution. A pixel's steps do not
     // depend on the others of its batch.
     for (int step = 0; step < kNewtonSteps; ++step) {
       const auto [sum, slope] = left_side(lambda);
-      const vfloat excess = max(sum - 9.0f, splat(0));
-      const vfloat change = excess > splat(9 * kTolerance) ? excess / (2.0f * max(slope, splat(1e-30f))) : vfloat{};
+      const vfloat excess = max(sum - right_side, splat(0));
+      const vfloat change = excess > kTolerance * right_side ? excess / (2.0f * max(slope, splat(1e-30f))) : vfloat{};
       lambda -= change;
       if (is_zero(change)) break;
     }
@@ -79,14 +89,13 @@ class Window {
     const Planes& d = input_.dependent;
     const vfloat r = load(d.row(0, y_) + x_), g = load(d.row(1, y_) + x_), b = load(d.row(2, y_) + x_);
     vfloat bound = splat(kFar);
+    const vfloat deviation = sqrt(variance_);
     const bool is_sum = input_.norm == Norm::kL1;
     for_each([&](size_t i, int qy, int qx) {
-      const vfloat dr = load(d.row(0, qy) + qx) - r, dg = load(d.row(1, qy) + qx) - g,
-                   db = load(d.row(2, qy) + qx) - b;
-      const vfloat difference =
-          is_sum ? max(dr, -dr) + max(dg, -dg) + max(db, -db) : sqrt(dr * dr + dg * dg + db * db);
+      const vfloat dr = load(d.row(0, qy) + qx) - r, dg = load(d.row(1, qy) + qx) - g, db = load(d.row(2, qy) + qx) - b;
+      const vfloat difference = is_sum ? max(dr, -dr) + max(dg, -dg) + max(db, -db) : sqrt(dr * dr + dg * dg + db * db);
       differences_[i] = min(difference * scale, splat(kFar));
-      bound = min(bound, differences_[i] + load(precision_.radius.row(0, qy) + qx));
+      bound = min(bound, differences_[i] + deviation * load(precision_.radius.row(0, qy) + qx));
     });
     return bound;
   }
@@ -124,26 +133,28 @@ class Window {
       result.region.pixel(x, y_)[0] = partners[l];
       result.centre_weight.pixel(x, y_)[0] = alone ? 0 : own[l] / slope[l];
       result.bound.pixel(x, y_)[0] = alone ? std::numeric_limits<float>::infinity() : lambda[l];
-      // sum f^2 v = sum weighted excess / slope^2.
-      const float least = input_.count.row(0, y_)[x];
+      // sum f^2 v = sum weighted excess / slope^2, in units of sigma^2 where that is common.
+      const float least = input_.count.row(0, y_)[x], scale = common_sigma_ ? 1 : variance[l];
       result.effective_samples.pixel(x, y_)[0] =
-          alone ? 0 : std::max(least, variance[l] * slope[l] * slope[l] / std::max(sum[l], 1e-30f));
+          alone ? 0 : std::max(least, scale * slope[l] * slope[l] / std::max(sum[l], 1e-30f));
     }
   }
 
   const FilterInput& input_;
   const Precision& precision_;
+  bool common_sigma_;
   int radius_, x_ = 0, y_ = 0;
+  vfloat variance_ = splat(1);  ///< of the centres where it is common, otherwise 1: v_q has it
   std::vector<vfloat> differences_;
 };
 
 }  // namespace
 
 FilteredImage bound_filter(const FilterInput& input, const BoundOptions& options, const Planes* difference_scale) {
-  const Precision precision(input);
+  const Precision precision(input, options.common_sigma);
   FilteredImage result(input.width(), input.height());
   parallel_for(input.height(), 4, [&](int y) {
-    Window window(input, precision, options.window / 2);
+    Window window(input, precision, options);
     for (int x = 0; x < input.width(); x += kLanes)
       window.apply(x, y, std::min(kLanes, input.width() - x), difference_scale, result);
   });

@@ -49,12 +49,12 @@ Image combine(const GroupedImage& crn, const FilterInput& input, const FilteredI
   parallel_for(crn.height, 8, [&](int y) {
     for (int x = 0; x < crn.width; ++x) {
       const auto n = static_cast<double>(crn.count(x, y));
-      const double N = weights == CombinationWeights::kCounts ? input.count.row(0, y)[x]
-                                                              : filtered.effective_samples.pixel(x, y)[0];
+      const double N =
+          weights == CombinationWeights::kCounts ? input.count.row(0, y)[x] : filtered.effective_samples.pixel(x, y)[0];
       const double part = n + N > 0 ? N / (n + N) : 0;
       for (int c = 0; c < 3; ++c)
-        result.pixel(x, y)[c] = static_cast<float>((1 - part) * input.dependent.row(c, y)[x] +
-                                                   part * filtered.colour.pixel(x, y)[c]);
+        result.pixel(x, y)[c] =
+            static_cast<float>((1 - part) * input.dependent.row(c, y)[x] + part * filtered.colour.pixel(x, y)[c]);
     }
   });
   return result;
@@ -91,18 +91,18 @@ DependentTestsOptions DependentTestsOptions::paper() {
 
 std::vector<std::string> DependentTestsOptions::validate() const {
   std::vector<std::string> problems;
-  const auto check_window = [&](const char* name, int value) {
-    if (value < 1 || value > 63 || value % 2 == 0)
-      problems.push_back(fmt::format("{} is {}, expected an odd number from 1 to 63", name, value));
+  const auto check_window = [&](const char* name, int value, int least) {
+    if (value < least || value > 63 || value % 2 == 0)
+      problems.push_back(fmt::format("{} is {}, expected an odd number from {} to 63", name, value, least));
   };
   if (regions.max_region < 1 || regions.max_region > 63)
     problems.push_back(fmt::format("max-region is {}, expected 1 to 63", regions.max_region));
   if (!(regions.min_centre_drop >= 0))
     problems.push_back(
         fmt::format("min-centre-drop is {}, expected zero or a positive number", regions.min_centre_drop));
-  check_window("window", bound.window);
-  check_window("sigma-window", smoothing);
-  if (guard != 0) check_window("guard-window", guard);
+  check_window("window", bound.window, 3);
+  check_window("sigma-window", smoothing, 1);
+  if (guard != 0) check_window("guard-window", guard, 1);
   return problems;
 }
 
@@ -120,15 +120,19 @@ EstimatorResult dependent_tests(const GroupedImage& crn, const GroupedImage& ind
       filter_input(crn, independent, valid, options.norm, options.variance, options.smoothing, border);
   std::optional<Planes> scale;
   if (exact && options.guard > 0) scale = difference_scale(input, valid, options.guard);
-  FilteredImage filtered = exact ? bound_filter(input, options.bound, scale ? &*scale : nullptr)
-                                 : region_filter(input, options.regions);
+  FilteredImage filtered =
+      exact ? bound_filter(input, options.bound, scale ? &*scale : nullptr) : region_filter(input, options.regions);
   result.estimate = combine(crn, input, filtered, options.weights);
   fill_invalid(crn, independent, valid, result.estimate);
   if (!stages) return result;
-  *stages = {{"dependent", image_of(input.dependent)}, {"independent", image_of(input.independent)},
-             {"combined", result.estimate},            {"samples", image_of(input.count)},
-             {"filtered", std::move(filtered.colour)}, {"region", std::move(filtered.region)},
-             {"bound", std::move(filtered.bound)},     {"centre_weight", std::move(filtered.centre_weight)}};
+  *stages = {{"dependent", image_of(input.dependent)},
+             {"independent", image_of(input.independent)},
+             {"combined", result.estimate},
+             {"samples", image_of(input.count)},
+             {"filtered", std::move(filtered.colour)},
+             {"region", std::move(filtered.region)},
+             {"bound", std::move(filtered.bound)},
+             {"centre_weight", std::move(filtered.centre_weight)}};
   return result;
 }
 
@@ -146,6 +150,7 @@ Estimator make_dependent_tests(EstimatorParameters& parameters) {
       {"effective", CombinationWeights::kEffective}, {"counts", CombinationWeights::kCounts}};
   static constexpr std::pair<const char*, VarianceSource> kSources[] = {{"both", VarianceSource::kBoth},
                                                                         {"dependent", VarianceSource::kDependent}};
+  static constexpr std::pair<const char*, bool> kOwners[] = {{"centre", true}, {"each", false}};
   static constexpr std::pair<const char*, int> kGuards[] = {{"on", DependentTestsOptions().guard}, {"off", 0}};
   EstimatorParameters& p = parameters;
   const bool paper = p.flag("paper", "dependent-tests as published: its filter, weights and allocation");
@@ -154,16 +159,21 @@ Estimator make_dependent_tests(EstimatorParameters& parameters) {
   if (paper) adaptive.counts.allocation = Allocation::kEqualError, adaptive.counts.min_spp = 0;
   if (paper) adaptive.counts.smoothing = 1;
   ask_for(p, adaptive);
-  p.choice<DependentFilter>("filter", o.filter, kFilters, "Weights that minimise the error bound, or the published ones");
+  p.choice<DependentFilter>("filter", o.filter, kFilters,
+                            "Weights that minimise the error bound, or the published ones");
   p.choice<Norm>("norm", o.norm, kNorms, kNormHelp);
   p.whole("window", o.bound.window, kWindowRange, kWindowHelp);
   p.choice<VarianceSource>("sigma", o.variance, kSources, "Passes that tell the noise of a sample");
-  p.whole("sigma-window", o.smoothing, {.low = 1, .high = 63, .odd = true}, "Side of the window that averages the noise");
+  p.choice<bool>("sigma-of", o.bound.common_sigma, kOwners,
+                 "Whose noise pixels of a window have: its centre's, or their own");
+  p.whole("sigma-window", o.smoothing, {.low = 1, .high = 63, .odd = true},
+          "Side of the window that averages the noise");
   p.choice<int>("guard", o.guard, kGuards, "Trust the CRN image less where it is too dark");
   p.whole("max-region", o.regions.max_region, {.low = 1, .high = 63}, "Largest side of a region of --filter paper");
   p.real("min-centre-drop", o.regions.min_centre_drop, {.low = 0},
          "Regions grow while the weight of their centre falls by so much");
-  p.choice<Pyramid>("pyramid", o.regions.pyramid, kPyramids, "Height of the pyramid: side of the region, or its pixels");
+  p.choice<Pyramid>("pyramid", o.regions.pyramid, kPyramids,
+                    "Height of the pyramid: side of the region, or its pixels");
   p.choice<CombinationWeights>("weights", o.weights, kWeights,
                                "Weight of the filtered image: samples it is worth, or has");
   adaptive.counts.norm = o.norm;

@@ -16,8 +16,7 @@ Spectrum mean_of(const GroupedImage& image, int x, int y) {
   const uint32_t count = image.count(x, y);
   double sum[3] = {};
   for (int t = 0; t < image.groups; ++t)
-    for (int c = 0; c < 3; ++c)
-      sum[c] += static_cast<double>(group_size(count, image.groups, t)) * groups[3 * t + c];
+    for (int c = 0; c < 3; ++c) sum[c] += static_cast<double>(group_size(count, image.groups, t)) * groups[3 * t + c];
   const double scale = count > 0 ? 1.0 / count : 0;
   return {static_cast<float>(sum[0] * scale), static_cast<float>(sum[1] * scale), static_cast<float>(sum[2] * scale)};
 }
@@ -31,8 +30,8 @@ double freedom(const GroupedImage& image, int x, int y) {
 float pooled_variance(const GroupedImage& a, const GroupedImage& b, int x, int y, Norm norm) {
   const double of_a = freedom(a, x, y), of_b = freedom(b, x, y);
   if (of_a + of_b <= 0) return 0;
-  const double sum = of_a * scalar_variance(norm, a.sample_variance(x, y)) +
-                     of_b * scalar_variance(norm, b.sample_variance(x, y));
+  const double sum =
+      of_a * scalar_variance(norm, a.sample_variance(x, y)) + of_b * scalar_variance(norm, b.sample_variance(x, y));
   return static_cast<float>(sum / (of_a + of_b));
 }
 
@@ -102,9 +101,8 @@ FilterInput filter_input(const GroupedImage& crn, const GroupedImage& independen
     for (int x = 0; x < crn.width; ++x) {
       if (!valid[static_cast<size_t>(y) * crn.width + x]) continue;
       input.count.row(0, y)[x] = static_cast<float>(independent.count(x, y));
-      input.variance.row(0, y)[x] = source == VarianceSource::kBoth
-                                        ? pooled_variance(crn, independent, x, y, norm)
-                                        : scalar_variance(norm, crn.sample_variance(x, y));
+      input.variance.row(0, y)[x] = source == VarianceSource::kBoth ? pooled_variance(crn, independent, x, y, norm)
+                                                                    : scalar_variance(norm, crn.sample_variance(x, y));
     }
   });
   if (smoothing > 1) input.variance = box_mean(input.variance, valid, smoothing, border, 0);

@@ -14,7 +14,7 @@
 namespace covary {
 namespace {
 
-constexpr const char* kCounts = "samples";  // channel of covary's films
+constexpr const char* kCounts = "samples";               // channel of covary's films
 constexpr const char* kVariance = "variance_in_groups";  // channels .R .G .B of some of them
 
 [[noreturn]] void fail(const std::string& path, const std::string& what) {

@@ -58,8 +58,8 @@ EstimatorResult mean_of_groups(const GroupedImage& image) {
         const ChannelMean m = equal ? mean_of_equal(groups, T) : mean_of_unequal(groups, T, count);
         result.estimate.pixel(x, y)[c] = static_cast<float>(m.mean);
         if (has_error)
-          result.std_error.pixel(x, y)[c] = static_cast<float>(
-              image.variance_in_groups ? error_of_samples(variance[c], count) : m.std_error);
+          result.std_error.pixel(x, y)[c] =
+              static_cast<float>(image.variance_in_groups ? error_of_samples(variance[c], count) : m.std_error);
       }
     }
   return result;
@@ -69,7 +69,8 @@ Estimator make_none(EstimatorParameters& parameters) {
   EstimatorParameters& p = parameters;
   Estimator estimator;
   AdaptiveSampling adaptive;
-  const bool is_adaptive = p.flag("adaptive", "As many samples in each pixel as a first pass says that is not averaged in");
+  const bool is_adaptive =
+      p.flag("adaptive", "As many samples in each pixel as a first pass says that is not averaged in");
   adaptive.least_min_spp = 1;  // a mean needs a sample
   ask_for(p, adaptive);
   p.choice<Norm>("norm", adaptive.counts.norm, kNorms, kNormHelp);

@@ -55,8 +55,7 @@ struct Kernel {
     height = static_cast<float>(pyramid == Pyramid::kSide ? side : region.size) * std::sqrt(0.5f);
   }
   float weight(const Region& region, int i) const {
-    return std::max(0.0f, offset - slope * region.difference[i]) *
-           std::max(0.0f, height - region.place[i]->distance);
+    return std::max(0.0f, offset - slope * region.difference[i]) * std::max(0.0f, height - region.place[i]->distance);
   }
   float sum(const Region& region) const {
     float total = 0;

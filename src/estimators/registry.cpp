@@ -12,8 +12,12 @@ namespace covary {
 
 std::span<const EstimatorPlugin> estimator_plugins() {
   static constexpr EstimatorPlugin kPlugins[] = {
-      {"iicv", make_iicv}, {"cv-baseline", make_cv_baseline}, {"iduw", make_iduw},
-      {"dependent-tests", make_dependent_tests}, {"polynomials", make_polynomials}, {"none", make_none},
+      {"iicv", make_iicv},
+      {"cv-baseline", make_cv_baseline},
+      {"iduw", make_iduw},
+      {"dependent-tests", make_dependent_tests},
+      {"polynomials", make_polynomials},
+      {"none", make_none},
   };
   return kPlugins;
 }

@@ -126,8 +126,9 @@ TEST(EstimatorRegistry, ValuesReachTheOptions) {
                                      {"sigma-window", "3"}}),
             dependent_tests(g, h, tests).estimate.data);
   DependentTestsOptions exact;
-  exact.bound.window = 7, exact.guard = 0;
-  EXPECT_EQ(made("dependent-tests", {{"window", "7"}, {"guard", "off"}}), dependent_tests(g, h, exact).estimate.data);
+  exact.bound = {7, false}, exact.guard = 0;
+  EXPECT_EQ(made("dependent-tests", {{"window", "7"}, {"sigma-of", "each"}, {"guard", "off"}}),
+            dependent_tests(g, h, exact).estimate.data);
   EXPECT_EQ(make_estimator("polynomials", {{"dimensions", "2"}}).film_settings, "polynomials dimensions=2");
   EXPECT_EQ(make_estimator("iicv", {{"paper", ""}, {"k", "50"}}).text, "iicv --paper --k 50");
 }
@@ -188,7 +189,8 @@ TEST(EstimatorRegistry, AdaptiveEstimatorsHaveTheirNumbers) {
   EXPECT_TRUE(contains(message("none", {{"adaptive", ""}, {"min-spp", "0"}}), "min-spp is 0, expected 1 or more"));
   EXPECT_TRUE(contains(message("dependent-tests", {{"relative-error", "-1"}}), "relative error is -1"));
   EXPECT_TRUE(contains(message("dependent-tests", {{"min-spp", "9"}, {"max-spp", "8"}}), "more than max-spp"));
-  EXPECT_TRUE(contains(message("iicv", {{"relative-error", "1"}}), "is an option of --estimator dependent-tests, none"));
+  EXPECT_TRUE(
+      contains(message("iicv", {{"relative-error", "1"}}), "is an option of --estimator dependent-tests, none"));
 }
 
 TEST(EstimatorRegistry, SamplesOfAPixel) {
@@ -219,7 +221,7 @@ TEST(EstimatorRegistry, RangesAreThoseThatAreChecked) {
       };
       const OptionRange& range = option.range;
       const double step = option.type == Type::kWhole ? (range.odd ? 2 : 1) : 0.25;
-      if (!option.default_value.empty()) EXPECT_TRUE(range.contains(std::stod(option.default_value)));
+      EXPECT_TRUE(option.default_value.empty() || range.contains(std::stod(option.default_value)));
       EXPECT_EQ(accepts(range.low), !range.above_low);
       EXPECT_TRUE(accepts(range.low + step));
       EXPECT_FALSE(accepts(range.low - step));
@@ -239,7 +241,7 @@ TEST(EstimatorRegistry, SaysWhatIsWrong) {
   };
   EXPECT_EQ(message("iidw", {}),
             "no estimator is named 'iidw'; did you mean 'iduw' or 'iicv'?; expected iicv, cv-baseline, iduw, "
-            "polynomials, none");
+            "dependent-tests, polynomials, none");
   EXPECT_EQ(message("iduw", {{"k", "3"}}), "--k is an option of --estimator iicv, cv-baseline, not of iduw");
   EXPECT_EQ(message("iicv", {{"windwo", "3"}}), "--windwo is not an option of any estimator; did you mean 'window'?");
   EXPECT_EQ(message("iicv", {{"k", "3x"}}), "--k '3x': expected a whole number");

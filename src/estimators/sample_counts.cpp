@@ -23,7 +23,7 @@ double rounded_up(double samples) { return std::ceil(samples - 1e-6); }
 /// What pixels want for a factor s: demand s - already, before limits and rounding.
 struct Demand {
   std::vector<double> of_pixel;
-  double already = 0;  ///< samples that count, too
+  double already = 0;    ///< samples that count, too
   double for_error = 0;  ///< factor that leads to the relative error, where one is given
 };
 
@@ -151,8 +151,8 @@ std::vector<std::string> CountOptions::validate() const {
   if (max_spp && *max_spp >= 1 && *max_spp < min_spp)
     problems.push_back(fmt::format("min-spp is {}, more than max-spp, which is {}", min_spp, *max_spp));
   if (smoothing < 1 || smoothing > 63 || smoothing % 2 == 0)
-    problems.push_back(fmt::format("the window that smooths variances is {}, expected an odd number from 1 to 63",
-                                   smoothing));
+    problems.push_back(
+        fmt::format("the window that smooths variances is {}, expected an odd number from 1 to 63", smoothing));
   return problems;
 }
 
@@ -186,8 +186,8 @@ void ask_for(EstimatorParameters& parameters, AdaptiveSampling& sampling) {
                                                                         {"uniform", Allocation::kUniform}};
   EstimatorParameters& p = parameters;
   CountOptions& o = sampling.counts;
-  p.whole("dependent-spp", sampling.first_spp, {.low = 1},
-          "Samples of the first pass; else half of --spp, up to 50", {"pilot-spp"});
+  p.whole("dependent-spp", sampling.first_spp, {.low = 1}, "Samples of the first pass; else half of --spp, up to 50",
+          {"pilot-spp"});
   p.choice<Allocation>("allocation", o.allocation, kAllocations, "How pixels share the samples of the last pass");
   p.real("relative-error", o.relative_error, {.low = 0, .above_low = true},
          "Error that pixels shall have, as three standard deviations; --spp then is a limit");

@@ -16,10 +16,10 @@ constexpr const char* kPrefix = "covary:";
 constexpr const char* kFormat = "film";  // attribute covary:film, version of the format
 constexpr const char* kFormatVersion = "1";
 constexpr const char* kGroups = "groups";
-constexpr const char* kChecksum = "checksum";      // CRC-32 of counts, group means, auxiliary images and variances
-constexpr const char* kSamples = "samples";        // attribute covary:samples and channel `samples`
+constexpr const char* kChecksum = "checksum";  // CRC-32 of counts, group means, auxiliary images and variances
+constexpr const char* kSamples = "samples";    // attribute covary:samples and channel `samples`
 constexpr const char* kVariance = "variance_in_groups";  // channels .R .G .B, in some films
-constexpr const char* kFewest = "samples_fewest";  // of any pixel; only where pixels differ
+constexpr const char* kFewest = "samples_fewest";        // of any pixel; only where pixels differ
 constexpr const char* kMost = "samples_most";
 
 /// Attributes that follow from the film's numbers: written, and not kept in Film::attributes when read.

@@ -100,8 +100,7 @@ TEST(SampleVariance, HasTheSameBitsWhenContinuedThroughAFile) {
     ASSERT_TRUE(film.keeps_sample_variance());
     EXPECT_EQ(film.aovs.size(), 0u);
     for (int x = 0; x < 3; ++x)
-      for (uint32_t s = film.count(x, 0); s < 5000 + static_cast<uint32_t>(x); ++s)
-        film.add(x, 0, sample_at(2, x, s));
+      for (uint32_t s = film.count(x, 0); s < 5000 + static_cast<uint32_t>(x); ++s) film.add(x, 0, sample_at(2, x, s));
     EXPECT_EQ(film.data(), whole.data());
     EXPECT_EQ(film.variance_in_groups(), whole.variance_in_groups());
   }

@@ -52,10 +52,9 @@ ImageErrors image_errors(const Image& image, const std::string& path, const Scen
   if (const std::optional<nlohmann::json> kept = cache.read_json("measures", key + ".json"))
     return {number_or_none(*kept, "mae"), number_or_none(*kept, "flip"), number_or_none(*kept, "above5"),
             number_or_none(*kept, "predicted_relmse")};
-  const ImageErrors errors{compute_metric(Metric::kMae, image, references).value,
-                           compute_metric(Metric::kFlip, image, references).value,
-                           compute_metric(Metric::kAbove5, image, references).value,
-                           predicted_relmse(path, scene, references)};
+  const ImageErrors errors{
+      compute_metric(Metric::kMae, image, references).value, compute_metric(Metric::kFlip, image, references).value,
+      compute_metric(Metric::kAbove5, image, references).value, predicted_relmse(path, scene, references)};
   cache.write_json("measures", key + ".json",
                    {{"mae", errors.mae},
                     {"flip", errors.flip},

@@ -74,7 +74,7 @@ std::vector<Option> parsed(const Words& words) {
 /// estimators of the same pair of passes.
 Words pass_options(const Words& words, const PlanContext& context) {
   const std::vector<Option> options = parsed(words);
-  std::string estimator = *context.pair_estimators.begin();
+  std::string estimator = context.default_estimator;
   for (const Option& option : options)
     if (option.name == "--estimator" && !option.values.empty()) estimator = option.values[0];
   const auto own = context.estimator_options.find(estimator);

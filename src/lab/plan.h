@@ -50,6 +50,7 @@ struct PlanContext {
   std::map<std::string, std::set<std::string>> estimator_options;
   /// Estimators that need the same pair of passes.
   std::set<std::string> pair_estimators;
+  std::string default_estimator;  ///< of a method that names none
 };
 
 /// Both halves of the reference that is to be rendered for a scene.

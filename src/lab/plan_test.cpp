@@ -29,7 +29,7 @@ Suite two_methods() {
 }
 
 const PlanContext kContext{
-    "1.0", {{"iicv", {"--k", "--paper"}}, {"iduw", {"--k"}}, {"dependent-tests", {"--k"}}}, {"iicv", "iduw"}};
+    "1.0", {{"iicv", {"--k", "--paper"}}, {"iduw", {"--k"}}, {"dependent-tests", {"--k"}}}, {"iicv", "iduw"}, "iicv"};
 
 SceneInstance instance(SceneEntry entry = {"room", "room.xml"}, int width = 640, int height = 480,
                        int64_t max_pixels = 0) {

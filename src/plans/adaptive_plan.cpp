@@ -15,9 +15,9 @@
 namespace covary {
 namespace {
 
-constexpr uint32_t kMostFirst = 50;     // samples of the first pass where nobody asks for a number
-constexpr double kFirstShare = 0.5;     // of the budget or the time, at most
-constexpr double kOverestimate = 1.1;   // of the samples that a limit of time allows
+constexpr uint32_t kMostFirst = 50;    // samples of the first pass where nobody asks for a number
+constexpr double kFirstShare = 0.5;    // of the budget or the time, at most
+constexpr double kOverestimate = 1.1;  // of the samples that a limit of time allows
 
 struct Method {
   AdaptiveSampling sampling;
