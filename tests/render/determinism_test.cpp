@@ -18,7 +18,7 @@ TestScene load_room(int width, int height) {
   LoadOptions options;
   options.width = width, options.height = height;
   options.make_integrator = [](Parameters& parameters) -> std::shared_ptr<SceneObject> {
-    return integrator_plugins()[0].make(parameters, PathLengthSettings::from(parameters));
+    return scene_integrator(parameters);
   };
   return load_file(kRoom, options);
 }

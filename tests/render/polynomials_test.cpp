@@ -111,7 +111,7 @@ TEST(PolynomialsInARender, AgreesWithTheReferenceOnRealPixels) {
   LoadOptions options;
   options.width = 60, options.height = 40;
   options.make_integrator = [](Parameters& parameters) -> std::shared_ptr<SceneObject> {
-    return integrator_plugins()[0].make(parameters, PathLengthSettings::from(parameters));
+    return scene_integrator(parameters);
   };
   const TestScene scene = load_file(std::string(COVARY_SOURCE_DIR) + "/scenes/room.xml", options);
   for (const int d : {2, 4, 6}) {

@@ -31,6 +31,16 @@ inline TestScene load_file(const std::string& file, const LoadOptions& options) 
   return scene;
 }
 
+/// The integrator that a scene names, with its own settings.
+inline std::shared_ptr<Integrator> scene_integrator(Parameters& parameters, const PathLengthSettings& lengths) {
+  for (const IntegratorPlugin& plugin : integrator_plugins())
+    if (parameters.type() == plugin.name) return plugin.make(parameters, lengths);
+  return nullptr;
+}
+inline std::shared_ptr<Integrator> scene_integrator(Parameters& parameters) {
+  return scene_integrator(parameters, PathLengthSettings::from(parameters));
+}
+
 using MakeIntegrator = std::function<std::shared_ptr<Integrator>(const PathLengthSettings&)>;
 
 /// `min_depth` as on the command line. `make`, where given, makes another integrator than the scene's.
@@ -41,10 +51,7 @@ inline TestScene load_text(const std::string& xml, int min_depth = 0, const Make
   options.make_integrator = [&](Parameters& parameters) -> std::shared_ptr<SceneObject> {
     PathLengthSettings lengths = PathLengthSettings::from(parameters);
     lengths.min_depth = min_depth;
-    if (make) return make(lengths);
-    for (const IntegratorPlugin& plugin : integrator_plugins())
-      if (parameters.type() == plugin.name) return plugin.make(parameters, lengths);
-    return nullptr;
+    return make ? make(lengths) : scene_integrator(parameters, lengths);
   };
   return load_file(file, options);
 }

@@ -99,8 +99,7 @@ TestScene load_room() {
   LoadOptions options;
   options.width = 70, options.height = 45;
   options.make_integrator = [](Parameters& parameters) -> std::shared_ptr<SceneObject> {
-    return std::make_shared<CellMeans>(integrator_plugins()[0].make(parameters, PathLengthSettings::from(parameters)),
-                                       6);
+    return std::make_shared<CellMeans>(scene_integrator(parameters), 6);
   };
   return load_file(kRoom, options);
 }

@@ -17,7 +17,7 @@ TestScene load_own(const std::string& name, const std::map<std::string, std::str
   LoadOptions options;
   options.defines = defines;
   options.make_integrator = [](Parameters& parameters) -> std::shared_ptr<SceneObject> {
-    return integrator_plugins()[0].make(parameters, PathLengthSettings::from(parameters));
+    return scene_integrator(parameters);
   };
   return {load_scene(std::string(COVARY_SOURCE_DIR) + "/scenes/" + name, options)};
 }
