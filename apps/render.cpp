@@ -27,6 +27,7 @@
 #include "render_options.h"
 #include "render_report.h"
 #include "stages.h"
+#include "technique_files.h"
 
 namespace covary {
 namespace {
@@ -155,9 +156,11 @@ void render(RenderOptions options) {
   outputs.reads(scene.files);
   for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", warning);
   if (!options.replay.empty()) return print_replay(options, scene);
+  if (!options.debug_strategies.empty()) check_technique_folder(options.debug_strategies, scene);
   const RenderResult result = render_watched(options, scene, display ? &*display : nullptr);
   if (result.complete) write_stages(options, result);
   report({options, scene, result, load_seconds, threads});
+  if (!options.debug_strategies.empty() && !g_stop) write_techniques(options.debug_strategies, scene, result, &g_stop);
 }
 
 }  // namespace

@@ -69,6 +69,10 @@ void take_training(uint32_t training, const LoadedScene& scene, RenderRequest& r
   request.spp = all - training;
 }
 
+CrnPart crn_part_named(const std::string& name) {
+  return name == "camera" ? CrnPart::kCamera : name == "light" ? CrnPart::kLight : CrnPart::kBoth;
+}
+
 }  // namespace
 
 void check_options(RenderOptions& options) {
@@ -92,6 +96,8 @@ void check_options(RenderOptions& options) {
     usage(fmt::format("--split: the first pass of {} has its own number of samples, --dependent-spp", name));
   if (estimator.adaptive && given("--sampling"))
     usage("--sampling: --adaptive always takes independent random numbers");
+  if (passes != EstimatorPasses::kPair && options.sampling != "crn" && given("--crn-part"))
+    usage("--crn-part needs a pass with common random numbers");
   if (passes != EstimatorPasses::kPair && given("--split"))
     usage("--split is an option of estimators with two passes, not of " + name);
   if (passes == EstimatorPasses::kSamples && given("--groups"))
@@ -149,6 +155,7 @@ RenderRequest make_request(const RenderOptions& options, const LoadedScene& scen
       training > 0 && options.replay.empty() && options.load_training.empty())
     take_training(training, scene, request);
   request.aovs = options.aovs;
+  request.crn_part = crn_part_named(options.crn_part);
   request.output = options.output;
   request.preview = options.preview;
   request.save_training = options.save_training, request.load_training = options.load_training;
@@ -197,6 +204,11 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
                   "Random numbers per pixel, or common to all; a single pass (estimator none)")
       ->check(one_of({"independent", "crn"}));
   command
+      .add_option("--crn-part", o.crn_part,
+                  "Which part of a path has the common random numbers, for integrators that trace light")
+      ->check(one_of({"both", "camera", "light"}))
+      ->capture_default_str();
+  command
       .add_option(
           "--groups", o.groups,
           "Groups of samples whose means films keep; default: the largest from 12 to 8 that divides the samples, "
@@ -235,6 +247,8 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
   add_define_option(command, o.defines);
   command.add_flag("--aovs", o.aovs, "Add the images Albedo, N (normal) and P (position) to the output");
   command.add_option("--replay", o.replay, "X,Y,SAMPLE[,PASS]: print one sample instead of rendering");
+  command.add_option("--debug-strategies", o.debug_strategies,
+                     "New folder for images of each technique (s, t) of bidirectional path tracing, rendered beside");
   command.add_option("--json", o.json, "File for statistics; '-': standard output");
   command.add_flag("!--no-preview", o.preview, "Do not write the PNG");
   command.add_flag("--quiet", o.quiet, "No progress and no summary");

@@ -39,6 +39,7 @@ std::string replay_command(const RenderOptions& o, const Pass& pass, const BadSa
   if (o.max_depth) add("--max-depth", std::to_string(*o.max_depth));
   if (!o.rfilter.empty()) add("--rfilter", o.rfilter);
   add("--sampling", sampling_name(pass));
+  if (pass.settings.sampling == Sampling::kCrn && o.crn_part != "both") add("--crn-part", o.crn_part);
   add("--seed", std::to_string(o.seed));
   add("--replay", fmt::format("{},{},{}", bad.x, bad.y, bad.sample) +
                       (pass.plan.number ? fmt::format(",{}", pass.plan.number) : ""));

@@ -207,6 +207,11 @@ void check_learner(const Integrator& integrator, const PassSettings& settings, c
 
 }  // namespace
 
+const char* sampling_name(Sampling sampling, CrnPart part) {
+  if (sampling != Sampling::kCrn) return "independent";
+  return part == CrnPart::kCamera ? "crn-camera" : part == CrnPart::kLight ? "crn-light" : "crn";
+}
+
 uint32_t wave_end(uint32_t count, int groups) {
   const uint32_t size = static_cast<uint32_t>(groups) * std::max(1, 16 / groups);
   if (count >= size) return (count / size + 1) * size;

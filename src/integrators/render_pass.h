@@ -25,6 +25,9 @@ using PixelEstimate = std::function<Spectrum(std::span<const CameraSample>)>;
 /// What the pixels of a pass with common random numbers have in common, where samples have a light subpath as well.
 enum class CrnPart { kBoth, kCamera, kLight };
 
+/// "independent", "crn", "crn-camera" or "crn-light": attribute of films.
+const char* sampling_name(Sampling sampling, CrnPart part);
+
 /// Bit of PassSettings::pass in the keys of what pixels of a CRN pass do not have in common, so that it shares no
 /// numbers with the independent pass of the same number.
 inline constexpr uint32_t kOwnNumbers = 1u << 29;

@@ -141,6 +141,10 @@ class Techniques {
 
 }  // namespace
 
+bool has_techniques(const Integrator& integrator) {
+  return dynamic_cast<const BidirectionalTracer<BidirectionalParts>*>(&integrator) != nullptr;
+}
+
 std::vector<TechniqueImage> render_techniques(const Scene& scene, const Integrator& integrator,
                                               const PassSettings& settings, const CropWindow& window) {
   const auto* tracer = dynamic_cast<const BidirectionalTracer<BidirectionalParts>*>(&integrator);

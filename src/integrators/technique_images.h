@@ -20,6 +20,9 @@ struct TechniqueImage {
 /// Longest paths that are shown, in edges.
 inline constexpr int kTechniqueEdges = 6;
 
+/// Whether render_techniques() can take the integrator.
+bool has_techniques(const Integrator& integrator);
+
 /// All techniques for paths of up to kTechniqueEdges edges that found something, ordered by length, then s. Reads
 /// settings.spp (its largest number), sampling, seed, pass, filter and stop; light paths as many as the
 /// integrator has for these samples, in whole bundles. `window`: the pixels rendered, which are those of the images.

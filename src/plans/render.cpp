@@ -10,6 +10,7 @@
 #include "core/stopwatch.h"
 #include "estimators/predicted_error.h"
 #include "integrators/aov.h"
+#include "integrators/light_pass.h"
 #include "integrators/training.h"
 #include "plans/budget.h"
 #include "plans/folder_lock.h"
@@ -38,10 +39,14 @@ std::string filter_text(const FilterSettings& filter) {
   throw Error(ErrorCode::kInternal, "unknown reconstruction filter");
 }
 
-/// The scene's integrator, prepared for it.
-std::shared_ptr<const Integrator> integrator_of(const LoadedScene& scene) {
+/// The scene's integrator, prepared for it. Throws Error(kUsage) where it does not fit the request.
+std::shared_ptr<const Integrator> integrator_of(const LoadedScene& scene, const RenderRequest& request) {
   auto integrator = std::dynamic_pointer_cast<Integrator>(scene.integrator);
   COVARY_CHECK(integrator, "the scene was loaded with an integrator");
+  if (request.crn_part != CrnPart::kBoth && !dynamic_cast<const LightTracingIntegrator*>(integrator.get()))
+    throw Error(ErrorCode::kUsage,
+                "the paths of this integrator have no light part that could have numbers of its own; "
+                "integrators that trace light have");
   integrator->prepare(*scene.scene);
   return integrator;
 }
@@ -77,7 +82,7 @@ class PlanRun {
         callbacks_(callbacks),
         window_(window_of(scene, request)),
         filter_(request.filter.value_or(scene.filter)),
-        state_{scene, request, callbacks.stop, integrator_of(scene), 0, 0, {}} {}
+        state_{scene, request, callbacks.stop, integrator_of(scene, request), 0, 0, {}} {}
 
   RenderResult run();
 
@@ -236,6 +241,7 @@ Pass PlanRun::begin_pass(const PassPlan& plan) const {
   pass.plan = plan;
   pass.integrator = state_.integrator;
   pass.settings.sampling = plan.sampling;
+  pass.settings.crn_part = request_.crn_part;
   pass.settings.seed = request_.seed;
   pass.settings.pass = plan.number;
   pass.settings.filter = filter_;
@@ -246,7 +252,7 @@ Pass PlanRun::begin_pass(const PassPlan& plan) const {
   const std::string number = plan.number ? fmt::format("; pass {}", plan.number) : "";
   pass.film.attributes = request_.attributes;
   pass.film.attributes.insert_or_assign(film_key::kSeed, std::to_string(request_.seed));
-  pass.film.attributes.insert_or_assign(film_key::kSampling, plan.sampling == Sampling::kCrn ? "crn" : "independent");
+  pass.film.attributes.insert_or_assign(film_key::kSampling, sampling_name(plan.sampling, request_.crn_part));
   pass.film.attributes.insert_or_assign(film_key::kSceneHash, scene_.content_hash);
   pass.film.attributes.insert_or_assign(film_key::kSettings, state_.integrator->description() + "; filter " +
                                                                  filter_text(filter_) + number + plan.settings);
@@ -357,10 +363,11 @@ ReplayedSample replay(const LoadedScene& scene, const RenderRequest& request, co
                                                scene.width, scene.height));
   PassSettings settings;
   settings.sampling = address.sampling;
+  settings.crn_part = request.crn_part;
   settings.seed = request.seed;
   settings.pass = address.pass;
   settings.filter = request.filter.value_or(scene.filter);
-  const auto integrator = integrator_of(scene);
+  const auto integrator = integrator_of(scene, request);
   train(scene, request, {window_of(scene, request), settings.filter, nullptr, nullptr, {}});
   return replay_sample(*scene.scene, *integrator, settings, address.x, address.y, address.sample);
 }

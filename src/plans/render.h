@@ -26,6 +26,8 @@ struct RenderRequest {
   double seconds = 0;  ///< > 0: limit for rendering and estimating together
   double until = 0;    ///< > 0: add samples until the predicted relMSE is this
   bool aovs = false;   ///< also the images Albedo, N and P
+  /// Of passes with common random numbers; other parts than both need an integrator with light subpaths.
+  CrnPart crn_part = CrnPart::kBoth;
 
   std::string output;    ///< EXR file of the result; empty: no file is written
   bool preview = false;  ///< also a PNG beside it

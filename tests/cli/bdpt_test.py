@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""covary render with bidirectional path tracing, as a user runs it."""
+import json
+import re
+import unittest
+
+from cli_test import CliTest
+from exr_reader import read_exr
+
+SCENE = """<scene version="3.0.0">
+<integrator type="bdpt"><integer name="max_depth" value="4"/><string name="light_tracing" value="off"/></integrator>
+<sensor type="perspective"><film type="hdrfilm"><integer name="width" value="24"/><integer name="height" value="16"/>
+<rfilter type="box"/></film></sensor>
+<shape type="rectangle"><transform name="to_world"><scale value="4"/><rotate y="1" angle="180"/><translate z="6"/>
+</transform></shape>
+<shape type="rectangle"><transform name="to_world"><scale value="4"/><rotate x="1" angle="-90"/>
+<translate y="-1" z="4"/></transform></shape>
+<shape type="rectangle"><transform name="to_world"><scale value="0.5"/><rotate x="1" angle="90"/>
+<translate y="1" z="4"/></transform><emitter type="area"><rgb name="radiance" value="8"/></emitter></shape></scene>
+"""
+
+
+class Bdpt(CliTest):
+    def setUp(self):
+        super().setUp()
+        (self.path / "scene.xml").write_text(SCENE)
+        path = SCENE.replace("bdpt", "path").replace('<string name="light_tracing" value="off"/>', "")
+        (self.path / "path.xml").write_text(path)
+
+    def render(self, output, *arguments):
+        self.good("render", "scene.xml", "-o", output, "--estimator", "none", "--quiet", "--no-preview", *arguments)
+        return self.pixels(output)
+
+    def pixels(self, name):
+        channels = read_exr((self.path / name).read_bytes())
+        return [channels[c] for c in "RGB"]
+
+    def test_parts_of_common_random_numbers(self):
+        images = {}
+        for part in ("both", "camera", "light"):
+            arguments = ("--sampling", "crn", "--crn-part", part, "--spp", "1")
+            images[part] = self.render(f"{part}.exr", *arguments)
+            sampling = json.loads(self.good("info", f"{part}.exr", "--json").stdout)["attributes"]["covary:sampling"]
+            self.assertEqual(sampling, {"both": "crn", "camera": "crn-camera", "light": "crn-light"}[part])
+            printed = self.good("render", "scene.xml", *arguments[:4], "--replay", "7,12,0").stdout
+            values = re.search(r"radiance \((.*)\)", printed).group(1).split(", ")
+            for channel, value in zip(images[part], values):
+                self.assertAlmostEqual(channel[12 * 24 + 7], float(value), places=6)
+        self.assertEqual(len({str(image) for image in images.values()}), 3, "all three differ")
+
+    def test_parts_need_a_pass_with_common_numbers_and_light_subpaths(self):
+        output = ("-o", "a.exr", "--estimator", "none")
+        self.bad(2, "--crn-part needs a pass with common random numbers", "render", "scene.xml", *output, "--crn-part",
+                 "light")
+        self.bad(2, "no light part", "render", "path.xml", *output, "--sampling", "crn", "--crn-part", "light")
+
+    def test_images_of_techniques(self):
+        whole = self.render("a.exr", "--spp", "4", "--debug-strategies", "techniques")
+        names = {path.name for path in (self.path / "techniques").iterdir()}
+        found = (re.fullmatch(r"s(\d)_t(\d)\.exr", name) for name in names)
+        techniques = {match.groups() for match in found if match}
+        self.assertLessEqual({("0", "2"), ("1", "2"), ("2", "2"), ("1", "3"), ("3", "2"), ("2", "3")}, techniques)
+        self.assertFalse([t for t in techniques if t[1] == "1"], "no light is traced")
+        self.assertEqual(len(names), 2 * len(techniques) + 2)
+        total = [[0.0] * (24 * 16) for _ in range(3)]
+        for s, t in techniques:
+            weighted, alone = (self.pixels(f"techniques/s{s}_t{t}{end}.exr") for end in ("", "_unweighted"))
+            for c in range(3):
+                total[c] = [a + b for a, b in zip(total[c], weighted[c])]
+                self.assertTrue(all(a <= b + 1e-6 for a, b in zip(weighted[c], alone[c])))
+        for c in range(3):
+            for a, b in zip(total[c], whole[c]):
+                self.assertAlmostEqual(a, b, delta=1e-4 * max(1, b))
+        self.bad(2, "is not an empty folder", "render", "scene.xml", "-o", "b.exr", "--debug-strategies", "techniques")
+        self.bad(2, "integrator 'bdpt'", "render", "path.xml", "-o", "b.exr", "--debug-strategies", "new")
+
+
+if __name__ == "__main__":
+    unittest.main()
