@@ -209,7 +209,7 @@ CacheSettings CacheSettings::published(uint32_t resolution) {
   CacheSettings settings;
   settings.resolution = resolution;
   settings.by_normal = settings.pyramid = settings.held_out = false;
-  settings.prior_samples = 0;
+  settings.prior_samples = 0.1;
   return settings;
 }
 

@@ -23,10 +23,11 @@ struct CacheSettings {
   bool pyramid = true;         ///< false: each cell stands alone, and without data is plain
   bool held_out = true;        ///< scale each cell's control by what the next wave says of it
   bool monochrome = false;     ///< one coefficient for all channels
-  double prior_samples = 4;    ///< SolveSettings::prior_samples; 0: as published
+  double prior_samples = 0.3;  ///< SolveSettings::prior_samples
   double prior_vertices = 32;  ///< how many held-out vertices the parent's scale counts as
   size_t memory_limit = size_t{256} << 20;  ///< bytes of sums and coefficients while training
-  /// As published: position only, cells alone, no test.
+  /// As published: position only, cells alone, no test. The pull is as small as has a use: without any, lights that
+  /// only directions find, with tiny weights, have coefficients without limit.
   static CacheSettings published(uint32_t resolution);
 };
 
