@@ -84,7 +84,7 @@ std::vector<float> ControlledPath::make_clusters() {
   return {counts.begin(), counts.end()};
 }
 
-/// By what the camera sees: cells as wide as 16 pixels in the mean over the image, where that gives 16 to 256 cells; 64
+/// By what the camera sees: cells as wide as 8 pixels in the mean over the image, where that gives 64 to 256 cells; 64
 /// where it sees nothing.
 uint32_t ControlledPath::resolution() const {
   if (settings_.grid != ControlSettings::kAutomaticGrid) return settings_.grid;
@@ -102,7 +102,7 @@ uint32_t ControlledPath::resolution() const {
   }
   if (!(sum > 0)) return 64;
   const Vec3 size = scene_->bounds().upper - scene_->bounds().lower;
-  return static_cast<uint32_t>(std::clamp(max_component(size) / (16 * sum / n), 16.0, 256.0));
+  return static_cast<uint32_t>(std::clamp(max_component(size) / (8 * sum / n), 64.0, 256.0));
 }
 
 void ControlledPath::use(CoefficientTable table) {

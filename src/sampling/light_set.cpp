@@ -21,7 +21,7 @@ double weight_of(const Light& light, LightSelection selection) {
     case LightSelection::kShape:
       return shape && shape->n_parts() > 1 ? static_cast<double>(shape->part_area(light.part)) / shape->area() : 1;
     case LightSelection::kPower:
-      return luminance(light.emitter->part_power(light.part));
+      return mean(light.emitter->part_power(light.part));
   }
   throw Error(ErrorCode::kInternal, "unknown selection of lights");
 }

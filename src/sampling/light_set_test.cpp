@@ -34,18 +34,18 @@ std::shared_ptr<TriangleMesh> parallelogram(float z) {
 /// A mesh of two triangles, a parallelogram, a sphere, a point light and an environment, all seen from below.
 struct ManyLights {
   ManyLights() {
-    const auto add = [&](std::shared_ptr<Shape> shape, float radiance) {
-      auto light = std::make_shared<AreaLight>(std::make_shared<ConstantTexture>(Spectrum(radiance)));
+    const auto add = [&](std::shared_ptr<Shape> shape, const Spectrum& radiance) {
+      auto light = std::make_shared<AreaLight>(std::make_shared<ConstantTexture>(radiance));
       light->attach(shape.get());
       shape->set_emitter(light);
       shape->set_bsdf(std::make_shared<BlackBsdf>());
       parts.shapes.push_back(std::move(shape));
       parts.emitters.push_back(light);
     };
-    add(two_triangles(2), 4);
-    add(parallelogram(2), 1);
+    add(two_triangles(2), Spectrum(4));
+    add(parallelogram(2), {0, 0, 3});
     parts.emitters.push_back(make_plugin<Emitter>(emitter_plugins(), "emitter", "constant", {}).object);
-    add(std::make_shared<Sphere>(Transform(), Vec3{0, -3, 3}, 0.5f, false), 2);
+    add(std::make_shared<Sphere>(Transform(), Vec3{0, -3, 3}, 0.5f, false), Spectrum(2));
     parts.emitters.push_back(make_plugin<Emitter>(emitter_plugins(), "emitter", "point", {}).object);
     parts.camera = std::make_shared<Camera>(CameraSettings{}, 4, 4);
     scene = std::make_unique<Scene>(std::move(parts));
