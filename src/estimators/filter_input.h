@@ -5,25 +5,11 @@
 
 #include <vector>
 
-#include "core/spectrum.h"
 #include "estimators/grouped_image.h"
+#include "estimators/norm.h"
 #include "estimators/planes.h"
 
 namespace covary {
-
-/// Length of a difference of colours; the same for differences, standard deviations and brightness.
-enum class Norm {
-  kL1,  ///< sum of the absolute values of the channels, [Csonka2002] end of Sec. 4
-  kL2,  ///< Euclidean
-};
-
-inline constexpr std::pair<const char*, Norm> kNorms[] = {{"l1", Norm::kL1}, {"l2", Norm::kL2}};
-inline constexpr const char* kNormHelp = "Length of colours: sum of absolute values, or Euclidean";
-
-float length(Norm norm, const Spectrum& colour);
-/// Variance of one sample as a scalar. Euclidean: the sum of the channels' variances, exact. Sum of absolute values:
-/// (sum of the channels' standard deviations)^2, the most that it can be, and exact where channels vary in proportion.
-float scalar_variance(Norm norm, const Spectrum& variance);
 
 /// Planes have a border that reads as "no partner": far away, without samples.
 struct FilterInput {

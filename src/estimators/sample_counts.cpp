@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "core/error.h"
+#include "estimators/filter_input.h"
 
 namespace covary {
 namespace {

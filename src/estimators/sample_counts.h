@@ -17,11 +17,12 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "estimators/estimator_parameters.h"
-#include "estimators/filter_input.h"
 #include "estimators/grouped_image.h"
+#include "estimators/norm.h"
 
 namespace covary {
 
