@@ -14,6 +14,7 @@
 #include <optional>
 #include <vector>
 
+#include "combine_light.h"
 #include "commands.h"
 #include "core/stopwatch.h"
 #include "estimator_options.h"
@@ -33,7 +34,7 @@ namespace {
 
 struct CombineOptions {
   std::vector<std::string> crn, independent;
-  std::string output, crn_layer, independent_layer, stages, json;
+  std::string output, crn_layer, independent_layer, light, stages, json;
   EstimatorOptions estimator;
   bool error = false, force = false, quiet = false;
   std::optional<int> samples;
@@ -258,6 +259,7 @@ void check_distinct(const CombineOptions& o) {
   std::vector<std::pair<const char*, std::string>> files;
   for (const std::string& path : o.crn) files.emplace_back("--crn", path);
   for (const std::string& path : o.independent) files.emplace_back("--independent", path);
+  if (!o.light.empty()) files.emplace_back("--light", o.light);
   for (size_t i = 0; i < files.size(); ++i)
     for (size_t k = 0; k < i; ++k)
       if (is_same_file(files[i].second, files[k].second))
@@ -271,6 +273,7 @@ void check_files_of_command(const CombineOptions& o) {
   Outputs outputs;
   outputs.reads(o.crn);
   outputs.reads(o.independent);
+  if (!o.light.empty()) outputs.reads(o.light);
   outputs.writes("-o", o.output, OutputKind::kFilm);
   outputs.writes("--json", o.json, OutputKind::kText);
 }
@@ -281,6 +284,8 @@ void combine(const CombineOptions& o) {
   if (o.threads > 0) control.emplace(tbb::global_control::max_allowed_parallelism, o.threads);
   Stopwatch watch;
   const GroupedFile crn(o.crn, o.crn_layer), independent(o.independent, o.independent_layer);
+  std::optional<GroupedFile> light;
+  if (!o.light.empty()) light.emplace(std::vector{o.light});
   const Estimator estimator = make_estimator(o.estimator);
   const PairSettings settings = settings_of(o, estimator, crn);
   check_explain(o, estimator, crn);
@@ -288,6 +293,7 @@ void combine(const CombineOptions& o) {
 
   std::vector<Finding> findings;
   check_files(crn, independent, findings);
+  check_light_files(crn, independent, light ? &*light : nullptr, findings);
   Bands bands(crn, independent, o.memory_mib);
   const InputReport report = examine(estimator, crn, independent, bands);
   findings.insert(findings.end(), report.findings.begin(), report.findings.end());
@@ -303,6 +309,7 @@ void combine(const CombineOptions& o) {
   const double check_seconds = watch.lap();
 
   EstimatorResult result = estimate(estimator, settings, crn, bands);
+  if (light) add_light_file(*light, result);
   const double estimate_seconds = watch.lap();
   write(o, crn, independent, result);
   if (!o.stages.empty()) {
@@ -338,6 +345,7 @@ void combine(const CombineOptions& o) {
         {"crn_independent", json_of(report.crn_independent)}}},
       {"mean", {{"crn", report.crn_mean}, {"independent", report.independent_mean}}},
       {"seconds", {{"read_and_check", check_seconds}, {"estimate", estimate_seconds}, {"write", write_seconds}}}};
+  if (light) json["light_groups"] = light->groups();
   if (!pixel.is_null()) json["pixel"] = pixel;
   write_text_output(o.json, json_text(json));
 }
@@ -358,6 +366,7 @@ void add_combine(CLI::App& app) {
   command->add_option("--crn-layer", o->crn_layer, "Layer of the CRN image where its files hold several");
   command->add_option("--independent-layer,--pt-layer", o->independent_layer,
                       "Layer of the independent image where its files hold several");
+  command->add_option("--light", o->light, "Light film (light.exr of covary render --passes) to add to the result");
   command->add_option("--estimator", o->estimator.name, "iicv, or a comparator")
       ->check(CLI::Validator(check_has_images, ""))
       ->check(one_of(pair_estimator_names()))

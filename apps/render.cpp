@@ -50,9 +50,19 @@ void catch_signals() {
     if (std::signal(signal, on_signal) == SIG_IGN) std::signal(signal, SIG_IGN);
 }
 
+void print_light_path(const RenderOptions& options, const LoadedScene& scene) {
+  const uint64_t number = *options.light.replay;
+  const ReplayedLightPath path = replay_light(scene, make_plan(options), make_request(options, scene), number);
+  fmt::print("light path {}, {} rays, {} splats\n", number, path.n_rays, path.splats.size());
+  for (const LightSplat& splat : path.splats)
+    fmt::print("pixel ({}, {}): ({:.9g}, {:.9g}, {:.9g})\n", splat.x, splat.y, splat.value.r, splat.value.g,
+               splat.value.b);
+}
+
 void print_replay(const RenderOptions& options, const LoadedScene& scene) {
+  if (options.light.replay) return print_light_path(options, scene);
   const SampleAddress at = replayed_sample(options);
-  const ReplayedSample sample = replay(scene, make_request(options, scene), at);
+  const ReplayedSample sample = replay(scene, make_plan(options), make_request(options, scene), at);
   fmt::print("pixel ({}, {}), sample {}, film position ({}, {}), {} rays\nradiance ({:.9g}, {:.9g}, {:.9g})\n", at.x,
              at.y, at.sample, sample.position.x, sample.position.y, sample.n_rays, sample.value.r, sample.value.g,
              sample.value.b);
@@ -96,8 +106,8 @@ std::string interruption(const RenderOptions& options, const RenderResult& resul
   return fmt::format(
       "interrupted after {:.1f} of {:g} samples per pixel; '{}' is the image so far{}; the same command "
       "with --resume continues",
-      result.samples_per_pixel(), result.sum([](const Pass& p) { return p.settings.spp.mean(); }), options.output,
-      result.kept == options.output ? "" : ", '" + result.kept + "' holds its films");
+      result.samples_per_pixel(), result.camera_sum([](const Pass& p) { return p.settings.spp.mean(); }),
+      options.output, result.kept == options.output ? "" : ", '" + result.kept + "' holds its films");
 }
 
 void report(const RenderReport& report) {
@@ -120,14 +130,14 @@ Outputs files_of(const RenderOptions& options) {
   outputs.reads(options.scene);
   outputs.writes("--json", options.json, OutputKind::kText);
   if (!options.save_training.empty()) outputs.writes("--save-training", options.save_training, OutputKind::kText);
-  if (!options.replay.empty()) return outputs;
+  if (options.is_replay()) return outputs;
   outputs.writes("-o", options.output, OutputKind::kFilm);
   if (output_target(options.output).is_special)
     throw Error(ErrorCode::kUsage, fmt::format("-o '{}' is no regular file, which a render needs to continue after an "
                                                "interruption",
                                                options.output));
   if (std::filesystem::is_directory(options.passes))
-    for (const char* name : {"crn", "independent", "pilot-1"}) {
+    for (const char* name : {"crn", "independent", "pilot-1", "light"}) {
       const std::string path = (std::filesystem::path(options.passes) / name).string();
       outputs.writes("--passes", path + ".exr", OutputKind::kFilm);
       outputs.writes("--passes", path + ".json", OutputKind::kText);
@@ -155,7 +165,7 @@ void render(RenderOptions options) {
   const double load_seconds = load_watch.seconds() - scene.scene->build_seconds();
   outputs.reads(scene.files);
   for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", warning);
-  if (!options.replay.empty()) return print_replay(options, scene);
+  if (options.is_replay()) return print_replay(options, scene);
   if (!options.debug_strategies.empty()) check_technique_folder(options.debug_strategies, scene);
   const RenderResult result = render_watched(options, scene, display ? &*display : nullptr);
   if (result.complete) write_stages(options, result);

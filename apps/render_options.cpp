@@ -77,8 +77,8 @@ CrnPart crn_part_named(const std::string& name) {
 
 void check_options(RenderOptions& options) {
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
-  if (options.replay.empty() && options.output.empty())
-    usage("no output given; use -o OUT.exr (or --replay X,Y,SAMPLE)");
+  if (!options.is_replay() && options.output.empty()) usage("no output given; use -o OUT.exr (or --replay X,Y,SAMPLE)");
+  if (!options.replay.empty() && options.light.replay) usage("--replay and --replay-light exclude each other");
   if (!options.integrator.empty() && !find_integrator(options.integrator))
     usage("--integrator: " + unknown_integrator(options.integrator));
   const std::string& name = options.estimator.name;
@@ -124,9 +124,13 @@ LoadedScene load(const RenderOptions& options) {
       throw Error(ErrorCode::kUsage, "--resolution '" + options.resolution + "': each side must be 1 to 65536");
     load_options.width = static_cast<int>(size[0]), load_options.height = static_cast<int>(size[1]);
   }
-  load_options.make_integrator =
-      integrator_maker({options.integrator, options.min_depth, options.max_depth, control_options(options.control)});
-  return load_scene(options.scene, load_options);
+  load_options.integrator_properties = integrator_properties(options.light);
+  const bool tolerates_light = !load_options.integrator_properties.empty() || !options.integrator.empty();
+  load_options.make_integrator = integrator_maker(
+      {options.integrator, options.min_depth, options.max_depth, control_options(options.control), tolerates_light});
+  LoadedScene scene = load_scene(options.scene, load_options);
+  check_light_options(options.light, scene, options.integrator);
+  return scene;
 }
 
 Plan make_plan(const RenderOptions& options) {
@@ -257,6 +261,7 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
       ->group(kControlGroup);
   command.add_option("--load-training", o.load_training, "File of coefficients to use in place of a training")
       ->group(kControlGroup);
+  add_light_options(command, o.light);
   add_estimator_options(command, o.estimator, estimator_names());
 }
 

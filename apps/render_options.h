@@ -12,6 +12,7 @@
 
 #include "control_options.h"
 #include "estimator_options.h"
+#include "light_options.h"
 #include "plans/plan.h"
 #include "plans/render.h"
 
@@ -23,12 +24,15 @@ struct RenderOptions {
   std::string crn_part = "both", debug_strategies;
   EstimatorOptions estimator;
   ControlTexts control;
+  LightOptions light;
   std::vector<std::string> defines;
   std::optional<uint32_t> spp;
   std::optional<int> groups, min_depth, max_depth;
   uint64_t seed = 0;
   int threads = 0;
   double seconds = 0, checkpoint_seconds = 300;
+  /// One sample or light path is printed instead of rendering.
+  bool is_replay() const { return !replay.empty() || light.replay; }
   bool resume = false, overwrite = false, aovs = false, quiet = false, preview = true;
 };
 

@@ -10,7 +10,9 @@
 
 #include "commands.h"
 #include "core/shell_text.h"
+#include "film/splat_layer.h"
 #include "integrators/controlled_path.h"
+#include "integrators/light_pass.h"
 #include "plans/budget.h"
 #include "plans/memory.h"
 #include "progress.h"
@@ -26,6 +28,16 @@ double peak_memory_bytes() {
 
 const char* sampling_name(const Pass& pass) { return pass.settings.sampling == Sampling::kCrn ? "crn" : "independent"; }
 
+/// What decides on the weights of strategies beside the scene: whether light is traced, and for how many pixels.
+void add_light_words(const RenderOptions& o, const Pass& pass, std::vector<std::string>& words) {
+  if (!dynamic_cast<const LightTracingIntegrator*>(pass.integrator.get())) return;
+  LightOptions light = o.light;
+  light.light_tracing = light_tracer(*pass.integrator) ? "on" : "off";
+  const std::vector<std::string> of_light = option_words(light);
+  words.insert(words.end(), of_light.begin(), of_light.end());
+  if (!o.crop.empty()) words.insert(words.end(), {"--crop", o.crop});
+}
+
 /// Command that repeats one sample of a pass: the user's own, with the sample in place of the outputs.
 std::string replay_command(const RenderOptions& o, const Pass& pass, const BadSample& bad) {
   std::vector<std::string> words = {"covary", "render", o.scene};
@@ -38,9 +50,14 @@ std::string replay_command(const RenderOptions& o, const Pass& pass, const BadSa
   if (o.min_depth) add("--min-depth", std::to_string(*o.min_depth));
   if (o.max_depth) add("--max-depth", std::to_string(*o.max_depth));
   if (!o.rfilter.empty()) add("--rfilter", o.rfilter);
-  add("--sampling", sampling_name(pass));
+  add_light_words(o, pass, words);
+  if (!pass.plan.light) add("--sampling", sampling_name(pass));
   if (pass.settings.sampling == Sampling::kCrn && o.crn_part != "both") add("--crn-part", o.crn_part);
   add("--seed", std::to_string(o.seed));
+  if (pass.plan.light) {
+    add("--replay-light", std::to_string(bad.sample));
+    return shell_text(words);
+  }
   add("--replay", fmt::format("{},{},{}", bad.x, bad.y, bad.sample) +
                       (pass.plan.number ? fmt::format(",{}", pass.plan.number) : ""));
   return shell_text(words);
@@ -71,30 +88,46 @@ const ControlledPath* trained_integrator(const LoadedScene& scene) {
 void report_bad_samples(const RenderOptions& options, const Pass& pass) {
   const PassResult& result = pass.result;
   if (result.bad_samples.empty()) return;
-  fmt::print(stderr, "warning: {} samples were not finite and {} negative; they count as black. The first:\n",
-             result.n_not_finite, result.n_negative);
+  const bool light = pass.plan.light;
+  fmt::print(stderr, "warning: {} {} were not finite and {} negative; they count as black. The first:\n",
+             result.n_not_finite, light ? "splats of light paths" : "samples", result.n_negative);
   for (const BadSample& bad : result.bad_samples)
-    fmt::print(stderr, "  pixel ({}, {}), sample {}: ({}, {}, {})\n    {}\n", bad.x, bad.y, bad.sample, bad.value.r,
-               bad.value.g, bad.value.b, replay_command(options, pass, bad));
+    fmt::print(stderr, "  pixel ({}, {}), {} {}: ({}, {}, {})\n    {}\n", bad.x, bad.y, light ? "light path" : "sample",
+               bad.sample, bad.value.r, bad.value.g, bad.value.b, replay_command(options, pass, bad));
 }
+
+namespace {
+
+nlohmann::ordered_json statistics_of(const Pass& pass) {
+  nlohmann::ordered_json json = {{"sampling", sampling_name(pass)}};
+  if (pass.plan.light)
+    json["light_paths"] = light_paths(pass.film);
+  else
+    json["samples_per_pixel"] = pass.film.mean_count();
+  json["groups"] = pass.film.groups();
+  json["samples"] = pass.result.n_samples;
+  json["rays"] = pass.result.n_rays;
+  json["seconds"] = pass.result.seconds;
+  return json;
+}
+
+}  // namespace
 
 nlohmann::ordered_json statistics(const RenderReport& report) {
   const auto& [options, scene, result, load_seconds, threads] = report;
   const RenderRequest request = make_request(options, scene);
   const CropWindow window = window_of(scene, request);
-  const double samples = result.sum([](const Pass& p) { return p.result.n_samples; });
+  const double samples = result.camera_sum([](const Pass& p) { return p.result.n_samples; });
   const double rays = result.sum([](const Pass& p) { return p.result.n_rays; });
   const double rate = 1 / std::max(result.render_seconds(), 1e-9);
   nlohmann::ordered_json passes = nlohmann::json::array(), bad = nlohmann::json::array();
   for (const Pass& pass : result.passes) {
-    passes.push_back({{"sampling", sampling_name(pass)},
-                      {"samples_per_pixel", pass.film.mean_count()},
-                      {"groups", pass.film.groups()},
-                      {"samples", pass.result.n_samples},
-                      {"rays", pass.result.n_rays},
-                      {"seconds", pass.result.seconds}});
+    passes.push_back(statistics_of(pass));
     for (const BadSample& b : pass.result.bad_samples)
-      bad.push_back({{"x", b.x}, {"y", b.y}, {"sample", b.sample}, {"replay", replay_command(options, pass, b)}});
+      bad.push_back({{"x", b.x},
+                     {"y", b.y},
+                     {pass.plan.light ? "light_path" : "sample", b.sample},
+                     {"replay", replay_command(options, pass, b)}});
   }
   nlohmann::ordered_json json = {
       {"version", COVARY_VERSION},
@@ -139,6 +172,7 @@ nlohmann::ordered_json statistics(const RenderReport& report) {
                                 {"times_coarsened", controlled->cache().n_coarsened()},
                                 {"samples_not_finite", controlled->cache().n_rejected()},
                                 {"memory_bytes", controlled->training_bytes()}};
+  if (const Pass* light = light_pass(result.passes)) json["light_paths"] = light_paths(light->film);
   if (result.predicted_relmse) {
     json["predicted_relmse"] = *result.predicted_relmse;
     json["predicted_relmse_reliable"] = fewest_reliable_samples(report) == 0;
@@ -150,14 +184,16 @@ nlohmann::ordered_json statistics(const RenderReport& report) {
 void print_summary(const RenderReport& report) {
   const auto& [options, scene, result, load_seconds, threads] = report;
   std::string samples;
-  for (const Pass& pass : result.passes)
+  for (const Pass& pass : camera_passes(result.passes))
     samples += fmt::format("{}{:g} {}", samples.empty() ? "" : " + ", pass.film.mean_count(), pass.plan.name);
+  samples += " samples per pixel";
+  if (const Pass* light = light_pass(result.passes))
+    samples += fmt::format(" + {} light paths", format_count(static_cast<double>(light_paths(light->film))));
   const double seconds = std::max(result.render_seconds(), 1e-9);
-  fmt::print(stderr,
-             "{}: {} x {}, {} samples per pixel in {:.2f} s (load {:.2f} s, build {:.2f} s, {} samples/s, {} rays/s)\n",
+  fmt::print(stderr, "{}: {} x {}, {} in {:.2f} s (load {:.2f} s, build {:.2f} s, {} samples/s, {} rays/s)\n",
              options.output, result.passes[0].film.width(), result.passes[0].film.height(), samples, seconds,
              load_seconds, scene.scene->build_seconds(),
-             format_count(result.sum([](const Pass& p) { return p.result.n_samples; }) / seconds),
+             format_count(result.camera_sum([](const Pass& p) { return p.result.n_samples; }) / seconds),
              format_count(result.sum([](const Pass& p) { return p.result.n_rays; }) / seconds));
   if (const ControlledPath* controlled = trained_integrator(scene)) {
     fmt::print(stderr, "control variates in {} cells, {} of them switched off, from {} samples per pixel in {:.2f} s\n",

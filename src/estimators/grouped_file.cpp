@@ -10,6 +10,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "film/splat_layer.h"
 
 namespace covary {
 namespace {
@@ -167,6 +168,8 @@ void GroupedFile::add_file(const std::string& path, const std::string& layer, bo
   agree("sampling", sampling_);
   agree("scene_hash", scene_hash_);
   agree("settings", settings_);
+  agree(film_key::kLightPaths, light_paths_per_sample_);
+  agree(film_key::kLight, light_film_);
 }
 
 void GroupedFile::read_rows(int first_row, int n_rows, Rows& rows) const {

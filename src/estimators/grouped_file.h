@@ -33,6 +33,9 @@ class GroupedFile {
   /// Attributes of covary's films, "" for other files.
   const std::string& scene_hash() const { return scene_hash_; }
   const std::string& settings() const { return settings_; }
+  /// A light film (film/splat_layer.h); an image to which one was added.
+  bool is_light_film() const { return !light_paths_per_sample_.empty(); }
+  bool has_light_added() const { return !light_film_.empty(); }
   /// Whether a channel has 16 bits only.
   bool has_half() const { return has_half_; }
   /// For messages.
@@ -60,7 +63,7 @@ class GroupedFile {
   std::vector<Group> groups_;
   ImagePlace place_;
   double samples_ = 0, samples_of_group_ = 0;
-  std::string sampling_, scene_hash_, settings_, name_;
+  std::string sampling_, scene_hash_, settings_, light_paths_per_sample_, light_film_, name_;
   bool has_half_ = false, has_counts_ = false, has_variance_ = false;
 };
 

@@ -11,6 +11,7 @@
 
 #include "film/film_file.h"
 #include "film/groups.h"
+#include "film/splat_layer.h"
 
 namespace covary {
 namespace {
@@ -64,11 +65,25 @@ std::string aov_names(const Film& film) {
   return text;
 }
 
+std::string kind_of(const Attributes& film) {
+  if (!attribute(film, film_key::kLightPaths).empty()) return "light paths";
+  return attribute(film, film_key::kLight).empty() ? "camera samples" : "camera samples with a light film added";
+}
+
+/// Films of light paths and of camera samples are two parts of an image.
+void check_light(const Attributes& a, const Attributes& b, const std::string& name_a, const std::string& name_b) {
+  if (kind_of(a) != kind_of(b))
+    throw Error(ErrorCode::kInput, fmt::format("films cannot be merged: {} holds {}, {} holds {}; merge each kind "
+                                               "alone, 'covary combine --light' adds a light film to an image",
+                                               name_a, kind_of(a), name_b, kind_of(b)));
+}
+
 /// What all films share, plus the seeds; `order` becomes the films' indices by their smallest seeds.
 Attributes merge_attributes(std::span<const Attributes> films, std::span<const std::string> names,
                             std::vector<size_t>& order) {
   std::map<uint64_t, size_t> owner;  // seed -> film
   for (size_t i = 0; i < films.size(); ++i) {
+    check_light(films[0], films[i], names[0], names[i]);
     for (const char* key : {film_key::kSampling, film_key::kSceneHash, film_key::kSettings, film_key::kLightPaths})
       check_same(key, attribute(films[0], key), attribute(films[i], key), names[0], names[i]);
     for (uint64_t seed : seeds_of(films[i], names[i])) {

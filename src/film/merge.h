@@ -17,8 +17,8 @@ namespace covary {
 /// Throws Error(kInput) when the films differ in frame, crop, groups, sampling, scene hash, settings or the list of
 /// auxiliary images, or when two share a seed, because then they hold the same samples; and when films of common random
 /// numbers have counts that would move the groups of pixels differently, which then would not share their random
-/// numbers any more. `names` stand for the films in error messages. Of the attributes those remain that all films
-/// share, and all seeds; `complete` is "true" when all are.
+/// numbers any more; and when light films and others are mixed. `names` stand for the films in error messages. Of the
+/// attributes those remain that all films share, and all seeds; `complete` is "true" when all are.
 Film merge_films(std::span<const Film> films, std::span<const std::string> names);
 
 /// The same for films in files, of which only one is in memory at a time.

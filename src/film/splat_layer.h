@@ -21,6 +21,10 @@ namespace covary {
 
 inline constexpr uint32_t kBundlePaths = 256;
 
+namespace film_key {
+inline constexpr const char* kLight = "light_film";  ///< "added": an image that is a film and a light film together
+}  // namespace film_key
+
 /// Light paths in a light film.
 inline uint64_t light_paths(const Film& film) {
   return film.counts().empty() ? 0 : uint64_t{film.count(0, 0)} * kBundlePaths;

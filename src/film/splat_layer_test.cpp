@@ -162,8 +162,13 @@ TEST(SplatLayer, FilmsOfTwoSeedsMergeByTheirLightPaths) {
     EXPECT_NEAR(merged.data()[i], (a.data()[i] + 2.0 * b.data()[i]) / 3, 1e-6 * merged.data()[i]);
   Film camera = light_film(12, 3);
   const Film mixed[] = {a, camera};
-  EXPECT_TRUE(
-      contains(message_of([&] { merge_films(mixed, names); }), "light_paths_per_sample differs: '256' in a, ''"));
+  EXPECT_TRUE(contains(message_of([&] { merge_films(mixed, names); }, ErrorCode::kInput),
+                       "a holds light paths, b holds camera samples; merge each kind alone"));
+  Film sum = light_film(12, 4);
+  sum.attributes[film_key::kLight] = "added";
+  const Film images[] = {camera, sum};
+  EXPECT_TRUE(contains(message_of([&] { merge_films(images, names); }),
+                       "a holds camera samples, b holds camera samples with a light film added"));
 }
 
 TEST(SplatLayer, BadSplatsAreCountedAndLeftOut) {

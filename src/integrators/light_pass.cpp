@@ -51,8 +51,7 @@ SplatPixel LightPaths::pixel_at(Vec2 film, Vec2 u) const {
 }
 
 void LightTracingIntegrator::fix_light_tracing(uint64_t n_pixels, bool beside_crn) {
-  const bool on = settings_.mode == LightTracing::kOn || (settings_.mode == LightTracing::kAuto && !beside_crn);
-  paths_per_spp_ = on ? settings_.paths_per_sample * static_cast<double>(n_pixels) : 0;
+  paths_per_spp_ = wants_light_pass(beside_crn) ? settings_.paths_per_sample * static_cast<double>(n_pixels) : 0;
 }
 
 std::string LightTracingIntegrator::light_tracing_text() const {

@@ -69,6 +69,10 @@ class LightTracingIntegrator : public Integrator {
   /// Says how the integrator is used: `n_pixels` are rendered, and `beside_crn` says whether some of them with common
   /// random numbers. Called after prepare() and before description() or any tracing; without it, no light is traced.
   void fix_light_tracing(uint64_t n_pixels, bool beside_crn);
+  /// What fix_light_tracing() decides.
+  bool wants_light_pass(bool beside_crn) const {
+    return settings_.mode == LightTracing::kOn || (settings_.mode == LightTracing::kAuto && !beside_crn);
+  }
   /// Whether there is a light pass beside the camera's. Where not, strategies that join a light path to the lens have
   /// weight 0.
   bool traces_light() const { return paths_per_spp_ > 0; }

@@ -73,10 +73,24 @@ class Loader {
     result_.warnings = diagnostics_.warnings();
     diagnostics_.throw_if_errors();
     result_.read_seconds = watch.seconds();
+    result_.has_delta_lights_and_surfaces = has_delta_lights() && has_delta_surfaces();
     result_.scene = std::make_unique<Scene>(std::move(parts_));
   }
 
  private:
+  bool has_delta_lights() const {
+    return std::any_of(parts_.emitters.begin(), parts_.emitters.end(), [](const auto& e) { return e->is_delta(); });
+  }
+  bool has_delta_surfaces() const {
+    const auto any = [](const std::vector<ShapePtr>& shapes) {
+      return std::any_of(shapes.begin(), shapes.end(), [](const ShapePtr& shape) {
+        return shape->bsdf() && shape->bsdf()->flags() & (kDeltaReflection | kDeltaTransmission);
+      });
+    };
+    return any(parts_.shapes) || std::any_of(parts_.instances.begin(), parts_.instances.end(),
+                                             [&](const Instance& instance) { return any(instance.group->shapes); });
+  }
+
   // ---- what can be made in parallel ----
 
   void collect_jobs() {
@@ -344,7 +358,12 @@ class Loader {
     integrator_ = object;
     result_.integrator_type = object->type;
     if (!options_.make_integrator) return;
-    Parameters p(*object, factory_, diagnostics_);
+    ObjectDescription changed = *object;
+    for (const Property& property : options_.integrator_properties) {
+      std::erase_if(changed.properties, [&](const Property& p) { return p.name == property.name; });
+      changed.properties.push_back(property);
+    }
+    Parameters p(changed, factory_, diagnostics_);
     result_.integrator = make_checked(p, options_.make_integrator);
   }
 

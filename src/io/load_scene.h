@@ -19,6 +19,8 @@ struct LoadOptions {
   /// Makes the integrator from the scene's <integrator> element, so that its mistakes are reported with all others.
   /// When empty, the element is only kept in LoadedScene::integrator_type.
   std::function<std::shared_ptr<SceneObject>(Parameters&)> make_integrator;
+  /// Take the place of properties of the <integrator> element, or are added to it.
+  std::vector<Property> integrator_properties;
 };
 
 struct LoadedScene {
@@ -29,6 +31,9 @@ struct LoadedScene {
   int spp = 4;                  ///< of the scene's sampler
   std::string integrator_type;  ///< "" when the file names none
   std::shared_ptr<SceneObject> integrator;
+  /// There are lights that are a point or a direction, and mirrors or smooth glass: light of the former by way of the
+  /// latter is only found by paths from the lights.
+  bool has_delta_lights_and_surfaces = false;
   std::vector<std::string> warnings;
   std::vector<std::string> files;  ///< paths of all files that the scene's file names and that were read
   double read_seconds = 0;         ///< parsing and reading files; Scene::build_seconds() comes on top

@@ -91,6 +91,7 @@ Plan adaptive_plan(const Estimator& estimator, std::optional<int> groups) {
   plan.estimator = estimator.text;
   plan.predicts_error = estimator.predicts_error;
   plan.takes_unfinished = is_pair;
+  plan.has_crn_pass = is_pair;
   plan.estimate = mean_of_last;
   if (is_pair) {
     plan.estimate_bytes_per_pixel = estimator.bytes_per_pixel;

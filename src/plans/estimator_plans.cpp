@@ -51,6 +51,7 @@ Plan plain_plan(Sampling sampling, std::optional<int> groups) {
   Plan plan;
   plan.name = plan.estimator = "none";
   plan.film_is_image = plan.predicts_error = true;
+  plan.has_crn_pass = sampling == Sampling::kCrn;
   plan.estimate = mean_of_first;
   Phase phase;
   phase.passes = [=](const PlanState& state) {
@@ -94,6 +95,7 @@ Plan pair_plan(const PairMethod& method) {
   Plan plan;
   plan.name = method.name;
   plan.estimator = method.estimator;
+  plan.has_crn_pass = true;
   plan.predicts_error = method.predicts_error;
   plan.groups_follow_speed = !method.groups;
   plan.estimate_bytes_per_pixel = method.bytes_per_pixel;

@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "integrators/controlled_path.h"
+#include "integrators/light_pass.h"
 
 namespace covary {
 
@@ -21,6 +22,7 @@ std::function<std::shared_ptr<SceneObject>(Parameters&)> integrator_maker(const 
       parameters.error(unknown_integrator(parameters.type()));
       return nullptr;
     }
+    if (choice.tolerates_light) LightTracingSettings::from(parameters), parameters.get_string("heuristic", "");
     const std::shared_ptr<Integrator> integrator = plugin->make(parameters, lengths);
     if (choice.control) {
       auto* controlled = dynamic_cast<ControlledPath*>(integrator.get());

@@ -18,6 +18,9 @@ struct IntegratorChoice {
   std::optional<int> max_depth;  ///< largest number of path edges; < 0: no limit
   /// For `controlled-path`; an error with another integrator where anything is given.
   std::optional<ControlOptions> control;
+  /// Settings of light tracing are no mistake where the chosen integrator traces none: they are those of options, which
+  /// the caller checks, or of an element whose integrator another one replaces.
+  bool tolerates_light = false;
 };
 
 /// For LoadOptions::make_integrator.

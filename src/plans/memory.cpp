@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "plans/budget.h"
+#include "plans/light_plan.h"
 #include "plans/render.h"
 
 namespace covary {
@@ -13,17 +14,21 @@ namespace {
 
 constexpr double kImageBytes = 3 * sizeof(float);  // per pixel
 constexpr int kAuxiliaryImages = 3;
+constexpr double kSplatBytes = 16e6;  // of a round of light paths, about
 
 }  // namespace
 
 RenderMemory render_memory(const Plan& plan, std::span<const PassPlan> passes, int width, int height, bool aovs) {
   const double n_pixels = static_cast<double>(width) * height;
   RenderMemory memory;
-  for (const PassPlan& pass : passes)
-    memory.films += n_pixels * ((pass.groups + (pass.sample_variance ? 1 : 0)) * kImageBytes + sizeof(uint32_t));
+  for (const PassPlan& pass : passes) {
+    const double film = n_pixels * ((pass.groups + (pass.sample_variance ? 1 : 0)) * kImageBytes + sizeof(uint32_t));
+    memory.films += film + (pass.light ? kSplatBytes : 0);
+    if (pass.light && plan.film_is_image) memory.estimate += film;  // the sum of both films
+  }
   if (aovs) memory.films += n_pixels * kAuxiliaryImages * kImageBytes;
   // A picture for a viewer or the preview.
-  memory.estimate = n_pixels * (plan.estimate_bytes_per_pixel + kImageBytes);
+  memory.estimate += n_pixels * (plan.estimate_bytes_per_pixel + kImageBytes);
   return memory;
 }
 
@@ -34,6 +39,7 @@ RenderMemory render_memory(const LoadedScene& scene, const Plan& plan, const Ren
   std::vector<PassPlan> passes;
   for (const Phase& phase : plan.phases)
     for (const PassPlan& pass : phase.passes(state)) passes.push_back(pass);
+  if (has_light_pass(scene, plan)) passes.push_back(light_pass_plan(plan, passes));
   return render_memory(plan, passes, window.width, window.height, request.aovs);
 }
 

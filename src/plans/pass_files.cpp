@@ -12,6 +12,7 @@
 #include "core/error.h"
 #include "film/film_file.h"
 #include "film/output_file.h"
+#include "film/splat_layer.h"
 #include "plans/pass_costs.h"
 
 namespace covary {
@@ -67,8 +68,13 @@ void resume(const RenderRequest& request, Pass& pass) {
   if (film.groups() != groups && !any_groups) differs("groups", std::to_string(film.groups()), std::to_string(groups));
   if (pass.plan.sample_variance && !film.keeps_sample_variance())
     differs("variances of samples", "not kept", "kept ones");
-  for (const char* key : {film_key::kSceneHash, film_key::kSampling, film_key::kSeed, film_key::kSettings})
-    if (film.attributes[key] != attributes.at(key)) differs(key, film.attributes[key], attributes.at(key));
+  const auto wanted = [&](const char* key) {
+    const auto it = attributes.find(key);
+    return it == attributes.end() ? std::string() : it->second;
+  };
+  for (const char* key : {film_key::kSceneHash, film_key::kSampling, film_key::kSeed, film_key::kSettings,
+                          film_key::kLightPaths, film_key::kLight})
+    if (film.attributes[key] != wanted(key)) differs(key, film.attributes[key], wanted(key));
   film.attributes = attributes;
   film.aovs.clear();
   pass.film = std::move(film);
@@ -77,7 +83,7 @@ void resume(const RenderRequest& request, Pass& pass) {
 }  // namespace
 
 bool output_is_film(const Plan& plan, const RenderRequest& request) {
-  return plan.film_is_image && request.passes.empty();
+  return plan.film_is_image && !plan.traces_light && request.passes.empty();
 }
 
 fs::path passes_folder(const RenderRequest& request) {

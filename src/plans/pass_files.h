@@ -12,7 +12,7 @@
 
 namespace covary {
 
-/// Whether the result's file is the film itself.
+/// Whether the result's file is the film itself, which can be continued.
 bool output_is_film(const Plan& plan, const RenderRequest& request);
 
 /// Where the films are while the plan runs; empty where the request names no file.

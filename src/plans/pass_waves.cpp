@@ -2,6 +2,11 @@
 #include "plans/pass_waves.h"
 
 #include <algorithm>
+#include <optional>
+#include <utility>
+
+#include "film/splat_layer.h"
+#include "integrators/light_pass.h"
 
 namespace covary {
 namespace {
@@ -17,21 +22,57 @@ void add(const PassResult& from, PassResult& to) {
 }
 
 /// Part of the pass that is done.
-double fraction(const Pass& pass) { return static_cast<double>(pass.count) / pass.settings.spp.largest(); }
+double fraction(const Pass& pass) {
+  return pass.count / (pass.plan.light ? pass.wanted : static_cast<double>(pass.settings.spp.largest()));
+}
+
+bool is_complete(const Pass& pass) { return pass.count >= pass.settings.spp.largest(); }
+
+/// What is counted for the caller: camera samples and light paths that are missing.
+uint64_t missing(const Pass& pass) {
+  if (!pass.plan.light) return pass.settings.spp.missing(pass.film);
+  const uint32_t target = pass.settings.spp.largest();
+  return uint64_t{target - std::min(target, pass.count)} * kBundlePaths;
+}
+
+/// The pass that is farthest behind; null when all are complete.
+Pass* next_pass(std::span<Pass> passes) {
+  Pass* next = nullptr;
+  for (Pass& pass : passes)
+    if (!is_complete(pass) && (!next || fraction(pass) < fraction(*next))) next = &pass;
+  return next;
+}
+
+/// Samples of a light film at the end of the next round: at most as many more as the pass took in such a time, because
+/// what a round gathers is of use only when it is complete.
+uint32_t light_limit(const Pass& pass, std::optional<double> seconds) {
+  const auto groups = static_cast<uint32_t>(pass.film.groups());
+  const uint32_t end = light_round_end(pass.count, pass.film.groups());
+  if (!seconds) return end;
+  const double speed = static_cast<double>(pass.result.n_samples) / kBundlePaths / std::max(pass.result.seconds, 1e-9);
+  const double n_groups = std::min<double>(*seconds * speed / groups, (end - pass.count) / groups);
+  return pass.count + static_cast<uint32_t>(n_groups) * groups;
+}
+
+PassResult render_wave(const Scene& scene, const Pass& pass, const PassSettings& settings, Film& film) {
+  if (!pass.plan.light) return render_pass(scene, *pass.integrator, settings, film);
+  return render_light_pass(scene, *light_tracer(*pass.integrator), settings, film);
+}
 
 }  // namespace
 
 uint64_t render_passes(const Scene& scene, std::span<Pass> passes, const WaveLimits& limits) {
   uint64_t total = 0;
-  for (const Pass& pass : passes) total += pass.settings.spp.missing(pass.film);
+  for (const Pass& pass : passes) total += missing(pass);
   uint64_t done = 0;
   const auto stopped = [&] { return limits.stop && limits.stop->load(); };
   for (;;) {
-    Pass& pass = *std::min_element(passes.begin(), passes.end(),
-                                   [](const Pass& a, const Pass& b) { return fraction(a) < fraction(b); });
-    if (pass.count >= pass.settings.spp.largest() || stopped()) return done;
+    Pass* const next = next_pass(passes);
+    if (!next || stopped()) return done;
+    Pass& pass = *next;
     PassSettings wave = pass.settings;
     if (!wave.estimate) wave.limit = wave_end(pass.count, pass.film.groups());
+    if (pass.plan.light) wave.limit = light_limit(pass, {});
     wave.stop = limits.stop;
     wave.checkpoint = wave.estimate ? limits.wave : nullptr;  // that wave is all there is
     wave.progress = [&](uint64_t now, uint64_t) {
@@ -40,13 +81,17 @@ uint64_t render_passes(const Scene& scene, std::span<Pass> passes, const WaveLim
     if (limits.seconds_left && pass.count > 0) {  // the pass that is farthest behind
       wave.seconds = limits.seconds_left();
       if (wave.seconds <= 0) return done;
+      if (pass.plan.light) {
+        wave.limit = light_limit(pass, std::exchange(wave.seconds, 0));
+        if (wave.limit == pass.count) return done;
+      }
     }
-    const PassResult result = render_pass(scene, *pass.integrator, wave, pass.film);
+    const PassResult result = render_wave(scene, pass, wave, pass.film);
     add(result, pass.result);
     done += result.n_samples;
     if (!result.complete) return done;  // interrupted, or out of time
     pass.count = pass.settings.spp.reached(pass.film);
-    pass.result.complete = pass.count >= pass.settings.spp.largest();
+    pass.result.complete = is_complete(pass);
     if (limits.wave) limits.wave();
   }
 }

@@ -15,12 +15,12 @@ struct WaveLimits {
   const std::atomic<bool>* stop = nullptr;  ///< stop at the next tile
   /// Where given, asked before each wave once every pixel has samples of every pass: seconds that are left.
   std::function<double()> seconds_left;
-  std::function<void(uint64_t done, uint64_t total)> progress;  ///< samples of all passes together
+  std::function<void(uint64_t done, uint64_t total)> progress;  ///< samples and light paths of all passes together
   std::function<void()> wave;                                   ///< called between waves
 };
 
 /// Renders all passes up to their settings.spp. The pass with the smallest part of its samples is next, one wave at a
-/// time, so that the passes advance together. Returns the samples taken.
+/// time, so that the passes advance together. Returns the samples and light paths taken.
 uint64_t render_passes(const Scene& scene, std::span<Pass> passes, const WaveLimits& limits);
 
 }  // namespace covary

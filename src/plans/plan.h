@@ -35,6 +35,9 @@ struct PassPlan {
   int fewest_groups = 0;
   bool sample_variance = false;  ///< the film keeps the variance of samples
   PixelEstimate estimate;        ///< PassSettings::estimate
+  /// A light pass (integrators/light_pass.h): the film's samples are bundles of light paths, and the number in its
+  /// random numbers is kLightPass + number.
+  bool light = false;
   std::string
       settings;  ///< of the pass, added to the integrator's in the film's attribute: all that changes its samples
   std::string estimator;  ///< attribute of the film where the pass itself makes the image; may be empty
@@ -51,7 +54,10 @@ struct Pass {
   Film film;
   std::string path;    ///< the file that keeps the film; empty where none does
   uint32_t count = 0;  ///< samples that every pixel has which is to have so many
-  PassResult result;   ///< of all calls together, earlier ones included where a folder of passes keeps them
+  /// Of a light pass: the samples that keep step with the camera's, which may be more than a film can hold where only
+  /// time ends the render.
+  double wanted = 0;
+  PassResult result;  ///< of all calls together, earlier ones included where a folder of passes keeps them
 };
 
 /// What phases read.
@@ -66,7 +72,7 @@ struct PlanState {
   uint32_t group_budget = 0;  ///< the budget that decides how many groups there are; stays
   /// With a limit of time, what is left of it when a phase's targets are set, for all that follows.
   std::optional<double> seconds_left;
-  std::vector<Pass> passes;   ///< of this phase and all before it, in the order of the plan
+  std::vector<Pass> passes;  ///< of this phase and all before it, in the order of the plan
 
   /// The pass of this name and number. Throws Error(kInternal) where none has begun.
   const Pass& pass(const std::string& name, uint32_t number = 0) const;
@@ -84,6 +90,9 @@ struct Phase {
   std::function<void(const PlanState&, std::span<Pass>)> set_targets;
 };
 
+/// What render() makes of a plan whose integrator traces light: a pass "light" beside those of the last phase, which
+/// advances with them, and whose film is added to the image (light_plan.h). Phases and estimate() see the passes of
+/// camera samples alone.
 struct Plan {
   std::string name;       ///< of the estimator, for messages
   std::string estimator;  ///< the same with its options, for the image's attribute
@@ -94,11 +103,18 @@ struct Plan {
   double estimate_bytes_per_pixel = 0;  ///< memory that estimate() takes beside the films, about
   bool takes_unfinished = false;        ///< estimate() works where pixels of a film still have no samples
   bool film_is_image = false;           ///< the film of the one pass is the result; estimate() only serves its error
+  bool has_crn_pass = false;            ///< some pass takes common random numbers
+  bool traces_light = false;            ///< set by render(): there is a light pass
   bool predicts_error = false;          ///< estimate() gives a standard error
   bool fixed_samples = false;           ///< the number of samples must be known before: no limits of time or error
   /// With a time limit, the speed is measured before the passes begin, so that there are no more groups than samples.
   bool groups_follow_speed = false;
 };
+
+/// The passes without the light pass, which is the last where there is one.
+std::span<const Pass> camera_passes(std::span<const Pass> passes);
+/// The light pass, or null.
+const Pass* light_pass(std::span<const Pass> passes);
 
 /// Group means and counts of some rows of a film.
 GroupedImage rows_of(const Film& film, int first_row, int n_rows);

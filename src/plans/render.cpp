@@ -8,12 +8,15 @@
 
 #include "core/error.h"
 #include "core/stopwatch.h"
+#include "estimators/light_film.h"
 #include "estimators/predicted_error.h"
+#include "film/splat_layer.h"
 #include "integrators/aov.h"
 #include "integrators/light_pass.h"
 #include "integrators/training.h"
 #include "plans/budget.h"
 #include "plans/folder_lock.h"
+#include "plans/light_plan.h"
 #include "plans/memory.h"
 #include "plans/pass_files.h"
 #include "plans/pass_waves.h"
@@ -37,18 +40,6 @@ std::string filter_text(const FilterSettings& filter) {
       return fmt::format("gaussian radius={} stddev={}", filter.radius, filter.stddev);
   }
   throw Error(ErrorCode::kInternal, "unknown reconstruction filter");
-}
-
-/// The scene's integrator, prepared for it. Throws Error(kUsage) where it does not fit the request.
-std::shared_ptr<const Integrator> integrator_of(const LoadedScene& scene, const RenderRequest& request) {
-  auto integrator = std::dynamic_pointer_cast<Integrator>(scene.integrator);
-  COVARY_CHECK(integrator, "the scene was loaded with an integrator");
-  if (request.crn_part != CrnPart::kBoth && !dynamic_cast<const LightTracingIntegrator*>(integrator.get()))
-    throw Error(ErrorCode::kUsage,
-                "the paths of this integrator have no light part that could have numbers of its own; "
-                "integrators that trace light have");
-  integrator->prepare(*scene.scene);
-  return integrator;
 }
 
 /// Trains the scene's integrator if it learns. False when stopped.
@@ -82,7 +73,9 @@ class PlanRun {
         callbacks_(callbacks),
         window_(window_of(scene, request)),
         filter_(request.filter.value_or(scene.filter)),
-        state_{scene, request, callbacks.stop, integrator_of(scene, request), 0, 0, {}} {}
+        state_{scene, request, callbacks.stop, prepared_integrator(scene, plan, request), 0, 0, {}} {
+    plan_.traces_light = has_light_pass(scene, plan);
+  }
 
   RenderResult run();
 
@@ -94,8 +87,10 @@ class PlanRun {
   double seconds_left(size_t phase, double share);
   void begin_phase(const Phase& phase);
   Pass begin_pass(const PassPlan& plan) const;
+  EstimatorResult estimate_rows(int first_row, int n_rows) const;
   void between_waves();
   void warn_of_other_samples(uint32_t asked) const;
+  void warn_of_missing_light() const;
   void estimate();
   double time_estimate();
   void render_auxiliary_images();
@@ -126,7 +121,7 @@ class PlanRun {
   }
 
   const LoadedScene& scene_;
-  const Plan& plan_;
+  Plan plan_;
   const RenderRequest& request_;
   const RenderCallbacks& callbacks_;
   const CropWindow window_;
@@ -164,7 +159,16 @@ void PlanRun::write_files() {
     remove_passes(plan_, request_, result_.passes);
 }
 
+void PlanRun::warn_of_missing_light() const {
+  if (plan_.traces_light || !scene_.has_delta_lights_and_surfaces || !callbacks_.warning ||
+      !dynamic_cast<const LightTracingIntegrator*>(state_.integrator.get()))
+    return;
+  callbacks_.warning(
+      "without light tracing the image lacks what mirrors and glass cast of lights that are a point or a direction");
+}
+
 bool PlanRun::render_to_limits() {
+  warn_of_missing_light();
   const Stopwatch training;
   if (!train(scene_, request_, {window_, filter_, callbacks_.stop, callbacks_.progress, {}})) return false;
   result_.seconds.train = training.seconds();
@@ -205,7 +209,8 @@ bool PlanRun::render_phase(size_t index, double share) {
   if (passes.empty()) return false;  // interrupted before its films were made
   if (index + 1 == plan_.phases.size() && request_.aovs && result_.aovs.empty()) render_auxiliary_images();
   if (timed()) state_.seconds_left = request_.seconds - watch_.seconds();
-  phase.set_targets(state_, passes);
+  phase.set_targets(state_, passes.first(camera_passes(passes).size()));
+  if (passes.back().plan.light) set_light_target(*state_.integrator, camera_passes(state_.passes), passes.back());
   for (Pass& pass : passes) pass.count = pass.settings.spp.reached(pass.film);
   if (index + 1 == plan_.phases.size() && !timed() && request_.until == 0) warn_of_other_samples(state_.budget);
   WaveLimits limits;
@@ -222,16 +227,19 @@ void PlanRun::begin_phase(const Phase& phase) {
   first_of_phase_.push_back(state_.passes.size());
   if (phase.prepare) phase.prepare(state_);
   if (stopped()) return;
-  const std::vector<PassPlan> plans = phase.passes(state_);
+  std::vector<PassPlan> plans = phase.passes(state_);
   COVARY_CHECK(!plans.empty(), "a phase has passes");
+  const bool is_last = first_of_phase_.size() == plan_.phases.size();
+  if (plan_.traces_light && is_last) plans.push_back(light_pass_plan(plan_, plans));
   std::vector<PassPlan> all = plans;
   for (const Pass& pass : state_.passes) all.push_back(pass.plan);
   check_memory(render_memory(plan_, all, window_.width, window_.height, request_.aovs), window_.width, window_.height);
-  for (const PassPlan& plan : plans) {
+  for (PassPlan& plan : plans) {
+    if (plan.light) plan.groups = light_groups(plan_, std::span(state_.passes).subspan(first_of_phase_.back()));
     for (const Pass& other : state_.passes)
-      COVARY_CHECK(
-          other.plan.id() != plan.id() && (other.plan.sampling != plan.sampling || other.plan.number != plan.number),
-          "passes '" + other.plan.id() + "' and '" + plan.id() + "' of a plan have identities of their own");
+      COVARY_CHECK(other.plan.id() != plan.id() && (other.plan.sampling != plan.sampling ||
+                                                    other.plan.number != plan.number || other.plan.light != plan.light),
+                   "passes '" + other.plan.id() + "' and '" + plan.id() + "' of a plan have identities of their own");
     state_.passes.push_back(begin_pass(plan));
   }
 }
@@ -243,7 +251,7 @@ Pass PlanRun::begin_pass(const PassPlan& plan) const {
   pass.settings.sampling = plan.sampling;
   pass.settings.crn_part = request_.crn_part;
   pass.settings.seed = request_.seed;
-  pass.settings.pass = plan.number;
+  pass.settings.pass = plan.light ? kLightPass + plan.number : plan.number;
   pass.settings.filter = filter_;
   pass.settings.estimate = plan.estimate;
   pass.path = pass_path(plan_, request_, plan);
@@ -257,6 +265,7 @@ Pass PlanRun::begin_pass(const PassPlan& plan) const {
   pass.film.attributes.insert_or_assign(film_key::kSettings, state_.integrator->description() + "; filter " +
                                                                  filter_text(filter_) + number + plan.settings);
   pass.film.attributes.insert_or_assign(film_key::kComplete, "false");
+  if (plan.light) pass.film.attributes.insert_or_assign(film_key::kLightPaths, std::to_string(kBundlePaths));
   if (!plan.estimator.empty()) pass.film.attributes.insert_or_assign("estimator", plan.estimator);
   take_film_on_disk(request_, callbacks_.warning, pass);
   return pass;
@@ -273,7 +282,7 @@ void PlanRun::between_waves() {
 
 void PlanRun::warn_of_other_samples(uint32_t asked) const {
   double planned = 0;
-  for (const Pass& pass : state_.passes) {
+  for (const Pass& pass : camera_passes(state_.passes)) {
     if (pass.settings.spp.is_map()) return;  // its numbers are about what was asked for, or limited by other options
     planned += pass.settings.spp.largest();
   }
@@ -282,9 +291,15 @@ void PlanRun::warn_of_other_samples(uint32_t asked) const {
                                    planned, asked, state_.passes[0].film.groups()));
 }
 
+EstimatorResult PlanRun::estimate_rows(int first_row, int n_rows) const {
+  EstimatorResult image = plan_.estimate(camera_passes(state_.passes), first_row, n_rows);
+  if (const Pass* light = light_pass(state_.passes)) add_light(rows_of(light->film, first_row, n_rows), image);
+  return image;
+}
+
 void PlanRun::estimate() {
   const Stopwatch watch;
-  EstimatorResult image = plan_.estimate(state_.passes, 0, window_.height);
+  EstimatorResult image = estimate_rows(0, window_.height);
   if (!image.std_error.data.empty()) result_.predicted_relmse = predicted_relmse(image);
   if (request_.until > 0 && !result_.predicted_relmse)
     throw Error(ErrorCode::kUsage, "an error can only be predicted from 2 or more groups");
@@ -298,7 +313,7 @@ double PlanRun::time_estimate() {
   if (plan_.film_is_image) return 0;  // a mean
   const Stopwatch watch;
   const int height = window_.height, n_rows = std::min(height, std::max(kTrialRows, height / 8));
-  plan_.estimate(state_.passes, (height - n_rows) / 2, n_rows);
+  estimate_rows((height - n_rows) / 2, n_rows);
   const double seconds = watch.seconds();
   result_.seconds.trial += seconds;
   return seconds * height / n_rows;
@@ -306,7 +321,7 @@ double PlanRun::time_estimate() {
 
 void PlanRun::render_auxiliary_images() {
   const Stopwatch watch;
-  Pass& last = state_.passes.back();
+  Pass& last = state_.passes[camera_passes(state_.passes).size() - 1];
   render_aovs(*scene_.scene, filter_, last.settings.sampling, last.settings.seed, last.settings.pass, kAovSamples,
               last.film, callbacks_.stop);
   result_.aovs = std::exchange(last.film.aovs, {});
@@ -343,21 +358,26 @@ RenderResult render(const LoadedScene& scene, const Plan& plan, const RenderRequ
 
 Image preview_of(std::span<const Pass> passes) {
   if (passes.empty()) return {};
-  Image image = passes[0].film.mean_image();
+  const std::span<const Pass> cameras = camera_passes(passes);
+  const Pass* light = light_pass(passes);
+  Image image = cameras[0].film.mean_image();
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x) {
-      double samples = passes[0].film.count(x, y);
-      for (const Pass& pass : passes.subspan(1)) {
+      double samples = cameras[0].film.count(x, y);
+      for (const Pass& pass : cameras.subspan(1)) {
         const Spectrum next = pass.film.mean(x, y);
         samples += pass.film.count(x, y);
         const auto part = static_cast<float>(pass.film.count(x, y) / std::max(samples, 1.0));
         for (int c = 0; c < 3; ++c) image.pixel(x, y)[c] += part * (next[c] - image.pixel(x, y)[c]);
       }
+      const Spectrum splats = light ? light->film.mean(x, y) : Spectrum(0);
+      for (int c = 0; c < 3; ++c) image.pixel(x, y)[c] += splats[c];
     }
   return image;
 }
 
-ReplayedSample replay(const LoadedScene& scene, const RenderRequest& request, const SampleAddress& address) {
+ReplayedSample replay(const LoadedScene& scene, const Plan& plan, const RenderRequest& request,
+                      const SampleAddress& address) {
   if (address.x < 0 || address.y < 0 || address.x >= scene.width || address.y >= scene.height)
     throw Error(ErrorCode::kUsage, fmt::format("pixel ({}, {}) is outside the {} x {} frame", address.x, address.y,
                                                scene.width, scene.height));
@@ -367,9 +387,23 @@ ReplayedSample replay(const LoadedScene& scene, const RenderRequest& request, co
   settings.seed = request.seed;
   settings.pass = address.pass;
   settings.filter = request.filter.value_or(scene.filter);
-  const auto integrator = integrator_of(scene, request);
+  const auto integrator = prepared_integrator(scene, plan, request);
   train(scene, request, {window_of(scene, request), settings.filter, nullptr, nullptr, {}});
   return replay_sample(*scene.scene, *integrator, settings, address.x, address.y, address.sample);
+}
+
+ReplayedLightPath replay_light(const LoadedScene& scene, const Plan& plan, const RenderRequest& request,
+                               uint64_t path) {
+  const auto integrator = prepared_integrator(scene, plan, request);
+  const LightTracingIntegrator* tracer = light_tracer(*integrator);
+  if (!tracer)
+    throw Error(ErrorCode::kUsage,
+                fmt::format("there are no light paths: '{}' traces none here", integrator->description()));
+  PassSettings settings;
+  settings.seed = request.seed;
+  settings.pass = kLightPass;
+  settings.filter = request.filter.value_or(scene.filter);
+  return replay_light_path(*scene.scene, *tracer, settings, window_of(scene, request), path);
 }
 
 }  // namespace covary

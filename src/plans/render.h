@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "integrators/light_pass.h"
 #include "plans/plan.h"
 
 namespace covary {
@@ -46,7 +47,7 @@ struct RenderRequest {
 struct RenderCallbacks {
   /// The render ends at the next tile once this is true; may be set from a signal handler.
   const std::atomic<bool>* stop = nullptr;
-  /// After each tile, from any thread; must be thread-safe. `total` counts the samples of the current phase.
+  /// After each tile, from any thread; must be thread-safe. Counts the samples and light paths of the current phase.
   std::function<void(uint64_t done, uint64_t total)> progress;
   /// Between waves, when films may be read, and once in about half a second in passes of a single wave.
   std::function<void(std::span<const Pass>)> wave;
@@ -82,8 +83,13 @@ struct RenderResult {
     for (const Pass& pass : passes) total += static_cast<double>(value(pass));
     return total;
   }
+  /// The same of camera samples alone.
+  template <typename F>
+  double camera_sum(F value) const {
+    return sum([&](const Pass& pass) { return pass.plan.light ? 0 : value(pass); });
+  }
   double samples_per_pixel() const {
-    return sum([](const Pass& p) { return p.film.mean_count(); });
+    return camera_sum([](const Pass& p) { return p.film.mean_count(); });
   }
   /// Time of the passes and auxiliary images, without what estimates inside passes took.
   double render_seconds() const {
@@ -105,7 +111,7 @@ struct RenderResult {
 RenderResult render(const LoadedScene& scene, const Plan& plan, const RenderRequest& request,
                     const RenderCallbacks& callbacks = {});
 
-/// The mean of all samples so far: a picture for a viewer while passes go on.
+/// The mean of all samples so far, and the light film: a picture for a viewer while passes go on.
 Image preview_of(std::span<const Pass> passes);
 
 /// One sample of a pass.
@@ -115,8 +121,13 @@ struct SampleAddress {
   int x = 0, y = 0;   ///< pixel in the full frame
   uint64_t sample = 0;
 };
-/// The value of the sample, as render() adds it to a film with this request's seed and filter. Throws Error(kUsage) for
-/// a pixel outside the frame.
-ReplayedSample replay(const LoadedScene& scene, const RenderRequest& request, const SampleAddress& address);
+/// The value of the sample, as render() adds it to a film of the plan with this request's seed, filter and crop. Throws
+/// Error(kUsage) for a pixel outside the frame.
+ReplayedSample replay(const LoadedScene& scene, const Plan& plan, const RenderRequest& request,
+                      const SampleAddress& address);
+
+/// What the light path of this number adds to the film of the plan's light pass. Throws Error(kUsage) where there is
+/// none.
+ReplayedLightPath replay_light(const LoadedScene& scene, const Plan& plan, const RenderRequest& request, uint64_t path);
 
 }  // namespace covary

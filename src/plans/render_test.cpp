@@ -121,9 +121,9 @@ TEST(Render, ReplayGivesTheSampleOfThePassOfThatNumber) {
     return std::vector{pass};
   };
   const Film film = render(scene, plan, request).passes[0].film;
-  EXPECT_EQ(replay(scene, request, {Sampling::kIndependent, 3, 11, 13, 0}).value, film.mean(11, 13));
-  EXPECT_NE(replay(scene, request, {Sampling::kIndependent, 0, 11, 13, 0}).value, film.mean(11, 13));
-  EXPECT_THROW(replay(scene, request, {Sampling::kIndependent, 3, 40, 13, 0}), Error);
+  EXPECT_EQ(replay(scene, plan, request, {Sampling::kIndependent, 3, 11, 13, 0}).value, film.mean(11, 13));
+  EXPECT_NE(replay(scene, plan, request, {Sampling::kIndependent, 0, 11, 13, 0}).value, film.mean(11, 13));
+  EXPECT_THROW(replay(scene, plan, request, {Sampling::kIndependent, 3, 40, 13, 0}), Error);
 }
 
 /// A CRN pass of 12 samples, then an independent one that has more samples the brighter the first image is.

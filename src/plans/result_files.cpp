@@ -9,6 +9,7 @@
 #include "estimators/result_file.h"
 #include "film/film_file.h"
 #include "film/image_writer.h"
+#include "plans/light_plan.h"
 
 namespace covary {
 
@@ -18,12 +19,17 @@ std::string preview_path(const std::string& output) {
 
 void write_result_files(const Plan& plan, const RenderRequest& request, RenderResult& result) {
   if (request.output.empty()) return;
-  Film& film = result.passes.back().film;
+  Film& last = result.passes[camera_passes(result.passes).size() - 1].film;
   if (plan.film_is_image) {
+    const Pass* light = light_pass(result.passes);
+    Film sum;
+    if (light) sum = sum_of_films(last, light->film);
+    Film& film = light ? sum : last;
     film.attributes[film_key::kComplete] = result.interrupted ? "false" : "true";
     film.aovs = result.aovs;
     write_film(request.output, film);
   } else {
+    const Film& film = last;
     std::map<std::string, std::string> attributes;
     for (const char* key :
          {film_key::kSeed, film_key::kSceneHash, film_key::kSettings, film_key::kVersion, film_key::kCommand})

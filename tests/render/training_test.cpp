@@ -242,7 +242,8 @@ TEST(Training, ARenderByAPlanTrainsFirst) {
   EXPECT_TRUE(same_bits(film, render(other, 2, 7)));
   EXPECT_TRUE(film.attributes.at(film_key::kSettings).starts_with(other.integrator().description() + ";"));
 
-  const ReplayedSample replayed = replay(scene.loaded, request, {.x = 11, .y = 13, .sample = 1});
+  const ReplayedSample replayed =
+      replay(scene.loaded, plain_plan(Sampling::kIndependent), request, {.x = 11, .y = 13, .sample = 1});
   PassSettings settings;
   settings.seed = 7, settings.filter = other.loaded.filter;
   EXPECT_EQ(replayed.value, replay_sample(other.scene(), other.integrator(), settings, 11, 13, 1).value);

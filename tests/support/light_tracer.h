@@ -14,6 +14,26 @@
 
 namespace covary::test_support {
 
+/// A scene of a diffuse corner with a lamp, a point light and a ball, the camera looking along +z.
+inline std::string corner_text(int width, int height, const std::string& rfilter,
+                               const std::string& type = "perspective", const std::string& sensor = "") {
+  return "<scene version='3.0.0'><integrator type='path'/><sensor type='" + type + "'>" + sensor +
+         "<film type='hdrfilm'><integer name='width' value='" + std::to_string(width) +
+         "'/><integer name='height' value='" + std::to_string(height) + "'/><rfilter type='" + rfilter +
+         "'/></film></sensor>"
+         "<shape type='rectangle'><transform name='to_world'><scale value='4'/><rotate y='1' angle='180'/>"
+         "<translate z='6'/></transform></shape>"
+         "<shape type='rectangle'><transform name='to_world'><scale value='4'/><rotate x='1' angle='-90'/>"
+         "<translate y='-1' z='4'/></transform></shape>"
+         "<shape type='sphere'><point name='center' x='0.4' y='-0.4' z='4'/><float name='radius' value='0.6'/>"
+         "<bsdf type='diffuse'><rgb name='reflectance' value='0.8, 0.4, 0.2'/></bsdf></shape>"
+         "<shape type='rectangle'><transform name='to_world'><scale value='0.5'/><rotate x='1' angle='120'/>"
+         "<translate x='-0.8' y='1' z='4.4'/></transform><emitter type='area'><rgb name='radiance' value='6, 5, 4'/>"
+         "</emitter></shape>"
+         "<emitter type='point'><point name='position' x='1.5' y='1' z='3'/><rgb name='intensity' value='1, 2, 4'/>"
+         "</emitter></scene>";
+}
+
 class LightTracer final : public LightTracingIntegrator {
  public:
   /// lengths.max_depth should be small: there is no roulette for light paths.
