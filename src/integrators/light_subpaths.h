@@ -193,7 +193,8 @@ bool LightSubpaths::scatter(const Parts& parts, const BidirectionalMis& mis, con
   if (!next.valid() || is_black(next.weight)) return false;
   path.throughput *= next.weight * parts.adjoint_factor(wo, next.wi, ng);
   if (roulette) {
-    const float survival = parts.survival_probability(path.throughput * path.scale, 1, random.sampling());
+    // As for independent numbers also where they are common: all pixels then share the subpath, whatever its length.
+    const float survival = parts.survival_probability(path.throughput * path.scale, 1, Sampling::kIndependent);
     if (random.get_1d(vertex, Event::kRoulette) < survival)
       path.throughput *= parts.survivor_weight(survival);
     else if (std::isnan(survival))
