@@ -19,7 +19,7 @@
 namespace covary {
 
 struct BoundOptions {
-  int window = 15;  ///< side of the square around a pixel, odd, 3 … 63
+  int window = 7;  ///< side of the square around a pixel, odd, 3 … 63
   /// sigma of the pixel itself for all pixels of its window, as the paper has it, instead of each one's own. Weights
   /// then do not favour pixels whose samples happened to be dark, and so to vary little.
   bool common_sigma = true;
