@@ -237,7 +237,9 @@ void add_compare(CLI::App& app) {
   command->add_option(
       "--reference2", o->reference2,
       "A second reference with samples of its own: products (F - R1)(F - R2) cancel the references' noise");
-  command->add_option("-m,--metric", o->metrics, "relmse, mse, mae, mape, flip, above5; several separated by commas")
+  command
+      ->add_option("-m,--metric", o->metrics,
+                   "relmse, relmse-trimmed, mse, mae, mape, flip, above5; several separated by commas")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->capture_default_str();

@@ -3,9 +3,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "film/flip.h"
 
@@ -61,9 +63,43 @@ double pixel_error(Metric metric, const Pixel& p) {
       return sum > kPerceptible * brightness ? 1 : 0;
     }
     case Metric::kFlip:
+    case Metric::kRelMseTrimmed:
       break;
   }
-  throw Error(ErrorCode::kInternal, "FLIP is not a sum over single pixels");
+  throw Error(ErrorCode::kInternal, "not a sum over single pixels");
+}
+
+/// Relative squared errors of single values, by the value's own reference; 0 where pixels are left out.
+std::vector<double> channel_errors(const Image& image, std::span<const Image> references,
+                                   const std::vector<char>& finite) {
+  std::vector<double> errors(3 * finite.size());
+  for (size_t p = 0; p < finite.size(); ++p) {
+    if (!finite[p]) continue;
+    const Pixel pixel(image, references, p);
+    for (size_t c = 0; c < 3; ++c)
+      errors[3 * p + c] =
+          (pixel.f[c] - pixel.r1[c]) * (pixel.f[c] - pixel.r2[c]) / (pixel.r[c] * pixel.r[c] + kRelativeOffset);
+  }
+  return errors;
+}
+
+/// kRelMseTrimmed: the largest values do not count.
+Image trimmed_map(const Image& image, std::span<const Image> references, const std::vector<char>& finite,
+                  uint64_t n_pixels) {
+  std::vector<double> errors = channel_errors(image, references, finite);
+  const auto n_dropped = static_cast<size_t>(kTrimmedPart * 3 * static_cast<double>(n_pixels));
+  std::vector<size_t> order(errors.size());
+  std::iota(order.begin(), order.end(), size_t{0});
+  // Equal values: those of later pixels are dropped first.
+  std::nth_element(order.begin(), order.end() - static_cast<ptrdiff_t>(n_dropped), order.end(),
+                   [&](size_t a, size_t b) { return errors[a] != errors[b] ? errors[a] < errors[b] : a < b; });
+  for (size_t i = order.size() - n_dropped; i < order.size(); ++i) errors[order[i]] = 0;
+  Image map(image.width, image.height, 1);
+  const double scale =
+      static_cast<double>(n_pixels) / (3 * static_cast<double>(n_pixels) - static_cast<double>(n_dropped));
+  for (size_t p = 0; p < finite.size(); ++p)
+    map.data[p] = static_cast<float>((errors[3 * p] + errors[3 * p + 1] + errors[3 * p + 2]) * scale);
+  return map;
 }
 
 /// FLIP looks at neighbourhoods: pixels that are left out become equal in both images.
@@ -89,6 +125,9 @@ const std::vector<MetricInfo>& metrics() {
   static const std::vector<MetricInfo> all{
       {Metric::kRelMse, "relmse", "1/(3N) sum ||F - R||^2 / (R'^2 + 0.01), R' = mean of R's RGB",
        "1/(3N) sum (F - R1).(F - R2) / (R'^2 + 0.01), R' = mean of (R1 + R2)/2's RGB"},
+      {Metric::kRelMseTrimmed, "relmse-trimmed",
+       "mean over pixels and channels of (F - R)^2 / (R^2 + 0.01), without the largest 0.1 %",
+       "mean over pixels and channels of (F - R1)(F - R2) / (R^2 + 0.01), R = (R1 + R2)/2, without the largest 0.1 %"},
       {Metric::kMse, "mse", "1/(3N) sum ||F - R||^2", "1/(3N) sum (F - R1).(F - R2)"},
       {Metric::kMae, "mae", "1/(3N) sum |F - R|", "1/(3N) sum |F - (R1 + R2)/2|"},
       {Metric::kMape, "mape", "1/(3N) sum |F - R| / (|R| + 0.01)",
@@ -126,16 +165,17 @@ MetricResult compute_metric(Metric metric, const Image& image, std::span<const I
     throw Error(ErrorCode::kInput,
                 fmt::format("none of the {} pixels is finite in the image and the reference", n_pixels));
 
-  result.map = metric == Metric::kFlip ? flip_map(image, references, finite, low_dynamic_range)
-                                       : Image(image.width, image.height, 1);
+  const bool by_pixels = metric != Metric::kFlip && metric != Metric::kRelMseTrimmed;
+  result.map = metric == Metric::kFlip            ? flip_map(image, references, finite, low_dynamic_range)
+               : metric == Metric::kRelMseTrimmed ? trimmed_map(image, references, finite, result.n_pixels)
+                                                  : Image(image.width, image.height, 1);
   double sum = 0;
   for (size_t p = 0; p < n_pixels; ++p) {
     if (!finite[p]) {
       result.map.data[p] = std::numeric_limits<float>::quiet_NaN();
       continue;
     }
-    const double error =
-        metric == Metric::kFlip ? result.map.data[p] : pixel_error(metric, Pixel(image, references, p));
+    const double error = by_pixels ? pixel_error(metric, Pixel(image, references, p)) : result.map.data[p];
     result.map.data[p] = static_cast<float>(error);
     sum += error;
   }

@@ -19,7 +19,10 @@ inline constexpr double kRelativeOffset = 0.01;
 /// Relative error of a pixel that kAbove5 counts, as perceptible [Csonka2002] Sec. 6.
 inline constexpr double kPerceptible = 0.05;
 
-enum class Metric { kRelMse, kMse, kMae, kMape, kFlip, kAbove5 };
+/// Part of the values, the largest ones, that kRelMseTrimmed leaves out [Hua2023] Sec. 7.
+inline constexpr double kTrimmedPart = 0.001;
+
+enum class Metric { kRelMse, kRelMseTrimmed, kMse, kMae, kMape, kFlip, kAbove5 };
 
 struct MetricInfo {
   Metric metric;
@@ -39,7 +42,9 @@ struct MetricResult {
   double value = 0;           ///< mean over the finite pixels
   uint64_t n_pixels = 0;      ///< finite pixels
   uint64_t n_non_finite = 0;  ///< pixels with a value that is not finite in F, R1 or R2; left out
-  Image map;  ///< 1 channel: the error of each pixel, whose mean is `value`; not-a-number where left out
+  /// 1 channel: the error of each pixel, whose mean is `value`; not-a-number where left out. What kRelMseTrimmed leaves
+  /// out is 0 here.
+  Image map;
 };
 
 /// Images of equal size with 3 channels, linear RGB. `references`: one or two. For FLIP, `low_dynamic_range` chooses

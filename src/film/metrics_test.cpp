@@ -61,6 +61,25 @@ TEST(Metrics, CountsPixelsAboveFivePercent) {
   EXPECT_EQ(value(Metric::kAbove5, above, {low, high}), 0) << "0.1 of 3.1";
 }
 
+// 1,000 pixels: 3 of the 3,000 values are dropped, whichever pixels they belong to.
+TEST(Metrics, TrimmedRelMseLeavesOutTheLargestValues) {
+  std::vector<float> values(3000, 1.0f), reference(3000, 1.0f);
+  for (size_t i = 0; i < values.size(); i += 10) values[i] = 1.1f;
+  const Image r = image_of(reference);
+  values[5] = 100, values[1001] = 50, values[1002] = -50;
+  EXPECT_NEAR(value(Metric::kRelMseTrimmed, image_of(values), {r}), 300 * 0.01 / 1.01 / 2997, 1e-8);
+  values[2222] = 3;
+  EXPECT_NEAR(value(Metric::kRelMseTrimmed, image_of(values), {r}), (300 * 0.01 + 4) / 1.01 / 2997, 1e-8);
+  const MetricResult result = compute_metric(Metric::kRelMseTrimmed, image_of(values), std::vector{r});
+  EXPECT_EQ(result.map.data[1], 0) << "the pixel with 100";
+  EXPECT_GT(result.map.data[740], 0) << "the pixel with 3";
+  // By the value's own reference, not by the pixel's mean.
+  EXPECT_NEAR(value(Metric::kRelMseTrimmed, image_of({2, 2, 2}), {image_of({1, 2, 4})}), (1 / 1.01 + 4 / 16.01) / 3,
+              1e-7);
+  EXPECT_NEAR(value(Metric::kRelMseTrimmed, image_of({2, 2, 2}), {image_of({1, 2, 4}), image_of({1.5f, 3, 3})}),
+              (0.5 / (1.25 * 1.25 + 0.01) + 2 / (3.5 * 3.5 + 0.01)) / 3, 1e-7);
+}
+
 TEST(Metrics, TwoReferencesWorkedOutByHand) {
   const Image f = image_of({2, 2, 2}), r1 = image_of({1, 2, 4}), r2 = image_of({1.5f, 3, 3});
   const double products = 1 * 0.5 + 0 * -1 + -2 * -1, grey = (1.25 + 2.5 + 3.5) / 3;
@@ -103,7 +122,8 @@ TEST(Metrics, NonFinitePixelsAreLeftOutAndCounted) {
 TEST(Metrics, NamesAndSizes) {
   for (const MetricInfo& info : metrics()) EXPECT_EQ(find_metric(info.name).metric, info.metric);
   EXPECT_TRUE(contains(message_of([] { find_metric("relmsee"); }),
-                       "unknown metric 'relmsee'; did you mean 'relmse'?; accepted are relmse, mse, mae, mape, flip"));
+                       "unknown metric 'relmsee'; did you mean 'relmse'?; accepted are relmse, relmse-trimmed, mse, "
+                       "mae, mape, flip"));
   EXPECT_TRUE(contains(message_of([] { value(Metric::kMse, Image(4, 3, 3), {Image(3, 4, 3)}); }),
                        "the image has 4 x 3 pixels, the reference 3 x 4"));
 }

@@ -18,7 +18,7 @@ namespace {
 
 /// Errors of one image that are kept: the rest costs less than reading them.
 struct ImageErrors {
-  double mae = 0, flip = 0, above5 = 0, predicted_relmse = kNone;
+  double relmse_trimmed = kNone, mae = 0, flip = 0, above5 = 0, predicted_relmse = kNone;
 };
 
 /// relMSE that the file's standard errors predict, with the references in the denominator; none where it has no such
@@ -50,13 +50,14 @@ double number_or_none(const nlohmann::json& json, const char* name) {
 ImageErrors image_errors(const Image& image, const std::string& path, const SceneInstance& scene,
                          const std::vector<Image>& references, const Cache& cache, const std::string& key) {
   if (const std::optional<nlohmann::json> kept = cache.read_json("measures", key + ".json"))
-    return {number_or_none(*kept, "mae"), number_or_none(*kept, "flip"), number_or_none(*kept, "above5"),
-            number_or_none(*kept, "predicted_relmse")};
-  const ImageErrors errors{
-      compute_metric(Metric::kMae, image, references).value, compute_metric(Metric::kFlip, image, references).value,
-      compute_metric(Metric::kAbove5, image, references).value, predicted_relmse(path, scene, references)};
+    return {number_or_none(*kept, "relmse_trimmed"), number_or_none(*kept, "mae"), number_or_none(*kept, "flip"),
+            number_or_none(*kept, "above5"), number_or_none(*kept, "predicted_relmse")};
+  const auto error = [&](Metric metric) { return compute_metric(metric, image, references).value; };
+  const ImageErrors errors{error(Metric::kRelMseTrimmed), error(Metric::kMae), error(Metric::kFlip),
+                           error(Metric::kAbove5), predicted_relmse(path, scene, references)};
   cache.write_json("measures", key + ".json",
-                   {{"mae", errors.mae},
+                   {{"relmse_trimmed", errors.relmse_trimmed},
+                    {"mae", errors.mae},
                     {"flip", errors.flip},
                     {"above5", errors.above5},
                     {"predicted_relmse", errors.predicted_relmse}});
@@ -192,7 +193,8 @@ void measure(Cell& cell, const SceneInstance& scene, const std::vector<Image>& r
     images[s] = read_window(run.record.image, scene);
     const std::string key = key_text(run_keys[s] + " " + reference_key);
     const ImageErrors errors = image_errors(images[s], run.record.image, scene, references, cache, key);
-    run.mae = errors.mae, run.flip = errors.flip, run.above5 = errors.above5;
+    run.relmse_trimmed = errors.relmse_trimmed, run.mae = errors.mae, run.flip = errors.flip,
+    run.above5 = errors.above5;
     run.predicted_relmse = errors.predicted_relmse;
   });
   cell.split = split_error(images, references);
@@ -201,6 +203,7 @@ void measure(Cell& cell, const SceneInstance& scene, const std::vector<Image>& r
     cell.runs[s].mse = cell.split.absolute.of_render[s];
     cell.runs[s].mean_ratio = cell.split.mean_ratio_of_render[s];
   }
+  cell.relmse_trimmed = mean_estimate(values_of(cell, [](const RunResult& r) { return r.relmse_trimmed; }));
   cell.mae = mean_estimate(values_of(cell, [](const RunResult& r) { return r.mae; }));
   cell.flip = mean_estimate(values_of(cell, [](const RunResult& r) { return r.flip; }));
   cell.above5 = mean_estimate(values_of(cell, [](const RunResult& r) { return r.above5; }));

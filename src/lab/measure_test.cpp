@@ -79,6 +79,8 @@ TEST_F(Measure, ErrorsAndTimesAreThoseOfTheRuns) {
   // The seeds' mean is 1.15. Variance: sum of squares around it, over n - 1.
   EXPECT_NEAR(cell.split.absolute.variance.value, 2 * 0.05 * 0.05, 1e-6);
   EXPECT_NEAR(cell.split.absolute.squared_bias.value, 0.2 * 0.1, 1e-6);
+  EXPECT_NEAR(cell.runs[1].relmse_trimmed, 0.01 * kWeight, 1e-6);
+  EXPECT_NEAR(cell.relmse_trimmed.value, 0.025 * kWeight, 1e-6);
   EXPECT_NEAR(cell.mae.value, 0.15, 1e-6);
   EXPECT_NEAR(cell.mae_of_mean, 0.15, 1e-6);
   EXPECT_EQ(cell.above5.value, 1);

@@ -206,6 +206,7 @@ Json quality_table(const Results& results, size_t budget) {
                column("share", "Bias share", "percent"),
                column("variance", "Variance", "number"),
                column("mean", "Image mean / reference", "number"),
+               column("trimmed", "relMSE, trimmed", "number"),
                column("mae", "MAE", "number"),
                column("flip", "FLIP", "number"),
                column("above5", "Pixels above 5 %", "percent"),
@@ -218,6 +219,7 @@ Json quality_table(const Results& results, size_t budget) {
     row["share"] = number(split.squared_bias.value / split.error.value);
     row["variance"] = value_of(split.variance);
     row["mean"] = value_of(cell.split.mean_ratio);
+    row["trimmed"] = value_of(cell.relmse_trimmed);
     row["mae"] = value_of(cell.mae);
     row["flip"] = value_of(cell.flip);
     row["above5"] = number(cell.above5.value);

@@ -42,6 +42,7 @@ Json json_of(const RunResult& run) {
   const RunRecord& r = run.record;
   return {{"seed", run.seed},
           {"relmse", number(run.relmse)},
+          {"relmse_trimmed", number(run.relmse_trimmed)},
           {"mse", number(run.mse)},
           {"mae", number(run.mae)},
           {"flip", number(run.flip)},
@@ -72,6 +73,7 @@ Json json_of(const Cell& cell, const Results& results) {
           {"pixels", cell.split.n_pixels},
           {"non_finite_pixels", cell.split.n_non_finite},
           {"relmse", json_of(cell.split.relative)},
+          {"relmse_trimmed", json_of(cell.relmse_trimmed)},
           {"mse", json_of(cell.split.absolute)},
           {"mae", mae},
           {"flip", flip},

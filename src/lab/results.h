@@ -18,7 +18,7 @@ namespace covary::lab {
 struct RunResult {
   uint64_t seed = 0;
   RunRecord record;
-  double relmse = 0, mse = 0, mae = 0, flip = 0, above5 = 0, mean_ratio = 0;
+  double relmse = 0, relmse_trimmed = 0, mse = 0, mae = 0, flip = 0, above5 = 0, mean_ratio = 0;
   double predicted_relmse = kNone;  ///< from the run's own standard errors, where it has them
 };
 
@@ -30,7 +30,7 @@ struct Cell {
   size_t scene = 0, method = 0, budget = 0;  ///< indices into the suite
   std::vector<RunResult> runs;               ///< by seed, as in the suite
   ErrorSplit split;
-  Estimate mae, flip, above5;
+  Estimate relmse_trimmed, mae, flip, above5;
   double mae_of_mean = kNone, flip_of_mean = kNone;  ///< of the mean image of all runs
   Estimate load_seconds, render_seconds, estimate_seconds, then_seconds;
   Estimate method_seconds;  ///< render + estimate + then

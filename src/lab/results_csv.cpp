@@ -46,6 +46,7 @@ void add_cell(Table& table, const Cell& cell) {
   table.add("mse", cell.split.absolute.error);
   table.add("mse_squared_bias", cell.split.absolute.squared_bias);
   table.add("mse_variance", cell.split.absolute.variance);
+  table.add("relmse_trimmed", cell.relmse_trimmed);
   table.add("mae", cell.mae);
   table.add("mae_of_mean", cell.mae_of_mean);
   table.add("flip", cell.flip);
@@ -71,6 +72,7 @@ void add_cell(Table& table, const Cell& cell) {
 
 void add_run(Table& table, const RunResult& run) {
   table.add("relmse", run.relmse);
+  table.add("relmse_trimmed", run.relmse_trimmed);
   table.add("mse", run.mse);
   table.add("mae", run.mae);
   table.add("flip", run.flip);
