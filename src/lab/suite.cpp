@@ -106,6 +106,9 @@ std::vector<std::string> validate(const Suite& suite) {
   for (const MethodEntry& method : suite.methods)
     check_options("method '" + method.name + "'", method.options, problems);
   check_options("common_options", suite.common_options, problems);
+  for (const std::string& word : suite.common_options)
+    if (word.substr(0, word.find('=')) == "--estimator")
+      problems.emplace_back("common_options: '--estimator' belongs to methods; references are plain means");
   std::vector<std::string> methods;
   for (const MethodEntry& m : suite.methods) methods.push_back(m.name);
   if (!suite.methods.empty() && !suite.method(suite.baseline))

@@ -93,6 +93,15 @@ TEST(Suite, ReportsAllMistakesWithTheirLines) {
     EXPECT_TRUE(contains(message, part));
 }
 
+TEST(Suite, CommonOptionsHaveNoEstimator) {
+  Suite suite = parse_suite(kSuite, "suite.json");
+  for (const char* option : {"--estimator", "--estimator=none"}) {
+    suite.common_options = {option, "--rfilter", "box"};
+    EXPECT_EQ(validate(suite),
+              std::vector<std::string>{"common_options: '--estimator' belongs to methods; references are plain means"});
+  }
+}
+
 TEST(Suite, ReportsWhatIsNotJson) {
   EXPECT_TRUE(contains(message_of([] { parse_suite("{\n  \"name\": \"x\",\n  oops\n}", "bad.json"); }),
                        "bad.json:3: not JSON near"));
