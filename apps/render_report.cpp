@@ -13,6 +13,7 @@
 #include "film/splat_layer.h"
 #include "integrators/controlled_path.h"
 #include "integrators/light_pass.h"
+#include "integrators/training.h"
 #include "plans/budget.h"
 #include "plans/memory.h"
 #include "progress.h"
@@ -83,6 +84,12 @@ const ControlledPath* trained_integrator(const LoadedScene& scene) {
   return controlled && controlled->settings().on() ? controlled : nullptr;
 }
 
+/// Samples per pixel of the training; 0 without one, and where a file took its place.
+uint32_t training_samples_taken(const RenderReport& report) {
+  const auto* learning = dynamic_cast<const LearningIntegrator*>(report.scene.integrator.get());
+  return learning && report.options.load_training.empty() ? learning->trained_spp() : 0;
+}
+
 }  // namespace
 
 void report_bad_samples(const RenderOptions& options, const Pass& pass) {
@@ -139,6 +146,7 @@ nlohmann::ordered_json statistics(const RenderReport& report) {
       {"height", window.height},
       {"estimator", make_estimator(options.estimator).text},
       {"samples_per_pixel", result.samples_per_pixel()},
+      {"training_samples_per_pixel", training_samples_taken(report)},
       {"seed", options.seed},
       {"threads", threads},
       {"complete", result.complete},

@@ -40,9 +40,9 @@ RunRecord record_of(const nlohmann::json& stats) {
   RunRecord record;
   const nlohmann::json seconds = stats.value("seconds", nlohmann::json::object());
   record.load_seconds = seconds.value("load", 0.0) + seconds.value("build", 0.0);
-  record.render_seconds = seconds.value("render", 0.0) + seconds.value("trial", 0.0);
+  record.render_seconds = seconds.value("render", 0.0) + seconds.value("trial", 0.0) + seconds.value("train", 0.0);
   record.estimate_seconds = seconds.value("estimate", 0.0);
-  record.samples_per_pixel = stats.value("samples_per_pixel", 0.0);
+  record.samples_per_pixel = stats.value("samples_per_pixel", 0.0) + stats.value("training_samples_per_pixel", 0.0);
   record.peak_memory_bytes = stats.value("peak_memory_bytes", 0.0);
   return record;
 }

@@ -30,12 +30,12 @@ class Options(CliTest):
     def test_counts_training_as_samples_and_reports_it(self):
         self.good(*PLAIN, "--spp", "12", "-o", "a.exr", "--json", "a.json")
         report = json.loads((self.path / "a.json").read_text())
-        self.assertEqual(report["samples_per_pixel"], 8)
+        self.assertEqual((report["samples_per_pixel"], report["training_samples_per_pixel"]), (8, 4))
         self.assertGreater(report["control_variates"]["cells"], 10)
         self.assertGreater(report["seconds"]["train"], 0)
         self.good(*RENDER, "--cv", "off", "--estimator", "none", "--spp", "12", "-o", "b.exr", "--json", "b.json")
         report = json.loads((self.path / "b.json").read_text())
-        self.assertEqual(report["samples_per_pixel"], 12)
+        self.assertEqual((report["samples_per_pixel"], report["training_samples_per_pixel"]), (12, 0))
         self.assertNotIn("control_variates", report)
 
     def test_warns_of_cells_that_grew(self):
@@ -83,7 +83,8 @@ class TrainingFiles(CliTest):
     def test_take_the_place_of_a_training(self):
         self.good(*PLAIN, "--spp", "4", "-o", "b.exr", "--load-training", "a.training", "--json", "b.json")
         self.assertEqual(read_exr((self.path / "a.exr").read_bytes()), read_exr((self.path / "b.exr").read_bytes()))
-        self.assertEqual(json.loads((self.path / "b.json").read_text())["samples_per_pixel"], 4)
+        report = json.loads((self.path / "b.json").read_text())
+        self.assertEqual((report["samples_per_pixel"], report["training_samples_per_pixel"]), (4, 0))
 
     def test_belong_to_scene_and_settings(self):
         wanted = ("--spp", "4", "-o", "b.exr", "--load-training", "a.training")

@@ -199,6 +199,19 @@ class Kinds(ExperimentTest):
                        if f"{cell['method']}, 0.2 s: took" in w]
             self.assertEqual(bool(flagged), abs(spent - 1) > 0.05, flagged)
 
+    def test_training_counts(self):
+        """A method that learns takes no more samples than the others, and its training is part of its time."""
+        self.suite["methods"][1] = {"name": "learns", "options": ["--estimator", "none", "--integrator",
+                                                                  "controlled-path", "--cv-train", "8"]}
+        self.suite["budgets"], self.suite["seeds"] = [{"spp": 24}], 1
+        learns = next(c for c in self.results()["cells"] if c["method"] == "learns")
+        self.assertEqual(learns["samples_per_pixel"], 24)
+        self.assertFalse(learns["equal_sample_normalised"])
+        facts = [json.loads(p.read_text()) for p in (self.path / "out" / "cache" / "runs").glob("*/*.json")]
+        trained = [f for f in facts if f.get("training_samples_per_pixel") == 8]
+        self.assertEqual(len(trained), 1)
+        self.assertGreaterEqual(learns["seconds"]["render"]["value"], trained[0]["seconds"]["train"])
+
     def test_later_commands(self):
         more = self.run_covary([COVARY, "render", str(SCENES / "room.xml"), "--resolution", "32x24", "--rfilter", "box",
                                 "--spp", "24", "--estimator", "none", "--seed", "99", "-o", "more.exr", "--quiet",
