@@ -243,9 +243,7 @@ class BidirectionalTracer final : public LightTracingIntegrator {
       if (!go_on(depth, vertex, samples[path.sample], hit, wo, *bsdf, path, sums, batch.rays[i])) continue;
       batch.alive.push_back(i);
     }
-    for (size_t n = 0; n < batch.alive.size(); ++n)
-      if (const uint32_t i = batch.alive[n]; i != n) batch.paths[n] = batch.paths[i], batch.rays[n] = batch.rays[i];
-    batch.resize(batch.alive.size());
+    keep_alive(batch);
   }
 
   /// Draws the next ray of a camera subpath; false where it ends.

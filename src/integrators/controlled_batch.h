@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/in_place.h"
-#include "integrators/integrator.h"
+#include "integrators/path_batch.h"
 #include "sampling/coefficient_cache.h"
 
 namespace covary {
@@ -28,17 +28,8 @@ struct ControlledVertex {
 /// Camera paths that ControlledTracer advances together, and for each of them what its loops hand on to one another.
 struct ControlledBatch final : ThreadState {
   /// What a path that goes on carries.
-  struct Path {
-    Spectrum throughput{1};
-    float eta = 1;               ///< product of relative indices, undoes the radiance scaling in roulette
-    Vec3 previous_p;             ///< where the last direction sample started
-    float previous_pdf = 1;      ///< its density per unit solid angle
-    bool previous_delta = true;  ///< it came from a delta lobe or the camera
-    bool only_null = true;       ///< nothing but null surfaces met so far
-    bool found = false;          ///< whether the ray hit a surface
-    uint32_t sample = 0;         ///< which of the batch
-    uint32_t n_smooth = 0;       ///< vertices so far on surfaces that have more than delta lobes
-    uint32_t last_vertex = 0;    ///< address of the numbers of the last vertex
+  struct Path : PathBatch::Path {
+    uint32_t last_vertex = 0;  ///< address of the numbers of the last vertex
   };
 
   /// What a vertex samples, and with which numbers.

@@ -30,6 +30,7 @@
 #include "integrators/controlled_batch.h"
 #include "integrators/light_selection.h"
 #include "integrators/mis.h"
+#include "integrators/path_steps.h"
 #include "integrators/primary_sample.h"
 #include "integrators/roulette.h"
 #include "sampling/coefficient_table.h"
@@ -87,11 +88,11 @@ class ControlledTracer {
     for (uint32_t i = 0; i < samples_.size(); ++i) batch_.rays[i] = samples_[i].ray, batch_.paths[i].sample = i;
     const bool any_light = !control_.lights->empty() || control_.environment;
     for (int depth = 0; !batch_.paths.empty(); ++depth) {
-      find_surfaces(depth);
+      find_surfaces(scene_, depth, lengths_.hide_emitters, batch_, context_);
       for (size_t i = 0; i < batch_.paths.size(); ++i)
         meet_light(depth, batch_.paths[i], batch_.rays[i], batch_.hits[i]);
       if (depth + 1 >= lengths_.max_depth) break;
-      keep_paths(depth);
+      keep_paths(batch_, [&](Path& path) { return path.found && (depth < lengths_.rr_depth || survives(path)); });
       const bool connect = depth + 2 >= lengths_.min_depth && any_light;
       choose_lights(connect);
       for (size_t i = 0; i < batch_.paths.size(); ++i) sample_lights(i);
@@ -105,32 +106,6 @@ class ControlledTracer {
  private:
   using Path = ControlledBatch::Path;
   static constexpr uint32_t kNoLight = ControlledSample::kNoLight;
-
-  /// Nearest hits of all rays.
-  void find_surfaces(int depth) {
-    const size_t n = batch_.paths.size();
-    scene_.nearest(batch_.rays, batch_.ray_hits, depth == 0);
-    context_.n_rays += n;
-    for (size_t i = 0; i < n; ++i) {
-      Path& path = batch_.paths[i];
-      path.found = batch_.ray_hits[i].found();
-      if (!path.found) continue;
-      scene_.resolve(batch_.rays[i], batch_.ray_hits[i], batch_.hits[i]);
-      if (const Texture* texture = batch_.hits[i].shape->main_texture()) texture->prefetch(batch_.hits[i].uv);
-    }
-    if (lengths_.hide_emitters && depth == 0)
-      for (size_t i = 0; i < n; ++i) skip_area_lights(batch_.paths[i], batch_.rays[i], batch_.hits[i]);
-  }
-
-  /// Follows the camera ray past area lights until something else is hit.
-  void skip_area_lights(Path& path, Ray& ray, SurfaceHit& hit) {
-    while (path.found && hit.emitter) {
-      ray.o = offset_origin(hit.p, hit.ng, ray.d);
-      ray.t_max -= hit.t;
-      ++context_.n_rays;
-      path.found = scene_.intersect(ray, hit);
-    }
-  }
 
   /// Adds the emission of what the path's ray met, which closes the vertex from which the ray came.
   void meet_light(int depth, const Path& path, const Ray& ray, const SurfaceHit& hit) {
@@ -157,19 +132,7 @@ class ControlledTracer {
     close(path.sample);
   }
 
-  /// Ends paths that met no surface, and some of the others by Russian roulette.
-  void keep_paths(int depth) {
-    size_t n_kept = 0;
-    for (size_t i = 0; i < batch_.paths.size(); ++i) {
-      Path& path = batch_.paths[i];
-      if (!path.found || (depth >= lengths_.rr_depth && !survives(path))) continue;
-      if (n_kept != i)
-        batch_.paths[n_kept] = path, batch_.rays[n_kept] = batch_.rays[i], batch_.hits[n_kept] = batch_.hits[i];
-      ++n_kept;
-    }
-    batch_.resize(n_kept);
-  }
-
+  /// Plays Russian roulette.
   bool survives(Path& path) {
     CameraSample& sample = samples_[path.sample];
     const float survival = roulette::survival_probability(path.throughput, path.eta, sample.random.sampling());
@@ -266,10 +229,7 @@ class ControlledTracer {
       make_in_place(batch_.rays[i], [&] { return Ray{offset_origin(hit.p, hit.ng, wi), wi, kInfinity}; });
       batch_.alive.push_back(i);
     }
-    for (size_t n = 0; n < batch_.alive.size(); ++n)
-      if (const uint32_t i = batch_.alive[n]; i != n)
-        batch_.paths[n] = batch_.paths[i], batch_.rays[n] = batch_.rays[i];
-    batch_.resize(batch_.alive.size());
+    keep_alive(batch_);
   }
 
   /// Begins the estimate of a vertex: Σ N β of its control.

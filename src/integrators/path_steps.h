@@ -22,7 +22,8 @@ inline void skip_area_lights(const Scene& scene, PathBatch::Path& path, Ray& ray
 }
 
 /// Nearest hits of all rays; `depth`: edges before them.
-inline void find_surfaces(const Scene& scene, int depth, bool hide_emitters, PathBatch& batch, PathContext& context) {
+template <typename Batch>
+void find_surfaces(const Scene& scene, int depth, bool hide_emitters, Batch& batch, PathContext& context) {
   const size_t n = batch.paths.size();
   scene.nearest(batch.rays, batch.ray_hits, depth == 0);
   context.n_rays += n;
@@ -36,16 +37,30 @@ inline void find_surfaces(const Scene& scene, int depth, bool hide_emitters, Pat
     for (size_t i = 0; i < n; ++i) skip_area_lights(scene, batch.paths[i], batch.rays[i], batch.hits[i], context);
 }
 
-/// Removes the paths that left the scene.
-inline void end_paths_without_surface(PathBatch& batch) {
+/// Removes the paths of which `keep` is false; it is asked once for each, in their order.
+template <typename Batch, typename Keep>
+void keep_paths(Batch& batch, const Keep& keep) {
   size_t n_kept = 0;
   for (size_t i = 0; i < batch.paths.size(); ++i) {
-    if (!batch.paths[i].found) continue;
+    if (!keep(batch.paths[i])) continue;
     if (n_kept != i)
       batch.paths[n_kept] = batch.paths[i], batch.rays[n_kept] = batch.rays[i], batch.hits[n_kept] = batch.hits[i];
     ++n_kept;
   }
   batch.resize(n_kept);
+}
+
+/// Removes the paths that left the scene.
+inline void end_paths_without_surface(PathBatch& batch) {
+  keep_paths(batch, [](const PathBatch::Path& path) { return path.found; });
+}
+
+/// Removes the paths that are not among Batch::alive, with their next rays.
+template <typename Batch>
+void keep_alive(Batch& batch) {
+  for (size_t n = 0; n < batch.alive.size(); ++n)
+    if (const uint32_t i = batch.alive[n]; i != n) batch.paths[n] = batch.paths[i], batch.rays[n] = batch.rays[i];
+  batch.resize(batch.alive.size());
 }
 
 /// One light sample for each vertex whose surface can use it. All choices come first, so that memory answers to one

@@ -135,9 +135,7 @@ class PathTracer final : public Integrator {
       make_in_place(batch.rays[i], [&] { return Ray{offset_origin(hit.p, hit.ng, wi), wi, kInfinity}; });
       batch.alive.push_back(i);
     }
-    for (size_t n = 0; n < batch.alive.size(); ++n)
-      if (const uint32_t i = batch.alive[n]; i != n) batch.paths[n] = batch.paths[i], batch.rays[n] = batch.rays[i];
-    batch.resize(batch.alive.size());
+    keep_alive(batch);
   }
 
   /// Adds the light samples that nothing hides.
