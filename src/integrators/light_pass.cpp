@@ -7,8 +7,8 @@
 
 #include "core/error.h"
 #include "core/parallel.h"
-#include "core/stopwatch.h"
 #include "film/splat_layer.h"
+#include "integrators/pass_limits.h"
 
 namespace covary {
 namespace {
@@ -76,32 +76,23 @@ PassResult render_light_pass(const Scene& scene, const LightTracingIntegrator& i
                              Film& film) {
   COVARY_CHECK(settings.pass >= kLightPass, "a light pass has numbers of its own");
   COVARY_CHECK(integrator.traces_light(), "the integrator traces no light here");
-  const Stopwatch watch;
   const uint32_t target = std::min(settings.spp.largest(), settings.limit);
   SplatLayer layer(film);
   const uint32_t begin = film.count(0, 0);
-  const uint64_t total = uint64_t{target - std::min(begin, target)} * kBundlePaths;
+  PassLimits limits(settings, uint64_t{target - std::min(begin, target)} * kBundlePaths);
   PerThread<Worker> workers;
-  std::atomic<uint64_t> done{0};
-  std::atomic<bool> out_of_time{false};
-  const auto ended = [&] {
-    return out_of_time.load(std::memory_order_relaxed) ||
-           (settings.stop && settings.stop->load(std::memory_order_relaxed));
-  };
-  while (!ended() && layer.begin_round(std::min(target, light_round_end(film.count(0, 0), film.groups())))) {
+  while (!limits.ended() && layer.begin_round(std::min(target, light_round_end(film.count(0, 0), film.groups())))) {
     const uint32_t first = layer.first_bundle();
     parallel_for(layer.end_bundle() - first, [&](uint32_t i) {
-      if (ended()) return;
+      if (limits.ended()) return;
       Worker& worker = workers.local(integrator);
       const uint64_t first_path = uint64_t{first + i} * kBundlePaths;
       trace_sorted(scene, integrator, light_paths_of(settings, film.crop(), first_path, kBundlePaths), worker.splats,
                    worker.context);
       for (const LightSplat& splat : worker.splats) layer.add(splat.path, splat.x, splat.y, splat.value);
-      const uint64_t now = done.fetch_add(kBundlePaths) + kBundlePaths;
-      if (settings.seconds > 0 && watch.seconds() >= settings.seconds) out_of_time = true;
-      if (settings.progress) settings.progress(now, total);
+      limits.advance(kBundlePaths);
     });
-    if (ended()) break;
+    if (limits.ended()) break;
     layer.finish_round();
     if (settings.checkpoint) settings.checkpoint();
   }
@@ -112,7 +103,7 @@ PassResult render_light_pass(const Scene& scene, const LightTracingIntegrator& i
   result.n_not_finite = counts.n_not_finite, result.n_negative = counts.n_negative;
   for (const BadSplat& bad : counts.bad_splats) result.bad_samples.push_back({bad.x, bad.y, bad.path, bad.value});
   result.complete = film.count(0, 0) >= target;
-  result.seconds = watch.seconds();
+  result.seconds = limits.seconds();
   return result;
 }
 

@@ -10,6 +10,7 @@
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "core/warp.h"
+#include "integrators/pass_limits.h"
 #include "integrators/training.h"
 
 namespace covary {
@@ -244,7 +245,6 @@ CameraSample camera_sample(const Scene& scene, const PassSettings& settings, int
 }
 
 PassResult render_pass(const Scene& scene, const Integrator& integrator, const PassSettings& settings, Film& film) {
-  const Stopwatch watch;
   COVARY_CHECK(settings.spp.fits(film), "the map of samples has another size than the film");
   COVARY_CHECK(!settings.estimate || film.groups() == 1, "an estimate from all samples of a pixel has no groups");
   COVARY_CHECK(film.frame_width() == scene.camera().width() && film.frame_height() == scene.camera().height(),
@@ -253,35 +253,27 @@ PassResult render_pass(const Scene& scene, const Integrator& integrator, const P
   const std::vector<Tile> tiles = make_tiles(film);
   const uint32_t limit = settings.estimate ? UINT32_MAX : settings.limit;
   const uint32_t largest = std::min(settings.spp.largest(), limit);
-  const uint64_t total = settings.spp.missing(film, limit);
+  PassLimits limits(settings, settings.spp.missing(film, limit));
   uint32_t reached = settings.spp.reached(film);
 
   PerThread<Worker> workers;
-  std::atomic<uint64_t> done{0};
-  std::atomic<bool> out_of_time{false};
-  const auto ended = [&] {
-    return out_of_time.load(std::memory_order_relaxed) ||
-           (settings.stop && settings.stop->load(std::memory_order_relaxed));
-  };
   // In waves, so that all pixels advance together. The one wave of pixels that are estimated is cut into rounds of some
   // time.
-  while (reached < largest && !ended()) {
+  while (reached < largest && !limits.ended()) {
     const Wave wave{settings.spp, settings.estimate ? largest : std::min(largest, wave_end(reached, film.groups()))};
     const Stopwatch round_watch;
     std::atomic<bool> round_over{false};
     render_tiles(tiles.size(), settings.learner, integrator, workers, [&](size_t i) {
-      if (ended() || round_over.load(std::memory_order_relaxed)) return;
+      if (limits.ended() || round_over.load(std::memory_order_relaxed)) return;
       Worker& worker = workers.local(integrator);
       const Stopwatch tile_watch;
       const uint64_t n_new = render_tile(scene, integrator, settings, tiles[i], wave, film, worker);
       if (n_new == 0) return;
       worker.seconds += tile_watch.seconds();
       if (settings.estimate && round_watch.seconds() >= kRoundSeconds) round_over = true;
-      const uint64_t now = done.fetch_add(n_new) + n_new;
-      if (settings.seconds > 0 && watch.seconds() >= settings.seconds) out_of_time = true;
-      if (settings.progress) settings.progress(now, total);
+      limits.advance(n_new);
     });
-    if (ended()) break;
+    if (limits.ended()) break;
     if (!round_over) reached = wave.end;
     if (settings.learner) settings.learner->end_wave(wave.end);
     if (settings.checkpoint) settings.checkpoint();
@@ -300,7 +292,7 @@ PassResult render_pass(const Scene& scene, const Integrator& integrator, const P
   });
   keep_first(result.bad_samples);
   result.complete = settings.spp.missing(film, limit) == 0;
-  result.seconds = watch.seconds();
+  result.seconds = limits.seconds();
   if (busy_seconds > 0) result.estimate_seconds *= result.seconds / busy_seconds;  // its share of the time
   return result;
 }
