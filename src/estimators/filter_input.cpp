@@ -37,17 +37,6 @@ float pooled_variance(const GroupedImage& a, const GroupedImage& b, int x, int y
 
 }  // namespace
 
-float length(Norm norm, const Spectrum& colour) {
-  if (norm == Norm::kL1) return std::abs(colour.r) + std::abs(colour.g) + std::abs(colour.b);
-  return std::sqrt(colour.r * colour.r + colour.g * colour.g + colour.b * colour.b);
-}
-
-float scalar_variance(Norm norm, const Spectrum& variance) {
-  if (norm == Norm::kL2) return variance.r + variance.g + variance.b;
-  const float sum = std::sqrt(variance.r) + std::sqrt(variance.g) + std::sqrt(variance.b);
-  return sum * sum;
-}
-
 Planes mean_planes(const GroupedImage& image, const std::vector<unsigned char>& valid, int border, float outside) {
   Planes planes(image.width, image.height, 3, border, outside);
   parallel_for(image.height, 8, [&](int y) {
