@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include <atomic>
 #include <cmath>
 #include <filesystem>
 
@@ -127,14 +126,8 @@ TEST(AdaptivePlan, StoppedAtManyTilesAndResumedGivesTheSameBits) {
     request.resume = true;
     int first_phase = 0, last_phase = 0;
     for (int tiles = 5;; tiles += 11) {
-      std::atomic<bool> stop{false};
-      std::atomic<int> left{tiles};
-      RenderCallbacks callbacks;
-      callbacks.stop = &stop;
-      callbacks.progress = [&](uint64_t, uint64_t) {
-        if (--left <= 0) stop = true;
-      };
-      const RenderResult part = render(scene, plan, request, callbacks);
+      StopAfter stop(tiles);
+      const RenderResult part = render(scene, plan, request, stop.callbacks);
       ++(part.passes.size() == 1 ? first_phase : last_phase);
       EXPECT_TRUE(fs::exists(request.output));
       if (!part.complete) continue;

@@ -29,19 +29,6 @@ using test_support::TemporaryFolder;
 
 const std::string kRoom = std::string(COVARY_SOURCE_DIR) + "/scenes/room.xml";
 
-/// Stops a render after a number of tiles.
-struct StopAfter {
-  explicit StopAfter(int tiles) : left(tiles) {
-    callbacks.stop = &stop;
-    callbacks.progress = [this](uint64_t, uint64_t) {
-      if (--left <= 0) stop = true;
-    };
-  }
-  std::atomic<bool> stop{false};
-  std::atomic<int> left;
-  RenderCallbacks callbacks;
-};
-
 std::string attribute(const std::string& path, const std::string& name) {
   const ImageInfo info = inspect_image(path);
   for (const auto& [key, value] : info.attributes)

@@ -194,14 +194,8 @@ TEST(LightPlan, APlainRenderIsResumedFromItsTwoFilms) {
   const LoadedScene scene = light_scene();
   RenderRequest request = request_of(32);
   request.output = test_file("image.exr");
-  std::atomic<bool> stop{false};
-  std::atomic<int> left{20};
-  RenderCallbacks callbacks;
-  callbacks.stop = &stop;
-  callbacks.progress = [&](uint64_t, uint64_t) {
-    if (--left <= 0) stop = true;
-  };
-  const RenderResult part = render(scene, plan_of("none"), request, callbacks);
+  StopAfter stop(20);
+  const RenderResult part = render(scene, plan_of("none"), request, stop.callbacks);
   ASSERT_TRUE(part.interrupted);
   EXPECT_EQ(part.kept, test_file("image.passes"));
   EXPECT_EQ(read_film(request.output).attributes.at(film_key::kComplete), "false");

@@ -59,14 +59,8 @@ TEST(Render, StoppedAtManyTilesAndResumedGivesTheSameBits) {
   request.resume = true;
   int interruptions = 0;
   for (int tiles = 7;; tiles += 31) {
-    std::atomic<bool> stop{false};
-    std::atomic<int> left{tiles};
-    RenderCallbacks callbacks;
-    callbacks.stop = &stop;
-    callbacks.progress = [&](uint64_t, uint64_t) {
-      if (--left <= 0) stop = true;
-    };
-    const RenderResult part = render(scene, average_plan(), request, callbacks);
+    StopAfter stop(tiles);
+    const RenderResult part = render(scene, average_plan(), request, stop.callbacks);
     if (part.complete) {
       EXPECT_TRUE(same_bits(part.passes[0].film, whole.passes[0].film));
       EXPECT_TRUE(same_bits(part.passes[1].film, whole.passes[1].film));
@@ -186,14 +180,8 @@ TEST(Phases, AnInterruptedPhaseResumesToTheSameBits) {
   request.passes = folder.file("films");
   request.resume = true;
   for (int tiles : {3, 20, 1000}) {  // in the first phase, in the second, never
-    std::atomic<bool> stop{false};
-    std::atomic<int> left{tiles};
-    RenderCallbacks callbacks;
-    callbacks.stop = &stop;
-    callbacks.progress = [&](uint64_t, uint64_t) {
-      if (--left <= 0) stop = true;
-    };
-    const RenderResult part = render(scene, two_phases(trainings), request, callbacks);
+    StopAfter stop(tiles);
+    const RenderResult part = render(scene, two_phases(trainings), request, stop.callbacks);
     EXPECT_EQ(part.interrupted, tiles < 1000);
     EXPECT_EQ(part.passes.size(), tiles == 3 ? 1u : 2u);
     if (part.interrupted) continue;

@@ -2,6 +2,7 @@
 // Small scenes and quick plans.
 #pragma once
 
+#include <atomic>
 #include <cstring>
 #include <string>
 
@@ -41,6 +42,19 @@ inline Plan average_plan() {
   };
   return pair_plan(method);
 }
+
+/// Stops a render after a number of tiles.
+struct StopAfter {
+  explicit StopAfter(int tiles) : left(tiles) {
+    callbacks.stop = &stop;
+    callbacks.progress = [this](uint64_t, uint64_t) {
+      if (--left <= 0) stop = true;
+    };
+  }
+  std::atomic<bool> stop{false};
+  std::atomic<int> left;
+  RenderCallbacks callbacks;
+};
 
 inline bool same_bits(const Film& a, const Film& b) {
   return a.counts() == b.counts() && a.data().size() == b.data().size() &&
