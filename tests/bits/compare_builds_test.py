@@ -16,8 +16,8 @@ class CompareBuilds(unittest.TestCase):
         self.folder = tempfile.TemporaryDirectory()
         self.addCleanup(self.folder.cleanup)
 
-    def compare(self, other, case):
-        return subprocess.run([sys.executable, str(HERE / "compare_builds"), COVARY, other, "--only", case],
+    def compare(self, other, case, *options):
+        return subprocess.run([sys.executable, str(HERE / "compare_builds"), COVARY, other, "--only", case, *options],
                               capture_output=True, text=True)
 
     def program(self, more):
@@ -50,6 +50,10 @@ class CompareBuilds(unittest.TestCase):
 
     def test_wrong_usage(self):
         self.assertEqual(self.compare("/no/such/program", "none, 1 group").returncode, 2)
+        for size in ("42x32", "43x31", "64", "wide"):
+            result = self.compare(COVARY, "crop", "--resolution", size)
+            self.assertEqual(result.returncode, 2, size)
+            self.assertIn(f"resolution '{size}'; expected WIDTHxHEIGHT, at least 43x32", result.stderr)
 
 
 if __name__ == "__main__":
