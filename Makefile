@@ -71,7 +71,8 @@ lint:
 	@scripts/lint build/release $(if $(ALL),--all)
 
 install: setup
-	@cmake --preset $(INSTALL) $(if $(filter release,$(INSTALL)),-DCOVARY_ARCH=$(ARCH)) -DCOVARY_WERROR=$(WERROR) > /dev/null
+	@cmake --preset $(INSTALL) $(if $(filter release,$(INSTALL)),-DCOVARY_ARCH=$(ARCH)) \
+	  -DCOVARY_WERROR=$(WERROR) > /dev/null
 	@cmake --build build/$(INSTALL) -j $(JOBS) --target covary
 	@cmake --install build/$(INSTALL) --prefix $(PREFIX)
 

@@ -33,7 +33,7 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*"([^"]+)"')
 CITATION = re.compile(r"\[([A-Z][A-Za-z]+\d{4}[a-z]?)\]")
 LONG_FILE = 450
 COLUMNS = 120  # of code and prose
-WRAPPED = (".h", ".cpp", ".cu", ".cuh", ".py", ".md", ".js", ".cmake", "CMakeLists.txt")
+WRAPPED = (".h", ".cpp", ".cu", ".cuh", ".py", ".md", ".js", ".cmake", "CMakeLists.txt", "Makefile")
 
 
 def visible_modules(module):
@@ -67,6 +67,11 @@ def lines(root, path):
 
 def is_test(path):
     return re.search(r"_(test|bench)\.(cpp|cu)$", path) is not None
+
+
+def is_script(root, path):
+    with open(os.path.join(root, path), "rb") as file:
+        return file.read(2) == b"#!"
 
 
 def includes_follow_arrows(root):
@@ -236,12 +241,12 @@ def documented_commands(root):
 
 
 def lines_fit(root):
-    """No line of code or prose has more than COLUMNS characters, but for addresses, which cannot be broken. Tracked
-    files only, where the tree is a repository."""
+    """No line of code or prose has more than COLUMNS characters, but for addresses, which cannot be broken; scenes,
+    suites and other data may. Tracked files only, where the tree is a repository."""
     listed = subprocess.run(["git", "ls-files"], cwd=root, capture_output=True, text=True).stdout.splitlines()
     problems = []
-    for path in listed or files(root, ["."], WRAPPED):
-        if path.endswith(WRAPPED) and os.path.exists(os.path.join(root, path)):
+    for path in listed or files(root, ["."], ""):
+        if os.path.isfile(os.path.join(root, path)) and (path.endswith(WRAPPED) or is_script(root, path)):
             problems += [f"{path}:{number}: {len(text)} columns; at most {COLUMNS}"
                          for number, text in lines(root, path) if len(text) > COLUMNS and "://" not in text]
     return problems

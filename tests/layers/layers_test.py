@@ -66,6 +66,11 @@ class Planted(unittest.TestCase):
         self.write("docs/page.bib", "x" * 200)
         self.expect(layers.lines_fit, "docs/page.md:2: 121 columns; at most 120")
 
+    def test_long_line_of_a_script(self):
+        self.write("scripts/run", f"#!/bin/sh\necho {'x' * 120}\n")
+        self.write(".gitignore", "x" * 200)
+        self.expect(layers.lines_fit, "scripts/run:2: 125 columns; at most 120")
+
     def test_include_against_an_arrow(self):
         self.write("src/film/film.cpp", SPDX + '#include "core/vec.h"\n#include "scene/scene.h"\n')
         self.expect(layers.includes_follow_arrows, "src/film/film.cpp:3: film may not include 'scene/scene.h'")
