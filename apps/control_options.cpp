@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "control_options.h"
 
+#include <fmt/format.h>
+
+#include "integrators/controlled_path.h"
 #include "numbers.h"
 
 namespace covary {
@@ -69,6 +72,13 @@ std::optional<ControlOptions> control_options(const ControlTexts& texts) {
   if (!texts.variance.empty()) options.relative = texts.variance == "relative";
   if (!texts.prefix.empty()) options.prefix = texts.prefix == "on";
   return options;
+}
+
+void check_control_options(const ControlTexts& texts, const LoadedScene& scene, const std::string& integrator) {
+  const std::vector<std::string> words = command_words(texts);
+  if (words.empty() || dynamic_cast<const ControlledPath*>(scene.integrator.get())) return;
+  throw Error(ErrorCode::kUsage, fmt::format("{} is an option of --integrator controlled-path, not of {}", words[0],
+                                             integrator.empty() ? scene.integrator_type : integrator));
 }
 
 std::vector<std::string> command_words(const ControlTexts& texts) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "integrators/control_settings.h"
+#include "io/load_scene.h"
 
 namespace covary {
 
@@ -25,6 +26,10 @@ void add_control_options(CLI::App& command, ControlTexts& texts);
 
 /// What they say; nothing where none was given. Throws Error(kUsage).
 std::optional<ControlOptions> control_options(const ControlTexts& texts);
+
+/// Throws Error(kUsage) where options are given and the scene's integrator has none of them. `integrator`: the one that
+/// took the place of the scene's, or empty.
+void check_control_options(const ControlTexts& texts, const LoadedScene& scene, const std::string& integrator);
 
 /// The options as words of a command line.
 std::vector<std::string> command_words(const ControlTexts& texts);

@@ -130,6 +130,7 @@ LoadedScene load(const RenderOptions& options) {
       {options.integrator, options.min_depth, options.max_depth, control_options(options.control), tolerates_light});
   LoadedScene scene = load_scene(options.scene, load_options);
   check_light_options(options.light, scene, options.integrator);
+  check_control_options(options.control, scene, options.integrator);
   return scene;
 }
 

@@ -38,6 +38,8 @@ class LearningIntegrator : public Integrator {
   /// Samples per pixel of the training after which the importance of each pixel (PassSettings::importance) is made of
   /// the image so far; 0: it is not asked for.
   virtual uint32_t pilot_spp() const { return 0; }
+  /// Bytes that what is learnt may take, at most; 0: few.
+  virtual size_t training_memory() const { return 0; }
   /// What trace() has recorded in a thread's state since the last call, or null. Not called when frozen. Thread-safe.
   virtual std::unique_ptr<TrainingRecord> take_record(ThreadState& state) const = 0;
   /// Adds a record. Called by one thread at a time, in the order of tiles, never null.

@@ -24,14 +24,8 @@ std::function<std::shared_ptr<SceneObject>(Parameters&)> integrator_maker(const 
     }
     if (choice.tolerates_light) LightTracingSettings::from(parameters), parameters.get_string("heuristic", "");
     const std::shared_ptr<Integrator> integrator = plugin->make(parameters, lengths);
-    if (choice.control) {
-      auto* controlled = dynamic_cast<ControlledPath*>(integrator.get());
-      if (!controlled)
-        throw Error(ErrorCode::kUsage, fmt::format("options of control variates (--cv, --lights and others) are of "
-                                                   "--integrator controlled-path, not of {}",
-                                                   plugin->name));
+    if (auto* controlled = dynamic_cast<ControlledPath*>(integrator.get()); controlled && choice.control)
       controlled->change(*choice.control);
-    }
     return integrator;
   };
 }

@@ -16,7 +16,7 @@ struct IntegratorChoice {
   std::string name;              ///< registered name; empty: the scene's
   std::optional<int> min_depth;  ///< leave out paths with fewer edges
   std::optional<int> max_depth;  ///< largest number of path edges; < 0: no limit
-  /// For `controlled-path`; an error with another integrator where anything is given.
+  /// For `controlled-path`; other integrators have none of these settings, which the caller checks.
   std::optional<ControlOptions> control;
   /// Settings of light tracing are no mistake where the chosen integrator traces none: they are those of options, which
   /// the caller checks, or of an element whose integrator another one replaces.

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include "core/error.h"
+#include "integrators/training.h"
 #include "plans/budget.h"
 #include "plans/light_plan.h"
 #include "plans/render.h"
@@ -40,7 +41,14 @@ RenderMemory render_memory(const LoadedScene& scene, const Plan& plan, const Ren
   for (const Phase& phase : plan.phases)
     for (const PassPlan& pass : phase.passes(state)) passes.push_back(pass);
   if (has_light_pass(scene, plan)) passes.push_back(light_pass_plan(plan, passes));
-  return render_memory(plan, passes, window.width, window.height, request.aovs);
+  RenderMemory memory = render_memory(plan, passes, window.width, window.height, request.aovs);
+  memory.training = training_memory(scene);
+  return memory;
+}
+
+double training_memory(const LoadedScene& scene) {
+  const auto* learning = dynamic_cast<const LearningIntegrator*>(scene.integrator.get());
+  return learning ? static_cast<double>(learning->training_memory()) : 0;
 }
 
 double physical_memory() {
@@ -49,11 +57,13 @@ double physical_memory() {
 
 void check_memory(const RenderMemory& memory, int width, int height) {
   if (memory.total() <= physical_memory()) return;
-  throw Error(ErrorCode::kUsage,
-              fmt::format("{} x {} pixels need {} of memory ({} for films, {} for the estimator) and this machine has "
-                          "{}; render fewer pixels, a part of the frame, or with fewer groups",
-                          width, height, bytes_text(memory.total()), bytes_text(memory.films),
-                          bytes_text(memory.estimate), bytes_text(physical_memory())));
+  throw Error(
+      ErrorCode::kUsage,
+      fmt::format("{} x {} pixels need {} of memory ({} for films, {} for the estimator{}) and this machine "
+                  "has {}; render fewer pixels, a part of the frame, or with fewer groups",
+                  width, height, bytes_text(memory.total()), bytes_text(memory.films), bytes_text(memory.estimate),
+                  memory.training > 0 ? ", " + bytes_text(memory.training) + " to learn" : "",
+                  bytes_text(physical_memory())));
 }
 
 std::string bytes_text(double bytes) {

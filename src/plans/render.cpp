@@ -233,7 +233,9 @@ void PlanRun::begin_phase(const Phase& phase) {
   if (plan_.traces_light && is_last) plans.push_back(light_pass_plan(plan_, plans));
   std::vector<PassPlan> all = plans;
   for (const Pass& pass : state_.passes) all.push_back(pass.plan);
-  check_memory(render_memory(plan_, all, window_.width, window_.height, request_.aovs), window_.width, window_.height);
+  RenderMemory memory = render_memory(plan_, all, window_.width, window_.height, request_.aovs);
+  memory.training = training_memory(scene_);
+  check_memory(memory, window_.width, window_.height);
   for (PassPlan& plan : plans) {
     if (plan.light) plan.groups = light_groups(plan_, std::span(state_.passes).subspan(first_of_phase_.back()));
     for (const Pass& other : state_.passes)

@@ -16,7 +16,10 @@ PLAIN = (*RENDER, "--estimator", "none", "--cv-train", "4")
 
 class Options(CliTest):
     def test_refuses_options_of_another_integrator(self):
-        self.bad(1, "--integrator controlled-path, not of path", "render", ROOM, "-o", "a.exr", "--cv", "off")
+        self.bad(2, "--cv is an option of --integrator controlled-path, not of path", "render", ROOM, "-o", "a.exr",
+                 "--cv", "off")
+        self.bad(2, "--lights is an option of --integrator controlled-path, not of bdpt", "render", ROOM, "-o",
+                 "a.exr", "--integrator", "bdpt", "--lights", "power")
 
     def test_refuses_grids_of_no_cells(self):
         for grid in ("0", "-1", "half", "65537"):
@@ -33,10 +36,12 @@ class Options(CliTest):
         self.assertEqual((report["samples_per_pixel"], report["training_samples_per_pixel"]), (8, 4))
         self.assertGreater(report["control_variates"]["cells"], 10)
         self.assertGreater(report["seconds"]["train"], 0)
+        self.assertGreater(report["planned_memory_bytes"], 256 << 20)
         self.good(*RENDER, "--cv", "off", "--estimator", "none", "--spp", "12", "-o", "b.exr", "--json", "b.json")
         report = json.loads((self.path / "b.json").read_text())
         self.assertEqual((report["samples_per_pixel"], report["training_samples_per_pixel"]), (12, 0))
         self.assertNotIn("control_variates", report)
+        self.assertLess(report["planned_memory_bytes"], 1 << 20)
 
     def test_warns_of_cells_that_grew(self):
         result = self.good(*PLAIN, "--spp", "6", "-o", "a.exr", "--cv-grid", "4096", "--cv-memory", "1")

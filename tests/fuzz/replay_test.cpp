@@ -227,6 +227,9 @@ TEST(FuzzReplay, Suite) {
   replay_corpus("suite", {"[", "{", "}", "null", "true", "\"seeds\": 4000000000,", "\"name\": \"a\",", "\\u0000", "{}"},
                 2000);
 }
+TEST(FuzzReplay, Training) {
+  replay_corpus("training", {std::string(4, '\0'), "\xff\xff\xff\xff", std::string("\1\0\0\0", 4), "covary"}, 2000);
+}
 TEST(FuzzReplay, Costs) { replay_corpus("costs", {"[", "{", "null", "\"rays\": 1,", "{}", "-", "\""}, 2000); }
 
 }  // namespace

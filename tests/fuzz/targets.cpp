@@ -5,6 +5,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <string>
 #include <string_view>
 
@@ -16,6 +17,7 @@
 #include "io/mesh_file.h"
 #include "lab/suite.h"
 #include "plans/pass_costs.h"
+#include "sampling/coefficient_table.h"
 #include "textures/image.h"
 
 namespace covary::fuzz {
@@ -99,10 +101,21 @@ bool costs(Bytes input) {
   return accepts([&] { parse_pass_costs(text_of(input)); });
 }
 
+bool training(Bytes input) {
+  const bool file = accepts([&] { CoefficientTable::from_bytes(text_of(input), "scene; settings", "file"); });
+  const bool body = accepts([&] {
+    const CoefficientTable table = CoefficientTable::from_body(text_of(input), "table");
+    for (const Vec3& p : {Vec3(), Vec3(1, 2, 3), Vec3(-1e30f)})
+      if (const uint32_t cell = table.find(table.grid().key(p, {0, 0, 1})); cell != CoefficientTable::kNone)
+        for (uint32_t light = 0; light < std::min(table.n_lights(), 4u); ++light) table.light(cell, light);
+  });
+  return file || body;
+}
+
 std::span<const Target> targets() {
-  static constexpr Target kTargets[] = {{"scene", scene}, {"ply", ply},     {"obj", obj},
-                                        {"film", film},   {"image", image}, {"serialized", serialized},
-                                        {"suite", suite}, {"costs", costs}, {"grouped", grouped}};
+  static constexpr Target kTargets[] = {
+      {"scene", scene},           {"ply", ply},     {"obj", obj},     {"film", film},       {"image", image},
+      {"serialized", serialized}, {"suite", suite}, {"costs", costs}, {"grouped", grouped}, {"training", training}};
   return kTargets;
 }
 

@@ -26,6 +26,9 @@ bool suite(Bytes input);
 /// What the samples of a kept film cost.
 bool costs(Bytes input);
 
+/// A training file, and the table behind its header alone, which no checksum protects.
+bool training(Bytes input);
+
 /// Name and function of every target; the name is also that of its folder in tests/fuzz/corpus.
 struct Target {
   const char* name;
