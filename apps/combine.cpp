@@ -14,6 +14,7 @@
 #include <optional>
 #include <vector>
 
+#include "combine_counts.h"
 #include "combine_light.h"
 #include "commands.h"
 #include "core/stopwatch.h"
@@ -34,7 +35,7 @@ namespace {
 
 struct CombineOptions {
   std::vector<std::string> crn, independent;
-  std::string output, crn_layer, independent_layer, light, stages, json;
+  std::string output, crn_layer, independent_layer, counts, light, stages, json;
   EstimatorOptions estimator;
   bool error = false, force = false, quiet = false;
   std::optional<int> samples;
@@ -233,9 +234,9 @@ PairSettings settings_of(const CombineOptions& o, const Estimator& estimator, co
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
   const std::string& name = estimator.name;
   const bool counts = estimator.needs_sample_count;
-  if (o.samples && !counts)
-    usage(fmt::format("--samples is an option of --estimator {}, not of {}", fmt::join(estimators_with_samples(), ", "),
-                      name));
+  if (o.samples && !counts && o.counts.empty())
+    usage(fmt::format("--samples is an option of --counts and --estimator {}, not of {}",
+                      fmt::join(estimators_with_samples(), ", "), name));
   if (o.error && !estimator.predicts_error) usage("--error: " + name + " does not estimate its error");
   const int64_t samples = o.samples ? *o.samples : std::llround(crn.samples());
   if (counts && samples == 0)
@@ -260,6 +261,7 @@ void check_distinct(const CombineOptions& o) {
   for (const std::string& path : o.crn) files.emplace_back("--crn", path);
   for (const std::string& path : o.independent) files.emplace_back("--independent", path);
   if (!o.light.empty()) files.emplace_back("--light", o.light);
+  if (!o.counts.empty()) files.emplace_back("--counts", o.counts);
   for (size_t i = 0; i < files.size(); ++i)
     for (size_t k = 0; k < i; ++k)
       if (is_same_file(files[i].second, files[k].second))
@@ -273,7 +275,8 @@ void check_files_of_command(const CombineOptions& o) {
   Outputs outputs;
   outputs.reads(o.crn);
   outputs.reads(o.independent);
-  if (!o.light.empty()) outputs.reads(o.light);
+  for (const std::string& path : {o.light, o.counts})
+    if (!path.empty()) outputs.reads(path);
   outputs.writes("-o", o.output, OutputKind::kFilm);
   outputs.writes("--json", o.json, OutputKind::kText);
 }
@@ -283,13 +286,14 @@ void combine(const CombineOptions& o) {
   std::optional<tbb::global_control> control;
   if (o.threads > 0) control.emplace(tbb::global_control::max_allowed_parallelism, o.threads);
   Stopwatch watch;
-  const GroupedFile crn(o.crn, o.crn_layer), independent(o.independent, o.independent_layer);
+  GroupedFile crn(o.crn, o.crn_layer), independent(o.independent, o.independent_layer);
   std::optional<GroupedFile> light;
   if (!o.light.empty()) light.emplace(std::vector{o.light});
   const Estimator estimator = make_estimator(o.estimator);
   const PairSettings settings = settings_of(o, estimator, crn);
   check_explain(o, estimator, crn);
   check_stages(o.stages, estimator);
+  take_counts(o.counts, o.samples, crn, independent);
 
   std::vector<Finding> findings;
   check_files(crn, independent, findings);
@@ -366,6 +370,9 @@ void add_combine(CLI::App& app) {
   command->add_option("--crn-layer", o->crn_layer, "Layer of the CRN image where its files hold several");
   command->add_option("--independent-layer,--pt-layer", o->independent_layer,
                       "Layer of the independent image where its files hold several");
+  command->add_option("--counts", o->counts,
+                      "EXR with the samples of each pixel of the independent image, all groups together, where its "
+                      "files do not tell and pixels differ");
   command->add_option("--light", o->light, "Light film (light.exr of covary render --passes) to add to the result");
   command->add_option("--estimator", o->estimator.name, "iicv, or a comparator")
       ->check(CLI::Validator(check_has_images, ""))
@@ -375,7 +382,7 @@ void add_combine(CLI::App& app) {
   add_stages_option(*command, o->stages);
   command
       ->add_option("--samples", o->samples,
-                   fmt::format("{}: samples per pixel of the CRN image; default: what its file tells",
+                   fmt::format("With --counts, or {}: samples per pixel of the CRN image; default: what its file tells",
                                fmt::join(estimators_with_samples(), ", ")))
       ->transform(whole_number(1, std::numeric_limits<int>::max()));
   command->add_flag("--error", o->error, "Add the standard error as channels StdError.R, .G, .B");

@@ -8,6 +8,7 @@
 #include <cctype>
 #include <charconv>
 #include <cmath>
+#include <numeric>
 
 #include "core/error.h"
 #include "film/splat_layer.h"
@@ -172,10 +173,61 @@ void GroupedFile::add_file(const std::string& path, const std::string& layer, bo
   agree(film_key::kLight, light_film_);
 }
 
+void GroupedFile::take_counts(const std::string& path) {
+  if (has_counts()) fail(name_, "tells itself how many samples its pixels have; '" + path + "' is not needed");
+  auto file = std::make_unique<ExrFile>(path);
+  if (!(file->place() == place_)) {
+    const CropWindow &there = file->place().window, &here = place_.window;
+    fail(path, fmt::format("{} x {} pixels at ({}, {}); {} has {} x {} at ({}, {})", there.width, there.height, there.x,
+                           there.y, name_, here.width, here.height, here.x, here.y));
+  }
+  const bool is_only = file->channels().size() == 1;
+  if (!is_only && !file->find(kCounts))
+    fail(path, fmt::format("expected is one channel, or one that is named '{}'; {}", kCounts, list_layers(*file, {})));
+  counts_channel_ = is_only ? file->channels()[0].name : kCounts;
+  counts_file_ = std::move(file);
+  counts_path_ = path;
+  std::vector<uint32_t> counts;
+  double sum = 0;
+  for (int y = 0; y < height(); ++y) {
+    read_counts(y, 1, counts);
+    sum += std::accumulate(counts.begin(), counts.end(), 0.0);
+  }
+  samples_ = sum / (static_cast<double>(width()) * height());
+}
+
+void GroupedFile::take_count(uint32_t samples) {
+  COVARY_CHECK(samples > 0 && !has_counts(), "counts are told once");
+  count_of_all_ = samples;
+  samples_ = samples;
+}
+
+void GroupedFile::read_counts(int first_row, int n_rows, std::vector<uint32_t>& counts) const {
+  const size_t n_pixels = static_cast<size_t>(width()) * n_rows;
+  counts.assign(n_pixels, count_of_all_);
+  if (!counts_file_) return;
+  if (counts_file_->find(counts_channel_)->type == "uint") {
+    const ExrPlane plane{counts_channel_, ExrPlane::Type::kUint, counts.data(), sizeof(uint32_t)};
+    counts_file_->read_rows({&plane, 1}, first_row, n_rows);
+    return;
+  }
+  std::vector<float> values(n_pixels);
+  const ExrPlane plane{counts_channel_, ExrPlane::Type::kFloat, values.data(), sizeof(float)};
+  counts_file_->read_rows({&plane, 1}, first_row, n_rows);
+  for (size_t i = 0; i < n_pixels; ++i) {
+    if (!(values[i] >= 0 && values[i] <= 0x1p30f && values[i] == std::floor(values[i])))
+      fail(counts_path_, fmt::format("{} at ({}, {}); expected are whole numbers of samples", values[i],
+                                     i % static_cast<size_t>(width()), first_row + i / static_cast<size_t>(width())));
+    counts[i] = static_cast<uint32_t>(values[i]);
+  }
+}
+
 void GroupedFile::read_rows(int first_row, int n_rows, Rows& rows) const {
   const size_t per_pixel = groups_.size() * 3, n_pixels = static_cast<size_t>(width()) * n_rows;
   rows.data.resize(n_pixels * per_pixel);
-  rows.counts.resize(has_counts_ ? n_pixels : 0);
+  rows.counts.clear();
+  if (has_counts_) rows.counts.resize(n_pixels);
+  if (has_counts() && !has_counts_) read_counts(first_row, n_rows, rows.counts);
   rows.variance_in_groups.resize(has_variance_ ? n_pixels * 3 : 0);
   for (size_t f = 0; f < files_.size(); ++f) {
     std::vector<ExrPlane> planes;

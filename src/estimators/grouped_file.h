@@ -28,6 +28,14 @@ class GroupedFile {
   int groups() const { return static_cast<int>(groups_.size()); }
   /// Samples per pixel of all groups together, their mean where pixels differ; 0 where the files do not tell.
   double samples() const { return samples_; }
+  /// Whether it is known how many samples each pixel has, so that read_rows() gives counts.
+  bool has_counts() const { return has_counts_ || counts_file_ || count_of_all_ > 0; }
+  /// Says so for files that do not: an EXR file of the same pixels, with one channel of whole numbers, or one that is
+  /// named "samples": samples of all groups together, which then have the sizes of film/groups.h. Throws Error(kIo),
+  /// and Error(kInput) where the file is not like that or the counts are known already.
+  void take_counts(const std::string& path);
+  /// The same number, > 0, for all pixels.
+  void take_count(uint32_t samples);
   /// Attribute of covary's films: "crn", "independent"; "" for other files.
   const std::string& sampling() const { return sampling_; }
   /// Attributes of covary's films, "" for other files.
@@ -44,7 +52,7 @@ class GroupedFile {
   /// Rows of both arrays of a GroupedImage.
   struct Rows {
     std::vector<float> data;
-    std::vector<uint32_t> counts;  ///< of a film of covary in one file; empty otherwise, where groups must be equal
+    std::vector<uint32_t> counts;  ///< where has_counts(); empty otherwise, where groups must be equal
     std::vector<float> variance_in_groups;  ///< GroupedImage::variance_in_groups, of films that keep it
   };
   /// Rows [first_row, first_row + n_rows).
@@ -58,6 +66,7 @@ class GroupedFile {
     std::string prefix;  ///< of the channel names: "" or "name."
   };
   void add_file(const std::string& path, const std::string& layer, bool only_file);
+  void read_counts(int first_row, int n_rows, std::vector<uint32_t>& counts) const;
 
   std::vector<std::unique_ptr<ExrFile>> files_;
   std::vector<Group> groups_;
@@ -65,6 +74,9 @@ class GroupedFile {
   double samples_ = 0, samples_of_group_ = 0;
   std::string sampling_, scene_hash_, settings_, light_paths_per_sample_, light_film_, name_;
   bool has_half_ = false, has_counts_ = false, has_variance_ = false;
+  std::unique_ptr<ExrFile> counts_file_;
+  std::string counts_path_, counts_channel_;
+  uint32_t count_of_all_ = 0;
 };
 
 }  // namespace covary

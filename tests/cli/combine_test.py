@@ -6,7 +6,7 @@ import unittest
 
 from cli_test import CliTest
 from exr_reader import read_exr
-from exr_writer import HALF, exr
+from exr_writer import FLOAT, HALF, UINT, exr
 
 SIZE = WIDTH, HEIGHT = 24, 20
 GROUPS = 12
@@ -197,7 +197,7 @@ class Combine(CliTest):
         self.bad(2, "window is 10, expected an odd number from 3 to 63", *inputs, "--window", "10")
         self.bad(2, "--penalty is an option of --estimator iicv, not of iduw", *inputs, "--estimator", "iduw",
                  "--penalty", "pilot")
-        self.bad(2, "--samples is an option of --estimator iduw, not of iicv", *inputs, "--samples", "3")
+        self.bad(2, "--samples is an option of --counts and --estimator iduw, not of iicv", *inputs, "--samples", "3")
         self.bad(2, "--penalty", *inputs, "--penalty", "none")
         self.bad(2, "--independent is required", "combine", "--crn", "crn.exr", "-o", "out.exr")
         self.layers("two.exr", self.crn_images[:2])
@@ -206,6 +206,52 @@ class Combine(CliTest):
         self.layers("anonymous.exr", self.crn_images)
         self.bad(2, "needs --samples N", "combine", "--crn", "anonymous.exr", "--independent", "independent.exr", "-o",
                  "out.exr", "--estimator", "iduw")
+
+    def counted(self, name, counts, size=SIZE, kind=UINT, channel="Y"):
+        return self.write(name, exr({channel: counts}, size, None, None, {channel: kind}))
+
+    def test_counts_of_pixels(self):
+        self.layers("plain.exr", self.independent_images)
+        inputs = ["combine", "--crn", "crn.exr", "--independent", "plain.exr", "--quiet"]
+        counts = [12 * (1 + p % 5) for p in range(WIDTH * HEIGHT)]
+        self.counted("counts.exr", counts)
+        self.good(*inputs, "-o", "uniform.exr")
+        self.good(*inputs, "-o", "counted.exr", "--counts", "counts.exr")
+        self.assertNotEqual(self.read("counted.exr"), self.read("uniform.exr"))
+        self.assertIn("covary:samples: 132\n", self.good("info", "counted.exr").stdout)  # 96 + 36
+        # Equal counts are none; kinds of pixels and names of channels do not matter.
+        self.counted("equal.exr", [36] * len(counts))
+        self.good(*inputs, "-o", "equal.out.exr", "--counts", "equal.exr")
+        self.assertEqual(self.read("equal.out.exr"), self.read("uniform.exr"))
+        self.write("floats.exr", exr({"samples": [float(n) for n in counts], "Z": [0] * len(counts)}, SIZE))
+        for memory in ("100", "0.02"):
+            self.good(*inputs, "-o", "floats.out.exr", "--counts", "floats.exr", "--memory", memory)
+            self.assertEqual(self.read("floats.out.exr"), self.read("counted.exr"))
+
+    def test_pixels_without_samples(self):
+        self.layers("plain.exr", self.independent_images)
+        self.counted("counts.exr", [0 if p == 7 else 24 for p in range(WIDTH * HEIGHT)])
+        inputs = ["combine", "--crn", "crn.exr", "--independent", "plain.exr", "--counts", "counts.exr", "--quiet"]
+        self.good(*inputs, "-o", "out.exr", "--estimator", "dependent-tests", "--paper", "--samples", "96")
+        crn = [mean([image[c][7] for image in self.crn_images]) for c in "RGB"]
+        for c, expected in zip("RGB", crn):
+            self.assertAlmostEqual(self.read("out.exr")[c][7], expected, 5)
+        self.bad(2, "pixel (7, 0) of the independent image has 0 samples, fewer than the 12 groups", *inputs, "-o", "out.exr", "--force")
+
+    def test_wrong_counts(self):
+        self.layers("plain.exr", self.independent_images)
+        inputs = ["combine", "--crn", "plain.exr", "--independent", "independent.exr", "-o", "out.exr", "--force"]
+        self.counted("counts.exr", [24] * (WIDTH * HEIGHT))
+        self.bad(2, "--counts needs --samples N, the samples per pixel of the CRN image", *inputs, "--counts",
+                 "counts.exr")
+        inputs += ["--samples", "24", "--counts"]
+        self.counted("small.exr", [24] * 48, (8, 6))
+        self.bad(1, "small.exr: 8 x 6 pixels at (0, 0); independent.exr has 24 x 20 at (0, 0)", *inputs, "small.exr")
+        self.counted("odd.exr", [24] * 30 + [1.5] + [24] * (WIDTH * HEIGHT - 31), kind=FLOAT)
+        self.bad(1, "odd.exr: 1.5 at (6, 1); expected are whole numbers of samples", *inputs, "odd.exr")
+        self.bad(1, "plain.exr: expected is one channel, or one that is named 'samples'; channels in it: group00.B",
+                 *inputs[:2], "crn.exr", *inputs[3:], "plain.exr")
+        self.bad(2, "are the same file", *inputs, "independent.exr")
 
     def test_sizes_must_agree(self):
         self.layers("small.exr", noisy(2, False, 4, (8, 6)), (8, 6))
