@@ -12,7 +12,8 @@ void take_counts(const std::string& path, std::optional<int> crn_samples, Groupe
   independent.take_counts(path);
   if (crn.has_counts()) return;
   const auto samples = crn_samples ? static_cast<uint32_t>(*crn_samples) : std::lround(crn.samples());
-  if (samples == 0) throw Error(ErrorCode::kUsage, "--counts needs --samples N, the samples per pixel of the CRN image");
+  if (samples == 0)
+    throw Error(ErrorCode::kUsage, "--counts needs --samples N, the samples per pixel of the CRN image");
   crn.take_count(static_cast<uint32_t>(samples));
 }
 

@@ -38,6 +38,10 @@ std::string OptionRange::text() const {
   return odd ? "odd, " + bounds : bounds;
 }
 
+bool EstimatorParameters::any_given(std::span<const char* const> names) const {
+  return std::any_of(names.begin(), names.end(), [this](const char* name) { return values_.count(name) > 0; });
+}
+
 const std::string* EstimatorParameters::find(const EstimatorOption& option) const {
   const auto found = values_.find(option.name);
   return found == values_.end() ? nullptr : &found->second;

@@ -69,8 +69,8 @@ class EstimatorParameters {
     value = choices[choose(name, aliases, names, chosen, help)].second;
   }
 
-  /// Whether any value was given at all.
-  bool any_given() const { return !values_.empty(); }
+  /// Whether the value of one of these names was given.
+  bool any_given(std::span<const char* const> names) const;
   /// All that were asked for, in this order.
   const std::vector<EstimatorOption>& options() const { return options_; }
 

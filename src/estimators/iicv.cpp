@@ -158,9 +158,18 @@ Estimator make_iicv(EstimatorParameters& parameters) {
           "Side of the feedback's window");
   p.real("feedback-bandwidth", o.feedback_options.bandwidth, {.low = 0, .above_low = true},
          "Bandwidth of the feedback in standard errors");
-  throw_if_any("iicv", o.validate());
-
+  std::vector<std::string> problems = o.validate();
+  AdaptiveSampling standard;
+  standard.least_min_spp = 1;  // the plan rounds up to one of each group
+  standard.most_first_spp = std::numeric_limits<int>::max();
+  standard.reads_groups = true;
   Estimator estimator;
+  estimator.adaptive =
+      ask_for_adaptive(p, standard, "As many independent samples in each pixel as the CRN pass says", problems);
+  estimator.pass_options.insert(std::begin(kAdaptiveOptions), std::end(kAdaptiveOptions));
+  estimator.pass_options.insert("pilot-spp");
+  throw_if_any("iicv", problems);
+
   estimator.summary = "imperfect image-space control variates";
   estimator.predicts_error = true;
   estimator.reliable_samples = kReliableSamples;

@@ -68,17 +68,20 @@ EstimatorResult mean_of_groups(const GroupedImage& image) {
 Estimator make_none(EstimatorParameters& parameters) {
   EstimatorParameters& p = parameters;
   Estimator estimator;
-  AdaptiveSampling adaptive;
-  const bool is_adaptive =
-      p.flag("adaptive", "As many samples in each pixel as a first pass says that is not averaged in");
-  adaptive.least_min_spp = 1;  // a mean needs a sample
-  ask_for(p, adaptive);
-  p.choice<Norm>("norm", adaptive.counts.norm, kNorms, kNormHelp);
-  adaptive.counts.first_pass_counts = false;
-  std::vector<std::string> problems = adaptive.validate();
-  if (!is_adaptive && p.any_given()) problems.emplace_back("options of samples per pixel need --adaptive");
+  AdaptiveSampling standard;
+  standard.least_min_spp = 1;  // a mean needs a sample
+  standard.counts.first_pass_counts = false;
+  std::vector<std::string> problems;
+  estimator.adaptive = ask_for_adaptive(
+      p, standard, "As many samples in each pixel as a first pass says that is not averaged in", problems);
+  Norm norm = standard.counts.norm;
+  p.choice<Norm>("norm", norm, kNorms, kNormHelp);
+  static constexpr const char* kNormOnly[] = {"norm"};
+  if (estimator.adaptive)
+    estimator.adaptive->counts.norm = norm;
+  else if (p.any_given(kNormOnly))
+    problems.emplace_back("--norm needs --adaptive");
   throw_if_any("none", problems);
-  if (is_adaptive) estimator.adaptive = adaptive;
   estimator.passes = EstimatorPasses::kAny;
   estimator.summary = "the mean";
   estimator.predicts_error = true;

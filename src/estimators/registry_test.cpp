@@ -76,12 +76,18 @@ TEST(EstimatorRegistry, DefaultsAreThoseOfTheOptions) {
   EXPECT_EQ(make_estimator("polynomials").dimensions, PolynomialsOptions().dimensions);
 }
 
+bool has(const std::vector<EstimatorOption>& options, const std::string& name) {
+  return std::any_of(options.begin(), options.end(), [&](const EstimatorOption& o) { return o.name == name; });
+}
+
 /// Every default, given as a value, changes nothing.
 TEST(EstimatorRegistry, ListsTheDefaults) {
   for (const std::string& name : pair_estimator_names())
     for (const EstimatorOption& option : options_of_estimator(name)) {
       if (option.default_value.empty()) continue;
-      EXPECT_EQ(made(name, {{option.name, option.default_value}}), made(name, {})) << name << " " << option.name;
+      OptionValues values = {{option.name, option.default_value}};
+      if (has(options_of_estimator(name), "adaptive")) values["adaptive"] = "";
+      EXPECT_EQ(made(name, values), made(name, {})) << name << " " << option.name;
     }
 }
 
@@ -190,7 +196,14 @@ TEST(EstimatorRegistry, AdaptiveEstimatorsHaveTheirNumbers) {
   EXPECT_TRUE(contains(message("dependent-tests", {{"relative-error", "-1"}}), "relative error is -1"));
   EXPECT_TRUE(contains(message("dependent-tests", {{"min-spp", "9"}, {"max-spp", "8"}}), "more than max-spp"));
   EXPECT_TRUE(
-      contains(message("iicv", {{"relative-error", "1"}}), "is an option of --estimator dependent-tests, none"));
+      contains(message("iduw", {{"relative-error", "1"}}), "is an option of --estimator iicv, dependent-tests, none"));
+  EXPECT_TRUE(contains(message("iicv", {{"allocation", "uniform"}}), "need --adaptive"));
+  EXPECT_TRUE(contains(message("none", {{"norm", "l2"}}), "--norm needs --adaptive"));
+  const Estimator iicv = make_estimator("iicv", {{"adaptive", ""}, {"max-spp", "99"}});
+  ASSERT_TRUE(iicv.adaptive);
+  EXPECT_EQ(iicv.adaptive->counts.max_spp, 99);
+  EXPECT_TRUE(iicv.adaptive->reads_groups);
+  EXPECT_FALSE(make_estimator("iicv").adaptive);
 }
 
 TEST(EstimatorRegistry, SamplesOfAPixel) {
@@ -201,10 +214,6 @@ TEST(EstimatorRegistry, SamplesOfAPixel) {
   EXPECT_EQ(estimator.estimate_pixel(values, coordinates).r, 2.0f);
   EXPECT_TRUE(estimator.check_samples(4).empty());
   EXPECT_FALSE(estimator.check_samples(3).empty());
-}
-
-bool has(const std::vector<EstimatorOption>& options, const std::string& name) {
-  return std::any_of(options.begin(), options.end(), [&](const EstimatorOption& o) { return o.name == name; });
 }
 
 TEST(EstimatorRegistry, RangesAreThoseThatAreChecked) {

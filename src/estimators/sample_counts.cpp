@@ -187,14 +187,25 @@ void ask_for(EstimatorParameters& parameters, AdaptiveSampling& sampling) {
                                                                         {"uniform", Allocation::kUniform}};
   EstimatorParameters& p = parameters;
   CountOptions& o = sampling.counts;
-  p.whole("dependent-spp", sampling.first_spp, {.low = 1}, "Samples of the first pass; else half of --spp, up to 50",
-          {"pilot-spp"});
+  p.whole("dependent-spp", sampling.first_spp, {.low = 1},
+          "Samples of the first pass; else half, up to 50 (not iicv)", {"pilot-spp"});
   p.choice<Allocation>("allocation", o.allocation, kAllocations, "How pixels share the samples of the last pass");
   p.real("relative-error", o.relative_error, {.low = 0, .above_low = true},
          "Error that pixels shall have, as three standard deviations; --spp then is a limit");
   p.whole("min-spp", o.min_spp, {.low = static_cast<double>(sampling.least_min_spp)},
           "Samples that each pixel of the last pass has at least");
   p.whole("max-spp", o.max_spp, {.low = 1}, "Samples that each pixel of the last pass has at most");
+}
+
+std::optional<AdaptiveSampling> ask_for_adaptive(EstimatorParameters& parameters, AdaptiveSampling standard,
+                                                 const std::string& help, std::vector<std::string>& problems) {
+  const bool is_adaptive = parameters.flag("adaptive", help);
+  ask_for(parameters, standard);
+  const std::vector<std::string> wrong = standard.validate();
+  problems.insert(problems.end(), wrong.begin(), wrong.end());
+  if (is_adaptive) return standard;
+  if (parameters.any_given(kAdaptiveOptions)) problems.emplace_back("options of samples per pixel need --adaptive");
+  return {};
 }
 
 }  // namespace covary

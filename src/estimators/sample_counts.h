@@ -56,16 +56,22 @@ uint32_t class_of(double samples);
 /// otherwise a pilot, an independent pass that is not part of the image, so that the mean stays unbiased.
 struct AdaptiveSampling {
   CountOptions counts;
-  std::optional<int> first_spp;  ///< of the first pass, >= 1; default: half of the budget, at most 50
-  int least_min_spp = 0;         ///< smallest value of counts.min_spp that the estimator takes
+  std::optional<int> first_spp;  ///< of the first pass, >= 1; default: half of the budget, at most most_first_spp
+  int most_first_spp = 50;
+  int least_min_spp = 0;      ///< smallest value of counts.min_spp that the estimator takes
+  bool reads_groups = false;  ///< the estimator needs means of groups, not only the variance of samples
 
   std::vector<std::string> validate() const;
 };
 
 /// Options that only say how passes are rendered.
-inline constexpr const char* kAdaptiveOptions[] = {"dependent-spp", "allocation", "relative-error", "min-spp",
-                                                   "max-spp"};
-/// Asks for these.
+inline constexpr const char* kAdaptiveOptions[] = {"adaptive",       "dependent-spp", "allocation",
+                                                   "relative-error", "min-spp",       "max-spp"};
+/// Asks for these but the first.
 void ask_for(EstimatorParameters& parameters, AdaptiveSampling& sampling);
+/// Asks for all of these, with `standard` for defaults and the help of --adaptive; nothing where that is not given.
+/// Appends what is wrong with them to `problems`.
+std::optional<AdaptiveSampling> ask_for_adaptive(EstimatorParameters& parameters, AdaptiveSampling standard,
+                                                 const std::string& help, std::vector<std::string>& problems);
 
 }  // namespace covary

@@ -15,14 +15,23 @@
 namespace covary {
 namespace {
 
-constexpr uint32_t kMostFirst = 50;    // samples of the first pass where nobody asks for a number
 constexpr double kFirstShare = 0.5;    // of the budget or the time, at most
 constexpr double kOverestimate = 1.1;  // of the samples that a limit of time allows
+
+constexpr uint32_t kFirstOfError = 50;  // samples of the first pass where a relative error says how many there are
 
 struct Method {
   AdaptiveSampling sampling;
   std::string name;
-  int groups = 1;
+  std::optional<int> groups;  ///< that were asked for
+
+  /// Of both films.
+  uint32_t groups_of(const PlanState& state) const {
+    if (groups) return static_cast<uint32_t>(*groups);
+    if (!sampling.reads_groups) return 1;
+    constexpr uint32_t kEnough = 4;  // as of other estimators of two passes
+    return static_cast<uint32_t>(number_of_groups({{kFirstShare, 1 - kFirstShare}, kEnough}, state));
+  }
 };
 
 /// Samples per pixel of the first pass.
@@ -30,8 +39,8 @@ uint32_t first_samples(const Method& method, const PlanState& state) {
   if (method.sampling.first_spp) return static_cast<uint32_t>(*method.sampling.first_spp);
   const auto part = static_cast<uint32_t>(kFirstShare * state.group_budget);
   const bool is_open = method.sampling.counts.relative_error && !state.request.spp;
-  const uint32_t samples = is_open ? kMostFirst : std::min(part, kMostFirst);
-  const auto groups = static_cast<uint32_t>(method.groups);
+  const uint32_t samples = is_open ? kFirstOfError : std::min<uint32_t>(part, method.sampling.most_first_spp);
+  const uint32_t groups = method.groups_of(state);
   return std::max(samples / groups, 1u) * groups;
 }
 
@@ -43,7 +52,7 @@ double whole_budget(const Method& method, const PlanState& state) {
 
 void check_budget(const Method& method, const PlanState& state, uint32_t first) {
   const double budget = whole_budget(method, state);
-  const int least = std::max({1, method.sampling.counts.min_spp, method.groups});
+  const int least = std::max({1, method.sampling.counts.min_spp, static_cast<int>(method.groups_of(state))});
   if (budget >= static_cast<double>(first) + least) return;
   throw Error(ErrorCode::kUsage,
               fmt::format("{} samples per pixel are too few for {}: its first pass takes {} (--dependent-spp), and at "
@@ -64,15 +73,15 @@ SampleTarget last_target(const Method& method, const PlanState& state, const Fil
   double budget = whole_budget(method, state) - first.mean_count();
   if (state.seconds_left) budget = std::min(budget, samples_in_time(state));
   return SampleTarget(sample_counts(rows_of(first, 0, first.height()), std::max(0.0, budget), method.sampling.counts,
-                                    static_cast<uint32_t>(method.groups)));
+                                    method.groups_of(state)));
 }
 
-PassPlan pass_of(const std::string& name, Sampling sampling, uint32_t number, const Method& method) {
+PassPlan pass_of(const std::string& name, Sampling sampling, uint32_t number, uint32_t groups) {
   PassPlan pass;
   pass.name = name;
   pass.number = number;
   pass.sampling = sampling;
-  pass.groups = method.groups;
+  pass.groups = static_cast<int>(groups);
   pass.sample_variance = true;
   return pass;
 }
@@ -85,33 +94,37 @@ EstimatorResult mean_of_last(std::span<const Pass> passes, int first_row, int n_
 
 Plan adaptive_plan(const Estimator& estimator, std::optional<int> groups) {
   const bool is_pair = estimator.passes == EstimatorPasses::kPair;
-  Method method{*estimator.adaptive, estimator.name, groups.value_or(1)};
+  const Method method{*estimator.adaptive, estimator.name, groups};
   Plan plan;
   plan.name = estimator.name;
   plan.estimator = estimator.text;
   plan.predicts_error = estimator.predicts_error;
-  plan.takes_unfinished = is_pair;
+  plan.takes_unfinished = is_pair && !method.sampling.reads_groups;
   plan.has_crn_pass = is_pair;
   plan.estimate = mean_of_last;
   if (is_pair) {
     plan.estimate_bytes_per_pixel = estimator.bytes_per_pixel;
-    plan.estimate = [apply = estimator.apply](std::span<const Pass> passes, int first_row, int n_rows) {
-      return apply(rows_of(passes[0].film, first_row, n_rows), rows_of(passes[1].film, first_row, n_rows), {});
+    const bool std_error = estimator.predicts_error;
+    plan.estimate = [apply = estimator.apply, std_error](std::span<const Pass> passes, int first_row, int n_rows) {
+      const Film &crn = passes[0].film, &independent = passes[1].film;
+      return apply(rows_of(crn, first_row, n_rows), rows_of(independent, first_row, n_rows),
+                   {std::llround(crn.mean_count()), std_error});
     };
   }
   Phase first, last;
   first.share = last.share = kFirstShare;
-  first.passes = [=](const PlanState&) {
-    return std::vector{is_pair ? pass_of("crn", Sampling::kCrn, 0, method)
-                               : pass_of("pilot", Sampling::kIndependent, 1, method)};
+  first.passes = [=](const PlanState& state) {
+    const uint32_t n_groups = method.groups_of(state);
+    return std::vector{is_pair ? pass_of("crn", Sampling::kCrn, 0, n_groups)
+                               : pass_of("pilot", Sampling::kIndependent, 1, n_groups)};
   };
   first.set_targets = [=](const PlanState& state, std::span<Pass> passes) {
     const uint32_t samples = first_samples(method, state);
     check_budget(method, state, samples);
     passes[0].settings.spp = samples;
   };
-  last.passes = [=](const PlanState&) {
-    return std::vector{pass_of("independent", Sampling::kIndependent, 0, method)};
+  last.passes = [=](const PlanState& state) {
+    return std::vector{pass_of("independent", Sampling::kIndependent, 0, method.groups_of(state))};
   };
   last.set_targets = [=](const PlanState& state, std::span<Pass> passes) {
     passes[0].settings.spp = last_target(method, state, state.passes[0].film);

@@ -19,8 +19,9 @@ namespace covary {
 /// samples as a trial of its speed promises for what is left, and a tenth more, so that none is left over; pixels
 /// advance together, so that those with most samples lack some where the promise was not kept.
 ///
-/// `groups`: of both films; default: 1. Numbers of samples of the last pass are multiples of it. Rendering
-/// throws Error(kUsage) where the budget leaves less than one sample, or min_spp, for the last pass.
+/// `groups`: of both films; default: 1, or number_of_groups() of budget.h where the estimator reads them. Numbers of
+/// samples of the last pass are multiples of it. Rendering throws Error(kUsage) where the budget leaves less than one
+/// sample, or min_spp, for the last pass.
 Plan adaptive_plan(const Estimator& estimator, std::optional<int> groups = {});
 
 }  // namespace covary

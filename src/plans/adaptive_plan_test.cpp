@@ -63,6 +63,25 @@ TEST(AdaptivePlan, OptionsOfTheEstimatorReachIt) {
   for (const uint32_t n : independent.counts()) EXPECT_EQ(n, class_of(n)) << "classes";
 }
 
+/// Half of the samples are the CRN pass's, and groups are there for the estimator to read.
+TEST(AdaptivePlan, ControlVariatesOfUnequalNumbers) {
+  const LoadedScene scene = load_sized(kRoom);
+  const RenderResult result = render(scene, plan_of("iicv", {{"adaptive", ""}}), request_of(192));
+  ASSERT_EQ(result.passes.size(), 2u);
+  const Film &crn = result.passes[0].film, &independent = result.passes[1].film;
+  EXPECT_EQ(crn.groups(), 12);
+  EXPECT_EQ(crn.mean_count(), 96);
+  EXPECT_EQ(result.passes[0].settings.sampling, Sampling::kCrn);
+  EXPECT_NEAR(independent.mean_count(), 96, 0.96);
+  const auto [least, most] = std::minmax_element(independent.counts().begin(), independent.counts().end());
+  EXPECT_GT(*most, *least);
+  for (const uint32_t n : independent.counts()) EXPECT_TRUE(n >= 12 && n % 12 == 0);
+  EXPECT_EQ(result.image.estimate.data,
+            make_estimator("iicv").apply(rows_of(crn, 0, 30), rows_of(independent, 0, 30), {96, true}).estimate.data);
+  ASSERT_TRUE(result.predicted_relmse);
+  EXPECT_GT(*result.predicted_relmse, 0);
+}
+
 TEST(AdaptivePlan, ARelativeErrorTakesThePlaceOfTheBudget) {
   const LoadedScene scene = load_sized(kRoom, 20, 15);
   RenderRequest request = request_of(1);
@@ -118,7 +137,8 @@ TEST(AdaptivePlan, SameBitsForAnyNumberOfThreads) {
 
 TEST(AdaptivePlan, StoppedAtManyTilesAndResumedGivesTheSameBits) {
   const LoadedScene scene = load_sized(kRoom);
-  for (const Plan& plan : {plan_of("dependent-tests"), plain_adaptive()}) {
+  for (const Plan& plan :
+       {plan_of("dependent-tests"), plain_adaptive(), plan_of("iicv", {{"adaptive", ""}})}) {
     const TemporaryFolder folder;
     RenderRequest request = request_of(48);
     const RenderResult whole = render(scene, plan, request);

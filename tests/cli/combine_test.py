@@ -236,7 +236,8 @@ class Combine(CliTest):
         crn = [mean([image[c][7] for image in self.crn_images]) for c in "RGB"]
         for c, expected in zip("RGB", crn):
             self.assertAlmostEqual(self.read("out.exr")[c][7], expected, 5)
-        self.bad(2, "pixel (7, 0) of the independent image has 0 samples, fewer than the 12 groups", *inputs, "-o", "out.exr", "--force")
+        self.bad(2, "pixel (7, 0) of the independent image has 0 samples, fewer than the 12 groups", *inputs, "-o",
+                 "out.exr", "--force")
 
     def test_wrong_counts(self):
         self.layers("plain.exr", self.independent_images)
