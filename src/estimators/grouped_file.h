@@ -52,7 +52,7 @@ class GroupedFile {
   /// Rows of both arrays of a GroupedImage.
   struct Rows {
     std::vector<float> data;
-    std::vector<uint32_t> counts;  ///< where has_counts(); empty otherwise, where groups must be equal
+    std::vector<uint32_t> counts;           ///< where has_counts(); empty otherwise, where groups must be equal
     std::vector<float> variance_in_groups;  ///< GroupedImage::variance_in_groups, of films that keep it
   };
   /// Rows [first_row, first_row + n_rows).

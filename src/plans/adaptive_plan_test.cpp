@@ -137,8 +137,7 @@ TEST(AdaptivePlan, SameBitsForAnyNumberOfThreads) {
 
 TEST(AdaptivePlan, StoppedAtManyTilesAndResumedGivesTheSameBits) {
   const LoadedScene scene = load_sized(kRoom);
-  for (const Plan& plan :
-       {plan_of("dependent-tests"), plain_adaptive(), plan_of("iicv", {{"adaptive", ""}})}) {
+  for (const Plan& plan : {plan_of("dependent-tests"), plain_adaptive(), plan_of("iicv", {{"adaptive", ""}})}) {
     const TemporaryFolder folder;
     RenderRequest request = request_of(48);
     const RenderResult whole = render(scene, plan, request);
