@@ -16,8 +16,9 @@ constexpr uint32_t kMaxNumber = 1u << 30;
 void add_control_options(CLI::App& command, ControlTexts& texts) {
   command
       .add_option("--cv", texts.kind,
-                  "Control variates: one coefficient for each colour, for all, of light samples alone, or none")
-      ->check(one_of({"rgb", "mono", "vevoda", "off"}))
+                  "Control variates: one coefficient for each colour, for all, of light samples alone, by pixel for "
+                  "the first surface, or none")
+      ->check(one_of({"rgb", "mono", "vevoda", "optimal-mis", "off"}))
       ->group(kControlGroup);
   command
       .add_flag("--cv-paper", texts.paper,
@@ -52,6 +53,10 @@ void add_control_options(CLI::App& command, ControlTexts& texts) {
                   "MiB of sums and coefficients while learning, then cells become wider; default: 256")
       ->transform(whole_number(1u, kMaxNumber))
       ->group(kControlGroup);
+  command
+      .add_flag("--path-lengths", texts.path_lengths,
+                "Add an image for each number of edges of paths (Edges01, …) to the output")
+      ->group(kControlGroup);
 }
 
 std::optional<ControlOptions> control_options(const ControlTexts& texts) {
@@ -75,7 +80,8 @@ std::optional<ControlOptions> control_options(const ControlTexts& texts) {
 }
 
 void check_control_options(const ControlTexts& texts, const LoadedScene& scene, const std::string& integrator) {
-  const std::vector<std::string> words = command_words(texts);
+  std::vector<std::string> words = command_words(texts);
+  if (texts.path_lengths) words.emplace_back("--path-lengths");
   if (words.empty() || dynamic_cast<const ControlledPath*>(scene.integrator.get())) return;
   throw Error(ErrorCode::kUsage, fmt::format("{} is an option of --integrator controlled-path, not of {}", words[0],
                                              integrator.empty() ? scene.integrator_type : integrator));

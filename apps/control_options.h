@@ -20,6 +20,7 @@ struct ControlTexts {
   std::string kind, lights, grid, variance, prefix;
   std::optional<uint32_t> train_spp, clusters, memory_mib;
   bool paper = false;
+  bool path_lengths = false;
 };
 
 void add_control_options(CLI::App& command, ControlTexts& texts);
@@ -31,7 +32,7 @@ std::optional<ControlOptions> control_options(const ControlTexts& texts);
 /// took the place of the scene's, or empty.
 void check_control_options(const ControlTexts& texts, const LoadedScene& scene, const std::string& integrator);
 
-/// The options as words of a command line.
+/// The options that decide on samples as words of a command line.
 std::vector<std::string> command_words(const ControlTexts& texts);
 
 }  // namespace covary

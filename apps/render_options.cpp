@@ -160,6 +160,7 @@ RenderRequest make_request(const RenderOptions& options, const LoadedScene& scen
       training > 0 && options.replay.empty() && options.load_training.empty())
     take_training(training, scene, request);
   request.aovs = options.aovs;
+  request.path_lengths = options.control.path_lengths;
   request.crn_part = crn_part_named(options.crn_part);
   request.output = options.output;
   request.preview = options.preview;

@@ -91,6 +91,8 @@ class Film {
   std::map<std::string, std::string> attributes;
   /// Auxiliary images of the same size by name ("Albedo", "N", "P"), 3 channels each.
   std::map<std::string, Image> aovs;
+  /// What the file is to show as R G B where that is more than the film's samples; empty: their mean. It is not read.
+  Image shown;
 
   /// The arrays behind the film, for readers and writers: counts row-major; data as [pixel][group][rgb].
   std::vector<uint32_t>& counts() { return counts_; }
@@ -117,6 +119,7 @@ inline constexpr const char* kSeed = "seed";             ///< decimal; after a m
 inline constexpr const char* kSampling = "sampling";     ///< "independent" or "crn"
 inline constexpr const char* kSceneHash = "scene_hash";  ///< content of the scene
 inline constexpr const char* kSettings = "settings";     ///< all options that change the samples except the seed
+inline constexpr const char* kTraining = "training";     ///< hash of what the integrator learned, if it learns
 inline constexpr const char* kLightPaths = "light_paths_per_sample";  ///< light films only (splat_layer.h)
 inline constexpr const char* kVersion = "version";       ///< of the program
 inline constexpr const char* kCommand = "command";       ///< command line

@@ -19,12 +19,14 @@ constexpr const char* kGroups = "groups";
 constexpr const char* kChecksum = "checksum";  // CRC-32 of counts, group means, auxiliary images and variances
 constexpr const char* kSamples = "samples";    // attribute covary:samples and channel `samples`
 constexpr const char* kVariance = "variance_in_groups";  // channels .R .G .B, in some films
+constexpr const char* kShown = "shown";                  // "more": R G B hold more than the samples of the groups
 constexpr const char* kFewest = "samples_fewest";        // of any pixel; only where pixels differ
 constexpr const char* kMost = "samples_most";
 
 /// Attributes that follow from the film's numbers: written, and not kept in Film::attributes when read.
 bool is_derived(const std::string& key) {
-  return key == kFormat || key == kGroups || key == kSamples || key == kFewest || key == kMost || key == kChecksum;
+  return key == kFormat || key == kGroups || key == kSamples || key == kFewest || key == kMost || key == kChecksum ||
+         key == kShown;
 }
 
 std::string group_name(int group) { return fmt::format("group{:02d}", group); }
@@ -42,7 +44,7 @@ std::string checksum(const Film& film) {
 }
 
 /// The channels of a film and where their values lie; the same list serves writing and reading.
-/// `means` holds the image of R G B where the film has several groups.
+/// `means` holds the image of R G B where these are not the channels of the one group.
 std::vector<ExrPlane> film_planes(Film& film, Image& means) {
   std::vector<ExrPlane> planes;
   const auto add_rgb = [&](const std::array<std::string, 3>& names, float* data, size_t values_per_pixel) {
@@ -50,7 +52,7 @@ std::vector<ExrPlane> film_planes(Film& film, Image& means) {
       planes.push_back({names[c], ExrPlane::Type::kFloat, data + c, values_per_pixel * sizeof(float)});
   };
   const size_t stride = static_cast<size_t>(film.groups()) * 3;
-  if (film.groups() == 1) {
+  if (means.data.empty()) {
     add_rgb({"R", "G", "B"}, film.data().data(), stride);
   } else {
     add_rgb({"R", "G", "B"}, means.data.data(), 3);
@@ -77,12 +79,12 @@ std::vector<ExrPlane> film_planes(Film& film, Image& means) {
 }
 
 /// The names of the auxiliary images: every triple of channels that is no group, mean or variance.
-std::vector<std::string> find_aovs(const ExrFile& file, int groups) {
+std::vector<std::string> find_aovs(const ExrFile& file, bool has_groups) {
   std::vector<std::string> names;
   for (const ExrFile::Channel& channel : file.channels()) {
     const size_t dot = channel.name.rfind('.');
     const std::string name = channel.name.substr(0, dot == std::string::npos ? 0 : dot);
-    if (name.empty() || name == kVariance || (name.starts_with("group") && groups > 1)) continue;
+    if (name.empty() || name == kVariance || (name.starts_with("group") && has_groups)) continue;
     if (names.empty() || names.back() != name) names.push_back(name);
   }
   return names;
@@ -123,7 +125,8 @@ void write_film(const std::string& path, const Film& film) {
   }
   derive(kChecksum, checksum(film));
 
-  Image means = film.groups() > 1 ? film.mean_image() : Image();
+  if (!film.shown.data.empty()) derive(kShown, "more");
+  Image means = !film.shown.data.empty() ? film.shown : film.groups() > 1 ? film.mean_image() : Image();
   // The list of planes serves reading, too, and so wants a film it may write to; write_exr only reads.
   write_exr(path, {film.frame_width(), film.frame_height(), film.crop()}, attributes,
             film_planes(const_cast<Film&>(film), means),
@@ -151,9 +154,10 @@ Film read_film(const std::string& path) {
   for (const auto& [key, value] : attributes)
     if (!is_derived(key)) film.attributes[key] = value;
   if (file.find(std::string(kVariance) + ".R")) film.keep_sample_variance();
-  for (const std::string& name : find_aovs(file, groups)) film.aovs[name] = Image(film.width(), film.height(), 3);
+  const bool has_groups = groups > 1 || attributes.count(kShown);
+  for (const std::string& name : find_aovs(file, has_groups)) film.aovs[name] = Image(film.width(), film.height(), 3);
 
-  Image means = groups > 1 ? Image(film.width(), film.height(), 3) : Image();
+  Image means = has_groups ? Image(film.width(), film.height(), 3) : Image();
   const std::vector<ExrPlane> planes = film_planes(film, means);
   for (const ExrPlane& plane : planes) {
     const ExrFile::Channel* found = file.find(plane.name);

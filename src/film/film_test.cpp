@@ -82,7 +82,9 @@ TEST(Film, AddsSumsToGroupsOfEqualSizes) {
   EXPECT_EQ(film.group_mean(0, 0, 0), Spectrum(2, 2, 2));
   EXPECT_EQ(film.group_mean(0, 0, 1), Spectrum(1, 1, static_cast<float>(5.0 / 3)));
   film.add(0, 0, Spectrum(1));
-  EXPECT_TRUE(contains(message_of([&] { film.add_sums(0, 0, 1, std::vector{Spectrum(1), Spectrum(1)}); }),
+  EXPECT_TRUE(contains(message_of([&] {
+                         film.add_sums(0, 0, 1, std::vector{Spectrum(1), Spectrum(1)});
+                       }),
                        "groups of equal sizes"));
 }
 
@@ -148,6 +150,23 @@ TEST(Film, FileRoundTripIsBitExact) {
     EXPECT_EQ(read.attributes, film.attributes);
     ASSERT_EQ(read.aovs.size(), 3u);
     for (const char* name : {"Albedo", "N", "P"}) EXPECT_EQ(read.aovs.at(name).data, film.aovs.at(name).data);
+  }
+}
+
+TEST(Film, AFileMayShowMoreThanItsSamples) {
+  for (const int groups : {1, 3}) {
+    Film film = test_film(groups, 1, 2);
+    film.aovs["Albedo"] = Image(17, 19, 3);
+    film.shown = Image(17, 19, 3);
+    film.shown.data[5] = 7;
+    const std::string path = test_file("film.exr");
+    write_film(path, film);
+    EXPECT_EQ(read_image(path).image.data, film.shown.data);
+    const Film read = read_film(path);
+    EXPECT_TRUE(same_bits(film, read)) << "its samples are in the groups";
+    EXPECT_TRUE(read.shown.data.empty());
+    EXPECT_EQ(read.attributes, film.attributes);
+    EXPECT_EQ(read.aovs.size(), 1u);
   }
 }
 

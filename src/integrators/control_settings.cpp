@@ -6,7 +6,8 @@
 namespace covary {
 namespace {
 
-constexpr ControlKind kKinds[] = {ControlKind::kOff, ControlKind::kRgb, ControlKind::kMono, ControlKind::kVevoda};
+constexpr ControlKind kKinds[] = {ControlKind::kOff, ControlKind::kRgb, ControlKind::kMono, ControlKind::kVevoda,
+                                  ControlKind::kOptimalMis};
 constexpr LightSelection kSelections[] = {LightSelection::kTriangle, LightSelection::kShape, LightSelection::kPower};
 constexpr int kMaxInt = 1 << 30;
 
@@ -32,6 +33,8 @@ std::string name_of(ControlKind kind) {
       return "mono";
     case ControlKind::kVevoda:
       return "vevoda";
+    case ControlKind::kOptimalMis:
+      return "optimal-mis";
   }
   throw Error(ErrorCode::kInternal, "unknown kind of control variate");
 }
@@ -89,7 +92,7 @@ ControlSettings ControlSettings::with(const ControlOptions& options) const {
 
 CacheSettings ControlSettings::cache(uint32_t resolution) const {
   CacheSettings settings;
-  if (paper)
+  if (paper || per_pixel())
     settings = CacheSettings::published(resolution);
   else
     settings.resolution = resolution;

@@ -17,6 +17,8 @@ enum class ControlKind {
   kRgb,     ///< one coefficient for each colour channel
   kMono,    ///< one coefficient for all
   kVevoda,  ///< for light samples alone, one coefficient for each colour channel, after [Vevoda2018]
+  /// Optimal MIS weights of each pixel's direct light, from the pixel's samples so far [Kondapaneni2019].
+  kOptimalMis,
 };
 
 /// Settings given one by one; those that are not keep their values.
@@ -54,12 +56,14 @@ struct ControlSettings {
   /// Samples per pixel of training, if any.
   uint32_t training_spp() const { return on() ? train_spp : 0; }
   /// Training samples per pixel that first make an estimate of each pixel's value, and no coefficients.
-  uint32_t pilot_spp() const { return on() && relative ? (train_spp >= 4 ? 2 : train_spp / 2) : 0; }
+  uint32_t pilot_spp() const { return on() && relative && !per_pixel() ? (train_spp >= 4 ? 2 : train_spp / 2) : 0; }
+  /// Whether each pixel has coefficients of its own, for the first surface, instead of each cell of space.
+  bool per_pixel() const { return kind == ControlKind::kOptimalMis; }
   CacheSettings cache(uint32_t resolution) const;
   std::string text() const;
 };
 
-/// "off", "rgb", "mono", "vevoda".
+/// "off", "rgb", "mono", "vevoda", "optimal-mis".
 std::string name_of(ControlKind kind);
 /// The one of that name, or nothing.
 std::optional<ControlKind> control_kind(const std::string& name);

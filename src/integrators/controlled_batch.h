@@ -20,6 +20,7 @@ struct ControlledVertex {
   Spectrum control;                         ///< what the control adds to the plain estimate, so far
 
   // While coefficients are learnt:
+  bool recorded = false;
   uint32_t sums_cell = 0;  ///< of ControlledBatch::sums
   float weight = 0;        ///< of its samples in the sums
   Spectrum plain;          ///< the plain estimate without the throughput, so far
@@ -38,6 +39,7 @@ struct ControlledBatch final : ThreadState {
     uint32_t light = 0;  ///< number of the light
     Vec2 u, u_environment;
     float u_primitive = 0;
+    bool in_cell = false;  ///< key says where its coefficients are learnt and looked up
     CellKey key;
   };
 
@@ -58,6 +60,7 @@ struct ControlledBatch final : ThreadState {
           vertices.resize(n);
     if (blocked.size() < 2 * n) blocked.resize(2 * n), connections.resize(2 * n), shadow_rays.resize(2 * n);
     for (size_t i = 0; i < n; ++i) vertices[i].open = false;
+    by_length.assign(n * n_lengths, Spectrum());
     n_connections = 0;
   }
   /// Keeps the first n paths.
@@ -76,6 +79,11 @@ struct ControlledBatch final : ThreadState {
   std::vector<uint8_t> blocked;
   std::vector<uint32_t> alive;  ///< places of the paths that go on
   std::vector<uint32_t> ended;  ///< samples of the paths that end at their last vertex
+
+  /// Parts of the samples' radiances by the number of edges of their paths, 1 … n_lengths, one sample after another;
+  /// none are kept where n_lengths is 0.
+  size_t n_lengths = 0;
+  std::vector<Spectrum> by_length;
 
   bool recording = false;
   SystemSums sums;

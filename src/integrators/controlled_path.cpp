@@ -6,7 +6,7 @@
 // | max_depth     | integer | -1       | largest number of path edges; -1: no limit                            |
 // | rr_depth      | integer | 5        | number of edges after which roulette may end a path                   |
 // | hide_emitters | boolean | false    | lights are invisible to the camera                                    |
-// | cv            | string  | rgb      | control variates: `off`, `rgb`, `mono`, `vevoda`                      |
+// | cv            | string  | rgb      | control variates: `off`, `rgb`, `mono`, `vevoda`, `optimal-mis`       |
 // | cv_paper      | boolean | false    | the published method; other parameters change it                      |
 // | lights        | string  | power    | how lights are chosen: `triangle`, `shape`, `power`                   |
 // | cv_grid       | integer | 0        | cells along the longest side of the scene; 0: by the size of pixels   |
@@ -60,7 +60,13 @@ void ControlledPath::prepare(const Scene& scene) {
   lights_ = LightSet(scene, settings_.lights);
   compensated_ = scene.environment() ? scene.environment()->mis_compensated() : nullptr;
   const Emitter* environment = compensated_ ? compensated_.get() : scene.environment();
-  controlled_ = {&lights_, {}, environment, &table(), settings_.prefix, settings_.kind == ControlKind::kVevoda};
+  controlled_ = {&lights_,
+                 {},
+                 environment,
+                 &table(),
+                 settings_.prefix,
+                 settings_.kind == ControlKind::kVevoda,
+                 settings_.per_pixel()};
   std::vector<float> counts = make_clusters();
   controlled_.cluster_of = cluster_of_;
   if (settings_.on())
@@ -84,9 +90,11 @@ std::vector<float> ControlledPath::make_clusters() {
   return {counts.begin(), counts.end()};
 }
 
-/// By what the camera sees: cells as wide as 8 pixels in the mean over the image, where that gives 64 to 256 cells; 64
-/// where it sees nothing.
+/// The longer side of the frame where pixels have coefficients. Otherwise by what the camera sees: cells as wide as 8
+/// pixels in the mean over the image, where that gives 64 to 256 cells; 64 where it sees nothing.
 uint32_t ControlledPath::resolution() const {
+  if (settings_.per_pixel())
+    return static_cast<uint32_t>(std::max(scene_->camera().width(), scene_->camera().height()));
   if (settings_.grid != ControlSettings::kAutomaticGrid) return settings_.grid;
   constexpr int kSide = 16;
   const Camera& camera = scene_->camera();

@@ -35,11 +35,15 @@ class ControlledPath : public LearningIntegrator {
   size_t training_bytes() const { return training_bytes_; }
 
   void prepare(const Scene& scene) override;
+  const PathLengthSettings& lengths() const { return lengths_; }
   std::unique_ptr<ThreadState> make_thread_state() const override { return std::make_unique<ControlledBatch>(); }
   void trace(const Scene& scene, std::span<CameraSample> samples, PathContext& context) const override {
     trace_with<ControlledParts>(scene, samples, context);
   }
   bool allows_negative() const override { return settings_.on(); }
+  WaveWeights wave_weights() const override {
+    return settings_.paper || settings_.per_pixel() ? WaveWeights::kSamples : WaveWeights::kVariance;
+  }
   /// 0 once coefficients were given.
   uint32_t training_spp() const override { return given_ ? 0 : settings_.training_spp(); }
   uint32_t pilot_spp() const override { return settings_.pilot_spp(); }

@@ -23,6 +23,7 @@
 // `Parts` says what tests exchange to plant bugs; see ControlledParts.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <span>
 
@@ -48,6 +49,8 @@ struct ControlledScene {
   /// The control knows light samples alone, as if no other technique found their points [Vevoda2018]: r is 1 for each
   /// of them, and direction samples have no part in it.
   bool light_samples_only = false;
+  /// Coefficients belong to pixels, those into which the camera sees the first surface; later vertices have none.
+  bool per_pixel = false;
   /// Dense techniques: directions by the BSDF, then the environment.
   static constexpr uint32_t kBsdf = 0, kEnvironment = 1;
   uint32_t n_dense() const { return environment ? 2 : 1; }
@@ -94,12 +97,12 @@ class ControlledTracer {
       if (depth + 1 >= lengths_.max_depth) break;
       keep_paths(batch_, [&](Path& path) { return path.found && (depth < lengths_.rr_depth || survives(path)); });
       const bool connect = depth + 2 >= lengths_.min_depth && any_light;
-      choose_lights(connect);
+      choose_lights(connect, depth);
       for (size_t i = 0; i < batch_.paths.size(); ++i) sample_lights(i);
       scatter(depth);
-      trace_connections();
+      trace_connections(depth + 2);
       if constexpr (Parts::kCloseEnded)
-        for (const uint32_t sample : batch_.ended) close(sample);
+        for (const uint32_t sample : batch_.ended) close(sample, depth + 2);
     }
   }
 
@@ -126,10 +129,10 @@ class ControlledTracer {
       }
       r = Parts::direction_weight(path.previous_pdf, pdf_light, !path.found);
     }
-    if (!is_black(light.radiance)) samples_[path.sample].radiance += path.throughput * light.radiance * r;
+    if (!is_black(light.radiance)) add(path.sample, depth + 1, path.throughput * light.radiance * r);
     if (!vertex.open) return;
     if (!control_.light_samples_only) take(vertex, vertex.direction_weight * light.radiance * r, cluster, 1 - r);
-    close(path.sample);
+    close(path.sample, depth + 1);
   }
 
   /// Plays Russian roulette.
@@ -145,7 +148,7 @@ class ControlledTracer {
   }
 
   /// What each vertex is to sample. All choices come first, so that memory answers to one while the others are made.
-  void choose_lights(bool connect) {
+  void choose_lights(bool connect, int depth) {
     for (size_t i = 0; i < batch_.paths.size(); ++i) {
       ControlledBatch::LightChoice& choice = batch_.choices[i];
       choice.open = connect && (batch_.hits[i].bsdf_flags & kSmooth);
@@ -161,10 +164,9 @@ class ControlledTracer {
         choice.u_environment = random.get_2d(kEnvironmentVertices + vertex, Event::kLightPosition);
         control_.environment->prefetch(choice.u_environment, PrefetchStep::kTable);
       }
-      if (uses_cells()) {
-        const SurfaceHit& hit = batch_.hits[i];
-        const bool front = dot(hit.frame.n, batch_.rays[i].d) < 0;
-        choice.key = table_.grid().key(hit.p, front ? hit.frame.n : -hit.frame.n);
+      choice.in_cell = uses_cells() && (depth == 0 || !control_.per_pixel);
+      if (choice.in_cell) {
+        choice.key = key_of(batch_.rays[i], batch_.hits[i]);
         table_.prefetch(choice.key);
       }
     }
@@ -172,6 +174,18 @@ class ControlledTracer {
       for (size_t i = 0; i < batch_.paths.size(); ++i)
         if (batch_.choices[i].open)
           control_.environment->prefetch(batch_.choices[i].u_environment, PrefetchStep::kValues);
+  }
+
+  CellKey key_of(const Ray& ray, const SurfaceHit& hit) const {
+    const bool front = dot(hit.frame.n, ray.d) < 0;
+    if (!control_.per_pixel) return table_.grid().key(hit.p, front ? hit.frame.n : -hit.frame.n);
+    const Camera& camera = scene_.camera();
+    const Vec2 film = camera.project(hit.p, ray.d);
+    const auto pixel = [this](float x, int size) {
+      return static_cast<uint32_t>(std::clamp(x, 0.0f, static_cast<float>(size - 1))) >> table_.grid().level();
+    };
+    return {pixel(film.x, camera.width()), pixel(film.y, camera.height()), 0, CellGrid::kEveryNormal,
+            table_.grid().level()};
   }
 
   bool uses_cells() const { return batch_.recording || table_.n_cells() > 0; }
@@ -203,7 +217,7 @@ class ControlledTracer {
       ControlledVertex& vertex = batch_.vertices[path.sample];
       vertex.open = batch_.choices[i].open;
       if (vertex.open) {
-        open(vertex, path, batch_.choices[i].key);
+        open(vertex, path, batch_.choices[i]);
         if (!control_.lights->empty())
           connect(path, hit, wo, *bsdf, batch_.lights[i], control_.cluster_of[batch_.choices[i].light],
                   (*control_.lights)[batch_.choices[i].light].pmf);
@@ -233,19 +247,20 @@ class ControlledTracer {
   }
 
   /// Begins the estimate of a vertex: Σ N β of its control.
-  void open(ControlledVertex& vertex, const Path& path, CellKey key) {
+  void open(ControlledVertex& vertex, const Path& path, const ControlledBatch::LightChoice& choice) {
     vertex.throughput = path.throughput;
-    vertex.cell = table_.n_cells() > 0 ? table_.find(key) : CoefficientTable::kNone;
+    vertex.recorded = choice.in_cell && batch_.recording;
+    vertex.cell = choice.in_cell && table_.n_cells() > 0 ? table_.find(choice.key) : CoefficientTable::kNone;
     if (vertex.cell != CoefficientTable::kNone) {
       if (!batch_.recording && is_black(table_.scale(vertex.cell)))
         vertex.cell = CoefficientTable::kNone;
       else
         begin_control(vertex);
     }
-    if (!batch_.recording) return;
+    if (!vertex.recorded) return;
     const Spectrum importance = context_.importance.empty() ? Spectrum(1) : context_.importance[path.sample];
     vertex.weight = variance_weight(control_.prefix ? path.throughput : Spectrum(1), importance);
-    vertex.sums_cell = batch_.sums.cell(key);
+    vertex.sums_cell = batch_.sums.cell(choice.key);
     vertex.plain = Spectrum();
   }
 
@@ -268,7 +283,7 @@ class ControlledTracer {
       if (r_light > 0) sum += coefficient(vertex.cell, cluster) * r_light;
       vertex.control = vertex.control - sum;
     }
-    if (batch_.recording) record(vertex, value, cluster, r_light);
+    if (vertex.recorded) record(vertex, value, cluster, r_light);
   }
 
   void record(ControlledVertex& vertex, const Spectrum& value, uint32_t cluster, float r_light) {
@@ -299,7 +314,7 @@ class ControlledTracer {
   }
 
   /// Finishes the light samples, now that it is known which are hidden.
-  void trace_connections() {
+  void trace_connections(int edges) {
     const size_t n = batch_.n_connections;
     scene_.occluded(std::span(batch_.shadow_rays).first(n), batch_.blocked);
     context_.n_rays += n;
@@ -309,20 +324,28 @@ class ControlledTracer {
       if (batch_.blocked[i]) {
         take(vertex, Spectrum(), connection.cluster, 1);
       } else {
-        samples_[connection.sample].radiance += vertex.throughput * connection.value;
+        add(connection.sample, edges, vertex.throughput * connection.value);
         take(vertex, connection.value, connection.cluster, control_.light_samples_only ? 1 : connection.r_technique);
       }
     }
     batch_.n_connections = 0;
   }
 
-  /// Ends the estimate of a vertex.
-  void close(uint32_t sample) {
+  /// Adds to the radiance of a sample what came by paths of so many edges.
+  void add(uint32_t sample, int edges, const Spectrum& value) {
+    samples_[sample].radiance += value;
+    const auto place = static_cast<size_t>(edges - 1);
+    if (place < batch_.n_lengths) [[unlikely]]
+      batch_.by_length[sample * batch_.n_lengths + place] += value;
+  }
+
+  /// Ends the estimate of a vertex, which is of paths of so many edges.
+  void close(uint32_t sample, int edges) {
     ControlledVertex& vertex = batch_.vertices[sample];
     vertex.open = false;
     if (vertex.cell == CoefficientTable::kNone) return;
-    samples_[sample].radiance += vertex.throughput * table_.scale(vertex.cell) * vertex.control;
-    if (batch_.recording) batch_.sums.add_held_out(vertex.sums_cell, vertex.weight, vertex.plain, vertex.control);
+    add(sample, edges, vertex.throughput * table_.scale(vertex.cell) * vertex.control);
+    if (vertex.recorded) batch_.sums.add_held_out(vertex.sums_cell, vertex.weight, vertex.plain, vertex.control);
   }
 
   const Scene& scene_;

@@ -260,7 +260,9 @@ PassResult render_pass(const Scene& scene, const Integrator& integrator, const P
   // In waves, so that all pixels advance together. The one wave of pixels that are estimated is cut into rounds of some
   // time.
   while (reached < largest && !limits.ended()) {
-    const Wave wave{settings.spp, settings.estimate ? largest : std::min(largest, wave_end(reached, film.groups()))};
+    const Wave wave{settings.spp, settings.estimate
+                                      ? largest
+                                      : std::min(largest, wave_end(reached, settings.learner ? 1 : film.groups()))};
     const Stopwatch round_watch;
     std::atomic<bool> round_over{false};
     render_tiles(tiles.size(), settings.learner, integrator, workers, [&](size_t i) {

@@ -2,18 +2,21 @@
 #include "integrators/training.h"
 
 #include "core/content_hash.h"
+#include "core/stopwatch.h"
 
 namespace covary {
 
 void LearningIntegrator::restart() {
   on_restart();
-  trained_spp_ = 0;
+  trained_spp_ = 0, update_seconds_ = 0;
   frozen_ = false;
 }
 
 void LearningIntegrator::end_wave(uint32_t spp) {
   COVARY_CHECK(!frozen_, "a frozen integrator cannot learn");
+  const Stopwatch watch;
   update();
+  update_seconds_ += watch.seconds();
   trained_spp_ = spp;
 }
 
@@ -24,25 +27,31 @@ void LearningIntegrator::freeze() {
 }
 
 std::string LearningIntegrator::description() const {
-  return settings_text() + (frozen_ ? " training=" + hash_text(hash_) : " untrained");
+  return settings_text() + (frozen_ ? " training=" : " ") + training_text();
 }
+
+std::string LearningIntegrator::training_text() const { return frozen_ ? hash_text(hash_) : "untrained"; }
 
 bool train(const Scene& scene, LearningIntegrator& integrator, const TrainingSettings& settings) {
   integrator.restart();
   if (integrator.training_spp() > 0) {
     PassSettings pass;
-    pass.seed = integrator.training_seed(), pass.pass = kTrainingPass, pass.spp = integrator.training_spp();
+    pass.seed = settings.seed, pass.pass = kTrainingPass, pass.spp = integrator.training_spp();
     pass.filter = settings.filter, pass.stop = settings.stop, pass.progress = settings.progress;
     pass.learner = &integrator;
-    Film film(scene.camera().width(), scene.camera().height(), settings.window, 1);
+    Film film(scene.camera().width(), scene.camera().height(), settings.window, settings.image ? 2 : 1);
+    WaveCombination waves(integrator.wave_weights());
     std::vector<Spectrum> importance;
     pass.checkpoint = [&] {
-      if (!settings.importance || integrator.trained_spp() != integrator.pilot_spp()) return;
-      importance = settings.importance(film);
-      pass.importance = importance;
+      if (settings.importance && integrator.trained_spp() == integrator.pilot_spp()) {
+        importance = settings.importance(film);
+        pass.importance = importance;
+      }
+      if (settings.image) waves.add(film, importance);
     };
     render_pass(scene, integrator, pass, film);
     if (integrator.trained_spp() != integrator.training_spp()) return false;
+    if (settings.image) *settings.image = waves.result();
   }
   integrator.freeze();
   return true;

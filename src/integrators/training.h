@@ -10,9 +10,9 @@
 //     freeze()         from here on a sample is a function of its address alone, as those of other integrators
 //
 // The samples of a wave read only what earlier waves taught, so their mean is right in expectation and they may stay
-// in the film (PassSettings::learner). train() below, with which a render by a plan begins, uses them for nothing else.
-// The hash of the frozen state is part of description() and so of a film's settings: films of different training are
-// not continued or merged.
+// in the film (PassSettings::learner). train() below, with which a render by a plan begins, makes an image of them
+// (training_image.h). The hash of the frozen state goes into a film's attributes: films of different training are not
+// continued, but may be merged, since each is right in expectation.
 #pragma once
 
 #include <memory>
@@ -20,6 +20,7 @@
 #include "film/film.h"
 #include "integrators/integrator.h"
 #include "integrators/render_pass.h"
+#include "integrators/training_image.h"
 
 namespace covary {
 
@@ -33,8 +34,8 @@ class LearningIntegrator : public Integrator {
  public:
   /// Samples per pixel that it wants to learn from, by its parameters; 0: it is to be frozen as it is.
   virtual uint32_t training_spp() const = 0;
-  /// PassSettings::seed of the training. Films of different seeds can be merged where this is the same for all.
-  virtual uint64_t training_seed() const { return 0; }
+  /// How the waves of the training become an image.
+  virtual WaveWeights wave_weights() const { return WaveWeights::kVariance; }
   /// Samples per pixel of the training after which the importance of each pixel (PassSettings::importance) is made of
   /// the image so far; 0: it is not asked for.
   virtual uint32_t pilot_spp() const { return 0; }
@@ -55,8 +56,14 @@ class LearningIntegrator : public Integrator {
   /// Samples per pixel learnt from so far.
   uint32_t trained_spp() const { return trained_spp_; }
   bool frozen() const { return frozen_; }
+  /// Seconds that making what trace() reads has taken since restart().
+  double update_seconds() const { return update_seconds_; }
   /// settings_text() and the hash of the frozen state; "untrained" before.
   std::string description() const final;
+  /// Registered name and settings.
+  virtual std::string settings_text() const = 0;
+  /// Hash of the frozen state, or "untrained".
+  std::string training_text() const;
 
  protected:
   /// Called by restart(): back to what trace() reads and absorb() adds to before anything was learnt.
@@ -67,13 +74,12 @@ class LearningIntegrator : public Integrator {
   virtual void on_freeze() {}
   /// Hash (core/content_hash.h) of all that trace() reads of what was learnt.
   virtual uint64_t state_hash() const = 0;
-  /// Registered name and settings.
-  virtual std::string settings_text() const = 0;
 
  private:
   uint32_t trained_spp_ = 0;
   bool frozen_ = false;
   uint64_t hash_ = 0;
+  double update_seconds_ = 0;
 };
 
 /// PassSettings::pass of training, so that it shares no numbers with the passes of a plan.
@@ -86,10 +92,13 @@ struct TrainingSettings {
   std::function<void(uint64_t done, uint64_t total)> progress;  ///< as in PassSettings
   /// Makes the importance of each pixel from the film after pilot_spp() samples; empty: 1 everywhere.
   std::function<std::vector<Spectrum>(const Film&)> importance;
+  /// PassSettings::seed of the training: renders of different seeds learn from different samples.
+  uint64_t seed = 0;
+  TrainingImage* image = nullptr;  ///< when set, gets the image of the samples
 };
 
-/// Trains a prepared integrator from the beginning, by training_spp() independent samples in each pixel that are used
-/// for nothing else, and freezes it. False when stopped before that; it can be trained again.
+/// Trains a prepared integrator from the beginning, by training_spp() independent samples in each pixel, and freezes
+/// it. False when stopped before that; it can be trained again.
 bool train(const Scene& scene, LearningIntegrator& integrator, const TrainingSettings& settings);
 
 }  // namespace covary

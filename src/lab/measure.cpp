@@ -27,7 +27,7 @@ double predicted_relmse(const std::string& path, const SceneInstance& scene, con
   const ImageInfo info = inspect_image(path);
   const bool has_errors = std::any_of(info.channels.begin(), info.channels.end(),
                                       [](const ExrFile::Channel& c) { return c.name == "StdError.R"; });
-  if (!has_errors) return kNone;
+  if (!has_errors || !scene.entry.layer.empty()) return kNone;
   const Image errors = read_window(path, scene, "StdError");
   double sum = 0;
   size_t n = 0;
@@ -171,7 +171,7 @@ Summary summary_of(const Results& results, size_t method, size_t budget) {
 }  // namespace
 
 Image read_window(const std::string& path, const SceneInstance& scene, const std::string& layer) {
-  const PlacedImage source = read_image(path, layer);
+  const PlacedImage source = read_image(path, layer.empty() ? scene.entry.layer : layer);
   const CropWindow &have = source.place.window, &want = scene.window;
   if (source.place.frame_width != scene.frame_width || source.place.frame_height != scene.frame_height)
     throw Error(ErrorCode::kInput, fmt::format("{} has a frame of {} x {} pixels, the scene one of {} x {}", path,
@@ -191,7 +191,7 @@ void measure(Cell& cell, const SceneInstance& scene, const std::vector<Image>& r
   parallel_for(n, [&](size_t s) {
     RunResult& run = cell.runs[s];
     images[s] = read_window(run.record.image, scene);
-    const std::string key = key_text(run_keys[s] + " " + reference_key);
+    const std::string key = key_text(run_keys[s] + " " + reference_key + scene.entry.layer);
     const ImageErrors errors = image_errors(images[s], run.record.image, scene, references, cache, key);
     run.relmse_trimmed = errors.relmse_trimmed, run.mae = errors.mae, run.flip = errors.flip,
     run.above5 = errors.above5;

@@ -8,7 +8,8 @@
 
 namespace covary::lab {
 
-/// Pixels of a scene's window from an image of any size that covers it. Throws Error(kInput) where it does not.
+/// Pixels of a scene's window from an image of any size that covers it; of `layer`, or the scene's where that is empty.
+/// Throws Error(kInput) where it does not cover it.
 Image read_window(const std::string& path, const SceneInstance& scene, const std::string& layer = "");
 
 /// Fills in everything of a cell that follows from its own runs; their records and seeds are given. MAE and FLIP are

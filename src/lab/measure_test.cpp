@@ -113,6 +113,17 @@ TEST_F(Measure, PredictedErrorsComeFromTheLayerOfStandardErrors) {
   EXPECT_TRUE(std::isnan(plain.mae_of_mean)) << "one run has no mean image of its own";
 }
 
+TEST_F(Measure, ReadsTheLayerThatTheSceneNames) {
+  SceneInstance errors = scene();
+  errors.entry.layer = "StdError";
+  Cell cell = two_runs();
+  measure(cell, errors, {constant(1)}, false, {24, 0}, cache_, keys_, "reference");
+  EXPECT_NEAR(cell.runs[0].mse, 0.49, 1e-6);
+  EXPECT_TRUE(std::isnan(cell.runs[0].predicted_relmse));
+  measure_cell(cell);
+  EXPECT_NEAR(cell.runs[0].mae, 0.2, 1e-6) << "not that of the other layer";
+}
+
 /// Errors that cost more than reading the image are kept, one file a run and reference.
 TEST_F(Measure, KeepsErrorsOfImages) {
   Cell cell = two_runs();

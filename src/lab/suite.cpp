@@ -65,6 +65,7 @@ Json json_of(const SceneEntry& scene) {
   if (scene.max_depth) json["max_depth"] = *scene.max_depth;
   if (!scene.defines.empty()) json["defines"] = scene.defines;
   if (!scene.credit.empty()) json["credit"] = scene.credit;
+  if (!scene.layer.empty()) json["layer"] = scene.layer;
   for (const CropWindow& w : scene.insets)
     json["insets"].push_back({{"x", w.x}, {"y", w.y}, {"w", w.width}, {"h", w.height}});
   if (scene.reference) json["reference"] = json_of(*scene.reference);

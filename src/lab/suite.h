@@ -36,6 +36,7 @@ struct SceneEntry {
   std::optional<int64_t> max_depth;
   std::vector<std::string> defines;  ///< name=value
   std::string credit;                ///< author, title, licence
+  std::string layer;                 ///< of images and references that is looked at; empty: R G B
   std::vector<CropWindow> insets;    ///< in the frame
   std::optional<ReferencePlan> reference;
 };

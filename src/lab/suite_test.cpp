@@ -18,7 +18,7 @@ const char* const kSuite = R"({
   "scene_root": "scenes",
   "scenes": [
     {"name": "room", "file": "room.xml", "resolution": "96x64", "max_depth": -1, "defines": ["spp=4"],
-     "credit": "ours", "insets": [{"x": 1, "y": 2, "w": 3, "h": 4}]},
+     "credit": "ours", "layer": "N", "insets": [{"x": 1, "y": 2, "w": 3, "h": 4}]},
     {"name": "wall", "file": "wall.xml", "crop": "8x8", "reference": {"files": ["a.exr", "b.exr"]}}
   ],
   "methods": [
@@ -38,6 +38,7 @@ TEST(Suite, ReadsEverything) {
   const Suite suite = parse_suite(kSuite, "small.json");
   EXPECT_EQ(suite.scenes.size(), 2u);
   EXPECT_EQ(suite.scenes[0].max_depth, -1);
+  EXPECT_EQ(suite.scenes[0].layer, "N");
   EXPECT_EQ(suite.scenes[0].insets[0], (CropWindow{1, 2, 3, 4}));
   EXPECT_EQ(suite.reference_of(suite.scenes[0]).spp, 64u);
   EXPECT_EQ(suite.reference_of(suite.scenes[1]).files, (std::vector<std::string>{"a.exr", "b.exr"}));

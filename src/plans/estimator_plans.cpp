@@ -52,6 +52,7 @@ Plan plain_plan(Sampling sampling, std::optional<int> groups) {
   plan.name = plan.estimator = "none";
   plan.film_is_image = plan.predicts_error = true;
   plan.has_crn_pass = sampling == Sampling::kCrn;
+  plan.takes_training = !plan.has_crn_pass;
   plan.estimate = mean_of_first;
   Phase phase;
   phase.passes = [=](const PlanState& state) {

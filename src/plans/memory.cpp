@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include "core/error.h"
+#include "integrators/path_length_images.h"
 #include "integrators/training.h"
 #include "plans/budget.h"
 #include "plans/light_plan.h"
@@ -43,6 +44,7 @@ RenderMemory render_memory(const LoadedScene& scene, const Plan& plan, const Ren
   if (has_light_pass(scene, plan)) passes.push_back(light_pass_plan(plan, passes));
   RenderMemory memory = render_memory(plan, passes, window.width, window.height, request.aovs);
   memory.training = training_memory(scene);
+  if (request.path_lengths) memory.films += window.width * window.height * kMostEdges * kImageBytes;
   return memory;
 }
 

@@ -73,7 +73,7 @@ void resume(const RenderRequest& request, Pass& pass) {
     return it == attributes.end() ? std::string() : it->second;
   };
   for (const char* key : {film_key::kSceneHash, film_key::kSampling, film_key::kSeed, film_key::kSettings,
-                          film_key::kLightPaths, film_key::kLight})
+                          film_key::kTraining, film_key::kLightPaths, film_key::kLight})
     if (film.attributes[key] != wanted(key)) differs(key, film.attributes[key], wanted(key));
   film.attributes = attributes;
   film.aovs.clear();

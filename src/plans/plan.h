@@ -103,6 +103,7 @@ struct Plan {
   double estimate_bytes_per_pixel = 0;  ///< memory that estimate() takes beside the films, about
   bool takes_unfinished = false;        ///< estimate() works where pixels of a film still have no samples
   bool film_is_image = false;           ///< the film of the one pass is the result; estimate() only serves its error
+  bool takes_training = false;          ///< samples of the integrator's training join the image
   bool has_crn_pass = false;            ///< some pass takes common random numbers
   bool traces_light = false;            ///< set by render(): there is a light pass
   bool predicts_error = false;          ///< estimate() gives a standard error

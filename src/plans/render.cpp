@@ -13,6 +13,7 @@
 #include "film/splat_layer.h"
 #include "integrators/aov.h"
 #include "integrators/light_pass.h"
+#include "integrators/path_length_images.h"
 #include "integrators/training.h"
 #include "plans/budget.h"
 #include "plans/folder_lock.h"
@@ -20,9 +21,8 @@
 #include "plans/memory.h"
 #include "plans/pass_files.h"
 #include "plans/pass_waves.h"
-#include "plans/pixel_importance.h"
 #include "plans/result_files.h"
-#include "plans/training_file.h"
+#include "plans/training_stage.h"
 
 namespace covary {
 namespace {
@@ -42,24 +42,14 @@ std::string filter_text(const FilterSettings& filter) {
   throw Error(ErrorCode::kInternal, "unknown reconstruction filter");
 }
 
-/// Trains the scene's integrator if it learns. False when stopped.
-bool train(const LoadedScene& scene, const RenderRequest& request, TrainingSettings settings) {
-  auto* learning = dynamic_cast<LearningIntegrator*>(scene.integrator.get());
-  settings.importance = [&](const Film& film) {
-    return pixel_importance(*scene.scene, settings.filter, film, settings.stop);
-  };
-  if (!request.load_training.empty()) load_training(scene, request.load_training);
-  if (learning && !train(*scene.scene, *learning, settings)) return false;
-  if (!request.save_training.empty()) save_training(scene, request.save_training);
-  return true;
-}
-
-void check(const Plan& plan, const RenderRequest& request) {
+void check(const LoadedScene& scene, const Plan& plan, const RenderRequest& request) {
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
   if (request.spp && (*request.spp < 1 || *request.spp > kMaxBudget))
     usage(fmt::format("{} samples per pixel; expected are 1 to {}", *request.spp, kMaxBudget));
   if (plan.fixed_samples && (request.seconds > 0 || request.until > 0))
     usage(plan.name + " needs the number of samples to be known before, so there can be no limit of time or error");
+  if (request.path_lengths && !dynamic_cast<const ControlledPath*>(scene.integrator.get()))
+    usage("images by the number of edges need the integrator controlled-path");
   if (request.until > 0 && !plan.predicts_error) usage(plan.name + " does not estimate its error");
 }
 
@@ -94,8 +84,10 @@ class PlanRun {
   void estimate();
   double time_estimate();
   void render_auxiliary_images();
+  void add_path_lengths();
   void write_files();
 
+  bool has_training() const { return !result_.training.mean.data.empty(); }
   bool timed() const { return request_.seconds > 0; }
   bool stopped() const { return callbacks_.stop && callbacks_.stop->load(); }
   /// The passes of every phase are there.
@@ -150,6 +142,9 @@ void PlanRun::write_files() {
   const bool is_film = output_is_film(plan_, request_);
   result_.passes = std::move(state_.passes);
   if (result_.interrupted && result_.samples_per_pixel() == 0) return;
+  if (plan_.film_is_image && has_training())
+    result_.image.estimate = with_training(result_.passes[0].film, result_.training);
+  if (request_.path_lengths && !result_.interrupted) add_path_lengths();
   if (!request_.passes.empty() || (result_.interrupted && !is_film))
     save_passes(request_, result_.passes, !result_.interrupted);
   write_result_files(plan_, request_, result_);
@@ -157,6 +152,15 @@ void PlanRun::write_files() {
     result_.kept = is_film ? request_.output : passes_folder(request_).string();
   else
     remove_passes(plan_, request_, result_.passes);
+}
+
+void PlanRun::add_path_lengths() {
+  const Pass& pass = camera_passes(result_.passes).back();
+  PassSettings settings = pass.settings;
+  settings.stop = callbacks_.stop;
+  const auto& integrator = dynamic_cast<const ControlledPath&>(*pass.integrator);
+  std::vector<Image> images = path_length_images(*scene_.scene, integrator, settings, pass.film);
+  for (size_t i = 0; i < images.size(); ++i) result_.aovs[fmt::format("Edges{:02}", i + 1)] = std::move(images[i]);
 }
 
 void PlanRun::warn_of_missing_light() const {
@@ -169,9 +173,9 @@ void PlanRun::warn_of_missing_light() const {
 
 bool PlanRun::render_to_limits() {
   warn_of_missing_light();
-  const Stopwatch training;
-  if (!train(scene_, request_, {window_, filter_, callbacks_.stop, callbacks_.progress, {}})) return false;
-  result_.seconds.train = training.seconds();
+  TrainingSettings settings{window_, filter_, callbacks_.stop, callbacks_.progress, {}};
+  if (plan_.takes_training) settings.image = &result_.training;
+  if (!train(scene_, request_, settings, result_.seconds)) return false;
   const uint32_t limit = largest_budget(scene_, request_);
   state_.budget = state_.group_budget = first_budget(scene_, request_);
   if (timed() && plan_.groups_follow_speed) {
@@ -264,8 +268,11 @@ Pass PlanRun::begin_pass(const PassPlan& plan) const {
   pass.film.attributes.insert_or_assign(film_key::kSeed, std::to_string(request_.seed));
   pass.film.attributes.insert_or_assign(film_key::kSampling, sampling_name(plan.sampling, request_.crn_part));
   pass.film.attributes.insert_or_assign(film_key::kSceneHash, scene_.content_hash);
-  pass.film.attributes.insert_or_assign(film_key::kSettings, state_.integrator->description() + "; filter " +
-                                                                 filter_text(filter_) + number + plan.settings);
+  const auto* learning = dynamic_cast<const LearningIntegrator*>(state_.integrator.get());
+  pass.film.attributes.insert_or_assign(
+      film_key::kSettings, (learning ? learning->settings_text() : state_.integrator->description()) + "; filter " +
+                               filter_text(filter_) + number + plan.settings);
+  if (learning) pass.film.attributes.insert_or_assign(film_key::kTraining, learning->training_text());
   pass.film.attributes.insert_or_assign(film_key::kComplete, "false");
   if (plan.light) pass.film.attributes.insert_or_assign(film_key::kLightPaths, std::to_string(kBundlePaths));
   if (!plan.estimator.empty()) pass.film.attributes.insert_or_assign("estimator", plan.estimator);
@@ -296,6 +303,7 @@ void PlanRun::warn_of_other_samples(uint32_t asked) const {
 EstimatorResult PlanRun::estimate_rows(int first_row, int n_rows) const {
   EstimatorResult image = plan_.estimate(camera_passes(state_.passes), first_row, n_rows);
   if (const Pass* light = light_pass(state_.passes)) add_light(rows_of(light->film, first_row, n_rows), image);
+  if (has_training()) add_training(state_.passes[0].film, result_.training, first_row, image);
   return image;
 }
 
@@ -354,7 +362,7 @@ Image RenderResult::picture() const { return image.estimate.data.empty() ? previ
 
 RenderResult render(const LoadedScene& scene, const Plan& plan, const RenderRequest& request,
                     const RenderCallbacks& callbacks) {
-  check(plan, request);
+  check(scene, plan, request);
   return PlanRun(scene, plan, request, callbacks).run();
 }
 
@@ -390,7 +398,8 @@ ReplayedSample replay(const LoadedScene& scene, const Plan& plan, const RenderRe
   settings.pass = address.pass;
   settings.filter = request.filter.value_or(scene.filter);
   const auto integrator = prepared_integrator(scene, plan, request);
-  train(scene, request, {window_of(scene, request), settings.filter, nullptr, nullptr, {}});
+  RenderSeconds seconds;
+  train(scene, request, {window_of(scene, request), settings.filter, nullptr, nullptr, {}}, seconds);
   return replay_sample(*scene.scene, *integrator, settings, address.x, address.y, address.sample);
 }
 

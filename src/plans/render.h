@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "integrators/light_pass.h"
+#include "integrators/training_image.h"
 #include "plans/plan.h"
 
 namespace covary {
@@ -27,6 +28,9 @@ struct RenderRequest {
   double seconds = 0;  ///< > 0: limit for rendering and estimating together
   double until = 0;    ///< > 0: add samples until the predicted relMSE is this
   bool aovs = false;   ///< also the images Albedo, N and P
+  /// Also the images Edges01, Edges02, … of the last pass of camera samples (integrators/path_length_images.h), which
+  /// needs the integrator controlled-path.
+  bool path_lengths = false;
   /// Of passes with common random numbers; other parts than both need an integrator with light subpaths.
   CrnPart crn_part = CrnPart::kBoth;
 
@@ -57,6 +61,8 @@ struct RenderCallbacks {
 struct RenderSeconds {
   double auxiliary = 0;  ///< of rendering auxiliary images
   double train = 0;      ///< of the integrator's training
+  double surrogate = 0;  ///< part of it: of making the importance of pixels
+  double solve = 0;      ///< part of it: of making of samples what the integrator reads
   double trial = 0;      ///< of finding out, for a time limit, how fast passes and estimator are
   double estimate = 0;   ///< after the passes
   double write = 0;
@@ -66,10 +72,12 @@ struct RenderSeconds {
 /// What has become of a plan.
 struct RenderResult {
   std::vector<Pass> passes;
-  /// Empty where the film is the image, and of a render that was interrupted before every pixel of every film had
+  /// Empty where the film alone is the image, and of a render that was interrupted before every pixel of every film had
   /// samples.
   EstimatorResult image;
   std::optional<double> predicted_relmse;
+  /// Image of the samples of the integrator's training, where they are a part of the image (Plan::takes_training).
+  TrainingImage training;
   std::map<std::string, Image> aovs;
   RenderSeconds seconds;
   bool complete = false;              ///< all passes have the samples that were planned

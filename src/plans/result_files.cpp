@@ -27,6 +27,7 @@ void write_result_files(const Plan& plan, const RenderRequest& request, RenderRe
     Film& film = light ? sum : last;
     film.attributes[film_key::kComplete] = result.interrupted ? "false" : "true";
     film.aovs = result.aovs;
+    film.shown = result.image.estimate;
     write_film(request.output, film);
   } else {
     const Film& film = last;

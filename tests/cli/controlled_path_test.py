@@ -35,7 +35,9 @@ class Options(CliTest):
         report = json.loads((self.path / "a.json").read_text())
         self.assertEqual((report["samples_per_pixel"], report["training_samples_per_pixel"]), (8, 4))
         self.assertGreater(report["control_variates"]["cells"], 10)
-        self.assertGreater(report["seconds"]["train"], 0)
+        seconds = report["seconds"]
+        self.assertGreater(min(seconds["surrogate"], seconds["solve"]), 0)
+        self.assertLess(seconds["surrogate"] + seconds["solve"], seconds["train"])
         self.assertGreater(report["planned_memory_bytes"], 256 << 20)
         self.good(*RENDER, "--cv", "off", "--estimator", "none", "--spp", "12", "-o", "b.exr", "--json", "b.json")
         report = json.loads((self.path / "b.json").read_text())
@@ -68,16 +70,63 @@ class Films(CliTest):
         self.assertEqual(self.pixels("a.exr"), self.pixels("b.exr"))
         attributes = [json.loads(self.good("info", "films/" + film.name, "--json").stdout)["attributes"]
                       for film in (self.path / "films").glob("*.exr")]
-        settings = {attribute["covary:settings"] for attribute in attributes}
-        self.assertEqual(len({text.split(";")[0] for text in settings}), 1)
-        self.assertIn("training=", settings.pop())
+        self.assertEqual(len({attribute["covary:settings"].split(";")[0] for attribute in attributes}), 1)
+        self.assertEqual(len({attribute["covary:training"] for attribute in attributes}), 1)
 
     def test_replays_samples_of_the_same_training(self):
-        self.good(*PLAIN, "--spp", "5", "-o", "a.exr")
-        radiance = re.search(r"radiance \((.*), (.*), (.*)\)", self.good(*PLAIN, "--replay", "20,10,0").stdout)
+        self.good(*PLAIN, "--spp", "5", "-o", "a.exr", "--seed", "3")
+        replay = self.good(*PLAIN, "--replay", "20,10,0", "--seed", "3").stdout
         channels = self.pixels("a.exr")
-        for value, name in zip(radiance.groups(), "RGB"):
-            self.assertAlmostEqual(float(value), channels[name][10 * 48 + 20], delta=1e-6)
+        for value, name in zip(re.search(r"radiance \((.*), (.*), (.*)\)", replay).groups(), "RGB"):
+            self.assertAlmostEqual(float(value), channels["group00." + name][10 * 48 + 20], delta=1e-6)
+
+    def test_the_image_holds_the_samples_of_training_too(self):
+        self.good(*PLAIN, "--spp", "6", "-o", "a.exr", "--cv-paper", "--json", "a.json")
+        report = json.loads((self.path / "a.json").read_text())
+        self.assertEqual(report["training_counts_as_samples"], 4)
+        self.good(*PLAIN, "--spp", "6", "-o", "b.exr", "--passes", "films", "--cv-paper")
+        both, film = self.pixels("a.exr"), self.pixels("films/independent.exr")
+        self.assertEqual(both["R"], self.pixels("b.exr")["R"])
+        self.assertEqual(both["group00.R"], film["R"])
+        self.assertNotEqual(both["R"], film["R"])
+        self.good(*PLAIN, "--spp", "8", "-o", "crn.exr", "--sampling", "crn")
+        self.assertNotIn("covary:shown", json.loads(self.good("info", "crn.exr", "--json").stdout)["attributes"])
+
+    def test_films_of_different_training_can_be_merged_and_not_continued(self):
+        for seed in "12":
+            self.good(*PLAIN, "--spp", "8", "-o", seed + ".exr", "--seed", seed)
+        self.good("merge", "1.exr", "2.exr", "-o", "both.exr")
+        one, two, both = (self.pixels(name) for name in ("1.exr", "2.exr", "both.exr"))
+        self.assertAlmostEqual(both["R"][700], (one["group00.R"][700] + two["group00.R"][700]) / 2, delta=1e-6)
+        (self.path / "2.exr").write_bytes((self.path / "1.exr").read_bytes())
+        self.good(*PLAIN, "--spp", "12", "-o", "2.exr", "--seed", "1", "--resume")
+        self.bad(1, "seed", *PLAIN, "--spp", "12", "-o", "1.exr", "--seed", "2", "--resume")
+
+
+class PathLengths(CliTest):
+    def test_add_up_to_the_film(self):
+        self.good(*PLAIN, "--spp", "8", "--max-depth", "4", "--path-lengths", "-o", "a.exr")
+        channels = read_exr((self.path / "a.exr").read_bytes())
+        self.assertEqual(sorted(name for name in channels if name.startswith("Edges") and name.endswith("R")),
+                         [f"Edges0{n}.R" for n in range(1, 5)])
+        for name in "RGB":
+            lengths = zip(*(channels[f"Edges0{n}.{name}"] for n in range(1, 5)))
+            for whole, parts in zip(channels["group00." + name], lengths):
+                self.assertAlmostEqual(whole, sum(parts), delta=1e-4 * (1 + sum(map(abs, parts))))
+        for n in range(1, 5):
+            self.assertGreater(max(map(abs, channels[f"Edges0{n}.G"])), 1e-3)
+
+    def test_are_parts_of_what_shorter_paths_see(self):
+        off = ("--cv", "off", "--spp", "4", "--estimator", "none")
+        self.good(*RENDER, *off, "--max-depth", "4", "--path-lengths", "-o", "a.exr")
+        self.good(*RENDER, *off, "--max-depth", "2", "--min-depth", "2", "-o", "b.exr")
+        parts = (read_exr((self.path / name).read_bytes()) for name in ("a.exr", "b.exr"))
+        for a, b in zip(*(channels[name] for channels, name in zip(parts, ("Edges02.G", "G")))):
+            self.assertAlmostEqual(a, b, delta=1e-5 * (1 + b))
+
+    def test_need_the_integrator(self):
+        self.bad(2, "--path-lengths is an option of --integrator controlled-path", "render", ROOM, "-o", "a.exr",
+                 "--path-lengths")
 
 
 class TrainingFiles(CliTest):
@@ -87,7 +136,8 @@ class TrainingFiles(CliTest):
 
     def test_take_the_place_of_a_training(self):
         self.good(*PLAIN, "--spp", "4", "-o", "b.exr", "--load-training", "a.training", "--json", "b.json")
-        self.assertEqual(read_exr((self.path / "a.exr").read_bytes()), read_exr((self.path / "b.exr").read_bytes()))
+        trained, loaded = (read_exr((self.path / name).read_bytes()) for name in ("a.exr", "b.exr"))
+        self.assertEqual(trained["group00.R"], loaded["R"])
         report = json.loads((self.path / "b.json").read_text())
         self.assertEqual((report["samples_per_pixel"], report["training_samples_per_pixel"]), (4, 0))
 

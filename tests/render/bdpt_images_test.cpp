@@ -205,12 +205,11 @@ TEST(BdptImages, ScaledScenes) {
 // and well apart.
 TEST(BdptImages, CompleteTechniquesAlone) {
   constexpr int kMaxEdges = 4;
-  const TestScene scene = load_text(
-      bdpt_scene(leaning_floor(diffuse(0.8)) +
-                     rectangle("<scale value='4'/><rotate x='1' angle='180'/><translate y='4' z='11'/>", diffuse(0.8)) +
-                     rectangle("<scale value='2'/><rotate x='1' angle='60'/><translate y='4' z='3'/>",
-                               diffuse(0) + area_light(5)),
-                 kSize, kMaxEdges, "<string name='light_tracing' value='on'/>", sensor()));
+  const TestScene scene = load_text(bdpt_scene(
+      leaning_floor(diffuse(0.8)) +
+          rectangle("<scale value='4'/><rotate x='1' angle='180'/><translate y='4' z='11'/>", diffuse(0.8)) +
+          rectangle("<scale value='2'/><rotate x='1' angle='60'/><translate y='4' z='3'/>", diffuse(0) + area_light(5)),
+      kSize, kMaxEdges, "<string name='light_tracing' value='on'/>", sensor()));
   auto& tracer = dynamic_cast<LightTracingIntegrator&>(*scene.loaded.integrator);
   tracer.fix_light_tracing(kSize * kSize, false);
   std::map<std::pair<int, int>, std::vector<double>> differences;  // of a technique alone from the weighted sum

@@ -11,6 +11,8 @@
 #include <optional>
 #include <type_traits>
 
+#include "plans/estimator_plans.h"
+#include "plans/render.h"
 #include "render_fixture.h"
 #include "statistics/p_values.h"
 
@@ -171,25 +173,33 @@ TestScene trained(const std::string& xml, const ControlOptions& options) {
 /// Differences of block means, and at the end of the mean of the image, for each of 16 seeds.
 using Differences = std::vector<std::vector<double>>;
 
-double block_mean(const Film& film, int block) {
-  if (block == kBlocks * kBlocks) return image_mean(film);
-  const int size = kSide / kBlocks, x0 = block % kBlocks * size, y0 = block / kBlocks * size;
+double block_mean(const Image& image, int block) {
+  const bool whole = block == kBlocks * kBlocks;
+  const int size = whole ? kSide : kSide / kBlocks;
+  const int x0 = whole ? 0 : block % kBlocks * size, y0 = whole ? 0 : block / kBlocks * size;
   double sum = 0;
   for (int y = y0; y < y0 + size; ++y)
-    for (int x = x0; x < x0 + size; ++x) sum += mean(film.mean(x, y));
+    for (int x = x0; x < x0 + size; ++x) sum += mean(image.rgb(x, y));
   return sum / (size * size);
 }
 
-/// `shift`: by how much the seeds of b differ from those of a.
-Differences differences(const TestScene& a, const TestScene& b, uint32_t spp, uint64_t shift) {
+/// Of the images that a and b make of each seed.
+template <typename A, typename B>
+Differences differences(const A& a, const B& b) {
   Differences result(kBlocks * kBlocks + 1);
   for (uint64_t seed = 0; seed < 16; ++seed) {
-    const Film image_a = render(a, spp, seed), image_b = render(b, spp, seed + shift);
+    const Image image_a = a(seed), image_b = b(seed);
     for (size_t block = 0; block < result.size(); ++block)
       result[block].push_back(block_mean(image_a, static_cast<int>(block)) -
                               block_mean(image_b, static_cast<int>(block)));
   }
   return result;
+}
+
+/// `shift`: by how much the seeds of b differ from those of a.
+Differences differences(const TestScene& a, const TestScene& b, uint32_t spp, uint64_t shift) {
+  return differences([&](uint64_t seed) { return render(a, spp, seed).mean_image(); },
+                     [&](uint64_t seed) { return render(b, spp, seed + shift).mean_image(); });
 }
 
 /// Blocks whose difference has another mean than zero.
@@ -261,8 +271,37 @@ TEST(ControlledPath, TrainedAgreesWithPath) {
   EXPECT_GT(integrator_of(on).table().n_cells(), 10u);
   EXPECT_EQ(n_biased(differences(on, off, 16, 0)), 0);
   EXPECT_EQ(n_biased(differences(on, path, 16, 100)), 0);
-  for (const ControlKind kind : {ControlKind::kMono, ControlKind::kVevoda})
+  for (const ControlKind kind : {ControlKind::kMono, ControlKind::kVevoda, ControlKind::kOptimalMis})
     EXPECT_EQ(n_biased(differences(trained(everything(), options(kind)), off, 16, 0)), 0) << name_of(kind);
+}
+
+// Each seed trains anew, and the samples of the training are a part of the image.
+TEST(ControlledPath, TrainedOnTheFlyAgreesWithPath) {
+  const TestScene path = load_text(everything());
+  const auto planned = [](const TestScene& scene, bool twice) {
+    return [&scene, twice](uint64_t seed) {
+      RenderRequest request;
+      request.spp = 8, request.seed = seed;
+      const RenderResult result = render(scene.loaded, plain_plan(Sampling::kIndependent), request);
+      EXPECT_GT(result.training.samples[0], 4);
+      Image image = result.picture();
+      if (twice)  // planted bug: the training is added to the image without its weight
+        for (size_t i = 0; i < image.data.size(); ++i) image.data[i] += 0.2f * result.training.mean.data[i];
+      return image;
+    };
+  };
+  for (const bool paper : {false, true}) {
+    ControlOptions wanted = options(ControlKind::kRgb);
+    wanted.paper = paper;
+    const TestScene scene = controlled(everything(), wanted);
+    const auto by_path = [&](uint64_t seed) { return render(path, 16, seed + 100).mean_image(); };
+    const Differences right = differences(planned(scene, false), by_path);
+    EXPECT_EQ(n_biased(right), 0) << paper;
+    EXPECT_LT(detectable(right), 0.08 * image_mean(render(path, 16, 0)));
+    if (!paper) {
+      EXPECT_GT(n_biased(differences(planned(scene, true), by_path)), 0);
+    }
+  }
 }
 
 /// Sum of squared differences of two renders with other numbers: twice the variance.
@@ -282,6 +321,17 @@ TEST(ControlledPath, HasLessNoiseWhereLightsDiffer) {
   EXPECT_LT(mono, 1.1 * plain);
   EXPECT_LT(noise(trained(coloured_lights(), options(ControlKind::kVevoda))), 0.7 * plain);
   EXPECT_LT(rgb, 0.5 * plain);
+}
+
+TEST(ControlledPath, PixelsHaveOptimalWeightsOfTheirOwn) {
+  ControlOptions many = options(ControlKind::kOptimalMis);
+  many.train_spp = 64;
+  const TestScene scene = trained(coloured_lights(), many);
+  const CoefficientTable& table = integrator_of(scene).table();
+  EXPECT_GT(table.n_cells(), 300u);
+  EXPECT_LE(table.n_cells(), uint32_t{kSide * kSide});
+  EXPECT_LT(noise(scene), 0.6 * noise(with_coefficients(coloured_lights(), false)));
+  EXPECT_EQ(integrator_of(scene).settings().pilot_spp(), 0u);
 }
 
 TEST(ControlledPath, TakesTheRaysOfThePlainEstimate) {

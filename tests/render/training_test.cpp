@@ -27,11 +27,9 @@ class CellMeans final : public LearningIntegrator {
 
   /// Planted bug: records are added in another order.
   bool backwards = false;
-  uint64_t seed = 0;
   std::vector<uint32_t> waves;  ///< trained_spp() before each update
 
   uint32_t training_spp() const override { return spp_; }
-  uint64_t training_seed() const override { return seed; }
   std::unique_ptr<ThreadState> make_thread_state() const override { return std::make_unique<State>(*inner_); }
   bool allows_negative() const override { return true; }
 
@@ -107,9 +105,9 @@ TestScene load_room() {
 CellMeans& learner(const TestScene& scene) { return dynamic_cast<CellMeans&>(*scene.loaded.integrator); }
 
 /// Trains the scene's integrator in the whole frame.
-bool train_room(const TestScene& scene, const std::atomic<bool>* stop = nullptr) {
+bool train_room(const TestScene& scene, uint64_t seed = 0, TrainingImage* image = nullptr) {
   return train(scene.scene(), learner(scene),
-               {{0, 0, scene.loaded.width, scene.loaded.height}, scene.loaded.filter, stop, {}});
+               {{0, 0, scene.loaded.width, scene.loaded.height}, scene.loaded.filter, nullptr, {}, {}, seed, image});
 }
 
 /// Samples for learning that stay in the film.
@@ -152,8 +150,7 @@ TEST(Training, DescriptionTellsOneTrainingFromAnother) {
   for (const uint64_t seed : {0, 1, 0}) {
     const TestScene scene = load_room();
     EXPECT_TRUE(scene.integrator().description().ends_with(" untrained"));
-    learner(scene).seed = seed;
-    train_room(scene);
+    train_room(scene, seed);
     descriptions.push_back(scene.integrator().description());
     EXPECT_NE(descriptions.back().find("cell-means path min_depth=0"), std::string::npos);
     EXPECT_NE(descriptions.back().find(" training="), std::string::npos);
@@ -237,10 +234,12 @@ TEST(Training, ARenderByAPlanTrainsFirst) {
   RenderRequest request;
   request.spp = 2, request.seed = 7;
   const RenderResult result = render(scene.loaded, plain_plan(Sampling::kIndependent), request);
-  EXPECT_TRUE(train_room(other));
+  EXPECT_TRUE(train_room(other, 7));
   const Film& film = result.passes[0].film;
   EXPECT_TRUE(same_bits(film, render(other, 2, 7)));
-  EXPECT_TRUE(film.attributes.at(film_key::kSettings).starts_with(other.integrator().description() + ";"));
+  const LearningIntegrator& trained = learner(other);
+  EXPECT_EQ(trained.description(), trained.settings_text() + " training=" + film.attributes.at(film_key::kTraining));
+  EXPECT_TRUE(film.attributes.at(film_key::kSettings).starts_with(trained.settings_text() + ";"));
 
   const ReplayedSample replayed =
       replay(scene.loaded, plain_plan(Sampling::kIndependent), request, {.x = 11, .y = 13, .sample = 1});

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// The image by the number of edges of its paths: what is seen of the lights themselves (1), by one reflection (2), …
+#pragma once
+
+#include <vector>
+
+#include "film/film.h"
+#include "integrators/controlled_path.h"
+#include "integrators/render_pass.h"
+
+namespace covary {
+
+/// Most edges of a path that are told apart; longer paths are in none of the images.
+inline constexpr int kMostEdges = 16;
+
+/// Image i holds the part of the film's samples that came by paths of i + 1 edges; as many images as there are lengths,
+/// at most kMostEdges. Together they are the film's mean where no path has more edges. Traces the samples again, so it
+/// takes as long as the film did. `settings`: those with which the film was rendered; reads stop, and then returns none.
+std::vector<Image> path_length_images(const Scene& scene, const ControlledPath& integrator,
+                                      const PassSettings& settings, const Film& film);
+
+}  // namespace covary

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plans/training_stage.h"
+
+#include <cmath>
+
+#include "core/stopwatch.h"
+#include "plans/pixel_importance.h"
+#include "plans/training_file.h"
+
+namespace covary {
+
+bool train(const LoadedScene& scene, const RenderRequest& request, TrainingSettings settings, RenderSeconds& seconds) {
+  const Stopwatch watch;
+  auto* learning = dynamic_cast<LearningIntegrator*>(scene.integrator.get());
+  settings.seed = request.seed;
+  settings.importance = [&](const Film& film) {
+    const Stopwatch surrogate;
+    std::vector<Spectrum> importance = pixel_importance(*scene.scene, settings.filter, film, settings.stop);
+    seconds.surrogate = surrogate.seconds();
+    return importance;
+  };
+  if (!request.load_training.empty()) load_training(scene, request.load_training);
+  if (learning && !train(*scene.scene, *learning, settings)) return false;
+  if (!request.save_training.empty()) save_training(scene, request.save_training);
+  seconds.train = watch.seconds();
+  if (learning) seconds.solve = learning->update_seconds();
+  return true;
+}
+
+void add_training(const Film& film, const TrainingImage& training, int first_row, EstimatorResult& image) {
+  for (int y = 0; y < image.std_error.height; ++y)
+    for (int x = 0; x < image.std_error.width; ++x) {
+      const double n = film.count(x, first_row + y), all = n + training.samples_at(x, first_row + y);
+      for (int c = 0; c < 3; ++c) image.std_error.pixel(x, y)[c] *= static_cast<float>(std::sqrt(n / all));
+    }
+}
+
+}  // namespace covary
