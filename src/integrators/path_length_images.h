@@ -14,8 +14,8 @@ namespace covary {
 inline constexpr int kMostEdges = 16;
 
 /// Image i holds the part of the film's samples that came by paths of i + 1 edges; as many images as there are lengths,
-/// at most kMostEdges. Together they are the film's mean where no path has more edges. Traces the samples again, so it
-/// takes as long as the film did. `settings`: those with which the film was rendered; reads stop, and then returns none.
+/// at most kMostEdges. Together they are the film's mean where no path has more edges. Traces the samples again, which
+/// takes as long as the film did. `settings`: those of the film's render; reads stop, and then returns none.
 std::vector<Image> path_length_images(const Scene& scene, const ControlledPath& integrator,
                                       const PassSettings& settings, const Film& film);
 

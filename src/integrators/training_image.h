@@ -3,8 +3,8 @@
 // the mean of each wave is unbiased, and their variance falls from wave to wave. Waves are combined with weights that
 // are inverse to their variance.
 //
-// Weights must not depend on the samples that they weigh, or bright samples, which raise a wave's variance, would count
-// too little. So the pixels of the two colours of a chessboard are combined apart, each with the variances of the other.
+// Weights must not depend on the samples that they weigh: bright samples, which raise a wave's variance, would count
+// too little. So the pixels of the two colours of a chessboard are combined apart, by the variances of one another.
 #pragma once
 
 #include <array>
