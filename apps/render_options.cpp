@@ -64,7 +64,8 @@ void take_training(uint32_t training, const LoadedScene& scene, RenderRequest& r
   const uint32_t all = request.spp.value_or(static_cast<uint32_t>(scene.spp));
   if (all <= training)
     throw Error(ErrorCode::kUsage, fmt::format("{} samples per pixel, of which the training takes {}, leave none for "
-                                               "the image; use a larger --spp or a smaller --cv-train",
+                                               "the image; use a larger --spp or a shorter training "
+                                               "(--cv-train, --guide-train)",
                                                all, training));
   request.spp = all - training;
 }
@@ -107,6 +108,7 @@ void check_options(RenderOptions& options) {
         "--time: {} are fitted to all samples of a pixel together, so their number must be known; use --spp", name));
   parse_split(options.split);
   control_options(options.control);
+  guide_options(options.guide);
   if (!options.until.empty()) {
     parse_until(options.until);
     if (!estimator.predicts_error)
@@ -126,11 +128,13 @@ LoadedScene load(const RenderOptions& options) {
   }
   load_options.integrator_properties = integrator_properties(options.light);
   const bool tolerates_light = !load_options.integrator_properties.empty() || !options.integrator.empty();
-  load_options.make_integrator = integrator_maker(
-      {options.integrator, options.min_depth, options.max_depth, control_options(options.control), tolerates_light});
+  load_options.make_integrator =
+      integrator_maker({options.integrator, options.min_depth, options.max_depth, control_options(options.control),
+                        guide_options(options.guide), tolerates_light});
   LoadedScene scene = load_scene(options.scene, load_options);
   check_light_options(options.light, scene, options.integrator);
   check_control_options(options.control, scene, options.integrator);
+  check_guide_options(options.guide, scene, options.integrator);
   return scene;
 }
 
@@ -195,7 +199,8 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
       .add_option("--spp", o.spp,
                   "Samples per pixel of all passes together, at least 4 in each of two; default: the scene's")
       ->transform(whole_number(1u, 1u << 30));
-  command.add_option("--integrator", o.integrator, "Integrator instead of the scene's: bdpt, controlled-path or path");
+  command.add_option("--integrator", o.integrator,
+                     "Integrator instead of the scene's: bdpt, controlled-path, guided-path or path");
   command
       .add_option("--estimator", o.estimator.name,
                   fmt::format("How passes become the image: {} of a pass with common random numbers and an "
@@ -259,10 +264,9 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
   command.add_flag("!--no-preview", o.preview, "Do not write the PNG");
   command.add_flag("--quiet", o.quiet, "No progress and no summary");
   add_control_options(command, o.control);
-  command.add_option("--save-training", o.save_training, "File that keeps the coefficients learnt")
-      ->group(kControlGroup);
-  command.add_option("--load-training", o.load_training, "File of coefficients to use in place of a training")
-      ->group(kControlGroup);
+  add_guide_options(command, o.guide);
+  command.add_option("--save-training", o.save_training, "File that keeps what controlled-path or guided-path learnt");
+  command.add_option("--load-training", o.load_training, "Such a file, to use in place of a training");
   add_light_options(command, o.light);
   add_estimator_options(command, o.estimator, estimator_names());
 }

@@ -12,6 +12,7 @@
 
 #include "control_options.h"
 #include "estimator_options.h"
+#include "guide_options.h"
 #include "light_options.h"
 #include "plans/plan.h"
 #include "plans/render.h"
@@ -24,6 +25,7 @@ struct RenderOptions {
   std::string crn_part = "both", debug_strategies;
   EstimatorOptions estimator;
   ControlTexts control;
+  GuideTexts guide;
   LightOptions light;
   std::vector<std::string> defines;
   std::optional<uint32_t> spp;

@@ -12,6 +12,7 @@
 #include "core/shell_text.h"
 #include "film/splat_layer.h"
 #include "integrators/controlled_path.h"
+#include "integrators/guided_path.h"
 #include "integrators/light_pass.h"
 #include "integrators/training.h"
 #include "plans/budget.h"
@@ -47,6 +48,7 @@ std::string replay_command(const RenderOptions& o, const Pass& pass, const BadSa
   if (!o.resolution.empty()) add("--resolution", o.resolution);
   if (!o.integrator.empty()) add("--integrator", o.integrator);
   for (const std::string& word : command_words(o.control)) words.push_back(word);
+  for (const std::string& word : command_words(o.guide)) words.push_back(word);
   if (!o.load_training.empty()) add("--load-training", o.load_training);
   if (o.min_depth) add("--min-depth", std::to_string(*o.min_depth));
   if (o.max_depth) add("--max-depth", std::to_string(*o.max_depth));
@@ -82,6 +84,23 @@ void print_training_warnings(const ControlledPath& controlled) {
 const ControlledPath* trained_integrator(const LoadedScene& scene) {
   const auto* controlled = dynamic_cast<const ControlledPath*>(scene.integrator.get());
   return controlled && controlled->settings().on() ? controlled : nullptr;
+}
+
+const GuidedPath* guided_integrator(const LoadedScene& scene) {
+  return dynamic_cast<const GuidedPath*>(scene.integrator.get());
+}
+
+nlohmann::ordered_json guiding_statistics(const GuidedPath& guided) {
+  const GuidingField& field = guided.field();
+  const double millions = 1e-6 * static_cast<double>(field.n_fitted());
+  return {{"leaves", field.n_leaves()},
+          {"lobes", field.n_lobes()},
+          {"samples", field.n_samples()},
+          {"samples_left_out", field.n_rejected()},
+          {"fit_seconds", field.fit_seconds()},
+          {"fit_seconds_per_million_samples", millions > 0 ? field.fit_seconds() / millions : 0},
+          {"training_memory_bytes", guided.training_bytes()},
+          {"memory_bytes", field.bytes()}};
 }
 
 /// Samples per pixel of the training; 0 without one, and where a file took its place.
@@ -183,6 +202,7 @@ nlohmann::ordered_json statistics(const RenderReport& report) {
                                 {"times_coarsened", controlled->cache().n_coarsened()},
                                 {"samples_not_finite", controlled->cache().n_rejected()},
                                 {"memory_bytes", controlled->training_bytes()}};
+  if (const GuidedPath* guided = guided_integrator(scene)) json["guiding"] = guiding_statistics(*guided);
   if (const Pass* light = light_pass(result.passes)) json["light_paths"] = light_paths(light->film);
   if (result.predicted_relmse) {
     json["predicted_relmse"] = *result.predicted_relmse;
@@ -211,6 +231,13 @@ void print_summary(const RenderReport& report) {
                controlled->table().n_cells(), controlled->table().n_switched_off(), controlled->training_spp(),
                result.seconds.train);
     print_training_warnings(*controlled);
+  }
+  if (const GuidedPath* guided = guided_integrator(scene)) {
+    const GuidingField& field = guided->field();
+    fmt::print(stderr, "guiding by {} lobes in {} leaves, from {} samples per pixel in {:.2f} s\n", field.n_lobes(),
+               field.n_leaves(), guided->training_spp(), result.seconds.train);
+    if (field.n_rejected() > 0)
+      fmt::print(stderr, "warning: {} samples of the training were not finite and are left out\n", field.n_rejected());
   }
   const Estimator estimator = make_estimator(options.estimator);
   if (estimator.passes != EstimatorPasses::kAny) {

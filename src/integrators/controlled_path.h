@@ -50,6 +50,11 @@ class ControlledPath : public LearningIntegrator {
   size_t training_memory() const override { return settings_.on() ? size_t{settings_.memory_mib} << 20 : 0; }
   std::unique_ptr<TrainingRecord> take_record(ThreadState& state) const override;
   void absorb(const TrainingRecord& record) override;
+  bool keeps_training() const override { return settings_.on(); }
+  std::string trained_bytes() const override { return table().body(); }
+  void use_bytes(std::string_view bytes, const std::string& where) override {
+    use(CoefficientTable::from_body(bytes, where));
+  }
 
  protected:
   template <typename Parts>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Steps of camera paths that advance together, common to the integrators that trace them.
+// Steps of camera paths that advance together, common to the integrators that trace them. A `Batch` has the arrays of
+// PathBatch that a step names.
 #pragma once
 
 #include <span>
@@ -11,8 +12,8 @@
 namespace covary {
 
 /// Follows the camera ray past area lights until something else is hit.
-inline void skip_area_lights(const Scene& scene, PathBatch::Path& path, Ray& ray, SurfaceHit& hit,
-                             PathContext& context) {
+template <typename Path>
+void skip_area_lights(const Scene& scene, Path& path, Ray& ray, SurfaceHit& hit, PathContext& context) {
   while (path.found && hit.emitter) {
     ray.o = offset_origin(hit.p, hit.ng, ray.d);
     ray.t_max -= hit.t;

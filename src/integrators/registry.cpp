@@ -6,12 +6,14 @@ namespace covary {
 
 std::shared_ptr<Integrator> make_bdpt(Parameters&, const PathLengthSettings&);
 std::shared_ptr<Integrator> make_controlled_path(Parameters&, const PathLengthSettings&);
+std::shared_ptr<Integrator> make_guided_path(Parameters&, const PathLengthSettings&);
 std::shared_ptr<Integrator> make_path(Parameters&, const PathLengthSettings&);
 
 std::span<const IntegratorPlugin> integrator_plugins() {
   static constexpr IntegratorPlugin kPlugins[] = {
       {"bdpt", make_bdpt},
       {"controlled-path", make_controlled_path},
+      {"guided-path", make_guided_path},
       {"path", make_path},
   };
   return kPlugins;

@@ -16,6 +16,8 @@
 #pragma once
 
 #include <memory>
+#include <string>
+#include <string_view>
 
 #include "film/film.h"
 #include "integrators/integrator.h"
@@ -46,6 +48,16 @@ class LearningIntegrator : public Integrator {
   /// Adds a record. Called by one thread at a time, in the order of tiles, never null.
   virtual void absorb(const TrainingRecord& record) = 0;
 
+  /// Whether what was learnt can be kept, by the two functions below.
+  virtual bool keeps_training() const { return false; }
+  /// What was learnt, as bytes; after freeze().
+  virtual std::string trained_bytes() const { return {}; }
+  /// Takes bytes of trained_bytes() in place of a training; after prepare(), before the training. Throws Error(kInput)
+  /// for bytes that are no such thing; `where` names their source.
+  virtual void use_bytes(std::string_view /*bytes*/, const std::string& /*where*/) {}
+  /// Registered name and settings.
+  virtual std::string settings_text() const = 0;
+
   /// Forgets what was learnt, if anything.
   void restart();
   /// Ends a wave after which each pixel has taken `spp` samples; called when no thread traces.
@@ -60,8 +72,6 @@ class LearningIntegrator : public Integrator {
   double update_seconds() const { return update_seconds_; }
   /// settings_text() and the hash of the frozen state; "untrained" before.
   std::string description() const final;
-  /// Registered name and settings.
-  virtual std::string settings_text() const = 0;
   /// Hash of the frozen state, or "untrained".
   std::string training_text() const;
 

@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "integrators/controlled_path.h"
+#include "integrators/guided_path.h"
 #include "integrators/light_pass.h"
 
 namespace covary {
@@ -26,6 +27,8 @@ std::function<std::shared_ptr<SceneObject>(Parameters&)> integrator_maker(const 
     const std::shared_ptr<Integrator> integrator = plugin->make(parameters, lengths);
     if (auto* controlled = dynamic_cast<ControlledPath*>(integrator.get()); controlled && choice.control)
       controlled->change(*choice.control);
+    if (auto* guided = dynamic_cast<GuidedPath*>(integrator.get()); guided && choice.guide)
+      guided->change(*choice.guide);
     return integrator;
   };
 }

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "integrators/control_settings.h"
+#include "integrators/guide_settings.h"
 #include "integrators/integrator.h"
 #include "io/load_scene.h"
 
@@ -18,6 +19,8 @@ struct IntegratorChoice {
   std::optional<int> max_depth;  ///< largest number of path edges; < 0: no limit
   /// For `controlled-path`; other integrators have none of these settings, which the caller checks.
   std::optional<ControlOptions> control;
+  /// Likewise for `guided-path`.
+  std::optional<GuideOptions> guide;
   /// Settings of light tracing are no mistake where the chosen integrator traces none: they are those of options, which
   /// the caller checks, or of an element whose integrator another one replaces.
   bool tolerates_light = false;

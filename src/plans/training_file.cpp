@@ -8,38 +8,41 @@
 
 #include "core/error.h"
 #include "film/output_file.h"
-#include "integrators/controlled_path.h"
+#include "integrators/training.h"
+#include "sampling/training_bytes.h"
 
 namespace covary {
 namespace {
 
-ControlledPath& controlled_path(const LoadedScene& scene) {
-  auto* controlled = dynamic_cast<ControlledPath*>(scene.integrator.get());
-  if (!controlled || !controlled->settings().on())
-    throw Error(ErrorCode::kUsage, "only the integrator controlled-path with control variates keeps a training file");
-  return *controlled;
+LearningIntegrator& learning_integrator(const LoadedScene& scene) {
+  auto* learning = dynamic_cast<LearningIntegrator*>(scene.integrator.get());
+  if (!learning || !learning->keeps_training())
+    throw Error(ErrorCode::kUsage,
+                "only the integrator controlled-path with control variates and guided-path keep a training file");
+  return *learning;
 }
 
-/// What the coefficients belong to.
-std::string key(const LoadedScene& scene, const ControlledPath& controlled) {
-  return scene.content_hash + "; " + controlled.settings_text();
+/// What was learnt from.
+std::string key(const LoadedScene& scene, const LearningIntegrator& integrator) {
+  return scene.content_hash + "; " + integrator.settings_text();
 }
 
 }  // namespace
 
 void save_training(const LoadedScene& scene, const std::string& path) {
-  const ControlledPath& controlled = controlled_path(scene);
-  write_text_file(path, controlled.table().to_bytes(key(scene, controlled)));
+  const LearningIntegrator& integrator = learning_integrator(scene);
+  write_text_file(path, training_file_bytes(key(scene, integrator), integrator.trained_bytes()));
 }
 
 void load_training(const LoadedScene& scene, const std::string& path) {
-  ControlledPath& controlled = controlled_path(scene);
+  LearningIntegrator& integrator = learning_integrator(scene);
   std::ifstream file(path, std::ios::binary);
-  std::ostringstream bytes;
-  if (file) bytes << file.rdbuf();
-  if (!file || !bytes)
+  std::ostringstream content;
+  if (file) content << file.rdbuf();
+  if (!file || !content)
     throw Error(ErrorCode::kIo, "cannot read the training file '" + path + "': " + std::strerror(errno));
-  controlled.use(CoefficientTable::from_bytes(bytes.str(), key(scene, controlled), path));
+  const std::string bytes = content.str();
+  integrator.use_bytes(training_file_body(bytes, key(scene, integrator), path), path);
 }
 
 }  // namespace covary

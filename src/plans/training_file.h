@@ -8,11 +8,11 @@
 
 namespace covary {
 
-/// Writes the coefficients of the scene's trained `controlled-path`. Throws Error(kUsage) where the scene has another
-/// integrator or its control is off, and Error(kIo).
+/// Writes what the scene's trained integrator has learnt. Throws Error(kUsage) where it learns nothing that is kept
+/// (LearningIntegrator::keeps_training), and Error(kIo).
 void save_training(const LoadedScene& scene, const std::string& path);
 
-/// Gives them to the scene's prepared `controlled-path`, which is then not trained. Throws Error(kUsage) likewise,
+/// Gives it to the scene's prepared integrator, which is then not trained. Throws Error(kUsage) likewise,
 /// Error(kIo), and Error(kInput) for a file that is damaged, of another version, or of another scene or other settings.
 void load_training(const LoadedScene& scene, const std::string& path);
 

@@ -4,13 +4,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
-#include <cstring>
 #include <numeric>
 
 #include "core/content_hash.h"
 #include "core/error.h"
 #include "core/parallel.h"
+#include "sampling/training_bytes.h"
 
 namespace covary {
 namespace {
@@ -21,42 +20,7 @@ uint32_t nearest_axis(const Vec3& n) {
   return static_cast<uint32_t>(2 * axis + (n[axis] < 0 ? 1 : 0));
 }
 
-/// Bytes of a table, written one value after the other. All machines that run this are little-endian.
-static_assert(std::endian::native == std::endian::little);
-template <typename T>
-void append(std::string& bytes, const T& value) {
-  static_assert(std::is_trivially_copyable_v<T>);
-  bytes.append(reinterpret_cast<const char*>(&value), sizeof(T));
-}
-
-constexpr std::string_view kMagic = "covary coefficients\n";
-constexpr uint32_t kVersion = 1;
 constexpr size_t kChunk = 64;  // cells that a thread fills at a time
-
-class Reader {
- public:
-  Reader(std::string_view bytes, const std::string& where) : bytes_(bytes), where_(where) {}
-  template <typename T>
-  T read() {
-    T value;
-    std::memcpy(static_cast<void*>(&value), take(sizeof(T)).data(), sizeof(T));
-    return value;
-  }
-  std::string_view take(size_t size) {
-    if (bytes_.size() < size) fail("is truncated: a training file was expected to go on");
-    const std::string_view taken = bytes_.substr(0, size);
-    bytes_.remove_prefix(size);
-    return taken;
-  }
-  std::string_view rest() const { return bytes_; }
-  [[noreturn]] void fail(const std::string& what) const {
-    throw Error(ErrorCode::kInput, fmt::format("{}: {}", where_, what));
-  }
-
- private:
-  std::string_view bytes_;
-  const std::string& where_;
-};
 
 }  // namespace
 
@@ -183,53 +147,31 @@ std::vector<uint32_t> CoefficientTable::lights_of(const Cell& cell) const {
 
 std::string CoefficientTable::body() const {
   std::string body;
-  append(body, grid_.origin_), append(body, grid_.cell_width_), append(body, grid_.resolution_);
-  append(body, grid_.level_), append(body, uint32_t{grid_.by_normal_});
-  append(body, n_lights_), append(body, n_dense_), append(body, n_cells());
+  append_bytes(body, grid_.origin_), append_bytes(body, grid_.cell_width_), append_bytes(body, grid_.resolution_);
+  append_bytes(body, grid_.level_), append_bytes(body, uint32_t{grid_.by_normal_});
+  append_bytes(body, n_lights_), append_bytes(body, n_dense_), append_bytes(body, n_cells());
   for (uint32_t i = 0; i < n_cells(); ++i) {
     const Cell& cell = cells_[i];
-    append(body, index_.keys()[i]), append(body, cell.parent), append(body, cell.scale), append(body, cell.light_sum);
-    for (uint32_t j = 0; j < n_dense_; ++j) append(body, dense(i, j));
+    append_bytes(body, index_.keys()[i]), append_bytes(body, cell.parent), append_bytes(body, cell.scale),
+        append_bytes(body, cell.light_sum);
+    for (uint32_t j = 0; j < n_dense_; ++j) append_bytes(body, dense(i, j));
     const std::vector<uint32_t> lights = lights_of(cell);
-    append(body, static_cast<uint32_t>(lights.size()));
-    for (uint32_t own : lights) append(body, own), append(body, light(i, own));
+    append_bytes(body, static_cast<uint32_t>(lights.size()));
+    for (uint32_t own : lights) append_bytes(body, own), append_bytes(body, light(i, own));
   }
   return body;
 }
 
-std::string CoefficientTable::to_bytes(const std::string& key) const {
-  const std::string body = this->body();
-  std::string bytes(kMagic);
-  append(bytes, kVersion), append(bytes, uint64_t{key.size()}), bytes += key;
-  append(bytes, uint64_t{body.size()}), append(bytes, hash_bytes(body)), bytes += body;
-  return bytes;
-}
+std::string CoefficientTable::to_bytes(const std::string& key) const { return training_file_bytes(key, body()); }
 
 CoefficientTable CoefficientTable::from_bytes(std::string_view bytes, const std::string& key,
                                               const std::string& where) {
-  Reader reader(bytes, where);
-  if (!bytes.starts_with(kMagic.substr(0, bytes.size())))
-    reader.fail("is no training file; --save-training writes them");
-  reader.take(kMagic.size());
-  const auto version = reader.read<uint32_t>();
-  if (version != kVersion)
-    reader.fail(fmt::format("is a training file of version {}; this program reads version {}", version, kVersion));
-  const std::string_view found = reader.take(reader.read<uint64_t>());
-  const auto size = reader.read<uint64_t>(), hash = reader.read<uint64_t>();
-  if (reader.rest().size() < size)
-    reader.fail(fmt::format("is truncated: {} bytes of {} are there", reader.rest().size(), size));
-  if (reader.rest().size() > size || hash_bytes(reader.rest()) != hash)
-    reader.fail("is damaged: its content does not match its checksum");
-  if (found != key)
-    reader.fail(fmt::format("was trained for another scene or with other settings: '{}'; '{}' is needed", found, key));
-  return from_body(reader.rest(), where);
+  return from_body(training_file_body(bytes, key, where), where);
 }
 
 CoefficientTable CoefficientTable::from_body(std::string_view bytes, const std::string& where) {
-  Reader reader(bytes, where);
-  const auto check = [&](bool possible) {
-    if (!possible) reader.fail("is damaged: it has impossible numbers");
-  };
+  ByteReader reader(bytes, where);
+  const auto check = [&](bool possible) { reader.check(possible); };
   CellGrid grid;
   grid.origin_ = reader.read<Vec3>(), grid.cell_width_ = reader.read<float>();
   grid.resolution_ = reader.read<uint32_t>(), grid.level_ = reader.read<uint32_t>();

@@ -3,12 +3,11 @@
 
 #include <algorithm>
 #include <array>
-#include <cstring>
 
 #include "core/content_hash.h"
-#include "core/error.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
+#include "sampling/training_bytes.h"
 
 namespace covary {
 namespace {
@@ -33,32 +32,6 @@ Extent extent_of(std::span<const GuidingSample> samples) {
       extent.variance[i] += (s.position[i] - extent.mean[i]) * (s.position[i] - extent.mean[i]);
   return extent;
 }
-
-template <typename T>
-void append(std::string& bytes, const T& value) {
-  bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
-}
-
-class Reader {
- public:
-  Reader(std::string_view bytes, const std::string& where) : bytes_(bytes), where_(where) {}
-  template <typename T>
-  T read() {
-    check(bytes_.size() >= sizeof(T));
-    T value;
-    std::memcpy(&value, bytes_.data(), sizeof value);
-    bytes_.remove_prefix(sizeof value);
-    return value;
-  }
-  void check(bool possible) const {
-    if (!possible) throw Error(ErrorCode::kInput, where_ + " is damaged: it has impossible numbers");
-  }
-  bool at_end() const { return bytes_.empty(); }
-
- private:
-  std::string_view bytes_;
-  const std::string& where_;
-};
 
 }  // namespace
 
@@ -145,7 +118,7 @@ void GuidingField::update() {
   fit_seconds_ += watch.seconds();
 }
 
-void GuidingField::freeze() { samples_ = {}; }
+void GuidingField::freeze() { std::vector<GuidingSample>().swap(samples_); }
 
 void GuidingField::restart() { *this = GuidingField(settings_); }
 
@@ -164,20 +137,21 @@ uint64_t GuidingField::hash() const { return hash_bytes(body()); }
 
 std::string GuidingField::body() const {
   std::string bytes;
-  append(bytes, static_cast<uint32_t>(nodes_.size())), append(bytes, n_leaves());
-  for (const Node& node : nodes_) append(bytes, node.position), append(bytes, node.axis), append(bytes, node.child);
+  append_bytes(bytes, static_cast<uint32_t>(nodes_.size())), append_bytes(bytes, n_leaves());
+  for (const Node& node : nodes_)
+    append_bytes(bytes, node.position), append_bytes(bytes, node.axis), append_bytes(bytes, node.child);
   for (const GuidingLeaf& leaf : leaves_) {
     const VmfMixture& mixture = leaf.mixture;
-    append(bytes, leaf.fraction), append(bytes, mixture.pivot), append(bytes, mixture.lobes.n);
+    append_bytes(bytes, leaf.fraction), append_bytes(bytes, mixture.pivot), append_bytes(bytes, mixture.lobes.n);
     for (int k = 0; k < mixture.lobes.n; ++k)
-      append(bytes, mixture.lobes.weight[k]), append(bytes, mixture.lobes.lobe(k)),
-          append(bytes, mixture.inverse_distance[k]);
+      append_bytes(bytes, mixture.lobes.weight[k]), append_bytes(bytes, mixture.lobes.lobe(k)),
+          append_bytes(bytes, mixture.inverse_distance[k]);
   }
   return bytes;
 }
 
 GuidingField GuidingField::from_body(std::string_view bytes, const std::string& where) {
-  Reader reader(bytes, where);
+  ByteReader reader(bytes, where);
   GuidingField field;
   const auto n_nodes = reader.read<uint32_t>(), n_leaves = reader.read<uint32_t>();
   reader.check(n_nodes <= bytes.size() / sizeof(Node) && n_leaves <= bytes.size());
@@ -203,7 +177,7 @@ GuidingField GuidingField::from_body(std::string_view bytes, const std::string& 
     }
     mixture.lobes.pad();
   }
-  reader.check(reader.at_end());
+  reader.check(reader.rest().empty());
   return field;
 }
 

@@ -61,7 +61,9 @@ class GuidingField {
   uint64_t n_rejected() const { return n_rejected_; }  ///< that were left out
   double fit_seconds() const { return fit_seconds_; }  ///< in update() so far
   uint64_t n_fitted() const { return n_fitted_; }      ///< samples that were fitted so far, once for each update()
-  size_t bytes() const;                                ///< of tree, leaves and samples
+  /// Bytes of samples that are kept while training, at most.
+  size_t training_memory() const { return settings_.max_samples * sizeof(GuidingSample); }
+  size_t bytes() const;  ///< of tree, leaves and samples
   uint64_t hash() const;
 
   /// Tree and leaves as bytes (docs/file-formats.md), and back. from_body() throws Error(kInput) for bytes that are no

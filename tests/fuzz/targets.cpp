@@ -18,6 +18,7 @@
 #include "lab/suite.h"
 #include "plans/pass_costs.h"
 #include "sampling/coefficient_table.h"
+#include "sampling/guiding_field.h"
 #include "textures/image.h"
 
 namespace covary::fuzz {
@@ -109,7 +110,12 @@ bool training(Bytes input) {
       if (const uint32_t cell = table.find(table.grid().key(p, {0, 0, 1})); cell != CoefficientTable::kNone)
         for (uint32_t light = 0; light < std::min(table.n_lights(), 4u); ++light) table.light(cell, light);
   });
-  return file || body;
+  const bool field = accepts([&] {
+    const GuidingField guiding = GuidingField::from_body(text_of(input), "field");
+    for (const Vec3& p : {Vec3(), Vec3(1, 2, 3), Vec3(-1e30f)})
+      if (const uint32_t leaf = guiding.find(p); leaf != GuidingField::kNone) guiding.leaf(leaf).mixture.at(p);
+  });
+  return file || body || field;
 }
 
 std::span<const Target> targets() {

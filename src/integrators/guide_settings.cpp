@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "integrators/guide_settings.h"
+
+#include <algorithm>
+#include <charconv>
+
+namespace covary {
+
+std::optional<GuideFraction> GuideFraction::from(const std::string& text) {
+  if (text == "learned") return GuideFraction{0.5f, true};
+  float value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !(value > 0 && value < 1)) return {};
+  return GuideFraction{value, false};
+}
+
+std::string GuideFraction::text() const {
+  if (learned) return "learned";
+  char digits[32];
+  return {digits, std::to_chars(digits, digits + sizeof digits, value).ptr};
+}
+
+GuideOptions GuideOptions::from(Parameters& parameters) {
+  GuideOptions options;
+  const auto number = [&](const char* name, int highest) -> std::optional<uint32_t> {
+    if (!parameters.has(name)) return {};
+    return static_cast<uint32_t>(parameters.get_int(name, 1, 1, highest));
+  };
+  options.lobes = number("guide_lobes", VmfLobes::kMax);
+  options.train_spp = number("guide_train", GuideSettings::kMaxTrainingSpp);
+  if (parameters.has("guide_fraction")) {
+    const std::string text = parameters.get_string("guide_fraction", "0.5");
+    options.fraction = GuideFraction::from(text);
+    if (!options.fraction)
+      parameters.error("guide_fraction '" + text + "': expected learned or a number above 0 and below 1");
+  }
+  if (parameters.has("guide_roughness")) options.roughness = parameters.get_float("guide_roughness", 0.1f, 0, 1);
+  if (parameters.has("nee")) options.nee = parameters.get_bool("nee", true);
+  return options;
+}
+
+GuideSettings GuideSettings::with(const GuideOptions& options) const {
+  GuideSettings settings = *this;
+  settings.lobes = options.lobes.value_or(lobes);
+  settings.train_spp = options.train_spp.value_or(train_spp);
+  settings.fraction = options.fraction.value_or(fraction);
+  settings.roughness = options.roughness.value_or(roughness);
+  settings.nee = options.nee.value_or(nee);
+  return settings;
+}
+
+GuidingSettings GuideSettings::field() const {
+  GuidingSettings settings;
+  settings.fit.n_lobes = static_cast<int>(lobes);
+  settings.fit.max_lobes = std::min(2 * settings.fit.n_lobes, VmfLobes::kMax);
+  settings.learn_fraction = fraction.learned;
+  return settings;
+}
+
+std::string GuideSettings::text() const {
+  return "lobes=" + std::to_string(lobes) + " train=" + std::to_string(train_spp) + " fraction=" + fraction.text() +
+         " roughness=" + std::to_string(roughness) + " nee=" + (nee ? "on" : "off");
+}
+
+}  // namespace covary

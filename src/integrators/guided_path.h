@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// `guided-path`: path tracing that learns where light comes from and samples there [Ruppert2020]. guided_tracer.h has
+// the estimator, sampling/guiding_field.h the learning.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "integrators/guide_settings.h"
+#include "integrators/guided_batch.h"
+#include "integrators/guided_tracer.h"
+#include "integrators/training.h"
+
+namespace covary {
+
+class GuidedPath : public LearningIntegrator {
+ public:
+  GuidedPath(const PathLengthSettings& lengths, const GuideSettings& settings)
+      : lengths_(lengths), settings_(settings), field_(settings.field()) {}
+
+  const GuideSettings& settings() const { return settings_; }
+  /// Changes settings; before prepare().
+  void change(const GuideOptions& options);
+  /// What was learnt so far, or given.
+  const GuidingField& field() const { return given_ ? *given_ : field_; }
+  /// Takes a field that was learnt before, in place of a training; after prepare(), before the training.
+  void use(GuidingField field);
+  /// Bytes of samples and mixtures at the end of the training.
+  size_t training_bytes() const { return training_bytes_; }
+  std::string settings_text() const override;
+
+  void prepare(const Scene& scene) override;
+  std::unique_ptr<ThreadState> make_thread_state() const override { return std::make_unique<GuidedBatch>(); }
+  void trace(const Scene& scene, std::span<CameraSample> samples, PathContext& context) const override {
+    trace_with<GuidedParts>(scene, samples, context);
+  }
+  /// 0 once a field was given.
+  uint32_t training_spp() const override { return given_ ? 0 : settings_.train_spp; }
+  size_t training_memory() const override { return field_.training_memory(); }
+  std::unique_ptr<TrainingRecord> take_record(ThreadState& state) const override;
+  void absorb(const TrainingRecord& record) override;
+  bool keeps_training() const override { return true; }
+  std::string trained_bytes() const override { return field().body(); }
+  void use_bytes(std::string_view bytes, const std::string& where) override {
+    use(GuidingField::from_body(bytes, where));
+  }
+
+ protected:
+  template <typename Parts>
+  void trace_with(const Scene& scene, std::span<CameraSample> samples, PathContext& context) const {
+    context.state_as<GuidedBatch>().recording = !frozen();
+    GuidedTracer<Parts>(scene, guided_, lengths_, samples, context).trace();
+  }
+
+  void on_restart() override { field_.restart(); }
+  void update() override { field_.update(); }
+  void on_freeze() override;
+  uint64_t state_hash() const override { return field().hash(); }
+
+ private:
+  PathLengthSettings lengths_;
+  GuideSettings settings_;
+  LightSet lights_;
+  std::shared_ptr<const Emitter> compensated_;  // the environment as it is sampled, where it is not the scene's own
+  GuidingField field_;
+  std::optional<GuidingField> given_;
+  GuidedScene guided_{};
+  size_t training_bytes_ = 0;
+};
+
+}  // namespace covary

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`covary render --integrator guided-path`: its options, what it reports, and films that belong together."""
+import json
+import os
+import re
+import unittest
+from pathlib import Path
+
+from cli_test import CliTest
+from exr_reader import read_exr
+
+ROOM = str(Path(os.environ["SCENES"]) / "room.xml")
+RENDER = ("render", ROOM, "--resolution", "48x32", "--no-preview", "--integrator", "guided-path", "--guide-train", "4")
+PLAIN = (*RENDER, "--estimator", "none")
+
+
+class Options(CliTest):
+    def test_refuses_options_of_another_integrator(self):
+        self.bad(2, "--nee is an option of --integrator guided-path, not of path", "render", ROOM, "-o", "a.exr", "--nee", "off")
+        self.bad(2, "--integrator controlled-path, not of guided-path", *PLAIN, "-o", "a.exr", "--cv-grid", "8")
+
+    def test_refuses_impossible_fractions(self):
+        for fraction in ("0", "1", "-0.5", "much", "nan", "0.5x"):
+            self.bad(2, f"--guide-fraction '{fraction}': expected learned or a number above 0 and below 1", *PLAIN, "-o",
+                     "a.exr", "--guide-fraction=" + fraction)
+
+    def test_refuses_impossible_numbers(self):
+        for option, value in (("--guide-lobes", "33"), ("--guide-lobes", "0"), ("--guide-train", "0"), ("--nee", "yes")):
+            self.bad(2, option, *PLAIN, "-o", "a.exr", option, value)
+
+    def test_refuses_more_training_than_samples(self):
+        self.bad(2, "4 samples per pixel, of which the training takes 4, leave none for the image", *PLAIN, "-o",
+                 "a.exr", "--spp", "4")
+
+    def test_reports_what_it_learnt(self):
+        self.good(*PLAIN, "--spp", "12", "-o", "a.exr", "--json", "a.json")
+        report = json.loads((self.path / "a.json").read_text())
+        self.assertEqual((report["samples_per_pixel"], report["training_samples_per_pixel"]), (8, 4))
+        guiding = report["guiding"]
+        self.assertGreaterEqual(guiding["leaves"], 1)
+        self.assertGreater(guiding["lobes"], guiding["leaves"])
+        self.assertGreater(guiding["samples"], 48 * 32 * 4)
+        self.assertEqual(guiding["samples_left_out"], 0)
+        self.assertGreater(guiding["fit_seconds_per_million_samples"], 0)
+        self.assertLess(guiding["memory_bytes"], 2048 * guiding["leaves"] + 1024)
+        self.assertGreater(report["seconds"]["train"], 0)
+
+    def test_settings_of_a_scene(self):
+        scene = Path(ROOM).read_text()
+        scene = re.sub(r'<integrator type="path">', '<integrator type="guided-path"><string name="guide_fraction" '
+                       'value="learned"/><boolean name="nee" value="false"/><integer name="guide_lobes" value="4"/>',
+                       scene, count=1)
+        (self.path / "guided.xml").write_text(scene)
+        self.good("render", "guided.xml", "--resolution", "24x16", "--no-preview", "--estimator", "none", "--spp", "20",
+                  "-o", "a.exr")
+        settings = json.loads(self.good("info", "a.exr", "--json").stdout)["attributes"]["covary:settings"]
+        self.assertIn("lobes=4 train=16 fraction=learned", settings)
+        self.assertIn("nee=off", settings)
+
+
+class Films(CliTest):
+    def pixels(self, name):
+        return read_exr((self.path / name).read_bytes())
+
+    def test_resumed_films_have_the_bits_of_whole_ones(self):
+        self.good(*PLAIN, "--spp", "12", "-o", "whole.exr")
+        self.good(*PLAIN, "--spp", "8", "-o", "parts.exr")
+        self.good(*PLAIN, "--spp", "12", "-o", "parts.exr", "--resume", "--threads", "1")
+        self.assertEqual(self.pixels("whole.exr"), self.pixels("parts.exr"))
+
+    def test_other_settings_are_other_films(self):
+        self.good(*PLAIN, "--spp", "8", "-o", "a.exr")
+        self.bad(1, "a.exr", *PLAIN, "--guide-fraction", "0.3", "--spp", "12", "-o", "a.exr", "--resume")
+
+    def test_both_passes_share_one_training(self):
+        self.good(*RENDER, "--spp", "20", "-o", "a.exr", "--passes", "films", "--threads", "1")
+        self.good(*RENDER, "--spp", "20", "-o", "b.exr")
+        self.assertEqual(self.pixels("a.exr"), self.pixels("b.exr"))
+        attributes = [json.loads(self.good("info", "films/" + film.name, "--json").stdout)["attributes"]
+                      for film in (self.path / "films").glob("*.exr")]
+        self.assertEqual(len({attribute["covary:settings"].split(";")[0] for attribute in attributes}), 1)
+        self.assertEqual(len({attribute["covary:training"] for attribute in attributes}), 1)
+
+    def test_crops_and_times(self):
+        self.good(*PLAIN, "--crop", "8,8,16,16", "--spp", "6", "-o", "crop.exr")
+        self.good(*PLAIN, "--time", "0.5", "-o", "timed.exr", "--json", "timed.json")
+        report = json.loads((self.path / "timed.json").read_text())
+        self.assertGreater(report["samples_per_pixel"], 0)
+        self.assertEqual(report["training_samples_per_pixel"], 4)
+
+    def test_replays_samples_of_the_same_training(self):
+        self.good(*PLAIN, "--spp", "5", "-o", "a.exr", "--seed", "3")
+        replay = self.good(*PLAIN, "--replay", "20,10,0", "--seed", "3").stdout
+        channels = self.pixels("a.exr")
+        for value, name in zip(re.search(r"radiance \((.*), (.*), (.*)\)", replay).groups(), "RGB"):
+            self.assertAlmostEqual(float(value), channels["group00." + name][10 * 48 + 20], delta=1e-6)
+
+
+class TrainingFiles(CliTest):
+    def setUp(self):
+        super().setUp()
+        self.good(*PLAIN, "--spp", "8", "-o", "a.exr", "--save-training", "a.training")
+
+    def test_take_the_place_of_a_training(self):
+        self.good(*PLAIN, "--spp", "4", "-o", "b.exr", "--load-training", "a.training", "--json", "b.json")
+        a, b = (read_exr((self.path / name).read_bytes()) for name in ("a.exr", "b.exr"))
+        self.assertEqual(a["group00.R"], b["R"])
+        report = json.loads((self.path / "b.json").read_text())
+        self.assertEqual((report["samples_per_pixel"], report["training_samples_per_pixel"]), (4, 0))
+
+    def test_belong_to_integrator_scene_and_settings(self):
+        wanted = ("--spp", "4", "-o", "b.exr", "--load-training", "a.training")
+        self.bad(1, "a.training", *PLAIN, "--guide-lobes", "9", *wanted)
+        other = str(Path(os.environ["SCENES"]) / "materials.xml")
+        self.bad(1, "a.training", "render", other, *PLAIN[2:], *wanted)
+        self.bad(1, "a.training", "render", ROOM, "--resolution", "48x32", "--integrator", "controlled-path", *wanted)
+        self.bad(2, "only the integrator controlled-path with control variates and guided-path", "render", ROOM,
+                 "--integrator", "path", *wanted)
+
+    def test_that_are_damaged_are_refused(self):
+        whole = (self.path / "a.training").read_bytes()
+        for name, content in (("half", whole[:len(whole) // 2]), ("none", b""), ("longer", whole + b"x")):
+            (self.path / name).write_bytes(content)
+            self.bad(1, name, *PLAIN, "--spp", "4", "-o", "b.exr", "--load-training", name)
+
+
+if __name__ == "__main__":
+    unittest.main()
