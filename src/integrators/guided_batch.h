@@ -15,6 +15,7 @@ struct GuidedBatch final : ThreadState {
   /// What a path that goes on carries.
   struct Path {
     Spectrum throughput{1};
+    Spectrum bsdf_throughput{1};  ///< what it would be if the BSDF had drawn all directions
     float eta = 1;               ///< product of relative indices, undoes the radiance scaling in roulette
     Vec3 previous_p;             ///< where the last direction sample started
     float previous_pdf = 1;      ///< its density per unit solid angle, that of the mixture of BSDF and guide

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Path tracing that draws directions from a mixture of the BSDF and of what a guiding field has learnt [Ruppert2020].
-// At a vertex a share g of directions comes from the lobes of the field's leaf, seen from the vertex and multiplied with
+// At a vertex a share g of directions comes from the lobes of the field's leaf, seen from the vertex and multiplied by
 // the cosine; the density of every direction, whichever drew it, is that of the mixture,
 //
 //     p(w) = (1 − g) p_bsdf(w) + g p_guide(w),
 //
 // and so is the one that light samples are weighted against (balance heuristic). Hence the estimate is unbiased for any
 // field. g is the fraction of guided directions times the probability of those BSDF lobes that guiding can replace:
-// neither delta lobes nor narrow ones.
+// neither delta lobes nor narrow ones. Russian roulette looks at the throughput that the path would have if the BSDF
+// had drawn its directions: guided ones of high density have little, and that is no reason to end their paths.
 //
 // `Parts` says what tests exchange to plant bugs; see GuidedParts.
 #pragma once
@@ -156,9 +157,10 @@ class GuidedTracer {
 
   bool survives(Path& path) {
     CameraSample& sample = samples_[path.sample];
-    const float survival = roulette::survival_probability(path.throughput, path.eta, sample.random.sampling());
+    const float survival = roulette::survival_probability(path.bsdf_throughput, path.eta, sample.random.sampling());
     if (sample.random.get_1d(path.last_vertex, Event::kRoulette) < survival) {
       path.throughput *= roulette::survivor_weight(survival);
+      path.bsdf_throughput *= roulette::survivor_weight(survival);
       return true;
     }
     if (std::isnan(survival)) sample.radiance = path.throughput;  // a bad sample, not a black one
@@ -238,6 +240,7 @@ class GuidedTracer {
       path.recorded = false;
       if (!next.valid() || is_black(next.weight)) continue;
       path.throughput *= next.weight;
+      path.bsdf_throughput *= next.weight * (direction.pdf_bsdf > 0 ? next.pdf / direction.pdf_bsdf : 1);
       path.eta *= next.eta;
       if (!(next.flags & kNullTransmission)) path.only_null = false;
       const Vec3 wi = hit.frame.to_world(next.wi);
