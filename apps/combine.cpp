@@ -26,6 +26,7 @@
 #include "estimators/planes.h"
 #include "estimators/result_file.h"
 #include "film/outputs.h"
+#include "guide_layer.h"
 #include "json_output.h"
 #include "numbers.h"
 #include "stages.h"
@@ -35,7 +36,7 @@ namespace {
 
 struct CombineOptions {
   std::vector<std::string> crn, independent;
-  std::string output, crn_layer, independent_layer, counts, light, stages, json;
+  std::string output, crn_layer, independent_layer, counts, light, guides, stages, json;
   EstimatorOptions estimator;
   bool error = false, force = false, quiet = false;
   std::optional<int> samples;
@@ -176,6 +177,8 @@ void check_explain(const CombineOptions& o, const Estimator& estimator, const Gr
   if (o.explain.empty()) return;
   const CropWindow& window = file.place().window;
   const int x = o.explain[0] - window.x, y = o.explain[1] - window.y;
+  if (estimator.reads_guides)
+    throw Error(ErrorCode::kUsage, "--explain: with --denoise, a pixel is no sum of control variates");
   if (!estimator.explain)
     throw Error(ErrorCode::kUsage, "--explain: " + o.estimator.name + " has no control variates with coefficients");
   if (x < 0 || y < 0 || x >= window.width || y >= window.height)
@@ -230,6 +233,28 @@ std::vector<std::string> estimators_with_samples() {
   return estimators_where([](const Estimator& e) { return e.needs_sample_count; });
 }
 
+/// The layers of --guides.
+struct GuideImages {
+  std::optional<Image> albedo, normal;
+  Guides view() const { return {albedo ? &*albedo : nullptr, albedo && normal ? &*normal : nullptr}; }
+};
+
+GuideImages read_guides(const CombineOptions& o, const Estimator& estimator, const GroupedFile& file) {
+  if (o.guides.empty()) return {};
+  if (!estimator.reads_guides)
+    throw Error(ErrorCode::kUsage, "--guides is an option of --denoise bias, balanced and error");
+  const ImageInfo info = inspect_image(o.guides);
+  GuideImages guides{guide_layer(o.guides, info, "Albedo"), guide_layer(o.guides, info, "N")};
+  if (!guides.albedo)
+    throw Error(ErrorCode::kInput,
+                fmt::format("--guides '{}' has no layer Albedo (Albedo.R, .G, .B), and may have a layer N", o.guides));
+  for (const auto& guide : {guides.albedo, guides.normal})
+    if (guide && (guide->width != file.width() || guide->height != file.height()))
+      throw Error(ErrorCode::kInput, fmt::format("--guides '{}' has {} x {} pixels, the images have {} x {}", o.guides,
+                                                 guide->width, guide->height, file.width(), file.height()));
+  return guides;
+}
+
 PairSettings settings_of(const CombineOptions& o, const Estimator& estimator, const GroupedFile& crn) {
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
   const std::string& name = estimator.name;
@@ -241,7 +266,10 @@ PairSettings settings_of(const CombineOptions& o, const Estimator& estimator, co
   const int64_t samples = o.samples ? *o.samples : std::llround(crn.samples());
   if (counts && samples == 0)
     usage("--estimator " + name + " needs --samples N, the samples per pixel of the CRN image");
-  return {samples, o.error};
+  PairSettings settings;
+  settings.crn_samples = samples;
+  settings.std_error = o.error;
+  return settings;
 }
 
 /// Says of an estimator that reads samples why images are not enough.
@@ -275,7 +303,7 @@ void check_files_of_command(const CombineOptions& o) {
   Outputs outputs;
   outputs.reads(o.crn);
   outputs.reads(o.independent);
-  for (const std::string& path : {o.light, o.counts})
+  for (const std::string& path : {o.light, o.counts, o.guides})
     if (!path.empty()) outputs.reads(path);
   outputs.writes("-o", o.output, OutputKind::kFilm);
   outputs.writes("--json", o.json, OutputKind::kText);
@@ -290,7 +318,9 @@ void combine(const CombineOptions& o) {
   std::optional<GroupedFile> light;
   if (!o.light.empty()) light.emplace(std::vector{o.light});
   const Estimator estimator = make_estimator(o.estimator);
-  const PairSettings settings = settings_of(o, estimator, crn);
+  PairSettings settings = settings_of(o, estimator, crn);
+  const GuideImages guides = read_guides(o, estimator, crn);
+  settings.guides = guides.view();
   check_explain(o, estimator, crn);
   check_stages(o.stages, estimator);
   take_counts(o.counts, o.samples, crn, independent);
@@ -318,7 +348,7 @@ void combine(const CombineOptions& o) {
   write(o, crn, independent, result);
   if (!o.stages.empty()) {
     bands.read(0, crn.height());
-    save_stages(o.stages, estimator, bands.crn(), bands.independent(), crn.place());
+    save_stages(o.stages, estimator, bands.crn(), bands.independent(), settings, crn.place());
   }
   const double write_seconds = watch.lap();
   nlohmann::ordered_json pixel;
@@ -379,6 +409,9 @@ void add_combine(CLI::App& app) {
       ->check(one_of(pair_estimator_names()))
       ->capture_default_str();
   add_estimator_options(*command, o->estimator, pair_estimator_names(), kAdaptiveOptions);
+  add_denoise_options(*command, o->estimator);
+  command->add_option("--guides", o->guides,
+                      "For --denoise: image (EXR) of the same pixels whose layers Albedo and N show the surfaces");
   add_stages_option(*command, o->stages);
   command
       ->add_option("--samples", o->samples,

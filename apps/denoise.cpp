@@ -2,7 +2,8 @@
 // covary denoise: Open Image Denoise on an image, guided by its albedo and normal where it has them.
 #include "estimators/denoise.h"
 
-#include <algorithm>
+#include <fmt/format.h>
+
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -13,6 +14,7 @@
 #include "film/image_file.h"
 #include "film/outputs.h"
 #include "film/provenance.h"
+#include "guide_layer.h"
 
 namespace covary {
 namespace {
@@ -20,18 +22,19 @@ namespace {
 struct Options {
   std::string input, output;
   DenoiseOptions denoise;
-  bool no_guides = false, quiet = false;
+  bool no_guides = false, check = false, quiet = false;
 };
 
-/// Layer `name` of the image, if it has one with three channels that begin so.
-std::optional<Image> guide(const std::string& path, const ImageInfo& info, const std::string& name) {
-  const auto n = std::count_if(info.channels.begin(), info.channels.end(),
-                               [&](const ExrFile::Channel& c) { return c.name.starts_with(name + "."); });
-  if (n != 3) return std::nullopt;
-  return read_image(path, name).image;
+/// --check: which library there is.
+void check(const Options& o) {
+  const DenoiserInfo info = denoiser_info(o.denoise);
+  fmt::print("Open Image Denoise {}\n{}\n", info.version, info.path);
 }
 
 void run(const Options& o) {
+  if (o.check) return check(o);
+  if (o.input.empty() || o.output.empty())
+    throw Error(ErrorCode::kUsage, "expected are IN.exr and -o OUT.exr, or --check");
   const Stopwatch watch;
   Outputs outputs;
   outputs.reads(o.input);
@@ -40,8 +43,8 @@ void run(const Options& o) {
   const PlacedImage image = read_image(o.input);
   std::optional<Image> albedo, normal;
   if (!o.no_guides) {
-    albedo = guide(o.input, info, "Albedo");
-    if (albedo) normal = guide(o.input, info, "N");
+    albedo = guide_layer(o.input, info, "Albedo");
+    if (albedo) normal = guide_layer(o.input, info, "N");
   }
   Image result = denoise(image.image, albedo ? &*albedo : nullptr, normal ? &*normal : nullptr, o.denoise);
   std::map<std::string, std::string> attributes = inherited_attributes(info.attributes);
@@ -65,11 +68,12 @@ void run(const Options& o) {
 void add_denoise(CLI::App& app) {
   const auto o = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand("denoise", "Denoise an image with Open Image Denoise (biased)");
-  command->add_option("IN", o->input, "Linear image (EXR); its layers Albedo and N are guides")->required();
-  command->add_option("-o,--output", o->output, "The result (EXR)")->required();
+  command->add_option("IN", o->input, "Linear image (EXR); its layers Albedo and N are guides");
+  command->add_option("-o,--output", o->output, "The result (EXR)");
   command->add_option("--oidn", o->denoise.library,
                       "Open Image Denoise's library, its folder, the folder of Python's package pyoidn, or of an "
                       "environment that holds it");
+  command->add_flag("--check", o->check, "Print version and path of Open Image Denoise as it is found, and do nothing");
   command->add_flag("--no-guides", o->no_guides, "Do not use the layers Albedo and N");
   command->add_flag("--quiet", o->quiet, "No summary");
   command->callback([o] { run(*o); });

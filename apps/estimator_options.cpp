@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/error.h"
 #include "numbers.h"
 
 namespace covary {
@@ -74,6 +75,30 @@ void add_estimator_options(CLI::App& command, EstimatorOptions& o, const std::ve
     }
     option->group(kEstimatorGroup);
   }
+}
+
+void add_denoise_options(CLI::App& command, EstimatorOptions& o) {
+  command
+      .add_option("--denoise", o.denoise,
+                  "Mix the image with denoised ones where held-out samples find that better: for least bias, for least "
+                  "error, or balanced")
+      ->check(one_of(denoise_mode_names()))
+      ->capture_default_str();
+  command.add_option(
+      "--oidn", o.oidn,
+      "For --denoise: Open Image Denoise's library or a folder of it; default: where it is found; 'off': "
+      "without it");
+}
+
+Estimator make_estimator(const EstimatorOptions& o) {
+  const Estimator base = make_estimator(o.name, o.values);
+  MixedDenoisingOptions options;
+  options.mode = denoise_mode(o.denoise);
+  if (options.mode == DenoiseMode::kNone && !o.oidn.empty())
+    throw Error(ErrorCode::kUsage, "--oidn is an option of --denoise bias, balanced and error");
+  options.use_oidn = o.oidn != "off";
+  if (options.use_oidn) options.oidn.library = o.oidn;
+  return with_denoising(base, options);
 }
 
 std::string list_text(const std::vector<std::string>& words, const std::string& last) {

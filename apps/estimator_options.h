@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "estimators/mixed_denoising.h"
 #include "estimators/registry.h"
 
 namespace covary {
@@ -19,7 +20,8 @@ inline constexpr const char* kEstimatorGroup = "Estimator";
 struct EstimatorOptions {
   std::string name = kDefaultEstimator;
   OptionValues values;
-  const CLI::App* command = nullptr;  ///< knows which options were given
+  std::string denoise = "none", oidn;  ///< --denoise, --oidn
+  const CLI::App* command = nullptr;   ///< knows which options were given
 };
 
 /// Adds the options of these estimators, but `--estimator` itself. Equal names are one option, whose help has all
@@ -28,10 +30,12 @@ struct EstimatorOptions {
 void add_estimator_options(CLI::App& command, EstimatorOptions& options, const std::vector<std::string>& estimators,
                            std::span<const char* const> left_out = {});
 
-/// make_estimator() of the registry: throws Error(kUsage) for options of another estimator and values out of range.
-inline Estimator make_estimator(const EstimatorOptions& options) {
-  return make_estimator(options.name, options.values);
-}
+/// Adds --denoise and --oidn.
+void add_denoise_options(CLI::App& command, EstimatorOptions& options);
+
+/// make_estimator() of the registry, and what --denoise makes of it: throws Error(kUsage) for options of another
+/// estimator, values out of range, and where there is nothing to denoise.
+Estimator make_estimator(const EstimatorOptions& options);
 
 /// "a, b or c".
 std::string list_text(const std::vector<std::string>& words, const std::string& last = " or ");

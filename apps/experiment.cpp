@@ -197,6 +197,7 @@ lab::PlanContext plan_context() {
     const Estimator estimator = make_estimator(name);
     if (!estimator.adaptive) context.pair_estimators.insert(name);
     std::set<std::string>& own = context.estimator_options[name];
+    own.insert({"--denoise", "--oidn"});
     for (const EstimatorOption& option : options_of_estimator(name)) {
       if (estimator.pass_options.contains(option.name)) continue;
       own.insert("--" + option.name);

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <csignal>
 #include <filesystem>
 #include <memory>
@@ -97,8 +98,12 @@ RenderResult render_watched(const RenderOptions& options, const LoadedScene& sce
 void write_stages(const RenderOptions& options, const RenderResult& result) {
   if (options.stages.empty()) return;
   const Film &crn = result.passes[0].film, &independent = result.passes[1].film;
+  PairSettings settings;
+  settings.crn_samples = std::llround(crn.mean_count());
+  if (!result.aovs.empty()) settings.guides = {&result.aovs.at("Albedo"), &result.aovs.at("N")};
   save_stages(options.stages, make_estimator(options.estimator), rows_of(crn, 0, crn.height()),
-              rows_of(independent, 0, independent.height()), {crn.frame_width(), crn.frame_height(), crn.crop()});
+              rows_of(independent, 0, independent.height()), settings,
+              {crn.frame_width(), crn.frame_height(), crn.crop()});
 }
 
 std::string interruption(const RenderOptions& options, const RenderResult& result) {

@@ -268,6 +268,7 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
   command.add_option("--save-training", o.save_training, "File that keeps what controlled-path or guided-path learnt");
   command.add_option("--load-training", o.load_training, "Such a file, to use in place of a training");
   add_light_options(command, o.light);
+  add_denoise_options(command, o.estimator);
   add_estimator_options(command, o.estimator, estimator_names());
 }
 

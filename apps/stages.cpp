@@ -39,12 +39,12 @@ void check_stages(const std::string& folder, const Estimator& estimator) {
 }
 
 void save_stages(const std::string& folder, const Estimator& estimator, const GroupedImage& crn,
-                 const GroupedImage& independent, const ImagePlace& place) {
+                 const GroupedImage& independent, const PairSettings& settings, const ImagePlace& place) {
   if (folder.empty()) return;
   std::error_code failed;
   std::filesystem::create_directories(folder, failed);
   if (failed) throw Error(ErrorCode::kIo, "--save-stages '" + folder + "': " + failed.message());
-  for (auto& [name, image] : estimator.stages(crn, independent)) {
+  for (auto& [name, image] : estimator.stages(crn, independent, settings)) {
     const std::string path = (std::filesystem::path(folder) / name).string();
     std::vector<ExrPlane> planes;
     if (image.channels == 3)

@@ -19,6 +19,6 @@ void check_stages(const std::string& folder, const Estimator& estimator);
 /// if need be. Images of one channel are coloured from black over red to pale yellow, with decades where they span
 /// more than two. Throws Error(kIo).
 void save_stages(const std::string& folder, const Estimator& estimator, const GroupedImage& crn,
-                 const GroupedImage& independent, const ImagePlace& place);
+                 const GroupedImage& independent, const PairSettings& settings, const ImagePlace& place);
 
 }  // namespace covary

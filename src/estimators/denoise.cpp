@@ -3,11 +3,13 @@
 
 #include <dlfcn.h>
 #include <fmt/format.h>
+#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <deque>
 #include <filesystem>
 #include <memory>
 #include <string_view>
@@ -28,6 +30,8 @@ struct Api {
   void* (*new_device)(int type) = nullptr;
   void (*commit_device)(void* device) = nullptr;
   void (*release_device)(void* device) = nullptr;
+  void (*set_device_int)(void* device, const char* name, int value) = nullptr;
+  int (*get_device_int)(void* device, const char* name) = nullptr;
   int (*device_error)(void* device, const char** message) = nullptr;
   void* (*new_filter)(void* device, const char* type) = nullptr;
   void (*set_image)(void* filter, const char* name, void* data, int format, size_t width, size_t height,
@@ -88,13 +92,13 @@ std::vector<std::string> candidates(const DenoiseOptions& options) {
   return all;
 }
 
-struct Library {
+struct LibraryFile {
   std::string path;
   void* handle = nullptr;
 };
 
 /// The library stays loaded until the program ends: its threads and ours may share a scheduler.
-Library open_library(const DenoiseOptions& options, std::string& why) {
+LibraryFile open_library(const DenoiseOptions& options, std::string& why) {
   for (const std::string& path : candidates(options)) {
     if (void* handle = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL)) return {path, handle};
     why = dlerror();
@@ -103,16 +107,16 @@ Library open_library(const DenoiseOptions& options, std::string& why) {
 }
 
 template <typename Function>
-void bind(const Library& library, const char* name, Function& function) {
+void bind(const LibraryFile& library, const char* name, Function& function) {
   function = reinterpret_cast<Function>(dlsym(library.handle, name));
   if (!function)
     throw Error(ErrorCode::kIo,
                 fmt::format("{} has no function {}; version 2 of Open Image Denoise is needed", library.path, name));
 }
 
-Api load(const DenoiseOptions& options) {
+Api load(const DenoiseOptions& options, std::string* path = nullptr) {
   std::string why;
-  const Library library = open_library(options, why);
+  const LibraryFile library = open_library(options, why);
   if (!library.handle)
     throw Error(
         ErrorCode::kUsage,
@@ -120,8 +124,11 @@ Api load(const DenoiseOptions& options) {
             "Open Image Denoise is not there ({}); install it with `pip install pyoidn`, or name {}, its "
             "folder or the Python environment that holds it with --oidn or the environment variable COVARY_OIDN",
             why, kLibrary));
+  if (path) *path = library.path;
   Api api;
   bind(library, "oidnNewDevice", api.new_device);
+  bind(library, "oidnSetDeviceInt", api.set_device_int);
+  bind(library, "oidnGetDeviceInt", api.get_device_int);
   bind(library, "oidnCommitDevice", api.commit_device);
   bind(library, "oidnReleaseDevice", api.release_device);
   bind(library, "oidnGetDeviceError", api.device_error);
@@ -149,14 +156,7 @@ Image finite(const Image& image) {
   return copy;
 }
 
-}  // namespace
-
-std::string find_denoiser(const DenoiseOptions& options) {
-  std::string why;
-  return open_library(options, why).path;
-}
-
-Image denoise(const Image& rgb, const Image* albedo, const Image* normal, const DenoiseOptions& options) {
+void check_images(const Image& rgb, const Image* albedo, const Image* normal) {
   if (rgb.width < 1 || rgb.height < 1 || rgb.channels != 3)
     throw Error(ErrorCode::kInput,
                 fmt::format("denoise: the image is {} x {} with {} channels; expected are 3 channels", rgb.width,
@@ -164,34 +164,86 @@ Image denoise(const Image& rgb, const Image* albedo, const Image* normal, const 
   check_size("albedo", rgb, albedo);
   check_size("normal", rgb, normal);
   if (normal && !albedo) throw Error(ErrorCode::kInput, "denoise: a normal without an albedo; the denoiser needs both");
+}
 
-  const Api api = load(options);
-  const std::unique_ptr<void, void (*)(void*)> device(api.new_device(Api::kDeviceCpu), api.release_device);
-  const auto check = [&] {
+}  // namespace
+
+std::string find_denoiser(const DenoiseOptions& options) {
+  std::string why;
+  return open_library(options, why).path;
+}
+
+struct Denoiser::Library {
+  std::string path;
+  Api api;
+  std::unique_ptr<void, void (*)(void*)> device;
+
+  explicit Library(const DenoiseOptions& options)
+      : api(load(options, &path)), device(api.new_device(Api::kDeviceCpu), api.release_device) {
+    check();
+    const auto threads = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
+    api.set_device_int(device.get(), "numThreads", static_cast<int>(threads));
+    // Pinned threads of two processes on one machine get in each other's way.
+    api.set_device_int(device.get(), "setAffinity", 0);
+    api.commit_device(device.get());
+    check();
+  }
+
+  void check() const {
     const char* message = nullptr;
     if (api.device_error(device.get(), &message) != 0 || !device)
       throw Error(ErrorCode::kIo, fmt::format("Open Image Denoise: {}", message ? message : "no processor device"));
-  };
-  check();
-  api.commit_device(device.get());
-  check();
-  const std::unique_ptr<void, void (*)(void*)> filter(api.new_filter(device.get(), "RT"), api.release_filter);
-  check();
+  }
 
-  Image colour = finite(rgb), result(rgb.width, rgb.height, 3), albedo_copy, normal_copy;
-  const auto set = [&](const char* name, Image& image) {
-    api.set_image(filter.get(), name, image.data.data(), Api::kFormatFloat3, image.width, image.height, 0, 0, 0);
-  };
-  set("color", colour);
-  if (albedo) set("albedo", albedo_copy = finite(*albedo));
-  if (normal) set("normal", normal_copy = finite(*normal));
-  set("output", result);
-  api.set_bool(filter.get(), "hdr", true);
-  api.commit_filter(filter.get());
-  check();
-  api.execute_filter(filter.get());
-  check();
-  return result;
+  /// Runs the filter "RT" with these inputs, some of which may be null.
+  Image run(std::initializer_list<std::pair<const char*, const Image*>> inputs, bool hdr, bool clean_guides) const {
+    const std::unique_ptr<void, void (*)(void*)> filter(api.new_filter(device.get(), "RT"), api.release_filter);
+    check();
+    std::deque<Image> kept;
+    const auto set = [&](const char* name, Image& image) {
+      api.set_image(filter.get(), name, image.data.data(), Api::kFormatFloat3, image.width, image.height, 0, 0, 0);
+    };
+    for (const auto& [name, image] : inputs)
+      if (image) set(name, kept.emplace_back(finite(*image)));
+    Image result(kept.front().width, kept.front().height, 3);
+    set("output", result);
+    if (hdr) api.set_bool(filter.get(), "hdr", true);
+    if (clean_guides) api.set_bool(filter.get(), "cleanAux", true);
+    api.commit_filter(filter.get());
+    check();
+    api.execute_filter(filter.get());
+    check();
+    return result;
+  }
+};
+
+Denoiser::Denoiser(const DenoiseOptions& options) : library_(std::make_unique<Library>(options)) {}
+Denoiser::~Denoiser() = default;
+
+Image Denoiser::denoise(const Image& rgb, const Image* albedo, const Image* normal, bool clean_guides) {
+  check_images(rgb, albedo, normal);
+  return library_->run({{"color", &rgb}, {"albedo", albedo}, {"normal", normal}}, true, clean_guides && albedo);
+}
+
+Image Denoiser::denoise_guide(const std::string& name, const Image& guide) {
+  COVARY_CHECK(name == "albedo" || name == "normal", "a guide is an albedo or a normal");
+  check_images(guide, nullptr, nullptr);
+  return library_->run({{name.c_str(), &guide}}, false, false);
+}
+
+Image denoise(const Image& rgb, const Image* albedo, const Image* normal, const DenoiseOptions& options) {
+  check_images(rgb, albedo, normal);
+  return Denoiser(options).denoise(rgb, albedo, normal);
+}
+
+DenoiserInfo denoiser_info(const DenoiseOptions& options) {
+  DenoiserInfo info;
+  const Api api = load(options, &info.path);
+  const std::unique_ptr<void, void (*)(void*)> device(api.new_device(Api::kDeviceCpu), api.release_device);
+  const int version = device ? api.get_device_int(device.get(), "version") : 0;
+  if (version == 0) throw Error(ErrorCode::kIo, "Open Image Denoise: no processor device");
+  info.version = fmt::format("{}.{}.{}", version / 10000, version / 100 % 100, version % 100);
+  return info;
 }
 
 }  // namespace covary

@@ -194,7 +194,7 @@ Estimator make_dependent_tests(EstimatorParameters& parameters) {
   estimator.apply = [o](const GroupedImage& crn, const GroupedImage& independent, const PairSettings&) {
     return dependent_tests(crn, independent, o);
   };
-  estimator.stages = [o](const GroupedImage& crn, const GroupedImage& independent) {
+  estimator.stages = [o](const GroupedImage& crn, const GroupedImage& independent, const PairSettings&) {
     DependentTestsStages stages;
     dependent_tests(crn, independent, o, &stages);
     return stages;

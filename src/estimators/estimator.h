@@ -26,10 +26,18 @@ enum class EstimatorPasses {
   kAny,      ///< one of either kind, whose mean is the image: the film needs no estimator
 };
 
+/// What the surfaces behind the pixels look like: images of three channels, of the same size as the image. Null where
+/// not known; there is no normal without an albedo.
+struct Guides {
+  const Image* albedo = nullptr;  ///< reflectance, in [0, 1]
+  const Image* normal = nullptr;  ///< in [-1, 1]
+};
+
 /// What an estimator of a pair is told beside the images.
 struct PairSettings {
   int64_t crn_samples = 1;  ///< samples per pixel of the CRN image, > 0; read where needs_sample_count says so
   bool std_error = false;   ///< estimate the standard error, too; where predicts_error says that it can
+  Guides guides;            ///< read where reads_guides says so
 };
 
 /// Samples of a pixel, and of each the first random numbers that it was made of: [sample][dimension].
@@ -47,6 +55,7 @@ struct Estimator {
   bool needs_sample_count = false;  ///< PairSettings::crn_samples
   /// Groups of samples that it needs in each pass. All estimators take groups that differ in size by a sample.
   int fewest_groups = 1;
+  bool reads_guides = false;  ///< PairSettings::guides
   /// Parts of the samples for the CRN and the independent pass where nothing else is asked for; they add up to 1.
   std::array<double, 2> split = {0.5, 0.5};
 
@@ -63,7 +72,9 @@ struct Estimator {
       explain;
 
   /// Images of single steps by name, for files; empty function where the estimator has none.
-  std::function<std::map<std::string, Image>(const GroupedImage& crn, const GroupedImage& independent)> stages;
+  std::function<std::map<std::string, Image>(const GroupedImage& crn, const GroupedImage& independent,
+                                             const PairSettings& settings)>
+      stages;
 
   // Of the samples of a pixel.
   PixelFunction estimate_pixel;

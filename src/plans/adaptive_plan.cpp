@@ -86,7 +86,7 @@ PassPlan pass_of(const std::string& name, Sampling sampling, uint32_t number, ui
   return pass;
 }
 
-EstimatorResult mean_of_last(std::span<const Pass> passes, int first_row, int n_rows) {
+EstimatorResult mean_of_last(std::span<const Pass> passes, int first_row, int n_rows, const Guides&) {
   return mean_of_groups(rows_of(passes.back().film, first_row, n_rows));
 }
 
@@ -105,10 +105,11 @@ Plan adaptive_plan(const Estimator& estimator, std::optional<int> groups) {
   if (is_pair) {
     plan.estimate_bytes_per_pixel = estimator.bytes_per_pixel;
     const bool std_error = estimator.predicts_error;
-    plan.estimate = [apply = estimator.apply, std_error](std::span<const Pass> passes, int first_row, int n_rows) {
+    plan.estimate = [apply = estimator.apply, std_error](std::span<const Pass> passes, int first_row, int n_rows,
+                                                         const Guides&) {
       const Film &crn = passes[0].film, &independent = passes[1].film;
       return apply(rows_of(crn, first_row, n_rows), rows_of(independent, first_row, n_rows),
-                   {std::llround(crn.mean_count()), std_error});
+                   {std::llround(crn.mean_count()), std_error, {}});
     };
   }
   Phase first, last;

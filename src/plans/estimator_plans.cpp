@@ -28,7 +28,7 @@ PixelEstimate pixel_estimate(const PixelFunction& estimate, int dimensions) {
   };
 }
 
-EstimatorResult mean_of_first(std::span<const Pass> passes, int first_row, int n_rows) {
+EstimatorResult mean_of_first(std::span<const Pass> passes, int first_row, int n_rows, const Guides&) {
   return mean_of_groups(rows_of(passes[0].film, first_row, n_rows));
 }
 
@@ -39,10 +39,11 @@ void set_only_target(const PlanState& state, std::span<Pass> passes) {
   set_budget(whole_budget(passes[0].plan.groups), state, passes);
 }
 
-/// The same for all methods, so that they can share films: at least four groups, which each of them can use.
+/// The same for all methods that need no more, so that they can share films: at least four groups.
 Shares shares_of(const PairMethod& method) {
   constexpr int kEnough = 4;
-  return {{method.split.begin(), method.split.end()}, static_cast<uint32_t>(method.groups.value_or(kEnough))};
+  const int fewest = method.groups.value_or(std::max(kEnough, method.fewest_groups));
+  return {{method.split.begin(), method.split.end()}, static_cast<uint32_t>(fewest)};
 }
 
 }  // namespace
@@ -100,10 +101,13 @@ Plan pair_plan(const PairMethod& method) {
   plan.predicts_error = method.predicts_error;
   plan.groups_follow_speed = !method.groups;
   plan.estimate_bytes_per_pixel = method.bytes_per_pixel;
-  plan.estimate = [estimate = method.estimate](std::span<const Pass> passes, int first_row, int n_rows) {
-    const auto crn_samples = static_cast<int64_t>(std::llround(passes[0].film.mean_count()));
-    return estimate(rows_of(passes[0].film, first_row, n_rows), rows_of(passes[1].film, first_row, n_rows),
-                    crn_samples);
+  plan.reads_guides = method.reads_guides;
+  plan.estimate = [estimate = method.estimate](std::span<const Pass> passes, int first_row, int n_rows,
+                                               const Guides& guides) {
+    PairSettings settings;
+    settings.crn_samples = static_cast<int64_t>(std::llround(passes[0].film.mean_count()));
+    settings.guides = guides;
+    return estimate(rows_of(passes[0].film, first_row, n_rows), rows_of(passes[1].film, first_row, n_rows), settings);
   };
   Phase phase;
   phase.passes = [method](const PlanState& state) {
@@ -140,9 +144,11 @@ Plan estimator_plan(const Estimator& estimator, const PassChoice& choice) {
   method.fewest_groups = estimator.fewest_groups;
   method.predicts_error = estimator.predicts_error;
   method.bytes_per_pixel = estimator.bytes_per_pixel;
+  method.reads_guides = estimator.reads_guides;
   method.estimate = [apply = estimator.apply, std_error = estimator.predicts_error](
-                        const GroupedImage& crn, const GroupedImage& independent, int64_t crn_samples) {
-    return apply(crn, independent, {crn_samples, std_error});
+                        const GroupedImage& crn, const GroupedImage& independent, PairSettings settings) {
+    settings.std_error = std_error;
+    return apply(crn, independent, settings);
   };
   return pair_plan(method);
 }

@@ -32,8 +32,8 @@ struct PairMethod {
   int fewest_groups = 3;  ///< that the estimator works with
   bool predicts_error = false;
   double bytes_per_pixel = 0;  ///< memory that `estimate` takes beside its input, about
-  /// `crn_samples`: samples per pixel of the CRN image.
-  std::function<EstimatorResult(const GroupedImage& crn, const GroupedImage& independent, int64_t crn_samples)>
+  bool reads_guides = false;   ///< `estimate` reads PairSettings::guides
+  std::function<EstimatorResult(const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings)>
       estimate;
 };
 /// Passes "crn" and "independent" that advance together, and the estimator. Rendering throws Error(kUsage) where

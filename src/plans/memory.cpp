@@ -42,7 +42,7 @@ RenderMemory render_memory(const LoadedScene& scene, const Plan& plan, const Ren
   for (const Phase& phase : plan.phases)
     for (const PassPlan& pass : phase.passes(state)) passes.push_back(pass);
   if (has_light_pass(scene, plan)) passes.push_back(light_pass_plan(plan, passes));
-  RenderMemory memory = render_memory(plan, passes, window.width, window.height, request.aovs);
+  RenderMemory memory = render_memory(plan, passes, window.width, window.height, request.aovs || plan.reads_guides);
   memory.training = training_memory(scene);
   if (request.path_lengths) memory.films += window.width * window.height * kMostEdges * kImageBytes;
   return memory;

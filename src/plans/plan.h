@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "estimators/grouped_image.h"
+#include "estimators/estimator.h"
 #include "film/film.h"
 #include "integrators/integrator.h"
 #include "integrators/render_pass.h"
@@ -97,11 +97,12 @@ struct Plan {
   std::string name;       ///< of the estimator, for messages
   std::string estimator;  ///< the same with its options, for the image's attribute
   std::vector<Phase> phases;
-  /// The image of rows first_row … first_row + n_rows - 1 of the films so far. Its cost depends on the size, not on
-  /// counts.
-  std::function<EstimatorResult(std::span<const Pass>, int first_row, int n_rows)> estimate;
+  /// The image of rows first_row … first_row + n_rows - 1 of the films so far, with the guides of these rows where the
+  /// plan reads them. Its cost depends on the size, not on counts.
+  std::function<EstimatorResult(std::span<const Pass>, int first_row, int n_rows, const Guides& guides)> estimate;
   double estimate_bytes_per_pixel = 0;  ///< memory that estimate() takes beside the films, about
   bool takes_unfinished = false;        ///< estimate() works where pixels of a film still have no samples
+  bool reads_guides = false;            ///< estimate() reads albedo and normal, which are rendered for it
   bool film_is_image = false;           ///< the film of the one pass is the result; estimate() only serves its error
   bool takes_training = false;          ///< samples of the integrator's training join the image
   bool has_crn_pass = false;            ///< some pass takes common random numbers
@@ -119,5 +120,7 @@ const Pass* light_pass(std::span<const Pass> passes);
 
 /// Group means and counts of some rows of a film.
 GroupedImage rows_of(const Film& film, int first_row, int n_rows);
+/// Some rows of an image.
+Image rows_of(const Image& image, int first_row, int n_rows);
 
 }  // namespace covary

@@ -89,6 +89,7 @@ class PlanRun {
 
   bool has_training() const { return !result_.training.mean.data.empty(); }
   bool timed() const { return request_.seconds > 0; }
+  bool needs_aovs() const { return request_.aovs || plan_.reads_guides; }
   bool stopped() const { return callbacks_.stop && callbacks_.stop->load(); }
   /// The passes of every phase are there.
   bool all_begun() const {
@@ -211,7 +212,7 @@ bool PlanRun::render_phase(size_t index, double share) {
   if (index == first_of_phase_.size()) begin_phase(phase);
   const std::span<Pass> passes = passes_of(index);
   if (passes.empty()) return false;  // interrupted before its films were made
-  if (index + 1 == plan_.phases.size() && request_.aovs && result_.aovs.empty()) render_auxiliary_images();
+  if (index + 1 == plan_.phases.size() && needs_aovs() && result_.aovs.empty()) render_auxiliary_images();
   if (timed()) state_.seconds_left = request_.seconds - watch_.seconds();
   phase.set_targets(state_, passes.first(camera_passes(passes).size()));
   if (passes.back().plan.light) set_light_target(*state_.integrator, camera_passes(state_.passes), passes.back());
@@ -237,7 +238,7 @@ void PlanRun::begin_phase(const Phase& phase) {
   if (plan_.traces_light && is_last) plans.push_back(light_pass_plan(plan_, plans));
   std::vector<PassPlan> all = plans;
   for (const Pass& pass : state_.passes) all.push_back(pass.plan);
-  RenderMemory memory = render_memory(plan_, all, window_.width, window_.height, request_.aovs);
+  RenderMemory memory = render_memory(plan_, all, window_.width, window_.height, needs_aovs());
   memory.training = training_memory(scene_);
   check_memory(memory, window_.width, window_.height);
   for (PassPlan& plan : plans) {
@@ -301,7 +302,14 @@ void PlanRun::warn_of_other_samples(uint32_t asked) const {
 }
 
 EstimatorResult PlanRun::estimate_rows(int first_row, int n_rows) const {
-  EstimatorResult image = plan_.estimate(camera_passes(state_.passes), first_row, n_rows);
+  Image albedo, normal;
+  Guides guides;
+  if (plan_.reads_guides && !result_.aovs.empty()) {  // empty where the render was stopped before
+    albedo = rows_of(result_.aovs.at("Albedo"), first_row, n_rows);
+    normal = rows_of(result_.aovs.at("N"), first_row, n_rows);
+    guides = {&albedo, &normal};
+  }
+  EstimatorResult image = plan_.estimate(camera_passes(state_.passes), first_row, n_rows, guides);
   if (const Pass* light = light_pass(state_.passes)) add_light(rows_of(light->film, first_row, n_rows), image);
   if (has_training()) add_training(state_.passes[0].film, result_.training, first_row, image);
   return image;
@@ -339,6 +347,12 @@ void PlanRun::render_auxiliary_images() {
 }
 
 }  // namespace
+
+Image rows_of(const Image& image, int first_row, int n_rows) {
+  Image rows(image.width, n_rows, image.channels);
+  std::copy_n(image.pixel(0, first_row), rows.data.size(), rows.data.begin());
+  return rows;
+}
 
 GroupedImage rows_of(const Film& film, int first_row, int n_rows) {
   return {film.width(),

@@ -213,7 +213,7 @@ std::vector<std::pair<uint32_t, int>> taken(const Plan& plan, const RenderReques
 TEST(Budget, IsTakenToTheSample) {
   using Taken = std::vector<std::pair<uint32_t, int>>;
   PairMethod method;
-  method.name = "average", method.estimate = [](const GroupedImage&, const GroupedImage&, int64_t) {
+  method.name = "average", method.estimate = [](const GroupedImage&, const GroupedImage&, const PairSettings&) {
     return EstimatorResult{Image(3, 2, 3), {}, 0};
   };
   const auto pair = [&](uint32_t spp) { return taken(pair_plan(method), request_of(spp)); };

@@ -19,6 +19,8 @@ std::string preview_path(const std::string& output) {
 
 void write_result_files(const Plan& plan, const RenderRequest& request, RenderResult& result) {
   if (request.output.empty()) return;
+  std::map<std::string, Image> aovs;  // without those that only the estimator asked for
+  if (request.aovs) aovs = result.aovs;
   Film& last = result.passes[camera_passes(result.passes).size() - 1].film;
   if (plan.film_is_image) {
     const Pass* light = light_pass(result.passes);
@@ -26,7 +28,7 @@ void write_result_files(const Plan& plan, const RenderRequest& request, RenderRe
     if (light) sum = sum_of_films(last, light->film);
     Film& film = light ? sum : last;
     film.attributes[film_key::kComplete] = result.interrupted ? "false" : "true";
-    film.aovs = result.aovs;
+    film.aovs = aovs;
     film.shown = result.image.estimate;
     write_film(request.output, film);
   } else {
@@ -42,7 +44,7 @@ void write_result_files(const Plan& plan, const RenderRequest& request, RenderRe
     const ImagePlace place{film.frame_width(), film.frame_height(), film.crop()};
     EstimatorResult mean;  // of an interrupted render whose films are too young for the estimator
     if (!estimated) mean.estimate = result.picture();
-    write_result(request.output, place, attributes, estimated ? result.image : mean, result.aovs);
+    write_result(request.output, place, attributes, estimated ? result.image : mean, aovs);
   }
   if (request.preview) write_png(preview_path(request.output), result.picture());
 }

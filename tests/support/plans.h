@@ -31,7 +31,7 @@ inline RenderRequest request_of(uint32_t spp) {
 inline Plan average_plan() {
   PairMethod method;
   method.name = method.estimator = "average";
-  method.estimate = [](const GroupedImage& crn, const GroupedImage& independent, int64_t) {
+  method.estimate = [](const GroupedImage& crn, const GroupedImage& independent, const PairSettings&) {
     EstimatorResult result;
     result.estimate = Image(crn.width, crn.height, 3);
     for (int y = 0; y < crn.height; ++y)

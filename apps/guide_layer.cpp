@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "guide_layer.h"
+
+#include <algorithm>
+
+namespace covary {
+
+std::optional<Image> guide_layer(const std::string& path, const ImageInfo& info, const std::string& name) {
+  const auto n = std::count_if(info.channels.begin(), info.channels.end(),
+                               [&](const ExrFile::Channel& c) { return c.name.starts_with(name + "."); });
+  if (n != 3) return std::nullopt;
+  return read_image(path, name).image;
+}
+
+}  // namespace covary

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+// Weights where the best ones are known, and the error estimate from held-out samples on data of known error.
+#include "estimators/mixture.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+
+#include "estimators/held_out_error.h"
+#include "estimators/test_images.h"
+
+namespace covary {
+namespace {
+
+constexpr int kSize = 48;
+constexpr float kTruth = 0.5f;
+
+/// A flat picture with uniform noise of this variance in every value, and an offset.
+Image flat(float offset, double variance, uint64_t seed) {
+  Image image(kSize, kSize, 3);
+  const auto width = static_cast<float>(std::sqrt(12 * variance));
+  for (size_t i = 0; i < image.data.size(); ++i) image.data[i] = kTruth + offset + width * test::noise(seed, i, 0);
+  return image;
+}
+
+Moments moments_of(const Image& image, float variance) {
+  Moments m{Planes(kSize, kSize, 3, 0, 0), Planes(kSize, kSize, 3, 0, variance), {}};
+  for (int y = 0; y < kSize; ++y)
+    for (int x = 0; x < kSize; ++x)
+      for (int c = 0; c < 3; ++c) m.mean.row(c, y)[x] = image.pixel(x, y)[c];
+  return m;
+}
+
+Image average(const Image& a, const Image& b) {
+  Image mean = a;
+  for (size_t i = 0; i < mean.data.size(); ++i) mean.data[i] = 0.5f * (a.data[i] + b.data[i]);
+  return mean;
+}
+
+/// Independent images of two halves with these variances, and what methods made of them.
+struct Experiment {
+  static constexpr double kVariance = 0.04;  // of a half's independent image
+  Moments independent[2];
+  std::vector<unsigned char> valid = std::vector<unsigned char>(size_t{kSize} * kSize, 1);
+  Image guide = flat(0, 0, 0);
+  explicit Experiment(uint64_t seed)
+      : independent{moments_of(flat(0, kVariance, 100 * seed + 1), kVariance),
+                    moments_of(flat(0, kVariance, 100 * seed + 2), kVariance)} {}
+
+  /// `make(half)`: base and candidates of a half; the whole is the mean of both.
+  Mixture run(const std::function<CandidateSet(int)>& make, float bias_share) const {
+    const CandidateSet halves[2] = {make(0), make(1)};
+    CandidateSet whole{average(halves[0].base, halves[1].base), {}};
+    for (size_t p = 0; p < halves[0].candidates.size(); ++p)
+      whole.candidates.push_back(average(halves[0].candidates[p], halves[1].candidates[p]));
+    return mix({&whole, {&halves[0], &halves[1]}, {&independent[0], &independent[1]}, &guide, &valid, bias_share});
+  }
+};
+
+double mean_weight(const Mixture& mixture, size_t candidate) {
+  double sum = 0;
+  for (float w : mixture.weights[candidate].data) sum += w;
+  return sum / (kSize * kSize);
+}
+
+/// Base without bias and with variance v in a half, candidate with bias b and no variance: the half's error is
+/// x^2 b^2 + (1 - x)^2 v, least at x = v / (b^2 + v).
+TEST(Mixture, FindsTheWeightOfLeastError) {
+  const Experiment experiment(1);
+  const double v = 0.01;
+  for (const float b : {0.03f, 0.0707f, 0.2f})
+    for (const float bias_share : {1.0f, 2.0f, 4.0f}) {
+      const Mixture mixture = experiment.run(
+          [&](int half) {
+            return CandidateSet{flat(0, v, 7 + half), {flat(b, 0, 0)}};
+          },
+          bias_share);
+      const double weighted = bias_share * b * b, best = v / (weighted + v);
+      // Noise of h in the sums leaves about 0.03 of the weight uncertain.
+      EXPECT_NEAR(mean_weight(mixture, 0), best, 0.1) << b << " " << bias_share;
+    }
+}
+
+TEST(Mixture, GivesAPerfectCandidateTheWholeAndBadOnesNothing) {
+  const Experiment experiment(2);
+  const auto perfect_and_bad = [&](int half) {
+    return CandidateSet{flat(0, 0.01, 7 + half), {flat(0.5f, 0, 0), flat(0, 0, 0), flat(-0.3f, 0.02, 9 + half)}};
+  };
+  const Mixture mixture = experiment.run(perfect_and_bad, 1);
+  EXPECT_LT(mean_weight(mixture, 0), 0.05);
+  EXPECT_GT(mean_weight(mixture, 1), 0.9);
+  EXPECT_LT(mean_weight(mixture, 2), 0.05);
+  const auto bad = [&](int half) {
+    return CandidateSet{flat(0, 0.001, 7 + half), {flat(0.5f, 0, 0), flat(0.3f, 0, 0)}};
+  };
+  const Mixture base = experiment.run(bad, 1);
+  EXPECT_LT(mean_weight(base, 0), 0.02);
+  EXPECT_LT(mean_weight(base, 1), 0.02);
+}
+
+TEST(Mixture, WeightsAreSharesOfOne) {
+  const Experiment experiment(3);
+  const auto many = [&](int half) {
+    CandidateSet set{flat(0, 0.01, 7 + half), {}};
+    for (int p = 0; p < kMostCandidates; ++p)
+      set.candidates.push_back(flat(0.02f * static_cast<float>(p), 0.005, 20 + 2 * p + half));
+    return set;
+  };
+  const Mixture mixture = experiment.run(many, 1);
+  for (int i = 0; i < kSize * kSize; ++i) {
+    float sum = 0;
+    for (const Image& weights : mixture.weights) {
+      ASSERT_GE(weights.data[i], -1e-6f);
+      sum += weights.data[i];
+    }
+    ASSERT_LE(sum, 1 + 1e-5f);
+  }
+}
+
+TEST(Mixture, KeepsTheBaseWhereNothingIsValid) {
+  Experiment experiment(4);
+  std::fill_n(experiment.valid.begin(), kSize, 0);
+  const auto make = [&](int half) { return CandidateSet{flat(0, 0.01, 7 + half), {flat(0, 0, 0)}}; };
+  const Mixture mixture = experiment.run(make, 1);
+  const Image base = average(make(0).base, make(1).base);
+  for (int x = 0; x < kSize; ++x) EXPECT_EQ(mixture.image.pixel(x, 0)[1], base.pixel(x, 0)[1]);
+  EXPECT_NE(mixture.image.pixel(5, 1)[1], base.pixel(5, 1)[1]);
+}
+
+/// Student's t of the predicted minus the true squared error over 32 experiments: |t| beyond 5.5 has a probability of
+/// 5e-6. The standard deviation of a difference is about 7 % of the error, so that 7 % too much or too little is seen.
+double t_of_prediction(float bias, bool held_out) {
+  constexpr int kRuns = 32;
+  double sum = 0, squares = 0;
+  for (uint64_t seed = 1; seed <= kRuns; ++seed) {
+    const Experiment e(seed);
+    const Image a = flat(bias, 0.002, 100 * seed + 11), b = flat(bias, 0.002, 100 * seed + 12);
+    // Held out: the other half's samples. Otherwise, as a planted error, the images judge themselves.
+    const Moments own[2] = {moments_of(a, 0.002f), moments_of(b, 0.002f)};
+    const Image error =
+        held_out_error({{&a, &b},
+                        {held_out ? &e.independent[0] : &own[0], held_out ? &e.independent[1] : &own[1]},
+                        &e.guide,
+                        &e.valid});
+    const Image whole = average(a, b);
+    double difference = 0;
+    for (size_t i = 0; i < whole.data.size(); ++i)
+      difference += error.data[i] * error.data[i] - std::pow(whole.data[i] - kTruth, 2);
+    sum += difference;
+    squares += difference * difference;
+  }
+  const double mean = sum / kRuns, variance = (squares / kRuns - mean * mean) / (kRuns - 1);
+  return mean / std::sqrt(variance);
+}
+
+TEST(HeldOutError, IsUnbiased) {
+  EXPECT_LT(std::abs(t_of_prediction(0.05f, true)), 5.5);
+  EXPECT_LT(std::abs(t_of_prediction(0.1f, true)), 5.5);
+  // Images that are judged by themselves seem to have no bias.
+  EXPECT_GT(std::abs(t_of_prediction(0.1f, false)), 5.5);
+}
+
+}  // namespace
+}  // namespace covary

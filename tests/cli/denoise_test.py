@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""--denoise of covary render and covary combine, and covary denoise --check, as a user runs them."""
+import json
+import os
+import unittest
+
+from exr_reader import read_exr
+from render_test import ROOM, SMALL, RenderTest
+
+# Without Open Image Denoise, so that results do not depend on what is installed.
+PLAIN = ("--oidn", "off")
+
+
+class Denoise(RenderTest):
+    def channels(self, name):
+        return set(read_exr((self.path / name).read_bytes()))
+
+    def test_less_error_in_the_order_of_the_dial(self):
+        self.good("render", ROOM, *SMALL, "-o", "r.exr", "--estimator", "none", "--spp", "512", "--seed", "9")
+        errors = {}
+        for mode in ("none", "bias", "balanced", "error"):
+            options = () if mode == "none" else PLAIN
+            self.good("render", ROOM, *SMALL, "-o", f"{mode}.exr", "--denoise", mode, *options, "--spp", "48")
+            errors[mode] = self.relmse(f"{mode}.exr", "r.exr")
+        self.assertLess(errors["bias"], 1.1 * errors["none"])
+        self.assertLess(errors["balanced"], 0.9 * errors["none"])
+        self.assertLess(errors["error"], 0.8 * errors["none"])
+
+    def test_combine_of_films_and_guides_gives_the_same_bits(self):
+        self.good("render", ROOM, *SMALL, "-o", "a.exr", "--denoise", "balanced", *PLAIN, "--spp", "24", "--aovs",
+                  "--passes", "films", "--save-stages", "steps")
+        self.good("combine", "--crn", "films/crn.exr", "--independent", "films/independent.exr", "-o", "b.exr",
+                  "--denoise", "balanced", *PLAIN, "--guides", "a.exr", "--quiet", "--error")
+        self.same("a.exr", "b.exr")
+        self.assertIn("StdError.G", self.channels("b.exr"))
+        names = ["sharp", "sharp-independent", "smooth", "demodulated"]
+        self.assertEqual({p.name for p in (self.path / "steps").iterdir()},
+                         {f"{kind}-{name}.{end}" for kind in ("candidate", "weight") for name in names
+                          for end in ("exr", "png")})
+        # Without guides it is another image.
+        self.good("combine", "--crn", "films/crn.exr", "--independent", "films/independent.exr", "-o", "c.exr",
+                  "--denoise", "balanced", *PLAIN, "--quiet")
+        self.assertNotEqual((self.path / "b.exr").read_bytes(), (self.path / "c.exr").read_bytes())
+
+    def test_threads_resume_and_attributes(self):
+        options = ("--denoise", "error", *PLAIN, "--spp", "24")
+        self.good("render", ROOM, *SMALL, "-o", "a.exr", *options, "--threads", "1")
+        self.good("render", ROOM, *SMALL, "-o", "b.exr", *options, "--threads", "3", "--passes", "films")
+        self.same("a.exr", "b.exr")
+        self.good("render", ROOM, *SMALL, "-o", "c.exr", *options, "--passes", "films", "--resume")
+        self.same("a.exr", "c.exr")
+        self.assertNotIn("Albedo.R", self.channels("a.exr"), "guides are only written where --aovs asks for them")
+        info = json.loads(self.good("info", "a.exr", "--json").stdout)
+        self.assertEqual(info["attributes"]["covary:estimator"], "iicv --denoise error --oidn off")
+
+    def test_until_and_few_samples(self):
+        facts = self.statistics("-o", "a.exr", "--denoise", "error", *PLAIN, "--until", "relmse=0.01")
+        self.assertLessEqual(facts["predicted_relmse"], 0.01)
+        facts = self.statistics("-o", "b.exr", "--denoise", "error", *PLAIN, "--spp", "4")
+        self.assertEqual(facts["samples_per_pixel"], 12, "six groups in each pass")
+
+    def test_what_cannot_be(self):
+        self.bad(2, "--denoise needs an estimator of two passes that predicts its error (", "render", ROOM, "-o",
+                 "a.exr", "--estimator", "none", "--denoise", "error")
+        self.bad(2, "--oidn is an option of --denoise bias, balanced and error", "render", ROOM, "-o", "a.exr", *PLAIN)
+        self.bad(2, "--denoise", "render", ROOM, "-o", "a.exr", "--denoise", "much")
+        self.bad(2, "Open Image Denoise is not there (/nowhere/lib.so", "render", ROOM, *SMALL, "-o", "a.exr",
+                 "--denoise", "error", "--oidn", "/nowhere/lib.so", "--spp", "24")
+        self.good("render", ROOM, *SMALL, "-o", "b.exr", "--spp", "24", "--passes", "films")
+        inputs = ("combine", "--crn", "films/crn.exr", "--independent", "films/independent.exr", "-o", "c.exr")
+        self.bad(1, "--guides 'b.exr' has no layer Albedo", *inputs, "--denoise", "error", *PLAIN, "--guides", "b.exr")
+        self.bad(2, "--guides is an option of --denoise", *inputs, "--guides", "b.exr")
+        self.bad(2, "--explain: with --denoise", *inputs, "--denoise", "error", *PLAIN, "--explain", "1,1")
+
+    def test_check(self):
+        self.bad(2, "Open Image Denoise is not there (/nowhere/lib.so", "denoise", "--check", "--oidn",
+                 "/nowhere/lib.so")
+        self.bad(2, "expected are IN.exr and -o OUT.exr, or --check", "denoise")
+        result = self.run_covary("denoise", "--check", env={**os.environ, "COVARY_OIDN": ""})
+        if result.returncode == 0:
+            self.assertRegex(result.stdout, r"\AOpen Image Denoise 2\.\d+\.\d+\n.*libOpenImageDenoise\.so\.2\n\Z")
+        else:
+            self.assertIn("pip install pyoidn", result.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
