@@ -11,13 +11,13 @@
 // is the squared error of the half's mixture, up to a constant. Its coefficients are summed over a window of pixels
 // like the target, w_ij = exp(-||G_j - G_i||^2 / ((0.5 G'_i)^2 + 1e-4)) with a guide G, over cells of 4 x 4 pixels.
 //
-// The variance of the half's mixture is known from the two halves, ||M_A - M_B||^2 / 2, and the rest is squared bias.
-// With both, the weights x minimise
+// The variance of the half's mixture is known from both halves, ||M_A - M_B||^2 / 2, and the rest is squared bias. With
+// both, the weights x minimise
 //
 //     bias_share * squared bias + variance,   x >= 0, sum x <= 1.
 //
-// The whole image has half of that variance. Its bias is smaller than that of a half, too, so that bias_share = 1 leaves
-// less error than 2 (docs/notes/denoising.md).
+// The whole image has half of that variance. Its bias is smaller than that of a half, too, so that bias_share = 1
+// leaves less error than 2 (docs/notes/denoising.md).
 #pragma once
 
 #include <array>
@@ -50,8 +50,6 @@ struct Mixture {
 
 /// At most this many candidates.
 inline constexpr int kMostCandidates = 8;
-/// How far from a pixel, in rows or columns, the input can influence its weights, where images begin at a multiple of 4.
-inline constexpr int kMixtureReach = 32;
 
 /// Bit-identical for any number of threads.
 Mixture mix(const MixtureInput& input);
