@@ -23,6 +23,7 @@
 #include "estimators/grouped_file.h"
 #include "estimators/input_checks.h"
 #include "estimators/mean.h"
+#include "estimators/pair_input.h"
 #include "estimators/planes.h"
 #include "estimators/result_file.h"
 #include "film/outputs.h"
@@ -45,36 +46,9 @@ struct CombineOptions {
   int threads = 0;
 };
 
-/// What the files themselves tell: sizes, kinds of sampling, precision.
-void check_files(const GroupedFile& crn, const GroupedFile& independent, std::vector<Finding>& findings) {
-  using Severity = Finding::Severity;
-  const auto size = [](const GroupedFile& f) {
-    const CropWindow& w = f.place().window;
-    return fmt::format("{} x {} pixels at ({}, {}) of {} x {}", w.width, w.height, w.x, w.y, f.place().frame_width,
-                       f.place().frame_height);
-  };
-  if (!(crn.place() == independent.place()))
-    throw Error(ErrorCode::kInput, fmt::format("{} has {}, {} has {}; both images must show the same pixels",
-                                               crn.name(), size(crn), independent.name(), size(independent)));
-  if (crn.sampling() == "independent" || independent.sampling() == "crn")
-    findings.push_back({Severity::kError, "the files say that the CRN image was rendered with sampling '" +
-                                              crn.sampling() + "' and the independent image with '" +
-                                              independent.sampling() +
-                                              "'; expected are --sampling crn and --sampling independent"});
-  if (!crn.scene_hash().empty() && !independent.scene_hash().empty() && crn.scene_hash() != independent.scene_hash())
-    findings.push_back({Severity::kError, "the files say that they show different scenes (attribute scene_hash)"});
-  if (!crn.settings().empty() && !independent.settings().empty() && crn.settings() != independent.settings())
-    findings.push_back(
-        {Severity::kError, "the files say that they were rendered with different settings: the CRN image with '" +
-                               crn.settings() + "', the independent image with '" + independent.settings() + "'"});
-  for (const auto& [name, file] : {std::pair{"CRN image", &crn}, {"independent image", &independent}})
-    if (file->has_half())
-      findings.push_back(
-          {Severity::kWarning,
-           fmt::format(
-               "{}: values have 16 bits, which limits what can be gained; save 32-bit float values: in Mitsuba "
-               "component_format \"float32\", in pbrt Film \"bool savefp16\" false, in Blender color_depth = '32'",
-               name)});
+/// What the file tells beside its pixels.
+ImageOrigin origin_of(const GroupedFile& file) {
+  return {file.name(), file.place(), file.sampling(), file.scene_hash(), file.settings(), file.has_half()};
 }
 
 /// Both images, some rows at a time.
@@ -111,23 +85,13 @@ class Bands {
   GroupedFile::Rows crn_rows_, independent_rows_;
 };
 
-/// Whether a group of a pixel has no samples, so that images cannot be checked.
-bool lacks_samples(const GroupedImage& image) {
-  const auto groups = static_cast<uint32_t>(image.groups);
-  return image.counts && std::any_of(image.counts, image.counts + static_cast<size_t>(image.width) * image.height,
-                                     [groups](uint32_t n) { return n < groups; });
-}
-
 InputReport examine(const Estimator& estimator, const GroupedFile& crn, const GroupedFile& independent, Bands& bands) {
   InputChecks checks(crn.width(), crn.height(), crn.groups(), independent.groups());
   const int step = std::max(16, bands.rows());
   for (int y = 0; y < crn.height(); y += step) {
     bands.read(y, std::min(step, crn.height() - y));
-    if (estimator.adaptive && (lacks_samples(bands.crn()) || lacks_samples(bands.independent()))) {
-      InputReport report;
-      report.findings.push_back({Finding::Severity::kNote, "images in which pixels lack samples are not checked"});
-      return report;
-    }
+    if (estimator.adaptive && (lacks_samples(bands.crn()) || lacks_samples(bands.independent())))
+      return unchecked_report();
     checks.add_rows(bands.crn(), bands.independent());
   }
   return checks.report();
@@ -228,11 +192,6 @@ nlohmann::ordered_json json_of(const Correlation& c) {
   return {{"value", c.value}, {"standard_error", c.standard_error}, {"pairs", c.pairs}};
 }
 
-/// Estimators that need the number of samples of the CRN image.
-std::vector<std::string> estimators_with_samples() {
-  return estimators_where([](const Estimator& e) { return e.needs_sample_count; });
-}
-
 /// The layers of --guides.
 struct GuideImages {
   std::optional<Image> albedo, normal;
@@ -253,34 +212,6 @@ GuideImages read_guides(const CombineOptions& o, const Estimator& estimator, con
       throw Error(ErrorCode::kInput, fmt::format("--guides '{}' has {} x {} pixels, the images have {} x {}", o.guides,
                                                  guide->width, guide->height, file.width(), file.height()));
   return guides;
-}
-
-PairSettings settings_of(const CombineOptions& o, const Estimator& estimator, const GroupedFile& crn) {
-  const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
-  const std::string& name = estimator.name;
-  const bool counts = estimator.needs_sample_count;
-  if (o.samples && !counts && o.counts.empty())
-    usage(fmt::format("--samples is an option of --counts and --estimator {}, not of {}",
-                      fmt::join(estimators_with_samples(), ", "), name));
-  if (o.error && !estimator.predicts_error) usage("--error: " + name + " does not estimate its error");
-  const int64_t samples = o.samples ? *o.samples : std::llround(crn.samples());
-  if (counts && samples == 0)
-    usage("--estimator " + name + " needs --samples N, the samples per pixel of the CRN image");
-  PairSettings settings;
-  settings.crn_samples = samples;
-  settings.std_error = o.error;
-  return settings;
-}
-
-/// Says of an estimator that reads samples why images are not enough.
-std::string check_has_images(std::string& name) {
-  for (const EstimatorPlugin& plugin : estimator_plugins())
-    if (name == plugin.name && make_estimator(name).passes == EstimatorPasses::kSamples)
-      return fmt::format(
-          "{0} are fitted to the samples of each pixel, which images do not hold; use 'covary render "
-          "SCENE --estimator {0}'",
-          name);
-  return "";
 }
 
 /// A file used twice would be a control variate of itself, or a group without information of its own.
@@ -318,7 +249,8 @@ void combine(const CombineOptions& o) {
   std::optional<GroupedFile> light;
   if (!o.light.empty()) light.emplace(std::vector{o.light});
   const Estimator estimator = make_estimator(o.estimator);
-  PairSettings settings = settings_of(o, estimator, crn);
+  PairSettings settings = pair_settings(
+      estimator, estimator.needs_sample_count || o.counts.empty() ? o.samples : std::nullopt, crn.samples(), o.error);
   const GuideImages guides = read_guides(o, estimator, crn);
   settings.guides = guides.view();
   check_explain(o, estimator, crn);
@@ -326,15 +258,12 @@ void combine(const CombineOptions& o) {
   take_counts(o.counts, o.samples, crn, independent);
 
   std::vector<Finding> findings;
-  check_files(crn, independent, findings);
+  check_origins(origin_of(crn), origin_of(independent), findings);
   check_light_files(crn, independent, light ? &*light : nullptr, findings);
   Bands bands(crn, independent, o.memory_mib);
   const InputReport report = examine(estimator, crn, independent, bands);
   findings.insert(findings.end(), report.findings.begin(), report.findings.end());
-  std::string errors;
-  for (const Finding& f : findings)
-    if (f.severity == Finding::Severity::kError && !o.force) errors += (errors.empty() ? "" : "; ") + f.text;
-  if (!errors.empty())
+  if (const std::string errors = errors_text(findings); !errors.empty() && !o.force)
     throw Error(ErrorCode::kInput, "the inputs do not fit: " + errors + " (--force combines them nevertheless)");
   for (const Finding& f : findings) {
     const bool note = f.severity == Finding::Severity::kNote;
@@ -405,7 +334,7 @@ void add_combine(CLI::App& app) {
                       "files do not tell and pixels differ");
   command->add_option("--light", o->light, "Light film (light.exr of covary render --passes) to add to the result");
   command->add_option("--estimator", o->estimator.name, "iicv, or a comparator")
-      ->check(CLI::Validator(check_has_images, ""))
+      ->check(CLI::Validator([](std::string& name) { return needs_samples_text(name); }, ""))
       ->check(one_of(pair_estimator_names()))
       ->capture_default_str();
   add_estimator_options(*command, o->estimator, pair_estimator_names(), kAdaptiveOptions);

@@ -9,10 +9,10 @@
 #include "commands.h"
 #include "core/error.h"
 #include "defines.h"
-#include "integrators/training.h"
 #include "numbers.h"
 #include "plans/estimator_plans.h"
 #include "plans/integrator_choice.h"
+#include "plans/request_options.h"
 #include "stages.h"
 
 namespace covary {
@@ -34,12 +34,6 @@ double parse_until(const std::string& text) {
   return *value;
 }
 
-FilterSettings filter_named(const std::string& name) {
-  if (name == "box") return {FilterKind::kBox, 0.5f, 0};
-  if (name == "tent") return {FilterKind::kTent, 1.0f, 0};
-  return {FilterKind::kGaussian, 2.0f, 0.5f};
-}
-
 namespace {
 
 /// "polynomials, for direct light, or none, the mean".
@@ -49,29 +43,6 @@ std::string single_pass_estimators() {
     if (const Estimator e = make_estimator(name); e.passes != EstimatorPasses::kPair)
       texts.push_back(name + ", " + e.summary);
   return list_text(texts, ", or ");
-}
-
-/// Samples per pixel of the integrator's training.
-uint32_t training_samples(const LoadedScene& scene) {
-  const auto* learning = dynamic_cast<const LearningIntegrator*>(scene.integrator.get());
-  return learning ? learning->training_spp() : 0;
-}
-
-/// Takes the samples of training off those of the passes, where their number is given.
-void take_training(uint32_t training, const LoadedScene& scene, RenderRequest& request) {
-  const bool open_ended = request.seconds > 0 || request.until > 0;
-  if (!request.spp && open_ended) return;
-  const uint32_t all = request.spp.value_or(static_cast<uint32_t>(scene.spp));
-  if (all <= training)
-    throw Error(ErrorCode::kUsage, fmt::format("{} samples per pixel, of which the training takes {}, leave none for "
-                                               "the image; use a larger --spp or a shorter training "
-                                               "(--cv-train, --guide-train)",
-                                               all, training));
-  request.spp = all - training;
-}
-
-CrnPart crn_part_named(const std::string& name) {
-  return name == "camera" ? CrnPart::kCamera : name == "light" ? CrnPart::kLight : CrnPart::kBoth;
 }
 
 }  // namespace
@@ -160,9 +131,7 @@ RenderRequest make_request(const RenderOptions& options, const LoadedScene& scen
   request.spp = options.spp;
   request.seconds = options.seconds;
   if (!options.until.empty()) request.until = parse_until(options.until);
-  if (const uint32_t training = training_samples(scene);
-      training > 0 && options.replay.empty() && options.load_training.empty())
-    take_training(training, scene, request);
+  if (options.replay.empty() && options.load_training.empty()) take_training(scene, request);
   request.aovs = options.aovs;
   request.path_lengths = options.control.path_lengths;
   request.crn_part = crn_part_named(options.crn_part);

@@ -57,7 +57,5 @@ SampleAddress replayed_sample(const RenderOptions& options);
 std::array<double, 2> parse_split(const std::string& text);
 /// --until "relmse=0.005".
 double parse_until(const std::string& text);
-/// --rfilter.
-FilterSettings filter_named(const std::string& name);
 
 }  // namespace covary
