@@ -1,0 +1,25 @@
+# Whether the Python package can be built, and nanobind for it. COVARY_PYTHON: ON, OFF, or AUTO: where nanobind is
+# installed for the interpreter that scripts/setup prepares in build/venv or, without that, for Python_EXECUTABLE or the
+# first python3 there is.
+set(COVARY_PYTHON AUTO CACHE STRING "Build the Python package: ON, OFF, or AUTO (where nanobind is installed)")
+set(COVARY_VENV ${PROJECT_SOURCE_DIR}/build/venv/bin/python)
+if(NOT DEFINED Python_EXECUTABLE AND EXISTS ${COVARY_VENV})
+  set(Python_EXECUTABLE ${COVARY_VENV})
+endif()
+set(build_python OFF)
+if(COVARY_PYTHON STREQUAL "ON" OR (COVARY_PYTHON STREQUAL "AUTO" AND NOT COVARY_SANITIZE))
+  find_package(Python 3.10 COMPONENTS Interpreter Development.Module)
+  if(Python_Development.Module_FOUND)
+    execute_process(COMMAND ${Python_EXECUTABLE} -m nanobind --cmake_dir OUTPUT_VARIABLE nanobind_ROOT
+      OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET RESULT_VARIABLE no_nanobind)
+    if(no_nanobind EQUAL 0)
+      find_package(nanobind CONFIG REQUIRED)
+      set(build_python ON)
+    endif()
+  endif()
+  if(NOT build_python AND COVARY_PYTHON STREQUAL "ON")
+    message(FATAL_ERROR "COVARY_PYTHON needs Python 3.10 or newer with its headers, and the package nanobind")
+  elseif(NOT build_python)
+    message(STATUS "The Python package is left out: there is no nanobind")
+  endif()
+endif()

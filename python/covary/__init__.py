@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Less Monte Carlo noise by control variates and correlated sampling.
+
+    result = covary.combine(crn, independent)          # arrays [T, H, W, 3] of any renderer
+    result = covary.render("scene.xml", spp=96)        # Mitsuba XML
+
+docs/python.md is the manual.
+"""
+from . import errors, metrics, progress
+from ._combine import InputReport, check_inputs, combine
+from ._covary import set_threads
+from ._covary import version as __version__
+from ._images import denoise, read_groups, read_image, write_image
+from ._program import program
+from ._render import Scene, render
+from ._result import RenderResult, Result
+from .errors import Error, InputError, InternalError, IoError, UsageError
+from .estimators import *  # noqa: F403
+from .estimators import __all__ as _estimators
+from .film import Film, film_from_groups, merge_films
+from .notebook import View, view
+
+__all__ = [
+    "Error", "Film", "InputError", "InputReport", "InternalError", "IoError", "RenderResult", "Result", "Scene",
+    "UsageError", "View", "__version__", "check_inputs", "combine", "denoise", "errors", "film_from_groups",
+    "merge_films", "metrics", "program", "progress", "read_groups", "read_image", "render", "set_threads", "view",
+    "write_image",
+]
+__all__ += _estimators

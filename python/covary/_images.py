@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Images of files, and Open Image Denoise."""
+from __future__ import annotations
+
+from collections.abc import Iterable
+from os import PathLike, fspath
+from typing import TYPE_CHECKING, Any
+
+from . import _covary
+
+if TYPE_CHECKING:
+    from ._result import FloatArray
+
+def read_image(path: str | PathLike[str], layer: str = "") -> FloatArray:
+    """Linear RGB [H, W, 3] of a file of any format; `layer` chooses among those of an EXR: "N", "Albedo", …"""
+    image: FloatArray = _covary.read_image(fspath(path), layer)
+    return image
+
+
+def write_image(path: str | PathLike[str], image: Any, attributes: dict[str, str] | None = None) -> None:
+    """Writes linear RGB [H, W, 3] in the format that the name tells: .exr .pfm .tif .hdr .png .jpg."""
+    _covary.write_image(fspath(path), image, attributes or {})
+
+
+def read_groups(paths: str | PathLike[str] | Iterable[str | PathLike[str]], layer: str = "") -> FloatArray:
+    """Groups [T, H, W, 3] for combine() from EXR files of any renderer: one file with a layer for each group, or one
+    file for each."""
+    names = [fspath(paths)] if isinstance(paths, (str, PathLike)) else [fspath(path) for path in paths]
+    if not names:
+        raise ValueError("paths: found none; one file or more are needed")
+    groups: FloatArray = _covary.read_groups(names, layer)
+    return groups
+
+
+def denoise(image: Any, albedo: Any = None, normal: Any = None, *, library: str | PathLike[str] = "") -> FloatArray:
+    """The image [H, W, 3] by Open Image Denoise, where it is installed (`pip install pyoidn`). Biased.
+
+    albedo, normal: guides [H, W, 3], the normal only together with the albedo.
+    library: its file or folder, as `covary denoise --oidn` takes it.
+    """
+    denoised: FloatArray = _covary.denoise(image, albedo, normal, fspath(library))
+    return denoised

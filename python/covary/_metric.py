@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One error of an image, by name."""
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from . import _covary
+
+if TYPE_CHECKING:
+    from ._result import FloatArray
+
+
+@dataclass(frozen=True)
+class MetricResult:
+    """An error of an image."""
+
+    #: Mean over the finite pixels.
+    value: float
+    n_pixels: int
+    #: Pixels with a value that is not finite in the image or a reference; left out.
+    n_non_finite: int
+    #: The error of each pixel, [H, W].
+    map: FloatArray = field(repr=False)
+
+
+def compute(name: str, image: Any, reference: Any, reference2: Any = None, *,
+            low_dynamic_range: bool = False) -> MetricResult:
+    """The error `name` ("relmse", "flip", …) of an image [H, W, 3] against one reference, or two independent ones.
+
+    low_dynamic_range: clamp to [0, 1] for FLIP.
+    """
+    return MetricResult(*_covary.metric(name, image, reference, reference2, low_dynamic_range))

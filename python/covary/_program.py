@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The program `covary` that comes with the package."""
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from pathlib import Path
+
+from .errors import Error
+
+
+def program() -> Path:
+    """Path of the program: that of COVARY_PROGRAM where it is set, the package's own, or one on the search path."""
+    named = os.environ.get("COVARY_PROGRAM")
+    own = Path(__file__).parent / "bin" / "covary"
+    found = named or (str(own) if own.exists() else shutil.which("covary"))
+    if not found:
+        raise Error("the program 'covary' is not installed: it is neither in the package nor on the search path, and "
+                    "COVARY_PROGRAM does not name it")
+    return Path(found)
+
+
+def main() -> None:
+    """Becomes the program, with the arguments of this process: the command `covary` of an installed package."""
+    path = str(program())
+    os.execv(path, [path, *sys.argv[1:]])

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What combine() and render() return."""
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from os import PathLike, fspath
+from typing import TYPE_CHECKING
+
+from . import _covary
+
+if TYPE_CHECKING:
+    import numpy
+    from numpy.typing import NDArray
+
+    FloatArray = NDArray[numpy.float32]
+
+
+@dataclass(frozen=True)
+class Result:
+    """An image and what is known of its error."""
+
+    #: Linear Rec. 709, [H, W, 3].
+    image: FloatArray = field(repr=False)
+    #: Estimated standard error of each value, [H, W, 3]; None where the estimator does not tell, or was not asked.
+    std_error: FloatArray | None = field(repr=False)
+    #: relMSE that the standard errors predict, with the image in place of a reference.
+    predicted_relmse: float | None
+    #: What the checks of the inputs, or the render, warned of.
+    warnings: list[str]
+    #: Pixels with a value that is not finite in an input; the mean of their finite groups stands there.
+    nonfinite_pixels: int
+    #: Name and options, as `covary:estimator` of files has them.
+    estimator: str
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Writes the image in the format that the name tells: .exr .pfm .tif .hdr .png .jpg."""
+        _covary.write_image(fspath(path), self.image, {"covary:estimator": self.estimator})
+
+    def _repr_html_(self) -> str:
+        from .notebook import view
+
+        return view({"image": self})._repr_html_()
+
+
+@dataclass(frozen=True)
+class RenderResult(Result):
+    """What has become of a render."""
+
+    #: Films of the passes by name: "crn", "independent", …
+    films: dict[str, _covary.Film] = field(repr=False)
+    #: Auxiliary images by name where they were asked for: "Albedo", "N", "P".
+    aovs: dict[str, FloatArray] = field(repr=False)
+    #: Samples per pixel of all passes together.
+    samples_per_pixel: float
+    render_seconds: float
+    estimate_seconds: float
+    #: Whether all passes have the samples that were planned.
+    complete: bool
+    #: Whether the predicted error is at most the wanted one, where one was.
+    until_reached: bool | None

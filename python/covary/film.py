@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Films: what render passes leave behind, and making them of arrays or of each other."""
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike, fspath
+from typing import Any
+
+from ._covary import Film
+
+__all__ = ["Film", "film_from_groups", "merge_films"]
+
+
+def merge_films(films: Sequence[Film | str | PathLike[str]]) -> Film:
+    """The film of all samples of several films of one scene with different seeds, as `covary merge` makes it: the order
+    given does not matter, bit for bit. Of files only one is in memory at a time. Raises InputError where they do not
+    belong together or share a seed."""
+    members = [film for film in films if isinstance(film, Film)]
+    paths = [fspath(film) for film in films if not isinstance(film, Film)]
+    if members and paths:
+        raise TypeError("films: found Film objects and names of files; accepted are either")
+    return Film._merge_files(paths) if paths else Film._merge(members)
+
+
+def film_from_groups(groups: Any, samples: int, *, sampling: str = "", seed: int | None = None,
+                     attributes: dict[str, str] | None = None) -> Film:
+    """A film of group means [T, H, W, 3] of any renderer, `samples` per pixel of all groups together.
+
+    sampling: "crn" or "independent", which combine() then checks; seed: that merge_films() looks at.
+    """
+    known = {key: value for key, value in (("sampling", sampling), ("seed", "" if seed is None else str(seed)))
+             if value}
+    return Film._from_groups(groups, samples, {**known, **(attributes or {})})

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The comparer of `covary view` in a notebook."""
+from __future__ import annotations
+
+import html
+import subprocess
+import tempfile
+from collections.abc import Mapping, Sequence
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any
+
+from . import _covary
+from ._program import program
+from ._result import Result
+from .errors import Error
+
+
+class View:
+    """A page that compares images; shown by a notebook, or written by save()."""
+
+    def __init__(self, page: str, height: int) -> None:
+        self.page, self.height = page, height
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Writes the page (HTML), which needs no network."""
+        Path(path).write_text(self.page, encoding="utf-8")
+
+    def _repr_html_(self) -> str:
+        return (f'<iframe srcdoc="{html.escape(self.page)}" width="100%" height="{self.height}" '
+                'style="border: 0"></iframe>')
+
+
+def _named(images: Mapping[str, Any] | Sequence[Any] | Any) -> dict[str, Any]:
+    if isinstance(images, Mapping):
+        return {str(name): image for name, image in images.items()}
+    if isinstance(images, (list, tuple)):
+        return {f"image {number}": image for number, image in enumerate(images, 1)}
+    return {"image": images}
+
+
+def _file_of(image: Any, folder: Path, name: str) -> str:
+    """The image's file, written where it is an array or a result."""
+    if isinstance(image, (str, PathLike)):
+        return fspath(image)
+    if not name or "/" in name or name.startswith("."):
+        raise ValueError(f"images: found the name {name!r}; accepted are names without '/' that begin with no dot")
+    path = str(folder / f"{name}.exr")
+    _covary.write_image(path, image.image if isinstance(image, Result) else image, {})
+    return path
+
+
+def view(images: Mapping[str, Any] | Sequence[Any] | Any, reference: Any = None, *, title: str = "", height: int = 640,
+         small: bool = False) -> View:
+    """Compares images as `covary view` does: arrays [H, W, 3], results, or names of files; a mapping gives them names.
+
+    reference: errors are shown relative to it; height: of the page in the notebook, in pixels; small: without FLIP.
+    """
+    with tempfile.TemporaryDirectory(prefix="covary-view-") as temporary:
+        folder = Path(temporary)
+        command = [str(program()), "view", "-o", str(folder / "page.html")]
+        command += [_file_of(image, folder, name) for name, image in _named(images).items()]
+        if reference is not None:
+            (folder / "reference").mkdir()
+            command += ["--reference", _file_of(reference, folder / "reference", "reference")]
+        command += ["--title", title] if title else []
+        command += ["--small"] if small else []
+        run = subprocess.run(command, capture_output=True, text=True, check=False)
+        if run.returncode != 0:
+            raise Error(run.stderr.strip().removeprefix("covary: "))
+        return View((folder / "page.html").read_text(encoding="utf-8"), height)

@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: Apache-2.0
+"""make_modules.py PACKAGE: writes estimators.py, metrics.py and _covary.pyi into the folder PACKAGE, which holds the
+extension module, from the registries that this was built with. So each estimator and metric is a function with types
+and a docstring, and none has to be written by hand."""
+import importlib.util
+import keyword
+import sys
+import textwrap
+from pathlib import Path
+
+HEAD = '''# SPDX-License-Identifier: Apache-2.0
+"""{}
+
+Made by python/make_modules.py from the registry."""
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any{}
+
+{}
+'''
+
+
+def load_extension(package):
+    path = next(package.glob("_covary*.so"))
+    spec = importlib.util.spec_from_file_location("_covary", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def identifier(name):
+    name = name.replace("-", "_")
+    return name + "_" if keyword.iskeyword(name) else name
+
+
+def wrapped(text, indent):
+    return "\n".join(textwrap.wrap(text, 120, initial_indent=indent, subsequent_indent=indent + "    "))
+
+
+def literal(names):
+    return f"Literal[{', '.join(repr(name) for name in names)}]"
+
+
+def type_and_default(option):
+    """Of the keyword argument. Options that are not given are not passed on, because one may change another's default:
+    None stands for them; flags are off."""
+    if option["type"] == "flag":
+        return "bool", "False"
+    python_type = {"whole": "int", "real": "float", "choice": literal(option["choices"])}[option["type"]]
+    return f"{python_type} | None", "None"
+
+
+def option_line(option):
+    about = [option["range"]] if option["type"] in ("whole", "real") and option["range"] else []
+    about += [f"default {option['default']}"] if option["default"] else []
+    note = f" ({'; '.join(about)})" if about else ""
+    return wrapped(f"{identifier(option['name'])}: {option['help']}{note}.", "    ")
+
+
+def listed(first, items, last):
+    """Items with commas, broken between items at 120 columns below the opening bracket that `first` ends with."""
+    lines, indent = [first], " " * len(first)
+    for number, item in enumerate(items):
+        text = item + (last if number + 1 == len(items) else ",")
+        if len(lines[-1]) + len(text) + 1 > 120:
+            lines.append(indent)
+        lines[-1] += text if lines[-1] in (first, indent) else " " + text
+    return "\n".join(lines)
+
+
+def signature(name, fixed, options):
+    arguments = [f"{identifier(o['name'])}: {t} = {d}" for o in options for t, d in [type_and_default(o)]]
+    return listed(f"def {name}(", [*fixed, *arguments], ") -> Result:")
+
+
+def estimator_function(estimator):
+    fixed = ["crn: Any", "independent: Any", "*", "force: bool = False", "progress: Progress | None = None"]
+    passed = ["force=force", "progress=progress"]
+    for known, name, kind in (("predicts_error", "std_error", "bool"), ("needs_sample_count", "samples", "int")):
+        if estimator[known]:
+            fixed.append(f"{name}: {kind} | None = None")
+            passed.append(f"{name}={name}")
+    passed += [f"{identifier(o['name'])}={identifier(o['name'])}" for o in estimator["options"]]
+    name = identifier(estimator["name"])
+    summary = f"{name}: {estimator['summary']}; at least {estimator['fewest_groups']} groups."
+    call = listed("    return combine(", ["crn", "independent", repr(estimator["name"]), *passed], ")")
+    return "\n".join([
+        signature(name, fixed, estimator["options"]),
+        wrapped(f'"""{summary}', "    "), "",
+        "    combine() says what crn, independent and the other arguments are.", "",
+        *map(option_line, estimator["options"]), '    """', call])
+
+
+def estimators_module(estimators):
+    pairs = [e for e in estimators if e["passes"] == "pair"]
+    head = HEAD.format("The estimators of two images by name, with their options.", ", Literal",
+                       "from ._combine import combine\n\nif TYPE_CHECKING:\n    from ._combine import Progress\n"
+                       "    from ._result import Result\n")
+    names = sorted([identifier(e["name"]) for e in pairs])
+    types = [f"#: Estimators of two images.\nPairEstimator = {literal([e['name'] for e in pairs])}",
+             f"#: Those of render().\nEstimator = {literal([e['name'] for e in estimators])}"]
+    return "\n".join([head, f"__all__ = {names!r}", "", *types, *(f"\n\n{estimator_function(e)}" for e in pairs), ""])
+
+
+METRIC = '''
+
+def {name}(image: Any, reference: Any, reference2: Any = None, *, low_dynamic_range: bool = False) -> float:
+    """{formula}
+
+    With reference2, a second reference of the same quality:
+    {formula_two}
+    """
+    return compute({registered!r}, image, reference, reference2, low_dynamic_range=low_dynamic_range).value
+'''
+
+
+def metrics_module(metrics):
+    head = HEAD.format("Errors of images against references, as `covary compare` measures them. Images are [H, W, 3], "
+                       "float32,\nlinear RGB.", "",
+                       "from ._metric import MetricResult, compute")
+    head = head.replace("TYPE_CHECKING, ", "")
+    names = sorted(["MetricResult", "compute", *(identifier(m["name"]) for m in metrics)])
+    functions = (METRIC.format(name=identifier(m["name"]), registered=m["name"], formula=m["formula"],
+                               formula_two=m["formula_two"]) for m in metrics)
+    return head + f"\n__all__ = {names!r}\n" + "".join(functions)
+
+
+def stub_of(module):
+    from nanobind.stubgen import StubGen
+    generator = StubGen(module, include_private=True)
+    generator.put(module)
+    return "# SPDX-License-Identifier: Apache-2.0\n" + generator.get()
+
+
+def main():
+    package = Path(sys.argv[1])
+    module = load_extension(package)
+    (package / "estimators.py").write_text(estimators_module(module.estimators()))
+    (package / "metrics.py").write_text(metrics_module(module.metrics()))
+    (package / "_covary.pyi").write_text(stub_of(module))
+
+
+if __name__ == "__main__":
+    main()

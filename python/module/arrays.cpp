@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "python/module/arrays.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <limits>
+#include <sstream>
+
+#include "core/error.h"
+#include "core/parallel.h"
+
+namespace covary::python {
+namespace {
+
+constexpr const char* kArrays = "an array of NumPy or PyTorch, or one with DLPack or the buffer protocol";
+
+/// "numpy.ndarray of float64"; what is known of an object that is not taken.
+std::string describe(nb::handle object) {
+  std::string text = nb::cast<std::string>(nb::str(object.type().attr("__module__"))) + "." +
+                     nb::cast<std::string>(nb::str(object.type().attr("__name__")));
+  if (text.starts_with("builtins.")) text.erase(0, 9);
+  if (nb::hasattr(object, "dtype")) text += " of " + nb::cast<std::string>(nb::str(nb::object(object.attr("dtype"))));
+  return text;
+}
+
+[[noreturn]] void raise_type(nb::handle object, const std::string& name, const std::string& shape,
+                             const std::string& found) {
+  std::string message = fmt::format("{}: found {}; accepted is {}, of float32 [{}]", name,
+                                    found.empty() ? describe(object) : found, kArrays, shape);
+  if (nb::hasattr(object, "dtype")) message += "; convert with array.astype(numpy.float32), or tensor.float()";
+  throw nb::type_error(message.c_str());
+}
+
+std::string text_of(const std::vector<int64_t>& shape) { return fmt::format("[{}]", fmt::join(shape, ", ")); }
+
+/// The sizes that must be so, and -1 for those that need not.
+std::vector<int64_t> parse_shape(const std::string& shape) {
+  std::vector<int64_t> sizes;
+  std::stringstream words(shape);
+  for (std::string word; std::getline(words, word, ',');) {
+    word.erase(0, word.find_first_not_of(' '));
+    sizes.push_back(std::isdigit(static_cast<unsigned char>(word[0])) ? std::stoll(word) : -1);
+  }
+  return sizes;
+}
+
+void check_shape(const Floats& floats, const std::string& name, const std::string& shape) {
+  const std::vector<int64_t> wanted = parse_shape(shape);
+  bool fits = wanted.size() == floats.shape.size();
+  for (size_t i = 0; fits && i < wanted.size(); ++i)
+    fits = wanted[i] < 0 ? floats.shape[i] > 0 && floats.shape[i] <= std::numeric_limits<int>::max()
+                         : floats.shape[i] == wanted[i];
+  if (!fits)
+    throw nb::value_error(
+        fmt::format("{}: found the shape {}; accepted is [{}], no size 0", name, text_of(floats.shape), shape).c_str());
+}
+
+/// NumPy array of memory that a vector holds, which goes when the array does.
+nb::object array_of(std::vector<float>&& values, const std::vector<size_t>& shape,
+                    const std::vector<int64_t>& strides) {
+  auto* kept = new std::vector<float>(std::move(values));
+  const nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<float>*>(p); });
+  return nb::cast(nb::ndarray<nb::numpy, float>(kept->data(), shape.size(), shape.data(), owner,
+                                                strides.empty() ? nullptr : strides.data()));
+}
+
+}  // namespace
+
+Floats floats_of(nb::handle array, const std::string& name, const std::string& shape) {
+  Floats floats;
+  if (!nb::try_cast(array, floats.owner)) raise_type(array, name, shape, "");
+  if (floats.owner.device_type() != nb::device::cpu::value)
+    raise_type(array, name, shape, describe(array) + " on another device than the CPU (tensor.cpu() copies it)");
+  if (floats.owner.dtype() != nb::dtype<float>()) raise_type(array, name, shape, "");
+  floats.data = static_cast<const float*>(floats.owner.data());
+  for (size_t i = 0; i < floats.owner.ndim(); ++i) {
+    floats.shape.push_back(static_cast<int64_t>(floats.owner.shape(i)));
+    floats.strides.push_back(floats.owner.stride(i));
+  }
+  check_shape(floats, name, shape);
+  return floats;
+}
+
+Groups::Groups(nb::handle array, const std::string& name) : source_(floats_of(array, name, "T, H, W, 3")) {
+  if (source_.shape[0] > Film::kMaxGroups)
+    throw nb::value_error(
+        fmt::format("{}: found {} groups; at most {} are accepted", name, source_.shape[0], Film::kMaxGroups).c_str());
+}
+
+GroupedImage Groups::view() {
+  const int64_t T = source_.shape[0], H = source_.shape[1], W = source_.shape[2];
+  GroupedImage image{static_cast<int>(W), static_cast<int>(H), static_cast<int>(T), source_.data};
+  const std::vector<int64_t>& s = source_.strides;
+  // A size of 1 leaves its stride open.
+  const auto lies = [&](int axis, int64_t stride) { return source_.shape[axis] == 1 || s[axis] == stride; };
+  if (lies(0, 3) && lies(1, W * T * 3) && lies(2, T * 3) && lies(3, 1)) return image;
+  if (ordered_.empty()) {
+    ordered_.resize(static_cast<size_t>(T * H * W * 3));
+    parallel_for(H, [&](int64_t y) {
+      for (int64_t t = 0; t < T; ++t) {
+        const float* from = source_.data + t * s[0] + y * s[1];
+        float* to = ordered_.data() + (y * W * T + t) * 3;
+        for (int64_t x = 0; x < W; ++x, from += s[2], to += T * 3)
+          for (int64_t c = 0; c < 3; ++c) to[c] = from[c * s[3]];
+      }
+    });
+  }
+  image.data = ordered_.data();
+  return image;
+}
+
+Image image_of(nb::handle array, const std::string& name) {
+  const Floats floats = floats_of(array, name, "H, W, 3");
+  const std::vector<int64_t>& s = floats.strides;
+  Image image(static_cast<int>(floats.shape[1]), static_cast<int>(floats.shape[0]), 3);
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x)
+      for (int c = 0; c < 3; ++c) image.pixel(x, y)[c] = floats.data[y * s[0] + x * s[1] + c * s[2]];
+  return image;
+}
+
+nb::object array_of(Image&& image) {
+  if (image.data.empty()) return nb::none();
+  std::vector<size_t> shape{static_cast<size_t>(image.height), static_cast<size_t>(image.width)};
+  if (image.channels > 1) shape.push_back(static_cast<size_t>(image.channels));
+  return array_of(std::move(image.data), shape, {});
+}
+
+nb::object groups_array(std::vector<float>&& values, int width, int height, int groups) {
+  const int64_t W = width, T = groups;
+  return array_of(std::move(values),
+                  {static_cast<size_t>(groups), static_cast<size_t>(height), static_cast<size_t>(width), 3},
+                  {3, W * T * 3, T * 3, 1});
+}
+
+}  // namespace covary::python

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <memory>
+
+#include "core/error.h"
+#include "estimators/denoise.h"
+#include "estimators/grouped_file.h"
+#include "film/image_file.h"
+#include "film/image_writer.h"
+#include "film/metrics.h"
+#include "python/module/arrays.h"
+#include "python/module/bindings.h"
+#include "python/module/work.h"
+
+namespace covary::python {
+namespace {
+
+nb::object read(const std::string& path, const std::string& layer) {
+  PlacedImage image;
+  run_work([&](WorkState&) { image = read_image(path, layer); }, nb::none());
+  return array_of(std::move(image.image));
+}
+
+void write(const std::string& path, nb::object array, const std::map<std::string, std::string>& attributes) {
+  const Image image = image_of(array, "image");
+  const ImagePlace place{image.width, image.height, {0, 0, image.width, image.height}};
+  run_work([&](WorkState&) { write_image(path, image, place, attributes); }, nb::none());
+}
+
+nb::object read_groups(const std::vector<std::string>& paths, const std::string& layer) {
+  GroupedFile::Rows rows;
+  int width = 0, height = 0, groups = 0;
+  run_work(
+      [&](WorkState&) {
+        const GroupedFile file(paths, layer);
+        width = file.width(), height = file.height(), groups = file.groups();
+        file.read_rows(0, height, rows);
+      },
+      nb::none());
+  return groups_array(std::move(rows.data), width, height, groups);
+}
+
+nb::tuple metric(const std::string& name, nb::object image, nb::object reference, nb::object reference2,
+                 bool low_dynamic_range) {
+  const Metric metric = find_metric(name).metric;
+  const Image pixels = image_of(image, "image");
+  std::vector<Image> references{image_of(reference, "reference")};
+  if (!reference2.is_none()) references.push_back(image_of(reference2, "reference2"));
+  MetricResult result;
+  run_work([&](WorkState&) { result = compute_metric(metric, pixels, references, low_dynamic_range); }, nb::none());
+  return nb::make_tuple(result.value, result.n_pixels, result.n_non_finite, array_of(std::move(result.map)));
+}
+
+nb::object denoised(nb::object image, nb::object albedo, nb::object normal, const std::string& library) {
+  const Image rgb = image_of(image, "image");
+  Image a, n;
+  if (!albedo.is_none()) a = image_of(albedo, "albedo");
+  if (!normal.is_none()) n = image_of(normal, "normal");
+  if (a.data.empty() && !n.data.empty())
+    throw Error(ErrorCode::kUsage, "normal: it is a guide only together with the albedo");
+  Image result;
+  run_work(
+      [&](WorkState&) {
+        DenoiseOptions options;
+        options.library = library;
+        result = denoise(rgb, a.data.empty() ? nullptr : &a, n.data.empty() ? nullptr : &n, options);
+      },
+      nb::none());
+  return array_of(std::move(result));
+}
+
+}  // namespace
+
+void bind_images(nb::module_& module) {
+  using namespace nb::literals;
+  module.def("read_image", &read, "path"_a, "layer"_a, nb::sig("def read_image(path: str, layer: str) -> typing.Any"));
+  module.def("write_image", &write, "path"_a, "image"_a.none(), "attributes"_a,
+             nb::sig("def write_image(path: str, image: object, attributes: dict[str, str]) -> None"));
+  module.def("read_groups", &read_groups, "paths"_a, "layer"_a,
+             nb::sig("def read_groups(paths: list[str], layer: str) -> typing.Any"));
+  module.def("metric", &metric, "name"_a, "image"_a.none(), "reference"_a.none(), "reference2"_a.none(),
+             "low_dynamic_range"_a,
+             nb::sig("def metric(name: str, image: object, reference: object, reference2: object | None, "
+                     "low_dynamic_range: bool) -> tuple[float, int, int, typing.Any]"));
+  module.def("denoise", &denoised, "image"_a.none(), "albedo"_a.none(), "normal"_a.none(), "library"_a,
+             nb::sig("def denoise(image: object, albedo: object | None, normal: object | None, library: str) -> "
+                     "typing.Any"));
+}
+
+}  // namespace covary::python

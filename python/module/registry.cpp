@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "estimators/registry.h"
+
+#include "film/metrics.h"
+#include "python/module/bindings.h"
+
+namespace covary::python {
+namespace {
+
+const char* name_of(EstimatorOption::Type type) {
+  switch (type) {
+    case EstimatorOption::Type::kFlag:
+      return "flag";
+    case EstimatorOption::Type::kWhole:
+      return "whole";
+    case EstimatorOption::Type::kReal:
+      return "real";
+    case EstimatorOption::Type::kChoice:
+      return "choice";
+  }
+  return "";
+}
+
+const char* name_of(EstimatorPasses passes) {
+  switch (passes) {
+    case EstimatorPasses::kPair:
+      return "pair";
+    case EstimatorPasses::kSamples:
+      return "samples";
+    case EstimatorPasses::kAny:
+      return "any";
+  }
+  return "";
+}
+
+nb::dict option_dict(const EstimatorOption& option) {
+  nb::dict d;
+  d["name"] = option.name;
+  d["aliases"] = option.aliases;
+  d["type"] = name_of(option.type);
+  d["default"] = option.default_value;
+  d["range"] = option.range.text();
+  d["choices"] = option.choices;
+  d["help"] = option.help;
+  return d;
+}
+
+nb::list estimators() {
+  nb::list list;
+  for (const std::string& name : estimator_names()) {
+    const Estimator estimator = make_estimator(name);
+    nb::dict d;
+    d["name"] = name;
+    d["summary"] = estimator.summary;
+    d["passes"] = name_of(estimator.passes);
+    d["predicts_error"] = estimator.predicts_error;
+    d["needs_sample_count"] = estimator.needs_sample_count;
+    d["fewest_groups"] = estimator.fewest_groups;
+    nb::list options;
+    for (const EstimatorOption& option : options_of_estimator(name)) options.append(option_dict(option));
+    d["options"] = options;
+    list.append(d);
+  }
+  return list;
+}
+
+nb::list metric_list() {
+  nb::list list;
+  for (const MetricInfo& metric : metrics()) {
+    nb::dict d;
+    d["name"] = metric.name;
+    d["formula"] = metric.formula;
+    d["formula_two"] = metric.formula_two;
+    list.append(d);
+  }
+  return list;
+}
+
+}  // namespace
+
+void bind_registry(nb::module_& module) {
+  module.def("estimators", &estimators, nb::sig("def estimators() -> list[dict[str, typing.Any]]"));
+  module.def("metrics", &metric_list, nb::sig("def metrics() -> list[dict[str, str]]"));
+}
+
+}  // namespace covary::python

@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plans/render.h"
+
+#include <mutex>
+#include <optional>
+#include <utility>
+
+#include "estimators/registry.h"
+#include "plans/estimator_plans.h"
+#include "plans/integrator_choice.h"
+#include "plans/request_options.h"
+#include "python/module/arrays.h"
+#include "python/module/bindings.h"
+#include "python/module/work.h"
+
+namespace covary::python {
+namespace {
+
+using Options = std::map<std::string, std::string>;
+
+/// A property of the <integrator> element from a Python value.
+Property property_of(const std::string& name, nb::handle value) {
+  Property property{name, {}, {"integrator_options", 0, 0}};
+  if (nb::isinstance<nb::bool_>(value))
+    property.value = nb::cast<bool>(value);
+  else if (nb::isinstance<nb::int_>(value))
+    property.value = nb::cast<int64_t>(value);
+  else if (nb::isinstance<nb::float_>(value))
+    property.value = nb::cast<double>(value);
+  else if (nb::isinstance<nb::str>(value))
+    property.value = nb::cast<std::string>(value);
+  else
+    throw nb::type_error(("integrator_options['" + name + "']: accepted are bool, int, float and str").c_str());
+  return property;
+}
+
+struct SceneChoice {
+  Options defines;
+  std::optional<std::pair<int, int>> resolution;
+  std::string integrator;
+  std::optional<int> min_depth, max_depth;
+};
+
+std::shared_ptr<LoadedScene> load(const std::string& path, const SceneChoice& choice, nb::dict integrator_options) {
+  LoadOptions options;
+  options.defines = choice.defines;
+  if (choice.resolution) {
+    const auto [width, height] = *choice.resolution;
+    if (width < 1 || height < 1 || width > 65536 || height > 65536)
+      throw Error(ErrorCode::kUsage, "resolution: each side must be 1 to 65536");
+    options.width = width, options.height = height;
+  }
+  for (const auto& [name, value] : integrator_options)
+    options.integrator_properties.push_back(property_of(nb::cast<std::string>(name), value));
+  if (!choice.integrator.empty() && !find_integrator(choice.integrator))
+    throw Error(ErrorCode::kUsage, "integrator: " + unknown_integrator(choice.integrator));
+  IntegratorChoice integrator;
+  integrator.name = choice.integrator;
+  integrator.min_depth = choice.min_depth, integrator.max_depth = choice.max_depth;
+  integrator.tolerates_light = !choice.integrator.empty();
+  options.make_integrator = integrator_maker(integrator);
+  auto scene = std::make_shared<LoadedScene>();
+  run_work([&](WorkState&) { *scene = load_scene(path, options); }, nb::none());
+  return scene;
+}
+
+/// What render() is asked for beside the numbers of RenderRequest.
+struct Choice {
+  std::string estimator;
+  Options options;
+  std::string sampling;
+  std::optional<int> groups;
+  std::optional<std::array<double, 2>> split;
+};
+
+Plan plan_of(const Choice& choice) {
+  PassChoice passes;
+  passes.sampling = choice.sampling == "crn" ? Sampling::kCrn : Sampling::kIndependent;
+  passes.groups = choice.groups;
+  if (choice.split) {
+    const auto [crn, independent] = *choice.split;
+    if (!(crn > 0) || !(independent > 0)) throw Error(ErrorCode::kUsage, "split: each part must be above 0");
+    passes.split = {crn / (crn + independent), independent / (crn + independent)};
+  }
+  return estimator_plan(make_estimator(choice.estimator, choice.options), passes);
+}
+
+nb::dict dict_of(RenderResult&& result, const std::string& estimator, const std::vector<std::string>& warnings) {
+  nb::dict films, aovs, d;
+  d["estimator"] = estimator;
+  Image picture = result.passes.empty() ? Image() : result.picture();
+  d["samples_per_pixel"] = result.samples_per_pixel();
+  d["render_seconds"] = result.render_seconds();
+  d["estimate_seconds"] = result.estimate_seconds();
+  for (Pass& pass : result.passes) films[pass.plan.id().c_str()] = nb::cast(std::move(pass.film));
+  for (auto& [name, image] : result.aovs) aovs[name.c_str()] = array_of(std::move(image));
+  d["image"] = array_of(std::move(picture));
+  d["std_error"] = array_of(std::move(result.image.std_error));
+  d["predicted_relmse"] = result.predicted_relmse;
+  d["nonfinite_pixels"] = result.image.nonfinite_pixels;
+  d["warnings"] = warnings;
+  d["films"] = films;
+  d["aovs"] = aovs;
+  d["complete"] = result.complete;
+  d["until_reached"] = result.until_reached;
+  return d;
+}
+
+nb::dict render_scene(const LoadedScene& scene, const Choice& choice, RenderRequest request, nb::object progress) {
+  const Plan plan = plan_of(choice);
+  request.attributes[film_key::kVersion] = COVARY_VERSION;
+  if (request.load_training.empty()) take_training(scene, request);
+  std::vector<std::string> warnings(scene.warnings);
+  std::mutex mutex;
+  RenderResult result;
+  run_work(
+      [&](WorkState& state) {
+        RenderCallbacks callbacks;
+        callbacks.stop = &state.stop;
+        callbacks.progress = [&](uint64_t done, uint64_t total) { state.done = done, state.total = total; };
+        callbacks.warning = [&](const std::string& text) {
+          const std::lock_guard lock(mutex);
+          warnings.push_back(text);
+        };
+        result = render(scene, plan, request, callbacks);
+      },
+      progress);
+  return dict_of(std::move(result), plan.estimator, warnings);
+}
+
+/// Request by name: Python's render() passes what it was given.
+RenderRequest request_of(const nb::dict& given) {
+  RenderRequest r;
+  const auto take = [&](const char* name, auto& value) {
+    if (given.contains(name) && !given[name].is_none())
+      value = nb::cast<std::decay_t<decltype(value)>>(nb::object(given[name]));
+  };
+  take("seed", r.seed), take("spp", r.spp), take("seconds", r.seconds), take("until", r.until), take("aovs", r.aovs);
+  take("output", r.output), take("preview", r.preview), take("passes", r.passes), take("resume", r.resume);
+  take("overwrite", r.overwrite), take("checkpoint", r.checkpoint_seconds);
+  take("save_training", r.save_training), take("load_training", r.load_training), take("attributes", r.attributes);
+  std::string filter, crn_part;
+  take("filter", filter), take("crn_part", crn_part);
+  if (!filter.empty()) r.filter = filter_named(filter);
+  if (!crn_part.empty()) r.crn_part = crn_part_named(crn_part);
+  std::array<int, 4> crop{};
+  take("crop", crop);
+  if (crop[2] != 0 || crop[3] != 0) r.crop = {crop[0], crop[1], crop[2], crop[3]};
+  return r;
+}
+
+}  // namespace
+
+void bind_render(nb::module_& module) {
+  using namespace nb::literals;
+  nb::class_<LoadedScene>(module, "LoadedScene")
+      .def_ro("width", &LoadedScene::width)
+      .def_ro("height", &LoadedScene::height)
+      .def_ro("spp", &LoadedScene::spp)
+      .def_ro("integrator", &LoadedScene::integrator_type)
+      .def_ro("warnings", &LoadedScene::warnings)
+      .def_ro("files", &LoadedScene::files)
+      .def_ro("content_hash", &LoadedScene::content_hash);
+  module.def(
+      "load_scene",
+      [](const std::string& path, const Options& defines, std::optional<std::pair<int, int>> resolution,
+         const std::string& integrator, std::optional<int> min_depth, std::optional<int> max_depth,
+         nb::dict integrator_options) {
+        return load(path, {defines, resolution, integrator, min_depth, max_depth}, integrator_options);
+      },
+      "path"_a, "defines"_a, "resolution"_a.none(), "integrator"_a, "min_depth"_a.none(), "max_depth"_a.none(),
+      "integrator_options"_a,
+      nb::sig(
+          "def load_scene(path: str, defines: dict[str, str], resolution: tuple[int, int] | None, integrator: str, "
+          "min_depth: int | None, max_depth: int | None, integrator_options: dict[str, typing.Any]) -> LoadedScene"));
+  module.def(
+      "render",
+      [](const std::shared_ptr<LoadedScene>& scene, const std::string& estimator, const Options& options,
+         const std::string& sampling, std::optional<int> groups, std::optional<std::array<double, 2>> split,
+         nb::dict request, nb::object progress) {
+        return render_scene(*scene, {estimator, options, sampling, groups, split}, request_of(request), progress);
+      },
+      "scene"_a, "estimator"_a, "options"_a, "sampling"_a, "groups"_a.none(), "split"_a.none(), "request"_a,
+      "progress"_a.none(),
+      nb::sig("def render(scene: LoadedScene, estimator: str, options: dict[str, str], sampling: str, "
+              "groups: int | None, split: tuple[float, float] | None, request: dict[str, typing.Any], "
+              "progress: typing.Any) -> dict[str, typing.Any]"));
+}
+
+}  // namespace covary::python

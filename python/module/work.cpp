@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "python/module/work.h"
+
+#include <tbb/task_group.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <exception>
+#include <memory>
+#include <mutex>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "core/error.h"
+
+namespace covary::python {
+namespace {
+
+constexpr std::chrono::milliseconds kPoll{50};
+
+/// A flag that threads wait for.
+class Event {
+ public:
+  void set() {
+    const std::lock_guard lock(mutex_);
+    set_ = true;
+    changed_.notify_all();
+  }
+  /// Whether it was set before the time was over.
+  bool wait() {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_for(lock, kPoll, [this] { return set_; });
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool set_ = false;
+};
+
+/// A thread that works when asked. Threads are kept between calls, because each new one that enters TBB leaves some
+/// memory of TBB behind.
+class Worker {
+ public:
+  Worker() {
+    std::thread([this] { loop(); }).detach();
+  }
+  void start(std::function<void()> job) {
+    const std::lock_guard lock(mutex_);
+    job_ = std::move(job);
+    changed_.notify_one();
+  }
+
+ private:
+  void loop() {
+    for (;;) {
+      std::unique_lock lock(mutex_);
+      changed_.wait(lock, [this] { return job_ != nullptr; });
+      const std::function<void()> job = std::exchange(job_, nullptr);
+      lock.unlock();
+      job();
+    }
+  }
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::function<void()> job_;
+};
+
+/// Those without work; as many exist as calls have been at once. They live until the process ends, without destructors.
+class Workers {
+ public:
+  static Workers& all() {
+    static auto* workers = new Workers;
+    return *workers;
+  }
+  Worker* take() {
+    const std::lock_guard lock(mutex_);
+    if (idle_.empty()) return new Worker;
+    Worker* worker = idle_.back();
+    idle_.pop_back();
+    return worker;
+  }
+  void give_back(Worker* worker) {
+    const std::lock_guard lock(mutex_);
+    idle_.push_back(worker);
+  }
+
+ private:
+  std::mutex mutex_;
+  std::vector<Worker*> idle_;
+};
+
+void check_not_forked() {
+  static const pid_t first = getpid();
+  if (getpid() != first)
+    throw Error(ErrorCode::kUsage,
+                "covary was used before this process was forked, and its threads are not in the copy; start processes "
+                "by multiprocessing.get_context('spawn'), or use covary in them only");
+}
+
+/// Calls `progress` where the numbers have changed.
+class Reporter {
+ public:
+  explicit Reporter(nb::handle progress) : progress_(progress) {}
+  void report(const WorkState& state) {
+    const uint64_t done = state.done, total = state.total;
+    if (progress_.is_none() || total == 0 || (done == done_ && total == total_)) return;
+    done_ = done, total_ = total;
+    progress_(done, total);
+  }
+
+ private:
+  nb::handle progress_;
+  uint64_t done_ = 0, total_ = 0;
+};
+
+}  // namespace
+
+void run_work(const std::function<void(WorkState&)>& work, nb::handle progress) {
+  check_not_forked();
+  WorkState state;
+  const auto finished = std::make_shared<Event>();  // the worker leaves it after this function may have
+  std::exception_ptr error, raised;
+  Worker* worker = Workers::all().take();
+  worker->start([&, finished] {
+    try {
+      work(state);
+    } catch (...) {
+      error = std::current_exception();
+    }
+    finished->set();
+  });
+  Reporter reporter(progress);
+  const auto look = [&] {
+    if (raised) return;
+    try {
+      if (PyErr_CheckSignals() != 0) throw nb::python_error();
+      reporter.report(state);
+    } catch (...) {
+      raised = std::current_exception();
+      state.stop = true;
+    }
+  };
+  {
+    const nb::gil_scoped_release release;
+    while (!finished->wait()) {
+      const nb::gil_scoped_acquire acquire;
+      look();
+    }
+  }
+  Workers::all().give_back(worker);
+  if (!error) look();  // the last numbers
+  if (raised) std::rethrow_exception(raised);
+  if (error) std::rethrow_exception(error);
+}
+
+bool run_stoppable(WorkState& state, const std::function<void()>& body) {
+  if (state.stop) return false;
+  tbb::task_group_context context;
+  Event finished;
+  // Loops inside belong to the context, which cancels them.
+  std::thread watcher([&] {
+    while (!finished.wait())
+      if (state.stop) context.cancel_group_execution();
+  });
+  std::exception_ptr error;
+  try {
+    tbb::task_group group(context);
+    group.run_and_wait(body);
+  } catch (...) {
+    error = std::current_exception();
+  }
+  finished.set();
+  watcher.join();
+  if (error && !state.stop) std::rethrow_exception(error);
+  return !state.stop;
+}
+
+}  // namespace covary::python

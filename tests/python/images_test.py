@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: Apache-2.0
+"""combine(), metrics, images and films: the values and messages of the command line."""
+import json
+import subprocess
+import unittest
+
+import covary
+import numpy
+from common import GROUPS, HEIGHT, PROGRAM, WIDTH, PackageTest, channels, noisy, pair, rgb
+from exr_writer import exr
+
+
+class FilesTest(PackageTest):
+    def setUp(self):
+        super().setUp()
+        self.crn, self.independent = pair()
+        for name, images in (("crn", self.crn), ("independent", self.independent)):
+            layers = {f"group{g:02}.{c}": image[:, :, i].ravel().tolist()
+                      for g, image in enumerate(images) for i, c in enumerate("RGB")}
+            (self.path / f"{name}.exr").write_bytes(exr(layers, (WIDTH, HEIGHT)))
+
+    def combine_files(self, *options):
+        self.run_program("combine", "--crn", "crn.exr", "--independent", "independent.exr", "-o", "out.exr", "--quiet",
+                         *options)
+        return self.path / "out.exr"
+
+
+class Combine(FilesTest):
+    def test_bits_of_the_program(self):
+        result = covary.combine(self.crn, self.independent)
+        path = self.combine_files("--error")
+        self.assert_same_bits(result.image.reshape(-1, 3), rgb(path))
+        self.assert_same_bits(result.std_error.reshape(-1, 3), channels(path, [f"StdError.{c}" for c in "RGB"]))
+
+    def test_options(self):
+        for options, words in (({"paper": True}, ["--paper"]), ({"k": 9, "ridge": 0.1}, ["--k", 9, "--ridge", 0.1]),
+                               ({"feedback": "off"}, ["--feedback", "off"])):
+            result = covary.combine(self.crn, self.independent, **options)
+            self.assert_same_bits(result.image.reshape(-1, 3), rgb(self.combine_files(*words)))
+
+    def test_every_estimator(self):
+        for name in ("cv-baseline", "iduw", "dependent-tests"):
+            more = {"samples": 96} if name == "iduw" else {}
+            result = covary.combine(self.crn, self.independent, name, **more)
+            path = self.combine_files("--estimator", name, *(["--samples", 96] if more else []))
+            self.assert_same_bits(result.image.reshape(-1, 3), rgb(path))
+
+    def test_files_as_arrays(self):
+        self.assert_same_bits(covary.read_groups(self.path / "crn.exr"), self.crn)
+        self.assertEqual(self.message_of(ValueError, covary.read_groups, []),
+                         "paths: found none; one file or more are needed")
+
+    def test_messages_of_the_program(self):
+        swapped = self.failure_of_program("combine", "--crn", "independent.exr", "--independent", "crn.exr", "-o",
+                                          "x.exr")
+        message = self.message_of(covary.InputError, covary.combine, self.independent, self.crn)
+        self.assertEqual(message.replace("force=True", "--force"), swapped)
+        wrong = self.failure_of_program("combine", "--crn", "crn.exr", "--independent", "independent.exr", "-o",
+                                        "x.exr", "--window", "4")
+        self.assertEqual(self.message_of(covary.UsageError, covary.combine, self.crn, self.independent, window=4),
+                         wrong)
+
+    def test_less_noise(self):
+        truth = noisy(0, False)[0] * 0 + (1 + 0.02 * numpy.arange(WIDTH)[:, None] + 0.1 * numpy.arange(3))
+        errors = [numpy.mean((image - truth) ** 2) for image in
+                  (covary.combine(self.crn, self.independent).image, self.independent.mean(0))]
+        self.assertLess(errors[0], 0.5 * errors[1])
+
+    def test_check_inputs(self):
+        report = covary.check_inputs(self.crn, self.independent)
+        self.assertTrue(report.ok)
+        self.assertGreater(report.crn_horizontal[0], 0.5)
+        self.assertLess(abs(report.independent_horizontal[0]), 5 * report.independent_horizontal[1])
+        report = covary.check_inputs(self.independent, self.crn)
+        self.assertFalse(report.ok)
+        self.assertIn("swapped", report.errors[0])
+
+
+class Estimators(FilesTest):
+    def test_functions_by_name(self):
+        self.assert_same_bits(covary.iicv(self.crn, self.independent).image,
+                              covary.combine(self.crn, self.independent).image)
+        result = covary.iicv(self.crn, self.independent, paper=True, k=9)
+        self.assertEqual(result.estimator, "iicv --paper --k 9")
+        self.assertEqual(covary.cv_baseline(self.crn, self.independent, exclude_target=True).estimator,
+                         "cv-baseline --exclude-target")
+        self.assertIsNone(covary.iduw(self.crn, self.independent, samples=96).std_error)
+
+    def test_every_pair_estimator_has_one(self):
+        for estimator in covary._covary.estimators():
+            name = estimator["name"].replace("-", "_")
+            self.assertEqual(hasattr(covary, name), estimator["passes"] == "pair", name)
+            if estimator["passes"] == "pair":
+                text = getattr(covary, name).__doc__
+                for option in estimator["options"]:
+                    self.assertIn(option["name"].replace("-", "_") + ":", text)
+
+    def test_others_are_refused(self):
+        self.assertIn("which images do not hold", self.message_of(covary.UsageError, covary.combine, self.crn,
+                                                                 self.independent, "polynomials"))
+        self.assertIn("not one of two images", self.message_of(covary.UsageError, covary.combine, self.crn,
+                                                               self.independent, "none"))
+
+
+class Metrics(PackageTest):
+    def test_values_of_the_program(self):
+        image, reference, second = noisy(3, False)[0], noisy(4, False)[0], noisy(5, False)[0]
+        for name, values in (("i", image), ("r", reference), ("s", second)):
+            covary.write_image(self.path / f"{name}.exr", values)
+        names = [metric["name"] for metric in covary._covary.metrics()]
+        self.assertIn("flip", names)
+        for references, words in (((reference,), []), ((reference, second), ["--reference2", "s.exr"])):
+            text = subprocess.run([PROGRAM, "compare", "i.exr", "--reference", "r.exr", *words, "--metric",
+                                   ",".join(names), "--json", "-"], cwd=self.path, capture_output=True, text=True,
+                                  check=True).stdout
+            for name in names:
+                function = getattr(covary.metrics, name.replace("-", "_"))
+                self.assertEqual(function(image, *references), json.loads(text)[name], name)
+
+    def test_map(self):
+        image, reference = noisy(3, False)[0].copy(), noisy(4, False)[0]
+        image[0, 0, 0] = numpy.inf
+        result = covary.metrics.compute("relmse", image, reference)
+        self.assertEqual((result.n_pixels, result.n_non_finite, result.map.shape),
+                         (HEIGHT * WIDTH - 1, 1, (HEIGHT, WIDTH)))
+        self.assertAlmostEqual(float(numpy.nanmean(result.map)), result.value, places=6)
+
+    def test_errors(self):
+        image = noisy(3, False)[0]
+        self.assertIn("relmse", self.message_of(covary.UsageError, covary.metrics.compute, "relmsee", image, image))
+        self.assertIn("reference: found the shape", self.message_of(ValueError, covary.metrics.mse, image, image[0]))
+        self.assertIn("reference", self.message_of(covary.InputError, covary.metrics.mse, image, image[1:]))
+
+
+class Images(PackageTest):
+    def test_written_and_read(self):
+        image = noisy(6, False)[0]
+        covary.write_image(self.path / "a.exr", image[:, ::-1])
+        self.assert_same_bits(covary.read_image(self.path / "a.exr"), image[:, ::-1])
+        covary.combine(*pair()).save(self.path / "b.png")
+        self.assertEqual(covary.read_image(self.path / "b.png").shape, (HEIGHT, WIDTH, 3))
+
+    def test_errors(self):
+        missing = str(self.path / "missing.exr")
+        message = self.message_of(OSError, covary.read_image, missing)
+        self.assertIn(message, self.failure_of_program("compare", missing, "--reference", missing))
+        self.assertIn("image: found", self.message_of(TypeError, covary.write_image, "x.exr", [1]))
+        self.assertIn("/nowhere/x.exr", self.message_of(covary.IoError, covary.write_image, "/nowhere/x.exr",
+                                                        noisy(6, False)[0]))
+
+    def test_denoiser_that_is_missing(self):
+        message = self.message_of(covary.UsageError, covary.denoise, noisy(6, False)[0], library="/nowhere")
+        self.assertIn("/nowhere", message)
+        self.assertIn("only together with the albedo",
+                      self.message_of(covary.UsageError, covary.denoise, noisy(6, False)[0],
+                                      normal=noisy(7, False)[0]))
+
+
+class Films(PackageTest):
+    def film(self, seed, **keywords):
+        return covary.film_from_groups(noisy(seed, True), 24, sampling="crn", seed=seed, **keywords)
+
+    def test_of_arrays(self):
+        film = self.film(1)
+        self.assert_same_bits(film.groups, noisy(1, True))
+        self.assertTrue((film.counts == 24).all())
+        self.assertEqual((film.width, film.height, film.samples_per_pixel), (WIDTH, HEIGHT, 24))
+        numpy.testing.assert_allclose(film.mean, noisy(1, True).mean(0), rtol=1e-6)
+        self.assertIn("each of the 12 groups", self.message_of(covary.UsageError, covary.film_from_groups,
+                                                               noisy(1, True), 11))
+
+    def test_views_keep_the_film(self):
+        groups = self.film(1).groups
+        with self.assertRaises(ValueError):
+            groups[0] = 0
+        self.assert_same_bits(groups, noisy(1, True))
+
+    def test_saved_loaded_and_merged(self):
+        films = [self.film(seed) for seed in (1, 2)]
+        for number, film in enumerate(films):
+            film.save(str(self.path / f"{number}.exr"))
+        loaded = covary.Film.load(str(self.path / "0.exr"))
+        self.assert_same_bits(loaded.groups, films[0].groups)
+        self.assertEqual(loaded.attributes["seed"], "1")
+        merged = covary.merge_films(films[::-1])
+        self.run_program("merge", "0.exr", "1.exr", "-o", "merged.exr")
+        for other in (covary.Film.load(str(self.path / "merged.exr")),
+                      covary.merge_films([self.path / "0.exr", self.path / "1.exr"])):
+            self.assert_same_bits(merged.groups, other.groups)
+            self.assertTrue((merged.counts == other.counts).all())
+        self.assertIn("seed", self.message_of(covary.InputError, covary.merge_films, [films[0], films[0]]))
+        self.assertIn("accepted are either", self.message_of(TypeError, covary.merge_films, [films[0], "0.exr"]))
+        self.assertIn("found none", self.message_of(ValueError, covary.merge_films, []))
+
+    def test_combined(self):
+        crn, independent = pair()
+        films = [covary.film_from_groups(values, 24, sampling=kind)
+                 for values, kind in ((crn, "crn"), (independent, "independent"))]
+        self.assert_same_bits(covary.combine(*films).image, covary.combine(crn, independent).image)
+        self.assertIn("expected are --sampling crn", self.message_of(covary.InputError, covary.combine, *films[::-1]))
+        self.assertEqual(covary.combine(films[0], independent).image.shape, (HEIGHT, WIDTH, 3))
+
+
+if __name__ == "__main__":
+    assert GROUPS == 12
+    unittest.main()
