@@ -19,8 +19,9 @@ std::string preview_path(const std::string& output) {
 
 void write_result_files(const Plan& plan, const RenderRequest& request, RenderResult& result) {
   if (request.output.empty()) return;
-  std::map<std::string, Image> aovs;  // without those that only the estimator asked for
-  if (request.aovs) aovs = result.aovs;
+  std::map<std::string, Image> aovs = result.aovs;
+  if (!request.aovs)  // only the estimator asked for these
+    for (const char* name : {"Albedo", "N", "P"}) aovs.erase(name);
   Film& last = result.passes[camera_passes(result.passes).size() - 1].film;
   if (plan.film_is_image) {
     const Pass* light = light_pass(result.passes);
