@@ -31,3 +31,9 @@ def film_from_groups(groups: Any, samples: int, *, sampling: str = "", seed: int
     known = {key: value for key, value in (("sampling", sampling), ("seed", "" if seed is None else str(seed)))
              if value}
     return Film._from_groups(groups, samples, {**known, **(attributes or {})})
+
+
+def _from_parts(frame: tuple[int, int], crop: tuple[int, int, int, int], groups: Any, counts: Any,
+                attributes: dict[str, str]) -> Film:
+    """A film of its group means [H, W, T, 3], counts [H, W] and the rest; what pickle calls."""
+    return Film._from_parts(frame, crop, groups, counts, attributes)

@@ -78,6 +78,42 @@ nb::object counts_of(nb::handle self) {
       film.counts().data(), {static_cast<size_t>(film.height()), static_cast<size_t>(film.width())}, self));
 }
 
+/// The group means as they lie, [H, W, T, 3].
+nb::object memory_of(nb::handle self) {
+  const Film& film = nb::cast<const Film&>(self);
+  return nb::cast(nb::ndarray<nb::numpy, const float, nb::ndim<4>>(
+      film.data().data(),
+      {static_cast<size_t>(film.height()), static_cast<size_t>(film.width()), static_cast<size_t>(film.groups()), 3},
+      self));
+}
+
+/// A film of arrays [H, W, T, 3] and [H, W].
+Film from_parts(std::pair<int, int> frame, std::array<int, 4> crop, nb::object values, nb::object counts,
+                const Attributes& attributes) {
+  const auto groups = nb::cast<nb::ndarray<const float, nb::ndim<4>, nb::c_contig, nb::device::cpu>>(values);
+  const auto samples = nb::cast<nb::ndarray<const uint32_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>>(counts);
+  Film film(frame.first, frame.second, {crop[0], crop[1], crop[2], crop[3]}, static_cast<int>(groups.shape(2)));
+  if (groups.size() != film.data().size() || samples.size() != film.counts().size())
+    throw nb::value_error("the arrays of a film do not have the size of its crop");
+  film.data().assign(groups.data(), groups.data() + groups.size());
+  film.counts().assign(samples.data(), samples.data() + samples.size());
+  film.attributes = attributes;
+  return film;
+}
+
+/// How pickle takes a film to another process.
+nb::tuple reduced(nb::handle self) {
+  const Film& film = nb::cast<const Film&>(self);
+  if (film.keeps_sample_variance() || !film.aovs.empty())
+    throw nb::type_error(
+        "a film that keeps the variance of its samples, or auxiliary images, cannot be pickled; save() writes it");
+  const CropWindow& c = film.crop();
+  return nb::make_tuple(
+      nb::module_::import_("covary.film").attr("_from_parts"),
+      nb::make_tuple(std::pair(film.frame_width(), film.frame_height()), std::array{c.x, c.y, c.width, c.height},
+                     memory_of(self), counts_of(self), film.attributes));
+}
+
 nb::dict aovs_of(const Film& film) {
   nb::dict d;
   for (const auto& [name, image] : film.aovs) d[name.c_str()] = array_of(Image(image));
@@ -97,6 +133,10 @@ void bind_film(nb::module_& module) {
       .def_static("_merge_files", &merge_files, "paths"_a, nb::sig("def _merge_files(paths: list[str]) -> Film"))
       .def_static("_from_groups", &from_groups, "groups"_a.none(), "samples"_a, "attributes"_a,
                   nb::sig("def _from_groups(groups: object, samples: int, attributes: dict[str, str]) -> Film"))
+      .def_static("_from_parts", &from_parts, "frame"_a, "crop"_a, "groups"_a, "counts"_a, "attributes"_a,
+                  nb::sig("def _from_parts(frame: tuple[int, int], crop: tuple[int, int, int, int], groups: object, "
+                          "counts: object, attributes: dict[str, str]) -> Film"))
+      .def("__reduce__", &reduced, nb::sig("def __reduce__(self) -> tuple[typing.Any, ...]"))
       .def_prop_ro("groups", &groups_of, nb::sig("def groups(self) -> numpy.typing.NDArray[numpy.float32]"),
                    "The group means, [T, H, W, 3]: a read-only view of the film's memory.")
       .def_prop_ro("counts", &counts_of, nb::sig("def counts(self) -> numpy.typing.NDArray[numpy.uint32]"),

@@ -1,0 +1,272 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Rendering on a cluster by Dask (`pip install distributed`): tiles and ranges of samples on workers, which may come,
+go and die.
+
+A part is a tile of the frame and a seed. What a worker renders follows from the part alone, so a part that is lost with
+its worker is rendered again with the same bits, on any other, and each part enters the film once. Tiles are put
+together to the film of one machine in every bit; films of several seeds are merged as merge_films() does it."""
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import os
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from . import _covary
+from ._combine import Progress, combine
+from ._options import OptionValue, text_options
+from ._render import Scene
+from ._render import render as render_here
+from ._result import Result
+from .errors import Error, InputError, IoError, UsageError
+from .film import Film, merge_films
+
+if TYPE_CHECKING:
+    from ._result import FloatArray
+    from .estimators import Estimator
+
+#: Estimators that look at films after the passes, and do not change what passes take.
+_ESTIMATORS = ("iicv", "cv-baseline", "iduw", "none")
+_RETRIES = 5  # of a part that an error of the machine ended; dead workers are counted by Dask (allowed-failures)
+
+
+@dataclass(frozen=True)
+class _Part:
+    crop: tuple[int, int, int, int]
+    seed: int
+    number: int
+
+
+@dataclass(frozen=True)
+class _Job:
+    """What all parts have in common."""
+
+    scene_hash: str
+    file: str
+    loading: dict[str, Any]
+    settings: dict[str, Any]
+    folder: str = field(default="")
+
+
+class SceneFiles:
+    """The files of a scene by their content, which every worker, also one that comes later, gets once."""
+
+    def __init__(self, scene: Scene) -> None:
+        paths = sorted({os.path.realpath(path) for path in [scene.path, *scene.files]})
+        root = os.path.commonpath([os.path.dirname(path) for path in paths])
+        self.contents = {os.path.relpath(path, root): Path(path).read_bytes() for path in paths}
+        self.file = os.path.relpath(os.path.realpath(scene.path), root)
+        digest = hashlib.sha256()
+        for name, content in sorted(self.contents.items()):
+            digest.update(f"{name}\0{len(content)}\0".encode() + content)
+        self.hash = digest.hexdigest()[:32]
+
+    def write(self, parent: Path) -> Path:
+        """Writes them into a folder of their own, unless they are there. Raises IoError."""
+        folder = parent / f"covary-scene-{self.hash}"
+        if folder.exists():
+            return folder
+        try:
+            parent.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryDirectory(dir=parent, prefix="covary-scene-") as temporary:
+                made = Path(temporary) / "files"
+                for name, content in self.contents.items():
+                    (made / name).parent.mkdir(parents=True, exist_ok=True)
+                    (made / name).write_bytes(content)
+                made.rename(folder)
+        except OSError as error:
+            if folder.exists():  # another worker of this machine was first
+                return folder
+            size = sum(map(len, self.contents.values()))
+            raise IoError(f"a worker cannot write the scene's files, {size / 1e6:.1f} MB, into {parent}: "
+                          f"{error.strerror}; workers' --local-directory names another place") from error
+        return folder
+
+
+_scenes: dict[tuple[str, str], Scene] = {}
+
+
+def _make_plugin(files: SceneFiles) -> Any:
+    from distributed import WorkerPlugin  # type: ignore[import-not-found,import-untyped,unused-ignore]
+
+    class Deliver(WorkerPlugin):  # type: ignore[misc,unused-ignore]
+        name = f"covary-scene-{files.hash}"
+        idempotent = True
+
+        def setup(self, worker: Any) -> None:
+            files.write(Path(worker.local_directory))
+
+    return Deliver()
+
+
+def _render_part(job: _Job, part: _Part) -> dict[str, Film] | Error:
+    """On a worker: the films of a part, or what is wrong with all parts, so that Dask does not try again."""
+    from distributed import get_worker  # type: ignore[import-not-found,import-untyped,unused-ignore]
+
+    folder = Path(job.folder or get_worker().local_directory) / f"covary-scene-{job.scene_hash}"
+    key = (str(folder / job.file), repr(sorted(job.loading.items())))
+    try:
+        if key not in _scenes:
+            _scenes.clear()  # one scene in memory at a time
+            _scenes[key] = Scene(key[0], job.loading)
+        return render_here(_scenes[key], crop=part.crop, seed=part.seed, **job.settings).films
+    except (InputError, UsageError) as error:
+        return error
+
+
+def _tiles(width: int, height: int, side: int) -> Iterator[tuple[int, int, int, int]]:
+    for y in range(0, height, side):
+        for x in range(0, width, side):
+            yield x, y, min(side, width - x), min(side, height - y)
+
+
+class _Canvas:
+    """Films of the whole frame in the making, one for each pass and seed."""
+
+    def __init__(self, width: int, height: int) -> None:
+        self.width, self.height = width, height
+        self.arrays: dict[tuple[int, str], tuple[Any, Any, dict[str, str]]] = {}
+        self.parts: set[int] = set()
+
+    def add(self, part: _Part, films: Mapping[str, Film]) -> None:
+        import numpy
+
+        if part.number in self.parts:
+            raise RuntimeError(f"part {part.number} came twice")
+        self.parts.add(part.number)
+        x, y, width, height = part.crop
+        for name, film in films.items():
+            groups = film.groups
+            if (part.seed, name) not in self.arrays:
+                self.arrays[part.seed, name] = (
+                    numpy.zeros((self.height, self.width, groups.shape[0], 3), numpy.float32),
+                    numpy.zeros((self.height, self.width), numpy.uint32), dict(film.attributes))
+            values, counts, _ = self.arrays[part.seed, name]
+            values[y:y + height, x:x + width] = groups.transpose(1, 2, 0, 3)
+            counts[y:y + height, x:x + width] = film.counts
+
+    def films(self) -> dict[str, Film]:
+        made: dict[str, list[Film]] = {}
+        for (_, name), (values, counts, attributes) in sorted(self.arrays.items()):
+            film = Film._from_parts((self.width, self.height), (0, 0, self.width, self.height), values, counts,
+                                    attributes)
+            made.setdefault(name, []).append(film)
+        return {name: merge_films(films) if len(films) > 1 else films[0] for name, films in made.items()}
+
+    def image(self) -> FloatArray:
+        """The mean of all samples so far, black where there are none."""
+        import numpy
+
+        total = numpy.zeros((self.height, self.width, 3))
+        samples = numpy.zeros((self.height, self.width, 1))
+        for values, counts, _ in self.arrays.values():
+            total += values.mean(axis=2) * counts[..., None]
+            samples += counts[..., None]
+        return (total / numpy.maximum(samples, 1)).astype(numpy.float32)
+
+
+def _versions() -> tuple[str, str]:
+    """Of covary and distributed."""
+    return _covary.version, importlib.metadata.version("distributed")
+
+
+def _check_versions(client: Any) -> None:
+    """All must run one covary and one distributed: films of versions may differ, and so may what Dask sends."""
+    here = _versions()
+    found = {str(worker): tuple(there) for worker, there in client.run(_versions).items()}
+    found["the scheduler"] = (here[0], client.get_versions()["scheduler"]["packages"]["distributed"])
+    others = [f"{who} has covary {theirs[0]} and distributed {theirs[1]}" for who, theirs in sorted(found.items())
+              if theirs != here]
+    if others:
+        raise UsageError(f"versions differ: here are covary {here[0]} and distributed {here[1]}; {'; '.join(others)}. "
+                         "Install the same everywhere")
+
+
+@dataclass(frozen=True)
+class ClusterResult(Result):
+    """What has become of render()."""
+
+    films: dict[str, Film] = field(repr=False)
+    samples_per_pixel: float
+    #: Parts that were rendered, and seconds from the first to the last.
+    parts: int
+    render_seconds: float
+
+
+def render(client: Any, scene: Scene | str | os.PathLike[str], spp: int, estimator: Estimator = "iicv", *,
+           seed: int = 0, sample_ranges: int = 1, tile: int = 128, progress: Progress | None = None,
+           on_image: Callable[[FloatArray], object] | None = None, image_seconds: float = 5.0,
+           settings: Mapping[str, Any] | None = None, **options: OptionValue) -> ClusterResult:
+    """Renders on the workers of a dask.distributed.Client.
+
+    spp: samples per pixel of all passes and ranges together.
+    sample_ranges: into how many seeds, `seed` and those that follow, the samples are divided; their films are merged.
+        With 1 the result has the bits of `covary.render(scene, spp, estimator, seed=seed)`, with more those of
+        merge_films() of such renders, for any number of workers and whatever becomes of them.
+    tile: side of the tiles that are parts, in pixels.
+    progress: called with (done, total) parts.
+    on_image: called with the mean of all samples so far, at most every `image_seconds`.
+    settings: further keywords of covary.render() for the passes: filter, groups, split, ….
+
+    Raises UsageError for estimators and integrators whose passes look beyond a tile.
+    """
+    try:
+        import distributed  # type: ignore[import-not-found,import-untyped,unused-ignore]
+    except ImportError as error:
+        raise ImportError("covary.distributed needs Dask: pip install distributed") from error
+    if estimator not in _ESTIMATORS:
+        raise UsageError(f"estimator '{estimator}' looks at other pixels or samples while it renders; on a cluster "
+                         f"accepted are {', '.join(_ESTIMATORS)}")
+    if tile < 1 or sample_ranges < 1 or spp % sample_ranges:
+        raise UsageError(f"found tile {tile} and {spp} samples in {sample_ranges} ranges; tiles have one pixel or more, "
+                         "and the ranges divide the samples")
+    chosen = scene if isinstance(scene, Scene) else Scene.load(scene)
+    if chosen.integrator not in ("path", ""):
+        raise UsageError(f"the integrator '{chosen.integrator}' trains or traces light over the whole frame; on a "
+                         "cluster accepted is path")
+    _check_versions(client)
+    files = SceneFiles(chosen)
+    client.register_plugin(_make_plugin(files))
+    passed = {"spp": spp // sample_ranges, "estimator": estimator, **(settings or {}),
+              **{name.replace("-", "_"): value or True for name, value in text_options(options).items()}}
+    job = _Job(files.hash, files.file, chosen._loading, passed)
+    width, height = chosen.resolution
+    parts = [_Part(crop, seed + r, 0) for r in range(sample_ranges) for crop in _tiles(width, height, tile)]
+    parts = [_Part(part.crop, part.seed, number) for number, part in enumerate(parts)]
+    canvas = _Canvas(width, height)
+    started = last_image = time.monotonic()
+    futures = {client.submit(_render_part, job, part, pure=False, retries=_RETRIES): part for part in parts}
+    try:
+        for future in distributed.as_completed(futures):  # type: ignore[no-untyped-call,unused-ignore]
+            films = future.result()
+            if isinstance(films, Error):
+                raise films
+            canvas.add(futures[future], films)
+            future.release()
+            if progress is not None:
+                progress(len(canvas.parts), len(parts))
+            if on_image is not None and time.monotonic() - last_image >= image_seconds:
+                on_image(canvas.image())
+                last_image = time.monotonic()
+    except BaseException:
+        client.cancel(list(futures))
+        raise
+    seconds = time.monotonic() - started
+    return _result(canvas, estimator, options, len(parts), seconds)
+
+
+def _result(canvas: _Canvas, estimator: str, options: Mapping[str, OptionValue], parts: int,
+            seconds: float) -> ClusterResult:
+    films = canvas.films()
+    samples = sum(film.samples_per_pixel for film in films.values())
+    if estimator == "none":
+        film = next(iter(films.values()))
+        return ClusterResult(film.mean, None, None, [], 0, "none", films, samples, parts, seconds)
+    made = combine(films["crn"], films["independent"], estimator, force=True, **options)  # type: ignore[arg-type]
+    return ClusterResult(made.image, made.std_error, made.predicted_relmse, [], made.nonfinite_pixels, made.estimator,
+                         films, samples, parts, seconds)

@@ -1,0 +1,260 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Mitsuba 3 (`pip install mitsuba`, its LLVM and CUDA variants) as the renderer of both images."""
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from ._combine import Progress, combine
+from ._options import OptionValue
+from ._result import Result
+from .errors import UsageError
+from .film import Film, film_from_groups
+
+if TYPE_CHECKING:
+    from ._result import FloatArray
+    from .estimators import PairEstimator
+
+#: Lanes that Mitsuba traces at once.
+_MOST_LANES = 1 << 32
+_defined: dict[str, None] = {}
+
+
+@dataclass(frozen=True)
+class MitsubaResult(Result):
+    """What has become of render()."""
+
+    #: "crn" and "independent", for other estimators: `covary.combine(films["crn"], films["independent"], …)`.
+    films: dict[str, Film] = field(repr=False)
+    #: "Albedo" and "N" where they were asked for: guides for covary.denoise().
+    aovs: dict[str, FloatArray] = field(repr=False)
+    render_seconds: float
+    estimate_seconds: float
+
+
+def _module() -> Any:
+    """Mitsuba with a variant that fits."""
+    try:
+        import mitsuba  # type: ignore[import-not-found,import-untyped,unused-ignore]
+    except ImportError as error:
+        raise ImportError("covary.mitsuba needs Mitsuba 3: pip install mitsuba") from error
+    variant = mitsuba.variant()
+    vectorised = [name for name in mitsuba.variants() if name.startswith(("llvm", "cuda"))]
+    if variant is None:
+        raise UsageError("no variant of Mitsuba is chosen; call mitsuba.set_variant() with one of "
+                         f"{', '.join(vectorised)} first")
+    if variant not in vectorised:
+        raise UsageError(f"the variant '{variant}' of Mitsuba takes samples one by one, which a sampler in Python is too "
+                         f"slow for; accepted are {', '.join(vectorised)}")
+    return mitsuba
+
+
+def _define_plugins(mi: Any) -> None:
+    """Registers the CRN sampler and the sensor around another, once for each variant."""
+    if mi.variant() in _defined:
+        return
+    import drjit  # type: ignore[import-not-found,import-untyped,unused-ignore]
+
+    class CommonNumbers(mi.Sampler):  # type: ignore[misc,unused-ignore]
+        """Numbers that depend on the seed and the index of the sample, and not on the pixel. Mitsuba traces the samples
+        of a pixel side by side: lane i is sample i mod n, for n samples a pixel in a pass."""
+
+        def __init__(self, properties: Any) -> None:
+            super().__init__(properties)
+            self.pixels = properties.get("pixels", 1)
+            self.first = properties.get("first", 0)
+
+        def seed(self, seed: Any, wavefront_size: int) -> None:
+            super().seed(seed, wavefront_size)
+            self.seed_value, self.size, self.passes = seed, wavefront_size, 0
+            self._start()
+
+        def _start(self) -> None:
+            in_pass = max(self.size // self.pixels, 1)
+            # Opaque: these change from group to group, for which the kernel is not compiled again.
+            first = drjit.opaque(mi.UInt64, self.first + self.passes * in_pass)
+            state = mi.UInt64(self.seed_value) * 0x9e3779b97f4a7c15
+            drjit.make_opaque(state)
+            sample = drjit.arange(mi.UInt64, self.size) % in_pass + first
+            self.random = mi.PCG32(initstate=state, initseq=sample)
+
+        def advance(self) -> None:
+            super().advance()
+            self.passes += 1
+            self._start()
+
+        def schedule_state(self) -> None:
+            super().schedule_state()
+            drjit.schedule(self.random)
+
+        def next_1d(self, active: Any = True) -> Any:
+            return self.random.next_float32(active)
+
+        def next_2d(self, active: Any = True) -> Any:
+            return mi.Point2f(self.next_1d(active), self.next_1d(active))
+
+        def _copy(self) -> Any:
+            properties = mi.Properties()
+            properties["pixels"], properties["first"] = self.pixels, self.first
+            other = CommonNumbers(properties)
+            other.set_sample_count(self.sample_count())
+            return other
+
+        def fork(self) -> Any:
+            return self._copy()
+
+        def clone(self) -> Any:
+            other = self._copy()
+            if hasattr(self, "random"):
+                other.seed_value, other.size, other.passes = self.seed_value, self.size, self.passes
+                other.random = mi.PCG32(self.random)
+            return other
+
+    class Around(mi.Sensor):  # type: ignore[misc,unused-ignore]
+        """Another sensor with a film and a sampler of its own."""
+
+        def __init__(self, properties: Any) -> None:
+            super().__init__(properties)
+            self.inner = properties["inner"]
+
+        def sample_ray(self, *arguments: Any) -> Any:
+            return self.inner.sample_ray(*arguments)
+
+        def sample_ray_differential(self, *arguments: Any) -> Any:
+            return self.inner.sample_ray_differential(*arguments)
+
+        def bbox(self) -> Any:
+            return self.inner.bbox()
+
+    mi.register_sampler("covary_common_numbers", CommonNumbers)
+    mi.register_sensor("covary_around", Around)
+    _defined[mi.variant()] = None
+
+
+def _integrator(mi: Any, scene: Any, given: Any) -> Any:
+    integrator = scene.integrator() if given is None else mi.load_dict(given) if isinstance(given, dict) else given
+    if isinstance(integrator, str):
+        integrator = mi.load_dict({"type": integrator})
+    name = type(integrator).__name__
+    if isinstance(integrator, mi.AdjointIntegrator):
+        raise UsageError(f"the integrator {name} follows light to pixels anywhere, so that no random numbers belong to a "
+                         "pixel; accepted are integrators that begin at the camera, such as path")
+    if ".ad" in type(integrator).__module__ or name.lower().startswith("prb"):
+        raise UsageError(f"the integrator {name} is made for derivatives, which the combination of two images does not "
+                         "have; use path or another one for images")
+    return integrator
+
+
+def _size(sensor: Any) -> tuple[int, int]:
+    width, height = sensor.film().crop_size()
+    return int(width), int(height)
+
+
+def _around(mi: Any, sensor: Any, sampler: dict[str, Any]) -> Any:
+    film = sensor.film()
+    width, height = (int(n) for n in film.size())
+    crop_x, crop_y = (int(n) for n in film.crop_offset())
+    crop_width, crop_height = _size(sensor)
+    return mi.load_dict({
+        "type": "covary_around", "inner": sensor, "sampler": sampler,
+        "film": {"type": "hdrfilm", "width": width, "height": height, "crop_offset_x": crop_x, "crop_offset_y": crop_y,
+                 "crop_width": crop_width, "crop_height": crop_height, "rfilter": {"type": "box"},
+                 "pixel_format": "rgb", "component_format": "float32"}})
+
+
+def _check_sensor(sensor: Any) -> list[str]:
+    """What is changed in the sensor, with the reason. Raises where that is impossible."""
+    if sensor.needs_aperture_sample() or sensor.shutter_open_time() > 0:
+        raise UsageError(f"the sensor {type(sensor).__name__} draws points on its lens or in time, which the sensor "
+                         "around it would not; accepted are pinhole cameras at one moment")
+    rfilter = type(sensor.film().rfilter()).__name__
+    if "Box" in repr(sensor.film().rfilter()):
+        return []
+    return [f"the film's filter {rfilter} was replaced by a box one pixel wide, because a wider one mixes the errors of "
+            "neighbouring pixels, which control variates take for independent"]
+
+
+def render(scene: Any, spp: int, seed: int = 0, integrator: Any = None, sensor: int = 0, *, groups: int = 12,
+           estimator: PairEstimator = "iicv", aovs: bool = False, progress: Progress | None = None,
+           **options: OptionValue) -> MitsubaResult:
+    """Renders a scene by Mitsuba, half of the samples with common random numbers and half with independent ones, and
+    combines both.
+
+    scene: a mitsuba.Scene, or the name of an XML file.
+    spp: samples per pixel of both images together.
+    integrator: in place of the scene's: an Integrator, its name, or a dictionary for mitsuba.load_dict().
+    sensor: its number in the scene.
+    groups: of samples in each image, 3 or more; fewer where there are fewer samples.
+    aovs: also albedo and shading normals, as guides for denoise().
+    progress: called with (done, total) groups.
+    options: of the estimator.
+
+    The film's filter is replaced by a box, with a warning. The samples in each group are traced at once. Raises
+    UsageError for what cannot work: a scalar variant, integrators of derivatives or of light paths alone.
+    """
+    mi = _module()
+    _define_plugins(mi)
+    loaded = mi.load_file(str(scene)) if not isinstance(scene, mi.Scene) else scene
+    if not 0 <= sensor < len(loaded.sensors()):
+        raise UsageError(f"sensor {sensor}: the scene has {len(loaded.sensors())}, counted from 0")
+    camera = loaded.sensors()[sensor]
+    warnings = _check_sensor(camera)
+    chosen = _integrator(mi, loaded, integrator)
+    count = spp // 2
+    if spp % 2 or count < 3 or groups < 3:
+        raise UsageError(f"found {spp} samples per pixel in {groups} groups; an even number, 6 or more, and 3 groups or "
+                         "more are needed: half of the samples have common random numbers")
+    groups = min(groups, count)
+
+    started = time.perf_counter()
+    total = 2 * groups
+    done = 0
+
+    def finished() -> None:
+        nonlocal done
+        done += 1
+        if progress is not None:
+            progress(done, total)
+
+    films = {name: _film(mi, loaded, camera, chosen, name, count, groups, seed, finished)
+             for name in ("crn", "independent")}
+    guides = _guides(mi, loaded, camera, chosen, seed) if aovs else {}
+    rendered = time.perf_counter()
+    result = combine(films["crn"], films["independent"], estimator, **options)  # type: ignore[arg-type]
+    estimated = time.perf_counter()
+    return MitsubaResult(result.image, result.std_error, result.predicted_relmse, warnings + result.warnings,
+                         result.nonfinite_pixels, result.estimator, films, guides, rendered - started,
+                         estimated - rendered)
+
+
+def _film(mi: Any, scene: Any, camera: Any, integrator: Any, sampling: str, count: int, groups: int, seed: int,
+          finished: Callable[[], None]) -> Film:
+    """One of the two images: groups whose sizes differ by a sample at most."""
+    import numpy
+
+    width, height = _size(camera)
+    images, first = [], 0
+    for group in range(groups):
+        size = count // groups + (group < count % groups)
+        if width * height * size >= _MOST_LANES:
+            raise UsageError(f"{width} x {height} pixels with {size} samples in a group are more than Mitsuba traces at "
+                             f"once; use more groups than {groups}")
+        common = {"type": "covary_common_numbers", "pixels": width * height, "first": first, "sample_count": size}
+        around = _around(mi, camera, common if sampling == "crn" else {"type": "independent", "sample_count": size})
+        number = 2 * seed if sampling == "crn" else (2 * seed + 1) * 4096 + group
+        image = integrator.render(scene, around, seed=number % (1 << 32), spp=size)
+        images.append(numpy.array(image, dtype=numpy.float32)[..., :3])
+        first += size
+        finished()
+    return film_from_groups(numpy.stack(images), count, sampling=sampling)
+
+
+def _guides(mi: Any, scene: Any, camera: Any, integrator: Any, seed: int) -> dict[str, FloatArray]:
+    import numpy
+
+    both = mi.load_dict({"type": "aov", "aovs": "albedo:albedo,normal:sh_normal", "image": integrator})
+    around = _around(mi, camera, {"type": "independent", "sample_count": 16})
+    image = numpy.array(both.render(scene, around, seed=(2 * seed + 1) * 4096 + 4095, spp=16), dtype=numpy.float32)
+    return {"Albedo": image[..., -6:-3], "N": image[..., -3:]}

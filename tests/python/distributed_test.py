@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: Apache-2.0
+"""covary.distributed on clusters of this machine: the bits of one machine, with workers that die, and without the files
+of the scene."""
+import os
+import pickle
+import shutil
+import signal
+import sys
+import unittest
+
+import covary
+import covary.distributed
+import numpy
+from common import ROOM, SOURCE, PackageTest
+
+SIZE = (72, 48)
+
+
+class Parts(PackageTest):
+    """What needs no cluster."""
+
+    def test_tiles_cover_the_frame_once(self):
+        for width, height, side in ((72, 48, 24), (50, 31, 16), (5, 5, 100)):
+            covered = numpy.zeros((height, width), int)
+            for x, y, w, h in covary.distributed._tiles(width, height, side):
+                covered[y:y + h, x:x + w] += 1
+            self.assertTrue((covered == 1).all())
+
+    def test_parts_are_counted_once(self):
+        film = covary.render(ROOM, 4, "none", crop=(0, 0, 4, 4)).films["independent"]
+        canvas = covary.distributed._Canvas(4, 4)
+        part = covary.distributed._Part((0, 0, 4, 4), 0, 0)
+        canvas.add(part, {"independent": film})
+        self.assertIn("came twice", self.message_of(RuntimeError, canvas.add, part, {"independent": film}))
+        self.assert_same_bits(canvas.films()["independent"].groups, film.groups)
+
+    def test_films_go_through_pickle(self):
+        film = covary.render(ROOM, 24, crop=(3, 4, 20, 10)).films["crn"]
+        other = pickle.loads(pickle.dumps(film))
+        self.assert_same_bits(film.groups, other.groups)
+        self.assertEqual((film.crop, film.frame, film.attributes), (other.crop, other.frame, other.attributes))
+        self.assertTrue((film.counts == other.counts).all())
+        with_aovs = covary.render(ROOM, 4, "none", crop=(0, 0, 4, 4), aovs=True).films["independent"]
+        if with_aovs.aovs:
+            self.assertIn("cannot be pickled", self.message_of(TypeError, pickle.dumps, with_aovs))
+
+    def test_files_by_content(self):
+        shutil.copy(ROOM, self.path / "a.xml")
+        files = covary.distributed.SceneFiles(covary.Scene.load(self.path / "a.xml"))
+        self.assertEqual(sorted(files.contents), ["a.xml"])
+        folder = files.write(self.path / "worker")
+        self.assertEqual((folder / "a.xml").read_bytes(), ROOM.read_bytes())
+        self.assertEqual(files.write(self.path / "worker"), folder)
+        (self.path / "a.xml").write_text(ROOM.read_text() + "<!-- other -->")
+        self.assertNotEqual(covary.distributed.SceneFiles(covary.Scene.load(self.path / "a.xml")).hash, files.hash)
+
+    def test_disk_that_takes_nothing(self):
+        files = covary.distributed.SceneFiles(covary.Scene.load(ROOM))
+        (self.path / "file").write_text("")
+        message = self.message_of(covary.IoError, files.write, self.path / "file" / "folder")
+        self.assertIn("a worker cannot write the scene's files", message)
+        self.assertIn("--local-directory", message)
+
+    def test_missing_dask(self):
+        kept = sys.modules.get("distributed")
+        sys.modules["distributed"] = None
+        try:
+            self.assertEqual(self.message_of(ImportError, covary.distributed.render, None, ROOM, 4),
+                             "covary.distributed needs Dask: pip install distributed")
+        finally:
+            if kept is None:
+                del sys.modules["distributed"]
+            else:
+                sys.modules["distributed"] = kept
+
+
+class Cluster(PackageTest):
+    @classmethod
+    def setUpClass(cls):
+        from distributed import Client, LocalCluster
+        cls.cluster = LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, processes=True)
+        cls.addClassCleanup(cls.cluster.close)
+        cls.client = Client(cls.cluster)
+        cls.addClassCleanup(cls.client.close)
+
+    def scene(self, **keywords):
+        return covary.Scene.load(ROOM, resolution=SIZE, **keywords)
+
+    def test_bits_of_one_machine(self):
+        here = covary.render(self.scene(), 24, seed=3)
+        seen = []
+        there = covary.distributed.render(self.client, self.scene(), 24, seed=3, tile=20,
+                                          progress=lambda done, total: seen.append((done, total)))
+        self.assert_same_bits(here.image, there.image)
+        self.assert_same_bits(here.std_error, there.std_error)
+        self.assertEqual((seen[-1], there.parts, there.samples_per_pixel), ((12, 12), 12, 24))
+        for name in ("crn", "independent"):
+            self.assert_same_bits(here.films[name].groups, there.films[name].groups)
+
+    def test_ranges_of_samples(self):
+        films = [covary.render(self.scene(), 8, "none", seed=seed).films["independent"] for seed in (5, 6, 7)]
+        images = []
+        there = covary.distributed.render(self.client, self.scene(), 24, "none", seed=5, sample_ranges=3, tile=40,
+                                          on_image=images.append, image_seconds=0)
+        self.assert_same_bits(covary.merge_films(films).mean, there.image)
+        self.assertEqual(images[-1].shape, there.image.shape)
+
+    def test_workers_that_die(self):
+        """One is killed in the middle; what it had is rendered again, on the one that takes its place, too."""
+        here = covary.render(self.scene(), 48, seed=4)
+        killed = []
+
+        def kill(done, total):
+            if done in (3, 9):
+                pid = next(iter(self.client.run(os.getpid).values()))
+                killed.append(pid)
+                os.kill(pid, signal.SIGKILL)
+        there = covary.distributed.render(self.client, self.scene(), 48, seed=4, tile=12, progress=kill)
+        self.assertEqual(len(killed), 2)
+        self.assert_same_bits(here.image, there.image)
+
+    def test_refused(self):
+        def refused(*arguments, **keywords):
+            return self.message_of(covary.UsageError, covary.distributed.render, self.client, *arguments, **keywords)
+        self.assertIn("looks at other pixels", refused(self.scene(), 24, "dependent-tests"))
+        self.assertIn("the ranges divide the samples", refused(self.scene(), 25, sample_ranges=2))
+        self.assertIn("accepted is path", refused(self.scene(integrator="bdpt"), 24))
+
+    def test_other_versions(self):
+        kept, covary._covary.version = covary._covary.version, "0.0.9"
+        try:
+            message = self.message_of(covary.UsageError, covary.distributed.render, self.client, self.scene(), 24)
+        finally:
+            covary._covary.version = kept
+        self.assertIn("versions differ: here are covary 0.0.9", message)
+
+    def test_errors_of_workers(self):
+        message = self.message_of(covary.UsageError, covary.distributed.render, self.client, self.scene(), 24,
+                                  settings={"groups": 2})
+        self.assertIn("2 groups are too few", message)
+
+
+if __name__ == "__main__":
+    assert (SOURCE / "scenes").exists()
+    unittest.main()
