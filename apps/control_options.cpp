@@ -26,8 +26,9 @@ void add_control_options(CLI::App& command, ControlTexts& texts) {
       ->group(kControlGroup);
   command
       .add_option("--lights", texts.lights,
-                  "How lights are chosen: uniformly over emissive triangles, over shapes, or by power")
-      ->check(one_of({"triangle", "shape", "power"}))
+                  "How lights are chosen: uniformly over emissive triangles, over shapes, by power, or as training "
+                  "tells")
+      ->check(one_of({"triangle", "shape", "power", "learned"}))
       ->group(kControlGroup);
   command
       .add_option("--cv-grid", texts.grid, "Cells along the longest side of the scene, or auto: by the size of pixels")

@@ -8,7 +8,8 @@ namespace {
 
 constexpr ControlKind kKinds[] = {ControlKind::kOff, ControlKind::kRgb, ControlKind::kMono, ControlKind::kVevoda,
                                   ControlKind::kOptimalMis};
-constexpr LightSelection kSelections[] = {LightSelection::kTriangle, LightSelection::kShape, LightSelection::kPower};
+constexpr LightSelection kSelections[] = {LightSelection::kTriangle, LightSelection::kShape, LightSelection::kPower,
+                                          LightSelection::kLearned};
 constexpr int kMaxInt = 1 << 30;
 
 template <typename T>
@@ -103,7 +104,7 @@ CacheSettings ControlSettings::cache(uint32_t resolution) const {
 
 std::string ControlSettings::text() const {
   const std::string selection = "cv=" + name_of(kind) + " lights=" + name_of(lights);
-  if (!on()) return selection;
+  if (!learns()) return selection;
   const auto number = [](uint32_t value) { return std::to_string(value); };
   return selection + (paper ? " paper" : "") + " grid=" + (grid == kAutomaticGrid ? "auto" : number(grid)) +
          " train=" + number(train_spp) + " clusters=" + number(clusters) + " memory=" + number(memory_mib) +

@@ -53,10 +53,12 @@ struct ControlSettings {
   ControlSettings with(const ControlOptions& options) const;
 
   bool on() const { return kind != ControlKind::kOff; }
+  /// Whether anything is learnt: coefficients, or how to choose lights.
+  bool learns() const { return on() || lights == LightSelection::kLearned; }
   /// Samples per pixel of training, if any.
-  uint32_t training_spp() const { return on() ? train_spp : 0; }
+  uint32_t training_spp() const { return learns() ? train_spp : 0; }
   /// Training samples per pixel that first make an estimate of each pixel's value, and no coefficients.
-  uint32_t pilot_spp() const { return on() && relative && !per_pixel() ? (train_spp >= 4 ? 2 : train_spp / 2) : 0; }
+  uint32_t pilot_spp() const { return learns() && relative && !per_pixel() ? (train_spp >= 4 ? 2 : train_spp / 2) : 0; }
   /// Whether each pixel has coefficients of its own, for the first surface, instead of each cell of space.
   bool per_pixel() const { return kind == ControlKind::kOptimalMis; }
   CacheSettings cache(uint32_t resolution) const;

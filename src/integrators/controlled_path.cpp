@@ -8,7 +8,7 @@
 // | hide_emitters | boolean | false    | lights are invisible to the camera                                    |
 // | cv            | string  | rgb      | control variates: `off`, `rgb`, `mono`, `vevoda`, `optimal-mis`       |
 // | cv_paper      | boolean | false    | the published method; other parameters change it                      |
-// | lights        | string  | power    | how lights are chosen: `triangle`, `shape`, `power`                   |
+// | lights        | string  | power    | how lights are chosen: `triangle`, `shape`, `power`, `learned`        |
 // | cv_grid       | integer | 0        | cells along the longest side of the scene; 0: by the size of pixels   |
 // | cv_train      | integer | 16       | samples per pixel to learn from                                       |
 // | cv_clusters   | integer | 5000     | most clusters of lights                                               |
@@ -66,25 +66,30 @@ void ControlledPath::prepare(const Scene& scene) {
                  &table(),
                  settings_.prefix,
                  settings_.kind == ControlKind::kVevoda,
-                 settings_.per_pixel()};
-  std::vector<float> counts = make_clusters();
+                 settings_.per_pixel(),
+                 settings_.lights == LightSelection::kLearned};
+  make_clusters();
   controlled_.cluster_of = cluster_of_;
-  if (settings_.on())
-    cache_ = CoefficientCache(scene.bounds(), std::move(counts), controlled_.n_dense(), settings_.cache(resolution()));
+  if (settings_.learns())
+    cache_ = CoefficientCache(scene.bounds(), cluster_counts(), controlled_.n_dense(), settings_.cache(resolution()));
 }
 
-/// Groups the lights; returns the expected number of samples that a vertex takes of each cluster.
-std::vector<float> ControlledPath::make_clusters() {
+/// Groups the lights.
+void ControlledPath::make_clusters() {
   cluster_of_.resize(lights_.size());
   std::iota(cluster_of_.begin(), cluster_of_.end(), 0u);
   n_clusters_ = lights_.size();
-  if (settings_.on() && lights_.size() > settings_.clusters) {
+  if (settings_.learns() && lights_.size() > settings_.clusters) {
     std::vector<ClusterLight> lights;
     for (uint32_t i = 0; i < lights_.size(); ++i) lights.push_back(cluster_light(lights_[i], scene_->bounds()));
     const Bounds3& bounds = scene_->bounds();
     LightClusters clusters = cluster_lights(lights, settings_.clusters, 2 * bounds.radius());
     cluster_of_ = std::move(clusters.cluster_of), n_clusters_ = clusters.n_clusters;
   }
+}
+
+/// The expected number of samples that a vertex takes of each cluster.
+std::vector<float> ControlledPath::cluster_counts() const {
   std::vector<double> counts(n_clusters_);
   for (uint32_t i = 0; i < lights_.size(); ++i) counts[cluster_of_[i]] += lights_[i].pmf;
   return {counts.begin(), counts.end()};
@@ -113,14 +118,26 @@ uint32_t ControlledPath::resolution() const {
   return static_cast<uint32_t>(std::clamp(max_component(size) / (8 * sum / n), 64.0, 256.0));
 }
 
+/// Chooses clusters with these probabilities, relative to one another, and their lights as before.
+void ControlledPath::select(const std::vector<float>& clusters) {
+  const std::vector<float> counts = cluster_counts();
+  std::vector<double> weights;
+  for (uint32_t i = 0; i < lights_.size(); ++i) {
+    const uint32_t cluster = cluster_of_[i];
+    weights.push_back(counts[cluster] > 0 ? double{clusters[cluster]} * lights_[i].pmf / counts[cluster] : 0);
+  }
+  lights_.change(weights);
+}
+
 void ControlledPath::use(CoefficientTable table) {
   COVARY_CHECK(scene_ && settings_.on(), "coefficients belong to a scene and to control variates");
+  if (!table.selection().empty()) select(table.selection());
   given_ = std::move(table);
   controlled_.table = &*given_;
 }
 
 void ControlledPath::begin_batch(ControlledBatch& batch) const {
-  batch.recording = !frozen() && settings_.on() && trained_spp() >= pilot_spp();
+  batch.recording = !frozen() && settings_.learns() && trained_spp() >= pilot_spp();
   if (batch.recording && batch.sums.n_cells() == 0) batch.sums = cache_.new_sums();
 }
 
@@ -136,8 +153,29 @@ void ControlledPath::absorb(const TrainingRecord& record) {
   cache_.absorb(static_cast<const SumsRecord&>(record).sums);
 }
 
+void ControlledPath::on_restart() {
+  if (given_) return;
+  if (selects_by_learning()) lights_ = LightSet(*scene_, settings_.lights);
+  if (settings_.learns()) cache_.select(cluster_counts());
+  cache_.restart();
+}
+
 void ControlledPath::update() {
-  if (trained_spp() >= pilot_spp()) cache_.update();
+  if (trained_spp() < pilot_spp()) return;
+  const std::vector<float> selection = cache_.table().selection();
+  if (settings_.on()) cache_.update();
+  // Lights are chosen by what was learnt as soon as half of the samples have been taken: the other half then teaches
+  // the coefficients of this choice.
+  const uint32_t end = std::min(training_spp(), wave_end(trained_spp(), 1));
+  std::vector<float> best;
+  if (controlled_.residuals && selection.empty() && 2 * end >= training_spp() && end < training_spp())
+    best = cache_.best_selection();
+  cache_.forget_residuals();
+  if (!best.empty()) {
+    select(best);
+    cache_.select(cluster_counts());
+  }
+  cache_.set_selection(best.empty() ? selection : best);
 }
 
 std::string ControlledPath::settings_text() const {

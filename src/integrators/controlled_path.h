@@ -41,13 +41,15 @@ class ControlledPath : public LearningIntegrator {
     trace_with<ControlledParts>(scene, samples, context);
   }
   bool allows_negative() const override { return settings_.on(); }
+  /// Whether the probabilities of lights were learnt.
+  bool selects_by_learning() const { return !table().selection().empty(); }
   WaveWeights wave_weights() const override {
     return settings_.paper || settings_.per_pixel() ? WaveWeights::kSamples : WaveWeights::kVariance;
   }
   /// 0 once coefficients were given.
   uint32_t training_spp() const override { return given_ ? 0 : settings_.training_spp(); }
   uint32_t pilot_spp() const override { return settings_.pilot_spp(); }
-  size_t training_memory() const override { return settings_.on() ? size_t{settings_.memory_mib} << 20 : 0; }
+  size_t training_memory() const override { return settings_.learns() ? size_t{settings_.memory_mib} << 20 : 0; }
   std::unique_ptr<TrainingRecord> take_record(ThreadState& state) const override;
   void absorb(const TrainingRecord& record) override;
   bool keeps_training() const override { return settings_.on(); }
@@ -63,7 +65,7 @@ class ControlledPath : public LearningIntegrator {
     ControlledTracer<Parts>(scene, controlled_, lengths_, samples, context).trace();
   }
 
-  void on_restart() override { cache_.restart(); }
+  void on_restart() override;
   void update() override;
   void on_freeze() override {
     training_bytes_ = cache_.bytes();
@@ -73,7 +75,9 @@ class ControlledPath : public LearningIntegrator {
 
  private:
   void begin_batch(ControlledBatch& batch) const;
-  std::vector<float> make_clusters();
+  void make_clusters();
+  std::vector<float> cluster_counts() const;
+  void select(const std::vector<float>& clusters);
   uint32_t resolution() const;
 
   PathLengthSettings lengths_;

@@ -51,6 +51,7 @@ struct ControlledScene {
   bool light_samples_only = false;
   /// Coefficients belong to pixels, those into which the camera sees the first surface; later vertices have none.
   bool per_pixel = false;
+  bool residuals = false;  ///< while learning, what is left of each light's samples is recorded
   /// Dense techniques: directions by the BSDF, then the environment.
   static constexpr uint32_t kBsdf = 0, kEnvironment = 1;
   uint32_t n_dense() const { return environment ? 2 : 1; }
@@ -278,12 +279,17 @@ class ControlledTracer {
   /// One sample of a vertex, its value f/p, and balance weights: `r_light` of a light's cluster, or of the environment
   /// for kNoLight, and 1 − r_light of the BSDF.
   void take(ControlledVertex& vertex, const Spectrum& value, uint32_t cluster, float r_light) {
+    Spectrum residual = value;
     if (vertex.cell != CoefficientTable::kNone) {
       Spectrum sum = table_.dense(vertex.cell, ControlledScene::kBsdf) * (1 - r_light);
       if (r_light > 0) sum += coefficient(vertex.cell, cluster) * r_light;
       vertex.control = vertex.control - sum;
+      residual = value - sum * table_.scale(vertex.cell);
     }
-    if (vertex.recorded) record(vertex, value, cluster, r_light);
+    if (!vertex.recorded) return;
+    record(vertex, value, cluster, r_light);
+    if (control_.residuals && cluster != kNoLight && r_light > 0)
+      batch_.sums.add_residual(cluster, vertex.weight, residual);
   }
 
   void record(ControlledVertex& vertex, const Spectrum& value, uint32_t cluster, float r_light) {

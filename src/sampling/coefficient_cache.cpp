@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 
 #include "core/error.h"
 #include "core/parallel.h"
@@ -260,6 +261,33 @@ void CoefficientCache::update() {
     add_to_table(levels[l], first_above, table_);
   }
   sums_.scale_held_out(0);
+}
+
+std::vector<float> CoefficientCache::best_selection() const {
+  constexpr double kKept = 0.2;  // part of the former probabilities: lights may matter where no sample has been yet
+  const std::span<const double> residuals = sums_.light_residuals();
+  std::vector<double> roots(light_counts_.size());
+  double count = 0, sum = 0;
+  for (size_t k = 0; k < roots.size(); ++k) {
+    if (k < residuals.size()) roots[k] = std::sqrt(light_counts_[k] * residuals[k]);
+    count += light_counts_[k], sum += roots[k];
+  }
+  if (!(sum > 0)) return {};
+  std::vector<float> selection;
+  for (size_t k = 0; k < roots.size(); ++k)
+    selection.push_back(static_cast<float>(kKept * light_counts_[k] / count + (1 - kKept) * roots[k] / sum));
+  return selection;
+}
+
+void CoefficientCache::select(std::vector<float> light_counts) {
+  COVARY_CHECK(light_counts.size() == light_counts_.size(), "an expected number of samples for each light");
+  std::vector<float> factors;
+  for (size_t k = 0; k < light_counts.size(); ++k)
+    factors.push_back(light_counts[k] > 0 ? light_counts_[k] / light_counts[k] : 0);
+  if (table_.n_cells() > 0) table_.scale_lights(factors);
+  light_counts_ = std::move(light_counts);
+  n_rejected_ = n_rejected();
+  sums_ = SystemSums(layout_, sums_.level());
 }
 
 void CoefficientCache::freeze() {

@@ -49,6 +49,15 @@ class CoefficientCache {
   void absorb(const SystemSums& sums);
   /// Solves all cells, in parallel; the number of threads changes no bit.
   void update();
+  /// How probable lights should be for the least variance: c_k in proportion to the root of c_k Σ w residual² over the
+  /// samples since forget_residuals(), and for a part as before. Empty where no light was seen.
+  std::vector<float> best_selection() const;
+  void forget_residuals() { sums_.forget_residuals(); }
+  /// Lights have other expected numbers of samples from now on: `light_counts`. The table's coefficients are changed
+  /// accordingly, and the sums, which belong to the former numbers, are forgotten.
+  void select(std::vector<float> light_counts);
+  /// CoefficientTable::selection() of the table.
+  void set_selection(std::vector<float> selection) { table_.set_selection(std::move(selection)); }
   /// Forgets the sums, which only training needs.
   void freeze();
   /// Forgets everything that was learnt.

@@ -354,7 +354,7 @@ TEST_F(TrainingFile, IsRefusedWhenItIsSomethingElse) {
             refused(bytes_, "scene 2"));
   std::string newer = bytes_;
   newer[20] = 9;
-  EXPECT_EQ("a.training: is a training file of version 9; this program reads version 1", refused(newer, "scene 1"));
+  EXPECT_EQ("a.training: is a training file of version 9; this program reads version 2", refused(newer, "scene 1"));
   std::string damaged = bytes_;
   damaged[damaged.size() - 20] ^= 1;
   EXPECT_EQ("a.training: is damaged: its content does not match its checksum", refused(damaged, "scene 1"));
@@ -388,6 +388,47 @@ TEST(TrainingFileBody, ManyMutationsAreRefusedOrHarmless) {
     }
   }
   EXPECT_GT(n_accepted, 100);
+}
+
+// c_k in proportion to the root of c_k S_k: here of 0.25 · 1 and 0.75 · 12, so 0.5 : 3; a fifth stays as it was.
+TEST(LightSelectionByResiduals, IsThatOfLeastVariance) {
+  CoefficientCache cache({{0, 0, 0}, {1, 1, 1}}, {0.25f, 0.75f}, 1, {});
+  EXPECT_TRUE(cache.best_selection().empty());
+  SystemSums tile = cache.new_sums(), other = cache.new_sums();
+  tile.add_residual(1, 2, Spectrum(1, 1, 2));
+  tile.add_residual(1, 1, Spectrum(std::nanf("")));
+  other.add_residual(0, 1, Spectrum(1));
+  other.add_residual(1, 8, Spectrum(1));
+  cache.absorb(tile), cache.absorb(other);
+  const std::vector<float> selection = cache.best_selection();
+  ASSERT_EQ(selection.size(), 2u);
+  EXPECT_NEAR(selection[0], 0.2 * 0.25 + 0.8 * 0.5 / 3.5, 1e-6);
+  EXPECT_NEAR(selection[1], 0.2 * 0.75 + 0.8 * 3 / 3.5, 1e-6);
+  cache.forget_residuals();
+  EXPECT_TRUE(cache.best_selection().empty());
+}
+
+TEST(LightSelectionByResiduals, KeepsTheSumOfTheControl) {
+  const float dense[] = {0.25f}, nothing[] = {0};
+  CoefficientCache cache({{0, 0, 0}, {1, 1, 1}}, {0.25f, 0.75f}, 1, {});
+  SystemSums sums = cache.new_sums();
+  const CellKey key = cache.key({0.5f, 0.5f, 0.5f}, {0, 0, 1});
+  for (int i = 0; i < 100; ++i) {
+    sums.add(sums.cell(key), 1, {Spectrum(1 + i % 2), static_cast<uint32_t>(i % 2), 0.75f, dense});
+    sums.add(sums.cell(key), 1, {Spectrum(3), 0, 1, nothing});
+  }
+  cache.absorb(sums), cache.update();
+  const CoefficientTable before = cache.table();
+  cache.select({0.5f, 0.5f});
+  const uint32_t cell = cache.table().find(key);
+  EXPECT_EQ(cache.table().light_sum(cell), before.light_sum(cell));
+  EXPECT_FLOAT_EQ(cache.table().light(cell, 0).r, before.light(cell, 0).r / 2);
+  EXPECT_FLOAT_EQ(cache.table().light(cell, 1).g, before.light(cell, 1).g * 1.5f);
+  cache.set_selection({1, 2});
+  const CoefficientTable read = CoefficientTable::from_bytes(cache.table().to_bytes("key"), "key", "a.training");
+  EXPECT_EQ(read.selection(), (std::vector<float>{1, 2}));
+  EXPECT_EQ(read.hash(), cache.table().hash());
+  EXPECT_NE(read.hash(), before.hash());
 }
 
 }  // namespace

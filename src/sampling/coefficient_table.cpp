@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 #include "core/content_hash.h"
@@ -132,6 +133,19 @@ void CoefficientTable::fill(const Cell& cell, const NewCell& from) {
   }
 }
 
+void CoefficientTable::scale_lights(std::span<const float> factors) {
+  COVARY_CHECK(factors.size() == n_lights_, "a factor for each light");
+  for (const Cell& cell : cells_) {
+    Spectrum* values = values_.data() + cell.first;
+    if (cell.n_slots == kEveryLight) {
+      for (uint32_t light = 0; light < n_lights_; ++light) values[light] *= factors[light];
+      continue;
+    }
+    for (uint32_t i = 0; i < cell.n_slots; ++i)
+      if (const uint32_t light = slots_[cell.first_slot + i]; light != kNone) values[i] *= factors[light];
+  }
+}
+
 std::vector<uint32_t> CoefficientTable::lights_of(const Cell& cell) const {
   std::vector<uint32_t> lights;
   if (cell.n_slots == kEveryLight) {
@@ -149,6 +163,8 @@ std::string CoefficientTable::body() const {
   std::string body;
   append_bytes(body, grid_.origin_), append_bytes(body, grid_.cell_width_), append_bytes(body, grid_.resolution_);
   append_bytes(body, grid_.level_), append_bytes(body, uint32_t{grid_.by_normal_});
+  append_bytes(body, static_cast<uint32_t>(selection_.size()));
+  for (const float probability : selection_) append_bytes(body, probability);
   append_bytes(body, n_lights_), append_bytes(body, n_dense_), append_bytes(body, n_cells());
   for (uint32_t i = 0; i < n_cells(); ++i) {
     const Cell& cell = cells_[i];
@@ -176,9 +192,18 @@ CoefficientTable CoefficientTable::from_body(std::string_view bytes, const std::
   grid.origin_ = reader.read<Vec3>(), grid.cell_width_ = reader.read<float>();
   grid.resolution_ = reader.read<uint32_t>(), grid.level_ = reader.read<uint32_t>();
   grid.by_normal_ = reader.read<uint32_t>() != 0;
+  std::vector<float> selection;
+  double total = 0;
+  for (auto n = reader.read<uint32_t>(); n > 0; --n) {
+    selection.push_back(reader.read<float>());
+    check(selection.back() >= 0 && std::isfinite(selection.back()));
+    total += selection.back();
+  }
   const auto n_lights = reader.read<uint32_t>(), n_dense = reader.read<uint32_t>();
+  check(selection.empty() || (selection.size() == n_lights && total > 0));
   check(grid.resolution_ >= 1 && n_dense <= SystemLayout::kMaxDense);
   CoefficientTable table(grid, n_lights, n_dense);
+  table.set_selection(std::move(selection));
   std::vector<Spectrum> dense(n_dense), values;
   std::vector<uint32_t> lights;
   for (auto n_cells = reader.read<uint32_t>(); n_cells > 0; --n_cells) {

@@ -95,6 +95,13 @@ class CoefficientTable {
   void add_cells(std::span<const NewCell> cells);
   static CellKey root_key() { return {0, 0, 0, 0, 255}; }
 
+  /// Multiplies the coefficients of each light. Sums over lights stay: they are right where the expected numbers of the
+  /// lights' samples are divided by the same factors.
+  void scale_lights(std::span<const float> factors);
+  /// How probable lights (or clusters) are where that was learnt too, relative to one another; otherwise empty.
+  const std::vector<float>& selection() const { return selection_; }
+  void set_selection(std::vector<float> selection) { selection_ = std::move(selection); }
+
   /// All of the table as bytes, as docs/file-formats.md describes them. `key` names what the coefficients belong to
   /// (scene and settings).
   std::string to_bytes(const std::string& key) const;
@@ -127,6 +134,7 @@ class CoefficientTable {
   KeyIndex index_;
   std::vector<Cell> cells_;
   std::vector<Spectrum> dense_, values_;
+  std::vector<float> selection_;
   std::vector<uint32_t> slots_;  // lights of the slots, kNone where empty
 };
 

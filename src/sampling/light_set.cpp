@@ -21,6 +21,7 @@ double weight_of(const Light& light, LightSelection selection) {
     case LightSelection::kShape:
       return shape && shape->n_parts() > 1 ? static_cast<double>(shape->part_area(light.part)) / shape->area() : 1;
     case LightSelection::kPower:
+    case LightSelection::kLearned:
       return mean(light.emitter->part_power(light.part));
   }
   throw Error(ErrorCode::kInternal, "unknown selection of lights");
@@ -62,6 +63,8 @@ std::string name_of(LightSelection selection) {
       return "shape";
     case LightSelection::kPower:
       return "power";
+    case LightSelection::kLearned:
+      return "learned";
   }
   throw Error(ErrorCode::kInternal, "unknown selection of lights");
 }
@@ -83,6 +86,11 @@ LightSet::LightSet(const Scene& scene, LightSelection selection) {
   const bool finite = std::all_of(weights.begin(), weights.end(), [](double weight) { return std::isfinite(weight); });
   const bool black = std::all_of(weights.begin(), weights.end(), [](double weight) { return !(weight > 0); });
   if (!finite || black) std::fill(weights.begin(), weights.end(), 1.0);
+  change(weights);
+}
+
+void LightSet::change(const std::vector<double>& weights) {
+  COVARY_CHECK(weights.size() == lights_.size(), "a weight for each light");
   selection_ = Discrete(whole_steps(weights));
   for (uint32_t i = 0; i < size(); ++i) lights_[i].pmf = selection_.pmf(i);
 }

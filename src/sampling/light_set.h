@@ -19,9 +19,10 @@ enum class LightSelection {
   kTriangle,  ///< uniform over emissive triangles [Hua2023] §6; analytic shapes and delta lights count as one each
   kShape,     ///< uniform over shapes and delta lights, then by area, as `path` samples them
   kPower,     ///< in proportion to the power, the mean of its channels; uniform where none or an infinite one is known
+  kLearned,   ///< first as kPower; who learns from samples changes it by LightSet::change()
 };
 
-/// "triangle", "shape", "power".
+/// "triangle", "shape", "power", "learned".
 std::string name_of(LightSelection selection);
 
 /// One light: an emitter or a part of it, such as a triangle.
@@ -37,6 +38,10 @@ class LightSet {
   LightSet() = default;
   /// Throws Error(kInput) where there are more than 2^22 lights.
   LightSet(const Scene& scene, LightSelection selection);
+
+  /// Changes the probabilities to multiples of 2^-24 near the parts that `weights` have in their sum: finite, not
+  /// negative, one for each light, not all zero. A positive weight keeps a positive probability.
+  void change(const std::vector<double>& weights);
 
   uint32_t size() const { return static_cast<uint32_t>(lights_.size()); }
   bool empty() const { return lights_.empty(); }

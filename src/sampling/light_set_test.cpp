@@ -133,5 +133,17 @@ TEST(LightSet, IsEmptyWithAnEnvironmentAlone) {
   EXPECT_TRUE(LightSet(Scene(std::move(parts)), LightSelection::kPower).empty());
 }
 
+TEST(LightSet, TakesProbabilitiesFromElsewhere) {
+  const ManyLights many;
+  LightSet lights(*many.scene, LightSelection::kLearned);
+  std::vector<double> weights(lights.size(), 0);
+  weights[0] = 3, weights[lights.size() - 1] = 1;
+  lights.change(weights);
+  EXPECT_NEAR(lights[0].pmf, 0.75, 1e-6);
+  EXPECT_EQ(lights.select(0.5f), 0u);
+  EXPECT_EQ(lights.select(0.9f), lights.size() - 1);
+  EXPECT_EQ(lights[1].pmf, 0);
+}
+
 }  // namespace
 }  // namespace covary

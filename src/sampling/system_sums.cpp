@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sampling/system_sums.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/error.h"
@@ -91,6 +92,13 @@ void SystemSums::add_held_out(uint32_t cell, float weight, const Spectrum& plain
   }
 }
 
+void SystemSums::add_residual(uint32_t light, float weight, const Spectrum& residual) {
+  const double square = static_cast<double>(weight) * mean(residual * residual);
+  if (!std::isfinite(square)) return;
+  if (light_residuals_.size() <= light) light_residuals_.resize(light + 1);
+  light_residuals_[light] += square;
+}
+
 void SystemSums::merge(const SystemSums& other) {
   COVARY_CHECK(other.level_ <= level_ && other.layout_.n_dense == layout_.n_dense, "sums of other cells");
   std::vector<uint32_t> own_cell(other.n_cells());
@@ -104,6 +112,8 @@ void SystemSums::merge(const SystemSums& other) {
     rows_.resize(rows_index_.keys().size() * layout_.row_size());
     add_to(&rows_[size_t{number} * layout_.row_size()], other.row(i));
   }
+  light_residuals_.resize(std::max(light_residuals_.size(), other.light_residuals_.size()));
+  add_to(light_residuals_.data(), std::span(other.light_residuals_));
   n_rejected_ += other.n_rejected_;
 }
 
@@ -115,7 +125,7 @@ void SystemSums::scale_held_out(double factor) {
 
 void SystemSums::clear() {
   cells_.clear(), rows_index_.clear();
-  heads_.clear(), rows_.clear();
+  heads_.clear(), rows_.clear(), light_residuals_.clear();
   n_rejected_ = 0;
 }
 
@@ -134,7 +144,8 @@ std::span<const float> SystemSums::row(size_t row) const {
 }
 
 size_t SystemSums::bytes() const {
-  return cells_.bytes() + rows_index_.bytes() + heads_.capacity() * sizeof(double) + rows_.capacity() * sizeof(float);
+  return cells_.bytes() + rows_index_.bytes() + (heads_.capacity() + light_residuals_.capacity()) * sizeof(double) +
+         rows_.capacity() * sizeof(float);
 }
 
 }  // namespace covary

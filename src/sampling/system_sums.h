@@ -79,6 +79,12 @@ class SystemSums {
   /// Adds what a vertex tells about the coefficients in use: `plain`, the sum of its f/p, and `control`, the unscaled
   /// control added to it. The coefficients must not be made of this vertex.
   void add_held_out(uint32_t cell, float weight, const Spectrum& plain, const Spectrum& control);
+  /// Adds what is left of a sample's value after its control, for the light that could have taken it: the mean over RGB
+  /// of its square.
+  void add_residual(uint32_t light, float weight, const Spectrum& residual);
+  /// Σ w residual² of each light, the lights that were seen; those beyond its end have none.
+  std::span<const double> light_residuals() const { return light_residuals_; }
+  void forget_residuals() { light_residuals_.clear(); }
   /// Adds all sums of `other`, whose level is at most that of these.
   void merge(const SystemSums& other);
   /// Multiplies the sums of held-out vertices, with which older coefficients were judged.
@@ -104,6 +110,7 @@ class SystemSums {
   KeyIndex cells_, rows_index_;  // rows: cell number << 32 | light
   std::vector<double> heads_;
   std::vector<float> rows_;  // many: single precision, whose error lies far below that of the samples
+  std::vector<double> light_residuals_;
   uint64_t n_rejected_ = 0;
 };
 

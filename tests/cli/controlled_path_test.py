@@ -141,6 +141,13 @@ class TrainingFiles(CliTest):
         report = json.loads((self.path / "b.json").read_text())
         self.assertEqual((report["samples_per_pixel"], report["training_samples_per_pixel"]), (4, 0))
 
+    def test_keep_the_learned_probabilities_of_lights(self):
+        learned = (*RENDER, "--estimator", "none", "--cv-train", "8", "--lights", "learned")
+        self.good(*learned, "--spp", "12", "-o", "l.exr", "--save-training", "l.training")
+        self.good(*learned, "--spp", "4", "-o", "m.exr", "--load-training", "l.training")
+        trained, loaded = (read_exr((self.path / name).read_bytes()) for name in ("l.exr", "m.exr"))
+        self.assertEqual(trained["group00.G"], loaded["G"])
+
     def test_belong_to_scene_and_settings(self):
         wanted = ("--spp", "4", "-o", "b.exr", "--load-training", "a.training")
         self.bad(1, "a.training", *PLAIN, "--cv-grid", "9", *wanted)

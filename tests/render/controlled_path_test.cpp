@@ -244,6 +244,41 @@ TEST(ControlledPath, PixelsHaveOptimalWeightsOfTheirOwn) {
   EXPECT_EQ(integrator_of(scene).settings().pilot_spp(), 0u);
 }
 
+/// A bright light behind the ceiling, and a small one in the room.
+std::string hidden_light() {
+  return scene_text(
+      kFloor +
+          rectangle("<scale value='9'/><rotate x='1' angle='90'/><translate y='5' z='5'/>",
+                    "<bsdf type='twosided'><bsdf type='diffuse'/></bsdf>") +
+          sphere("x='0' y='7' z='5'", "<emitter type='area'><rgb name='radiance' value='50'/></emitter>") +
+          sphere("x='1' y='4.6' z='5'",
+                 "<float name='radius' value='0.3'/><emitter type='area'>"
+                 "<rgb name='radiance' value='20'/></emitter>"),
+      kSide, kSide, 2, kWide);
+}
+
+TEST(ControlledPath, LearnsHowToChooseLights) {
+  const TestScene power = with_coefficients(hidden_light(), false);
+  for (const ControlKind kind : {ControlKind::kOff, ControlKind::kRgb}) {
+    const TestScene learned = trained(hidden_light(), options(kind, LightSelection::kLearned));
+    EXPECT_GT(integrator_of(learned).lights()[1].pmf, 0.7) << name_of(kind);
+    EXPECT_LT(integrator_of(power).lights()[1].pmf, 0.1);
+    EXPECT_LT(noise(learned), 0.4 * noise(power));
+    EXPECT_EQ(n_biased(differences(learned, power, 16, 0)), 0);
+  }
+  for (const ControlKind kind : {ControlKind::kOff, ControlKind::kRgb, ControlKind::kVevoda})
+    EXPECT_EQ(n_biased(differences(trained(everything(), options(kind, LightSelection::kLearned)),
+                                   with_coefficients(everything(), false), 16, 100)),
+              0);
+  // Trained again it is as if nothing had been.
+  const TestScene scene = trained(hidden_light(), options(ControlKind::kRgb, LightSelection::kLearned));
+  const std::string description = scene.integrator().description();
+  const LoadedScene& l = scene.loaded;
+  EXPECT_TRUE(
+      train(scene.scene(), integrator_of(scene), {{l.crop_x, l.crop_y, l.crop_width, l.crop_height}, l.filter}));
+  EXPECT_EQ(scene.integrator().description(), description);
+}
+
 TEST(ControlledPath, TakesTheRaysOfThePlainEstimate) {
   const std::string no_roulette = everything("<integer name='rr_depth' value='100'/>");
   const TestScene off = with_coefficients(no_roulette, false), on = with_coefficients(no_roulette, true);
