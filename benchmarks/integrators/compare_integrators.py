@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Have two ways to render a scene the same expectation? And how much noise has each?
 
-    compare_integrators.py --scenes DIR [--first "--integrator path"] [--second "--integrator controlled-path"] [NAME...]
+    compare_integrators.py --scenes DIR [--first "--integrator path"] [--second "--integrator controlled-path"] [NAME]
 
 Renders every scene of DIR in a small frame with R seeds of each, and tests by Welch's t over the renders, not the
 pixels, whether the means of the image and of 8 x 8 blocks differ (../against_mitsuba/agreement.py). The noise is the
