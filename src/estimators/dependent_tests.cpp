@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "estimators/common_options.h"
+#include "estimators/least_error_mixture.h"
 #include "estimators/registry.h"
 
 namespace covary {
@@ -68,6 +69,38 @@ Image image_of(const Planes& planes) {
   return image;
 }
 
+/// v of least_error_mixture.h: variance of the independent image's means, by its own samples where these tell.
+Planes noise_of_means(const GroupedImage& crn, const GroupedImage& independent) {
+  Planes noise(crn.width, crn.height, 1, 0, 0);
+  parallel_for(crn.height, 8, [&](int y) {
+    for (int x = 0; x < crn.width; ++x) {
+      const bool tells = variance_freedom(independent, x, y) > 0;
+      const Spectrum variance = (tells ? independent : crn).sample_variance(x, y);
+      if (const uint32_t count = independent.count(x, y); count > 0)
+        noise.row(0, y)[x] = (variance.r + variance.g + variance.b) / static_cast<float>(count);
+    }
+  });
+  return noise;
+}
+
+/// Writes the mixture of least measured error where pixels have independent samples.
+void mix(const GroupedImage& crn, const GroupedImage& independent, const std::vector<unsigned char>& valid,
+         const DependentTestsOptions& options, const FilterInput& input, const FilteredImage& filtered,
+         const Planes* scale, Image& result) {
+  const Image dependent = image_of(input.dependent);
+  std::vector<MixtureCandidate> candidates = {{&dependent, nullptr}, {&filtered.colour, &filtered.centre_weight}};
+  std::optional<FilteredImage> narrow;
+  if (options.filter == DependentFilter::kExact && options.bound.window > 3) {
+    narrow.emplace(bound_filter(input, {3, options.bound.common_sigma}, scale));
+    candidates.push_back({&narrow->colour, &narrow->centre_weight});
+  }
+  const Image mixture =
+      least_error_mixture(input, noise_of_means(crn, independent), valid, candidates, options.measure_window);
+  for (int y = 0; y < crn.height; ++y)
+    for (int x = 0; x < crn.width; ++x)
+      if (input.count.row(0, y)[x] > 0) std::copy_n(mixture.pixel(x, y), 3, result.pixel(x, y));
+}
+
 void check(const GroupedImage& crn, const GroupedImage& independent, std::vector<std::string>& problems) {
   // Pixels may lack samples, which check_inputs() looks for where counts are given.
   GroupedImage without_counts[2] = {crn, independent};
@@ -102,6 +135,7 @@ std::vector<std::string> DependentTestsOptions::validate() const {
         fmt::format("min-centre-drop is {}, expected zero or a positive number", regions.min_centre_drop));
   check_window("window", bound.window, 3);
   check_window("sigma-window", smoothing, 1);
+  check_window("measure-window", measure_window, 3);
   if (guard != 0) check_window("guard-window", guard, 1);
   return problems;
 }
@@ -123,6 +157,8 @@ EstimatorResult dependent_tests(const GroupedImage& crn, const GroupedImage& ind
   FilteredImage filtered =
       exact ? bound_filter(input, options.bound, scale ? &*scale : nullptr) : region_filter(input, options.regions);
   result.estimate = combine(crn, input, filtered, options.weights);
+  if (options.weights == CombinationWeights::kMeasured)
+    mix(crn, independent, valid, options, input, filtered, scale ? &*scale : nullptr, result.estimate);
   fill_invalid(crn, independent, valid, result.estimate);
   if (!stages) return result;
   *stages = {{"dependent", image_of(input.dependent)},
@@ -137,9 +173,11 @@ EstimatorResult dependent_tests(const GroupedImage& crn, const GroupedImage& ind
 }
 
 int dependent_tests_reach(const DependentTestsOptions& options) {
-  const int smoothing = options.smoothing / 2;
-  if (options.filter == DependentFilter::kPaper) return options.regions.max_region / 2 + smoothing;
-  return std::max(options.bound.window / 2 + smoothing, options.guard / 2);
+  const bool paper = options.filter == DependentFilter::kPaper;
+  const int window = paper ? options.regions.max_region : options.bound.window;
+  const int filter = std::max(window / 2 + options.smoothing / 2, paper ? 0 : options.guard / 2);
+  const bool measured = options.weights == CombinationWeights::kMeasured;
+  return filter + (measured ? least_error_mixture_reach(options.measure_window) : 0);
 }
 
 Estimator make_dependent_tests(EstimatorParameters& parameters) {
@@ -147,7 +185,9 @@ Estimator make_dependent_tests(EstimatorParameters& parameters) {
                                                                          {"paper", DependentFilter::kPaper}};
   static constexpr std::pair<const char*, Pyramid> kPyramids[] = {{"side", Pyramid::kSide}, {"count", Pyramid::kCount}};
   static constexpr std::pair<const char*, CombinationWeights> kWeights[] = {
-      {"effective", CombinationWeights::kEffective}, {"counts", CombinationWeights::kCounts}};
+      {"measured", CombinationWeights::kMeasured},
+      {"effective", CombinationWeights::kEffective},
+      {"counts", CombinationWeights::kCounts}};
   static constexpr std::pair<const char*, VarianceSource> kSources[] = {{"both", VarianceSource::kBoth},
                                                                         {"dependent", VarianceSource::kDependent}};
   static constexpr std::pair<const char*, bool> kOwners[] = {{"centre", true}, {"each", false}};
@@ -175,7 +215,8 @@ Estimator make_dependent_tests(EstimatorParameters& parameters) {
   p.choice<Pyramid>("pyramid", o.regions.pyramid, kPyramids,
                     "Height of the pyramid: side of the region, or its pixels");
   p.choice<CombinationWeights>("weights", o.weights, kWeights,
-                               "Weight of the filtered image: samples it is worth, or has");
+                               "Mixture of the images: by measured error, worth, or samples");
+  p.whole("measure-window", o.measure_window, kWindowRange, "Side of the windows over which errors are measured");
   adaptive.counts.norm = o.norm;
   adaptive.counts.classes = o.filter == DependentFilter::kPaper;
   std::vector<std::string> problems = o.validate();

@@ -7,8 +7,8 @@
 // are alike, by weights that hold the balance between noise and distortion; the result is averaged with the CRN image.
 //
 // The defaults go beyond the paper, each an option: the weights that really minimise the error bound over a large
-// window (bound_filter.h), sigma from both passes and averaged over neighbours, an average with the CRN image by the
-// samples that each side is worth, and differences scaled up where the CRN image is darker than the independent one,
+// window (bound_filter.h), sigma from both passes and averaged over neighbours, a combination by measured errors
+// instead of numbers of samples (least_error_mixture.h), and differences scaled up where the CRN image is darker than the independent one,
 // because too few of its samples found the light. DependentTestsOptions::paper() has none of them.
 //
 // Claim: consistent with Filter::kExact, and biased for any number of samples: the filter distorts, and numbers of
@@ -32,6 +32,9 @@ enum class DependentFilter {
 enum class CombinationWeights {
   kCounts,     ///< n : N, the samples of the pixel in both images, [Csonka2002] Sec. 5
   kEffective,  ///< n : N_eff, the samples that the filtered mean is worth
+  /// Of the least error that is measured with the independent samples, least_error_mixture.h: of C_d, C_i, the filtered
+  /// image and, with kExact, the one filtered over 3 x 3 pixels.
+  kMeasured,
 };
 
 struct DependentTestsOptions {
@@ -39,12 +42,14 @@ struct DependentTestsOptions {
   Norm norm = Norm::kL1;
   RegionOptions regions;  ///< of kPaper
   BoundOptions bound;     ///< of kExact
-  CombinationWeights weights = CombinationWeights::kEffective;
+  CombinationWeights weights = CombinationWeights::kMeasured;
   VarianceSource variance = VarianceSource::kBoth;
   int smoothing = 7;  ///< side of the window over which sigma^2 is averaged, odd, 1 … 63
   /// Side of the window over which the brightness of both images is compared, odd, 1 … 63; 0: not compared. Only of
   /// kExact. Differences Delta are multiplied by the ratio where the independent image is brighter.
   int guard = 15;
+  /// Side of the window over which kMeasured measures errors, odd, 3 … 63.
+  int measure_window = 31;
 
   /// The published estimator with its published settings.
   static DependentTestsOptions paper();
@@ -68,6 +73,6 @@ EstimatorResult dependent_tests(const GroupedImage& crn, const GroupedImage& ind
 int dependent_tests_reach(const DependentTestsOptions& options);
 
 /// Memory that dependent_tests() takes beside its input, its result included: bytes per pixel, about.
-inline constexpr double kDependentTestsBytesPerPixel = 4.0 * (3 + 3 + 2 + 2 + 7 + 4) + 24;
+inline constexpr double kDependentTestsBytesPerPixel = 4.0 * (3 + 3 + 2 + 2 + 7 + 4 + 7 + 3 + 6) + 24;
 
 }  // namespace covary

@@ -269,7 +269,8 @@ TEST(DependentTests, CombinesByCountsOrByWorth) {
   independent.counts.assign(24 * 18, 8);
   independent.counts[5] = 4;
   for (const bool paper : {false, true}) {
-    const DependentTestsOptions options = paper ? DependentTestsOptions::paper() : DependentTestsOptions();
+    DependentTestsOptions options = paper ? DependentTestsOptions::paper() : DependentTestsOptions();
+    options.weights = paper ? CombinationWeights::kCounts : CombinationWeights::kEffective;
     DependentTestsStages stages;
     const EstimatorResult result = dependent_tests(crn.view(), independent.view(), options, &stages);
     EXPECT_EQ(result.estimate.data, stages.at("combined").data);
@@ -284,6 +285,41 @@ TEST(DependentTests, CombinesByCountsOrByWorth) {
         EXPECT_TRUE(std::abs(value - f) <= n / (n + N) * std::abs(d - f) + 1e-6) << "worth N or more";
     }
   }
+}
+
+/// A CRN image that is too bright in all its pixels alike, as its numbers are common to them, is left out.
+TEST(DependentTests, MeasuresTheErrorOfTheCrnImage) {
+  test::Grouped crn = test::crn_image(48, 40, 6, 1);
+  const test::Grouped independent = test::independent_image(48, 40, 12, 1);
+  for (float& value : crn.data) value *= 1.5f;
+  const auto mean_of = [](const EstimatorResult& result) {
+    return std::accumulate(result.estimate.data.begin(), result.estimate.data.end(), 0.0) /
+           static_cast<double>(result.estimate.data.size());
+  };
+  DependentTestsOptions by_worth;
+  by_worth.weights = CombinationWeights::kEffective;
+  const double measured = mean_of(dependent_tests(crn.view(), independent.view()));
+  const double worth = mean_of(dependent_tests(crn.view(), independent.view(), by_worth));
+  DependentTestsStages stages;
+  dependent_tests(crn.view(), independent.view(), {}, &stages);
+  double truth = 0;
+  for (const float value : stages.at("independent").data) truth += value / static_cast<double>(48 * 40 * 3);
+  EXPECT_LT(std::abs(measured - truth), 0.3 * std::abs(worth - truth));
+}
+
+/// A pixel without samples of its own is combined by what the filtered image is worth there.
+TEST(DependentTests, PixelsWithoutSamplesAreCombinedByWorth) {
+  const test::Grouped crn = test::crn_image(24, 18, 6, 1);
+  test::Grouped independent = test::independent_image(24, 18, 4, 1);
+  independent.counts.assign(24 * 18, 8);
+  independent.counts[100] = 0;
+  for (int i = 0; i < 12; ++i) independent.data[100 * 12 + i] = 0;
+  DependentTestsOptions by_worth;
+  by_worth.weights = CombinationWeights::kEffective;
+  const EstimatorResult measured = dependent_tests(crn.view(), independent.view());
+  const EstimatorResult worth = dependent_tests(crn.view(), independent.view(), by_worth);
+  EXPECT_EQ(measured.estimate.data[300], worth.estimate.data[300]);
+  EXPECT_NE(measured.estimate.data[303], worth.estimate.data[303]);
 }
 
 TEST(DependentTests, WithoutIndependentSamplesItIsTheCrnImage) {
@@ -339,16 +375,16 @@ TEST(DependentTests, HasTheSameBitsForAnyNumberOfThreads) {
 
 /// Rows farther away than the reach change nothing.
 TEST(DependentTests, LooksNoFartherThanItsReach) {
-  const test::Grouped crn = test::crn_image(20, 60, 3, 5);
-  test::Grouped independent = test::independent_image(20, 60, 3, 5);
+  const test::Grouped crn = test::crn_image(20, 90, 3, 5);
+  const test::Grouped independent = test::independent_image(20, 90, 3, 5);
   for (const DependentTestsOptions& options : {DependentTestsOptions(), DependentTestsOptions::paper()}) {
     const EstimatorResult whole = dependent_tests(crn.view(), independent.view(), options);
-    const int first = 30 - dependent_tests_reach(options), rows = 2 * dependent_tests_reach(options) + 1;
+    const int first = 45 - dependent_tests_reach(options), rows = 2 * dependent_tests_reach(options) + 1;
     const auto part = [&](const test::Grouped& image) {
       return GroupedImage{20, rows, image.groups, image.view().pixel(0, first)};
     };
     const EstimatorResult band = dependent_tests(part(crn), part(independent), options);
-    for (int x = 0; x < 20; ++x) EXPECT_EQ(band.estimate.pixel(x, 30 - first)[0], whole.estimate.pixel(x, 30)[0]);
+    for (int x = 0; x < 20; ++x) EXPECT_EQ(band.estimate.pixel(x, 45 - first)[0], whole.estimate.pixel(x, 45)[0]);
   }
 }
 
@@ -376,8 +412,9 @@ TEST(DependentTests, SaysWhatIsWrong) {
   options.regions.min_centre_drop = -1;
   options.bound.window = 4;
   options.smoothing = 2;
+  options.measure_window = 1;
   const std::string text = message_of([&] { dependent_tests(crn.view(), crn.view(), options); });
-  for (const char* part : {"min-centre-drop is -1", "window is 4", "sigma-window is 2"})
+  for (const char* part : {"min-centre-drop is -1", "window is 4", "sigma-window is 2", "measure-window is 1"})
     EXPECT_TRUE(contains(text, part));
 }
 

@@ -21,14 +21,8 @@ Spectrum mean_of(const GroupedImage& image, int x, int y) {
   return {static_cast<float>(sum[0] * scale), static_cast<float>(sum[1] * scale), static_cast<float>(sum[2] * scale)};
 }
 
-/// Samples beyond the first, each of which tells of the variance; as many as groups where these alone tell.
-double freedom(const GroupedImage& image, int x, int y) {
-  const double count = image.count(x, y);
-  return std::max(0.0, (image.variance_in_groups ? count : std::min<double>(count, image.groups)) - 1);
-}
-
 float pooled_variance(const GroupedImage& a, const GroupedImage& b, int x, int y, Norm norm) {
-  const double of_a = freedom(a, x, y), of_b = freedom(b, x, y);
+  const double of_a = variance_freedom(a, x, y), of_b = variance_freedom(b, x, y);
   if (of_a + of_b <= 0) return 0;
   const double sum =
       of_a * scalar_variance(norm, a.sample_variance(x, y)) + of_b * scalar_variance(norm, b.sample_variance(x, y));
@@ -36,6 +30,11 @@ float pooled_variance(const GroupedImage& a, const GroupedImage& b, int x, int y
 }
 
 }  // namespace
+
+double variance_freedom(const GroupedImage& image, int x, int y) {
+  const double count = image.count(x, y);
+  return std::max(0.0, (image.variance_in_groups ? count : std::min<double>(count, image.groups)) - 1);
+}
 
 Planes mean_planes(const GroupedImage& image, const std::vector<unsigned char>& valid, int border, float outside) {
   Planes planes(image.width, image.height, 3, border, outside);

@@ -26,6 +26,10 @@ struct FilterInput {
 /// sigma^2 from the samples of the CRN image, or of both images weighted by their degrees of freedom.
 enum class VarianceSource { kDependent, kBoth };
 
+/// Degrees of freedom of GroupedImage::sample_variance(): samples beyond the first where these tell of the variance,
+/// otherwise groups beyond the first.
+double variance_freedom(const GroupedImage& image, int x, int y);
+
 /// `smoothing`: side of the window over which sigma^2 is averaged, odd; 1: not at all.
 FilterInput filter_input(const GroupedImage& crn, const GroupedImage& independent,
                          const std::vector<unsigned char>& valid, Norm norm, VarianceSource source, int smoothing,

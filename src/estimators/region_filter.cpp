@@ -10,17 +10,18 @@
 namespace covary {
 namespace {
 
-constexpr int kMaxSide = 63;
+using namespace lanes;
 
 /// A pixel of the largest square, relative to its centre, in the order in which growing squares reach it.
 struct Place {
   int dx, dy;
   float distance;
+  float side;  ///< of the smallest square that has it
 };
 
 /// The pixels that the square of side m adds to that of side m - 1 are [first[m - 1], first[m]).
 struct Places {
-  std::vector<Place> list{{0, 0, 0}};
+  std::vector<Place> list{{0, 0, 0, 1}};
   std::vector<size_t> first{0, 1};
 
   explicit Places(int max_side) {
@@ -29,124 +30,157 @@ struct Places {
       for (int dy = low; dy <= high; ++dy)
         for (int dx = low; dx <= high; ++dx) {
           if (dx >= before_low && dx <= before_high && dy >= before_low && dy <= before_high) continue;
-          list.push_back({dx, dy, std::sqrt(static_cast<float>(dx * dx + dy * dy))});
+          list.push_back({dx, dy, std::sqrt(static_cast<float>(dx * dx + dy * dy)), static_cast<float>(m)});
         }
       first.push_back(list.size());
     }
   }
 };
 
-/// The pixels of a region so far.
+/// A region of each lane: side m, pixels M inside the frame, sum of their Delta.
 struct Region {
-  int size = 0;
-  float sum_of_differences = 0;
-  float difference[kMaxSide * kMaxSide];
-  const Place* place[kMaxSide * kMaxSide];
+  vfloat side = splat(1), size = splat(1), differences{};
 };
 
 /// Weights before they are divided by their sum.
 struct Kernel {
-  float slope, offset, height;  // f = offset - slope * difference, d = height - distance
+  vfloat slope, offset, height;  // f = offset - slope * Delta, d = height - distance
 
-  Kernel(const Region& region, float deviation, int side, Pyramid pyramid) {
-    const auto M = static_cast<float>(region.size);
-    slope = 1 / (deviation * std::sqrt(M));  // sqrt(N) / (3 sigma sqrt(M))
-    offset = 1 / M + slope * region.sum_of_differences / M;
-    height = static_cast<float>(pyramid == Pyramid::kSide ? side : region.size) * std::sqrt(0.5f);
-  }
-  float weight(const Region& region, int i) const {
-    return std::max(0.0f, offset - slope * region.difference[i]) * std::max(0.0f, height - region.place[i]->distance);
-  }
-  float sum(const Region& region) const {
-    float total = 0;
-    for (int i = 0; i < region.size; ++i) total += weight(region, i);
-    return total;
+  Kernel(const Region& region, vfloat deviation, Pyramid pyramid)
+      : slope(1.0f / (deviation * sqrt(region.size))),  // sqrt(N) / (3 sigma sqrt(M))
+        offset(1.0f / region.size + slope * region.differences / region.size),
+        height((pyramid == Pyramid::kSide ? region.side : region.size) * std::sqrt(0.5f)) {}
+
+  vfloat weight(vfloat difference, float distance) const {
+    return max(offset - slope * difference, splat(0)) * max(height - distance, splat(0));
   }
 };
 
-class RegionFilter {
- public:
-  RegionFilter(const FilterInput& input, const RegionOptions& options)
-      : input_(input), options_(options), places_(options.max_region) {}
+bool any(vint mask) {
+  int32_t all = 0;
+  for (int l = 0; l < kLanes; ++l) all |= mask[l];
+  return all != 0;
+}
 
-  /// The pixel (x, y), with `region` to work in.
-  void apply(int x, int y, Region& region, FilteredImage& result) const {
-    const float count = input_.count.row(0, y)[x], variance = input_.variance.row(0, y)[x];
-    region.size = 0;
-    region.sum_of_differences = 0;
-    add(1, x, y, count, region);
-    const float deviation = 3 * std::sqrt(variance / count);
-    int side = 1, size = 1;
-    float sum_of_differences = 0, centre_weight = 1;
-    for (int m = 2; m <= options_.max_region && count > 0 && deviation > 0 && add(m, x, y, count, region); ++m) {
-      const Kernel kernel(region, deviation, m, options_.pyramid);
-      const float weight = kernel.weight(region, 0) / kernel.sum(region);
-      if (!(centre_weight - weight >= options_.min_centre_drop)) break;
-      side = m, size = region.size, sum_of_differences = region.sum_of_differences, centre_weight = weight;
-    }
-    region.size = size, region.sum_of_differences = sum_of_differences;
-    write(x, y, side, region, result);
+/// The regions of kLanes pixels next to each other.
+class RegionBatch {
+ public:
+  RegionBatch(const FilterInput& input, const RegionOptions& options, const Places& places)
+      : input_(input),
+        options_(options),
+        places_(places),
+        differences_(places.list.size()),
+        inside_(places.list.size(), splat(1)) {
+    for (int l = 0; l < kLanes; ++l) lane_[l] = l;
+  }
+
+  /// Writes the first n pixels of the batch at (x, y).
+  void apply(int x, int y, int n, FilteredImage& result) {
+    x_ = x, y_ = y;
+    count_ = load(input_.count.row(0, y) + x);
+    variance_ = load(input_.variance.row(0, y) + x);
+    deviation_ = 3.0f * sqrt(variance_ / count_);
+    write(grown(), n, result);
   }
 
  private:
-  /// Adds the pixels that side m adds and that lie inside the frame. False where one of them has another class.
-  bool add(int m, int x, int y, float count, Region& region) const {
-    const float centre[3] = {input_.dependent.row(0, y)[x], input_.dependent.row(1, y)[x],
-                             input_.dependent.row(2, y)[x]};
-    for (size_t i = places_.first[m - 1]; i < places_.first[m]; ++i) {
-      const Place& place = places_.list[i];
-      const int qx = x + place.dx, qy = y + place.dy;
-      if (qx < 0 || qy < 0 || qx >= input_.width() || qy >= input_.height()) continue;
-      if (input_.count.row(0, qy)[qx] != count) return false;
-      const Spectrum difference(input_.dependent.row(0, qy)[qx] - centre[0],
-                                input_.dependent.row(1, qy)[qx] - centre[1],
-                                input_.dependent.row(2, qy)[qx] - centre[2]);
-      region.difference[region.size] = length(input_.norm, difference);
-      region.place[region.size] = &place;
-      region.sum_of_differences += region.difference[region.size];
-      ++region.size;
+  /// Lets regions grow while pixels are of one class and the weight of the centre falls enough.
+  Region grown() {
+    Region region, accepted;
+    vfloat centre_weight = splat(1);
+    vint grows = (count_ > splat(0)) & (deviation_ > splat(0));
+    for (int m = 2; m <= options_.max_region && any(grows); ++m) {
+      grows &= ~add_places(m, region);
+      if (!any(grows)) break;
+      const Kernel kernel(region, deviation_, options_.pyramid);
+      vfloat sum{};
+      for (size_t i = 0; i < places_.first[m]; ++i)
+        sum += inside_[i] * kernel.weight(differences_[i], places_.list[i].distance);
+      const vfloat weight = kernel.weight(splat(0), 0) / sum;
+      grows &= centre_weight - weight >= splat(options_.min_centre_drop);
+      accepted.side = grows ? region.side : accepted.side;
+      accepted.size = grows ? region.size : accepted.size;
+      accepted.differences = grows ? region.differences : accepted.differences;
+      centre_weight = grows ? weight : centre_weight;
     }
-    return true;
+    return accepted;
   }
 
-  void write(int x, int y, int side, const Region& region, FilteredImage& result) const {
-    const float count = input_.count.row(0, y)[x], variance = input_.variance.row(0, y)[x];
-    result.region.pixel(x, y)[0] = static_cast<float>(region.size);
-    result.centre_weight.pixel(x, y)[0] = 1;
-    float squares = 1, colour[3], distortion = 0;
-    for (int c = 0; c < 3; ++c) colour[c] = input_.independent.row(c, y)[x];
-    if (side > 1) {
-      const Kernel kernel(region, 3 * std::sqrt(variance / count), side, options_.pyramid);
-      const float scale = 1 / kernel.sum(region);
-      squares = colour[0] = colour[1] = colour[2] = 0;
-      for (int i = 0; i < region.size; ++i) {
-        const float weight = scale * kernel.weight(region, i);
-        for (int c = 0; c < 3; ++c)
-          colour[c] += weight * input_.independent.row(c, y + region.place[i]->dy)[x + region.place[i]->dx];
-        squares += weight * weight;
-        distortion += weight * region.difference[i];
-      }
-      result.centre_weight.pixel(x, y)[0] = scale * kernel.weight(region, 0);
+  /// Adds the pixels that side m adds and that lie inside the frame. Says where one of them has another class.
+  vint add_places(int m, Region& region) {
+    const Planes& d = input_.dependent;
+    const vfloat r = load(d.row(0, y_) + x_), g = load(d.row(1, y_) + x_), b = load(d.row(2, y_) + x_);
+    vint differs{};
+    region.side = splat(static_cast<float>(m));
+    for (size_t i = places_.first[m - 1]; i < places_.first[m]; ++i) {
+      const int qx = x_ + places_.list[i].dx, qy = y_ + places_.list[i].dy;
+      const vint column = lane_ + qx;
+      const vint inside = (column >= splat_int(0)) & (column < splat_int(input_.width())) &
+                          splat_int(qy >= 0 && qy < input_.height() ? -1 : 0);
+      const vfloat dr = load(d.row(0, qy) + qx) - r, dg = load(d.row(1, qy) + qx) - g, db = load(d.row(2, qy) + qx) - b;
+      const vfloat length =
+          input_.norm == Norm::kL1 ? max(dr, -dr) + max(dg, -dg) + max(db, -db) : sqrt(dr * dr + dg * dg + db * db);
+      differs |= inside & (load(input_.count.row(0, qy) + qx) != count_);
+      inside_[i] = inside ? splat(1) : splat(0);
+      differences_[i] = inside ? length : splat(0);
+      region.size += inside_[i];
+      region.differences += differences_[i];
     }
-    std::copy_n(colour, 3, result.colour.pixel(x, y));
-    result.bound.pixel(x, y)[0] =
-        count > 0 ? 3 * std::sqrt(variance / count * squares) + distortion : std::numeric_limits<float>::infinity();
-    result.effective_samples.pixel(x, y)[0] = count / squares;
+    return differs;
+  }
+
+  void write(const Region& region, int n, FilteredImage& result) const {
+    const Kernel kernel(region, deviation_, options_.pyramid);
+    float side = 1;
+    for (int l = 0; l < n; ++l) side = std::max(side, region.side[l]);
+    const size_t last = places_.first[static_cast<size_t>(side)];
+    const auto weight_of = [&](size_t i) {
+      const Place& place = places_.list[i];
+      const vfloat weight = inside_[i] * kernel.weight(differences_[i], place.distance);
+      return splat(place.side) <= region.side ? weight : splat(0);
+    };
+    vfloat sum{}, squares{}, distortion{}, colour[3] = {};
+    for (size_t i = 0; i < last; ++i) sum += weight_of(i);
+    for (size_t i = 0; i < last; ++i) {
+      const vfloat weight = weight_of(i) / sum;
+      const int qx = x_ + places_.list[i].dx, qy = y_ + places_.list[i].dy;
+      for (int c = 0; c < 3; ++c) colour[c] += weight * load(input_.independent.row(c, qy) + qx);
+      squares += weight * weight;
+      distortion += weight * differences_[i];
+    }
+    const vint alone = region.side <= splat(1);
+    for (int c = 0; c < 3; ++c) colour[c] = alone ? load(input_.independent.row(c, y_) + x_) : colour[c];
+    squares = alone ? splat(1) : squares;
+    distortion = alone ? splat(0) : distortion;
+    const vfloat centre = alone ? splat(1) : kernel.weight(splat(0), 0) / sum;
+    const vfloat bound = count_ > splat(0) ? 3.0f * sqrt(variance_ / count_ * squares) + distortion
+                                           : splat(std::numeric_limits<float>::infinity());
+    for (int l = 0; l < n; ++l) {
+      for (int c = 0; c < 3; ++c) result.colour.pixel(x_ + l, y_)[c] = colour[c][l];
+      result.region.pixel(x_ + l, y_)[0] = region.size[l];
+      result.centre_weight.pixel(x_ + l, y_)[0] = centre[l];
+      result.bound.pixel(x_ + l, y_)[0] = bound[l];
+      result.effective_samples.pixel(x_ + l, y_)[0] = count_[l] / squares[l];
+    }
   }
 
   const FilterInput& input_;
   const RegionOptions& options_;
-  Places places_;
+  const Places& places_;
+  int x_ = 0, y_ = 0;
+  vint lane_{};
+  vfloat count_{}, variance_{}, deviation_{};
+  std::vector<vfloat> differences_, inside_;  ///< Delta of the places so far; 1 inside the frame, otherwise 0
 };
 
 }  // namespace
 
 FilteredImage region_filter(const FilterInput& input, const RegionOptions& options) {
-  const RegionFilter filter(input, options);
+  const Places places(options.max_region);
   FilteredImage result(input.width(), input.height());
   parallel_for(input.height(), 4, [&](int y) {
-    thread_local Region region;
-    for (int x = 0; x < input.width(); ++x) filter.apply(x, y, region, result);
+    RegionBatch batch(input, options, places);
+    for (int x = 0; x < input.width(); x += kLanes) batch.apply(x, y, std::min(kLanes, input.width() - x), result);
   });
   return result;
 }

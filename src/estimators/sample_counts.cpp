@@ -15,7 +15,8 @@ namespace {
 
 constexpr uint32_t kMost = 1u << 30;  // samples of any pixel
 constexpr double kOffset = 0.01;      // of squared brightness
-constexpr double kLeastShare = 0.5, kLargestShare = 4;
+constexpr double kLeastShare = 0.7, kLargestShare = 2;
+constexpr double kDamping = 0.5;  // power of the relative deviation that least-error is proportional to
 constexpr int kBisections = 60;
 
 /// Rounding up must not follow from the last bits of a power or a logarithm.
@@ -28,20 +29,32 @@ struct Demand {
   double for_error = 0;  ///< factor that leads to the relative error, where one is given
 };
 
-/// (3 sigma)^2 / |C|^2 of each pixel, with `offset` added to |C|^2.
-std::vector<double> squared_errors(const GroupedImage& image, const CountOptions& options, double offset) {
+/// Brightness |C| of each pixel.
+Planes brightness(const FilterInput& input) {
+  Planes plane(input.width(), input.height(), 1, 0, 0);
+  for (int y = 0; y < input.height(); ++y)
+    for (int x = 0; x < input.width(); ++x)
+      plane.row(0, y)[x] = length(
+          input.norm, {input.dependent.row(0, y)[x], input.dependent.row(1, y)[x], input.dependent.row(2, y)[x]});
+  return plane;
+}
+
+/// (3 sigma)^2 / |C|^2 of each pixel; other allocations than equal-error average |C|, too, and add 0.01 to its square.
+std::vector<double> squared_errors(const GroupedImage& image, const CountOptions& options) {
   long n_nonfinite = 0;
   const std::vector<unsigned char> valid = finite_pixels(image, image, n_nonfinite);
   const FilterInput input =
       filter_input(image, image, valid, options.norm, VarianceSource::kDependent, options.smoothing, 0);
+  const bool exact = options.allocation == Allocation::kEqualError;
+  Planes means = brightness(input);
+  if (!exact) means = box_mean(means, valid, options.smoothing, 0, 0);
   std::vector<double> errors(valid.size());
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x) {
       const size_t pixel = static_cast<size_t>(y) * image.width + x;
-      const double variance = 9.0 * input.variance.row(0, y)[x];
+      const double variance = 9.0 * input.variance.row(0, y)[x], mean = means.row(0, y)[x];
       if (!valid[pixel] || variance <= 0) continue;
-      const Spectrum mean(input.dependent.row(0, y)[x], input.dependent.row(1, y)[x], input.dependent.row(2, y)[x]);
-      errors[pixel] = variance / std::max(std::pow(static_cast<double>(length(options.norm, mean)), 2) + offset, 1e-30);
+      errors[pixel] = variance / std::max(mean * mean + (exact ? 0 : kOffset), 1e-30);
     }
   return errors;
 }
@@ -60,14 +73,14 @@ Demand demand_of(const GroupedImage& image, const CountOptions& options) {
   const double error = options.relative_error.value_or(1), per_error = 1 / (error * error);
   Demand demand;
   if (options.allocation == Allocation::kEqualError) {
-    demand.of_pixel = squared_errors(image, options, 0);
+    demand.of_pixel = squared_errors(image, options);
     if (options.first_pass_counts) demand.already = mean_count(image);
     demand.for_error = per_error;
     return demand;
   }
-  std::vector<double> errors = squared_errors(image, options, kOffset);
+  std::vector<double> errors = squared_errors(image, options);
   const double mean_square = mean_of(errors);
-  for (double& e : errors) e = options.allocation == Allocation::kUniform ? 1 : std::sqrt(e);
+  for (double& e : errors) e = options.allocation == Allocation::kUniform ? 1 : std::pow(e, kDamping / 2);
   if (const double mean = mean_of(errors); mean > 0)
     for (double& e : errors) e = std::clamp(e / mean, kLeastShare, kLargestShare);
   else

@@ -3,8 +3,10 @@
 //
 //   equal-error   all pixels the same relative error eps, [Csonka2002] Sec. 5: N = (3 sigma / (eps |C|))^2 - n, n being
 //                 the samples of the first pass. Dark and noisy pixels take nearly everything.
-//   least-error   the least sum of squared relative errors for a number of samples: N in proportion to
-//                 sigma / sqrt(|C|^2 + 0.01), at least half and at most 4 times its mean.
+//   least-error   towards the least sum of squared relative errors for a number of samples, which would be N in
+//                 proportion to e = sigma / sqrt(|C|^2 + 0.01). As e is known from few samples, whose errors are
+//                 common to neighbours, and C is dark where sigma is missed: N in proportion to sqrt(e), with |C| and
+//                 sigma^2 averaged over neighbours, at least 0.7 and at most twice its mean.
 //   uniform       all pixels the same.
 //
 // With a relative error, `equal-error` has it in every pixel, and the others on average: the root of the mean of
@@ -36,7 +38,8 @@ struct CountOptions {
   std::optional<int> max_spp;           ///< and at most, >= min_spp and 1; default: no limit
   bool classes = false;                 ///< round up to classes
   bool first_pass_counts = true;        ///< its samples are part of the image
-  int smoothing = 7;                    ///< side of the window over which sigma^2 is averaged, odd, 1 … 63
+  /// Side of the window over which sigma^2, and |C| of kLeastError, are averaged, odd, 1 … 63.
+  int smoothing = 7;
 
   /// Everything that is wrong with the options; empty if nothing is.
   std::vector<std::string> validate() const;

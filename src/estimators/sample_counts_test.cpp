@@ -96,13 +96,13 @@ TEST(SampleCounts, EqualErrorIsThePublishedFormula) {
   }
 }
 
-TEST(SampleCounts, LeastErrorIsProportionalToRelativeDeviation) {
+TEST(SampleCounts, LeastErrorIsProportionalToTheRootOfRelativeDeviation) {
   const test::Grouped image = noisy_first_pass();
   const std::vector<uint32_t> counts = sample_counts(image.view(), 10000, options_of(Allocation::kLeastError));
   const auto ratio = [&](int p) {
     const float* v = image.view().pixel(p % kWidth, p / kWidth);
     const double C = 1.5 * (double{v[0]} + v[3]), sigma = 3 * std::abs(double{v[0]} - v[3]) / std::sqrt(2.0);
-    return sigma / std::sqrt(C * C + 0.01);
+    return std::sqrt(sigma / std::sqrt(C * C + 0.01));
   };
   std::vector<double> shares;
   for (int p = 0; p < kWidth * kHeight; ++p) shares.push_back(ratio(p));
@@ -110,7 +110,7 @@ TEST(SampleCounts, LeastErrorIsProportionalToRelativeDeviation) {
     return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
   };
   const double mean_ratio = mean_of(shares);
-  for (double& share : shares) share = std::clamp(share / mean_ratio, 0.5, 4.0);
+  for (double& share : shares) share = std::clamp(share / mean_ratio, 0.7, 2.0);
   const double mean_share = mean_of(shares);
   for (size_t p = 0; p < counts.size(); ++p)
     EXPECT_NEAR(counts[p], 10000 * shares[p] / mean_share, 2 + 1e-4 * counts[p]) << p;
