@@ -8,8 +8,8 @@
 //
 // The defaults go beyond the paper, each an option: the weights that really minimise the error bound over a large
 // window (bound_filter.h), sigma from both passes and averaged over neighbours, a combination by measured errors
-// instead of numbers of samples (least_error_mixture.h), and differences scaled up where the CRN image is darker than the independent one,
-// because too few of its samples found the light. DependentTestsOptions::paper() has none of them.
+// instead of numbers of samples (least_error_mixture.h), and differences scaled up where the CRN image is darker than
+// the independent one, because too few of its samples found the light. DependentTestsOptions::paper() has none of them.
 //
 // Claim: consistent with Filter::kExact, and biased for any number of samples: the filter distorts, and numbers of
 // samples that follow from an image that is averaged in favour its low values.
