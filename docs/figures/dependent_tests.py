@@ -95,7 +95,8 @@ def stages(scene, number, folder):
         scene.row(step, step)
     scene.render("exact", *BDPT, *METHOD, "--spp", 100, "--dependent-spp", 50)
     scene.row("default instead of `--paper`", "exact")
-    sheet(folder / f"dependent-tests-{number}.jpg", [scene.panel(s, s) for s in steps] + [scene.panel("default", "exact")])
+    panels = [scene.panel(step, step) for step in steps]
+    sheet(folder / f"dependent-tests-{number}.jpg", [*panels, scene.panel("default", "exact")])
 
 
 def figure3(kitchen, folder):
@@ -169,7 +170,8 @@ def main():
         figure3(crop, folder)
         figure4(crop, folder)
         first_samples(box)
-        figure5(Scene(covary, at, "small", ROOT / "scenes/box.xml", "--resolution", "28x28", reference_spp=8192), folder)
+        small = Scene(covary, at, "small", ROOT / "scenes/box.xml", "--resolution", "28x28", reference_spp=8192)
+        figure5(small, folder)
 
 
 if __name__ == "__main__":
