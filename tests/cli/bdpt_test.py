@@ -54,6 +54,15 @@ class Bdpt(CliTest):
                  "light")
         self.bad(2, "no light part", "render", "path.xml", *output, "--sampling", "crn", "--crn-part", "light")
 
+    def test_scenes_without_light_are_black(self):
+        (self.path / "scene.xml").write_text(re.sub(r"<emitter.*?</emitter>", "", SCENE).replace('value="off"',
+                                                                                              'value="auto"'))
+        for options in ((), ("--light-tracing", "on"), ("--estimator", "none", "--adaptive"), ("--adaptive",),
+                        ("--estimator", "dependent-tests"), ("--estimator", "dependent-tests", "--paper"),
+                        ("--estimator", "dependent-tests", "--relative-error", "0.1", "--max-spp", "9")):
+            self.good("render", "scene.xml", "-o", "a.exr", "--spp", "16", "--quiet", "--no-preview", *options)
+            self.assertEqual({v for channel in self.pixels("a.exr") for v in channel}, {0.0}, options)
+
     def test_images_of_techniques(self):
         whole = self.render("a.exr", "--spp", "4", "--debug-strategies", "techniques")
         names = {path.name for path in (self.path / "techniques").iterdir()}
