@@ -81,7 +81,8 @@ def main():
     options = parser.parse_args()
     options.resolution = tuple(map(int, options.resolution.split("x")))
     mi.set_variant(options.variant)
-    print("| scene | path | IICV | gain, equal samples | gain, equal time | covary's own gain |\n|---|---|---|---|---|---|")
+    print("| scene | path | IICV | gain, equal samples | gain, equal time | covary's own gain |\n"
+          "|---|---|---|---|---|---|")
     for file in options.scenes:
         plain, ours, same_time, longer = mitsuba_gains(load(file, *options.resolution), options)
         name = Path(file).parent.name if Path(file).stem.startswith("scene") else Path(file).stem

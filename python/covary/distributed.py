@@ -223,8 +223,8 @@ def render(client: Any, scene: Scene | str | os.PathLike[str], spp: int, estimat
         raise UsageError(f"estimator '{estimator}' looks at other pixels or samples while it renders; on a cluster "
                          f"accepted are {', '.join(_ESTIMATORS)}")
     if tile < 1 or sample_ranges < 1 or spp % sample_ranges:
-        raise UsageError(f"found tile {tile} and {spp} samples in {sample_ranges} ranges; tiles have one pixel or more, "
-                         "and the ranges divide the samples")
+        raise UsageError(f"found tile {tile} and {spp} samples in {sample_ranges} ranges; tiles have one pixel or "
+                         "more, and the ranges divide the samples")
     chosen = scene if isinstance(scene, Scene) else Scene.load(scene)
     if chosen.integrator not in ("path", ""):
         raise UsageError(f"the integrator '{chosen.integrator}' trains or traces light over the whole frame; on a "

@@ -46,8 +46,8 @@ def _module() -> Any:
         raise UsageError("no variant of Mitsuba is chosen; call mitsuba.set_variant() with one of "
                          f"{', '.join(vectorised)} first")
     if variant not in vectorised:
-        raise UsageError(f"the variant '{variant}' of Mitsuba takes samples one by one, which a sampler in Python is too "
-                         f"slow for; accepted are {', '.join(vectorised)}")
+        raise UsageError(f"the variant '{variant}' of Mitsuba takes samples one by one, which a sampler in Python is "
+                         f"too slow for; accepted are {', '.join(vectorised)}")
     return mitsuba
 
 
@@ -139,8 +139,8 @@ def _integrator(mi: Any, scene: Any, given: Any) -> Any:
         integrator = mi.load_dict({"type": integrator})
     name = type(integrator).__name__
     if isinstance(integrator, mi.AdjointIntegrator):
-        raise UsageError(f"the integrator {name} follows light to pixels anywhere, so that no random numbers belong to a "
-                         "pixel; accepted are integrators that begin at the camera, such as path")
+        raise UsageError(f"the integrator {name} follows light to pixels anywhere, so that no random numbers belong to "
+                         "a pixel; accepted are integrators that begin at the camera, such as path")
     if ".ad" in type(integrator).__module__ or name.lower().startswith("prb"):
         raise UsageError(f"the integrator {name} is made for derivatives, which the combination of two images does not "
                          "have; use path or another one for images")
@@ -172,8 +172,8 @@ def _check_sensor(sensor: Any) -> list[str]:
     rfilter = type(sensor.film().rfilter()).__name__
     if "Box" in repr(sensor.film().rfilter()):
         return []
-    return [f"the film's filter {rfilter} was replaced by a box one pixel wide, because a wider one mixes the errors of "
-            "neighbouring pixels, which control variates take for independent"]
+    return [f"the film's filter {rfilter} was replaced by a box one pixel wide, because a wider one mixes the errors "
+            "of neighbouring pixels, which control variates take for independent"]
 
 
 def render(scene: Any, spp: int, seed: int = 0, integrator: Any = None, sensor: int = 0, *, groups: int = 12,
@@ -204,8 +204,8 @@ def render(scene: Any, spp: int, seed: int = 0, integrator: Any = None, sensor: 
     chosen = _integrator(mi, loaded, integrator)
     count = spp // 2
     if spp % 2 or count < 3 or groups < 3:
-        raise UsageError(f"found {spp} samples per pixel in {groups} groups; an even number, 6 or more, and 3 groups or "
-                         "more are needed: half of the samples have common random numbers")
+        raise UsageError(f"found {spp} samples per pixel in {groups} groups; an even number, 6 or more, and 3 groups "
+                         "or more are needed: half of the samples have common random numbers")
     groups = min(groups, count)
 
     started = time.perf_counter()
@@ -239,8 +239,8 @@ def _film(mi: Any, scene: Any, camera: Any, integrator: Any, sampling: str, coun
     for group in range(groups):
         size = count // groups + (group < count % groups)
         if width * height * size >= _MOST_LANES:
-            raise UsageError(f"{width} x {height} pixels with {size} samples in a group are more than Mitsuba traces at "
-                             f"once; use more groups than {groups}")
+            raise UsageError(f"{width} x {height} pixels with {size} samples in a group are more than Mitsuba traces "
+                             f"at once; use more groups than {groups}")
         common = {"type": "covary_common_numbers", "pixels": width * height, "first": first, "sample_count": size}
         around = _around(mi, camera, common if sampling == "crn" else {"type": "independent", "sample_count": size})
         number = 2 * seed if sampling == "crn" else (2 * seed + 1) * 4096 + group
