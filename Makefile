@@ -12,6 +12,8 @@
 #   make lint             formatting, static analysis, rules of the tree    ALL=1 analyses all files, not changed ones
 #   make install          build for every x86-64 processor (docs/library.md) and install under PREFIX (default
 #                         /usr/local); ARCH=native builds for this machine alone, in a third of the time
+#   make wheel            the Python package as a wheel for every x86-64 processor, and its sources, in dist/
+#                         (docs/python.md); ARCH=native for machines like this alone
 #   make asan|ubsan|tsan  build and run the tests under a sanitizer
 #   make dev|clang        the same with checks of the standard library; by Clang
 #   make clean            remove build/ and out/
@@ -32,7 +34,7 @@ CONFIGURE = -DCOVARY_ARCH=$(ARCH) -DCOVARY_WERROR=$(WERROR)
 # Install for every processor unless ARCH was given.
 INSTALL = $(if $(filter file,$(origin ARCH)),portable,release)
 
-.PHONY: all setup configure build demo test check nightly bench lint install dev clang asan ubsan tsan clean
+.PHONY: all setup configure build demo test check nightly bench lint install wheel dev clang asan ubsan tsan clean
 all: build
 
 setup:
@@ -76,6 +78,9 @@ install: setup
 	@cmake --build build/$(INSTALL) -j $(JOBS) --target covary
 	@cmake --install build/$(INSTALL) --prefix $(PREFIX)
 
+wheel: setup
+	@WERROR=$(WERROR) JOBS=$(JOBS) scripts/wheel $(if $(filter file,$(origin ARCH)),portable,$(ARCH)) dist
+
 dev clang:
 	@scripts/setup $@
 	@cmake --preset $@ -DCOVARY_ARCH=$(ARCH) > /dev/null
@@ -88,4 +93,4 @@ asan ubsan tsan: setup
 	@cd build/$@ && ../../scripts/sanitized $@ $(CTEST)
 
 clean:
-	rm -rf build out
+	rm -rf build out dist

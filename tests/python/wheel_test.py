@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A wheel for this machine, in a fresh virtual environment and without the environment of the build. Needs PyPI."""
+import subprocess
+import unittest
+
+from common import ROOM, SOURCE, PackageTest
+
+FIVE_LINES = f"""
+import covary
+scene = covary.Scene.load("{ROOM}", resolution=(60, 40))
+result = covary.render(scene, spp=24)
+again = covary.combine(result.films["crn"].groups, result.films["independent"].groups)
+assert (again.image == result.image).all()
+result.save("room.png")
+assert "<iframe" in covary.view([result.image])._repr_html_()
+"""
+
+
+class Wheel(PackageTest):
+    def bare(self, *command):
+        """Runs without variables that name parts of the build."""
+        return subprocess.run(list(map(str, command)), cwd=self.path, capture_output=True, text=True, check=True,
+                              env={"PATH": "/usr/bin:/bin", "HOME": str(self.path)}).stdout
+
+    def test_wheel(self):
+        subprocess.run([SOURCE / "scripts" / "wheel", "native", self.path / "dist"], check=True, capture_output=True)
+        wheel, = (self.path / "dist").glob("covary-*-cp310-abi3-manylinux_*_x86_64.whl")
+        self.assertLess(wheel.stat().st_size, 40e6)
+        self.assertEqual(len(list((self.path / "dist").glob("covary-*.tar.gz"))), 1)
+        self.bare("/usr/bin/python3", "-m", "venv", "fresh")
+        self.bare("fresh/bin/pip", "install", "-q", wheel)
+        self.bare("fresh/bin/python", "-c", FIVE_LINES)
+        self.assertTrue((self.path / "room.png").exists())
+        self.assertIn("covary ", self.bare("fresh/bin/covary", "--version"))
+        linked = self.bare("ldd", *(self.path / "fresh").glob("lib/python*/site-packages/covary/_covary*.so"))
+        self.assertNotIn("not found", linked)
+        self.assertNotIn("/usr/lib/x86_64-linux-gnu/libembree", linked)
+
+
+if __name__ == "__main__":
+    unittest.main()
