@@ -24,6 +24,7 @@ struct Method {
   AdaptiveSampling sampling;
   std::string name;
   std::optional<int> groups;  ///< that were asked for
+  int fewest_groups = 1;
 
   /// Of both films.
   uint32_t groups_of(const PlanState& state) const {
@@ -48,6 +49,19 @@ uint32_t first_samples(const Method& method, const PlanState& state) {
 double whole_budget(const Method& method, const PlanState& state) {
   const bool is_open = method.sampling.counts.relative_error && !state.request.spp && !state.seconds_left;
   return is_open ? std::numeric_limits<double>::infinity() : state.budget;
+}
+
+/// An estimator that reads groups needs some, each with a sample of the first pass.
+void check_groups(const Method& method, const PlanState& state, uint32_t first) {
+  if (!method.sampling.reads_groups) return;
+  const uint32_t groups = method.groups_of(state);
+  if (groups < static_cast<uint32_t>(method.fewest_groups))
+    throw Error(ErrorCode::kUsage,
+                fmt::format("{} groups are too few: {} needs at least {}", groups, method.name, method.fewest_groups));
+  if (first < groups)
+    throw Error(ErrorCode::kUsage, fmt::format("dependent-spp is {}, expected at least {}, one sample for each group "
+                                               "(--groups)",
+                                               first, groups));
 }
 
 void check_budget(const Method& method, const PlanState& state, uint32_t first) {
@@ -94,7 +108,7 @@ EstimatorResult mean_of_last(std::span<const Pass> passes, int first_row, int n_
 
 Plan adaptive_plan(const Estimator& estimator, std::optional<int> groups) {
   const bool is_pair = estimator.passes == EstimatorPasses::kPair;
-  const Method method{*estimator.adaptive, estimator.name, groups};
+  const Method method{*estimator.adaptive, estimator.name, groups, estimator.fewest_groups};
   Plan plan;
   plan.name = estimator.name;
   plan.estimator = estimator.text;
@@ -121,6 +135,7 @@ Plan adaptive_plan(const Estimator& estimator, std::optional<int> groups) {
   };
   first.set_targets = [=](const PlanState& state, std::span<Pass> passes) {
     const uint32_t samples = first_samples(method, state);
+    check_groups(method, state, samples);
     check_budget(method, state, samples);
     passes[0].settings.spp = samples;
   };

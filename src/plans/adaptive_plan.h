@@ -21,7 +21,7 @@ namespace covary {
 ///
 /// `groups`: of both films; default: 1, or number_of_groups() of budget.h where the estimator reads them. Numbers of
 /// samples of the last pass are multiples of it. Rendering throws Error(kUsage) where the budget leaves less than one
-/// sample, or min_spp, for the last pass.
+/// sample, or min_spp, for the last pass, and where an estimator that reads groups gets too few.
 Plan adaptive_plan(const Estimator& estimator, std::optional<int> groups = {});
 
 }  // namespace covary

@@ -110,6 +110,12 @@ TEST(AdaptivePlan, TooSmallABudgetIsAnError) {
                        "least 1 must be left"));
   EXPECT_TRUE(contains(message(40, {{"min-spp", "21"}}), "at least 21 must be left"));
   EXPECT_TRUE(contains(message(1, {}), "too few"));
+  const auto of_iicv = [&](const char* first, std::optional<int> groups) {
+    const Estimator iicv = make_estimator("iicv", {{"adaptive", ""}, {"dependent-spp", first}});
+    return message_of([&] { render(scene, adaptive_plan(iicv, groups), request_of(48)); }, ErrorCode::kUsage);
+  };
+  EXPECT_EQ(of_iicv("24", 2), "2 groups are too few: iicv needs at least 3");
+  EXPECT_EQ(of_iicv("2", {}), "dependent-spp is 2, expected at least 12, one sample for each group (--groups)");
   EXPECT_EQ(message(2, {}), "no error");
 }
 
