@@ -4,12 +4,16 @@
 #include <fmt/format.h>
 
 #include "integrators/controlled_path.h"
+#include "integrators/guided_path.h"
 #include "numbers.h"
 
 namespace covary {
 namespace {
 
 constexpr uint32_t kMaxNumber = 1u << 30;
+
+/// Control variates that guided-path has, too.
+bool one_of_guided(const std::string& kind) { return kind == "rgb" || kind == "mono" || kind == "off"; }
 
 }  // namespace
 
@@ -81,9 +85,16 @@ std::optional<ControlOptions> control_options(const ControlTexts& texts) {
 }
 
 void check_control_options(const ControlTexts& texts, const LoadedScene& scene, const std::string& integrator) {
-  std::vector<std::string> words = command_words(texts);
+  if (dynamic_cast<const ControlledPath*>(scene.integrator.get())) return;
+  ControlTexts foreign = texts;
+  if (dynamic_cast<const GuidedPath*>(scene.integrator.get())) {
+    if (!texts.kind.empty() && !one_of_guided(texts.kind))
+      throw Error(ErrorCode::kUsage, fmt::format("--cv {}: guided-path knows rgb, mono and off", texts.kind));
+    foreign.kind.clear(), foreign.train_spp.reset();
+  }
+  std::vector<std::string> words = command_words(foreign);
   if (texts.path_lengths) words.emplace_back("--path-lengths");
-  if (words.empty() || dynamic_cast<const ControlledPath*>(scene.integrator.get())) return;
+  if (words.empty()) return;
   throw Error(ErrorCode::kUsage, fmt::format("{} is an option of --integrator controlled-path, not of {}", words[0],
                                              integrator.empty() ? scene.integrator_type : integrator));
 }

@@ -100,7 +100,9 @@ nlohmann::ordered_json guiding_statistics(const GuidedPath& guided) {
           {"fit_seconds", field.fit_seconds()},
           {"fit_seconds_per_million_samples", millions > 0 ? field.fit_seconds() / millions : 0},
           {"training_memory_bytes", guided.training_bytes()},
-          {"memory_bytes", field.bytes()}};
+          {"memory_bytes", field.bytes() + guided.table().bytes()},
+          {"controlled_leaves", guided.table().n_cells()},
+          {"controlled_leaves_switched_off", guided.table().n_switched_off()}};
 }
 
 /// Samples per pixel of the training; 0 without one, and where a file took its place.

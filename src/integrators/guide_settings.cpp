@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <limits>
 
 namespace covary {
 
@@ -36,6 +37,8 @@ GuideOptions GuideOptions::from(Parameters& parameters) {
   }
   if (parameters.has("guide_roughness")) options.roughness = parameters.get_float("guide_roughness", 0.1f, 0, 1);
   if (parameters.has("nee")) options.nee = parameters.get_bool("nee", true);
+  if (parameters.has("cv")) options.control = control_kind(parameters.get_choice("cv", "off", {"off", "rgb", "mono"}));
+  options.control_train_spp = number("cv_train", GuideSettings::kMaxTrainingSpp);
   return options;
 }
 
@@ -46,6 +49,8 @@ GuideSettings GuideSettings::with(const GuideOptions& options) const {
   settings.fraction = options.fraction.value_or(fraction);
   settings.roughness = options.roughness.value_or(roughness);
   settings.nee = options.nee.value_or(nee);
+  settings.control = options.control.value_or(control);
+  settings.control_train_spp = options.control_train_spp.value_or(control_train_spp);
   return settings;
 }
 
@@ -59,7 +64,16 @@ GuidingSettings GuideSettings::field() const {
 
 std::string GuideSettings::text() const {
   return "lobes=" + std::to_string(lobes) + " train=" + std::to_string(train_spp) + " fraction=" + fraction.text() +
-         " roughness=" + std::to_string(roughness) + " nee=" + (nee ? "on" : "off");
+         " roughness=" + std::to_string(roughness) + " nee=" + (nee ? "on" : "off") + " cv=" + name_of(control) +
+         (controlled() ? " cv_train=" + std::to_string(control_train_spp) : "");
+}
+
+CacheSettings GuideSettings::cache() const {
+  CacheSettings settings;
+  settings.pyramid = false;  // lobes of one leaf are not those of another
+  settings.monochrome = control == ControlKind::kMono;
+  settings.memory_limit = std::numeric_limits<size_t>::max();  // leaves have no wider ones
+  return settings;
 }
 
 }  // namespace covary

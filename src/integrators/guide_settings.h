@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "integrators/control_settings.h"
 #include "sampling/guiding_field.h"
 #include "scene/parameters.h"
 
@@ -27,8 +28,10 @@ struct GuideOptions {
   std::optional<GuideFraction> fraction;
   std::optional<float> roughness;
   std::optional<bool> nee;
+  std::optional<ControlKind> control;
+  std::optional<uint32_t> control_train_spp;
 
-  /// Reads guide_lobes, guide_train, guide_fraction, guide_roughness and nee.
+  /// Reads guide_lobes, guide_train, guide_fraction, guide_roughness, nee, cv and cv_train.
   static GuideOptions from(Parameters& parameters);
 };
 
@@ -38,8 +41,15 @@ struct GuideSettings {
   uint32_t lobes = 16;      ///< of a leaf at first, 1 to VmfLobes::kMax; splitting makes up to twice as many
   uint32_t train_spp = 16;  ///< samples per pixel to learn from
   GuideFraction fraction;
-  float roughness = 0.1f;  ///< lobes of BSDFs that are less rough are not guided
-  bool nee = true;         ///< light samples (next-event estimation)
+  float roughness = 0.1f;                   ///< lobes of BSDFs that are less rough are not guided
+  bool nee = true;                          ///< light samples (next-event estimation)
+  ControlKind control = ControlKind::kOff;  ///< control variates on the lobes: kOff, kRgb or kMono
+  uint32_t control_train_spp = 32;          ///< samples per pixel to learn their coefficients from, after the lobes
+
+  bool controlled() const { return control != ControlKind::kOff; }
+  /// Samples per pixel of the training.
+  uint32_t training_spp() const { return train_spp + (controlled() ? control_train_spp : 0); }
+  CacheSettings cache() const;
 
   GuideSettings with(const GuideOptions& options) const;
   GuidingSettings field() const;

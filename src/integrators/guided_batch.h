@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/in_place.h"
+#include "integrators/guided_control.h"
 #include "integrators/integrator.h"
 #include "sampling/guiding_field.h"
 
@@ -16,16 +17,16 @@ struct GuidedBatch final : ThreadState {
   struct Path {
     Spectrum throughput{1};
     Spectrum bsdf_throughput{1};  ///< what it would be if the BSDF had drawn all directions
-    float eta = 1;               ///< product of relative indices, undoes the radiance scaling in roulette
-    Vec3 previous_p;             ///< where the last direction sample started
-    float previous_pdf = 1;      ///< its density per unit solid angle, that of the mixture of BSDF and guide
-    bool previous_delta = true;  ///< it came from a delta lobe or the camera
-    bool only_null = true;       ///< nothing but null surfaces met so far
-    bool found = false;          ///< whether the ray hit a surface
-    uint32_t sample = 0;         ///< which of the batch
-    uint32_t n_smooth = 0;       ///< vertices so far on surfaces that have more than delta lobes
-    uint32_t last_vertex = 0;    ///< address of the numbers of the last vertex
-    bool recorded = false;       ///< the last direction sample is the last of the path's trail
+    float eta = 1;                ///< product of relative indices, undoes the radiance scaling in roulette
+    Vec3 previous_p;              ///< where the last direction sample started
+    float previous_pdf = 1;       ///< its density per unit solid angle, that of the mixture of BSDF and guide
+    bool previous_delta = true;   ///< it came from a delta lobe or the camera
+    bool only_null = true;        ///< nothing but null surfaces met so far
+    bool found = false;           ///< whether the ray hit a surface
+    uint32_t sample = 0;          ///< which of the batch
+    uint32_t n_smooth = 0;        ///< vertices so far on surfaces that have more than delta lobes
+    uint32_t last_vertex = 0;     ///< address of the numbers of the last vertex
+    bool recorded = false;        ///< the last direction sample is the last of the path's trail
   };
 
   /// Which light a vertex samples, and with which numbers.
@@ -40,6 +41,16 @@ struct GuidedBatch final : ThreadState {
   struct Connection {
     Spectrum radiance;
     uint32_t sample;
+    uint32_t place;  ///< of `connection_parts`, where the vertex has a control
+  };
+
+  /// Of a light sample: what its control needs.
+  struct ConnectionParts {
+    Spectrum value;        ///< f/p
+    uint32_t light;        ///< that was sampled, or ControlledSample::kNoLight: the environment
+    float r_light;         ///< its balance weight where nothing lies between
+    Spectrum direction;    ///< Σ β N λ / Σ N λ of the dense techniques that draw directions
+    TechniqueDensities r;  ///< their balance weights, while coefficients are learnt
   };
 
   /// A direction sample whose light is known when the path has ended.
@@ -56,7 +67,10 @@ struct GuidedBatch final : ThreadState {
     paths.resize(n), rays.resize(n);
     for (Path& path : paths) make_in_place(path, [] { return Path(); });
     if (hits.size() < n)
-      ray_hits.resize(n), hits.resize(n), choices.resize(n), lights.resize(n), environments.resize(n), leaves.resize(n);
+      ray_hits.resize(n), hits.resize(n), choices.resize(n), lights.resize(n), environments.resize(n), leaves.resize(n),
+          vertices.resize(n);
+    for (size_t i = 0; i < n; ++i) vertices[i].active = false;
+    control_steps.clear(), control_samples.clear();
     if (blocked.size() < 2 * n) blocked.resize(2 * n), connections.resize(2 * n), shadow_rays.resize(2 * n);
     n_connections = 0;
     if (!recording) return;
@@ -80,11 +94,19 @@ struct GuidedBatch final : ThreadState {
   std::vector<Ray> shadow_rays;  ///< one of each connection
   std::vector<uint8_t> blocked;
   std::vector<uint32_t> alive;  ///< places of the paths that go on
+  std::vector<uint32_t> ended;  ///< samples of paths that ended at their last vertex, which has a control
+  std::vector<ControlledVertexState> vertices;  ///< the last one of each path, by Path::sample
+  std::vector<ConnectionParts> connection_parts;
 
   bool recording = false;
   std::vector<uint32_t> n_steps;       ///< of each path's trail, by Path::sample
   std::vector<Step> steps;             ///< kMaxSteps for each path
   std::vector<GuidingSample> records;  ///< of paths that have ended, until they are collected
+
+  bool recording_control = false;
+  std::vector<ControlStep> control_steps;  ///< of this batch
+  std::vector<uint32_t> control_samples;   ///< Path::sample of each of them
+  SystemSums sums;                         ///< until they are collected
 };
 
 }  // namespace covary

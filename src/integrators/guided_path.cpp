@@ -11,14 +11,22 @@
 // | guide_fraction  | string        | 0.5     | fraction of guided directions, or `learned`                         |
 // | guide_roughness | number        | 0.1     | lobes of BSDFs that are less rough are not guided                   |
 // | nee             | boolean       | true    | light samples (next-event estimation)                               |
+// | cv              | string        | off     | control variates on the lobes: `off`, `rgb`, `mono`                 |
+// | cv_train        | integer       | 32      | samples per pixel to learn their coefficients from, after the lobes |
 #include "integrators/guided_path.h"
+
+#include "core/content_hash.h"
+#include "sampling/training_bytes.h"
 
 namespace covary {
 namespace {
 
+constexpr uint32_t kMaxClusters = 5000;
+
 /// What the samples of one tile taught.
 struct SamplesRecord final : TrainingRecord {
   std::vector<GuidingSample> samples;
+  SystemSums sums;
 };
 
 }  // namespace
@@ -29,6 +37,8 @@ void GuidedPath::change(const GuideOptions& options) {
 }
 
 void GuidedPath::prepare(const Scene& scene) {
+  if (scene_ == &scene) return;
+  scene_ = &scene;
   lights_ = settings_.nee ? LightSet(scene, LightSelection::kPower) : LightSet();
   compensated_ = settings_.nee && scene.environment() ? scene.environment()->mis_compensated() : nullptr;
   guided_ = {settings_.nee ? &lights_ : nullptr,
@@ -36,27 +46,79 @@ void GuidedPath::prepare(const Scene& scene) {
              &field(),
              settings_.fraction.value,
              settings_.fraction.learned,
-             settings_.roughness};
+             settings_.roughness,
+             &table(),
+             {}};
+  if (!settings_.controlled() && !settings_.nee) return;
+  std::vector<float> counts = make_clusters();
+  guided_.cluster_of = cluster_of_;
+  if (settings_.controlled())
+    cache_ = CoefficientCache(scene.bounds(), std::move(counts), GuidedTechnique::kCount, settings_.cache());
 }
 
-void GuidedPath::use(GuidingField field) {
-  given_ = std::move(field);
-  guided_.field = &*given_;
+/// Lights of neighbouring numbers together, where there are many; returns the expected number of samples that a vertex
+/// takes of each cluster.
+std::vector<float> GuidedPath::make_clusters() {
+  const uint32_t n = std::min(lights_.size(), kMaxClusters);
+  std::vector<double> counts(n);
+  cluster_of_.resize(lights_.size());
+  for (uint32_t i = 0; i < lights_.size(); ++i) {
+    cluster_of_[i] = static_cast<uint32_t>(uint64_t{i} * n / lights_.size());
+    counts[cluster_of_[i]] += lights_[i].pmf;
+  }
+  return {counts.begin(), counts.end()};
+}
+
+void GuidedPath::begin_batch(GuidedBatch& batch) const {
+  batch.recording = !frozen() && learns_field();
+  batch.recording_control = !frozen() && !learns_field() && settings_.controlled();
+  if (batch.recording_control && batch.sums.n_cells() == 0) batch.sums = cache_.new_sums();
+}
+
+std::string GuidedPath::trained_bytes() const {
+  const std::string body = field().body();
+  std::string bytes;
+  append_bytes(bytes, uint64_t{body.size()});
+  return bytes + body + table().body();
+}
+
+void GuidedPath::use_bytes(std::string_view bytes, const std::string& where) {
+  ByteReader reader(bytes, where);
+  const std::string_view field = reader.take(reader.read<uint64_t>());
+  given_ = GuidingField::from_body(field, where);
+  given_table_ = CoefficientTable::from_body(reader.rest(), where);
+  reader.check(given_table_->n_cells() == 0 || (given_table_->n_dense() == GuidedTechnique::kCount &&
+                                                given_table_->n_lights() == cache_.table().n_lights()));
+  guided_.field = &*given_, guided_.table = &*given_table_;
+}
+
+uint64_t GuidedPath::state_hash() const { return combine64(field().hash(), table().hash()); }
+
+void GuidedPath::update() {
+  if (learns_field())
+    field_.update();
+  else
+    cache_.update();
 }
 
 std::unique_ptr<TrainingRecord> GuidedPath::take_record(ThreadState& state) const {
-  std::vector<GuidingSample>& samples = static_cast<GuidedBatch&>(state).records;
-  if (samples.empty()) return nullptr;
+  GuidedBatch& batch = static_cast<GuidedBatch&>(state);
+  if (batch.records.empty() && batch.sums.n_cells() == 0) return nullptr;
   auto record = std::make_unique<SamplesRecord>();
-  record->samples.swap(samples);
+  record->samples.swap(batch.records);
+  std::swap(record->sums, batch.sums);
   return record;
 }
 
-void GuidedPath::absorb(const TrainingRecord& record) { field_.add(static_cast<const SamplesRecord&>(record).samples); }
+void GuidedPath::absorb(const TrainingRecord& record) {
+  const auto& learnt = static_cast<const SamplesRecord&>(record);
+  field_.add(learnt.samples);
+  if (learnt.sums.n_cells() > 0) cache_.absorb(learnt.sums);
+}
 
 void GuidedPath::on_freeze() {
-  training_bytes_ = field_.bytes();
-  field_.freeze();
+  training_bytes_ = field_.bytes() + cache_.bytes();
+  field_.freeze(), cache_.freeze();
 }
 
 std::string GuidedPath::settings_text() const { return "guided-path " + lengths_.text() + " " + settings_.text(); }

@@ -24,8 +24,8 @@ class GuidedPath : public LearningIntegrator {
   void change(const GuideOptions& options);
   /// What was learnt so far, or given.
   const GuidingField& field() const { return given_ ? *given_ : field_; }
-  /// Takes a field that was learnt before, in place of a training; after prepare(), before the training.
-  void use(GuidingField field);
+  /// Coefficients of control variates that were learnt so far, or given.
+  const CoefficientTable& table() const { return given_table_ ? *given_table_ : cache_.table(); }
   /// Bytes of samples and mixtures at the end of the training.
   size_t training_bytes() const { return training_bytes_; }
   std::string settings_text() const override;
@@ -36,35 +36,43 @@ class GuidedPath : public LearningIntegrator {
     trace_with<GuidedParts>(scene, samples, context);
   }
   /// 0 once a field was given.
-  uint32_t training_spp() const override { return given_ ? 0 : settings_.train_spp; }
+  uint32_t training_spp() const override { return given_ ? 0 : settings_.training_spp(); }
   size_t training_memory() const override { return field_.training_memory(); }
   std::unique_ptr<TrainingRecord> take_record(ThreadState& state) const override;
   void absorb(const TrainingRecord& record) override;
   bool keeps_training() const override { return true; }
-  std::string trained_bytes() const override { return field().body(); }
-  void use_bytes(std::string_view bytes, const std::string& where) override {
-    use(GuidingField::from_body(bytes, where));
-  }
+  std::string trained_bytes() const override;
+  void use_bytes(std::string_view bytes, const std::string& where) override;
+  bool allows_negative() const override { return settings_.controlled(); }
 
  protected:
   template <typename Parts>
   void trace_with(const Scene& scene, std::span<CameraSample> samples, PathContext& context) const {
-    context.state_as<GuidedBatch>().recording = !frozen();
+    begin_batch(context.state_as<GuidedBatch>());
     GuidedTracer<Parts>(scene, guided_, lengths_, samples, context).trace();
   }
 
-  void on_restart() override { field_.restart(); }
-  void update() override { field_.update(); }
+  void on_restart() override { field_.restart(), cache_.restart(); }
+  void update() override;
   void on_freeze() override;
-  uint64_t state_hash() const override { return field().hash(); }
+  uint64_t state_hash() const override;
 
  private:
+  /// Waves that begin with so many samples teach the field; those behind, if any, the control.
+  bool learns_field() const { return trained_spp() < settings_.train_spp; }
+  void begin_batch(GuidedBatch& batch) const;
+  std::vector<float> make_clusters();
+
   PathLengthSettings lengths_;
   GuideSettings settings_;
+  const Scene* scene_ = nullptr;  // that of prepare()
   LightSet lights_;
   std::shared_ptr<const Emitter> compensated_;  // the environment as it is sampled, where it is not the scene's own
   GuidingField field_;
   std::optional<GuidingField> given_;
+  std::vector<uint32_t> cluster_of_;  // for each light
+  CoefficientCache cache_;
+  std::optional<CoefficientTable> given_table_;
   GuidedScene guided_{};
   size_t training_bytes_ = 0;
 };

@@ -32,15 +32,21 @@ struct GuidedScene {
   const LightSet* lights;      ///< sampled at each vertex; null: no light samples
   const Emitter* environment;  ///< as it is sampled, or null
   const GuidingField* field;
-  float fraction;         ///< of guided directions
-  bool learned_fraction;  ///< each leaf has its own instead
-  float min_roughness;    ///< BSDF lobes that are less rough are not guided
+  float fraction;                        ///< of guided directions
+  bool learned_fraction;                 ///< each leaf has its own instead
+  float min_roughness;                   ///< BSDF lobes that are less rough are not guided
+  const CoefficientTable* table;         ///< coefficients of control variates; without cells: no control
+  std::span<const uint32_t> cluster_of;  ///< for each light
 };
 
 /// The correct ones.
 struct GuidedParts {
   /// Density of the mixture of BSDF and guide, with the share `g` of guided directions.
   static float mixture_pdf(float g, float pdf_bsdf, float pdf_guide) { return (1 - g) * pdf_bsdf + g * pdf_guide; }
+  /// Whether a direction that failed counts as a sample of the control.
+  static constexpr bool kCountFailed = true;
+  /// The cell of the coefficients for a direction at a vertex whose Σ N β is that of `cell`.
+  static uint32_t direction_cell(uint32_t cell, uint32_t /*n_cells*/) { return cell; }
   /// A direction of the lobes `guide` of a leaf.
   static Vec3 sample_guide(const VmfLobes& guide, const GuidingField&, uint32_t /*leaf*/, float u_lobe, Vec2 u) {
     return guide.sample(u_lobe, u);
@@ -73,6 +79,7 @@ class GuidedTracer {
       : scene_(scene),
         guided_(guided),
         field_(*guided.field),
+        table_(*guided.table),
         lengths_(lengths),
         samples_(samples),
         context_(context),
@@ -95,8 +102,11 @@ class GuidedTracer {
       scatter(depth);
       if (connecting_) trace_connections();
       if (batch_.recording) begin_steps();
+      if (batch_.recording_control) begin_control_steps();
+      for (const uint32_t sample : batch_.ended) close(sample);
     }
     if (batch_.recording) finish_steps();
+    if (batch_.recording_control) finish_control_steps();
   }
 
  private:
@@ -120,11 +130,22 @@ class GuidedTracer {
     float pdf_bsdf = 0, pdf_guide = 0;
   };
 
-  /// Adds the emission of what the path's ray met.
+  /// Adds the emission of what the path's ray met, which closes the vertex from which the ray came.
   void arrive(int depth, size_t i) {
     const Path& path = batch_.paths[i];
+    if (path.recorded) batch_.last_step(path.sample).sample.inverse_distance = path.found ? 1 / batch_.hits[i].t : 0;
+    float r_light = 0;
+    uint32_t light = ControlledSample::kNoLight;
+    add_emission(depth, i, r_light, light);
+    if (!batch_.vertices[path.sample].active) return;
+    take_direction(path.sample, r_light, light);
+    close(path.sample);
+  }
+
+  /// Sets `r_light` and `light` where a light sample could have found what was met.
+  void add_emission(int depth, size_t i, float& r_light, uint32_t& light_cluster) {
+    const Path& path = batch_.paths[i];
     const SurfaceHit& hit = batch_.hits[i];
-    if (path.recorded) batch_.last_step(path.sample).sample.inverse_distance = path.found ? 1 / hit.t : 0;
     if (depth + 1 < lengths_.min_depth) return;
     const Emitter* emitter = path.found ? hit.emitter : guided_.environment;
     if (!emitter || (!path.found && lengths_.hide_emitters && path.only_null)) return;
@@ -136,10 +157,15 @@ class GuidedTracer {
       samples_[path.sample].radiance += radiance;
       return;
     }
-    const float pdf_light = path.found ? (*guided_.lights)[guided_.lights->number_of(hit)].pmf *
-                                             LightSet::pdf_solid_angle(path.previous_p, hit)
-                                       : light.pdf_solid_angle;
-    samples_[path.sample].radiance += radiance * mis::balance(path.previous_pdf, pdf_light);
+    float pdf_light = light.pdf_solid_angle;
+    if (path.found) {
+      const uint32_t number = guided_.lights->number_of(hit);
+      pdf_light = (*guided_.lights)[number].pmf * LightSet::pdf_solid_angle(path.previous_p, hit);
+      light_cluster = guided_.cluster_of[number];
+    }
+    const float r = mis::balance(path.previous_pdf, pdf_light);
+    r_light = 1 - r;
+    samples_[path.sample].radiance += radiance * r;
   }
 
   /// Ends paths that met no surface, and some of the others by Russian roulette.
@@ -218,7 +244,7 @@ class GuidedTracer {
 
   /// Evaluates the surfaces: connections to the light samples, and the next rays. Paths that end are removed.
   void scatter(int depth) {
-    batch_.alive.clear();
+    batch_.alive.clear(), batch_.ended.clear(), batch_.connection_parts.clear();
     for (uint32_t i = 0; i < batch_.paths.size(); ++i) {
       Path& path = batch_.paths[i];
       const SurfaceHit& hit = batch_.hits[i];
@@ -229,16 +255,25 @@ class GuidedTracer {
       context_.arena.reset();
       const BsdfClosure* bsdf = hit.bsdf->bind(hit, wo.z > 0, TransportMode::kRadiance, context_.arena);
       make_guide(hit, wo, *bsdf, smooth, i);
+      open(path);
       if (connecting_ && batch_.choices[i].open) {
         if (!guided_.lights->empty())
-          connect(path, hit, wo, *bsdf, batch_.lights[i], (*guided_.lights)[batch_.choices[i].light].pmf);
-        if (guided_.environment) connect(path, hit, wo, *bsdf, batch_.environments[i], 1);
+          connect(path, hit, wo, *bsdf, batch_.lights[i], (*guided_.lights)[batch_.choices[i].light].pmf,
+                  guided_.cluster_of[batch_.choices[i].light]);
+        if (guided_.environment) connect(path, hit, wo, *bsdf, batch_.environments[i], 1, ControlledSample::kNoLight);
       }
 
       const Direction direction = sample_direction(hit, wo, *bsdf, random, path.last_vertex);
       const BsdfSample& next = direction.sample;
       path.recorded = false;
-      if (!next.valid() || is_black(next.weight)) continue;
+      const bool ends = !next.valid() || is_black(next.weight);
+      if (batch_.vertices[path.sample].active) keep_direction(path.sample, hit, direction, !ends);
+      if (ends) {
+        if (!batch_.vertices[path.sample].active) continue;
+        if (Parts::kCountFailed) take_direction(path.sample, 0, ControlledSample::kNoLight);
+        batch_.ended.push_back(path.sample);
+        continue;
+      }
       path.throughput *= next.weight;
       path.bsdf_throughput *= next.weight * (direction.pdf_bsdf > 0 ? next.pdf / direction.pdf_bsdf : 1);
       path.eta *= next.eta;
@@ -296,20 +331,42 @@ class GuidedTracer {
     return direction;
   }
 
-  /// Next-event estimation: f cos L / p, if nothing lies between. `pmf`: with which the light was chosen.
+  /// Next-event estimation: f cos L / p, if nothing lies between. `pmf`: with which the light of `cluster` was chosen;
+  /// kNoLight: the environment.
   void connect(const Path& path, const SurfaceHit& hit, const Vec3& wo, const BsdfClosure& bsdf,
-               const EmitterSample& light, float pmf) {
-    if (!(light.pdf_solid_angle > 0) || is_black(light.radiance)) return;
-    const BsdfValue f = bsdf.eval(wo, hit.frame.to_local(light.wi));
-    if (is_black(f.value)) return;
-    const float pdf_direction = light.is_delta ? 0 : guide_.mixture_pdf(f.pdf_solid_angle, guide_.pdf(light.wi));
-    const float pdf = pmf * light.pdf_solid_angle;
-    const size_t n = batch_.n_connections++;
-    make_in_place(batch_.connections[n], [&] {
-      return GuidedBatch::Connection{path.throughput * f.value * light.radiance * (1 / (pdf + pdf_direction)),
-                                     path.sample};
-    });
-    make_in_place(batch_.shadow_rays[n], [&] { return shadow_ray(hit, light); });
+               const EmitterSample& light, float pmf, uint32_t cluster) {
+    const bool active = batch_.vertices[path.sample].active;
+    if (light.pdf_solid_angle > 0 && !is_black(light.radiance)) {
+      const BsdfValue f = bsdf.eval(wo, hit.frame.to_local(light.wi));
+      if (!is_black(f.value)) {
+        GuidedBatch::ConnectionParts parts;
+        float pdf_direction = 0;
+        if (!light.is_delta) {
+          if (active) {
+            pdf_direction = densities(f.pdf_solid_angle, light.wi);
+            parts.direction = weighted_coefficients(path.sample, pdf_direction);
+          } else {
+            pdf_direction = guide_.mixture_pdf(f.pdf_solid_angle, guide_.pdf(light.wi));
+          }
+        }
+        const float pdf = pmf * light.pdf_solid_angle;
+        const Spectrum value = f.value * light.radiance * (1 / (pdf + pdf_direction));
+        const size_t n = batch_.n_connections++;
+        const auto place = static_cast<uint32_t>(batch_.connection_parts.size());
+        make_in_place(batch_.connections[n], [&] {
+          return GuidedBatch::Connection{path.throughput * value, path.sample, place};
+        });
+        make_in_place(batch_.shadow_rays[n], [&] { return shadow_ray(hit, light); });
+        if (!active) return;
+        parts.value = value, parts.light = cluster, parts.r_light = mis::balance(pdf, pdf_direction);
+        if (batch_.recording_control)
+          for (uint32_t k = 0; k < GuidedTechnique::kCount; ++k)
+            parts.r[k] = pdf_direction > 0 ? densities_[k] / (pdf + pdf_direction) : 0;
+        batch_.connection_parts.push_back(parts);
+        return;
+      }
+    }
+    if (active) take_light(path.sample, {{}, cluster, 1, {}, {}});
   }
 
   /// Adds the light samples that nothing hides.
@@ -317,9 +374,161 @@ class GuidedTracer {
     const size_t n = batch_.n_connections;
     scene_.occluded(std::span(batch_.shadow_rays).first(n), batch_.blocked);
     context_.n_rays += n;
-    for (size_t i = 0; i < n; ++i)
-      if (!batch_.blocked[i]) samples_[batch_.connections[i].sample].radiance += batch_.connections[i].radiance;
+    for (size_t i = 0; i < n; ++i) {
+      const GuidedBatch::Connection& connection = batch_.connections[i];
+      if (!batch_.blocked[i]) samples_[connection.sample].radiance += connection.radiance;
+      if (!batch_.vertices[connection.sample].active) continue;
+      const GuidedBatch::ConnectionParts& parts = batch_.connection_parts[connection.place];
+      take_light(connection.sample,
+                 batch_.blocked[i] ? GuidedBatch::ConnectionParts{{}, parts.light, 1, {}, {}} : parts);
+    }
     batch_.n_connections = 0;
+  }
+
+  /// Begins the control of a vertex: Σ N β. Only directions that are guided have one.
+  void open(const Path& path) {
+    ControlledVertexState& vertex = batch_.vertices[path.sample];
+    vertex.active = false;
+    const bool learns = batch_.recording_control && batch_.control_steps.size() < kMaxControlSteps * samples_.size();
+    if (guide_.fraction == 0 || (guided_.lights && !connecting_) || (!learns && table_.n_cells() == 0)) return;
+    const CellKey key = control_key(guide_.leaf);
+    vertex.cell = table_.n_cells() > 0 ? table_.find(key) : CoefficientTable::kNone;
+    if (!learns && (vertex.cell == CoefficientTable::kNone || is_black(table_.scale(vertex.cell)))) return;
+    vertex.active = true;
+    vertex.throughput = path.throughput;
+    vertex.control = Spectrum();
+    if (vertex.cell != CoefficientTable::kNone) {
+      const GuidingLeaf& leaf = field_.leaf(guide_.leaf);
+      vertex.control = table_.dense(vertex.cell, GuidedTechnique::kBsdf) * (1 - guide_.fraction);
+      for (int k = 0; k < guide_.lobes.n; ++k)
+        vertex.control +=
+            table_.dense(vertex.cell, GuidedTechnique::of(leaf, k)) * (guide_.fraction * guide_.lobes.weight[k]);
+      if (guided_.lights) {
+        vertex.control += table_.light_sum(vertex.cell);
+        if (guided_.environment) vertex.control += table_.dense(vertex.cell, GuidedTechnique::kEnvironment);
+      }
+    }
+    vertex.step = ~0u;
+    if (!learns) return;
+    vertex.step = static_cast<uint32_t>(batch_.control_steps.size());
+    ControlStep& step = batch_.control_steps.emplace_back();
+    batch_.control_samples.push_back(path.sample);
+    const Spectrum importance = context_.importance.empty() ? Spectrum(1) : context_.importance[path.sample];
+    step.cell = batch_.sums.cell(key);
+    step.weight = variance_weight(path.throughput, importance);
+    step.throughput = path.throughput;
+    step.held_out = vertex.cell != CoefficientTable::kNone;
+  }
+
+  /// Sets densities_ to N λ of the techniques that draw directions; returns their sum.
+  float densities(float pdf_bsdf, const Vec3& w) {
+    alignas(32) float parts[VmfLobes::kMax];
+    const float pdf_guide = guide_.lobes.pdfs(w, parts);
+    densities_.fill(0);
+    densities_[GuidedTechnique::kBsdf] = (1 - guide_.fraction) * pdf_bsdf;
+    const GuidingLeaf& leaf = field_.leaf(guide_.leaf);
+    for (int k = 0; k < guide_.lobes.n; ++k) densities_[GuidedTechnique::of(leaf, k)] += guide_.fraction * parts[k];
+    return (1 - guide_.fraction) * pdf_bsdf + guide_.fraction * pdf_guide;
+  }
+
+  /// Σ β N λ / Σ N λ over densities_, whose sum is `pdf`.
+  Spectrum weighted_coefficients(uint32_t sample, float pdf) const {
+    Spectrum sum;
+    if (batch_.vertices[sample].cell == CoefficientTable::kNone || !(pdf > 0)) return sum;
+    const uint32_t cell = Parts::direction_cell(batch_.vertices[sample].cell, table_.n_cells());
+    for (uint32_t k = 0; k <= GuidedTechnique::kBsdf; ++k)
+      if (densities_[k] > 0) sum += table_.dense(cell, k) * (densities_[k] / pdf);
+    return sum;
+  }
+
+  /// Keeps what the control of the direction sample needs; it is taken when the next surface is found.
+  void keep_direction(uint32_t sample, const SurfaceHit& hit, const Direction& direction, bool followed) {
+    float pdf = 1;
+    if (direction.sample.valid() && !direction.sample.is_delta()) {
+      pdf = densities(direction.pdf_bsdf, hit.frame.to_world(direction.sample.wi));
+    } else {  // nothing else finds it
+      densities_.fill(0);
+      densities_[GuidedTechnique::kBsdf] = 1;
+    }
+    ControlledVertexState& vertex = batch_.vertices[sample];
+    vertex.direction = weighted_coefficients(sample, pdf);
+    if (vertex.step == ~0u) return;
+    ControlStep& step = batch_.control_steps[vertex.step];
+    for (uint32_t k = 0; k < GuidedTechnique::kCount; ++k) step.r[k] = densities_[k] / pdf;
+    step.followed = followed;
+  }
+
+  /// β of a cluster of lights, or of the environment.
+  Spectrum light_coefficient(uint32_t cell, uint32_t cluster) const {
+    return cluster == ControlledSample::kNoLight ? table_.dense(cell, GuidedTechnique::kEnvironment)
+                                                 : table_.light(cell, cluster);
+  }
+
+  /// Subtracts Σ β r of the direction sample, which light samples of `cluster` find with balance weight `r_light`.
+  void take_direction(uint32_t sample, float r_light, uint32_t cluster) {
+    ControlledVertexState& vertex = batch_.vertices[sample];
+    if (vertex.cell != CoefficientTable::kNone) {
+      Spectrum sum = vertex.direction * (1 - r_light);
+      if (r_light > 0) sum += light_coefficient(vertex.cell, cluster) * r_light;
+      vertex.control = vertex.control - sum;
+    }
+    if (vertex.step == ~0u) return;
+    ControlStep& step = batch_.control_steps[vertex.step];
+    for (float& r : step.r) r *= 1 - r_light;
+    step.light = cluster, step.r_light = r_light;
+  }
+
+  /// The same of a light sample.
+  void take_light(uint32_t sample, const GuidedBatch::ConnectionParts& parts) {
+    ControlledVertexState& vertex = batch_.vertices[sample];
+    if (vertex.cell != CoefficientTable::kNone)
+      vertex.control = vertex.control - (light_coefficient(vertex.cell, parts.light) * parts.r_light +
+                                         parts.direction * (1 - parts.r_light));
+    if (vertex.step == ~0u) return;
+    ControlStep& step = batch_.control_steps[vertex.step];
+    step.plain += parts.value;
+    add_to_sums(step, parts.value, parts.light, parts.r_light, parts.r);
+  }
+
+  void add_to_sums(const ControlStep& step, const Spectrum& value, uint32_t light, float r_light,
+                   TechniqueDensities r) {
+    const bool of_light = light != ControlledSample::kNoLight && r_light > 0;
+    if (!of_light && r_light > 0) r[GuidedTechnique::kEnvironment] = r_light;
+    batch_.sums.add(step.cell, step.weight,
+                    {value, of_light ? light : ControlledSample::kNoLight, of_light ? r_light : 0, r});
+  }
+
+  /// Ends the control of a vertex.
+  void close(uint32_t sample) {
+    ControlledVertexState& vertex = batch_.vertices[sample];
+    vertex.active = false;
+    if (vertex.cell == CoefficientTable::kNone) return;
+    const Spectrum own = vertex.throughput * table_.scale(vertex.cell) * vertex.control;
+    samples_[sample].radiance += own;
+    if (vertex.step == ~0u) return;
+    batch_.control_steps[vertex.step].own = own;
+    batch_.control_steps[vertex.step].control = vertex.control;
+  }
+
+  /// Like begin_steps().
+  void begin_control_steps() {
+    for (const Path& path : batch_.paths)
+      if (const ControlledVertexState& vertex = batch_.vertices[path.sample]; vertex.active && vertex.step != ~0u)
+        batch_.control_steps[vertex.step].before = samples_[path.sample].radiance;
+  }
+
+  /// Adds the direction samples to the sums: what the path gained behind each of them, without the vertex's control.
+  void finish_control_steps() {
+    for (size_t i = 0; i < batch_.control_steps.size(); ++i) {
+      ControlStep& step = batch_.control_steps[i];
+      Spectrum value;
+      if (step.followed) {
+        const Spectrum gained = samples_[batch_.control_samples[i]].radiance - step.before - step.own;
+        for (int c = 0; c < 3; ++c) value[c] = step.throughput[c] > 0 ? gained[c] / step.throughput[c] : 0;
+      }
+      add_to_sums(step, value, step.light, step.r_light, step.r);
+      if (step.held_out) batch_.sums.add_held_out(step.cell, step.weight, step.plain + value, step.control);
+    }
   }
 
   /// Appends a direction sample to the path's trail.
@@ -361,12 +570,15 @@ class GuidedTracer {
   const Scene& scene_;
   const GuidedScene& guided_;
   const GuidingField& field_;
+  const CoefficientTable& table_;
   const PathLengthSettings& lengths_;
   std::span<CameraSample> samples_;
   PathContext& context_;
   GuidedBatch& batch_;
-  bool connecting_ = false;  // vertices take light samples
-  Guide guide_;              // of the vertex at hand
+  static constexpr size_t kMaxControlSteps = 16;  // of a path, in the mean over a batch
+  bool connecting_ = false;                       // vertices take light samples
+  Guide guide_;                                   // of the vertex at hand
+  TechniqueDensities densities_{};                // of the direction at hand
 };
 
 }  // namespace covary

@@ -27,8 +27,14 @@ std::function<std::shared_ptr<SceneObject>(Parameters&)> integrator_maker(const 
     const std::shared_ptr<Integrator> integrator = plugin->make(parameters, lengths);
     if (auto* controlled = dynamic_cast<ControlledPath*>(integrator.get()); controlled && choice.control)
       controlled->change(*choice.control);
-    if (auto* guided = dynamic_cast<GuidedPath*>(integrator.get()); guided && choice.guide)
-      guided->change(*choice.guide);
+    if (auto* guided = dynamic_cast<GuidedPath*>(integrator.get())) {
+      if (choice.guide) guided->change(*choice.guide);
+      if (choice.control) {
+        GuideOptions control;
+        control.control = choice.control->kind, control.control_train_spp = choice.control->train_spp;
+        guided->change(control);
+      }
+    }
     return integrator;
   };
 }

@@ -28,7 +28,7 @@ struct Level {
 
   uint32_t n_cells() const { return static_cast<uint32_t>(keys.size()); }
   size_t n_lights(uint32_t cell) const { return first[cell + 1] - first[cell]; }
-  std::span<const uint32_t> lights_of(uint32_t cell) const { return {&lights[0] + first[cell], n_lights(cell)}; }
+  std::span<const uint32_t> lights_of(uint32_t cell) const { return {lights.data() + first[cell], n_lights(cell)}; }
   CoefficientsView coefficients(uint32_t cell) {
     return {{light_values.data() + first[cell], n_lights(cell)},
             {dense_values.data() + size_t{cell} * layout.n_dense, layout.n_dense}};

@@ -23,7 +23,7 @@ namespace covary {
 
 struct GuidingSettings {
   VmfFitSettings fit;
-  uint32_t leaf_samples = 32000;    ///< a leaf with more is split
+  uint32_t leaf_samples = 8000;     ///< a leaf with more is split
   uint32_t min_leaf_samples = 100;  ///< a leaf with fewer samples, zero ones included, does not guide
   uint32_t max_depth = 32;          ///< of the tree
   uint32_t max_samples = 1u << 22;  ///< kept while training

@@ -34,7 +34,7 @@ struct VmfFitSettings {
   double weight_prior = 0.01;      ///< samples added to each lobe
   double mean_cosine_prior = 0.2;  ///< samples of mean cosine 0 added to each lobe
   int max_steps = 100;             ///< of EM between two rounds of splitting and merging
-  double tolerance = 0.005;        ///< ends EM: relative change of the penalised log-likelihood per sample
+  double tolerance = 0.001;        ///< ends EM: change of the penalised log-likelihood per sample
   double split_above = 0.5;        ///< part of a lobe in the χ² divergence of samples and mixture
   double merge_below = 0.025;      ///< χ² divergence of two lobes from the one that would replace them
   int max_rounds = 2;              ///< of splitting and merging

@@ -20,6 +20,13 @@ class Options(CliTest):
                  "--nee", "off")
         self.bad(2, "--integrator controlled-path, not of guided-path", *PLAIN, "-o", "a.exr", "--cv-grid", "8")
 
+    def test_control_variates(self):
+        self.bad(2, "--cv vevoda: guided-path knows rgb, mono and off", *PLAIN, "-o", "a.exr", "--cv", "vevoda")
+        self.good(*PLAIN, "--cv", "rgb", "--cv-train", "8", "--spp", "20", "-o", "a.exr", "--json", "a.json")
+        report = json.loads((self.path / "a.json").read_text())
+        self.assertEqual((report["samples_per_pixel"], report["training_samples_per_pixel"]), (8, 12))
+        self.assertGreaterEqual(report["guiding"]["controlled_leaves"], 1)
+
     def test_refuses_impossible_fractions(self):
         for fraction in ("0", "1", "-0.5", "much", "nan", "0.5x"):
             self.bad(2, f"--guide-fraction '{fraction}': expected learned or a number above 0 and below 1", *PLAIN,
@@ -43,7 +50,7 @@ class Options(CliTest):
         self.assertGreater(guiding["samples"], 48 * 32 * 4)
         self.assertEqual(guiding["samples_left_out"], 0)
         self.assertGreater(guiding["fit_seconds_per_million_samples"], 0)
-        self.assertLess(guiding["memory_bytes"], 2048 * guiding["leaves"] + 1024)
+        self.assertLess(guiding["memory_bytes"], 2048 * guiding["leaves"] + 4096)
         self.assertGreater(report["seconds"]["train"], 0)
 
     def test_settings_of_a_scene(self):

@@ -28,6 +28,15 @@ struct NoBsdfDensity : GuidedParts {
   }
 };
 
+/// Directions that failed are no samples of the control.
+struct FailedForgotten : GuidedParts {
+  static constexpr bool kCountFailed = false;
+};
+/// Coefficients of another leaf than those whose sum is added, as after a split.
+struct OtherCoefficients : GuidedParts {
+  static uint32_t direction_cell(uint32_t cell, uint32_t n_cells) { return (cell + 1) % n_cells; }
+};
+
 template <typename Parts>
 class WithBug final : public GuidedPath {
  public:
@@ -40,6 +49,12 @@ class WithBug final : public GuidedPath {
 GuideOptions options(bool nee, const char* fraction = "0.5", uint32_t train_spp = 16) {
   GuideOptions result;
   result.nee = nee, result.fraction = GuideFraction::from(fraction), result.train_spp = train_spp;
+  return result;
+}
+
+GuideOptions controlled(bool nee, ControlKind kind = ControlKind::kRgb) {
+  GuideOptions result = options(nee);
+  result.control = kind;
   return result;
 }
 
@@ -114,12 +129,44 @@ TEST(GuidedPath, HasLessNoiseWhereLightIsHardToFind) {
   EXPECT_LT(noise(trained(xml, options(false, "learned"))), 0.7 * half);
 }
 
+TEST(GuidedPath, ControlledAgreesWithPath) {
+  const TestScene path = load_text(everything());
+  for (const ControlKind kind : {ControlKind::kRgb, ControlKind::kMono}) {
+    const TestScene scene = trained(everything(), controlled(true, kind));
+    EXPECT_GE(integrator_of(scene).table().n_cells(), 2u);
+    EXPECT_EQ(n_biased(differences(scene, path, 16, 100)), 0) << name_of(kind);
+  }
+}
+
+TEST(GuidedPath, ControlledAgreesWithPathWithoutLightSamples) {
+  const std::string xml = everything(kRoulette, false);
+  const TestScene path = load_text(xml), scene = trained(xml, controlled(false));
+  EXPECT_GE(integrator_of(scene).table().n_cells(), 2u);
+  EXPECT_EQ(n_biased(differences(scene, path, 32, 100)), 0);
+  // With the same numbers only the control differs.
+  EXPECT_GT(n_biased(differences(with_bug<FailedForgotten>(xml, controlled(false), scene), scene, 16, 0)), 0);
+  EXPECT_GT(n_biased(differences(with_bug<OtherCoefficients>(xml, controlled(false), scene), scene, 16, 0)), 0);
+}
+
+TEST(GuidedPath, ControlRestoresThePerfectTechnique) {
+  // The BSDF samples a uniform sky without noise; guiding adds noise, which the control takes away.
+  const std::string wall = rectangle("<scale value='20'/><rotate x='1' angle='180'/><translate z='5'/>",
+                                     "<bsdf type='diffuse'><rgb name='reflectance' value='0.6,0.5,0.3'/></bsdf>");
+  const std::string sky = "<emitter type='constant'><rgb name='radiance' value='1,2,4'/></emitter>";
+  const std::string xml = scene_text(wall + sky, kSide, kSide, 2, kWide);
+  const double off = noise(trained(xml, options(false)));
+  EXPECT_LT(noise(trained(xml, controlled(false))), 0.02 * off);
+  EXPECT_LT(noise(trained(xml, controlled(false, ControlKind::kMono))), 0.6 * off);
+}
+
 TEST(GuidedPath, SameBitsForAnyNumberOfThreads) {
   std::string description;
   std::optional<Film> film;
   for (const size_t threads : {1, 2, 5}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    const TestScene scene = trained(everything(), options(true, "learned"));
+    GuideOptions wanted = controlled(true);
+    wanted.fraction = GuideFraction{0.5f, true};
+    const TestScene scene = trained(everything(), wanted);
     const Film next = render(scene, 4, 3);
     if (!film) film.emplace(next), description = scene.integrator().description();
     EXPECT_TRUE(same_bits(next, *film)) << threads;
@@ -128,8 +175,8 @@ TEST(GuidedPath, SameBitsForAnyNumberOfThreads) {
 }
 
 TEST(GuidedPath, AFieldOfAFileTakesThePlaceOfATraining) {
-  const TestScene scene = trained(everything(), options(true));
-  const TestScene other = with_bug<GuidedParts>(everything(), options(true), scene);
+  const TestScene scene = trained(everything(), controlled(true));
+  const TestScene other = with_bug<GuidedParts>(everything(), controlled(true), scene);
   EXPECT_EQ(integrator_of(other).training_spp(), 0u);
   EXPECT_TRUE(same_bits(render(scene, 2, 3), render(other, 2, 3)));
   EXPECT_EQ(scene.integrator().description(), other.integrator().description());
@@ -143,7 +190,9 @@ TEST(GuidedPath, IsToldApartByItsTraining) {
 }
 
 double trained_mean(const std::string& xml, bool nee) {
-  return image_mean(render(trained(xml, options(nee, "learned", 4)), 2, 0));
+  GuideOptions wanted = options(nee, "learned", 4);
+  wanted.control = ControlKind::kRgb, wanted.control_train_spp = 12;
+  return image_mean(render(trained(xml, wanted), 2, 0));
 }
 
 TEST(GuidedPath, TakesScenesThatHaveLittleToLearn) {
