@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Control variates on the lobes that guide a path [Hua2023] (Sec. 5 and 7.5). Techniques of a vertex are the lobes of its
-// leaf, the BSDF, and with light samples the environment and the lights. Each has its coefficient in the leaf:
+// Control variates on the lobes that guide a path [Hua2023] (Sec. 5 and 7.5). Techniques of a vertex are the lobes of
+// its leaf, the BSDF, and with light samples the environment and the lights. Each has its coefficient in the leaf:
 //
 //     control = Σ_k N_k β_k − Σ_s Σ_k β_k r_k(s),     r_k = N_k λ_k / p,
 //
