@@ -21,6 +21,7 @@
 #include "estimator_options.h"
 #include "estimators/feedback.h"
 #include "estimators/grouped_file.h"
+#include "estimators/held_out_error.h"
 #include "estimators/input_checks.h"
 #include "estimators/mean.h"
 #include "estimators/pair_input.h"
@@ -123,6 +124,9 @@ EstimatorResult estimate(const Estimator& estimator, const PairSettings& setting
     };
     append(part.estimate, whole.estimate);
     append(part.std_error, whole.std_error);
+    if (!part.held_out.empty())
+      whole.held_out.insert(whole.held_out.end(), part.held_out.begin() + (y - first),
+                            part.held_out.begin() + (std::min(height, y + step) - first));
   }
   return whole;
 }
@@ -272,6 +276,7 @@ void combine(const CombineOptions& o) {
   const double check_seconds = watch.lap();
 
   EstimatorResult result = estimate(estimator, settings, crn, bands);
+  calibrate(result);
   if (light) add_light_file(*light, result);
   const double estimate_seconds = watch.lap();
   write(o, crn, independent, result);

@@ -124,9 +124,12 @@ void report(const RenderReport& report) {
   if (!result.until_reached.value_or(true))
     throw Unfinished(
         kTargetMissed,
-        fmt::format("--until {} was not reached: '{}' has a predicted relMSE of {:.3g} after {:.4g} samples per "
-                    "pixel",
-                    options.until, options.output, *result.predicted_relmse, result.samples_per_pixel()));
+        fmt::format(
+            "--until {} was not reached: '{}' has a predicted relMSE of {:.3g}{} after {:.4g} samples per "
+            "pixel",
+            options.until, options.output, *result.predicted_relmse,
+            parse_until(options.until).in_blocks ? fmt::format(", {:.3g} in blocks,", *result.predicted_blocks) : "",
+            result.samples_per_pixel()));
 }
 
 /// What the command reads and writes, as far as it is known before the scene is loaded.

@@ -25,13 +25,14 @@ std::array<double, 2> parse_split(const std::string& text) {
   return {static_cast<double>(parts[0]) / sum, static_cast<double>(parts[1]) / sum};
 }
 
-double parse_until(const std::string& text) {
-  const std::string key = "relmse=";
-  const std::optional<double> value =
-      text.starts_with(key) ? parse_real(std::string_view(text).substr(key.size())) : std::nullopt;
-  if (!value || *value <= 0)
-    throw Error(ErrorCode::kUsage, "--until '" + text + "': expected relmse=X with X > 0, e.g. relmse=0.005");
-  return *value;
+Until parse_until(const std::string& text) {
+  for (const std::string key : {"relmse=", "relmse-p95="})
+    if (text.starts_with(key)) {
+      const std::optional<double> value = parse_real(std::string_view(text).substr(key.size()));
+      if (value && *value > 0) return {*value, key != "relmse="};
+    }
+  throw Error(ErrorCode::kUsage,
+              "--until '" + text + "': expected relmse=X or relmse-p95=X with X > 0, e.g. relmse=0.005");
 }
 
 namespace {
@@ -130,7 +131,10 @@ RenderRequest make_request(const RenderOptions& options, const LoadedScene& scen
   }
   request.spp = options.spp;
   request.seconds = options.seconds;
-  if (!options.until.empty()) request.until = parse_until(options.until);
+  if (!options.until.empty()) {
+    const Until until = parse_until(options.until);
+    request.until = until.error, request.until_in_blocks = until.in_blocks;
+  }
   if (options.replay.empty() && options.load_training.empty()) take_training(scene, request);
   request.aovs = options.aovs;
   request.path_lengths = options.control.path_lengths;
@@ -196,7 +200,10 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
       ->transform(whole_number(1, Film::kMaxGroups));
   command.add_option("--display-server", o.display_server,
                      "HOST:PORT of a running tev, which shows the image while it renders");
-  command.add_option("--until", o.until, "relmse=X: add samples until the predicted error is X, at most --spp");
+  command.add_option(
+      "--until", o.until,
+      "relmse=X: add samples until the predicted error is X, at most --spp; relmse-p95=X: until 95 % of the blocks "
+      "of 16 x 16 pixels have no more");
   command.add_option("--seed", o.seed, "Seed of the random numbers")
       ->transform(whole_number(uint64_t{0}, std::numeric_limits<uint64_t>::max()))
       ->capture_default_str();

@@ -55,7 +55,11 @@ SampleAddress replayed_sample(const RenderOptions& options);
 
 /// --split "1:3": parts of the samples for the CRN and the independent pass; they add up to 1.
 std::array<double, 2> parse_split(const std::string& text);
-/// --until "relmse=0.005".
-double parse_until(const std::string& text);
+/// --until "relmse=0.005" or "relmse-p95=0.01".
+struct Until {
+  double error = 0;
+  bool in_blocks = false;  ///< of 16 x 16 pixels, 95 % of which are to have less
+};
+Until parse_until(const std::string& text);
 
 }  // namespace covary

@@ -208,6 +208,7 @@ nlohmann::ordered_json statistics(const RenderReport& report) {
   if (const Pass* light = light_pass(result.passes)) json["light_paths"] = light_paths(light->film);
   if (result.predicted_relmse) {
     json["predicted_relmse"] = *result.predicted_relmse;
+    json["predicted_relmse_p95"] = *result.predicted_blocks;
     json["predicted_relmse_reliable"] = fewest_reliable_samples(report) == 0;
   }
   if (result.until_reached) json["until_reached"] = *result.until_reached;

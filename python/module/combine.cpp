@@ -2,6 +2,7 @@
 #include <optional>
 
 #include "core/error.h"
+#include "estimators/held_out_error.h"
 #include "estimators/pair_input.h"
 #include "estimators/predicted_error.h"
 #include "estimators/registry.h"
@@ -89,6 +90,7 @@ nb::tuple combine(nb::object crn, nb::object independent, const CombineRequest& 
     const bool whole =
         run_stoppable(state, [&] { result = estimator.apply(pair.crn.view(), pair.independent.view(), settings); });
     if (!whole) return;
+    calibrate(result);
     if (!result.std_error.data.empty()) predicted = predicted_relmse(result);
     state.done = 2;
   };

@@ -37,6 +37,7 @@ struct Guides {
 struct PairSettings {
   int64_t crn_samples = 1;  ///< samples per pixel of the CRN image, > 0; read where needs_sample_count says so
   bool std_error = false;   ///< estimate the standard error, too; where predicts_error says that it can
+  bool held_out = true;     ///< with the standard error, also EstimatorResult::held_out
   Guides guides;            ///< read where reads_guides says so
 };
 
@@ -50,6 +51,8 @@ struct Estimator {
   std::string text;     ///< name and options as given: "iicv --paper --k 50"
 
   bool predicts_error = false;  ///< that of its result
+  /// Its predicted error is to be calibrated by held-out samples (held_out_error.h).
+  bool holds_out = false;
   /// Samples per pixel, of all passes together, below which the predicted error was measured to be unreliable.
   uint32_t reliable_samples = 0;
   bool needs_sample_count = false;  ///< PairSettings::crn_samples

@@ -37,6 +37,16 @@ struct GroupedImage {
   bool has_equal_groups(int x, int y) const { return count(x, y) % static_cast<uint32_t>(groups) == 0; }
 };
 
+/// What held-out samples tell of the error of a row of pixels (held_out_error.h), relative as in relMSE: sums over its
+/// values, each over F'^2 + 0.01.
+struct HeldOutRow {
+  double error = 0;      ///< squared error of images made of half of the samples
+  double variance = 0;   ///< their variance alone
+  double predicted = 0;  ///< squared standard error of the image made of all
+  double squares = 0;    ///< of `error` of the parts of the row, of which there are `parts`
+  int parts = 0;
+};
+
 /// What an estimator returns. `estimate` has the three channels R, G, B. `std_error` has them too, or is empty where no
 /// error estimate was asked for.
 struct EstimatorResult {
@@ -45,6 +55,8 @@ struct EstimatorResult {
   /// Pixels with a non-finite value in either input. They are left out everywhere else and show the mean of their
   /// finite groups, or zero where there are none.
   long nonfinite_pixels = 0;
+  /// Of each row, for calibrate() of held_out_error.h; empty where nothing was held out.
+  std::vector<HeldOutRow> held_out;
 };
 
 /// Throws Error(kUsage) that lists `problems` unless there are none. `name`: of the estimator.

@@ -6,6 +6,7 @@
 
 #include "core/parallel.h"
 #include "estimators/guided_cells.h"
+#include "estimators/halves.h"
 
 namespace covary {
 namespace {
@@ -55,7 +56,97 @@ double factor_of_image(const HeldOutInput& in) {
   return std::clamp((all.error - 0.5 * all.variance) / (0.5 * all.variance), kLeastFactor, kLargestFactor);
 }
 
+double square(double value) { return value * value; }
+
+/// Pixels of a part of a row, whose errors are taken together.
+constexpr int kPart = 16;
+/// Relative standard error of the held-out error at which it counts as much as the estimator's own prediction.
+constexpr double kTrusted = 0.3;
+/// Least error of the whole over the variance of the halves: half, but for noise.
+constexpr double kLeastOverVariance = 0.25;
+
+float relative_weight(const float* f) { return 1 / (sqr((f[0] + f[1] + f[2]) / 3) + 0.01f); }
+
+/// The weight of each squared error is that of the image it belongs to: independent of the held-out samples.
+HeldOutRow held_out_row(const HeldOutInput& in, const EstimatorResult& whole, int y) {
+  HeldOutRow row;
+  double part = 0;
+  const int width = whole.estimate.width;
+  for (int x = 0; x < width; ++x) {
+    if ((*in.valid)[static_cast<size_t>(y) * width + x]) {
+      const double w = relative_weight(whole.estimate.pixel(x, y));
+      const float* m[2] = {in.halves[0]->pixel(x, y), in.halves[1]->pixel(x, y)};
+      const double weights[2] = {relative_weight(m[0]), relative_weight(m[1])};
+      for (int c = 0; c < 3; ++c) {
+        for (int half : {0, 1}) {
+          const Moments& h = *in.independent[1 - half];
+          part += 0.5 * weights[half] * (square(h.mean.row(c, y)[x] - m[half][c]) - h.variance_of_mean.row(c, y)[x]);
+        }
+        row.variance += 0.25 * (weights[0] + weights[1]) * square(m[0][c] - m[1][c]);
+        row.predicted += w * square(whole.std_error.pixel(x, y)[c]);
+      }
+    }
+    if (x % kPart != kPart - 1 && x != width - 1) continue;
+    row.error += part;
+    row.squares += part * part;
+    row.parts += 1;
+    part = 0;
+  }
+  return row;
+}
+
+EstimatorResult apply_with_rows(const Estimator& base, const GroupedImage& crn, const GroupedImage& independent,
+                                const PairSettings& settings) {
+  EstimatorResult whole = base.apply(crn, independent, settings);
+  if (!settings.std_error || !settings.held_out || crn.groups < 2 * base.fewest_groups ||
+      independent.groups < 2 * base.fewest_groups)
+    return whole;
+  PairSettings half_settings = settings;
+  half_settings.std_error = false;
+  half_settings.crn_samples = std::max<int64_t>(1, settings.crn_samples / 2);
+  long ignored = 0;
+  const std::vector<unsigned char> valid = finite_pixels(crn, independent, ignored);
+  std::array<Image, 2> images;
+  std::array<Moments, 2> h;
+  for (int half : {0, 1}) {
+    const HalfImage half_crn(crn, half), half_independent(independent, half);
+    images[half] = base.apply(half_crn.view(), half_independent.view(), half_settings).estimate;
+    h[half] = moments(half_independent.view(), valid, 0, 0.0f);
+  }
+  const HeldOutInput input{{&images[0], &images[1]}, {&h[0], &h[1]}, nullptr, &valid};
+  whole.held_out.resize(static_cast<size_t>(crn.height));
+  parallel_for(crn.height, 8, [&](int y) { whole.held_out[static_cast<size_t>(y)] = held_out_row(input, whole, y); });
+  return whole;
+}
+
 }  // namespace
+
+Estimator with_held_out_rows(const Estimator& base) {
+  if (!base.holds_out || base.adaptive) return base;
+  Estimator estimator = base;
+  // Half of the groups of both images, and the images and moments of both halves.
+  estimator.bytes_per_pixel += 144 + 2 * (3 + 6) * sizeof(float);
+  estimator.apply = [base](const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings) {
+    return apply_with_rows(base, crn, independent, settings);
+  };
+  return estimator;
+}
+
+void calibrate(EstimatorResult& result) {
+  HeldOutRow all;
+  for (const HeldOutRow& row : result.held_out) {
+    all.error += row.error, all.variance += row.variance, all.predicted += row.predicted;
+    all.squares += row.squares, all.parts += row.parts;
+  }
+  result.held_out.clear();
+  if (all.parts < 2 || !(all.predicted > 0) || !(all.error > 0) || !std::isfinite(all.error + all.variance)) return;
+  const double noise = std::max(0.0, all.squares - all.error * all.error / all.parts);
+  const double trust = 1 / (1 + noise / square(kTrusted * all.error));
+  const double whole = std::max(all.error - 0.5 * all.variance, kLeastOverVariance * all.variance);
+  if (!(whole > 0)) return;
+  const auto factor = static_cast<float>(std::pow(whole / all.predicted, 0.5 * trust));
+  for (float& value : result.std_error.data) value *= factor;
+}
 
 Image held_out_error(const HeldOutInput& input) {
   const int width = input.guide->width, height = input.guide->height;

@@ -13,6 +13,7 @@
 #include <array>
 #include <vector>
 
+#include "estimators/estimator.h"
 #include "estimators/planes.h"
 
 namespace covary {
@@ -27,5 +28,15 @@ struct HeldOutInput {
 /// The estimated standard error of an image that the same method made of both halves. Bit-identical for any number of
 /// threads.
 Image held_out_error(const HeldOutInput& input);
+
+/// An estimator that fills EstimatorResult::held_out beside its standard error where both halves of the groups are
+/// enough for it; only of those with Estimator::holds_out, others are returned as they are.
+Estimator with_held_out_rows(const Estimator& base);
+
+/// Scales the standard error so that its relMSE is between what the estimator predicts and what held-out samples tell:
+/// nearer to the latter the better these know it. With their relative standard error c, the logarithm of the ratio of
+/// both counts 1 / (1 + (c / 0.3)^2). Held-out samples see bias; few of them may have missed rare light. Empties
+/// `result.held_out`; does nothing where it is empty.
+void calibrate(EstimatorResult& result);
 
 }  // namespace covary

@@ -172,6 +172,8 @@ Estimator make_iicv(EstimatorParameters& parameters) {
 
   estimator.summary = "imperfect image-space control variates";
   estimator.predicts_error = true;
+  // Without feedback the bias of a half is too much larger than that of the whole (docs/methods/error-estimates.md).
+  estimator.holds_out = o.feedback;
   estimator.reliable_samples = kReliableSamples;
   estimator.fewest_groups = o.penalty == Penalty::kCrossFit ? 4 : 3;
   estimator.reach = iicv_reach(o);

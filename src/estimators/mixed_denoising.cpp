@@ -54,6 +54,7 @@ Image interior(const Planes& planes) {
 Part make_part(const Estimator& base, const GroupedImage& crn, const GroupedImage& independent, PairSettings settings,
                const std::vector<unsigned char>& valid, const std::vector<CandidateMaker>& makers) {
   settings.std_error = true;
+  settings.held_out = false;
   Part part;
   part.base = base.apply(crn, independent, settings);
   part.independent = moments(independent, valid, 0, 0.0f);

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 
@@ -159,6 +160,36 @@ TEST(HeldOutError, IsUnbiased) {
   EXPECT_LT(std::abs(t_of_prediction(0.1f, true)), 5.5);
   // Images that are judged by themselves seem to have no bias.
   EXPECT_GT(std::abs(t_of_prediction(0.1f, false)), 5.5);
+}
+
+/// Rows of an image whose held-out error is `error` in each of `n` parts, give or take `spread`.
+EstimatorResult with_rows(double error, double variance, double predicted, double spread, int n) {
+  EstimatorResult result;
+  result.std_error = Image(1, 1, 3);
+  std::fill(result.std_error.data.begin(), result.std_error.data.end(), 1.0f);
+  for (int i = 0; i < n; ++i) {
+    const double value = error + (i % 2 ? spread : -spread);
+    result.held_out.push_back({value, variance, predicted, value * value, 1});
+  }
+  return result;
+}
+
+double calibrated(EstimatorResult result) {
+  calibrate(result);
+  EXPECT_TRUE(result.held_out.empty());
+  return std::pow(result.std_error.data[0], 2);
+}
+
+TEST(Calibration, TrustsHeldOutSamplesAsFarAsTheyKnow) {
+  // Without noise: squared bias 1 and variance 2 of a half make 2 of the whole.
+  EXPECT_NEAR(calibrated(with_rows(3, 2, 1, 0, 100)), 2, 1e-5);
+  EXPECT_NEAR(calibrated(with_rows(3, 2, 4, 0, 100)), 0.5, 1e-5);
+  // A relative standard error of 0.3: half of the way, in logarithms.
+  EXPECT_NEAR(calibrated(with_rows(3, 2, 8, 0.3 * 3 * 10, 100)), 0.5, 1e-3);
+  // Noise alone, or nothing: the estimator's own prediction.
+  EXPECT_NEAR(calibrated(with_rows(3, 2, 8, 1e4, 100)), 1, 0.01);
+  EXPECT_EQ(calibrated(with_rows(-1, 2, 8, 0, 100)), 1);
+  EXPECT_EQ(calibrated(with_rows(3, 2, 8, 0, 0)), 1);
 }
 
 }  // namespace

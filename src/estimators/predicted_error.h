@@ -11,4 +11,8 @@ namespace covary {
 /// Pixels that are not finite are left out. Throws Error(kUsage) where `result` has no standard error.
 double predicted_relmse(const EstimatorResult& result);
 
+/// The same of the block of 16 x 16 pixels (smaller at the right and lower edge) that 95 % of the blocks do not exceed:
+/// how bad the worst regions are.
+double predicted_blocks(const EstimatorResult& result);
+
 }  // namespace covary

@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "core/error.h"
+#include "estimators/held_out_error.h"
 
 namespace covary {
 
@@ -63,7 +64,7 @@ Estimator make_estimator(const std::string& name, const OptionValues& values) {
     estimator.text += " --" + option.name;
     if (option.type != EstimatorOption::Type::kFlag) estimator.text += " " + given->second;
   }
-  return estimator;
+  return with_held_out_rows(estimator);
 }
 
 std::vector<std::string> estimator_names() {

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <random>
 
+#include "estimators/held_out_error.h"
 #include "estimators/light_film.h"
 #include "estimators/mean.h"
 #include "estimators/predicted_error.h"
@@ -83,6 +84,7 @@ TEST(LightPlan, BesideCrnThereIsOneWhereItIsAskedFor) {
   const Film &crn = on.passes[0].film, &independent = on.passes[1].film;
   EstimatorResult expected =
       make_estimator("iicv").apply(rows_of(crn, 0, kHeight), rows_of(independent, 0, kHeight), {12, true});
+  calibrate(expected);
   const EstimatorResult light = mean_of_groups(rows_of(on.passes[2].film, 0, kHeight));
   for (size_t i = 0; i < expected.estimate.data.size(); ++i) {
     ASSERT_EQ(on.image.estimate.data[i], expected.estimate.data[i] + light.estimate.data[i]);

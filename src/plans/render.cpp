@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/stopwatch.h"
+#include "estimators/held_out_error.h"
 #include "estimators/light_film.h"
 #include "estimators/predicted_error.h"
 #include "film/splat_layer.h"
@@ -89,6 +90,10 @@ class PlanRun {
 
   bool has_training() const { return !result_.training.mean.data.empty(); }
   bool timed() const { return request_.seconds > 0; }
+  /// What RenderRequest::until is about.
+  double error_to_limit() const {
+    return request_.until_in_blocks ? *result_.predicted_blocks : *result_.predicted_relmse;
+  }
   bool needs_aovs() const { return request_.aovs || plan_.reads_guides; }
   bool stopped() const { return callbacks_.stop && callbacks_.stop->load(); }
   /// The passes of every phase are there.
@@ -194,10 +199,10 @@ bool PlanRun::render_to_limits() {
     }
     if (!plan_.film_is_image || request_.until > 0) estimate();
     result_.seconds.limited = watch_.seconds();
-    if (request_.until > 0) result_.until_reached = *result_.predicted_relmse <= request_.until;
+    if (request_.until > 0) result_.until_reached = error_to_limit() <= request_.until;
     const bool out_of_time = timed() && seconds_left(plan_.phases.size() - 1, 1) <= 0;
     if (result_.until_reached.value_or(true) || state_.budget >= limit || out_of_time) return true;
-    state_.budget = next_budget(state_.budget, *result_.predicted_relmse, request_.until, limit);
+    state_.budget = next_budget(state_.budget, error_to_limit(), request_.until, limit);
   }
 }
 
@@ -310,6 +315,7 @@ EstimatorResult PlanRun::estimate_rows(int first_row, int n_rows) const {
     guides = {&albedo, &normal};
   }
   EstimatorResult image = plan_.estimate(camera_passes(state_.passes), first_row, n_rows, guides);
+  calibrate(image);
   if (const Pass* light = light_pass(state_.passes)) add_light(rows_of(light->film, first_row, n_rows), image);
   if (has_training()) add_training(state_.passes[0].film, result_.training, first_row, image);
   return image;
@@ -318,7 +324,10 @@ EstimatorResult PlanRun::estimate_rows(int first_row, int n_rows) const {
 void PlanRun::estimate() {
   const Stopwatch watch;
   EstimatorResult image = estimate_rows(0, window_.height);
-  if (!image.std_error.data.empty()) result_.predicted_relmse = predicted_relmse(image);
+  if (!image.std_error.data.empty()) {
+    result_.predicted_relmse = predicted_relmse(image);
+    result_.predicted_blocks = predicted_blocks(image);
+  }
   if (request_.until > 0 && !result_.predicted_relmse)
     throw Error(ErrorCode::kUsage, "an error can only be predicted from 2 or more groups");
   if (!plan_.film_is_image) result_.image = std::move(image);

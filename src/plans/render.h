@@ -25,9 +25,10 @@ struct RenderRequest {
   /// Samples per pixel of all passes together, 1 … 2^30. Default: the scene's, or no limit where `seconds` or `until`
   /// is given.
   std::optional<uint32_t> spp;
-  double seconds = 0;  ///< > 0: limit for rendering and estimating together
-  double until = 0;    ///< > 0: add samples until the predicted relMSE is this
-  bool aovs = false;   ///< also the images Albedo, N and P
+  double seconds = 0;            ///< > 0: limit for rendering and estimating together
+  double until = 0;              ///< > 0: add samples until the predicted relMSE is this
+  bool until_in_blocks = false;  ///< `until` means predicted_blocks() of predicted_error.h, not the whole image
+  bool aovs = false;             ///< also the images Albedo, N and P
   /// Also the images Edges01, Edges02, … of the last pass of camera samples (integrators/path_length_images.h), which
   /// needs the integrator controlled-path.
   bool path_lengths = false;
@@ -76,6 +77,7 @@ struct RenderResult {
   /// samples.
   EstimatorResult image;
   std::optional<double> predicted_relmse;
+  std::optional<double> predicted_blocks;  ///< of predicted_error.h
   /// Image of the samples of the integrator's training, where they are a part of the image (Plan::takes_training).
   TrainingImage training;
   std::map<std::string, Image> aovs;

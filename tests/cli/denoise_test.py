@@ -56,6 +56,9 @@ class Denoise(RenderTest):
     def test_until_and_few_samples(self):
         facts = self.statistics("-o", "a.exr", "--denoise", "error", *PLAIN, "--until", "relmse=0.01")
         self.assertLessEqual(facts["predicted_relmse"], 0.01)
+        facts = self.statistics("-o", "c.exr", "--denoise", "error", *PLAIN, "--until", "relmse-p95=0.03")
+        self.assertLessEqual(facts["predicted_relmse_p95"], 0.03)
+        self.assertGreater(facts["predicted_relmse_p95"], facts["predicted_relmse"])
         facts = self.statistics("-o", "b.exr", "--denoise", "error", *PLAIN, "--spp", "4")
         self.assertEqual(facts["samples_per_pixel"], 12, "six groups in each pass")
 
