@@ -78,7 +78,9 @@ void WaveCombination::add(const Film& film, std::span<const Spectrum> importance
 
 TrainingImage WaveCombination::result() const {
   TrainingImage result{sum_, {}};
-  for (size_t colour = 0; colour < 2; ++colour) result.samples[colour] = weight_sums_[colour] * last_variance_[colour];
+  // Earlier waves are no better than the last: where they seem so, it has met rare bright samples.
+  for (size_t colour = 0; colour < 2; ++colour)
+    result.samples[colour] = std::min<double>(end_, weight_sums_[colour] * last_variance_[colour]);
   for (int y = 0; y < sum_.height; ++y)
     for (int x = 0; x < sum_.width; ++x)
       for (int c = 0; c < 3; ++c)

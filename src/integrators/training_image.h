@@ -25,7 +25,8 @@ enum class WaveWeights {
 /// An unbiased image of a training's samples.
 struct TrainingImage {
   Image mean;  ///< empty: there is none
-  /// As how many samples of the trained integrator it counts, of pixels with even and with odd x + y.
+  /// As how many samples of the trained integrator it counts, of pixels with even and with odd x + y; at most as many
+  /// as it has.
   std::array<double, 2> samples{};
   double samples_at(int x, int y) const { return samples[static_cast<size_t>((x + y) & 1)]; }
 };
