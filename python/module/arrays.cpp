@@ -95,18 +95,19 @@ GroupedImage Groups::view() {
   // A size of 1 leaves its stride open.
   const auto lies = [&](int axis, int64_t stride) { return source_.shape[axis] == 1 || s[axis] == stride; };
   if (lies(0, 3) && lies(1, W * T * 3) && lies(2, T * 3) && lies(3, 1)) return image;
-  if (ordered_.empty()) {
-    ordered_.resize(static_cast<size_t>(T * H * W * 3));
+  if (!ordered_) {
+    ordered_ = std::make_unique_for_overwrite<float[]>(static_cast<size_t>(T * H * W * 3));
     parallel_for(H, [&](int64_t y) {
       for (int64_t t = 0; t < T; ++t) {
         const float* from = source_.data + t * s[0] + y * s[1];
-        float* to = ordered_.data() + (y * W * T + t) * 3;
-        for (int64_t x = 0; x < W; ++x, from += s[2], to += T * 3)
-          for (int64_t c = 0; c < 3; ++c) to[c] = from[c * s[3]];
+        float* to = ordered_.get() + (y * W * T + t) * 3;
+        for (int64_t x = 0; x < W; ++x, from += s[2], to += T * 3) {
+          to[0] = from[0], to[1] = from[s[3]], to[2] = from[2 * s[3]];
+        }
       }
     });
   }
-  image.data = ordered_.data();
+  image.data = ordered_.get();
   return image;
 }
 

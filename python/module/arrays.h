@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -40,7 +41,7 @@ class Groups {
 
  private:
   Floats source_;
-  std::vector<float> ordered_;
+  std::unique_ptr<float[]> ordered_;
 };
 
 /// An array [H, W, 3] as an image of its own. Raises like floats_of().
