@@ -14,6 +14,7 @@ void add_render(CLI::App& app);
 void add_compare(CLI::App& app);
 void add_merge(CLI::App& app);
 void add_info(CLI::App& app);
+void add_probe(CLI::App& app);
 void add_convert(CLI::App& app);
 void add_combine(CLI::App& app);
 void add_denoise(CLI::App& app);

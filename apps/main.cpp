@@ -66,6 +66,7 @@ int run(int argc, char** argv) {
   add_render(app);
   add_compare(app);
   add_merge(app);
+  add_probe(app);
   add_info(app);
   add_convert(app);
   add_combine(app);

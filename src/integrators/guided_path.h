@@ -26,6 +26,8 @@ class GuidedPath : public LearningIntegrator {
   const GuidingField& field() const { return given_ ? *given_ : field_; }
   /// Coefficients of control variates that were learnt so far, or given.
   const CoefficientTable& table() const { return given_table_ ? *given_table_ : cache_.table(); }
+  /// What paths are traced with; after prepare().
+  const GuidedScene& guided() const { return guided_; }
   /// Bytes of samples and mixtures at the end of the training.
   size_t training_bytes() const { return training_bytes_; }
   std::string settings_text() const override;

@@ -71,6 +71,17 @@ inline float guidable_share(const BsdfClosure& bsdf, const Vec3& wo, float min_r
   return std::min(share, 1.0f);
 }
 
+/// The lobes of a leaf for a vertex at `p` whose normal on the side of the path is `normal`, and the fraction of
+/// directions that they draw there. False where the leaf does not guide.
+inline bool guide_at(const GuidedScene& guided, uint32_t leaf_number, const Vec3& p, const Vec3& normal, float share,
+                     float& fraction, VmfLobes& lobes) {
+  const GuidingLeaf& leaf = guided.field->leaf(leaf_number);
+  if (share == 0 || leaf.mixture.lobes.n == 0) return false;
+  fraction = share * (guided.learned_fraction ? leaf.fraction : guided.fraction);
+  lobes = leaf.mixture.at(p).times_cosine(normal);
+  return true;
+}
+
 template <typename Parts>
 class GuidedTracer {
  public:
@@ -297,12 +308,10 @@ class GuidedTracer {
     guide_.fraction = guide_.share = 0;
     if (!smooth || (field_.n_leaves() == 0 && !batch_.recording)) return;
     guide_.share = guidable_share(bsdf, wo, guided_.min_roughness);
-    if (field_.n_leaves() == 0 || guide_.share == 0) return;
-    const GuidingLeaf& leaf = field_.leaf(batch_.leaves[i]);
-    if (leaf.mixture.lobes.n == 0) return;
+    if (field_.n_leaves() == 0) return;
     guide_.leaf = batch_.leaves[i];
-    guide_.fraction = guide_.share * (guided_.learned_fraction ? leaf.fraction : guided_.fraction);
-    guide_.lobes = leaf.mixture.at(hit.p).times_cosine(wo.z > 0 ? hit.frame.n : -hit.frame.n);
+    guide_at(guided_, guide_.leaf, hit.p, wo.z > 0 ? hit.frame.n : -hit.frame.n, guide_.share, guide_.fraction,
+             guide_.lobes);
   }
 
   Direction sample_direction(const SurfaceHit& hit, const Vec3& wo, const BsdfClosure& bsdf, const PathRandom& random,

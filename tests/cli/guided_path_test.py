@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`covary render --integrator guided-path`: its options, what it reports, and films that belong together."""
 import json
+import math
 import os
 import re
 import unittest
@@ -102,6 +103,33 @@ class Films(CliTest):
         channels = self.pixels("a.exr")
         for value, name in zip(re.search(r"radiance \((.*), (.*), (.*)\)", replay).groups(), "RGB"):
             self.assertAlmostEqual(float(value), channels["group00." + name][10 * 48 + 20], delta=1e-6)
+
+
+class Probe(CliTest):
+    PROBE = ("probe", *RENDER[1:4], "--guide-train", "4", "-o", "a.exr")
+
+    def test_density_integrates_to_one(self):
+        self.good(*self.PROBE, "--pixel", "4,4", "--samples", "2", "--cv", "rgb", "--cv-train", "12")
+        channels, height = read_exr((self.path / "a.exr").read_bytes()), 64
+        width, sums = 2 * height, [0, 0, 0]
+        for y in range(height):
+            area = 2 * math.pi / width * (math.cos(math.pi * y / height) - math.cos(math.pi * (y + 1) / height))
+            for part in range(3):
+                row = channels["R"][(3 * y + part) * width:(3 * y + part + 1) * width]
+                sums[part] += area * sum(row)
+        self.assertGreater(sums[0], 0.01)
+        self.assertAlmostEqual(sums[1], 1, delta=0.05)
+        self.assertNotEqual(sums[2], 0)
+
+    def test_uses_a_training(self):
+        self.good(*PLAIN, "--spp", "8", "-o", "b.exr", "--save-training", "a.training")
+        self.good(*self.PROBE, "--pixel", "24,28", "--samples", "1", "--load-training", "a.training", "--height", "8")
+
+    def test_refuses_what_it_cannot_show(self):
+        self.bad(2, "--pixel '48,0' is outside the 48 x 32 frame", *self.PROBE, "--pixel", "48,0")
+        self.bad(2, "probe shows what guided-path has learnt, not path", "probe", *RENDER[1:4], "--integrator", "path",
+                 "--pixel", "1,1", "-o", "a.exr")
+        self.bad(2, "no output given", "probe", ROOM, "--pixel", "1,1")
 
 
 class TrainingFiles(CliTest):

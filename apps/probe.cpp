@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+// covary probe: what guided-path has learnt at the surface behind a pixel, as latitude-longitude images.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "commands.h"
+#include "film/image_writer.h"
+#include "film/outputs.h"
+#include "integrators/guide_probe.h"
+#include "numbers.h"
+#include "plans/budget.h"
+#include "plans/training_stage.h"
+#include "render_options.h"
+
+namespace covary {
+namespace {
+
+/// Samples per pixel that are asked for where none are taken but those of the training.
+constexpr uint32_t kAnyBudget = 1u << 20;
+
+struct ProbeOptions {
+  RenderOptions render;
+  std::string pixel;
+  int height = 64;
+  uint32_t samples = 64;
+};
+
+/// The three images side by side.
+Image side_by_side(const GuideProbe& probe) {
+  const int width = probe.radiance.width, height = probe.radiance.height;
+  Image all(3 * width, height, 3);
+  const Image* images[] = {&probe.radiance, &probe.density, &probe.control};
+  for (int i = 0; i < 3; ++i)
+    for (int y = 0; y < height; ++y) std::copy_n(images[i]->pixel(0, y), 3 * width, all.pixel(i * width, y));
+  return all;
+}
+
+void probe(ProbeOptions options) {
+  RenderOptions& render = options.render;
+  if (render.output.empty()) throw Error(ErrorCode::kUsage, "no output given; use -o OUT.exr");
+  if (render.integrator.empty()) render.integrator = "guided-path";
+  render.spp = kAnyBudget;
+  check_options(render);
+  Outputs outputs;
+  outputs.writes("-o", render.output, OutputKind::kImage);
+  const LoadedScene scene = load(render);
+  outputs.reads(scene.files);
+  auto* guided = dynamic_cast<GuidedPath*>(scene.integrator.get());
+  if (!guided) throw Error(ErrorCode::kUsage, "probe shows what guided-path has learnt, not " + render.integrator);
+  const auto at = parse_numbers("--pixel", options.pixel, ',', 2, "X,Y, e.g. 640,360");
+  if (at[0] < 0 || at[1] < 0 || at[0] >= scene.width || at[1] >= scene.height)
+    throw Error(ErrorCode::kUsage,
+                fmt::format("--pixel '{}' is outside the {} x {} frame", options.pixel, scene.width, scene.height));
+  guided->prepare(*scene.scene);
+  const RenderRequest request = make_request(render, scene);
+  RenderSeconds seconds;
+  train(scene, request, {window_of(scene, request), scene.filter, nullptr, nullptr, {}}, seconds);
+  const Ray ray =
+      scene.scene->camera().ray({static_cast<float>(at[0]) + 0.5f, static_cast<float>(at[1]) + 0.5f}, {0.5f, 0.5f});
+  const std::optional<GuideProbe> found =
+      probe_guide(*scene.scene, *guided, ray, options.height, options.samples, render.seed);
+  if (!found) throw Error(ErrorCode::kUsage, fmt::format("no surface lies behind the pixel {}", options.pixel));
+  const Image image = side_by_side(*found);
+  write_image(render.output, image, {image.width, image.height, {0, 0, image.width, image.height}}, {});
+  fmt::print(stderr, "{}: radiance, density and control at ({:g}, {:g}, {:g}), {} x {} pixels each\n", render.output,
+             found->position.x, found->position.y, found->position.z, found->radiance.width, found->radiance.height);
+}
+
+}  // namespace
+
+void add_probe(CLI::App& app) {
+  const auto options = std::make_shared<ProbeOptions>();
+  CLI::App* command =
+      app.add_subcommand("probe", "What guided-path has learnt at the surface behind a pixel, as images (EXR)");
+  add_render_options(*command, options->render);
+  command->add_option("--pixel", options->pixel, "X,Y of the frame")->required();
+  command->add_option("--height", options->height, "Rows of the images, which are twice as wide")
+      ->transform(whole_number(1, 4096))
+      ->capture_default_str();
+  command->add_option("--samples", options->samples, "Samples of the radiance of each direction")
+      ->transform(whole_number(1u, 1u << 20))
+      ->capture_default_str();
+  command->callback([options] { probe(*options); });
+}
+
+}  // namespace covary

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "integrators/guide_probe.h"
+
+#include "core/parallel.h"
+#include "core/trigonometry.h"
+
+namespace covary {
+namespace {
+
+/// PassSettings::pass of probes, so that they share no numbers with renders.
+constexpr uint32_t kProbePass = 1u << 28;
+
+/// What the surface does with directions.
+class Surface {
+ public:
+  Surface(const GuidedPath& integrator, const SurfaceHit& hit, const Vec3& to_viewer)
+      : guided_(integrator.guided()), hit_(hit), wo_(hit.frame.to_local(to_viewer)) {
+    bsdf_ = hit.bsdf->bind(hit, wo_.z > 0, TransportMode::kRadiance, arena_);
+    leaf_ = guided_.field->find(hit.p);
+    if (leaf_ == GuidingField::kNone) return;
+    guides_ = guide_at(guided_, leaf_, hit.p, wo_.z > 0 ? hit.frame.n : -hit.frame.n,
+                       guidable_share(*bsdf_, wo_, guided_.min_roughness), fraction_, lobes_);
+    if (guides_ && guided_.table->n_cells() > 0) cell_ = guided_.table->find(control_key(leaf_));
+  }
+
+  float density(const Vec3& w) const {
+    const float pdf = bsdf_->eval(wo_, hit_.frame.to_local(w)).pdf_solid_angle;
+    return guides_ ? GuidedParts::mixture_pdf(fraction_, pdf, lobes_.pdf(w)) : pdf;
+  }
+
+  Spectrum control(const Vec3& w) const {
+    if (cell_ == CoefficientTable::kNone) return {};
+    const CoefficientTable& table = *guided_.table;
+    const float pdf = bsdf_->eval(wo_, hit_.frame.to_local(w)).pdf_solid_angle;
+    Spectrum sum = table.dense(cell_, GuidedTechnique::kBsdf) * ((1 - fraction_) * pdf);
+    alignas(32) float parts[VmfLobes::kMax];
+    lobes_.pdfs(w, parts);
+    for (int k = 0; k < lobes_.n; ++k)
+      sum += table.dense(cell_, GuidedTechnique::of(guided_.field->leaf(leaf_), k)) * (fraction_ * parts[k]);
+    return sum * table.scale(cell_);
+  }
+
+ private:
+  const GuidedScene& guided_;
+  const SurfaceHit& hit_;
+  Vec3 wo_;
+  Arena arena_;
+  const BsdfClosure* bsdf_;
+  uint32_t leaf_ = GuidingField::kNone, cell_ = CoefficientTable::kNone;
+  bool guides_ = false;
+  float fraction_ = 0;
+  VmfLobes lobes_;
+};
+
+void set(Image& image, int x, int y, const Spectrum& value) {
+  for (int c = 0; c < 3; ++c) image.pixel(x, y)[c] = value[c];
+}
+
+}  // namespace
+
+Vec3 probe_direction(float x, float y) {
+  const SinCos polar = sincos_turns(0.5f * y), turn = sincos_turns(x);
+  return {polar.sin * turn.cos, polar.cos, polar.sin * turn.sin};
+}
+
+std::optional<GuideProbe> probe_guide(const Scene& scene, const GuidedPath& integrator, Ray ray, int height,
+                                      uint32_t spp, uint64_t seed) {
+  SurfaceHit hit;
+  if (!scene.intersect(ray, hit)) return {};
+  const int width = 2 * height;
+  GuideProbe probe{hit.p, Image(width, height, 3), Image(width, height, 3), Image(width, height, 3)};
+  const Surface surface(integrator, hit, -ray.d);
+  parallel_for(height, [&](int y) {
+    PathContext context(integrator);
+    std::vector<CameraSample> samples;
+    for (int x = 0; x < width; ++x) {
+      samples.clear();
+      const auto pixel = static_cast<uint64_t>(y) * static_cast<uint64_t>(width) + static_cast<uint64_t>(x);
+      for (uint32_t s = 0; s < spp; ++s) {
+        const PathRandom random(Sampling::kIndependent, seed, kProbePass, pixel, s);
+        const Vec2 u = random.get_2d(0, Event::kPixel);
+        const Vec3 w = probe_direction((static_cast<float>(x) + u.x) / static_cast<float>(width),
+                                       (static_cast<float>(y) + u.y) / static_cast<float>(height));
+        samples.push_back({{offset_origin(hit.p, hit.ng, w), w, kInfinity}, random, {}});
+      }
+      integrator.trace(scene, samples, context);
+      Spectrum sum;
+      for (const CameraSample& sample : samples) sum += sample.radiance;
+      set(probe.radiance, x, y, sum / static_cast<float>(spp));
+      const Vec3 centre = probe_direction((static_cast<float>(x) + 0.5f) / static_cast<float>(width),
+                                          (static_cast<float>(y) + 0.5f) / static_cast<float>(height));
+      set(probe.density, x, y, Spectrum(surface.density(centre)));
+      set(probe.control, x, y, surface.control(centre));
+    }
+  });
+  return probe;
+}
+
+}  // namespace covary
