@@ -21,6 +21,8 @@ constexpr float kWidening = 4, kSecondWidening = 12;
 /// Variance of the narrow mean, relative to that of the estimate, at which both means count equally. 0.1 to 3 trade
 /// bias for error, slowly (docs/notes/iicv.md).
 constexpr float kNoise = 0.2f;
+/// Variance of a wide mean, relative to that of the estimate, at which half of it is given back.
+constexpr float kWideNoise = 1;
 
 /// Cells of side x side pixels, one row of cells per row, repeated horizontally so that column x holds the cell of
 /// pixel x: mean of F^ (kFar for cells without valid pixels), sums over the valid pixels of n (h - F^), n and n^2 var h
@@ -67,6 +69,12 @@ struct GuidedMean {
   vfloat weights = {}, residuals[3] = {}, squares = {};  ///< squares: sum of w^2 var h
   /// Where nothing is alike, there is nothing to give back.
   vfloat value(int c) const { return residuals[c] / max(weights, splat(1e-20f)); }
+  /// t / (t + v), v the mean's variance, summed over RGB, t = `tolerated`. 0 without weights, or beyond the range of
+  /// floats.
+  vfloat share(vfloat tolerated) const {
+    const vfloat excess = (squares + splat(1e-30f)) / max(tolerated * weights * weights, splat(1e-37f));
+    return excess >= 0.0f ? 1 / (1 + excess) : vfloat{};
+  }
 };
 
 /// r of feedback.h at the pixels (x + lane, y) with values f, over (2 radius + 1)^2 cells.
@@ -126,12 +134,9 @@ void add_feedback(const Moments& h, const FeedbackOptions& options, const std::v
       const GuidedMean narrow = guided_mean(pixels, 1, narrow_radius, x, y, f, variance * bandwidth);
       const GuidedMean wide =
           guided_mean(cells, kCell, wide_radius, x, y, f, variance * (bandwidth * kWidening * kWidening));
-      // Without weights, or beyond the range of floats, the wide mean alone.
-      const vfloat tolerated = kNoise * variance * narrow.weights * narrow.weights;
-      const vfloat excess = (narrow.squares + splat(1e-30f)) / max(tolerated, splat(1e-37f));
-      const vfloat share = excess >= 0.0f ? 1 / (1 + excess) : vfloat{};
+      const vfloat a = narrow.share(kNoise * variance), b = (1 - a) * wide.share(kWideNoise * variance);
       std::array<vfloat, 3> result;
-      for (int c = 0; c < 3; ++c) result[c] = share * narrow.value(c) + (1 - share) * wide.value(c);
+      for (int c = 0; c < 3; ++c) result[c] = a * narrow.value(c) + b * wide.value(c);
       return result;
     };
     add_everywhere(valid, std_error, mixed, estimate);
@@ -141,7 +146,8 @@ void add_feedback(const Moments& h, const FeedbackOptions& options, const std::v
   const auto second = [&](int x, int y, const vfloat* f, vfloat variance) {
     const GuidedMean mean =
         guided_mean(cells, kFeedbackCell, radius, x, y, f, variance * (bandwidth * kSecondWidening * kSecondWidening));
-    return std::array<vfloat, 3>{mean.value(0), mean.value(1), mean.value(2)};
+    const vfloat b = mean.share(kWideNoise * variance);
+    return std::array<vfloat, 3>{b * mean.value(0), b * mean.value(1), b * mean.value(2)};
   };
   add_everywhere(valid, std_error, second, estimate);
 }

@@ -10,14 +10,18 @@
 // s_i^2: estimated variance of F^_i, summed over RGB (Eq. (8) of the estimator). A small kappa leaves the least bias,
 // but where few pixels are alike, its mean is noisy. So two are mixed by the noise v_i of the first, summed over RGB:
 //
-//     F^'_i = F^_i + a_i r_i(kappa) + (1 - a_i) r_i(4 kappa),
-//     a_i = 0.2 s_i^2 / (0.2 s_i^2 + v_i),   v_i = sum_j w_ij^2 var h_j / (sum_j w_ij)^2.
+//     F^'_i = F^_i + a_i r_i(kappa) + (1 - a_i) b_i(4 kappa) r_i(4 kappa),
+//     a_i = 0.2 s_i^2 / (0.2 s_i^2 + v_i),   v_i = sum_j w_ij^2 var h_j / (sum_j w_ij)^2,
+//     b_i(kappa) = s_i^2 / (s_i^2 + v_i(kappa)).
+//
+// Ordinary wide means have little noise, and b is near 1. One very bright sample of the independent image, a mirrored
+// light say, can have more than all the light of the darker pixels around; without b all that are like it in F^ got it.
 //
 // The first runs over the pixels of half the window, the second over cells of 2 x 2 pixels of the whole one. Outliers
 // raise their own guide, so that narrow means leave them out, and the image stays a little too dark. A second feedback,
 // of F^' by means over cells of 4 x 4 pixels, brings that back:
 //
-//     F^''_i = F^'_i + r'_i(12 kappa).
+//     F^''_i = F^'_i + b'_i(12 kappa) r'_i(12 kappa).
 //
 // Where pixels of the PT image have unequal counts n_j, weights are n_j w_ij.
 #pragma once

@@ -271,6 +271,23 @@ TEST(Iicv, WithAnExactIndependentImageIsTheIndependentImage) {
       }
 }
 
+/// One sample of a small bright light, met by the independent image alone, stays near its pixel: what a wide mean of
+/// residuals gives back must be more than its noise.
+TEST(Iicv, ABrightSampleIsNotSpreadOverTheDarkAround) {
+  test::Grouped crn = test::crn_image(64, 48, 12, 3), independent = test::independent_image(64, 48, 12, 4);
+  for (test::Grouped* image : {&crn, &independent})
+    for (float& value : image->data) value *= 1e-3f;
+  const EstimatorResult plain = iicv(crn.view(), independent.view());
+  for (int c = 0; c < 3; ++c) independent.pixel(22, 21)[c] = 1000;
+  const EstimatorResult bright = iicv(crn.view(), independent.view());
+  for (int y = 0; y < 48; ++y)
+    for (int x = 0; x < 64; ++x) {
+      if (std::max(std::abs(x - 22), std::abs(y - 21)) <= 10) continue;  // its neighbourhood of the regression
+      for (int c = 0; c < 3; ++c)
+        EXPECT_NEAR(bright.estimate.pixel(x, y)[c], plain.estimate.pixel(x, y)[c], 2e-4) << x << ", " << y;
+    }
+}
+
 /// Bits do not depend on the number of threads, nor on where a pixel lies in a tile or vector: inside a crop, farther
 /// than the windows reach from its border, they are those of the whole image.
 TEST(Iicv, BitsDoNotDependOnThreadsTilesOrCrops) {

@@ -58,14 +58,18 @@ inline RgbImage feedback(const RgbImage& estimate, const RgbImage& std_error, co
       const double variance = distance2(std_error[p], {0, 0, 0});
       const GuidedMean narrow = mean(estimate, x, y, 1, window / 4, kappa);
       const GuidedMean wide = mean(estimate, x, y, 2, window / 4, 4 * kappa);
-      const double share = 0.2 * variance / (0.2 * variance + narrow.variance);
-      for (int c = 0; c < 3; ++c) first[p][c] += share * narrow.value[c] + (1 - share) * wide.value[c];
+      const double a = 0.2 * variance / (0.2 * variance + narrow.variance);
+      const double b = variance / (variance + wide.variance);
+      for (int c = 0; c < 3; ++c) first[p][c] += a * narrow.value[c] + (1 - a) * b * wide.value[c];
     }
   RgbImage second = first;
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
+      const size_t p = static_cast<size_t>(y) * width + x;
+      const double variance = distance2(std_error[p], {0, 0, 0});
       const GuidedMean again = mean(first, x, y, 4, window / 8, 12 * kappa);
-      for (int c = 0; c < 3; ++c) second[static_cast<size_t>(y) * width + x][c] += again.value[c];
+      const double b = variance / (variance + again.variance);
+      for (int c = 0; c < 3; ++c) second[p][c] += b * again.value[c];
     }
   return second;
 }
