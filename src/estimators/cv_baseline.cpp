@@ -63,7 +63,7 @@ Estimator make_cv_baseline(EstimatorParameters& parameters) {
   estimator.reliable_samples = kReliableSamples;
   estimator.fewest_groups = 3;
   estimator.reach = o.window / 2;
-  estimator.bytes_per_pixel = kCvBaselineBytesPerPixel;
+  estimator.memory.always = kCvBaselineBytesPerPixel;
   estimator.apply = [o](const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings) {
     CvBaselineOptions options = o;
     options.std_error = settings.std_error;

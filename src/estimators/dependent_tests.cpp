@@ -231,7 +231,7 @@ Estimator make_dependent_tests(EstimatorParameters& parameters) {
   estimator.pass_options = {"paper",   "dependent-spp", "pilot-spp", "allocation", "relative-error",
                             "min-spp", "max-spp",       "filter",    "norm"};
   estimator.reach = dependent_tests_reach(o);
-  estimator.bytes_per_pixel = kDependentTestsBytesPerPixel;
+  estimator.memory.always = kDependentTestsBytesPerPixel;
   estimator.apply = [o](const GroupedImage& crn, const GroupedImage& independent, const PairSettings&) {
     return dependent_tests(crn, independent, o);
   };

@@ -44,6 +44,18 @@ struct PairSettings {
 /// Samples of a pixel, and of each the first random numbers that it was made of: [sample][dimension].
 using PixelFunction = std::function<Spectrum(std::span<const Spectrum> values, std::span<const float> coordinates)>;
 
+/// Memory that an estimator takes beside its input, in bytes per pixel, about.
+struct EstimatorMemory {
+  double always = 0;
+  /// More where both images have so many groups that halves of them are held out: at once, and for each group.
+  double of_halves = 0, of_halves_per_group = 0;
+  int groups_for_halves = 0;
+
+  double per_pixel(int groups) const {
+    return always + (groups >= groups_for_halves ? of_halves + of_halves_per_group * groups : 0);
+  }
+};
+
 struct Estimator {
   EstimatorPasses passes = EstimatorPasses::kPair;
   std::string name;     ///< registered one
@@ -68,8 +80,8 @@ struct Estimator {
   // Of a pair.
   std::function<EstimatorResult(const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings)>
       apply;
-  int reach = 0;               ///< rows beyond its own that a band of rows needs; -1: the whole image is needed
-  double bytes_per_pixel = 0;  ///< memory that `apply` takes beside its input, about
+  int reach = 0;           ///< rows beyond its own that a band of rows needs; -1: the whole image is needed
+  EstimatorMemory memory;  ///< that `apply` takes
   /// The control variates of a pixel; empty function where the estimator has none.
   std::function<std::vector<ControlVariate>(const GroupedImage& crn, const GroupedImage& independent, int x, int y)>
       explain;

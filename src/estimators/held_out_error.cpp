@@ -124,8 +124,10 @@ EstimatorResult apply_with_rows(const Estimator& base, const GroupedImage& crn, 
 Estimator with_held_out_rows(const Estimator& base) {
   if (!base.holds_out || base.adaptive) return base;
   Estimator estimator = base;
-  // Half of the groups of both images, and the images and moments of both halves.
-  estimator.bytes_per_pixel += 144 + 2 * (3 + 6) * sizeof(float);
+  // The images and moments of both halves, and half of the groups of both images.
+  estimator.memory.of_halves = 2 * (3 + 6) * sizeof(float);
+  estimator.memory.of_halves_per_group = 3 * sizeof(float);
+  estimator.memory.groups_for_halves = 2 * base.fewest_groups;
   estimator.apply = [base](const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings) {
     return apply_with_rows(base, crn, independent, settings);
   };

@@ -185,7 +185,7 @@ Estimator make_iduw(EstimatorParameters& parameters) {
   estimator.needs_sample_count = true;
   estimator.fewest_groups = 4;
   estimator.reach = -1;
-  estimator.bytes_per_pixel = kIduwBytesPerPixel;
+  estimator.memory.always = kIduwBytesPerPixel;
   estimator.apply = [o](const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings) {
     IduwOptions options = o;
     options.samples = static_cast<int>(settings.crn_samples);

@@ -177,7 +177,7 @@ Estimator make_iicv(EstimatorParameters& parameters) {
   estimator.reliable_samples = kReliableSamples;
   estimator.fewest_groups = o.penalty == Penalty::kCrossFit ? 4 : 3;
   estimator.reach = iicv_reach(o);
-  estimator.bytes_per_pixel = iicv_bytes_per_pixel(o);
+  estimator.memory.always = iicv_bytes_per_pixel(o);
   estimator.apply = [o](const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings) {
     IicvOptions options = o;
     options.std_error = settings.std_error;

@@ -150,7 +150,7 @@ Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& opt
   estimator.reads_guides = true;
   estimator.reach = -1;
   estimator.explain = nullptr;
-  estimator.bytes_per_pixel += kBytesPerPixel;
+  estimator.memory.always += kBytesPerPixel;
   const auto makers = [options, with_oidn](const Guides& guides) {
     std::vector<CandidateMaker> all = {filtered_candidates(guides)};
     if (with_oidn) all.push_back(neural_candidates(guides, options.oidn));

@@ -117,7 +117,7 @@ Plan adaptive_plan(const Estimator& estimator, std::optional<int> groups) {
   plan.has_crn_pass = is_pair;
   plan.estimate = mean_of_last;
   if (is_pair) {
-    plan.estimate_bytes_per_pixel = estimator.bytes_per_pixel;
+    plan.estimate_memory = estimator.memory;
     const bool std_error = estimator.predicts_error;
     plan.estimate = [apply = estimator.apply, std_error](std::span<const Pass> passes, int first_row, int n_rows,
                                                          const Guides&) {

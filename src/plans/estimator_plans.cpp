@@ -100,7 +100,7 @@ Plan pair_plan(const PairMethod& method) {
   plan.has_crn_pass = true;
   plan.predicts_error = method.predicts_error;
   plan.groups_follow_speed = !method.groups;
-  plan.estimate_bytes_per_pixel = method.bytes_per_pixel;
+  plan.estimate_memory = method.memory;
   plan.reads_guides = method.reads_guides;
   plan.estimate = [estimate = method.estimate](std::span<const Pass> passes, int first_row, int n_rows,
                                                const Guides& guides) {
@@ -143,7 +143,7 @@ Plan estimator_plan(const Estimator& estimator, const PassChoice& choice) {
   method.groups = choice.groups;
   method.fewest_groups = estimator.fewest_groups;
   method.predicts_error = estimator.predicts_error;
-  method.bytes_per_pixel = estimator.bytes_per_pixel;
+  method.memory = estimator.memory;
   method.reads_guides = estimator.reads_guides;
   method.estimate = [apply = estimator.apply, std_error = estimator.predicts_error](
                         const GroupedImage& crn, const GroupedImage& independent, PairSettings settings) {

@@ -31,8 +31,8 @@ struct PairMethod {
   std::optional<int> groups;
   int fewest_groups = 3;  ///< that the estimator works with
   bool predicts_error = false;
-  double bytes_per_pixel = 0;  ///< memory that `estimate` takes beside its input, about
-  bool reads_guides = false;   ///< `estimate` reads PairSettings::guides
+  EstimatorMemory memory;     ///< that `estimate` takes
+  bool reads_guides = false;  ///< `estimate` reads PairSettings::guides
   std::function<EstimatorResult(const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings)>
       estimate;
 };

@@ -221,10 +221,15 @@ TEST(Memory, CountsFilmsAuxiliaryImagesAndEstimator) {
   const LoadedScene scene = load_sized(kRoom, 100, 50);
   RenderRequest request = request_of(48);
   Plan plan = average_plan();
-  plan.estimate_bytes_per_pixel = 100;
+  plan.estimate_memory.always = 100;
   const RenderMemory memory = render_memory(scene, plan, request);
   EXPECT_EQ(memory.films, 2 * 5000 * (12 * 12 + 4));
   EXPECT_EQ(memory.estimate, 5000 * (100 + 12));
+  plan.estimate_memory.of_halves = 20, plan.estimate_memory.of_halves_per_group = 7;
+  plan.estimate_memory.groups_for_halves = 12;
+  EXPECT_EQ(render_memory(scene, plan, request).estimate, 5000 * (100 + 20 + 12 * 7 + 12));
+  plan.estimate_memory.groups_for_halves = 13;
+  EXPECT_EQ(render_memory(scene, plan, request).estimate, 5000 * (100 + 12));
   request.aovs = true;
   EXPECT_EQ(render_memory(scene, plan, request).films - memory.films, 5000 * 36);
   request.crop = CropWindow{0, 0, 10, 10};
@@ -234,7 +239,7 @@ TEST(Memory, CountsFilmsAuxiliaryImagesAndEstimator) {
 TEST(Memory, MoreThanTheMachineHasIsRefusedBeforeItIsTaken) {
   const LoadedScene scene = load_sized(kRoom);
   Plan plan = average_plan();
-  plan.estimate_bytes_per_pixel = 2 * physical_memory();
+  plan.estimate_memory.always = 2 * physical_memory();
   EXPECT_TRUE(
       contains(message_of([&] { render(scene, plan, request_of(24)); }, ErrorCode::kUsage), "40 x 30 pixels need "));
 }

@@ -4,6 +4,9 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <limits>
+
 #include "core/error.h"
 #include "integrators/path_length_images.h"
 #include "integrators/training.h"
@@ -23,14 +26,16 @@ constexpr double kSplatBytes = 16e6;  // of a round of light paths, about
 RenderMemory render_memory(const Plan& plan, std::span<const PassPlan> passes, int width, int height, bool aovs) {
   const double n_pixels = static_cast<double>(width) * height;
   RenderMemory memory;
+  int fewest_groups = std::numeric_limits<int>::max();
   for (const PassPlan& pass : passes) {
+    fewest_groups = std::min(fewest_groups, pass.groups);
     const double film = n_pixels * ((pass.groups + (pass.sample_variance ? 1 : 0)) * kImageBytes + sizeof(uint32_t));
     memory.films += film + (pass.light ? kSplatBytes : 0);
     if (pass.light && plan.film_is_image) memory.estimate += film;  // the sum of both films
   }
   if (aovs) memory.films += n_pixels * kAuxiliaryImages * kImageBytes;
   // A picture for a viewer or the preview.
-  memory.estimate += n_pixels * (plan.estimate_bytes_per_pixel + kImageBytes);
+  memory.estimate += n_pixels * (plan.estimate_memory.per_pixel(fewest_groups) + kImageBytes);
   return memory;
 }
 

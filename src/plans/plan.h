@@ -100,15 +100,15 @@ struct Plan {
   /// The image of rows first_row … first_row + n_rows - 1 of the films so far, with the guides of these rows where the
   /// plan reads them. Its cost depends on the size, not on counts.
   std::function<EstimatorResult(std::span<const Pass>, int first_row, int n_rows, const Guides& guides)> estimate;
-  double estimate_bytes_per_pixel = 0;  ///< memory that estimate() takes beside the films, about
-  bool takes_unfinished = false;        ///< estimate() works where pixels of a film still have no samples
-  bool reads_guides = false;            ///< estimate() reads albedo and normal, which are rendered for it
-  bool film_is_image = false;           ///< the film of the one pass is the result; estimate() only serves its error
-  bool takes_training = false;          ///< samples of the integrator's training join the image
-  bool has_crn_pass = false;            ///< some pass takes common random numbers
-  bool traces_light = false;            ///< set by render(): there is a light pass
-  bool predicts_error = false;          ///< estimate() gives a standard error
-  bool fixed_samples = false;           ///< the number of samples must be known before: no limits of time or error
+  EstimatorMemory estimate_memory;  ///< that estimate() takes beside the films
+  bool takes_unfinished = false;    ///< estimate() works where pixels of a film still have no samples
+  bool reads_guides = false;        ///< estimate() reads albedo and normal, which are rendered for it
+  bool film_is_image = false;       ///< the film of the one pass is the result; estimate() only serves its error
+  bool takes_training = false;      ///< samples of the integrator's training join the image
+  bool has_crn_pass = false;        ///< some pass takes common random numbers
+  bool traces_light = false;        ///< set by render(): there is a light pass
+  bool predicts_error = false;      ///< estimate() gives a standard error
+  bool fixed_samples = false;       ///< the number of samples must be known before: no limits of time or error
   /// With a time limit, the speed is measured before the passes begin, so that there are no more groups than samples.
   bool groups_follow_speed = false;
 };
