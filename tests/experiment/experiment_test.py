@@ -55,6 +55,15 @@ def is_render(pid):
         return False
 
 
+def processor_seconds(pid):
+    """What the process has used so far; 0 once it is gone."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return 0
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
 def wait_for(condition):
     deadline = time.monotonic() + 100
     while not condition():
@@ -255,7 +264,9 @@ class Resume(ExperimentTest):
         if pid == 0:
             os.chdir(self.path)
             os.execv(command[0], command)
-        wait_for(lambda: any(is_render(child) and catches(child, signal.SIGINT) for child in children(pid)))
+        # Long enough for the first samples, and a small part of the reference.
+        wait_for(lambda: any(is_render(child) and catches(child, signal.SIGINT) and processor_seconds(child) > 1
+                             for child in children(pid)))
         os.write(terminal, b"\x03")
         shown = b""
         while True:
