@@ -7,6 +7,7 @@
 #include "core/parallel.h"
 #include "estimators/guided_cells.h"
 #include "estimators/halves.h"
+#include "estimators/relative_weight.h"
 
 namespace covary {
 namespace {
@@ -15,13 +16,6 @@ using namespace lanes;
 
 /// Bounds of the whole image's error over what its halves' differences tell alone: an image without bias has 1.
 constexpr double kLeastFactor = 1, kLargestFactor = 100;
-
-/// 1 / (F'^2 + 0.01), the weight of relMSE, at the guide's pixel.
-float relative_weight(const Image& guide, int x, int y) {
-  const Spectrum f = guide.rgb(x, y);
-  const float grey = (f.r + f.g + f.b) / 3;
-  return 1 / (grey * grey + 0.01f);
-}
 
 /// What relMSE sums over the pixels of a row.
 struct RowSums {
@@ -33,7 +27,7 @@ RowSums sums_of_row(const HeldOutInput& in, int y) {
   RowSums sums;
   for (int x = 0; x < in.guide->width; ++x) {
     if (!(*in.valid)[static_cast<size_t>(y) * in.guide->width + x]) continue;
-    const double weight = relative_weight(*in.guide, x, y);
+    const double weight = relative_weight(in.guide->pixel(x, y));
     for (int c = 0; c < 3; ++c) {
       const double m[2] = {in.halves[0]->pixel(x, y)[c], in.halves[1]->pixel(x, y)[c]};
       for (int half : {0, 1}) {
@@ -64,8 +58,6 @@ constexpr int kPart = 16;
 constexpr double kTrusted = 0.3;
 /// Least error of the whole over the variance of the halves: half, but for noise.
 constexpr double kLeastOverVariance = 0.25;
-
-float relative_weight(const float* f) { return 1 / (sqr((f[0] + f[1] + f[2]) / 3) + 0.01f); }
 
 /// The weight of each squared error is that of the image it belongs to: independent of the held-out samples.
 HeldOutRow held_out_row(const HeldOutInput& in, const EstimatorResult& whole, int y) {
@@ -154,7 +146,7 @@ Image held_out_error(const HeldOutInput& input) {
   const int width = input.guide->width, height = input.guide->height;
   // Half of the variance of a half, and the number of pixels, each times the weight of relMSE.
   const GuidedCells cells(*input.guide, *input.valid, 4, [&](int x, int y, float* sums) {
-    const float weight = relative_weight(*input.guide, x, y);
+    const float weight = relative_weight(input.guide->pixel(x, y));
     for (int c = 0; c < 3; ++c)
       sums[c] += 0.25f * weight * sqr(input.halves[0]->pixel(x, y)[c] - input.halves[1]->pixel(x, y)[c]);
     sums[3] += 1;
@@ -167,7 +159,7 @@ Image held_out_error(const HeldOutInput& input) {
     for (int l = 0; l < n; ++l) {
       if (!(*input.valid)[static_cast<size_t>(y) * width + x + l]) continue;
       const float scale =
-          static_cast<float>(factor) / (std::max(sums[3][l], 1e-20f) * relative_weight(*input.guide, x + l, y));
+          static_cast<float>(factor) / (std::max(sums[3][l], 1e-20f) * relative_weight(input.guide->pixel(x + l, y)));
       for (int c = 0; c < 3; ++c) result.pixel(x + l, y)[c] = std::sqrt(scale * sums[c][l]);
     }
   });

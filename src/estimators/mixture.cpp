@@ -6,6 +6,7 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "estimators/guided_cells.h"
+#include "estimators/relative_weight.h"
 
 namespace covary {
 namespace {
@@ -28,8 +29,7 @@ void add_pixel(const MixtureInput& in, int m, int x, int y, float* sums) {
   for (int half : {0, 1}) {
     const CandidateSet& set = *in.halves[half];
     const float* f = set.base.pixel(x, y);
-    const float grey = (f[0] + f[1] + f[2]) / 3;
-    weight[half] = 1 / (grey * grey + 0.01f);
+    weight[half] = relative_weight(f);
     for (int c = 0; c < 3; ++c) {
       base[half][c] = f[c];
       residual[half][c] = in.independent[1 - half]->mean.row(c, y)[x] - f[c];
