@@ -9,7 +9,6 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <functional>
 #include <limits>
 #include <string>
 
@@ -21,16 +20,8 @@ namespace covary {
 namespace {
 
 namespace fs = std::filesystem;
+using test_support::message_of;
 using test_support::test_folder;
-
-std::string message_of(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const Error& e) {
-    return e.what();
-  }
-  return "no error";
-}
 
 /// The test picture with independent noise.
 Image noisy(int width, int height) {

@@ -7,15 +7,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 
 #include "core/error.h"
 #include "estimators/registry.h"
 #include "estimators/test_images.h"
+#include "support/files.h"
 
 namespace covary {
 namespace {
+
+using test_support::message_of;
 
 constexpr int kWidth = 72, kHeight = 56;
 
@@ -184,15 +186,6 @@ TEST(MixedDenoising, TakesTinyImages) {
     ASSERT_EQ(result.estimate.data.size(), static_cast<size_t>(width) * height * 3);
     for (float value : result.estimate.data) ASSERT_TRUE(std::isfinite(value));
   }
-}
-
-std::string message_of(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const Error& e) {
-    return e.what();
-  }
-  return "no error";
 }
 
 TEST(MixedDenoising, SaysWhatItCannotDo) {

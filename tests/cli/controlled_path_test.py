@@ -2,12 +2,12 @@
 """`covary render --integrator controlled-path`: its options, what it reports, and films that belong together."""
 import json
 import os
-import re
 import unittest
 from pathlib import Path
 
 from cli_test import CliTest
 from exr_reader import read_exr
+from training_tests import LearningFiles, LearningFilms
 
 ROOM = str(Path(os.environ["SCENES"]) / "room.xml")
 RENDER = ("render", ROOM, "--resolution", "48x32", "--no-preview", "--integrator", "controlled-path")
@@ -50,36 +50,11 @@ class Options(CliTest):
         self.assertRegex(result.stderr, r"warning: 1 MiB .*--cv-memory.* were reached; cells are \d+ times as wide")
 
 
-class Films(CliTest):
-    def pixels(self, name):
-        return read_exr((self.path / name).read_bytes())
+class Controlled:
+    RENDER, PLAIN, OTHER_SETTING = (*RENDER, "--cv-train", "4"), PLAIN, ("--cv-grid", "7")
 
-    def test_resumed_films_have_the_bits_of_whole_ones(self):
-        self.good(*PLAIN, "--spp", "12", "-o", "whole.exr")
-        self.good(*PLAIN, "--spp", "8", "-o", "parts.exr")
-        self.good(*PLAIN, "--spp", "12", "-o", "parts.exr", "--resume")
-        self.assertEqual(self.pixels("whole.exr"), self.pixels("parts.exr"))
 
-    def test_other_settings_are_other_films(self):
-        self.good(*PLAIN, "--spp", "8", "-o", "a.exr")
-        self.bad(1, "a.exr", *PLAIN, "--cv-grid", "7", "--spp", "12", "-o", "a.exr", "--resume")
-
-    def test_both_passes_share_one_training(self):
-        self.good(*RENDER, "--cv-train", "4", "--spp", "20", "-o", "a.exr", "--passes", "films", "--threads", "1")
-        self.good(*RENDER, "--cv-train", "4", "--spp", "20", "-o", "b.exr")
-        self.assertEqual(self.pixels("a.exr"), self.pixels("b.exr"))
-        attributes = [json.loads(self.good("info", "films/" + film.name, "--json").stdout)["attributes"]
-                      for film in (self.path / "films").glob("*.exr")]
-        self.assertEqual(len({attribute["covary:settings"].split(";")[0] for attribute in attributes}), 1)
-        self.assertEqual(len({attribute["covary:training"] for attribute in attributes}), 1)
-
-    def test_replays_samples_of_the_same_training(self):
-        self.good(*PLAIN, "--spp", "5", "-o", "a.exr", "--seed", "3")
-        replay = self.good(*PLAIN, "--replay", "20,10,0", "--seed", "3").stdout
-        channels = self.pixels("a.exr")
-        for value, name in zip(re.search(r"radiance \((.*), (.*), (.*)\)", replay).groups(), "RGB"):
-            self.assertAlmostEqual(float(value), channels["group00." + name][10 * 48 + 20], delta=1e-6)
-
+class Films(Controlled, LearningFilms, CliTest):
     def test_the_image_holds_the_samples_of_training_too(self):
         self.good(*PLAIN, "--spp", "6", "-o", "a.exr", "--cv-paper", "--json", "a.json")
         report = json.loads((self.path / "a.json").read_text())
@@ -129,39 +104,16 @@ class PathLengths(CliTest):
                  "--path-lengths")
 
 
-class TrainingFiles(CliTest):
-    def setUp(self):
-        super().setUp()
-        self.good(*PLAIN, "--spp", "8", "-o", "a.exr", "--save-training", "a.training")
-
-    def test_take_the_place_of_a_training(self):
-        self.good(*PLAIN, "--spp", "4", "-o", "b.exr", "--load-training", "a.training", "--json", "b.json")
-        trained, loaded = (read_exr((self.path / name).read_bytes()) for name in ("a.exr", "b.exr"))
-        self.assertEqual(trained["group00.R"], loaded["R"])
-        report = json.loads((self.path / "b.json").read_text())
-        self.assertEqual((report["samples_per_pixel"], report["training_samples_per_pixel"]), (4, 0))
-
+class TrainingFiles(Controlled, LearningFiles, CliTest):
     def test_keep_the_learned_probabilities_of_lights(self):
         learned = (*RENDER, "--estimator", "none", "--cv-train", "8", "--lights", "learned")
         self.good(*learned, "--spp", "12", "-o", "l.exr", "--save-training", "l.training")
         self.good(*learned, "--spp", "4", "-o", "m.exr", "--load-training", "l.training")
-        trained, loaded = (read_exr((self.path / name).read_bytes()) for name in ("l.exr", "m.exr"))
-        self.assertEqual(trained["group00.G"], loaded["G"])
+        self.assertEqual(self.pixels("l.exr")["group00.G"], self.pixels("m.exr")["G"])
 
-    def test_belong_to_scene_and_settings(self):
-        wanted = ("--spp", "4", "-o", "b.exr", "--load-training", "a.training")
-        self.bad(1, "a.training", *PLAIN, "--cv-grid", "9", *wanted)
-        other = str(Path(os.environ["SCENES"]) / "materials.xml")
-        self.bad(1, "a.training", "render", other, *PLAIN[2:], *wanted)
-        self.bad(2, "only the integrator controlled-path with control variates", *RENDER, "--cv", "off", *wanted)
-
-    def test_that_are_damaged_are_refused(self):
-        whole = (self.path / "a.training").read_bytes()
-        for name, content in (("half", whole[:len(whole) // 2]), ("none", b""), ("longer", whole + b"x")):
-            (self.path / name).write_bytes(content)
-            self.bad(1, name, *PLAIN, "--spp", "4", "-o", "b.exr", "--load-training", name)
-        self.bad(1, "cannot read the training file 'missing'", *PLAIN, "--spp", "4", "-o", "b.exr", "--load-training",
-                 "missing")
+    def test_belong_to_control_variates(self):
+        self.bad(2, "only the integrator controlled-path with control variates", *RENDER, "--cv", "off", *self.WANTED,
+                 "a.training")
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from cli_test import CliTest
 from exr_reader import read_exr
+from training_tests import LearningFiles, LearningFilms
 
 ROOM = str(Path(os.environ["SCENES"]) / "room.xml")
 RENDER = ("render", ROOM, "--resolution", "48x32", "--no-preview", "--integrator", "guided-path", "--guide-train", "4")
@@ -67,28 +68,14 @@ class Options(CliTest):
         self.assertIn("nee=off", settings)
 
 
-class Films(CliTest):
-    def pixels(self, name):
-        return read_exr((self.path / name).read_bytes())
+class Guided:
+    RENDER, PLAIN, OTHER_SETTING = RENDER, PLAIN, ("--guide-lobes", "9")
 
-    def test_resumed_films_have_the_bits_of_whole_ones(self):
-        self.good(*PLAIN, "--spp", "12", "-o", "whole.exr")
-        self.good(*PLAIN, "--spp", "8", "-o", "parts.exr")
-        self.good(*PLAIN, "--spp", "12", "-o", "parts.exr", "--resume", "--threads", "1")
-        self.assertEqual(self.pixels("whole.exr"), self.pixels("parts.exr"))
 
-    def test_other_settings_are_other_films(self):
+class Films(Guided, LearningFilms, CliTest):
+    def test_other_fractions_are_other_films(self):
         self.good(*PLAIN, "--spp", "8", "-o", "a.exr")
         self.bad(1, "a.exr", *PLAIN, "--guide-fraction", "0.3", "--spp", "12", "-o", "a.exr", "--resume")
-
-    def test_both_passes_share_one_training(self):
-        self.good(*RENDER, "--spp", "20", "-o", "a.exr", "--passes", "films", "--threads", "1")
-        self.good(*RENDER, "--spp", "20", "-o", "b.exr")
-        self.assertEqual(self.pixels("a.exr"), self.pixels("b.exr"))
-        attributes = [json.loads(self.good("info", "films/" + film.name, "--json").stdout)["attributes"]
-                      for film in (self.path / "films").glob("*.exr")]
-        self.assertEqual(len({attribute["covary:settings"].split(";")[0] for attribute in attributes}), 1)
-        self.assertEqual(len({attribute["covary:training"] for attribute in attributes}), 1)
 
     def test_crops_and_times(self):
         self.good(*PLAIN, "--crop", "8,8,16,16", "--spp", "6", "-o", "crop.exr")
@@ -96,13 +83,6 @@ class Films(CliTest):
         report = json.loads((self.path / "timed.json").read_text())
         self.assertGreater(report["samples_per_pixel"], 0)
         self.assertEqual(report["training_samples_per_pixel"], 4)
-
-    def test_replays_samples_of_the_same_training(self):
-        self.good(*PLAIN, "--spp", "5", "-o", "a.exr", "--seed", "3")
-        replay = self.good(*PLAIN, "--replay", "20,10,0", "--seed", "3").stdout
-        channels = self.pixels("a.exr")
-        for value, name in zip(re.search(r"radiance \((.*), (.*), (.*)\)", replay).groups(), "RGB"):
-            self.assertAlmostEqual(float(value), channels["group00." + name][10 * 48 + 20], delta=1e-6)
 
 
 class Probe(CliTest):
@@ -132,32 +112,12 @@ class Probe(CliTest):
         self.bad(2, "no output given", "probe", ROOM, "--pixel", "1,1")
 
 
-class TrainingFiles(CliTest):
-    def setUp(self):
-        super().setUp()
-        self.good(*PLAIN, "--spp", "8", "-o", "a.exr", "--save-training", "a.training")
-
-    def test_take_the_place_of_a_training(self):
-        self.good(*PLAIN, "--spp", "4", "-o", "b.exr", "--load-training", "a.training", "--json", "b.json")
-        a, b = (read_exr((self.path / name).read_bytes()) for name in ("a.exr", "b.exr"))
-        self.assertEqual(a["group00.R"], b["R"])
-        report = json.loads((self.path / "b.json").read_text())
-        self.assertEqual((report["samples_per_pixel"], report["training_samples_per_pixel"]), (4, 0))
-
-    def test_belong_to_integrator_scene_and_settings(self):
-        wanted = ("--spp", "4", "-o", "b.exr", "--load-training", "a.training")
-        self.bad(1, "a.training", *PLAIN, "--guide-lobes", "9", *wanted)
-        other = str(Path(os.environ["SCENES"]) / "materials.xml")
-        self.bad(1, "a.training", "render", other, *PLAIN[2:], *wanted)
+class TrainingFiles(Guided, LearningFiles, CliTest):
+    def test_belong_to_an_integrator(self):
+        wanted = (*self.WANTED, "a.training")
         self.bad(1, "a.training", "render", ROOM, "--resolution", "48x32", "--integrator", "controlled-path", *wanted)
         self.bad(2, "only the integrator controlled-path with control variates and guided-path", "render", ROOM,
                  "--integrator", "path", *wanted)
-
-    def test_that_are_damaged_are_refused(self):
-        whole = (self.path / "a.training").read_bytes()
-        for name, content in (("half", whole[:len(whole) // 2]), ("none", b""), ("longer", whole + b"x")):
-            (self.path / name).write_bytes(content)
-            self.bad(1, name, *PLAIN, "--spp", "4", "-o", "b.exr", "--load-training", name)
 
 
 if __name__ == "__main__":

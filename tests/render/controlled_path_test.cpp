@@ -214,16 +214,6 @@ TEST(ControlledPath, TrainedOnTheFlyAgreesWithPath) {
   }
 }
 
-/// Sum of squared differences of two renders with other numbers: twice the variance.
-double noise(const TestScene& scene) {
-  const Film a = render(scene, 8, 1), b = render(scene, 8, 2);
-  double sum = 0;
-  for (int y = 0; y < kSide; ++y)
-    for (int x = 0; x < kSide; ++x)
-      for (int c = 0; c < 3; ++c) sum += sqr(a.mean(x, y)[c] - b.mean(x, y)[c]);
-  return sum;
-}
-
 TEST(ControlledPath, HasLessNoiseWhereLightsDiffer) {
   const double plain = noise(with_coefficients(coloured_lights(), false));
   const double mono = noise(trained(coloured_lights(), options(ControlKind::kMono)));

@@ -110,16 +110,6 @@ TEST(GuidedPath, AgreesWithPathWithoutLightSamples) {
   EXPECT_GT(n_biased(differences(with_bug<NoBsdfDensity>(xml, options(false), scene), path, 16, 100)), 0);
 }
 
-/// Sum of squared differences of two renders with other numbers: twice the variance.
-double noise(const TestScene& scene) {
-  const Film a = render(scene, 8, 1), b = render(scene, 8, 2);
-  double sum = 0;
-  for (int y = 0; y < kSide; ++y)
-    for (int x = 0; x < kSide; ++x)
-      for (int c = 0; c < 3; ++c) sum += sqr(a.mean(x, y)[c] - b.mean(x, y)[c]);
-  return sum;
-}
-
 TEST(GuidedPath, HasLessNoiseWhereLightIsHardToFind) {
   const std::string xml =
       scene_text(kFloor + sphere("x='0' y='6' z='3'", "<float name='radius' value='0.3'/><emitter type='area'/>"),

@@ -12,9 +12,12 @@
 #include "plans/estimator_plans.h"
 #include "plans/render.h"
 #include "render_fixture.h"
+#include "support/files.h"
 
 namespace covary {
 namespace {
+
+using test_support::message_of;
 
 const std::string kRoom = std::string(COVARY_SOURCE_DIR) + "/scenes/room.xml";
 constexpr uint32_t kCells = 50;
@@ -176,16 +179,6 @@ TEST(Training, NegativeSamplesStayWhereTheIntegratorAllowsThem) {
   train_room(scene);
   const Film film = render(scene, 1, 7);  // expects that no sample is counted as bad
   EXPECT_LT(*std::min_element(film.data().begin(), film.data().end()), 0);
-}
-
-template <typename Function>
-std::string message_of(const Function& function) {
-  try {
-    function();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
 }
 
 TEST(Training, PassesRefuseWhatWouldMixTrainings) {

@@ -105,4 +105,14 @@ inline double detectable(const Differences& blocks) {
   return statistics::smallest_detectable(std::sqrt(moments.sample_variance()), 16, statistics::test_alpha(), 0.99);
 }
 
+/// Sum of squared differences of two renders with other numbers: twice the variance.
+inline double noise(const TestScene& scene) {
+  const Film a = render(scene, 8, 1), b = render(scene, 8, 2);
+  double sum = 0;
+  for (int y = 0; y < kSide; ++y)
+    for (int x = 0; x < kSide; ++x)
+      for (int c = 0; c < 3; ++c) sum += sqr(a.mean(x, y)[c] - b.mean(x, y)[c]);
+  return sum;
+}
+
 }  // namespace covary
