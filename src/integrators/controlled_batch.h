@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/in_place.h"
+#include "integrators/light_samples.h"
 #include "integrators/path_batch.h"
 #include "sampling/coefficient_cache.h"
 
@@ -26,59 +26,34 @@ struct ControlledVertex {
   Spectrum plain;          ///< the plain estimate without the throughput, so far
 };
 
-/// Camera paths that ControlledTracer advances together, and for each of them what its loops hand on to one another.
-struct ControlledBatch final : ThreadState {
-  /// What a path that goes on carries.
-  struct Path : PathBatch::Path {
-    uint32_t last_vertex = 0;  ///< address of the numbers of the last vertex
-  };
+struct ControlledPathState : CameraPath {
+  uint32_t last_vertex = 0;  ///< address of the numbers of the last vertex
+};
 
-  /// What a vertex samples, and with which numbers.
-  struct LightChoice {
-    bool open = false;   ///< the surface can use light samples
-    uint32_t light = 0;  ///< number of the light
-    Vec2 u, u_environment;
-    float u_primitive = 0;
-    bool in_cell = false;  ///< key says where its coefficients are learnt and looked up
-    CellKey key;
-  };
+struct ControlledChoice : LightSetChoice {
+  bool in_cell = false;  ///< key says where its coefficients are learnt and looked up
+  CellKey key;
+};
 
-  /// A light sample that counts if nothing lies between.
-  struct Connection {
-    Spectrum value;     ///< f/p
-    uint32_t sample;    ///< of the path
-    uint32_t cluster;   ///< that was sampled, or ControlledSample::kNoLight: the environment
-    float r_technique;  ///< balance weight of the technique that took the sample
-  };
+struct ControlledConnection {
+  Spectrum value;     ///< f/p
+  uint32_t sample;    ///< of the path
+  uint32_t cluster;   ///< that was sampled, or ControlledSample::kNoLight: the environment
+  float r_technique;  ///< balance weight of the technique that took the sample
+};
 
-  /// Makes room for n fresh paths; what else the arrays hold is old and is overwritten before it is read.
+/// The batch of ControlledTracer.
+struct ControlledBatch final : CameraBatch<ControlledPathState, ControlledChoice, ControlledConnection> {
   void start(size_t n) {
-    paths.resize(n), rays.resize(n);
-    for (Path& path : paths) make_in_place(path, [] { return Path(); });
-    if (hits.size() < n)
-      ray_hits.resize(n), hits.resize(n), choices.resize(n), lights.resize(n), environments.resize(n),
-          vertices.resize(n);
-    if (blocked.size() < 2 * n) blocked.resize(2 * n), connections.resize(2 * n), shadow_rays.resize(2 * n);
+    CameraBatch::start(n, 2);
+    if (vertices.size() < n) environments.resize(n), vertices.resize(n);
     for (size_t i = 0; i < n; ++i) vertices[i].open = false;
     by_length.assign(n * n_lengths, Spectrum());
-    n_connections = 0;
   }
-  /// Keeps the first n paths.
-  void resize(size_t n) { paths.resize(n), rays.resize(n); }
 
-  std::vector<Path> paths;
-  std::vector<Ray> rays;  ///< the next one of each path
-  std::vector<RayHit> ray_hits;
-  std::vector<SurfaceHit> hits;
-  std::vector<LightChoice> choices;
-  std::vector<EmitterSample> lights, environments;
+  std::vector<EmitterSample> environments;
   std::vector<ControlledVertex> vertices;  ///< the last one of each path, by Path::sample
-  size_t n_connections = 0;
-  std::vector<Connection> connections;
-  std::vector<Ray> shadow_rays;  ///< one of each connection
-  std::vector<uint8_t> blocked;
-  std::vector<uint32_t> alive;  ///< places of the paths that go on
-  std::vector<uint32_t> ended;  ///< samples of the paths that end at their last vertex
+  std::vector<uint32_t> ended;             ///< samples of the paths that end at their last vertex
 
   /// Parts of the samples' radiances by the number of edges of their paths, 1 … n_lengths, one sample after another;
   /// none are kept where n_lengths is 0.

@@ -27,13 +27,11 @@
 #include <cmath>
 #include <span>
 
-#include "core/in_place.h"
 #include "integrators/controlled_batch.h"
 #include "integrators/light_selection.h"
 #include "integrators/mis.h"
 #include "integrators/path_steps.h"
 #include "integrators/primary_sample.h"
-#include "integrators/roulette.h"
 #include "sampling/coefficient_table.h"
 #include "sampling/light_set.h"
 
@@ -69,9 +67,6 @@ struct ControlledParts {
   }
 };
 
-/// Addresses of the numbers of environment samples: those of the vertex, apart from all others.
-inline constexpr uint32_t kEnvironmentVertices = 1u << 21;
-
 template <typename Parts>
 class ControlledTracer {
  public:
@@ -98,8 +93,9 @@ class ControlledTracer {
       if (depth + 1 >= lengths_.max_depth) break;
       keep_paths(batch_, [&](Path& path) { return path.found && (depth < lengths_.rr_depth || survives(path)); });
       const bool connect = depth + 2 >= lengths_.min_depth && any_light;
-      choose_lights(connect, depth);
-      for (size_t i = 0; i < batch_.paths.size(); ++i) sample_lights(i);
+      choose_lights(*control_.lights, control_.environment, samples_, connect, batch_);
+      find_cells(depth);
+      sample_lights(*control_.lights, control_.environment, batch_);
       scatter(depth);
       trace_connections(depth + 2);
       if constexpr (Parts::kCloseEnded)
@@ -136,45 +132,22 @@ class ControlledTracer {
     close(path.sample, depth + 1);
   }
 
-  /// Plays Russian roulette.
   bool survives(Path& path) {
-    CameraSample& sample = samples_[path.sample];
-    const float survival = roulette::survival_probability(path.throughput, path.eta, sample.random.sampling());
-    if (sample.random.get_1d(path.last_vertex, Event::kRoulette) < survival) {
-      path.throughput *= roulette::survivor_weight(survival);
-      return true;
-    }
-    if (std::isnan(survival)) sample.radiance = path.throughput;  // a bad sample, not a black one
-    return false;
+    const float weight = play_roulette(path, path.throughput, samples_[path.sample]);
+    path.throughput *= weight;
+    return weight > 0;
   }
 
-  /// What each vertex is to sample. All choices come first, so that memory answers to one while the others are made.
-  void choose_lights(bool connect, int depth) {
+  /// Where the coefficients of the vertices lie.
+  void find_cells(int depth) {
     for (size_t i = 0; i < batch_.paths.size(); ++i) {
       ControlledBatch::LightChoice& choice = batch_.choices[i];
-      choice.open = connect && (batch_.hits[i].bsdf_flags & kSmooth);
       if (!choice.open) continue;
-      const PathRandom& random = samples_[batch_.paths[i].sample].random;
-      const uint32_t vertex = kFirstSurfaceVertex + batch_.paths[i].n_smooth;
-      if (!control_.lights->empty()) {
-        choice.light = control_.lights->select(random.get_1d(vertex, Event::kLightChoice));
-        choice.u = random.get_2d(vertex, Event::kLightPosition);
-        choice.u_primitive = random.get_1d(vertex, Event::kLightPrimitive);
-      }
-      if (control_.environment) {
-        choice.u_environment = random.get_2d(kEnvironmentVertices + vertex, Event::kLightPosition);
-        control_.environment->prefetch(choice.u_environment, PrefetchStep::kTable);
-      }
       choice.in_cell = uses_cells() && (depth == 0 || !control_.per_pixel);
-      if (choice.in_cell) {
-        choice.key = key_of(batch_.rays[i], batch_.hits[i]);
-        table_.prefetch(choice.key);
-      }
+      if (!choice.in_cell) continue;
+      choice.key = key_of(batch_.rays[i], batch_.hits[i]);
+      table_.prefetch(choice.key);
     }
-    if (control_.environment)
-      for (size_t i = 0; i < batch_.paths.size(); ++i)
-        if (batch_.choices[i].open)
-          control_.environment->prefetch(batch_.choices[i].u_environment, PrefetchStep::kValues);
   }
 
   CellKey key_of(const Ray& ray, const SurfaceHit& hit) const {
@@ -190,19 +163,6 @@ class ControlledTracer {
   }
 
   bool uses_cells() const { return batch_.recording || table_.n_cells() > 0; }
-
-  void sample_lights(size_t i) {
-    const ControlledBatch::LightChoice& choice = batch_.choices[i];
-    batch_.lights[i].pdf_solid_angle = batch_.environments[i].pdf_solid_angle = 0;
-    if (!choice.open) return;
-    const Vec3& p = batch_.hits[i].p;
-    if (!control_.lights->empty())
-      make_in_place(batch_.lights[i],
-                    [&] { return control_.lights->sample(choice.light, p, choice.u, choice.u_primitive); });
-    if (control_.environment)
-      make_in_place(batch_.environments[i],
-                    [&] { return control_.environment->sample_towards(p, choice.u_environment, 0); });
-  }
 
   /// Evaluates the surfaces: connections to the light samples, and the next rays. Paths that end are removed.
   void scatter(int depth) {

@@ -9,40 +9,36 @@
 
 namespace covary {
 
-/// Camera paths that PathTracer advances together, and for each of them what its loops hand on to one another.
-struct PathBatch final : ThreadState {
-  /// What a path that goes on carries.
-  struct Path {
-    Spectrum throughput{1};
-    float eta = 1;               ///< product of relative indices, undoes the radiance scaling in roulette
-    Vec3 previous_p;             ///< where the last direction sample started
-    float previous_pdf = 1;      ///< its density per unit solid angle
-    bool previous_delta = true;  ///< it came from a delta lobe or the camera
-    bool only_null = true;       ///< nothing but null surfaces met so far
-    bool found = false;          ///< whether the ray hit a surface
-    uint32_t sample = 0;         ///< which of the batch
-    uint32_t n_smooth = 0;       ///< vertices so far on surfaces that have more than delta lobes
-  };
+/// What a camera path that goes on carries.
+struct CameraPath {
+  Spectrum throughput{1};
+  float eta = 1;               ///< product of relative indices, undoes the radiance scaling in roulette
+  Vec3 previous_p;             ///< where the last direction sample started
+  float previous_pdf = 1;      ///< its density per unit solid angle
+  bool previous_delta = true;  ///< it came from a delta lobe or the camera
+  bool only_null = true;       ///< nothing but null surfaces met so far
+  bool found = false;          ///< whether the ray hit a surface
+  uint32_t sample = 0;         ///< which of the batch
+  uint32_t n_smooth = 0;       ///< vertices so far on surfaces that have more than delta lobes
+};
 
-  /// Which light a vertex samples, and with which numbers.
-  struct LightChoice {
-    const Emitter* emitter = nullptr;  ///< null: the surface cannot use light samples
-    Vec2 u;
-    float u_primitive = 0;
-  };
+/// Camera paths that an integrator advances together, and for each of them what its loops hand on to one another.
+/// `PathType`: what a path carries, a CameraPath or more; `ChoiceType`: which light a vertex samples, and with which
+/// numbers; `ConnectionType`: a light sample that counts if nothing lies between.
+template <typename PathType, typename ChoiceType, typename ConnectionType>
+struct CameraBatch : ThreadState {
+  using Path = PathType;
+  using LightChoice = ChoiceType;
+  using Connection = ConnectionType;
 
-  /// A light sample that counts if nothing lies between.
-  struct Connection {
-    Spectrum radiance;
-    uint32_t sample;
-  };
-
-  /// Makes room for n fresh paths; what else the arrays hold is old and is overwritten before it is read.
-  void start(size_t n) {
+  /// Makes room for n fresh paths, with so many connections of a vertex; what else the arrays hold is old and is
+  /// overwritten before it is read.
+  void start(size_t n, size_t n_connections_each = 1) {
     paths.resize(n), rays.resize(n);
     for (Path& path : paths) make_in_place(path, [] { return Path(); });
     if (hits.size() < n) ray_hits.resize(n), hits.resize(n), choices.resize(n), lights.resize(n);
-    if (blocked.size() < n) blocked.resize(n), connections.resize(n), shadow_rays.resize(n);
+    const size_t most = n * n_connections_each;
+    if (blocked.size() < most) blocked.resize(most), connections.resize(most), shadow_rays.resize(most);
     n_connections = 0;
   }
   /// Keeps the first n paths.
@@ -60,5 +56,21 @@ struct PathBatch final : ThreadState {
   std::vector<uint8_t> blocked;
   std::vector<uint32_t> alive;  ///< places of the paths that go on
 };
+
+/// A light that was chosen.
+struct EmitterChoice {
+  const Emitter* emitter = nullptr;  ///< null: the surface cannot use light samples
+  Vec2 u;
+  float u_primitive = 0;
+};
+
+/// What a light sample adds to the radiance of which sample of the batch.
+struct LightConnection {
+  Spectrum radiance;
+  uint32_t sample;
+};
+
+/// The batch of PathTracer.
+struct PathBatch final : CameraBatch<CameraPath, EmitterChoice, LightConnection> {};
 
 }  // namespace covary

@@ -3,11 +3,13 @@
 // PathBatch that a step names.
 #pragma once
 
+#include <cmath>
 #include <span>
 
 #include "core/in_place.h"
 #include "integrators/path_batch.h"
 #include "integrators/primary_sample.h"
+#include "integrators/roulette.h"
 
 namespace covary {
 
@@ -49,6 +51,16 @@ void keep_paths(Batch& batch, const Keep& keep) {
     ++n_kept;
   }
   batch.resize(n_kept);
+}
+
+/// Plays Russian roulette with a path that carries `throughput`, and returns what is to be multiplied to what it
+/// carries; 0: it ends.
+template <typename Path>
+float play_roulette(const Path& path, const Spectrum& throughput, CameraSample& sample) {
+  const float survival = roulette::survival_probability(throughput, path.eta, sample.random.sampling());
+  if (sample.random.get_1d(path.last_vertex, Event::kRoulette) < survival) return roulette::survivor_weight(survival);
+  if (std::isnan(survival)) sample.radiance = path.throughput;  // a bad sample, not a black one
+  return 0;
 }
 
 /// Removes the paths that left the scene.

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// What tracers share that sample one light of a LightSet at each vertex, and the environment apart from it.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "core/in_place.h"
+#include "integrators/integrator.h"
+#include "integrators/primary_sample.h"
+#include "sampling/light_set.h"
+
+namespace covary {
+
+/// Addresses of the numbers of environment samples: those of the vertex, apart from all others.
+inline constexpr uint32_t kEnvironmentVertices = 1u << 21;
+
+/// Which light a vertex samples, and with which numbers.
+struct LightSetChoice {
+  bool open = false;   ///< the surface can use light samples
+  uint32_t light = 0;  ///< number of the light
+  Vec2 u, u_environment;
+  float u_primitive = 0;
+};
+
+/// What the vertices of `batch` are to sample; nothing without `connect`. All choices come first, so that memory
+/// answers to one while the others are made. `environment`: as it is sampled, or null.
+template <typename Batch>
+void choose_lights(const LightSet& lights, const Emitter* environment, std::span<const CameraSample> samples,
+                   bool connect, Batch& batch) {
+  for (size_t i = 0; i < batch.paths.size(); ++i) {
+    LightSetChoice& choice = batch.choices[i];
+    choice.open = connect && (batch.hits[i].bsdf_flags & kSmooth);
+    if (!choice.open) continue;
+    const PathRandom& random = samples[batch.paths[i].sample].random;
+    const uint32_t vertex = kFirstSurfaceVertex + batch.paths[i].n_smooth;
+    if (!lights.empty()) {
+      choice.light = lights.select(random.get_1d(vertex, Event::kLightChoice));
+      choice.u = random.get_2d(vertex, Event::kLightPosition);
+      choice.u_primitive = random.get_1d(vertex, Event::kLightPrimitive);
+    }
+    if (!environment) continue;
+    choice.u_environment = random.get_2d(kEnvironmentVertices + vertex, Event::kLightPosition);
+    environment->prefetch(choice.u_environment, PrefetchStep::kTable);
+  }
+  if (!environment) return;
+  for (size_t i = 0; i < batch.paths.size(); ++i)
+    if (batch.choices[i].open) environment->prefetch(batch.choices[i].u_environment, PrefetchStep::kValues);
+}
+
+/// The light and environment samples of all vertices; those without have densities of 0.
+template <typename Batch>
+void sample_lights(const LightSet& lights, const Emitter* environment, Batch& batch) {
+  for (size_t i = 0; i < batch.paths.size(); ++i) {
+    const LightSetChoice& choice = batch.choices[i];
+    batch.lights[i].pdf_solid_angle = batch.environments[i].pdf_solid_angle = 0;
+    if (!choice.open) continue;
+    const Vec3& p = batch.hits[i].p;
+    if (!lights.empty())
+      make_in_place(batch.lights[i], [&] { return lights.sample(choice.light, p, choice.u, choice.u_primitive); });
+    if (environment)
+      make_in_place(batch.environments[i], [&] { return environment->sample_towards(p, choice.u_environment, 0); });
+  }
+}
+
+}  // namespace covary
