@@ -19,10 +19,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "core/content_hash.h"
-#include "sampling/light_clusters.h"
 
 namespace covary {
 namespace {
@@ -31,26 +29,6 @@ namespace {
 struct SumsRecord final : TrainingRecord {
   SystemSums sums;
 };
-
-ClusterLight cluster_light(const Light& light, const Bounds3& scene) {
-  ClusterLight result;
-  result.power = luminance(light.emitter->part_power(light.part));
-  if (const Shape* shape = light.emitter->shape()) {
-    result.bounds = shape->part_bounds(light.part);
-    const Vec3 normal = shape->part_normal(light.part);
-    if (length_squared(normal) > 0) result.axis = normal, result.cos_half_angle = 1;
-    return result;
-  }
-  const Vec3 centre = scene.center();
-  const EmitterSample sample = light.emitter->sample_towards(centre, {0.5f, 0.5f}, 0.5f);
-  if (sample.distance == kInfinity) {
-    result.bounds = scene, result.axis = -sample.wi, result.cos_half_angle = 1;
-  } else {
-    const Vec3 p = centre + sample.wi * sample.distance;
-    result.bounds = {p, p};
-  }
-  return result;
-}
 
 }  // namespace
 
@@ -68,31 +46,11 @@ void ControlledPath::prepare(const Scene& scene) {
                  settings_.kind == ControlKind::kVevoda,
                  settings_.per_pixel(),
                  settings_.lights == LightSelection::kLearned};
-  make_clusters();
-  controlled_.cluster_of = cluster_of_;
+  clusters_ = cluster_light_set(lights_, scene.bounds(), settings_.learns() ? settings_.clusters : ~0u);
+  controlled_.cluster_of = clusters_.cluster_of;
   if (settings_.learns())
-    cache_ = CoefficientCache(scene.bounds(), cluster_counts(), controlled_.n_dense(), settings_.cache(resolution()));
-}
-
-/// Groups the lights.
-void ControlledPath::make_clusters() {
-  cluster_of_.resize(lights_.size());
-  std::iota(cluster_of_.begin(), cluster_of_.end(), 0u);
-  n_clusters_ = lights_.size();
-  if (settings_.learns() && lights_.size() > settings_.clusters) {
-    std::vector<ClusterLight> lights;
-    for (uint32_t i = 0; i < lights_.size(); ++i) lights.push_back(cluster_light(lights_[i], scene_->bounds()));
-    const Bounds3& bounds = scene_->bounds();
-    LightClusters clusters = cluster_lights(lights, settings_.clusters, 2 * bounds.radius());
-    cluster_of_ = std::move(clusters.cluster_of), n_clusters_ = clusters.n_clusters;
-  }
-}
-
-/// The expected number of samples that a vertex takes of each cluster.
-std::vector<float> ControlledPath::cluster_counts() const {
-  std::vector<double> counts(n_clusters_);
-  for (uint32_t i = 0; i < lights_.size(); ++i) counts[cluster_of_[i]] += lights_[i].pmf;
-  return {counts.begin(), counts.end()};
+    cache_ = CoefficientCache(scene.bounds(), expected_samples(clusters_, lights_), controlled_.n_dense(),
+                              settings_.cache(resolution()));
 }
 
 /// The longer side of the frame where pixels have coefficients. Otherwise by what the camera sees: cells as wide as 8
@@ -120,10 +78,10 @@ uint32_t ControlledPath::resolution() const {
 
 /// Chooses clusters with these probabilities, relative to one another, and their lights as before.
 void ControlledPath::select(const std::vector<float>& clusters) {
-  const std::vector<float> counts = cluster_counts();
+  const std::vector<float> counts = expected_samples(clusters_, lights_);
   std::vector<double> weights;
   for (uint32_t i = 0; i < lights_.size(); ++i) {
-    const uint32_t cluster = cluster_of_[i];
+    const uint32_t cluster = clusters_.cluster_of[i];
     weights.push_back(counts[cluster] > 0 ? double{clusters[cluster]} * lights_[i].pmf / counts[cluster] : 0);
   }
   lights_.change(weights);
@@ -156,7 +114,7 @@ void ControlledPath::absorb(const TrainingRecord& record) {
 void ControlledPath::on_restart() {
   if (given_) return;
   if (selects_by_learning()) lights_ = LightSet(*scene_, settings_.lights);
-  if (settings_.learns()) cache_.select(cluster_counts());
+  if (settings_.learns()) cache_.select(expected_samples(clusters_, lights_));
   cache_.restart();
 }
 
@@ -173,7 +131,7 @@ void ControlledPath::update() {
   cache_.forget_residuals();
   if (!best.empty()) {
     select(best);
-    cache_.select(cluster_counts());
+    cache_.select(expected_samples(clusters_, lights_));
   }
   cache_.set_selection(best.empty() ? selection : best);
 }

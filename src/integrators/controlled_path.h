@@ -11,6 +11,7 @@
 #include "integrators/control_settings.h"
 #include "integrators/controlled_batch.h"
 #include "integrators/controlled_tracer.h"
+#include "integrators/light_groups.h"
 #include "integrators/training.h"
 
 namespace covary {
@@ -30,7 +31,7 @@ class ControlledPath : public LearningIntegrator {
   /// Takes coefficients that were learnt before, in place of a training; after prepare(), before the training.
   void use(CoefficientTable table);
   const LightSet& lights() const { return lights_; }
-  uint32_t n_clusters() const { return n_clusters_; }
+  uint32_t n_clusters() const { return clusters_.n_clusters; }
   /// Bytes of sums and coefficients at the end of the training.
   size_t training_bytes() const { return training_bytes_; }
 
@@ -75,8 +76,6 @@ class ControlledPath : public LearningIntegrator {
 
  private:
   void begin_batch(ControlledBatch& batch) const;
-  void make_clusters();
-  std::vector<float> cluster_counts() const;
   void select(const std::vector<float>& clusters);
   uint32_t resolution() const;
 
@@ -84,8 +83,7 @@ class ControlledPath : public LearningIntegrator {
   ControlSettings settings_;
   const Scene* scene_ = nullptr;  // that of prepare()
   LightSet lights_;
-  std::vector<uint32_t> cluster_of_;  // for each light
-  uint32_t n_clusters_ = 0;
+  LightClusters clusters_;
   std::shared_ptr<const Emitter> compensated_;  // the environment as it is sampled, where it is not the scene's own
   CoefficientCache cache_;
   std::optional<CoefficientTable> given_;

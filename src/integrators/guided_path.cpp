@@ -50,23 +50,11 @@ void GuidedPath::prepare(const Scene& scene) {
              &table(),
              {}};
   if (!settings_.controlled() && !settings_.nee) return;
-  std::vector<float> counts = make_clusters();
-  guided_.cluster_of = cluster_of_;
+  clusters_ = cluster_light_set(lights_, scene.bounds(), settings_.controlled() ? kMaxClusters : ~0u);
+  guided_.cluster_of = clusters_.cluster_of;
   if (settings_.controlled())
-    cache_ = CoefficientCache(scene.bounds(), std::move(counts), GuidedTechnique::kCount, settings_.cache());
-}
-
-/// Lights of neighbouring numbers together, where there are many; returns the expected number of samples that a vertex
-/// takes of each cluster.
-std::vector<float> GuidedPath::make_clusters() {
-  const uint32_t n = std::min(lights_.size(), kMaxClusters);
-  std::vector<double> counts(n);
-  cluster_of_.resize(lights_.size());
-  for (uint32_t i = 0; i < lights_.size(); ++i) {
-    cluster_of_[i] = static_cast<uint32_t>(uint64_t{i} * n / lights_.size());
-    counts[cluster_of_[i]] += lights_[i].pmf;
-  }
-  return {counts.begin(), counts.end()};
+    cache_ = CoefficientCache(scene.bounds(), expected_samples(clusters_, lights_), GuidedTechnique::kCount,
+                              settings_.cache());
 }
 
 void GuidedPath::begin_batch(GuidedBatch& batch) const {

@@ -10,6 +10,7 @@
 #include "integrators/guide_settings.h"
 #include "integrators/guided_batch.h"
 #include "integrators/guided_tracer.h"
+#include "integrators/light_groups.h"
 #include "integrators/training.h"
 
 namespace covary {
@@ -63,16 +64,15 @@ class GuidedPath : public LearningIntegrator {
   /// Waves that begin with so many samples teach the field; those behind, if any, the control.
   bool learns_field() const { return trained_spp() < settings_.train_spp; }
   void begin_batch(GuidedBatch& batch) const;
-  std::vector<float> make_clusters();
 
   PathLengthSettings lengths_;
   GuideSettings settings_;
   const Scene* scene_ = nullptr;  // that of prepare()
   LightSet lights_;
+  LightClusters clusters_;
   std::shared_ptr<const Emitter> compensated_;  // the environment as it is sampled, where it is not the scene's own
   GuidingField field_;
   std::optional<GuidingField> given_;
-  std::vector<uint32_t> cluster_of_;  // for each light
   CoefficientCache cache_;
   std::optional<CoefficientTable> given_table_;
   GuidedScene guided_{};
