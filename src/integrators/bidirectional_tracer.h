@@ -268,7 +268,7 @@ class BidirectionalTracer final : public LightTracingIntegrator {
     sums = mis_.leave(sums, mis_cosine(hit.ng, wi), scatter_pdfs(bsdf, wo, next));
     if (parts_.max_light_vertices() == 1) sums.vc = 0;
     path.previous_p = hit.p;
-    make_in_place(ray, [&] { return Ray{offset_origin(hit.p, hit.ng, wi), wi, kInfinity}; });
+    make_in_place(ray, [&] { return Ray{offset_origin(hit, wi), wi, kInfinity}; });
     return true;
   }
 
@@ -313,8 +313,8 @@ class BidirectionalTracer final : public LightTracingIntegrator {
                             end.bsdf.reverse_pdf(end.wo, wi_camera));
     const float factor = parts_.adjoint_factor(light.wo, wi_light, light.ng_local) / distance_squared;
     const Spectrum value = end.path.throughput * camera_f.value * (light.throughput * light_f.value * factor);
-    const Vec3 o = offset_origin(end.hit.p, end.hit.ng, w);
-    const Vec3 target = offset_origin(light.p, light.ng, -w);
+    const Vec3 o = offset_origin(end.hit, w);
+    const Vec3 target = offset_origin(light.p, light.ng, light.offset, -w);
     const float distance = length(target - o);
     const Ray ray{o, (target - o) * (1 / distance), distance * (1 - kRayEpsilon)};
     connect(value, 1 / (1 + others), ray, static_cast<int>(light.n_vertices), end, state);
@@ -368,7 +368,7 @@ class BidirectionalTracer final : public LightTracingIntegrator {
 
   /// Whether the camera sees the vertex, past area lights where these are hidden.
   bool reaches_lens(const Scene& scene, const LightVertex& end, const LensSample& lens, PathContext& context) const {
-    const Vec3 o = offset_origin(end.p, end.ng, lens.wi);
+    const Vec3 o = offset_origin(end.p, end.ng, end.offset, lens.wi);
     const float distance = length(lens.near_p - o);
     Ray ray{o, (lens.near_p - o) * (1 / distance), distance};
     ++context.n_rays;
@@ -376,7 +376,7 @@ class BidirectionalTracer final : public LightTracingIntegrator {
     SurfaceHit hit;
     while (scene.intersect(ray, hit)) {
       if (!hit.emitter) return false;
-      ray.o = offset_origin(hit.p, hit.ng, ray.d);
+      ray.o = offset_origin(hit, ray.d);
       ray.t_max -= hit.t;
       ++context.n_rays;
     }

@@ -201,7 +201,7 @@ class ControlledTracer {
       path.previous_p = hit.p;
       path.previous_pdf = next.pdf;
       path.previous_delta = next.is_delta();
-      make_in_place(batch_.rays[i], [&] { return Ray{offset_origin(hit.p, hit.ng, wi), wi, kInfinity}; });
+      make_in_place(batch_.rays[i], [&] { return Ray{offset_origin(hit, wi), wi, kInfinity}; });
       batch_.alive.push_back(i);
     }
     keep_alive(batch_);

@@ -81,7 +81,7 @@ std::optional<GuideProbe> probe_guide(const Scene& scene, const GuidedPath& inte
         const Vec2 u = random.get_2d(0, Event::kPixel);
         const Vec3 w = probe_direction((static_cast<float>(x) + u.x) / static_cast<float>(width),
                                        (static_cast<float>(y) + u.y) / static_cast<float>(height));
-        samples.push_back({{offset_origin(hit.p, hit.ng, w), w, kInfinity}, random, {}});
+        samples.push_back({{offset_origin(hit, w), w, kInfinity}, random, {}});
       }
       integrator.trace(scene, samples, context);
       Spectrum sum;

@@ -165,7 +165,7 @@ class GuidedTracer {
       path.previous_p = hit.p;
       path.previous_pdf = next.pdf;
       path.previous_delta = next.is_delta();
-      make_in_place(batch_.rays[i], [&] { return Ray{offset_origin(hit.p, hit.ng, wi), wi, kInfinity}; });
+      make_in_place(batch_.rays[i], [&] { return Ray{offset_origin(hit, wi), wi, kInfinity}; });
       if (batch_.recording && !next.is_delta() && guide_.share > 0) record(path, hit.p, wi, direction);
       batch_.alive.push_back(i);
     }

@@ -47,7 +47,7 @@ class PowerLights {
 
 /// Ray from a surface to a light sample, short of the light itself.
 inline Ray shadow_ray(const SurfaceHit& hit, const EmitterSample& light) {
-  const Vec3 o = offset_origin(hit.p, hit.ng, light.wi);
+  const Vec3 o = offset_origin(hit, light.wi);
   if (light.distance == kInfinity) return {o, light.wi, kInfinity};
   const Vec3 d = hit.p + light.wi * light.distance - o;
   const float distance = length(d);

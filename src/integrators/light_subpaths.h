@@ -21,6 +21,7 @@ namespace covary {
 struct LightVertex {
   Vec3 p;
   Vec3 ng;                  ///< unit geometric normal
+  float offset;             ///< SurfaceHit::offset
   Frame frame;              ///< shading frame
   Vec3 ng_local;            ///< ng in the frame
   Vec3 wo;                  ///< towards the vertex before, in the frame
@@ -90,7 +91,7 @@ class LightSubpaths {
   };
 
   template <typename Parts>
-  void emit(const Parts& parts, const PowerLights& lights, std::span<const PathRandom> randoms);
+  void emit(const Parts& parts, const Scene& scene, const PowerLights& lights, std::span<const PathRandom> randoms);
   /// The sums of a path at the first surface that it meets.
   static SubpathSums first_sums(const Scene& scene, const BidirectionalMis& mis, const Start& start, const Path& path,
                                 const Ray& ray, const SurfaceHit& hit, double cosine);
@@ -108,7 +109,8 @@ class LightSubpaths {
 };
 
 template <typename Parts>
-void LightSubpaths::emit(const Parts& parts, const PowerLights& lights, std::span<const PathRandom> randoms) {
+void LightSubpaths::emit(const Parts& parts, const Scene& scene, const PowerLights& lights,
+                         std::span<const PathRandom> randoms) {
   paths_.clear(), rays_.clear();
   starts_.resize(randoms.size());
   for (uint32_t i = 0; i < randoms.size(); ++i) {
@@ -122,8 +124,9 @@ void LightSubpaths::emit(const Parts& parts, const PowerLights& lights, std::spa
     const Spectrum throughput = from.radiance * (std::abs(dot(from.n, d)) / (pmf * pdf));
     starts_[i] = {&emitter, from.n, from.uv, lights.pmf(emitter), {from.pdf_position, from.pdf_direction}};
     const bool on_surface = !from.delta_position && !emitter.is_infinite();
-    paths_.push_back({throughput, 1 / max_component(throughput), {}, from.ray.o, i});
-    rays_.push_back({on_surface ? offset_origin(from.ray.o, from.n, d) : from.ray.o, d, kInfinity});
+    const Vec3& p = from.ray.o;
+    paths_.push_back({throughput, 1 / max_component(throughput), {}, p, i});
+    rays_.push_back({on_surface ? offset_origin(p, from.n, scene.ray_offset(p), d) : p, d, kInfinity});
   }
 }
 
@@ -148,7 +151,7 @@ void LightSubpaths::trace(const Parts& parts, const Scene& scene, const PowerLig
   vertices_.start(randoms.size());
   closures_.reset();
   if (max_surfaces > 0 && !lights.empty())
-    emit(parts, lights, randoms);
+    emit(parts, scene, lights, randoms);
   else
     paths_.clear(), rays_.clear();
   for (int depth = 0; !paths_.empty(); ++depth) {
@@ -185,7 +188,7 @@ bool LightSubpaths::scatter(const Parts& parts, const BidirectionalMis& mis, con
   if (last && !smooth) return false;
   const BsdfClosure* bsdf = closures_.bind(hit, wo.z > 0, parts.light_mode());
   if (smooth)
-    vertices_.append(path.index, {hit.p, hit.ng, hit.frame, ng, wo, bsdf, path.throughput, path.sums,
+    vertices_.append(path.index, {hit.p, hit.ng, hit.offset, hit.frame, ng, wo, bsdf, path.throughput, path.sums,
                                   static_cast<uint32_t>(depth) + 2, vertex, hit.emitter != nullptr});
   if (last) return false;
   const BsdfSample next =
@@ -205,7 +208,7 @@ bool LightSubpaths::scatter(const Parts& parts, const BidirectionalMis& mis, con
   const Vec3 wi = hit.frame.to_world(next.wi);
   path.sums = mis.leave(path.sums, mis_cosine(hit.ng, wi), scatter_pdfs(*bsdf, wo, next));
   path.previous_p = hit.p;
-  ray = {offset_origin(hit.p, hit.ng, wi), wi, kInfinity};
+  ray = {offset_origin(hit, wi), wi, kInfinity};
   return true;
 }
 

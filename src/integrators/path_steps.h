@@ -17,7 +17,7 @@ namespace covary {
 template <typename Path>
 void skip_area_lights(const Scene& scene, Path& path, Ray& ray, SurfaceHit& hit, PathContext& context) {
   while (path.found && hit.emitter) {
-    ray.o = offset_origin(hit.p, hit.ng, ray.d);
+    ray.o = offset_origin(hit, ray.d);
     ray.t_max -= hit.t;
     ++context.n_rays;
     path.found = scene.intersect(ray, hit);

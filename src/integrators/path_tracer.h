@@ -132,7 +132,7 @@ class PathTracer final : public Integrator {
       path.previous_p = hit.p;
       path.previous_pdf = next.pdf;
       path.previous_delta = next.is_delta();
-      make_in_place(batch.rays[i], [&] { return Ray{offset_origin(hit.p, hit.ng, wi), wi, kInfinity}; });
+      make_in_place(batch.rays[i], [&] { return Ray{offset_origin(hit, wi), wi, kInfinity}; });
       batch.alive.push_back(i);
     }
     keep_alive(batch);

@@ -25,6 +25,7 @@ Scene::Scene(SceneParts parts) : parts_(std::move(parts)) {
       n_triangles_ += dynamic_cast<const TriangleMesh*>(shape.get()) ? shape->n_primitives() : 0;
     }
   if (bounds_.empty()) bounds_ = {{-1, -1, -1}, {1, 1, 1}};  // lights at infinity still need a sphere to shine through
+  offset_unit_ = std::min(1.0f, std::max(max_component(abs(bounds_.lower)), max_component(abs(bounds_.upper))));
   tracer_ = std::make_unique<RayTracer>(parts_.shapes, parts_.instances);
 
   for (auto& emitter : parts_.emitters) {
@@ -41,13 +42,16 @@ Scene::~Scene() = default;
 bool Scene::intersect(const Ray& ray, SurfaceHit& hit) const {
   RayHit found;
   tracer_->nearest({&ray, 1}, {&found, 1}, false);
-  if (found.found()) tracer_->resolve(ray, found, hit);
+  if (found.found()) resolve(ray, found, hit);
   return found.found();
 }
 void Scene::nearest(std::span<const Ray> rays, std::span<RayHit> hits, bool coherent) const {
   tracer_->nearest(rays, hits, coherent);
 }
-void Scene::resolve(const Ray& ray, const RayHit& found, SurfaceHit& hit) const { tracer_->resolve(ray, found, hit); }
+void Scene::resolve(const Ray& ray, const RayHit& found, SurfaceHit& hit) const {
+  tracer_->resolve(ray, found, hit);
+  hit.offset = ray_offset(hit.p);
+}
 bool Scene::occluded(const Ray& ray) const {
   uint8_t blocked = 0;
   tracer_->occluded({&ray, 1}, {&blocked, 1});

@@ -54,6 +54,9 @@ struct RayHit {
   bool found() const { return geometry != kNone; }
 };
 
+/// Offset of ray origins against self-intersection, relative to the size of coordinates.
+inline constexpr float kRayEpsilon = 1500 * 0x1p-24f;
+
 class Scene {
  public:
   /// Builds the ray tracer's hierarchy.
@@ -78,6 +81,8 @@ class Scene {
   /// The light at infinity that rays leaving the scene meet, or null.
   const Emitter* environment() const { return environment_; }
   const Bounds3& bounds() const { return bounds_; }
+  /// Distance off a surface at `p` at which rays that leave it begin, against self-intersection.
+  float ray_offset(const Vec3& p) const { return (offset_unit_ + max_component(abs(p))) * kRayEpsilon; }
   size_t n_triangles() const { return n_triangles_; }
   size_t n_shapes() const { return parts_.shapes.size(); }
   double build_seconds() const { return build_seconds_; }
@@ -87,17 +92,15 @@ class Scene {
   std::unique_ptr<RayTracer> tracer_;
   const Emitter* environment_ = nullptr;
   Bounds3 bounds_;
+  float offset_unit_ = 1;  // largest coordinate of the scene, at most 1
   size_t n_triangles_ = 0;
   double build_seconds_ = 0;
 };
 
-/// Offset of ray origins against self-intersection, relative to the size of coordinates.
-inline constexpr float kRayEpsilon = 1500 * 0x1p-24f;
-
-/// `p` moved off its surface to the side `w` points to.
-inline Vec3 offset_origin(const Vec3& p, const Vec3& ng, const Vec3& w) {
-  const float magnitude = (1 + max_component(abs(p))) * kRayEpsilon;
-  return p + ng * std::copysign(magnitude, dot(ng, w));
+/// `p`, on a surface of the geometric normal `ng`, moved by `offset` to the side of the surface `w` points to.
+inline Vec3 offset_origin(const Vec3& p, const Vec3& ng, float offset, const Vec3& w) {
+  return p + ng * std::copysign(offset, dot(ng, w));
 }
+inline Vec3 offset_origin(const SurfaceHit& hit, const Vec3& w) { return offset_origin(hit.p, hit.ng, hit.offset, w); }
 
 }  // namespace covary

@@ -23,6 +23,7 @@ struct SurfaceHit {
   const Shape* shape = nullptr;
   const Bsdf* bsdf = nullptr;        ///< never null for a hit
   uint32_t bsdf_flags = 0;           ///< of bsdf
+  float offset = 0;                  ///< distance off the surface at which rays that leave it begin
   const Emitter* emitter = nullptr;  ///< area light of this surface, or null
   uint32_t primitive = 0;            ///< triangle index within a mesh
   Vec2 barycentric;                  ///< weights of the triangle's 2nd and 3rd vertex

@@ -3,6 +3,7 @@
 //
 // Statistical cases: R = 32 renders of each integrator with seeds 0 … 31, Student's t-test of the differences of image
 // means at alpha = 5e-7. Each case asserts that it rejects, with power 0.99, the relative error that it says.
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <numeric>
@@ -183,21 +184,41 @@ TEST(BdptImages, ThinLensAndHiddenLights) {
       64, 0.07);
 }
 
-// What does not depend on the units of length, far from the absolute distance at which rays start beside surfaces.
+/// A floor, a ceiling and a lamp within 80 units around the camera, with lengths multiplied by `scale`.
+std::string scaled_scene(const std::string& scale) {
+  const auto placed = [&](const std::string& transform, const std::string& content) {
+    return rectangle(transform + "<scale value='" + scale + "'/>", content);
+  };
+  const std::string far =
+      "<float name='near_clip' value='" + scale + "'/><float name='far_clip' value='1e9'/>";
+  return bdpt_scene(placed("<scale value='40'/><rotate x='1' angle='-90'/><translate y='-10' z='40'/>", diffuse(0.7)) +
+                        placed("<scale value='40'/><rotate x='1' angle='180'/><translate y='1' z='80'/>",
+                               diffuse(0.8)) +
+                        placed("<scale value='10'/><rotate x='1' angle='90'/><translate y='30' z='40'/>",
+                               area_light(5)),
+                    kSize, 4, "", far);
+}
+
 TEST(BdptImages, ScaledScenes) {
-  for (const char* scale : {"1", "1000", "1000000"}) {
+  for (const char* scale : {"0.001", "1", "1000", "1000000"}) {
     SCOPED_TRACE(scale);
-    const std::string s = std::string("<scale value='") + scale + "'/>";
-    const auto placed = [&](const std::string& transform, const std::string& content) {
-      return rectangle(transform + s, content);
+    expect_images_of_path(scaled_scene(scale), 32, 0.05);
+  }
+}
+
+// Powers of two do not round: below one unit, where lengths have no absolute size, the images have the same bits.
+TEST(BdptImages, SmallScenesDoNotKnowTheUnitOfLength) {
+  for (const char* integrator : {"path", "bdpt"}) {
+    SCOPED_TRACE(integrator);
+    const auto image = [&](const char* scale) {
+      std::string xml = scaled_scene(scale);
+      xml.replace(xml.find("type='bdpt'"), 11, "type='" + std::string(integrator) + "'");
+      const TestScene scene = load_text(xml);
+      return render(scene, 16, 3).mean_image();
     };
-    const std::string far =
-        "<float name='near_clip' value='" + std::string(scale) + "'/><float name='far_clip' value='1e9'/>";
-    const std::string body =
-        placed("<scale value='40'/><rotate x='1' angle='-90'/><translate y='-10' z='40'/>", diffuse(0.7)) +
-        placed("<scale value='40'/><rotate x='1' angle='180'/><translate y='1' z='80'/>", diffuse(0.8)) +
-        placed("<scale value='10'/><rotate x='1' angle='90'/><translate y='30' z='40'/>", area_light(5));
-    expect_images_of_path(bdpt_scene(body, kSize, 4, "", far), 32, 0.05);
+    const Image large = image("0.0078125"), small = image("0.0000152587890625");  // 2^-7, 2^-16
+    ASSERT_GT(*std::max_element(large.data.begin(), large.data.end()), 0);
+    EXPECT_EQ(large.data, small.data);
   }
 }
 

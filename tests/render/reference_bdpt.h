@@ -119,7 +119,7 @@ class Sampler {
       Vertex v;
       bool found = scene_.intersect(ray, v.hit);
       while (depth == 0 && settings_.hide_emitters && found && v.hit.emitter) {
-        ray = {offset_origin(v.hit.p, v.hit.ng, ray.d), ray.d, ray.t_max - v.hit.t};
+        ray = {offset_origin(v.hit, ray.d), ray.d, ray.t_max - v.hit.t};
         found = scene_.intersect(ray, v.hit);
       }
       v.from_camera = true;
@@ -154,7 +154,7 @@ class Sampler {
     origin.to_light = -from.ray.d;
     Path path = {origin};
     Ray ray = {from.ray.o, from.ray.d, kInfinity};
-    if (!emitter.is_delta() && !emitter.is_infinite()) ray.o = offset_origin(ray.o, from.n, ray.d);
+    if (!emitter.is_delta() && !emitter.is_infinite()) ray.o = offset_origin(ray.o, from.n, scene_.ray_offset(ray.o), ray.d);
     uint32_t n_smooth = 0;
     for (uint32_t depth = 0; static_cast<int>(depth) + 1 < settings_.max_depth; ++depth) {
       Vertex v;
@@ -179,7 +179,7 @@ class Sampler {
     if (!next.valid() || is_black(next.weight)) return false;
     v.event = next;
     const Vec3 wi = v.hit.frame.to_world(next.wi);
-    ray = {offset_origin(v.hit.p, v.hit.ng, wi), wi, kInfinity};
+    ray = {offset_origin(v.hit, wi), wi, kInfinity};
     return true;
   }
 
@@ -219,7 +219,8 @@ class Sampler {
     const SurfaceHit &a = camera[i].hit, &b = light[j].hit;
     if (!(b.bsdf_flags & kSmooth)) return {};
     const Vec3 w = normalize(b.p - a.p);
-    const Vec3 o = offset_origin(a.p, a.ng, w), target = offset_origin(b.p, b.ng, -w);
+    const Vec3 o = offset_origin(a.p, a.ng, scene_.ray_offset(a.p), w);
+    const Vec3 target = offset_origin(b.p, b.ng, scene_.ray_offset(b.p), -w);
     if (scene_.occluded({o, normalize(target - o), length(target - o) * (1 - kRayEpsilon)})) return {};
     Path path(light.begin(), light.begin() + static_cast<long>(j) + 1);
     path[j].event.reset();
@@ -229,11 +230,11 @@ class Sampler {
   }
 
   bool sees_lens(const Vertex& v, const LensSample& lens) const {
-    Vec3 o = offset_origin(v.hit.p, v.hit.ng, lens.wi);
+    Vec3 o = offset_origin(v.hit, lens.wi);
     SurfaceHit hit;
     while (scene_.intersect({o, normalize(lens.near_p - o), length(lens.near_p - o)}, hit)) {
       if (!settings_.hide_emitters || !hit.emitter) return false;
-      o = offset_origin(hit.p, hit.ng, lens.wi);
+      o = offset_origin(hit, lens.wi);
     }
     return true;
   }

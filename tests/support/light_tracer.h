@@ -82,7 +82,7 @@ class LightTracer final : public LightTracingIntegrator {
       add(join, 0, 1, e.ray.o, e.n, throughput, [&](const Vec3& wi) { return std::max(0.0f, dot(e.n, wi)); });
     throughput *= cosine / e.pdf_direction;
     Ray ray = e.ray;
-    if (!e.delta_position) ray.o = offset_origin(ray.o, e.n, ray.d);
+    if (!e.delta_position) ray.o = offset_origin(ray.o, e.n, join.scene.ray_offset(ray.o), ray.d);
     SurfaceHit hit;
     for (int edges = 1; edges + 1 <= longest_; ++edges) {
       ++join.context.n_rays;
@@ -100,7 +100,7 @@ class LightTracer final : public LightTracingIntegrator {
       if (!next.valid()) return;
       throughput *= next.weight * shading_normal_factor(wo, next.wi, ns, ng, TransportMode::kImportance);
       const Vec3 wi = hit.frame.to_world(next.wi);
-      ray = {offset_origin(hit.p, hit.ng, wi), wi, kInfinity};
+      ray = {offset_origin(hit, wi), wi, kInfinity};
     }
   }
 
@@ -115,7 +115,7 @@ class LightTracer final : public LightTracingIntegrator {
     if (pixel.weight == 0) return;
     const Spectrum value = throughput * f(lens.wi) * (share_ * pixel.weight * lens.importance / lens.pdf_solid_angle);
     if (is_black(value)) return;
-    const Vec3 o = offset_origin(p, ng, lens.wi);
+    const Vec3 o = offset_origin(p, ng, join.scene.ray_offset(p), lens.wi);
     const Vec3 d = lens.near_p - o;
     const float distance = length(d);
     ++join.context.n_rays;
