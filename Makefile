@@ -6,16 +6,18 @@
 #   make build            build/release/covary
 #   make demo             render a small scene plainly and with IICV into out/
 #   make test             build and run all tests but the nightly ones      TESTS=regex selects some
-#   make check            all there is: lint of every file, the tests of a build with checks, under each sanitizer and
-#                         by Clang, and a minute of each fuzz target; takes hours      FUZZ=seconds for each target
+#   make check            all there is: lint of every file, the tests under sanitizers and of a build by Clang with the
+#                         checks of the standard library, a minute of each fuzz target; takes hours
+#                         FUZZ=seconds for each target
 #   make bench            build and run the micro benchmarks                BENCH=regex selects some
 #   make lint             formatting, static analysis, rules of the tree    ALL=1 analyses all files, not changed ones
 #   make install          build for every x86-64 processor (docs/library.md) and install under PREFIX (default
 #                         /usr/local); ARCH=native builds for this machine alone, in a third of the time
 #   make wheel            the Python package as a wheel for every x86-64 processor, and its sources, in dist/
 #                         (docs/python.md); ARCH=native for machines like this alone
-#   make asan|ubsan|tsan  build and run the tests under a sanitizer
-#   make dev|clang        the same with checks of the standard library; by Clang
+#   make asan|tsan        build and run the tests under the sanitizers of addresses, leaks and undefined behaviour; under
+#                         that of threads
+#   make dev|clang        the same with checks of the standard library, by GCC; by Clang
 #   make clean            remove build/ and out/
 #
 # ARCH=x86-64-v3 builds for every AVX2 machine instead of this one; WERROR=ON makes warnings errors (dev and clang
@@ -34,7 +36,7 @@ CONFIGURE = -DCOVARY_ARCH=$(ARCH) -DCOVARY_WERROR=$(WERROR)
 # Install for every processor unless ARCH was given.
 INSTALL = $(if $(filter file,$(origin ARCH)),portable,release)
 
-.PHONY: all setup configure build demo test check nightly bench lint install wheel dev clang asan ubsan tsan clean
+.PHONY: all setup configure build demo test check nightly bench lint install wheel dev clang asan tsan clean
 all: build
 
 setup:
@@ -56,7 +58,7 @@ test: configure
 check:
 	@scripts/setup check
 	@$(MAKE) --no-print-directory lint ALL=1
-	@for build in dev asan ubsan tsan clang; do $(MAKE) --no-print-directory $$build || exit 1; done
+	@for build in asan tsan clang; do $(MAKE) --no-print-directory $$build || exit 1; done
 	@scripts/fuzz $(FUZZ)
 
 nightly: configure
@@ -87,7 +89,7 @@ dev clang:
 	@cmake --build build/$@ -j $(JOBS)
 	@cd build/$@ && $(CTEST)
 
-asan ubsan tsan: setup
+asan tsan: setup
 	@cmake --preset $@ $(CONFIGURE) > /dev/null
 	@cmake --build build/$@ -j $(JOBS)
 	@cd build/$@ && ../../scripts/sanitized $@ $(CTEST)

@@ -14,7 +14,7 @@ from exr_writer import HALF, UINT, exr, film
 
 COVARY = os.environ["COVARY"]
 # About how many times slower the program is under a sanitizer (scripts/sanitized).
-SLOWDOWN = {"tsan": 10, "asan": 3, "ubsan": 2}.get(os.environ.get("SANITIZED"), 1)
+SLOWDOWN = {"tsan": 10, "asan": 4}.get(os.environ.get("SANITIZED"), 1)
 
 
 class CliTest(unittest.TestCase):
