@@ -15,8 +15,8 @@
 #                         /usr/local); ARCH=native builds for this machine alone, in a third of the time
 #   make wheel            the Python package as a wheel for every x86-64 processor, and its sources, in dist/
 #                         (docs/python.md); ARCH=native for machines like this alone
-#   make asan|tsan        build and run the tests under the sanitizers of addresses, leaks and undefined behaviour; under
-#                         that of threads
+#   make asan|tsan        build and run the tests under the sanitizers of addresses, leaks and undefined behaviour;
+#                         under that of threads
 #   make dev|clang        the same with checks of the standard library, by GCC; by Clang
 #   make clean            remove build/ and out/
 #

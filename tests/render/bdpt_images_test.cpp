@@ -189,14 +189,12 @@ std::string scaled_scene(const std::string& scale) {
   const auto placed = [&](const std::string& transform, const std::string& content) {
     return rectangle(transform + "<scale value='" + scale + "'/>", content);
   };
-  const std::string far =
-      "<float name='near_clip' value='" + scale + "'/><float name='far_clip' value='1e9'/>";
-  return bdpt_scene(placed("<scale value='40'/><rotate x='1' angle='-90'/><translate y='-10' z='40'/>", diffuse(0.7)) +
-                        placed("<scale value='40'/><rotate x='1' angle='180'/><translate y='1' z='80'/>",
-                               diffuse(0.8)) +
-                        placed("<scale value='10'/><rotate x='1' angle='90'/><translate y='30' z='40'/>",
-                               area_light(5)),
-                    kSize, 4, "", far);
+  const std::string far = "<float name='near_clip' value='" + scale + "'/><float name='far_clip' value='1e9'/>";
+  return bdpt_scene(
+      placed("<scale value='40'/><rotate x='1' angle='-90'/><translate y='-10' z='40'/>", diffuse(0.7)) +
+          placed("<scale value='40'/><rotate x='1' angle='180'/><translate y='1' z='80'/>", diffuse(0.8)) +
+          placed("<scale value='10'/><rotate x='1' angle='90'/><translate y='30' z='40'/>", area_light(5)),
+      kSize, 4, "", far);
 }
 
 TEST(BdptImages, ScaledScenes) {

@@ -154,7 +154,8 @@ class Sampler {
     origin.to_light = -from.ray.d;
     Path path = {origin};
     Ray ray = {from.ray.o, from.ray.d, kInfinity};
-    if (!emitter.is_delta() && !emitter.is_infinite()) ray.o = offset_origin(ray.o, from.n, scene_.ray_offset(ray.o), ray.d);
+    if (!emitter.is_delta() && !emitter.is_infinite())
+      ray.o = offset_origin(ray.o, from.n, scene_.ray_offset(ray.o), ray.d);
     uint32_t n_smooth = 0;
     for (uint32_t depth = 0; static_cast<int>(depth) + 1 < settings_.max_depth; ++depth) {
       Vertex v;
