@@ -49,7 +49,8 @@ struct CombineOptions {
 
 /// What the file tells beside its pixels.
 ImageOrigin origin_of(const GroupedFile& file) {
-  return {file.name(), file.place(), file.sampling(), file.scene_hash(), file.settings(), file.has_half()};
+  return {file.name(),     file.place(),    file.sampling(),      file.scene_hash(),
+          file.settings(), file.has_half(), file.is_light_film(), file.has_light_added()};
 }
 
 /// Both images, some rows at a time.
@@ -262,8 +263,10 @@ void combine(const CombineOptions& o) {
   take_counts(o.counts, o.samples, crn, independent);
 
   std::vector<Finding> findings;
-  check_origins(origin_of(crn), origin_of(independent), findings);
-  check_light_files(crn, independent, light ? &*light : nullptr, findings);
+  const ImageOrigin crn_origin = origin_of(crn), independent_origin = origin_of(independent);
+  const std::optional<ImageOrigin> light_origin = light ? std::optional(origin_of(*light)) : std::nullopt;
+  check_origins(crn_origin, independent_origin, findings);
+  check_light(crn_origin, independent_origin, light_origin ? &*light_origin : nullptr, findings);
   Bands bands(crn, independent, o.memory_mib);
   const InputReport report = examine(estimator, crn, independent, bands);
   findings.insert(findings.end(), report.findings.begin(), report.findings.end());

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <limits>
 
-#include "core/error.h"
 #include "numbers.h"
 
 namespace covary {
@@ -91,14 +90,7 @@ void add_denoise_options(CLI::App& command, EstimatorOptions& o) {
 }
 
 Estimator make_estimator(const EstimatorOptions& o) {
-  const Estimator base = make_estimator(o.name, o.values);
-  MixedDenoisingOptions options;
-  options.mode = denoise_mode(o.denoise);
-  if (options.mode == DenoiseMode::kNone && !o.oidn.empty())
-    throw Error(ErrorCode::kUsage, "--oidn is an option of --denoise bias, balanced and error");
-  options.use_oidn = o.oidn != "off";
-  if (options.use_oidn) options.oidn.library = o.oidn;
-  return with_denoising(base, options);
+  return with_denoising(make_estimator(o.name, o.values), o.denoise, o.oidn);
 }
 
 std::string list_text(const std::vector<std::string>& words, const std::string& last) {

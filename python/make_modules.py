@@ -74,12 +74,16 @@ def signature(name, fixed, options):
 
 
 def estimator_function(estimator):
-    fixed = ["crn: Any", "independent: Any", "*", "force: bool = False", "progress: Progress | None = None"]
-    passed = ["force=force", "progress=progress"]
-    for known, name, kind in (("predicts_error", "std_error", "bool"), ("needs_sample_count", "samples", "int")):
-        if estimator[known]:
-            fixed.append(f"{name}: {kind} | None = None")
-            passed.append(f"{name}={name}")
+    fixed = ["crn: Any", "independent: Any", "*", "light: Film | None = None", "counts: Any = None",
+             "samples: int | None = None", "force: bool = False", "progress: Progress | None = None"]
+    passed = ["light=light", "counts=counts", "samples=samples", "force=force", "progress=progress"]
+    if estimator["denoises"]:
+        fixed += ['denoise: DenoiseMode = "none"', "albedo: Any = None", "normal: Any = None",
+                  'oidn: str | PathLike[str] = ""']
+        passed += ["denoise=denoise", "albedo=albedo", "normal=normal", "oidn=oidn"]
+    if estimator["predicts_error"]:
+        fixed.append("std_error: bool | None = None")
+        passed.append("std_error=std_error")
     passed += [f"{identifier(o['name'])}={identifier(o['name'])}" for o in estimator["options"]]
     name = identifier(estimator["name"])
     summary = f"{name}: {estimator['summary']}; at least {estimator['fewest_groups']} groups."
@@ -94,8 +98,9 @@ def estimator_function(estimator):
 def estimators_module(estimators):
     pairs = [e for e in estimators if e["passes"] == "pair"]
     head = HEAD.format("The estimators of two images by name, with their options.", ", Literal",
-                       "from ._combine import combine\n\nif TYPE_CHECKING:\n    from ._combine import Progress\n"
-                       "    from ._result import Result\n")
+                       "from ._combine import combine\n\nif TYPE_CHECKING:\n    from os import PathLike\n\n"
+                       "    from ._combine import DenoiseMode, Progress\n    from ._result import Result\n"
+                       "    from .film import Film\n")
     names = sorted([identifier(e["name"]) for e in pairs])
     types = [f"#: Estimators of two images.\nPairEstimator = {literal([e['name'] for e in pairs])}",
              f"#: Those of render().\nEstimator = {literal([e['name'] for e in estimators])}"]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from os import PathLike, fspath
+from typing import TYPE_CHECKING, Any, Literal
 
 from . import _covary
 from ._options import OptionValue, text_options
@@ -12,13 +13,20 @@ from ._result import Result
 
 if TYPE_CHECKING:
     from .estimators import PairEstimator
+    from .film import Film
 
 Progress = Callable[[int, int], object]
+_MOST_SAMPLES = 1 << 30  # of a pixel
 
 
-def combine(crn: Any, independent: Any, estimator: PairEstimator = "iicv", *, std_error: bool | None = None,
-            samples: int | None = None, force: bool = False, progress: Progress | None = None,
-            **options: OptionValue) -> Result:
+#: What `--denoise` of the command line takes.
+DenoiseMode = Literal["none", "bias", "balanced", "error"]
+
+
+def combine(crn: Any, independent: Any, estimator: PairEstimator = "iicv", *, light: Film | None = None,
+            counts: Any = None, samples: int | None = None, denoise: DenoiseMode = "none", albedo: Any = None,
+            normal: Any = None, oidn: str | PathLike[str] = "", std_error: bool | None = None, force: bool = False,
+            progress: Progress | None = None, **options: OptionValue) -> Result:
     """One image of two: `crn`, whose pixels share their random numbers, and `independent`, whose pixels do not.
 
     Each is an array of float32 [T, H, W, 3], the means of T groups of samples (renders with different seeds), of NumPy,
@@ -26,16 +34,35 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = "iicv", *, st
     are recommended. Memory that is [H, W, T, 3], as of read_groups() and Film.groups, is read where it lies.
 
     estimator: "iicv", or a comparator; its options follow as keywords (covary.estimators has each with its types).
+    light: the film of light paths, that of a pass "light", which is added to the result.
+    counts: samples of each pixel of the independent image, all groups together, where these differ: whole numbers
+        [H, W]; a Film knows its own. With them, samples.
+    samples: samples per pixel of the CRN image, for counts and for estimators that need them.
+    denoise: mix the image with denoised ones where held-out samples find that better: for least bias, for least error,
+        or balanced. albedo, normal: guides [H, W, 3] for it, the normal only together with the albedo; oidn: Open Image
+        Denoise's library or a folder of it, by default where it is found; "off": without it.
     std_error: estimate the error, too; by default where the estimator can.
-    samples: samples per pixel of the CRN image, for estimators that need them.
     force: combine even where the checks of the inputs find errors.
     progress: called with (done, total) steps.
 
     The values are those of `covary combine` in every bit. Raises InputError where the inputs do not fit, UsageError for
     options that the estimator does not have.
     """
-    return Result(*_covary.combine(crn, independent, estimator, text_options(options), force, std_error, samples,
-                                   progress))
+    return Result(**_covary.combine(crn, independent, None if counts is None else _counts(counts), light, albedo,
+                                    normal, estimator, text_options(options), denoise, fspath(oidn), force, std_error,
+                                    samples, progress))
+
+
+def _counts(counts: Any) -> Any:
+    """As the module takes them. Raises TypeError and ValueError for what are no numbers of samples."""
+    import numpy
+
+    array = numpy.asarray(counts)
+    if array.dtype.kind not in "ui" or array.ndim != 2:
+        raise TypeError(f"counts: found {array.dtype} {list(array.shape)}; accepted are whole numbers, [H, W]")
+    if array.size and not 0 <= int(array.min()) <= int(array.max()) <= _MOST_SAMPLES:
+        raise ValueError(f"counts: found {array.min()} to {array.max()}; accepted are 0 to {_MOST_SAMPLES}")
+    return numpy.ascontiguousarray(array, numpy.uint32)
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,10 @@ from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any, Literal, Union
 
 from . import _covary
-from ._combine import Progress
+from ._combine import DenoiseMode, Progress
 from ._options import OptionValue, text_options
 from ._result import RenderResult
+from .errors import UsageError
 
 if TYPE_CHECKING:
     from .estimators import Estimator
@@ -88,13 +89,16 @@ class Scene:
 
 
 def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator = "iicv", *, integrator: str = "",
-           until: float | None = None, time: float | None = None, seed: int = 0,
+           until: float | None = None, until_p95: float | None = None, time: float | None = None, seed: int = 0,
+           denoise: DenoiseMode = "none", oidn: str | PathLike[str] = "",
            output: str | PathLike[str] | None = None, passes: str | PathLike[str] | None = None, resume: bool = False,
            overwrite: bool = False, checkpoint: float = 0, preview: bool = False, aovs: bool = False,
-           crop: tuple[int, int, int, int] | None = None, filter: Literal["box", "tent", "gaussian"] | None = None,
+           path_lengths: bool = False, crop: tuple[int, int, int, int] | None = None,
+           filter: Literal["box", "tent", "gaussian"] | None = None,
            sampling: Literal["independent", "crn"] = "independent",
            crn_part: Literal["both", "camera", "light"] = "both", groups: int | None = None,
-           split: tuple[float, float] | None = None, save_training: str | PathLike[str] | None = None,
+           split: tuple[float, float] | None = None, films_only: bool = False,
+           save_training: str | PathLike[str] | None = None,
            load_training: str | PathLike[str] | None = None, progress: Progress | None = None,
            **options: OptionValue) -> RenderResult:
     """Renders a scene, or the file of one, as `covary render` does; the values are the same in every bit.
@@ -103,15 +107,18 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator = "i
     estimator: "iicv" takes half of the samples with common random numbers; "none" is the mean. Its options follow as
         keywords.
     integrator: in place of the scene's.
-    until: adds samples until the predicted relMSE is this.
+    until: adds samples until the predicted relMSE is this; until_p95: until 95 % of the blocks of 16 x 16 pixels have
+        no more.
     time: seconds for rendering and estimating together.
+    denoise, oidn: as combine() has them; the guides are rendered.
     output: EXR file of the result; preview: also a PNG beside it.
     passes: folder that keeps the films; resume: continues those that are there; overwrite: replaces them;
         checkpoint: seconds between writing unfinished films.
-    aovs: also the images Albedo, N and P.
+    aovs: also the images Albedo, N and P; path_lengths: also images of paths of each length, by controlled-path.
     crop: x, y, width and height in the frame.
     sampling: of the one pass of estimator "none".
     groups: of samples whose means films keep; split: parts of the samples for the CRN and the independent pass.
+    films_only: take the passes and make no image of them; result.image is then the mean of all samples.
     progress: called with (done, total) samples, up to 20 times a second.
 
     Ctrl-C ends the render within a tile; with `output` or `passes` what there is was kept, and `resume=True` continues.
@@ -122,6 +129,11 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator = "i
     request: dict[str, Any] = {name: None if path is None else fspath(path) for name, path in names.items()}
     request |= {"spp": spp, "seed": seed, "until": until, "seconds": time, "resume": resume, "overwrite": overwrite,
                 "checkpoint": float(checkpoint), "preview": preview, "aovs": aovs, "crop": crop, "filter": filter,
-                "crn_part": crn_part}
-    made = _covary.render(chosen._loaded, estimator, text_options(options), sampling, groups, split, request, progress)
+                "crn_part": crn_part, "path_lengths": path_lengths}
+    if until_p95 is not None:
+        if until is not None:
+            raise UsageError("found until and until_p95; accepted is one of them")
+        request |= {"until": until_p95, "until_in_blocks": True}
+    made = _covary.render(chosen._loaded, estimator, text_options(options), denoise, fspath(oidn), sampling, groups,
+                          split, films_only, request, progress)
     return RenderResult(**made)

@@ -2,9 +2,9 @@
 """What combine() and render() return."""
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from os import PathLike, fspath
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from . import _covary
 
@@ -31,15 +31,25 @@ class Result:
     nonfinite_pixels: int
     #: Name and options, as `covary:estimator` of files has them.
     estimator: str
+    #: Samples per pixel of all images together, on average; None where arrays do not tell.
+    samples_per_pixel: float | None
 
     def save(self, path: str | PathLike[str]) -> None:
         """Writes the image in the format that the name tells: .exr .pfm .tif .hdr .png .jpg."""
-        _covary.write_image(fspath(path), self.image, {"covary:estimator": self.estimator})
+        attributes = {"covary:estimator": self.estimator}
+        if self.samples_per_pixel is not None:
+            attributes["covary:samples"] = f"{self.samples_per_pixel:g}"
+        _covary.write_image(fspath(path), self.image, attributes)
 
     def _repr_html_(self) -> str:
         from .notebook import view
 
         return view({"image": self})._repr_html_()
+
+
+def fields_of(result: Result) -> dict[str, Any]:
+    """Those of Result alone, by name: what results with more of them begin with."""
+    return {each.name: getattr(result, each.name) for each in fields(Result)}
 
 
 @dataclass(frozen=True)
@@ -48,13 +58,13 @@ class RenderResult(Result):
 
     #: Films of the passes by name: "crn", "independent", …
     films: dict[str, _covary.Film] = field(repr=False)
-    #: Auxiliary images by name where they were asked for: "Albedo", "N", "P".
+    #: Auxiliary images by name where they were asked for, or guided a denoiser: "Albedo", "N", "P".
     aovs: dict[str, FloatArray] = field(repr=False)
-    #: Samples per pixel of all passes together.
-    samples_per_pixel: float
     render_seconds: float
     estimate_seconds: float
     #: Whether all passes have the samples that were planned.
     complete: bool
     #: Whether the predicted error is at most the wanted one, where one was.
     until_reached: bool | None
+    #: What 95 % of the blocks of 16 x 16 pixels do not exceed of the predicted error; None as predicted_relmse.
+    predicted_relmse_p95: float | None

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from . import _covary
 from ._combine import Progress, combine
 from ._options import OptionValue
-from ._result import Result
+from ._result import Result, fields_of
 from .errors import UsageError
 from .film import Film, film_from_groups
 
@@ -174,8 +174,8 @@ def _combined(images: dict[str, list[Any]], spp: int, estimator: str, options: d
 
     films = {kind: film_from_groups(numpy.stack(members), spp // 2, sampling=kind) for kind, members in images.items()}
     result = combine(films["crn"], films["independent"], estimator, **options)  # type: ignore[arg-type]
-    return BlenderResult(result.image, result.std_error, result.predicted_relmse, changed + result.warnings,
-                         result.nonfinite_pixels, result.estimator, films, seconds)
+    given = fields_of(result) | {"warnings": changed + result.warnings}
+    return BlenderResult(**given, films=films, render_seconds=seconds)
 
 
 def show(result: Result, name: str = "covary") -> Any:

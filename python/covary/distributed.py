@@ -22,7 +22,7 @@ from ._combine import Progress, combine
 from ._options import OptionValue, text_options
 from ._render import Scene
 from ._render import render as render_here
-from ._result import Result
+from ._result import Result, fields_of
 from .errors import Error, InputError, IoError, UsageError
 from .film import Film, merge_films
 
@@ -104,8 +104,16 @@ def _make_plugin(files: SceneFiles) -> Any:
     return Deliver()
 
 
-def _render_part(job: _Job, part: _Part) -> dict[str, Film] | Error:
-    """On a worker: the films of a part, or what is wrong with all parts, so that Dask does not try again."""
+@dataclass(frozen=True)
+class _Rendered:
+    """Of a part: the films of its passes, and the images that guide a denoiser where one is wanted."""
+
+    films: dict[str, Film]
+    aovs: dict[str, FloatArray] = field(default_factory=dict)
+
+
+def _render_part(job: _Job, part: _Part) -> _Rendered | Error:
+    """On a worker: what a part leaves behind, or what is wrong with all parts, so that Dask does not try again."""
     from distributed import get_worker  # type: ignore[import-not-found,import-untyped,unused-ignore]
 
     folder = Path(job.folder or get_worker().local_directory) / f"covary-scene-{job.scene_hash}"
@@ -114,7 +122,8 @@ def _render_part(job: _Job, part: _Part) -> dict[str, Film] | Error:
         if key not in _scenes:
             _scenes.clear()  # one scene in memory at a time
             _scenes[key] = Scene(key[0], job.loading)
-        return render_here(_scenes[key], crop=part.crop, seed=part.seed, **job.settings).films
+        made = render_here(_scenes[key], crop=part.crop, seed=part.seed, films_only=True, **job.settings)
+        return _Rendered(made.films, made.aovs)
     except (InputError, UsageError) as error:
         return error
 
@@ -131,16 +140,20 @@ class _Canvas:
     def __init__(self, width: int, height: int) -> None:
         self.width, self.height = width, height
         self.arrays: dict[tuple[int, str], tuple[Any, Any, dict[str, str]]] = {}
+        self.aovs: dict[str, FloatArray] = {}
         self.parts: set[int] = set()
 
-    def add(self, part: _Part, films: Mapping[str, Film]) -> None:
+    def add(self, part: _Part, rendered: _Rendered) -> None:
         import numpy
 
         if part.number in self.parts:
             raise RuntimeError(f"part {part.number} came twice")
         self.parts.add(part.number)
         x, y, width, height = part.crop
-        for name, film in films.items():
+        for name, image in rendered.aovs.items():
+            whole = self.aovs.setdefault(name, numpy.zeros((self.height, self.width, 3), numpy.float32))
+            whole[y:y + height, x:x + width] = image
+        for name, film in rendered.films.items():
             groups = film.groups
             if (part.seed, name) not in self.arrays:
                 self.arrays[part.seed, name] = (
@@ -192,7 +205,6 @@ class ClusterResult(Result):
     """What has become of render()."""
 
     films: dict[str, Film] = field(repr=False)
-    samples_per_pixel: float
     #: Parts that were rendered, and seconds from the first to the last.
     parts: int
     render_seconds: float
@@ -212,6 +224,7 @@ def render(client: Any, scene: Scene | str | os.PathLike[str], spp: int, estimat
     progress: called with (done, total) parts.
     on_image: called with the mean of all samples so far, at most every `image_seconds`.
     settings: further keywords of covary.render() for the passes: filter, groups, split, ….
+    options: of the estimator, and denoise and oidn of combine(), whose guides are rendered, too.
 
     Raises UsageError for estimators and integrators whose passes look beyond a tile.
     """
@@ -243,10 +256,10 @@ def render(client: Any, scene: Scene | str | os.PathLike[str], spp: int, estimat
     futures = {client.submit(_render_part, job, part, pure=False, retries=_RETRIES): part for part in parts}
     try:
         for future in distributed.as_completed(futures):  # type: ignore[no-untyped-call,unused-ignore]
-            films = future.result()
-            if isinstance(films, Error):
-                raise films
-            canvas.add(futures[future], films)
+            rendered = future.result()
+            if isinstance(rendered, Error):
+                raise rendered
+            canvas.add(futures[future], rendered)
             future.release()
             if progress is not None:
                 progress(len(canvas.parts), len(parts))
@@ -260,13 +273,13 @@ def render(client: Any, scene: Scene | str | os.PathLike[str], spp: int, estimat
     return _result(canvas, estimator, options, len(parts), seconds)
 
 
-def _result(canvas: _Canvas, estimator: str, options: Mapping[str, OptionValue], parts: int,
-            seconds: float) -> ClusterResult:
+def _result(canvas: _Canvas, estimator: str, options: Mapping[str, Any], parts: int, seconds: float) -> ClusterResult:
     films = canvas.films()
     samples = sum(film.samples_per_pixel for film in films.values())
     if estimator == "none":
-        film = next(iter(films.values()))
-        return ClusterResult(film.mean, None, None, [], 0, "none", films, samples, parts, seconds)
-    made = combine(films["crn"], films["independent"], estimator, force=True, **options)  # type: ignore[arg-type]
-    return ClusterResult(made.image, made.std_error, made.predicted_relmse, [], made.nonfinite_pixels, made.estimator,
-                         films, samples, parts, seconds)
+        made = Result(next(iter(films.values())).mean, None, None, [], 0, "none", samples)
+    else:
+        made = combine(films["crn"], films["independent"], estimator, force=True,  # type: ignore[arg-type]
+                       albedo=canvas.aovs.get("Albedo"), normal=canvas.aovs.get("N"), **options)
+    given = fields_of(made) | {"warnings": [], "samples_per_pixel": samples}
+    return ClusterResult(**given, films=films, parts=parts, render_seconds=seconds)

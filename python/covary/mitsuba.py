@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ._combine import Progress, combine
 from ._options import OptionValue
-from ._result import Result
+from ._result import Result, fields_of
 from .errors import UsageError
 from .film import Film, film_from_groups
 
@@ -224,9 +224,9 @@ def render(scene: Any, spp: int, seed: int = 0, integrator: Any = None, sensor: 
     rendered = time.perf_counter()
     result = combine(films["crn"], films["independent"], estimator, **options)  # type: ignore[arg-type]
     estimated = time.perf_counter()
-    return MitsubaResult(result.image, result.std_error, result.predicted_relmse, warnings + result.warnings,
-                         result.nonfinite_pixels, result.estimator, films, guides, rendered - started,
-                         estimated - rendered)
+    given = fields_of(result) | {"warnings": warnings + result.warnings}
+    return MitsubaResult(**given, films=films, aovs=guides, render_seconds=rendered - started,
+                         estimate_seconds=estimated - rendered)
 
 
 def _film(mi: Any, scene: Any, camera: Any, integrator: Any, sampling: str, count: int, groups: int, seed: int,

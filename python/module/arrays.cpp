@@ -111,8 +111,8 @@ GroupedImage Groups::view() {
   return image;
 }
 
-Image image_of(nb::handle array, const std::string& name) {
-  const Floats floats = floats_of(array, name, "H, W, 3");
+Image image_of(nb::handle array, const std::string& name, const std::string& shape) {
+  const Floats floats = floats_of(array, name, shape);
   const std::vector<int64_t>& s = floats.strides;
   Image image(static_cast<int>(floats.shape[1]), static_cast<int>(floats.shape[0]), 3);
   for (int y = 0; y < image.height; ++y)

@@ -38,14 +38,16 @@ class Groups {
   /// Raises like floats_of().
   Groups(nb::handle array, const std::string& name);
   GroupedImage view();
+  int width() const { return static_cast<int>(source_.shape[2]); }
+  int height() const { return static_cast<int>(source_.shape[1]); }
 
  private:
   Floats source_;
   std::unique_ptr<float[]> ordered_;
 };
 
-/// An array [H, W, 3] as an image of its own. Raises like floats_of().
-Image image_of(nb::handle array, const std::string& name);
+/// An array [H, W, 3] as an image of its own. Raises like floats_of(); `shape` may name the size that it must have.
+Image image_of(nb::handle array, const std::string& name, const std::string& shape = "H, W, 3");
 
 /// [H, W, channels], or [H, W] with one channel, of the image's memory; None where it is empty.
 nb::object array_of(Image&& image);

@@ -1,11 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <numeric>
 #include <optional>
+#include <span>
 
 #include "core/error.h"
 #include "estimators/held_out_error.h"
+#include "estimators/light_film.h"
+#include "estimators/mixed_denoising.h"
 #include "estimators/pair_input.h"
 #include "estimators/predicted_error.h"
 #include "estimators/registry.h"
+#include "film/splat_layer.h"
 #include "plans/plan.h"
 #include "python/module/arrays.h"
 #include "python/module/bindings.h"
@@ -14,31 +21,61 @@
 namespace covary::python {
 namespace {
 
+using Counts = nb::ndarray<const uint32_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+
 /// One of the two images: an array [T, H, W, 3], or a film, which lies as estimators read it.
 class Input {
  public:
   Input(nb::handle object, const std::string& name) : name_(name) {
     if (object.is_none() || !nb::try_cast(object, film_)) groups_.emplace(object, name);
+    samples_ = film_ ? film_->mean_count() : 0;
   }
   const Film* film() const { return film_; }
-  GroupedImage view() { return film_ ? rows_of(*film_, 0, film_->height()) : groups_->view(); }
-  double samples() const { return film_ ? film_->mean_count() : 0; }
-  ImageOrigin origin() const {
+  int width() const { return film_ ? film_->width() : groups_->width(); }
+  int height() const { return film_ ? film_->height() : groups_->height(); }
+  /// Per pixel, on average; 0 where that is not known.
+  double samples() const { return samples_; }
+  /// Of each pixel, all groups together. Raises where the image knows them.
+  void take_counts(std::span<const uint32_t> counts) {
+    if (film_)
+      throw Error(ErrorCode::kInput, name_ +
+                                         ": the film tells itself how many samples its pixels have; 'counts' is "
+                                         "not needed");
+    counts_.assign(counts.begin(), counts.end());
+    samples_ = std::accumulate(counts_.begin(), counts_.end(), 0.0) / static_cast<double>(counts_.size());
+  }
+  GroupedImage view() {
+    GroupedImage image = film_ ? rows_of(*film_, 0, film_->height()) : groups_->view();
+    if (!counts_.empty()) image.counts = counts_.data(), image.mean_count = samples_;
+    return image;
+  }
+  /// What a film tells. Of an array nothing is known but its size: its place is `place` where that has this size.
+  ImageOrigin origin(const ImagePlace& place) const {
+    const CropWindow& w = place.window;
+    if (!film_ && w.width == width() && w.height == height()) return {name_, place, "", "", ""};
+    return film_ ? origin_of(*film_, name_) : ImageOrigin{name_, {width(), height(), {0, 0, width(), height()}}};
+  }
+  static ImageOrigin origin_of(const Film& film, const std::string& name) {
     const auto text = [&](const char* key) {
-      const auto found = film_->attributes.find(key);
-      return found == film_->attributes.end() ? std::string() : found->second;
+      const auto found = film.attributes.find(key);
+      return found == film.attributes.end() ? std::string() : found->second;
     };
-    return {name_,
-            {film_->frame_width(), film_->frame_height(), film_->crop()},
+    return {name,
+            {film.frame_width(), film.frame_height(), film.crop()},
             text(film_key::kSampling),
             text(film_key::kSceneHash),
-            text(film_key::kSettings)};
+            text(film_key::kSettings),
+            false,
+            !text(film_key::kLightPaths).empty(),
+            !text(film_key::kLight).empty()};
   }
 
  private:
   std::string name_;
   Film* film_ = nullptr;
   std::optional<Groups> groups_;
+  std::vector<uint32_t> counts_;
+  double samples_ = 0;
 };
 
 /// The two images and what an estimator of pairs is to make of them.
@@ -47,9 +84,25 @@ struct Pair {
   std::vector<Finding> findings;
   InputReport report;
 
-  Pair(nb::handle crn_object, nb::handle independent_object)
+  Pair(nb::handle crn_object, nb::handle independent_object, const Film* light)
       : crn(crn_object, "crn"), independent(independent_object, "independent") {
-    if (crn.film() && independent.film()) check_origins(crn.origin(), independent.origin(), findings);
+    const std::optional<ImageOrigin> added = light ? std::optional(Input::origin_of(*light, "light")) : std::nullopt;
+    const ImagePlace place = added ? added->place : ImagePlace{};
+    const ImageOrigin first = crn.origin(place), second = independent.origin(place);
+    if (crn.film() && independent.film()) check_origins(first, second, findings);
+    check_light(first, second, added ? &*added : nullptr, findings);
+  }
+  /// `samples`: of each pixel of the CRN image, where it does not tell them.
+  void take_counts(const Counts& counts, std::optional<int> samples) {
+    if (counts.shape(0) != static_cast<size_t>(independent.height()) ||
+        counts.shape(1) != static_cast<size_t>(independent.width()))
+      throw nb::value_error(fmt::format("counts: found the shape [{}, {}]; accepted is [{}, {}]", counts.shape(0),
+                                        counts.shape(1), independent.height(), independent.width())
+                                .c_str());
+    independent.take_counts({counts.data(), counts.size()});
+    if (crn.film()) return;
+    if (!samples) throw Error(ErrorCode::kUsage, "--counts needs --samples N, the samples per pixel of the CRN image");
+    crn.take_counts(std::vector(static_cast<size_t>(crn.width()) * crn.height(), static_cast<uint32_t>(*samples)));
   }
   void check(const Estimator& estimator) {
     const GroupedImage g = crn.view(), h = independent.view();
@@ -69,18 +122,54 @@ struct Pair {
 struct CombineRequest {
   std::string estimator;
   OptionValues options;
+  std::string denoise, oidn;
   bool force = false;
   std::optional<bool> std_error;
   std::optional<int> samples;
 };
 
-nb::tuple combine(nb::object crn, nb::object independent, const CombineRequest& request, nb::object progress) {
-  const Estimator estimator = make_pair_estimator(request.estimator, request.options);
-  Pair pair(crn, independent);
-  const PairSettings settings = pair_settings(estimator, request.samples, pair.crn.samples(),
-                                              request.std_error.value_or(estimator.predicts_error));
+/// What may come beside the two images; None where it does not.
+struct Beside {
+  nb::object counts, light, albedo, normal;
+};
+
+/// The guides of --denoise.
+struct GuideImages {
+  Image albedo, normal;
+  GuideImages(const Beside& beside, const Estimator& estimator, const Input& image) {
+    if (beside.albedo.is_none() && beside.normal.is_none()) return;
+    if (!estimator.reads_guides)
+      throw Error(ErrorCode::kUsage, "--guides is an option of --denoise bias, balanced and error");
+    if (beside.albedo.is_none()) throw Error(ErrorCode::kUsage, "normal: it is a guide only together with the albedo");
+    const std::string shape = fmt::format("{}, {}, 3", image.height(), image.width());
+    albedo = image_of(beside.albedo, "albedo", shape);
+    if (!beside.normal.is_none()) normal = image_of(beside.normal, "normal", shape);
+  }
+  Guides view() const { return {albedo.data.empty() ? nullptr : &albedo, normal.data.empty() ? nullptr : &normal}; }
+};
+
+const Film* film_of(nb::handle light) {
+  Film* film = nullptr;
+  if (!light.is_none() && !nb::try_cast(light, film))
+    throw nb::type_error("light: accepted is a covary.Film, that of a pass 'light'");
+  return film;
+}
+
+nb::dict combine(nb::object crn, nb::object independent, const Beside& beside, const CombineRequest& request,
+                 nb::object progress) {
+  const Estimator estimator =
+      with_denoising(make_pair_estimator(request.estimator, request.options), request.denoise, request.oidn);
+  const Film* light = film_of(beside.light);
+  Pair pair(crn, independent, light);
+  const bool has_counts = !beside.counts.is_none();
+  PairSettings settings =
+      pair_settings(estimator, estimator.needs_sample_count || !has_counts ? request.samples : std::nullopt,
+                    pair.crn.samples(), request.std_error.value_or(estimator.predicts_error));
+  const GuideImages guides(beside, estimator, pair.crn);
+  settings.guides = guides.view();
+  if (has_counts) pair.take_counts(nb::cast<Counts>(beside.counts), request.samples);
   EstimatorResult result;
-  std::optional<double> predicted;
+  std::optional<double> predicted, samples;
   const auto work = [&](WorkState& state) {
     state.total = 2;
     pair.check(estimator);
@@ -91,12 +180,22 @@ nb::tuple combine(nb::object crn, nb::object independent, const CombineRequest& 
         run_stoppable(state, [&] { result = estimator.apply(pair.crn.view(), pair.independent.view(), settings); });
     if (!whole) return;
     calibrate(result);
+    if (light) add_light(rows_of(*light, 0, light->height()), result);
     if (!result.std_error.data.empty()) predicted = predicted_relmse(result);
     state.done = 2;
   };
   run_work(work, progress);
-  return nb::make_tuple(array_of(std::move(result.estimate)), array_of(std::move(result.std_error)), predicted,
-                        pair.warnings(), result.nonfinite_pixels, estimator.text);
+  if (pair.crn.samples() > 0 && pair.independent.samples() > 0)
+    samples = pair.crn.samples() + pair.independent.samples();
+  nb::dict d;
+  d["image"] = array_of(std::move(result.estimate));
+  d["std_error"] = array_of(std::move(result.std_error));
+  d["predicted_relmse"] = predicted;
+  d["warnings"] = pair.warnings();
+  d["nonfinite_pixels"] = result.nonfinite_pixels;
+  d["estimator"] = estimator.text;
+  d["samples_per_pixel"] = samples;
+  return d;
 }
 
 nb::object correlation(const Correlation& c) {
@@ -105,7 +204,7 @@ nb::object correlation(const Correlation& c) {
 }
 
 nb::dict check(nb::object crn, nb::object independent) {
-  Pair pair(crn, independent);
+  Pair pair(crn, independent, nullptr);
   run_work([&](WorkState&) { pair.check({}); }, nb::none());
   nb::list errors, warnings, notes;
   for (const Finding& f : pair.findings)
@@ -134,15 +233,20 @@ void bind_combine(nb::module_& module) {
   using namespace nb::literals;
   module.def(
       "combine",
-      [](nb::object crn, nb::object independent, const std::string& estimator, const OptionValues& options, bool force,
-         std::optional<bool> std_error, std::optional<int> samples, nb::object progress) {
-        return combine(crn, independent, {estimator, options, force, std_error, samples}, progress);
+      [](nb::object crn, nb::object independent, nb::object counts, nb::object light, nb::object albedo,
+         nb::object normal, const std::string& estimator, const OptionValues& options, const std::string& denoise,
+         const std::string& oidn, bool force, std::optional<bool> std_error, std::optional<int> samples,
+         nb::object progress) {
+        return combine(crn, independent, {counts, light, albedo, normal},
+                       {estimator, options, denoise, oidn, force, std_error, samples}, progress);
       },
-      "crn"_a.none(), "independent"_a.none(), "estimator"_a, "options"_a, "force"_a, "std_error"_a.none(),
-      "samples"_a.none(), "progress"_a.none(),
-      nb::sig("def combine(crn: object, independent: object, estimator: str, options: dict[str, str], force: bool, "
-              "std_error: bool | None, samples: int | None, progress: typing.Any) -> tuple[typing.Any, typing.Any, "
-              "float | None, list[str], int, str]"));
+      "crn"_a.none(), "independent"_a.none(), "counts"_a.none(), "light"_a.none(), "albedo"_a.none(), "normal"_a.none(),
+      "estimator"_a, "options"_a, "denoise"_a, "oidn"_a, "force"_a, "std_error"_a.none(), "samples"_a.none(),
+      "progress"_a.none(),
+      nb::sig("def combine(crn: object, independent: object, counts: object | None, light: object | None, albedo: "
+              "object | None, normal: object | None, estimator: str, options: dict[str, str], denoise: str, oidn: str, "
+              "force: bool, std_error: bool | None, samples: int | None, progress: typing.Any) -> "
+              "dict[str, typing.Any]"));
   module.def("check_inputs", &check, "crn"_a.none(), "independent"_a.none(),
              nb::sig("def check_inputs(crn: object, independent: object) -> dict[str, typing.Any]"));
 }

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "film/film.h"
 
+#include <nanobind/stl/filesystem.h>
+
 #include <algorithm>
+#include <filesystem>
 
 #include "core/error.h"
 #include "film/film_file.h"
@@ -15,14 +18,14 @@ namespace {
 
 using Attributes = std::map<std::string, std::string>;
 
-Film load(const std::string& path) {
+Film load(const std::filesystem::path& path) {
   Film film;
-  run_work([&](WorkState&) { film = read_film(path); }, nb::none());
+  run_work([&](WorkState&) { film = read_film(path.string()); }, nb::none());
   return film;
 }
 
-void save(const Film& film, const std::string& path) {
-  run_work([&](WorkState&) { write_film(path, film); }, nb::none());
+void save(const Film& film, const std::filesystem::path& path) {
+  run_work([&](WorkState&) { write_film(path.string(), film); }, nb::none());
 }
 
 Film merge(const std::vector<const Film*>& films) {
@@ -127,8 +130,10 @@ void bind_film(nb::module_& module) {
   nb::class_<Film>(module, "Film",
                    "What a render pass leaves behind: for each pixel the number of samples, and the means of T groups "
                    "of them. Writing a film and reading it gives the same bits.")
-      .def_static("load", &load, "path"_a, "Reads a film that covary wrote.")
-      .def("save", &save, "path"_a, "Writes the film (EXR); the file appears under its name only when complete.")
+      .def_static("load", &load, "path"_a, nb::sig("def load(path: str | os.PathLike[str]) -> Film"),
+                  "Reads a film that covary wrote.")
+      .def("save", &save, "path"_a, nb::sig("def save(self, path: str | os.PathLike[str]) -> None"),
+           "Writes the film (EXR); the file appears under its name only when complete.")
       .def_static("_merge", &merge, "films"_a, nb::sig("def _merge(films: list[Film]) -> Film"))
       .def_static("_merge_files", &merge_files, "paths"_a, nb::sig("def _merge_files(paths: list[str]) -> Film"))
       .def_static("_from_groups", &from_groups, "groups"_a.none(), "samples"_a, "attributes"_a,

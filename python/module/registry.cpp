@@ -54,7 +54,7 @@ nb::list estimators() {
     d["summary"] = estimator.summary;
     d["passes"] = name_of(estimator.passes);
     d["predicts_error"] = estimator.predicts_error;
-    d["needs_sample_count"] = estimator.needs_sample_count;
+    d["denoises"] = estimator.apply && estimator.predicts_error && !estimator.adaptive;
     d["fewest_groups"] = estimator.fewest_groups;
     nb::list options;
     for (const EstimatorOption& option : options_of_estimator(name)) options.append(option_dict(option));

@@ -3,8 +3,10 @@
 
 #include <mutex>
 #include <optional>
+#include <span>
 #include <utility>
 
+#include "estimators/mixed_denoising.h"
 #include "estimators/registry.h"
 #include "plans/estimator_plans.h"
 #include "plans/integrator_choice.h"
@@ -68,9 +70,11 @@ std::shared_ptr<LoadedScene> load(const std::string& path, const SceneChoice& ch
 struct Choice {
   std::string estimator;
   Options options;
+  std::string denoise, oidn;
   std::string sampling;
   std::optional<int> groups;
   std::optional<std::array<double, 2>> split;
+  bool films_only = false;  ///< no image is made of the films
 };
 
 Plan plan_of(const Choice& choice) {
@@ -82,7 +86,16 @@ Plan plan_of(const Choice& choice) {
     if (!(crn > 0) || !(independent > 0)) throw Error(ErrorCode::kUsage, "split: each part must be above 0");
     passes.split = {crn / (crn + independent), independent / (crn + independent)};
   }
-  return estimator_plan(make_estimator(choice.estimator, choice.options), passes);
+  const Estimator estimator =
+      with_denoising(make_estimator(choice.estimator, choice.options), choice.denoise, choice.oidn);
+  Plan plan = estimator_plan(estimator, passes);
+  if (choice.films_only) {
+    plan.estimate = [](std::span<const Pass>, int, int, const Guides&) { return EstimatorResult(); };
+    plan.estimate_memory = {};
+    plan.estimator = kNoEstimator;
+    plan.predicts_error = false;
+  }
+  return plan;
 }
 
 nb::dict dict_of(RenderResult&& result, const std::string& estimator, const std::vector<std::string>& warnings) {
@@ -97,6 +110,7 @@ nb::dict dict_of(RenderResult&& result, const std::string& estimator, const std:
   d["image"] = array_of(std::move(picture));
   d["std_error"] = array_of(std::move(result.image.std_error));
   d["predicted_relmse"] = result.predicted_relmse;
+  d["predicted_relmse_p95"] = result.predicted_blocks;
   d["nonfinite_pixels"] = result.image.nonfinite_pixels;
   d["warnings"] = warnings;
   d["films"] = films;
@@ -136,6 +150,7 @@ RenderRequest request_of(const nb::dict& given) {
       value = nb::cast<std::decay_t<decltype(value)>>(nb::object(given[name]));
   };
   take("seed", r.seed), take("spp", r.spp), take("seconds", r.seconds), take("until", r.until), take("aovs", r.aovs);
+  take("until_in_blocks", r.until_in_blocks), take("path_lengths", r.path_lengths);
   take("output", r.output), take("preview", r.preview), take("passes", r.passes), take("resume", r.resume);
   take("overwrite", r.overwrite), take("checkpoint", r.checkpoint_seconds);
   take("save_training", r.save_training), take("load_training", r.load_training), take("attributes", r.attributes);
@@ -176,15 +191,16 @@ void bind_render(nb::module_& module) {
   module.def(
       "render",
       [](const std::shared_ptr<LoadedScene>& scene, const std::string& estimator, const Options& options,
-         const std::string& sampling, std::optional<int> groups, std::optional<std::array<double, 2>> split,
-         nb::dict request, nb::object progress) {
-        return render_scene(*scene, {estimator, options, sampling, groups, split}, request_of(request), progress);
+         const std::string& denoise, const std::string& oidn, const std::string& sampling, std::optional<int> groups,
+         std::optional<std::array<double, 2>> split, bool films_only, nb::dict request, nb::object progress) {
+        return render_scene(*scene, {estimator, options, denoise, oidn, sampling, groups, split, films_only},
+                            request_of(request), progress);
       },
-      "scene"_a, "estimator"_a, "options"_a, "sampling"_a, "groups"_a.none(), "split"_a.none(), "request"_a,
-      "progress"_a.none(),
-      nb::sig("def render(scene: LoadedScene, estimator: str, options: dict[str, str], sampling: str, "
-              "groups: int | None, split: tuple[float, float] | None, request: dict[str, typing.Any], "
-              "progress: typing.Any) -> dict[str, typing.Any]"));
+      "scene"_a, "estimator"_a, "options"_a, "denoise"_a, "oidn"_a, "sampling"_a, "groups"_a.none(), "split"_a.none(),
+      "films_only"_a, "request"_a, "progress"_a.none(),
+      nb::sig("def render(scene: LoadedScene, estimator: str, options: dict[str, str], denoise: str, oidn: str, "
+              "sampling: str, groups: int | None, split: tuple[float, float] | None, films_only: bool, "
+              "request: dict[str, typing.Any], progress: typing.Any) -> dict[str, typing.Any]"));
 }
 
 }  // namespace covary::python

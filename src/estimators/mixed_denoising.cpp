@@ -175,4 +175,14 @@ Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& opt
   return estimator;
 }
 
+Estimator with_denoising(const Estimator& base, const std::string& mode, const std::string& oidn) {
+  MixedDenoisingOptions options;
+  options.mode = denoise_mode(mode);
+  if (options.mode == DenoiseMode::kNone && !oidn.empty())
+    throw Error(ErrorCode::kUsage, "--oidn is an option of --denoise bias, balanced and error");
+  options.use_oidn = oidn != "off";
+  if (options.use_oidn) options.oidn.library = oidn;
+  return with_denoising(base, options);
+}
+
 }  // namespace covary

@@ -48,6 +48,31 @@ void check_origins(const ImageOrigin& crn, const ImageOrigin& independent, std::
                name)});
 }
 
+void check_light(const ImageOrigin& crn, const ImageOrigin& independent, const ImageOrigin* light,
+                 std::vector<Finding>& findings) {
+  for (const ImageOrigin* image : {&crn, &independent}) {
+    if (image->is_light_film)
+      findings.push_back({Severity::kError, image->name + " is a light film, which --light adds"});
+    else if (light && image->has_light_added)
+      findings.push_back({Severity::kError, image->name + " has a light film added already"});
+    else if (!light && !image->has_light_added && image->settings.find("light_tracing=on") != std::string::npos)
+      findings.push_back({Severity::kWarning, image->name + " lacks the light of a light film; --light adds it"});
+  }
+  if (!light) return;
+  if (!light->is_light_film)
+    throw Error(ErrorCode::kInput, fmt::format("--light '{}' is no light film: it lacks the attribute "
+                                               "covary:light_paths_per_sample",
+                                               light->name));
+  if (!(light->place == crn.place))
+    throw Error(ErrorCode::kInput, fmt::format("--light '{}' shows other pixels than '{}'", light->name, crn.name));
+  if (!crn.scene_hash.empty() && light->scene_hash != crn.scene_hash)
+    findings.push_back({Severity::kError, "the light film says that it shows another scene (attribute scene_hash)"});
+  if (!crn.settings.empty() && light->settings != crn.settings)
+    findings.push_back({Severity::kError, fmt::format("the light film says that it was rendered with '{}', the CRN "
+                                                      "image with '{}'",
+                                                      light->settings, crn.settings)});
+}
+
 std::string errors_text(const std::vector<Finding>& findings) {
   std::string text;
   for (const Finding& f : findings)

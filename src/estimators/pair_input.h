@@ -22,11 +22,18 @@ struct ImageOrigin {
   std::string sampling;              ///< attribute of films: "crn", "independent"
   std::string scene_hash, settings;  ///< attributes of films
   bool has_half = false;             ///< a channel has 16 bits only
+  bool is_light_film = false;        ///< film/splat_layer.h
+  bool has_light_added = false;      ///< an image to which a light film was added
 };
 
 /// Appends to `findings` what the origins say against combining the images. Throws Error(kInput) where they do not show
 /// the same pixels.
 void check_origins(const ImageOrigin& crn, const ImageOrigin& independent, std::vector<Finding>& findings);
+
+/// Appends to `findings` what the origins say about light films: `light` is the one to add, or null. Throws
+/// Error(kInput) where it is none, or shows other pixels.
+void check_light(const ImageOrigin& crn, const ImageOrigin& independent, const ImageOrigin* light,
+                 std::vector<Finding>& findings);
 
 /// The errors among the findings, separated by "; "; empty where there are none.
 std::string errors_text(const std::vector<Finding>& findings);

@@ -30,8 +30,9 @@ class Parts(PackageTest):
         film = covary.render(ROOM, 4, "none", crop=(0, 0, 4, 4)).films["independent"]
         canvas = covary.distributed._Canvas(4, 4)
         part = covary.distributed._Part((0, 0, 4, 4), 0, 0)
-        canvas.add(part, {"independent": film})
-        self.assertIn("came twice", self.message_of(RuntimeError, canvas.add, part, {"independent": film}))
+        rendered = covary.distributed._Rendered({"independent": film})
+        canvas.add(part, rendered)
+        self.assertIn("came twice", self.message_of(RuntimeError, canvas.add, part, rendered))
         self.assert_same_bits(canvas.films()["independent"].groups, film.groups)
 
     def test_films_go_through_pickle(self):
@@ -96,6 +97,14 @@ class Cluster(PackageTest):
         self.assertEqual((seen[-1], there.parts, there.samples_per_pixel), ((12, 12), 12, 24))
         for name in ("crn", "independent"):
             self.assert_same_bits(here.films[name].groups, there.films[name].groups)
+
+    def test_denoised(self):
+        """With guides that the workers render, and the denoiser of the frame, not of tiles."""
+        here = covary.render(self.scene(), 48, denoise="error", oidn="off")
+        there = covary.distributed.render(self.client, self.scene(), 48, tile=30, denoise="error", oidn="off")
+        self.assert_same_bits(here.image, there.image)
+        self.assert_same_bits(here.std_error, there.std_error)
+        self.assertEqual(here.estimator, there.estimator)
 
     def test_ranges_of_samples(self):
         films = [covary.render(self.scene(), 8, "none", seed=seed).films["independent"] for seed in (5, 6, 7)]

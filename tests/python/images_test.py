@@ -178,8 +178,8 @@ class Films(PackageTest):
     def test_saved_loaded_and_merged(self):
         films = [self.film(seed) for seed in (1, 2)]
         for number, film in enumerate(films):
-            film.save(str(self.path / f"{number}.exr"))
-        loaded = covary.Film.load(str(self.path / "0.exr"))
+            film.save(self.path / f"{number}.exr")
+        loaded = covary.Film.load(self.path / "0.exr")
         self.assert_same_bits(loaded.groups, films[0].groups)
         self.assertEqual(loaded.attributes["seed"], "1")
         merged = covary.merge_films(films[::-1])

@@ -6,6 +6,7 @@ import sys
 import unittest
 
 import covary
+import numpy
 from common import ROOM, PackageTest, rgb
 
 SIZE, TEXT = (36, 24), "36x24"
@@ -45,6 +46,13 @@ class Render(PackageTest):
         self.assertTrue(result.until_reached)
         self.assertLessEqual(result.predicted_relmse, 0.05)
         self.assertLess(result.samples_per_pixel, 400)
+
+    def test_films_only(self):
+        whole, films = (covary.render(self.scene(), 24, films_only=only) for only in (False, True))
+        for name in ("crn", "independent"):
+            self.assert_same_bits(whole.films[name].groups, films.films[name].groups)
+        self.assertEqual((films.std_error, films.estimator), (None, "none"))
+        numpy.testing.assert_allclose(films.image, sum(film.mean for film in films.films.values()) / 2, rtol=1e-5)
 
     def test_scene(self):
         scene = self.scene()

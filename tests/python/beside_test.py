@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What may come beside two images: light films, numbers of samples, denoising with guides. Values and messages of the
+command line."""
+import unittest
+
+import covary
+import numpy
+from common import HEIGHT, ROOM, WIDTH, PackageTest, channels, noisy, pair, rgb
+from exr_writer import exr
+
+SIZE = ("--resolution", "24x20")
+FILES = ("combine", "--crn", "crn.exr", "--independent", "independent.exr", "-o", "out.exr", "--quiet")
+
+
+class BesideTest(PackageTest):
+    def write_groups(self, crn, independent):
+        for name, images in (("crn", crn), ("independent", independent)):
+            self.write(name, {f"group{g:02}.{c}": image[:, :, i] for g, image in enumerate(images)
+                              for i, c in enumerate("RGB")})
+
+    def write(self, name, layers):
+        (self.path / f"{name}.exr").write_bytes(exr({key: values.ravel().tolist() for key, values in layers.items()},
+                                                    (WIDTH, HEIGHT)))
+
+    def assert_program_has(self, result, *words):
+        """Image and standard error of `covary combine` on the files."""
+        self.run_program(*FILES, "--error", *words)
+        self.assert_same_bits(result.image.reshape(-1, 3), rgb(self.path / "out.exr"))
+        self.assert_same_bits(result.std_error.reshape(-1, 3),
+                              channels(self.path / "out.exr", [f"StdError.{c}" for c in "RGB"]))
+
+
+class Light(BesideTest):
+    """The films of a render by bidirectional path tracing."""
+
+    def setUp(self):
+        super().setUp()
+        self.run_program("render", ROOM, "-o", "whole.exr", *SIZE, "--integrator", "bdpt", "--light-tracing", "on",
+                         "--spp", 24, "--max-depth", 3, "--passes", ".", "--quiet", "--no-preview")
+        self.films = {name: covary.Film.load(self.path / f"{name}.exr") for name in ("crn", "independent", "light")}
+
+    def test_bits_of_the_program(self):
+        images = self.films["crn"], self.films["independent"]
+        result = covary.combine(*images, light=self.films["light"])
+        self.assert_program_has(result, "--light", "light.exr")
+        self.assert_same_bits(result.image.reshape(-1, 3), rgb(self.path / "whole.exr"))
+        self.assertEqual(result.samples_per_pixel, 24)
+        arrays = covary.combine(*(film.groups for film in images), light=self.films["light"])
+        self.assert_same_bits(arrays.image, result.image)
+        self.assert_same_bits(arrays.std_error, result.std_error)
+        self.assertEqual(covary.iduw(*images, light=self.films["light"]).std_error, None)
+
+    def test_messages(self):
+        images = self.films["crn"], self.films["independent"]
+        self.assertIn("crn lacks the light of a light film; --light adds it", covary.combine(*images).warnings)
+        self.assertIn("crn is a light film, which --light adds", self.message_of(
+            covary.InputError, covary.combine, self.films["light"], images[1], light=self.films["light"]))
+        self.assertIn("is no light film: it lacks the attribute", self.message_of(
+            covary.InputError, covary.combine, *images, light=images[0]))
+        self.assertIn("shows other pixels", self.message_of(
+            covary.InputError, covary.combine, *pair(height=19), light=self.films["light"]))
+        self.assertIn("light: accepted is a covary.Film", self.message_of(
+            TypeError, covary.combine, *images, light=images[0].mean))
+
+
+class Counts(BesideTest):
+    """Pixels with numbers of samples of their own."""
+
+    def setUp(self):
+        super().setUp()
+        self.images = pair()
+        self.write_groups(*self.images)
+        self.counts = numpy.random.default_rng(3).integers(12, 60, (HEIGHT, WIDTH))
+
+    def test_bits_of_the_program(self):
+        self.write("counts", {"samples": self.counts})
+        for kind in (numpy.uint32, numpy.int64, numpy.uint16):
+            result = covary.combine(*self.images, counts=self.counts.astype(kind), samples=24)
+            self.assert_program_has(result, "--counts", "counts.exr", "--samples", 24)
+        self.assertAlmostEqual(result.samples_per_pixel, 24 + self.counts.mean())
+        self.assertFalse((result.image == covary.combine(*self.images).image).all())
+        self.assert_same_bits(covary.iicv(*self.images, counts=self.counts, samples=24).image, result.image)
+
+    def test_messages(self):
+        self.write("counts", {"samples": self.counts})
+        self.assertEqual(self.failure_of_program(*FILES, "--counts", "counts.exr"),
+                         self.message_of(covary.UsageError, covary.combine, *self.images, counts=self.counts))
+        film = covary.film_from_groups(self.images[1], 24)
+        for error, text, images, counts in (
+                (TypeError, "counts: found float64 [20, 24]; accepted are whole numbers, [H, W]", self.images,
+                 self.counts * 1.0),
+                (TypeError, "counts: found int64 [480]", self.images, self.counts.ravel()),
+                (ValueError, "counts: found -1 to", self.images, self.counts - self.counts.min() - 1),
+                (ValueError, "counts: found the shape [19, 24]; accepted is [20, 24]", self.images, self.counts[1:]),
+                (covary.UsageError, "fewer than the 12 groups", self.images, self.counts * 0 + 3),
+                (covary.InputError, "independent: the film tells itself", (self.images[0], film), self.counts)):
+            self.assertIn(text, self.message_of(error, covary.combine, *images, counts=counts, samples=24))
+
+
+class Denoise(BesideTest):
+    """Without Open Image Denoise, which may be there or not."""
+
+    def setUp(self):
+        super().setUp()
+        self.images = pair()
+        self.write_groups(*self.images)
+        rng = numpy.random.default_rng(5)
+        self.albedo, self.normal = (rng.random((HEIGHT, WIDTH, 3), numpy.float32) for _ in range(2))
+
+    def test_bits_of_the_program(self):
+        self.write("guides", {f"{name}.{c}": image[:, :, i] for i, (rgb_name, xyz) in enumerate(zip("RGB", "XYZ"))
+                              for name, image, c in (("Albedo", self.albedo, rgb_name), ("N", self.normal, xyz))})
+        for mode in ("bias", "balanced", "error"):
+            result = covary.combine(*self.images, denoise=mode, oidn="off")
+            self.assertEqual(result.estimator, f"iicv --denoise {mode} --oidn off")
+            self.assert_program_has(result, "--denoise", mode, "--oidn", "off")
+        guided = covary.combine(*self.images, denoise="error", oidn="off", albedo=self.albedo, normal=self.normal)
+        self.assert_program_has(guided, "--denoise", "error", "--oidn", "off", "--guides", "guides.exr")
+        self.assertFalse((guided.image == result.image).all())
+        self.assert_same_bits(guided.image, covary.iicv(*self.images, denoise="error", oidn="off", albedo=self.albedo,
+                                                        normal=self.normal).image)
+
+    def test_messages(self):
+        def message(error, estimator="iicv", **keywords):
+            return self.message_of(error, covary.combine, *self.images, estimator, **keywords)
+        self.write("guides", {f"Albedo.{c}": self.albedo[:, :, i] for i, c in enumerate("RGB")})
+        self.assertEqual(message(covary.UsageError, albedo=self.albedo),
+                         self.failure_of_program(*FILES, "--guides", "guides.exr"))
+        self.assertEqual(message(covary.UsageError, oidn="off"), self.failure_of_program(*FILES, "--oidn", "off"))
+        self.assertEqual(message(covary.UsageError, "dependent-tests", denoise="bias"),
+                         self.failure_of_program(*FILES, "--denoise", "bias", "--estimator", "dependent-tests"))
+        self.assertIn("only together with the albedo", message(covary.UsageError, denoise="bias", normal=self.normal))
+        self.assertIn("albedo: found the shape [19, 24, 3]; accepted is [20, 24, 3]",
+                      message(ValueError, denoise="bias", albedo=self.albedo[1:]))
+        self.assertIn("blured", message(covary.UsageError, denoise="blured"))
+
+    def test_render(self):
+        scene = covary.Scene.load(ROOM, resolution=(24, 20))
+        result = covary.render(scene, spp=48, denoise="balanced", oidn="off", progress=lambda done, total: None)
+        self.run_program("render", ROOM, "-o", "out.exr", *SIZE, "--spp", 48, "--denoise", "balanced", "--oidn", "off",
+                         "--quiet", "--no-preview")
+        self.assert_same_bits(result.image.reshape(-1, 3), rgb(self.path / "out.exr"))
+        again = covary.combine(result.films["crn"], result.films["independent"], denoise="balanced", oidn="off",
+                               albedo=result.aovs["Albedo"], normal=result.aovs["N"])
+        self.assert_same_bits(again.image, result.image)
+        self.assert_same_bits(again.std_error, result.std_error)
+        self.assertEqual(result.predicted_relmse, again.predicted_relmse)
+
+    def test_until_of_blocks(self):
+        scene = covary.Scene.load(ROOM, resolution=(24, 20))
+        result = covary.render(scene, spp=400, until_p95=0.2)
+        self.assertTrue(result.until_reached)
+        self.assertLessEqual(result.predicted_relmse_p95, 0.2)
+        self.assertIn("accepted is one of them", self.message_of(
+            covary.UsageError, covary.render, scene, until=0.1, until_p95=0.1))
+
+
+if __name__ == "__main__":
+    unittest.main()
