@@ -110,6 +110,51 @@ void check(const GroupedImage& crn, const GroupedImage& independent, std::vector
     problems.push_back("the CRN image has 1 group, at least 2 are needed where films do not keep sample variances");
 }
 
+/// The whole of two images at once.
+EstimatorResult filter_and_combine(const GroupedImage& crn, const GroupedImage& independent,
+                                   const DependentTestsOptions& options, DependentTestsStages* stages) {
+  EstimatorResult result;
+  const std::vector<unsigned char> valid = finite_pixels(crn, independent, result.nonfinite_pixels);
+  const bool exact = options.filter == DependentFilter::kExact;
+  const int border = exact ? options.bound.window / 2 : options.regions.max_region;
+  const FilterInput input =
+      filter_input(crn, independent, valid, options.norm, options.variance, options.smoothing, border);
+  std::optional<Planes> scale;
+  if (exact && options.guard > 0) scale = difference_scale(input, valid, options.guard);
+  FilteredImage filtered =
+      exact ? bound_filter(input, options.bound, scale ? &*scale : nullptr) : region_filter(input, options.regions);
+  result.estimate = combine(crn, input, filtered, options.weights);
+  if (options.weights == CombinationWeights::kMeasured)
+    mix(crn, independent, valid, options, input, filtered, scale ? &*scale : nullptr, result.estimate);
+  fill_invalid(crn, independent, valid, result.estimate);
+  if (!stages) return result;
+  *stages = {{"dependent", image_of(input.dependent)},
+             {"independent", image_of(input.independent)},
+             {"combined", result.estimate},
+             {"samples", image_of(input.count)},
+             {"filtered", std::move(filtered.colour)},
+             {"region", std::move(filtered.region)},
+             {"bound", std::move(filtered.bound)},
+             {"centre_weight", std::move(filtered.centre_weight)}};
+  return result;
+}
+
+GroupedImage rows_of(GroupedImage image, int first_row, int n_rows) {
+  image.data = image.pixel(0, first_row);
+  const size_t first_pixel = static_cast<size_t>(first_row) * image.width;
+  if (image.counts) image.counts += first_pixel;
+  if (image.variance_in_groups) image.variance_in_groups += 3 * first_pixel;
+  image.height = n_rows;
+  return image;
+}
+
+/// Rows of a band without those around it that it needs; small ones would spend their time on these.
+int rows_of_band(int width, int reach) {
+  constexpr int kFewest = 64;
+  const double rows = kDependentTestsBand / (kDependentTestsBytesPerPixel * width);
+  return std::max(kFewest, static_cast<int>(rows) - 2 * reach);
+}
+
 }  // namespace
 
 DependentTestsOptions DependentTestsOptions::paper() {
@@ -146,29 +191,21 @@ EstimatorResult dependent_tests(const GroupedImage& crn, const GroupedImage& ind
   check(crn, independent, problems);
   throw_if_any("dependent-tests", problems);
 
+  const int width = crn.width, height = crn.height, reach = dependent_tests_reach(options);
+  const int step = rows_of_band(width, reach);
+  if (stages || step >= height) return filter_and_combine(crn, independent, options, stages);
   EstimatorResult result;
-  const std::vector<unsigned char> valid = finite_pixels(crn, independent, result.nonfinite_pixels);
-  const bool exact = options.filter == DependentFilter::kExact;
-  const int border = exact ? options.bound.window / 2 : options.regions.max_region;
-  const FilterInput input =
-      filter_input(crn, independent, valid, options.norm, options.variance, options.smoothing, border);
-  std::optional<Planes> scale;
-  if (exact && options.guard > 0) scale = difference_scale(input, valid, options.guard);
-  FilteredImage filtered =
-      exact ? bound_filter(input, options.bound, scale ? &*scale : nullptr) : region_filter(input, options.regions);
-  result.estimate = combine(crn, input, filtered, options.weights);
-  if (options.weights == CombinationWeights::kMeasured)
-    mix(crn, independent, valid, options, input, filtered, scale ? &*scale : nullptr, result.estimate);
-  fill_invalid(crn, independent, valid, result.estimate);
-  if (!stages) return result;
-  *stages = {{"dependent", image_of(input.dependent)},
-             {"independent", image_of(input.independent)},
-             {"combined", result.estimate},
-             {"samples", image_of(input.count)},
-             {"filtered", std::move(filtered.colour)},
-             {"region", std::move(filtered.region)},
-             {"bound", std::move(filtered.bound)},
-             {"centre_weight", std::move(filtered.centre_weight)}};
+  result.estimate = Image(width, height, 3);
+  for (int y = 0; y < height; y += step) {
+    const int own = std::min(step, height - y), first = std::max(0, y - reach);
+    const int rows = std::min(height, y + own + reach) - first;
+    const EstimatorResult band =
+        filter_and_combine(rows_of(crn, first, rows), rows_of(independent, first, rows), options, nullptr);
+    std::copy_n(band.estimate.pixel(0, y - first), 3 * static_cast<size_t>(width) * own, result.estimate.pixel(0, y));
+    long n_nonfinite = 0;  // without the rows around, which other bands count
+    finite_pixels(rows_of(crn, y, own), rows_of(independent, y, own), n_nonfinite);
+    result.nonfinite_pixels += n_nonfinite;
+  }
   return result;
 }
 
@@ -232,6 +269,7 @@ Estimator make_dependent_tests(EstimatorParameters& parameters) {
                             "min-spp", "max-spp",       "filter",    "norm"};
   estimator.reach = dependent_tests_reach(o);
   estimator.memory.always = kDependentTestsBytesPerPixel;
+  estimator.memory.largest_part = kDependentTestsBand;
   estimator.apply = [o](const GroupedImage& crn, const GroupedImage& independent, const PairSettings&) {
     return dependent_tests(crn, independent, o);
   };

@@ -74,5 +74,8 @@ int dependent_tests_reach(const DependentTestsOptions& options);
 
 /// Memory that dependent_tests() takes beside its input, its result included: bytes per pixel, about.
 inline constexpr double kDependentTestsBytesPerPixel = 4.0 * (3 + 3 + 2 + 2 + 7 + 4 + 7 + 3 + 6) + 24;
+/// Without stages, large images are taken in bands of rows, with the bits of the whole: no more than so many bytes
+/// beside input and result, where 64 rows and those around them do not need more.
+inline constexpr double kDependentTestsBand = 48e6;
 
 }  // namespace covary

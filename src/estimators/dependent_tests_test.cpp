@@ -388,6 +388,22 @@ TEST(DependentTests, LooksNoFartherThanItsReach) {
   }
 }
 
+/// With stages, images are taken as a whole.
+TEST(DependentTests, LargeImagesAreTakenInBands) {
+  constexpr int width = 2500, height = 150;
+  ASSERT_GT(width * height * kDependentTestsBytesPerPixel, kDependentTestsBand);
+  test::Grouped crn = test::crn_image(width, height, 2, 5);
+  const test::Grouped independent = test::independent_image(width, height, 2, 5);
+  crn.pixel(7, 70)[0] = std::numeric_limits<float>::quiet_NaN();
+  for (const DependentTestsOptions& options : {DependentTestsOptions(), DependentTestsOptions::paper()}) {
+    DependentTestsStages stages;
+    const EstimatorResult whole = dependent_tests(crn.view(), independent.view(), options, &stages);
+    const EstimatorResult in_bands = dependent_tests(crn.view(), independent.view(), options);
+    EXPECT_EQ(in_bands.estimate.data, whole.estimate.data);
+    EXPECT_EQ(in_bands.nonfinite_pixels, 1);
+  }
+}
+
 TEST(DependentTests, PixelsThatAreNotFiniteAreLeftOut) {
   test::Grouped crn = test::crn_image(20, 20, 3, 6), independent = test::independent_image(20, 20, 3, 6);
   crn.pixel(4, 4)[0] = std::numeric_limits<float>::quiet_NaN();

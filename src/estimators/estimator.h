@@ -2,9 +2,11 @@
 // An estimator with its options, as everything else sees it: what it needs of a render, what it can do, and how.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <map>
 #include <optional>
 #include <set>
@@ -47,12 +49,17 @@ using PixelFunction = std::function<Spectrum(std::span<const Spectrum> values, s
 /// Memory that an estimator takes beside its input, in bytes per pixel, about.
 struct EstimatorMemory {
   double always = 0;
+  /// In bytes: no more than this and its result, of estimators that work on parts of large images one after the other.
+  double largest_part = std::numeric_limits<double>::infinity();
   /// More where both images have so many groups that halves of them are held out: at once, and for each group.
   double of_halves = 0, of_halves_per_group = 0;
   int groups_for_halves = 0;
 
-  double per_pixel(int groups) const {
-    return always + (groups >= groups_for_halves ? of_halves + of_halves_per_group * groups : 0);
+  /// Bytes for an image of `n_pixels` pixels with `groups` groups.
+  double bytes(double n_pixels, int groups) const {
+    constexpr double kResult = 3 * sizeof(float);
+    const double halves = groups >= groups_for_halves ? of_halves + of_halves_per_group * groups : 0;
+    return std::min(n_pixels * always, largest_part + n_pixels * kResult) + n_pixels * halves;
   }
 };
 

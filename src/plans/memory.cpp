@@ -35,7 +35,7 @@ RenderMemory render_memory(const Plan& plan, std::span<const PassPlan> passes, i
   }
   if (aovs) memory.films += n_pixels * kAuxiliaryImages * kImageBytes;
   // A picture for a viewer or the preview.
-  memory.estimate += n_pixels * (plan.estimate_memory.per_pixel(fewest_groups) + kImageBytes);
+  memory.estimate += plan.estimate_memory.bytes(n_pixels, fewest_groups) + n_pixels * kImageBytes;
   return memory;
 }
 
