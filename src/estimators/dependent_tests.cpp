@@ -221,6 +221,7 @@ Estimator make_dependent_tests(EstimatorParameters& parameters) {
   static constexpr std::pair<const char*, DependentFilter> kFilters[] = {{"exact", DependentFilter::kExact},
                                                                          {"paper", DependentFilter::kPaper}};
   static constexpr std::pair<const char*, Pyramid> kPyramids[] = {{"side", Pyramid::kSide}, {"count", Pyramid::kCount}};
+  static constexpr std::pair<const char*, bool> kSides[] = {{"all", false}, {"odd", true}};
   static constexpr std::pair<const char*, CombinationWeights> kWeights[] = {
       {"measured", CombinationWeights::kMeasured},
       {"effective", CombinationWeights::kEffective},
@@ -251,6 +252,7 @@ Estimator make_dependent_tests(EstimatorParameters& parameters) {
          "Regions grow while the weight of their centre falls by so much");
   p.choice<Pyramid>("pyramid", o.regions.pyramid, kPyramids,
                     "Height of the pyramid: side of the region, or its pixels");
+  p.choice<bool>("region-sides", o.regions.odd_sides, kSides, "Sides of regions: all, or the odd, which do not shift");
   p.choice<CombinationWeights>("weights", o.weights, kWeights,
                                "Mixture of the images: by measured error, worth, or samples");
   p.whole("measure-window", o.measure_window, kWindowRange, "Side of the windows over which errors are measured");

@@ -227,6 +227,26 @@ TEST(RegionFilter, GrowsWhileTheCentreLosesWeight) {
               1e-3);
 }
 
+TEST(RegionFilter, OddSidesDoNotShift) {
+  FilterInput input = random_input(8, 0, 10);  // one colour, and a ramp to the right
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x) input.independent.row(0, y)[x] = static_cast<float>(x);
+  const auto filtered = [&](int most, bool odd) {
+    return region_filter(input, {.max_region = most, .min_centre_drop = 0, .odd_sides = odd});
+  };
+  EXPECT_GT(filtered(4, false).colour.pixel(9, 6)[0], 9.1f);
+  for (const int most : {3, 4}) {
+    const FilteredImage odd = filtered(most, true);
+    EXPECT_EQ(odd.region.pixel(9, 6)[0], 9);
+    EXPECT_NEAR(odd.colour.pixel(9, 6)[0], 9, 1e-5);
+  }
+  EXPECT_EQ(filtered(5, true).region.pixel(9, 6)[0], 25);
+  EXPECT_EQ(filtered(2, true).region.pixel(9, 6)[0], 1);
+  for (int y = 0; y < kHeight; ++y) input.count.row(0, y)[10] = 20;
+  EXPECT_EQ(filtered(5, true).region.pixel(9, 6)[0], 1) << "another class in the square of side 3";
+  EXPECT_EQ(filtered(5, true).region.pixel(8, 6)[0], 9) << "and in that of side 5, through side 4";
+}
+
 TEST(RegionFilter, StopsAtOtherClasses) {
   FilterInput input = random_input(9, 0, 10);
   for (int y = 0; y < kHeight; ++y)

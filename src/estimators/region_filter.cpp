@@ -92,6 +92,7 @@ class RegionBatch {
     for (int m = 2; m <= options_.max_region && any(grows); ++m) {
       grows &= ~add_places(m, region);
       if (!any(grows)) break;
+      if (options_.odd_sides && m % 2 == 0) continue;
       const Kernel kernel(region, deviation_, options_.pyramid);
       vfloat sum{};
       for (size_t i = 0; i < places_.first[m]; ++i)

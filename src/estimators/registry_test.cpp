@@ -121,13 +121,14 @@ TEST(EstimatorRegistry, ValuesReachTheOptions) {
             cv_baseline(g, h, baseline).estimate.data);
   DependentTestsOptions tests;
   tests.filter = DependentFilter::kPaper, tests.norm = Norm::kL2, tests.weights = CombinationWeights::kCounts;
-  tests.regions = {6, 0.001f, Pyramid::kCount}, tests.variance = VarianceSource::kDependent, tests.smoothing = 3;
+  tests.regions = {6, 0.001f, Pyramid::kCount, true}, tests.variance = VarianceSource::kDependent, tests.smoothing = 3;
   EXPECT_EQ(made("dependent-tests", {{"filter", "paper"},
                                      {"norm", "l2"},
                                      {"weights", "counts"},
                                      {"max-region", "6"},
                                      {"min-centre-drop", "0.001"},
                                      {"pyramid", "count"},
+                                     {"region-sides", "odd"},
                                      {"sigma", "dependent"},
                                      {"sigma-window", "3"}}),
             dependent_tests(g, h, tests).estimate.data);
