@@ -36,7 +36,7 @@ namespace fs = std::filesystem;
 
 struct ExperimentCommand {
   std::string suite, output, cache, scenes;
-  std::string seeds;
+  std::string seeds, part;
   std::vector<uint32_t> spp;
   std::vector<double> seconds;
   lab::Overrides overrides;
@@ -149,6 +149,15 @@ std::vector<uint64_t> parse_seeds(const std::string& text) {
   seeds.clear();
   for (uint64_t s = 1; s <= n; ++s) seeds.push_back(s);
   return seeds;
+}
+
+/// "3/8": the third of eight parts.
+lab::Part parse_part(const std::string& text) {
+  if (text.empty()) return {};
+  const std::vector<int64_t> numbers = parse_numbers("--part", text, '/', 2, "K/N, e.g. 3/8");
+  if (numbers[0] < 1 || numbers[0] > numbers[1])
+    throw Error(ErrorCode::kUsage, "--part '" + text + "': expected K/N with K from 1 to N, e.g. 3/8");
+  return {static_cast<size_t>(numbers[0] - 1), static_cast<size_t>(numbers[1])};
 }
 
 // ---- progress
@@ -284,6 +293,15 @@ void print_summary(const lab::Results& results, const std::string& folder) {
   fmt::print(stderr, "{}/report.html, results.json, results.csv\n", folder);
 }
 
+void finish(lab::Results& results, const std::string& version, const ExperimentCommand& command) {
+  results.version = version;
+  results.command = command_line();
+  results.date = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
+  results.machine = lab::machine_facts();
+  write_results(results, command.output);
+  if (!command.quiet) print_summary(results, command.output);
+}
+
 void experiment(ExperimentCommand command) {
   if (command.list) return list_suites();
   if (command.suite.empty())
@@ -291,6 +309,7 @@ void experiment(ExperimentCommand command) {
   if (!command.seeds.empty()) command.overrides.seeds = parse_seeds(command.seeds);
   for (uint32_t spp : command.spp) command.overrides.budgets.push_back({spp, 0});
   for (double seconds : command.seconds) command.overrides.budgets.push_back({0, seconds});
+  const lab::Part part = parse_part(command.part);
   const lab::Suite suite = load_suite(command);
   if (command.print) return write_text_output("-", json_text(lab::to_json(suite)));
   if (command.output.empty()) throw Error(ErrorCode::kUsage, "no folder for the results given; use -o DIR");
@@ -310,22 +329,18 @@ void experiment(ExperimentCommand command) {
   options.max_pixels = command.overrides.quick ? lab::kQuickPixels : 0;
   options.threads = command.threads;
   options.keep_passes = command.keep_passes;
+  options.part = part;
   options.stop = &g_stop;
   options.progress = [&](const lab::Progress& p) { printer.print(p); };
   catch_signals();
   lab::Results results = lab::run_experiment(suite, options);
   printer.clear();
-  results.version = options.context.program_version;
-  results.command = command_line();
-  results.date = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
-  results.machine = lab::machine_facts();
-  write_results(results, command.output);
-  if (!command.quiet) print_summary(results, command.output);
+  if (part.of == 0) finish(results, options.context.program_version, command);
   if (!results.failures.empty())
-    throw Error(ErrorCode::kInput,
-                fmt::format("{} of the experiment's parts failed; {}/results.json says which and why, "
-                            "and the same command tries them again",
-                            results.failures.size(), command.output));
+    throw Error(ErrorCode::kInput, fmt::format("{} of the experiment's parts failed; {} which and why, and the same "
+                                               "command tries them again",
+                                               results.failures.size(),
+                                               part.of == 0 ? command.output + "/results.json says" : "above stands"));
 }
 
 }  // namespace
@@ -358,6 +373,9 @@ void add_experiment(CLI::App& app) {
   single(
       command->add_option("--reference", o->overrides.reference_files, "One or two references (EXR)")->expected(1, 2));
   add_threads_option(*command, o->threads, "Threads of each render");
+  command->add_option("--part", o->part,
+                      "K/N: make only the K-th of N parts of the runs, into the cache; when all parts are there, the "
+                      "command without --part measures them");
   command->add_flag("--keep-passes", o->keep_passes, "Keep the films of all passes in the cache");
   command->add_flag("--quiet", o->quiet, "Failures only");
   command->callback([o] { experiment(*o); });

@@ -22,6 +22,11 @@ def program() -> Path:
 
 
 def main() -> None:
-    """Becomes the program, with the arguments of this process: the command `covary` of an installed package."""
+    """Becomes the program, with the arguments of this process: the command `covary` of an installed package. Only
+    `covary experiment … --cluster ADDRESS` is Python's."""
+    if sys.argv[1:2] == ["experiment"] and any(word.partition("=")[0] == "--cluster" for word in sys.argv):
+        from .distributed import main as on_cluster
+
+        sys.exit(on_cluster(sys.argv[1:]))
     path = str(program())
     os.execv(path, [path, *sys.argv[1:]])

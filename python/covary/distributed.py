@@ -7,28 +7,29 @@ its worker is rendered again with the same bits, on any other, and each part ent
 together to the film of one machine in every bit; films of several seeds are merged as merge_films() does it."""
 from __future__ import annotations
 
-import hashlib
-import importlib.metadata
 import os
-import tempfile
+import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from . import _covary
+from ._cluster import SceneFiles, check_versions, dask, make_plugin
 from ._combine import Progress, combine
+from ._experiment import experiment, main
 from ._options import OptionValue, text_options
 from ._render import Scene
 from ._render import render as render_here
 from ._result import Result, fields_of
-from .errors import Error, InputError, IoError, UsageError
+from .errors import Error, InputError, UsageError
 from .film import Film, merge_films
 
 if TYPE_CHECKING:
     from ._result import FloatArray
     from .estimators import Estimator
+
+__all__ = ["ClusterResult", "SceneFiles", "experiment", "main", "render"]
 
 #: Estimators that look at films after the passes, and do not change what passes take.
 _ESTIMATORS = ("iicv", "cv-baseline", "iduw", "none")
@@ -46,62 +47,14 @@ class _Part:
 class _Job:
     """What all parts have in common."""
 
-    scene_hash: str
+    scene_folder: str
     file: str
     loading: dict[str, Any]
     settings: dict[str, Any]
     folder: str = field(default="")
 
 
-class SceneFiles:
-    """The files of a scene by their content, which every worker, also one that comes later, gets once."""
-
-    def __init__(self, scene: Scene) -> None:
-        paths = sorted({os.path.realpath(path) for path in [scene.path, *scene.files]})
-        root = os.path.commonpath([os.path.dirname(path) for path in paths])
-        self.contents = {os.path.relpath(path, root): Path(path).read_bytes() for path in paths}
-        self.file = os.path.relpath(os.path.realpath(scene.path), root)
-        digest = hashlib.sha256()
-        for name, content in sorted(self.contents.items()):
-            digest.update(f"{name}\0{len(content)}\0".encode() + content)
-        self.hash = digest.hexdigest()[:32]
-
-    def write(self, parent: Path) -> Path:
-        """Writes them into a folder of their own, unless they are there. Raises IoError."""
-        folder = parent / f"covary-scene-{self.hash}"
-        if folder.exists():
-            return folder
-        try:
-            parent.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryDirectory(dir=parent, prefix="covary-scene-") as temporary:
-                made = Path(temporary) / "files"
-                for name, content in self.contents.items():
-                    (made / name).parent.mkdir(parents=True, exist_ok=True)
-                    (made / name).write_bytes(content)
-                made.rename(folder)
-        except OSError as error:
-            if folder.exists():  # another worker of this machine was first
-                return folder
-            size = sum(map(len, self.contents.values()))
-            raise IoError(f"a worker cannot write the scene's files, {size / 1e6:.1f} MB, into {parent}: "
-                          f"{error.strerror}; workers' --local-directory names another place") from error
-        return folder
-
-
 _scenes: dict[tuple[str, str], Scene] = {}
-
-
-def _make_plugin(files: SceneFiles) -> Any:
-    from distributed import WorkerPlugin  # type: ignore[import-not-found,import-untyped,unused-ignore]
-
-    class Deliver(WorkerPlugin):  # type: ignore[misc,unused-ignore]
-        name = f"covary-scene-{files.hash}"
-        idempotent = True
-
-        def setup(self, worker: Any) -> None:
-            files.write(Path(worker.local_directory))
-
-    return Deliver()
 
 
 @dataclass(frozen=True)
@@ -116,7 +69,7 @@ def _render_part(job: _Job, part: _Part) -> _Rendered | Error:
     """On a worker: what a part leaves behind, or what is wrong with all parts, so that Dask does not try again."""
     from distributed import get_worker  # type: ignore[import-not-found,import-untyped,unused-ignore]
 
-    folder = Path(job.folder or get_worker().local_directory) / f"covary-scene-{job.scene_hash}"
+    folder = Path(job.folder or get_worker().local_directory) / job.scene_folder
     key = (str(folder / job.file), repr(sorted(job.loading.items())))
     try:
         if key not in _scenes:
@@ -183,23 +136,6 @@ class _Canvas:
         return (total / numpy.maximum(samples, 1)).astype(numpy.float32)
 
 
-def _versions() -> tuple[str, str]:
-    """Of covary and distributed."""
-    return _covary.version, importlib.metadata.version("distributed")
-
-
-def _check_versions(client: Any) -> None:
-    """All must run one covary and one distributed: films of versions may differ, and so may what Dask sends."""
-    here = _versions()
-    found = {str(worker): tuple(there) for worker, there in client.run(_versions).items()}
-    found["the scheduler"] = (here[0], client.get_versions()["scheduler"]["packages"]["distributed"])
-    others = [f"{who} has covary {theirs[0]} and distributed {theirs[1]}" for who, theirs in sorted(found.items())
-              if theirs != here]
-    if others:
-        raise UsageError(f"versions differ: here are covary {here[0]} and distributed {here[1]}; {'; '.join(others)}. "
-                         "Install the same everywhere")
-
-
 @dataclass(frozen=True)
 class ClusterResult(Result):
     """What has become of render()."""
@@ -228,10 +164,7 @@ def render(client: Any, scene: Scene | str | os.PathLike[str], spp: int, estimat
 
     Raises UsageError for estimators and integrators whose passes look beyond a tile.
     """
-    try:
-        import distributed  # type: ignore[import-not-found,import-untyped,unused-ignore]
-    except ImportError as error:
-        raise ImportError("covary.distributed needs Dask: pip install distributed") from error
+    distributed = dask()
     if estimator not in _ESTIMATORS:
         raise UsageError(f"estimator '{estimator}' looks at other pixels or samples while it renders; on a cluster "
                          f"accepted are {', '.join(_ESTIMATORS)}")
@@ -242,12 +175,12 @@ def render(client: Any, scene: Scene | str | os.PathLike[str], spp: int, estimat
     if chosen.integrator not in ("path", ""):
         raise UsageError(f"the integrator '{chosen.integrator}' trains or traces light over the whole frame; on a "
                          "cluster accepted is path")
-    _check_versions(client)
+    check_versions(client)
     files = SceneFiles(chosen)
-    client.register_plugin(_make_plugin(files))
+    client.register_plugin(make_plugin(files))
     passed = {"spp": spp // sample_ranges, "estimator": estimator, **(settings or {}),
               **{name.replace("-", "_"): value or True for name, value in text_options(options).items()}}
-    job = _Job(files.hash, files.file, chosen._loading, passed)
+    job = _Job(files.folder, files.file, chosen._loading, passed)
     width, height = chosen.resolution
     parts = [_Part(crop, seed + r, 0) for r in range(sample_ranges) for crop in _tiles(width, height, tile)]
     parts = [_Part(part.crop, part.seed, number) for number, part in enumerate(parts)]
@@ -255,7 +188,7 @@ def render(client: Any, scene: Scene | str | os.PathLike[str], spp: int, estimat
     started = last_image = time.monotonic()
     futures = {client.submit(_render_part, job, part, pure=False, retries=_RETRIES): part for part in parts}
     try:
-        for future in distributed.as_completed(futures):  # type: ignore[no-untyped-call,unused-ignore]
+        for future in distributed.as_completed(futures):
             rendered = future.result()
             if isinstance(rendered, Error):
                 raise rendered
@@ -283,3 +216,7 @@ def _result(canvas: _Canvas, estimator: str, options: Mapping[str, Any], parts: 
                        albedo=canvas.aovs.get("Albedo"), normal=canvas.aovs.get("N"), **options)
     given = fields_of(made) | {"warnings": [], "samples_per_pixel": samples}
     return ClusterResult(**given, films=films, parts=parts, render_seconds=seconds)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -42,11 +42,16 @@ class Clock {
   size_t runs_left_ = 0, runs_ = 0;
 };
 
+/// "3-of-8", or "" for the whole.
+std::string part_name(const Part& part) {
+  return part.of == 0 ? "" : fmt::format("{}-of-{}", part.number + 1, part.of);
+}
+
 class Experiment {
  public:
   Experiment(const Suite& suite, const ExperimentOptions& options)
       : options_(options),
-        cache_(options.cache_folder),
+        cache_(options.cache_folder, part_name(options.part)),
         runner_(cache_, options.program, options.threads, options.stop) {
     results_.suite = suite;
   }
@@ -62,6 +67,7 @@ class Experiment {
     if (stopped())
       throw Unfinished(kInterrupted,
                        fmt::format("interrupted after {} of {} runs; the same command continues", done_, total_));
+    if (options_.part.of > 0) return std::move(results_);
     for (size_t s = 0; s < n; ++s)
       if (usable_[s]) measure_scene(s);
     compare_cells(results_);
@@ -115,9 +121,21 @@ class Experiment {
       if (results_.suite.reference_of(scene.entry).files.empty())
         references_[s] = reference_runs(results_.suite, scene, options_.context);
       runs_[s] = runs_of_scene(results_.suite, s, scene, options_.context);
+      if (options_.part.of > 0) keep_part(s);
       for (const std::vector<Run>* runs : {&references_[s], &runs_[s]})
         for (const Run& run : *runs) ++total_, clock_.add_planned(run.work);
     }
+  }
+
+  /// Of the scene's runs those of the part. Runs that share passes have one seed and budget.
+  void keep_part(size_t s) {
+    const auto is_own = [this] { return piece_++ % options_.part.of == options_.part.number; };
+    std::erase_if(references_[s], [&](const Run&) { return !is_own(); });
+    const auto cell = [](const Run& run) { return std::pair(run.seed, run.budget); };
+    std::map<std::pair<uint64_t, size_t>, bool> own;
+    for (const Run& run : runs_[s])
+      if (!own.contains(cell(run))) own[cell(run)] = is_own();
+    std::erase_if(runs_[s], [&](const Run& run) { return !own[cell(run)]; });
   }
 
   /// A run from the cache or a new one.
@@ -332,6 +350,7 @@ class Experiment {
   std::map<std::string, RunRecord> records_;         // by key
   Clock clock_;
   size_t done_ = 0, total_ = 0;
+  size_t piece_ = 0;  // of those that parts are made of, counted over all scenes
 };
 
 }  // namespace

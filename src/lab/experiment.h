@@ -18,6 +18,12 @@ struct Progress {
   enum class Kind { kStarted, kFailed } kind = Kind::kStarted;
 };
 
+/// A part of an experiment that machines make side by side: number `number`, from 0, of `of` parts. What is divided
+/// are the halves of references, and for each seed and budget the runs of all methods. of == 0: the whole.
+struct Part {
+  size_t number = 0, of = 0;
+};
+
 struct ExperimentOptions {
   std::string program;  ///< path of `covary`
   std::string cache_folder;
@@ -26,6 +32,7 @@ struct ExperimentOptions {
   int64_t max_pixels = 0;  ///< > 0: frames are scaled down to so many pixels
   int threads = 0;         ///< of each render; 0: its default
   bool keep_passes = false;
+  Part part;                                ///< only its runs are made and kept, and nothing is measured
   const std::atomic<bool>* stop = nullptr;  ///< ends after the run in progress has saved its state
   std::function<void(const Progress&)> progress;
 };

@@ -64,22 +64,29 @@ nlohmann::ordered_json seconds_of(const RunRecord& r) {
           {"then", r.then_seconds}};
 }
 
-Cache::Cache(std::string folder) : folder_(std::move(folder)) {
+Cache::Cache(std::string folder, const std::string& part) : folder_(std::move(folder)) {
   std::error_code error;
   for (const char* kind : {"runs", "passes", "measures"}) fs::create_directories(fs::path(folder_) / kind, error);
   if (error) throw Error(ErrorCode::kIo, fmt::format("cannot make the cache {}: {}", folder_, error.message()));
-  lock_ = open((folder_ + "/lock").c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0666);
-  if (lock_ < 0)
-    throw Error(ErrorCode::kIo, fmt::format("cannot write to the cache {}: {}", folder_, std::strerror(errno)));
-  if (flock(lock_, LOCK_EX | LOCK_NB) != 0) {
-    close(lock_);
-    throw Error(ErrorCode::kIo, fmt::format("the cache {} is in use by another experiment; wait for it, or give this "
-                                            "one its own by --cache DIR",
-                                            folder_));
-  }
+  lock("lock", part.empty() ? LOCK_EX : LOCK_SH);
+  if (!part.empty()) lock("lock-" + part, LOCK_EX);
 }
 
-Cache::~Cache() { close(lock_); }
+void Cache::lock(const std::string& name, int operation) {
+  const int file = open((folder_ + "/" + name).c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0666);
+  if (file < 0)
+    throw Error(ErrorCode::kIo, fmt::format("cannot write to the cache {}: {}", folder_, std::strerror(errno)));
+  locks_.push_back(file);
+  if (flock(file, operation | LOCK_NB) == 0) return;
+  for (const int held : locks_) close(held);
+  throw Error(ErrorCode::kIo, fmt::format("the cache {} is in use by another experiment; wait for it, or give this "
+                                          "one its own by --cache DIR",
+                                          folder_));
+}
+
+Cache::~Cache() {
+  for (const int file : locks_) close(file);
+}
 
 std::string Cache::path(const std::string& kind, const std::string& key) const {
   return folder_ + "/" + kind + "/" + key;

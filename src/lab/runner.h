@@ -45,8 +45,9 @@ struct RunFailure {
 
 class Cache {
  public:
-  /// Makes the folder where needed and locks it against other experiments until this object ends. Throws Error(kIo).
-  explicit Cache(std::string folder);
+  /// Makes the folder where needed and locks it against other experiments until this object ends; with `part`, the
+  /// name of a part of an experiment, not against other parts. Throws Error(kIo).
+  explicit Cache(std::string folder, const std::string& part = "");
   ~Cache();
   Cache(const Cache&) = delete;
   Cache& operator=(const Cache&) = delete;
@@ -59,8 +60,9 @@ class Cache {
   const std::string& folder() const { return folder_; }
 
  private:
+  void lock(const std::string& name, int operation);
   std::string folder_;
-  int lock_ = -1;
+  std::vector<int> locks_;
 };
 
 class Runner {

@@ -235,6 +235,61 @@ class Kinds(ExperimentTest):
         self.assertIn(" && covary merge ", cells["merged"]["runs"][0]["command"])
 
 
+class Parts(ExperimentTest):
+    """--part, by processes side by side with one cache."""
+
+    def setUp(self):
+        super().setUp()
+        self.suite["scenes"].append({"name": "wall", "file": "wall.xml", "resolution": "16x12"})
+        self.suite["budgets"] = [{"spp": 24}]
+
+    def test_make_the_whole(self):
+        expected = without_times(self.results(out="whole"))
+        processes = [subprocess.Popen(self.command("--part", f"{k}/3"), cwd=self.path, stderr=subprocess.PIPE)
+                     for k in (1, 2, 3)]
+        for process in processes:
+            _, errors = process.communicate(timeout=120)
+            self.assertEqual(process.returncode, 0, errors)
+        self.assertFalse((self.path / "out" / "results.json").exists())
+        runs = self.runs()
+        self.assertEqual(len(runs), 2 * (2 + 2 * 2))
+        self.assertEqual(without_times(self.results()), expected)
+        self.assertEqual(self.runs(), runs, "all of them were there")
+        self.assertEqual(list((self.path / "out" / "cache" / "passes").iterdir()), [])
+
+    def test_share_nothing(self):
+        sizes = []
+        for k in (1, 2, 3, 4, 5, 6, 7, 8, 9):
+            done = self.run_covary(self.command("--part", f"{k}/9", out=f"out{k}"))
+            self.assertEqual(done.returncode, 0, done.stderr)
+            sizes.append(len(self.runs(f"out{k}")))
+        # Two halves of the reference, then two seeds with two methods each, for both scenes.
+        self.assertEqual(sizes, [1, 1, 2, 2, 1, 1, 2, 2, 0])
+
+    def test_failures(self):
+        self.suite["methods"].append({"name": "wrong", "options": ["--groups", "2"]})
+        done = self.run_covary(self.command("--part", "1/1"))
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("failed: room, wrong, 24 spp: ", done.stderr)
+        self.assertIn("2 of the experiment's parts failed; above stands which and why", done.stderr)
+
+    def test_wrong_parts(self):
+        for part in ("0/3", "4/3", "3", "a/b", "1/0"):
+            self.bad(2, f"--part '{part}'", "--part", part)
+
+    def test_one_and_the_whole_exclude_each_other(self):
+        process = subprocess.Popen(self.command("--reference-spp", "100000", "--part", "1/2"), cwd=self.path,
+                                   stderr=subprocess.DEVNULL)
+        try:
+            wait_for(lambda: (self.path / "out" / "cache" / "lock-1-of-2").exists())
+            time.sleep(0.2)
+            self.bad(1, "is in use by another experiment")
+            self.bad(1, "is in use by another experiment", "--part", "1/2")
+        finally:
+            process.kill()
+            process.wait()
+
+
 class Resume(ExperimentTest):
     def test_killed_at_random_and_resumed(self):
         self.suite["budgets"] = [{"spp": 24}]

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """covary.distributed on clusters of this machine: the bits of one machine, with workers that die, and without the files
 of the scene."""
+import json
 import os
 import pickle
 import shutil
 import signal
+import subprocess
 import sys
 import unittest
 
@@ -14,6 +16,9 @@ import numpy
 from common import ROOM, SOURCE, PackageTest
 
 SIZE = (72, 48)
+SUITE = {"name": "tiny", "scenes": [{"name": "room", "file": "room.xml", "resolution": "32x24"}],
+         "methods": [{"name": "pt", "options": ["--estimator", "none"]}, {"name": "iicv", "options": []}],
+         "budgets": [{"spp": 24}], "seeds": 2, "common_options": ["--rfilter", "box"], "reference": {"spp": 32}}
 
 
 class Parts(PackageTest):
@@ -127,6 +132,50 @@ class Cluster(PackageTest):
         there = covary.distributed.render(self.client, self.scene(), 48, seed=4, tile=12, progress=kill)
         self.assertEqual(len(killed), 2)
         self.assert_same_bits(here.image, there.image)
+
+    def test_experiment(self):
+        """The numbers of one machine, whose commands are named; a second time nothing is run."""
+        (self.path / "suite.json").write_text(json.dumps(SUITE))
+        words = ("--scenes", str(SOURCE / "scenes"), "--threads", "1")
+        self.run_program("experiment", "suite.json", "-o", "here", *words)
+        seen = []
+        report = covary.distributed.experiment(self.client, self.path / "suite.json", self.path / "there", words,
+                                               progress=lambda done, total: seen.append((done, total)))
+        self.assertTrue(report.exists())
+        self.assertEqual(seen[-1], (4, 4))
+        here, there = (json.loads((self.path / out / "results.json").read_text()) for out in ("here", "there"))
+        self.assertEqual([[run["relmse"] for run in cell["runs"]] for cell in here["cells"]],
+                         [[run["relmse"] for run in cell["runs"]] for cell in there["cells"]])
+        self.assertEqual([[run["command"] for run in cell["runs"]] for cell in here["cells"]],
+                         [[run["command"] for run in cell["runs"]] for cell in there["cells"]])
+        images = {key.parent.name: key for key in (self.path / "here" / "cache" / "runs").glob("*/image.exr")}
+        self.assertEqual(len(images), 6)
+        for key, image in images.items():
+            other = self.path / "there" / "cache" / "runs" / key / "image.exr"
+            self.assert_same_bits(covary.read_image(image), covary.read_image(other))
+        covary.distributed.experiment(self.client, self.path / "suite.json", self.path / "there", words,
+                                      progress=lambda done, total: seen.append((done, total)))
+        self.assertEqual(len(seen), 4)
+
+    def test_experiment_by_its_address(self):
+        (self.path / "suite.json").write_text(json.dumps({**SUITE, "seeds": 1}))
+        for start in (["-m", "covary.distributed"], ["-c", "import covary._program; covary._program.main()"]):
+            command = [sys.executable, *start, "experiment", self.path / "suite.json", "-o", self.path / "out",
+                       "--cluster", self.cluster.scheduler_address, "--scenes", SOURCE / "scenes"]
+            run = subprocess.run(command, capture_output=True, text=True, check=False)
+            self.assertEqual(run.returncode, 0, run.stderr)
+            self.assertEqual(run.stdout, f"{self.path / 'out' / 'report.html'}\n")
+        run = subprocess.run([*command, "--spp", "x"], capture_output=True, text=True, check=False)
+        self.assertEqual(run.returncode, 2, run.stderr)
+        self.assertIn("--spp", run.stderr)
+
+    def test_experiment_that_fails(self):
+        suite = {**SUITE, "methods": [*SUITE["methods"], {"name": "wrong", "options": ["--groups", "2"]}], "seeds": 1}
+        (self.path / "suite.json").write_text(json.dumps(suite))
+        message = self.message_of(covary.Error, covary.distributed.experiment, self.client, self.path / "suite.json",
+                                  self.path / "out", ["--scenes", str(SOURCE / "scenes")])
+        self.assertIn("of the experiment's parts failed", message)
+        self.assertEqual(len(list((self.path / "out" / "cache" / "runs").glob("*/run.json"))), 4)
 
     def test_refused(self):
         def refused(*arguments, **keywords):

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What work on a cluster begins with: the same versions everywhere, and the files of scenes on every worker."""
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import os
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from . import _covary
+from ._render import Scene
+from .errors import IoError, UsageError
+
+
+class SceneFiles:
+    """The files of a scene by their content, which every worker, also one that comes later, gets once."""
+
+    def __init__(self, scene: Scene) -> None:
+        paths = sorted({os.path.realpath(path) for path in [scene.path, *scene.files]})
+        root = os.path.commonpath([os.path.dirname(path) for path in paths])
+        self.contents = {os.path.relpath(path, root): Path(path).read_bytes() for path in paths}
+        self.file = os.path.relpath(os.path.realpath(scene.path), root)
+        digest = hashlib.sha256()
+        for name, content in sorted(self.contents.items()):
+            digest.update(f"{name}\0{len(content)}\0".encode() + content)
+        self.hash = digest.hexdigest()[:32]
+
+    @property
+    def folder(self) -> str:
+        """Its name in the folder of a worker."""
+        return f"covary-scene-{self.hash}"
+
+    def write(self, parent: Path) -> Path:
+        """Writes them into a folder of their own, unless they are there. Raises IoError."""
+        folder = parent / self.folder
+        if folder.exists():
+            return folder
+        try:
+            parent.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryDirectory(dir=parent, prefix="covary-scene-") as temporary:
+                made = Path(temporary) / "files"
+                for name, content in self.contents.items():
+                    (made / name).parent.mkdir(parents=True, exist_ok=True)
+                    (made / name).write_bytes(content)
+                made.rename(folder)
+        except OSError as error:
+            if folder.exists():  # another worker of this machine was first
+                return folder
+            size = sum(map(len, self.contents.values()))
+            raise IoError(f"a worker cannot write the scene's files, {size / 1e6:.1f} MB, into {parent}: "
+                          f"{error.strerror}; workers' --local-directory names another place") from error
+        return folder
+
+
+def make_plugin(files: SceneFiles) -> Any:
+    """What `Client.register_plugin()` takes to write the files wherever a worker is or comes."""
+    from distributed import WorkerPlugin  # type: ignore[import-not-found,import-untyped,unused-ignore]
+
+    class Deliver(WorkerPlugin):  # type: ignore[misc,unused-ignore]
+        name = files.folder
+        idempotent = True
+
+        def setup(self, worker: Any) -> None:
+            files.write(Path(worker.local_directory))
+
+    return Deliver()
+
+
+def dask() -> Any:
+    """The module `distributed`. Raises ImportError with what to install."""
+    try:
+        import distributed  # type: ignore[import-not-found,import-untyped,unused-ignore]
+    except ImportError as error:
+        raise ImportError("covary.distributed needs Dask: pip install distributed") from error
+    return distributed
+
+
+def _versions() -> tuple[str, str]:
+    """Of covary and distributed."""
+    return _covary.version, importlib.metadata.version("distributed")
+
+
+def check_versions(client: Any) -> None:
+    """All must run one covary and one distributed: films of versions may differ, and so may what Dask sends."""
+    here = _versions()
+    found = {str(worker): tuple(there) for worker, there in client.run(_versions).items()}
+    found["the scheduler"] = (here[0], client.get_versions()["scheduler"]["packages"]["distributed"])
+    others = [f"{who} has covary {theirs[0]} and distributed {theirs[1]}" for who, theirs in sorted(found.items())
+              if theirs != here]
+    if others:
+        raise UsageError(f"versions differ: here are covary {here[0]} and distributed {here[1]}; {'; '.join(others)}. "
+                         "Install the same everywhere")

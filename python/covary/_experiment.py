@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`covary experiment` with its runs on the workers of Dask. Each worker makes parts of the experiment by the program,
+as `covary experiment --part K/N` does; what the parts leave in their caches goes into the one here, where the program
+then finds all runs, measures them and writes the report. So the results are those of one machine in every bit but what
+depends on clocks."""
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ._cluster import SceneFiles, check_versions, dask, make_plugin
+from ._combine import Progress
+from ._program import program
+from ._render import Scene
+from .errors import Error, UsageError
+
+_RETRIES = 5  # of a part that an error of the machine ended
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """One part of the runs of one scene."""
+
+    suite: str  #: JSON, with this scene alone
+    folder: str  #: of the scene's files on a worker
+    file: str  #: the scene's in it
+    local: str  #: its name here
+    part: str  #: "3/8"
+    options: tuple[str, ...]
+
+    def name(self, program_hash: str) -> str:
+        """Of the record that says that it is done."""
+        text = json.dumps([program_hash, self.suite, self.folder, self.part, self.options])
+        return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def _program_hash() -> str:
+    """Of its content: the keys of runs hold the build."""
+    return hashlib.sha256(program().read_bytes()).hexdigest()
+
+
+def _check_programs(client: Any, here: str) -> None:
+    others = [worker for worker, there in client.run(_program_hash).items() if there != here]
+    if others:
+        raise UsageError(f"the program covary is another one on {', '.join(sorted(others))}; install the same package "
+                         "everywhere")
+
+
+def _run(piece: _Piece) -> dict[str, dict[str, bytes]]:
+    """On a worker: the files of the runs that succeeded, by key. Those that fail are tried again where the report is
+    made, which then has their messages."""
+    from distributed import get_worker  # type: ignore[import-not-found,import-untyped,unused-ignore]
+
+    parent = Path(get_worker().local_directory)
+    scene = parent / piece.folder
+    with tempfile.TemporaryDirectory(dir=parent, prefix="covary-experiment-") as temporary:
+        (Path(temporary) / "suite.json").write_text(piece.suite, encoding="utf-8")
+        subprocess.run([str(program()), "experiment", "suite.json", "-o", "out", "--scenes", str(scene), "--part",
+                        piece.part, "--quiet", *piece.options], cwd=temporary, capture_output=True, check=False)
+        found: dict[str, dict[str, bytes]] = {}
+        for done in (Path(temporary) / "out" / "cache" / "runs").glob("*/run.json"):
+            found[done.parent.name] = {path.name: path.read_bytes() for path in done.parent.iterdir()}
+        there, here = str(scene / piece.file).encode(), piece.local.encode()
+        for files in found.values():
+            files["run.json"] = files["run.json"].replace(there, here)
+        return found
+
+
+def _keep(runs: dict[str, dict[str, bytes]], cache: Path) -> None:
+    """Puts runs into the cache; each is there as a whole or not at all."""
+    for key, files in runs.items():
+        if (cache / "runs" / key / "run.json").exists():
+            continue
+        (cache / "runs" / key).mkdir(parents=True, exist_ok=True)
+        for name in sorted(files, key=lambda name: name == "run.json"):  # this one last: it says that all is there
+            whole = cache / "runs" / key / f"{name}.part"
+            whole.write_bytes(files[name])
+            whole.rename(cache / "runs" / key / name)
+
+
+def _number_of_parts(suite: dict[str, Any], scene: dict[str, Any]) -> int:
+    """Of a scene: the halves of its reference, where they are rendered, and all methods of each seed and budget."""
+    reference = scene.get("reference") or suite.get("reference") or {}
+    seeds = suite.get("seeds", 1)
+    runs = (len(seeds) if isinstance(seeds, list) else int(seeds)) * len(suite["budgets"])
+    return runs + (0 if reference.get("files") else 2)
+
+
+def _scenes_folder(given: str | None, suite_word: str, suite: dict[str, Any]) -> Path:
+    """Where the program looks for the suite's scenes."""
+    root: str = suite.get("scene_root", "")
+    if given is not None:
+        return Path(given)
+    if suite_word.endswith(".json"):
+        return Path(suite_word).parent / root
+    here = program().parent
+    for base in (Path(), here / ".." / "..", here / ".." / "share" / "covary") if root else (Path(),):
+        if (base / root / suite["scenes"][0]["file"]).exists():
+            return base / root
+    raise UsageError(f"the suite '{suite['name']}' needs --scenes DIR, the folder that holds "
+                     f"{suite['scenes'][0]['file']}")
+
+
+def _pieces(client: Any, suite: dict[str, Any], folder: Path, options: tuple[str, ...]) -> Iterator[_Piece]:
+    """All parts; the files of a scene go to the workers before its first."""
+    for scene in suite["scenes"]:
+        path = folder / scene["file"]
+        defines = dict(text.split("=", 1) for text in scene.get("defines", []))
+        files = SceneFiles(Scene.load(path, defines=defines))
+        client.register_plugin(make_plugin(files))
+        alone = json.dumps({**suite, "scenes": [{**scene, "file": files.file}]})
+        number = _number_of_parts(suite, scene)
+        for k in range(1, number + 1):
+            yield _Piece(alone, files.folder, files.file, str(path), f"{k}/{number}", options)
+
+
+def _ask(*words: str | os.PathLike[str]) -> str:
+    """What the program prints. Raises Error with its message."""
+    run = subprocess.run([program(), "experiment", *words], capture_output=True, text=True, check=False)
+    if run.returncode != 0:
+        raise (UsageError if run.returncode == 2 else Error)(run.stderr.strip().removeprefix("covary: "))
+    return run.stdout
+
+
+def _make_runs(client: Any, pieces: Sequence[_Piece], cache: Path, program_hash: str,
+               progress: Progress | None) -> None:
+    """On the workers, without those that the cache has."""
+    records = cache / "parts"
+    records.mkdir(parents=True, exist_ok=True)
+
+    def is_done(piece: _Piece) -> bool:
+        record = records / piece.name(program_hash)
+        return record.exists() and all((cache / "runs" / key / "run.json").exists()
+                                       for key in json.loads(record.read_text()))
+
+    left = [piece for piece in pieces if not is_done(piece)]
+    done = len(pieces) - len(left)
+    futures = {client.submit(_run, piece, pure=False, retries=_RETRIES): piece for piece in left}
+    try:
+        for future in dask().as_completed(futures):
+            runs = future.result()
+            _keep(runs, cache)
+            (records / futures[future].name(program_hash)).write_text(json.dumps(sorted(runs)))
+            future.release()
+            done += 1
+            if progress is not None:
+                progress(done, len(pieces))
+    except BaseException:
+        client.cancel(list(futures))
+        raise
+
+
+def experiment(client: Any, suite: str | os.PathLike[str], output: str | os.PathLike[str],
+               arguments: Sequence[str] = (), *, progress: Progress | None = None) -> Path:
+    """`covary experiment SUITE -o OUTPUT ARGUMENTS…` with its runs on the workers of a dask.distributed.Client.
+    Returns the path of the report. What the cache has is not run again, so that the same call continues after an
+    interruption.
+
+    suite: a file (JSON, or a scene in XML) or the name of a built-in suite.
+    arguments: further options of the command, e.g. ["--quick", "--scenes", "scenes"]; --threads is that of each run.
+    progress: called with (done, total) parts.
+
+    Raises UsageError and Error with the messages of the command.
+    """
+    dask()
+    parser = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    for name in ("--scenes", "--cache", "--threads"):
+        parser.add_argument(name)
+    parser.add_argument("--quick", action="store_true")
+    known, _ = parser.parse_known_args(list(arguments))
+    printed = json.loads(_ask(suite, *arguments, "--print"))
+    check_versions(client)
+    program_hash = _program_hash()
+    _check_programs(client, program_hash)
+    options = (*(["--quick"] if known.quick else []), *(["--threads", known.threads] if known.threads else []))
+    folder = _scenes_folder(known.scenes, os.fspath(suite), printed)
+    pieces = list(_pieces(client, printed, folder, options))
+    cache = Path(known.cache or Path(output) / "cache")
+    _make_runs(client, pieces, cache, program_hash, progress)
+    _ask(suite, *arguments, "-o", output, "--quiet")
+    return Path(output) / "report.html"
+
+
+def main(words: Sequence[str]) -> int:
+    """`covary experiment SUITE -o DIR --cluster ADDRESS [OPTIONS]`, or `python -m covary.distributed experiment …`.
+    Returns the exit code."""
+    parser = argparse.ArgumentParser("covary experiment", allow_abbrev=False)
+    parser.add_argument("--cluster", required=True, metavar="ADDRESS",
+                        help="of Dask's scheduler, tcp://HOST:PORT, or its --scheduler-file")
+    parser.add_argument("-o", "--output", required=True)
+    known, rest = parser.parse_known_args(list(words))
+    if rest[:1] != ["experiment"] or len(rest) < 2 or rest[1].startswith("-"):
+        print("covary: expected is experiment SUITE -o DIR --cluster ADDRESS [OPTIONS]", file=sys.stderr)
+        return 2
+
+    def show(done: int, total: int) -> None:
+        print(f"[{done}/{total}] parts", file=sys.stderr)
+
+    try:
+        place = "scheduler_file" if known.cluster.endswith(".json") else "address"
+        with dask().Client(**{place: known.cluster}) as client:
+            print(experiment(client, rest[1], known.output, rest[2:], progress=show))
+    except (Error, ImportError, OSError) as error:
+        print(f"covary: {error}", file=sys.stderr)
+        return 2 if isinstance(error, UsageError) else 1
+    return 0
