@@ -8,11 +8,10 @@ docs/python.md is the manual.
 """
 from . import errors, metrics, progress
 from ._combine import InputReport, check_inputs, combine
-from ._covary import set_threads
 from ._covary import version as __version__
 from ._images import denoise, read_groups, read_image, write_image
 from ._program import program
-from ._render import Scene, render
+from ._render import Scene, render, set_threads
 from ._result import RenderResult, Result
 from .errors import Error, InputError, InternalError, IoError, UsageError
 from .estimators import *  # noqa: F403

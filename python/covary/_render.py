@@ -137,3 +137,8 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator = "i
     made = _covary.render(chosen._loaded, estimator, text_options(options), denoise, fspath(oidn), sampling, groups,
                           split, films_only, request, progress)
     return RenderResult(**made)
+
+
+def set_threads(n: int) -> None:
+    """Limits the processors that covary uses in this process; 0: all. Raises ValueError for less."""
+    _covary.set_threads(n)

@@ -103,6 +103,11 @@ class Cluster(PackageTest):
         for name in ("crn", "independent"):
             self.assert_same_bits(here.films[name].groups, there.films[name].groups)
 
+    def test_threads_of_workers(self):
+        self.assertEqual(set(self.client.run(covary.set_threads, 1).values()), {None})
+        self.client.run(covary.set_threads, 0)
+        self.assertIn("threads: expected", self.message_of(ValueError, self.client.run, covary.set_threads, -1))
+
     def test_denoised(self):
         """With guides that the workers render, and the denoiser of the frame, not of tiles."""
         here = covary.render(self.scene(), 48, denoise="error", oidn="off")
