@@ -15,6 +15,7 @@
 #                         /usr/local); ARCH=native builds for this machine alone, in a third of the time
 #   make wheel            the Python package as a wheel for every x86-64 processor, and its sources, in dist/
 #                         (docs/python.md); ARCH=native for machines like this alone
+#   make blender          the add-on of Blender as dist/covary-blender.zip, of the wheel that `make wheel` made, or makes
 #   make asan|tsan        build and run the tests under the sanitizers of addresses, leaks and undefined behaviour;
 #                         under that of threads
 #   make dev|clang        the same with checks of the standard library, by GCC; by Clang
@@ -36,7 +37,7 @@ CONFIGURE = -DCOVARY_ARCH=$(ARCH) -DCOVARY_WERROR=$(WERROR)
 # Install for every processor unless ARCH was given.
 INSTALL = $(if $(filter file,$(origin ARCH)),portable,release)
 
-.PHONY: all setup configure build demo test check nightly bench lint install wheel dev clang asan tsan clean
+.PHONY: all setup configure build demo test check nightly bench lint install wheel blender dev clang asan tsan clean
 all: build
 
 setup:
@@ -82,6 +83,14 @@ install: setup
 
 wheel: setup
 	@WERROR=$(WERROR) JOBS=$(JOBS) scripts/wheel $(if $(filter file,$(origin ARCH)),portable,$(ARCH)) dist
+
+# Blender 4.2 to 5.0 have Python 3.11.
+blender: setup
+	@ls dist/covary-*.whl > /dev/null 2>&1 || $(MAKE) --no-print-directory wheel
+	@build/venv/bin/pip download -q --disable-pip-version-check --no-deps --only-binary :all: --python-version 3.11 \
+	  --platform manylinux_2_28_x86_64 -d build/wheel nanobind-backend==1.0.0
+	@scripts/blender_addon $$(ls -t dist/covary-*.whl | head -n 1) build/wheel/nanobind_backend-*.whl \
+	  dist/covary-blender.zip
 
 dev clang:
 	@scripts/setup $@

@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """covary.blender by the package bpy, without a window, on a closed room of its own with an area light, a mirror and
 matt objects."""
+import os
+import subprocess
 import sys
 import unittest
+import zipfile
+from pathlib import Path
 
 import covary
 import covary.blender
 import numpy
-from common import PackageTest
+from common import SOURCE, PackageTest
 
 
 class Missing(PackageTest):
@@ -56,6 +60,64 @@ def settings_of(scene):
     return {(owner.rna_type.name, p.identifier): str(getattr(owner, p.identifier))
             for owner in (scene, scene.cycles, scene.render, scene.render.image_settings)
             for p in owner.rna_type.properties if p.type in ("BOOLEAN", "INT", "FLOAT", "ENUM", "STRING")}
+
+
+INSTALLED = """
+import pathlib
+import sys
+import bpy
+bpy.ops.extensions.package_install_files(filepath=sys.argv[1], repo="user_default", enable_on_install=True)
+import covary.blender  # that of the extension's wheel
+from blender_test import build_room
+scene = build_room(bpy)  # resets the preferences, but not what Python has
+bpy.ops.preferences.addon_enable(module="bl_ext.user_default.covary")
+scene.render.resolution_x, scene.render.resolution_y, scene.covary_samples = 24, 16, 72
+assert bpy.ops.render.covary() == {"FINISHED"}
+assert tuple(bpy.data.images["covary"].size) == (24, 16)
+bpy.ops.preferences.addon_disable(module="bl_ext.user_default.covary")
+assert not hasattr(bpy.types.Scene, "covary_samples")
+print("from", covary.blender.__file__)
+assert (pathlib.Path(covary.__file__).parents[1] / "nanobind_backend").exists()
+"""
+
+
+class Extension(PackageTest):
+    """The file that Blender installs."""
+
+    def wheel(self, name, tag, root, *packages):
+        """Of files of this build, or of the environment, by hand."""
+        path = self.path / f"{name}-0.1.0-{tag}.whl"
+        information = f"{name}-0.1.0.dist-info"
+        with zipfile.ZipFile(path, "w") as archive:
+            for file in (file for package in packages for file in sorted((root / package).rglob("*"))):
+                if file.is_file() and file.suffix != ".pyc":
+                    archive.write(file, file.relative_to(root))
+            archive.writestr(f"{information}/METADATA", f"Metadata-Version: 2.1\nName: {name}\nVersion: 0.1.0\n")
+            archive.writestr(f"{information}/WHEEL", f"Wheel-Version: 1.0\nRoot-Is-Purelib: false\nTag: {tag}\n")
+            archive.writestr(f"{information}/RECORD", "")
+        return path
+
+    def test_installed_from_a_file(self):
+        import nanobind_backend
+        own = Path(covary.__file__).parent.parent
+        wheels = (self.wheel("covary", "cp310-abi3-manylinux_2_35_x86_64", own, "covary"),
+                  self.wheel("nanobind_backend", "cp311-cp311-manylinux_2_28_x86_64",
+                             Path(nanobind_backend.__file__).parent.parent, "nanobind_backend"))
+        subprocess.run([SOURCE / "scripts" / "blender_addon", *wheels, self.path / "covary.zip"], check=True)
+        with zipfile.ZipFile(self.path / "covary.zip") as archive:
+            self.assertIn('version = "0.1.0"', archive.read("blender_manifest.toml").decode())
+        environment = {**os.environ, "BLENDER_USER_RESOURCES": str(self.path / "blender"),
+                       "PYTHONPATH": f"{SOURCE / 'tests' / 'python'}:{SOURCE / 'tests' / 'cli'}"}
+        run = subprocess.run([sys.executable, "-c", INSTALLED, self.path / "covary.zip"], capture_output=True, text=True,
+                             env=environment, check=False)
+        self.assertEqual(run.returncode, 0, run.stdout + run.stderr)
+        self.assertIn(f"from {self.path / 'blender'}", run.stdout)
+
+    def test_other_files(self):
+        run = subprocess.run([SOURCE / "scripts" / "blender_addon", "a.whl", "b.whl", "c.zip"], capture_output=True,
+                             text=True, check=False)
+        self.assertEqual(run.returncode, 1)
+        self.assertIn("expected are a wheel of covary and others", run.stderr)
 
 
 class Render(PackageTest):
