@@ -15,6 +15,9 @@ void add_guide_options(CLI::App& command, GuideTexts& texts) {
                   "Lobes of a leaf at first, 1 to 32; splitting makes up to twice as many; default: 16")
       ->transform(whole_number(1u, static_cast<uint32_t>(VmfLobes::kMax)))
       ->group(kGuideGroup);
+  command.add_option("--guide-leaf", texts.leaf_samples, "Samples of a leaf; one with more is split; default: 8000")
+      ->transform(whole_number(GuideSettings::kMinLeafSamples, GuideSettings::kMaxLeafSamples))
+      ->group(kGuideGroup);
   command.add_option("--guide-train", texts.train_spp, "Samples per pixel to learn from, a part of --spp; default: 16")
       ->transform(whole_number(1u, GuideSettings::kMaxTrainingSpp))
       ->group(kGuideGroup);
@@ -30,7 +33,7 @@ void add_guide_options(CLI::App& command, GuideTexts& texts) {
 std::optional<GuideOptions> guide_options(const GuideTexts& texts) {
   if (command_words(texts).empty()) return {};
   GuideOptions options;
-  options.lobes = texts.lobes, options.train_spp = texts.train_spp;
+  options.lobes = texts.lobes, options.leaf_samples = texts.leaf_samples, options.train_spp = texts.train_spp;
   if (!texts.fraction.empty()) {
     options.fraction = GuideFraction::from(texts.fraction);
     if (!options.fraction)
@@ -55,6 +58,7 @@ std::vector<std::string> command_words(const GuideTexts& texts) {
   };
   const auto number = [](const std::optional<uint32_t>& value) { return value ? std::to_string(*value) : ""; };
   add("--guide-lobes", number(texts.lobes));
+  add("--guide-leaf", number(texts.leaf_samples));
   add("--guide-train", number(texts.train_spp));
   add("--guide-fraction", texts.fraction);
   add("--nee", texts.nee);

@@ -17,7 +17,7 @@ inline constexpr const char* kGuideGroup = "Guided path";
 
 /// As given; empty: not given.
 struct GuideTexts {
-  std::optional<uint32_t> lobes, train_spp;
+  std::optional<uint32_t> lobes, leaf_samples, train_spp;
   std::string fraction, nee;
 };
 

@@ -23,11 +23,13 @@ std::string GuideFraction::text() const {
 
 GuideOptions GuideOptions::from(Parameters& parameters) {
   GuideOptions options;
-  const auto number = [&](const char* name, int highest) -> std::optional<uint32_t> {
+  const auto number = [&](const char* name, uint32_t highest, uint32_t lowest = 1) -> std::optional<uint32_t> {
     if (!parameters.has(name)) return {};
-    return static_cast<uint32_t>(parameters.get_int(name, 1, 1, highest));
+    const auto low = static_cast<int>(lowest);
+    return static_cast<uint32_t>(parameters.get_int(name, low, low, static_cast<int>(highest)));
   };
   options.lobes = number("guide_lobes", VmfLobes::kMax);
+  options.leaf_samples = number("guide_leaf", GuideSettings::kMaxLeafSamples, GuideSettings::kMinLeafSamples);
   options.train_spp = number("guide_train", GuideSettings::kMaxTrainingSpp);
   if (parameters.has("guide_fraction")) {
     const std::string text = parameters.get_string("guide_fraction", "0.5");
@@ -45,6 +47,7 @@ GuideOptions GuideOptions::from(Parameters& parameters) {
 GuideSettings GuideSettings::with(const GuideOptions& options) const {
   GuideSettings settings = *this;
   settings.lobes = options.lobes.value_or(lobes);
+  settings.leaf_samples = options.leaf_samples.value_or(leaf_samples);
   settings.train_spp = options.train_spp.value_or(train_spp);
   settings.fraction = options.fraction.value_or(fraction);
   settings.roughness = options.roughness.value_or(roughness);
@@ -58,12 +61,13 @@ GuidingSettings GuideSettings::field() const {
   GuidingSettings settings;
   settings.fit.n_lobes = static_cast<int>(lobes);
   settings.fit.max_lobes = std::min(2 * settings.fit.n_lobes, VmfLobes::kMax);
+  settings.leaf_samples = leaf_samples;
   settings.learn_fraction = fraction.learned;
   return settings;
 }
 
 std::string GuideSettings::text() const {
-  return "lobes=" + std::to_string(lobes) + " train=" + std::to_string(train_spp) + " fraction=" + fraction.text() +
+  return "lobes=" + std::to_string(lobes) + " leaf=" + std::to_string(leaf_samples) + " train=" + std::to_string(train_spp) + " fraction=" + fraction.text() +
          " roughness=" + std::to_string(roughness) + " nee=" + (nee ? "on" : "off") + " cv=" + name_of(control) +
          (controlled() ? " cv_train=" + std::to_string(control_train_spp) : "");
 }

@@ -24,21 +24,23 @@ struct GuideFraction {
 
 /// Settings given one by one; those that are not keep their values.
 struct GuideOptions {
-  std::optional<uint32_t> lobes, train_spp;
+  std::optional<uint32_t> lobes, leaf_samples, train_spp;
   std::optional<GuideFraction> fraction;
   std::optional<float> roughness;
   std::optional<bool> nee;
   std::optional<ControlKind> control;
   std::optional<uint32_t> control_train_spp;
 
-  /// Reads guide_lobes, guide_train, guide_fraction, guide_roughness, nee, cv and cv_train.
+  /// Reads guide_lobes, guide_leaf, guide_train, guide_fraction, guide_roughness, nee, cv and cv_train.
   static GuideOptions from(Parameters& parameters);
 };
 
 struct GuideSettings {
   static constexpr uint32_t kMaxTrainingSpp = 1u << 16;
+  static constexpr uint32_t kMinLeafSamples = 200, kMaxLeafSamples = 1u << 22;
 
   uint32_t lobes = 16;      ///< of a leaf at first, 1 to VmfLobes::kMax; splitting makes up to twice as many
+  uint32_t leaf_samples = GuidingSettings().leaf_samples;  ///< a leaf with more is split, kMinLeafSamples or more
   uint32_t train_spp = 16;  ///< samples per pixel to learn from
   GuideFraction fraction;
   float roughness = 0.1f;                   ///< lobes of BSDFs that are less rough are not guided

@@ -7,6 +7,7 @@
 // | rr_depth        | integer       | 5       | number of edges after which roulette may end a path                 |
 // | hide_emitters   | boolean       | false   | lights are invisible to the camera                                  |
 // | guide_lobes     | integer       | 16      | lobes of a leaf at first, 1 to 32; splitting makes up to twice many |
+// | guide_leaf      | integer       | 8000    | samples of a leaf of the tree; one with more is split               |
 // | guide_train     | integer       | 16      | samples per pixel to learn from                                     |
 // | guide_fraction  | string        | 0.5     | fraction of guided directions, or `learned`                         |
 // | guide_roughness | number        | 0.1     | lobes of BSDFs that are less rough are not guided                   |

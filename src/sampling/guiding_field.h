@@ -22,7 +22,7 @@
 namespace covary {
 
 struct GuidingSettings {
-  VmfFitSettings fit;
+  VmfFitSettings fit{.max_steps = 10};  ///< each wave goes on where the one before it ended
   uint32_t leaf_samples = 8000;     ///< a leaf with more is split
   uint32_t min_leaf_samples = 100;  ///< a leaf with fewer samples, zero ones included, does not guide
   uint32_t max_depth = 32;          ///< of the tree

@@ -35,7 +35,7 @@ class Options(CliTest):
                      "-o", "a.exr", "--guide-fraction=" + fraction)
 
     def test_refuses_impossible_numbers(self):
-        for option, value in (("--guide-lobes", "33"), ("--guide-lobes", "0"), ("--guide-train", "0"), ("--nee", "1")):
+        for option, value in (("--guide-lobes", "33"), ("--guide-lobes", "0"), ("--guide-leaf", "199"), ("--guide-train", "0"), ("--nee", "1")):
             self.bad(2, option, *PLAIN, "-o", "a.exr", option, value)
 
     def test_refuses_more_training_than_samples(self):
@@ -64,7 +64,7 @@ class Options(CliTest):
         self.good("render", "guided.xml", "--resolution", "24x16", "--no-preview", "--estimator", "none", "--spp", "20",
                   "-o", "a.exr")
         settings = json.loads(self.good("info", "a.exr", "--json").stdout)["attributes"]["covary:settings"]
-        self.assertIn("lobes=4 train=16 fraction=learned", settings)
+        self.assertIn("lobes=4 leaf=8000 train=16 fraction=learned", settings)
         self.assertIn("nee=off", settings)
 
 
