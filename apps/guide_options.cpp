@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "core/error.h"
 #include "integrators/guided_path.h"
 #include "numbers.h"
@@ -49,6 +51,16 @@ void check_guide_options(const GuideTexts& texts, const LoadedScene& scene, cons
   if (words.empty() || dynamic_cast<const GuidedPath*>(scene.integrator.get())) return;
   throw Error(ErrorCode::kUsage, fmt::format("{} is an option of --integrator guided-path, not of {}", words[0],
                                              integrator.empty() ? scene.integrator_type : integrator));
+}
+
+void warn_of_unseen_lights(LoadedScene& scene) {
+  const auto* guided = dynamic_cast<const GuidedPath*>(scene.integrator.get());
+  if (!guided || guided->settings().nee) return;
+  const auto n = std::ranges::count_if(scene.scene->emitters(), [](const auto& light) { return light->is_delta(); });
+  if (n > 0)
+    scene.warnings.push_back(
+        fmt::format("without light samples (--nee off), lights at a point or in one direction are not seen: {} of {}",
+                    n, scene.scene->emitters().size()));
 }
 
 std::vector<std::string> command_words(const GuideTexts& texts) {

@@ -30,6 +30,9 @@ std::optional<GuideOptions> guide_options(const GuideTexts& texts);
 /// another integrator than guided-path.
 void check_guide_options(const GuideTexts& texts, const LoadedScene& scene, const std::string& integrator);
 
+/// Adds a warning to a scene whose lights at a point or in one direction the integrator cannot see.
+void warn_of_unseen_lights(LoadedScene& scene);
+
 /// The options as words of a command line.
 std::vector<std::string> command_words(const GuideTexts& texts);
 

@@ -47,6 +47,7 @@ void probe(ProbeOptions options) {
   outputs.writes("-o", render.output, OutputKind::kImage);
   const LoadedScene scene = load(render);
   outputs.reads(scene.files);
+  for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", warning);
   auto* guided = dynamic_cast<GuidedPath*>(scene.integrator.get());
   if (!guided) throw Error(ErrorCode::kUsage, "probe shows what guided-path has learnt, not " + render.integrator);
   const auto at = parse_numbers("--pixel", options.pixel, ',', 2, "X,Y, e.g. 640,360");

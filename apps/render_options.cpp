@@ -107,6 +107,7 @@ LoadedScene load(const RenderOptions& options) {
   check_light_options(options.light, scene, options.integrator);
   check_control_options(options.control, scene, options.integrator);
   check_guide_options(options.guide, scene, options.integrator);
+  warn_of_unseen_lights(scene);
   return scene;
 }
 

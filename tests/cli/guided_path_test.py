@@ -29,13 +29,22 @@ class Options(CliTest):
         self.assertEqual((report["samples_per_pixel"], report["training_samples_per_pixel"]), (8, 12))
         self.assertGreaterEqual(report["guiding"]["controlled_leaves"], 1)
 
+    def test_warns_of_lights_that_it_cannot_see(self):
+        point = '<emitter type="point"><point name="position" x="0" y="1" z="0"/></emitter></scene>'
+        (self.path / "point.xml").write_text(Path(ROOM).read_text().replace("</scene>", point))
+        render = ("render", "point.xml", *PLAIN[2:], "--spp", "5", "-o", "a.exr")
+        self.assertNotIn("not seen", self.good(*render).stderr)
+        self.assertIn("without light samples (--nee off), lights at a point or in one direction are not seen: 1 of ",
+                      self.good(*render, "--nee", "off").stderr)
+
     def test_refuses_impossible_fractions(self):
         for fraction in ("0", "1", "-0.5", "much", "nan", "0.5x"):
             self.bad(2, f"--guide-fraction '{fraction}': expected learned or a number above 0 and below 1", *PLAIN,
                      "-o", "a.exr", "--guide-fraction=" + fraction)
 
     def test_refuses_impossible_numbers(self):
-        for option, value in (("--guide-lobes", "33"), ("--guide-lobes", "0"), ("--guide-leaf", "199"), ("--guide-train", "0"), ("--nee", "1")):
+        for option, value in (("--guide-lobes", "33"), ("--guide-lobes", "0"), ("--guide-leaf", "199"),
+                              ("--guide-train", "0"), ("--nee", "1")):
             self.bad(2, option, *PLAIN, "-o", "a.exr", option, value)
 
     def test_refuses_more_training_than_samples(self):
