@@ -67,7 +67,8 @@ GuidingSettings GuideSettings::field() const {
 }
 
 std::string GuideSettings::text() const {
-  return "lobes=" + std::to_string(lobes) + " leaf=" + std::to_string(leaf_samples) + " train=" + std::to_string(train_spp) + " fraction=" + fraction.text() +
+  return "lobes=" + std::to_string(lobes) + " leaf=" + std::to_string(leaf_samples) +
+         " train=" + std::to_string(train_spp) + " fraction=" + fraction.text() +
          " roughness=" + std::to_string(roughness) + " nee=" + (nee ? "on" : "off") + " cv=" + name_of(control) +
          (controlled() ? " cv_train=" + std::to_string(control_train_spp) : "");
 }

@@ -39,9 +39,9 @@ struct GuideSettings {
   static constexpr uint32_t kMaxTrainingSpp = 1u << 16;
   static constexpr uint32_t kMinLeafSamples = 200, kMaxLeafSamples = 1u << 22;
 
-  uint32_t lobes = 16;      ///< of a leaf at first, 1 to VmfLobes::kMax; splitting makes up to twice as many
+  uint32_t lobes = 16;  ///< of a leaf at first, 1 to VmfLobes::kMax; splitting makes up to twice as many
   uint32_t leaf_samples = GuidingSettings().leaf_samples;  ///< a leaf with more is split, kMinLeafSamples or more
-  uint32_t train_spp = 16;  ///< samples per pixel to learn from
+  uint32_t train_spp = 16;                                 ///< samples per pixel to learn from
   GuideFraction fraction;
   float roughness = 0.1f;                   ///< lobes of BSDFs that are less rough are not guided
   bool nee = true;                          ///< light samples (next-event estimation)

@@ -63,7 +63,8 @@ inline bool guide_at(const GuidedScene& guided, uint32_t leaf_number, const Vec3
   const GuidingLeaf& leaf = guided.field->leaf(leaf_number);
   if (share == 0 || leaf.mixture.lobes.n == 0) return false;
   fraction = share * (guided.learned_fraction ? leaf.fraction : guided.fraction);
-  lobes = leaf.mixture.at(p).times_cosine(normal);
+  leaf.mixture.see_from(p, lobes);
+  lobes.multiply_by_cosine(normal);
   return true;
 }
 

@@ -45,9 +45,7 @@ int VmfLobes::choose(float u) const {
   return chosen;
 }
 
-VmfLobes VmfLobes::times_cosine(const Vec3& normal) const {
-  VmfLobes product;
-  product.n = n;
+void VmfLobes::multiply_by_cosine(const Vec3& normal) {
   const int end = padded();
   // N(κ) e^{κ μ·w − κ} N(c) e^{c n·w − c} = [N(κ) N(c) / N(κ') e^{κ' − κ − c}] N(κ') e^{κ' μ'·w − κ'}
   // with κ' μ' = κ μ + c n.
@@ -59,21 +57,21 @@ VmfLobes VmfLobes::times_cosine(const Vec3& normal) const {
     // κ' − κ − c without cancellation: κ'² − (κ + c)² = −κ c |μ − n|².
     const float exponent =
         -kappa[k] * kCosineKappa * (dx * dx + dy * dy + dz * dz) / (length + kappa[k] + kCosineKappa);
-    product.kappa[k] = length;
-    product.peak[k] = vmf::peak(length);
-    product.weight[k] = weight[k] * peak[k] * kCosinePeak / product.peak[k] * vmf::exp_nonpositive(exponent);
-    product.x[k] = kx * scale, product.y[k] = ky * scale, product.z[k] = kz * scale;
+    const float product_peak = vmf::peak(length);
+    weight[k] = weight[k] * peak[k] * kCosinePeak / product_peak * vmf::exp_nonpositive(exponent);
+    kappa[k] = length, peak[k] = product_peak;
+    x[k] = kx * scale, y[k] = ky * scale, z[k] = kz * scale;
   }
   float sum = 0;
-  for (int k = 0; k < n; ++k) sum += product.weight[k];
-  for (int k = 0; k < end; ++k) product.weight[k] *= 1 / sum;
-  return product;
+  for (int k = 0; k < n; ++k) sum += weight[k];
+  for (int k = 0; k < end; ++k) weight[k] *= 1 / sum;
 }
 
-VmfLobes VmfMixture::at(const Vec3& p) const {
-  VmfLobes seen = lobes;
+void VmfMixture::see_from(const Vec3& p, VmfLobes& written) const {
+  VmfLobes& __restrict seen = written;  // or the loop is not vectorised
   const Vec3 d = pivot - p;
   const int end = lobes.padded();
+  seen.n = lobes.n;
   for (int k = 0; k < end; ++k) {
     const float dx = lobes.x[k] + d.x * inverse_distance[k], dy = lobes.y[k] + d.y * inverse_distance[k],
                 dz = lobes.z[k] + d.z * inverse_distance[k];
@@ -83,7 +81,13 @@ VmfLobes VmfMixture::at(const Vec3& p) const {
     seen.x[k] = far ? dx * scale : lobes.x[k];
     seen.y[k] = far ? dy * scale : lobes.y[k];
     seen.z[k] = far ? dz * scale : lobes.z[k];
+    seen.weight[k] = lobes.weight[k], seen.kappa[k] = lobes.kappa[k], seen.peak[k] = lobes.peak[k];
   }
+}
+
+VmfLobes VmfMixture::at(const Vec3& p) const {
+  VmfLobes seen;
+  see_from(p, seen);
   return seen;
 }
 

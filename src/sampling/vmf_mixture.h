@@ -12,7 +12,7 @@ namespace covary {
 /// Lobes with weights that add up to 1, or none.
 struct VmfLobes {
   static constexpr int kMax = 32;
-  int n = 0;  ///< entries behind are padding of weight 0 up to the next multiple of kLanes
+  int n = 0;  ///< entries behind are padding of weight 0 up to the next multiple of kLanes, and unused ones
   alignas(32) float weight[kMax] = {};
   alignas(32) float kappa[kMax] = {};
   alignas(32) float peak[kMax] = {};  ///< vmf::peak of kappa
@@ -33,10 +33,15 @@ struct VmfLobes {
   int choose(float u) const;
   /// A direction of density pdf(); `u_lobe` in [0, 1) chooses the lobe.
   Vec3 sample(float u_lobe, Vec2 u) const { return vmf::sample(lobe(choose(u_lobe)), u); }
-  /// The normalised product with the cosine at the unit vector `normal`. The cosine is replaced by the vMF lobe of the
-  /// same mean cosine 2/3, so that the product is again a mixture: of the same lobes with other weights, and each
-  /// turned towards the normal.
-  VmfLobes times_cosine(const Vec3& normal) const;
+  /// The lobes become the normalised product with the cosine at the unit vector `normal`. The cosine is replaced by the
+  /// vMF lobe of the same mean cosine 2/3, so that the product is again a mixture: of the same lobes with other
+  /// weights, and each turned towards the normal.
+  void multiply_by_cosine(const Vec3& normal);
+  VmfLobes times_cosine(const Vec3& normal) const {
+    VmfLobes product = *this;
+    product.multiply_by_cosine(normal);
+    return product;
+  }
 };
 
 struct VmfMixture {
@@ -47,6 +52,8 @@ struct VmfMixture {
 
   /// As seen from `p`: mean directions point from there to where the lights are.
   VmfLobes at(const Vec3& p) const;
+  /// The same, written to another place up to the padding; what lies behind stays.
+  void see_from(const Vec3& p, VmfLobes& written) const;
   /// The same lights with another pivot.
   VmfMixture moved_to(const Vec3& new_pivot) const;
 };
