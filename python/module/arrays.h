@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cstdint>
+#include <cstdlib>
 #include <memory>
 #include <string>
 #include <vector>
@@ -43,7 +44,7 @@ class Groups {
 
  private:
   Floats source_;
-  std::unique_ptr<float[]> ordered_;
+  std::unique_ptr<float[], decltype(&std::free)> ordered_{nullptr, std::free};
 };
 
 /// An array [H, W, 3] as an image of its own. Raises like floats_of(); `shape` may name the size that it must have.
