@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -17,8 +17,11 @@ if TYPE_CHECKING:
     from ._result import FloatArray
     from .estimators import PairEstimator
 
-#: Lanes that Mitsuba traces at once.
+#: Lanes that Mitsuba traces at once, and of groups that are traced together; one group may have more.
 _MOST_LANES = 1 << 32
+_LANES_OF_STACK = 1 << 24
+#: Rows of groups that are traced together: positions of samples, 32-bit floats, keep 1/4096 of a pixel.
+_ROWS_OF_STACK = 4096
 _defined: dict[str, None] = {}
 
 
@@ -59,11 +62,13 @@ def _define_plugins(mi: Any) -> None:
 
     class CommonNumbers(mi.Sampler):  # type: ignore[misc,unused-ignore]
         """Numbers that depend on the seed and the index of the sample, and not on the pixel. Mitsuba traces the samples
-        of a pixel side by side: lane i is sample i mod n, for n samples a pixel in a pass."""
+        of a pixel side by side: lane i is sample i mod n, for n samples a pixel in a pass. `pixels`: of the film, in
+        which groups of `group_pixels` pixels and `sample_count` samples lie one below the other."""
 
         def __init__(self, properties: Any) -> None:
             super().__init__(properties)
             self.pixels = properties.get("pixels", 1)
+            self.group_pixels = properties.get("group_pixels", 1)
             self.first = properties.get("first", 0)
 
         def seed(self, seed: Any, wavefront_size: int) -> None:
@@ -77,7 +82,9 @@ def _define_plugins(mi: Any) -> None:
             first = drjit.opaque(mi.UInt64, self.first + self.passes * in_pass)
             state = mi.UInt64(self.seed_value) * 0x9e3779b97f4a7c15
             drjit.make_opaque(state)
-            sample = drjit.arange(mi.UInt64, self.size) % in_pass + first
+            lane = drjit.arange(mi.UInt64, self.size)
+            group = lane // in_pass // drjit.opaque(mi.UInt64, self.group_pixels)
+            sample = lane % in_pass + first + group * drjit.opaque(mi.UInt64, self.sample_count())
             self.random = mi.PCG32(initstate=state, initseq=sample)
 
         def advance(self) -> None:
@@ -98,6 +105,7 @@ def _define_plugins(mi: Any) -> None:
         def _copy(self) -> Any:
             properties = mi.Properties()
             properties["pixels"], properties["first"] = self.pixels, self.first
+            properties["group_pixels"] = self.group_pixels
             other = CommonNumbers(properties)
             other.set_sample_count(self.sample_count())
             return other
@@ -113,17 +121,30 @@ def _define_plugins(mi: Any) -> None:
             return other
 
     class Around(mi.Sensor):  # type: ignore[misc,unused-ignore]
-        """Another sensor with a film and a sampler of its own."""
+        """Another sensor with a film and a sampler of its own. With `groups`, the film holds the frame so many times,
+        one below the other and each followed by a row that is thrown away."""
 
         def __init__(self, properties: Any) -> None:
             super().__init__(properties)
-            self.inner = properties["inner"]
+            self.inner, self.groups = properties["inner"], properties.get("groups", 0)
 
-        def sample_ray(self, *arguments: Any) -> Any:
-            return self.inner.sample_ray(*arguments)
+        def _of_frame(self, position: Any) -> Any:
+            """The position in the frame. Rounding may have moved one across the edge of its row: over the bottom, into
+            the upper half of the row between, or over the top, into the lower half."""
+            if self.groups == 0:
+                return position
+            height = _size(self.inner)[1]
+            y = mi.Float64(position.y) * (self.groups * (height + 1))
+            row = y - drjit.floor(y / (height + 1)) * (height + 1)
+            row = drjit.select(row >= height + 0.5, 0.0, drjit.minimum(row, height))
+            return mi.Point2f(position.x, mi.Float(row / height))
 
-        def sample_ray_differential(self, *arguments: Any) -> Any:
-            return self.inner.sample_ray_differential(*arguments)
+        def sample_ray(self, time: Any, wavelength: Any, position: Any, aperture: Any, active: Any = True) -> Any:
+            return self.inner.sample_ray(time, wavelength, self._of_frame(position), aperture, active)
+
+        def sample_ray_differential(self, time: Any, wavelength: Any, position: Any, aperture: Any,
+                                    active: Any = True) -> Any:
+            return self.inner.sample_ray_differential(time, wavelength, self._of_frame(position), aperture, active)
 
         def bbox(self) -> Any:
             return self.inner.bbox()
@@ -152,16 +173,13 @@ def _size(sensor: Any) -> tuple[int, int]:
     return int(width), int(height)
 
 
-def _around(mi: Any, sensor: Any, sampler: dict[str, Any]) -> Any:
-    film = sensor.film()
-    width, height = (int(n) for n in film.size())
-    crop_x, crop_y = (int(n) for n in film.crop_offset())
-    crop_width, crop_height = _size(sensor)
+def _around(mi: Any, sensor: Any, sampler: dict[str, Any], groups: int = 0) -> Any:
+    """A sensor for the pixels of another, or for several groups of them."""
+    width, height = _size(sensor)
     return mi.load_dict({
-        "type": "covary_around", "inner": sensor, "sampler": sampler,
-        "film": {"type": "hdrfilm", "width": width, "height": height, "crop_offset_x": crop_x, "crop_offset_y": crop_y,
-                 "crop_width": crop_width, "crop_height": crop_height, "rfilter": {"type": "box"},
-                 "pixel_format": "rgb", "component_format": "float32"}})
+        "type": "covary_around", "inner": sensor, "sampler": sampler, "groups": groups,
+        "film": {"type": "hdrfilm", "width": width, "height": max(1, groups) * (height + (groups > 0)),
+                 "rfilter": {"type": "box"}, "pixel_format": "rgb", "component_format": "float32"}})
 
 
 def _check_sensor(sensor: Any) -> list[str]:
@@ -191,7 +209,7 @@ def render(scene: Any, spp: int, seed: int = 0, integrator: Any = None, sensor: 
     progress: called with (done, total) groups.
     options: of the estimator.
 
-    The film's filter is replaced by a box, with a warning. The samples in each group are traced at once. Raises
+    The film's filter is replaced by a box, with a warning. As many groups as fit are traced at once. Raises
     UsageError for what cannot work: a scalar variant, integrators of derivatives or of light paths alone.
     """
     mi = _module()
@@ -212,9 +230,9 @@ def render(scene: Any, spp: int, seed: int = 0, integrator: Any = None, sensor: 
     total = 2 * groups
     done = 0
 
-    def finished() -> None:
+    def finished(number: int) -> None:
         nonlocal done
-        done += 1
+        done += number
         if progress is not None:
             progress(done, total)
 
@@ -229,25 +247,37 @@ def render(scene: Any, spp: int, seed: int = 0, integrator: Any = None, sensor: 
                          estimate_seconds=estimated - rendered)
 
 
+def _stacks(count: int, groups: int, width: int, height: int) -> Iterator[tuple[int, int]]:
+    """Of which groups are traced together: how many, and how many samples each has; sizes differ by one at most."""
+    for size, number in ((count // groups + 1, count % groups), (count // groups, groups - count % groups)):
+        lanes = width * (height + 1) * size
+        together = max(1, min(_LANES_OF_STACK // lanes, _ROWS_OF_STACK // (height + 1)))
+        if lanes * together >= _MOST_LANES:
+            raise UsageError(f"{width} x {height} pixels with {size} samples in a group are more than Mitsuba traces "
+                             f"at once; use more groups than {groups}")
+        for first in range(0, number, together):
+            yield min(together, number - first), size
+
+
 def _film(mi: Any, scene: Any, camera: Any, integrator: Any, sampling: str, count: int, groups: int, seed: int,
-          finished: Callable[[], None]) -> Film:
-    """One of the two images: groups whose sizes differ by a sample at most."""
+          finished: Callable[[int], None]) -> Film:
+    """One of the two images."""
     import numpy
 
     width, height = _size(camera)
-    images, first = [], 0
-    for group in range(groups):
-        size = count // groups + (group < count % groups)
-        if width * height * size >= _MOST_LANES:
-            raise UsageError(f"{width} x {height} pixels with {size} samples in a group are more than Mitsuba traces "
-                             f"at once; use more groups than {groups}")
-        common = {"type": "covary_common_numbers", "pixels": width * height, "first": first, "sample_count": size}
-        around = _around(mi, camera, common if sampling == "crn" else {"type": "independent", "sample_count": size})
-        number = 2 * seed if sampling == "crn" else (2 * seed + 1) * 4096 + group
-        image = integrator.render(scene, around, seed=number % (1 << 32), spp=size)
-        images.append(numpy.array(image, dtype=numpy.float32)[..., :3])
-        first += size
-        finished()
+    images: list[Any] = []
+    first = 0
+    for number, size in _stacks(count, groups, width, height):
+        pixels = width * (height + 1)
+        common = {"type": "covary_common_numbers", "pixels": pixels * number, "group_pixels": pixels, "first": first,
+                  "sample_count": size}
+        sampler = common if sampling == "crn" else {"type": "independent", "sample_count": size}
+        own = 2 * seed if sampling == "crn" else (2 * seed + 1) * 4096 + len(images)
+        made = integrator.render(scene, _around(mi, camera, sampler, number), seed=own % (1 << 32), spp=size)
+        values = numpy.array(made, dtype=numpy.float32)[..., :3]
+        images.extend(values.reshape(number, height + 1, width, 3)[:, :height])
+        first += number * size
+        finished(number)
     return film_from_groups(numpy.stack(images), count, sampling=sampling)
 
 

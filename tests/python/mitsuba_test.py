@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """covary.mitsuba with Mitsuba's own wheel, in the LLVM variant. Seeds are fixed."""
+import subprocess
 import sys
 import unittest
 
 import covary
 import covary.mitsuba
 import numpy
-from common import SOURCE, PackageTest
+from common import ROOM, SOURCE, PackageTest
 
 VARIANT = "llvm_ad_rgb"
 SIZE = {"width": 48, "height": 32}
@@ -67,6 +68,30 @@ class Render(WithMitsuba):
                         for more in ({}, {"samples_per_pass": 2}))
         numpy.testing.assert_allclose(once.films["crn"].groups, passes.films["crn"].groups, rtol=1e-4, atol=1e-5)
 
+    def test_groups_traced_together(self):
+        """Or one by one: the same samples of the image with common numbers, but for roundings at edges."""
+        together = covary.mitsuba.render(self.room(), 28).films["crn"].groups
+        kept, covary.mitsuba._LANES_OF_STACK = covary.mitsuba._LANES_OF_STACK, 1
+        try:
+            alone = covary.mitsuba.render(self.room(), 28).films["crn"].groups
+        finally:
+            covary.mitsuba._LANES_OF_STACK = kept
+        self.assertGreater(numpy.mean(numpy.abs(together - alone) <= 0.01 * alone), 0.98)
+        numpy.testing.assert_allclose(together.mean((1, 2)), alone.mean((1, 2)), rtol=2e-3)
+
+    def test_stacks(self):
+        """Of groups hold each once, within the limits."""
+        for count, groups, width, height in ((24, 12, 64, 48), (26, 12, 64, 48), (12, 12, 1280, 720), (3, 3, 1, 5000)):
+            stacks = list(covary.mitsuba._stacks(count, groups, width, height))
+            self.assertEqual(sum(number for number, _ in stacks), groups)
+            self.assertEqual(sum(number * size for number, size in stacks), count)
+            for number, size in stacks:
+                self.assertTrue(number == 1 or number * size * width * (height + 1) <= 1 << 24)
+                self.assertTrue(number == 1 or number * (height + 1) <= 4096)
+        self.assertEqual(len(list(covary.mitsuba._stacks(24, 12, 64, 48))), 1)
+        self.assertIn("use more groups than 3", self.message_of(
+            covary.UsageError, lambda: list(covary.mitsuba._stacks(3000, 3, 4096, 2160))))
+
     def test_groups_of_unequal_sizes(self):
         result = covary.mitsuba.render(self.room(), 28)
         self.assertEqual(result.films["crn"].groups.shape[0], 12)
@@ -110,6 +135,9 @@ class Refused(WithMitsuba):
         self.assertIn("points on its lens", self.refused(self.mi.load_dict(scene), 48))
 
     def test_variants(self):
+        code = f"import covary.mitsuba; covary.mitsuba.render({str(ROOM)!r}, 48)"
+        run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+        self.assertIn("no variant of Mitsuba is chosen; call mitsuba.set_variant() with one of", run.stderr)
         self.mi.set_variant("scalar_rgb")
         self.assertIn("the variant 'scalar_rgb' of Mitsuba takes samples one by one", self.refused("x.xml", 48))
 
