@@ -204,6 +204,26 @@ class Calls(PackageTest):
         self.assertLess((pages_after - pages_before) * 4096, 8 << 20)  # 10 kB a call; one image alone has 9 kB
 
 
+    def test_no_growth_under_threads(self):
+        """Calls of threads that come and go."""
+        crn, independent = pair(height=8, width=8)
+
+        def calls():
+            for _ in range(10):
+                covary.combine(crn, independent, force=True)
+        resident = []
+        for batch in range(40):
+            threads = [threading.Thread(target=calls) for _ in range(3)]
+            for thread in threads:
+                thread.start()
+            for thread in threads:
+                thread.join()
+            if batch in (9, 39):
+                gc.collect()
+                resident.append(resident_pages())
+        self.assertLess((resident[1] - resident[0]) * 4096, 8 << 20)  # 9 kB for each of 900 calls
+
+
 def resident_pages():
     with open("/proc/self/statm", encoding="ascii") as file:
         return int(file.read().split()[1])
