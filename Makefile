@@ -15,7 +15,7 @@
 #                         /usr/local); ARCH=native builds for this machine alone, in a third of the time
 #   make wheel            the Python package as a wheel for every x86-64 processor, and its sources, in dist/
 #                         (docs/python.md); ARCH=native for machines like this alone
-#   make blender          the add-on of Blender as dist/covary-blender.zip, of the wheel that `make wheel` made, or makes
+#   make blender          the add-on of Blender as dist/covary-blender.zip, of the wheel in dist/ or a new one
 #   make asan|tsan        build and run the tests under the sanitizers of addresses, leaks and undefined behaviour;
 #                         under that of threads
 #   make dev|clang        the same with checks of the standard library, by GCC; by Clang

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """blender_gain.py [--resolution 160x96] [--spp 192] [--seeds 2] [--reference-spp 1024]
 
-How much less error covary.blender has than Cycles in the closed room of tests/python/blender_test.py, with equal samples
-and in equal processor time, against Cycles with the sampler that is its default, and against the same with its
+How much less error covary.blender has than Cycles in the closed room of tests/python/blender_test.py, with equal
+samples and in equal processor time, against Cycles with the sampler that is its default, and against the same with its
 denoiser. All have a box filter and no clamp. Errors are relMSE in product form against two references, means over the
 seeds; times are processor seconds of the whole process. Needs the Python packages covary and bpy."""
 import argparse

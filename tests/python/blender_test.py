@@ -108,8 +108,8 @@ class Extension(PackageTest):
             self.assertIn('version = "0.1.0"', archive.read("blender_manifest.toml").decode())
         environment = {**os.environ, "BLENDER_USER_RESOURCES": str(self.path / "blender"),
                        "PYTHONPATH": f"{SOURCE / 'tests' / 'python'}:{SOURCE / 'tests' / 'cli'}"}
-        run = subprocess.run([sys.executable, "-c", INSTALLED, self.path / "covary.zip"], capture_output=True, text=True,
-                             env=environment, check=False)
+        run = subprocess.run([sys.executable, "-c", INSTALLED, self.path / "covary.zip"], env=environment,
+                             capture_output=True, text=True, check=False)
         self.assertEqual(run.returncode, 0, run.stdout + run.stderr)
         self.assertIn(f"from {self.path / 'blender'}", run.stdout)
 
