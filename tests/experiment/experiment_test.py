@@ -245,8 +245,8 @@ class Parts(ExperimentTest):
 
     def test_make_the_whole(self):
         expected = without_times(self.results(out="whole"))
-        processes = [subprocess.Popen(self.command("--part", f"{k}/3"), cwd=self.path, stderr=subprocess.PIPE)
-                     for k in (1, 2, 3)]
+        commands = [self.command("--part", f"{k}/3") for k in (1, 2, 3)]  # writes the suite, which they read
+        processes = [subprocess.Popen(command, cwd=self.path, stderr=subprocess.PIPE) for command in commands]
         for process in processes:
             _, errors = process.communicate(timeout=120)
             self.assertEqual(process.returncode, 0, errors)
