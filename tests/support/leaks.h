@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#ifdef __SANITIZE_ADDRESS__
+#include <sanitizer/lsan_interface.h>
+#endif
+
+namespace covary::test_support {
+
+/// While it lives, what this thread allocates is not counted as a leak: for those of other libraries that
+/// scripts/sanitizers/leaks.txt cannot name, because the stack through them is not known.
+#ifdef __SANITIZE_ADDRESS__
+using LeaksOfOthers = __lsan::ScopedDisabler;
+#else
+struct LeaksOfOthers {
+  LeaksOfOthers() {}  // not trivial, so that nothing is unused
+};
+#endif
+
+}  // namespace covary::test_support
