@@ -140,6 +140,7 @@ RenderRequest make_request(const RenderOptions& options, const LoadedScene& scen
   request.aovs = options.aovs;
   request.path_lengths = options.control.path_lengths;
   request.crn_part = crn_part_named(options.crn_part);
+  if (!options.sampler.empty()) request.sampler = sampler_named(options.sampler);
   request.output = options.output;
   request.preview = options.preview;
   request.save_training = options.save_training, request.load_training = options.load_training;
@@ -163,6 +164,7 @@ SampleAddress replayed_sample(const RenderOptions& options) {
   address.x = static_cast<int>(at[0]), address.y = static_cast<int>(at[1]);
   address.sample = static_cast<uint64_t>(at[2]);
   if (with_pass) address.pass = static_cast<uint32_t>(at[3]);
+  address.groups = options.groups;
   return address;
 }
 
@@ -188,6 +190,12 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
       .add_option("--sampling", o.sampling,
                   "Random numbers per pixel, or common to all; a single pass (estimator none)")
       ->check(one_of({"independent", "crn"}));
+  command
+      .add_option(
+          "--sampler", o.sampler,
+          "Random numbers of the samples of a group: independent, or Owen-scrambled Sobol' points; default: the "
+          "scene's, any but independent meaning sobol")
+      ->check(one_of({"independent", "sobol"}));
   command
       .add_option("--crn-part", o.crn_part,
                   "Which part of a path has the common random numbers, for integrators that trace light")

@@ -22,7 +22,7 @@ namespace covary {
 struct RenderOptions {
   std::string scene, output, integrator, sampling, split = "1:1", rfilter, json, passes;
   std::string stages, resolution, crop, replay, until, display_server, save_training, load_training;
-  std::string crn_part = "both", debug_strategies;
+  std::string crn_part = "both", sampler, debug_strategies;
   EstimatorOptions estimator;
   ControlTexts control;
   GuideTexts guide;

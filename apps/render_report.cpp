@@ -57,6 +57,9 @@ std::string replay_command(const RenderOptions& o, const Pass& pass, const BadSa
   if (!pass.plan.light) add("--sampling", sampling_name(pass));
   if (pass.settings.sampling == Sampling::kCrn && o.crn_part != "both") add("--crn-part", o.crn_part);
   add("--seed", std::to_string(o.seed));
+  const bool is_sobol = pass.settings.sampler == Sampler::kSobol;
+  if (is_sobol || !o.sampler.empty()) add("--sampler", sampler_name(pass.settings.sampler));
+  if (is_sobol) add("--groups", std::to_string(pass.settings.groups));
   if (pass.plan.light) {
     add("--replay-light", std::to_string(bad.sample));
     return shell_text(words);
@@ -127,7 +130,7 @@ void report_bad_samples(const RenderOptions& options, const Pass& pass) {
 namespace {
 
 nlohmann::ordered_json statistics_of(const Pass& pass) {
-  nlohmann::ordered_json json = {{"sampling", sampling_name(pass)}};
+  nlohmann::ordered_json json = {{"sampling", sampling_name(pass)}, {"sampler", sampler_name(pass.settings.sampler)}};
   if (pass.plan.light)
     json["light_paths"] = light_paths(pass.film);
   else

@@ -96,6 +96,7 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator = "i
            path_lengths: bool = False, crop: tuple[int, int, int, int] | None = None,
            filter: Literal["box", "tent", "gaussian"] | None = None,
            sampling: Literal["independent", "crn"] = "independent",
+           sampler: Literal["independent", "sobol"] | None = None,
            crn_part: Literal["both", "camera", "light"] = "both", groups: int | None = None,
            split: tuple[float, float] | None = None, films_only: bool = False,
            save_training: str | PathLike[str] | None = None,
@@ -117,6 +118,7 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator = "i
     aovs: also the images Albedo, N and P; path_lengths: also images of paths of each length, by controlled-path.
     crop: x, y, width and height in the frame.
     sampling: of the one pass of estimator "none".
+    sampler: "sobol" for Owen-scrambled Sobol' points in each group of samples; by default the scene's.
     groups: of samples whose means films keep; split: parts of the samples for the CRN and the independent pass.
     films_only: take the passes and make no image of them; result.image is then the mean of all samples.
     progress: called with (done, total) samples, up to 20 times a second.
@@ -129,7 +131,7 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator = "i
     request: dict[str, Any] = {name: None if path is None else fspath(path) for name, path in names.items()}
     request |= {"spp": spp, "seed": seed, "until": until, "seconds": time, "resume": resume, "overwrite": overwrite,
                 "checkpoint": float(checkpoint), "preview": preview, "aovs": aovs, "crop": crop, "filter": filter,
-                "crn_part": crn_part, "path_lengths": path_lengths}
+                "sampler": sampler, "crn_part": crn_part, "path_lengths": path_lengths}
     if until_p95 is not None:
         if until is not None:
             raise UsageError("found until and until_p95; accepted is one of them")

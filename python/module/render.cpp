@@ -154,9 +154,10 @@ RenderRequest request_of(const nb::dict& given) {
   take("output", r.output), take("preview", r.preview), take("passes", r.passes), take("resume", r.resume);
   take("overwrite", r.overwrite), take("checkpoint", r.checkpoint_seconds);
   take("save_training", r.save_training), take("load_training", r.load_training), take("attributes", r.attributes);
-  std::string filter, crn_part;
-  take("filter", filter), take("crn_part", crn_part);
+  std::string filter, sampler, crn_part;
+  take("filter", filter), take("sampler", sampler), take("crn_part", crn_part);
   if (!filter.empty()) r.filter = filter_named(filter);
+  if (!sampler.empty()) r.sampler = sampler_named(sampler);
   if (!crn_part.empty()) r.crn_part = crn_part_named(crn_part);
   std::array<int, 4> crop{};
   take("crop", crop);

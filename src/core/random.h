@@ -6,10 +6,14 @@
 //
 // The dimension is itself an address (subpath, vertex of it, event at that vertex). Two neighbouring pixels' paths
 // read the same number for the same event although one of them may have drawn fewer numbers before it.
+//
+// With Sampler::kSobol the numbers that the samples of a group read for one event are points of one scrambled Sobol'
+// sequence (core/sobol.h); groups, events, pixels, passes and seeds have scrambles of their own.
 #pragma once
 
 #include <cstdint>
 
+#include "core/sobol.h"
 #include "core/vec.h"
 
 namespace covary {
@@ -47,6 +51,9 @@ enum class Subpath : uint32_t { kCamera, kLight };
 
 enum class Sampling : uint32_t { kIndependent, kCrn };
 
+/// How the numbers of a pixel's samples relate to each other: not at all, or as points of a sequence for each group.
+enum class Sampler : uint32_t { kIndependent, kSobol };
+
 /// Stream of the numbers of one path, at first those of its camera subpath. Copying is cheap; there is no state.
 class PathRandom {
  public:
@@ -55,6 +62,16 @@ class PathRandom {
   PathRandom(Sampling sampling, uint64_t seed, uint32_t pass, uint64_t pixel, uint64_t sample)
       : key_(combine64(combine64(combine64(seed, pass), sampling == Sampling::kCrn ? ~uint64_t{0} : pixel), sample)),
         sampling_(sampling) {}
+
+  /// The numbers of the path that is sample `index` of a group of samples, for Sampler::kSobol; at most 2^32 - 1 have
+  /// the numbers of one sequence. The rest as above.
+  static PathRandom sobol(Sampling sampling, uint64_t seed, uint32_t pass, uint64_t pixel, uint32_t group,
+                          uint32_t index) {
+    constexpr uint64_t kGroups = uint64_t{1} << 63;  // in the place of samples, which are fewer
+    PathRandom random(sampling, seed, pass, pixel, kGroups + group);
+    random.reversed_index_ = reverse_bits(index);
+    return random;
+  }
 
   Sampling sampling() const { return sampling_; }
   /// Equal: all numbers are.
@@ -69,14 +86,19 @@ class PathRandom {
   }
 
   /// One number in [0, 1), a multiple of 2^-24.
-  float get_1d(uint32_t vertex, Event event) const { return to_unit(static_cast<uint32_t>(bits(vertex, event) >> 32)); }
+  float get_1d(uint32_t vertex, Event event) const {
+    const uint64_t z = bits(vertex, event);
+    return to_unit(in_sequence() ? sobol_first(reversed_index_, z) : static_cast<uint32_t>(z >> 32));
+  }
   /// Two independent numbers in [0, 1).
   Vec2 get_2d(uint32_t vertex, Event event) const {
-    const uint64_t z = bits(vertex, event);
+    uint64_t z = bits(vertex, event);
+    if (in_sequence()) z = sobol_point(reversed_index_, z);
     return {to_unit(static_cast<uint32_t>(z >> 32)), to_unit(static_cast<uint32_t>(z))};
   }
 
  private:
+  bool in_sequence() const { return reversed_index_ != kNoIndex; }
   static float to_unit(uint32_t u) { return static_cast<float>(u >> 8) * 0x1p-24f; }
   uint64_t bits(uint32_t vertex, Event event) const {
     const uint64_t dimension = vertex * kEventsPerVertex + static_cast<uint32_t>(event);  // less than 2^32
@@ -84,7 +106,9 @@ class PathRandom {
   }
   static constexpr uint64_t kStep = 0x9e3779b97f4a7c15ull;  // odd, so no two dimensions share a number
   static constexpr uint32_t kSubpathKinds = 2;
+  static constexpr uint32_t kNoIndex = ~uint32_t{0};
   uint64_t key_;
+  uint32_t reversed_index_ = kNoIndex;  // in the sequences of its group
   Sampling sampling_;
 };
 

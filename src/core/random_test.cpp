@@ -197,6 +197,55 @@ TEST(PathRandom, CommonNumbersLeaveOutThePixelAndNothingElse) {
   EXPECT_EQ(random.get_2d(2, Event::kDirection), copy.get_2d(2, Event::kDirection));
 }
 
+// Numbers of Sobol' points: the samples of a group share the sequence of an event, and everything else has one of its
+// own. N and alpha as above; pairs run through pixels. Planted bug: a step that does not change the address.
+TEST(PathRandom, SequencesOfNeighbouringAddressesAreIndependent) {
+  struct Point {
+    Address address;
+    uint32_t group = 3, index = 5;
+  };
+  const auto numbers = [](const Point& p) {
+    const Address& a = p.address;
+    const PathRandom random = PathRandom::sobol(a.sampling, a.seed, a.pass, a.pixel, p.group, p.index);
+    return (a.subpath == 0 ? random : random.subpath(Subpath::kLight, uint32_t(a.subpath - 1)))
+        .get_2d(a.vertex, a.event);
+  };
+  const auto test = [&](const std::string& name, const std::function<void(Point&)>& step) {
+    return test_pairs(name, kPairs, [&](int i) {
+      Point a;
+      a.address.pixel += 10000 * i;
+      Point b = a;
+      step(b);
+      return Vec2{numbers(a).x, numbers(b).x};
+    });
+  };
+  for (const Walk& walk : kWalks)
+    if (walk.name != std::string("samples")) {
+      const Chi2Result result = test(walk.name, [&](Point& p) { walk.step(p.address, 1); });
+      EXPECT_TRUE(result.accepted) << result.message;
+    }
+  EXPECT_TRUE(test("groups", [](Point& p) { ++p.group; }).accepted);
+  EXPECT_FALSE(test("samples", [](Point& p) { ++p.index; }).accepted) << "points of a sequence keep their distance";
+  EXPECT_FALSE(test("nothing", [](Point&) {}).accepted);
+}
+
+TEST(PathRandom, SamplesOfAGroupArePointsOfOneSequenceForEachEvent) {
+  for (const Sampling sampling : {Sampling::kIndependent, Sampling::kCrn}) {
+    std::set<int> columns, rows;
+    for (uint32_t index = 0; index < 64; ++index) {
+      const PathRandom random = PathRandom::sobol(sampling, 7, 1, 1000, 2, index);
+      const Vec2 u = random.get_2d(2, Event::kDirection);
+      EXPECT_EQ(u.x, random.get_1d(2, Event::kDirection));
+      columns.insert(int(u.x * 64)), rows.insert(int(u.y * 64));
+      const PathRandom elsewhere = PathRandom::sobol(sampling, 7, 1, 1001, 2, index);
+      EXPECT_EQ(elsewhere == random, sampling == Sampling::kCrn) << "the pixel, and nothing else";
+      EXPECT_FALSE(random == PathRandom(sampling, 7, 1, 1000, index));
+    }
+    EXPECT_EQ(columns.size(), 64u);
+    EXPECT_EQ(rows.size(), 64u);
+  }
+}
+
 // Films that are continued or merged rely on these.
 TEST(PathRandom, AddressesKeepTheirNumbers) {
   const auto bits = [](float u) { return static_cast<uint32_t>(u * 0x1p24f); };
@@ -207,6 +256,10 @@ TEST(PathRandom, AddressesKeepTheirNumbers) {
   EXPECT_EQ(bits(random.subpath(Subpath::kCamera).get_1d(0, Event::kPixel)), 5967396u);
   EXPECT_EQ(bits(random.subpath(Subpath::kLight).get_1d(0, Event::kPixel)), 10187763u);
   EXPECT_EQ(bits(random.subpath(Subpath::kLight, 5).get_1d(0, Event::kPixel)), 6422205u);
+  const PathRandom sobol = PathRandom::sobol(Sampling::kIndependent, 7, 1, 1000, 3, 12);
+  EXPECT_EQ(bits(sobol.get_1d(0, Event::kPixel)), 7972066u);
+  EXPECT_EQ(bits(sobol.get_2d(2, Event::kDirection).y), 7025476u);
+  EXPECT_EQ(bits(sobol.subpath(Subpath::kLight).get_1d(0, Event::kPixel)), 9880291u);
 }
 
 // Of 10 000 pairs of 24-bit numbers from two seeds 0.0006 are expected to be equal; from one seed all are.

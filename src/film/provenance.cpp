@@ -19,19 +19,23 @@ std::string attribute(const ImageFacts& image, const std::string& key, const std
   return it == image.info.attributes.end() ? otherwise : it->second;
 }
 
-/// Integrator and its parameters, and the pixel filter, of the attribute `settings`: "path …; filter …; …".
+/// Integrator and its parameters, pixel filter and sampler of the attribute `settings`: "path …; filter …; …".
 struct Settings {
-  std::string integrator, filter;
+  std::string integrator, filter, sampler = "independent";
   explicit Settings(const std::string& text) {
     std::stringstream parts(text);
     for (std::string part; std::getline(parts, part, ';');) {
       part.erase(0, part.find_first_not_of(' '));
       if (part.starts_with("filter "))
         filter = part.substr(7);
+      else if (part.starts_with("sampler "))
+        sampler = part.substr(8);
       else if (integrator.empty())
         integrator = part;
     }
   }
+  /// Light paths are independent whatever the sampler.
+  bool traces_light() const { return integrator.find("light_tracing=on") != std::string::npos; }
 };
 
 std::set<std::string> seeds_of(const ImageFacts& image) {
@@ -75,15 +79,16 @@ std::vector<std::string> comparison_warnings(const ImageFacts& image, const Imag
   const std::set<std::string> seeds = seeds_of(image), other_seeds = seeds_of(reference);
   std::vector<std::string> common;
   std::set_intersection(seeds.begin(), seeds.end(), other_seeds.begin(), other_seeds.end(), std::back_inserter(common));
-  // Passes of common and of independent random numbers share no samples, whatever their seeds.
+  // Passes of common and of independent random numbers share no samples, whatever their seeds, nor do samplers.
+  const Settings settings(attribute(image, "settings")), other(attribute(reference, "settings"));
+  const bool same_sampler = settings.sampler == other.sampler || settings.traces_light();
   const std::string sampling = attribute(image, "sampling"), other_sampling = attribute(reference, "sampling");
-  if (!common.empty() && (sampling.empty() || other_sampling.empty() || sampling == other_sampling))
+  if (!common.empty() && same_sampler && (sampling.empty() || other_sampling.empty() || sampling == other_sampling))
     warn(fmt::format("have seed {} in common and so share samples, which makes errors between them wrong",
                      fmt::join(common, ", ")));
   if (const std::string a = attribute(image, "scene_hash"), b = attribute(reference, "scene_hash");
       !a.empty() && !b.empty() && a != b)
     warn("show different scenes, or versions of one (attribute covary:scene_hash)");
-  const Settings settings(attribute(image, "settings")), other(attribute(reference, "settings"));
   compare("were rendered with different settings", settings.integrator, other.integrator);
   compare("were rendered with different pixel filters", settings.filter, other.filter);
   // An exposure of 0 is not written.

@@ -43,6 +43,10 @@ TEST(Provenance, SeedsInCommon) {
   EXPECT_EQ(warnings({{"seed", "99,19"}}), "");
   EXPECT_EQ(warnings({{"seed", "9"}, {"sampling", "crn"}}), "");
   EXPECT_TRUE(contains(warnings({{"seed", "9"}, {"sampling", ""}}), "have seed 9 in common"));  // of both passes
+  const std::string sobol = " max_depth=5; filter box radius=0.5; sampler sobol";
+  EXPECT_EQ(warnings({{"seed", "9"}, {"settings", "path" + sobol}}), "");
+  EXPECT_TRUE(contains(warnings({{"seed", "9"}, {"settings", "bdpt light_tracing=on" + sobol}}),
+                       "have seed 9 in common"));  // of light paths
 }
 
 TEST(Provenance, OtherScenesAndSettings) {

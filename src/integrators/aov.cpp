@@ -2,12 +2,11 @@
 #include "integrators/aov.h"
 
 #include "core/parallel.h"
-#include "integrators/render_pass.h"
 
 namespace covary {
 
-void render_aovs(const Scene& scene, const FilterSettings& filter, Sampling sampling, uint64_t seed, uint32_t pass,
-                 uint32_t spp, Film& film, const std::atomic<bool>* stop) {
+void render_aovs(const Scene& scene, const PassSettings& settings, uint32_t spp, Film& film,
+                 const std::atomic<bool>* stop) {
   Image albedo(film.width(), film.height(), 3), normal = albedo, position = albedo;
   const auto stopped = [&] { return stop && stop->load(std::memory_order_relaxed); };
   parallel_for(film.height(), [&](int y) {
@@ -17,10 +16,7 @@ void render_aovs(const Scene& scene, const FilterSettings& filter, Sampling samp
       Spectrum a;
       Vec3 n, p;
       for (uint32_t s = 0; s < spp; ++s) {
-        const uint64_t pixel = static_cast<uint64_t>(frame_y) * film.frame_width() + frame_x;
-        const PathRandom random(sampling, seed, pass, pixel, s);
-        const Ray ray =
-            scene.camera().ray(film_position(filter, frame_x, frame_y, random), random.get_2d(0, Event::kLens));
+        const Ray ray = camera_sample(scene, settings, frame_x, frame_y, s).ray;
         SurfaceHit hit;
         if (!scene.intersect(ray, hit)) continue;
         a += hit.bsdf->albedo(hit);

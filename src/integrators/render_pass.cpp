@@ -83,8 +83,12 @@ std::vector<Tile> make_tiles(const Film& film) {
 PathRandom sample_random(const PassSettings& settings, const Camera& camera, int x, int y, uint64_t sample,
                          bool common) {
   const uint64_t pixel = static_cast<uint64_t>(y) * camera.width() + x;
-  if (!common) return {Sampling::kIndependent, settings.seed, settings.pass | kOwnNumbers, pixel, sample};
-  return {settings.sampling, settings.seed, settings.pass, pixel, sample};
+  const Sampling sampling = common ? settings.sampling : Sampling::kIndependent;
+  const uint32_t pass = common ? settings.pass : settings.pass | kOwnNumbers;
+  if (settings.sampler == Sampler::kIndependent) return {sampling, settings.seed, pass, pixel, sample};
+  const auto groups = static_cast<uint32_t>(settings.groups);
+  return PathRandom::sobol(sampling, settings.seed, pass, pixel, static_cast<uint32_t>(sample % groups),
+                           static_cast<uint32_t>(sample / groups));
 }
 
 /// Sorts by pixel and sample and keeps the first few; which ones does not depend on the order they came in.
@@ -213,6 +217,8 @@ const char* sampling_name(Sampling sampling, CrnPart part) {
   return part == CrnPart::kCamera ? "crn-camera" : part == CrnPart::kLight ? "crn-light" : "crn";
 }
 
+const char* sampler_name(Sampler sampler) { return sampler == Sampler::kSobol ? "sobol" : "independent"; }
+
 uint32_t wave_end(uint32_t count, int groups) {
   const uint32_t size = static_cast<uint32_t>(groups) * std::max(1, 16 / groups);
   if (count >= size) return (count / size + 1) * size;
@@ -249,6 +255,8 @@ PassResult render_pass(const Scene& scene, const Integrator& integrator, const P
   COVARY_CHECK(!settings.estimate || film.groups() == 1, "an estimate from all samples of a pixel has no groups");
   COVARY_CHECK(film.frame_width() == scene.camera().width() && film.frame_height() == scene.camera().height(),
                "film and camera differ in size");
+  COVARY_CHECK(settings.sampler == Sampler::kIndependent || settings.groups == film.groups(),
+               "points of a sequence for each group follow from the film's number of groups");
   check_learner(integrator, settings, film);
   const std::vector<Tile> tiles = make_tiles(film);
   const uint32_t limit = settings.estimate ? UINT32_MAX : settings.limit;

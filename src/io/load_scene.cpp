@@ -380,6 +380,7 @@ class Loader {
     result_.crop_width = film.crop_width, result_.crop_height = film.crop_height;
     result_.filter = film.filter;
     result_.spp = sensor.sampler.sample_count;
+    result_.sampler_type = sensor.sampler.type;
     try {
       parts_.camera = std::make_shared<Camera>(sensor.camera, film.width, film.height);
     } catch (const Error& error) {

@@ -29,6 +29,7 @@ struct LoadedScene {
   int crop_x = 0, crop_y = 0, crop_width = 0, crop_height = 0;
   FilterSettings filter;
   int spp = 4;                  ///< of the scene's sampler
+  std::string sampler_type;     ///< "" when the file names none
   std::string integrator_type;  ///< "" when the file names none
   std::shared_ptr<SceneObject> integrator;
   /// There are lights that are a point or a direction, and mirrors or smooth glass: light of the former by way of the

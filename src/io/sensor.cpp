@@ -104,6 +104,7 @@ std::shared_ptr<FilmSettings> make_film(Parameters& p) {
 
 std::shared_ptr<SamplerSettings> make_sampler(Parameters& p) {
   auto sampler = std::make_shared<SamplerSettings>();
+  sampler->type = p.type();
   sampler->sample_count = p.get_int("sample_count", 4, 1, kMaxInt);
   p.get_int("seed", 0, 0, kMaxInt);  // the command line's --seed counts
   p.get_bool("jitter", true);

@@ -19,6 +19,7 @@ struct FilterObject : SceneObject {
 };
 
 struct SamplerSettings : SceneObject {
+  std::string type;  ///< its name in the scene; empty where there is none
   int sample_count = 4;
 };
 

@@ -123,12 +123,14 @@ TEST(AuxiliaryImages, AreTimedAsRenderingAndEndWithTheRender) {
 
 TEST(AuxiliaryImages, EndAtOnceWhenStopped) {
   const LoadedScene scene = load_sized(kRoom);
+  PassSettings settings;
+  settings.filter = scene.filter;
   Film film(40, 30, {0, 0, 40, 30}, 1);
   std::atomic<bool> stop{true};
-  render_aovs(*scene.scene, scene.filter, Sampling::kIndependent, 0, 0, 4, film, &stop);
+  render_aovs(*scene.scene, settings, 4, film, &stop);
   EXPECT_TRUE(film.aovs.empty());
   stop = false;
-  render_aovs(*scene.scene, scene.filter, Sampling::kIndependent, 0, 0, 4, film, &stop);
+  render_aovs(*scene.scene, settings, 4, film, &stop);
   EXPECT_EQ(film.aovs.size(), 3u);
 }
 

@@ -14,8 +14,10 @@ std::vector<Spectrum> pixel_importance(const Scene& scene, const FilterSettings&
                                        const std::atomic<bool>* stop) {
   constexpr float kSmallest = 0.01f;
   constexpr uint32_t kGuideSamples = 2;
+  PassSettings settings;
+  settings.pass = kTrainingPass, settings.filter = filter;
   Film guides(film.frame_width(), film.frame_height(), film.crop(), 1);
-  render_aovs(scene, filter, Sampling::kIndependent, 0, kTrainingPass, kGuideSamples, guides, stop);
+  render_aovs(scene, settings, kGuideSamples, guides, stop);
   if (!guides.aovs.contains("N")) return {};
   const Image &albedo = guides.aovs.at("Albedo"), &normal = guides.aovs.at("N");
   const Image value = find_denoiser().empty() ? joint_bilateral(film.mean_image(), albedo, normal)

@@ -82,6 +82,7 @@ class PlanRun {
   void between_waves();
   void warn_of_other_samples(uint32_t asked) const;
   void warn_of_missing_light() const;
+  void warn_of_other_sampler() const;
   void estimate();
   double time_estimate();
   void render_auxiliary_images();
@@ -177,8 +178,15 @@ void PlanRun::warn_of_missing_light() const {
       "without light tracing the image lacks what mirrors and glass cast of lights that are a point or a direction");
 }
 
+void PlanRun::warn_of_other_sampler() const {
+  const std::string& type = scene_.sampler_type;
+  if (request_.sampler || !callbacks_.warning || type.empty() || type == "independent" || type == "sobol") return;
+  callbacks_.warning(fmt::format("the scene's sampler '{}' is rendered as 'sobol' (--sampler)", type));
+}
+
 bool PlanRun::render_to_limits() {
   warn_of_missing_light();
+  warn_of_other_sampler();
   TrainingSettings settings{window_, filter_, callbacks_.stop, callbacks_.progress, {}};
   if (plan_.takes_training) settings.image = &result_.training;
   if (!train(scene_, request_, settings, result_.seconds)) return false;
@@ -261,6 +269,8 @@ Pass PlanRun::begin_pass(const PassPlan& plan) const {
   pass.plan = plan;
   pass.integrator = state_.integrator;
   pass.settings.sampling = plan.sampling;
+  const Sampler sampler = sampler_of(scene_, request_);
+  pass.settings.sampler = plan.light ? Sampler::kIndependent : sampler;
   pass.settings.crn_part = request_.crn_part;
   pass.settings.seed = request_.seed;
   pass.settings.pass = plan.light ? kLightPass + plan.number : plan.number;
@@ -277,12 +287,14 @@ Pass PlanRun::begin_pass(const PassPlan& plan) const {
   const auto* learning = dynamic_cast<const LearningIntegrator*>(state_.integrator.get());
   pass.film.attributes.insert_or_assign(
       film_key::kSettings, (learning ? learning->settings_text() : state_.integrator->description()) + "; filter " +
-                               filter_text(filter_) + number + plan.settings);
+                               filter_text(filter_) + number + plan.settings +
+                               (sampler == Sampler::kSobol ? "; sampler sobol" : ""));
   if (learning) pass.film.attributes.insert_or_assign(film_key::kTraining, learning->training_text());
   pass.film.attributes.insert_or_assign(film_key::kComplete, "false");
   if (plan.light) pass.film.attributes.insert_or_assign(film_key::kLightPaths, std::to_string(kBundlePaths));
   if (!plan.estimator.empty()) pass.film.attributes.insert_or_assign("estimator", plan.estimator);
   take_film_on_disk(request_, callbacks_.warning, pass);
+  pass.settings.groups = pass.film.groups();
   return pass;
 }
 
@@ -349,8 +361,7 @@ double PlanRun::time_estimate() {
 void PlanRun::render_auxiliary_images() {
   const Stopwatch watch;
   Pass& last = state_.passes[camera_passes(state_.passes).size() - 1];
-  render_aovs(*scene_.scene, filter_, last.settings.sampling, last.settings.seed, last.settings.pass, kAovSamples,
-              last.film, callbacks_.stop);
+  render_aovs(*scene_.scene, last.settings, kAovSamples, last.film, callbacks_.stop);
   result_.aovs = std::exchange(last.film.aovs, {});
   result_.seconds.auxiliary = watch.seconds();
 }
@@ -382,6 +393,11 @@ const Pass& PlanState::pass(const std::string& name, uint32_t number) const {
 }
 
 Image RenderResult::picture() const { return image.estimate.data.empty() ? preview_of(passes) : image.estimate; }
+
+Sampler sampler_of(const LoadedScene& scene, const RenderRequest& request) {
+  const bool is_independent = scene.sampler_type.empty() || scene.sampler_type == "independent";
+  return request.sampler.value_or(is_independent ? Sampler::kIndependent : Sampler::kSobol);
+}
 
 RenderResult render(const LoadedScene& scene, const Plan& plan, const RenderRequest& request,
                     const RenderCallbacks& callbacks) {
@@ -416,6 +432,12 @@ ReplayedSample replay(const LoadedScene& scene, const Plan& plan, const RenderRe
                                                scene.width, scene.height));
   PassSettings settings;
   settings.sampling = address.sampling;
+  settings.sampler = sampler_of(scene, request);
+  if (settings.sampler == Sampler::kSobol && !address.groups)
+    throw Error(ErrorCode::kUsage,
+                "a sample of --sampler sobol is one of a group; --groups says how many groups the "
+                "film has, 'covary info FILM' shows it");
+  settings.groups = address.groups.value_or(1);
   settings.crn_part = request.crn_part;
   settings.seed = request.seed;
   settings.pass = address.pass;

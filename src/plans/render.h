@@ -21,6 +21,7 @@ namespace covary {
 struct RenderRequest {
   uint64_t seed = 0;
   std::optional<FilterSettings> filter;  ///< default: the scene's
+  std::optional<Sampler> sampler;        ///< of camera samples; default: sampler_of()
   std::optional<CropWindow> crop;        ///< default: the scene's; inside the frame
   /// Samples per pixel of all passes together, 1 … 2^30. Default: the scene's, or no limit where `seconds` or `until`
   /// is given.
@@ -113,6 +114,10 @@ struct RenderResult {
   Image picture() const;
 };
 
+/// The sampler of camera samples: the request's, or else what stands for that of the scene: independent numbers for
+/// `independent` and where the scene has none, Sobol' points for each of Mitsuba's stratified and low-discrepancy ones.
+Sampler sampler_of(const LoadedScene& scene, const RenderRequest& request);
+
 /// Renders, estimates and, where the request names files, writes. `scene` was loaded with an integrator
 /// (integrator_choice.h). An interrupted render leaves what there is: films that can be continued and, where any sample
 /// was taken, the image of these, marked by the attribute covary:complete=false. Throws Error(kUsage) for a request
@@ -130,9 +135,10 @@ struct SampleAddress {
   uint32_t pass = 0;  ///< PassPlan::number
   int x = 0, y = 0;   ///< pixel in the full frame
   uint64_t sample = 0;
+  std::optional<int> groups;  ///< of the film; needed where sampler_of() is Sampler::kSobol
 };
 /// The value of the sample, as render() adds it to a film of the plan with this request's seed, filter and crop. Throws
-/// Error(kUsage) for a pixel outside the frame.
+/// Error(kUsage) for a pixel outside the frame, and where the number of groups is needed and not given.
 ReplayedSample replay(const LoadedScene& scene, const Plan& plan, const RenderRequest& request,
                       const SampleAddress& address);
 

@@ -22,6 +22,12 @@ CrnPart crn_part_named(const std::string& name) {
   throw Error(ErrorCode::kUsage, fmt::format("CRN part '{}': expected one of both, camera, light", name));
 }
 
+Sampler sampler_named(const std::string& name) {
+  if (name == "independent") return Sampler::kIndependent;
+  if (name == "sobol") return Sampler::kSobol;
+  throw Error(ErrorCode::kUsage, fmt::format("sampler '{}': expected one of independent, sobol", name));
+}
+
 void take_training(const LoadedScene& scene, RenderRequest& request) {
   const auto* learning = dynamic_cast<const LearningIntegrator*>(scene.integrator.get());
   const uint32_t training = learning ? learning->training_spp() : 0;

@@ -15,6 +15,9 @@ FilterSettings filter_named(const std::string& name);
 /// "both", "camera" or "light". Throws Error(kUsage).
 CrnPart crn_part_named(const std::string& name);
 
+/// "independent" or "sobol". Throws Error(kUsage).
+Sampler sampler_named(const std::string& name);
+
 /// Takes the samples of the integrator's training, where it has one, off those of the passes, where their number is
 /// known. Throws Error(kUsage) where none are left.
 void take_training(const LoadedScene& scene, RenderRequest& request);

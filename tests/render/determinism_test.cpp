@@ -31,15 +31,16 @@ PassSettings pass(const TestScene& scene, Sampling sampling, uint32_t spp) {
 
 TEST(Determinism, OneTwoAndFiveThreads) {
   const TestScene scene = load_room(70, 45);
-  for (const Sampling sampling : {Sampling::kIndependent, Sampling::kCrn}) {
-    std::vector<Film> films;
-    for (const size_t threads : {1, 2, 5}) {
-      const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
-      films.push_back(render(scene, 24, 7, sampling, 12));
+  for (const Sampler sampler : {Sampler::kIndependent, Sampler::kSobol})
+    for (const Sampling sampling : {Sampling::kIndependent, Sampling::kCrn}) {
+      std::vector<Film> films;
+      for (const size_t threads : {1, 2, 5}) {
+        const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+        films.push_back(render(scene, 24, 7, sampling, 12, sampler));
+      }
+      EXPECT_TRUE(same_bits(films[0], films[1]));
+      EXPECT_TRUE(same_bits(films[0], films[2]));
     }
-    EXPECT_TRUE(same_bits(films[0], films[1]));
-    EXPECT_TRUE(same_bits(films[0], films[2]));
-  }
 }
 
 TEST(Determinism, AnotherSeedGivesOtherBits) {
@@ -49,20 +50,33 @@ TEST(Determinism, AnotherSeedGivesOtherBits) {
 
 TEST(Determinism, ACropIsACutOfTheFrame) {
   const TestScene scene = load_room(60, 40);
-  const Film frame = render(scene, 4, 7);
-  const CropWindow crop{13, 9, 30, 21};
-  Film part(60, 40, crop, 1);
-  render_pass(scene.scene(), scene.integrator(), pass(scene, Sampling::kIndependent, 4), part);
-  for (int y = 0; y < crop.height; ++y)
-    for (int x = 0; x < crop.width; ++x) ASSERT_EQ(part.mean(x, y), frame.mean(crop.x + x, crop.y + y));
+  for (const Sampler sampler : {Sampler::kIndependent, Sampler::kSobol}) {
+    const Film frame = render(scene, 4, 7, Sampling::kIndependent, 2, sampler);
+    const CropWindow crop{13, 9, 30, 21};
+    Film part(60, 40, crop, 2);
+    PassSettings settings = pass(scene, Sampling::kIndependent, 4);
+    settings.sampler = sampler, settings.groups = 2;
+    render_pass(scene.scene(), scene.integrator(), settings, part);
+    for (int y = 0; y < crop.height; ++y)
+      for (int x = 0; x < crop.width; ++x) ASSERT_EQ(part.mean(x, y), frame.mean(crop.x + x, crop.y + y));
+  }
+}
+
+TEST(Determinism, PointsOfSequencesNeedTheGroupsOfTheFilm) {
+  const TestScene scene = load_room(16, 16);
+  Film film = new_film(scene, 2);
+  PassSettings settings = pass(scene, Sampling::kIndependent, 4);
+  settings.sampler = Sampler::kSobol;
+  EXPECT_THROW(render_pass(scene.scene(), scene.integrator(), settings, film), Error);
 }
 
 // Stopped at random moments (after a random number of tiles), written, read and continued, until done.
-TEST(Determinism, TwentyInterruptions) {
+void interrupt_twenty_times(Sampler sampler) {
   const TestScene scene = load_room(70, 45);
   constexpr uint32_t kSpp = 60;
   Film whole = new_film(scene, 12);
   PassSettings settings = pass(scene, Sampling::kCrn, kSpp);
+  settings.sampler = sampler, settings.groups = 12;
   int n_tiles = 0;
   std::atomic<int> tiles{0};
   settings.progress = [&](uint64_t, uint64_t) { ++tiles; };
@@ -88,6 +102,8 @@ TEST(Determinism, TwentyInterruptions) {
   EXPECT_EQ(interruptions, 20);
   EXPECT_TRUE(same_bits(film, whole));
 }
+TEST(Determinism, TwentyInterruptions) { interrupt_twenty_times(Sampler::kIndependent); }
+TEST(Determinism, TwentyInterruptionsOfSequences) { interrupt_twenty_times(Sampler::kSobol); }
 
 /// What a sample of the stand-in below is worth: many digits, so that any other order of additions shows.
 Spectrum value_of(const CameraSample& sample) {

@@ -73,10 +73,11 @@ inline Film new_film(const TestScene& scene, int groups = 1) {
 }
 
 inline Film render(const TestScene& scene, uint32_t spp, uint64_t seed, Sampling sampling = Sampling::kIndependent,
-                   int groups = 1) {
+                   int groups = 1, Sampler sampler = Sampler::kIndependent) {
   Film film = new_film(scene, groups);
   PassSettings settings;
   settings.sampling = sampling, settings.seed = seed, settings.spp = spp, settings.filter = scene.loaded.filter;
+  settings.sampler = sampler, settings.groups = groups;
   const PassResult result = render_pass(scene.scene(), scene.integrator(), settings, film);
   EXPECT_TRUE(result.complete);
   EXPECT_EQ(result.n_not_finite + result.n_negative, 0u);
