@@ -18,17 +18,20 @@ namespace {
 
 /// Errors of one image that are kept: the rest costs less than reading them.
 struct ImageErrors {
-  double relmse_trimmed = kNone, mae = 0, flip = 0, above5 = 0, predicted_relmse = kNone;
+  double relmse_trimmed = kNone, mae = 0, flip = 0, above5 = 0, predicted_relmse = kNone, coverage = kNone;
 };
 
-/// relMSE that the file's standard errors predict, with the references in the denominator; none where it has no such
-/// layer.
-double predicted_relmse(const std::string& path, const SceneInstance& scene, const std::vector<Image>& references) {
+/// The standard errors in the file; empty where it has none, or where another layer is looked at.
+Image standard_errors(const std::string& path, const SceneInstance& scene) {
   const ImageInfo info = inspect_image(path);
   const bool has_errors = std::any_of(info.channels.begin(), info.channels.end(),
                                       [](const ExrFile::Channel& c) { return c.name == "StdError.R"; });
-  if (!has_errors || !scene.entry.layer.empty()) return kNone;
-  const Image errors = read_window(path, scene, "StdError");
+  return has_errors && scene.entry.layer.empty() ? read_window(path, scene, "StdError") : Image();
+}
+
+/// relMSE that standard errors predict, with the references in the denominator; none where there are none.
+double predicted_relmse(const Image& errors, const std::vector<Image>& references) {
+  if (errors.data.empty()) return kNone;
   double sum = 0;
   size_t n = 0;
   for (size_t p = 0; p < errors.data.size() / 3; ++p) {
@@ -43,24 +46,51 @@ double predicted_relmse(const std::string& path, const SceneInstance& scene, con
   return sum / static_cast<double>(n);
 }
 
+/// RunResult::coverage; none without standard errors. The reference's variance is (R1 - R2)^2 / 4, noisy as it is, so
+/// that it should be small.
+double coverage(const Image& image, const Image& errors, const std::vector<Image>& references) {
+  if (errors.data.empty()) return kNone;
+  constexpr double kNormal95 = 1.96;
+  size_t n = 0, n_inside = 0;
+  for (size_t i = 0; i < errors.data.size(); ++i) {
+    const double a = references.front().data[i], b = references.back().data[i];
+    const double deviation = image.data[i] - (a + b) / 2, error = errors.data[i];
+    if (!std::isfinite(deviation) || !std::isfinite(error)) continue;
+    ++n;
+    n_inside += std::abs(deviation) <= kNormal95 * std::hypot(error, (a - b) / 2);
+  }
+  return static_cast<double>(n_inside) / static_cast<double>(n);
+}
+
 double number_or_none(const nlohmann::json& json, const char* name) {
   return json.contains(name) && json[name].is_number() ? json[name].get<double>() : kNone;
 }
 
 ImageErrors image_errors(const Image& image, const std::string& path, const SceneInstance& scene,
                          const std::vector<Image>& references, const Cache& cache, const std::string& key) {
-  if (const std::optional<nlohmann::json> kept = cache.read_json("measures", key + ".json"))
-    return {number_or_none(*kept, "relmse_trimmed"), number_or_none(*kept, "mae"), number_or_none(*kept, "flip"),
-            number_or_none(*kept, "above5"), number_or_none(*kept, "predicted_relmse")};
+  if (const std::optional<nlohmann::json> kept = cache.read_json("measures", key + ".json");
+      kept && kept->contains("coverage"))
+    return {number_or_none(*kept, "relmse_trimmed"),
+            number_or_none(*kept, "mae"),
+            number_or_none(*kept, "flip"),
+            number_or_none(*kept, "above5"),
+            number_or_none(*kept, "predicted_relmse"),
+            number_or_none(*kept, "coverage")};
+  const Image std_error = standard_errors(path, scene);
   const auto error = [&](Metric metric) { return compute_metric(metric, image, references).value; };
-  const ImageErrors errors{error(Metric::kRelMseTrimmed), error(Metric::kMae), error(Metric::kFlip),
-                           error(Metric::kAbove5), predicted_relmse(path, scene, references)};
+  const ImageErrors errors{error(Metric::kRelMseTrimmed),
+                           error(Metric::kMae),
+                           error(Metric::kFlip),
+                           error(Metric::kAbove5),
+                           predicted_relmse(std_error, references),
+                           coverage(image, std_error, references)};
   cache.write_json("measures", key + ".json",
                    {{"relmse_trimmed", errors.relmse_trimmed},
                     {"mae", errors.mae},
                     {"flip", errors.flip},
                     {"above5", errors.above5},
-                    {"predicted_relmse", errors.predicted_relmse}});
+                    {"predicted_relmse", errors.predicted_relmse},
+                    {"coverage", errors.coverage}});
   return errors;
 }
 
@@ -195,7 +225,7 @@ void measure(Cell& cell, const SceneInstance& scene, const std::vector<Image>& r
     const ImageErrors errors = image_errors(images[s], run.record.image, scene, references, cache, key);
     run.relmse_trimmed = errors.relmse_trimmed, run.mae = errors.mae, run.flip = errors.flip,
     run.above5 = errors.above5;
-    run.predicted_relmse = errors.predicted_relmse;
+    run.predicted_relmse = errors.predicted_relmse, run.coverage = errors.coverage;
   });
   cell.split = split_error(images, references);
   for (size_t s = 0; s < n; ++s) {
@@ -224,6 +254,7 @@ void measure(Cell& cell, const SceneInstance& scene, const std::vector<Image>& r
   cell.efficiency = efficiency(cell);
   cell.predicted_over_true =
       ratio_of_means(values_of(cell, [](const RunResult& r) { return r.predicted_relmse; }), values_of(cell, relmse));
+  cell.coverage = mean_estimate(values_of(cell, [](const RunResult& r) { return r.coverage; }));
   cell.suspicions = suspicions(cell.split, unbiased);
 }
 

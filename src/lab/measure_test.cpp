@@ -104,13 +104,30 @@ TEST_F(Measure, PredictedErrorsComeFromTheLayerOfStandardErrors) {
   measure_cell(cell);
   EXPECT_NEAR(cell.runs[0].predicted_relmse, 0.09 * kWeight, 1e-6);
   EXPECT_NEAR(cell.predicted_over_true.value, (0.09 + 0.01) / (0.04 + 0.01), 1e-5);
+  EXPECT_EQ(cell.coverage.value, 1) << "0.2 and 0.1 are less than 1.96 times 0.3 and 0.1";
   Cell plain;
   plain.runs = {run_of(1, write("plain.exr", constant(1.2f)), 1, 0)};
   keys_ = {"plain run"};
   measure_cell(plain);
   EXPECT_TRUE(std::isnan(plain.runs[0].predicted_relmse));
   EXPECT_TRUE(std::isnan(plain.predicted_over_true.value));
+  EXPECT_TRUE(std::isnan(plain.coverage.value));
   EXPECT_TRUE(std::isnan(plain.mae_of_mean)) << "one run has no mean image of its own";
+}
+
+TEST_F(Measure, IntervalsCountTheNoiseOfReferences) {
+  keys_ = {"run"};
+  const auto coverage = [&](const std::vector<Image>& references, const std::string& key) {
+    Cell cell;
+    cell.runs = {run_of(1, write("narrow.exr", constant(1.2f), 0.05f), 1, 0)};
+    measure(cell, scene(), references, false, {24, 0}, cache_, keys_, key);
+    return cell.coverage.value;
+  };
+  EXPECT_EQ(coverage({constant(1), constant(1)}, "exact"), 0) << "0.2 is four standard errors";
+  EXPECT_EQ(coverage({constant(0.9f), constant(1.1f)}, "noisy"), 1) << "0.2 is less than 1.96 times 0.11";
+  Image half = constant(1);
+  std::fill(half.data.begin(), half.data.begin() + static_cast<std::ptrdiff_t>(half.data.size() / 4), 1.15f);
+  EXPECT_EQ(coverage({half, half}, "half"), 0.25);
 }
 
 TEST_F(Measure, ReadsTheLayerThatTheSceneNames) {

@@ -210,7 +210,8 @@ Json quality_table(const Results& results, size_t budget) {
                column("mae", "MAE", "number"),
                column("flip", "FLIP", "number"),
                column("above5", "Pixels above 5 %", "percent"),
-               column("predicted", "Predicted / true error", "ratio")};
+               column("predicted", "Predicted / true error", "ratio"),
+               column("coverage", "Intervals that hold", "percent")};
   columns[6]["digits"] = 4;
   Json rows = cell_rows(results, budget, [](const Cell& cell, Json& row) {
     const SplitError& split = cell.split.relative;
@@ -224,6 +225,7 @@ Json quality_table(const Results& results, size_t budget) {
     row["flip"] = value_of(cell.flip);
     row["above5"] = number(cell.above5.value);
     row["predicted"] = value_of(cell.predicted_over_true);
+    row["coverage"] = number(cell.coverage.value);
   });
   return table("Errors divided, " + results.suite.budgets[budget].label(), columns, rows);
 }

@@ -20,6 +20,8 @@ struct RunResult {
   RunRecord record;
   double relmse = 0, relmse_trimmed = 0, mse = 0, mae = 0, flip = 0, above5 = 0, mean_ratio = 0;
   double predicted_relmse = kNone;  ///< from the run's own standard errors, where it has them
+  /// Part of the values that differ from the reference by 1.96 standard errors at most, the reference's included.
+  double coverage = kNone;
 };
 
 /// Numbers of samples that differ by this part at most count as the same.
@@ -43,6 +45,7 @@ struct Cell {
   /// For time budgets: method seconds / budget.
   double time_ratio = kNone;
   Estimate predicted_over_true;  ///< predicted relMSE / relMSE
+  Estimate coverage;             ///< of RunResult
   double published_relmse = kNone, published_ratio = kNone;
   std::vector<std::string> suspicions;
 };

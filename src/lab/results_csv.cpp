@@ -58,6 +58,7 @@ void add_cell(Table& table, const Cell& cell) {
   table.add("equal_time", cell.equal_time);
   table.add("efficiency", cell.efficiency);
   table.add("predicted_over_true", cell.predicted_over_true);
+  table.add("coverage", cell.coverage);
   table.add("published_relmse", cell.published_relmse);
   table.add("published_ratio", cell.published_ratio);
   table.add("seconds_load", cell.load_seconds);
@@ -79,6 +80,7 @@ void add_run(Table& table, const RunResult& run) {
   table.add("above5", run.above5);
   table.add("mean_ratio", run.mean_ratio);
   table.add("predicted_relmse", run.predicted_relmse);
+  table.add("coverage", run.coverage);
   table.add("seconds_load", run.record.load_seconds);
   table.add("seconds_render", run.record.render_seconds);
   table.add("seconds_estimate", run.record.estimate_seconds);
