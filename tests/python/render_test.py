@@ -33,6 +33,8 @@ class Render(PackageTest):
                   5, "--rfilter", "tent")
         self.same(covary.render(scene, 24, "iicv", k=9, split=(1, 2), groups=4), "--spp", 24, "--k", 9, "--split",
                   "1:2", "--groups", 4)
+        self.same(covary.render(scene, 8, "none", sampler="sobol"), "--spp", 8, "--estimator", "none", "--sampler",
+                  "sobol")
         self.same(covary.render(scene, 24, integrator="controlled-path", aovs=True), "--spp", 24, "--integrator",
                   "controlled-path", "--aovs")
 
