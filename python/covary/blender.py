@@ -46,6 +46,14 @@ def _module() -> Any:
     return bpy
 
 
+def _compositor(scene: Any) -> tuple[Any, str, Any, str]:
+    """The entry of _needed() that turns it off: from Blender 5.0 on there is one where it has nodes."""
+    reason = "the compositor would change the pixels of each group"
+    if hasattr(scene, "compositing_node_group"):
+        return scene.render, "use_compositing", False, reason if scene.compositing_node_group else ""
+    return scene, "use_nodes", False, reason
+
+
 def _needed(scene: Any) -> list[tuple[Any, str, Any, str]]:
     """(owner, name, value, reason) of each setting that both images need; "" for those that leave the picture as it
     is."""
@@ -64,7 +72,7 @@ def _needed(scene: Any) -> list[tuple[Any, str, Any, str]]:
         (cycles, "auto_scrambling_distance", False, ""),
         (cycles, "sampling_pattern", "TABULATED_SOBOL", ""),
         (cycles, "time_limit", 0.0, ""),
-        (scene, "use_nodes", False, "the compositor would change the pixels of each group"),
+        _compositor(scene),
         (scene.render, "use_sequencer", False, ""),
         (scene.render, "use_border", False, "the image would be a part of the frame"),
         (scene.render, "use_motion_blur", scene.render.use_motion_blur, ""),
@@ -85,7 +93,7 @@ def changes(scene: Any) -> list[str]:
 def _settings(scene: Any) -> Iterator[None]:
     """The scene as it must be; everything is put back afterwards, also what a group changes."""
     cycles, more = scene.cycles, ("samples", "sample_offset", "seed", "scrambling_distance", "use_sample_subset",
-                                  "sample_subset_offset", "sample_subset_length")
+                                  "sample_subset_length")
     kept = [(owner, name, getattr(owner, name)) for owner, name, _, _ in _needed(scene) if hasattr(owner, name)]
     kept += [(cycles, name, getattr(cycles, name)) for name in more if hasattr(cycles, name)]
     kept.append((scene.render, "filepath", scene.render.filepath))
@@ -103,7 +111,7 @@ def _set_samples(cycles: Any, size: int) -> None:
     """Samples size … 2 size - 1 of the pattern: its sample 0 lies at the pixel's centre for every seed."""
     if hasattr(cycles, "use_sample_subset"):
         cycles.use_sample_subset = True
-        cycles.sample_subset_offset, cycles.sample_subset_length = size, size
+        cycles.sample_offset, cycles.sample_subset_length = size, size
         cycles.samples = 2 * size
     else:
         cycles.samples, cycles.sample_offset = size, size

@@ -36,9 +36,12 @@ def material(bpy, colour, metallic=0.0, roughness=1.0):
     return made
 
 
-def build_room(bpy):
-    """A box around the camera."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+def build_room(bpy, reset=True):
+    """A box around the camera, in place of all that is there; with `reset` also of the preferences."""
+    if reset:
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+    for thing in list(bpy.data.objects):
+        bpy.data.objects.remove(thing)
     scene = bpy.context.scene
     bpy.ops.mesh.primitive_cube_add(size=4)
     bpy.context.object.data.materials.append(material(bpy, (0.7, 0.6, 0.5)))
@@ -62,15 +65,20 @@ def settings_of(scene):
             for p in owner.rna_type.properties if p.type in ("BOOLEAN", "INT", "FLOAT", "ENUM", "STRING")}
 
 
-INSTALLED = """
-import pathlib
+INSTALL = """
 import sys
 import bpy
 bpy.ops.extensions.package_install_files(filepath=sys.argv[1], repo="user_default", enable_on_install=True)
+bpy.ops.wm.save_userpref()
+assert bpy.types.Scene.covary_samples
+"""
+USE = """
+import pathlib
+import bpy
+bpy.ops.preferences.addon_enable(module="bl_ext.user_default.covary")
 import covary.blender  # that of the extension's wheel
 from blender_test import build_room
-scene = build_room(bpy)  # resets the preferences, but not what Python has
-bpy.ops.preferences.addon_enable(module="bl_ext.user_default.covary")
+scene = build_room(bpy, reset=False)
 scene.render.resolution_x, scene.render.resolution_y, scene.covary_samples = 24, 16, 72
 assert bpy.ops.render.covary() == {"FINISHED"}
 assert tuple(bpy.data.images["covary"].size) == (24, 16)
@@ -108,9 +116,10 @@ class Extension(PackageTest):
             self.assertIn('version = "0.1.0"', archive.read("blender_manifest.toml").decode())
         environment = {**os.environ, "BLENDER_USER_RESOURCES": str(self.path / "blender"),
                        "PYTHONPATH": f"{SOURCE / 'tests' / 'python'}:{SOURCE / 'tests' / 'cli'}"}
-        run = subprocess.run([sys.executable, "-c", INSTALLED, self.path / "covary.zip"], env=environment,
-                             capture_output=True, text=True, check=False)
-        self.assertEqual(run.returncode, 0, run.stdout + run.stderr)
+        for code in (INSTALL, USE):
+            run = subprocess.run([sys.executable, "-c", code, self.path / "covary.zip"], env=environment,
+                                 capture_output=True, text=True, check=False)
+            self.assertEqual(run.returncode, 0, run.stdout + run.stderr)
         self.assertIn(f"from {self.path / 'blender'}", run.stdout)
 
     def test_other_files(self):
@@ -167,6 +176,18 @@ class Render(PackageTest):
         self.assertIn("found 100 samples in 12 groups", refused(100))
         self.scene.render.engine = "BLENDER_WORKBENCH"
         self.assertIn("only Cycles has common random numbers", refused(96))
+
+    def test_compositor(self):
+        """Is off while groups render, and said to be where it has nodes."""
+        self.assertNotIn("compositor", " ".join(covary.blender.changes(self.scene)))
+        if self.bpy.app.version < (5, 0):
+            self.scene.use_nodes = True
+        else:
+            self.scene.compositing_node_group = self.bpy.data.node_groups.new("group", "CompositorNodeTree")
+        self.assertIn("the compositor would change the pixels", " ".join(covary.blender.changes(self.scene)))
+        with covary.blender._settings(self.scene):
+            owner, name, value, _ = covary.blender._compositor(self.scene)
+            self.assertEqual((getattr(owner, name), value), (False, False))
 
     def test_settings_come_back_after_an_error(self):
         def fail(done, total):
