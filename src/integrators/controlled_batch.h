@@ -33,6 +33,7 @@ struct ControlledPathState : CameraPath {
 struct ControlledChoice : LightSetChoice {
   bool in_cell = false;  ///< key says where its coefficients are learnt and looked up
   CellKey key;
+  uint32_t cell = CoefficientTable::kNone;  ///< of the table
 };
 
 struct ControlledConnection {

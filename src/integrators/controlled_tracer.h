@@ -94,8 +94,9 @@ class ControlledTracer {
       keep_paths(batch_, [&](Path& path) { return path.found && (depth < lengths_.rr_depth || survives(path)); });
       const bool connect = depth + 2 >= lengths_.min_depth && any_light;
       choose_lights(*control_.lights, control_.environment, samples_, connect, batch_);
-      find_cells(depth);
+      choose_cells(depth);
       sample_lights(*control_.lights, control_.environment, batch_);
+      find_cells();
       scatter(depth);
       trace_connections(depth + 2);
       if constexpr (Parts::kCloseEnded)
@@ -138,8 +139,8 @@ class ControlledTracer {
     return weight > 0;
   }
 
-  /// Where the coefficients of the vertices lie.
-  void find_cells(int depth) {
+  /// In which cells the vertices lie.
+  void choose_cells(int depth) {
     for (size_t i = 0; i < batch_.paths.size(); ++i) {
       ControlledBatch::LightChoice& choice = batch_.choices[i];
       if (!choice.open) continue;
@@ -148,6 +149,23 @@ class ControlledTracer {
       choice.key = key_of(batch_.rays[i], batch_.hits[i]);
       table_.prefetch(choice.key);
     }
+  }
+
+  /// Where their coefficients lie; one loop asks memory for what the next one reads.
+  void find_cells() {
+    const auto of_each_vertex = [this](const auto& visit) {
+      for (size_t i = 0; i < batch_.paths.size(); ++i)
+        if (ControlledBatch::LightChoice& choice = batch_.choices[i]; choice.open) visit(choice);
+    };
+    of_each_vertex([this](ControlledBatch::LightChoice& choice) {
+      choice.cell = choice.in_cell ? table_.find(choice.key) : CoefficientTable::kNone;
+      if (choice.cell != CoefficientTable::kNone) table_.prefetch_cell(choice.cell);
+    });
+    if (control_.lights->empty()) return;
+    of_each_vertex([this](const ControlledBatch::LightChoice& choice) {
+      if (choice.cell != CoefficientTable::kNone)
+        table_.prefetch_light(choice.cell, control_.cluster_of[choice.light]);
+    });
   }
 
   CellKey key_of(const Ray& ray, const SurfaceHit& hit) const {
@@ -211,7 +229,7 @@ class ControlledTracer {
   void open(ControlledVertex& vertex, const Path& path, const ControlledBatch::LightChoice& choice) {
     vertex.throughput = path.throughput;
     vertex.recorded = choice.in_cell && batch_.recording;
-    vertex.cell = choice.in_cell && table_.n_cells() > 0 ? table_.find(choice.key) : CoefficientTable::kNone;
+    vertex.cell = choice.cell;
     if (vertex.cell != CoefficientTable::kNone) {
       if (!batch_.recording && is_black(table_.scale(vertex.cell)))
         vertex.cell = CoefficientTable::kNone;

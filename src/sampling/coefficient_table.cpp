@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "core/content_hash.h"
 #include "core/error.h"
@@ -61,18 +60,25 @@ uint32_t CoefficientTable::find(CellKey key) const {
   return root_;
 }
 
-void CoefficientTable::prefetch(CellKey key) const { index_.prefetch(key.bits); }
-
 Spectrum CoefficientTable::light_of(uint32_t cell, uint32_t light) const {
   for (; cell != kNone; cell = cells_[cell].parent) {
     const Cell& own = cells_[cell];
-    if (own.n_slots == kEveryLight) return values_[own.first + light];
-    if (own.n_slots == 0) continue;
-    const uint32_t* slots = &slots_[own.first_slot];
-    for (uint32_t i = light & (own.n_slots - 1); slots[i] != kNone; i = (i + 1) & (own.n_slots - 1))
-      if (slots[i] == light) return values_[own.first + i];
+    if (own.n_slots == kEveryLight) return slots_[own.first + light].value;
+    if (!own.may_hold(light)) continue;
+    const Slot* slots = &slots_[own.first];
+    for (uint32_t i = light & (own.n_slots - 1); slots[i].light != kNone; i = (i + 1) & (own.n_slots - 1))
+      if (slots[i].light == light) return slots[i].value;
   }
   return Spectrum(0);
+}
+
+void CoefficientTable::prefetch_light(uint32_t cell, uint32_t light) const {
+  for (; cell != kNone; cell = cells_[cell].parent) {
+    const Cell& own = cells_[cell];
+    if (own.n_slots != kEveryLight && !own.may_hold(light)) continue;
+    __builtin_prefetch(&slots_[own.first + (own.n_slots == kEveryLight ? light : light & (own.n_slots - 1))]);
+    return;
+  }
 }
 
 uint32_t CoefficientTable::n_switched_off() const {
@@ -83,21 +89,21 @@ uint32_t CoefficientTable::n_switched_off() const {
 
 size_t CoefficientTable::bytes() const {
   return index_.bytes() + cells_.capacity() * sizeof(Cell) +
-         (dense_.capacity() + values_.capacity()) * sizeof(Spectrum) + slots_.capacity() * sizeof(uint32_t);
+         dense_.capacity() * sizeof(Spectrum) + slots_.capacity() * sizeof(Slot);
 }
 
 uint64_t CoefficientTable::hash() const { return hash_bytes(body()); }
 
 uint32_t CoefficientTable::slots_for(size_t n_lights) const {
   if (n_lights == 0) return 0;
-  // At least one slot stays empty, so that a search ends. A value for every light needs 12 bytes, a slot 16.
+  // At least one slot stays empty, so that a search ends.
   const uint32_t slots = std::bit_ceil(static_cast<uint32_t>(n_lights + n_lights / 2 + 1));
-  return 4 * uint64_t{slots} < 3 * uint64_t{n_lights_} ? slots : kEveryLight;
+  return slots < n_lights_ ? slots : kEveryLight;
 }
 
 void CoefficientTable::add_cells(std::span<const NewCell> cells) {
   const size_t first = cells_.size();
-  size_t n_values = values_.size(), n_slots = slots_.size();
+  size_t n_slots = slots_.size();
   for (const NewCell& cell : cells) {
     const uint32_t number = index_.insert(cell.key.bits);
     COVARY_CHECK(number == cells_.size() && (cell.parent == kNone || cell.parent < first), "a cell before its parent");
@@ -108,53 +114,42 @@ void CoefficientTable::add_cells(std::span<const NewCell> cells) {
     else
       last_level_ = std::max(last_level_, cell.key.level());
     const uint32_t slots = slots_for(cell.lights.size());
-    cells_.push_back({cell.scale, cell.light_sum, cell.parent, slots, n_values, n_slots});
-    n_values += slots == kEveryLight ? n_lights_ : slots, n_slots += slots == kEveryLight ? 0 : slots;
+    cells_.push_back({cell.scale, cell.light_sum, cell.parent, slots, n_slots});
+    n_slots += slots == kEveryLight ? n_lights_ : slots;
     dense_.insert(dense_.end(), cell.dense_values.begin(), cell.dense_values.end());
   }
-  values_.resize(n_values), slots_.resize(n_slots, kNone);
+  slots_.resize(n_slots);
   parallel_for(cells.size(), kChunk, [&](size_t i) { fill(cells_[first + i], cells[i]); });
 }
 
-void CoefficientTable::fill(const Cell& cell, const NewCell& from) {
-  Spectrum* values = values_.data() + cell.first;
+void CoefficientTable::fill(Cell& cell, const NewCell& from) {
+  Slot* slots = slots_.data() + cell.first;
   if (cell.n_slots == kEveryLight) {
     for (uint32_t light = 0, k = 0; light < n_lights_; ++light)
-      values[light] = k < from.lights.size() && from.lights[k] == light ? from.light_values[k++]
-                      : from.parent != kNone                            ? this->light(from.parent, light)
-                                                                        : Spectrum(0);
+      slots[light] = {light, k < from.lights.size() && from.lights[k] == light ? from.light_values[k++]
+                             : from.parent != kNone                            ? this->light(from.parent, light)
+                                                                               : Spectrum(0)};
     return;
   }
-  uint32_t* slots = slots_.data() + cell.first_slot;
   for (size_t k = 0; k < from.lights.size(); ++k) {
     uint32_t i = from.lights[k] & (cell.n_slots - 1);
-    while (slots[i] != kNone) i = (i + 1) & (cell.n_slots - 1);
-    slots[i] = from.lights[k], values[i] = from.light_values[k];
+    while (slots[i].light != kNone) i = (i + 1) & (cell.n_slots - 1);
+    slots[i] = {from.lights[k], from.light_values[k]};
+    cell.note(from.lights[k]);
   }
 }
 
 void CoefficientTable::scale_lights(std::span<const float> factors) {
   COVARY_CHECK(factors.size() == n_lights_, "a factor for each light");
-  for (const Cell& cell : cells_) {
-    Spectrum* values = values_.data() + cell.first;
-    if (cell.n_slots == kEveryLight) {
-      for (uint32_t light = 0; light < n_lights_; ++light) values[light] *= factors[light];
-      continue;
-    }
-    for (uint32_t i = 0; i < cell.n_slots; ++i)
-      if (const uint32_t light = slots_[cell.first_slot + i]; light != kNone) values[i] *= factors[light];
-  }
+  for (Slot& slot : slots_)
+    if (slot.light != kNone) slot.value *= factors[slot.light];
 }
 
 std::vector<uint32_t> CoefficientTable::lights_of(const Cell& cell) const {
   std::vector<uint32_t> lights;
-  if (cell.n_slots == kEveryLight) {
-    lights.resize(n_lights_);
-    std::iota(lights.begin(), lights.end(), 0u);
-    return lights;
-  }
-  for (uint32_t i = 0; i < cell.n_slots; ++i)
-    if (const uint32_t light = slots_[cell.first_slot + i]; light != kNone) lights.push_back(light);
+  const uint32_t n = cell.n_slots == kEveryLight ? n_lights_ : cell.n_slots;
+  for (uint32_t i = 0; i < n; ++i)
+    if (const uint32_t light = slots_[cell.first + i].light; light != kNone) lights.push_back(light);
   std::sort(lights.begin(), lights.end());
   return lights;
 }

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/large_vector.h"
 #include "core/ray.h"
 #include "sampling/system_sums.h"
 
@@ -60,7 +61,13 @@ class CoefficientTable {
   /// The finest cell that holds coefficients for the place, or kNone: plain sampling.
   uint32_t find(CellKey key) const;
   /// Asks memory for what find(key) reads.
-  void prefetch(CellKey key) const;
+  void prefetch(CellKey key) const { index_.prefetch(key.bits); }
+  /// Asks memory for what scale(), light_sum() and dense() of a cell read.
+  void prefetch_cell(uint32_t cell) const {
+    __builtin_prefetch(&cells_[cell]), __builtin_prefetch(&dense_[size_t{cell} * n_dense_]);
+  }
+  /// Asks memory for what light() reads.
+  void prefetch_light(uint32_t cell, uint32_t light) const;
 
   /// Share of the control to use in `cell`, in [0, 1]; is_black() where the cell is switched off.
   Spectrum scale(uint32_t cell) const { return cells_[cell].scale; }
@@ -71,14 +78,14 @@ class CoefficientTable {
   /// β of a light: that of the finest of the cell and its ancestors which have seen the light, otherwise zero.
   Spectrum light(uint32_t cell, uint32_t light) const {
     const Cell& own = cells_[cell];
-    return own.n_slots == kEveryLight ? values_[own.first + light] : light_of(cell, light);
+    return own.n_slots == kEveryLight ? slots_[own.first + light].value : light_of(cell, light);
   }
 
   uint32_t n_cells() const { return static_cast<uint32_t>(cells_.size()); }
   uint32_t n_switched_off() const;
   size_t bytes() const;
   /// About the bytes of a table of so many cells that hold so many coefficients of lights.
-  static size_t expected_bytes(size_t n_cells, size_t n_values) { return n_cells * 2 * sizeof(Cell) + n_values * 24; }
+  static size_t expected_bytes(size_t n_cells, size_t n_values) { return n_cells * 2 * sizeof(Cell) + n_values * 32; }
   uint64_t hash() const;
 
   /// A cell to be added. Lights that are not in `lights` have the parent's coefficients.
@@ -114,17 +121,26 @@ class CoefficientTable {
 
  private:
   // A cell that has seen many of the lights holds a value for each light there is, inherited ones too; others hold an
-  // open-addressing table of those they have seen.
+  // open-addressing table of those they have seen, and a set of bits, one for each of some lights, that says of most
+  // others without a look at the table that they are not there.
   static constexpr uint32_t kEveryLight = kNone;
-  struct Cell {
+  struct alignas(64) Cell {
     Spectrum scale, light_sum;
     uint32_t parent = kNone;
-    uint32_t n_slots = 0;              // a power of two, 0 for no lights, or kEveryLight
-    size_t first = 0, first_slot = 0;  // of values_ and of slots_
+    uint32_t n_slots = 0;  // a power of two, 0 for no lights, or kEveryLight
+    size_t first = 0;      // of slots_
+    uint64_t bits[2] = {};
+
+    void note(uint32_t light) { bits[light >> 6 & 1] |= uint64_t{1} << (light & 63); }
+    bool may_hold(uint32_t light) const { return bits[light >> 6 & 1] >> (light & 63) & 1; }
+  };
+  struct Slot {
+    uint32_t light = kNone;  // kNone: empty
+    Spectrum value;
   };
   Spectrum light_of(uint32_t cell, uint32_t light) const;
   uint32_t slots_for(size_t n_lights) const;
-  void fill(const Cell& cell, const NewCell& from);
+  void fill(Cell& cell, const NewCell& from);
   std::vector<uint32_t> lights_of(const Cell& cell) const;
 
   CellGrid grid_;
@@ -132,10 +148,10 @@ class CoefficientTable {
   uint32_t last_level_ = 0;  // highest level of a cell but for the root
   uint32_t root_ = kNone;
   KeyIndex index_;
-  std::vector<Cell> cells_;
-  std::vector<Spectrum> dense_, values_;
+  LargeVector<Cell> cells_;
+  LargeVector<Spectrum> dense_;
+  LargeVector<Slot> slots_;
   std::vector<float> selection_;
-  std::vector<uint32_t> slots_;  // lights of the slots, kNone where empty
 };
 
 }  // namespace covary

@@ -19,33 +19,34 @@ void add_to(T* sums, std::span<const T> numbers) {
 uint32_t KeyIndex::insert(uint64_t key) {
   if (3 * slots_.size() <= 4 * keys_.size()) grow();
   for (size_t i = slot_of(key);; i = (i + 1) & (slots_.size() - 1)) {
-    if (slots_[i] == kNone) {
-      slots_[i] = static_cast<uint32_t>(keys_.size());
+    Slot& slot = slots_[i];
+    if (slot.number == kNone) {
+      slot = {key, static_cast<uint32_t>(keys_.size())};
       keys_.push_back(key);
-      return slots_[i];
+      return slot.number;
     }
-    if (keys_[slots_[i]] == key) return slots_[i];
+    if (slot.key == key) return slot.number;
   }
 }
 
 uint32_t KeyIndex::find(uint64_t key) const {
   if (slots_.empty()) return kNone;
   for (size_t i = slot_of(key);; i = (i + 1) & (slots_.size() - 1))
-    if (slots_[i] == kNone || keys_[slots_[i]] == key) return slots_[i];
+    if (slots_[i].number == kNone || slots_[i].key == key) return slots_[i].number;
 }
 
 void KeyIndex::grow() {
-  slots_.assign(std::max<size_t>(64, 2 * slots_.size()), kNone);
+  slots_.assign(std::max<size_t>(64, 2 * slots_.size()), Slot());
   for (size_t number = 0; number < keys_.size(); ++number) {
     size_t i = slot_of(keys_[number]);
-    while (slots_[i] != kNone) i = (i + 1) & (slots_.size() - 1);
-    slots_[i] = static_cast<uint32_t>(number);
+    while (slots_[i].number != kNone) i = (i + 1) & (slots_.size() - 1);
+    slots_[i] = {keys_[number], static_cast<uint32_t>(number)};
   }
 }
 
 void KeyIndex::clear() {
   keys_.clear();
-  slots_.assign(slots_.size(), kNone);
+  slots_.assign(slots_.size(), Slot());
 }
 
 uint32_t SystemSums::cell(CellKey key) {

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "core/large_vector.h"
 #include "core/random.h"
 #include "sampling/coefficient_solver.h"
 
@@ -54,15 +55,20 @@ class KeyIndex {
   uint32_t find(uint64_t key) const;
   std::span<const uint64_t> keys() const { return keys_; }
   void clear();
+  /// Asks memory for what find(key) reads first.
   void prefetch(uint64_t key) const {
     if (!slots_.empty()) __builtin_prefetch(&slots_[slot_of(key)]);
   }
-  size_t bytes() const { return slots_.capacity() * sizeof(uint32_t) + keys_.capacity() * sizeof(uint64_t); }
+  size_t bytes() const { return slots_.capacity() * sizeof(Slot) + keys_.capacity() * sizeof(uint64_t); }
 
  private:
+  struct Slot {
+    uint64_t key = 0;
+    uint32_t number = kNone;  // kNone: empty
+  };
   size_t slot_of(uint64_t key) const { return mix64(key) & (slots_.size() - 1); }
   void grow();
-  std::vector<uint32_t> slots_;  // places of keys_ by open addressing, a power of two of them; kNone where empty
+  LargeVector<Slot> slots_;  // open addressing, a power of two of them
   std::vector<uint64_t> keys_;
 };
 
