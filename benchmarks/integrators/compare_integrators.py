@@ -4,11 +4,13 @@
 
     compare_integrators.py --scenes DIR [--first "--integrator path"] [--second "--integrator controlled-path"] [NAME]
 
-Renders every scene of DIR in a small frame with R seeds of each, and tests by Welch's t over the renders, not the
-pixels, whether the means of the image and of 8 x 8 blocks differ (../against_mitsuba/agreement.py). The noise is the
-mean over blocks, relative to the squared mean + 0.01, of the variance over the seeds, without the largest 1 %: its
-ratio says how many times fewer samples the second needs. `detects`: smallest relative difference of the image's mean
-that is found with power 0.99. Needs `pip install numpy scipy`.
+Tests by Welch's t over R independent images of each, not over pixels, whether the means of the image and of 8 x 8
+blocks differ (../against_mitsuba/agreement.py). The images are the R groups of samples of one film, which share one
+training; with --each-trained they are R renders with seeds and trainings of their own, and the samples of a training
+are part of the image. The noise is the mean over pixels, relative to the squared mean + 0.01, of the variance over the
+images, without the largest 1 %: its ratio says how many times fewer samples the second needs, those of the training
+counted. `detects`: smallest relative difference of the image's mean that is found with power 0.99. Needs
+`pip install numpy scipy`.
 """
 import argparse
 import pathlib
@@ -28,15 +30,27 @@ from exr_reader import read_exr  # noqa: E402
 
 
 def render(options, scene, words, seed, spp, folder):
-    """One image as an array (height, width, 3)."""
+    """The channels of one render, arrays (height, width) by name."""
     out = pathlib.Path(folder) / "image.exr"
-    width, height = (int(side) for side in options.resolution.split("x"))
     command = [options.covary, "render", str(scene), "-o", str(out), "--resolution", options.resolution, "--spp",
                str(spp), "--seed", str(seed), "--rfilter", "box", "--max-depth", str(options.max_depth), "--estimator",
                "none", "--no-preview", "--quiet", *words]
     subprocess.run(command, check=True, stderr=subprocess.DEVNULL)
-    channels = read_exr(out.read_bytes())
-    return numpy.array([channels[name] for name in "RGB"]).T.reshape(height, width, 3)
+    width, height = (int(side) for side in options.resolution.split("x"))
+    return {name: numpy.array(values).reshape(height, width) for name, values in read_exr(out.read_bytes()).items()}
+
+
+def images(options, scene, words, first_seed):
+    """Independent images of a scene, an array (R, height, width, 3)."""
+    with tempfile.TemporaryDirectory() as folder:
+        if options.each_trained:
+            renders = [render(options, scene, words, first_seed + i, options.spp, folder)
+                       for i in range(options.images)]
+            return numpy.stack([[channels[name] for name in "RGB"] for channels in renders]).transpose(0, 2, 3, 1)
+        channels = render(options, scene, [*words, "--groups", str(options.images)], first_seed,
+                          options.spp * options.images, folder)
+        return numpy.stack([[channels[f"group{i:02}.{name}"] for name in "RGB"]
+                            for i in range(options.images)]).transpose(0, 2, 3, 1)
 
 
 def noise(images):
@@ -46,12 +60,9 @@ def noise(images):
 
 
 def compare(options, scene):
-    sides = []
-    with tempfile.TemporaryDirectory() as folder:
-        for side, words in enumerate((options.first, options.second)):
-            # Other seeds on either side, so that the renders share no random numbers.
-            sides.append(numpy.stack([render(options, scene, shlex.split(words), seed + 1 + side * 1000, options.spp,
-                                             folder) for seed in range(options.seeds)]))
+    # Other seeds on either side, so that the renders share no random numbers.
+    sides = [images(options, scene, shlex.split(words), 1 + 1000 * side)
+             for side, words in enumerate((options.first, options.second))]
     return agreement(*sides, options.alpha), noise(sides[0]) / noise(sides[1])
 
 
@@ -63,9 +74,11 @@ def main(arguments):
     parser.add_argument("--first", default="--integrator path", help="options of the one side")
     parser.add_argument("--second", default="--integrator controlled-path", help="options of the other")
     parser.add_argument("--resolution", default="32x24", metavar="WxH")
-    parser.add_argument("--spp", type=int, default=64)
+    parser.add_argument("--spp", type=int, default=32, help="samples per pixel of each image")
     parser.add_argument("--max-depth", type=int, default=5)
-    parser.add_argument("--seeds", type=int, default=16, help="renders of each side")
+    parser.add_argument("--images", type=int, default=16, metavar="R", help="independent images of each side")
+    parser.add_argument("--each-trained", action="store_true",
+                        help="renders of their own in place of one film's groups of samples")
     parser.add_argument("--alpha", type=float, default=1e-3, help="false-positive probability of a scene's test")
     options = parser.parse_args(arguments)
     print("| scene | mean ratio | detects | largest t of blocks | differs | noise ratio |\n|---|---|---|---|---|---|")
