@@ -253,6 +253,10 @@ void CoefficientCache::update() {
       levels.push_back(coarser_level(levels.back(), light_counts_.size(), false));
     levels.push_back(coarser_level(levels.back(), light_counts_.size(), true));
   }
+  std::vector<size_t> lights_per_cell;
+  for (const Level& level : levels)
+    for (uint32_t i = 0; i < level.n_cells(); ++i) lights_per_cell.push_back(level.n_lights(i));
+  table_.reserve(lights_per_cell);
   uint32_t first_above = 0, first = 0;
   for (size_t l = levels.size(); l-- > 0; first_above = first, first = table_.n_cells()) {
     const Level* above = l + 1 < levels.size() ? &levels[l + 1] : nullptr;

@@ -92,7 +92,20 @@ size_t CoefficientTable::bytes() const {
          dense_.capacity() * sizeof(Spectrum) + slots_.capacity() * sizeof(Slot);
 }
 
-uint64_t CoefficientTable::hash() const { return hash_bytes(body()); }
+uint64_t CoefficientTable::hash() const {
+  std::string parts;
+  const auto append = [&](const auto& array) { append_bytes(parts, hash_bytes(std::as_bytes(std::span(array)))); };
+  append_bytes(parts, grid_.origin_), append_bytes(parts, grid_.cell_width_), append_bytes(parts, grid_.level_);
+  append(index_.keys()), append(cells_), append(dense_), append(slots_), append(selection_);
+  return hash_bytes(parts);
+}
+
+void CoefficientTable::reserve(std::span<const size_t> lights_per_cell) {
+  size_t n_slots = slots_.size();
+  for (const size_t n : lights_per_cell) n_slots += n_slots_of(slots_for(n));
+  const size_t n_cells = cells_.size() + lights_per_cell.size();
+  cells_.reserve(n_cells), dense_.reserve(n_cells * n_dense_), slots_.reserve(n_slots);
+}
 
 uint32_t CoefficientTable::slots_for(size_t n_lights) const {
   if (n_lights == 0) return 0;
@@ -115,7 +128,7 @@ void CoefficientTable::add_cells(std::span<const NewCell> cells) {
       last_level_ = std::max(last_level_, cell.key.level());
     const uint32_t slots = slots_for(cell.lights.size());
     cells_.push_back({cell.scale, cell.light_sum, cell.parent, slots, n_slots});
-    n_slots += slots == kEveryLight ? n_lights_ : slots;
+    n_slots += n_slots_of(slots);
     dense_.insert(dense_.end(), cell.dense_values.begin(), cell.dense_values.end());
   }
   slots_.resize(n_slots);
@@ -147,8 +160,7 @@ void CoefficientTable::scale_lights(std::span<const float> factors) {
 
 std::vector<uint32_t> CoefficientTable::lights_of(const Cell& cell) const {
   std::vector<uint32_t> lights;
-  const uint32_t n = cell.n_slots == kEveryLight ? n_lights_ : cell.n_slots;
-  for (uint32_t i = 0; i < n; ++i)
+  for (uint32_t i = 0; i < n_slots_of(cell.n_slots); ++i)
     if (const uint32_t light = slots_[cell.first + i].light; light != kNone) lights.push_back(light);
   std::sort(lights.begin(), lights.end());
   return lights;

@@ -87,6 +87,8 @@ class CoefficientTable {
   /// About the bytes of a table of so many cells that hold so many coefficients of lights.
   static size_t expected_bytes(size_t n_cells, size_t n_values) { return n_cells * 2 * sizeof(Cell) + n_values * 32; }
   uint64_t hash() const;
+  /// Makes room for cells that hold coefficients of so many lights each.
+  void reserve(std::span<const size_t> lights_per_cell);
 
   /// A cell to be added. Lights that are not in `lights` have the parent's coefficients.
   struct NewCell {
@@ -130,6 +132,7 @@ class CoefficientTable {
     uint32_t n_slots = 0;  // a power of two, 0 for no lights, or kEveryLight
     size_t first = 0;      // of slots_
     uint64_t bits[2] = {};
+    uint64_t unused = 0;  // no byte is left undefined, see hash()
 
     void note(uint32_t light) { bits[light >> 6 & 1] |= uint64_t{1} << (light & 63); }
     bool may_hold(uint32_t light) const { return bits[light >> 6 & 1] >> (light & 63) & 1; }
@@ -140,6 +143,7 @@ class CoefficientTable {
   };
   Spectrum light_of(uint32_t cell, uint32_t light) const;
   uint32_t slots_for(size_t n_lights) const;
+  uint32_t n_slots_of(uint32_t slots) const { return slots == kEveryLight ? n_lights_ : slots; }
   void fill(Cell& cell, const NewCell& from);
   std::vector<uint32_t> lights_of(const Cell& cell) const;
 
