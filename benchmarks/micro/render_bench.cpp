@@ -1,12 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 // What one sample is made of, step by step on one thread: random numbers, camera rays, nearest hits, shadow rays, and
-// whole paths, on the scenes of scenes/. items_per_second of "paths" are samples per second and thread.
+// whole paths, on the scenes of scenes/, and in a room with 10² to 10⁵ emissive triangles. items_per_second of "paths"
+// and "many_lights" are samples per second and thread.
 #include <benchmark/benchmark.h>
+#include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <map>
 #include <string>
 #include <vector>
 
+#include "integrators/controlled_path.h"
 #include "integrators/integrator.h"
 #include "integrators/light_selection.h"
 #include "integrators/render_pass.h"
@@ -18,17 +25,19 @@ namespace {
 constexpr uint64_t kSeed = 1;
 constexpr int kItems = 4096;  // per iteration, spread over the frame
 
-LoadedScene load(const std::string& name) {
+LoadedScene load(const std::string& path, const std::string& integrator) {
   LoadOptions options;
-  options.make_integrator = [](Parameters& parameters) -> std::shared_ptr<SceneObject> {
-    return integrator_plugins()[0].make(parameters, PathLengthSettings::from(parameters));
+  options.make_integrator = [&](Parameters& parameters) -> std::shared_ptr<SceneObject> {
+    const auto plugin = std::ranges::find_if(integrator_plugins(), [&](const auto& p) { return p.name == integrator; });
+    return plugin->make(parameters, PathLengthSettings::from(parameters));
   };
-  return load_scene(std::string(COVARY_SOURCE_DIR) + "/scenes/" + name + ".xml", options);
+  return load_scene(path, options);
 }
 
 const LoadedScene& scene(const std::string& name) {
   static std::map<std::string, LoadedScene> scenes;
-  if (!scenes.contains(name)) scenes.emplace(name, load(name));
+  if (!scenes.contains(name))
+    scenes.emplace(name, load(std::string(COVARY_SOURCE_DIR) + "/scenes/" + name + ".xml", "path"));
   return scenes.at(name);
 }
 
@@ -91,8 +100,7 @@ void shadow_rays(benchmark::State& state, const std::string& name) {
   state.SetItemsProcessed(state.iterations() * static_cast<int64_t>(rays.size()));
 }
 
-void paths(benchmark::State& state, const std::string& name) {
-  const LoadedScene& loaded = scene(name);
+void trace_paths(benchmark::State& state, const LoadedScene& loaded) {
   const auto& integrator = dynamic_cast<const Integrator&>(*loaded.integrator);
   PathContext context(integrator);
   uint64_t sample = 0;
@@ -111,6 +119,48 @@ void paths(benchmark::State& state, const std::string& name) {
   state.counters["rays"] = benchmark::Counter(static_cast<double>(context.n_rays), benchmark::Counter::kIsRate);
 }
 
+void paths(benchmark::State& state, const std::string& name) { trace_paths(state, scene(name)); }
+
+/// Writes a room under a grid of about `n` emissive triangles into `folder`, and returns its scene file.
+std::string write_room_of_lights(const std::filesystem::path& folder, int64_t n) {
+  const auto side = static_cast<int>(std::lround(std::sqrt(static_cast<double>(n) / 2)));
+  std::ofstream mesh(folder / "lights.obj");
+  for (int y = 0; y <= side; ++y)
+    for (int x = 0; x <= side; ++x) mesh << fmt::format("v {} 3 {}\n", 8.0 * x / side - 4, 8.0 * y / side - 4);
+  for (int y = 0; y < side; ++y)
+    for (int x = 0; x < side; ++x) {
+      const int a = y * (side + 1) + x + 1, b = a + side + 1;
+      mesh << fmt::format("f {} {} {}\nf {} {} {}\n", a, a + 1, b, a + 1, b + 1, b);
+    }
+  const std::filesystem::path scene = folder / "room.xml";
+  std::ofstream(scene) << R"(<scene version="3.0.0">
+  <integrator type="path"><integer name="max_depth" value="4"/></integrator>
+  <sensor type="perspective"><float name="fov" value="60"/>
+    <transform name="to_world"><lookat origin="0, 1, -7" target="0, 1, 0" up="0, 1, 0"/></transform>
+    <film type="hdrfilm"><integer name="width" value="64"/><integer name="height" value="48"/></film></sensor>
+  <shape type="cube"><transform name="to_world"><scale value="8, 4, 8"/></transform>
+    <bsdf type="twosided"><bsdf type="diffuse"/></bsdf></shape>
+  <shape type="obj"><string name="filename" value="lights.obj"/>
+    <emitter type="area"><rgb name="radiance" value="1, 2, 3"/></emitter></shape>
+</scene>)";
+  return scene.string();
+}
+
+void many_lights(benchmark::State& state, const std::string& integrator, ControlKind kind) {
+  const std::filesystem::path folder = std::filesystem::temp_directory_path() / "covary-render-bench";
+  std::filesystem::create_directories(folder);
+  const LoadedScene loaded = load(write_room_of_lights(folder, state.range(0)), integrator);
+  std::filesystem::remove_all(folder);
+  if (auto* controlled = dynamic_cast<ControlledPath*>(loaded.integrator.get())) {
+    ControlOptions options;
+    options.kind = kind;
+    controlled->change(options);
+    controlled->prepare(*loaded.scene);
+    train(*loaded.scene, *controlled, {{0, 0, loaded.width, loaded.height}, loaded.filter});
+  }
+  trace_paths(state, loaded);
+}
+
 BENCHMARK_CAPTURE(camera_rays, room, "room");
 BENCHMARK_CAPTURE(camera_rays, materials, "materials");
 BENCHMARK_CAPTURE(nearest_hits, room, "room");
@@ -119,6 +169,9 @@ BENCHMARK_CAPTURE(shadow_rays, room, "room");
 BENCHMARK_CAPTURE(shadow_rays, materials, "materials");
 BENCHMARK_CAPTURE(paths, room, "room");
 BENCHMARK_CAPTURE(paths, materials, "materials");
+BENCHMARK_CAPTURE(many_lights, path, "path", ControlKind::kOff)->RangeMultiplier(10)->Range(100, 100000);
+BENCHMARK_CAPTURE(many_lights, off, "controlled-path", ControlKind::kOff)->RangeMultiplier(10)->Range(100, 100000);
+BENCHMARK_CAPTURE(many_lights, rgb, "controlled-path", ControlKind::kRgb)->RangeMultiplier(10)->Range(100, 100000);
 
 }  // namespace
 }  // namespace covary

@@ -63,6 +63,7 @@ struct ControlledBatch final : CameraBatch<ControlledPathState, ControlledChoice
 
   bool recording = false;
   SystemSums sums;
+  size_t last_cells = 0, last_rows = 0;  ///< of the last tile's sums: the next is likely to need as much room
 };
 
 }  // namespace covary

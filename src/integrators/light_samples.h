@@ -36,6 +36,7 @@ void choose_lights(const LightSet& lights, const Emitter* environment, std::span
     const uint32_t vertex = kFirstSurfaceVertex + batch.paths[i].n_smooth;
     if (!lights.empty()) {
       choice.light = lights.select(random.get_1d(vertex, Event::kLightChoice));
+      lights.prefetch(choice.light);
       choice.u = random.get_2d(vertex, Event::kLightPosition);
       choice.u_primitive = random.get_1d(vertex, Event::kLightPrimitive);
     }

@@ -72,7 +72,8 @@ std::string name_of(LightSelection selection) {
 LightSet::LightSet(const Scene& scene, LightSelection selection) {
   for (const auto& emitter : scene.emitters()) {
     if (emitter->is_environment()) continue;
-    first_[emitter.get()] = size();
+    emitters_.insert(key_of(*emitter));
+    first_.push_back(size());
     const uint32_t n = emitter->n_parts();
     if (n > kMaxLights - size())
       throw Error(ErrorCode::kInput, "the scene has more than " + std::to_string(kMaxLights) +

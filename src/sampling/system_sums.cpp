@@ -2,6 +2,7 @@
 #include "sampling/system_sums.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "core/error.h"
@@ -17,7 +18,7 @@ void add_to(T* sums, std::span<const T> numbers) {
 }  // namespace
 
 uint32_t KeyIndex::insert(uint64_t key) {
-  if (3 * slots_.size() <= 4 * keys_.size()) grow();
+  if (3 * slots_.size() <= 4 * keys_.size()) resize(std::max<size_t>(64, 2 * slots_.size()));
   for (size_t i = slot_of(key);; i = (i + 1) & (slots_.size() - 1)) {
     Slot& slot = slots_[i];
     if (slot.number == kNone) {
@@ -35,8 +36,13 @@ uint32_t KeyIndex::find(uint64_t key) const {
     if (slots_[i].number == kNone || slots_[i].key == key) return slots_[i].number;
 }
 
-void KeyIndex::grow() {
-  slots_.assign(std::max<size_t>(64, 2 * slots_.size()), Slot());
+void KeyIndex::reserve(size_t n) {
+  keys_.reserve(n);
+  if (const size_t needed = std::bit_ceil(4 * n / 3 + 1); needed > slots_.size()) resize(std::max<size_t>(64, needed));
+}
+
+void KeyIndex::resize(size_t n_slots) {
+  slots_.assign(n_slots, Slot());
   for (size_t number = 0; number < keys_.size(); ++number) {
     size_t i = slot_of(keys_[number]);
     while (slots_[i].number != kNone) i = (i + 1) & (slots_.size() - 1);
@@ -47,6 +53,11 @@ void KeyIndex::grow() {
 void KeyIndex::clear() {
   keys_.clear();
   slots_.assign(slots_.size(), Slot());
+}
+
+void SystemSums::reserve(size_t n_cells, size_t n_rows) {
+  cells_.reserve(n_cells), rows_index_.reserve(n_rows);
+  heads_.reserve(n_cells * layout_.head_size()), rows_.reserve(n_rows * layout_.row_size());
 }
 
 uint32_t SystemSums::cell(CellKey key) {

@@ -55,6 +55,8 @@ class KeyIndex {
   uint32_t find(uint64_t key) const;
   std::span<const uint64_t> keys() const { return keys_; }
   void clear();
+  /// Makes room for n keys.
+  void reserve(size_t n);
   /// Asks memory for what find(key) reads first.
   void prefetch(uint64_t key) const {
     if (!slots_.empty()) __builtin_prefetch(&slots_[slot_of(key)]);
@@ -67,7 +69,7 @@ class KeyIndex {
     uint32_t number = kNone;  // kNone: empty
   };
   size_t slot_of(uint64_t key) const { return mix64(key) & (slots_.size() - 1); }
-  void grow();
+  void resize(size_t n_slots);
   LargeVector<Slot> slots_;  // open addressing, a power of two of them
   std::vector<uint64_t> keys_;
 };
@@ -77,6 +79,8 @@ class SystemSums {
   /// `level`: that of the keys.
   explicit SystemSums(SystemLayout layout = {}, uint32_t level = 0) : layout_(layout), level_(level) {}
 
+  /// Makes room for so many cells and rows.
+  void reserve(size_t n_cells, size_t n_rows);
   /// The number of a cell, for add(); it holds until clear().
   uint32_t cell(CellKey key);
   /// Adds one sample of a vertex in `cell`. A sample whose value or weight is not finite, or whose weight is negative,
