@@ -42,7 +42,7 @@ void add_control_options(CLI::App& command, ControlTexts& texts) {
                   "Samples per pixel to learn from, a part of --spp that is not in the image; default: 16")
       ->transform(whole_number(1u, ControlSettings::kMaxTrainingSpp))
       ->group(kControlGroup);
-  command.add_option("--cv-clusters", texts.clusters, "Most clusters of lights; default: 5000")
+  command.add_option("--cv-clusters", texts.clusters, "Most clusters of lights; default: 256")
       ->transform(whole_number(1u, kMaxNumber))
       ->group(kControlGroup);
   command.add_option("--cv-variance", texts.variance, "What is made least: relative or absolute variance")

@@ -75,6 +75,7 @@ ControlSettings ControlSettings::published() {
   settings.paper = true;
   settings.lights = LightSelection::kTriangle;
   settings.grid = 64;
+  settings.clusters = 5000;
   return settings;
 }
 

@@ -41,7 +41,7 @@ struct ControlSettings {
   LightSelection lights = LightSelection::kPower;
   uint32_t grid = kAutomaticGrid;  ///< cells along the longest side of the scene
   uint32_t train_spp = 16;         ///< samples per pixel to learn from
-  uint32_t clusters = 5000;        ///< most clusters of lights
+  uint32_t clusters = 256;         ///< most clusters of lights
   uint32_t memory_mib = 256;       ///< of sums and coefficients while training
   bool relative = true;            ///< least relative variance [Hua2023] §4.2.1, otherwise least variance
   bool prefix = true;              ///< samples weigh by the throughput before them [Hua2023] §4.4

@@ -11,7 +11,7 @@
 // | lights        | string  | power    | how lights are chosen: `triangle`, `shape`, `power`, `learned`        |
 // | cv_grid       | integer | 0        | cells along the longest side of the scene; 0: by the size of pixels   |
 // | cv_train      | integer | 16       | samples per pixel to learn from                                       |
-// | cv_clusters   | integer | 5000     | most clusters of lights                                               |
+// | cv_clusters   | integer | 256      | most clusters of lights                                               |
 // | cv_variance   | string  | relative | what is made least: `relative` or `absolute` variance                 |
 // | cv_prefix     | boolean | true     | samples weigh by the throughput of the path before them               |
 // | cv_memory     | integer | 256      | MiB of sums and coefficients while training; then cells become wider  |
@@ -54,7 +54,7 @@ void ControlledPath::prepare(const Scene& scene) {
 }
 
 /// The longer side of the frame where pixels have coefficients. Otherwise by what the camera sees: cells as wide as 8
-/// pixels in the mean over the image, where that gives 64 to 256 cells; 64 where it sees nothing.
+/// pixels in the mean over the image, where that gives 32 to 256 cells; 64 where it sees nothing.
 uint32_t ControlledPath::resolution() const {
   if (settings_.per_pixel())
     return static_cast<uint32_t>(std::max(scene_->camera().width(), scene_->camera().height()));
@@ -73,7 +73,7 @@ uint32_t ControlledPath::resolution() const {
   }
   if (!(sum > 0)) return 64;
   const Vec3 size = scene_->bounds().upper - scene_->bounds().lower;
-  return static_cast<uint32_t>(std::clamp(max_component(size) / (8 * sum / n), 64.0, 256.0));
+  return static_cast<uint32_t>(std::clamp(max_component(size) / (8 * sum / n), 32.0, 256.0));
 }
 
 /// Chooses clusters with these probabilities, relative to one another, and their lights as before.
@@ -96,12 +96,16 @@ void ControlledPath::use(CoefficientTable table) {
 
 void ControlledPath::begin_batch(ControlledBatch& batch) const {
   batch.recording = !frozen() && settings_.learns() && trained_spp() >= pilot_spp();
-  if (batch.recording && batch.sums.n_cells() == 0) batch.sums = cache_.new_sums();
+  if (!batch.recording || batch.sums.n_cells() > 0) return;
+  batch.sums = cache_.new_sums();
+  batch.sums.reserve(batch.last_cells, batch.last_rows);
 }
 
 std::unique_ptr<TrainingRecord> ControlledPath::take_record(ThreadState& state) const {
-  SystemSums& sums = static_cast<ControlledBatch&>(state).sums;
+  auto& batch = static_cast<ControlledBatch&>(state);
+  SystemSums& sums = batch.sums;
   if (sums.n_cells() == 0) return nullptr;
+  batch.last_cells = sums.n_cells(), batch.last_rows = sums.n_rows();
   auto record = std::make_unique<SumsRecord>();
   std::swap(record->sums, sums);
   return record;
