@@ -275,6 +275,8 @@ def _film(mi: Any, scene: Any, camera: Any, integrator: Any, sampling: str, coun
         own = 2 * seed if sampling == "crn" else (2 * seed + 1) * 4096 + len(images)
         made = integrator.render(scene, _around(mi, camera, sampler, number), seed=own % (1 << 32), spp=size)
         values = numpy.array(made, dtype=numpy.float32)[..., :3]
+        if values.shape[-1] == 1:  # of variants without colours
+            values = numpy.repeat(values, 3, -1)
         images.extend(values.reshape(number, height + 1, width, 3)[:, :height])
         first += number * size
         finished(number)

@@ -104,6 +104,20 @@ class Render(WithMitsuba):
         spread = numpy.ptp(groups, axis=(1, 2)) / groups.mean(axis=(1, 2))
         self.assertLess(spread.max(), 0.02)
 
+    def test_other_variants(self):
+        """Without colours, all channels are one; spectra become colours."""
+        for variant in ("llvm_ad_mono", "llvm_ad_spectral"):
+            self.mi.set_variant(variant)
+            scene = self.room()
+            result = covary.mitsuba.render(scene, 24, groups=3, aovs=True)
+            plain = numpy.array(self.mi.render(scene, spp=64, seed=9))
+            numpy.testing.assert_allclose(result.image.mean(), plain[..., :3].mean(), rtol=0.05, err_msg=variant)
+            if variant == "llvm_ad_mono":
+                self.assertEqual(numpy.ptp(result.image, axis=-1).max(), 0)
+            self.assertEqual([result.aovs[name].shape for name in ("Albedo", "N")], [(32, 48, 3)] * 2)
+            self.assertGreater(result.aovs["Albedo"].mean(), 0.2)
+            self.assertAlmostEqual(float(numpy.linalg.norm(result.aovs["N"], axis=-1).max()), 1, delta=0.05)
+
     def test_filter(self):
         result = covary.mitsuba.render(self.mi.load_dict(self.scene_with({"type": "gaussian"})), 12)
         self.assertIn("was replaced by a box one pixel wide, because", result.warnings[0])
