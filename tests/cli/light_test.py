@@ -131,7 +131,7 @@ class Render(LightTest):
                                        stderr=subprocess.PIPE, text=True)
             time.sleep((0.1 + 0.07 * attempt) * SLOWDOWN)
             process.send_signal(signal.SIGINT)
-            message = process.communicate(timeout=60)[1]
+            message = process.communicate(timeout=60 * SLOWDOWN)[1]
             if process.returncode == 0:
                 break
             self.assertIn(process.returncode, (130, -signal.SIGINT), message)

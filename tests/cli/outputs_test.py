@@ -7,7 +7,7 @@ import subprocess
 import threading
 import unittest
 
-from cli_test import COVARY, CliTest
+from cli_test import COVARY, SLOWDOWN, CliTest
 from exr_reader import read_exr
 from exr_writer import exr, film
 
@@ -192,7 +192,7 @@ class Json(OutputsTest):
             file.write(film(2, groups=3, sampling="independent"))
 
     def json_of(self, *arguments):
-        done = subprocess.run([COVARY, *arguments], cwd=self.path, capture_output=True, timeout=60)
+        done = subprocess.run([COVARY, *arguments], cwd=self.path, capture_output=True, timeout=60 * SLOWDOWN)
         self.assertEqual(done.returncode, 0, done.stderr)
         return json.loads(done.stdout.decode("utf-8"))
 
@@ -205,7 +205,7 @@ class Json(OutputsTest):
         self.assertEqual(combined["output"], "combin\ufffd.exr")
         self.assertTrue(os.path.exists(os.fsencode(self.path) + b"/" + output))
         done = subprocess.run([COVARY, "view", self.NAME, "-o", "page.html"], cwd=self.path, capture_output=True,
-                              timeout=60)
+                              timeout=60 * SLOWDOWN)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("caf\ufffd", (self.path / "page.html").read_text(encoding="utf-8"))
 

@@ -215,6 +215,7 @@ class Memory(RenderTest):
         self.assertEqual(info["memory_bytes"]["none"], width * height * (12 + 4 + 12))
         self.assertIn("memory of a render beside the scene: ", self.good("info", ROOM).stdout)
 
+    @unittest.skipIf("SANITIZED" in os.environ, "sanitizers take memory of their own")
     def test_the_program_takes_about_as_much(self):
         """The difference between a large and a small image, in which program and scene cancel."""
         for estimator, groups in (("none", 4), ("iicv", 4), ("iicv", 12), ("cv-baseline", 4), ("iduw", 4)):

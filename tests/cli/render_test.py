@@ -194,7 +194,7 @@ class Files(RenderTest):
     def test_statistics_of_a_name_that_is_not_utf_8(self):
         output = b"caf\xe9.exr"
         done = subprocess.run([COVARY, *self.RENDER, "-o", output, "--json", "-"], cwd=self.path, capture_output=True,
-                              timeout=60)
+                              timeout=60 * SLOWDOWN)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(json.loads(done.stdout.decode("utf-8"))["output"], "caf\ufffd.exr")
 
@@ -354,7 +354,7 @@ class Time(RenderTest):
         process = subprocess.Popen([*command, "--time", "60"], cwd=self.path, stderr=subprocess.PIPE, text=True)
         time.sleep(1.5 * SLOWDOWN)
         process.send_signal(signal.SIGINT)
-        message = process.communicate(timeout=30)[1]
+        message = process.communicate(timeout=30 * SLOWDOWN)[1]
         self.assertEqual(process.returncode, 130, message)
         self.assertIn("interrupted after", message)
         before = json.loads(self.good("info", "a.passes/crn.exr", "--json").stdout)["attributes"]
@@ -385,7 +385,7 @@ class Interruption(RenderTest):
             process = subprocess.Popen(command, cwd=self.path, stderr=subprocess.PIPE, text=True)
             time.sleep((0.25 + 0.1 * attempt) * SLOWDOWN)
             process.send_signal(signal.SIGINT)
-            message = process.communicate(timeout=60)[1]
+            message = process.communicate(timeout=60 * SLOWDOWN)[1]
             if process.returncode == 0:
                 break
             self.assertIn(process.returncode, (130, -signal.SIGINT),

@@ -17,6 +17,8 @@ from pathlib import Path
 COVARY = os.environ["COVARY"]
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
 SUITES = SCENES.parent / "suites"
+# Seconds after which a command hangs; sanitizers (scripts/sanitized) are slow.
+TIMEOUT = 1200 if "SANITIZED" in os.environ else 120
 
 SUITE = {
     "name": "tiny",
@@ -92,7 +94,7 @@ class ExperimentTest(unittest.TestCase):
         return [COVARY, "experiment", "suite.json", "-o", out, "--scenes", str(SCENES), "--threads", "2", *arguments]
 
     def run_covary(self, command, **more):
-        return subprocess.run(command, cwd=self.path, capture_output=True, text=True, timeout=120, **more)
+        return subprocess.run(command, cwd=self.path, capture_output=True, text=True, timeout=TIMEOUT, **more)
 
     def results(self, *arguments, out="out", code=0):
         done = self.run_covary(self.command(*arguments, out=out))
@@ -248,7 +250,7 @@ class Parts(ExperimentTest):
         commands = [self.command("--part", f"{k}/3") for k in (1, 2, 3)]  # writes the suite, which they read
         processes = [subprocess.Popen(command, cwd=self.path, stderr=subprocess.PIPE) for command in commands]
         for process in processes:
-            _, errors = process.communicate(timeout=120)
+            _, errors = process.communicate(timeout=TIMEOUT)
             self.assertEqual(process.returncode, 0, errors)
         self.assertFalse((self.path / "out" / "results.json").exists())
         runs = self.runs()
@@ -301,7 +303,7 @@ class Resume(ExperimentTest):
             wait_for(lambda: catches(process.pid, signal.SIGINT))
             time.sleep(random.uniform(0, 0.5))
             process.send_signal(sent)
-            _, errors = process.communicate(timeout=60)
+            _, errors = process.communicate(timeout=TIMEOUT)
             if sent == signal.SIGINT and process.returncode != 0:
                 self.assertEqual(process.returncode, 130, errors)
                 self.assertRegex(errors, "interrupted after .* the same command continues")
