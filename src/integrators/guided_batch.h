@@ -27,11 +27,10 @@ struct GuidedConnection {
 struct GuidedBatch final : CameraBatch<GuidedPathState, LightSetChoice, GuidedConnection> {
   /// Of a light sample: what its control needs.
   struct ConnectionParts {
-    Spectrum value;        ///< f/p
-    uint32_t light;        ///< that was sampled, or ControlledSample::kNoLight: the environment
-    float r_light;         ///< its balance weight where nothing lies between
-    Spectrum direction;    ///< Σ β N λ / Σ N λ of the dense techniques that draw directions
-    TechniqueDensities r;  ///< their balance weights, while coefficients are learnt
+    Spectrum value;      ///< f/p
+    uint32_t light;      ///< that was sampled, or ControlledSample::kNoLight: the environment
+    float r_light;       ///< its balance weight where nothing lies between
+    Spectrum direction;  ///< Σ β N λ / Σ N λ of the dense techniques that draw directions
   };
 
   /// A direction sample whose light is known when the path has ended.
@@ -60,6 +59,7 @@ struct GuidedBatch final : CameraBatch<GuidedPathState, LightSetChoice, GuidedCo
   std::vector<uint32_t> ended;   ///< samples of paths that ended at their last vertex, which has a control
   std::vector<ControlledVertexState> vertices;  ///< the last one of each path, by Path::sample
   std::vector<ConnectionParts> connection_parts;
+  std::vector<TechniqueDensities> connection_weights;  ///< of what draws directions, while coefficients are learnt
 
   bool recording = false;
   std::vector<uint32_t> n_steps;       ///< of each path's trail, by Path::sample

@@ -81,14 +81,16 @@ struct Guide {
   float fraction = 0;  ///< g; 0: the BSDF alone
   uint32_t leaf = 0;
   VmfLobes lobes;
+  alignas(32) float parts[VmfLobes::kMax];  ///< of pdf(), by lobe, where the guide draws directions
 
-  float pdf(const Vec3& w) const { return fraction > 0 ? lobes.pdf(w) : 0; }
+  /// Density of the lobes; sets parts.
+  float pdf(const Vec3& w) { return fraction > 0 ? lobes.pdfs(w, parts) : 0; }
   float mixture_pdf(float pdf_bsdf, float pdf_guide) const {
     return fraction > 0 ? Parts::mixture_pdf(fraction, pdf_bsdf, pdf_guide) : pdf_bsdf;
   }
 
   GuidedDirection sample(const GuidingField& field, const SurfaceHit& hit, const Vec3& wo, const BsdfClosure& bsdf,
-                         const PathRandom& random, uint32_t vertex) const {
+                         const PathRandom& random, uint32_t vertex) {
     GuidedDirection direction;
     BsdfSample& next = direction.sample;
     const float u = fraction > 0 ? random.get_1d(vertex, Event::kTechnique) : 1;

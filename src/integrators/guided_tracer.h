@@ -128,6 +128,7 @@ class GuidedTracer {
   /// Evaluates the surfaces: connections to the light samples, and the next rays. Paths that end are removed.
   void scatter(int depth) {
     batch_.alive.clear(), batch_.ended.clear(), batch_.connection_parts.clear();
+    batch_.connection_weights.clear();
     for (uint32_t i = 0; i < batch_.paths.size(); ++i) {
       Path& path = batch_.paths[i];
       const SurfaceHit& hit = batch_.hits[i];
@@ -150,7 +151,7 @@ class GuidedTracer {
       const BsdfSample& next = direction.sample;
       path.recorded = false;
       const bool ends = !next.valid() || is_black(next.weight);
-      if (batch_.vertices[path.sample].active) control_.keep_direction(path.sample, hit, direction, !ends);
+      if (batch_.vertices[path.sample].active) control_.keep_direction(path.sample, direction, !ends);
       if (ends) {
         if (!batch_.vertices[path.sample].active) continue;
         if (Parts::kCountFailed) control_.take_direction(path.sample, 0, ControlledSample::kNoLight);
@@ -194,11 +195,12 @@ class GuidedTracer {
         GuidedBatch::ConnectionParts parts;
         float pdf_direction = 0;
         if (!light.is_delta) {
+          const float pdf_guide = guide_.pdf(light.wi);
           if (active) {
-            pdf_direction = control_.densities(f.pdf_solid_angle, light.wi);
+            pdf_direction = control_.densities(f.pdf_solid_angle, pdf_guide);
             parts.direction = control_.weighted_coefficients(path.sample, pdf_direction);
           } else {
-            pdf_direction = guide_.mixture_pdf(f.pdf_solid_angle, guide_.pdf(light.wi));
+            pdf_direction = guide_.mixture_pdf(f.pdf_solid_angle, pdf_guide);
           }
         }
         const float pdf = pmf * light.pdf_solid_angle;
@@ -211,14 +213,14 @@ class GuidedTracer {
         make_in_place(batch_.shadow_rays[n], [&] { return shadow_ray(hit, light); });
         if (!active) return;
         parts.value = value, parts.light = cluster, parts.r_light = mis::balance(pdf, pdf_direction);
-        if (batch_.recording_control)
-          for (uint32_t k = 0; k < GuidedTechnique::kCount; ++k)
-            parts.r[k] = pdf_direction > 0 ? control_.density(k) / (pdf + pdf_direction) : 0;
         batch_.connection_parts.push_back(parts);
+        if (!batch_.recording_control) return;
+        batch_.connection_weights.push_back(pdf_direction > 0 ? control_.balance_weights(pdf + pdf_direction)
+                                                              : TechniqueDensities{});
         return;
       }
     }
-    if (active) control_.take_light(path.sample, {{}, cluster, 1, {}, {}});
+    if (active) control_.take_light(path.sample, {{}, cluster, 1, {}}, kNoWeights);
   }
 
   /// Adds the light samples that nothing hides.
@@ -231,8 +233,12 @@ class GuidedTracer {
       if (!batch_.blocked[i]) samples_[connection.sample].radiance += connection.radiance;
       if (!batch_.vertices[connection.sample].active) continue;
       const GuidedBatch::ConnectionParts& parts = batch_.connection_parts[connection.place];
-      control_.take_light(connection.sample,
-                          batch_.blocked[i] ? GuidedBatch::ConnectionParts{{}, parts.light, 1, {}, {}} : parts);
+      if (batch_.blocked[i] || !batch_.recording_control)
+        control_.take_light(connection.sample,
+                            batch_.blocked[i] ? GuidedBatch::ConnectionParts{{}, parts.light, 1, {}} : parts,
+                            kNoWeights);
+      else
+        control_.take_light(connection.sample, parts, batch_.connection_weights[connection.place]);
     }
     batch_.n_connections = 0;
   }
@@ -273,6 +279,7 @@ class GuidedTracer {
       }
   }
 
+  static constexpr TechniqueDensities kNoWeights{};
   const Scene& scene_;
   const GuidedScene& guided_;
   const GuidingField& field_;

@@ -14,7 +14,8 @@ namespace covary {
 template <typename Parts>
 class GuidedVertexControl {
  public:
-  /// `guide`: of the vertex at hand; it is read by open(), densities() and keep_direction().
+  /// `guide`: of the vertex at hand; it is read by open() and, with the parts of its last pdf(), by densities(),
+  /// weighted_coefficients(), balance_weights() and keep_direction().
   GuidedVertexControl(const GuidedScene& guided, const Guide<Parts>& guide, std::span<CameraSample> samples,
                       PathContext& context, GuidedBatch& batch)
       : guided_(guided),
@@ -60,44 +61,47 @@ class GuidedVertexControl {
     step.held_out = vertex.cell != CoefficientTable::kNone;
   }
 
-  /// Sets densities_ to N λ of the techniques that draw directions; returns their sum.
-  float densities(float pdf_bsdf, const Vec3& w) {
-    alignas(32) float parts[VmfLobes::kMax];
-    const float pdf_guide = guide_.lobes.pdfs(w, parts);
-    densities_.fill(0);
-    densities_[GuidedTechnique::kBsdf] = (1 - guide_.fraction) * pdf_bsdf;
-    const GuidingLeaf& leaf = field_.leaf(guide_.leaf);
-    for (int k = 0; k < guide_.lobes.n; ++k) densities_[GuidedTechnique::of(leaf, k)] += guide_.fraction * parts[k];
-    return (1 - guide_.fraction) * pdf_bsdf + guide_.fraction * pdf_guide;
+  /// Takes N λ of the techniques that draw directions, for that of the guide's last pdf(); returns their sum.
+  float densities(float pdf_bsdf, float pdf_guide) {
+    n_lobes_ = guide_.lobes.n;
+    bsdf_density_ = (1 - guide_.fraction) * pdf_bsdf;
+    return bsdf_density_ + guide_.fraction * pdf_guide;
   }
 
-  /// N λ of technique k, as densities() found it.
-  float density(uint32_t k) const { return densities_[k]; }
-
-  /// Σ β N λ / Σ N λ over densities_, whose sum is `pdf`.
+  /// Σ β N λ / Σ N λ over densities(), whose sum is `pdf`.
   Spectrum weighted_coefficients(uint32_t sample, float pdf) const {
     Spectrum sum;
     if (batch_.vertices[sample].cell == CoefficientTable::kNone || !(pdf > 0)) return sum;
     const uint32_t cell = Parts::direction_cell(batch_.vertices[sample].cell, table_.n_cells());
-    for (uint32_t k = 0; k <= GuidedTechnique::kBsdf; ++k)
-      if (densities_[k] > 0) sum += table_.dense(cell, k) * (densities_[k] / pdf);
-    return sum;
+    const GuidingLeaf& leaf = field_.leaf(guide_.leaf);
+    for (int k = 0; k < n_lobes_; ++k) sum += table_.dense(cell, GuidedTechnique::of(leaf, k)) * guide_.parts[k];
+    sum = sum * guide_.fraction + table_.dense(cell, GuidedTechnique::kBsdf) * bsdf_density_;
+    return sum * (1 / pdf);
   }
 
-  /// Keeps what the control of the direction sample needs; it is taken when the next surface is found.
-  void keep_direction(uint32_t sample, const SurfaceHit& hit, const GuidedDirection& direction, bool followed) {
+  /// N λ / `sum` of each technique that draws directions.
+  TechniqueDensities balance_weights(float sum) const {
+    TechniqueDensities r{};
+    if (!(sum > 0)) return r;
+    r[GuidedTechnique::kBsdf] = bsdf_density_ / sum;
+    const GuidingLeaf& leaf = field_.leaf(guide_.leaf);
+    for (int k = 0; k < n_lobes_; ++k) r[GuidedTechnique::of(leaf, k)] += guide_.fraction * guide_.parts[k] / sum;
+    return r;
+  }
+
+  /// Keeps what the control of the direction sample, the guide's last one, needs; it is taken when the next surface is
+  /// found.
+  void keep_direction(uint32_t sample, const GuidedDirection& direction, bool followed) {
     float pdf = 1;
-    if (direction.sample.valid() && !direction.sample.is_delta()) {
-      pdf = densities(direction.pdf_bsdf, hit.frame.to_world(direction.sample.wi));
-    } else {  // nothing else finds it
-      densities_.fill(0);
-      densities_[GuidedTechnique::kBsdf] = 1;
-    }
+    if (direction.sample.valid() && !direction.sample.is_delta())
+      pdf = densities(direction.pdf_bsdf, direction.pdf_guide);
+    else  // nothing else finds it
+      n_lobes_ = 0, bsdf_density_ = 1;
     ControlledVertexState& vertex = batch_.vertices[sample];
     vertex.direction = weighted_coefficients(sample, pdf);
     if (vertex.step == ~0u) return;
     ControlStep& step = batch_.control_steps[vertex.step];
-    for (uint32_t k = 0; k < GuidedTechnique::kCount; ++k) step.r[k] = densities_[k] / pdf;
+    step.r = balance_weights(pdf);
     step.followed = followed;
   }
 
@@ -115,8 +119,8 @@ class GuidedVertexControl {
     step.light = cluster, step.r_light = r_light;
   }
 
-  /// The same of a light sample.
-  void take_light(uint32_t sample, const GuidedBatch::ConnectionParts& parts) {
+  /// The same of a light sample; `r`: balance weights of the techniques that draw directions.
+  void take_light(uint32_t sample, const GuidedBatch::ConnectionParts& parts, const TechniqueDensities& r) {
     ControlledVertexState& vertex = batch_.vertices[sample];
     if (vertex.cell != CoefficientTable::kNone)
       vertex.control = vertex.control - (light_coefficient(vertex.cell, parts.light) * parts.r_light +
@@ -124,7 +128,7 @@ class GuidedVertexControl {
     if (vertex.step == ~0u) return;
     ControlStep& step = batch_.control_steps[vertex.step];
     step.plain += parts.value;
-    add_to_sums(step, parts.value, parts.light, parts.r_light, parts.r);
+    add_to_sums(step, parts.value, parts.light, parts.r_light, r);
   }
 
   /// Ends the control of a vertex.
@@ -183,7 +187,8 @@ class GuidedVertexControl {
   std::span<CameraSample> samples_;
   PathContext& context_;
   GuidedBatch& batch_;
-  TechniqueDensities densities_{};  // of the direction at hand
+  int n_lobes_ = 0;         // whose densities are those of the guide's last pdf(); others have none
+  float bsdf_density_ = 0;  // N λ of the BSDF there
 };
 
 }  // namespace covary
