@@ -61,7 +61,7 @@ def noise(images):
 
 def compare(options, scene):
     # Other seeds on either side, so that the renders share no random numbers.
-    sides = [images(options, scene, shlex.split(words), 1 + 1000 * side)
+    sides = [images(options, scene, shlex.split(words), options.seed + 1000 * side)
              for side, words in enumerate((options.first, options.second))]
     return agreement(*sides, options.alpha), noise(sides[0]) / noise(sides[1])
 
@@ -75,6 +75,7 @@ def main(arguments):
     parser.add_argument("--second", default="--integrator controlled-path", help="options of the other")
     parser.add_argument("--resolution", default="32x24", metavar="WxH")
     parser.add_argument("--spp", type=int, default=32, help="samples per pixel of each image")
+    parser.add_argument("--seed", type=int, default=1, help="the first one")
     parser.add_argument("--max-depth", type=int, default=5)
     parser.add_argument("--images", type=int, default=16, metavar="R", help="independent images of each side")
     parser.add_argument("--each-trained", action="store_true",
