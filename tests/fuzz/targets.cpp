@@ -19,6 +19,7 @@
 #include "plans/pass_costs.h"
 #include "sampling/coefficient_table.h"
 #include "sampling/guiding_field.h"
+#include "support/leaks.h"
 #include "textures/image.h"
 
 namespace covary::fuzz {
@@ -88,6 +89,7 @@ bool grouped(Bytes input) {
 }
 bool image(Bytes input) {
   const InputFile file(input);
+  const test_support::LeaksOfOthers of_openimageio;
   const bool texture = accepts([&] { read_texels(file.path()); });
   const bool image = accepts([&] {
     inspect_image(file.path());

@@ -1,7 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#ifdef __SANITIZE_ADDRESS__
+#ifdef __SANITIZE_ADDRESS__  // GCC
+#define COVARY_COUNTS_LEAKS
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer)
+#define COVARY_COUNTS_LEAKS
+#endif
+#endif
+
+#ifdef COVARY_COUNTS_LEAKS
 #include <sanitizer/lsan_interface.h>
 #endif
 
@@ -9,7 +17,7 @@ namespace covary::test_support {
 
 /// While it lives, what this thread allocates is not counted as a leak: for those of other libraries that
 /// scripts/sanitizers/leaks.txt cannot name, because the stack through them is not known.
-#ifdef __SANITIZE_ADDRESS__
+#ifdef COVARY_COUNTS_LEAKS
 using LeaksOfOthers = __lsan::ScopedDisabler;
 #else
 struct LeaksOfOthers {
