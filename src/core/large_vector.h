@@ -7,11 +7,10 @@
 #include <new>
 #include <vector>
 
-#ifdef __linux__
-#include <sys/mman.h>
-#endif
-
 namespace covary {
+
+/// Asks the system for huge pages, where it has them; `memory` begins on one.
+void ask_for_huge_pages(void* memory, size_t size);
 
 template <typename T>
 struct LargeArrayAllocator {
@@ -23,9 +22,7 @@ struct LargeArrayAllocator {
   T* allocate(size_t n) {
     const size_t size = n * sizeof(T);
     void* memory = ::operator new(size, alignment(size));
-#ifdef __linux__
-    if (alignment(size) == kHugePage) madvise(memory, size, MADV_HUGEPAGE);  // a hint: refusal does no harm
-#endif
+    if (alignment(size) == kHugePage) ask_for_huge_pages(memory, size);
     return static_cast<T*>(memory);
   }
   void deallocate(T* memory, size_t n) { ::operator delete(memory, alignment(n * sizeof(T))); }
