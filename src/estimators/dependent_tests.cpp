@@ -110,11 +110,10 @@ void check(const GroupedImage& crn, const GroupedImage& independent, std::vector
     problems.push_back("the CRN image has 1 group, at least 2 are needed where films do not keep sample variances");
 }
 
-/// The whole of two images at once.
-EstimatorResult filter_and_combine(const GroupedImage& crn, const GroupedImage& independent,
-                                   const DependentTestsOptions& options, DependentTestsStages* stages) {
-  EstimatorResult result;
-  const std::vector<unsigned char> valid = finite_pixels(crn, independent, result.nonfinite_pixels);
+/// The image of the whole of two images at once, whose pixels with valid = 0 are left out.
+Image filter_and_combine(const GroupedImage& crn, const GroupedImage& independent,
+                         const std::vector<unsigned char>& valid, const DependentTestsOptions& options,
+                         DependentTestsStages* stages) {
   const bool exact = options.filter == DependentFilter::kExact;
   const int border = exact ? options.bound.window / 2 : options.regions.max_region;
   const FilterInput input =
@@ -123,20 +122,20 @@ EstimatorResult filter_and_combine(const GroupedImage& crn, const GroupedImage& 
   if (exact && options.guard > 0) scale = difference_scale(input, valid, options.guard);
   FilteredImage filtered =
       exact ? bound_filter(input, options.bound, scale ? &*scale : nullptr) : region_filter(input, options.regions);
-  result.estimate = combine(crn, input, filtered, options.weights);
+  Image estimate = combine(crn, input, filtered, options.weights);
   if (options.weights == CombinationWeights::kMeasured)
-    mix(crn, independent, valid, options, input, filtered, scale ? &*scale : nullptr, result.estimate);
-  fill_invalid(crn, independent, valid, result.estimate);
-  if (!stages) return result;
+    mix(crn, independent, valid, options, input, filtered, scale ? &*scale : nullptr, estimate);
+  fill_invalid(crn, independent, valid, estimate);
+  if (!stages) return estimate;
   *stages = {{"dependent", image_of(input.dependent)},
              {"independent", image_of(input.independent)},
-             {"combined", result.estimate},
+             {"combined", estimate},
              {"samples", image_of(input.count)},
              {"filtered", std::move(filtered.colour)},
              {"region", std::move(filtered.region)},
              {"bound", std::move(filtered.bound)},
              {"centre_weight", std::move(filtered.centre_weight)}};
-  return result;
+  return estimate;
 }
 
 GroupedImage rows_of(GroupedImage image, int first_row, int n_rows) {
@@ -193,18 +192,21 @@ EstimatorResult dependent_tests(const GroupedImage& crn, const GroupedImage& ind
 
   const int width = crn.width, height = crn.height, reach = dependent_tests_reach(options);
   const int step = rows_of_band(width, reach);
-  if (stages || step >= height) return filter_and_combine(crn, independent, options, stages);
   EstimatorResult result;
+  const std::vector<unsigned char> valid = finite_pixels(crn, independent, result.nonfinite_pixels);
+  if (stages || step >= height) {
+    result.estimate = filter_and_combine(crn, independent, valid, options, stages);
+    return result;
+  }
   result.estimate = Image(width, height, 3);
   for (int y = 0; y < height; y += step) {
     const int own = std::min(step, height - y), first = std::max(0, y - reach);
     const int rows = std::min(height, y + own + reach) - first;
-    const EstimatorResult band =
-        filter_and_combine(rows_of(crn, first, rows), rows_of(independent, first, rows), options, nullptr);
-    std::copy_n(band.estimate.pixel(0, y - first), 3 * static_cast<size_t>(width) * own, result.estimate.pixel(0, y));
-    long n_nonfinite = 0;  // without the rows around, which other bands count
-    finite_pixels(rows_of(crn, y, own), rows_of(independent, y, own), n_nonfinite);
-    result.nonfinite_pixels += n_nonfinite;
+    const auto valid_rows = valid.begin() + static_cast<std::ptrdiff_t>(first) * width;
+    const Image band =
+        filter_and_combine(rows_of(crn, first, rows), rows_of(independent, first, rows),
+                           {valid_rows, valid_rows + static_cast<std::ptrdiff_t>(rows) * width}, options, nullptr);
+    std::copy_n(band.pixel(0, y - first), 3 * static_cast<size_t>(width) * own, result.estimate.pixel(0, y));
   }
   return result;
 }
