@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "estimators/registry.h"
 
+#include "estimators/mixed_denoising.h"
 #include "film/metrics.h"
 #include "python/module/bindings.h"
 
@@ -54,7 +55,7 @@ nb::list estimators() {
     d["summary"] = estimator.summary;
     d["passes"] = name_of(estimator.passes);
     d["predicts_error"] = estimator.predicts_error;
-    d["denoises"] = estimator.apply && estimator.predicts_error && !estimator.adaptive;
+    d["denoises"] = can_be_denoised(estimator);
     d["fewest_groups"] = estimator.fewest_groups;
     nb::list options;
     for (const EstimatorOption& option : options_of_estimator(name)) options.append(option_dict(option));

@@ -133,16 +133,16 @@ MixedDenoising denoise_by_mixture(const Estimator& base, const GroupedImage& crn
   return out;
 }
 
+bool can_be_denoised(const Estimator& estimator) {
+  return estimator.apply && estimator.predicts_error && !estimator.adaptive;
+}
+
 Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& options) {
   if (options.mode == DenoiseMode::kNone) return base;
-  if (!base.apply || !base.predicts_error || base.adaptive)
-    throw Error(
-        ErrorCode::kUsage,
-        fmt::format(
-            "--denoise needs an estimator of two passes that predicts its error ({}), not {}",
-            fmt::join(estimators_where([](const Estimator& e) { return e.apply && e.predicts_error && !e.adaptive; }),
-                      ", "),
-            base.name));
+  if (!can_be_denoised(base))
+    throw Error(ErrorCode::kUsage,
+                fmt::format("--denoise needs an estimator of two passes that predicts its error ({}), not {}",
+                            fmt::join(estimators_where(can_be_denoised), ", "), base.name));
   const bool with_oidn = options.use_oidn && (!options.oidn.library.empty() || !find_denoiser(options.oidn).empty());
   Estimator estimator = base;
   estimator.text += fmt::format(" --denoise {}{}", settings_of(options.mode).name, with_oidn ? "" : " --oidn off");

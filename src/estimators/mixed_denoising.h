@@ -34,6 +34,9 @@ struct MixedDenoisingOptions {
 /// needs the whole image, and twice the groups. Throws Error(kUsage) for another base.
 Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& options);
 
+/// Whether an estimator can be the base.
+bool can_be_denoised(const Estimator& estimator);
+
 /// The same by words, as --denoise and --oidn have them: a name of denoise_mode_names(); a library or a folder of it,
 /// "" for where it is found, "off" to go without.
 Estimator with_denoising(const Estimator& base, const std::string& mode, const std::string& oidn);
