@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "estimators/registry.h"
+#include "film/splat_layer.h"
 
 namespace covary {
 namespace {
@@ -55,7 +56,7 @@ void check_light(const ImageOrigin& crn, const ImageOrigin& independent, const I
       findings.push_back({Severity::kError, image->name + " is a light film, which --light adds"});
     else if (light && image->has_light_added)
       findings.push_back({Severity::kError, image->name + " has a light film added already"});
-    else if (!light && !image->has_light_added && image->settings.find("light_tracing=on") != std::string::npos)
+    else if (!light && !image->has_light_added && has_light_film(image->settings))
       findings.push_back({Severity::kWarning, image->name + " lacks the light of a light film; --light adds it"});
   }
   if (!light) return;

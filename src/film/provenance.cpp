@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "film/outputs.h"
+#include "film/splat_layer.h"
 
 namespace covary {
 namespace {
@@ -35,7 +36,7 @@ struct Settings {
     }
   }
   /// Light paths are independent whatever the sampler.
-  bool traces_light() const { return integrator.find("light_tracing=on") != std::string::npos; }
+  bool traces_light() const { return has_light_film(integrator); }
 };
 
 std::set<std::string> seeds_of(const ImageFacts& image) {

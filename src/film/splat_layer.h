@@ -13,6 +13,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string_view>
 #include <vector>
 
 #include "film/film.h"
@@ -24,6 +25,11 @@ inline constexpr uint32_t kBundlePaths = 256;
 namespace film_key {
 inline constexpr const char* kLight = "light_film";  ///< "added": an image that is a film and a light film together
 }  // namespace film_key
+
+/// Whether the attribute `settings` of a film says that a light film belongs to it.
+inline bool has_light_film(std::string_view settings) {
+  return settings.find("light_tracing=on") != std::string_view::npos;
+}
 
 /// Light paths in a light film.
 inline uint64_t light_paths(const Film& film) {
