@@ -16,27 +16,28 @@ class Surface {
   Surface(const GuidedPath& integrator, const SurfaceHit& hit, const Vec3& to_viewer)
       : guided_(integrator.guided()), hit_(hit), wo_(hit.frame.to_local(to_viewer)) {
     bsdf_ = hit.bsdf->bind(hit, wo_.z > 0, TransportMode::kRadiance, arena_);
-    leaf_ = guided_.field->find(hit.p);
-    if (leaf_ == GuidingField::kNone) return;
-    guides_ = guide_at(guided_, leaf_, hit.p, wo_.z > 0 ? hit.frame.n : -hit.frame.n,
-                       guidable_share(*bsdf_, wo_, guided_.min_roughness), fraction_, lobes_);
-    if (guides_ && guided_.table->n_cells() > 0) cell_ = guided_.table->find(control_key(leaf_));
+    guide_.leaf = guided_.field->find(hit.p);
+    if (guide_.leaf == GuidingField::kNone) return;
+    guide_.share = guidable_share(*bsdf_, wo_, guided_.min_roughness);
+    guide_.see(guided_, hit, wo_);
+    if (guide_.lobes.n > 0 && guided_.table->n_cells() > 0) cell_ = guided_.table->find(control_key(guide_.leaf));
   }
 
   float density(const Vec3& w) const {
     const float pdf = bsdf_->eval(wo_, hit_.frame.to_local(w)).pdf_solid_angle;
-    return guides_ ? GuidedParts::mixture_pdf(fraction_, pdf, lobes_.pdf(w)) : pdf;
+    return guide_.fraction > 0 ? guide_.mixture_pdf(pdf, guide_.lobes.pdf(w)) : pdf;
   }
 
   Spectrum control(const Vec3& w) const {
     if (cell_ == CoefficientTable::kNone) return {};
     const CoefficientTable& table = *guided_.table;
     const float pdf = bsdf_->eval(wo_, hit_.frame.to_local(w)).pdf_solid_angle;
-    Spectrum sum = table.dense(cell_, GuidedTechnique::kBsdf) * ((1 - fraction_) * pdf);
+    Spectrum sum = table.dense(cell_, GuidedTechnique::kBsdf) * ((1 - guide_.fraction) * pdf);
     alignas(32) float parts[VmfLobes::kMax];
-    lobes_.pdfs(w, parts);
-    for (int k = 0; k < lobes_.n; ++k)
-      sum += table.dense(cell_, GuidedTechnique::of(guided_.field->leaf(leaf_), k)) * (fraction_ * parts[k]);
+    guide_.lobes.pdfs(w, parts);
+    const GuidingLeaf& leaf = guided_.field->leaf(guide_.leaf);
+    for (int k = 0; k < guide_.lobes.n; ++k)
+      sum += table.dense(cell_, GuidedTechnique::of(leaf, k)) * (guide_.fraction * parts[k]);
     return sum * table.scale(cell_);
   }
 
@@ -46,10 +47,8 @@ class Surface {
   Vec3 wo_;
   Arena arena_;
   const BsdfClosure* bsdf_;
-  uint32_t leaf_ = GuidingField::kNone, cell_ = CoefficientTable::kNone;
-  bool guides_ = false;
-  float fraction_ = 0;
-  VmfLobes lobes_;
+  uint32_t cell_ = CoefficientTable::kNone;
+  Guide<GuidedParts> guide_;
 };
 
 void set(Image& image, int x, int y, const Spectrum& value) {

@@ -56,18 +56,6 @@ inline float guidable_share(const BsdfClosure& bsdf, const Vec3& wo, float min_r
   return std::min(share, 1.0f);
 }
 
-/// The lobes of a leaf for a vertex at `p` whose normal on the side of the path is `normal`, and the fraction of
-/// directions that they draw there. False where the leaf does not guide.
-inline bool guide_at(const GuidedScene& guided, uint32_t leaf_number, const Vec3& p, const Vec3& normal, float share,
-                     float& fraction, VmfLobes& lobes) {
-  const GuidingLeaf& leaf = guided.field->leaf(leaf_number);
-  if (share == 0 || leaf.mixture.lobes.n == 0) return false;
-  fraction = share * (guided.learned_fraction ? leaf.fraction : guided.fraction);
-  leaf.mixture.see_from(p, lobes);
-  lobes.multiply_by_cosine(normal);
-  return true;
-}
-
 /// A direction with its densities per unit solid angle.
 struct GuidedDirection {
   BsdfSample sample;  ///< weight and pdf are those of the mixture
@@ -82,6 +70,16 @@ struct Guide {
   uint32_t leaf = 0;
   VmfLobes lobes;
   alignas(32) float parts[VmfLobes::kMax];  ///< of pdf(), by lobe, where the guide draws directions
+
+  /// Sets fraction and lobes to those of the leaf at a surface that is seen from `wo`, where share > 0 and the leaf
+  /// guides.
+  void see(const GuidedScene& guided, const SurfaceHit& hit, const Vec3& wo) {
+    const GuidingLeaf& own = guided.field->leaf(leaf);
+    if (share == 0 || own.mixture.lobes.n == 0) return;
+    fraction = share * (guided.learned_fraction ? own.fraction : guided.fraction);
+    own.mixture.see_from(hit.p, lobes);
+    lobes.multiply_by_cosine(wo.z > 0 ? hit.frame.n : -hit.frame.n);
+  }
 
   /// Density of the lobes; sets parts.
   float pdf(const Vec3& w) { return fraction > 0 ? lobes.pdfs(w, parts) : 0; }

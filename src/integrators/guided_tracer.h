@@ -180,8 +180,7 @@ class GuidedTracer {
     guide_.share = guidable_share(bsdf, wo, guided_.min_roughness);
     if (field_.n_leaves() == 0) return;
     guide_.leaf = batch_.leaves[i];
-    guide_at(guided_, guide_.leaf, hit.p, wo.z > 0 ? hit.frame.n : -hit.frame.n, guide_.share, guide_.fraction,
-             guide_.lobes);
+    guide_.see(guided_, hit, wo);
   }
 
   /// Next-event estimation: f cos L / p, if nothing lies between. `pmf`: with which the light of `cluster` was chosen;
