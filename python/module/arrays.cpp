@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <sys/mman.h>
 
 #include <algorithm>
 #include <limits>
@@ -11,6 +10,7 @@
 #include <sstream>
 
 #include "core/error.h"
+#include "core/large_vector.h"
 #include "core/parallel.h"
 
 namespace covary::python {
@@ -75,7 +75,7 @@ float* large_pages(size_t n) {
   const size_t bytes = (n * sizeof(float) + kPage - 1) / kPage * kPage;
   void* memory = bytes > kPage ? std::aligned_alloc(kPage, bytes) : std::malloc(n * sizeof(float));
   if (!memory) throw std::bad_alloc();
-  if (bytes > kPage) madvise(memory, bytes, MADV_HUGEPAGE);
+  if (bytes > kPage) ask_for_huge_pages(memory, bytes);
   return static_cast<float*>(memory);
 }
 
