@@ -8,32 +8,12 @@ Rows: the floor and the back wall, of rough metal, of scenes/glossy-box.xml, and
 left: radiance that arrives; density of the mixture of BSDF and guide; control variate (red: positive, blue: negative),
 a multiple of the density added for which its integral is 0, since such multiples have no effect. All directions,
 azimuth to the right, +y above; brightness by a power of 1/3, up to the 99.8th percentile."""
-import pathlib
-import subprocess
 import sys
-import tempfile
 
-import matplotlib
 import numpy as np
-
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "tests/cli"))
-matplotlib.use("Agg")
-from exr_reader import read_exr  # noqa: E402
-from matplotlib import pyplot  # noqa: E402
+from probes import ROOT, probe, save
 
 HEIGHT = 96
-
-
-def probe(covary, scene, resolution, pixel, options):
-    """Radiance, density and control in all directions."""
-    with tempfile.TemporaryDirectory() as folder:
-        out = pathlib.Path(folder) / "probe.exr"
-        subprocess.run([covary, "probe", str(scene), "--resolution", resolution, "--pixel", pixel, "--height",
-                        str(HEIGHT), "--samples", "64", "--cv", "rgb", *options, "-o", str(out)], check=True)
-        channels = read_exr(out.read_bytes())
-    image = np.array([channels[c] for c in "RGB"]).T.reshape(HEIGHT, 3, 2 * HEIGHT, 3)
-    return [image[:, i] for i in range(3)]
 
 
 def tone(image):
@@ -52,20 +32,15 @@ def signed(control, density):
 def main(covary, out, door):
     box = ROOT / "scenes/glossy-box.xml"
     no_lights = ["--nee", "off", "--guide-train", "64"]
-    rows = [("box, floor", (box, "128x128", "64,117", no_lights)), ("box, metal", (box, "128x128", "64,42", no_lights)),
-            ("door, floor", (door, "160x90", "80,78", ["--guide-train", "32"]))]
-    figure, axes = pyplot.subplots(3, 3, figsize=(12, 6.1))
-    for (title, where), row in zip(rows, axes):
-        radiance, density, control = probe(covary, *where)
-        for axis, image, name in zip(row, (tone(radiance), tone(density), signed(control, density)),
-                                     ("radiance", "density", "control")):
-            axis.imshow(image, aspect="auto")
-            axis.set_xticks([]), axis.set_yticks([])
-            if row is axes[0]:
-                axis.set_title(name, fontsize=10)
-        row[0].set_ylabel(title, fontsize=9)
-    figure.tight_layout()
-    figure.savefig(out, dpi=75)
+    places = [("box, floor", (box, "128x128", "64,117", no_lights)),
+              ("box, metal", (box, "128x128", "64,42", no_lights)),
+              ("door, floor", (door, "160x90", "80,78", ["--guide-train", "32"]))]
+    rows = []
+    for title, (scene, resolution, pixel, options) in places:
+        radiance, density, control = probe(covary, scene, pixel, HEIGHT, "--resolution", resolution, "--samples", "64",
+                                           "--cv", "rgb", *options)
+        rows.append((title, [tone(radiance), tone(density), signed(control, density)]))
+    save(rows, ("radiance", "density", "control"), (12, 6.1), out)
 
 
 if __name__ == "__main__":
