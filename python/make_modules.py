@@ -73,7 +73,13 @@ def signature(name, fixed, options):
     return listed(f"def {name}(", [*fixed, *arguments], ") -> Result:")
 
 
+def combine_options(estimator):
+    """Without those that only say how passes are rendered."""
+    return [option for option in estimator["options"] if not option["of_passes"]]
+
+
 def estimator_function(estimator):
+    options = combine_options(estimator)
     fixed = ["crn: Any", "independent: Any", "*", "light: Film | None = None", "counts: Any = None",
              "samples: int | None = None", "force: bool = False", "progress: Progress | None = None"]
     passed = ["light=light", "counts=counts", "samples=samples", "force=force", "progress=progress"]
@@ -84,15 +90,15 @@ def estimator_function(estimator):
     if estimator["predicts_error"]:
         fixed.append("std_error: bool | None = None")
         passed.append("std_error=std_error")
-    passed += [f"{identifier(o['name'])}={identifier(o['name'])}" for o in estimator["options"]]
+    passed += [f"{identifier(o['name'])}={identifier(o['name'])}" for o in options]
     name = identifier(estimator["name"])
     summary = f"{name}: {estimator['summary']}; at least {estimator['fewest_groups']} groups."
     call = listed("    return combine(", ["crn", "independent", repr(estimator["name"]), *passed], ")")
     return "\n".join([
-        signature(name, fixed, estimator["options"]),
+        signature(name, fixed, options),
         wrapped(f'"""{summary}', "    "), "",
         "    combine() says what crn, independent and the other arguments are.", "",
-        *map(option_line, estimator["options"]), '    """', call])
+        *map(option_line, options), '    """', call])
 
 
 def estimators_module(estimators):

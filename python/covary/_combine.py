@@ -8,7 +8,7 @@ from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any, Literal
 
 from . import _covary
-from ._options import OptionValue, text_options
+from ._options import OptionValue, check_no_passes, text_options
 from ._result import Result
 
 if TYPE_CHECKING:
@@ -48,6 +48,7 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = "iicv", *, li
     The values are those of `covary combine` in every bit. Raises InputError where the inputs do not fit, UsageError for
     options that the estimator does not have.
     """
+    check_no_passes(options, "here are images that are rendered: counts= tells the samples that their pixels have")
     return Result(**_covary.combine(crn, independent, None if counts is None else _counts(counts), light, albedo,
                                     normal, estimator, text_options(options), denoise, fspath(oidn), force, std_error,
                                     samples, progress))

@@ -2,8 +2,12 @@
 """Options of estimators as the registry takes them: text by name."""
 from __future__ import annotations
 
-from collections.abc import Mapping
+import functools
+from collections.abc import Iterable, Mapping
 from typing import Union
+
+from . import _covary
+from .errors import UsageError
 
 OptionValue = Union[bool, int, float, str, None]
 
@@ -18,3 +22,16 @@ def text_options(options: Mapping[str, OptionValue]) -> dict[str, str]:
             raise TypeError(f"{name}: found {type(value).__name__}; accepted are bool, int, float and str")
         texts[name.replace("_", "-")] = "" if value is True else str(value)
     return texts
+
+
+@functools.cache
+def _of_passes() -> frozenset[str]:
+    return frozenset(name for estimator in _covary.estimators() for option in estimator["options"]
+                     if option["of_passes"] for name in (option["name"], *option["aliases"]))
+
+
+def check_no_passes(names: Iterable[str], reason: str) -> None:
+    """Raises UsageError for keywords that say how passes share their samples among pixels."""
+    found = _of_passes().intersection(name.replace("_", "-") for name in names)
+    if found:
+        raise UsageError(f"--{min(found)} says how many samples pixels get while they are rendered; {reason}")

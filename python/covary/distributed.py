@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from ._cluster import SceneFiles, check_versions, dask, make_plugin
 from ._combine import Progress, combine
 from ._experiment import experiment, main
-from ._options import OptionValue, text_options
+from ._options import OptionValue, check_no_passes, text_options
 from ._render import Scene
 from ._render import render as render_here
 from ._result import Result, fields_of
@@ -168,6 +168,8 @@ def render(client: Any, scene: Scene | str | os.PathLike[str], spp: int, estimat
     if estimator not in _ESTIMATORS:
         raise UsageError(f"estimator '{estimator}' looks at other pixels or samples while it renders; on a cluster "
                          f"accepted are {', '.join(_ESTIMATORS)}")
+    texts = text_options(options)
+    check_no_passes([*options, *(settings or {})], "it looks at the whole frame, of which a worker has a tile")
     if tile < 1 or sample_ranges < 1 or spp % sample_ranges:
         raise UsageError(f"found tile {tile} and {spp} samples in {sample_ranges} ranges; tiles have one pixel or "
                          "more, and the ranges divide the samples")
@@ -179,7 +181,7 @@ def render(client: Any, scene: Scene | str | os.PathLike[str], spp: int, estimat
     files = SceneFiles(chosen)
     client.register_plugin(make_plugin(files))
     passed = {"spp": spp // sample_ranges, "estimator": estimator, **(settings or {}),
-              **{name.replace("-", "_"): value or True for name, value in text_options(options).items()}}
+              **{name.replace("-", "_"): value or True for name, value in texts.items()}}
     job = _Job(files.folder, files.file, chosen._loading, passed)
     width, height = chosen.resolution
     parts = [_Part(crop, seed + r, 0) for r in range(sample_ranges) for crop in _tiles(width, height, tile)]

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "estimators/registry.h"
 
+#include <algorithm>
+#include <iterator>
+
 #include "estimators/mixed_denoising.h"
+#include "estimators/sample_counts.h"
 #include "film/metrics.h"
 #include "python/module/bindings.h"
 
@@ -34,6 +38,10 @@ const char* name_of(EstimatorPasses passes) {
   return "";
 }
 
+bool is_adaptive_option(const std::string& name) {
+  return std::find(std::begin(kAdaptiveOptions), std::end(kAdaptiveOptions), name) != std::end(kAdaptiveOptions);
+}
+
 nb::dict option_dict(const EstimatorOption& option) {
   nb::dict d;
   d["name"] = option.name;
@@ -43,6 +51,7 @@ nb::dict option_dict(const EstimatorOption& option) {
   d["range"] = option.range.text();
   d["choices"] = option.choices;
   d["help"] = option.help;
+  d["of_passes"] = is_adaptive_option(option.name);
   return d;
 }
 

@@ -93,7 +93,15 @@ class Estimators(FilesTest):
             if estimator["passes"] == "pair":
                 text = getattr(covary, name).__doc__
                 for option in estimator["options"]:
-                    self.assertIn(option["name"].replace("-", "_") + ":", text)
+                    line = f"\n    {option['name'].replace('-', '_')}:"
+                    (self.assertNotIn if option["of_passes"] else self.assertIn)(line, text)
+
+    def test_options_of_passes_are_refused(self):
+        self.assertTrue(any(option["of_passes"] for option in covary._covary.estimators()[0]["options"]))
+        for options in ({"adaptive": True}, {"max_spp": 9}, {"pilot_spp": 9}):
+            message = self.message_of(covary.UsageError, covary.combine, self.crn, self.independent, **options)
+            self.assertIn("says how many samples pixels get while they are rendered", message)
+        self.assertRaises(TypeError, covary.iicv, self.crn, self.independent, adaptive=True)
 
     def test_others_are_refused(self):
         self.assertIn("which images do not hold", self.message_of(covary.UsageError, covary.combine, self.crn,
