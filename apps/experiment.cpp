@@ -94,22 +94,6 @@ lab::Suite builtin(const std::string& name) {
                                              name, did_you_mean(name, names), fmt::join(names, ", ")));
 }
 
-/// The folder that a suite's scene files are relative to.
-std::string scenes_folder(const ExperimentCommand& command, const lab::Suite& suite) {
-  if (!command.scenes.empty()) return command.scenes;
-  const fs::path given(command.suite);
-  if (given.extension() == ".json") return (fs::absolute(given).parent_path() / suite.scene_root).string();
-  if (given.extension() == ".xml" || suite.scenes.empty()) return fs::current_path().string();
-  // A built-in suite: from the source tree, or as installed.
-  const fs::path program = fs::path(program_path()).parent_path();
-  if (!suite.scene_root.empty())
-    for (const fs::path& base : {fs::current_path(), program / ".." / "..", program / ".." / "share" / "covary"})
-      if (fs::exists(base / suite.scene_root / suite.scenes[0].file))
-        return (base / suite.scene_root).lexically_normal().string();
-  throw Error(ErrorCode::kUsage, fmt::format("the suite '{}' needs --scenes DIR, the folder that holds {}", suite.name,
-                                             suite.scenes[0].file));
-}
-
 lab::Suite load_suite(const ExperimentCommand& command) {
   const fs::path given(command.suite);
   lab::Suite suite;
@@ -318,7 +302,8 @@ void experiment(ExperimentCommand command) {
   fs::create_directories(command.output, error);
   if (error) throw Error(ErrorCode::kIo, fmt::format("cannot make the folder {}: {}", command.output, error.message()));
 
-  const std::string scenes = scenes_folder(command, suite);
+  const std::string scenes =
+      command.scenes.empty() ? lab::scenes_folder(suite, command.suite, program_path()) : command.scenes;
   check_files(command, suite, scenes);
   ProgressPrinter printer(command.quiet);
   lab::ExperimentOptions options;

@@ -9,7 +9,6 @@ import argparse
 import hashlib
 import json
 import os
-import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -17,9 +16,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from . import _covary
 from ._cluster import SceneFiles, check_versions, dask, make_plugin
 from ._combine import Progress
-from ._program import program
+from ._program import program, run_program
 from ._render import Scene
 from .errors import Error, UsageError
 
@@ -63,11 +63,12 @@ def _run(piece: _Piece) -> dict[str, dict[str, bytes]]:
     parent = Path(get_worker().local_directory)
     scene = parent / piece.folder
     with tempfile.TemporaryDirectory(dir=parent, prefix="covary-experiment-") as temporary:
-        (Path(temporary) / "suite.json").write_text(piece.suite, encoding="utf-8")
-        subprocess.run([str(program()), "experiment", "suite.json", "-o", "out", "--scenes", str(scene), "--part",
-                        piece.part, "--quiet", *piece.options], cwd=temporary, capture_output=True, check=False)
+        suite, output = Path(temporary) / "suite.json", Path(temporary) / "out"
+        suite.write_text(piece.suite, encoding="utf-8")
+        run_program("experiment", suite, "-o", output, "--scenes", scene, "--part", piece.part, "--quiet",
+                    *piece.options)
         found: dict[str, dict[str, bytes]] = {}
-        for done in (Path(temporary) / "out" / "cache" / "runs").glob("*/run.json"):
+        for done in (output / "cache" / "runs").glob("*/run.json"):
             found[done.parent.name] = {path.name: path.read_bytes() for path in done.parent.iterdir()}
         there, here = str(scene / piece.file).encode(), piece.local.encode()
         for files in found.values():
@@ -87,48 +88,24 @@ def _keep(runs: dict[str, dict[str, bytes]], cache: Path) -> None:
             whole.rename(cache / "runs" / key / name)
 
 
-def _number_of_parts(suite: dict[str, Any], scene: dict[str, Any]) -> int:
-    """Of a scene: the halves of its reference, where they are rendered, and all methods of each seed and budget."""
-    reference = scene.get("reference") or suite.get("reference") or {}
-    seeds = suite.get("seeds", 1)
-    runs = (len(seeds) if isinstance(seeds, list) else int(seeds)) * len(suite["budgets"])
-    return runs + (0 if reference.get("files") else 2)
-
-
-def _scenes_folder(given: str | None, suite_word: str, suite: dict[str, Any]) -> Path:
-    """Where the program looks for the suite's scenes."""
-    root: str = suite.get("scene_root", "")
-    if given is not None:
-        return Path(given)
-    if suite_word.endswith(".json"):
-        return Path(suite_word).parent / root
-    here = program().parent
-    for base in (Path(), here / ".." / "..", here / ".." / "share" / "covary") if root else (Path(),):
-        if (base / root / suite["scenes"][0]["file"]).exists():
-            return base / root
-    raise UsageError(f"the suite '{suite['name']}' needs --scenes DIR, the folder that holds "
-                     f"{suite['scenes'][0]['file']}")
-
-
 def _pieces(client: Any, suite: dict[str, Any], folder: Path, options: tuple[str, ...]) -> Iterator[_Piece]:
     """All parts; the files of a scene go to the workers before its first."""
-    for scene in suite["scenes"]:
+    for scene, number in zip(suite["scenes"], _covary.numbers_of_parts(json.dumps(suite)), strict=True):
         path = folder / scene["file"]
         defines = dict(text.split("=", 1) for text in scene.get("defines", []))
         files = SceneFiles(Scene.load(path, defines=defines))
         client.register_plugin(make_plugin(files))
         alone = json.dumps({**suite, "scenes": [{**scene, "file": files.file}]})
-        number = _number_of_parts(suite, scene)
         for k in range(1, number + 1):
             yield _Piece(alone, files.folder, files.file, str(path), f"{k}/{number}", options)
 
 
 def _ask(*words: str | os.PathLike[str]) -> str:
     """What the program prints. Raises Error with its message."""
-    run = subprocess.run([program(), "experiment", *words], capture_output=True, text=True, check=False)
-    if run.returncode != 0:
-        raise (UsageError if run.returncode == 2 else Error)(run.stderr.strip().removeprefix("covary: "))
-    return run.stdout
+    exit_code, output, errors = run_program("experiment", *words)
+    if exit_code != 0:
+        raise (UsageError if exit_code == 2 else Error)(errors.strip().removeprefix("covary: "))
+    return output
 
 
 def _make_runs(client: Any, pieces: Sequence[_Piece], cache: Path, program_hash: str,
@@ -182,8 +159,8 @@ def experiment(client: Any, suite: str | os.PathLike[str], output: str | os.Path
     program_hash = _program_hash()
     _check_programs(client, program_hash)
     options = (*(["--quick"] if known.quick else []), *(["--threads", known.threads] if known.threads else []))
-    folder = _scenes_folder(known.scenes, os.fspath(suite), printed)
-    pieces = list(_pieces(client, printed, folder, options))
+    folder = known.scenes or _covary.scenes_folder(json.dumps(printed), os.fspath(suite), str(program()))
+    pieces = list(_pieces(client, printed, Path(folder), options))
     cache = Path(known.cache or Path(output) / "cache")
     _make_runs(client, pieces, cache, program_hash, progress)
     _ask(suite, *arguments, "-o", output, "--quiet")

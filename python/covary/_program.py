@@ -7,6 +7,7 @@ import shutil
 import sys
 from pathlib import Path
 
+from . import _covary
 from .errors import Error
 
 
@@ -19,6 +20,11 @@ def program() -> Path:
         raise Error("the program 'covary' is not installed: it is neither in the package nor on the search path, and "
                     "COVARY_PROGRAM does not name it")
     return Path(found)
+
+
+def run_program(*words: str | os.PathLike[str]) -> tuple[int, str, str]:
+    """Exit code, standard output and error of the program, which ends with this process, however that ends."""
+    return _covary.run_program([str(program()), *(os.fspath(word) for word in words)])
 
 
 def main() -> None:

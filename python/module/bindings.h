@@ -29,5 +29,7 @@ void bind_images(nb::module_& module);
 void bind_film(nb::module_& module);
 /// Scene and render().
 void bind_render(nb::module_& module);
+/// Suites of experiments, and running the program.
+void bind_experiment(nb::module_& module);
 
 }  // namespace covary::python

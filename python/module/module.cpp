@@ -63,4 +63,5 @@ NB_MODULE(_covary, module) {
   bind_film(module);
   bind_combine(module);
   bind_render(module);
+  bind_experiment(module);
 }

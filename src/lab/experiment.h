@@ -19,7 +19,8 @@ struct Progress {
 };
 
 /// A part of an experiment that machines make side by side: number `number`, from 0, of `of` parts. What is divided
-/// are the halves of references, and for each seed and budget the runs of all methods. of == 0: the whole.
+/// are the halves of references, and for each seed and budget the runs of all methods (number_of_parts()).
+/// of == 0: the whole.
 struct Part {
   size_t number = 0, of = 0;
 };

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <iterator>
 
 #include "core/content_hash.h"
 #include "core/error.h"
@@ -196,6 +197,11 @@ std::vector<Run> runs_of_scene(const Suite& suite, size_t index, const SceneInst
         std::stable_partition(at, runs.end(), [&, key = at->passes_key](const Run& r) { return r.passes_key == key; });
     }
   return runs;
+}
+
+size_t number_of_parts(const Suite& suite, const SceneEntry& scene) {
+  const size_t halves = suite.reference_of(scene).files.empty() ? std::size(kReferenceSeeds) : 0;
+  return halves + suite.seeds.size() * suite.budgets.size();
 }
 
 }  // namespace covary::lab

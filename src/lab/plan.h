@@ -61,4 +61,8 @@ std::vector<Run> reference_runs(const Suite& suite, const SceneInstance& scene, 
 std::vector<Run> runs_of_scene(const Suite& suite, size_t index, const SceneInstance& scene,
                                const PlanContext& context);
 
+/// Parts that the runs of a scene can be divided into at most: the halves of a reference that is to be rendered, and
+/// all methods with one seed and budget.
+size_t number_of_parts(const Suite& suite, const SceneEntry& scene);
+
 }  // namespace covary::lab

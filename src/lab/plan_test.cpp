@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <set>
+#include <utility>
 
 #include "core/shell_text.h"
 #include "lab/overrides.h"
@@ -160,6 +162,15 @@ TEST(Plan, ReferencesHaveSeedsOfTheirOwn) {
   ASSERT_EQ(halves.size(), 2u);
   EXPECT_NE(halves[0].key, halves[1].key);
   EXPECT_TRUE(contains(shell_text(halves[1].options), "--estimator none --spp 64 --seed 900000002"));
+}
+
+TEST(Plan, HasAPartForEachSeedAndBudgetAndForHalvesOfReferences) {
+  Suite suite = two_methods();
+  std::set<std::pair<uint64_t, size_t>> cells;
+  for (const auto& run : runs_of_scene(suite, 0, instance(), kContext)) cells.emplace(run.seed, run.budget);
+  EXPECT_EQ(number_of_parts(suite, suite.scenes[0]), cells.size() + reference_runs(suite, instance(), kContext).size());
+  suite.scenes[0].reference = ReferencePlan{0, {"given.exr"}};
+  EXPECT_EQ(number_of_parts(suite, suite.scenes[0]), cells.size());
 }
 
 TEST(Overrides, TakeThePlaceOfTheSuitesOwn) {

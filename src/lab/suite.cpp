@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <set>
 
 #include "core/error.h"
@@ -12,6 +13,7 @@ namespace covary::lab {
 namespace {
 
 using Json = nlohmann::ordered_json;
+namespace fs = std::filesystem;
 
 /// Options of `covary render` that the laboratory itself gives.
 const std::vector<std::string> kReserved = {"--spp",  "--time",       "--seed",   "-o",      "--output",
@@ -146,6 +148,19 @@ Json to_json(const Suite& suite) {
     if (!suite.published_ratio.empty()) json["published"]["ratio"] = suite.published_ratio;
   }
   return json;
+}
+
+std::string scenes_folder(const Suite& suite, const std::string& word, const std::string& program) {
+  const fs::path given(word);
+  if (given.extension() == ".json") return (fs::absolute(given).parent_path() / suite.scene_root).string();
+  if (given.extension() == ".xml" || suite.scenes.empty()) return fs::current_path().string();
+  const fs::path beside = fs::path(program).parent_path();
+  if (!suite.scene_root.empty())
+    for (const fs::path& base : {fs::current_path(), beside / ".." / "..", beside / ".." / "share" / "covary"})
+      if (fs::exists(base / suite.scene_root / suite.scenes[0].file))
+        return (base / suite.scene_root).lexically_normal().string();
+  throw Error(ErrorCode::kUsage, fmt::format("the suite '{}' needs --scenes DIR, the folder that holds {}", suite.name,
+                                             suite.scenes[0].file));
 }
 
 }  // namespace covary::lab

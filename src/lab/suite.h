@@ -81,4 +81,9 @@ std::vector<std::string> validate(const Suite& suite);
 
 nlohmann::ordered_json to_json(const Suite& suite);
 
+/// The folder that the suite's scene files are relative to: that of a file of a suite, the current one for a scene. For
+/// the name of a built-in suite it is searched here, in the source tree and the installation that `program`, the path
+/// of `covary`, lies in. `word` names the suite on the command line. Throws Error(kUsage) where there is none.
+std::string scenes_folder(const Suite& suite, const std::string& word, const std::string& program);
+
 }  // namespace covary::lab

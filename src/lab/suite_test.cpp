@@ -4,6 +4,9 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <fstream>
+
 #include "lab/builtin_suites.h"
 #include "support/files.h"
 
@@ -157,6 +160,23 @@ TEST(Suite, ValidatesAsAWhole) {
                            "method 'clean': '--spp' is chosen by", "show: 25 spp is not one of the budgets",
                            "scene 'room' has no reference", "published: no method is named 'iicvv'"})
     EXPECT_TRUE(contains(all, part));
+}
+
+/// Built-in suites find their scenes in the source tree, and beside the program where it is installed.
+TEST(Suite, KnowsWhereItsScenesLie) {
+  namespace fs = std::filesystem;
+  const fs::path tree = test_support::test_folder();
+  for (const char* made : {"bin", "share/covary/scenes"}) fs::create_directories(tree / made);
+  std::ofstream(tree / "share/covary/scenes/installed.xml") << "<scene/>";
+  Suite suite = parse_suite(kSuite, "small.json");
+  const auto found = [&](const std::string& word) { return scenes_folder(suite, word, tree / "bin/covary"); };
+  suite.scenes[0].file = "installed.xml";
+  EXPECT_EQ(found("elsewhere/small.json"), fs::current_path() / "elsewhere/scenes");
+  EXPECT_EQ(found("any.xml"), fs::current_path());
+  EXPECT_EQ(found("small"), tree / "share/covary/scenes");
+  suite.scenes[0].file = "missing.xml";
+  EXPECT_TRUE(contains(message_of([&] { found("small"); }),
+                       "the suite 'small' needs --scenes DIR, the folder that holds missing.xml"));
 }
 
 }  // namespace

@@ -4,6 +4,7 @@ of the scene."""
 import json
 import os
 import pickle
+import select
 import shutil
 import signal
 import subprocess
@@ -11,6 +12,7 @@ import sys
 import unittest
 
 import covary
+import covary._program
 import covary.distributed
 import numpy
 from common import ROOM, SOURCE, PackageTest
@@ -66,6 +68,28 @@ class Parts(PackageTest):
         message = self.message_of(covary.IoError, files.write, self.path / "file" / "folder")
         self.assertIn("a worker cannot write the scene's files", message)
         self.assertIn("--local-directory", message)
+
+    def test_program_that_ends_with_its_process(self):
+        """However that ends: of a worker that is killed nothing is left that takes processors."""
+        end, other_end = os.pipe()
+        self.addCleanup(os.close, end)
+        script = self.path / "program"
+        script.write_text(f"#!/bin/sh\necho started > /proc/self/fd/{other_end}\nexec sleep 100\n")
+        script.chmod(0o755)
+        code = "import covary._program; covary._program.run_program('experiment')"
+        with subprocess.Popen([sys.executable, "-c", code], pass_fds=[other_end],
+                              env={**os.environ, "COVARY_PROGRAM": str(script)}) as process:
+            os.close(other_end)
+            self.assertEqual(os.read(end, 100), b"started\n")
+            process.kill()
+        ready, _, _ = select.select([end], [], [], 50)
+        self.assertEqual((ready, os.read(end, 100)), ([end], b""))  # nobody has the other end open
+
+    def test_messages_of_the_program(self):
+        exit_code, output, errors = covary._program.run_program("experiment", "--list")
+        self.assertEqual((exit_code, errors), (0, ""))
+        self.assertIn("iicv-table1", output)
+        self.assertEqual(covary._program.run_program("experiment", "--lsit")[0], 2)
 
     def test_missing_dask(self):
         kept = sys.modules.get("distributed")
@@ -187,6 +211,8 @@ class Cluster(PackageTest):
             return self.message_of(covary.UsageError, covary.distributed.render, self.client, *arguments, **keywords)
         self.assertIn("looks at other pixels", refused(self.scene(), 24, "dependent-tests"))
         self.assertIn("the ranges divide the samples", refused(self.scene(), 25, sample_ranges=2))
+        for options in ({"adaptive": True}, {"settings": {"adaptive": True}}):
+            self.assertIn("looks at the whole frame", refused(self.scene(), 24, **options))
         self.assertIn("accepted is path", refused(self.scene(integrator="bdpt"), 24))
 
     def test_other_versions(self):
