@@ -192,14 +192,20 @@ void solve_dense(const SystemView& system, const SolveSettings& settings, Coeffi
 
 Spectrum best_share(const SystemView& system, const Spectrum& parent, double prior_vertices, bool monochrome) {
   const double* head = system.head.data();
-  const double n = head[Layout::kHeldOut];
-  Rgb cross = rgb(head + Layout::kPlainControl), squared = rgb(head + Layout::kControlSquared);
-  if (monochrome) cross = cross.mean(), squared = squared.mean();
+  const double n = head[Layout::kHeldOut], weight = head[Layout::kHeldOutWeight];
+  if (!(n > 0 && weight > 0)) return parent;
+  // Both have the means taken off: that of the plain estimate, times what noise is left of the control's mean of 0,
+  // would hide the share.
+  const Rgb control = rgb(head + Layout::kControl) / weight;
+  Rgb cross = rgb(head + Layout::kPlainControl) - rgb(head + Layout::kPlain) * control;
+  Rgb second = rgb(head + Layout::kControlSquared);
+  Rgb squared = second - weight * control * control;
+  if (monochrome) cross = cross.mean(), second = second.mean(), squared = squared.mean();
+  const double prior = prior_vertices / n;
   Spectrum result = parent;
   for (int c = 0; c < 3; ++c) {
-    if (!(n > 0 && squared[c] > 0)) continue;
-    const double prior = prior_vertices / n;
-    // The least second moment of plain + s · control lies at s = −Σ w plain control / Σ w control².
+    if (!(squared[c] > 1e-9 * second[c])) continue;  // one vertex, or equal ones, say nothing
+    // The least variance of plain + s · control lies at s = −Cov(plain, control) / Var(control).
     const double share = (-cross[c] / squared[c] + prior * parent[c]) / (1 + prior);
     result[c] = static_cast<float>(std::clamp(share, 0.0, 1.0));
   }

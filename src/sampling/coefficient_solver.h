@@ -34,10 +34,14 @@ struct SystemLayout {
   static constexpr uint32_t kWeight = 0;         ///< Σ w
   static constexpr uint32_t kWeightSquared = 1;  ///< Σ w²
   static constexpr uint32_t kValue = 2;          ///< Σ w f/p, RGB
-  static constexpr uint32_t kHeldOut = 5;        ///< number of held-out vertices
-  static constexpr uint32_t kPlainControl = 6;   ///< Σ w e c over held-out vertices, RGB: plain estimate times control
-  static constexpr uint32_t kControlSquared = 9;  ///< Σ w c² over held-out vertices, RGB
-  static constexpr uint32_t kDense = 12;
+  // Over held-out vertices, with plain estimate e and control c; all but the number with the weight w.
+  static constexpr uint32_t kHeldOut = 5;          ///< their number
+  static constexpr uint32_t kHeldOutWeight = 6;    ///< Σ w
+  static constexpr uint32_t kPlain = 7;            ///< Σ w e, RGB
+  static constexpr uint32_t kControl = 10;         ///< Σ w c, RGB
+  static constexpr uint32_t kPlainControl = 13;    ///< Σ w e c, RGB
+  static constexpr uint32_t kControlSquared = 16;  ///< Σ w c², RGB
+  static constexpr uint32_t kDense = 19;
   /// b_j of dense technique j, RGB.
   uint32_t dense(uint32_t j) const { return kDense + 3 * j; }
   /// A of two dense techniques.
@@ -87,9 +91,9 @@ void solve_block_arrow(const SystemView& system, const SolveSettings& settings, 
 void solve_dense(const SystemView& system, const SolveSettings& settings, CoefficientsView coefficients);
 
 /// How much of a system's control to use, per channel in [0, 1]: the share s for which the mixture of plain and
-/// controlled estimate, plain + s · control, had the least second moment over vertices that the coefficients had not
-/// been made of. `parent` counts as as many vertices as `prior_vertices`; with no data it is the result. The channels
-/// share one s when `monochrome`.
+/// controlled estimate, plain + s · control, varied least over vertices that the coefficients had not been made of: a
+/// regression with an intercept, which is exact where the control leaves a constant. `parent` counts as as many
+/// vertices as `prior_vertices`; with no data it is the result. The channels share one s when `monochrome`.
 Spectrum best_share(const SystemView& system, const Spectrum& parent, double prior_vertices, bool monochrome);
 
 /// Weight of a vertex's samples in the sums: the mean over RGB of (throughput · importance)². `throughput` is that of

@@ -224,6 +224,21 @@ TEST(CoefficientSolver, ShareOfTheControlIsWhatHeldOutVerticesSay) {
   EXPECT_EQ(one.r, one.b);
 }
 
+/// A plain estimate with a large mean and a control whose mean is by chance not 0.
+TEST(CoefficientSolver, ShareIsOneWhereTheControlLeavesAConstant) {
+  OneCell cell(0);
+  const float controls[] = {-1, 0.5f, 3, 2, 0.25f};
+  for (const float c : controls) cell.sums.add_held_out(cell.cell, 2 + c, Spectrum(100 - c), Spectrum(c));
+  const Spectrum share = best_share(cell.view(), Spectrum(), 0, false);
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(1, share[c], 1e-6);
+}
+
+TEST(CoefficientSolver, EqualVerticesSayNothingOfTheShare) {
+  OneCell cell(0);
+  for (int i = 0; i < 3; ++i) cell.sums.add_held_out(cell.cell, 1, Spectrum(0.1f), Spectrum(0.3f));
+  EXPECT_EQ(Spectrum(0.5f), best_share(cell.view(), Spectrum(0.5f), 0, false));
+}
+
 TEST(CoefficientSolver, WeightIsTheMeanOfSquaredFactors) {
   EXPECT_FLOAT_EQ((4 + 9 + 0) / 3.0f, variance_weight({1, 3, 0}, {2, 1, 5}));
 }

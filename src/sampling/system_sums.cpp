@@ -95,10 +95,13 @@ void SystemSums::add(uint32_t cell, float weight, const ControlledSample& sample
 
 void SystemSums::add_held_out(uint32_t cell, float weight, const Spectrum& plain, const Spectrum& control) {
   const Spectrum both = plain * control * weight, squared = control * control * weight;
-  if (!is_finite(both) || !is_finite(squared)) return;
+  if (!is_finite(both) || !is_finite(squared) || !is_finite(plain * weight) || !std::isfinite(weight)) return;
   double* head = &heads_[size_t{cell} * layout_.head_size()];
   head[SystemLayout::kHeldOut] += 1;
+  head[SystemLayout::kHeldOutWeight] += weight;
   for (int c = 0; c < 3; ++c) {
+    head[SystemLayout::kPlain + static_cast<uint32_t>(c)] += static_cast<double>(weight) * plain[c];
+    head[SystemLayout::kControl + static_cast<uint32_t>(c)] += static_cast<double>(weight) * control[c];
     head[SystemLayout::kPlainControl + static_cast<uint32_t>(c)] += both[c];
     head[SystemLayout::kControlSquared + static_cast<uint32_t>(c)] += squared[c];
   }

@@ -145,7 +145,7 @@ TEST(GuidedPath, ControlRestoresThePerfectTechnique) {
   const std::string sky = "<emitter type='constant'><rgb name='radiance' value='1,2,4'/></emitter>";
   const std::string xml = scene_text(wall + sky, kSide, kSide, 2, kWide);
   const double off = noise(trained(xml, options(false)));
-  EXPECT_LT(noise(trained(xml, controlled(false))), 0.02 * off);
+  EXPECT_LT(noise(trained(xml, controlled(false))), 1e-3 * off);
   EXPECT_LT(noise(trained(xml, controlled(false, ControlKind::kMono))), 0.6 * off);
 }
 
