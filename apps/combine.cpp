@@ -125,6 +125,7 @@ EstimatorResult estimate(const Estimator& estimator, const PairSettings& setting
     };
     append(part.estimate, whole.estimate);
     append(part.std_error, whole.std_error);
+    append(part.bias, whole.bias);
     if (!part.held_out.empty())
       whole.held_out.insert(whole.held_out.end(), part.held_out.begin() + (y - first),
                             part.held_out.begin() + (std::min(height, y + step) - first));

@@ -92,7 +92,7 @@ const char* display_of(const std::string& path, const std::vector<ExrFile::Chann
   const std::vector<std::string> names = layer_channels(path, channels, layer);
   std::string lower = layer;
   for (char& c : lower) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  if (names[0] == names[1]) return "range";
+  if (names[0] == names[1] || layer == "Bias") return "range";
   if (lower == "n" || lower == "nn" || lower.find("normal") != std::string::npos) return "direction";
   return names[0].ends_with('X') || names[0].ends_with('x') ? "range" : "picture";
 }

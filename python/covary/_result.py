@@ -23,6 +23,9 @@ class Result:
     image: FloatArray = field(repr=False)
     #: Estimated standard error of each value, [H, W, 3]; None where the estimator does not tell, or was not asked.
     std_error: FloatArray | None = field(repr=False)
+    #: Estimated bias of each value where it is significant, positive where too bright, zero elsewhere, [H, W, 3]; None
+    #: where it is not known.
+    bias: FloatArray | None = field(repr=False)
     #: relMSE that the standard errors predict, with the image in place of a reference.
     predicted_relmse: float | None
     #: What the checks of the inputs, or the render, warned of.

@@ -212,7 +212,7 @@ def _result(canvas: _Canvas, estimator: str, options: Mapping[str, Any], parts: 
     films = canvas.films()
     samples = sum(film.samples_per_pixel for film in films.values())
     if estimator == "none":
-        made = Result(next(iter(films.values())).mean, None, None, [], 0, "none", samples)
+        made = Result(next(iter(films.values())).mean, None, None, None, [], 0, "none", samples)
     else:
         made = combine(films["crn"], films["independent"], estimator, force=True,  # type: ignore[arg-type]
                        albedo=canvas.aovs.get("Albedo"), normal=canvas.aovs.get("N"), **options)

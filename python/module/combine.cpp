@@ -190,6 +190,7 @@ nb::dict combine(nb::object crn, nb::object independent, const Beside& beside, c
   nb::dict d;
   d["image"] = array_of(std::move(result.estimate));
   d["std_error"] = array_of(std::move(result.std_error));
+  d["bias"] = array_of(std::move(result.bias));
   d["predicted_relmse"] = predicted;
   d["warnings"] = pair.warnings();
   d["nonfinite_pixels"] = result.nonfinite_pixels;

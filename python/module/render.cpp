@@ -109,6 +109,7 @@ nb::dict dict_of(RenderResult&& result, const std::string& estimator, const std:
   for (auto& [name, image] : result.aovs) aovs[name.c_str()] = array_of(std::move(image));
   d["image"] = array_of(std::move(picture));
   d["std_error"] = array_of(std::move(result.image.std_error));
+  d["bias"] = array_of(std::move(result.image.bias));
   d["predicted_relmse"] = result.predicted_relmse;
   d["predicted_relmse_p95"] = result.predicted_blocks;
   d["nonfinite_pixels"] = result.image.nonfinite_pixels;

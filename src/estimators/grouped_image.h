@@ -47,11 +47,13 @@ struct HeldOutRow {
   int parts = 0;
 };
 
-/// What an estimator returns. `estimate` has the three channels R, G, B. `std_error` has them too, or is empty where no
-/// error estimate was asked for.
+/// What an estimator returns. `estimate` has the three channels R, G, B. `std_error` and `bias` have them too, or are
+/// empty: the first where no error estimate was asked for, the second where no bias is known.
 struct EstimatorResult {
   Image estimate;
   Image std_error;
+  /// That of each value where it is significant, positive where too bright, zero elsewhere (held_out_bias.h).
+  Image bias;
   /// Pixels with a non-finite value in either input. They are left out everywhere else and show the mean of their
   /// finite groups, or zero where there are none.
   long nonfinite_pixels = 0;

@@ -7,6 +7,7 @@
 #include "core/parallel.h"
 #include "estimators/guided_cells.h"
 #include "estimators/halves.h"
+#include "estimators/held_out_bias.h"
 #include "estimators/relative_weight.h"
 
 namespace covary {
@@ -106,6 +107,7 @@ EstimatorResult apply_with_rows(const Estimator& base, const GroupedImage& crn, 
     h[half] = moments(half_independent.view(), valid, 0, 0.0f);
   }
   const HeldOutInput input{{&images[0], &images[1]}, {&h[0], &h[1]}, nullptr, &valid};
+  whole.bias = held_out_bias({input.halves, input.halves, input.independent, &valid});
   whole.held_out.resize(static_cast<size_t>(crn.height));
   parallel_for(crn.height, 8, [&](int y) { whole.held_out[static_cast<size_t>(y)] = held_out_row(input, whole, y); });
   return whole;
@@ -120,6 +122,7 @@ Estimator with_held_out_rows(const Estimator& base) {
   estimator.memory.of_halves = 2 * (3 + 6) * sizeof(float);
   estimator.memory.of_halves_per_group = 3 * sizeof(float);
   estimator.memory.groups_for_halves = 2 * base.fewest_groups;
+  if (base.reach >= 0) estimator.reach += kBiasReach;
   estimator.apply = [base](const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings) {
     return apply_with_rows(base, crn, independent, settings);
   };

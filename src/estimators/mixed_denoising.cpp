@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "estimators/feedback.h"
 #include "estimators/halves.h"
+#include "estimators/held_out_bias.h"
 #include "estimators/held_out_error.h"
 #include "estimators/mixture.h"
 #include "estimators/registry.h"
@@ -71,7 +72,7 @@ Part make_part(const Estimator& base, const GroupedImage& crn, const GroupedImag
 }
 
 /// The first candidate: the estimator's image with little noise.
-const Image& guide_of(const Part& whole) { return whole.set.candidates[0]; }
+const Image& guide_of(const Part& part) { return part.set.candidates[0]; }
 
 }  // namespace
 
@@ -121,11 +122,12 @@ MixedDenoising denoise_by_mixture(const Estimator& base, const GroupedImage& crn
 
   MixedDenoising out;
   out.result = std::move(whole.base);
-  if (settings.std_error)
-    out.result.std_error =
-        held_out_error({{&mixture.halves[0], &mixture.halves[1]}, input.independent, input.guide, &valid});
-  else
-    out.result.std_error = Image();
+  out.result.std_error = Image();
+  if (settings.std_error) {
+    const std::array<const Image*, 2> images = {&mixture.halves[0], &mixture.halves[1]};
+    out.result.std_error = held_out_error({images, input.independent, input.guide, &valid});
+    out.result.bias = held_out_bias({images, {&guide_of(halves[0]), &guide_of(halves[1])}, input.independent, &valid});
+  }
   out.result.estimate = std::move(mixture.image);
   for (const CandidateMaker& maker : makers) out.names.insert(out.names.end(), maker.names.begin(), maker.names.end());
   out.weights = std::move(mixture.weights);

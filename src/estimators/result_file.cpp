@@ -9,6 +9,7 @@ void write_result(const std::string& path, const ImagePlace& place,
   std::vector<ExrPlane> planes;
   add_image_planes("", result.estimate, planes);
   if (!result.std_error.data.empty()) add_image_planes("StdError", result.std_error, planes);
+  if (!result.bias.data.empty()) add_image_planes("Bias", result.bias, planes);
   for (auto& [name, image] : aovs) add_image_planes(name, image, planes);
   write_exr(path, place, attributes, planes);
 }

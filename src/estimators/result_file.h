@@ -10,8 +10,9 @@
 
 namespace covary {
 
-/// Writes R, G, B, where there is an error estimate StdError.R, .G, .B, and the auxiliary images by name, with string
-/// attributes. The file appears under its name only when complete. Throws Error(kIo). The arguments are only read.
+/// Writes R, G, B, where there are an error estimate StdError.R, .G, .B and Bias.R, .G, .B, and the auxiliary images by
+/// name, with string attributes. The file appears under its name only when complete. Throws Error(kIo). The arguments
+/// are only read.
 void write_result(const std::string& path, const ImagePlace& place,
                   const std::map<std::string, std::string>& attributes, EstimatorResult& result,
                   std::map<std::string, Image>& aovs);

@@ -43,7 +43,8 @@ class Plans(RenderTest):
                   "--quiet")
         self.same("a.exr", "b.exr")
         info = json.loads(self.good("info", "a.exr", "--json").stdout)
-        self.assertEqual(set(info["channels"]), {"R", "G", "B", "StdError.R", "StdError.G", "StdError.B"})
+        self.assertEqual(set(info["channels"]),
+                         {f"{layer}{c}" for layer in ("", "StdError.", "Bias.") for c in "RGB"})
         self.assertEqual(info["attributes"]["covary:estimator"], "iicv")
         self.assertFalse(list(self.path.glob("*.passes")), "passes are not left behind")
 

@@ -31,6 +31,7 @@ class Combine(FilesTest):
         path = self.combine_files("--error")
         self.assert_same_bits(result.image.reshape(-1, 3), rgb(path))
         self.assert_same_bits(result.std_error.reshape(-1, 3), channels(path, [f"StdError.{c}" for c in "RGB"]))
+        self.assert_same_bits(result.bias.reshape(-1, 3), channels(path, [f"Bias.{c}" for c in "RGB"]))
 
     def test_options(self):
         for options, words in (({"paper": True}, ["--paper"]), ({"k": 9, "ridge": 0.1}, ["--k", 9, "--ridge", 0.1]),
@@ -85,6 +86,7 @@ class Estimators(FilesTest):
         self.assertEqual(covary.cv_baseline(self.crn, self.independent, exclude_target=True).estimator,
                          "cv-baseline --exclude-target")
         self.assertIsNone(covary.iduw(self.crn, self.independent, samples=96).std_error)
+        self.assertIsNone(covary.iduw(self.crn, self.independent, samples=96).bias)
 
     def test_every_pair_estimator_has_one(self):
         for estimator in covary._covary.estimators():
