@@ -54,6 +54,11 @@ void add_control_options(CLI::App& command, ControlTexts& texts) {
       ->check(one_of({"on", "off"}))
       ->group(kControlGroup);
   command
+      .add_option("--cv-albedo", texts.albedo,
+                  "Whether coefficients are multiplied by the albedo of the surface (--cv rgb and mono); default: on")
+      ->check(one_of({"on", "off"}))
+      ->group(kControlGroup);
+  command
       .add_option("--cv-memory", texts.memory_mib,
                   "MiB of sums and coefficients while learning, then cells become wider; default: 256")
       ->transform(whole_number(1u, kMaxNumber))
@@ -81,6 +86,7 @@ std::optional<ControlOptions> control_options(const ControlTexts& texts) {
   options.train_spp = texts.train_spp, options.clusters = texts.clusters, options.memory_mib = texts.memory_mib;
   if (!texts.variance.empty()) options.relative = texts.variance == "relative";
   if (!texts.prefix.empty()) options.prefix = texts.prefix == "on";
+  if (!texts.albedo.empty()) options.albedo = texts.albedo == "on";
   return options;
 }
 
@@ -113,6 +119,7 @@ std::vector<std::string> command_words(const ControlTexts& texts) {
   add("--cv-clusters", number(texts.clusters));
   add("--cv-variance", texts.variance);
   add("--cv-prefix", texts.prefix);
+  add("--cv-albedo", texts.albedo);
   add("--cv-memory", number(texts.memory_mib));
   return words;
 }

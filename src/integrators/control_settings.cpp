@@ -67,6 +67,7 @@ ControlOptions ControlOptions::from(Parameters& parameters) {
   if (parameters.has("cv_variance"))
     options.relative = parameters.get_choice("cv_variance", "relative", {"relative", "absolute"}) == "relative";
   if (parameters.has("cv_prefix")) options.prefix = parameters.get_bool("cv_prefix", true);
+  if (parameters.has("cv_albedo")) options.albedo = parameters.get_bool("cv_albedo", true);
   return options;
 }
 
@@ -76,6 +77,7 @@ ControlSettings ControlSettings::published() {
   settings.lights = LightSelection::kTriangle;
   settings.grid = 64;
   settings.clusters = 5000;
+  settings.albedo = false;
   return settings;
 }
 
@@ -89,6 +91,7 @@ ControlSettings ControlSettings::with(const ControlOptions& options) const {
   take(options.memory_mib, settings.memory_mib);
   take(options.relative, settings.relative);
   take(options.prefix, settings.prefix);
+  take(options.albedo, settings.albedo);
   return settings;
 }
 
@@ -109,7 +112,8 @@ std::string ControlSettings::text() const {
   const auto number = [](uint32_t value) { return std::to_string(value); };
   return selection + (paper ? " paper" : "") + " grid=" + (grid == kAutomaticGrid ? "auto" : number(grid)) +
          " train=" + number(train_spp) + " clusters=" + number(clusters) + " memory=" + number(memory_mib) +
-         " variance=" + (relative ? "relative" : "absolute") + " prefix=" + (prefix ? "on" : "off");
+         " variance=" + (relative ? "relative" : "absolute") + " prefix=" + (prefix ? "on" : "off") +
+         (by_albedo() ? " albedo" : "");
 }
 
 }  // namespace covary

@@ -26,10 +26,11 @@ struct ControlOptions {
   std::optional<ControlKind> kind;
   std::optional<LightSelection> lights;
   std::optional<uint32_t> grid, train_spp, clusters, memory_mib;
-  std::optional<bool> relative, prefix;
+  std::optional<bool> relative, prefix, albedo;
   bool paper = false;
 
-  /// Reads cv, cv_paper, lights, cv_grid, cv_train, cv_clusters, cv_variance, cv_prefix and cv_memory.
+  /// Reads cv, cv_paper, lights, cv_grid, cv_train, cv_clusters, cv_variance, cv_prefix, cv_albedo and
+  /// cv_memory.
   static ControlOptions from(Parameters& parameters);
 };
 
@@ -45,6 +46,7 @@ struct ControlSettings {
   uint32_t memory_mib = 256;       ///< of sums and coefficients while training
   bool relative = true;            ///< least relative variance [Hua2023] §4.2.1, otherwise least variance
   bool prefix = true;              ///< samples weigh by the throughput before them [Hua2023] §4.4
+  bool albedo = true;              ///< see by_albedo()
   bool paper = false;              ///< the cache as published, see CacheSettings::published()
 
   /// Those of [Hua2023] and its authors' program: triangles, 64 cells, 16 samples per pixel.
@@ -61,6 +63,8 @@ struct ControlSettings {
   uint32_t pilot_spp() const { return learns() && relative && !per_pixel() ? (train_spp >= 4 ? 2 : train_spp / 2) : 0; }
   /// Whether each pixel has coefficients of its own, for the first surface, instead of each cell of space.
   bool per_pixel() const { return kind == ControlKind::kOptimalMis; }
+  /// Whether the coefficients of a vertex are multiplied by its albedo: where there is one for each cell.
+  bool by_albedo() const { return albedo && (kind == ControlKind::kRgb || kind == ControlKind::kMono); }
   CacheSettings cache(uint32_t resolution) const;
   std::string text() const;
 };

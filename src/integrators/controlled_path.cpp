@@ -14,6 +14,7 @@
 // | cv_clusters   | integer | 256      | most clusters of lights                                               |
 // | cv_variance   | string  | relative | what is made least: `relative` or `absolute` variance                 |
 // | cv_prefix     | boolean | true     | samples weigh by the throughput of the path before them               |
+// | cv_albedo     | boolean | true     | coefficients are multiplied by the albedo of the surface; rgb and mono |
 // | cv_memory     | integer | 256      | MiB of sums and coefficients while training; then cells become wider  |
 #include "integrators/controlled_path.h"
 
@@ -45,7 +46,9 @@ void ControlledPath::prepare(const Scene& scene) {
                  settings_.prefix,
                  settings_.kind == ControlKind::kVevoda,
                  settings_.per_pixel(),
-                 settings_.lights == LightSelection::kLearned};
+                 settings_.lights == LightSelection::kLearned,
+                 settings_.by_albedo(),
+                 settings_.kind == ControlKind::kMono};
   clusters_ = cluster_light_set(lights_, scene.bounds(), settings_.learns() ? settings_.clusters : ~0u);
   controlled_.cluster_of = clusters_.cluster_of;
   if (settings_.learns())

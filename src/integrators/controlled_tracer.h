@@ -20,6 +20,9 @@
 // - Russian roulette comes after the next surface is found, which is the last that a vertex asks for: it would
 //   otherwise have to return the rest of the control of those it ends.
 //
+// Coefficients may be multiplied by any number that depends on the vertex alone. By the albedo, the vertices of a cell
+// share coefficients although their surface is textured.
+//
 // `Parts` says what tests exchange to plant bugs; see ControlledParts.
 #pragma once
 
@@ -49,7 +52,9 @@ struct ControlledScene {
   bool light_samples_only = false;
   /// Coefficients belong to pixels, those into which the camera sees the first surface; later vertices have none.
   bool per_pixel = false;
-  bool residuals = false;  ///< while learning, what is left of each light's samples is recorded
+  bool residuals = false;   ///< while learning, what is left of each light's samples is recorded
+  bool by_albedo = false;   ///< coefficients are multiplied by the albedo of the vertex
+  bool monochrome = false;  ///< by its mean over RGB
   /// Dense techniques: directions by the BSDF, then the environment.
   static constexpr uint32_t kBsdf = 0, kEnvironment = 1;
   uint32_t n_dense() const { return environment ? 2 : 1; }
@@ -65,6 +70,8 @@ struct ControlledParts {
   static float direction_weight(float pdf, float pdf_light, bool /*of_environment*/) {
     return mis::balance(pdf, pdf_light);
   }
+  /// What multiplies the coefficients of a vertex, whether its path ends there or goes on.
+  static Spectrum unit(const Spectrum& unit, bool /*ended*/) { return unit; }
 };
 
 template <typename Parts>
@@ -100,7 +107,7 @@ class ControlledTracer {
       scatter(depth);
       trace_connections(depth + 2);
       if constexpr (Parts::kCloseEnded)
-        for (const uint32_t sample : batch_.ended) close(sample, depth + 2);
+        for (const uint32_t sample : batch_.ended) close(sample, depth + 2, true);
     }
   }
 
@@ -130,7 +137,7 @@ class ControlledTracer {
     if (!is_black(light.radiance)) add(path.sample, depth + 1, path.throughput * light.radiance * r);
     if (!vertex.open) return;
     if (!control_.light_samples_only) take(vertex, vertex.direction_weight * light.radiance * r, cluster, 1 - r);
-    close(path.sample, depth + 1);
+    close(path.sample, depth + 1, false);
   }
 
   bool survives(Path& path) {
@@ -163,8 +170,7 @@ class ControlledTracer {
     });
     if (control_.lights->empty()) return;
     of_each_vertex([this](const ControlledBatch::LightChoice& choice) {
-      if (choice.cell != CoefficientTable::kNone)
-        table_.prefetch_light(choice.cell, control_.cluster_of[choice.light]);
+      if (choice.cell != CoefficientTable::kNone) table_.prefetch_light(choice.cell, control_.cluster_of[choice.light]);
     });
   }
 
@@ -196,7 +202,7 @@ class ControlledTracer {
       ControlledVertex& vertex = batch_.vertices[path.sample];
       vertex.open = batch_.choices[i].open;
       if (vertex.open) {
-        open(vertex, path, batch_.choices[i]);
+        open(vertex, path, hit, batch_.choices[i]);
         if (!control_.lights->empty())
           connect(path, hit, wo, *bsdf, batch_.lights[i], control_.cluster_of[batch_.choices[i].light],
                   (*control_.lights)[batch_.choices[i].light].pmf);
@@ -226,7 +232,8 @@ class ControlledTracer {
   }
 
   /// Begins the estimate of a vertex: Σ N β of its control.
-  void open(ControlledVertex& vertex, const Path& path, const ControlledBatch::LightChoice& choice) {
+  void open(ControlledVertex& vertex, const Path& path, const SurfaceHit& hit,
+            const ControlledBatch::LightChoice& choice) {
     vertex.throughput = path.throughput;
     vertex.recorded = choice.in_cell && batch_.recording;
     vertex.cell = choice.cell;
@@ -236,11 +243,22 @@ class ControlledTracer {
       else
         begin_control(vertex);
     }
+    const bool controlled = vertex.recorded || vertex.cell != CoefficientTable::kNone;
+    vertex.unit = control_.by_albedo && controlled ? unit_of(hit) : Spectrum(1);
     if (!vertex.recorded) return;
     const Spectrum importance = context_.importance.empty() ? Spectrum(1) : context_.importance[path.sample];
-    vertex.weight = variance_weight(control_.prefix ? path.throughput : Spectrum(1), importance);
+    vertex.weight = variance_weight((control_.prefix ? path.throughput : Spectrum(1)) * vertex.unit, importance);
     vertex.sums_cell = batch_.sums.cell(choice.key);
     vertex.plain = Spectrum();
+  }
+
+  /// The albedo of a surface; not zero, since a black surface can have highlights.
+  Spectrum unit_of(const SurfaceHit& hit) const {
+    constexpr float kLeast = 0.02f;
+    Spectrum albedo = hit.bsdf->albedo(hit);
+    if (control_.monochrome) albedo = Spectrum(mean(albedo));
+    for (int c = 0; c < 3; ++c) albedo[c] = std::clamp(albedo[c], kLeast, 1.0f);
+    return albedo;
   }
 
   void begin_control(ControlledVertex& vertex) {
@@ -257,17 +275,18 @@ class ControlledTracer {
   /// One sample of a vertex, its value f/p, and balance weights: `r_light` of a light's cluster, or of the environment
   /// for kNoLight, and 1 − r_light of the BSDF.
   void take(ControlledVertex& vertex, const Spectrum& value, uint32_t cluster, float r_light) {
-    Spectrum residual = value;
+    Spectrum control(0);
     if (vertex.cell != CoefficientTable::kNone) {
       Spectrum sum = table_.dense(vertex.cell, ControlledScene::kBsdf) * (1 - r_light);
       if (r_light > 0) sum += coefficient(vertex.cell, cluster) * r_light;
       vertex.control = vertex.control - sum;
-      residual = value - sum * table_.scale(vertex.cell);
+      control = sum * table_.scale(vertex.cell);
     }
     if (!vertex.recorded) return;
-    record(vertex, value, cluster, r_light);
+    const Spectrum in_units = value / vertex.unit;
+    record(vertex, in_units, cluster, r_light);
     if (control_.residuals && cluster != kNoLight && r_light > 0)
-      batch_.sums.add_residual(cluster, vertex.weight, residual);
+      batch_.sums.add_residual(cluster, vertex.weight, in_units - control);
   }
 
   void record(ControlledVertex& vertex, const Spectrum& value, uint32_t cluster, float r_light) {
@@ -324,11 +343,12 @@ class ControlledTracer {
   }
 
   /// Ends the estimate of a vertex, which is of paths of so many edges.
-  void close(uint32_t sample, int edges) {
+  void close(uint32_t sample, int edges, bool ended) {
     ControlledVertex& vertex = batch_.vertices[sample];
     vertex.open = false;
     if (vertex.cell == CoefficientTable::kNone) return;
-    add(sample, edges, vertex.throughput * table_.scale(vertex.cell) * vertex.control);
+    const Spectrum unit = Parts::unit(vertex.unit, ended);
+    add(sample, edges, vertex.throughput * table_.scale(vertex.cell) * vertex.control * unit);
     if (vertex.recorded) batch_.sums.add_held_out(vertex.sums_cell, vertex.weight, vertex.plain, vertex.control);
   }
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from cli_test import CliTest
 from exr_reader import read_exr
-from training_tests import LearningFiles, LearningFilms
+from training_tests import LearningFiles, LearningFilms, LearningTest
 
 ROOM = str(Path(os.environ["SCENES"]) / "room.xml")
 RENDER = ("render", ROOM, "--resolution", "48x32", "--no-preview", "--integrator", "controlled-path")
@@ -76,6 +76,28 @@ class Films(Controlled, LearningFilms, CliTest):
         (self.path / "2.exr").write_bytes((self.path / "1.exr").read_bytes())
         self.good(*PLAIN, "--spp", "12", "-o", "2.exr", "--seed", "1", "--resume")
         self.bad(1, "seed", *PLAIN, "--spp", "12", "-o", "1.exr", "--seed", "2", "--resume")
+
+
+class Albedo(LearningTest, CliTest):
+    def test_is_on_unless_told_otherwise_or_as_published(self):
+
+        def image(name, *options):
+            self.good(*PLAIN, "--spp", "6", "-o", name + ".exr", *options)
+            return self.pixels(name + ".exr")["R"]
+
+        on, off = image("on", "--cv-albedo", "on"), image("off", "--cv-albedo", "off")
+        self.assertEqual(image("default"), on)
+        self.assertNotEqual(on, off)
+        paper = image("paper", "--cv-paper")
+        self.assertEqual(image("paper-off", "--cv-paper", "--cv-albedo", "off"), paper)
+        self.assertNotEqual(image("paper-on", "--cv-paper", "--cv-albedo", "on"), paper)
+
+    def test_trainings_with_it_and_without_are_not_exchanged(self):
+        self.good(*PLAIN, "--spp", "6", "-o", "a.exr", "--save-training", "a.training")
+        self.good(*PLAIN, "--spp", "2", "-o", "b.exr", "--load-training", "a.training")
+        self.assertEqual(self.pixels("a.exr")["group00.R"], self.pixels("b.exr")["R"])
+        self.bad(1, "a.training", *PLAIN, "--spp", "2", "-o", "c.exr", "--load-training", "a.training", "--cv-albedo",
+                 "off")
 
 
 class PathLengths(CliTest):

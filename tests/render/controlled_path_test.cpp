@@ -37,6 +37,20 @@ std::string coloured_lights() {
   return scene_text(kFloor + lights, kSide, kSide, 2, kWide);
 }
 
+/// With `to` in place of `from`.
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  return text.replace(text.find(from), from.size(), to);
+}
+
+/// Another colour on each check of a board.
+std::string checks(const std::string& name) {
+  return "<texture name='" + name +
+         "' type='checkerboard'><rgb name='color0' value='0.1,0.9,0.3'/><rgb name='color1' value='0.9,0.05,0.6'/>"
+         "<transform name='to_uv'><scale value='24'/></transform></texture>";
+}
+const std::string kReflectance = "<rgb name='reflectance' value='0.6,0.5,0.3'/>";  // of coloured_lights()
+const std::string kAlpha = "<float name='alpha' value='0.9'/>";                    // of kRoughMetal
+
 struct NotClosed : ControlledParts {
   static constexpr bool kCloseEnded = false;
 };
@@ -49,6 +63,9 @@ struct EnvironmentTwice : ControlledParts {
   }
 };
 struct NegativeClipped : ControlledParts {};
+struct AlbedoForgottenAtEnds : ControlledParts {
+  static Spectrum unit(const Spectrum& unit, bool ended) { return ended ? Spectrum(1) : unit; }
+};
 
 /// With a planted bug.
 template <typename Parts>
@@ -221,6 +238,46 @@ TEST(ControlledPath, HasLessNoiseWhereLightsDiffer) {
   EXPECT_LT(mono, 1.1 * plain);
   EXPECT_LT(noise(trained(coloured_lights(), options(ControlKind::kVevoda))), 0.7 * plain);
   EXPECT_LT(rgb, 0.5 * plain);
+}
+
+ControlOptions with_albedo(bool on, ControlKind kind = ControlKind::kRgb) {
+  ControlOptions result = options(kind);
+  result.albedo = on, result.train_spp = 32;
+  return result;
+}
+
+TEST(ControlledPath, AlbedoTellsTexturesApart) {
+  const std::string board = replaced(coloured_lights(), kReflectance, checks("reflectance"));
+  const auto noise_of = [&](ControlKind kind, bool albedo) { return noise(trained(board, with_albedo(albedo, kind))); };
+  EXPECT_LT(noise_of(ControlKind::kRgb, true), 0.7 * noise_of(ControlKind::kRgb, false));
+  EXPECT_LT(noise_of(ControlKind::kMono, true), 1.05 * noise_of(ControlKind::kMono, false));
+  // Nothing changes where it is 1, or where coefficients belong to pixels or to light samples alone.
+  const std::string white = replaced(coloured_lights(), kReflectance, "<rgb name='reflectance' value='1'/>");
+  for (const ControlKind kind : {ControlKind::kRgb, ControlKind::kOptimalMis, ControlKind::kVevoda}) {
+    const std::string& scene = kind == ControlKind::kRgb ? white : board;
+    EXPECT_TRUE(same_bits(render(trained(scene, with_albedo(true, kind)), 2, 0),
+                          render(trained(scene, with_albedo(false, kind)), 2, 0)))
+        << name_of(kind);
+  }
+}
+
+TEST(ControlledPath, AlbedoIsUnbiased) {
+  // Many directions fail at the metal, which ends their paths.
+  const std::string metal = replaced(kRoughMetal, kAlpha, kAlpha + checks("specular_reflectance"));
+  const TestScene off = with_coefficients(metal, false), on = trained(metal, with_albedo(true));
+  const Differences right = differences(on, load_text(metal), 16, 100);
+  EXPECT_EQ(n_biased(right), 0);
+  EXPECT_LT(detectable(right), 0.05 * image_mean(render(off, 16, 0)));
+  EXPECT_EQ(n_biased(differences(on, off, 16, 0)), 0);
+  EXPECT_EQ(n_biased(differences(with_coefficients(metal, true), off, 16, 0)), 0);
+  EXPECT_GT(n_biased(differences(with_coefficients<AlbedoForgottenAtEnds>(metal, true), off, 16, 0)), 0);
+  // What looks black has highlights: coefficients are not multiplied by zero.
+  const std::string plastic = replaced(
+      coloured_lights(), "<bsdf type='diffuse'>" + kReflectance,
+      "<bsdf type='roughplastic'><float name='alpha' value='0.4'/><rgb name='diffuse_reflectance' value='0'/>");
+  const TestScene black = trained(plastic, with_albedo(true));
+  EXPECT_EQ(n_biased(differences(black, with_coefficients(plastic, false), 16, 0)), 0);
+  EXPECT_LT(noise(black), 0.8 * noise(with_coefficients(plastic, false)));
 }
 
 TEST(ControlledPath, PixelsHaveOptimalWeightsOfTheirOwn) {
