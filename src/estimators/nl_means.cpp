@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tiles of the image in parallel; in a tile one offset j - i after the other, for which the distances of all patches
-// are a box filter of the distances of pixels.
+// Tiles of the image in parallel; in a tile a few offsets j - i after the other, for which the distances of all patches
+// are a box filter of the distances of pixels. All loops run along rows.
 #include "estimators/nl_means.h"
 
 #include <algorithm>
+#include <array>
 
 #include "core/error.h"
 #include "core/parallel.h"
@@ -16,6 +17,8 @@ using namespace lanes;
 constexpr int kPatch = 1;  // radius
 constexpr int kTileWidth = 128 - 2 * kPatch, kTileHeight = 16;
 constexpr int kBorder = kNlMeansRadius + kPatch;
+/// Offsets whose pixels are added together.
+constexpr int kAtOnce = 3;
 /// Errors below this are taken for none.
 constexpr float kSmallestVariance = 1e-10f;
 
@@ -58,6 +61,10 @@ class Filter {
         mask_(mask_of(*steering.valid, width_, height_)),
         tasks_(tasks) {
     COVARY_CHECK(!guides_ || guides_->border() >= kNlMeansRadius, "guides have the border that NL-means reads");
+    for (int dy = -kNlMeansRadius; dy <= kNlMeansRadius; ++dy)
+      for (int dx = -kNlMeansRadius; dx <= kNlMeansRadius; ++dx)
+        if (is_compared(dx, dy) && std::abs(dx) < width_)
+          offsets_[static_cast<size_t>(dy + kNlMeansRadius)].push_back(dx);
     for (const NlMeansTask& task : tasks)
       for (const Image* source : task.sources) {
         sources_.push_back(continued(*source, false));
@@ -73,71 +80,117 @@ class Filter {
   }
 
  private:
-  /// Distances of the pixels (x + lane, y) from those at (dx, dy), summed over RGB.
-  vfloat pixel_distance(int x, int y, int dx, int dy) const {
-    vfloat sum = {};
+  /// What is done at once for kAtOnce offsets (dx[i], dy): sums that are read and written once for all.
+  struct Buffers {
+    Rows pixels;
+    std::array<Rows, kAtOnce> sums;
+    std::array<std::array<float, Rows::kStride>, kAtOnce> guides, weights;
+    std::vector<Rows> totals;  // per task its weights, per source three channels
+  };
+
+  /// Distances of the pixels of a row of the tile and its border from those at (dx, dy), summed over RGB.
+  void pixel_distances(int x0, int y, int n_columns, int dx, int dy, float* row) const {
+    const float *f[3], *f_there[3], *own[3], *other[3];
     for (int c = 0; c < 3; ++c) {
-      const vfloat difference = load(f_.row(c, y) + x) - load(f_.row(c, y + dy) + x + dx);
-      const vfloat own = load(variance_.row(c, y) + x), other = load(variance_.row(c, y + dy) + x + dx);
-      sum += (difference * difference - (own + min(own, other))) / (own + other + kSmallestVariance);
+      f[c] = f_.row(c, y) + x0, f_there[c] = f_.row(c, y + dy) + x0 + dx;
+      own[c] = variance_.row(c, y) + x0, other[c] = variance_.row(c, y + dy) + x0 + dx;
     }
-    return sum;
+    for (int x = -kPatch; x < n_columns + kPatch; x += kLanes) {
+      vfloat sum = {};
+      for (int c = 0; c < 3; ++c) {
+        const vfloat difference = load(f[c] + x) - load(f_there[c] + x), a = load(own[c] + x), b = load(other[c] + x);
+        sum += (difference * difference - (a + min(a, b))) / (a + b + kSmallestVariance);
+      }
+      store(row + x, sum);
+    }
   }
 
-  vfloat guide_distance(int x, int y, int dx, int dy) const {
-    vfloat sum = {};
-    for (int i = 0; guides_ && i < guides_->count(); ++i) {
-      const vfloat difference = load(guides_->row(i, y) + x) - load(guides_->row(i, y + dy) + x + dx);
-      sum += difference * difference;
-    }
-    return sum;
-  }
-
-  /// Distances of pixels for the tile at (x0, y0) and its border, summed over the columns of patches.
-  void make_distances(int x0, int y0, int n_columns, int n_rows, int dx, int dy, Rows& pixels, Rows& sums) const {
+  /// The same for the tile at (x0, y0), summed over the columns of patches.
+  void column_sums(int x0, int y0, int n_columns, int n_rows, int dx, int dy, Rows& pixels, Rows& sums) const {
     for (int y = -kPatch; y < n_rows + kPatch; ++y) {
       float* row = pixels.row(y);
-      for (int x = -kPatch; x < n_columns + kPatch; x += kLanes) store(row + x, pixel_distance(x0 + x, y0 + y, dx, dy));
+      pixel_distances(x0, y0 + y, n_columns, dx, dy, row);
       for (int x = 0; x < n_columns; x += kLanes)
         store(sums.row(y) + x, load(row + x - 1) + load(row + x) + load(row + x + 1));
     }
   }
 
-  void filter_tile(int x0, int y0) {
-    thread_local Rows pixels, sums;
-    thread_local std::vector<Rows> totals;  // per task its weights, per source three channels
-    totals.resize(tasks_.size() + 3 * sources_.size());
-    for (Rows& total : totals) std::fill(total.data.begin(), total.data.end(), 0.0f);
-    const int n_columns = std::min(kTileWidth, width_ - x0), n_rows = std::min(kTileHeight, height_ - y0);
-    for (int dy = -kNlMeansRadius; dy <= kNlMeansRadius; ++dy)
-      for (int dx = -kNlMeansRadius; dx <= kNlMeansRadius; ++dx) {
-        if (std::abs(dx) >= width_ || std::abs(dy) >= height_) continue;
-        make_distances(x0, y0, n_columns, n_rows, dx, dy, pixels, sums);
-        for (int y = 0; y < n_rows; ++y)
-          for (int x = 0; x < n_columns; x += kLanes) {
-            const vfloat distance =
-                (load(sums.row(y - 1) + x) + load(sums.row(y) + x) + load(sums.row(y + 1) + x)) * (1.0f / 27.0f);
-            add(x, y, x0 + x + dx, y0 + y + dy, distance, guide_distance(x0 + x, y0 + y, dx, dy), totals);
-          }
+  /// Distances of the guides of a row from those at (dx, dy).
+  void guide_distances(int x0, int y, int n_columns, int dx, int dy, float* row) const {
+    std::fill_n(row, n_columns + kLanes, 0.0f);
+    for (int i = 0; guides_ && i < guides_->count(); ++i) {
+      const float *here = guides_->row(i, y) + x0, *there = guides_->row(i, y + dy) + x0 + dx;
+      for (int x = 0; x < n_columns; x += kLanes) {
+        const vfloat difference = load(here + x) - load(there + x);
+        store(row + x, load(row + x) + difference * difference);
       }
-    for (int y = 0; y < n_rows; ++y)
-      for (int x = 0; x < n_columns; ++x) finish(x, y, x0, y0, totals);
+    }
   }
 
-  /// Adds the pixels at (qx + lane, qy) to the sums of those at (x + lane, y) of the tile.
-  void add(int x, int y, int qx, int qy, vfloat distance, vfloat guide_distance, std::vector<Rows>& totals) const {
-    const vfloat mask = load(mask_.row(0, qy) + qx);
+  void filter_tile(int x0, int y0) {
+    thread_local Buffers b;
+    b.totals.resize(tasks_.size() + 3 * sources_.size());
+    for (Rows& total : b.totals) std::fill(total.data.begin(), total.data.end(), 0.0f);
+    const int n_columns = std::min(kTileWidth, width_ - x0), n_rows = std::min(kTileHeight, height_ - y0);
+    for (int dy = -kNlMeansRadius; dy <= kNlMeansRadius; ++dy) {
+      if (std::abs(dy) >= height_) continue;
+      const std::vector<int>& offsets = offsets_[static_cast<size_t>(dy + kNlMeansRadius)];
+      for (size_t first = 0; first < offsets.size(); first += kAtOnce)
+        add_offsets(x0, y0, n_columns, n_rows, std::span(offsets).subspan(first), dy, b);
+    }
+    for (int y = 0; y < n_rows; ++y)
+      for (int x = 0; x < n_columns; ++x) finish(x, y, x0, y0, b.totals);
+  }
+
+  /// Adds the pixels at the first offsets, at most kAtOnce, to the sums of the tile.
+  void add_offsets(int x0, int y0, int n_columns, int n_rows, std::span<const int> dx, int dy, Buffers& b) const {
+    const int n = std::min(kAtOnce, static_cast<int>(dx.size()));
+    for (int i = 0; i < n; ++i) column_sums(x0, y0, n_columns, n_rows, dx[i], dy, b.pixels, b.sums[i]);
+    for (int y = 0; y < n_rows; ++y) {
+      for (int i = 0; i < n; ++i) guide_distances(x0, y0 + y, n_columns, dx[i], dy, b.guides[i].data());
+      if (n == kAtOnce)
+        add_row<kAtOnce>(x0, y0, y, n_columns, dx.data(), dy, 0, b);
+      else
+        for (int i = 0; i < n; ++i) add_row<1>(x0, y0, y, n_columns, dx.data() + i, dy, i, b);
+    }
+  }
+
+  /// Adds the pixels at n offsets, which are number `first` … of the buffers, to the sums of row y of the tile.
+  template <int n>
+  void add_row(int x0, int y0, int y, int n_columns, const int* dx, int dy, int first, Buffers& b) const {
     size_t total = 0, source = 0;
     for (const NlMeansTask& task : tasks_) {
-      const vfloat exponent = max(max(distance * (1 / (task.bandwidth * task.bandwidth)), guide_distance), vfloat{});
-      const vfloat weight = mask * exp_of_nonpositive(-exponent);
-      const auto add_to = [&](vfloat value) {
-        float* at = totals[total++].row(y) + x;
-        store(at, load(at) + value);
-      };
-      add_to(weight);
-      for (size_t i = 0; i < task.sources.size(); ++i, ++source)
-        for (int c = 0; c < 3; ++c) add_to(weight * load(sources_[source].row(c, qy) + qx));
+      add_weights<n>(task.bandwidth, mask_.row(0, y0 + y + dy) + x0, y, n_columns, dx, first, b,
+                     b.totals[total++].row(y));
+      for (size_t i = 0; i < 3 * task.sources.size(); ++i) {
+        const float* values = sources_[source + i / 3].row(static_cast<int>(i % 3), y0 + y + dy) + x0;
+        float* sums = b.totals[total++].row(y);
+        for (int x = 0; x < n_columns; x += kLanes) {
+          vfloat sum = load(sums + x);
+          for (int k = 0; k < n; ++k) sum += load(b.weights[k].data() + x) * load(values + dx[k] + x);
+          store(sums + x, sum);
+        }
+      }
+      source += task.sources.size();
+    }
+  }
+
+  template <int n>
+  void add_weights(float bandwidth, const float* mask, int y, int n_columns, const int* dx, int first, Buffers& b,
+                   float* total) const {
+    const float inverse = 1 / (bandwidth * bandwidth);
+    for (int x = 0; x < n_columns; x += kLanes) {
+      vfloat sum = load(total + x);
+      for (int k = 0; k < n; ++k) {
+        Rows& sums = b.sums[first + k];
+        const vfloat distance =
+            (load(sums.row(y - 1) + x) + load(sums.row(y) + x) + load(sums.row(y + 1) + x)) * (1.0f / 27.0f);
+        const vfloat exponent = max(max(distance * inverse, load(b.guides[first + k].data() + x)), vfloat{});
+        const vfloat weight = load(mask + dx[k] + x) * exp_of_nonpositive(-exponent);
+        store(b.weights[k].data() + x, weight);
+        sum += weight;
+      }
+      store(total + x, sum);
     }
   }
 
@@ -158,6 +211,7 @@ class Filter {
   const Planes* guides_;
   const Planes f_, variance_, mask_;
   const std::span<const NlMeansTask> tasks_;
+  std::array<std::vector<int>, 2 * kNlMeansRadius + 1> offsets_;  // dx of each dy
   std::vector<Planes> sources_;
   std::vector<Image> results_;
 };
