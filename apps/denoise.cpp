@@ -22,7 +22,7 @@ namespace {
 struct Options {
   std::string input, output;
   DenoiseOptions denoise;
-  bool no_guides = false, check = false, quiet = false;
+  bool no_guides = false, clean_guides = false, check = false, quiet = false;
 };
 
 /// --check: which library there is.
@@ -35,6 +35,7 @@ void run(const Options& o) {
   if (o.check) return check(o);
   if (o.input.empty() || o.output.empty())
     throw Error(ErrorCode::kUsage, "expected are IN.exr and -o OUT.exr, or --check");
+  if (o.no_guides && o.clean_guides) throw Error(ErrorCode::kUsage, "--clean-guides: with --no-guides there are none");
   const Stopwatch watch;
   Outputs outputs;
   outputs.reads(o.input);
@@ -46,7 +47,11 @@ void run(const Options& o) {
     albedo = guide_layer(o.input, info, "Albedo");
     if (albedo) normal = guide_layer(o.input, info, "N");
   }
-  Image result = denoise(image.image, albedo ? &*albedo : nullptr, normal ? &*normal : nullptr, o.denoise);
+  Denoiser denoiser(o.denoise);
+  if (o.clean_guides && albedo) albedo = denoiser.denoise_guide("albedo", *albedo);
+  if (o.clean_guides && normal) normal = denoiser.denoise_guide("normal", *normal);
+  Image result =
+      denoiser.denoise(image.image, albedo ? &*albedo : nullptr, normal ? &*normal : nullptr, o.clean_guides);
   std::map<std::string, std::string> attributes = inherited_attributes(info.attributes);
   attributes["covary:version"] = COVARY_VERSION;
   attributes["covary:command"] = command_line();
@@ -75,6 +80,9 @@ void add_denoise(CLI::App& app) {
                       "environment that holds it");
   command->add_flag("--check", o->check, "Print version and path of Open Image Denoise as it is found, and do nothing");
   command->add_flag("--no-guides", o->no_guides, "Do not use the layers Albedo and N");
+  command->add_flag(
+      "--clean-guides", o->clean_guides,
+      "Denoise Albedo and N first, each alone: less error where they are noisy, for three times the time");
   command->add_flag("--quiet", o->quiet, "No summary");
   command->callback([o] { run(*o); });
 }

@@ -75,6 +75,18 @@ class Denoise(RenderTest):
         self.bad(2, "--guides is an option of --denoise", *inputs, "--guides", "b.exr")
         self.bad(2, "--explain: with --denoise", *inputs, "--denoise", "error", *PLAIN, "--explain", "1,1")
 
+    def test_clean_guides(self):
+        self.bad(2, "--clean-guides: with --no-guides there are none", "denoise", "a.exr", "-o", "b.exr",
+                 "--clean-guides", "--no-guides")
+        if self.run_covary("denoise", "--check").returncode != 0:
+            return
+        self.good("render", ROOM, *SMALL, "-o", "r.exr", "--estimator", "none", "--spp", "512", "--seed", "9")
+        self.good("render", ROOM, *SMALL, "-o", "a.exr", "--estimator", "none", "--spp", "8", "--aovs")
+        self.good("denoise", "a.exr", "-o", "plain.exr", "--quiet")
+        self.good("denoise", "a.exr", "-o", "clean.exr", "--clean-guides", "--quiet")
+        self.assertNotEqual((self.path / "plain.exr").read_bytes(), (self.path / "clean.exr").read_bytes())
+        self.assertLess(self.relmse("clean.exr", "r.exr"), self.relmse("a.exr", "r.exr"))
+
     def test_check(self):
         self.bad(2, "Open Image Denoise is not there (/nowhere/lib.so", "denoise", "--check", "--oidn",
                  "/nowhere/lib.so")
