@@ -348,8 +348,9 @@ void add_experiment(CLI::App& app) {
   list(command->add_option("--time", o->seconds, "Budgets in seconds")->check(positive_number()));
   single(command->add_option("--crop", o->overrides.crop, "X,Y,WIDTH,HEIGHT, or WIDTHxHEIGHT in the middle"));
   single(command->add_option("--resolution", o->overrides.resolution, "WIDTHxHEIGHT of the frames"));
-  list(command->add_option("--scenes-only", o->overrides.scenes, "Only these of its scenes"));
-  list(command->add_option("--methods-only", o->overrides.methods, "Only these of its methods, and the baseline"));
+  // Names may hold commas.
+  single(command->add_option("--scenes-only", o->overrides.scenes, "Only these of its scenes"));
+  single(command->add_option("--methods-only", o->overrides.methods, "Only these of its methods, and the baseline"));
   single(command->add_option("--baseline", o->overrides.baseline, "Method that ratios refer to"));
   single(command
              ->add_option("--reference-spp", o->overrides.reference_spp,

@@ -19,8 +19,8 @@ void keep(const char* what, const std::vector<std::string>& names, std::vector<E
   for (const Entry& entry : entries) known.push_back(entry.name);
   for (const std::string& name : names)
     if (std::find(known.begin(), known.end(), name) == known.end())
-      throw Error(ErrorCode::kUsage, fmt::format("the suite has no {} '{}'{}; it has {}", what, name,
-                                                 did_you_mean(name, known), fmt::join(known, ", ")));
+      throw Error(ErrorCode::kUsage, fmt::format("the suite has no {} '{}'{}; it has '{}'", what, name,
+                                                 did_you_mean(name, known), fmt::join(known, "', '")));
   std::erase_if(entries, [&](const Entry& e) { return std::find(names.begin(), names.end(), e.name) == names.end(); });
 }
 

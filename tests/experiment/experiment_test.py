@@ -514,6 +514,11 @@ class BuiltIn(ExperimentTest):
         suite = json.loads(done.stdout)
         self.assertEqual(([s["name"] for s in suite["scenes"]], suite["seeds"]), (["house"], [1, 2]))
 
+    def test_names_with_commas_can_be_chosen(self):
+        done = self.run_covary([COVARY, "experiment", "guiding-scenes", "--print", "--methods-only", "path",
+                                "guided, cv rgb"])
+        self.assertEqual([m["name"] for m in json.loads(done.stdout)["methods"]], ["path", "guided, cv rgb"])
+
     def test_one_scene(self):
         done = self.run_covary([COVARY, "experiment", str(SCENES / "room.xml"), "--quick", "-o", "out", "--resolution",
                                 "24x16", "--seeds", "1", "--spp", "24", "--reference-spp", "32", "--quiet"])
