@@ -37,7 +37,7 @@ GuideOptions GuideOptions::from(Parameters& parameters) {
     if (!options.fraction)
       parameters.error("guide_fraction '" + text + "': expected learned or a number above 0 and below 1");
   }
-  if (parameters.has("guide_roughness")) options.roughness = parameters.get_float("guide_roughness", 0.1f, 0, 1);
+  if (parameters.has("guide_roughness")) options.roughness = parameters.get_float("guide_roughness", 0, 0, 1);
   if (parameters.has("nee")) options.nee = parameters.get_bool("nee", true);
   if (parameters.has("cv")) options.control = control_kind(parameters.get_choice("cv", "off", {"off", "rgb", "mono"}));
   options.control_train_spp = number("cv_train", GuideSettings::kMaxTrainingSpp);

@@ -43,7 +43,7 @@ struct GuideSettings {
   uint32_t leaf_samples = GuidingSettings().leaf_samples;  ///< a leaf with more is split, kMinLeafSamples or more
   uint32_t train_spp = 16;                                 ///< samples per pixel to learn from
   GuideFraction fraction;
-  float roughness = 0.1f;                   ///< lobes of BSDFs that are less rough are not guided
+  float roughness = 0.3f;                   ///< lobes of BSDFs that are less rough are not guided
   bool nee = true;                          ///< light samples (next-event estimation)
   ControlKind control = ControlKind::kOff;  ///< control variates on the lobes: kOff, kRgb or kMono
   uint32_t control_train_spp = 32;          ///< samples per pixel to learn their coefficients from, after the lobes

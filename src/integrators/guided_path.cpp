@@ -10,7 +10,7 @@
 // | guide_leaf      | integer       | 8000    | samples of a leaf of the tree; one with more is split               |
 // | guide_train     | integer       | 16      | samples per pixel to learn from                                     |
 // | guide_fraction  | string        | 0.5     | fraction of guided directions, or `learned`                         |
-// | guide_roughness | number        | 0.1     | lobes of BSDFs that are less rough are not guided                   |
+// | guide_roughness | number        | 0.3     | lobes of BSDFs that are less rough are not guided                   |
 // | nee             | boolean       | true    | light samples (next-event estimation)                               |
 // | cv              | string        | off     | control variates on the lobes: `off`, `rgb`, `mono`                 |
 // | cv_train        | integer       | 32      | samples per pixel to learn their coefficients from, after the lobes |
