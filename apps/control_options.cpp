@@ -59,6 +59,11 @@ void add_control_options(CLI::App& command, ControlTexts& texts) {
       ->check(one_of({"on", "off"}))
       ->group(kControlGroup);
   command
+      .add_option("--cv-indirect", texts.indirect,
+                  "Whether light that other surfaces reflect is controlled, too (--cv rgb and mono); default: off")
+      ->check(one_of({"on", "off"}))
+      ->group(kControlGroup);
+  command
       .add_option("--cv-memory", texts.memory_mib,
                   "MiB of sums and coefficients while learning, then cells become wider; default: 256")
       ->transform(whole_number(1u, kMaxNumber))
@@ -86,6 +91,7 @@ std::optional<ControlOptions> control_options(const ControlTexts& texts) {
   options.train_spp = texts.train_spp, options.clusters = texts.clusters, options.memory_mib = texts.memory_mib;
   if (!texts.variance.empty()) options.relative = texts.variance == "relative";
   if (!texts.prefix.empty()) options.prefix = texts.prefix == "on";
+  if (!texts.indirect.empty()) options.indirect = texts.indirect == "on";
   if (!texts.albedo.empty()) options.albedo = texts.albedo == "on";
   return options;
 }
@@ -120,6 +126,7 @@ std::vector<std::string> command_words(const ControlTexts& texts) {
   add("--cv-variance", texts.variance);
   add("--cv-prefix", texts.prefix);
   add("--cv-albedo", texts.albedo);
+  add("--cv-indirect", texts.indirect);
   add("--cv-memory", number(texts.memory_mib));
   return words;
 }

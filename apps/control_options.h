@@ -17,7 +17,7 @@ inline constexpr const char* kControlGroup = "Controlled path";
 
 /// As given; empty: not given.
 struct ControlTexts {
-  std::string kind, lights, grid, variance, prefix, albedo;
+  std::string kind, lights, grid, variance, prefix, albedo, indirect;
   std::optional<uint32_t> train_spp, clusters, memory_mib;
   bool paper = false;
   bool path_lengths = false;

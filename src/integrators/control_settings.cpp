@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "integrators/control_settings.h"
 
+#include <algorithm>
 #include <vector>
 
 namespace covary {
@@ -67,6 +68,7 @@ ControlOptions ControlOptions::from(Parameters& parameters) {
   if (parameters.has("cv_variance"))
     options.relative = parameters.get_choice("cv_variance", "relative", {"relative", "absolute"}) == "relative";
   if (parameters.has("cv_prefix")) options.prefix = parameters.get_bool("cv_prefix", true);
+  if (parameters.has("cv_indirect")) options.indirect = parameters.get_bool("cv_indirect", false);
   if (parameters.has("cv_albedo")) options.albedo = parameters.get_bool("cv_albedo", true);
   return options;
 }
@@ -92,6 +94,7 @@ ControlSettings ControlSettings::with(const ControlOptions& options) const {
   take(options.relative, settings.relative);
   take(options.prefix, settings.prefix);
   take(options.albedo, settings.albedo);
+  take(options.indirect, settings.indirect);
   return settings;
 }
 
@@ -102,7 +105,13 @@ CacheSettings ControlSettings::cache(uint32_t resolution) const {
   else
     settings.resolution = resolution;
   settings.monochrome = kind == ControlKind::kMono;
-  settings.memory_limit = size_t{memory_mib} << 20;
+  settings.memory_limit = (size_t{memory_mib} << 20) / (controls_indirect() ? 2 : 1);
+  return settings;
+}
+
+CacheSettings ControlSettings::indirect_cache(uint32_t resolution) const {
+  CacheSettings settings = cache(std::max(1u, resolution / 4));
+  settings.prior_samples = 16;
   return settings;
 }
 
@@ -113,7 +122,7 @@ std::string ControlSettings::text() const {
   return selection + (paper ? " paper" : "") + " grid=" + (grid == kAutomaticGrid ? "auto" : number(grid)) +
          " train=" + number(train_spp) + " clusters=" + number(clusters) + " memory=" + number(memory_mib) +
          " variance=" + (relative ? "relative" : "absolute") + " prefix=" + (prefix ? "on" : "off") +
-         (by_albedo() ? " albedo" : "");
+         (by_albedo() ? " albedo" : "") + (controls_indirect() ? " indirect" : "");
 }
 
 }  // namespace covary

@@ -26,11 +26,11 @@ struct ControlOptions {
   std::optional<ControlKind> kind;
   std::optional<LightSelection> lights;
   std::optional<uint32_t> grid, train_spp, clusters, memory_mib;
-  std::optional<bool> relative, prefix, albedo;
+  std::optional<bool> relative, prefix, albedo, indirect;
   bool paper = false;
 
-  /// Reads cv, cv_paper, lights, cv_grid, cv_train, cv_clusters, cv_variance, cv_prefix, cv_albedo and
-  /// cv_memory.
+  /// Reads cv, cv_paper, lights, cv_grid, cv_train, cv_clusters, cv_variance, cv_prefix, cv_albedo,
+  /// cv_indirect and cv_memory.
   static ControlOptions from(Parameters& parameters);
 };
 
@@ -47,6 +47,7 @@ struct ControlSettings {
   bool relative = true;            ///< least relative variance [Hua2023] §4.2.1, otherwise least variance
   bool prefix = true;              ///< samples weigh by the throughput before them [Hua2023] §4.4
   bool albedo = true;              ///< see by_albedo()
+  bool indirect = false;           ///< see controls_indirect()
   bool paper = false;              ///< the cache as published, see CacheSettings::published()
 
   /// Those of [Hua2023] and its authors' program: triangles, 64 cells, 16 samples per pixel.
@@ -65,7 +66,11 @@ struct ControlSettings {
   bool per_pixel() const { return kind == ControlKind::kOptimalMis; }
   /// Whether the coefficients of a vertex are multiplied by its albedo: where there is one for each cell.
   bool by_albedo() const { return albedo && (kind == ControlKind::kRgb || kind == ControlKind::kMono); }
+  /// Whether light that other surfaces reflect is controlled by bins of directions, too.
+  bool controls_indirect() const { return indirect && (kind == ControlKind::kRgb || kind == ControlKind::kMono); }
   CacheSettings cache(uint32_t resolution) const;
+  /// That of the bins of directions: wider cells, because there are many bins and their light is noisy.
+  CacheSettings indirect_cache(uint32_t resolution) const;
   std::string text() const;
 };
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "integrators/indirect_control.h"
 #include "integrators/light_samples.h"
 #include "integrators/path_batch.h"
 #include "sampling/coefficient_cache.h"
@@ -51,6 +52,7 @@ struct ControlledBatch final : CameraBatch<ControlledPathState, ControlledChoice
     if (vertices.size() < n) environments.resize(n), vertices.resize(n);
     for (size_t i = 0; i < n; ++i) vertices[i].open = false;
     by_length.assign(n * n_lengths, Spectrum());
+    indirect.start(n);
   }
 
   std::vector<EmitterSample> environments;
@@ -64,6 +66,7 @@ struct ControlledBatch final : CameraBatch<ControlledPathState, ControlledChoice
 
   bool recording = false;
   SystemSums sums;
+  IndirectRecorder indirect;
   size_t last_cells = 0, last_rows = 0;  ///< of the last tile's sums: the next is likely to need as much room
 };
 

@@ -15,6 +15,7 @@
 // | cv_variance   | string  | relative | what is made least: `relative` or `absolute` variance                 |
 // | cv_prefix     | boolean | true     | samples weigh by the throughput of the path before them               |
 // | cv_albedo     | boolean | true     | coefficients are multiplied by the albedo of the surface; rgb and mono |
+// | cv_indirect   | boolean | false    | control of light that other surfaces reflect, too; for rgb and mono   |
 // | cv_memory     | integer | 256      | MiB of sums and coefficients while training; then cells become wider  |
 #include "integrators/controlled_path.h"
 
@@ -22,13 +23,14 @@
 #include <cmath>
 
 #include "core/content_hash.h"
+#include "sampling/training_bytes.h"
 
 namespace covary {
 namespace {
 
 /// What the samples of one tile taught.
 struct SumsRecord final : TrainingRecord {
-  SystemSums sums;
+  SystemSums sums, indirect;
 };
 
 }  // namespace
@@ -54,6 +56,10 @@ void ControlledPath::prepare(const Scene& scene) {
   if (settings_.learns())
     cache_ = CoefficientCache(scene.bounds(), expected_samples(clusters_, lights_), controlled_.n_dense(),
                               settings_.cache(resolution()));
+  if (!settings_.controls_indirect()) return;
+  indirect_cache_ =
+      CoefficientCache(scene.bounds(), DirectionBins::counts(), 0, settings_.indirect_cache(resolution()));
+  controlled_.indirect = &indirect_table();
 }
 
 /// The longer side of the frame where pixels have coefficients. Otherwise by what the camera sees: cells as wide as 8
@@ -90,18 +96,48 @@ void ControlledPath::select(const std::vector<float>& clusters) {
   lights_.change(weights);
 }
 
-void ControlledPath::use(CoefficientTable table) {
+void ControlledPath::use(CoefficientTable table, CoefficientTable indirect) {
   COVARY_CHECK(scene_ && settings_.on(), "coefficients belong to a scene and to control variates");
   if (!table.selection().empty()) select(table.selection());
   given_ = std::move(table);
   controlled_.table = &*given_;
+  if (!controlled_.indirect) return;
+  given_indirect_ = std::move(indirect);
+  controlled_.indirect = &given_indirect_;
+}
+
+std::string ControlledPath::trained_bytes() const {
+  std::string bytes = table().body();
+  if (!controlled_.indirect) return bytes;
+  std::string both;
+  append_bytes(both, uint64_t{bytes.size()});
+  return both + bytes + indirect_table().body();
+}
+
+void ControlledPath::use_bytes(std::string_view bytes, const std::string& where) {
+  if (!controlled_.indirect) return use(CoefficientTable::from_body(bytes, where));
+  ByteReader reader(bytes, where);
+  const auto size = reader.read<uint64_t>();
+  reader.check(size <= reader.rest().size());
+  CoefficientTable table = CoefficientTable::from_body(reader.take(size), where);
+  CoefficientTable indirect = CoefficientTable::from_body(reader.rest(), where);
+  reader.check(indirect.n_cells() == 0 || (indirect.n_lights() == DirectionBins::kCount && indirect.n_dense() == 0));
+  use(std::move(table), std::move(indirect));
+}
+
+uint64_t ControlledPath::state_hash() const {
+  if (!controlled_.indirect) return table().hash();
+  const uint64_t hashes[] = {table().hash(), indirect_table().hash()};
+  return hash_bytes(std::as_bytes(std::span(hashes)));
 }
 
 void ControlledPath::begin_batch(ControlledBatch& batch) const {
   batch.recording = !frozen() && settings_.learns() && trained_spp() >= pilot_spp();
+  batch.indirect.recording = batch.recording && controlled_.indirect;
   if (!batch.recording || batch.sums.n_cells() > 0) return;
   batch.sums = cache_.new_sums();
   batch.sums.reserve(batch.last_cells, batch.last_rows);
+  if (controlled_.indirect) batch.indirect.sums = indirect_cache_.new_sums();
 }
 
 std::unique_ptr<TrainingRecord> ControlledPath::take_record(ThreadState& state) const {
@@ -111,11 +147,14 @@ std::unique_ptr<TrainingRecord> ControlledPath::take_record(ThreadState& state) 
   batch.last_cells = sums.n_cells(), batch.last_rows = sums.n_rows();
   auto record = std::make_unique<SumsRecord>();
   std::swap(record->sums, sums);
+  if (controlled_.indirect) std::swap(record->indirect, batch.indirect.sums);
   return record;
 }
 
 void ControlledPath::absorb(const TrainingRecord& record) {
-  cache_.absorb(static_cast<const SumsRecord&>(record).sums);
+  const auto& sums = static_cast<const SumsRecord&>(record);
+  cache_.absorb(sums.sums);
+  if (controlled_.indirect) indirect_cache_.absorb(sums.indirect);
 }
 
 void ControlledPath::on_restart() {
@@ -123,12 +162,14 @@ void ControlledPath::on_restart() {
   if (selects_by_learning()) lights_ = LightSet(*scene_, settings_.lights);
   if (settings_.learns()) cache_.select(expected_samples(clusters_, lights_));
   cache_.restart();
+  if (controlled_.indirect) indirect_cache_.restart();
 }
 
 void ControlledPath::update() {
   if (trained_spp() < pilot_spp()) return;
   const std::vector<float> selection = cache_.table().selection();
   if (settings_.on()) cache_.update();
+  if (controlled_.indirect) indirect_cache_.update();
   // Lights are chosen by what was learnt as soon as half of the samples have been taken: the other half then teaches
   // the coefficients of this choice.
   const uint32_t end = std::min(training_spp(), wave_end(trained_spp(), 1));

@@ -28,8 +28,10 @@ class ControlledPath : public LearningIntegrator {
   std::string settings_text() const override;
   /// The coefficients in use.
   const CoefficientTable& table() const { return given_ ? *given_ : cache_.table(); }
+  /// Those of the bins of directions; without cells where they are not learnt.
+  const CoefficientTable& indirect_table() const { return given_ ? given_indirect_ : indirect_cache_.table(); }
   /// Takes coefficients that were learnt before, in place of a training; after prepare(), before the training.
-  void use(CoefficientTable table);
+  void use(CoefficientTable table, CoefficientTable indirect = {});
   const LightSet& lights() const { return lights_; }
   uint32_t n_clusters() const { return clusters_.n_clusters; }
   /// Bytes of sums and coefficients at the end of the training.
@@ -54,10 +56,8 @@ class ControlledPath : public LearningIntegrator {
   std::unique_ptr<TrainingRecord> take_record(ThreadState& state) const override;
   void absorb(const TrainingRecord& record) override;
   bool keeps_training() const override { return settings_.on(); }
-  std::string trained_bytes() const override { return table().body(); }
-  void use_bytes(std::string_view bytes, const std::string& where) override {
-    use(CoefficientTable::from_body(bytes, where));
-  }
+  std::string trained_bytes() const override;
+  void use_bytes(std::string_view bytes, const std::string& where) override;
 
  protected:
   template <typename Parts>
@@ -69,10 +69,10 @@ class ControlledPath : public LearningIntegrator {
   void on_restart() override;
   void update() override;
   void on_freeze() override {
-    training_bytes_ = cache_.bytes();
-    cache_.freeze();
+    training_bytes_ = cache_.bytes() + indirect_cache_.bytes();
+    cache_.freeze(), indirect_cache_.freeze();
   }
-  uint64_t state_hash() const override { return table().hash(); }
+  uint64_t state_hash() const override;
 
  private:
   void begin_batch(ControlledBatch& batch) const;
@@ -86,7 +86,9 @@ class ControlledPath : public LearningIntegrator {
   LightClusters clusters_;
   std::shared_ptr<const Emitter> compensated_;  // the environment as it is sampled, where it is not the scene's own
   CoefficientCache cache_;
+  CoefficientCache indirect_cache_;
   std::optional<CoefficientTable> given_;
+  CoefficientTable given_indirect_;
   ControlledScene controlled_{};
   size_t training_bytes_ = 0;
 };

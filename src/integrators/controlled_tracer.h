@@ -55,6 +55,8 @@ struct ControlledScene {
   bool residuals = false;   ///< while learning, what is left of each light's samples is recorded
   bool by_albedo = false;   ///< coefficients are multiplied by the albedo of the vertex
   bool monochrome = false;  ///< by its mean over RGB
+  /// Coefficients of the bins of directions, for the light that other surfaces reflect; or null: no control of it.
+  const CoefficientTable* indirect = nullptr;
   /// Dense techniques: directions by the BSDF, then the environment.
   static constexpr uint32_t kBsdf = 0, kEnvironment = 1;
   uint32_t n_dense() const { return environment ? 2 : 1; }
@@ -109,6 +111,7 @@ class ControlledTracer {
       if constexpr (Parts::kCloseEnded)
         for (const uint32_t sample : batch_.ended) close(sample, depth + 2, true);
     }
+    batch_.indirect.finish();
   }
 
  private:
@@ -209,9 +212,12 @@ class ControlledTracer {
         if (control_.environment) connect(path, hit, wo, *bsdf, batch_.environments[i], kNoLight, 1);
       }
 
-      const BsdfSample next = bsdf->sample(wo, random.get_1d(path.last_vertex, Event::kLobe),
-                                           random.get_2d(path.last_vertex, Event::kDirection));
-      if (!next.valid() || is_black(next.weight)) {
+      const Vec2 u = random.get_2d(path.last_vertex, Event::kDirection);
+      const BsdfSample next = bsdf->sample(wo, random.get_1d(path.last_vertex, Event::kLobe), u);
+      const bool failed = !next.valid() || is_black(next.weight);
+      if (control_.indirect && vertex.open && batch_.choices[i].in_cell && (Parts::kCountFailed || !failed))
+        control_indirect(depth, path, batch_.rays[i], hit, u);
+      if (failed) {
         if (!vertex.open) continue;
         if (Parts::kCountFailed && !control_.light_samples_only) take(vertex, Spectrum(), kNoLight, 0);
         batch_.ended.push_back(path.sample);
@@ -244,12 +250,43 @@ class ControlledTracer {
         begin_control(vertex);
     }
     const bool controlled = vertex.recorded || vertex.cell != CoefficientTable::kNone;
-    vertex.unit = control_.by_albedo && controlled ? unit_of(hit) : Spectrum(1);
+    vertex.unit = control_.by_albedo && (controlled || control_.indirect) ? unit_of(hit) : Spectrum(1);
     if (!vertex.recorded) return;
-    const Spectrum importance = context_.importance.empty() ? Spectrum(1) : context_.importance[path.sample];
-    vertex.weight = variance_weight((control_.prefix ? path.throughput : Spectrum(1)) * vertex.unit, importance);
+    vertex.weight = weight_of(path, vertex.unit);
     vertex.sums_cell = batch_.sums.cell(choice.key);
     vertex.plain = Spectrum();
+  }
+
+  /// Weight of the samples of a vertex in the sums.
+  float weight_of(const Path& path, const Spectrum& unit) const {
+    const Spectrum importance = context_.importance.empty() ? Spectrum(1) : context_.importance[path.sample];
+    return variance_weight((control_.prefix ? path.throughput : Spectrum(1)) * unit, importance);
+  }
+
+  /// Control of the light that comes by way of the next surface, indirect_control.h; before the path's throughput holds
+  /// the direction that `u` chose.
+  void control_indirect(int depth, const Path& path, const Ray& ray, const SurfaceHit& hit, Vec2 u) {
+    const int edges = depth + 3;
+    if (depth >= IndirectRecorder::kVertices || edges > lengths_.max_depth) return;
+    const CoefficientTable& table = *control_.indirect;
+    const bool front = dot(hit.frame.n, ray.d) < 0;
+    const CellKey key = table.grid().key(hit.p, front ? hit.frame.n : -hit.frame.n);
+    const uint32_t cell = table.find(key), bin = DirectionBins::of(u);
+    const Spectrum& unit = batch_.vertices[path.sample].unit;
+    Spectrum control(0), share(0);
+    if (cell != CoefficientTable::kNone && (batch_.indirect.recording || !is_black(table.scale(cell)))) {
+      control = table.light_sum(cell) - table.light(cell, bin), share = table.scale(cell);
+      add(path.sample, edges, path.throughput * unit * share * control);
+    }
+    if (!batch_.indirect.recording) return;
+    batch_.indirect.vertex(path.sample, depth) = {true,
+                                                  cell != CoefficientTable::kNone,
+                                                  batch_.indirect.sums.cell(key),
+                                                  bin,
+                                                  weight_of(path, unit),
+                                                  path.throughput * unit,
+                                                  control,
+                                                  share};
   }
 
   /// The albedo of a surface; not zero, since a black surface can have highlights.
@@ -337,6 +374,8 @@ class ControlledTracer {
   /// Adds to the radiance of a sample what came by paths of so many edges.
   void add(uint32_t sample, int edges, const Spectrum& value) {
     samples_[sample].radiance += value;
+    if (batch_.indirect.recording) [[unlikely]]
+      batch_.indirect.add(sample, edges, value);
     const auto place = static_cast<size_t>(edges - 1);
     if (place < batch_.n_lengths) [[unlikely]]
       batch_.by_length[sample * batch_.n_lengths + place] += value;

@@ -133,6 +133,18 @@ class TrainingFiles(Controlled, LearningFiles, CliTest):
         self.good(*learned, "--spp", "4", "-o", "m.exr", "--load-training", "l.training")
         self.assertEqual(self.pixels("l.exr")["group00.G"], self.pixels("m.exr")["G"])
 
+    def test_keep_the_bins_of_directions(self):
+        indirect = (*PLAIN, "--cv-indirect", "on")
+        self.good(*indirect, "--spp", "8", "-o", "i.exr", "--save-training", "i.training")
+        self.good(*indirect, "--spp", "4", "-o", "j.exr", "--load-training", "i.training")
+        self.assertEqual(self.pixels("i.exr")["group00.G"], self.pixels("j.exr")["G"])
+        self.good(*PLAIN, "--spp", "8", "-o", "k.exr", "--save-training", "k.training")
+        self.assertNotEqual(self.pixels("i.exr")["group00.G"], self.pixels("k.exr")["group00.G"])
+        self.bad(1, "k.training", *indirect, "--spp", "4", "-o", "l.exr", "--load-training", "k.training")
+        whole = (self.path / "i.training").read_bytes()
+        (self.path / "i.training").write_bytes(whole[:-7])
+        self.bad(1, "i.training", *indirect, "--spp", "4", "-o", "l.exr", "--load-training", "i.training")
+
     def test_belong_to_control_variates(self):
         self.bad(2, "only the integrator controlled-path with control variates", *RENDER, "--cv", "off", *self.WANTED,
                  "a.training")
