@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""mitsuba_gain.py SCENE.xml… [--resolution 160x90] [--spp 48] [--seeds 2] [--reference-spp 1024]
+"""mitsuba_gain.py SCENE.xml… [--resolution 160x90] [--spp 48] [--seeds 3] [--reference-spp 1024]
 
 How much less error covary.mitsuba has than Mitsuba's own path, with equal samples and in equal processor time, and
 covary's IICV than its path, on the same scenes. Errors are relMSE in product form against two references of Mitsuba (of
-covary for its own), means over the seeds; times are processor seconds of the whole process after a first call that
-compiles. Needs the Python package covary, Mitsuba 3 and, where it is not found, DRJIT_LIBLLVM_PATH."""
+covary for its own), means over the seeds, and gains have standard errors; times are processor seconds of the whole
+process after a first call that compiles. Needs the Python package covary, Mitsuba 3 and, where it is not found,
+DRJIT_LIBLLVM_PATH."""
 import argparse
 import time
 import xml.etree.ElementTree as ET
@@ -41,7 +42,14 @@ def path(scene, spp, seed):
 
 
 def relmse(images, references):
-    return numpy.mean([covary.metrics.relmse(image, *references) for image in images])
+    return numpy.array([covary.metrics.relmse(image, *references) for image in images])
+
+
+def gain(plain, ours):
+    """Ratio of the mean errors, with its standard error to first order."""
+    ratio = plain.mean() / ours.mean()
+    relative = [errors.std(ddof=1) / errors.mean() / len(errors) ** 0.5 for errors in (plain, ours)]
+    return f"{ratio:.2f} ± {ratio * numpy.hypot(*relative):.2f}"
 
 
 def mitsuba_gains(scene, options):
@@ -67,7 +75,7 @@ def own_gain(file, options):
                   for n in range(2)]
     errors = [relmse([covary.render(scene, options.spp, name, seed=100 + seed, filter="box").image
                       for seed in range(options.seeds)], references) for name in ("none", "iicv")]
-    return errors[0] / errors[1]
+    return gain(*errors)
 
 
 def main():
@@ -75,7 +83,7 @@ def main():
     parser.add_argument("scenes", nargs="+")
     parser.add_argument("--resolution", default="160x90")
     parser.add_argument("--spp", type=int, default=48)
-    parser.add_argument("--seeds", type=int, default=2)
+    parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--reference-spp", type=int, default=1024)
     parser.add_argument("--variant", default="llvm_ad_rgb")
     options = parser.parse_args()
@@ -86,8 +94,8 @@ def main():
     for file in options.scenes:
         plain, ours, same_time, longer = mitsuba_gains(load(file, *options.resolution), options)
         name = Path(file).parent.name if Path(file).stem.startswith("scene") else Path(file).stem
-        print(f"| {name} | {plain:.4f} | {ours:.4f} | {plain / ours:.1f} | {same_time / ours:.1f} ({longer} samples) | "
-              f"{own_gain(file, options):.1f} |", flush=True)
+        print(f"| {name} | {plain.mean():.4f} | {ours.mean():.4f} | {gain(plain, ours)} | {gain(same_time, ours)} "
+              f"({longer} samples) | {own_gain(file, options)} |", flush=True)
 
 
 main()

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A wheel for this machine, in a fresh virtual environment and without the environment of the build. Needs PyPI."""
 import subprocess
+import tarfile
 import unittest
 
 from common import ROOM, SOURCE, PackageTest
@@ -22,11 +23,22 @@ class Wheel(PackageTest):
         return subprocess.run(list(map(str, command)), cwd=self.path, capture_output=True, text=True, check=True,
                               env={"PATH": "/usr/bin:/bin", "HOME": str(self.path)}).stdout
 
+    def check_sources(self, archive):
+        """All that the repository has, but pictures of the documentation."""
+        with tarfile.open(archive) as file:
+            names = {name.partition("/")[2] for name in file.getnames()}
+        self.assertIn("PKG-INFO", names)
+        if (SOURCE / ".git").exists():
+            tracked = subprocess.run(["git", "ls-files"], cwd=SOURCE, capture_output=True, text=True, check=True)
+            left_out = set(tracked.stdout.splitlines()) - names
+            self.assertEqual([name for name in left_out if not name.startswith((".ci/", "docs/images/"))], [])
+
     def test_wheel(self):
         subprocess.run([SOURCE / "scripts" / "wheel", "native", self.path / "dist"], check=True, capture_output=True)
         wheel, = (self.path / "dist").glob("covary-*-cp310-abi3-manylinux_*_x86_64.whl")
         self.assertLess(wheel.stat().st_size, 40e6)
-        self.assertEqual(len(list((self.path / "dist").glob("covary-*.tar.gz"))), 1)
+        sources, = (self.path / "dist").glob("covary-*.tar.gz")
+        self.check_sources(sources)
         self.bare("/usr/bin/python3", "-m", "venv", "fresh")
         self.bare("fresh/bin/pip", "install", "-q", wheel)
         self.bare("fresh/bin/python", "-c", FIVE_LINES)
