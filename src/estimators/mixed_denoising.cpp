@@ -22,13 +22,13 @@ namespace {
 struct ModeSettings {
   DenoiseMode mode;
   const char* name;
-  float bias_share;
+  float bias_share, prior;
   bool feedback;
 };
-constexpr ModeSettings kModes[] = {{DenoiseMode::kNone, "none", 1, false},
-                                   {DenoiseMode::kBias, "bias", 4, true},
-                                   {DenoiseMode::kBalanced, "balanced", 2, true},
-                                   {DenoiseMode::kError, "error", 1, false}};
+constexpr ModeSettings kModes[] = {{DenoiseMode::kNone, "none", 1, 0, false},
+                                   {DenoiseMode::kBias, "bias", 4, 0, true},
+                                   {DenoiseMode::kBalanced, "balanced", 2, 0, true},
+                                   {DenoiseMode::kError, "error", 1, 1, false}};
 
 ModeSettings settings_of(DenoiseMode mode) {
   return *std::find_if(std::begin(kModes), std::end(kModes), [&](const ModeSettings& m) { return m.mode == mode; });
@@ -113,6 +113,7 @@ MixedDenoising denoise_by_mixture(const Estimator& base, const GroupedImage& crn
   input.guide = &guide_of(whole);
   input.valid = &valid;
   input.bias_share = chosen.bias_share;
+  input.prior = chosen.prior;
   Mixture mixture = mix(input);
   if (chosen.feedback) {
     add_feedback(whole.independent, {}, valid, whole.base.std_error, mixture.image);

@@ -18,8 +18,12 @@ constexpr float kRidge = 1e-3f;
 /// Sweeps over all pairs of candidates; more change weights by less than 0.01 (mixture_test).
 constexpr int kSweeps = 24;
 
-/// Planes of normal equations: the upper triangle of the matrix row by row, then the right-hand side.
-int n_planes(int m) { return m * (m + 1) / 2 + m; }
+/// Planes of normal equations: the upper triangle of the matrix row by row, the right-hand side, and the variance of
+/// the halves' U_p, summed over p.
+constexpr int n_planes(int m) { return m * (m + 1) / 2 + m + 1; }
+/// Sums of normal equations in every lane.
+using Sums = std::array<vfloat, n_planes(kMostCandidates)>;
+using Weights = std::array<float, kMostCandidates>;
 
 /// Adds the normal equations of one pixel to `sums`, in 1 / (squared radiance).
 void add_pixel(const MixtureInput& in, int m, int x, int y, float* sums) {
@@ -37,7 +41,7 @@ void add_pixel(const MixtureInput& in, int m, int x, int y, float* sums) {
     }
   }
   // Error of the halves without 1 - 1 / bias_share of the variance: squared bias + variance / bias_share.
-  const float removed = (1 - 1 / in.bias_share) * 0.25f * (weight[0] + weight[1]);
+  const float variance = 0.25f * (weight[0] + weight[1]), removed = (1 - 1 / in.bias_share) * variance;
   int plane = 0;
   for (int p = 0; p < m; ++p)
     for (int q = p; q < m; ++q, ++plane)
@@ -50,16 +54,26 @@ void add_pixel(const MixtureInput& in, int m, int x, int y, float* sums) {
       for (int half : {0, 1}) sums[plane] += 0.5f * weight[half] * u[half][p][c] * residual[half][c];
       sums[plane] += removed * (u[0][p][c] - u[1][p][c]) * (base[0][c] - base[1][c]);
     }
+  for (int p = 0; p < m; ++p)
+    for (int c = 0; c < 3; ++c) sums[plane] += variance * sqr(u[0][p][c] - u[1][p][c]);
 }
 
-/// Minimises x'Ax/2 - b'x over x >= 0, sum x <= 1, in every lane, by exact steps along the edges between two
-/// candidates; the base image, number m, has zero rows. `a`: m x m.
-void solve(int m, std::array<std::array<vfloat, kMostCandidates>, kMostCandidates>& a,
-           const std::array<vfloat, kMostCandidates>& b, std::array<vfloat, kMostCandidates + 1>& x) {
+/// Minimises x'Ax/2 - b'x + strength v ||x - prior||^2 / 2 over x >= 0, sum x <= 1, in every lane, by exact steps along
+/// the edges between two candidates; v: mean variance of the U_p. The base image, number m, has zero rows.
+void solve(int m, const Sums& sums, const Weights& prior, float strength, std::array<vfloat, kMostCandidates + 1>& x) {
+  std::array<std::array<vfloat, kMostCandidates>, kMostCandidates> a;
+  std::array<vfloat, kMostCandidates> b;
+  int plane = 0;
+  for (int p = 0; p < m; ++p)
+    for (int q = p; q < m; ++q, ++plane) a[p][q] = a[q][p] = sums[plane];
+  for (int p = 0; p < m; ++p, ++plane) b[p] = sums[plane];
   vfloat ridge = {};
   for (int p = 0; p < m; ++p) ridge += max(a[p][p], vfloat{});
-  ridge = ridge * (kRidge / static_cast<float>(m)) + 1e-30f;
-  for (int p = 0; p < m; ++p) a[p][p] += ridge;
+  ridge = (ridge * kRidge + sums[plane] * strength) / static_cast<float>(m) + 1e-30f;
+  for (int p = 0; p < m; ++p) {
+    a[p][p] += ridge;
+    b[p] += ridge * prior[p];
+  }
   std::array<vfloat, kMostCandidates + 1> gradient;
   for (int p = 0; p < m; ++p) {
     x[p] = splat(1.0f / static_cast<float>(m + 1));
@@ -82,6 +96,27 @@ void solve(int m, std::array<std::array<vfloat, kMostCandidates>, kMostCandidate
         x[q] -= step;
         for (int i = 0; i < m; ++i) gradient[i] += step * (element(i, p) - element(i, q));
       }
+}
+
+/// The weights that are best for the whole image, if all pixels have the same.
+Weights weights_everywhere(const MixtureInput& in, int m) {
+  const int width = in.guide->width, height = in.guide->height;
+  std::vector<std::array<float, std::tuple_size_v<Sums>>> rows(static_cast<size_t>(height));
+  parallel_for(height, 8, [&](int y) {
+    for (int x = 0; x < width; ++x)
+      if ((*in.valid)[static_cast<size_t>(y) * width + x]) add_pixel(in, m, x, y, rows[static_cast<size_t>(y)].data());
+  });
+  Sums sums{};
+  for (int i = 0; i < n_planes(m); ++i) {
+    double sum = 0;
+    for (const auto& row : rows) sum += row[i];
+    sums[i] = splat(static_cast<float>(sum));
+  }
+  std::array<vfloat, kMostCandidates + 1> x;
+  solve(m, sums, {}, 0, x);
+  Weights weights{};
+  for (int p = 0; p < m; ++p) weights[p] = x[p][0];
+  return weights;
 }
 
 /// base + sum x (candidates - base), where valid.
@@ -112,17 +147,12 @@ Mixture mix(const MixtureInput& input) {
                           [&](int x, int y, float* sums) { add_pixel(input, m, x, y, sums); });
   Mixture mixture;
   mixture.weights.assign(m, Image(width, height, 1));
+  const Weights everywhere = weights_everywhere(input, m);
   for_each_batch(width, height, [&](int x, int y, int n) {
-    std::array<vfloat, kMostCandidates*(kMostCandidates + 3) / 2> sums;
+    Sums sums;
     cells.sum(x, y, sums.data());
-    std::array<std::array<vfloat, kMostCandidates>, kMostCandidates> a;
-    std::array<vfloat, kMostCandidates> b;
-    int plane = 0;
-    for (int p = 0; p < m; ++p)
-      for (int q = p; q < m; ++q, ++plane) a[p][q] = a[q][p] = sums[plane];
-    for (int p = 0; p < m; ++p, ++plane) b[p] = sums[plane];
     std::array<vfloat, kMostCandidates + 1> weights;
-    solve(m, a, b, weights);
+    solve(m, sums, everywhere, input.prior, weights);
     for (int p = 0; p < m; ++p)
       for (int l = 0; l < n; ++l) mixture.weights[p].pixel(x + l, y)[0] = weights[p][l];
   });

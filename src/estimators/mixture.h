@@ -16,6 +16,9 @@
 //
 //     bias_share * squared bias + variance,   x >= 0, sum x <= 1.
 //
+// Where that is told by noise more than by anything else, weights are near those of the whole image, x0: to the sum is
+// added prior * v ||x - x0||^2, v: mean variance of the U_p. It vanishes with more samples.
+//
 // The whole image has half of that variance. Its bias is smaller than that of a half, too, so that bias_share = 1
 // leaves less error than 2 (docs/notes/denoising.md).
 #pragma once
@@ -40,6 +43,7 @@ struct MixtureInput {
   const Image* guide = nullptr;
   const std::vector<unsigned char>* valid = nullptr;  ///< pixels with 0 are left out, and keep the base image
   float bias_share = 1;                               ///< weight of the squared bias, > 0
+  float prior = 0;                                    ///< how much the weights of the whole image count, >= 0
 };
 
 struct Mixture {

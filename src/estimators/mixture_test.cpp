@@ -50,12 +50,13 @@ struct Experiment {
                     moments_of(flat(0, kVariance, 100 * seed + 2), kVariance)} {}
 
   /// `make(half)`: base and candidates of a half; the whole is the mean of both.
-  Mixture run(const std::function<CandidateSet(int)>& make, float bias_share) const {
+  Mixture run(const std::function<CandidateSet(int)>& make, float bias_share, float prior = 0) const {
     const CandidateSet halves[2] = {make(0), make(1)};
     CandidateSet whole{average(halves[0].base, halves[1].base), {}};
     for (size_t p = 0; p < halves[0].candidates.size(); ++p)
       whole.candidates.push_back(average(halves[0].candidates[p], halves[1].candidates[p]));
-    return mix({&whole, {&halves[0], &halves[1]}, {&independent[0], &independent[1]}, &guide, &valid, bias_share});
+    return mix(
+        {&whole, {&halves[0], &halves[1]}, {&independent[0], &independent[1]}, &guide, &valid, bias_share, prior});
   }
 };
 
@@ -98,6 +99,31 @@ TEST(Mixture, GivesAPerfectCandidateTheWholeAndBadOnesNothing) {
   const Mixture base = experiment.run(bad, 1);
   EXPECT_LT(mean_weight(base, 0), 0.02);
   EXPECT_LT(mean_weight(base, 1), 0.02);
+}
+
+/// A candidate that is right on the left, two thirds of the picture, and wrong on the right, which the guide tells
+/// apart: its weight there.
+float weight_where_wrong(double variance, float prior) {
+  Experiment experiment(5);
+  const auto is_right = [](int x) { return x >= 2 * kSize / 3; };
+  for (int y = 0; y < kSize; ++y)
+    for (int x = 0; x < kSize; ++x)
+      for (int c = 0; c < 3; ++c) experiment.guide.pixel(x, y)[c] = is_right(x) ? 9.0f : 0.5f;
+  const auto make = [&](int half) {
+    Image wrong = flat(0, 0, 0);
+    for (int y = 0; y < kSize; ++y)
+      for (int x = 0; x < kSize; ++x)
+        for (int c = 0; c < 3; ++c) wrong.pixel(x, y)[c] += is_right(x) ? 0.3f : 0.0f;
+    return CandidateSet{flat(0, variance, 7 + half), {wrong}};
+  };
+  return experiment.run(make, 1, prior).weights[0].pixel(kSize - 1, 5)[0];
+}
+
+TEST(Mixture, TheWholeImagesWeightsCountOnlyWhereThereIsNoise) {
+  // v / (b^2 + v) is 0.25 there, 0.5 with the mean b^2 of the whole image, and (v + 10 v 0.5) / (b^2 + v + 10 v) 0.43.
+  EXPECT_NEAR(weight_where_wrong(0.03, 0), 0.25, 0.1);
+  EXPECT_NEAR(weight_where_wrong(0.03, 10), 0.43, 0.08);
+  EXPECT_LT(weight_where_wrong(1e-4, 10), 0.02);
 }
 
 TEST(Mixture, WeightsAreSharesOfOne) {

@@ -61,10 +61,6 @@ class Filter {
         mask_(mask_of(*steering.valid, width_, height_)),
         tasks_(tasks) {
     COVARY_CHECK(!guides_ || guides_->border() >= kNlMeansRadius, "guides have the border that NL-means reads");
-    for (int dy = -kNlMeansRadius; dy <= kNlMeansRadius; ++dy)
-      for (int dx = -kNlMeansRadius; dx <= kNlMeansRadius; ++dx)
-        if (is_compared(dx, dy) && std::abs(dx) < width_)
-          offsets_[static_cast<size_t>(dy + kNlMeansRadius)].push_back(dx);
     for (const NlMeansTask& task : tasks)
       for (const Image* source : task.sources) {
         sources_.push_back(continued(*source, false));
@@ -80,7 +76,7 @@ class Filter {
   }
 
  private:
-  /// What is done at once for kAtOnce offsets (dx[i], dy): sums that are read and written once for all.
+  /// What is done at once for kAtOnce offsets (dx + i, dy): sums that are read and written once for all.
   struct Buffers {
     Rows pixels;
     std::array<Rows, kAtOnce> sums;
@@ -132,42 +128,36 @@ class Filter {
     b.totals.resize(tasks_.size() + 3 * sources_.size());
     for (Rows& total : b.totals) std::fill(total.data.begin(), total.data.end(), 0.0f);
     const int n_columns = std::min(kTileWidth, width_ - x0), n_rows = std::min(kTileHeight, height_ - y0);
-    for (int dy = -kNlMeansRadius; dy <= kNlMeansRadius; ++dy) {
-      if (std::abs(dy) >= height_) continue;
-      const std::vector<int>& offsets = offsets_[static_cast<size_t>(dy + kNlMeansRadius)];
-      for (size_t first = 0; first < offsets.size(); first += kAtOnce)
-        add_offsets(x0, y0, n_columns, n_rows, std::span(offsets).subspan(first), dy, b);
-    }
+    const int most_x = std::min(kNlMeansRadius, width_ - 1), most_y = std::min(kNlMeansRadius, height_ - 1);
+    for (int dy = -most_y; dy <= most_y; ++dy)
+      for (int dx = -most_x; dx <= most_x; dx += kAtOnce) {
+        const int n = std::min(kAtOnce, most_x + 1 - dx);
+        for (int i = 0; i < n; ++i) column_sums(x0, y0, n_columns, n_rows, dx + i, dy, b.pixels, b.sums[i]);
+        for (int y = 0; y < n_rows; ++y) {
+          for (int i = 0; i < n; ++i) guide_distances(x0, y0 + y, n_columns, dx + i, dy, b.guides[i].data());
+          if (n == kAtOnce)
+            add_row<kAtOnce>(x0, y0, y, n_columns, dx, dy, b);
+          else
+            for (int i = 0; i < n; ++i) add_row<1>(x0, y0, y, n_columns, dx + i, dy, b, i);
+        }
+      }
     for (int y = 0; y < n_rows; ++y)
       for (int x = 0; x < n_columns; ++x) finish(x, y, x0, y0, b.totals);
   }
 
-  /// Adds the pixels at the first offsets, at most kAtOnce, to the sums of the tile.
-  void add_offsets(int x0, int y0, int n_columns, int n_rows, std::span<const int> dx, int dy, Buffers& b) const {
-    const int n = std::min(kAtOnce, static_cast<int>(dx.size()));
-    for (int i = 0; i < n; ++i) column_sums(x0, y0, n_columns, n_rows, dx[i], dy, b.pixels, b.sums[i]);
-    for (int y = 0; y < n_rows; ++y) {
-      for (int i = 0; i < n; ++i) guide_distances(x0, y0 + y, n_columns, dx[i], dy, b.guides[i].data());
-      if (n == kAtOnce)
-        add_row<kAtOnce>(x0, y0, y, n_columns, dx.data(), dy, 0, b);
-      else
-        for (int i = 0; i < n; ++i) add_row<1>(x0, y0, y, n_columns, dx.data() + i, dy, i, b);
-    }
-  }
-
-  /// Adds the pixels at n offsets, which are number `first` … of the buffers, to the sums of row y of the tile.
+  /// Adds the pixels at n offsets from (dx, dy) on, which are number `first` … of the buffers, to the sums of row y.
   template <int n>
-  void add_row(int x0, int y0, int y, int n_columns, const int* dx, int dy, int first, Buffers& b) const {
+  void add_row(int x0, int y0, int y, int n_columns, int dx, int dy, Buffers& b, int first = 0) const {
     size_t total = 0, source = 0;
+    const float* mask = mask_.row(0, y0 + y + dy) + x0 + dx;
     for (const NlMeansTask& task : tasks_) {
-      add_weights<n>(task.bandwidth, mask_.row(0, y0 + y + dy) + x0, y, n_columns, dx, first, b,
-                     b.totals[total++].row(y));
+      add_weights<n>(task.bandwidth, mask, y, n_columns, first, b, b.totals[total++].row(y));
       for (size_t i = 0; i < 3 * task.sources.size(); ++i) {
-        const float* values = sources_[source + i / 3].row(static_cast<int>(i % 3), y0 + y + dy) + x0;
+        const float* values = sources_[source + i / 3].row(static_cast<int>(i % 3), y0 + y + dy) + x0 + dx;
         float* sums = b.totals[total++].row(y);
         for (int x = 0; x < n_columns; x += kLanes) {
           vfloat sum = load(sums + x);
-          for (int k = 0; k < n; ++k) sum += load(b.weights[k].data() + x) * load(values + dx[k] + x);
+          for (int k = 0; k < n; ++k) sum += load(b.weights[k].data() + x) * load(values + k + x);
           store(sums + x, sum);
         }
       }
@@ -176,7 +166,7 @@ class Filter {
   }
 
   template <int n>
-  void add_weights(float bandwidth, const float* mask, int y, int n_columns, const int* dx, int first, Buffers& b,
+  void add_weights(float bandwidth, const float* mask, int y, int n_columns, int first, Buffers& b,
                    float* total) const {
     const float inverse = 1 / (bandwidth * bandwidth);
     for (int x = 0; x < n_columns; x += kLanes) {
@@ -186,7 +176,7 @@ class Filter {
         const vfloat distance =
             (load(sums.row(y - 1) + x) + load(sums.row(y) + x) + load(sums.row(y + 1) + x)) * (1.0f / 27.0f);
         const vfloat exponent = max(max(distance * inverse, load(b.guides[first + k].data() + x)), vfloat{});
-        const vfloat weight = load(mask + dx[k] + x) * exp_of_nonpositive(-exponent);
+        const vfloat weight = load(mask + k + x) * exp_of_nonpositive(-exponent);
         store(b.weights[k].data() + x, weight);
         sum += weight;
       }
@@ -211,7 +201,6 @@ class Filter {
   const Planes* guides_;
   const Planes f_, variance_, mask_;
   const std::span<const NlMeansTask> tasks_;
-  std::array<std::vector<int>, 2 * kNlMeansRadius + 1> offsets_;  // dx of each dy
   std::vector<Planes> sources_;
   std::vector<Image> results_;
 };

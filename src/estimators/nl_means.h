@@ -10,8 +10,6 @@
 // reach beyond the frame repeat its outermost pixels.
 #pragma once
 
-#include <algorithm>
-#include <cstdlib>
 #include <span>
 #include <vector>
 
@@ -32,12 +30,8 @@ struct NlMeansTask {
   std::vector<const Image*> sources;
 };
 
-/// How far from a pixel its weights reach, and how far every pixel is compared.
-inline constexpr int kNlMeansRadius = 10, kNlMeansDense = 3;
-/// The pixels of the window: all that are near, beyond those of one colour of a chequerboard.
-inline bool is_compared(int dx, int dy) {
-  return std::max(std::abs(dx), std::abs(dy)) <= kNlMeansDense || (dx + dy) % 2 == 0;
-}
+/// How far from a pixel its weights reach.
+inline constexpr int kNlMeansRadius = 10;
 
 /// The weighted means of all sources of all tasks, in their order. Weights of different tasks share their distances, so
 /// that a second task costs little. Pixels without any weight keep the source's value. All images have three channels

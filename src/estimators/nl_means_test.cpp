@@ -44,8 +44,7 @@ std::array<double, 3> expected_mean(const Picture& p, const Image& source, int x
   for (int dy = -kNlMeansRadius; dy <= kNlMeansRadius; ++dy)
     for (int dx = -kNlMeansRadius; dx <= kNlMeansRadius; ++dx) {
       const int qx = x + dx, qy = y + dy;
-      if (!is_compared(dx, dy) || qx < 0 || qy < 0 || qx >= width || qy >= height || !p.valid[qy * width + qx])
-        continue;
+      if (qx < 0 || qy < 0 || qx >= width || qy >= height || !p.valid[qy * width + qx]) continue;
       double distance = 0, guide = 0;
       for (int v = -1; v <= 1; ++v)
         for (int u = -1; u <= 1; ++u)
