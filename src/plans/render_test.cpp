@@ -214,7 +214,7 @@ TEST(Budget, IsTakenToTheSample) {
   using Taken = std::vector<std::pair<uint32_t, int>>;
   PairMethod method;
   method.name = "average", method.estimate = [](const GroupedImage&, const GroupedImage&, const PairSettings&) {
-    return EstimatorResult{Image(3, 2, 3), {}, 0};
+    return EstimatorResult{.estimate = Image(3, 2, 3)};
   };
   const auto pair = [&](uint32_t spp) { return taken(pair_plan(method), request_of(spp)); };
   EXPECT_EQ(pair(192), (Taken{{96, 12}, {96, 12}}));
