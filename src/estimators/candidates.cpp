@@ -85,6 +85,7 @@ CandidateMaker neural_candidates(const Guides& guides, const DenoiseOptions& opt
   if (guides.albedo && guides.normal) *normal = denoiser->denoise_guide("normal", *guides.normal);
   CandidateMaker maker;
   maker.names = {"oidn", "oidn-independent"};
+  maker.error_over_variance = 1.1;
   maker.make = [=](const CandidateInput& in) {
     std::vector<Image> images;
     for (const Image* image : {in.estimate, in.independent})

@@ -15,42 +15,6 @@ namespace {
 
 using namespace lanes;
 
-/// Bounds of the whole image's error over what its halves' differences tell alone: an image without bias has 1.
-constexpr double kLeastFactor = 1, kLargestFactor = 100;
-
-/// What relMSE sums over the pixels of a row.
-struct RowSums {
-  double error = 0;     ///< of the halves
-  double variance = 0;  ///< of the halves
-};
-
-RowSums sums_of_row(const HeldOutInput& in, int y) {
-  RowSums sums;
-  for (int x = 0; x < in.guide->width; ++x) {
-    if (!(*in.valid)[static_cast<size_t>(y) * in.guide->width + x]) continue;
-    const double weight = relative_weight(in.guide->pixel(x, y));
-    for (int c = 0; c < 3; ++c) {
-      const double m[2] = {in.halves[0]->pixel(x, y)[c], in.halves[1]->pixel(x, y)[c]};
-      for (int half : {0, 1}) {
-        const double residual = in.independent[1 - half]->mean.row(c, y)[x] - m[half];
-        sums.error += 0.5 * weight * (residual * residual - in.independent[1 - half]->variance_of_mean.row(c, y)[x]);
-      }
-      sums.variance += 0.5 * weight * (m[0] - m[1]) * (m[0] - m[1]);
-    }
-  }
-  return sums;
-}
-
-/// The image's squared error over half of the variance of the halves.
-double factor_of_image(const HeldOutInput& in) {
-  std::vector<RowSums> rows(static_cast<size_t>(in.guide->height));
-  parallel_for(in.guide->height, 8, [&](int y) { rows[static_cast<size_t>(y)] = sums_of_row(in, y); });
-  RowSums all;
-  for (const RowSums& row : rows) all.error += row.error, all.variance += row.variance;
-  if (!(all.variance > 0)) return kLeastFactor;
-  return std::clamp((all.error - 0.5 * all.variance) / (0.5 * all.variance), kLeastFactor, kLargestFactor);
-}
-
 double square(double value) { return value * value; }
 
 /// Pixels of a part of a row, whose errors are taken together.
@@ -59,6 +23,64 @@ constexpr int kPart = 16;
 constexpr double kTrusted = 0.3;
 /// Least error of the whole over the variance of the halves: half, but for noise.
 constexpr double kLeastOverVariance = 0.25;
+
+/// Adds the error of a part of a row.
+void add_part(HeldOutRow& row, double error) { row.error += error, row.squares += error * error, row.parts += 1; }
+
+HeldOutRow sum_of(const std::vector<HeldOutRow>& rows) {
+  HeldOutRow all;
+  for (const HeldOutRow& row : rows) {
+    all.error += row.error, all.variance += row.variance, all.predicted += row.predicted;
+    all.squares += row.squares, all.parts += row.parts;
+  }
+  return all;
+}
+
+/// How much the held-out error counts, 0 to 1: with its relative standard error c, 1 / (1 + (c / kTrusted)^2).
+double trust_in(const HeldOutRow& all) {
+  if (all.parts < 2 || !(all.error > 0) || !std::isfinite(all.squares + all.variance)) return 0;
+  const double noise = std::max(0.0, all.squares - all.error * all.error / all.parts);
+  return 1 / (1 + noise / square(kTrusted * all.error));
+}
+
+/// The squared error of the image of all samples.
+double error_of_whole(const HeldOutRow& all) {
+  return std::max(all.error - 0.5 * all.variance, kLeastOverVariance * all.variance);
+}
+
+/// The squared errors of the halves with the weight of the guide.
+HeldOutRow sums_of_row(const HeldOutInput& in, int y) {
+  HeldOutRow row;
+  double part = 0;
+  const int width = in.guide->width;
+  for (int x = 0; x < width; ++x) {
+    if ((*in.valid)[static_cast<size_t>(y) * width + x]) {
+      const double weight = relative_weight(in.guide->pixel(x, y));
+      for (int c = 0; c < 3; ++c) {
+        const double m[2] = {in.halves[0]->pixel(x, y)[c], in.halves[1]->pixel(x, y)[c]};
+        for (int half : {0, 1}) {
+          const Moments& h = *in.independent[1 - half];
+          part += 0.5 * weight * (square(h.mean.row(c, y)[x] - m[half]) - h.variance_of_mean.row(c, y)[x]);
+        }
+        row.variance += 0.5 * weight * square(m[0] - m[1]);
+      }
+    }
+    if (x % kPart != kPart - 1 && x != width - 1) continue;
+    add_part(row, part);
+    part = 0;
+  }
+  return row;
+}
+
+/// The image's squared error over half of the variance of the halves.
+double factor_of_image(const HeldOutInput& in) {
+  std::vector<HeldOutRow> rows(static_cast<size_t>(in.guide->height));
+  parallel_for(in.guide->height, 8, [&](int y) { rows[static_cast<size_t>(y)] = sums_of_row(in, y); });
+  const HeldOutRow all = sum_of(rows);
+  const double trust = all.variance > 0 ? trust_in(all) : 0, usual = in.error_over_variance;
+  if (trust == 0) return 2 * usual;
+  return 2 * usual * std::pow(error_of_whole(all) / (usual * all.variance), trust);
+}
 
 /// The weight of each squared error is that of the image it belongs to: independent of the held-out samples.
 HeldOutRow held_out_row(const HeldOutInput& in, const EstimatorResult& whole, int y) {
@@ -80,9 +102,7 @@ HeldOutRow held_out_row(const HeldOutInput& in, const EstimatorResult& whole, in
       }
     }
     if (x % kPart != kPart - 1 && x != width - 1) continue;
-    row.error += part;
-    row.squares += part * part;
-    row.parts += 1;
+    add_part(row, part);
     part = 0;
   }
   return row;
@@ -130,18 +150,11 @@ Estimator with_held_out_rows(const Estimator& base) {
 }
 
 void calibrate(EstimatorResult& result) {
-  HeldOutRow all;
-  for (const HeldOutRow& row : result.held_out) {
-    all.error += row.error, all.variance += row.variance, all.predicted += row.predicted;
-    all.squares += row.squares, all.parts += row.parts;
-  }
+  const HeldOutRow all = sum_of(result.held_out);
   result.held_out.clear();
-  if (all.parts < 2 || !(all.predicted > 0) || !(all.error > 0) || !std::isfinite(all.error + all.variance)) return;
-  const double noise = std::max(0.0, all.squares - all.error * all.error / all.parts);
-  const double trust = 1 / (1 + noise / square(kTrusted * all.error));
-  const double whole = std::max(all.error - 0.5 * all.variance, kLeastOverVariance * all.variance);
-  if (!(whole > 0)) return;
-  const auto factor = static_cast<float>(std::pow(whole / all.predicted, 0.5 * trust));
+  const double trust = trust_in(all);
+  if (trust == 0 || !(all.predicted > 0)) return;
+  const auto factor = static_cast<float>(std::pow(error_of_whole(all) / all.predicted, 0.5 * trust));
   for (float& value : result.std_error.data) value *= factor;
 }
 

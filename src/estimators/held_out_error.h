@@ -7,7 +7,7 @@
 //
 // The second has little noise and tells where the error is: its mean over pixels that look alike (guided_cells.h) is
 // the error's shape. The first, over the whole image, tells how large it is: with squared bias e - v of a half, that of
-// the whole is e - v + v / 2.
+// the whole is e - v + v / 2. Where light is rare e is noise, and what the error usually is over v decides.
 #pragma once
 
 #include <array>
@@ -23,6 +23,7 @@ struct HeldOutInput {
   std::array<const Moments*, 2> independent = {};     ///< h_A, h_B and the variances of their pixels
   const Image* guide = nullptr;                       ///< G of guided_cells.h
   const std::vector<unsigned char>* valid = nullptr;  ///< pixels with 0 are left out, and have no error
+  double error_over_variance = 0.5;                   ///< what the whole's error over v usually is; without bias 1/2
 };
 
 /// The estimated standard error of an image that the same method made of both halves. Bit-identical for any number of

@@ -126,7 +126,9 @@ MixedDenoising denoise_by_mixture(const Estimator& base, const GroupedImage& crn
   out.result.std_error = Image();
   if (settings.std_error) {
     const std::array<const Image*, 2> images = {&mixture.halves[0], &mixture.halves[1]};
-    out.result.std_error = held_out_error({images, input.independent, input.guide, &valid});
+    double usual = 0.5;
+    for (const CandidateMaker& maker : makers) usual = std::max(usual, maker.error_over_variance);
+    out.result.std_error = held_out_error({images, input.independent, input.guide, &valid, usual});
     out.result.bias = held_out_bias({images, {&guide_of(halves[0]), &guide_of(halves[1])}, input.independent, &valid});
   }
   out.result.estimate = std::move(mixture.image);

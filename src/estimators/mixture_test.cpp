@@ -188,6 +188,18 @@ TEST(HeldOutError, IsUnbiased) {
   EXPECT_GT(std::abs(t_of_prediction(0.1f, false)), 5.5);
 }
 
+TEST(HeldOutError, IsTheUsualOneWhereHeldOutSamplesAreNoise) {
+  Experiment e(5);
+  for (int c = 0; c < 3; ++c) e.independent[0].mean.row(c, 20)[30] += 30;  // a light that one path has found
+  const Image a = flat(0, 0.002, 11), b = flat(0, 0.002, 12);
+  const Image error = held_out_error({{&a, &b}, {&e.independent[0], &e.independent[1]}, &e.guide, &e.valid, 0.65});
+  double sum = 0;
+  for (const float value : error.data) sum += value * value;
+  const double over_variance = sum / static_cast<double>(error.data.size()) / 0.002;
+  EXPECT_GT(over_variance, 0.6);
+  EXPECT_LT(over_variance, 1.3) << "the light alone makes the squared error 30 times as large";
+}
+
 /// Rows of an image whose held-out error is `error` in each of `n` parts, give or take `spread`.
 EstimatorResult with_rows(double error, double variance, double predicted, double spread, int n) {
   EstimatorResult result;
