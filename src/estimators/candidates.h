@@ -28,8 +28,8 @@ struct CandidateInput {
 struct CandidateMaker {
   std::vector<std::string> names;  ///< of its images, in their order
   std::function<std::vector<Image>(const CandidateInput&)> make;
-  /// What the squared error of a mixture that has these usually is, over the variance of images of half of the samples:
-  /// the more of the variance they take away, the more of the error is bias. Measured (docs/methods/error-estimates.md).
+  /// What the squared error of a mixture that has these usually is, over the variance of mixtures of half of the
+  /// samples: the more of it they take away, the more of the error is bias. Measured (docs/methods/error-estimates.md).
   double error_over_variance = 0.65;
 };
 
