@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy
 from exr_reader import read_exr
 
-SOURCE, PROGRAM = Path(os.environ["SOURCE"]), os.environ["COVARY_PROGRAM"]
+SOURCE = Path(os.environ.get("SOURCE", Path(__file__).resolve().parents[2]))
+PROGRAM = os.environ.get("COVARY_PROGRAM", "covary")
 ROOM = SOURCE / "scenes" / "room.xml"
 GROUPS, HEIGHT, WIDTH = 12, 20, 24
 
