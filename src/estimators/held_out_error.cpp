@@ -24,9 +24,6 @@ constexpr double kTrusted = 0.3;
 /// Least error of the whole over the variance of the halves: half, but for noise.
 constexpr double kLeastOverVariance = 0.25;
 
-/// Adds the error of a part of a row.
-void add_part(HeldOutRow& row, double error) { row.error += error, row.squares += error * error, row.parts += 1; }
-
 HeldOutRow sum_of(const std::vector<HeldOutRow>& rows) {
   HeldOutRow all;
   for (const HeldOutRow& row : rows) {
@@ -48,25 +45,25 @@ double error_of_whole(const HeldOutRow& all) {
   return std::max(all.error - 0.5 * all.variance, kLeastOverVariance * all.variance);
 }
 
-/// The squared errors of the halves with the weight of the guide.
-HeldOutRow sums_of_row(const HeldOutInput& in, int y) {
+/// Squared errors and variance of the halves in a row; weights_at(x): those of both halves' squared errors.
+template <typename WeightsAt>
+HeldOutRow row_of_halves(const HeldOutInput& in, int width, int y, const WeightsAt& weights_at) {
   HeldOutRow row;
   double part = 0;
-  const int width = in.guide->width;
   for (int x = 0; x < width; ++x) {
     if ((*in.valid)[static_cast<size_t>(y) * width + x]) {
-      const double weight = relative_weight(in.guide->pixel(x, y));
+      const float* m[2] = {in.halves[0]->pixel(x, y), in.halves[1]->pixel(x, y)};
+      const std::array<double, 2> weights = weights_at(x);
       for (int c = 0; c < 3; ++c) {
-        const double m[2] = {in.halves[0]->pixel(x, y)[c], in.halves[1]->pixel(x, y)[c]};
         for (int half : {0, 1}) {
           const Moments& h = *in.independent[1 - half];
-          part += 0.5 * weight * (square(h.mean.row(c, y)[x] - m[half]) - h.variance_of_mean.row(c, y)[x]);
+          part += 0.5 * weights[half] * (square(h.mean.row(c, y)[x] - m[half][c]) - h.variance_of_mean.row(c, y)[x]);
         }
-        row.variance += 0.5 * weight * square(m[0] - m[1]);
+        row.variance += 0.25 * (weights[0] + weights[1]) * square(m[0][c] - m[1][c]);
       }
     }
     if (x % kPart != kPart - 1 && x != width - 1) continue;
-    add_part(row, part);
+    row.error += part, row.squares += part * part, row.parts += 1;
     part = 0;
   }
   return row;
@@ -75,7 +72,12 @@ HeldOutRow sums_of_row(const HeldOutInput& in, int y) {
 /// The image's squared error over half of the variance of the halves.
 double factor_of_image(const HeldOutInput& in) {
   std::vector<HeldOutRow> rows(static_cast<size_t>(in.guide->height));
-  parallel_for(in.guide->height, 8, [&](int y) { rows[static_cast<size_t>(y)] = sums_of_row(in, y); });
+  parallel_for(in.guide->height, 8, [&](int y) {
+    rows[static_cast<size_t>(y)] = row_of_halves(in, in.guide->width, y, [&](int x) {
+      const double weight = relative_weight(in.guide->pixel(x, y));
+      return std::array{weight, weight};
+    });
+  });
   const HeldOutRow all = sum_of(rows);
   const double trust = all.variance > 0 ? trust_in(all) : 0, usual = in.error_over_variance;
   if (trust == 0) return 2 * usual;
@@ -84,26 +86,15 @@ double factor_of_image(const HeldOutInput& in) {
 
 /// The weight of each squared error is that of the image it belongs to: independent of the held-out samples.
 HeldOutRow held_out_row(const HeldOutInput& in, const EstimatorResult& whole, int y) {
-  HeldOutRow row;
-  double part = 0;
   const int width = whole.estimate.width;
+  HeldOutRow row = row_of_halves(in, width, y, [&](int x) {
+    return std::array<double, 2>{relative_weight(in.halves[0]->pixel(x, y)),
+                                 relative_weight(in.halves[1]->pixel(x, y))};
+  });
   for (int x = 0; x < width; ++x) {
-    if ((*in.valid)[static_cast<size_t>(y) * width + x]) {
-      const double w = relative_weight(whole.estimate.pixel(x, y));
-      const float* m[2] = {in.halves[0]->pixel(x, y), in.halves[1]->pixel(x, y)};
-      const double weights[2] = {relative_weight(m[0]), relative_weight(m[1])};
-      for (int c = 0; c < 3; ++c) {
-        for (int half : {0, 1}) {
-          const Moments& h = *in.independent[1 - half];
-          part += 0.5 * weights[half] * (square(h.mean.row(c, y)[x] - m[half][c]) - h.variance_of_mean.row(c, y)[x]);
-        }
-        row.variance += 0.25 * (weights[0] + weights[1]) * square(m[0][c] - m[1][c]);
-        row.predicted += w * square(whole.std_error.pixel(x, y)[c]);
-      }
-    }
-    if (x % kPart != kPart - 1 && x != width - 1) continue;
-    add_part(row, part);
-    part = 0;
+    if (!(*in.valid)[static_cast<size_t>(y) * width + x]) continue;
+    const double w = relative_weight(whole.estimate.pixel(x, y));
+    for (int c = 0; c < 3; ++c) row.predicted += w * square(whole.std_error.pixel(x, y)[c]);
   }
   return row;
 }
