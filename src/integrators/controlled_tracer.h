@@ -177,9 +177,13 @@ class ControlledTracer {
     });
   }
 
+  /// The cell of a surface that a ray meets, by its normal on the side of the ray.
+  static CellKey cell_of(const CellGrid& grid, const Ray& ray, const SurfaceHit& hit) {
+    return grid.key(hit.p, dot(hit.frame.n, ray.d) < 0 ? hit.frame.n : -hit.frame.n);
+  }
+
   CellKey key_of(const Ray& ray, const SurfaceHit& hit) const {
-    const bool front = dot(hit.frame.n, ray.d) < 0;
-    if (!control_.per_pixel) return table_.grid().key(hit.p, front ? hit.frame.n : -hit.frame.n);
+    if (!control_.per_pixel) return cell_of(table_.grid(), ray, hit);
     const Camera& camera = scene_.camera();
     const Vec2 film = camera.project(hit.p, ray.d);
     const auto pixel = [this](float x, int size) {
@@ -269,8 +273,7 @@ class ControlledTracer {
     const int edges = depth + 3;
     if (depth >= IndirectRecorder::kVertices || edges > lengths_.max_depth) return;
     const CoefficientTable& table = *control_.indirect;
-    const bool front = dot(hit.frame.n, ray.d) < 0;
-    const CellKey key = table.grid().key(hit.p, front ? hit.frame.n : -hit.frame.n);
+    const CellKey key = cell_of(table.grid(), ray, hit);
     const uint32_t cell = table.find(key), bin = DirectionBins::of(u);
     const Spectrum& unit = batch_.vertices[path.sample].unit;
     Spectrum control(0), share(0);
