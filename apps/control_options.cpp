@@ -48,21 +48,15 @@ void add_control_options(CLI::App& command, ControlTexts& texts) {
   command.add_option("--cv-variance", texts.variance, "What is made least: relative or absolute variance")
       ->check(one_of({"relative", "absolute"}))
       ->group(kControlGroup);
-  command
-      .add_option("--cv-prefix", texts.prefix,
-                  "Whether samples weigh by the throughput of the path before them; default: on")
-      ->check(one_of({"on", "off"}))
-      ->group(kControlGroup);
-  command
-      .add_option("--cv-albedo", texts.albedo,
-                  "Whether coefficients are multiplied by the albedo of the surface (--cv rgb and mono); default: on")
-      ->check(one_of({"on", "off"}))
-      ->group(kControlGroup);
-  command
-      .add_option("--cv-indirect", texts.indirect,
-                  "Whether light that other surfaces reflect is controlled, too (--cv rgb and mono); default: off")
-      ->check(one_of({"on", "off"}))
-      ->group(kControlGroup);
+  const auto add_switch = [&](const char* name, std::string& text, const char* help) {
+    command.add_option(name, text, help)->check(one_of({"on", "off"}))->group(kControlGroup);
+  };
+  add_switch("--cv-prefix", texts.prefix,
+             "Whether samples weigh by the throughput of the path before them; default: on");
+  add_switch("--cv-albedo", texts.albedo,
+             "Whether coefficients are multiplied by the albedo of the surface (--cv rgb and mono); default: on");
+  add_switch("--cv-indirect", texts.indirect,
+             "Whether light that other surfaces reflect is controlled, too (--cv rgb and mono); default: off");
   command
       .add_option("--cv-memory", texts.memory_mib,
                   "MiB of sums and coefficients while learning, then cells become wider; default: 256")
