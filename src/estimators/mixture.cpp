@@ -147,7 +147,7 @@ Mixture mix(const MixtureInput& input) {
                           [&](int x, int y, float* sums) { add_pixel(input, m, x, y, sums); });
   Mixture mixture;
   mixture.weights.assign(m, Image(width, height, 1));
-  const Weights everywhere = weights_everywhere(input, m);
+  const Weights everywhere = input.prior > 0 ? weights_everywhere(input, m) : Weights{};
   for_each_batch(width, height, [&](int x, int y, int n) {
     Sums sums;
     cells.sum(x, y, sums.data());
