@@ -13,12 +13,13 @@ import sys
 # What each module may include, the arrows of docs/architecture.md. Entries are direct; everything behind them follows.
 ARROWS = {
     "core": [],
+    "settings": ["core"],
     "imageio": ["core"],
     "film": ["imageio"],
-    "estimators": ["film"],
+    "estimators": ["film", "settings"],
     "lab": ["report"],
     "report": ["film"],
-    "scene": ["core"],
+    "scene": ["settings"],
     "textures": ["scene", "imageio"],
     "bsdfs": ["textures"],
     "emitters": ["textures"],

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+// One declaration: reading, listing, checks, options without effect, and the text in films.
+#include "settings/settings.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "support/files.h"
+
+namespace covary {
+namespace {
+
+using test_support::contains, test_support::message_of;
+using Words = std::vector<std::string>;
+
+enum class Colour { kRed, kBlue };
+
+struct Fog {
+  int steps = 4;
+  uint32_t grid = 0;
+  float density = 0.5f;
+  std::optional<double> height;
+  Colour colour = Colour::kRed;
+  bool jitter = true, thick = false;
+  std::string file, mode = "a";
+  std::vector<std::string> names;
+};
+
+void declare(Settings& s, Fog& v) {
+  static constexpr std::pair<const char*, Colour> kColours[] = {{"red", Colour::kRed}, {"blue", Colour::kBlue}};
+  s.group("Fog", true);
+  if (s.preset("fog-thick")) v.steps = 32;
+  s.whole("fog-steps", v.steps, {.low = 1, .high = 64}, "Steps of each ray", {.film = "steps={}"});
+  s.whole<uint32_t>("fog-grid", v.grid, {.low = 1, .high = 9}, {"auto", 0}, "Cells", {.film = "grid={}"});
+  s.real("fog-density", v.density, {.low = 0, .high = 1, .above_low = true}, "Density", {.film = "density={:f}"});
+  s.real("fog-height", v.height, {}, "Height");
+  s.choice("fog-colour", v.colour, kColours, "Colour", {.aliases = {"fog-color"}, .level = OptionLevel::kBasic});
+  s.on_off("fog-jitter", v.jitter, "Whether steps begin at random", {.film = "jitter"});
+  s.flag("fog-thick", v.thick, "Many steps", {.film = "thick"});
+  s.text("fog-file", v.file, "FILE", "File of densities", {.names = OptionNames::kFile});
+  s.texts("fog-name", v.names, "NAME", "Names");
+  s.one_of("fog-mode", v.mode, {"a", "b"}, "Mode");
+  s.only_if(v.steps > 1, {"fog-jitter", "fog-height"}, "with --fog-steps 1");
+}
+
+Fog read(const OptionValues& values) {
+  Settings settings(values);
+  Fog fog;
+  declare(settings, fog);
+  return fog;
+}
+
+std::vector<Option> listed() {
+  Settings settings;
+  Fog fog;
+  declare(settings, fog);
+  return settings.options();
+}
+
+std::string problem(const OptionValues& values) {
+  return message_of([&] { read(values); }, ErrorCode::kUsage);
+}
+
+TEST(Settings, ValuesReachTheStruct) {
+  const Fog fog = read({{"fog-steps", "8"},
+                        {"fog-grid", "3"},
+                        {"fog-density", "0.25"},
+                        {"fog-height", "-2e3"},
+                        {"fog-colour", "blue"},
+                        {"fog-jitter", "off"},
+                        {"fog-file", "a b.vol"},
+                        {"fog-name", "x\ny"},
+                        {"fog-mode", "b"}});
+  EXPECT_EQ(fog.steps, 8);
+  EXPECT_EQ(fog.grid, 3u);
+  EXPECT_EQ(fog.density, 0.25f);
+  EXPECT_EQ(fog.height, -2000);
+  EXPECT_EQ(fog.colour, Colour::kBlue);
+  EXPECT_FALSE(fog.jitter);
+  EXPECT_FALSE(fog.thick);
+  EXPECT_EQ(fog.file, "a b.vol");
+  EXPECT_EQ(fog.names, (Words{"x", "y"}));
+  EXPECT_EQ(fog.mode, "b");
+  EXPECT_EQ(read({{"fog-grid", "auto"}}).grid, 0u);
+}
+
+TEST(Settings, PresetsChangeDefaultsOfWhatIsNotGiven) {
+  EXPECT_EQ(read({{"fog-thick", ""}}).steps, 32);
+  EXPECT_EQ(read({{"fog-thick", ""}, {"fog-steps", "5"}}).steps, 5);
+  EXPECT_TRUE(read({{"fog-thick", ""}}).thick);
+}
+
+TEST(Settings, DefaultsAreThoseOfTheStruct) {
+  const std::vector<Option> options = listed();
+  const auto standard = [&](const char* name) { return find_option(options, name)->default_value; };
+  EXPECT_EQ(standard("fog-steps"), "4");
+  EXPECT_EQ(standard("fog-grid"), "auto");
+  EXPECT_EQ(standard("fog-density"), "0.5");
+  EXPECT_EQ(standard("fog-height"), "");
+  EXPECT_EQ(standard("fog-color"), "red");
+  EXPECT_EQ(standard("fog-jitter"), "on");
+  EXPECT_EQ(standard("fog-thick"), "");
+  for (const Option& option : options) {
+    EXPECT_EQ(option.group, "Fog");
+    EXPECT_TRUE(option.changes_samples);
+    EXPECT_EQ(option.level == OptionLevel::kBasic, option.name == "fog-colour");
+    EXPECT_EQ(option.names == OptionNames::kFile, option.name == "fog-file");
+  }
+}
+
+TEST(Settings, WhatIsNoValueIsRefused) {
+  EXPECT_EQ(problem({{"fog-steps", "4.5"}}), "--fog-steps '4.5': expected a whole number from 1 to 64");
+  EXPECT_EQ(problem({{"fog-steps", "99999999999"}}), "--fog-steps '99999999999': expected a whole number from 1 to 64");
+  EXPECT_EQ(problem({{"fog-grid", "-1"}}), "--fog-grid '-1': expected auto or a whole number from 1 to 9");
+  EXPECT_EQ(problem({{"fog-density", "nan"}}), "--fog-density 'nan': expected a number above 0 to 1");
+  EXPECT_EQ(problem({{"fog-height", "1x"}}), "--fog-height '1x': expected a number");
+  EXPECT_EQ(problem({{"fog-colour", "blu"}}), "--fog-colour 'blu'; did you mean 'blue'?: expected red, blue");
+  EXPECT_EQ(problem({{"fog-jitter", "yes"}}), "--fog-jitter 'yes': expected on, off");
+}
+
+TEST(Settings, OptionsWithoutEffectAreErrors) {
+  EXPECT_EQ(problem({{"fog-steps", "1"}, {"fog-height", "2"}}), "--fog-height has no effect with --fog-steps 1");
+  EXPECT_EQ(problem({{"fog-steps", "1"}, {"fog-height", "2"}, {"fog-jitter", "on"}}),
+            "--fog-jitter, --fog-height have no effect with --fog-steps 1");
+  EXPECT_EQ(read({{"fog-steps", "1"}}).steps, 1);
+}
+
+TEST(Settings, FilmTextHasWhatHasAnEffect) {
+  Fog fog;
+  EXPECT_EQ(film_text_of(fog), "steps=4 grid=auto density=0.500000 jitter");
+  fog.grid = 7, fog.jitter = false, fog.thick = true;
+  EXPECT_EQ(film_text_of(fog), "steps=4 grid=7 density=0.500000 thick");
+  fog.jitter = true, fog.steps = 1;
+  EXPECT_EQ(film_text_of(fog), "steps=1 grid=7 density=0.500000 thick");
+}
+
+TEST(Options, AcceptedTextsAreThoseOfNumbers) {
+  const std::vector<Option> options = listed();
+  const auto kept = [&](const char* name, const char* text) {
+    return accepted(*find_option(options, name), text).value_or("refused");
+  };
+  EXPECT_EQ(kept("fog-steps", "+010"), "10");
+  EXPECT_EQ(kept("fog-steps", "0"), "refused");
+  EXPECT_EQ(kept("fog-steps", "65"), "refused");
+  EXPECT_EQ(kept("fog-steps", "0x10"), "refused");
+  EXPECT_EQ(kept("fog-grid", "auto"), "auto");
+  EXPECT_EQ(kept("fog-grid", "4294967297"), "refused");
+  EXPECT_EQ(kept("fog-density", "0"), "refused");
+  EXPECT_EQ(kept("fog-density", "1"), "1");
+  EXPECT_EQ(kept("fog-density", "+.5"), ".5");
+  EXPECT_EQ(kept("fog-height", "1e300"), "refused");
+  EXPECT_EQ(kept("fog-height", "inf"), "refused");
+}
+
+TEST(Options, WordsOfACommandLine) {
+  const OptionValues values = {{"fog-name", "x\ny"}, {"fog-thick", ""}, {"fog-steps", "8"}, {"other", "1"}};
+  EXPECT_EQ(option_words(listed(), values),
+            (Words{"--fog-steps", "8", "--fog-thick", "--fog-name", "x", "--fog-name", "y"}));
+}
+
+TEST(Options, MergedListsTellWhereTheyDiffer) {
+  std::vector<Option> other = listed();
+  other.erase(other.begin() + 1, other.end());
+  other[0].default_value = "9";
+  std::vector<Option> third = other;
+  third[0].help = "Steps of light", third[0].default_value = "";
+  const std::vector<Option> merged = merged_options({"fog", "mist", "smoke"}, {listed(), other, third});
+  EXPECT_EQ(merged.size(), listed().size());
+  EXPECT_EQ(merged[0].help, "Steps of each ray; default 4 (mist: 9); smoke: Steps of light");
+}
+
+}  // namespace
+}  // namespace covary
