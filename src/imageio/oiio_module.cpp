@@ -8,7 +8,9 @@
 #include <exception>
 #include <fstream>
 #include <iterator>
+#include <mutex>
 #include <system_error>
+#include <utility>
 
 #include "imageio/image_module.h"
 
@@ -20,6 +22,14 @@ std::string one_line(std::string text) {
   text.erase(text.find_last_not_of(" \n") + 1);
   for (size_t at = text.find('\n'); at != std::string::npos; at = text.find('\n', at)) text.replace(at, 1, "; ");
   return text.empty() ? "OpenImageIO gives no reason" : text;
+}
+
+/// Held while OpenImageIO opens or closes a file or writes one: version 2.4 decodes EXIF, ICC and XMP into tables that
+/// all threads share, and adds to them without a lock whatever it finds in a file (its issue 3756). Pixels are read
+/// without it.
+std::mutex& metadata_mutex() {
+  static std::mutex mutex;
+  return mutex;
 }
 
 class OiioReader final : public ImageReader {
@@ -40,6 +50,10 @@ class OiioReader final : public ImageReader {
       if (value.type() == OIIO::TypeDesc::STRING) header_.attributes[value.name().string()] = value.get_string();
     }
   }
+  ~OiioReader() override {
+    const std::lock_guard lock(metadata_mutex());
+    input_.reset();
+  }
 
  private:
   bool read(int first, int last, float* values, std::string& problem) override {
@@ -49,6 +63,8 @@ class OiioReader final : public ImageReader {
     return read_as(first, last, OIIO::TypeDesc::UINT8, values, problem);
   }
   bool read_as(int first, int last, OIIO::TypeDesc type, void* values, std::string& problem) {
+    std::unique_lock lock(metadata_mutex(), std::defer_lock);
+    if (std::exchange(was_read_, true)) lock.lock();  // some formats open the file again to go back
     try {
       if (input_->read_image(0, 0, first, last, type, values)) return true;
       problem = one_line(input_->geterror());
@@ -59,6 +75,7 @@ class OiioReader final : public ImageReader {
   }
 
   std::unique_ptr<OIIO::ImageInput> input_;
+  bool was_read_ = false;
 };
 
 /// A file without a place on a device. (OpenImageIO's own files in memory do not work for TIFF.)
@@ -85,6 +102,7 @@ class OiioModule final : public ImageModule {
  public:
   std::unique_ptr<ImageReader> open(const std::string& path, OtherColours colours,
                                     std::string& problem) const override {
+    const std::lock_guard lock(metadata_mutex());
     try {
       OIIO::ImageSpec config;
       config.attribute("oiio:UnassociatedAlpha", 1);  // do not multiply colours by alpha
@@ -105,6 +123,7 @@ class OiioModule final : public ImageModule {
 
   std::vector<unsigned char> encode(const std::string& extension, const ImageToEncode& image,
                                     std::string& problem) const override {
+    const std::lock_guard lock(metadata_mutex());
     try {
       const auto output = OIIO::ImageOutput::create("image." + extension);
       if (!output) {
