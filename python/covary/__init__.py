@@ -12,17 +12,17 @@ from ._covary import version as __version__
 from ._images import denoise, read_groups, read_image, write_image
 from ._program import program
 from ._render import Scene, render, set_threads
-from ._result import RenderResult, Result
-from .errors import Error, InputError, InternalError, IoError, UsageError
+from ._result import BadSample, RenderResult, Result
+from .errors import BadSamplesWarning, Error, InputError, InternalError, IoError, UsageError
 from .estimators import *  # noqa: F403
 from .estimators import __all__ as _estimators
 from .film import Film, film_from_groups, merge_films
 from .notebook import View, view
 
 __all__ = [
-    "Error", "Film", "InputError", "InputReport", "InternalError", "IoError", "RenderResult", "Result", "Scene",
-    "UsageError", "View", "__version__", "check_inputs", "combine", "denoise", "errors", "film_from_groups",
-    "merge_films", "metrics", "program", "progress", "read_groups", "read_image", "render", "set_threads", "view",
-    "write_image",
+    "BadSample", "BadSamplesWarning", "Error", "Film", "InputError", "InputReport", "InternalError", "IoError",
+    "RenderResult", "Result", "Scene", "UsageError", "View", "__version__", "check_inputs", "combine", "denoise",
+    "errors", "film_from_groups", "merge_films", "metrics", "program", "progress", "read_groups", "read_image",
+    "render", "set_threads", "view", "write_image",
 ]
 __all__ += _estimators

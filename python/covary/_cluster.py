@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What work on a cluster begins with: the same versions everywhere, and the files of scenes on every worker."""
+"""What work on a cluster begins with: a client of a cluster that somebody chose, the same versions everywhere, and the
+files of scenes on every worker."""
 from __future__ import annotations
 
 import hashlib
@@ -10,13 +11,32 @@ from pathlib import Path
 from typing import Any
 
 from . import _covary
+from ._arguments import Rule, checked, instance, path
 from ._render import Scene
 from .errors import IoError, UsageError
+
+_CLUSTER = ("cluster = SLURMCluster(…); cluster.scale(100); client = Client(cluster). scale() itself returns None, and "
+            "Client(None) starts workers on this machine, which Client(LocalCluster()) does where it is wanted")
+
+
+def _client(value: Any) -> Any:
+    if value is None or not (hasattr(value, "submit") and hasattr(value, "register_plugin")):
+        raise TypeError(f"client: found {value!r} ({type(value).__name__}); accepted is a dask.distributed.Client: "
+                        f"{_CLUSTER}")
+    if getattr(value, "_start_arg", value) is None and getattr(value, "cluster", None) is not None:
+        raise UsageError("client: found one that was made without a cluster, so that it started workers on this "
+                         f"machine by itself; accepted is a client of a cluster or an address: {_CLUSTER}")
+    return value
+
+
+#: The argument `client`.
+CLIENT = Rule("a dask.distributed.Client", _client)
 
 
 class SceneFiles:
     """The files of a scene by their content, which every worker, also one that comes later, gets once."""
 
+    @checked(scene=instance("a covary.Scene", lambda value: isinstance(value, Scene)))
     def __init__(self, scene: Scene) -> None:
         paths = sorted({os.path.realpath(path) for path in [scene.path, *scene.files]})
         root = os.path.commonpath([os.path.dirname(path) for path in paths])
@@ -32,8 +52,10 @@ class SceneFiles:
         """Its name in the folder of a worker."""
         return f"covary-scene-{self.hash}"
 
-    def write(self, parent: Path) -> Path:
+    @checked(parent=path)
+    def write(self, parent: str | os.PathLike[str]) -> Path:
         """Writes them into a folder of their own, unless they are there. Raises IoError."""
+        parent = Path(parent)
         folder = parent / self.folder
         if folder.exists():
             return folder

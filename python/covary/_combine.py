@@ -2,27 +2,33 @@
 """Images of any renderer, as arrays or films, made into one with less noise."""
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from os import PathLike, fspath
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from . import _covary
+from ._arguments import Rule, array, check_some, checked, choice, empty_or, flag, function, optional, path, text, whole
 from ._options import OptionValue, check_no_passes, text_options
 from ._result import Result
+from .errors import UsageError
 
 if TYPE_CHECKING:
     from .estimators import PairEstimator
     from .film import Film
 
 Progress = Callable[[int, int], object]
-_MOST_SAMPLES = 1 << 30  # of a pixel
-
-
 #: What `--denoise` of the command line takes.
 DenoiseMode = Literal["none", "bias", "balanced", "error"]
+DENOISE = choice(get_args(DenoiseMode))
+OIDN = empty_or(path)
+#: Checked with the pixels, by the module.
+IMAGE = Rule("a covary.Film or an array", array.convert)
 
 
+@checked(crn=IMAGE, independent=IMAGE, estimator=text, light=IMAGE, counts=array,
+         samples=optional(whole(1, _covary.most_samples)), denoise=DENOISE, albedo=array, normal=array, oidn=OIDN,
+         std_error=optional(flag), force=flag, progress=optional(function))
 def combine(crn: Any, independent: Any, estimator: PairEstimator = "iicv", *, light: Film | None = None,
             counts: Any = None, samples: int | None = None, denoise: DenoiseMode = "none", albedo: Any = None,
             normal: Any = None, oidn: str | PathLike[str] = "", std_error: bool | None = None, force: bool = False,
@@ -50,7 +56,8 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = "iicv", *, li
     """
     check_no_passes(options, "here are images that are rendered: counts= tells the samples that their pixels have")
     return Result(**_covary.combine(crn, independent, None if counts is None else _counts(counts), light, albedo,
-                                    normal, estimator, text_options(options), denoise, fspath(oidn), force, std_error,
+                                    normal, estimator, text_options(options, estimator), denoise, fspath(oidn), force,
+                                    std_error,
                                     samples, progress))
 
 
@@ -58,12 +65,26 @@ def _counts(counts: Any) -> Any:
     """As the module takes them. Raises TypeError and ValueError for what are no numbers of samples."""
     import numpy
 
-    array = numpy.asarray(counts)
-    if array.dtype.kind not in "ui" or array.ndim != 2:
-        raise TypeError(f"counts: found {array.dtype} {list(array.shape)}; accepted are whole numbers, [H, W]")
-    if array.size and not 0 <= int(array.min()) <= int(array.max()) <= _MOST_SAMPLES:
-        raise ValueError(f"counts: found {array.min()} to {array.max()}; accepted are 0 to {_MOST_SAMPLES}")
-    return numpy.ascontiguousarray(array, numpy.uint32)
+    numbers = numpy.asarray(counts)
+    if numbers.dtype.kind not in "ui" or numbers.ndim != 2:
+        found = f"{numbers.dtype} {list(numbers.shape)}" if numbers.ndim else repr(counts)
+        raise TypeError(f"counts: found {found}; accepted are whole numbers, [H, W]")
+    if numbers.size and not 0 <= int(numbers.min()) <= int(numbers.max()) <= _covary.most_samples:
+        raise ValueError(f"counts: found {numbers.min()} to {numbers.max()}; accepted are 0 to {_covary.most_samples}")
+    return numpy.ascontiguousarray(numbers, numpy.uint32)
+
+
+def check_options(estimator: str, options: Mapping[str, Any]) -> None:
+    """Raises what combine() would for its keywords; for those who render the images first. Those of the images are not
+    accepted."""
+    given = check_some(combine, options)
+    known = {name: given[name] for name in ("denoise", "oidn", "force", "std_error") if name in given}
+    if len(known) < len(given):
+        raise UsageError(f"{min(set(given) - set(known))}: is not accepted where the images are rendered")
+    rest = {name: value for name, value in options.items() if name not in known}
+    check_no_passes(rest, "here both images have the same number in all pixels")
+    _covary.check_pair_estimator(estimator, text_options(rest, estimator), known.get("denoise", "none"),
+                                 known.get("oidn", ""))
 
 
 @dataclass(frozen=True)
@@ -90,6 +111,7 @@ class InputReport:
         return not self.errors
 
 
+@checked(crn=IMAGE, independent=IMAGE)
 def check_inputs(crn: Any, independent: Any) -> InputReport:
     """Whether two images are what combine() assumes: finite and linear, with common random numbers in the one and
     independent ones in the other, of one scene. Takes what combine() takes."""

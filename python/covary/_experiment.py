@@ -17,7 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from . import _covary
-from ._cluster import SceneFiles, check_versions, dask, make_plugin
+from ._arguments import checked, function, list_of, optional, path, text
+from ._cluster import CLIENT, SceneFiles, check_versions, dask, make_plugin
 from ._combine import Progress
 from ._program import program, run_program
 from ._render import Scene
@@ -136,6 +137,8 @@ def _make_runs(client: Any, pieces: Sequence[_Piece], cache: Path, program_hash:
         raise
 
 
+@checked(client=CLIENT, suite=path, output=path, arguments=list_of(text, "a list of texts"),
+         progress=optional(function))
 def experiment(client: Any, suite: str | os.PathLike[str], output: str | os.PathLike[str],
                arguments: Sequence[str] = (), *, progress: Progress | None = None) -> Path:
     """`covary experiment SUITE -o OUTPUT ARGUMENTS…` with its runs on the workers of a dask.distributed.Client.
@@ -167,6 +170,7 @@ def experiment(client: Any, suite: str | os.PathLike[str], output: str | os.Path
     return Path(output) / "report.html"
 
 
+@checked(words=list_of(text, "a list of texts"))
 def main(words: Sequence[str]) -> int:
     """`covary experiment SUITE -o DIR --cluster ADDRESS [OPTIONS]`, or `python -m covary.distributed experiment …`.
     Returns the exit code."""

@@ -7,21 +7,29 @@ from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any
 
 from . import _covary
+from ._arguments import array, attribute_texts, checked, either, empty_or, list_of, optional, path, text
 
 if TYPE_CHECKING:
     from ._result import FloatArray
 
+_FILES = either("the name of a file, or a list of them", path, list_of(path, "a list of names of files"))
+
+
+@checked(path=path, layer=text)
 def read_image(path: str | PathLike[str], layer: str = "") -> FloatArray:
     """Linear RGB [H, W, 3] of a file of any format; `layer` chooses among those of an EXR: "N", "Albedo", …"""
     image: FloatArray = _covary.read_image(fspath(path), layer)
     return image
 
 
+@checked(path=path, image=array, attributes=optional(attribute_texts))
 def write_image(path: str | PathLike[str], image: Any, attributes: dict[str, str] | None = None) -> None:
-    """Writes linear RGB [H, W, 3] in the format that the name tells: .exr .pfm .tif .hdr .png .jpg."""
+    """Writes linear RGB [H, W, 3] in the format that the name tells: .exr .pfm .tif .hdr .png .jpg. Raises UsageError
+    for other names."""
     _covary.write_image(fspath(path), image, attributes or {})
 
 
+@checked(paths=_FILES, layer=text)
 def read_groups(paths: str | PathLike[str] | Iterable[str | PathLike[str]], layer: str = "") -> FloatArray:
     """Groups [T, H, W, 3] for combine() from EXR files of any renderer: one file with a layer for each group, or one
     file for each."""
@@ -32,6 +40,7 @@ def read_groups(paths: str | PathLike[str] | Iterable[str | PathLike[str]], laye
     return groups
 
 
+@checked(image=array, albedo=array, normal=array, library=empty_or(path))
 def denoise(image: Any, albedo: Any = None, normal: Any = None, *, library: str | PathLike[str] = "") -> FloatArray:
     """The image [H, W, 3] by Open Image Denoise, where it is installed (`pip install pyoidn`). Biased.
 

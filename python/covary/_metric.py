@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from . import _covary
+from ._arguments import array, checked, flag, text
 
 if TYPE_CHECKING:
     from ._result import FloatArray
@@ -24,6 +25,7 @@ class MetricResult:
     map: FloatArray = field(repr=False)
 
 
+@checked(name=text, image=array, reference=array, reference2=array, low_dynamic_range=flag)
 def compute(name: str, image: Any, reference: Any, reference2: Any = None, *,
             low_dynamic_range: bool = False) -> MetricResult:
     """The error `name` ("relmse", "flip", …) of an image [H, W, 3] against one reference, or two independent ones.

@@ -1,32 +1,58 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Options of estimators as the registry takes them: text by name."""
+"""Options of estimators as the registry takes them: text by name, each of the type that the registry says."""
 from __future__ import annotations
 
 import functools
 from collections.abc import Iterable, Mapping
-from typing import Union
+from typing import Any, Union
 
 from . import _covary
+from ._arguments import Rule, flag, optional, real, scalar, text, whole
 from .errors import UsageError
 
 OptionValue = Union[bool, int, float, str, None]
 
 
-def text_options(options: Mapping[str, OptionValue]) -> dict[str, str]:
-    """`exclude_target=True, k=9` as {"exclude-target": "", "k": "9"}; None and False are left out, as defaults."""
+@functools.cache
+def _registry() -> dict[str, dict[str, Any]]:
+    return {known["name"]: known for known in _covary.estimators()}
+
+
+def passes_of(estimator: str) -> str | None:
+    """"pair", "samples" or "any"; None where there is no such estimator."""
+    return _registry()[estimator]["passes"] if estimator in _registry() else None
+
+
+@functools.cache
+def _options_of(estimator: str) -> dict[str, dict[str, Any]]:
+    """Of the registry, by each of their names."""
+    return {name: option for option in _registry().get(estimator, {}).get("options", ())
+            for name in (option["name"], *option["aliases"])}
+
+
+def _rule_of(option: dict[str, Any]) -> Rule:
+    rule = {"flag": flag, "whole": whole(), "real": real(), "choice": text}[option["type"]]
+    bounds = f" ({option['range']})" if option["range"] and option["type"] in ("whole", "real") else ""
+    return optional(Rule(rule.accepted + bounds, rule.convert))
+
+
+def text_options(options: Mapping[str, OptionValue], estimator: str) -> dict[str, str]:
+    """`exclude_target=True, k=9` as {"exclude-target": "", "k": "9"}; None and False are left out, as defaults. Raises
+    TypeError and UsageError for values that are not of the option's type; the registry does so for those out of range
+    and for names that it does not know."""
+    known = _options_of(estimator)
     texts: dict[str, str] = {}
-    for name, value in options.items():
-        if value is None or value is False:
-            continue
-        if not isinstance(value, (bool, int, float, str)) and not hasattr(value, "__float__"):
-            raise TypeError(f"{name}: found {type(value).__name__}; accepted are bool, int, float and str")
-        texts[name.replace("_", "-")] = "" if value is True else str(value)
+    for keyword, value in options.items():
+        name = keyword.replace("_", "-").rstrip("-")
+        taken = (_rule_of(known[name]) if name in known else optional(scalar))(keyword, value)
+        if taken is not None and taken is not False:
+            texts[name] = "" if taken is True else str(taken)
     return texts
 
 
 @functools.cache
 def _of_passes() -> frozenset[str]:
-    return frozenset(name for estimator in _covary.estimators() for option in estimator["options"]
+    return frozenset(name for estimator in _registry().values() for option in estimator["options"]
                      if option["of_passes"] for name in (option["name"], *option["aliases"]))
 
 

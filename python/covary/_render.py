@@ -2,20 +2,33 @@
 """Scenes and rendering."""
 from __future__ import annotations
 
+import shlex
+import warnings
 from collections.abc import Mapping
 from os import PathLike, fspath
-from typing import TYPE_CHECKING, Any, Literal, Union
+from typing import TYPE_CHECKING, Any, Literal, Union, get_args
 
 from . import _covary
-from ._combine import DenoiseMode, Progress
-from ._options import OptionValue, text_options
-from ._result import RenderResult
-from .errors import UsageError
+from ._arguments import (
+    checked, choice, either, empty_or, flag, function, instance, mapping_of, optional, path, real, scalar, several,
+    text, whole,
+)
+from ._combine import DENOISE, DenoiseMode, Progress
+from ._options import OptionValue, passes_of, text_options
+from ._result import BadSample, RenderResult, text_of_bad_samples
+from .errors import BadSamplesWarning, UsageError
 
 if TYPE_CHECKING:
     from .estimators import Estimator
 
 PathOrScene = Union[str, "PathLike[str]", "Scene"]
+Filter = Literal["box", "tent", "gaussian"]
+Sampling = Literal["independent", "crn"]
+Sampler = Literal["independent", "sobol"]
+CrnPart = Literal["both", "camera", "light"]
+
+_SCALARS = optional(mapping_of(scalar, "a mapping from names to True, False, numbers or texts"))
+_CHECKPOINT_SECONDS = 300.0  # as the program
 
 
 class Scene:
@@ -26,6 +39,10 @@ class Scene:
         self._loaded = _covary.load_scene(path, **loading)
 
     @staticmethod
+    @checked(path=path,
+             resolution=optional(several("(width, height), each from 1 to 65536", whole(1, 65536), whole(1, 65536))),
+             integrator=text, min_depth=optional(whole(0, 1 << 30)), max_depth=optional(whole(-1, 1 << 30)),
+             integrator_options=_SCALARS, defines=_SCALARS)
     def load(path: str | PathLike[str], *, resolution: tuple[int, int] | None = None, integrator: str = "",
              min_depth: int | None = None, max_depth: int | None = None,
              integrator_options: Mapping[str, bool | int | float | str] | None = None,
@@ -44,6 +61,7 @@ class Scene:
                                     "min_depth": min_depth, "max_depth": max_depth,
                                     "integrator_options": dict(integrator_options or {})})
 
+    @checked(integrator=text)
     def with_integrator(self, integrator: str) -> Scene:
         """The scene, read again where it has another integrator than this."""
         if integrator in ("", self._loading["integrator"]):
@@ -88,18 +106,62 @@ class Scene:
         return f"<covary.Scene {self._path!r}, {self.resolution[0]} x {self.resolution[1]}>"
 
 
+#: Rules of arguments that several functions have.
+SCENE = either("a covary.Scene, as Scene.load() makes it, or the name of its file",
+               instance("a covary.Scene", lambda value: isinstance(value, Scene)), path)
+SEED = whole(0, (1 << 64) - 1)
+SPP = whole(1, _covary.most_samples)
+
+
+def _check_together(estimator: str, given: Mapping[str, Any]) -> None:
+    """Raises UsageError for arguments that have no effect beside, or without, others."""
+    def needs(names: tuple[str, ...], others: tuple[str, ...], what: str) -> None:
+        for name in names:
+            if given[name] and not any(given[other] is not None for other in others):
+                raise UsageError(f"{name}: found {given[name]!r} without {what}, where it has no effect")
+
+    needs(("resume", "overwrite", "checkpoint"), ("output", "passes"), "output or passes")
+    needs(("preview",), ("output",), "output")
+    for first, second in (("resume", "overwrite"), ("until", "until_p95")):
+        if given[first] and given[second]:
+            raise UsageError(f"found {first} and {second}; accepted is one of them")
+    passes = passes_of(estimator)
+    if given["sampling"] is not None and passes not in ("any", None):
+        raise UsageError(f"sampling: found {given['sampling']!r} with estimator {estimator!r}, which chooses itself; "
+                         "it is an argument of estimator 'none'")
+    if given["split"] is not None and passes not in ("pair", None):
+        raise UsageError(f"split: found {given['split']!r} with estimator {estimator!r}; it is an argument of "
+                         "estimators with two passes")
+
+
+def _check_scene_arguments(scene: PathOrScene, options: Mapping[str, Any]) -> None:
+    """Raises UsageError for arguments of Scene.load() among the options."""
+    found = sorted(set(options).intersection(Scene.load.rules))  # type: ignore[attr-defined]
+    if found:
+        load = ", ".join([repr(getattr(scene, "path", scene)), *(f"{name}={options[name]!r}" for name in found)])
+        raise UsageError(f"{', '.join(found)}: not of render(), but of Scene.load(): render(Scene.load({load}), …)")
+
+
+@checked(scene=SCENE, spp=optional(SPP), estimator=text, integrator=text, until=optional(real(0, above=True)),
+         until_p95=optional(real(0, above=True)), time=optional(real(0, above=True)), seed=SEED, denoise=DENOISE,
+         oidn=empty_or(path), output=optional(path), passes=optional(path), resume=flag, overwrite=flag,
+         checkpoint=optional(real(0)), preview=flag, aovs=flag, path_lengths=flag,
+         crop=optional(several("(x, y, width, height) in pixels", whole(0, 65535), whole(0, 65535), whole(1, 65536),
+                               whole(1, 65536))),
+         filter=optional(choice(get_args(Filter))), sampling=optional(choice(get_args(Sampling))),
+         sampler=optional(choice(get_args(Sampler))), crn_part=choice(get_args(CrnPart)),
+         groups=optional(whole(1, _covary.most_groups)),
+         split=optional(several("(CRN, independent), two numbers above 0", real(0, above=True), real(0, above=True))),
+         films_only=flag, save_training=optional(path), load_training=optional(path), progress=optional(function))
 def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator = "iicv", *, integrator: str = "",
            until: float | None = None, until_p95: float | None = None, time: float | None = None, seed: int = 0,
            denoise: DenoiseMode = "none", oidn: str | PathLike[str] = "",
            output: str | PathLike[str] | None = None, passes: str | PathLike[str] | None = None, resume: bool = False,
-           overwrite: bool = False, checkpoint: float = 0, preview: bool = False, aovs: bool = False,
+           overwrite: bool = False, checkpoint: float | None = None, preview: bool = False, aovs: bool = False,
            path_lengths: bool = False, crop: tuple[int, int, int, int] | None = None,
-           filter: Literal["box", "tent", "gaussian"] | None = None,
-           sampling: Literal["independent", "crn"] = "independent",
-           sampler: Literal["independent", "sobol"] | None = None,
-           crn_part: Literal["both", "camera", "light"] = "both", groups: int | None = None,
-           split: tuple[float, float] | None = None, films_only: bool = False,
-           save_training: str | PathLike[str] | None = None,
+           filter: Filter | None = None, sampling: Sampling | None = None, sampler: Sampler | None = None,
+           crn_part: CrnPart = "both", groups: int | None = None, split: tuple[float, float] | None = None,
+           films_only: bool = False, save_training: str | PathLike[str] | None = None,
            load_training: str | PathLike[str] | None = None, progress: Progress | None = None,
            **options: OptionValue) -> RenderResult:
     """Renders a scene, or the file of one, as `covary render` does; the values are the same in every bit.
@@ -114,10 +176,10 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator = "i
     denoise, oidn: as combine() has them; the guides are rendered.
     output: EXR file of the result; preview: also a PNG beside it.
     passes: folder that keeps the films; resume: continues those that are there; overwrite: replaces them;
-        checkpoint: seconds between writing unfinished films.
+        checkpoint: seconds between writing unfinished films, by default 300 where there is a place for them; 0: never.
     aovs: also the images Albedo, N and P; path_lengths: also images of paths of each length, by controlled-path.
     crop: x, y, width and height in the frame.
-    sampling: of the one pass of estimator "none".
+    sampling: of the one pass of estimator "none"; by default "independent".
     sampler: "sobol" for Owen-scrambled Sobol' points in each group of samples; by default the scene's.
     groups: of samples whose means films keep; split: parts of the samples for the CRN and the independent pass.
     films_only: take the passes and make no image of them; result.image is then the mean of all samples.
@@ -125,22 +187,67 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator = "i
 
     Ctrl-C ends the render within a tile; with `output` or `passes` what there is was kept, and `resume=True` continues.
     """
+    _check_scene_arguments(scene, options)
+    _check_together(estimator, {"resume": resume, "overwrite": overwrite, "checkpoint": checkpoint, "preview": preview,
+                                "output": output, "passes": passes, "until": until, "until_p95": until_p95,
+                                "sampling": sampling, "split": split})
+    texts = text_options(options, estimator)
     chosen = scene if isinstance(scene, Scene) else Scene.load(scene, integrator=integrator)
     chosen = chosen.with_integrator(integrator)
-    names = {"output": output, "passes": passes, "save_training": save_training, "load_training": load_training}
-    request: dict[str, Any] = {name: None if path is None else fspath(path) for name, path in names.items()}
-    request |= {"spp": spp, "seed": seed, "until": until, "seconds": time, "resume": resume, "overwrite": overwrite,
-                "checkpoint": float(checkpoint), "preview": preview, "aovs": aovs, "crop": crop, "filter": filter,
-                "sampler": sampler, "crn_part": crn_part, "path_lengths": path_lengths}
-    if until_p95 is not None:
-        if until is not None:
-            raise UsageError("found until and until_p95; accepted is one of them")
-        request |= {"until": until_p95, "until_in_blocks": True}
-    made = _covary.render(chosen._loaded, estimator, text_options(options), denoise, fspath(oidn), sampling, groups,
+    if checkpoint is None:
+        checkpoint = _CHECKPOINT_SECONDS if output is not None or passes is not None else 0
+    request: dict[str, Any] = {
+        "spp": spp, "seed": seed, "until": until if until_p95 is None else until_p95,
+        "until_in_blocks": until_p95 is not None, "seconds": time, "output": output, "passes": passes,
+        "resume": resume, "overwrite": overwrite, "checkpoint": checkpoint, "preview": preview, "aovs": aovs,
+        "crop": crop, "filter": filter, "sampler": sampler, "crn_part": crn_part, "path_lengths": path_lengths,
+        "save_training": save_training, "load_training": load_training}
+    made = _covary.render(chosen._loaded, estimator, texts, denoise, fspath(oidn), sampling or "independent", groups,
                           split, films_only, request, progress)
+    made["bad_samples"] = [_bad_sample(chosen, request, bad) for bad in made["bad_samples"]]
+    report_bad_samples(made)
     return RenderResult(**made)
 
 
+def report_bad_samples(made: dict[str, Any], depth: int = 4) -> None:
+    """Warns of them, `depth` calls up, where the caller's line is; puts the text into the result's warnings, too."""
+    report = text_of_bad_samples(made["not_finite_samples"], made["negative_samples"], made["bad_samples"])
+    if report:
+        made["warnings"] = [*made["warnings"], report]
+        warnings.warn(report, BadSamplesWarning, stacklevel=depth)
+
+
+def _bad_sample(scene: Scene, request: Mapping[str, Any], bad: dict[str, Any]) -> BadSample:
+    """With the command that replays it: what chose the scene and the numbers, with the sample in place of outputs."""
+    loading = scene._loading
+    words = ["covary", "render", scene.path]
+    for name, value in loading["defines"].items():
+        words += ["-D", f"{name}={value}"]
+    given = {"resolution": loading["resolution"] and "{}x{}".format(*loading["resolution"]),
+             "integrator": loading["integrator"] or None, "min-depth": loading["min_depth"],
+             "max-depth": loading["max_depth"],
+             **{name.replace("_", "-"): value for name, value in loading["integrator_options"].items()},
+             "load-training": request["load_training"], "rfilter": request["filter"],
+             "crop": request["crop"] and ",".join(map(str, request["crop"])), "seed": request["seed"]}
+    if not bad["light_path"]:
+        given["sampling"] = bad["sampling"]
+    if bad["sampling"] == "crn" and request["crn_part"] != "both":
+        given["crn-part"] = request["crn_part"]
+    if bad["sampler"] == "sobol":
+        given |= {"sampler": "sobol", "groups": bad["groups"]}
+    elif request["sampler"] is not None:
+        given["sampler"] = request["sampler"]
+    number = [bad["number"]] if bad["number"] else []
+    given |= ({"replay-light": bad["sample"]} if bad["light_path"] else
+              {"replay": ",".join(map(str, [bad["x"], bad["y"], bad["sample"], *number]))})
+    for name, value in given.items():
+        if value is not None:
+            words += [f"--{name}", {True: "on", False: "off"}[value] if isinstance(value, bool) else str(value)]
+    return BadSample(**{key: bad[key] for key in ("film", "x", "y", "sample", "value", "light_path")},
+                     replay=shlex.join(words))
+
+
+@checked(n=whole(0, 4096))
 def set_threads(n: int) -> None:
-    """Limits the processors that covary uses in this process; 0: all. Raises ValueError for less."""
+    """Limits the processors that covary uses in this process; 0: all."""
     _covary.set_threads(n)

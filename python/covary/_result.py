@@ -7,6 +7,7 @@ from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any
 
 from . import _covary
+from ._arguments import checked, path
 
 if TYPE_CHECKING:
     import numpy
@@ -37,6 +38,7 @@ class Result:
     #: Samples per pixel of all images together, on average; None where arrays do not tell.
     samples_per_pixel: float | None
 
+    @checked(path=path)
     def save(self, path: str | PathLike[str]) -> None:
         """Writes the image in the format that the name tells: .exr .pfm .tif .hdr .png .jpg."""
         attributes = {"covary:estimator": self.estimator}
@@ -56,6 +58,36 @@ def fields_of(result: Result) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
+class BadSample:
+    """A sample whose value is not finite, or negative where none may be. It counts as black."""
+
+    #: Name of its film in the result's `films`.
+    film: str
+    #: Its pixel in the full frame.
+    x: int
+    y: int
+    #: Its number in the pixel, or of the light path where `light_path` says so.
+    sample: int
+    value: tuple[float, float, float]
+    light_path: bool
+    #: The command that takes it again, alone, and prints it.
+    replay: str
+
+    def __str__(self) -> str:
+        kind = "light path" if self.light_path else "sample"
+        red, green, blue = self.value
+        return f"pixel ({self.x}, {self.y}), {kind} {self.sample}: ({red:g}, {green:g}, {blue:g})"
+
+
+def text_of_bad_samples(not_finite: int, negative: int, samples: list[BadSample]) -> str:
+    """As the program reports them; "" where there are none."""
+    if not samples:
+        return ""
+    lines = [f"{not_finite} samples were not finite and {negative} negative; they count as black. The first:"]
+    return "\n".join([*lines, *(f"  {sample}\n    {sample.replay}" for sample in samples)])
+
+
+@dataclass(frozen=True)
 class RenderResult(Result):
     """What has become of a render."""
 
@@ -71,3 +103,8 @@ class RenderResult(Result):
     until_reached: bool | None
     #: What 95 % of the blocks of 16 x 16 pixels do not exceed of the predicted error; None as predicted_relmse.
     predicted_relmse_p95: float | None
+    #: Samples of all passes that were not finite, and that were negative where none may be. They count as black.
+    not_finite_samples: int
+    negative_samples: int
+    #: The first of them in each pass, with the commands that replay them.
+    bad_samples: list[BadSample]

@@ -13,8 +13,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import _covary
-from ._combine import Progress, combine
+from ._arguments import checked, flag, function, instance, optional, text, whole
+from ._combine import Progress, check_options, combine
 from ._options import OptionValue
+from ._render import SEED, SPP
 from ._result import Result, fields_of
 from .errors import UsageError
 from .film import Film, film_from_groups
@@ -82,6 +84,7 @@ def _needed(scene: Any) -> list[tuple[Any, str, Any, str]]:
     ]
 
 
+@checked(scene=instance("a bpy.types.Scene", lambda value: hasattr(value, "cycles")))
 def changes(scene: Any) -> list[str]:
     """What of the scene's settings render() changes while it renders and that changes the picture, with reasons."""
     return [f"{name} is {getattr(owner, name)!r} and was rendered with {value!r}: {reason}"
@@ -121,9 +124,9 @@ def _check(scene: Any, spp: int, groups: int) -> None:
     if scene.render.engine != "CYCLES":
         raise UsageError(f"found the engine {scene.render.engine}; only Cycles has common random numbers: "
                          "scene.render.engine = 'CYCLES'")
-    if groups < 3 or spp < 2 * groups or spp % (2 * groups):
-        raise UsageError(f"found {spp} samples in {groups} groups; 3 groups or more are needed, and a multiple of "
-                         "twice their number, half of them with common random numbers")
+    if spp % (2 * groups):
+        raise UsageError(f"spp: found {spp} samples in {groups} groups; a multiple of twice the number of groups is "
+                         "needed, half of it with common random numbers")
 
 
 def _groups(bpy: Any, scene: Any, spp: int, groups: int, seed: int) -> Generator[tuple[str, Any], None, None]:
@@ -143,7 +146,11 @@ def _groups(bpy: Any, scene: Any, spp: int, groups: int, seed: int) -> Generator
 
 
 
+_SCENE = optional(instance("a bpy.types.Scene", lambda value: hasattr(value, "cycles")))
 
+
+@checked(scene=_SCENE, spp=SPP, seed=SEED, groups=whole(3, _covary.most_groups), estimator=text, change=flag,
+         progress=optional(function))
 def render(scene: Any = None, spp: int = 192, seed: int = 0, *, groups: int = 12, estimator: PairEstimator = "iicv",
            change: bool = True, progress: Progress | None = None, **options: OptionValue) -> BlenderResult:
     """Renders a scene of Blender by Cycles, half of the samples with common random numbers and half with independent
@@ -156,6 +163,7 @@ def render(scene: Any = None, spp: int = 192, seed: int = 0, *, groups: int = 12
         denoiser, …), and say so in `warnings`; without it raise UsageError.
     progress: called with (done, total) groups.
     """
+    check_options(estimator, options)
     bpy = _module()
     scene = scene or bpy.context.scene
     _check(scene, spp, groups)
@@ -186,6 +194,7 @@ def _combined(images: dict[str, list[Any]], spp: int, estimator: str, options: d
     return BlenderResult(**given, films=films, render_seconds=seconds)
 
 
+@checked(result=instance("what render() returns", lambda value: isinstance(value, Result)), name=text)
 def show(result: Result, name: str = "covary") -> Any:
     """The result as an image of Blender (float, linear), in place of one of this name, for the image editor."""
     import numpy

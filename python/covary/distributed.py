@@ -4,24 +4,29 @@ go and die.
 
 A part is a tile of the frame and a seed. What a worker renders follows from the part alone, so a part that is lost with
 its worker is rendered again with the same bits, on any other, and each part enters the film once. Tiles are put
-together to the film of one machine in every bit; films of several seeds are merged as merge_films() does it."""
+together to the film of one machine in every bit; films of several seeds are merged as merge_films() does it. With a
+folder, parts are on the disk as soon as they are here, and a render that begins again takes them."""
 from __future__ import annotations
 
 import os
 import sys
 import time
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from os import fspath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ._cluster import SceneFiles, check_versions, dask, make_plugin
-from ._combine import Progress, combine
+from ._arguments import array, check_some, checked, function, mapping_of, optional, path, real, text, whole
+from ._cluster import CLIENT, SceneFiles, check_versions, dask, make_plugin
+from ._combine import Progress, check_options, combine
 from ._experiment import experiment, main
-from ._options import OptionValue, check_no_passes, text_options
-from ._render import Scene
+from ._options import OptionValue, check_no_passes
+from ._parts import Part, PartFolder, Rendered
+from ._render import SCENE, SEED, SPP, Scene, report_bad_samples
 from ._render import render as render_here
-from ._result import Result, fields_of
+from ._result import BadSample, Result, fields_of
 from .errors import Error, InputError, UsageError
 from .film import Film, merge_films
 
@@ -33,14 +38,9 @@ __all__ = ["ClusterResult", "SceneFiles", "experiment", "main", "render"]
 
 #: Estimators that look at films after the passes, and do not change what passes take.
 _ESTIMATORS = ("iicv", "cv-baseline", "iduw", "none")
+#: Keywords of covary.render() that say what passes take.
+_SETTINGS = ("filter", "sampling", "sampler", "groups", "split")
 _RETRIES = 5  # of a part that an error of the machine ended; dead workers are counted by Dask (allowed-failures)
-
-
-@dataclass(frozen=True)
-class _Part:
-    crop: tuple[int, int, int, int]
-    seed: int
-    number: int
 
 
 @dataclass(frozen=True)
@@ -49,34 +49,31 @@ class _Job:
 
     scene_folder: str
     file: str
+    path: str  #: where the caller has it
     loading: dict[str, Any]
     settings: dict[str, Any]
-    folder: str = field(default="")
 
 
 _scenes: dict[tuple[str, str], Scene] = {}
 
 
-@dataclass(frozen=True)
-class _Rendered:
-    """Of a part: the films of its passes, and the images that guide a denoiser where one is wanted."""
-
-    films: dict[str, Film]
-    aovs: dict[str, FloatArray] = field(default_factory=dict)
-
-
-def _render_part(job: _Job, part: _Part) -> _Rendered | Error:
+def _render_part(job: _Job, part: Part) -> Rendered | Error:
     """On a worker: what a part leaves behind, or what is wrong with all parts, so that Dask does not try again."""
     from distributed import get_worker  # type: ignore[import-not-found,import-untyped,unused-ignore]
 
-    folder = Path(job.folder or get_worker().local_directory) / job.scene_folder
+    folder = Path(get_worker().local_directory) / job.scene_folder
     key = (str(folder / job.file), repr(sorted(job.loading.items())))
     try:
         if key not in _scenes:
             _scenes.clear()  # one scene in memory at a time
             _scenes[key] = Scene(key[0], job.loading)
-        made = render_here(_scenes[key], crop=part.crop, seed=part.seed, films_only=True, **job.settings)
-        return _Rendered(made.films, made.aovs)
+            _scenes[key]._path = job.path  # what commands name
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # the caller tells them
+            made = render_here(_scenes[key], crop=part.crop, seed=part.seed, films_only=True, **job.settings)
+        told = made.warnings[:-1] if made.bad_samples else made.warnings  # the last is about them
+        return Rendered(made.films, made.aovs, tuple(told), made.not_finite_samples, made.negative_samples,
+                        tuple(made.bad_samples))
     except (InputError, UsageError) as error:
         return error
 
@@ -95,17 +92,24 @@ class _Canvas:
         self.arrays: dict[tuple[int, str], tuple[Any, Any, dict[str, str]]] = {}
         self.aovs: dict[str, FloatArray] = {}
         self.parts: set[int] = set()
+        self.not_finite_samples = self.negative_samples = 0
+        self.bad_samples: list[BadSample] = []
+        self.warnings: dict[str, None] = {}  # each once, in the order of arrival
 
-    def add(self, part: _Part, rendered: _Rendered) -> None:
+    def add(self, part: Part, rendered: Rendered) -> None:
         import numpy
 
         if part.number in self.parts:
             raise RuntimeError(f"part {part.number} came twice")
         self.parts.add(part.number)
+        self.not_finite_samples += rendered.not_finite_samples
+        self.negative_samples += rendered.negative_samples
+        self.bad_samples += rendered.bad_samples
+        self.warnings.update(dict.fromkeys(rendered.warnings))
         x, y, width, height = part.crop
         for name, image in rendered.aovs.items():
-            whole = self.aovs.setdefault(name, numpy.zeros((self.height, self.width, 3), numpy.float32))
-            whole[y:y + height, x:x + width] = image
+            frame = self.aovs.setdefault(name, numpy.zeros((self.height, self.width, 3), numpy.float32))
+            frame[y:y + height, x:x + width] = image
         for name, film in rendered.films.items():
             groups = film.groups
             if (part.seed, name) not in self.arrays:
@@ -141,15 +145,65 @@ class ClusterResult(Result):
     """What has become of render()."""
 
     films: dict[str, Film] = field(repr=False)
-    #: Parts that were rendered, and seconds from the first to the last.
+    #: Of the frame, and how many of them were in the folder already.
     parts: int
+    parts_kept: int
+    #: From the first part to the last.
     render_seconds: float
+    #: As RenderResult has them; the first of each part.
+    not_finite_samples: int
+    negative_samples: int
+    bad_samples: list[BadSample]
 
 
+@dataclass(frozen=True)
+class _Plan:
+    """A render that was checked: what workers do and what becomes of it."""
+
+    scene: Scene
+    estimator: str
+    options: dict[str, Any]  #: for combine()
+    settings: dict[str, Any]  #: for covary.render()
+    parts: list[Part]
+
+
+def _plan(scene: Scene, spp: int, estimator: str, seed: int, sample_ranges: int, tile: int, settings: Mapping[str, Any],
+          options: Mapping[str, Any]) -> _Plan:
+    """Raises all that would be wrong with any part, and with the estimate after the last, before one is rendered."""
+    if estimator not in _ESTIMATORS:
+        raise UsageError(f"estimator '{estimator}' looks at other pixels or samples while it renders; on a cluster "
+                         f"accepted are {', '.join(_ESTIMATORS)}")
+    check_no_passes([*options, *settings], "it looks at the whole frame, of which a worker has a tile")
+    if unknown := set(settings) - set(_SETTINGS):
+        raise UsageError(f"settings: found {min(unknown)!r}; accepted are {', '.join(_SETTINGS)}")
+    settings = check_some(render_here, settings, "settings")
+    if spp % sample_ranges or seed + sample_ranges > 1 << 64:
+        raise UsageError(f"sample_ranges: found {sample_ranges} with {spp} samples and seed {seed}; the ranges divide "
+                         "the samples, and each has a seed of its own from `seed` on")
+    if scene.integrator not in ("path", ""):
+        raise UsageError(f"the integrator '{scene.integrator}' trains or traces light over the whole frame; on a "
+                         "cluster accepted is path")
+    if estimator != "none":
+        check_options(estimator, options)
+    of_combine = {"force", "std_error"}
+    passed = {"spp": spp // sample_ranges, "estimator": estimator, **settings,
+              **{name: value for name, value in options.items() if name not in of_combine}}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        render_here(scene, crop=(0, 0, 1, 1), seed=seed, films_only=True, **passed)  # one pixel meets all the rest
+    places = [(crop, seed + r) for r in range(sample_ranges) for crop in _tiles(*scene.resolution, tile)]
+    return _Plan(scene, estimator, dict(options), passed,
+                 [Part(crop, own_seed, number) for number, (crop, own_seed) in enumerate(places)])
+
+
+@checked(client=CLIENT, scene=SCENE, spp=SPP, estimator=text, seed=SEED, sample_ranges=whole(1, 1 << 20),
+         tile=whole(1, 65536), folder=optional(path), progress=optional(function), on_image=optional(function),
+         image_seconds=real(0), settings=optional(mapping_of(array, "a mapping from keywords of covary.render()")))
 def render(client: Any, scene: Scene | str | os.PathLike[str], spp: int, estimator: Estimator = "iicv", *,
-           seed: int = 0, sample_ranges: int = 1, tile: int = 128, progress: Progress | None = None,
-           on_image: Callable[[FloatArray], object] | None = None, image_seconds: float = 5.0,
-           settings: Mapping[str, Any] | None = None, **options: OptionValue) -> ClusterResult:
+           seed: int = 0, sample_ranges: int = 1, tile: int = 128, folder: str | os.PathLike[str] | None = None,
+           progress: Progress | None = None, on_image: Callable[[FloatArray], object] | None = None,
+           image_seconds: float = 5.0, settings: Mapping[str, Any] | None = None,
+           **options: OptionValue) -> ClusterResult:
     """Renders on the workers of a dask.distributed.Client.
 
     spp: samples per pixel of all passes and ranges together.
@@ -157,67 +211,87 @@ def render(client: Any, scene: Scene | str | os.PathLike[str], spp: int, estimat
         With 1 the result has the bits of `covary.render(scene, spp, estimator, seed=seed)`, with more those of
         merge_films() of such renders, for any number of workers and whatever becomes of them.
     tile: side of the tiles that are parts, in pixels.
+    folder: keeps each part as soon as it has come, on a disk of this machine; a render with the same scene and settings
+        takes what is there, also after this process has died.
     progress: called with (done, total) parts.
     on_image: called with the mean of all samples so far, at most every `image_seconds`.
-    settings: further keywords of covary.render() for the passes: filter, groups, split, ….
+    settings: further keywords of covary.render() for the passes: filter, sampling, sampler, groups, split.
     options: of the estimator, and denoise and oidn of combine(), whose guides are rendered, too.
 
-    Raises UsageError for estimators and integrators whose passes look beyond a tile.
+    Raises UsageError for estimators and integrators whose passes look beyond a tile, and for all that is wrong with
+    options, before anything is rendered.
     """
-    distributed = dask()
-    if estimator not in _ESTIMATORS:
-        raise UsageError(f"estimator '{estimator}' looks at other pixels or samples while it renders; on a cluster "
-                         f"accepted are {', '.join(_ESTIMATORS)}")
-    texts = text_options(options)
-    check_no_passes([*options, *(settings or {})], "it looks at the whole frame, of which a worker has a tile")
-    if tile < 1 or sample_ranges < 1 or spp % sample_ranges:
-        raise UsageError(f"found tile {tile} and {spp} samples in {sample_ranges} ranges; tiles have one pixel or "
-                         "more, and the ranges divide the samples")
     chosen = scene if isinstance(scene, Scene) else Scene.load(scene)
-    if chosen.integrator not in ("path", ""):
-        raise UsageError(f"the integrator '{chosen.integrator}' trains or traces light over the whole frame; on a "
-                         "cluster accepted is path")
+    plan = _plan(chosen, spp, estimator, seed, sample_ranges, tile, settings or {}, options)
     check_versions(client)
     files = SceneFiles(chosen)
+    kept = None if folder is None else PartFolder(fspath(folder), {
+        "scene": files.hash, "file": files.file, "loading": chosen._loading, "settings": plan.settings})
     client.register_plugin(make_plugin(files))
-    passed = {"spp": spp // sample_ranges, "estimator": estimator, **(settings or {}),
-              **{name.replace("-", "_"): value or True for name, value in texts.items()}}
-    job = _Job(files.folder, files.file, chosen._loading, passed)
-    width, height = chosen.resolution
-    parts = [_Part(crop, seed + r, 0) for r in range(sample_ranges) for crop in _tiles(width, height, tile)]
-    parts = [_Part(part.crop, part.seed, number) for number, part in enumerate(parts)]
-    canvas = _Canvas(width, height)
-    started = last_image = time.monotonic()
+    job = _Job(files.folder, files.file, chosen.path, chosen._loading, plan.settings)
+    canvas = _Canvas(*chosen.resolution)
+    last_image = started = time.monotonic()
+
+    def show() -> None:
+        nonlocal last_image
+        if progress is not None:
+            progress(len(canvas.parts), len(plan.parts))
+        if on_image is not None and time.monotonic() - last_image >= image_seconds:
+            on_image(canvas.image())
+            last_image = time.monotonic()
+
+    left = _take_kept(kept, plan.parts, canvas)
+    n_kept = len(canvas.parts)
+    if n_kept:
+        show()
+    for part, rendered in _rendered(client, job, left):
+        if kept is not None:
+            kept.keep(part, rendered)
+        canvas.add(part, rendered)
+        show()
+    return _result(canvas, plan, n_kept, time.monotonic() - started)
+
+
+def _take_kept(kept: PartFolder | None, parts: list[Part], canvas: _Canvas) -> list[Part]:
+    """Puts parts of the folder into the canvas; returns the others."""
+    left = []
+    for part in parts:
+        rendered = kept.load(part) if kept is not None else None
+        if rendered is None:
+            left.append(part)
+        else:
+            canvas.add(part, rendered)
+    return left
+
+
+def _rendered(client: Any, job: _Job, parts: list[Part]) -> Iterator[tuple[Part, Rendered]]:
+    """Parts as they come from the workers."""
     futures = {client.submit(_render_part, job, part, pure=False, retries=_RETRIES): part for part in parts}
     try:
-        for future in distributed.as_completed(futures):
+        for future in dask().as_completed(futures):
             rendered = future.result()
             if isinstance(rendered, Error):
                 raise rendered
-            canvas.add(futures[future], rendered)
+            yield futures[future], rendered
             future.release()
-            if progress is not None:
-                progress(len(canvas.parts), len(parts))
-            if on_image is not None and time.monotonic() - last_image >= image_seconds:
-                on_image(canvas.image())
-                last_image = time.monotonic()
     except BaseException:
         client.cancel(list(futures))
         raise
-    seconds = time.monotonic() - started
-    return _result(canvas, estimator, options, len(parts), seconds)
 
 
-def _result(canvas: _Canvas, estimator: str, options: Mapping[str, Any], parts: int, seconds: float) -> ClusterResult:
+def _result(canvas: _Canvas, plan: _Plan, n_kept: int, seconds: float) -> ClusterResult:
     films = canvas.films()
     samples = sum(film.samples_per_pixel for film in films.values())
-    if estimator == "none":
+    if plan.estimator == "none":
         made = Result(next(iter(films.values())).mean, None, None, None, [], 0, "none", samples)
     else:
-        made = combine(films["crn"], films["independent"], estimator, force=True,  # type: ignore[arg-type]
-                       albedo=canvas.aovs.get("Albedo"), normal=canvas.aovs.get("N"), **options)
-    given = fields_of(made) | {"warnings": [], "samples_per_pixel": samples}
-    return ClusterResult(**given, films=films, parts=parts, render_seconds=seconds)
+        made = combine(films["crn"], films["independent"], plan.estimator,  # type: ignore[arg-type]
+                       albedo=canvas.aovs.get("Albedo"), normal=canvas.aovs.get("N"), **{"force": True, **plan.options})
+    given = fields_of(made) | {"warnings": list(canvas.warnings), "samples_per_pixel": samples,
+                               "not_finite_samples": canvas.not_finite_samples,
+                               "negative_samples": canvas.negative_samples, "bad_samples": canvas.bad_samples}
+    report_bad_samples(given, 5)
+    return ClusterResult(**given, films=films, parts=len(canvas.parts), parts_kept=n_kept, render_seconds=seconds)
 
 
 if __name__ == "__main__":

@@ -21,3 +21,7 @@ class IoError(Error, OSError):
 
 class InternalError(Error, RuntimeError):
     """A bug in covary."""
+
+
+class BadSamplesWarning(UserWarning):
+    """Samples of a render were not finite, or negative where none may be; they count as black."""

@@ -6,11 +6,18 @@ from collections.abc import Sequence
 from os import PathLike, fspath
 from typing import Any
 
+from . import _covary
+from ._arguments import array, attribute_texts, checked, choice, either, instance, list_of, optional, path, whole
 from ._covary import Film
 
 __all__ = ["Film", "film_from_groups", "merge_films"]
 
 
+_FILM = either("a covary.Film or the name of its file",
+               instance("a covary.Film", lambda value: isinstance(value, Film)), path)
+
+
+@checked(films=list_of(_FILM, "a list of Film objects, or of names of their files"))
 def merge_films(films: Sequence[Film | str | PathLike[str]]) -> Film:
     """The film of all samples of several films of one scene with different seeds, as `covary merge` makes it: the order
     given does not matter, bit for bit. Of files only one is in memory at a time. Raises InputError where they do not
@@ -22,6 +29,8 @@ def merge_films(films: Sequence[Film | str | PathLike[str]]) -> Film:
     return Film._merge_files(paths) if paths else Film._merge(members)
 
 
+@checked(groups=array, samples=whole(1, _covary.most_samples), sampling=choice(("", "crn", "independent")),
+         seed=optional(whole(0, (1 << 64) - 1)), attributes=optional(attribute_texts))
 def film_from_groups(groups: Any, samples: int, *, sampling: str = "", seed: int | None = None,
                      attributes: dict[str, str] | None = None) -> Film:
     """A film of group means [T, H, W, 3] of any renderer, `samples` per pixel of all groups together.

@@ -7,8 +7,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from ._combine import Progress, combine
+from ._arguments import checked, either, flag, function, instance, optional, path, text, whole
+from ._combine import Progress, check_options, combine
+from ._covary import most_groups
 from ._options import OptionValue
+from ._render import SEED, SPP
 from ._result import Result, fields_of
 from .errors import UsageError
 from .film import Film, film_from_groups
@@ -194,6 +197,14 @@ def _check_sensor(sensor: Any) -> list[str]:
             "of neighbouring pixels, which control variates take for independent"]
 
 
+_ANY = "a mitsuba.Scene or the name of its file"
+_SCENE = either(_ANY, path, instance(_ANY, lambda value: hasattr(value, "sensors")))
+_INTEGRATOR = optional(instance("an Integrator of Mitsuba, its name, or a dictionary for mitsuba.load_dict()",
+                                lambda value: isinstance(value, (str, dict)) or hasattr(value, "render")))
+
+
+@checked(scene=_SCENE, spp=SPP, seed=SEED, integrator=_INTEGRATOR, sensor=whole(0), groups=whole(3, most_groups),
+         estimator=text, aovs=flag, progress=optional(function))
 def render(scene: Any, spp: int, seed: int = 0, integrator: Any = None, sensor: int = 0, *, groups: int = 12,
            estimator: PairEstimator = "iicv", aovs: bool = False, progress: Progress | None = None,
            **options: OptionValue) -> MitsubaResult:
@@ -212,18 +223,19 @@ def render(scene: Any, spp: int, seed: int = 0, integrator: Any = None, sensor: 
     The film's filter is replaced by a box, with a warning. As many groups as fit are traced at once. Raises
     UsageError for what cannot work: a scalar variant, integrators of derivatives or of light paths alone.
     """
+    check_options(estimator, options)
     mi = _module()
     _define_plugins(mi)
     loaded = mi.load_file(str(scene)) if not isinstance(scene, mi.Scene) else scene
-    if not 0 <= sensor < len(loaded.sensors()):
-        raise UsageError(f"sensor {sensor}: the scene has {len(loaded.sensors())}, counted from 0")
+    if sensor >= len(loaded.sensors()):
+        raise UsageError(f"sensor: found {sensor}; the scene has {len(loaded.sensors())}, counted from 0")
     camera = loaded.sensors()[sensor]
     warnings = _check_sensor(camera)
     chosen = _integrator(mi, loaded, integrator)
     count = spp // 2
-    if spp % 2 or count < 3 or groups < 3:
-        raise UsageError(f"found {spp} samples per pixel in {groups} groups; an even number, 6 or more, and 3 groups "
-                         "or more are needed: half of the samples have common random numbers")
+    if spp % 2 or count < 3:
+        raise UsageError(f"spp: found {spp} samples per pixel; an even number, 6 or more, is needed: half of the "
+                         "samples have common random numbers")
     groups = min(groups, count)
 
     started = time.perf_counter()

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from . import _covary
+from ._arguments import Rule, checked, flag, path, text, whole
 from ._program import program
 from ._result import Result
 from .errors import Error
@@ -22,9 +23,13 @@ class View:
     def __init__(self, page: str, height: int) -> None:
         self.page, self.height = page, height
 
+    @checked(path=path)
     def save(self, path: str | PathLike[str]) -> None:
-        """Writes the page (HTML), which needs no network."""
-        Path(path).write_text(self.page, encoding="utf-8")
+        """Writes the page (HTML), which needs no network; it appears under its name only when complete."""
+        target = Path(path)
+        part = target.with_name(f"{target.name}.part")
+        part.write_text(self.page, encoding="utf-8")
+        part.replace(target)
 
     def _repr_html_(self) -> str:
         return (f'<iframe srcdoc="{html.escape(self.page)}" width="100%" height="{self.height}" '
@@ -39,17 +44,25 @@ def _named(images: Mapping[str, Any] | Sequence[Any] | Any) -> dict[str, Any]:
     return {"image": images}
 
 
-def _file_of(image: Any, folder: Path, name: str) -> str:
-    """The image's file, written where it is an array or a result."""
+def _file_of(argument: str, image: Any, folder: Path, name: str) -> str:
+    """The image's file, written where it is an array or a result. `argument`: that it came with, for messages."""
     if isinstance(image, (str, PathLike)):
         return fspath(image)
     if not name or "/" in name or name.startswith("."):
         raise ValueError(f"images: found the name {name!r}; accepted are names without '/' that begin with no dot")
     path = str(folder / f"{name}.exr")
-    _covary.write_image(path, image.image if isinstance(image, Result) else image, {})
+    try:
+        _covary.write_image(path, image.image if isinstance(image, Result) else image, {})
+    except (TypeError, ValueError) as error:
+        raise type(error)(f"{argument}: {str(error).removeprefix('image: ')}") from None
     return path
 
 
+#: Arrays are checked with their memory, names of files by the program.
+_IMAGES = Rule("an array, a result, the name of a file, or several of them", lambda value: value)
+
+
+@checked(images=_IMAGES, reference=_IMAGES, title=text, height=whole(1, 1 << 20), small=flag)
 def view(images: Mapping[str, Any] | Sequence[Any] | Any, reference: Any = None, *, title: str = "", height: int = 640,
          small: bool = False) -> View:
     """Compares images as `covary view` does: arrays [H, W, 3], results, or names of files; a mapping gives them names.
@@ -59,10 +72,10 @@ def view(images: Mapping[str, Any] | Sequence[Any] | Any, reference: Any = None,
     with tempfile.TemporaryDirectory(prefix="covary-view-") as temporary:
         folder = Path(temporary)
         command = [str(program()), "view", "-o", str(folder / "page.html")]
-        command += [_file_of(image, folder, name) for name, image in _named(images).items()]
+        command += [_file_of("images", image, folder, name) for name, image in _named(images).items()]
         if reference is not None:
             (folder / "reference").mkdir()
-            command += ["--reference", _file_of(reference, folder / "reference", "reference")]
+            command += ["--reference", _file_of("reference", reference, folder / "reference", "reference")]
         command += ["--title", title] if title else []
         command += ["--small"] if small else []
         run = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -18,15 +18,6 @@ namespace {
 
 constexpr const char* kArrays = "an array of NumPy or PyTorch, or one with DLPack or the buffer protocol";
 
-/// "numpy.ndarray of float64"; what is known of an object that is not taken.
-std::string describe(nb::handle object) {
-  std::string text = nb::cast<std::string>(nb::str(object.type().attr("__module__"))) + "." +
-                     nb::cast<std::string>(nb::str(object.type().attr("__name__")));
-  if (text.starts_with("builtins.")) text.erase(0, 9);
-  if (nb::hasattr(object, "dtype")) text += " of " + nb::cast<std::string>(nb::str(nb::object(object.attr("dtype"))));
-  return text;
-}
-
 [[noreturn]] void raise_type(nb::handle object, const std::string& name, const std::string& shape,
                              const std::string& found) {
   std::string message = fmt::format("{}: found {}; accepted is {}, of float32 [{}]", name,
@@ -80,6 +71,14 @@ float* large_pages(size_t n) {
 }
 
 }  // namespace
+
+std::string describe(nb::handle object) {
+  std::string text = nb::cast<std::string>(nb::str(object.type().attr("__module__"))) + "." +
+                     nb::cast<std::string>(nb::str(object.type().attr("__name__")));
+  if (text.starts_with("builtins.")) text.erase(0, 9);
+  if (nb::hasattr(object, "dtype")) text += " of " + nb::cast<std::string>(nb::str(nb::object(object.attr("dtype"))));
+  return text;
+}
 
 Floats floats_of(nb::handle array, const std::string& name, const std::string& shape) {
   Floats floats;

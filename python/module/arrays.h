@@ -20,6 +20,9 @@ namespace covary::python {
 
 namespace nb = nanobind;
 
+/// "numpy.ndarray of float64"; what is known of an object that is not taken.
+std::string describe(nb::handle object);
+
 /// float32 values of a Python array where they lie, with any strides.
 struct Floats {
   nb::ndarray<nb::ro> owner;

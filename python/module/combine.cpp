@@ -139,7 +139,7 @@ struct GuideImages {
   GuideImages(const Beside& beside, const Estimator& estimator, const Input& image) {
     if (beside.albedo.is_none() && beside.normal.is_none()) return;
     if (!estimator.reads_guides)
-      throw Error(ErrorCode::kUsage, "--guides is an option of --denoise bias, balanced and error");
+      throw Error(ErrorCode::kUsage, "albedo, normal: guides are of denoise='bias', 'balanced' and 'error'");
     if (beside.albedo.is_none()) throw Error(ErrorCode::kUsage, "normal: it is a guide only together with the albedo");
     const std::string shape = fmt::format("{}, {}, 3", image.height(), image.width());
     albedo = image_of(beside.albedo, "albedo", shape);
@@ -151,7 +151,8 @@ struct GuideImages {
 const Film* film_of(nb::handle light) {
   Film* film = nullptr;
   if (!light.is_none() && !nb::try_cast(light, film))
-    throw nb::type_error("light: accepted is a covary.Film, that of a pass 'light'");
+    throw nb::type_error(
+        fmt::format("light: found {}; accepted is a covary.Film, that of a pass 'light'", describe(light)).c_str());
   return film;
 }
 
@@ -197,6 +198,30 @@ nb::dict combine(nb::object crn, nb::object independent, const Beside& beside, c
   d["estimator"] = estimator.text;
   d["samples_per_pixel"] = samples;
   return d;
+}
+
+/// Values of groups that differ from pixel to pixel and from `step` to `step`.
+std::vector<float> some_values(size_t n, size_t step) {
+  std::vector<float> values(n);
+  for (size_t i = 0; i < n; ++i) values[i] = 1 + 0.01f * static_cast<float>(i * step % 101);
+  return values;
+}
+
+/// Throws what combine() would for the options whatever the images are, by two of a few pixels: the range of some is
+/// checked when the image is made.
+void check_pair_estimator(const std::string& name, const OptionValues& options, const std::string& denoise,
+                          const std::string& oidn) {
+  constexpr int kSide = 8, kGroups = 24;
+  const Estimator estimator = with_denoising(make_pair_estimator(name, options), denoise, oidn);
+  const std::optional<int> samples = estimator.needs_sample_count ? std::optional(kGroups) : std::nullopt;
+  const PairSettings settings = pair_settings(estimator, samples, kGroups, estimator.predicts_error);
+  const std::vector<float> first = some_values(kSide * kSide * kGroups * 3, 37),
+                           second = some_values(kSide * kSide * kGroups * 3, 53);
+  run_work(
+      [&](WorkState&) {
+        estimator.apply({kSide, kSide, kGroups, first.data()}, {kSide, kSide, kGroups, second.data()}, settings);
+      },
+      nb::none());
 }
 
 nb::object correlation(const Correlation& c) {
@@ -248,6 +273,9 @@ void bind_combine(nb::module_& module) {
               "object | None, normal: object | None, estimator: str, options: dict[str, str], denoise: str, oidn: str, "
               "force: bool, std_error: bool | None, samples: int | None, progress: typing.Any) -> "
               "dict[str, typing.Any]"));
+  module.def(
+      "check_pair_estimator", &check_pair_estimator, "estimator"_a, "options"_a, "denoise"_a, "oidn"_a,
+      nb::sig("def check_pair_estimator(estimator: str, options: dict[str, str], denoise: str, oidn: str) -> None"));
   module.def("check_inputs", &check, "crn"_a.none(), "independent"_a.none(),
              nb::sig("def check_inputs(crn: object, independent: object) -> dict[str, typing.Any]"));
 }

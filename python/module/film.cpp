@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "film/film.h"
 
-#include <nanobind/stl/filesystem.h>
-
 #include <algorithm>
-#include <filesystem>
 
 #include "core/error.h"
 #include "film/film_file.h"
@@ -18,14 +15,26 @@ namespace {
 
 using Attributes = std::map<std::string, std::string>;
 
-Film load(const std::filesystem::path& path) {
+/// The name as the rules of Python's functions take it.
+std::string checked_path(nb::handle path) {
+  return nb::cast<std::string>(nb::module_::import_("covary._arguments").attr("path")("path", path));
+}
+
+Film load(nb::handle path) {
+  const std::string name = checked_path(path);
   Film film;
-  run_work([&](WorkState&) { film = read_film(path.string()); }, nb::none());
+  run_work([&](WorkState&) { film = read_film(name); }, nb::none());
   return film;
 }
 
-void save(const Film& film, const std::filesystem::path& path) {
-  run_work([&](WorkState&) { write_film(path.string(), film); }, nb::none());
+void save(const Film& film, nb::handle path) {
+  const std::string name = checked_path(path);
+  run_work([&](WorkState&) { write_film(name, film); }, nb::none());
+}
+
+void set_attributes(Film& film, nb::handle attributes) {
+  film.attributes =
+      nb::cast<Attributes>(nb::module_::import_("covary._arguments").attr("attribute_texts")("attributes", attributes));
 }
 
 Film merge(const std::vector<const Film*>& films) {
@@ -130,9 +139,9 @@ void bind_film(nb::module_& module) {
   nb::class_<Film>(module, "Film",
                    "What a render pass leaves behind: for each pixel the number of samples, and the means of T groups "
                    "of them. Writing a film and reading it gives the same bits.")
-      .def_static("load", &load, "path"_a, nb::sig("def load(path: str | os.PathLike[str]) -> Film"),
+      .def_static("load", &load, "path"_a.none(), nb::sig("def load(path: str | os.PathLike[str]) -> Film"),
                   "Reads a film that covary wrote.")
-      .def("save", &save, "path"_a, nb::sig("def save(self, path: str | os.PathLike[str]) -> None"),
+      .def("save", &save, "path"_a.none(), nb::sig("def save(self, path: str | os.PathLike[str]) -> None"),
            "Writes the film (EXR); the file appears under its name only when complete.")
       .def_static("_merge", &merge, "films"_a, nb::sig("def _merge(films: list[Film]) -> Film"))
       .def_static("_merge_files", &merge_files, "paths"_a, nb::sig("def _merge_files(paths: list[str]) -> Film"))
@@ -163,7 +172,11 @@ void bind_film(nb::module_& module) {
           },
           "x, y, width and height of the film's pixels in the frame.")
       .def_prop_ro("samples_per_pixel", &Film::mean_count, "Mean over the film.")
-      .def_rw("attributes", &Film::attributes, "Facts that travel with the file, as text: seed, sampling, ….")
+      .def_prop_rw(
+          "attributes", [](const Film& film) { return film.attributes; }, &set_attributes,
+          nb::for_getter(nb::sig("def attributes(self) -> dict[str, str]")),
+          nb::for_setter(nb::sig("def attributes(self, attributes: dict[str, str], /) -> None")),
+          nb::for_setter(nb::arg("attributes").none()), "Facts that travel with the file, as text: seed, sampling, ….")
       .def("__repr__", [](const Film& f) {
         return "<covary.Film " + std::to_string(f.width()) + " x " + std::to_string(f.height()) + ", " +
                std::to_string(f.groups()) + " groups>";

@@ -5,6 +5,8 @@
 #include <mutex>
 
 #include "core/error.h"
+#include "film/film.h"
+#include "plans/budget.h"
 #include "python/module/bindings.h"
 
 namespace covary::python {
@@ -33,7 +35,6 @@ std::unique_ptr<tbb::global_control> g_threads;
 std::mutex g_threads_mutex;
 
 void set_threads(int n) {
-  if (n < 0) throw nb::value_error("threads: expected a whole number from 0, which means all processors");
   const std::lock_guard lock(g_threads_mutex);
   g_threads.reset();  // before the next, or the lower of both would hold
   if (n > 0) g_threads = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism, size_t(n));
@@ -56,6 +57,8 @@ void bind_errors(nb::module_&) {
 NB_MODULE(_covary, module) {
   using namespace covary::python;
   module.attr("version") = COVARY_VERSION;
+  module.attr("most_samples") = covary::kMaxBudget;  // of a pixel
+  module.attr("most_groups") = covary::Film::kMaxGroups;
   module.def("set_threads", &set_threads, nanobind::arg("n"));
   bind_errors(module);
   bind_registry(module);

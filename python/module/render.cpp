@@ -29,10 +29,8 @@ Property property_of(const std::string& name, nb::handle value) {
     property.value = nb::cast<int64_t>(value);
   else if (nb::isinstance<nb::float_>(value))
     property.value = nb::cast<double>(value);
-  else if (nb::isinstance<nb::str>(value))
-    property.value = nb::cast<std::string>(value);
   else
-    throw nb::type_error(("integrator_options['" + name + "']: accepted are bool, int, float and str").c_str());
+    property.value = nb::cast<std::string>(value);
   return property;
 }
 
@@ -47,10 +45,7 @@ std::shared_ptr<LoadedScene> load(const std::string& path, const SceneChoice& ch
   LoadOptions options;
   options.defines = choice.defines;
   if (choice.resolution) {
-    const auto [width, height] = *choice.resolution;
-    if (width < 1 || height < 1 || width > 65536 || height > 65536)
-      throw Error(ErrorCode::kUsage, "resolution: each side must be 1 to 65536");
-    options.width = width, options.height = height;
+    options.width = choice.resolution->first, options.height = choice.resolution->second;
   }
   for (const auto& [name, value] : integrator_options)
     options.integrator_properties.push_back(property_of(nb::cast<std::string>(name), value));
@@ -83,7 +78,6 @@ Plan plan_of(const Choice& choice) {
   passes.groups = choice.groups;
   if (choice.split) {
     const auto [crn, independent] = *choice.split;
-    if (!(crn > 0) || !(independent > 0)) throw Error(ErrorCode::kUsage, "split: each part must be above 0");
     passes.split = {crn / (crn + independent), independent / (crn + independent)};
   }
   const Estimator estimator =
@@ -98,6 +92,22 @@ Plan plan_of(const Choice& choice) {
   return plan;
 }
 
+/// The first samples of a pass that count as black, with what replays them.
+void add_bad_samples(const Pass& pass, nb::list& list) {
+  for (const BadSample& bad : pass.result.bad_samples) {
+    nb::dict d;
+    d["film"] = pass.plan.id();
+    d["x"] = bad.x, d["y"] = bad.y, d["sample"] = bad.sample;
+    d["value"] = nb::make_tuple(bad.value.r, bad.value.g, bad.value.b);
+    d["number"] = pass.plan.number;
+    d["light_path"] = pass.plan.light;
+    d["sampling"] = pass.settings.sampling == Sampling::kCrn ? "crn" : "independent";
+    d["sampler"] = sampler_name(pass.settings.sampler);
+    d["groups"] = pass.settings.groups;
+    list.append(d);
+  }
+}
+
 nb::dict dict_of(RenderResult&& result, const std::string& estimator, const std::vector<std::string>& warnings) {
   nb::dict films, aovs, d;
   d["estimator"] = estimator;
@@ -105,6 +115,11 @@ nb::dict dict_of(RenderResult&& result, const std::string& estimator, const std:
   d["samples_per_pixel"] = result.samples_per_pixel();
   d["render_seconds"] = result.render_seconds();
   d["estimate_seconds"] = result.estimate_seconds();
+  nb::list bad;
+  for (const Pass& pass : result.passes) add_bad_samples(pass, bad);
+  d["bad_samples"] = bad;
+  d["not_finite_samples"] = static_cast<uint64_t>(result.sum([](const Pass& p) { return p.result.n_not_finite; }));
+  d["negative_samples"] = static_cast<uint64_t>(result.sum([](const Pass& p) { return p.result.n_negative; }));
   for (Pass& pass : result.passes) films[pass.plan.id().c_str()] = nb::cast(std::move(pass.film));
   for (auto& [name, image] : result.aovs) aovs[name.c_str()] = array_of(std::move(image));
   d["image"] = array_of(std::move(picture));

@@ -110,7 +110,7 @@ class BadArrays(PackageTest):
     def test_options(self):
         self.assertIn("did you mean 'iicv'?", self.refused(CRN, estimator="iicvv", error=covary.UsageError))
         self.assertIn("did you mean 'window'?", self.refused(CRN, windo=3, error=covary.UsageError))
-        self.assertIn("k: found list", self.refused(CRN, k=[3], error=TypeError))
+        self.assertIn("k: found [3] (list)", self.refused(CRN, k=[3], error=TypeError))
 
 
 def combine_in_child(queue):

@@ -16,6 +16,7 @@ import covary._program
 import covary.distributed
 import numpy
 from common import ROOM, SOURCE, PackageTest
+from render_test import OVERFLOW
 
 SIZE = (72, 48)
 SUITE = {"name": "tiny", "scenes": [{"name": "room", "file": "room.xml", "resolution": "32x24"}],
@@ -36,8 +37,8 @@ class Parts(PackageTest):
     def test_parts_are_counted_once(self):
         film = covary.render(ROOM, 4, "none", crop=(0, 0, 4, 4)).films["independent"]
         canvas = covary.distributed._Canvas(4, 4)
-        part = covary.distributed._Part((0, 0, 4, 4), 0, 0)
-        rendered = covary.distributed._Rendered({"independent": film})
+        part = covary.distributed.Part((0, 0, 4, 4), 0, 0)
+        rendered = covary.distributed.Rendered({"independent": film})
         canvas.add(part, rendered)
         self.assertIn("came twice", self.message_of(RuntimeError, canvas.add, part, rendered))
         self.assert_same_bits(canvas.films()["independent"].groups, film.groups)
@@ -91,11 +92,45 @@ class Parts(PackageTest):
         self.assertIn("iicv-table1", output)
         self.assertEqual(covary._program.run_program("experiment", "--lsit")[0], 2)
 
+    def test_parts_on_disk(self):
+        """With the same bits; one that is damaged, or of other settings, is not taken."""
+        part = covary.distributed.Part((2, 1, 20, 10), 3, 0)
+        made = covary.render(ROOM, 24, seed=3, crop=part.crop, films_only=True, aovs=True)
+        bad = covary.BadSample("crn", 2, 3, 4, (1.0, -2.0, 0.0), False, "covary render …")
+        rendered = covary.distributed.Rendered(made.films, made.aovs, ("a warning",), 5, 6, (bad,))
+        folder = covary._parts.PartFolder(str(self.path), {"scene": "a"})
+        self.assertIsNone(folder.load(part))
+        for _ in range(2):  # also in place of the same
+            folder.keep(part, rendered)
+        loaded = covary._parts.PartFolder(str(self.path), {"scene": "a"}).load(part)
+        for name, film in made.films.items():
+            self.assert_same_bits(film.groups, loaded.films[name].groups)
+            self.assertEqual({**film.attributes, **loaded.films[name].attributes}, loaded.films[name].attributes)
+        for name, image in made.aovs.items():
+            self.assert_same_bits(image, loaded.aovs[name])
+        self.assertEqual((loaded.warnings, loaded.not_finite_samples, loaded.negative_samples, loaded.bad_samples),
+                         (("a warning",), 5, 6, (bad,)))
+        self.assertEqual([path.name for path in folder.path.iterdir() if path.name.startswith(".part")], [])
+        self.assertIsNone(covary._parts.PartFolder(str(self.path), {"scene": "b"}).load(part))
+        self.assertIsNone(folder.load(covary.distributed.Part((2, 1, 20, 10), 4, 0)))
+        file = folder.path / part.name / "film-crn.exr"
+        content = bytearray(file.read_bytes())
+        content[-7] ^= 1
+        file.write_bytes(content)
+        self.assertIsNone(folder.load(part))
+        folder.keep(part, rendered)
+        self.assertIsNotNone(folder.load(part))
+
+    def test_disk_that_takes_no_parts(self):
+        (self.path / "file").write_text("")
+        self.assertIn("folder: cannot write into", self.message_of(
+            covary.IoError, covary._parts.PartFolder, str(self.path / "file"), {}))
+
     def test_missing_dask(self):
         kept = sys.modules.get("distributed")
         sys.modules["distributed"] = None
         try:
-            self.assertEqual(self.message_of(ImportError, covary.distributed.render, None, ROOM, 4),
+            self.assertEqual(self.message_of(ImportError, covary.distributed.dask),
                              "covary.distributed needs Dask: pip install distributed")
         finally:
             if kept is None:
@@ -130,7 +165,7 @@ class Cluster(PackageTest):
     def test_threads_of_workers(self):
         self.assertEqual(set(self.client.run(covary.set_threads, 1).values()), {None})
         self.client.run(covary.set_threads, 0)
-        self.assertIn("threads: expected", self.message_of(ValueError, self.client.run, covary.set_threads, -1))
+        self.assertIn("n: found -1", self.message_of(ValueError, self.client.run, covary.set_threads, -1))
 
     def test_denoised(self):
         """With guides that the workers render, and the denoiser of the frame, not of tiles."""
@@ -215,6 +250,50 @@ class Cluster(PackageTest):
             self.assertIn("looks at the whole frame", refused(self.scene(), 24, **options))
         self.assertIn("accepted is path", refused(self.scene(integrator="bdpt"), 24))
 
+    def test_clients_of_no_cluster(self):
+        """scale() of a cluster returns None, and Client(None) starts workers here without being asked."""
+        from distributed import Client
+        message = self.message_of(TypeError, covary.distributed.render, self.cluster.scale(2), self.scene(), 24)
+        self.assertIn("client: found None (NoneType); accepted is a dask.distributed.Client: cluster = ", message)
+        with Client(None, n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None,
+                    set_as_default=False) as client:
+            for call in (lambda: covary.distributed.render(client, self.scene(), 24),
+                         lambda: covary.distributed.experiment(client, "iicv-table1", self.path / "out")):
+                self.assertIn("made without a cluster, so that it started workers on this machine",
+                              self.message_of(covary.UsageError, call))
+        with Client(self.cluster.scheduler_address, set_as_default=False) as client:
+            covary._cluster.CLIENT("client", client)
+
+    def test_nothing_is_rendered_with_wrong_options(self):
+        """They are found before a part is given to a worker, or the scene's files."""
+        given = self.client.register_plugin, self.client.submit
+        self.client.register_plugin = self.client.submit = None
+        try:
+            for keywords, text in (({"windo": 3}, "did you mean 'window'?"), ({"k": 0.5}, "k: found 0.5"),
+                                   ({"settings": {"groups": 2}}, "2 groups are too few"),
+                                   ({"denoise": "error", "oidn": "/nowhere"}, "/nowhere"),
+                                   ({"settings": {"output": "x.exr"}}, "settings: found 'output'; accepted are filter"),
+                                   ({"settings": {"sampling": "crn"}}, "sampling: found 'crn' with estimator 'iicv'"),
+                                   ({"window": 4}, "window is 4")):
+                self.assertIn(text, self.message_of(covary.UsageError, covary.distributed.render, self.client,
+                                                    self.scene(), 24, **keywords))
+        finally:
+            self.client.register_plugin, self.client.submit = given
+
+    def test_bad_samples(self):
+        """Are told as by one machine, with the caller's name of the scene."""
+        file = self.path / "strong.xml"
+        file.write_text(OVERFLOW)
+        with self.assertWarns(covary.BadSamplesWarning):
+            here = covary.render(file, 8, "none", seed=2)
+        with self.assertWarns(covary.BadSamplesWarning) as warned:
+            there = covary.distributed.render(self.client, file, 8, "none", seed=2, tile=2)
+        self.assertEqual(warned.filename, __file__)
+        self.assertEqual(there.not_finite_samples, here.not_finite_samples)
+        self.assertLessEqual({(bad.x, bad.y, bad.sample) for bad in here.bad_samples},
+                             {(bad.x, bad.y, bad.sample) for bad in there.bad_samples})
+        self.assertTrue(there.bad_samples[0].replay.startswith(f"covary render {file} "))
+
     def test_other_versions(self):
         kept, covary._covary.version = covary._covary.version, "0.0.9"
         try:
@@ -224,9 +303,62 @@ class Cluster(PackageTest):
         self.assertIn("versions differ: here are covary 0.0.9", message)
 
     def test_errors_of_workers(self):
-        message = self.message_of(covary.UsageError, covary.distributed.render, self.client, self.scene(), 24,
-                                  settings={"groups": 2})
-        self.assertIn("2 groups are too few", message)
+        """Reach the caller as they are: here the one machine that cannot read the scene's file."""
+        file = self.path / "room.xml"
+        shutil.copy(ROOM, file)
+        plan, spoilt = covary.distributed._plan, ROOM.read_text().replace("<scene", "<scen")
+
+        def spoil(*arguments):
+            made = plan(*arguments)
+            file.write_text(spoilt)
+            return made
+        covary.distributed._plan = spoil
+        try:
+            self.message_of(covary.InputError, covary.distributed.render, self.client, file, 24)
+        finally:
+            covary.distributed._plan = plan
+
+
+DIES = """
+import os, signal, sys
+import covary, covary.distributed
+from distributed import Client
+
+def die(done, total):
+    if done == 5:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+if __name__ == "__main__":
+    scene = covary.Scene.load(sys.argv[2], resolution=(72, 48))
+    covary.distributed.render(Client(sys.argv[1]), scene, 24, seed=6, tile=20, folder=sys.argv[3], progress=die,
+                              denoise="error", oidn="off")
+"""
+
+
+class Kept(PackageTest):
+    def test_client_that_dies(self):
+        """What it had is on the disk; another one renders the rest, with the bits of one machine."""
+        from distributed import Client, LocalCluster
+        scene = covary.Scene.load(ROOM, resolution=SIZE)
+        folder = self.path / "parts"
+        with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+            run = subprocess.run([sys.executable, "-c", DIES, cluster.scheduler_address, ROOM, folder], check=False,
+                                 capture_output=True, text=True)
+            self.assertEqual(run.returncode, -signal.SIGKILL, run.stderr)
+            with Client(cluster) as client:
+                seen = []
+
+                def call(seed, **more):
+                    return covary.distributed.render(client, scene, 24, seed=seed, tile=20, folder=folder,
+                                                     denoise="error", oidn="off", **more)
+                there = call(6, progress=lambda done, total: seen.append(done))
+                again, other = call(6), call(7)
+        here = covary.render(scene, 24, seed=6, denoise="error", oidn="off")
+        self.assertEqual((there.parts, there.parts_kept, seen[0]), (12, 5, 5))
+        self.assertEqual((again.parts_kept, other.parts_kept), (12, 0))
+        for made in (there, again):
+            self.assert_same_bits(here.image, made.image)
+            self.assert_same_bits(here.std_error, made.std_error)
 
 
 if __name__ == "__main__":

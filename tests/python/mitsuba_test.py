@@ -140,8 +140,8 @@ class Refused(WithMitsuba):
 
     def test_numbers(self):
         self.assertIn("found 7 samples per pixel", self.refused(self.room(), 7))
-        self.assertIn("in 2 groups", self.refused(self.room(), 48, groups=2))
-        self.assertIn("sensor 3: the scene has 1", self.refused(self.room(), 48, sensor=3))
+        self.assertIn("groups: found 2", self.refused(self.room(), 48, groups=2))
+        self.assertIn("sensor: found 3; the scene has 1", self.refused(self.room(), 48, sensor=3))
 
     def test_lens(self):
         scene = Render.scene_with(self, {"type": "box"})

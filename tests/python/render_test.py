@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """render(): the values of `covary render`, limits, interruption."""
+import json
+import math
+import os
 import signal
 import subprocess
 import sys
 import unittest
+import warnings
+from pathlib import Path
 
 import covary
 import numpy
-from common import ROOM, PackageTest, rgb
+from common import PROGRAM, ROOM, PackageTest, rgb
 
 SIZE, TEXT = (36, 24), "36x24"
 
@@ -90,11 +95,74 @@ class Render(PackageTest):
                       self.message_of(covary.UsageError, covary.render, scene, integrator="pth"))
         self.assertEqual(self.message_of(covary.IoError, covary.render, "nix.xml"),
                          self.failure_of_program("render", "nix.xml", "-o", "x.exr"))
-        self.assertIn("accepted are bool, int, float and str",
+        self.assertIn("integrator_options: found 'x': []; accepted is a mapping",
                       self.message_of(TypeError, self.scene, integrator_options={"x": []}))
         (self.path / "bad.xml").write_text("<scene version='3.0.0'><shape type='cub'/></scene>")
         self.assertEqual(self.message_of(covary.InputError, covary.Scene.load, self.path / "bad.xml"),
                          self.failure_of_program("render", self.path / "bad.xml", "-o", "x.exr"))
+
+
+# Two lights so strong that the sum of what they send to the wall is not finite, and one under which it is.
+OVERFLOW = """<scene version="3.0.0"><default name="strength" value="3e38"/>
+<integrator type="path"><integer name="max_depth" value="2"/></integrator>
+<sensor type="perspective"><film type="hdrfilm"><integer name="width" value="4"/><integer name="height" value="3"/>
+<rfilter type="box"/></film></sensor>
+<shape type="rectangle"><transform name="to_world"><rotate y="1" angle="180"/><scale value="9"/><translate z="3"/>
+</transform></shape>
+<emitter type="point"><point name="position" x="1" y="0" z="2.9"/><rgb name="intensity" value="$strength"/></emitter>
+<emitter type="point"><point name="position" x="-1" y="0" z="2.9"/><rgb name="intensity" value="$strength"/></emitter>
+</scene>"""
+
+
+class BadSamples(PackageTest):
+    def setUp(self):
+        super().setUp()
+        self.file = self.path / "it's strong.xml"
+        self.file.write_text(OVERFLOW)
+
+    def replayed(self, bad):
+        """What the sample's command prints, in a shell."""
+        (self.path / "bin").mkdir(exist_ok=True)
+        if not (self.path / "bin" / "covary").exists():
+            (self.path / "bin" / "covary").symlink_to(Path(PROGRAM).resolve())
+        run = subprocess.run(bad.replay, shell=True, cwd=self.path, capture_output=True, text=True, check=False,
+                             env={**os.environ, "PATH": f"{self.path / 'bin'}:{os.environ['PATH']}"})
+        self.assertEqual(run.returncode, 0, run.stderr)
+        return run.stdout
+
+    def test_none(self):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            result = covary.render(covary.Scene.load(self.file, defines={"strength": 1e-3}), 4, "none")
+        self.assertEqual((result.not_finite_samples, result.negative_samples, result.bad_samples), (0, 0, []))
+
+    def test_counts_and_replays_of_the_program(self):
+        """In one pass, in both of IICV, and of a part of the frame of another size, whose pixels have other numbers."""
+        self.run_program("render", self.file, "-o", "a.exr", "--estimator", "none", "--spp", 4, "--seed", 9,
+                         "--quiet", "--no-preview", "--json", "facts.json")
+        facts = json.loads((self.path / "facts.json").read_text())
+        with self.assertWarnsRegex(covary.BadSamplesWarning, "samples were not finite and 0 negative") as warned:
+            result = covary.render(self.file, 4, "none", seed=9)
+        self.assertEqual(warned.filename, __file__)
+        self.assertGreater(result.not_finite_samples, 0)
+        self.assertEqual(result.not_finite_samples, facts["not_finite_samples"])
+        self.assertEqual([(bad.x, bad.y, bad.sample) for bad in result.bad_samples],
+                         [(bad["x"], bad["y"], bad["sample"]) for bad in facts["bad_samples"]])
+        self.assertIn("they count as black", result.warnings[-1])
+        with self.assertWarns(covary.BadSamplesWarning):
+            of_iicv = covary.render(covary.Scene.load(self.file, resolution=(8, 6), max_depth=2,
+                                                      defines={"strength": 2e38}), 24, seed=5, crop=(1, 2, 5, 3),
+                                    sampler="sobol")
+        self.assertEqual({bad.film for bad in of_iicv.bad_samples}, {"crn", "independent"})
+        for bad in (*result.bad_samples[:2], of_iicv.bad_samples[0], of_iicv.bad_samples[-1]):
+            self.assertEqual(bad.value, (math.inf,) * 3)
+            self.assertIn("radiance (inf, inf, inf)", self.replayed(bad))
+
+    def test_light_paths(self):
+        scene = covary.Scene.load(self.file, integrator="bdpt", integrator_options={"light_tracing": "on"})
+        with self.assertWarns(covary.BadSamplesWarning):
+            result = covary.render(scene, 8, "none")
+        self.assertIn("inf", self.replayed(result.bad_samples[0]))
 
 
 LONG = """
