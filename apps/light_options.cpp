@@ -64,10 +64,21 @@ std::vector<std::string> option_words(const LightOptions& options) {
   return words;
 }
 
-void check_light_options(const LightOptions& options, const LoadedScene& scene, const std::string& integrator) {
+void check_light_options(const LightOptions& options, const LoadedScene& scene, const std::string& integrator,
+                         bool has_crn_pass) {
   std::vector<std::string> words = option_words(options);
   if (options.replay) words.emplace_back("--replay-light");
-  if (words.empty() || dynamic_cast<const LightTracingIntegrator*>(scene.integrator.get())) return;
+  if (words.empty()) return;
+  if (const auto* tracer = dynamic_cast<const LightTracingIntegrator*>(scene.integrator.get())) {
+    if (options.light_paths && !tracer->wants_light_pass(has_crn_pass))
+      throw Error(ErrorCode::kUsage,
+                  fmt::format("--light-paths has no effect {}",
+                              options.light_tracing.value_or("auto") == "auto" && has_crn_pass
+                                  ? "beside a pass with common random numbers: no light is traced there without "
+                                    "--light-tracing on"
+                                  : "without light tracing (--light-tracing on)"));
+    return;
+  }
   throw Error(ErrorCode::kUsage, fmt::format("{} is an option of integrators that trace light; '{}' does not", words[0],
                                              integrator.empty() ? scene.integrator_type : integrator));
 }

@@ -25,7 +25,9 @@ std::vector<Property> integrator_properties(const LightOptions& options);
 /// The options as words of a command line, but for --replay-light.
 std::vector<std::string> option_words(const LightOptions& options);
 
-/// Throws Error(kUsage) where one of the options is given and the scene's integrator traces no light.
-void check_light_options(const LightOptions& options, const LoadedScene& scene, const std::string& integrator);
+/// Throws Error(kUsage) where one of the options is given and the scene's integrator traces no light, and where
+/// --light-paths is, and no light is traced in this render. `has_crn_pass`: some pass has common random numbers.
+void check_light_options(const LightOptions& options, const LoadedScene& scene, const std::string& integrator,
+                         bool has_crn_pass);
 
 }  // namespace covary

@@ -130,6 +130,11 @@ void report(const RenderReport& report) {
             options.until, options.output, *result.predicted_relmse,
             parse_until(options.until).in_blocks ? fmt::format(", {:.3g} in blocks,", *result.predicted_blocks) : "",
             result.samples_per_pixel()));
+  if (std::any_of(result.passes.begin(), result.passes.end(), [](const Pass& p) { return p.misses_error; }))
+    throw Unfinished(kTargetMissed,
+                     fmt::format("--relative-error was not reached: '{}' has {:.4g} samples per pixel, as many as "
+                                 "--spp, --time and --max-spp allow, and some pixels need more",
+                                 options.output, result.samples_per_pixel()));
 }
 
 /// What the command reads and writes, as far as it is known before the scene is loaded.

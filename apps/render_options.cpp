@@ -104,7 +104,7 @@ LoadedScene load(const RenderOptions& options) {
       integrator_maker({options.integrator, options.min_depth, options.max_depth, control_options(options.control),
                         guide_options(options.guide), tolerates_light});
   LoadedScene scene = load_scene(options.scene, load_options);
-  check_light_options(options.light, scene, options.integrator);
+  check_light_options(options.light, scene, options.integrator, make_plan(options).has_crn_pass);
   check_control_options(options.control, scene, options.integrator);
   check_guide_options(options.guide, scene, options.integrator);
   warn_of_unseen_lights(scene);

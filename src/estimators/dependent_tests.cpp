@@ -219,6 +219,20 @@ int dependent_tests_reach(const DependentTestsOptions& options) {
   return filter + (measured ? least_error_mixture_reach(options.measure_window) : 0);
 }
 
+namespace {
+
+/// Options that others leave without an effect.
+void check_effects(const EstimatorParameters& p, const DependentTestsOptions& o) {
+  const bool exact = o.filter == DependentFilter::kExact;
+  p.only_if(exact, {"window", "sigma-of", "guard"}, "with the published filter (--paper, --filter paper)");
+  p.only_if(!exact, {"max-region", "min-centre-drop", "pyramid", "region-sides"},
+            "with --filter exact: only the published filter (--filter paper) has regions");
+  p.only_if(o.weights == CombinationWeights::kMeasured, {"measure-window"},
+            "unless errors are measured (--weights measured)");
+}
+
+}  // namespace
+
 Estimator make_dependent_tests(EstimatorParameters& parameters) {
   static constexpr std::pair<const char*, DependentFilter> kFilters[] = {{"exact", DependentFilter::kExact},
                                                                          {"paper", DependentFilter::kPaper}};
@@ -260,6 +274,7 @@ Estimator make_dependent_tests(EstimatorParameters& parameters) {
   p.whole("measure-window", o.measure_window, kWindowRange, "Side of the windows over which errors are measured");
   adaptive.counts.norm = o.norm;
   adaptive.counts.classes = o.filter == DependentFilter::kPaper;
+  check_effects(p, o);
   std::vector<std::string> problems = o.validate();
   const std::vector<std::string> of_counts = adaptive.validate();
   problems.insert(problems.end(), of_counts.begin(), of_counts.end());

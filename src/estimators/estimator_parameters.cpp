@@ -38,8 +38,14 @@ std::string OptionRange::text() const {
   return odd ? "odd, " + bounds : bounds;
 }
 
-bool EstimatorParameters::any_given(std::span<const char* const> names) const {
-  return std::any_of(names.begin(), names.end(), [this](const char* name) { return values_.count(name) > 0; });
+void EstimatorParameters::only_if(bool applies, std::span<const char* const> names, const std::string& why) const {
+  if (applies) return;
+  std::vector<std::string> given;
+  for (const char* name : names)
+    if (values_.count(name) > 0) given.push_back(std::string("--") + name);
+  if (given.empty()) return;
+  throw Error(ErrorCode::kUsage,
+              fmt::format("{} {} no effect {}", fmt::join(given, ", "), given.size() == 1 ? "has" : "have", why));
 }
 
 const std::string* EstimatorParameters::find(const EstimatorOption& option) const {

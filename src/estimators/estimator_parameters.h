@@ -3,6 +3,7 @@
 // only: what it asks for is the list of its options, with the values of its options struct as defaults.
 #pragma once
 
+#include <initializer_list>
 #include <limits>
 #include <map>
 #include <optional>
@@ -69,8 +70,12 @@ class EstimatorParameters {
     value = choices[choose(name, aliases, names, chosen, help)].second;
   }
 
-  /// Whether the value of one of these names was given.
-  bool any_given(std::span<const char* const> names) const;
+  /// For options that were asked for and that other options decide on: unless `applies`, they change nothing, and
+  /// giving one of them throws Error(kUsage) "--NAME has no effect WHY", e.g. "with --penalty sample: …".
+  void only_if(bool applies, std::span<const char* const> names, const std::string& why) const;
+  void only_if(bool applies, std::initializer_list<const char*> names, const std::string& why) const {
+    only_if(applies, std::span(names.begin(), names.size()), why);
+  }
   /// All that were asked for, in this order.
   const std::vector<EstimatorOption>& options() const { return options_; }
 

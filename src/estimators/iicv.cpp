@@ -132,6 +132,26 @@ double iicv_bytes_per_pixel(const IicvOptions& options) {
   return planes * sizeof(float) + 1;
 }
 
+namespace {
+
+/// Options that others leave without an effect.
+void check_effects(const EstimatorParameters& p, const IicvOptions& o) {
+  const bool homogeneous = o.penalty == Penalty::kHomogeneous, sample = o.penalty == Penalty::kSample;
+  p.only_if(!homogeneous && !sample, {"pilot-window"},
+            "with this --penalty: only pilot, smoothed and cross-fit have a pilot");
+  p.only_if(homogeneous, {"ridge"}, "with this --penalty: it is the factor of homogeneous");
+  p.only_if(!homogeneous, {"sample-share", "asymmetric"},
+            "with --penalty homogeneous: all neighbours have the same penalty");
+  p.only_if(!sample || o.symmetric, {"sample-share"},
+            "with --penalty sample and --asymmetric: the penalty is the neighbour's sample variance already");
+  p.only_if(o.sample_share < 1, {"asymmetric"},
+            "with --sample-share 1: the penalty is the neighbour's sample variance already");
+  p.only_if(o.feedback, {"feedback-window", "feedback-bandwidth"},
+            "without feedback (--feedback on), which --paper leaves out");
+}
+
+}  // namespace
+
 Estimator make_iicv(EstimatorParameters& parameters) {
   static constexpr std::pair<const char*, Penalty> kPenalties[] = {{"pilot", Penalty::kPilot},
                                                                    {"sample", Penalty::kSample},
@@ -158,6 +178,7 @@ Estimator make_iicv(EstimatorParameters& parameters) {
           "Side of the feedback's window");
   p.real("feedback-bandwidth", o.feedback_options.bandwidth, {.low = 0, .above_low = true},
          "Bandwidth of the feedback in standard errors");
+  check_effects(p, o);
   std::vector<std::string> problems = o.validate();
   AdaptiveSampling standard;
   standard.least_min_spp = 1;  // the plan rounds up to one of each group

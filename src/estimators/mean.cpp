@@ -76,11 +76,8 @@ Estimator make_none(EstimatorParameters& parameters) {
       p, standard, "As many samples in each pixel as a first pass says that is not averaged in", problems);
   Norm norm = standard.counts.norm;
   p.choice<Norm>("norm", norm, kNorms, kNormHelp);
-  static constexpr const char* kNormOnly[] = {"norm"};
-  if (estimator.adaptive)
-    estimator.adaptive->counts.norm = norm;
-  else if (p.any_given(kNormOnly))
-    problems.emplace_back("--norm needs --adaptive");
+  if (estimator.adaptive) estimator.adaptive->counts.norm = norm;
+  p.only_if(estimator.adaptive.has_value(), {"norm"}, "without --adaptive: no noise is compared with a brightness");
   throw_if_any("none", problems);
   estimator.passes = EstimatorPasses::kAny;
   estimator.summary = "the mean";

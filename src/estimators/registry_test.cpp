@@ -80,14 +80,26 @@ bool has(const std::vector<EstimatorOption>& options, const std::string& name) {
   return std::any_of(options.begin(), options.end(), [&](const EstimatorOption& o) { return o.name == name; });
 }
 
+/// What must be given beside an option so that it has an effect.
+OptionValues with_what_it_needs(const std::string& name, OptionValues values) {
+  const auto given = [&](std::initializer_list<const char*> options) {
+    return std::any_of(options.begin(), options.end(), [&](const char* o) { return values.contains(o); });
+  };
+  if (given({"ridge"}) && name == "iicv") values["penalty"] = "homogeneous";
+  if (given({"max-region", "min-centre-drop", "pyramid", "region-sides"})) values["filter"] = "paper";
+  if (has(options_of_estimator(name), "adaptive")) values["adaptive"] = "";
+  return values;
+}
+
 /// Every default, given as a value, changes nothing.
 TEST(EstimatorRegistry, ListsTheDefaults) {
   for (const std::string& name : pair_estimator_names())
     for (const EstimatorOption& option : options_of_estimator(name)) {
       if (option.default_value.empty()) continue;
-      OptionValues values = {{option.name, option.default_value}};
-      if (has(options_of_estimator(name), "adaptive")) values["adaptive"] = "";
-      EXPECT_EQ(made(name, values), made(name, {})) << name << " " << option.name;
+      const OptionValues values = with_what_it_needs(name, {{option.name, option.default_value}});
+      OptionValues without = values;
+      without.erase(option.name);
+      EXPECT_EQ(made(name, values), made(name, without)) << name << " " << option.name;
     }
 }
 
@@ -192,14 +204,14 @@ TEST(EstimatorRegistry, AdaptiveEstimatorsHaveTheirNumbers) {
   const auto message = [](const std::string& name, const OptionValues& values) {
     return message_of([&] { make_estimator(name, values); }, ErrorCode::kUsage);
   };
-  EXPECT_TRUE(contains(message("none", {{"max-spp", "9"}}), "need --adaptive"));
+  EXPECT_TRUE(contains(message("none", {{"max-spp", "9"}}), "--max-spp has no effect without --adaptive"));
   EXPECT_TRUE(contains(message("none", {{"adaptive", ""}, {"min-spp", "0"}}), "min-spp is 0, expected 1 or more"));
   EXPECT_TRUE(contains(message("dependent-tests", {{"relative-error", "-1"}}), "relative error is -1"));
   EXPECT_TRUE(contains(message("dependent-tests", {{"min-spp", "9"}, {"max-spp", "8"}}), "more than max-spp"));
   EXPECT_TRUE(
       contains(message("iduw", {{"relative-error", "1"}}), "is an option of --estimator iicv, dependent-tests, none"));
-  EXPECT_TRUE(contains(message("iicv", {{"allocation", "uniform"}}), "need --adaptive"));
-  EXPECT_TRUE(contains(message("none", {{"norm", "l2"}}), "--norm needs --adaptive"));
+  EXPECT_TRUE(contains(message("iicv", {{"allocation", "uniform"}}), "--allocation has no effect without --adaptive"));
+  EXPECT_TRUE(contains(message("none", {{"norm", "l2"}}), "--norm has no effect without --adaptive"));
   const Estimator iicv = make_estimator("iicv", {{"adaptive", ""}, {"max-spp", "99"}});
   ASSERT_TRUE(iicv.adaptive);
   EXPECT_EQ(iicv.adaptive->counts.max_spp, 99);
@@ -226,7 +238,7 @@ TEST(EstimatorRegistry, RangesAreThoseThatAreChecked) {
         OptionValues values{{option.name, fmt::format("{:g}", value)}};
         const std::vector<EstimatorOption> all = options_of_estimator(name);
         if (option.name == "window" && has(all, "k")) values["k"] = "1";  // of few pixels
-        if (has(all, "adaptive")) values["adaptive"] = "";
+        values = with_what_it_needs(name, values);
         return message_of([&] { make_estimator(name, values); }) == "no error";
       };
       const OptionRange& range = option.range;
@@ -243,6 +255,51 @@ TEST(EstimatorRegistry, RangesAreThoseThatAreChecked) {
   EXPECT_TRUE((OptionRange{.low = 3, .high = 7, .odd = true}.contains(5)));
   EXPECT_FALSE((OptionRange{.low = 3, .high = 7, .odd = true}.contains(4)));
   EXPECT_EQ((OptionRange{.low = 0, .above_low = true}.text()), "above 0");
+}
+
+TEST(EstimatorRegistry, OptionsWithoutEffectAreErrors) {
+  const auto message = [](const std::string& name, const OptionValues& values) {
+    return message_of([&] { make_estimator(name, values); }, ErrorCode::kUsage);
+  };
+  EXPECT_EQ(message("iicv", {{"penalty", "sample"}, {"pilot-window", "5"}}),
+            "--pilot-window has no effect with this --penalty: only pilot, smoothed and cross-fit have a pilot");
+  EXPECT_EQ(message("iicv", {{"feedback", "off"}, {"feedback-window", "21"}, {"feedback-bandwidth", "1"}}),
+            "--feedback-window, --feedback-bandwidth have no effect without feedback (--feedback on), which --paper "
+            "leaves out");
+  struct Case {
+    const char *estimator, *option;
+    OptionValues values;
+  };
+  const Case cases[] = {
+      {"iicv", "pilot-window", {{"penalty", "homogeneous"}, {"pilot-window", "11"}}},
+      {"iicv", "ridge", {{"penalty", "pilot"}, {"ridge", "1"}}},
+      {"iicv", "ridge", {{"ridge", "1"}}},
+      {"iicv", "sample-share", {{"penalty", "homogeneous"}, {"sample-share", "0.5"}}},
+      {"iicv", "asymmetric", {{"penalty", "homogeneous"}, {"asymmetric", ""}}},
+      {"iicv", "asymmetric", {{"sample-share", "1"}, {"asymmetric", ""}}},
+      {"iicv", "sample-share", {{"penalty", "sample"}, {"asymmetric", ""}, {"sample-share", "0.5"}}},
+      {"iicv", "feedback-window", {{"paper", ""}, {"feedback-window", "41"}}},
+      {"iicv", "max-spp", {{"max-spp", "99"}}},
+      {"dependent-tests", "max-region", {{"max-region", "3"}}},
+      {"dependent-tests", "min-centre-drop", {{"min-centre-drop", "0.1"}}},
+      {"dependent-tests", "pyramid", {{"pyramid", "count"}}},
+      {"dependent-tests", "region-sides", {{"region-sides", "odd"}}},
+      {"dependent-tests", "window", {{"paper", ""}, {"window", "5"}}},
+      {"dependent-tests", "guard", {{"paper", ""}, {"guard", "on"}}},
+      {"dependent-tests", "sigma-of", {{"paper", ""}, {"sigma-of", "each"}}},
+      {"dependent-tests", "window", {{"filter", "paper"}, {"window", "5"}}},
+      {"dependent-tests", "measure-window", {{"paper", ""}, {"measure-window", "5"}}},
+      {"dependent-tests", "measure-window", {{"weights", "effective"}, {"measure-window", "5"}}},
+  };
+  for (const Case& c : cases)
+    EXPECT_TRUE(message(c.estimator, c.values).starts_with(fmt::format("--{} has no effect ", c.option)))
+        << message(c.estimator, c.values);
+  // These decide themselves that the others have one.
+  for (const OptionValues& values : {OptionValues{{"paper", ""}, {"feedback", "on"}, {"feedback-window", "21"}},
+                                     OptionValues{{"penalty", "cross-fit"}, {"pilot-window", "5"}}})
+    EXPECT_NO_THROW(make_estimator("iicv", values));
+  EXPECT_NO_THROW(make_estimator("dependent-tests", {{"paper", ""}, {"weights", "measured"}, {"measure-window", "5"}}));
+  EXPECT_NO_THROW(make_estimator("dependent-tests", {{"filter", "paper"}, {"max-region", "5"}}));
 }
 
 TEST(EstimatorRegistry, SaysWhatIsWrong) {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numeric>
 
 #include "core/error.h"
@@ -91,22 +92,28 @@ Demand demand_of(const GroupedImage& image, const CountOptions& options) {
   return demand;
 }
 
+/// The published filter averages pixels of equal numbers only, so that uniform ones may not differ at all.
+bool all_equal(const CountOptions& options) { return options.classes && options.allocation == Allocation::kUniform; }
+
 /// Turns demands into numbers.
 class Rounding {
  public:
-  Rounding(const CountOptions& options, uint32_t multiple) : options_(options), multiple_(multiple) {}
+  Rounding(const CountOptions& options, uint32_t multiple)
+      : options_(options), multiple_(multiple), classes_(options.classes && !all_equal(options)) {}
 
   uint32_t operator()(double samples) const {
     const double most = options_.max_spp ? std::min<double>(*options_.max_spp, kMost) : kMost;
     const double wanted = std::clamp(samples, 0.0, most);
-    const auto whole = options_.classes ? class_of(wanted) : static_cast<uint32_t>(rounded_up(wanted));
+    const auto whole = classes_ ? class_of(wanted) : static_cast<uint32_t>(rounded_up(wanted));
     const auto limited = std::clamp(whole, static_cast<uint32_t>(options_.min_spp), static_cast<uint32_t>(most));
-    return static_cast<uint32_t>((uint64_t{limited} + multiple_ - 1) / multiple_ * multiple_);
+    const uint64_t up = (uint64_t{limited} + multiple_ - 1) / multiple_ * multiple_;
+    return static_cast<uint32_t>(static_cast<double>(up) > most ? up - multiple_ : up);
   }
 
  private:
   const CountOptions& options_;
   uint32_t multiple_;
+  bool classes_;
 };
 
 std::vector<uint32_t> counts_for(const Demand& demand, double factor, const Rounding& rounding) {
@@ -119,8 +126,8 @@ double sum_of(const std::vector<uint32_t>& counts) {
   return static_cast<double>(std::accumulate(counts.begin(), counts.end(), uint64_t{0}));
 }
 
-/// Numbers that add up to `total`, or come as near as limits allow.
-std::vector<uint32_t> counts_within(const Demand& demand, double total, const Rounding& rounding) {
+/// Numbers that add up to `total`, or come near as limits allow; fewer where pixels of equal demand may not differ.
+std::vector<uint32_t> counts_within(const Demand& demand, double total, const Rounding& rounding, bool may_differ) {
   double low = -30 * std::log(10.0), high = 40 * std::log(10.0);
   std::vector<uint32_t> fewer = counts_for(demand, std::exp(low), rounding), more;
   if (sum_of(fewer) >= total) return fewer;
@@ -133,6 +140,7 @@ std::vector<uint32_t> counts_within(const Demand& demand, double total, const Ro
     (too_many ? high : low) = middle;
     (too_many ? more : fewer) = std::move(counts);
   }
+  if (!may_differ) return fewer;
   // Pixels of equal demand step together. As many of them as the total allows take the step, spread evenly.
   const double part = (total - sum_of(fewer)) / (sum_of(more) - sum_of(fewer));
   double due = 0;
@@ -156,7 +164,7 @@ uint32_t class_of(double samples) {
   return kMost;
 }
 
-std::vector<std::string> CountOptions::validate() const {
+std::vector<std::string> CountOptions::validate(uint32_t multiple) const {
   std::vector<std::string> problems;
   if (relative_error && !(*relative_error > 0))
     problems.push_back(fmt::format("relative error is {}, expected a number above 0", *relative_error));
@@ -167,12 +175,22 @@ std::vector<std::string> CountOptions::validate() const {
   if (smoothing < 1 || smoothing > 63 || smoothing % 2 == 0)
     problems.push_back(
         fmt::format("the window that smooths variances is {}, expected an odd number from 1 to 63", smoothing));
+  if (!problems.empty() || !max_spp) return problems;
+  const auto most = static_cast<uint32_t>(*max_spp);
+  if (most < multiple)
+    problems.push_back(
+        fmt::format("max-spp is {}, expected at least {}, one sample for each group (--groups)", most, multiple));
+  else if (most / multiple * multiple < static_cast<uint32_t>(min_spp))
+    problems.push_back(
+        fmt::format("min-spp is {} and max-spp {}, expected a multiple of {}, the number of groups, "
+                    "between them",
+                    min_spp, most, multiple));
   return problems;
 }
 
 std::vector<uint32_t> sample_counts(const GroupedImage& first_pass, double budget, const CountOptions& options,
                                     uint32_t multiple) {
-  throw_if_any("numbers of samples", options.validate());
+  throw_if_any("numbers of samples", options.validate(multiple));
   COVARY_CHECK(multiple >= 1 && budget >= 0 && (std::isfinite(budget) || options.relative_error),
                "counts follow from a budget or a relative error");
   const Demand demand = demand_of(first_pass, options);
@@ -182,7 +200,17 @@ std::vector<uint32_t> sample_counts(const GroupedImage& first_pass, double budge
     std::vector<uint32_t> counts = counts_for(demand, demand.for_error, rounding);
     if (sum_of(counts) <= total) return counts;
   }
-  return counts_within(demand, total, rounding);
+  return counts_within(demand, total, rounding, !all_equal(options));
+}
+
+bool have_relative_error(const GroupedImage& first_pass, const std::vector<uint32_t>& counts,
+                         const CountOptions& options, uint32_t multiple) {
+  if (!options.relative_error) return true;
+  CountOptions without_limit = options;
+  without_limit.max_spp.reset();
+  const Demand demand = demand_of(first_pass, without_limit);
+  const std::vector<uint32_t> wanted = counts_for(demand, demand.for_error, Rounding(without_limit, multiple));
+  return std::equal(counts.begin(), counts.end(), wanted.begin(), wanted.end(), std::greater_equal<>());
 }
 
 std::vector<std::string> AdaptiveSampling::validate() const {
@@ -217,7 +245,7 @@ std::optional<AdaptiveSampling> ask_for_adaptive(EstimatorParameters& parameters
   const std::vector<std::string> wrong = standard.validate();
   problems.insert(problems.end(), wrong.begin(), wrong.end());
   if (is_adaptive) return standard;
-  if (parameters.any_given(kAdaptiveOptions)) problems.emplace_back("options of samples per pixel need --adaptive");
+  parameters.only_if(false, kAdaptiveOptions, "without --adaptive: all pixels get the same number of samples");
   return {};
 }
 

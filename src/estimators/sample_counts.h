@@ -7,7 +7,8 @@
 //                 proportion to e = sigma / sqrt(|C|^2 + 0.01). As e is known from few samples, whose errors are
 //                 common to neighbours, and C is dark where sigma is missed: N in proportion to sqrt(e), with |C| and
 //                 sigma^2 averaged over neighbours, at least 0.7 and at most twice its mean.
-//   uniform       all pixels the same.
+//   uniform       all pixels the same; what is left of the budget is spread, but not where numbers are rounded to
+//                 classes: there all are equal, and no class is needed.
 //
 // With a relative error, `equal-error` has it in every pixel, and the others on average: the root of the mean of
 // (3 sigma)^2 / (N (|C|^2 + 0.01)) is eps. Without, or where that needs more than the budget, the one free factor is
@@ -41,16 +42,21 @@ struct CountOptions {
   /// Side of the window over which sigma^2, and |C| of kLeastError, are averaged, odd, 1 … 63.
   int smoothing = 7;
 
-  /// Everything that is wrong with the options; empty if nothing is.
-  std::vector<std::string> validate() const;
+  /// Everything that is wrong with the options; empty if nothing is. Numbers are to be multiples of `multiple`.
+  std::vector<std::string> validate(uint32_t multiple = 1) const;
 };
 
 /// The number for each pixel, row by row. `budget`: of samples per pixel on average, >= 0; infinite for no limit, which
 /// needs a relative error. Numbers are multiples of `multiple` >= 1. They add up to the budget to 1 %, unless min_spp,
-/// max_spp or `multiple` do not allow it, or where no pixel has noise: `least-error` then gives all the same, and
-/// `equal-error` min_spp. Throws Error(kUsage) for options that are wrong.
+/// max_spp or `multiple` do not allow it, for `uniform` with classes, and where no pixel has noise: `least-error` then
+/// gives all the same, and `equal-error` min_spp. Throws Error(kUsage) for options that are wrong.
 std::vector<uint32_t> sample_counts(const GroupedImage& first_pass, double budget, const CountOptions& options,
                                     uint32_t multiple = 1);
+
+/// Whether every pixel has as many samples as the relative error asks for, whatever budget and max_spp are. True
+/// without a relative error.
+bool have_relative_error(const GroupedImage& first_pass, const std::vector<uint32_t>& counts,
+                         const CountOptions& options, uint32_t multiple = 1);
 
 /// The smallest class that is at least `samples`.
 uint32_t class_of(double samples);

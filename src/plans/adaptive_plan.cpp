@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "core/error.h"
 #include "estimators/mean.h"
@@ -64,6 +65,10 @@ void check_groups(const Method& method, const PlanState& state, uint32_t first) 
                                                first, groups));
 }
 
+void check_counts(const Method& method, const PlanState& state) {
+  throw_if_any(method.name, method.sampling.counts.validate(method.groups_of(state)));
+}
+
 void check_budget(const Method& method, const PlanState& state, uint32_t first) {
   const double budget = whole_budget(method, state);
   const int least = std::max({1, method.sampling.counts.min_spp, static_cast<int>(method.groups_of(state))});
@@ -83,11 +88,16 @@ double samples_in_time(const PlanState& state) {
   return std::floor(std::max(1.0, kOverestimate * std::max(0.0, *state.seconds_left) * speed / pixels));
 }
 
-SampleTarget last_target(const Method& method, const PlanState& state, const Film& first) {
+void set_last_target(const Method& method, const PlanState& state, Pass& last) {
+  const Film& first = state.passes[0].film;
   double budget = whole_budget(method, state) - first.mean_count();
   if (state.seconds_left) budget = std::min(budget, samples_in_time(state));
-  return SampleTarget(sample_counts(rows_of(first, 0, first.height()), std::max(0.0, budget), method.sampling.counts,
-                                    method.groups_of(state)));
+  const GroupedImage image = rows_of(first, 0, first.height());
+  const CountOptions& options = method.sampling.counts;
+  const uint32_t groups = method.groups_of(state);
+  std::vector<uint32_t> counts = sample_counts(image, std::max(0.0, budget), options, groups);
+  last.misses_error = !have_relative_error(image, counts, options, groups);
+  last.settings.spp = SampleTarget(std::move(counts));
 }
 
 PassPlan pass_of(const std::string& name, Sampling sampling, uint32_t number, uint32_t groups) {
@@ -136,15 +146,14 @@ Plan adaptive_plan(const Estimator& estimator, std::optional<int> groups) {
   first.set_targets = [=](const PlanState& state, std::span<Pass> passes) {
     const uint32_t samples = first_samples(method, state);
     check_groups(method, state, samples);
+    check_counts(method, state);
     check_budget(method, state, samples);
     passes[0].settings.spp = samples;
   };
   last.passes = [=](const PlanState& state) {
     return std::vector{pass_of("independent", Sampling::kIndependent, 0, method.groups_of(state))};
   };
-  last.set_targets = [=](const PlanState& state, std::span<Pass> passes) {
-    passes[0].settings.spp = last_target(method, state, state.passes[0].film);
-  };
+  last.set_targets = [=](const PlanState& state, std::span<Pass> passes) { set_last_target(method, state, passes[0]); };
   plan.phases = {first, last};
   return plan;
 }

@@ -97,6 +97,10 @@ TEST(AdaptivePlan, ARelativeErrorTakesThePlaceOfTheBudget) {
   const RenderResult most =
       render(scene, plan_of("dependent-tests", {{"relative-error", "0.01"}, {"max-spp", "9"}}), request);
   EXPECT_LE(most.passes[1].film.mean_count(), 9);
+  EXPECT_FALSE(coarse.passes[1].misses_error);
+  EXPECT_FALSE(fine.passes[1].misses_error);
+  EXPECT_TRUE(limited.passes[1].misses_error);
+  EXPECT_TRUE(most.passes[1].misses_error);
 }
 
 TEST(AdaptivePlan, TooSmallABudgetIsAnError) {

@@ -57,6 +57,7 @@ struct Pass {
   /// Of a light pass: the samples that keep step with the camera's, which may be more than a film can hold where only
   /// time ends the render.
   double wanted = 0;
+  bool misses_error = false;  ///< the plan was asked for an error that needs more samples than it may take
   PassResult result;  ///< of all calls together, earlier ones included where a folder of passes keeps them
 };
 

@@ -72,10 +72,19 @@ class DependentTests(RenderTest):
 
     def test_relative_error_and_time(self):
         coarse = self.statistics("-o", "a.exr", *METHOD, "--relative-error", "1")
-        fine = self.statistics("-o", "a.exr", *METHOD, "--relative-error", "0.5", "--max-spp", "300")
+        fine = self.statistics("-o", "a.exr", *METHOD, "--relative-error", "0.5")
         self.assertGreater(fine["samples_per_pixel"], coarse["samples_per_pixel"])
         timed = self.statistics("-o", "a.exr", *METHOD, "--time", "0.3")
         self.assertTrue(timed["complete"] or timed["samples_per_pixel"] > 1)
+
+    def test_a_relative_error_that_is_not_reached_ends_like_until(self):
+        for method in (METHOD, ("--adaptive",), ("--estimator", "none", "--adaptive")):
+            for limit in (("--spp", "48"), ("--max-spp", "24")):
+                result = self.run_covary("render", ROOM, *SMALL, "-o", "a.exr", *method, "--relative-error", "1e-9",
+                                         *limit)
+                self.assertEqual(result.returncode, 3, result.stderr)
+                self.assertIn("--relative-error was not reached: 'a.exr' has ", result.stderr)
+                (self.path / "a.exr").unlink()
 
     def test_wrong_options(self):
         render = ("render", ROOM, *SMALL, "-o", "a.exr", *METHOD)
@@ -113,9 +122,11 @@ class Adaptive(RenderTest):
 
     def test_wrong_options(self):
         render = ("render", ROOM, *SMALL, "-o", "a.exr", "--estimator", "none")
-        self.bad(2, "need --adaptive", *render, "--max-spp", "8")
+        self.bad(2, "--max-spp has no effect without --adaptive", *render, "--max-spp", "8")
         self.bad(2, "--adaptive always takes independent random numbers", *render, "--adaptive", "--sampling", "crn")
         self.bad(2, "min-spp is 0, expected 1 or more", *render, "--adaptive", "--min-spp", "0")
+        self.bad(2, "iicv: max-spp is 1, expected at least 12, one sample for each group", "render", ROOM, *SMALL,
+                 "-o", "a.exr", "--adaptive", "--max-spp", "1", "--spp", "96")
 
 
 if __name__ == "__main__":

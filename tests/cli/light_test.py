@@ -51,6 +51,13 @@ class Render(LightTest):
         self.assertNotIn("light_paths", facts)
         self.assertIn("light_tracing=off", self.attributes("c.exr")["covary:settings"])
 
+    def test_light_paths_without_a_light_pass_are_an_error(self):
+        for given in ((), ("--estimator", "dependent-tests"), ("--sampling", "crn")):
+            self.bad(2, "--light-paths has no effect beside a pass with common random numbers", "render", CAUSTIC,
+                     "-o", "a.exr", "--light-paths", "2", *given)
+        self.bad(2, "--light-paths has no effect without light tracing", "render", CAUSTIC, "-o", "a.exr",
+                 "--estimator", "none", "--light-tracing", "off", "--light-paths", "2")
+
     def test_beside_common_random_numbers(self):
         facts = self.render("-o", "off.exr", "--spp", "24")
         self.assertNotIn("light_paths", facts)
