@@ -52,7 +52,7 @@ void catch_signals() {
 }
 
 void print_light_path(const RenderOptions& options, const LoadedScene& scene) {
-  const uint64_t number = *options.light.replay;
+  const uint64_t number = *options.replay_light;
   const ReplayedLightPath path = replay_light(scene, make_plan(options), make_request(options, scene), number);
   fmt::print("light path {}, {} rays, {} splats\n", number, path.n_rays, path.splats.size());
   for (const LightSplat& splat : path.splats)
@@ -61,7 +61,7 @@ void print_light_path(const RenderOptions& options, const LoadedScene& scene) {
 }
 
 void print_replay(const RenderOptions& options, const LoadedScene& scene) {
-  if (options.light.replay) return print_light_path(options, scene);
+  if (options.replay_light) return print_light_path(options, scene);
   const SampleAddress at = replayed_sample(options);
   const ReplayedSample sample = replay(scene, make_plan(options), make_request(options, scene), at);
   fmt::print("pixel ({}, {}), sample {}, film position ({}, {}), {} rays\nradiance ({:.9g}, {:.9g}, {:.9g})\n", at.x,

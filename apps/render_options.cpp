@@ -8,7 +8,11 @@
 
 #include "commands.h"
 #include "core/error.h"
+#include "declared_options.h"
 #include "defines.h"
+#include "integrators/controlled_path.h"
+#include "integrators/guided_path.h"
+#include "integrators/light_pass.h"
 #include "numbers.h"
 #include "plans/estimator_plans.h"
 #include "plans/integrator_choice.h"
@@ -51,7 +55,7 @@ std::string single_pass_estimators() {
 void check_options(RenderOptions& options) {
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
   if (!options.is_replay() && options.output.empty()) usage("no output given; use -o OUT.exr (or --replay X,Y,SAMPLE)");
-  if (!options.replay.empty() && options.light.replay) usage("--replay and --replay-light exclude each other");
+  if (!options.replay.empty() && options.replay_light) usage("--replay and --replay-light exclude each other");
   if (!options.integrator.empty() && !find_integrator(options.integrator))
     usage("--integrator: " + unknown_integrator(options.integrator));
   const std::string& name = options.estimator.name;
@@ -79,8 +83,6 @@ void check_options(RenderOptions& options) {
     usage(fmt::format(
         "--time: {} are fitted to all samples of a pixel together, so their number must be known; use --spp", name));
   parse_split(options.split);
-  control_options(options.control);
-  guide_options(options.guide);
   if (!options.until.empty()) {
     parse_until(options.until);
     if (!estimator.predicts_error)
@@ -88,6 +90,40 @@ void check_options(RenderOptions& options) {
     if (passes == EstimatorPasses::kAny && options.groups.value_or(2) < 2) usage("--until needs --groups 2 or more");
   }
 }
+
+namespace {
+
+/// Options of the render that some integrators have no part in.
+void check_integrator(const RenderOptions& options, const LoadedScene& scene) {
+  const std::string& name = options.integrator.empty() ? scene.integrator_type : options.integrator;
+  if (options.replay_light && !dynamic_cast<const LightTracingIntegrator*>(scene.integrator.get()))
+    throw Error(ErrorCode::kUsage,
+                fmt::format("--replay-light is an option of integrators that trace light; '{}' does not", name));
+  const auto* tracer = dynamic_cast<const LightTracingIntegrator*>(scene.integrator.get());
+  const bool beside_crn = make_plan(options).has_crn_pass;
+  if (tracer && options.of_integrator.contains("light-paths") && !tracer->wants_light_pass(beside_crn))
+    throw Error(ErrorCode::kUsage,
+                fmt::format("--light-paths has no effect {}",
+                            beside_crn ? "beside a pass with common random numbers: no light is traced there without "
+                                         "--light-tracing on"
+                                       : "without light tracing (--light-tracing on)"));
+  if (options.path_lengths && !dynamic_cast<const ControlledPath*>(scene.integrator.get()))
+    throw Error(ErrorCode::kUsage,
+                fmt::format("--path-lengths is an option of --integrator controlled-path, not of {}", name));
+}
+
+/// Adds a warning to a scene whose lights at a point or in one direction the integrator cannot see.
+void warn_of_unseen_lights(LoadedScene& scene) {
+  const auto* guided = dynamic_cast<const GuidedPath*>(scene.integrator.get());
+  if (!guided || guided->settings().nee) return;
+  const auto n = std::ranges::count_if(scene.scene->emitters(), [](const auto& light) { return light->is_delta(); });
+  if (n > 0)
+    scene.warnings.push_back(
+        fmt::format("without light samples (--nee off), lights at a point or in one direction are not seen: {} of {}",
+                    n, scene.scene->emitters().size()));
+}
+
+}  // namespace
 
 LoadedScene load(const RenderOptions& options) {
   LoadOptions load_options;
@@ -98,15 +134,9 @@ LoadedScene load(const RenderOptions& options) {
       throw Error(ErrorCode::kUsage, "--resolution '" + options.resolution + "': each side must be 1 to 65536");
     load_options.width = static_cast<int>(size[0]), load_options.height = static_cast<int>(size[1]);
   }
-  load_options.integrator_properties = integrator_properties(options.light);
-  const bool tolerates_light = !load_options.integrator_properties.empty() || !options.integrator.empty();
-  load_options.make_integrator =
-      integrator_maker({options.integrator, options.min_depth, options.max_depth, control_options(options.control),
-                        guide_options(options.guide), tolerates_light});
+  load_options.make_integrator = integrator_maker({options.integrator, options.of_integrator});
   LoadedScene scene = load_scene(options.scene, load_options);
-  check_light_options(options.light, scene, options.integrator, make_plan(options).has_crn_pass);
-  check_control_options(options.control, scene, options.integrator);
-  check_guide_options(options.guide, scene, options.integrator);
+  check_integrator(options, scene);
   warn_of_unseen_lights(scene);
   return scene;
 }
@@ -138,7 +168,7 @@ RenderRequest make_request(const RenderOptions& options, const LoadedScene& scen
   }
   if (options.replay.empty() && options.load_training.empty()) take_training(scene, request);
   request.aovs = options.aovs;
-  request.path_lengths = options.control.path_lengths;
+  request.path_lengths = options.path_lengths;
   request.crn_part = crn_part_named(options.crn_part);
   if (!options.sampler.empty()) request.sampler = sampler_named(options.sampler);
   request.output = options.output;
@@ -218,10 +248,6 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
       ->capture_default_str();
   command.add_option("--resolution", o.resolution, "WIDTHxHEIGHT of the full frame; default: the scene's");
   command.add_option("--crop", o.crop, "X,Y,WIDTH,HEIGHT: render only these pixels of the frame");
-  command.add_option("--min-depth", o.min_depth, "Leave out paths with fewer edges than this")
-      ->transform(whole_number(0, 1 << 30));
-  command.add_option("--max-depth", o.max_depth, "Largest number of path edges; -1: no limit; default: the scene's")
-      ->transform(whole_number(-1, 1 << 30));
   command.add_option("--rfilter", o.rfilter, "Reconstruction filter instead of the scene's")
       ->check(one_of({"box", "tent", "gaussian"}));
   add_threads_option(command, o.threads);
@@ -248,11 +274,14 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
   command.add_option("--json", o.json, "File for statistics; '-': standard output");
   command.add_flag("!--no-preview", o.preview, "Do not write the PNG");
   command.add_flag("--quiet", o.quiet, "No progress and no summary");
-  add_control_options(command, o.control);
-  add_guide_options(command, o.guide);
+  command.add_flag("--path-lengths", o.path_lengths,
+                   "Add an image for each number of edges of paths (Edges01, …) to the output");
+  command.add_option("--replay-light", o.replay_light, "NUMBER: print what one light path adds to the image")
+      ->transform(whole_number(uint64_t{0}, (uint64_t{1} << 40) - 1))
+      ->type_name("NUMBER");
+  add_options(command, options_of_integrators(), o.of_integrator);
   command.add_option("--save-training", o.save_training, "File that keeps what controlled-path or guided-path learnt");
   command.add_option("--load-training", o.load_training, "Such a file, to use in place of a training");
-  add_light_options(command, o.light);
   add_denoise_options(command, o.estimator);
   add_estimator_options(command, o.estimator, estimator_names());
 }

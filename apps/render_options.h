@@ -10,10 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "control_options.h"
 #include "estimator_options.h"
-#include "guide_options.h"
-#include "light_options.h"
 #include "plans/plan.h"
 #include "plans/render.h"
 
@@ -24,17 +21,17 @@ struct RenderOptions {
   std::string stages, resolution, crop, replay, until, display_server, save_training, load_training;
   std::string crn_part = "both", sampler, debug_strategies;
   EstimatorOptions estimator;
-  ControlTexts control;
-  GuideTexts guide;
-  LightOptions light;
+  OptionValues of_integrator;  ///< options of integrators, of depths as well
   std::vector<std::string> defines;
   std::optional<uint32_t> spp;
-  std::optional<int> groups, min_depth, max_depth;
+  std::optional<int> groups;
+  std::optional<uint64_t> replay_light;  ///< number of a light path
   uint64_t seed = 0;
   int threads = 0;
   double seconds = 0, checkpoint_seconds = 300;
   /// One sample or light path is printed instead of rendering.
-  bool is_replay() const { return !replay.empty() || light.replay; }
+  bool is_replay() const { return !replay.empty() || replay_light; }
+  bool path_lengths = false;
   bool resume = false, overwrite = false, aovs = false, quiet = false, preview = true;
 };
 

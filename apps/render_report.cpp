@@ -10,6 +10,7 @@
 
 #include "commands.h"
 #include "core/shell_text.h"
+#include "declared_options.h"
 #include "film/splat_layer.h"
 #include "integrators/controlled_path.h"
 #include "integrators/guided_path.h"
@@ -33,10 +34,7 @@ const char* sampling_name(const Pass& pass) { return pass.settings.sampling == S
 /// What decides on the weights of strategies beside the scene: whether light is traced, and for how many pixels.
 void add_light_words(const RenderOptions& o, const Pass& pass, std::vector<std::string>& words) {
   if (!dynamic_cast<const LightTracingIntegrator*>(pass.integrator.get())) return;
-  LightOptions light = o.light;
-  light.light_tracing = light_tracer(*pass.integrator) ? "on" : "off";
-  const std::vector<std::string> of_light = option_words(light);
-  words.insert(words.end(), of_light.begin(), of_light.end());
+  words.insert(words.end(), {"--light-tracing", light_tracer(*pass.integrator) ? "on" : "off"});
   if (!o.crop.empty()) words.insert(words.end(), {"--crop", o.crop});
 }
 
@@ -47,11 +45,10 @@ std::string replay_command(const RenderOptions& o, const Pass& pass, const BadSa
   for (const std::string& define : o.defines) add("-D", define);
   if (!o.resolution.empty()) add("--resolution", o.resolution);
   if (!o.integrator.empty()) add("--integrator", o.integrator);
-  for (const std::string& word : command_words(o.control)) words.push_back(word);
-  for (const std::string& word : command_words(o.guide)) words.push_back(word);
+  OptionValues of_integrator = o.of_integrator;
+  of_integrator.erase("light-tracing");  // add_light_words() tells what became of it
+  for (const std::string& word : option_words(options_of_integrators(), of_integrator)) words.push_back(word);
   if (!o.load_training.empty()) add("--load-training", o.load_training);
-  if (o.min_depth) add("--min-depth", std::to_string(*o.min_depth));
-  if (o.max_depth) add("--max-depth", std::to_string(*o.max_depth));
   if (!o.rfilter.empty()) add("--rfilter", o.rfilter);
   add_light_words(o, pass, words);
   if (!pass.plan.light) add("--sampling", sampling_name(pass));

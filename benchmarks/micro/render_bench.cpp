@@ -18,6 +18,7 @@
 #include "integrators/light_selection.h"
 #include "integrators/render_pass.h"
 #include "io/load_scene.h"
+#include "scene/property_source.h"
 
 namespace covary {
 namespace {
@@ -25,11 +26,12 @@ namespace {
 constexpr uint64_t kSeed = 1;
 constexpr int kItems = 4096;  // per iteration, spread over the frame
 
-LoadedScene load(const std::string& path, const std::string& integrator) {
+LoadedScene load(const std::string& path, const std::string& integrator, const OptionValues& values = {}) {
   LoadOptions options;
   options.make_integrator = [&](Parameters& parameters) -> std::shared_ptr<SceneObject> {
-    const auto plugin = std::ranges::find_if(integrator_plugins(), [&](const auto& p) { return p.name == integrator; });
-    return plugin->make(parameters, PathLengthSettings::from(parameters));
+    PropertySource source(parameters, values);
+    Settings settings(source);
+    return make_integrator(*find_integrator(integrator), settings);
   };
   return load_scene(path, options);
 }
@@ -146,15 +148,12 @@ std::string write_room_of_lights(const std::filesystem::path& folder, int64_t n)
   return scene.string();
 }
 
-void many_lights(benchmark::State& state, const std::string& integrator, ControlKind kind) {
+void many_lights(benchmark::State& state, const std::string& integrator, const OptionValues& values) {
   const std::filesystem::path folder = std::filesystem::temp_directory_path() / "covary-render-bench";
   std::filesystem::create_directories(folder);
-  const LoadedScene loaded = load(write_room_of_lights(folder, state.range(0)), integrator);
+  const LoadedScene loaded = load(write_room_of_lights(folder, state.range(0)), integrator, values);
   std::filesystem::remove_all(folder);
   if (auto* controlled = dynamic_cast<ControlledPath*>(loaded.integrator.get())) {
-    ControlOptions options;
-    options.kind = kind;
-    controlled->change(options);
     controlled->prepare(*loaded.scene);
     train(*loaded.scene, *controlled, {{0, 0, loaded.width, loaded.height}, loaded.filter});
   }
@@ -169,9 +168,13 @@ BENCHMARK_CAPTURE(shadow_rays, room, "room");
 BENCHMARK_CAPTURE(shadow_rays, materials, "materials");
 BENCHMARK_CAPTURE(paths, room, "room");
 BENCHMARK_CAPTURE(paths, materials, "materials");
-BENCHMARK_CAPTURE(many_lights, path, "path", ControlKind::kOff)->RangeMultiplier(10)->Range(100, 100000);
-BENCHMARK_CAPTURE(many_lights, off, "controlled-path", ControlKind::kOff)->RangeMultiplier(10)->Range(100, 100000);
-BENCHMARK_CAPTURE(many_lights, rgb, "controlled-path", ControlKind::kRgb)->RangeMultiplier(10)->Range(100, 100000);
+BENCHMARK_CAPTURE(many_lights, path, "path", OptionValues())->RangeMultiplier(10)->Range(100, 100000);
+BENCHMARK_CAPTURE(many_lights, off, "controlled-path", OptionValues({{"cv", "off"}}))
+    ->RangeMultiplier(10)
+    ->Range(100, 100000);
+BENCHMARK_CAPTURE(many_lights, rgb, "controlled-path", OptionValues({{"cv", "rgb"}}))
+    ->RangeMultiplier(10)
+    ->Range(100, 100000);
 
 }  // namespace
 }  // namespace covary

@@ -22,6 +22,8 @@ const char* name_of(EstimatorOption::Type type) {
       return "real";
     case EstimatorOption::Type::kChoice:
       return "choice";
+    case EstimatorOption::Type::kText:
+      return "text";
   }
   return "";
 }

@@ -20,18 +20,12 @@ namespace {
 
 using Options = std::map<std::string, std::string>;
 
-/// A property of the <integrator> element from a Python value.
-Property property_of(const std::string& name, nb::handle value) {
-  Property property{name, {}, {"integrator_options", 0, 0}};
-  if (nb::isinstance<nb::bool_>(value))
-    property.value = nb::cast<bool>(value);
-  else if (nb::isinstance<nb::int_>(value))
-    property.value = nb::cast<int64_t>(value);
-  else if (nb::isinstance<nb::float_>(value))
-    property.value = nb::cast<double>(value);
-  else
-    property.value = nb::cast<std::string>(value);
-  return property;
+/// The value of an option as text.
+std::string option_text(const std::string& name, nb::handle value) {
+  if (nb::isinstance<nb::bool_>(value)) return nb::cast<bool>(value) ? "on" : "off";
+  if (nb::isinstance<nb::str>(value) || nb::isinstance<nb::int_>(value) || nb::isinstance<nb::float_>(value))
+    return nb::cast<std::string>(nb::str(value));
+  throw nb::type_error(("integrator_options['" + name + "']: accepted are bool, int, float and str").c_str());
 }
 
 struct SceneChoice {
@@ -47,14 +41,16 @@ std::shared_ptr<LoadedScene> load(const std::string& path, const SceneChoice& ch
   if (choice.resolution) {
     options.width = choice.resolution->first, options.height = choice.resolution->second;
   }
-  for (const auto& [name, value] : integrator_options)
-    options.integrator_properties.push_back(property_of(nb::cast<std::string>(name), value));
   if (!choice.integrator.empty() && !find_integrator(choice.integrator))
     throw Error(ErrorCode::kUsage, "integrator: " + unknown_integrator(choice.integrator));
   IntegratorChoice integrator;
   integrator.name = choice.integrator;
-  integrator.min_depth = choice.min_depth, integrator.max_depth = choice.max_depth;
-  integrator.tolerates_light = !choice.integrator.empty();
+  for (const auto& [key, value] : integrator_options) {
+    const std::string name = nb::cast<std::string>(key);
+    integrator.options[dashed(name)] = option_text(name, value);
+  }
+  if (choice.min_depth) integrator.options["min-depth"] = std::to_string(*choice.min_depth);
+  if (choice.max_depth) integrator.options["max-depth"] = std::to_string(*choice.max_depth);
   options.make_integrator = integrator_maker(integrator);
   auto scene = std::make_shared<LoadedScene>();
   run_work([&](WorkState&) { *scene = load_scene(path, options); }, nb::none());

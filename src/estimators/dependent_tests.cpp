@@ -222,7 +222,7 @@ int dependent_tests_reach(const DependentTestsOptions& options) {
 namespace {
 
 /// Options that others leave without an effect.
-void check_effects(const EstimatorParameters& p, const DependentTestsOptions& o) {
+void check_effects(EstimatorParameters& p, const DependentTestsOptions& o) {
   const bool exact = o.filter == DependentFilter::kExact;
   p.only_if(exact, {"window", "sigma-of", "guard"}, "with the published filter (--paper, --filter paper)");
   p.only_if(!exact, {"max-region", "min-centre-drop", "pyramid", "region-sides"},

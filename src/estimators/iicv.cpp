@@ -135,7 +135,7 @@ double iicv_bytes_per_pixel(const IicvOptions& options) {
 namespace {
 
 /// Options that others leave without an effect.
-void check_effects(const EstimatorParameters& p, const IicvOptions& o) {
+void check_effects(EstimatorParameters& p, const IicvOptions& o) {
   const bool homogeneous = o.penalty == Penalty::kHomogeneous, sample = o.penalty == Penalty::kSample;
   p.only_if(!homogeneous && !sample, {"pilot-window"},
             "with this --penalty: only pilot, smoothed and cross-fit have a pilot");
@@ -165,7 +165,7 @@ Estimator make_iicv(EstimatorParameters& parameters) {
                       : IicvOptions();
   p.whole("k", o.k, kVariatesRange, kVariatesHelp);
   p.whole("window", o.window, kWindowRange, kWindowHelp);
-  p.choice<Penalty>("penalty", o.penalty, kPenalties, "Error of the independent pixels", {"variance"});
+  p.choice<Penalty>("penalty", o.penalty, kPenalties, "Error of the independent pixels", {.aliases = {"variance"}});
   p.whole("pilot-window", o.pilot_window, kWindowRange, "Side of the pilot's window");
   p.real("ridge", o.ridge, {.low = 0, .above_low = true}, "Factor of the homogeneous penalty");
   if (p.flag("asymmetric", "Penalty of the neighbour alone, not averaged with the target's")) o.symmetric = false;

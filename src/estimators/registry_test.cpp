@@ -311,8 +311,8 @@ TEST(EstimatorRegistry, SaysWhatIsWrong) {
             "dependent-tests, polynomials, none");
   EXPECT_EQ(message("iduw", {{"k", "3"}}), "--k is an option of --estimator iicv, cv-baseline, not of iduw");
   EXPECT_EQ(message("iicv", {{"windwo", "3"}}), "--windwo is not an option of any estimator; did you mean 'window'?");
-  EXPECT_EQ(message("iicv", {{"k", "3x"}}), "--k '3x': expected a whole number");
-  EXPECT_EQ(message("iicv", {{"ridge", "nan"}}), "--ridge 'nan': expected a number");
+  EXPECT_EQ(message("iicv", {{"k", "3x"}}), "--k '3x': expected a whole number of at least 1");
+  EXPECT_EQ(message("iicv", {{"ridge", "nan"}}), "--ridge 'nan': expected a number above 0");
   EXPECT_EQ(message("iicv", {{"feedback", "of"}}), "--feedback 'of'; did you mean 'off' or 'on'?: expected on, off");
   EXPECT_TRUE(contains(message("iicv", {{"k", "500"}}), "k is 500, expected 1 to 121"));
   EXPECT_TRUE(contains(message("polynomials", {{"dimensions", "7"}}), "dimensions is 7, expected 1 to 6"));

@@ -229,7 +229,7 @@ void ask_for(EstimatorParameters& parameters, AdaptiveSampling& sampling) {
   EstimatorParameters& p = parameters;
   CountOptions& o = sampling.counts;
   p.whole("dependent-spp", sampling.first_spp, {.low = 1}, "Samples of the first pass; else half, up to 50 (not iicv)",
-          {"pilot-spp"});
+          {.aliases = {"pilot-spp"}});
   p.choice<Allocation>("allocation", o.allocation, kAllocations, "How pixels share the samples of the last pass");
   p.real("relative-error", o.relative_error, {.low = 0, .above_low = true},
          "Error that pixels shall have, as three standard deviations; --spp then is a limit");

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// What `controlled-path` can be told, by a scene file or on the command line.
+// The settings of `controlled-path`.
 #pragma once
 
 #include <cstdint>
-#include <optional>
-#include <string>
+#include <utility>
 
 #include "sampling/coefficient_cache.h"
 #include "sampling/light_set.h"
-#include "scene/parameters.h"
+#include "settings/settings.h"
 
 namespace covary {
 
@@ -19,19 +18,6 @@ enum class ControlKind {
   kVevoda,  ///< for light samples alone, one coefficient for each colour channel, after [Vevoda2018]
   /// Optimal MIS weights of each pixel's direct light, from the pixel's samples so far [Kondapaneni2019].
   kOptimalMis,
-};
-
-/// Settings given one by one; those that are not keep their values.
-struct ControlOptions {
-  std::optional<ControlKind> kind;
-  std::optional<LightSelection> lights;
-  std::optional<uint32_t> grid, train_spp, clusters, memory_mib;
-  std::optional<bool> relative, prefix, albedo, indirect;
-  bool paper = false;
-
-  /// Reads cv, cv_paper, lights, cv_grid, cv_train, cv_clusters, cv_variance, cv_prefix, cv_albedo,
-  /// cv_indirect and cv_memory.
-  static ControlOptions from(Parameters& parameters);
 };
 
 struct ControlSettings {
@@ -52,8 +38,6 @@ struct ControlSettings {
 
   /// Those of [Hua2023] and its authors' program: triangles, 64 cells, 16 samples per pixel.
   static ControlSettings published();
-  /// With other settings in place of those given; `paper` replaces all others first.
-  ControlSettings with(const ControlOptions& options) const;
 
   bool on() const { return kind != ControlKind::kOff; }
   /// Whether anything is learnt: coefficients, or how to choose lights.
@@ -64,20 +48,63 @@ struct ControlSettings {
   uint32_t pilot_spp() const { return learns() && relative && !per_pixel() ? (train_spp >= 4 ? 2 : train_spp / 2) : 0; }
   /// Whether each pixel has coefficients of its own, for the first surface, instead of each cell of space.
   bool per_pixel() const { return kind == ControlKind::kOptimalMis; }
+  /// Whether there is a coefficient of each light and technique for each cell.
+  bool has_cells() const { return kind == ControlKind::kRgb || kind == ControlKind::kMono; }
   /// Whether the coefficients of a vertex are multiplied by its albedo: where there is one for each cell.
-  bool by_albedo() const { return albedo && (kind == ControlKind::kRgb || kind == ControlKind::kMono); }
+  bool by_albedo() const { return albedo && has_cells(); }
   /// Whether light that other surfaces reflect is controlled by bins of directions, too.
-  bool controls_indirect() const { return indirect && (kind == ControlKind::kRgb || kind == ControlKind::kMono); }
+  bool controls_indirect() const { return indirect && has_cells(); }
   CacheSettings cache(uint32_t resolution) const;
   /// That of the bins of directions: wider cells, because there are many bins and their light is noisy.
   CacheSettings indirect_cache(uint32_t resolution) const;
-  std::string text() const;
 };
 
-/// "off", "rgb", "mono", "vevoda", "optimal-mis".
-std::string name_of(ControlKind kind);
-/// The one of that name, or nothing.
-std::optional<ControlKind> control_kind(const std::string& name);
-std::optional<LightSelection> light_selection(const std::string& name);
+inline constexpr std::pair<const char*, ControlKind> kControlKinds[] = {{"rgb", ControlKind::kRgb},
+                                                                        {"mono", ControlKind::kMono},
+                                                                        {"vevoda", ControlKind::kVevoda},
+                                                                        {"optimal-mis", ControlKind::kOptimalMis},
+                                                                        {"off", ControlKind::kOff}};
+
+inline void declare(Settings& s, ControlSettings& v) {
+  static constexpr std::pair<const char*, LightSelection> kSelections[] = {{"triangle", LightSelection::kTriangle},
+                                                                           {"shape", LightSelection::kShape},
+                                                                           {"power", LightSelection::kPower},
+                                                                           {"learned", LightSelection::kLearned}};
+  static constexpr std::pair<const char*, bool> kVariances[] = {{"relative", true}, {"absolute", false}};
+  s.group("Integrator controlled-path", true);
+  if (s.preset("cv-paper")) v = ControlSettings::published();
+  s.choice("cv", v.kind, kControlKinds,
+           "Control variates: one coefficient for each colour, for all, of light samples alone, by pixel for the first "
+           "surface, or none",
+           {.film = "cv={}"});
+  s.choice("lights", v.lights, kSelections,
+           "How lights are chosen: uniformly over emissive triangles, over shapes, by power, or as training tells",
+           {.film = "lights={}"});
+  s.flag("cv-paper", v.paper,
+         "The published method: --lights triangle --cv-grid 64 --cv-train 16, cells by position alone",
+         {.film = "paper"});
+  s.whole<uint32_t>(
+      "cv-grid", v.grid, {.low = 0, .high = CellGrid::kMaxResolution}, {"auto", ControlSettings::kAutomaticGrid},
+      "Cells along the longest side of the scene; auto: by the size of pixels, 32 to 256", {.film = "grid={}"});
+  s.whole("cv-train", v.train_spp, {.low = 1, .high = ControlSettings::kMaxTrainingSpp},
+          "Samples per pixel to learn from, a part of --spp", {.film = "train={}"});
+  s.whole("cv-clusters", v.clusters, {.low = 1, .high = 1 << 30}, "Most clusters of lights", {.film = "clusters={}"});
+  s.whole("cv-memory", v.memory_mib, {.low = 1, .high = 1 << 30},
+          "MiB of sums and coefficients while learning, then cells become wider", {.film = "memory={}"});
+  s.choice("cv-variance", v.relative, kVariances, "What is made least: relative or absolute variance",
+           {.film = "variance={}"});
+  s.on_off("cv-prefix", v.prefix, "Whether samples weigh by the throughput of the path before them",
+           {.film = "prefix={}"});
+  s.on_off("cv-albedo", v.albedo, "Whether coefficients are multiplied by the albedo of the surface",
+           {.film = "albedo"});
+  s.on_off("cv-indirect", v.indirect, "Whether light that other surfaces reflect is controlled, too",
+           {.film = "indirect"});
+  s.only_if(v.learns(), {"cv-paper", "cv-grid", "cv-train", "cv-clusters", "cv-memory", "cv-variance", "cv-prefix"},
+            "with --cv off: nothing is learnt (unless --lights learned)");
+  s.only_if(v.has_cells(), {"cv-albedo", "cv-indirect"},
+            "with this --cv: only rgb and mono have coefficients of cells");
+  s.only_if(!v.per_pixel(), {"cv-grid", "cv-variance", "cv-prefix"},
+            "with --cv optimal-mis: each pixel has coefficients of its own");
+}
 
 }  // namespace covary

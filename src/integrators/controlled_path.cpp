@@ -1,22 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // `controlled-path`: see controlled_path.h.
-//
-// | parameter     | type    | default  | meaning                                                               |
-// |---------------|---------|----------|-----------------------------------------------------------------------|
-// | max_depth     | integer | -1       | largest number of path edges; -1: no limit                            |
-// | rr_depth      | integer | 5        | number of edges after which roulette may end a path                   |
-// | hide_emitters | boolean | false    | lights are invisible to the camera                                    |
-// | cv            | string  | rgb      | control variates: `off`, `rgb`, `mono`, `vevoda`, `optimal-mis`       |
-// | cv_paper      | boolean | false    | the published method; other parameters change it                      |
-// | lights        | string  | power    | how lights are chosen: `triangle`, `shape`, `power`, `learned`        |
-// | cv_grid       | integer | 0        | cells along the longest side of the scene; 0: by the size of pixels   |
-// | cv_train      | integer | 16       | samples per pixel to learn from                                       |
-// | cv_clusters   | integer | 256      | most clusters of lights                                               |
-// | cv_variance   | string  | relative | what is made least: `relative` or `absolute` variance                 |
-// | cv_prefix     | boolean | true     | samples weigh by the throughput of the path before them               |
-// | cv_albedo     | boolean | true     | coefficients are multiplied by the albedo of the surface; rgb and mono |
-// | cv_indirect   | boolean | false    | control of light that other surfaces reflect, too; for rgb and mono   |
-// | cv_memory     | integer | 256      | MiB of sums and coefficients while training; then cells become wider  |
 #include "integrators/controlled_path.h"
 
 #include <algorithm>
@@ -185,11 +168,13 @@ void ControlledPath::update() {
 }
 
 std::string ControlledPath::settings_text() const {
-  return "controlled-path " + lengths_.text() + " " + settings_.text();
+  return "controlled-path " + lengths_.text() + " " + film_text_of(settings_);
 }
 
-std::shared_ptr<Integrator> make_controlled_path(Parameters& parameters, const PathLengthSettings& lengths) {
-  return std::make_shared<ControlledPath>(lengths, ControlSettings().with(ControlOptions::from(parameters)));
+std::shared_ptr<Integrator> make_controlled_path(Settings& settings, const PathLengthSettings& lengths) {
+  ControlSettings own;
+  declare(settings, own);
+  return std::make_shared<ControlledPath>(lengths, own);
 }
 
 }  // namespace covary

@@ -22,8 +22,6 @@ class ControlledPath : public LearningIntegrator {
       : lengths_(lengths), settings_(settings) {}
 
   const ControlSettings& settings() const { return settings_; }
-  /// Changes settings; before prepare().
-  void change(const ControlOptions& options) { settings_ = settings_.with(options); }
   const CoefficientCache& cache() const { return cache_; }
   std::string settings_text() const override;
   /// The coefficients in use.

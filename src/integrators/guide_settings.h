@@ -1,48 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
-// What `guided-path` can be told, by a scene file or on the command line.
+// The settings of `guided-path`.
 #pragma once
 
 #include <cstdint>
-#include <optional>
-#include <string>
+#include <utility>
 
 #include "integrators/control_settings.h"
 #include "sampling/guiding_field.h"
-#include "scene/parameters.h"
+#include "settings/settings.h"
 
 namespace covary {
 
-/// Which share of directions is drawn from the mixture of guiding.
-struct GuideFraction {
-  float value = 0.5f;    ///< in (0, 1), where it is not learned
-  bool learned = false;  ///< a fraction for each leaf of the field
-
-  /// Reads "learned" or a number in (0, 1); nothing for another text.
-  static std::optional<GuideFraction> from(const std::string& text);
-  std::string text() const;
-};
-
-/// Settings given one by one; those that are not keep their values.
-struct GuideOptions {
-  std::optional<uint32_t> lobes, leaf_samples, train_spp;
-  std::optional<GuideFraction> fraction;
-  std::optional<float> roughness;
-  std::optional<bool> nee;
-  std::optional<ControlKind> control;
-  std::optional<uint32_t> control_train_spp;
-
-  /// Reads guide_lobes, guide_leaf, guide_train, guide_fraction, guide_roughness, nee, cv and cv_train.
-  static GuideOptions from(Parameters& parameters);
-};
-
 struct GuideSettings {
   static constexpr uint32_t kMaxTrainingSpp = 1u << 16;
+  static constexpr float kLearnedFraction = 0;  ///< a fraction for each leaf of the field
   static constexpr uint32_t kMinLeafSamples = 200, kMaxLeafSamples = 1u << 22;
 
   uint32_t lobes = 16;  ///< of a leaf at first, 1 to VmfLobes::kMax; splitting makes up to twice as many
   uint32_t leaf_samples = GuidingSettings().leaf_samples;  ///< a leaf with more is split, kMinLeafSamples or more
   uint32_t train_spp = 16;                                 ///< samples per pixel to learn from
-  GuideFraction fraction;
+  float fraction = 0.5f;                    ///< of directions that are guided, in (0, 1), or kLearnedFraction
   float roughness = 0.3f;                   ///< lobes of BSDFs that are less rough are not guided
   bool nee = true;                          ///< light samples (next-event estimation)
   ControlKind control = ControlKind::kOff;  ///< control variates on the lobes: kOff, kRgb or kMono
@@ -53,9 +30,30 @@ struct GuideSettings {
   uint32_t training_spp() const { return train_spp + (controlled() ? control_train_spp : 0); }
   CacheSettings cache() const;
 
-  GuideSettings with(const GuideOptions& options) const;
+  bool learns_fraction() const { return fraction == kLearnedFraction; }
   GuidingSettings field() const;
-  std::string text() const;
 };
+
+inline void declare(Settings& s, GuideSettings& v) {
+  static constexpr std::pair<const char*, ControlKind> kControls[] = {
+      {"rgb", ControlKind::kRgb}, {"mono", ControlKind::kMono}, {"off", ControlKind::kOff}};
+  s.group("Integrator guided-path", true);
+  s.whole("guide-lobes", v.lobes, {.low = 1, .high = VmfLobes::kMax},
+          "Lobes of a leaf at first; splitting makes up to twice as many", {.film = "lobes={}"});
+  s.whole("guide-leaf", v.leaf_samples, {.low = GuideSettings::kMinLeafSamples, .high = GuideSettings::kMaxLeafSamples},
+          "Samples of a leaf; one with more is split", {.film = "leaf={}"});
+  s.whole("guide-train", v.train_spp, {.low = 1, .high = GuideSettings::kMaxTrainingSpp},
+          "Samples per pixel to learn from, a part of --spp", {.film = "train={}"});
+  s.real<float>("guide-fraction", v.fraction, {.low = 0, .high = 1, .above_low = true, .below_high = true},
+                {"learned", GuideSettings::kLearnedFraction}, "Fraction of guided directions, or learned for each leaf",
+                {.film = "fraction={}"});
+  s.real("guide-roughness", v.roughness, {.low = 0, .high = 1}, "Lobes of BSDFs that are less rough are not guided",
+         {.film = "roughness={:f}"});
+  s.on_off("nee", v.nee, "Light samples at each vertex (next-event estimation)", {.film = "nee={}"});
+  s.choice("cv", v.control, kControls, "Control variates on the lobes", {.film = "cv={}"});
+  s.whole("cv-train", v.control_train_spp, {.low = 1, .high = GuideSettings::kMaxTrainingSpp},
+          "Samples per pixel to learn their coefficients from, after the lobes", {.film = "cv_train={}"});
+  s.only_if(v.controlled(), {"cv-train"}, "without control variates (--cv rgb or mono)");
+}
 
 }  // namespace covary

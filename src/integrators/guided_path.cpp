@@ -1,19 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // `guided-path`: see guided_path.h.
-//
-// | parameter       | type          | default | meaning                                                             |
-// |-----------------|---------------|---------|---------------------------------------------------------------------|
-// | max_depth       | integer       | -1      | largest number of path edges; -1: no limit                          |
-// | rr_depth        | integer       | 5       | number of edges after which roulette may end a path                 |
-// | hide_emitters   | boolean       | false   | lights are invisible to the camera                                  |
-// | guide_lobes     | integer       | 16      | lobes of a leaf at first, 1 to 32; splitting makes up to twice many |
-// | guide_leaf      | integer       | 8000    | samples of a leaf of the tree; one with more is split               |
-// | guide_train     | integer       | 16      | samples per pixel to learn from                                     |
-// | guide_fraction  | string        | 0.5     | fraction of guided directions, or `learned`                         |
-// | guide_roughness | number        | 0.3     | lobes of BSDFs that are less rough are not guided                   |
-// | nee             | boolean       | true    | light samples (next-event estimation)                               |
-// | cv              | string        | off     | control variates on the lobes: `off`, `rgb`, `mono`                 |
-// | cv_train        | integer       | 32      | samples per pixel to learn their coefficients from, after the lobes |
 #include "integrators/guided_path.h"
 
 #include "core/content_hash.h"
@@ -32,11 +18,6 @@ struct SamplesRecord final : TrainingRecord {
 
 }  // namespace
 
-void GuidedPath::change(const GuideOptions& options) {
-  settings_ = settings_.with(options);
-  field_ = GuidingField(settings_.field());
-}
-
 void GuidedPath::prepare(const Scene& scene) {
   if (scene_ == &scene) return;
   scene_ = &scene;
@@ -45,8 +26,8 @@ void GuidedPath::prepare(const Scene& scene) {
   guided_ = {settings_.nee ? &lights_ : nullptr,
              compensated_ ? compensated_.get() : scene.environment(),
              &field(),
-             settings_.fraction.value,
-             settings_.fraction.learned,
+             settings_.fraction,
+             settings_.learns_fraction(),
              settings_.roughness,
              &table(),
              {}};
@@ -110,10 +91,14 @@ void GuidedPath::on_freeze() {
   field_.freeze(), cache_.freeze();
 }
 
-std::string GuidedPath::settings_text() const { return "guided-path " + lengths_.text() + " " + settings_.text(); }
+std::string GuidedPath::settings_text() const {
+  return "guided-path " + lengths_.text() + " " + film_text_of(settings_);
+}
 
-std::shared_ptr<Integrator> make_guided_path(Parameters& parameters, const PathLengthSettings& lengths) {
-  return std::make_shared<GuidedPath>(lengths, GuideSettings().with(GuideOptions::from(parameters)));
+std::shared_ptr<Integrator> make_guided_path(Settings& settings, const PathLengthSettings& lengths) {
+  GuideSettings own;
+  declare(settings, own);
+  return std::make_shared<GuidedPath>(lengths, own);
 }
 
 }  // namespace covary

@@ -21,8 +21,6 @@ class GuidedPath : public LearningIntegrator {
       : lengths_(lengths), settings_(settings), field_(settings.field()) {}
 
   const GuideSettings& settings() const { return settings_; }
-  /// Changes settings; before prepare().
-  void change(const GuideOptions& options);
   /// What was learnt so far, or given.
   const GuidingField& field() const { return given_ ? *given_ : field_; }
   /// Coefficients of control variates that were learnt so far, or given.

@@ -7,11 +7,13 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "core/arena.h"
 #include "core/random.h"
-#include "scene/parameters.h"
 #include "scene/scene.h"
+#include "settings/settings.h"
 
 namespace covary {
 
@@ -76,17 +78,25 @@ struct PathLengthSettings {
   int max_depth = kUnlimited;  ///< largest number of path edges; 1: directly visible light only; 0: black
   int rr_depth = 5;            ///< number of edges after which Russian roulette begins
   bool hide_emitters = false;  ///< lights are invisible to the camera
-  /// Reads max_depth (-1: unlimited), rr_depth and hide_emitters.
-  static PathLengthSettings from(Parameters& parameters);
   std::string text() const;
 };
+void declare(Settings& settings, PathLengthSettings& lengths);
 
-/// One integrator: how to make it from a scene's element, and which of its settings the command line may change.
+/// One integrator. `make` declares its own settings.
 struct IntegratorPlugin {
   const char* name;
-  std::shared_ptr<Integrator> (*make)(Parameters& parameters, const PathLengthSettings& lengths);
+  std::shared_ptr<Integrator> (*make)(Settings& settings, const PathLengthSettings& lengths);
 };
 /// All integrators, sorted by name.
 std::span<const IntegratorPlugin> integrator_plugins();
+/// The one of that name, or null.
+const IntegratorPlugin* find_integrator(std::string_view name);
+/// What their settings are: those of paths and those of their own. `name` is registered.
+std::vector<Option> options_of_integrator(const std::string& name);
+std::vector<std::string> integrator_names();
+/// Names of those that have the option, without dashes; empty where none has.
+std::vector<std::string> integrators_with_option(const std::string& option);
+/// Declares settings of paths and of the integrator, and makes it.
+std::shared_ptr<Integrator> make_integrator(const IntegratorPlugin& plugin, Settings& settings);
 
 }  // namespace covary

@@ -35,14 +35,6 @@ void trace_sorted(const Scene& scene, const LightTracingIntegrator& integrator, 
 
 }  // namespace
 
-LightTracingSettings LightTracingSettings::from(Parameters& parameters) {
-  LightTracingSettings settings;
-  const std::string mode = parameters.get_choice("light_tracing", "auto", {"auto", "on", "off"});
-  settings.mode = mode == "on" ? LightTracing::kOn : mode == "off" ? LightTracing::kOff : LightTracing::kAuto;
-  settings.paths_per_sample = parameters.get_float("light_paths", 1, 1e-3f, 1e3f);
-  return settings;
-}
-
 SplatPixel LightPaths::pixel_at(Vec2 film, Vec2 u) const {
   SplatPixel pixel = filter.pixel(film, u);
   const bool inside = pixel.x >= window.x && pixel.y >= window.y && pixel.x < window.x + window.width &&

@@ -4,10 +4,10 @@
 
 namespace covary {
 
-std::shared_ptr<Integrator> make_bdpt(Parameters&, const PathLengthSettings&);
-std::shared_ptr<Integrator> make_controlled_path(Parameters&, const PathLengthSettings&);
-std::shared_ptr<Integrator> make_guided_path(Parameters&, const PathLengthSettings&);
-std::shared_ptr<Integrator> make_path(Parameters&, const PathLengthSettings&);
+std::shared_ptr<Integrator> make_bdpt(Settings&, const PathLengthSettings&);
+std::shared_ptr<Integrator> make_controlled_path(Settings&, const PathLengthSettings&);
+std::shared_ptr<Integrator> make_guided_path(Settings&, const PathLengthSettings&);
+std::shared_ptr<Integrator> make_path(Settings&, const PathLengthSettings&);
 
 std::span<const IntegratorPlugin> integrator_plugins() {
   static constexpr IntegratorPlugin kPlugins[] = {
@@ -19,13 +19,48 @@ std::span<const IntegratorPlugin> integrator_plugins() {
   return kPlugins;
 }
 
-PathLengthSettings PathLengthSettings::from(Parameters& parameters) {
+const IntegratorPlugin* find_integrator(std::string_view name) {
+  for (const IntegratorPlugin& plugin : integrator_plugins())
+    if (name == plugin.name) return &plugin;
+  return nullptr;
+}
+
+std::vector<Option> options_of_integrator(const std::string& name) {
+  Settings settings;
+  make_integrator(*find_integrator(name), settings);
+  return settings.options();
+}
+
+std::vector<std::string> integrator_names() {
+  std::vector<std::string> names;
+  for (const IntegratorPlugin& plugin : integrator_plugins()) names.emplace_back(plugin.name);
+  return names;
+}
+
+std::vector<std::string> integrators_with_option(const std::string& option) {
+  std::vector<std::string> names;
+  for (const std::string& name : integrator_names())
+    if (find_option(options_of_integrator(name), option)) names.push_back(name);
+  return names;
+}
+
+std::shared_ptr<Integrator> make_integrator(const IntegratorPlugin& plugin, Settings& settings) {
   PathLengthSettings lengths;
-  const int max_depth = parameters.get_int("max_depth", -1, -1, kUnlimited);
-  lengths.max_depth = max_depth < 0 ? kUnlimited : max_depth;
-  lengths.rr_depth = parameters.get_int("rr_depth", 5, 1, kUnlimited);
-  lengths.hide_emitters = parameters.get_bool("hide_emitters", false);
-  return lengths;
+  declare(settings, lengths);
+  return plugin.make(settings, lengths);
+}
+
+void declare(Settings& s, PathLengthSettings& v) {
+  constexpr int kMost = 1 << 30;
+  int max_depth = v.max_depth == PathLengthSettings::kUnlimited ? -1 : v.max_depth;
+  s.group("Paths", true);
+  s.whole("max-depth", max_depth, {.low = -1, .high = kMost},
+          "Largest number of path edges: 1 is emission seen directly, 2 direct light; -1: no limit",
+          {.level = OptionLevel::kBasic});
+  s.whole("min-depth", v.min_depth, {.low = 0, .high = kMost}, "Leave out paths with fewer edges than this");
+  s.whole("rr-depth", v.rr_depth, {.low = 1, .high = kMost}, "Edges after which Russian roulette may end a path");
+  s.on_off("hide-emitters", v.hide_emitters, "Whether lights that the camera sees directly are black");
+  v.max_depth = max_depth < 0 ? PathLengthSettings::kUnlimited : max_depth;
 }
 
 std::string PathLengthSettings::text() const {

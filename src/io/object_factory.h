@@ -59,8 +59,8 @@ const Plugin<T>* find_plugin(std::span<const Plugin<T>> plugins, const ObjectDes
   return nullptr;
 }
 
-/// What `make(parameters)` returns. Records what it throws; reports parameters nobody asked for when it does not throw
-/// (otherwise it may not have come to ask).
+/// What `make(parameters)` returns. Records what it throws, but for what the caller did wrong; reports parameters that
+/// nobody asked for when it does not throw (otherwise it may not have come to ask).
 template <typename Make>
 auto make_checked(Parameters& parameters, Make&& make) -> decltype(make(parameters)) {
   try {
@@ -68,7 +68,7 @@ auto make_checked(Parameters& parameters, Make&& make) -> decltype(make(paramete
     parameters.report_unknown();
     return object;
   } catch (const Error& error) {
-    if (error.code() == ErrorCode::kInternal) throw;
+    if (error.code() == ErrorCode::kInternal || error.code() == ErrorCode::kUsage) throw;
     parameters.error(error.what());
     return nullptr;
   }

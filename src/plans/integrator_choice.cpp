@@ -2,52 +2,52 @@
 #include "plans/integrator_choice.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <vector>
 
 #include "core/error.h"
-#include "integrators/controlled_path.h"
-#include "integrators/guided_path.h"
-#include "integrators/light_pass.h"
+#include "scene/property_source.h"
 
 namespace covary {
+namespace {
+
+void check_belong(const std::string& integrator, const OptionValues& options) {
+  const std::vector<Option> own = options_of_integrator(integrator);
+  for (const auto& [name, value] : options) {
+    if (find_option(own, name)) continue;
+    const std::vector<std::string> owners = integrators_with_option(name);
+    if (!owners.empty())
+      throw Error(ErrorCode::kUsage, fmt::format("--{} is an option of --integrator {}, not of {}", name,
+                                                 fmt::join(owners, ", "), integrator));
+    std::vector<std::string> names;
+    for (const Option& option : own) names.push_back(option.name);
+    throw Error(ErrorCode::kUsage,
+                fmt::format("--{} is not an option of any integrator{}", name, did_you_mean(name, names)));
+  }
+}
+
+}  // namespace
 
 std::function<std::shared_ptr<SceneObject>(Parameters&)> integrator_maker(const IntegratorChoice& choice) {
   return [choice](Parameters& parameters) -> std::shared_ptr<SceneObject> {
-    PathLengthSettings lengths = PathLengthSettings::from(parameters);
-    if (choice.min_depth) lengths.min_depth = *choice.min_depth;
-    if (choice.max_depth)
-      lengths.max_depth = *choice.max_depth < 0 ? PathLengthSettings::kUnlimited : *choice.max_depth;
-    const IntegratorPlugin* plugin = find_integrator(choice.name.empty() ? parameters.type() : choice.name);
+    const std::string& of_scene = parameters.type();
+    const std::string& name = choice.name.empty() ? of_scene : choice.name;
+    const IntegratorPlugin* plugin = find_integrator(name);
     if (!plugin) {
-      parameters.error(unknown_integrator(parameters.type()));
+      parameters.error(unknown_integrator(name));
       return nullptr;
     }
-    if (choice.tolerates_light) LightTracingSettings::from(parameters), parameters.get_string("heuristic", "");
-    const std::shared_ptr<Integrator> integrator = plugin->make(parameters, lengths);
-    if (auto* controlled = dynamic_cast<ControlledPath*>(integrator.get()); controlled && choice.control)
-      controlled->change(*choice.control);
-    if (auto* guided = dynamic_cast<GuidedPath*>(integrator.get())) {
-      if (choice.guide) guided->change(*choice.guide);
-      if (choice.control) {
-        GuideOptions control;
-        control.control = choice.control->kind, control.control_train_spp = choice.control->train_spp;
-        guided->change(control);
-      }
-    }
-    return integrator;
+    check_belong(name, choice.options);
+    if (name != of_scene && find_integrator(of_scene)) ignore_properties(parameters, options_of_integrator(of_scene));
+    PropertySource source(parameters, choice.options);
+    Settings settings(source);
+    return make_integrator(*plugin, settings);
   };
 }
 
-const IntegratorPlugin* find_integrator(const std::string& name) {
-  for (const IntegratorPlugin& plugin : integrator_plugins())
-    if (name == plugin.name) return &plugin;
-  return nullptr;
-}
-
 std::string unknown_integrator(const std::string& name) {
-  std::vector<std::string> names;
-  for (const IntegratorPlugin& plugin : integrator_plugins()) names.emplace_back(plugin.name);
+  const std::vector<std::string> names = integrator_names();
   return fmt::format("unknown integrator '{}'{}; supported: {}", name, did_you_mean(name, names),
                      fmt::join(names, ", "));
 }

@@ -16,6 +16,7 @@
 #include "film/film_file.h"
 #include "film/splat_layer.h"
 #include "plans/memory.h"
+#include "scene/property_source.h"
 #include "support/files.h"
 #include "support/light_tracer.h"
 #include "support/plans.h"
@@ -33,7 +34,7 @@ constexpr int kWidth = 24, kHeight = 16;
 LoadedScene light_scene(LightTracing mode = LightTracing::kAuto, double paths = 1) {
   LoadOptions options;
   options.make_integrator = [&](Parameters& parameters) {
-    PathLengthSettings lengths = PathLengthSettings::from(parameters);
+    PathLengthSettings lengths = read_settings<PathLengthSettings>(parameters);
     lengths.max_depth = 3;
     return std::make_shared<LightTracer>(LightTracingSettings{mode, paths}, lengths, 0.5f);
   };

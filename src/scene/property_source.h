@@ -30,6 +30,15 @@ class PropertySource final : public SettingsSource {
   bool only_caller_ = false;
 };
 
+/// Settings that have a declare(), as the properties say.
+template <typename T>
+T read_settings(Parameters& parameters, T settings = {}) {
+  PropertySource source(parameters);
+  Settings reader(source);
+  declare(reader, settings);
+  return settings;
+}
+
 /// Makes the properties of these options known, so that they are no error: they are those of an object that another one
 /// takes the place of.
 void ignore_properties(Parameters& parameters, const std::vector<Option>& options);

@@ -19,6 +19,7 @@
 #include "integrators/integrator.h"
 #include "integrators/render_pass.h"
 #include "io/load_scene.h"
+#include "scene/property_source.h"
 #include "statistics/p_values.h"
 
 namespace covary {
@@ -61,9 +62,11 @@ std::vector<Means> render(const std::string& scene_path, const nlohmann::json& r
   LoadOptions options;
   options.width = reference["width"], options.height = reference["height"];
   options.make_integrator = [](Parameters& parameters) -> std::shared_ptr<SceneObject> {
-    for (const IntegratorPlugin& plugin : integrator_plugins())
-      if (parameters.type() == plugin.name) return plugin.make(parameters, PathLengthSettings::from(parameters));
-    throw Error(ErrorCode::kInput, "no integrator '" + parameters.type() + "'");
+    const IntegratorPlugin* plugin = find_integrator(parameters.type());
+    if (!plugin) throw Error(ErrorCode::kInput, "no integrator '" + parameters.type() + "'");
+    PropertySource source(parameters);
+    Settings settings(source);
+    return make_integrator(*plugin, settings);
   };
   const LoadedScene loaded = load_scene(scene_path, options);
   auto& integrator = dynamic_cast<Integrator&>(*loaded.integrator);

@@ -16,15 +16,23 @@ PLAIN = (*RENDER, "--estimator", "none", "--cv-train", "4")
 
 class Options(CliTest):
     def test_refuses_options_of_another_integrator(self):
-        self.bad(2, "--cv is an option of --integrator controlled-path, not of path", "render", ROOM, "-o", "a.exr",
-                 "--cv", "off")
+        self.bad(2, "--cv is an option of --integrator controlled-path, guided-path, not of path", "render", ROOM,
+                 "-o", "a.exr", "--cv", "off")
         self.bad(2, "--lights is an option of --integrator controlled-path, not of bdpt", "render", ROOM, "-o",
                  "a.exr", "--integrator", "bdpt", "--lights", "power")
 
     def test_refuses_grids_of_no_cells(self):
-        for grid in ("0", "-1", "half", "65537"):
-            self.bad(2, f"--cv-grid '{grid}': expected auto or a whole number from 1 to 65536", *RENDER, "-o", "a.exr",
+        for grid in ("-1", "half", "65537"):
+            self.bad(2, f"--cv-grid: '{grid}': expected auto or a whole number from 0 to 65536", *RENDER, "-o", "a.exr",
                      "--cv-grid=" + grid)
+
+    def test_refuses_options_without_effect(self):
+        for option, *others in (("--cv-grid", "8", "--cv", "off"), ("--cv-albedo", "off", "--cv", "vevoda"),
+                                ("--cv-indirect", "on", "--cv", "vevoda"), ("--cv-prefix", "on", "--cv", "optimal-mis"),
+                                ("--cv-variance", "absolute", "--cv", "optimal-mis")):
+            self.bad(2, f"{option} has no effect with", *RENDER, "-o", "a.exr", option, *others)
+        self.good(*RENDER, "--estimator", "none", "--spp", "20", "-o", "a.exr", "--cv", "off", "--lights", "learned",
+                  "--cv-train", "8")
 
     def test_refuses_more_training_than_samples(self):
         self.bad(2, "16 samples per pixel, of which the training takes 16, leave none for the image", *RENDER, "-o",

@@ -23,7 +23,7 @@ class Options(CliTest):
         self.bad(2, "--integrator controlled-path, not of guided-path", *PLAIN, "-o", "a.exr", "--cv-grid", "8")
 
     def test_control_variates(self):
-        self.bad(2, "--cv vevoda: guided-path knows rgb, mono and off", *PLAIN, "-o", "a.exr", "--cv", "vevoda")
+        self.bad(2, "--cv 'vevoda': expected rgb, mono, off", *PLAIN, "-o", "a.exr", "--cv", "vevoda")
         self.good(*PLAIN, "--cv", "rgb", "--cv-train", "8", "--spp", "20", "-o", "a.exr", "--json", "a.json")
         report = json.loads((self.path / "a.json").read_text())
         self.assertEqual((report["samples_per_pixel"], report["training_samples_per_pixel"]), (8, 12))
@@ -39,7 +39,7 @@ class Options(CliTest):
 
     def test_refuses_impossible_fractions(self):
         for fraction in ("0", "1", "-0.5", "much", "nan", "0.5x"):
-            self.bad(2, f"--guide-fraction '{fraction}': expected learned or a number above 0 and below 1", *PLAIN,
+            self.bad(2, f"--guide-fraction: '{fraction}': expected learned or a number above 0 and below 1", *PLAIN,
                      "-o", "a.exr", "--guide-fraction=" + fraction)
 
     def test_refuses_impossible_numbers(self):

@@ -96,10 +96,11 @@ class Render(LightTest):
         self.bad(2, "there are no light paths", "render", CAUSTIC, "--replay-light", "0")
 
     def test_other_integrators_have_no_such_options(self):
-        for option in (("--light-tracing", "on"), ("--light-paths", "2"), ("--heuristic", "balance"),
-                       ("--replay-light", "3")):
-            self.bad(2, f"{option[0]} is an option of integrators that trace light; 'path' does not", "render", CAUSTIC,
+        for option in (("--light-tracing", "on"), ("--light-paths", "2"), ("--heuristic", "balance")):
+            self.bad(2, f"{option[0]} is an option of --integrator bdpt, not of path", "render", CAUSTIC,
                      "--integrator", "path", "-o", "a.exr", *option)
+        self.bad(2, "--replay-light is an option of integrators that trace light; 'path' does not", "render", CAUSTIC,
+                 "--integrator", "path", "-o", "a.exr", "--replay-light", "3")
         self.bad(2, "--light-paths", "render", CAUSTIC, "-o", "a.exr", "--light-paths", "0")
         self.bad(2, "'yes': expected auto, on, off", "render", CAUSTIC, "-o", "a.exr", "--light-tracing", "yes")
         self.assertNotIn("light_paths", self.render("-o", "a.exr", "--integrator", "path", "--spp", "24"))

@@ -80,16 +80,16 @@ class WithBug final : public ControlledPath {
   }
 };
 
-ControlOptions options(ControlKind kind, LightSelection lights = LightSelection::kPower) {
-  ControlOptions result;
+ControlSettings options(ControlKind kind, LightSelection lights = LightSelection::kPower) {
+  ControlSettings result;
   result.kind = kind, result.lights = lights, result.train_spp = 8, result.grid = 8;
   return result;
 }
 
 template <typename Parts = ControlledParts>
-TestScene controlled(const std::string& xml, const ControlOptions& options) {
+TestScene controlled(const std::string& xml, const ControlSettings& options) {
   return load_text(xml, 0, [&](const PathLengthSettings& lengths) -> std::shared_ptr<Integrator> {
-    return std::make_shared<WithBug<Parts>>(lengths, ControlSettings().with(options));
+    return std::make_shared<WithBug<Parts>>(lengths, options);
   });
 }
 
@@ -135,7 +135,7 @@ TestScene with_coefficients(const std::string& xml, bool random) {
 }
 
 /// Trained as a render trains it, but for the importance of pixels.
-TestScene trained(const std::string& xml, const ControlOptions& options) {
+TestScene trained(const std::string& xml, const ControlSettings& options) {
   TestScene scene = controlled(xml, options);
   const LoadedScene& l = scene.loaded;
   EXPECT_TRUE(
@@ -199,7 +199,7 @@ TEST(ControlledPath, TrainedAgreesWithPath) {
   EXPECT_EQ(n_biased(differences(on, off, 16, 0)), 0);
   EXPECT_EQ(n_biased(differences(on, path, 16, 100)), 0);
   for (const ControlKind kind : {ControlKind::kMono, ControlKind::kVevoda, ControlKind::kOptimalMis})
-    EXPECT_EQ(n_biased(differences(trained(everything(), options(kind)), off, 16, 0)), 0) << name_of(kind);
+    EXPECT_EQ(n_biased(differences(trained(everything(), options(kind)), off, 16, 0)), 0) << static_cast<int>(kind);
 }
 
 // Each seed trains anew, and the samples of the training are a part of the image.
@@ -218,7 +218,7 @@ TEST(ControlledPath, TrainedOnTheFlyAgreesWithPath) {
     };
   };
   for (const bool paper : {false, true}) {
-    ControlOptions wanted = options(ControlKind::kRgb);
+    ControlSettings wanted = options(ControlKind::kRgb);
     wanted.paper = paper;
     const TestScene scene = controlled(everything(), wanted);
     const auto by_path = [&](uint64_t seed) { return render(path, 16, seed + 100).mean_image(); };
@@ -240,8 +240,8 @@ TEST(ControlledPath, HasLessNoiseWhereLightsDiffer) {
   EXPECT_LT(rgb, 0.5 * plain);
 }
 
-ControlOptions with_albedo(bool on, ControlKind kind = ControlKind::kRgb) {
-  ControlOptions result = options(kind);
+ControlSettings with_albedo(bool on, ControlKind kind = ControlKind::kRgb) {
+  ControlSettings result = options(kind);
   result.albedo = on, result.train_spp = 32;
   return result;
 }
@@ -257,7 +257,7 @@ TEST(ControlledPath, AlbedoTellsTexturesApart) {
     const std::string& scene = kind == ControlKind::kRgb ? white : board;
     EXPECT_TRUE(same_bits(render(trained(scene, with_albedo(true, kind)), 2, 0),
                           render(trained(scene, with_albedo(false, kind)), 2, 0)))
-        << name_of(kind);
+        << static_cast<int>(kind);
   }
 }
 
@@ -297,8 +297,8 @@ std::string indirect_room() {
                     kSide, kSide, 4, kWide);
 }
 
-ControlOptions with_indirect(ControlKind kind = ControlKind::kRgb) {
-  ControlOptions result = options(kind);
+ControlSettings with_indirect(ControlKind kind = ControlKind::kRgb) {
+  ControlSettings result = options(kind);
   result.indirect = true, result.train_spp = 32;
   return result;
 }
@@ -352,7 +352,7 @@ TEST(ControlledPath, IndirectLightIsControlledWithoutBias) {
   for (const ControlKind kind : {ControlKind::kRgb, ControlKind::kMono})
     EXPECT_EQ(n_biased(differences(trained(indirect_room(), with_indirect(kind)), load_text(indirect_room()), 8, 100)),
               0);
-  ControlOptions direct = with_indirect();
+  ControlSettings direct = with_indirect();
   direct.indirect = false;
   EXPECT_LT(noise(trained(indirect_room(), with_indirect())), 0.8 * noise(trained(indirect_room(), direct)));
 }
@@ -373,18 +373,18 @@ TEST(ControlledPath, IndirectControlHasTheSameBitsForAnyNumberOfThreads) {
 /// Kinds of control that have no cells of their own, and paths without other surfaces, have nothing to add.
 TEST(ControlledPath, IndirectControlNeedsCellsAndPathsOfThreeEdges) {
   for (const ControlKind kind : {ControlKind::kOff, ControlKind::kVevoda, ControlKind::kOptimalMis}) {
-    ControlOptions without = with_indirect(kind);
+    ControlSettings without = with_indirect(kind);
     without.indirect = false;
     EXPECT_TRUE(same_bits(render(trained(everything(), with_indirect(kind)), 2, 0),
                           render(trained(everything(), without), 2, 0)))
-        << name_of(kind);
+        << static_cast<int>(kind);
   }
   const TestScene direct_light = trained(coloured_lights(), with_indirect());  // at most 2 edges
   EXPECT_EQ(integrator_of(direct_light).indirect_table().n_cells(), 0u);
 }
 
 TEST(ControlledPath, PixelsHaveOptimalWeightsOfTheirOwn) {
-  ControlOptions many = options(ControlKind::kOptimalMis);
+  ControlSettings many = options(ControlKind::kOptimalMis);
   many.train_spp = 64;
   const TestScene scene = trained(coloured_lights(), many);
   const CoefficientTable& table = integrator_of(scene).table();
@@ -411,7 +411,7 @@ TEST(ControlledPath, LearnsHowToChooseLights) {
   const TestScene power = with_coefficients(hidden_light(), false);
   for (const ControlKind kind : {ControlKind::kOff, ControlKind::kRgb}) {
     const TestScene learned = trained(hidden_light(), options(kind, LightSelection::kLearned));
-    EXPECT_GT(integrator_of(learned).lights()[1].pmf, 0.7) << name_of(kind);
+    EXPECT_GT(integrator_of(learned).lights()[1].pmf, 0.7) << static_cast<int>(kind);
     EXPECT_LT(integrator_of(power).lights()[1].pmf, 0.1);
     EXPECT_LT(noise(learned), 0.4 * noise(power));
     EXPECT_EQ(n_biased(differences(learned, power, 16, 0)), 0);
@@ -455,7 +455,7 @@ TEST(ControlledPath, SameBitsForAnyNumberOfThreads) {
 }
 
 /// Trains and renders; the mean of the image.
-double trained_mean(const std::string& xml, const ControlOptions& wanted = options(ControlKind::kRgb)) {
+double trained_mean(const std::string& xml, const ControlSettings& wanted = options(ControlKind::kRgb)) {
   return image_mean(render(trained(xml, wanted), 2, 0));
 }
 
@@ -489,7 +489,7 @@ TEST(ControlledPath, LeavesOutTrainingSamplesThatAreNotFinite) {
 }
 
 TEST(ControlledPath, KeepsToItsMemoryByWiderCells) {
-  ControlOptions little = options(ControlKind::kRgb);
+  ControlSettings little = options(ControlKind::kRgb);
   little.grid = 4096, little.memory_mib = 1;
   const TestScene scene = trained(everything(), little);
   EXPECT_GT(integrator_of(scene).cache().n_coarsened(), 0u);
@@ -497,7 +497,7 @@ TEST(ControlledPath, KeepsToItsMemoryByWiderCells) {
 }
 
 TEST(ControlledPath, IsToldApartByItsTraining) {
-  ControlOptions longer = options(ControlKind::kRgb);
+  ControlSettings longer = options(ControlKind::kRgb);
   longer.train_spp = 4;
   const TestScene scene = controlled(everything(), options(ControlKind::kRgb));
   EXPECT_NE(scene.integrator().description().find("untrained"), std::string::npos);

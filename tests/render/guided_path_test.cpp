@@ -46,14 +46,14 @@ class WithBug final : public GuidedPath {
   }
 };
 
-GuideOptions options(bool nee, const char* fraction = "0.5", uint32_t train_spp = 16) {
-  GuideOptions result;
-  result.nee = nee, result.fraction = GuideFraction::from(fraction), result.train_spp = train_spp;
+GuideSettings options(bool nee, float fraction = 0.5f, uint32_t train_spp = 16) {
+  GuideSettings result;
+  result.nee = nee, result.fraction = fraction, result.train_spp = train_spp;
   return result;
 }
 
-GuideOptions controlled(bool nee, ControlKind kind = ControlKind::kRgb) {
-  GuideOptions result = options(nee);
+GuideSettings controlled(bool nee, ControlKind kind = ControlKind::kRgb) {
+  GuideSettings result = options(nee);
   result.control = kind;
   return result;
 }
@@ -61,9 +61,9 @@ GuideOptions controlled(bool nee, ControlKind kind = ControlKind::kRgb) {
 GuidedPath& integrator_of(const TestScene& scene) { return dynamic_cast<GuidedPath&>(*scene.loaded.integrator); }
 
 template <typename Parts = GuidedParts>
-TestScene guided(const std::string& xml, const GuideOptions& options) {
+TestScene guided(const std::string& xml, const GuideSettings& options) {
   return load_text(xml, 0, [&](const PathLengthSettings& lengths) -> std::shared_ptr<Integrator> {
-    return std::make_shared<WithBug<Parts>>(lengths, GuideSettings().with(options));
+    return std::make_shared<WithBug<Parts>>(lengths, options);
   });
 }
 
@@ -72,7 +72,7 @@ bool train_scene(const TestScene& scene) {
   return train(scene.scene(), integrator_of(scene), {{l.crop_x, l.crop_y, l.crop_width, l.crop_height}, l.filter});
 }
 
-TestScene trained(const std::string& xml, const GuideOptions& options) {
+TestScene trained(const std::string& xml, const GuideSettings& options) {
   TestScene scene = guided(xml, options);
   EXPECT_TRUE(train_scene(scene));
   return scene;
@@ -80,7 +80,7 @@ TestScene trained(const std::string& xml, const GuideOptions& options) {
 
 /// The field that another scene's integrator has learnt, used with a bug.
 template <typename Parts>
-TestScene with_bug(const std::string& xml, const GuideOptions& options, const TestScene& learnt) {
+TestScene with_bug(const std::string& xml, const GuideSettings& options, const TestScene& learnt) {
   TestScene scene = guided<Parts>(xml, options);
   integrator_of(scene).use_bytes(integrator_of(learnt).trained_bytes(), "the other scene");
   EXPECT_TRUE(train_scene(scene));
@@ -91,7 +91,7 @@ const std::string kRoulette = "<integer name='rr_depth' value='3'/>";
 
 TEST(GuidedPath, AgreesWithPathWithLightSamples) {
   const TestScene path = load_text(everything());
-  for (const char* fraction : {"0.5", "learned"}) {
+  for (const float fraction : {0.5f, GuideSettings::kLearnedFraction}) {
     const TestScene scene = trained(everything(), options(true, fraction));
     const Differences right = differences(scene, path, 16, 100);
     EXPECT_EQ(n_biased(right), 0) << fraction;
@@ -101,7 +101,7 @@ TEST(GuidedPath, AgreesWithPathWithLightSamples) {
 
 TEST(GuidedPath, AgreesWithPathWithoutLightSamples) {
   const std::string xml = everything(kRoulette, false);
-  const TestScene path = load_text(xml), scene = trained(xml, options(false, "0.5", 48));
+  const TestScene path = load_text(xml), scene = trained(xml, options(false, 0.5f, 48));
   EXPECT_GE(integrator_of(scene).field().n_leaves(), 2u);
   const Differences right = differences(scene, path, 32, 100);
   EXPECT_EQ(n_biased(right), 0);
@@ -114,9 +114,9 @@ TEST(GuidedPath, HasLessNoiseWhereLightIsHardToFind) {
   const std::string xml =
       scene_text(kFloor + sphere("x='0' y='6' z='3'", "<float name='radius' value='0.3'/><emitter type='area'/>"),
                  kSide, kSide, 2, kWide);
-  const double hardly = noise(trained(xml, options(false, "0.01"))), half = noise(trained(xml, options(false)));
+  const double hardly = noise(trained(xml, options(false, 0.01f))), half = noise(trained(xml, options(false)));
   EXPECT_LT(half, 0.2 * hardly);
-  EXPECT_LT(noise(trained(xml, options(false, "learned"))), 0.7 * half);
+  EXPECT_LT(noise(trained(xml, options(false, GuideSettings::kLearnedFraction))), 0.7 * half);
 }
 
 TEST(GuidedPath, ControlledAgreesWithPath) {
@@ -124,7 +124,7 @@ TEST(GuidedPath, ControlledAgreesWithPath) {
   for (const ControlKind kind : {ControlKind::kRgb, ControlKind::kMono}) {
     const TestScene scene = trained(everything(), controlled(true, kind));
     EXPECT_GE(integrator_of(scene).table().n_cells(), 2u);
-    EXPECT_EQ(n_biased(differences(scene, path, 16, 100)), 0) << name_of(kind);
+    EXPECT_EQ(n_biased(differences(scene, path, 16, 100)), 0) << static_cast<int>(kind);
   }
 }
 
@@ -154,8 +154,8 @@ TEST(GuidedPath, SameBitsForAnyNumberOfThreads) {
   std::optional<Film> film;
   for (const size_t threads : {1, 2, 5}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    GuideOptions wanted = controlled(true);
-    wanted.fraction = GuideFraction{0.5f, true};
+    GuideSettings wanted = controlled(true);
+    wanted.fraction = GuideSettings::kLearnedFraction;
     const TestScene scene = trained(everything(), wanted);
     const Film next = render(scene, 4, 3);
     if (!film) film.emplace(next), description = scene.integrator().description();
@@ -175,12 +175,12 @@ TEST(GuidedPath, AFieldOfAFileTakesThePlaceOfATraining) {
 
 TEST(GuidedPath, IsToldApartByItsTraining) {
   EXPECT_NE(guided(everything(), options(true)).integrator().description().find("untrained"), std::string::npos);
-  EXPECT_NE(trained(everything(), options(true, "0.5", 4)).integrator().description(),
-            trained(everything(), options(true, "0.5", 8)).integrator().description());
+  EXPECT_NE(trained(everything(), options(true, 0.5f, 4)).integrator().description(),
+            trained(everything(), options(true, 0.5f, 8)).integrator().description());
 }
 
 double trained_mean(const std::string& xml, bool nee) {
-  GuideOptions wanted = options(nee, "learned", 4);
+  GuideSettings wanted = options(nee, GuideSettings::kLearnedFraction, 4);
   wanted.control = ControlKind::kRgb, wanted.control_train_spp = 12;
   return image_mean(render(trained(xml, wanted), 2, 0));
 }

@@ -13,13 +13,13 @@ namespace covary {
 namespace {
 
 double noise_under(const std::string& sky, ControlKind control) {
-  GuideOptions guide;
+  GuideSettings guide;
   guide.nee = false, guide.leaf_samples = 300000, guide.train_spp = 48;
   guide.control = control, guide.control_train_spp = 48;
   LoadOptions options;
   options.defines = {{"sky", sky}};
   options.make_integrator = [&](Parameters& parameters) -> std::shared_ptr<SceneObject> {
-    return std::make_shared<GuidedPath>(PathLengthSettings::from(parameters), GuideSettings().with(guide));
+    return std::make_shared<GuidedPath>(read_settings<PathLengthSettings>(parameters), guide);
   };
   const TestScene scene = load_file(std::string(COVARY_SOURCE_DIR) + "/scenes/plane-under-sky.xml", options);
   auto& integrator = dynamic_cast<GuidedPath&>(*scene.loaded.integrator);

@@ -13,6 +13,7 @@
 #include "integrators/integrator.h"
 #include "integrators/render_pass.h"
 #include "io/load_scene.h"
+#include "scene/property_source.h"
 #include "support/files.h"
 
 namespace covary {
@@ -34,11 +35,15 @@ inline TestScene load_file(const std::string& file, const LoadOptions& options) 
 /// The integrator that a scene names, with its own settings.
 inline std::shared_ptr<Integrator> scene_integrator(Parameters& parameters, const PathLengthSettings& lengths) {
   for (const IntegratorPlugin& plugin : integrator_plugins())
-    if (parameters.type() == plugin.name) return plugin.make(parameters, lengths);
+    if (parameters.type() == plugin.name) {
+      PropertySource source(parameters);
+      Settings settings(source);
+      return plugin.make(settings, lengths);
+    }
   return nullptr;
 }
 inline std::shared_ptr<Integrator> scene_integrator(Parameters& parameters) {
-  return scene_integrator(parameters, PathLengthSettings::from(parameters));
+  return scene_integrator(parameters, read_settings<PathLengthSettings>(parameters));
 }
 
 using MakeIntegrator = std::function<std::shared_ptr<Integrator>(const PathLengthSettings&)>;
@@ -49,7 +54,7 @@ inline TestScene load_text(const std::string& xml, int min_depth = 0, const Make
   std::ofstream(file) << xml;
   LoadOptions options;
   options.make_integrator = [&](Parameters& parameters) -> std::shared_ptr<SceneObject> {
-    PathLengthSettings lengths = PathLengthSettings::from(parameters);
+    PathLengthSettings lengths = read_settings<PathLengthSettings>(parameters);
     lengths.min_depth = min_depth;
     return make ? make(lengths) : scene_integrator(parameters, lengths);
   };

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "declared_options.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "integrators/integrator.h"
+
+namespace covary {
+namespace {
+
+/// "--cv-grid", "-o,--output".
+std::string names_of(const Option& option) {
+  std::string names;
+  for (const std::string& alias : option.aliases)
+    if (alias.size() == 1) names += "-" + alias + ",";
+  names += "--" + option.name;
+  for (const std::string& alias : option.aliases)
+    if (alias.size() > 1) names += ",--" + alias;
+  return names;
+}
+
+/// What the help shows behind the name.
+std::string value_name(const Option& option) {
+  if (option.type == Option::Type::kChoice) return fmt::format("{{{}}}", fmt::join(option.choices, ","));
+  if (option.type == Option::Type::kText) return option.form;
+  return (option.choices.empty() ? "" : option.choices[0] + "|") +
+         (option.type == Option::Type::kWhole ? "INT" : "FLOAT");
+}
+
+CLI::Validator checked(const Option& option) {
+  const auto check = [option](std::string& text) -> std::string {
+    const std::optional<std::string> value = accepted(option, text);
+    if (!value) return problem_of(option, text);
+    text = *value;
+    return "";
+  };
+  return {check, "", "value"};
+}
+
+void add_option(CLI::App& command, const Option& what, OptionValues& values) {
+  const std::string names = names_of(what), help = help_with_default(what);
+  CLI::Option* option = nullptr;
+  if (what.type == Option::Type::kFlag) {
+    option = command.add_flag_callback(
+        names, [&values, name = what.name] { values[name] = ""; }, help);
+  } else if (what.repeats) {
+    option = command.add_option_function<std::vector<std::string>>(
+        names,
+        [&values, name = what.name](const std::vector<std::string>& texts) {
+          values[name] = fmt::format("{}", fmt::join(texts, "\n"));
+        },
+        help);
+  } else {
+    option = command.add_option_function<std::string>(
+        names, [&values, name = what.name](const std::string& text) { values[name] = text; }, help);
+    option->transform(checked(what));
+  }
+  if (what.type != Option::Type::kFlag) option->type_name(value_name(what));
+  if (what.repeats) option->expected(1)->take_all();
+  if (!what.group.empty()) option->group(what.group);
+}
+
+}  // namespace
+
+void add_options(CLI::App& command, const std::vector<Option>& options, OptionValues& values) {
+  for (const Option& option : options) add_option(command, option, values);
+}
+
+std::vector<Option> options_of_integrators() {
+  const std::vector<std::string> names = integrator_names();
+  std::vector<std::vector<Option>> lists;
+  for (const std::string& name : names) lists.push_back(options_of_integrator(name));
+  return merged_options(names, lists);
+}
+
+}  // namespace covary
