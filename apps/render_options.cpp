@@ -2,6 +2,7 @@
 #include "render_options.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <limits>
@@ -205,8 +206,8 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
       .add_option("--spp", o.spp,
                   "Samples per pixel of all passes together, at least 4 in each of two; default: the scene's")
       ->transform(whole_number(1u, 1u << 30));
-  command.add_option("--integrator", o.integrator,
-                     "Integrator instead of the scene's: bdpt, controlled-path, guided-path or path");
+  command.add_option("--integrator", o.integrator, "Integrator instead of the scene's")
+      ->type_name(fmt::format("{{{}}}", fmt::join(integrator_names(), ",")));
   command
       .add_option("--estimator", o.estimator.name,
                   fmt::format("How passes become the image: {} of a pass with common random numbers and an "

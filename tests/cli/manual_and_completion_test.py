@@ -78,6 +78,7 @@ class Bash(HelpTest):
         self.assertLessEqual(set(estimators), set(self.complete("render", "--estimator", "")))
         self.assertEqual(self.complete("render", "--estimator", "ii"), ["iicv"])
         self.assertEqual(self.complete("render", "--estimator", "=", "ii"), ["iicv"])
+        self.assertEqual(self.complete("render", "--integrator", "contr"), ["controlled-path"])
         self.assertEqual(self.complete("render", "--spp", ""), [])
         self.assertEqual(self.complete("render", "-o", ""), [], "files are readline's matter")
 
