@@ -138,15 +138,6 @@ Image filter_and_combine(const GroupedImage& crn, const GroupedImage& independen
   return estimate;
 }
 
-GroupedImage rows_of(GroupedImage image, int first_row, int n_rows) {
-  image.data = image.pixel(0, first_row);
-  const size_t first_pixel = static_cast<size_t>(first_row) * image.width;
-  if (image.counts) image.counts += first_pixel;
-  if (image.variance_in_groups) image.variance_in_groups += 3 * first_pixel;
-  image.height = n_rows;
-  return image;
-}
-
 /// Rows of a band without those around it that it needs; small ones would spend their time on these.
 int rows_of_band(int width, int reach) {
   constexpr int kFewest = 64;

@@ -31,6 +31,33 @@ Spectrum GroupedImage::sample_variance(int x, int y) const {
                                  count(x, y));
 }
 
+GroupedImage rows_of(const GroupedImage& image, int first_row, int n_rows) {
+  GroupedImage rows = image;
+  const size_t skipped = static_cast<size_t>(first_row) * image.width;
+  rows.height = n_rows;
+  rows.data = image.pixel(0, first_row);
+  if (image.counts) rows.counts = image.counts + skipped;
+  if (image.variance_in_groups) rows.variance_in_groups = image.variance_in_groups + skipped * 3;
+  return rows;
+}
+
+GroupedImage rows_of(const Film& film, int first_row, int n_rows) {
+  const GroupedImage all{film.width(),
+                         film.height(),
+                         film.groups(),
+                         film.groups_of(0, 0),
+                         film.counts().data(),
+                         film.mean_count(),
+                         film.keeps_sample_variance() ? film.variance_in_groups().data() : nullptr};
+  return rows_of(all, first_row, n_rows);
+}
+
+Image rows_of(const Image& image, int first_row, int n_rows) {
+  Image rows(image.width, n_rows, image.channels);
+  std::copy_n(image.pixel(0, first_row), rows.data.size(), rows.data.begin());
+  return rows;
+}
+
 void throw_if_any(const std::string& name, const std::vector<std::string>& problems) {
   if (problems.empty()) return;
   std::string text = name + ": ";

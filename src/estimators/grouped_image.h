@@ -37,6 +37,13 @@ struct GroupedImage {
   bool has_equal_groups(int x, int y) const { return count(x, y) % static_cast<uint32_t>(groups) == 0; }
 };
 
+/// Rows first_row … first_row + n_rows - 1 of an image, of its memory.
+GroupedImage rows_of(const GroupedImage& image, int first_row, int n_rows);
+/// Group means and counts of some rows of a film.
+GroupedImage rows_of(const Film& film, int first_row, int n_rows);
+/// A copy of some rows of an image.
+Image rows_of(const Image& image, int first_row, int n_rows);
+
 /// What held-out samples tell of the error of a row of pixels (held_out_error.h), relative as in relMSE: sums over its
 /// values, each over F'^2 + 0.01.
 struct HeldOutRow {

@@ -119,9 +119,4 @@ std::span<const Pass> camera_passes(std::span<const Pass> passes);
 /// The light pass, or null.
 const Pass* light_pass(std::span<const Pass> passes);
 
-/// Group means and counts of some rows of a film.
-GroupedImage rows_of(const Film& film, int first_row, int n_rows);
-/// Some rows of an image.
-Image rows_of(const Image& image, int first_row, int n_rows);
-
 }  // namespace covary

@@ -6,10 +6,9 @@
 #include <algorithm>
 #include <utility>
 
+#include "combine/combine.h"
 #include "core/error.h"
 #include "core/stopwatch.h"
-#include "estimators/held_out_error.h"
-#include "estimators/light_film.h"
 #include "estimators/predicted_error.h"
 #include "film/splat_layer.h"
 #include "integrators/aov.h"
@@ -328,8 +327,9 @@ EstimatorResult PlanRun::estimate_rows(int first_row, int n_rows) const {
     guides = {&albedo, &normal};
   }
   EstimatorResult image = plan_.estimate(camera_passes(state_.passes), first_row, n_rows, guides);
-  calibrate(image);
-  if (const Pass* light = light_pass(state_.passes)) add_light(rows_of(light->film, first_row, n_rows), image);
+  const Pass* light = light_pass(state_.passes);
+  const GroupedImage light_rows = light ? rows_of(light->film, first_row, n_rows) : GroupedImage{};
+  finish(image, light ? &light_rows : nullptr);
   if (has_training()) add_training(state_.passes[0].film, result_.training, first_row, image);
   return image;
 }
@@ -368,24 +368,6 @@ void PlanRun::render_auxiliary_images() {
 }
 
 }  // namespace
-
-Image rows_of(const Image& image, int first_row, int n_rows) {
-  Image rows(image.width, n_rows, image.channels);
-  std::copy_n(image.pixel(0, first_row), rows.data.size(), rows.data.begin());
-  return rows;
-}
-
-GroupedImage rows_of(const Film& film, int first_row, int n_rows) {
-  return {film.width(),
-          n_rows,
-          film.groups(),
-          film.groups_of(0, first_row),
-          film.counts().data() + static_cast<size_t>(first_row) * film.width(),
-          film.mean_count(),
-          film.keeps_sample_variance()
-              ? film.variance_in_groups().data() + static_cast<size_t>(first_row) * film.width() * 3
-              : nullptr};
-}
 
 const Pass& PlanState::pass(const std::string& name, uint32_t number) const {
   for (const Pass& pass : passes)

@@ -17,6 +17,7 @@ ARROWS = {
     "imageio": ["core"],
     "film": ["imageio"],
     "estimators": ["film", "settings"],
+    "combine": ["estimators"],
     "lab": ["report"],
     "report": ["film"],
     "scene": ["settings"],
@@ -26,7 +27,7 @@ ARROWS = {
     "io": ["bsdfs", "emitters"],
     "sampling": ["scene"],
     "integrators": ["sampling", "film"],
-    "plans": ["estimators", "integrators", "io"],
+    "plans": ["combine", "integrators", "io"],
 }
 SOURCE_FOLDERS = ["src", "include", "apps", "python", "tests", "benchmarks"]
 CPP = (".h", ".cpp", ".cu", ".cuh")

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "combine/combine.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "core/error.h"
+#include "core/stopwatch.h"
+#include "estimators/feedback.h"
+#include "estimators/held_out_error.h"
+#include "estimators/light_film.h"
+#include "estimators/planes.h"
+#include "estimators/predicted_error.h"
+
+namespace covary {
+namespace {
+
+constexpr int kLightRows = 64;  // of the light film in memory at a time
+constexpr int kFewestRows = 16;
+
+void throw_errors(const InputFindings& inputs) {
+  if (const std::string errors = errors_text(inputs.findings); !errors.empty())
+    throw Error(ErrorCode::kInput, "the inputs do not fit: " + errors);
+}
+
+/// Puts the n rows of `part` from its row `skipped` on into `whole`, from row y on.
+void append(const EstimatorResult& part, int skipped, int y, int n, int height, EstimatorResult& whole) {
+  const auto copy = [&](const Image& from, Image& to) {
+    if (from.data.empty()) return;
+    if (to.data.empty()) to = Image(from.width, height, 3);
+    std::copy_n(from.pixel(0, skipped), static_cast<size_t>(from.width) * 3 * n, to.pixel(0, y));
+  };
+  copy(part.estimate, whole.estimate);
+  copy(part.std_error, whole.std_error);
+  copy(part.bias, whole.bias);
+  if (!part.held_out.empty())
+    whole.held_out.insert(whole.held_out.end(), part.held_out.begin() + skipped, part.held_out.begin() + skipped + n);
+}
+
+EstimatorResult estimate(const CombineRequest& request) {
+  const Estimator& estimator = request.estimator;
+  const int height = request.crn.height, in_memory = rows_in_memory(request);
+  if (estimator.reach < 0 || in_memory >= height)
+    return estimator.apply(request.crn.all(), request.independent.all(), request.settings);
+  const int step = std::max(kFewestRows, in_memory - 2 * estimator.reach) / kFeedbackCell * kFeedbackCell;
+  EstimatorResult whole;
+  for (int y = 0; y < height; y += step) {
+    const int n = std::min(step, height - y);
+    const Band band = band_around(request, y, y + n);
+    const EstimatorResult part = estimator.apply(band.crn, band.independent, request.settings);
+    long n_nonfinite = 0;  // without the rows around, which other bands count
+    finite_pixels(rows_of(band.crn, y - band.first, n), rows_of(band.independent, y - band.first, n), n_nonfinite);
+    whole.nonfinite_pixels += n_nonfinite;
+    append(part, y - band.first, y, n, height, whole);
+  }
+  return whole;
+}
+
+}  // namespace
+
+int rows_in_memory(const CombineRequest& request) {
+  // The values themselves, and about 40 floats per pixel that an estimator works with.
+  const double row_bytes = request.crn.width * (12.0 * (request.crn.groups + request.independent.groups) + 160);
+  return static_cast<int>(std::min<double>(request.crn.height, request.memory / row_bytes));
+}
+
+Band band_around(const CombineRequest& request, int first, int last) {
+  // Beginning at a multiple of a cell of the feedback.
+  const int begin = std::max(0, first - request.estimator.reach) / kFeedbackCell * kFeedbackCell;
+  const int n = std::min(request.crn.height, last + request.estimator.reach) - begin;
+  return {request.crn.rows(begin, n), request.independent.rows(begin, n), begin};
+}
+
+InputFindings examine(const CombineRequest& request) {
+  const GroupedSource &crn = request.crn, &independent = request.independent;
+  InputFindings inputs;
+  check_origins(crn.origin, independent.origin, inputs.findings);
+  check_light(crn.origin, independent.origin, request.light ? &request.light->origin : nullptr, inputs.findings);
+  InputChecks checks(crn.width, crn.height, crn.groups, independent.groups);
+  const int step = std::max(kFewestRows, rows_in_memory(request));
+  bool checkable = true;
+  for (int y = 0; y < crn.height && checkable; y += step) {
+    const int n = std::min(step, crn.height - y);
+    const GroupedImage g = crn.rows(y, n), h = independent.rows(y, n);
+    checkable = !request.estimator.adaptive || (!lacks_samples(g) && !lacks_samples(h));
+    if (checkable) checks.add_rows(g, h);
+  }
+  inputs.report = checkable ? checks.report() : unchecked_report();
+  inputs.findings.insert(inputs.findings.end(), inputs.report.findings.begin(), inputs.report.findings.end());
+  return inputs;
+}
+
+void finish(EstimatorResult& result, const GroupedImage* light) {
+  calibrate(result);
+  if (light) add_light(*light, result);
+}
+
+CombinedImage combine(const CombineRequest& request) {
+  CombinedImage combined;
+  Stopwatch watch;
+  combined.inputs = examine(request);
+  if (request.checked) request.checked(combined.inputs);
+  if (!request.force) throw_errors(combined.inputs);
+  combined.check_seconds = watch.lap();
+
+  combined.image = estimate(request);
+  finish(combined.image, nullptr);
+  if (request.light)
+    for (int y = 0; y < request.light->height; y += kLightRows)
+      add_light(request.light->rows(y, std::min(kLightRows, request.light->height - y)), combined.image, y);
+  if (!combined.image.std_error.data.empty()) combined.predicted_relmse = predicted_relmse(combined.image);
+  combined.estimate_seconds = watch.lap();
+  return combined;
+}
+
+}  // namespace covary

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// From two grouped images to one image with less noise: look at the inputs, estimate, calibrate the error estimate, add
+// the light film. The one pipeline of `covary combine`, Python and C++; renders end with its last two steps.
+#pragma once
+
+#include <functional>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "combine/grouped_source.h"
+#include "estimators/estimator.h"
+#include "estimators/input_checks.h"
+
+namespace covary {
+
+/// What is known of the inputs before anything is estimated.
+struct InputFindings {
+  InputReport report;
+  std::vector<Finding> findings;  ///< of the report, and what the images say of themselves
+};
+
+struct CombineRequest {
+  GroupedSource crn, independent;
+  std::optional<GroupedSource> light;  ///< a light film (film/splat_layer.h), to be added
+  Estimator estimator;                 ///< of a pair of images
+  PairSettings settings;
+  bool force = false;  ///< combine even where the findings hold errors
+  /// Bytes to work in: larger images are combined in bands of rows, with the same bits, by estimators whose reach is
+  /// limited.
+  double memory = std::numeric_limits<double>::infinity();
+  /// Called when the inputs have been looked at, before errors among the findings are thrown.
+  std::function<void(const InputFindings&)> checked;
+};
+
+struct CombinedImage {
+  EstimatorResult image;
+  std::optional<double> predicted_relmse;  ///< predicted_error.h; where there is a standard error
+  InputFindings inputs;
+  double check_seconds = 0, estimate_seconds = 0;
+};
+
+/// Looks at the two images as combine() does. Throws Error(kInput) where they do not show the same pixels.
+InputFindings examine(const CombineRequest& request);
+
+/// Throws Error(kInput) where the findings hold errors and `force` is not set, and what the estimator throws.
+CombinedImage combine(const CombineRequest& request);
+
+/// Rows that combine() works on at a time.
+int rows_in_memory(const CombineRequest& request);
+
+/// Rows of both images.
+struct Band {
+  GroupedImage crn, independent;
+  int first = 0;
+};
+/// Rows first … last - 1 with the estimator's reach on both sides, so that bands have the bits of the whole.
+Band band_around(const CombineRequest& request, int first, int last);
+
+/// The last steps of every image that an estimator made of films: its standard error is calibrated by held-out samples,
+/// and the mean of the light film's rows, if there is one, is added.
+void finish(EstimatorResult& result, const GroupedImage* light);
+
+}  // namespace covary

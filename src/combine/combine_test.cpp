@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "combine/combine.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "core/error.h"
+#include "estimators/held_out_error.h"
+#include "estimators/light_film.h"
+#include "estimators/predicted_error.h"
+#include "estimators/registry.h"
+#include "estimators/test_images.h"
+#include "support/files.h"
+
+namespace covary {
+namespace {
+
+using test_support::contains, test_support::message_of;
+
+constexpr int kWidth = 40, kHeight = 50, kGroups = 12;
+
+ImageOrigin origin(const std::string& name) { return {name, {kWidth, kHeight, {0, 0, kWidth, kHeight}}}; }
+
+struct Images {
+  test::Grouped crn = test::crn_image(kWidth, kHeight, kGroups, 1);
+  test::Grouped independent = test::independent_image(kWidth, kHeight, kGroups, 1);
+
+  CombineRequest request() const {
+    CombineRequest request;
+    request.crn = source_of(crn.view(), origin("a.exr"));
+    request.independent = source_of(independent.view(), origin("b.exr"));
+    request.estimator = make_estimator("iicv");
+    request.settings.std_error = true;
+    return request;
+  }
+};
+
+TEST(Combine, IsEstimateCalibrationAndPrediction) {
+  const Images images;
+  const CombineRequest request = images.request();
+  const CombinedImage combined = combine(request);
+  EstimatorResult expected = request.estimator.apply(images.crn.view(), images.independent.view(), request.settings);
+  const std::vector<float> uncalibrated = expected.std_error.data;
+  calibrate(expected);
+  EXPECT_EQ(combined.image.estimate.data, expected.estimate.data);
+  EXPECT_EQ(combined.image.std_error.data, expected.std_error.data);
+  EXPECT_NE(combined.image.std_error.data, uncalibrated);
+  EXPECT_EQ(*combined.predicted_relmse, predicted_relmse(expected));
+}
+
+TEST(Combine, BandsHaveTheBitsOfTheWhole) {
+  Images images;
+  images.crn.pixel(7, 30)[5] = std::numeric_limits<float>::quiet_NaN();  // counted once, though bands overlap
+  CombineRequest request = images.request();
+  request.force = true;
+  const CombinedImage whole = combine(request);
+  EXPECT_EQ(rows_in_memory(request), kHeight);
+  request.memory = 20.0 * kWidth * (12 * 2 * kGroups + 160);
+  ASSERT_EQ(rows_in_memory(request), 20);
+  int n_reads = 0;
+  request.crn.rows = [&n_reads, rows = request.crn.rows](int first, int n) { return ++n_reads, rows(first, n); };
+  const CombinedImage bands = combine(request);
+  EXPECT_GT(n_reads, 4);
+  EXPECT_EQ(bands.image.estimate.data, whole.image.estimate.data);
+  EXPECT_EQ(bands.image.std_error.data, whole.image.std_error.data);
+  EXPECT_EQ(whole.image.nonfinite_pixels, 1);
+  EXPECT_EQ(bands.image.nonfinite_pixels, 1);
+}
+
+TEST(Combine, LightIsAddedAfterCalibration) {
+  const Images images;
+  CombineRequest request = images.request();
+  request.estimator = make_estimator("iicv");
+  const CombinedImage without = combine(request);
+  const test::Grouped light = test::constant_image(kWidth, kHeight, 2, 0.25f);
+  ImageOrigin of_light = origin("light.exr");
+  of_light.is_light_film = true;
+  request.light = source_of(light.view(), of_light);
+  const CombinedImage with = combine(request);
+  for (size_t i = 0; i < without.image.estimate.data.size(); ++i)
+    ASSERT_EQ(with.image.estimate.data[i], without.image.estimate.data[i] + 0.25f);
+  EXPECT_EQ(with.image.std_error.data, without.image.std_error.data);
+  request.light->origin.is_light_film = false;
+  EXPECT_TRUE(contains(message_of([&] { combine(request); }, ErrorCode::kInput), "light.exr"));
+}
+
+TEST(Combine, ErrorsOfTheInputsAreThrownUnlessForced) {
+  Images images;
+  images.independent = images.crn;  // the same samples twice
+  CombineRequest request = images.request();
+  size_t n_findings = 0;
+  request.checked = [&](const InputFindings& inputs) { n_findings = inputs.findings.size(); };
+  EXPECT_TRUE(contains(message_of([&] { combine(request); }, ErrorCode::kInput), "the inputs do not fit: "));
+  EXPECT_GT(n_findings, 0u);
+  request.force = true;
+  EXPECT_EQ(combine(request).inputs.findings.size(), n_findings);
+}
+
+}  // namespace
+}  // namespace covary

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "combine/grouped_source.h"
+
+#include <memory>
+#include <numeric>
+#include <utility>
+
+namespace covary {
+
+GroupedSource source_of(const GroupedFile& file) {
+  GroupedSource source;
+  source.origin = {file.name(),     file.place(),    file.sampling(),      file.scene_hash(),
+                   file.settings(), file.has_half(), file.is_light_film(), file.has_light_added()};
+  source.width = file.width(), source.height = file.height(), source.groups = file.groups();
+  source.samples = file.samples();
+  struct Read {
+    GroupedFile::Rows rows;
+    int first = -1, n = 0;
+  };
+  source.rows = [&file, read = std::make_shared<Read>()](int first, int n) {
+    if (first != read->first || n != read->n) file.read_rows(first, n, read->rows);
+    read->first = first, read->n = n;
+    return file.view(read->rows, n);
+  };
+  return source;
+}
+
+GroupedSource source_of(const GroupedImage& image, ImageOrigin origin) {
+  GroupedSource source;
+  source.origin = std::move(origin);
+  source.width = image.width, source.height = image.height, source.groups = image.groups;
+  GroupedImage whole = image;  // rows of it tell the mean of the whole
+  if (image.counts && image.mean_count == 0) {
+    const size_t n_pixels = static_cast<size_t>(image.width) * image.height;
+    whole.mean_count = std::accumulate(image.counts, image.counts + n_pixels, 0.0) / static_cast<double>(n_pixels);
+  }
+  source.samples = whole.mean_count;
+  source.rows = [image = whole](int first, int n) { return rows_of(image, first, n); };
+  return source;
+}
+
+}  // namespace covary
