@@ -82,3 +82,20 @@ install(TARGETS covary_library EXPORT covaryTargets)
 install(EXPORT covaryTargets NAMESPACE covary:: DESTINATION ${package})
 install(FILES ${PROJECT_BINARY_DIR}/covaryConfig.cmake ${PROJECT_BINARY_DIR}/covaryConfigVersion.cmake
   DESTINATION ${package})
+
+# The same for pkg-config, with no folder of this machine. What libcovary.a needs is linked into the program, too, of
+# which embree has no file of pkg-config.
+set(requires)
+set(libraries)
+if(NOT BUILD_SHARED_LIBS)
+  set(requires "tbb OpenEXR libpng zlib pugixml fmt libxxhash")
+  get_target_property(configurations embree IMPORTED_CONFIGURATIONS)
+  list(GET configurations 0 configuration)
+  get_target_property(embree_file embree IMPORTED_LOCATION_${configuration})
+  string(REGEX REPLACE ".*/lib(embree[0-9]*)\\..*" "-l\\1" embree_link "${embree_file}")
+  set(libraries " ${embree_link} -ldl -Wl,-rpath,\${libdir}/covary")
+endif()
+file(RELATIVE_PATH prefix /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
+string(REGEX REPLACE "/$" "" prefix "${prefix}")
+configure_file(cmake/covary.pc.in covary.pc @ONLY)
+install(FILES ${PROJECT_BINARY_DIR}/covary.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)

@@ -141,6 +141,25 @@ class Package(unittest.TestCase):
             for folder in (self.work, BUILD, SOURCE):
                 self.assertNotIn(str(folder), file.read_text(), file)
 
+    def test_pkg_config(self):
+        """Compiles the examples without CMake, and names no folder of this machine."""
+        file = next((self.prefix / "lib").rglob("covary.pc"))
+        for folder in (self.work, BUILD, SOURCE):
+            self.assertNotIn(str(folder), file.read_text())
+
+        def pkg_config(*words):
+            return run("pkg-config", *words, "covary", folder=self.work, PKG_CONFIG_PATH=str(file.parent)).split()
+        self.assertEqual(pkg_config("--modversion"), [VERSION])
+        self.assertIn(f"-I{file.parent}", " ".join(pkg_config("--cflags")))
+        self.run_in_folder(CXX, "-std=c++20", "-o", "with_pkg_config", EXAMPLES / "render_scene.cpp",
+                           *os.environ.get("CXXFLAGS", "").split(), *pkg_config("--cflags", "--libs"))
+        library = str(next((self.prefix / "lib").rglob("libcovary.*")).parent)
+        images = []
+        for program in ("with_pkg_config", self.examples / "render_scene"):
+            run(self.work / program, ROOM, "image.exr", folder=self.work, LD_LIBRARY_PATH=library)
+            images.append(rgb(self.work / "image.exr"))
+        self.assertEqual(*images)
+
     def test_versions_with_other_interfaces_are_refused(self):
         major, minor, patch = map(int, VERSION.split("."))
         file = next((self.prefix / "lib").rglob("covaryConfigVersion.cmake"))
