@@ -2,11 +2,11 @@
 """Less Monte Carlo noise by control variates and correlated sampling.
 
     result = covary.combine(crn, independent)          # arrays [T, H, W, 3] of any renderer
-    result = covary.render("scene.xml", spp=96)        # Mitsuba XML
+    result = covary.render(covary.scenes.path("room"), spp=96)      # or a file of yours, Mitsuba XML
 
 docs/python.md is the manual.
 """
-from . import errors, metrics, progress
+from . import errors, metrics, progress, scenes
 from ._combine import InputReport, check_inputs, combine
 from ._covary import version as __version__
 from ._images import denoise, read_groups, read_image, write_image
@@ -23,6 +23,6 @@ __all__ = [
     "BadSample", "BadSamplesWarning", "Error", "Film", "InputError", "InputReport", "InternalError", "IoError",
     "RenderResult", "Result", "Scene", "UsageError", "View", "__version__", "check_inputs", "combine", "denoise",
     "errors", "film_from_groups", "merge_films", "metrics", "program", "progress", "read_groups", "read_image",
-    "render", "set_threads", "view", "write_image",
+    "render", "scenes", "set_threads", "view", "write_image",
 ]
 __all__ += _estimators

@@ -74,6 +74,7 @@ BAD = {
                     "title": (None, *NO_TEXT), "height": (0, 0.5, *NO_NUMBERS), "small": NO_FLAG},
     "covary.metrics.compute": {"name": ("relmsee", None, *NO_TEXT), **METRIC},
     **{f"covary.metrics.{metric['name'].replace('-', '_')}": METRIC for metric in covary._covary.metrics()},
+    "covary.scenes.path": {"name": ("rom", None, "../room", *NO_TEXT)},
     "covary.distributed.render": {
         "client": (None, 3, "tcp://x"), "scene": NO_SCENE, "spp": NO_SPP, "estimator": ("dependent-tests", 3),
         "seed": NO_SEED, "sample_ranges": (0, 7, 1.5, *NO_NUMBERS), "tile": (0, 2.5, *NO_NUMBERS), "folder": NO_PATH,
@@ -96,13 +97,13 @@ BAD = {
 }
 #: Classes that results are made of, which nobody calls, errors, and functions without arguments of ours.
 NOT_CALLED = ("Error", "Warning", "Result", "Report", "BadSample", "Scene", "Film", "View")
-WITHOUT_ARGUMENTS = ("program", "tqdm", "register", "unregister")
+WITHOUT_ARGUMENTS = ("program", "names", "tqdm", "register", "unregister")
 
 
 def public_functions():
     """Those of the modules, by their full names, and their parameters."""
     places = [("covary", covary, covary.__all__)]
-    for name in ("metrics", "distributed", "mitsuba", "blender", "progress"):
+    for name in ("metrics", "scenes", "distributed", "mitsuba", "blender", "progress"):
         module = importlib.import_module(f"covary.{name}")
         own = [key for key, value in vars(module).items() if not key.startswith("_") and callable(value)
                and getattr(value, "__module__", "") == module.__name__]

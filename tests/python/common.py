@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What tests of the Python package share: small images with and without common random numbers, and the program."""
 import os
+import re
 import subprocess
 import tempfile
 import unittest
@@ -13,6 +14,12 @@ SOURCE = Path(os.environ.get("SOURCE", Path(__file__).resolve().parents[2]))
 PROGRAM = os.environ.get("COVARY_PROGRAM", "covary")
 ROOM = SOURCE / "scenes" / "room.xml"
 GROUPS, HEIGHT, WIDTH = 12, 20, 24
+
+
+def examples_of_page():
+    """The examples of docs/python.md, in their order."""
+    page = (SOURCE / "docs" / "python.md").read_text()
+    return re.findall(r"^```python\n(.*?)^```$", page, re.M | re.S)
 
 
 def noisy(seed, common, groups=GROUPS, height=HEIGHT, width=WIDTH):

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import covary
 import numpy
-from common import ROOM, SOURCE, PackageTest, noisy
+from common import ROOM, SOURCE, PackageTest, examples_of_page, noisy
 
 
 class Import(PackageTest):
@@ -35,6 +35,13 @@ class Import(PackageTest):
         shutil.copy(os.environ["COVARY_PROGRAM"], self.path / "covary")
         run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=False)
         self.assertEqual(run.stdout, f"{self.path / 'covary'}\n")
+
+    def test_scenes(self):
+        """Those of the repository, with their files; the program finds them beside itself, as in a wheel."""
+        self.assertEqual(covary.scenes.names(), sorted(file.stem for file in (SOURCE / "scenes").glob("*.xml")))
+        for name in covary.scenes.names():
+            loaded = covary.Scene.load(covary.scenes.path(name))
+            self.assertEqual(loaded.content_hash, covary.Scene.load(SOURCE / "scenes" / f"{name}.xml").content_hash)
 
     def test_all_names_exist(self):
         for name in covary.__all__:
@@ -81,11 +88,9 @@ class Types(PackageTest):
 
 class Documentation(PackageTest):
     def test_examples(self):
-        """In the order of the page, in one namespace, where room.xml is."""
-        page = (SOURCE / "docs" / "python.md").read_text()
-        blocks = re.findall(r"^```python\n(.*?)^```$", page, re.M | re.S)
+        """In the order of the page, in one namespace, with no files but those of the package."""
+        blocks = examples_of_page()
         self.assertGreater(len(blocks), 5)
-        shutil.copy(ROOM, self.path / "room.xml")
         before = Path.cwd()
         os.chdir(self.path)
         self.addCleanup(os.chdir, before)

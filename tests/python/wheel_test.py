@@ -3,12 +3,13 @@
 import subprocess
 import tarfile
 import unittest
+import zipfile
 
-from common import ROOM, SOURCE, PackageTest
+from common import SOURCE, PackageTest, examples_of_page
 
-FIVE_LINES = f"""
+LINES = """
 import covary
-scene = covary.Scene.load("{ROOM}", resolution=(60, 40))
+scene = covary.Scene.load(covary.scenes.path("room"), resolution=(60, 40))
 result = covary.render(scene, spp=24)
 again = covary.combine(result.films["crn"].groups, result.films["independent"].groups)
 assert (again.image == result.image).all()
@@ -33,6 +34,17 @@ class Wheel(PackageTest):
             left_out = set(tracked.stdout.splitlines()) - names
             self.assertEqual([name for name in left_out if not name.startswith((".ci/", "docs/images/"))], [])
 
+    def check_metadata(self, wheel):
+        """What an index shows of it."""
+        with zipfile.ZipFile(wheel) as archive:
+            name, = (name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
+            facts = archive.read(name).decode().partition("\n\n")[0].splitlines()
+        cited = (SOURCE / "CITATION.cff").read_text()
+        author = next(line.removeprefix("Author: ") for line in facts if line.startswith("Author: "))
+        self.assertIn(f"name: {author}", cited)
+        self.assertGreater(len([line for line in facts if line.startswith("Classifier: ")]), 5)
+        self.assertIn("License-Expression: Apache-2.0", facts)
+
     def test_wheel(self):
         subprocess.run([SOURCE / "scripts" / "wheel", "native", self.path / "dist"], check=True, capture_output=True)
         wheel, = (self.path / "dist").glob("covary-*-cp310-abi3-manylinux_*_x86_64.whl")
@@ -41,9 +53,12 @@ class Wheel(PackageTest):
         self.check_sources(sources)
         self.bare("/usr/bin/python3", "-m", "venv", "fresh")
         self.bare("fresh/bin/pip", "install", "-q", wheel)
-        self.bare("fresh/bin/python", "-c", FIVE_LINES)
+        self.bare("fresh/bin/python", "-c", LINES)
+        self.bare("fresh/bin/python", "-c", "\n".join(examples_of_page()))
         self.assertTrue((self.path / "room.png").exists())
         self.assertIn("covary ", self.bare("fresh/bin/covary", "--version"))
+        self.assertIn("room.xml", self.bare("fresh/bin/covary", "experiment", "quick", "--print"))
+        self.check_metadata(wheel)
         linked = self.bare("ldd", *(self.path / "fresh").glob("lib/python*/site-packages/covary/_covary*.so"))
         self.assertNotIn("not found", linked)
         self.assertNotIn("/usr/lib/x86_64-linux-gnu/libembree", linked)

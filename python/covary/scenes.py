@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The small scenes that come with the package: `covary.render(covary.scenes.path("room"), spp=48)`."""
+from __future__ import annotations
+
+from pathlib import Path
+
+from ._arguments import checked, text
+from .errors import UsageError
+
+_FOLDER = Path(__file__).parent / "share" / "covary" / "scenes"  # where the package's program looks, too
+
+
+def names() -> list[str]:
+    """Of all of them."""
+    return sorted(file.stem for file in _FOLDER.glob("*.xml"))
+
+
+@checked(name=text)
+def path(name: str) -> Path:
+    """The file of the scene of this name, for Scene.load() and render()."""
+    file = _FOLDER / f"{name}.xml"
+    if name not in names():
+        raise UsageError(f"name: found {name!r}; accepted is one of {', '.join(names())}")
+    return file
