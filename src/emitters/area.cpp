@@ -7,6 +7,7 @@
 #include "emitters/area.h"
 
 #include "core/warp.h"
+#include "emitters/lattice.h"
 #include "emitters/registry.h"
 
 namespace covary {
@@ -104,19 +105,10 @@ EmissionPdf AreaLight::pdf_emission(const SurfaceHit& hit, const Vec3& w) const 
 
 template <typename Position>
 Spectrum AreaLight::power_of(int n_points, const Position& position) const {
-  // Mean of radiance over density, at points of the plastic-number lattice in three dimensions (Roberts 2018), which
-  // cover the cube evenly.
-  constexpr double kPlastic = 1.22074408460575947536;  // positive root of x^4 = x + 1
-  double sum[3] = {0, 0, 0};
+  double sum[3] = {0, 0, 0};  // of radiance over density
   for (int i = 0; i < n_points; ++i) {
-    double x[3], step = 1;
-    for (double& coordinate : x) {
-      step /= kPlastic;
-      coordinate = 0.5 + step * i;
-      coordinate -= std::floor(coordinate);
-    }
-    const Vec2 u = {static_cast<float>(x[0]) * kOneMinusEpsilon, static_cast<float>(x[1]) * kOneMinusEpsilon};
-    const AreaSample at = position(u, static_cast<float>(x[2]) * kOneMinusEpsilon);
+    const Vec3 u = lattice_point(i);
+    const AreaSample at = position({u.x, u.y}, u.z);
     if (!(at.pdf_area > 0)) continue;
     const Spectrum radiance = radiance_at(at);
     for (int c = 0; c < 3; ++c) sum[c] += radiance[c] / at.pdf_area;

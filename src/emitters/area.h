@@ -41,6 +41,7 @@ class AreaLight final : public Emitter {
   EmissionPdf pdf_emission(const SurfaceHit& hit, const Vec3& w) const override;
   /// pi times the integral of the radiance over the surface; for textures by quadrature.
   Spectrum power() const override;
+  bool knows_power() const override { return !textured_; }
 
  private:
   /// A point chosen by position only, with its density per unit area.

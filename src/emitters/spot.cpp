@@ -10,6 +10,7 @@
 // | texture      | texture   | none             | projected factor; its unit square spans the cone (cutoff < 90) |
 // | to_world     | transform | identity         | the light stands at the image of the origin                   |
 #include "core/warp.h"
+#include "emitters/lattice.h"
 #include "emitters/registry.h"
 #include "emitters/rotation.h"
 
@@ -73,13 +74,23 @@ class SpotLight final : public Emitter {
       const float mean_cosine = c - b > 1e-4f ? (std::sin(c) - std::sin(b)) / (c - b) : std::cos(c);
       return s_.intensity * (kTwoPi * (1 - mean_cosine));
     }
-    constexpr int kGrid = 64;
-    Spectrum sum;
-    for (int y = 0; y < kGrid; ++y)
-      for (int x = 0; x < kGrid; ++x)
-        sum += intensity(warp::square_to_cone({(x + 0.5f) / kGrid, (y + 0.5f) / kGrid}, one_minus_cos_cutoff_));
-    return sum * (kTwoPi * one_minus_cos_cutoff_ / (kGrid * kGrid));
+    // Over the texture's square, at positions that it chooses by its luminance, so that a few bright texels are found.
+    constexpr int kPoints = 1 << 14;
+    double sum[3] = {0, 0, 0};
+    for (int i = 0; i < kPoints; ++i) {
+      const Vec3 u = lattice_point(i);
+      const Texture::PositionSample at = s_.texture->sample_position({u.x, u.y});
+      if (!(at.pdf > 0)) continue;
+      const float side = 2 * std::tan(c);  // of the square at distance 1
+      const Vec3 local = normalize(Vec3{(at.uv.x - 0.5f) * side, (at.uv.y - 0.5f) * side, 1});
+      const float solid_angle = sqr(side) * local.z * sqr(local.z) / at.pdf;
+      const Spectrum value = intensity(local);
+      for (int channel = 0; channel < 3; ++channel) sum[channel] += value[channel] * solid_angle;
+    }
+    return {static_cast<float>(sum[0] / kPoints), static_cast<float>(sum[1] / kPoints),
+            static_cast<float>(sum[2] / kPoints)};
   }
+  bool knows_power() const override { return !s_.texture || s_.texture->is_constant(); }
 
  private:
   /// Power per unit solid angle in the unit direction `local` away from the light.

@@ -1,18 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "integrators/light_selection.h"
 
-#include <cmath>
+#include <numeric>
+
+#include "sampling/light_weights.h"
 
 namespace covary {
 
 PowerLights::PowerLights(const Scene& scene) : emitters_(scene.emitters()) {
   if (emitters_.empty()) return;
-  std::vector<float> powers;
-  for (const auto& emitter : emitters_) powers.push_back(luminance(emitter->power()));
-  const bool finite = std::all_of(powers.begin(), powers.end(), [](float power) { return std::isfinite(power); });
-  const bool black = std::all_of(powers.begin(), powers.end(), [](float power) { return power <= 0; });
-  if (!finite || black) std::fill(powers.begin(), powers.end(), 1.0f);
-  distribution_ = Discrete(powers);
+  std::vector<LightPower> powers;
+  for (const auto& emitter : emitters_) powers.push_back({luminance(emitter->power()), emitter->knows_power()});
+  const std::vector<double> weights = weights_by_power(powers);
+  // The table keeps sums as floats, whose last digit a positive weight must reach.
+  const double least = 0x1p-22 * std::accumulate(weights.begin(), weights.end(), 0.0);
+  std::vector<float> table;
+  for (const double weight : weights) table.push_back(static_cast<float>(weight > 0 ? std::max(weight, least) : 0));
+  distribution_ = Discrete(table);
   for (size_t i = 0; i < emitters_.size(); ++i)
     pmfs_[emitters_[i].get()] += distribution_.pmf(static_cast<uint32_t>(i));
 }

@@ -30,8 +30,8 @@ class UniformLights {
   float pmf_;
 };
 
-/// In proportion to the luminance of Emitter::power(). A light without power is never chosen; where none has any, or
-/// one has infinitely much, all are equally likely.
+/// In proportion to the luminance of Emitter::power(), by sampling/light_weights.h. A light that is known to have no
+/// power is never chosen; where none has any, or one has infinitely much, all are equally likely.
 class PowerLights {
  public:
   explicit PowerLights(const Scene& scene);

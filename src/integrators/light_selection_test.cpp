@@ -11,22 +11,24 @@
 namespace covary {
 namespace {
 
-/// Has power and nothing else.
+/// Has power, known or estimated, and nothing else.
 class PowerOnly final : public Emitter {
  public:
-  explicit PowerOnly(float power) : power_(power) {}
+  explicit PowerOnly(float power, bool known = true) : power_(power), known_(known) {}
   EmitterSample sample_towards(const Vec3&, Vec2, float) const override { return {}; }
   EmissionSample sample_emission(Vec2, Vec2, float) const override { return {}; }
   EmissionPdf pdf_emission(const SurfaceHit&, const Vec3&) const override { return {}; }
   Spectrum power() const override { return Spectrum(power_); }
+  bool knows_power() const override { return known_; }
 
  private:
   float power_;
+  bool known_;
 };
 
-std::unique_ptr<Scene> scene_of(std::initializer_list<float> powers) {
+std::unique_ptr<Scene> scene_of(std::initializer_list<float> powers, bool known = true) {
   SceneParts parts;
-  for (const float power : powers) parts.emitters.push_back(std::make_shared<PowerOnly>(power));
+  for (const float power : powers) parts.emitters.push_back(std::make_shared<PowerOnly>(power, known));
   parts.camera = std::make_shared<Camera>(CameraSettings{}, 4, 4);
   return std::make_unique<Scene>(std::move(parts));
 }
@@ -71,6 +73,19 @@ TEST(LightSelection, ALightWithoutPowerIsNotChosen) {
   const PowerLights lights(*scene);
   EXPECT_EQ(pmfs(lights, *scene), (std::vector<double>{0, 1, 0}));
   for (const float u : {0.0f, 0.4f, kOneMinusEpsilon}) EXPECT_EQ(&lights.select(u), scene->emitters()[1].get());
+}
+
+TEST(LightSelection, ALightOfUnknownPowerIsUnlikelyButPossible) {
+  const auto scene = scene_of({0, 3, 0}, false);
+  const PowerLights lights(*scene);
+  for (const size_t i : {0, 2}) EXPECT_NEAR(pmfs(lights, *scene)[i], 0.01 / 3.02, 1e-6);
+}
+
+TEST(LightSelection, ALightOfTinyPowerIsPossible) {
+  const auto scene = scene_of({1, 1e-12f, 1});
+  const PowerLights lights(*scene);
+  EXPECT_GT(pmfs(lights, *scene)[1], 0);
+  EXPECT_LT(pmfs(lights, *scene)[1], 1e-6);
 }
 
 TEST(LightSelection, PowersThatDoNotCompareGiveEqualChances) {

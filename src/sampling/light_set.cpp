@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "sampling/light_weights.h"
 
 namespace covary {
 namespace {
@@ -12,17 +13,41 @@ namespace {
 constexpr uint32_t kSteps = 1u << 24;  // of random numbers
 constexpr uint32_t kMaxLights = 1u << 22;
 
-/// Weight of a light by area or count, before normalisation.
-double weight_of(const Light& light, LightSelection selection) {
-  const Shape* shape = light.emitter->shape();
+std::vector<double> weights_by_power(const LargeVector<Light>& lights) {
+  std::vector<LightPower> powers;
+  for (const Light& light : lights)
+    powers.push_back({mean(light.emitter->part_power(light.part)), light.emitter->knows_power()});
+  return weights_by_power(powers);
+}
+
+std::vector<double> weights_by_triangle(const LargeVector<Light>& lights) {
+  std::vector<double> weights;
+  for (const Light& light : lights) {
+    const Shape* shape = light.emitter->shape();
+    weights.push_back(shape ? shape->triangles_per_part() : 1);
+  }
+  return weights;
+}
+
+std::vector<double> weights_by_area(const LargeVector<Light>& lights) {
+  std::vector<double> weights;
+  for (const Light& light : lights) {
+    const Shape* shape = light.emitter->shape();
+    weights.push_back(shape && shape->n_parts() > 1 ? double{shape->part_area(light.part)} / shape->area() : 1);
+  }
+  return weights;
+}
+
+/// Before normalisation.
+std::vector<double> weights_of(const LargeVector<Light>& lights, LightSelection selection) {
   switch (selection) {
     case LightSelection::kTriangle:
-      return shape ? shape->triangles_per_part() : 1;
+      return weights_by_triangle(lights);
     case LightSelection::kShape:
-      return shape && shape->n_parts() > 1 ? static_cast<double>(shape->part_area(light.part)) / shape->area() : 1;
+      return weights_by_area(lights);
     case LightSelection::kPower:
     case LightSelection::kLearned:
-      return mean(light.emitter->part_power(light.part));
+      return weights_by_power(lights);
   }
   throw Error(ErrorCode::kInternal, "unknown selection of lights");
 }
@@ -82,12 +107,7 @@ LightSet::LightSet(const Scene& scene, LightSelection selection) {
     for (uint32_t part = 0; part < n; ++part) lights_.push_back({emitter.get(), part, 0});
   }
   if (lights_.empty()) return;
-  std::vector<double> weights;
-  for (const Light& light : lights_) weights.push_back(weight_of(light, selection));
-  const bool finite = std::all_of(weights.begin(), weights.end(), [](double weight) { return std::isfinite(weight); });
-  const bool black = std::all_of(weights.begin(), weights.end(), [](double weight) { return !(weight > 0); });
-  if (!finite || black) std::fill(weights.begin(), weights.end(), 1.0);
-  change(weights);
+  change(weights_of(lights_, selection));
 }
 
 void LightSet::change(const std::vector<double>& weights) {

@@ -19,7 +19,7 @@ namespace covary {
 enum class LightSelection {
   kTriangle,  ///< uniform over emissive triangles [Hua2023] §6; analytic shapes and delta lights count as one each
   kShape,     ///< uniform over shapes and delta lights, then by area, as `path` samples them
-  kPower,     ///< in proportion to the power, the mean of its channels; uniform where none or an infinite one is known
+  kPower,     ///< in proportion to the power, the mean of its channels, by light_weights.h
   kLearned,   ///< first as kPower; who learns from samples changes it by LightSet::change()
 };
 

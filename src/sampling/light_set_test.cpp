@@ -8,6 +8,7 @@
 #include "scene/mesh.h"
 #include "support/describe.h"
 #include "support/light_scene.h"
+#include "textures/bitmap.h"
 
 namespace covary {
 namespace {
@@ -124,6 +125,50 @@ TEST(LightSet, PartsCarryThePowerOfTheWhole) {
   const ManyLights lights;
   const Emitter& mesh = *lights.scene->emitters()[0];
   EXPECT_NEAR(luminance(mesh.part_power(0) + mesh.part_power(1)), luminance(mesh.power()), 1e-5);
+}
+
+/// A spotlight through a picture of 300 x 300 texels whose only bright ones are 2 x 2 at the given place.
+std::shared_ptr<Emitter> spot_with_bright_texels(int x, int y) {
+  TexelImage image;
+  image.width = image.height = 300, image.channels = 3;
+  image.floats.resize(image.n_pixels() * 3);
+  for (int i = 0; i < 4; ++i) std::fill_n(image.floats.begin() + ((y + i / 2) * image.width + x + i % 2) * 3, 3, 1e5f);
+  Diagnostics diagnostics;
+  GivenObjects objects(diagnostics);
+  const NamedValues values = {{"texture", objects.nest("texture", make_bitmap_texture(image, {}))}};
+  return make_plugin<Emitter>(emitter_plugins(), "emitter", "spot", values, objects, diagnostics).object;
+}
+
+TEST(LightSet, FindsThePowerOfASpotWithFewBrightTexels) {
+  SceneParts parts;
+  parts.emitters.push_back(spot_with_bright_texels(141, 157));
+  parts.emitters.push_back(make_plugin<Emitter>(emitter_plugins(), "emitter", "point", {}).object);
+  parts.camera = std::make_shared<Camera>(CameraSettings{}, 4, 4);
+  // Its intensity is 1e5 in 4 of the 300^2 texels of a square of side 2 tan 20 degrees at distance 1.
+  const double spot = 4e5 * std::pow(2 * std::tan(20 * M_PI / 180) / 300, 2);
+  EXPECT_NEAR(mean(parts.emitters[0]->power()), spot, 0.02 * spot);
+  const LightSet set(Scene(std::move(parts)), LightSelection::kPower);
+  EXPECT_NEAR(set[0].pmf, spot / (spot + 4 * M_PI), 0.02 * set[0].pmf);
+}
+
+/// Black wherever its power is looked for, as a texture can be between the points of an estimate.
+class SeemsBlack final : public Emitter {
+ public:
+  EmitterSample sample_towards(const Vec3&, Vec2, float) const override { return {}; }
+  EmissionSample sample_emission(Vec2, Vec2, float) const override { return {}; }
+  EmissionPdf pdf_emission(const SurfaceHit&, const Vec3&) const override { return {}; }
+  Spectrum power() const override { return {}; }
+  bool knows_power() const override { return false; }
+};
+
+TEST(LightSet, ALightWhoseEstimatedPowerIsZeroStaysPossible) {
+  SceneParts parts;
+  parts.emitters.push_back(std::make_shared<SeemsBlack>());
+  parts.emitters.push_back(make_plugin<Emitter>(emitter_plugins(), "emitter", "point", {}).object);
+  parts.camera = std::make_shared<Camera>(CameraSettings{}, 4, 4);
+  const Scene scene(std::move(parts));
+  for (const LightSelection selection : {LightSelection::kPower, LightSelection::kLearned})
+    EXPECT_NEAR(LightSet(scene, selection)[0].pmf, 0.005 / 1.005, 1e-6) << name_of(selection);
 }
 
 TEST(LightSet, IsEmptyWithAnEnvironmentAlone) {

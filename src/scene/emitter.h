@@ -123,6 +123,8 @@ class Emitter : public SceneObject {
   /// Emitted power, summed over the surface and directions, in RGB; infinite lights: through the scene's bounding
   /// sphere.
   virtual Spectrum power() const = 0;
+  /// False where power() and part_power() look at some points only, as of a texture: what they find black may shine.
+  virtual bool knows_power() const { return true; }
 };
 
 }  // namespace covary
