@@ -11,6 +11,7 @@
 #include "integrators/guide_probe.h"
 #include "numbers.h"
 #include "plans/budget.h"
+#include "plans/light_plan.h"
 #include "plans/training_stage.h"
 #include "render_options.h"
 
@@ -48,20 +49,21 @@ void probe(ProbeOptions options) {
   const LoadedScene scene = load(render);
   outputs.reads(scene.files);
   for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", warning);
-  auto* guided = dynamic_cast<GuidedPath*>(scene.integrator.get());
-  if (!guided) throw Error(ErrorCode::kUsage, "probe shows what guided-path has learnt, not " + render.integrator);
+  const RenderRequest request = make_request(render, scene);
+  const std::shared_ptr<Integrator> integrator = prepared_integrator(scene, make_plan(render), request);
+  const LearningIntegrator* learning = integrator->learning();
+  if (!learning || !learning->learns_directions())
+    throw Error(ErrorCode::kUsage, "probe shows what guided-path has learnt, not " + render.integrator);
   const auto at = parse_numbers("--pixel", options.pixel, ',', 2, "X,Y, e.g. 640,360");
   if (at[0] < 0 || at[1] < 0 || at[0] >= scene.width || at[1] >= scene.height)
     throw Error(ErrorCode::kUsage,
                 fmt::format("--pixel '{}' is outside the {} x {} frame", options.pixel, scene.width, scene.height));
-  guided->prepare(*scene.scene);
-  const RenderRequest request = make_request(render, scene);
   RenderSeconds seconds;
-  train(scene, request, {window_of(scene, request), scene.filter, nullptr, nullptr, {}}, seconds);
+  train(scene, request, *integrator, {window_of(scene, request), scene.filter, nullptr, nullptr, {}}, seconds);
   const Ray ray =
       scene.scene->camera().ray({static_cast<float>(at[0]) + 0.5f, static_cast<float>(at[1]) + 0.5f}, {0.5f, 0.5f});
   const std::optional<GuideProbe> found =
-      probe_guide(*scene.scene, *guided, ray, options.height, options.samples, render.seed);
+      learning->probe(*scene.scene, ray, options.height, options.samples, render.seed);
   if (!found) throw Error(ErrorCode::kUsage, fmt::format("no surface lies behind the pixel {}", options.pixel));
   const Image image = side_by_side(*found);
   write_image(render.output, image, {image.width, image.height, {0, 0, image.width, image.height}}, {});

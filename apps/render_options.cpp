@@ -97,10 +97,10 @@ namespace {
 /// Options of the render that some integrators have no part in.
 void check_integrator(const RenderOptions& options, const LoadedScene& scene) {
   const std::string& name = options.integrator.empty() ? scene.integrator_type : options.integrator;
-  if (options.replay_light && !dynamic_cast<const LightTracingIntegrator*>(scene.integrator.get()))
+  if (options.replay_light && !integrator_of(scene).light_tracing())
     throw Error(ErrorCode::kUsage,
                 fmt::format("--replay-light is an option of integrators that trace light; '{}' does not", name));
-  const auto* tracer = dynamic_cast<const LightTracingIntegrator*>(scene.integrator.get());
+  const auto* tracer = integrator_of(scene).light_tracing();
   const bool beside_crn = make_plan(options).has_crn_pass;
   if (tracer && options.of_integrator.contains("light-paths") && !tracer->wants_light_pass(beside_crn))
     throw Error(ErrorCode::kUsage,
@@ -108,20 +108,9 @@ void check_integrator(const RenderOptions& options, const LoadedScene& scene) {
                             beside_crn ? "beside a pass with common random numbers: no light is traced there without "
                                          "--light-tracing on"
                                        : "without light tracing (--light-tracing on)"));
-  if (options.path_lengths && !dynamic_cast<const ControlledPath*>(scene.integrator.get()))
+  if (options.path_lengths && !integrator_of(scene).longest_path())
     throw Error(ErrorCode::kUsage,
                 fmt::format("--path-lengths is an option of --integrator controlled-path, not of {}", name));
-}
-
-/// Adds a warning to a scene whose lights at a point or in one direction the integrator cannot see.
-void warn_of_unseen_lights(LoadedScene& scene) {
-  const auto* guided = dynamic_cast<const GuidedPath*>(scene.integrator.get());
-  if (!guided || guided->settings().nee) return;
-  const auto n = std::ranges::count_if(scene.scene->emitters(), [](const auto& light) { return light->is_delta(); });
-  if (n > 0)
-    scene.warnings.push_back(
-        fmt::format("without light samples (--nee off), lights at a point or in one direction are not seen: {} of {}",
-                    n, scene.scene->emitters().size()));
 }
 
 }  // namespace
@@ -138,7 +127,8 @@ LoadedScene load(const RenderOptions& options) {
   load_options.make_integrator = integrator_maker({options.integrator, options.of_integrator});
   LoadedScene scene = load_scene(options.scene, load_options);
   check_integrator(options, scene);
-  warn_of_unseen_lights(scene);
+  for (std::string& warning : integrator_of(scene).blind_spots(*scene.scene))
+    scene.warnings.push_back(std::move(warning));
   return scene;
 }
 

@@ -12,8 +12,6 @@
 #include "core/shell_text.h"
 #include "declared_options.h"
 #include "film/splat_layer.h"
-#include "integrators/controlled_path.h"
-#include "integrators/guided_path.h"
 #include "integrators/light_pass.h"
 #include "integrators/training.h"
 #include "plans/budget.h"
@@ -33,7 +31,7 @@ const char* sampling_name(const Pass& pass) { return pass.settings.sampling == S
 
 /// What decides on the weights of strategies beside the scene: whether light is traced, and for how many pixels.
 void add_light_words(const RenderOptions& o, const Pass& pass, std::vector<std::string>& words) {
-  if (!dynamic_cast<const LightTracingIntegrator*>(pass.integrator.get())) return;
+  if (!pass.integrator->light_tracing()) return;
   words.insert(words.end(), {"--light-tracing", light_tracer(*pass.integrator) ? "on" : "off"});
   if (!o.crop.empty()) words.insert(words.end(), {"--crop", o.crop});
 }
@@ -72,42 +70,15 @@ uint32_t fewest_reliable_samples(const RenderReport& report) {
   return report.result.predicted_relmse && report.result.samples_per_pixel() < fewest ? fewest : 0;
 }
 
-void print_training_warnings(const ControlledPath& controlled) {
-  if (const uint32_t n = controlled.cache().n_coarsened(); n > 0)
-    fmt::print(stderr, "warning: {} MiB for control variates (--cv-memory) were reached; cells are {} times as wide\n",
-               controlled.settings().memory_mib, uint64_t{1} << n);
-  if (const uint64_t n = controlled.cache().n_rejected(); n > 0)
-    fmt::print(stderr, "warning: {} samples of the training were not finite and are left out\n", n);
-}
-
-/// The scene's integrator where it uses control variates, or null.
-const ControlledPath* trained_integrator(const LoadedScene& scene) {
-  const auto* controlled = dynamic_cast<const ControlledPath*>(scene.integrator.get());
-  return controlled && controlled->settings().on() ? controlled : nullptr;
-}
-
-const GuidedPath* guided_integrator(const LoadedScene& scene) {
-  return dynamic_cast<const GuidedPath*>(scene.integrator.get());
-}
-
-nlohmann::ordered_json guiding_statistics(const GuidedPath& guided) {
-  const GuidingField& field = guided.field();
-  const double millions = 1e-6 * static_cast<double>(field.n_fitted());
-  return {{"leaves", field.n_leaves()},
-          {"lobes", field.n_lobes()},
-          {"samples", field.n_samples()},
-          {"samples_left_out", field.n_rejected()},
-          {"fit_seconds", field.fit_seconds()},
-          {"fit_seconds_per_million_samples", millions > 0 ? field.fit_seconds() / millions : 0},
-          {"training_memory_bytes", guided.training_bytes()},
-          {"memory_bytes", field.bytes() + guided.table().bytes()},
-          {"controlled_leaves", guided.table().n_cells()},
-          {"controlled_leaves_switched_off", guided.table().n_switched_off()}};
+nlohmann::ordered_json json_of(const IntegratorReport& report) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::object();
+  for (const auto& [name, number] : report.numbers) std::visit([&](const auto& value) { json[name] = value; }, number);
+  return json;
 }
 
 /// Samples per pixel of the training; 0 without one, and where a file took its place.
 uint32_t training_samples_taken(const RenderReport& report) {
-  const auto* learning = dynamic_cast<const LearningIntegrator*>(report.scene.integrator.get());
+  const LearningIntegrator* learning = report.result.integrator->learning();
   return learning && report.options.load_training.empty() ? learning->trained_spp() : 0;
 }
 
@@ -195,16 +166,7 @@ nlohmann::ordered_json statistics(const RenderReport& report) {
       {"not_finite_samples", result.sum([](const Pass& p) { return p.result.n_not_finite; })},
       {"negative_samples", result.sum([](const Pass& p) { return p.result.n_negative; })},
       {"bad_samples", bad}};
-  if (const ControlledPath* controlled = trained_integrator(scene))
-    json["control_variates"] = {{"lights", controlled->lights().size()},
-                                {"clusters", controlled->n_clusters()},
-                                {"cells", controlled->table().n_cells()},
-                                {"cells_switched_off", controlled->table().n_switched_off()},
-                                {"grid", controlled->table().grid().resolution()},
-                                {"times_coarsened", controlled->cache().n_coarsened()},
-                                {"samples_not_finite", controlled->cache().n_rejected()},
-                                {"memory_bytes", controlled->training_bytes()}};
-  if (const GuidedPath* guided = guided_integrator(scene)) json["guiding"] = guiding_statistics(*guided);
+  if (const IntegratorReport of = result.integrator->report(); !of.name.empty()) json[of.name] = json_of(of);
   if (const Pass* light = light_pass(result.passes)) json["light_paths"] = light_paths(light->film);
   if (result.predicted_relmse) {
     json["predicted_relmse"] = *result.predicted_relmse;
@@ -229,19 +191,9 @@ void print_summary(const RenderReport& report) {
              load_seconds, scene.scene->build_seconds(),
              format_count(result.camera_sum([](const Pass& p) { return p.result.n_samples; }) / seconds),
              format_count(result.sum([](const Pass& p) { return p.result.n_rays; }) / seconds));
-  if (const ControlledPath* controlled = trained_integrator(scene)) {
-    fmt::print(stderr, "control variates in {} cells, {} of them switched off, from {} samples per pixel in {:.2f} s\n",
-               controlled->table().n_cells(), controlled->table().n_switched_off(), controlled->training_spp(),
-               result.seconds.train);
-    print_training_warnings(*controlled);
-  }
-  if (const GuidedPath* guided = guided_integrator(scene)) {
-    const GuidingField& field = guided->field();
-    fmt::print(stderr, "guiding by {} lobes in {} leaves, from {} samples per pixel in {:.2f} s\n", field.n_lobes(),
-               field.n_leaves(), guided->training_spp(), result.seconds.train);
-    if (field.n_rejected() > 0)
-      fmt::print(stderr, "warning: {} samples of the training were not finite and are left out\n", field.n_rejected());
-  }
+  const IntegratorReport of = result.integrator->report();
+  if (!of.summary.empty()) fmt::print(stderr, "{} in {:.2f} s\n", of.summary, result.seconds.train);
+  for (const std::string& warning : of.warnings) fmt::print(stderr, "warning: {}\n", warning);
   const Estimator estimator = make_estimator(options.estimator);
   if (estimator.passes != EstimatorPasses::kAny) {
     fmt::print(stderr, "{} in {:.2f} s", estimator.text, result.estimate_seconds());

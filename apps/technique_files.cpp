@@ -10,6 +10,7 @@
 #include "film/image_writer.h"
 #include "integrators/light_pass.h"
 #include "integrators/technique_images.h"
+#include "plans/integrator_choice.h"
 
 namespace covary {
 namespace {
@@ -54,8 +55,7 @@ const Pass& camera_pass(const RenderResult& result) {
 }  // namespace
 
 void check_technique_folder(const std::string& folder, const LoadedScene& scene) {
-  const auto* integrator = dynamic_cast<const Integrator*>(scene.integrator.get());
-  if (!integrator || !has_techniques(*integrator))
+  if (!has_techniques(integrator_of(scene)))
     throw Error(ErrorCode::kUsage,
                 "--debug-strategies shows the techniques of the integrator 'bdpt', which does not render this scene");
   std::error_code error;

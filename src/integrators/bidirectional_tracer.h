@@ -87,6 +87,10 @@ class BidirectionalTracer final : public LightTracingIntegrator {
         mis_(settings.heuristic),
         parts_(std::move(parts)) {}
 
+  std::shared_ptr<Integrator> clone() const override {
+    return std::make_shared<BidirectionalTracer>(settings_, parts_);
+  }
+  const BidirectionalSettings* bidirectional() const override { return &settings_; }
   void prepare(const Scene& scene) override {
     emission_lights_.emplace(scene);
     to_camera_ = scene.camera().settings().to_world.inverse();
@@ -131,7 +135,6 @@ class BidirectionalTracer final : public LightTracingIntegrator {
         join_to_lens(scene, paths, paths.first + i, end, splats, context);
   }
 
-  const BidirectionalSettings& settings() const { return settings_; }
   std::string description() const override {
     return "bdpt " + lengths_.text() +
            " heuristic=" + (settings_.heuristic == Heuristic::kPower ? "power " : "balance ") + light_tracing_text();

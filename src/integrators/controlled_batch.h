@@ -51,18 +51,12 @@ struct ControlledBatch final : CameraBatch<ControlledPathState, ControlledChoice
     CameraBatch::start(n, 2);
     if (vertices.size() < n) environments.resize(n), vertices.resize(n);
     for (size_t i = 0; i < n; ++i) vertices[i].open = false;
-    by_length.assign(n * n_lengths, Spectrum());
     indirect.start(n);
   }
 
   std::vector<EmitterSample> environments;
   std::vector<ControlledVertex> vertices;  ///< the last one of each path, by Path::sample
   std::vector<uint32_t> ended;             ///< samples of the paths that end at their last vertex
-
-  /// Parts of the samples' radiances by the number of edges of their paths, 1 … n_lengths, one sample after another;
-  /// none are kept where n_lengths is 0.
-  size_t n_lengths = 0;
-  std::vector<Spectrum> by_length;
 
   bool recording = false;
   SystemSums sums;

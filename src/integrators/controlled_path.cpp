@@ -2,6 +2,8 @@
 // `controlled-path`: see controlled_path.h.
 #include "integrators/controlled_path.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -165,6 +167,31 @@ void ControlledPath::update() {
     cache_.select(expected_samples(clusters_, lights_));
   }
   cache_.set_selection(best.empty() ? selection : best);
+}
+
+IntegratorReport ControlledPath::report() const {
+  if (!settings_.on()) return {};
+  const CoefficientTable& used = table();
+  IntegratorReport report{
+      "control_variates",
+      {{"lights", uint64_t{lights_.size()}},
+       {"clusters", uint64_t{clusters_.n_clusters}},
+       {"cells", uint64_t{used.n_cells()}},
+       {"cells_switched_off", uint64_t{used.n_switched_off()}},
+       {"grid", uint64_t{used.grid().resolution()}},
+       {"times_coarsened", uint64_t{cache_.n_coarsened()}},
+       {"samples_not_finite", uint64_t{cache_.n_rejected()}},
+       {"memory_bytes", uint64_t{training_bytes_}}},
+      fmt::format("control variates in {} cells, {} of them switched off, from {} samples per pixel", used.n_cells(),
+                  used.n_switched_off(), training_spp()),
+      {}};
+  if (const uint32_t n = cache_.n_coarsened(); n > 0)
+    report.warnings.push_back(
+        fmt::format("{} MiB for control variates (--cv-memory) were reached; cells are {} times as wide",
+                    settings_.memory_mib, uint64_t{1} << n));
+  if (const uint64_t n = cache_.n_rejected(); n > 0)
+    report.warnings.push_back(fmt::format("{} samples of the training were not finite and are left out", n));
+  return report;
 }
 
 std::string ControlledPath::settings_text() const {

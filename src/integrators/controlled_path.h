@@ -21,6 +21,7 @@ class ControlledPath : public LearningIntegrator {
   ControlledPath(const PathLengthSettings& lengths, const ControlSettings& settings)
       : lengths_(lengths), settings_(settings) {}
 
+  std::shared_ptr<Integrator> clone() const override { return std::make_shared<ControlledPath>(lengths_, settings_); }
   const ControlSettings& settings() const { return settings_; }
   const CoefficientCache& cache() const { return cache_; }
   std::string settings_text() const override;
@@ -31,17 +32,15 @@ class ControlledPath : public LearningIntegrator {
   /// Takes coefficients that were learnt before, in place of a training; after prepare(), before the training.
   void use(CoefficientTable table, CoefficientTable indirect = {});
   const LightSet& lights() const { return lights_; }
-  uint32_t n_clusters() const { return clusters_.n_clusters; }
-  /// Bytes of sums and coefficients at the end of the training.
-  size_t training_bytes() const { return training_bytes_; }
 
   void prepare(const Scene& scene) override;
-  const PathLengthSettings& lengths() const { return lengths_; }
   std::unique_ptr<ThreadState> make_thread_state() const override { return std::make_unique<ControlledBatch>(); }
   void trace(const Scene& scene, std::span<CameraSample> samples, PathContext& context) const override {
     trace_with<ControlledParts>(scene, samples, context);
   }
   bool allows_negative() const override { return settings_.on(); }
+  std::optional<int> longest_path() const override { return lengths_.max_depth; }
+  IntegratorReport report() const override;
   /// Whether the probabilities of lights were learnt.
   bool selects_by_learning() const { return !table().selection().empty(); }
   WaveWeights wave_weights() const override {
@@ -88,7 +87,7 @@ class ControlledPath : public LearningIntegrator {
   std::optional<CoefficientTable> given_;
   CoefficientTable given_indirect_;
   ControlledScene controlled_{};
-  size_t training_bytes_ = 0;
+  size_t training_bytes_ = 0;  // of sums and coefficients at the end of the training
 };
 
 }  // namespace covary

@@ -93,6 +93,7 @@ class ControlledTracer {
   void trace() {
     if (lengths_.max_depth <= 0) return;
     batch_.start(samples_.size());
+    context_.by_length.radiance.assign(samples_.size() * context_.by_length.n_lengths, Spectrum());
     for (uint32_t i = 0; i < samples_.size(); ++i) batch_.rays[i] = samples_[i].ray, batch_.paths[i].sample = i;
     const bool any_light = !control_.lights->empty() || control_.environment;
     for (int depth = 0; !batch_.paths.empty(); ++depth) {
@@ -380,8 +381,9 @@ class ControlledTracer {
     if (batch_.indirect.recording) [[unlikely]]
       batch_.indirect.add(sample, edges, value);
     const auto place = static_cast<size_t>(edges - 1);
-    if (place < batch_.n_lengths) [[unlikely]]
-      batch_.by_length[sample * batch_.n_lengths + place] += value;
+    RadianceByLength& by_length = context_.by_length;
+    if (place < by_length.n_lengths) [[unlikely]]
+      by_length.radiance[sample * by_length.n_lengths + place] += value;
   }
 
   /// Ends the estimate of a vertex, which is of paths of so many edges.

@@ -2,7 +2,12 @@
 // `guided-path`: see guided_path.h.
 #include "integrators/guided_path.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+
 #include "core/content_hash.h"
+#include "integrators/guide_probe.h"
 #include "sampling/training_bytes.h"
 
 namespace covary {
@@ -89,6 +94,40 @@ void GuidedPath::absorb(const TrainingRecord& record) {
 void GuidedPath::on_freeze() {
   training_bytes_ = field_.bytes() + cache_.bytes();
   field_.freeze(), cache_.freeze();
+}
+
+std::vector<std::string> GuidedPath::blind_spots(const Scene& scene) const {
+  const auto n = std::ranges::count_if(scene.emitters(), [](const auto& light) { return light->is_delta(); });
+  if (settings_.nee || n == 0) return {};
+  return {fmt::format("without light samples (--nee off), lights at a point or in one direction are not seen: {} of {}",
+                      n, scene.emitters().size())};
+}
+
+IntegratorReport GuidedPath::report() const {
+  const GuidingField& used = field();
+  const double millions = 1e-6 * static_cast<double>(used.n_fitted());
+  IntegratorReport report{"guiding",
+                          {{"leaves", uint64_t{used.n_leaves()}},
+                           {"lobes", uint64_t{used.n_lobes()}},
+                           {"samples", uint64_t{used.n_samples()}},
+                           {"samples_left_out", uint64_t{used.n_rejected()}},
+                           {"fit_seconds", used.fit_seconds()},
+                           {"fit_seconds_per_million_samples", millions > 0 ? used.fit_seconds() / millions : 0.0},
+                           {"training_memory_bytes", uint64_t{training_bytes_}},
+                           {"memory_bytes", uint64_t{used.bytes() + table().bytes()}},
+                           {"controlled_leaves", uint64_t{table().n_cells()}},
+                           {"controlled_leaves_switched_off", uint64_t{table().n_switched_off()}}},
+                          fmt::format("guiding by {} lobes in {} leaves, from {} samples per pixel", used.n_lobes(),
+                                      used.n_leaves(), training_spp()),
+                          {}};
+  if (const uint64_t n = used.n_rejected(); n > 0)
+    report.warnings.push_back(fmt::format("{} samples of the training were not finite and are left out", n));
+  return report;
+}
+
+std::optional<GuideProbe> GuidedPath::probe(const Scene& scene, const Ray& ray, int height, uint32_t spp,
+                                            uint64_t seed) const {
+  return probe_guide(scene, *this, ray, height, spp, seed);
 }
 
 std::string GuidedPath::settings_text() const {

@@ -20,6 +20,7 @@ class GuidedPath : public LearningIntegrator {
   GuidedPath(const PathLengthSettings& lengths, const GuideSettings& settings)
       : lengths_(lengths), settings_(settings), field_(settings.field()) {}
 
+  std::shared_ptr<Integrator> clone() const override { return std::make_shared<GuidedPath>(lengths_, settings_); }
   const GuideSettings& settings() const { return settings_; }
   /// What was learnt so far, or given.
   const GuidingField& field() const { return given_ ? *given_ : field_; }
@@ -27,8 +28,6 @@ class GuidedPath : public LearningIntegrator {
   const CoefficientTable& table() const { return given_table_ ? *given_table_ : cache_.table(); }
   /// What paths are traced with; after prepare().
   const GuidedScene& guided() const { return guided_; }
-  /// Bytes of samples and mixtures at the end of the training.
-  size_t training_bytes() const { return training_bytes_; }
   std::string settings_text() const override;
 
   void prepare(const Scene& scene) override;
@@ -45,6 +44,11 @@ class GuidedPath : public LearningIntegrator {
   std::string trained_bytes() const override;
   void use_bytes(std::string_view bytes, const std::string& where) override;
   bool allows_negative() const override { return settings_.controlled(); }
+  std::vector<std::string> blind_spots(const Scene& scene) const override;
+  IntegratorReport report() const override;
+  bool learns_directions() const override { return true; }
+  std::optional<GuideProbe> probe(const Scene& scene, const Ray& ray, int height, uint32_t spp,
+                                  uint64_t seed) const override;
 
  protected:
   template <typename Parts>
@@ -74,7 +78,7 @@ class GuidedPath : public LearningIntegrator {
   CoefficientCache cache_;
   std::optional<CoefficientTable> given_table_;
   GuidedScene guided_{};
-  size_t training_bytes_ = 0;
+  size_t training_bytes_ = 0;  // of samples and mixtures at the end of the training
 };
 
 }  // namespace covary

@@ -5,9 +5,12 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <variant>
 #include <vector>
 
 #include "core/arena.h"
@@ -25,6 +28,14 @@ class ThreadState {
 };
 
 class Integrator;
+class LearningIntegrator;
+class LightTracingIntegrator;
+
+/// Parts of samples' radiances by the number of edges of their paths.
+struct RadianceByLength {
+  size_t n_lengths = 0;            ///< paths of 1 … n_lengths edges are told apart; 0: none
+  std::vector<Spectrum> radiance;  ///< those of one sample after another, in the order of trace()
+};
 
 /// What one thread keeps while it traces paths of one integrator.
 struct PathContext {
@@ -40,6 +51,7 @@ struct PathContext {
   std::unique_ptr<ThreadState> state;
   /// PassSettings::importance of the pixel of each sample that trace() is called with; empty where there is none.
   std::span<const Spectrum> importance;
+  RadianceByLength by_length;  ///< filled by integrators that have Integrator::longest_path()
 };
 
 /// One camera ray, the random numbers of its path, and the estimate of the radiance arriving along it.
@@ -51,10 +63,22 @@ struct CameraSample {
   PathRandom light_random = random;
 };
 
+/// What an integrator tells of a render besides its image.
+struct IntegratorReport {
+  using Number = std::variant<uint64_t, double>;
+  std::string name;  ///< of the numbers together; empty where there is nothing to tell
+  std::vector<std::pair<std::string, Number>> numbers;
+  std::string summary;  ///< one line
+  std::vector<std::string> warnings;
+};
+
 /// How an integrator lives: it is made from parameters, gets the scene by prepare(), is trained if it learns
 /// (integrators/training.h), and then traces. From prepare() or training on, nothing that all threads see changes.
+/// A loaded scene holds one that is never prepared; each render works with a clone.
 class Integrator : public SceneObject {
  public:
+  /// Another with the same settings, which knows no scene and has learnt nothing. Thread-safe.
+  virtual std::shared_ptr<Integrator> clone() const = 0;
   /// Called with the scene before anything but description(); again with the same scene it changes nothing.
   virtual void prepare(const Scene& /*scene*/) {}
   /// A fresh state for a thread; null when trace() keeps nothing. Thread-safe.
@@ -67,6 +91,20 @@ class Integrator : public SceneObject {
   virtual bool allows_negative() const { return false; }
   /// Registered name and settings, as they go into a film's attributes: equal text, equal estimator.
   virtual std::string description() const = 0;
+
+  // What some integrators can do besides. Nobody asks for the type of one.
+  /// Itself where it learns from samples (training.h), otherwise null.
+  virtual LearningIntegrator* learning() { return nullptr; }
+  const LearningIntegrator* learning() const { return const_cast<Integrator*>(this)->learning(); }
+  /// Itself where it traces light (light_pass.h), otherwise null.
+  virtual LightTracingIntegrator* light_tracing() { return nullptr; }
+  const LightTracingIntegrator* light_tracing() const { return const_cast<Integrator*>(this)->light_tracing(); }
+  /// Most edges of its paths where trace() fills PathContext::by_length.
+  virtual std::optional<int> longest_path() const { return {}; }
+  /// What it cannot see of the scene, as warnings.
+  virtual std::vector<std::string> blind_spots(const Scene& /*scene*/) const { return {}; }
+  /// After the render.
+  virtual IntegratorReport report() const { return {}; }
 };
 
 inline PathContext::PathContext(const Integrator& integrator) : state(integrator.make_thread_state()) {}

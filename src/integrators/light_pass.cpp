@@ -51,7 +51,7 @@ std::string LightTracingIntegrator::light_tracing_text() const {
 }
 
 const LightTracingIntegrator* light_tracer(const Integrator& integrator) {
-  const auto* tracer = dynamic_cast<const LightTracingIntegrator*>(&integrator);
+  const LightTracingIntegrator* tracer = integrator.light_tracing();
   return tracer && tracer->traces_light() ? tracer : nullptr;
 }
 

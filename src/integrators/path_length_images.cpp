@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "core/error.h"
 #include "core/parallel.h"
 
 namespace covary {
@@ -12,7 +13,7 @@ constexpr uint32_t kBatch = 256;  // samples of a pixel traced together
 
 /// One thread's.
 struct Worker {
-  explicit Worker(const ControlledPath& integrator) : context(integrator) {}
+  explicit Worker(const Integrator& integrator) : context(integrator) {}
   PathContext context;
   std::vector<CameraSample> samples;
   std::vector<double> sums;  // RGB of each length
@@ -20,9 +21,9 @@ struct Worker {
 
 class PathLengths {
  public:
-  PathLengths(const Scene& scene, const ControlledPath& integrator, const PassSettings& settings, const Film& film)
+  PathLengths(const Scene& scene, const Integrator& integrator, const PassSettings& settings, const Film& film)
       : scene_(scene), integrator_(integrator), settings_(settings), film_(film) {
-    const auto n = static_cast<size_t>(std::clamp(integrator.lengths().max_depth, 0, kMostEdges));
+    const auto n = static_cast<size_t>(std::clamp(*integrator.longest_path(), 0, kMostEdges));
     images_.assign(n, Image(film.width(), film.height(), 3));
   }
 
@@ -39,8 +40,8 @@ class PathLengths {
   bool stopped() const { return settings_.stop && settings_.stop->load(std::memory_order_relaxed); }
 
   void trace_pixel(int x, int y, Worker& worker) {
-    ControlledBatch& batch = worker.context.state_as<ControlledBatch>();
-    batch.n_lengths = images_.size();
+    RadianceByLength& by_length = worker.context.by_length;
+    by_length.n_lengths = images_.size();
     worker.sums.assign(3 * images_.size(), 0);
     const uint32_t n = film_.count(x, y);
     for (uint32_t first = 0; first < n; first += kBatch) {
@@ -52,7 +53,7 @@ class PathLengths {
         if (!is_finite(worker.samples[s].radiance)) continue;  // black in the film, too
         for (size_t i = 0; i < images_.size(); ++i)
           for (int c = 0; c < 3; ++c)
-            worker.sums[3 * i + static_cast<size_t>(c)] += batch.by_length[s * images_.size() + i][c];
+            worker.sums[3 * i + static_cast<size_t>(c)] += by_length.radiance[s * images_.size() + i][c];
       }
     }
     for (size_t i = 0; n > 0 && i < images_.size(); ++i)
@@ -60,7 +61,7 @@ class PathLengths {
   }
 
   const Scene& scene_;
-  const ControlledPath& integrator_;
+  const Integrator& integrator_;
   const PassSettings& settings_;
   const Film& film_;
   std::vector<Image> images_;
@@ -68,8 +69,10 @@ class PathLengths {
 
 }  // namespace
 
-std::vector<Image> path_length_images(const Scene& scene, const ControlledPath& integrator,
-                                      const PassSettings& settings, const Film& film) {
+std::vector<Image> path_length_images(const Scene& scene, const Integrator& integrator, const PassSettings& settings,
+                                      const Film& film) {
+  if (!integrator.longest_path())
+    throw Error(ErrorCode::kUsage, "the integrator has no images by the number of edges; controlled-path has");
   return PathLengths(scene, integrator, settings, film).render();
 }
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "film/film.h"
-#include "integrators/controlled_path.h"
+#include "integrators/integrator.h"
 #include "integrators/render_pass.h"
 
 namespace covary {
@@ -15,8 +15,9 @@ inline constexpr int kMostEdges = 16;
 
 /// Image i holds the part of the film's samples that came by paths of i + 1 edges; as many images as there are lengths,
 /// at most kMostEdges. Together they are the film's mean where no path has more edges. Traces the samples again, which
-/// takes as long as the film did. `settings`: those of the film's render; reads stop, and then returns none.
-std::vector<Image> path_length_images(const Scene& scene, const ControlledPath& integrator,
-                                      const PassSettings& settings, const Film& film);
+/// takes as long as the film did. `settings`: those of the film's render; reads stop, and then returns none. Throws
+/// Error(kUsage) for an integrator without Integrator::longest_path().
+std::vector<Image> path_length_images(const Scene& scene, const Integrator& integrator, const PassSettings& settings,
+                                      const Film& film);
 
 }  // namespace covary

@@ -64,6 +64,7 @@ class PathTracer final : public Integrator {
   PathTracer(std::string name, const PathLengthSettings& lengths, Parts parts = {})
       : name_(std::move(name)), lengths_(lengths), parts_(std::move(parts)) {}
 
+  std::shared_ptr<Integrator> clone() const override { return std::make_shared<PathTracer>(name_, lengths_, parts_); }
   void prepare(const Scene& scene) override { parts_.prepare(scene); }
   std::unique_ptr<ThreadState> make_thread_state() const override { return std::make_unique<PathBatch>(); }
 

@@ -200,7 +200,7 @@ void render_tiles(size_t n, LearningIntegrator* learner, const Integrator& integ
 
 /// An integrator that learns has learnt, or learns from this pass.
 void check_learner(const Integrator& integrator, const PassSettings& settings, const Film& film) {
-  const auto* learning = dynamic_cast<const LearningIntegrator*>(&integrator);
+  const LearningIntegrator* learning = integrator.learning();
   const LearningIntegrator* learner = settings.learner;
   COVARY_CHECK(!learning || learning == learner || learning->frozen(), "the integrator has not been trained");
   if (!learner) return;

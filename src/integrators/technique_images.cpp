@@ -44,8 +44,8 @@ struct RecordingParts : BidirectionalParts {
 
 /// The integrator with a recording of its own.
 struct Recorder {
-  Recorder(const Scene& scene, const BidirectionalTracer<BidirectionalParts>& original, const CropWindow& window)
-      : recording{window, {}}, tracer(original.settings(), parts(&recording)) {
+  Recorder(const Scene& scene, const LightTracingIntegrator& original, const CropWindow& window)
+      : recording{window, {}}, tracer(*original.bidirectional(), parts(&recording)) {
     tracer.prepare(scene);
     const uint64_t n_pixels = uint64_t(window.width) * window.height;
     if (original.traces_light()) tracer.fix_light_tracing(n_pixels, false);
@@ -64,7 +64,7 @@ struct Recorder {
 
 class Techniques {
  public:
-  Techniques(const Scene& scene, const BidirectionalTracer<BidirectionalParts>& tracer, const PassSettings& settings,
+  Techniques(const Scene& scene, const LightTracingIntegrator& tracer, const PassSettings& settings,
              const CropWindow& window)
       : scene_(scene), tracer_(tracer), settings_(settings), window_(window), spp_(settings.spp.largest()) {
     for (int n = 2; n <= kTechniqueEdges + 1; ++n)
@@ -132,7 +132,7 @@ class Techniques {
   }
 
   const Scene& scene_;
-  const BidirectionalTracer<BidirectionalParts>& tracer_;
+  const LightTracingIntegrator& tracer_;
   const PassSettings& settings_;
   CropWindow window_;
   uint32_t spp_;
@@ -142,14 +142,13 @@ class Techniques {
 }  // namespace
 
 bool has_techniques(const Integrator& integrator) {
-  return dynamic_cast<const BidirectionalTracer<BidirectionalParts>*>(&integrator) != nullptr;
+  return integrator.light_tracing() && integrator.light_tracing()->bidirectional();
 }
 
 std::vector<TechniqueImage> render_techniques(const Scene& scene, const Integrator& integrator,
                                               const PassSettings& settings, const CropWindow& window) {
-  const auto* tracer = dynamic_cast<const BidirectionalTracer<BidirectionalParts>*>(&integrator);
-  if (!tracer) throw Error(ErrorCode::kUsage, "images of techniques need the integrator 'bdpt'");
-  return Techniques(scene, *tracer, settings, window).render();
+  if (!has_techniques(integrator)) throw Error(ErrorCode::kUsage, "images of techniques need the integrator 'bdpt'");
+  return Techniques(scene, *integrator.light_tracing(), settings, window).render();
 }
 
 }  // namespace covary

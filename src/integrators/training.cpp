@@ -3,8 +3,13 @@
 
 #include "core/content_hash.h"
 #include "core/stopwatch.h"
+#include "integrators/guide_probe.h"
 
 namespace covary {
+
+std::optional<GuideProbe> LearningIntegrator::probe(const Scene&, const Ray&, int, uint32_t, uint64_t) const {
+  throw Error(ErrorCode::kInternal, "the integrator learns no functions of directions");
+}
 
 void LearningIntegrator::restart() {
   on_restart();

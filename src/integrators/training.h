@@ -16,6 +16,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -32,8 +33,12 @@ class TrainingRecord {
   virtual ~TrainingRecord() = default;
 };
 
+struct GuideProbe;
+
 class LearningIntegrator : public Integrator {
  public:
+  using Integrator::learning;
+  LearningIntegrator* learning() final { return this; }
   /// Samples per pixel that it wants to learn from, by its parameters; 0: it is to be frozen as it is.
   virtual uint32_t training_spp() const = 0;
   /// How the waves of the training become an image.
@@ -57,6 +62,12 @@ class LearningIntegrator : public Integrator {
   virtual void use_bytes(std::string_view /*bytes*/, const std::string& /*where*/) {}
   /// Registered name and settings.
   virtual std::string settings_text() const = 0;
+
+  /// Whether it has learnt functions of directions, which probe() shows.
+  virtual bool learns_directions() const { return false; }
+  /// What it knows at the first surface along `ray`, by guide_probe.h; nothing where there is no surface.
+  virtual std::optional<GuideProbe> probe(const Scene& scene, const Ray& ray, int height, uint32_t spp,
+                                          uint64_t seed) const;
 
   /// Forgets what was learnt, if anything.
   void restart();

@@ -46,6 +46,12 @@ std::function<std::shared_ptr<SceneObject>(Parameters&)> integrator_maker(const 
   };
 }
 
+const Integrator& integrator_of(const LoadedScene& scene) {
+  const auto* integrator = dynamic_cast<const Integrator*>(scene.integrator.get());
+  COVARY_CHECK(integrator, "the scene was loaded with an integrator");
+  return *integrator;
+}
+
 std::string unknown_integrator(const std::string& name) {
   const std::vector<std::string> names = integrator_names();
   return fmt::format("unknown integrator '{}'{}; supported: {}", name, did_you_mean(name, names),

@@ -20,6 +20,9 @@ struct IntegratorChoice {
 /// wrong.
 std::function<std::shared_ptr<SceneObject>(Parameters&)> integrator_maker(const IntegratorChoice& choice);
 
+/// The integrator of a scene that was loaded with one: its settings, for no scene yet.
+const Integrator& integrator_of(const LoadedScene& scene);
+
 /// The message for an unknown name, with the names there are.
 std::string unknown_integrator(const std::string& name);
 

@@ -11,6 +11,7 @@
 #include "film/splat_layer.h"
 #include "integrators/light_pass.h"
 #include "plans/budget.h"
+#include "plans/integrator_choice.h"
 
 namespace covary {
 namespace {
@@ -32,20 +33,21 @@ const Pass* light_pass(std::span<const Pass> passes) {
 }
 
 bool has_light_pass(const LoadedScene& scene, const Plan& plan) {
-  const auto* tracer = dynamic_cast<const LightTracingIntegrator*>(scene.integrator.get());
+  if (!scene.integrator) return false;
+  const LightTracingIntegrator* tracer = integrator_of(scene).light_tracing();
   return tracer && tracer->wants_light_pass(plan.has_crn_pass);
 }
 
-std::shared_ptr<const Integrator> prepared_integrator(const LoadedScene& scene, const Plan& plan,
-                                                      const RenderRequest& request) {
-  auto integrator = std::dynamic_pointer_cast<Integrator>(scene.integrator);
-  COVARY_CHECK(integrator, "the scene was loaded with an integrator");
-  if (request.crn_part != CrnPart::kBoth && !dynamic_cast<const LightTracingIntegrator*>(integrator.get()))
+std::shared_ptr<Integrator> prepared_integrator(const LoadedScene& scene, const Plan& plan,
+                                                const RenderRequest& request) {
+  std::shared_ptr<Integrator> integrator = integrator_of(scene).clone();
+  LightTracingIntegrator* tracer = integrator->light_tracing();
+  if (request.crn_part != CrnPart::kBoth && !tracer)
     throw Error(ErrorCode::kUsage,
                 "the paths of this integrator have no light part that could have numbers of its own; "
                 "integrators that trace light have");
   integrator->prepare(*scene.scene);
-  if (auto* tracer = dynamic_cast<LightTracingIntegrator*>(integrator.get())) {
+  if (tracer) {
     const CropWindow window = window_of(scene, request);
     tracer->fix_light_tracing(static_cast<uint64_t>(window.width) * static_cast<uint64_t>(window.height),
                               plan.has_crn_pass);

@@ -12,10 +12,10 @@ namespace covary {
 /// Whether a render of the scene by the plan has a light pass.
 bool has_light_pass(const LoadedScene& scene, const Plan& plan);
 
-/// The scene's integrator, prepared, and told of the pixels and passes where it traces light. Throws Error(kUsage)
-/// where it does not fit the request.
-std::shared_ptr<const Integrator> prepared_integrator(const LoadedScene& scene, const Plan& plan,
-                                                      const RenderRequest& request);
+/// A clone of the scene's integrator for one render: prepared, and told of the pixels and passes where it traces light.
+/// Throws Error(kUsage) where it does not fit the request.
+std::shared_ptr<Integrator> prepared_integrator(const LoadedScene& scene, const Plan& plan,
+                                                const RenderRequest& request);
 
 /// The light pass beside these passes of the plan. It has the most groups of them, and enough for its standard error
 /// where the plan wants one.

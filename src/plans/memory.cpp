@@ -11,6 +11,7 @@
 #include "integrators/path_length_images.h"
 #include "integrators/training.h"
 #include "plans/budget.h"
+#include "plans/integrator_choice.h"
 #include "plans/light_plan.h"
 #include "plans/render.h"
 
@@ -54,7 +55,8 @@ RenderMemory render_memory(const LoadedScene& scene, const Plan& plan, const Ren
 }
 
 double training_memory(const LoadedScene& scene) {
-  const auto* learning = dynamic_cast<const LearningIntegrator*>(scene.integrator.get());
+  if (!scene.integrator) return 0;
+  const LearningIntegrator* learning = integrator_of(scene).learning();
   return learning ? static_cast<double>(learning->training_memory()) : 0;
 }
 

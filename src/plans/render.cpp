@@ -17,6 +17,7 @@
 #include "integrators/training.h"
 #include "plans/budget.h"
 #include "plans/folder_lock.h"
+#include "plans/integrator_choice.h"
 #include "plans/light_plan.h"
 #include "plans/memory.h"
 #include "plans/pass_files.h"
@@ -48,8 +49,8 @@ void check(const LoadedScene& scene, const Plan& plan, const RenderRequest& requ
     usage(fmt::format("{} samples per pixel; expected are 1 to {}", *request.spp, kMaxBudget));
   if (plan.fixed_samples && (request.seconds > 0 || request.until > 0))
     usage(plan.name + " needs the number of samples to be known before, so there can be no limit of time or error");
-  if (request.path_lengths && !dynamic_cast<const ControlledPath*>(scene.integrator.get()))
-    usage("images by the number of edges need the integrator controlled-path");
+  if (request.path_lengths && !integrator_of(scene).longest_path())
+    usage("images by the number of edges need an integrator that knows them, such as controlled-path");
   if (request.until > 0 && !plan.predicts_error) usage(plan.name + " does not estimate its error");
 }
 
@@ -63,7 +64,8 @@ class PlanRun {
         callbacks_(callbacks),
         window_(window_of(scene, request)),
         filter_(request.filter.value_or(scene.filter)),
-        state_{scene, request, callbacks.stop, prepared_integrator(scene, plan, request), 0, 0, {}} {
+        integrator_(prepared_integrator(scene, plan, request)),
+        state_{scene, request, callbacks.stop, integrator_, 0, 0, {}} {
     plan_.traces_light = has_light_pass(scene, plan);
   }
 
@@ -124,6 +126,7 @@ class PlanRun {
   const RenderCallbacks& callbacks_;
   const CropWindow window_;
   const FilterSettings filter_;
+  const std::shared_ptr<Integrator> integrator_;  // of this render alone
   PlanState state_;
   std::vector<size_t> first_of_phase_;  // index of the first pass of each phase that has begun
   RenderResult result_;
@@ -146,6 +149,7 @@ RenderResult PlanRun::run() {
 
 void PlanRun::write_files() {
   const bool is_film = output_is_film(plan_, request_);
+  result_.integrator = state_.integrator;
   result_.passes = std::move(state_.passes);
   if (result_.interrupted && result_.samples_per_pixel() == 0) return;
   if (plan_.film_is_image && has_training())
@@ -164,14 +168,13 @@ void PlanRun::add_path_lengths() {
   const Pass& pass = camera_passes(result_.passes).back();
   PassSettings settings = pass.settings;
   settings.stop = callbacks_.stop;
-  const auto& integrator = dynamic_cast<const ControlledPath&>(*pass.integrator);
-  std::vector<Image> images = path_length_images(*scene_.scene, integrator, settings, pass.film);
+  std::vector<Image> images = path_length_images(*scene_.scene, *pass.integrator, settings, pass.film);
   for (size_t i = 0; i < images.size(); ++i) result_.aovs[fmt::format("Edges{:02}", i + 1)] = std::move(images[i]);
 }
 
 void PlanRun::warn_of_missing_light() const {
   if (plan_.traces_light || !scene_.has_delta_lights_and_surfaces || !callbacks_.warning ||
-      !dynamic_cast<const LightTracingIntegrator*>(state_.integrator.get()))
+      !integrator_->light_tracing())
     return;
   callbacks_.warning(
       "without light tracing the image lacks what mirrors and glass cast of lights that are a point or a direction");
@@ -189,7 +192,7 @@ bool PlanRun::render_to_limits() {
   warn_of_other_sampler();
   TrainingSettings settings{window_, filter_, callbacks_.stop, callbacks_.progress, {}};
   if (plan_.takes_training) settings.image = &result_.training;
-  if (!train(scene_, request_, settings, result_.seconds)) return false;
+  if (!train(scene_, request_, *integrator_, settings, result_.seconds)) return false;
   const uint32_t limit = largest_budget(scene_, request_);
   state_.budget = state_.group_budget = first_budget(scene_, request_);
   if (timed() && plan_.groups_follow_speed) {
@@ -284,7 +287,7 @@ Pass PlanRun::begin_pass(const PassPlan& plan) const {
   pass.film.attributes.insert_or_assign(film_key::kSeed, std::to_string(request_.seed));
   pass.film.attributes.insert_or_assign(film_key::kSampling, sampling_name(plan.sampling, request_.crn_part));
   pass.film.attributes.insert_or_assign(film_key::kSceneHash, scene_.content_hash);
-  const auto* learning = dynamic_cast<const LearningIntegrator*>(state_.integrator.get());
+  const LearningIntegrator* learning = state_.integrator->learning();
   pass.film.attributes.insert_or_assign(
       film_key::kSettings, (learning ? learning->settings_text() : state_.integrator->description()) + "; filter " +
                                filter_text(filter_) + number + plan.settings +
@@ -427,7 +430,7 @@ ReplayedSample replay(const LoadedScene& scene, const Plan& plan, const RenderRe
   settings.filter = request.filter.value_or(scene.filter);
   const auto integrator = prepared_integrator(scene, plan, request);
   RenderSeconds seconds;
-  train(scene, request, {window_of(scene, request), settings.filter, nullptr, nullptr, {}}, seconds);
+  train(scene, request, *integrator, {window_of(scene, request), settings.filter, nullptr, nullptr, {}}, seconds);
   return replay_sample(*scene.scene, *integrator, settings, address.x, address.y, address.sample);
 }
 

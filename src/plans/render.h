@@ -73,6 +73,7 @@ struct RenderSeconds {
 
 /// What has become of a plan.
 struct RenderResult {
+  std::shared_ptr<const Integrator> integrator;  ///< of the last passes, with what it has learnt
   std::vector<Pass> passes;
   /// Empty where the film alone is the image, and of a render that was interrupted before every pixel of every film had
   /// samples.

@@ -6,12 +6,14 @@
 
 #include <atomic>
 #include <filesystem>
+#include <thread>
 
 #include "estimators/registry.h"
 #include "film/film_file.h"
 #include "film/image_file.h"
 #include "plans/budget.h"
 #include "plans/estimator_plans.h"
+#include "plans/integrator_choice.h"
 #include "support/files.h"
 #include "support/plans.h"
 
@@ -32,7 +34,7 @@ TEST(Render, OnePassIsTheFilmOfRenderPass) {
   PassSettings settings;
   settings.seed = 5, settings.spp = 6, settings.filter = scene.filter;
   Film film(40, 30, {0, 0, 40, 30}, 1);
-  render_pass(*scene.scene, dynamic_cast<const Integrator&>(*scene.integrator), settings, film);
+  render_pass(*scene.scene, integrator_of(scene), settings, film);
   EXPECT_TRUE(same_bits(result.passes[0].film, film));
   EXPECT_EQ(result.picture().data, film.mean_image().data);
 }
@@ -102,6 +104,34 @@ TEST(Render, ProgressCountsAllSamplesOfTheCall) {
   };
   render(scene, average_plan(), request_of(24), callbacks);
   EXPECT_EQ(last, 24u * 40 * 30);
+}
+
+// Each learns other things, from another seed and crop; a training that the scene's integrator held would be shared.
+TEST(Render, TwoThreadsMayRenderOneSceneThatLearns) {
+  for (const char* name : {"controlled-path", "guided-path", "bdpt"}) {
+    LoadOptions options;
+    options.width = 40, options.height = 30;
+    IntegratorChoice choice;
+    choice.name = name;
+    options.make_integrator = integrator_maker(choice);
+    const LoadedScene scene = load_scene(kRoom, options);
+    RenderRequest requests[2] = {request_of(4), request_of(4)};
+    requests[0].crop = CropWindow{0, 0, 24, 20};
+    requests[1].seed = 9, requests[1].crop = CropWindow{13, 8, 27, 22};
+    const auto run = [&](int i) { return render(scene, plain_plan(Sampling::kIndependent), requests[i]); };
+    const RenderResult alone[2] = {run(0), run(1)};
+    for (int repeat = 0; repeat < 3; ++repeat) {
+      RenderResult together[2];
+      std::thread other([&] { together[1] = run(1); });
+      together[0] = run(0);
+      other.join();
+      for (int i = 0; i < 2; ++i) {
+        EXPECT_TRUE(same_bits(together[i].passes[0].film, alone[i].passes[0].film)) << name << ' ' << i;
+        EXPECT_EQ(together[i].integrator->description(), alone[i].integrator->description()) << name << ' ' << i;
+      }
+    }
+    EXPECT_EQ(integrator_of(scene).description(), integrator_of(scene).clone()->description()) << "nothing was learnt";
+  }
 }
 
 TEST(Render, ReplayGivesTheSampleOfThePassOfThatNumber) {

@@ -5,6 +5,7 @@
 
 #include "core/error.h"
 #include "integrators/training.h"
+#include "plans/integrator_choice.h"
 
 namespace covary {
 
@@ -29,7 +30,7 @@ Sampler sampler_named(const std::string& name) {
 }
 
 void take_training(const LoadedScene& scene, RenderRequest& request) {
-  const auto* learning = dynamic_cast<const LearningIntegrator*>(scene.integrator.get());
+  const LearningIntegrator* learning = integrator_of(scene).learning();
   const uint32_t training = learning ? learning->training_spp() : 0;
   const bool open_ended = request.seconds > 0 || request.until > 0;
   if (training == 0 || (!request.spp && open_ended)) return;

@@ -9,9 +9,10 @@
 
 namespace covary {
 
-bool train(const LoadedScene& scene, const RenderRequest& request, TrainingSettings settings, RenderSeconds& seconds) {
+bool train(const LoadedScene& scene, const RenderRequest& request, Integrator& integrator, TrainingSettings settings,
+           RenderSeconds& seconds) {
   const Stopwatch watch;
-  auto* learning = dynamic_cast<LearningIntegrator*>(scene.integrator.get());
+  LearningIntegrator* learning = integrator.learning();
   settings.seed = request.seed;
   settings.importance = [&](const Film& film) {
     const Stopwatch surrogate;
@@ -19,9 +20,9 @@ bool train(const LoadedScene& scene, const RenderRequest& request, TrainingSetti
     seconds.surrogate = surrogate.seconds();
     return importance;
   };
-  if (!request.load_training.empty()) load_training(scene, request.load_training);
+  if (!request.load_training.empty()) load_training(scene.content_hash, integrator, request.load_training);
   if (learning && !train(*scene.scene, *learning, settings)) return false;
-  if (!request.save_training.empty()) save_training(scene, request.save_training);
+  if (!request.save_training.empty()) save_training(scene.content_hash, integrator, request.save_training);
   seconds.train = watch.seconds();
   if (learning) seconds.solve = learning->update_seconds();
   return true;

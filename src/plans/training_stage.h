@@ -8,10 +8,11 @@
 
 namespace covary {
 
-/// Trains the scene's integrator if it learns, or takes what it learnt from the request's file; keeps it in a file
-/// where the request names one. Sets settings.importance and seed, and of `seconds` those of the training. False when
-/// stopped.
-bool train(const LoadedScene& scene, const RenderRequest& request, TrainingSettings settings, RenderSeconds& seconds);
+/// Trains a prepared integrator of the scene if it learns, or takes what it learnt from the request's file; keeps it in
+/// a file where the request names one. Sets settings.importance and seed, and of `seconds` those of the training. False
+/// when stopped.
+bool train(const LoadedScene& scene, const RenderRequest& request, Integrator& integrator, TrainingSettings settings,
+           RenderSeconds& seconds);
 
 /// Makes the standard errors of rows first_row, … of the film's image those of film and training together: the
 /// training's image has, about, the variance of so many samples of the film.

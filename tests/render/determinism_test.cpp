@@ -114,6 +114,7 @@ Spectrum value_of(const CameraSample& sample) {
 /// An integrator that traces nothing, for tests of how samples reach the film.
 class Numbers final : public Integrator {
  public:
+  std::shared_ptr<Integrator> clone() const override { return std::make_shared<Numbers>(); }
   void trace(const Scene&, std::span<CameraSample> samples, PathContext&) const override {
     for (CameraSample& sample : samples) sample.radiance = value_of(sample);
   }

@@ -189,6 +189,7 @@ TEST(LightPass, ReplayListsThePathsSplats) {
 class BadSplats final : public LightTracingIntegrator {
  public:
   BadSplats() : LightTracingIntegrator({}) {}
+  std::shared_ptr<Integrator> clone() const override { return std::make_shared<BadSplats>(); }
   void trace(const Scene&, std::span<CameraSample>, PathContext&) const override {}
   void trace_light_paths(const Scene&, const LightPaths& paths, std::vector<LightSplat>& splats,
                          PathContext&) const override {

@@ -57,6 +57,7 @@ class PolynomialIntegrator final : public Integrator {
  public:
   /// `with_bad`: one sample in 64 is not a number.
   explicit PolynomialIntegrator(bool with_bad = false) : with_bad_(with_bad) {}
+  std::shared_ptr<Integrator> clone() const override { return std::make_shared<PolynomialIntegrator>(with_bad_); }
   void trace(const Scene&, std::span<CameraSample> samples, PathContext&) const override {
     for (CameraSample& sample : samples) {
       const Vec2 pixel = sample.random.get_2d(0, Event::kPixel), light = sample.random.get_2d(1, Event::kLightPosition),

@@ -28,6 +28,8 @@ class CellMeans final : public LearningIntegrator {
  public:
   CellMeans(std::shared_ptr<Integrator> inner, uint32_t spp) : inner_(std::move(inner)), spp_(spp) {}
 
+  std::shared_ptr<Integrator> clone() const override { return std::make_shared<CellMeans>(inner_->clone(), spp_); }
+
   /// Planted bug: records are added in another order.
   bool backwards = false;
   std::vector<uint32_t> waves;  ///< trained_spp() before each update

@@ -40,6 +40,7 @@ class LightTracer final : public LightTracingIntegrator {
   LightTracer(const LightTracingSettings& settings, const PathLengthSettings& lengths, float share)
       : LightTracingIntegrator(settings), path_("path", lengths), longest_(lengths.max_depth), share_(share) {}
 
+  std::shared_ptr<Integrator> clone() const override { return std::make_shared<LightTracer>(*this); }
   void prepare(const Scene& scene) override { path_.prepare(scene); }
   std::unique_ptr<ThreadState> make_thread_state() const override { return path_.make_thread_state(); }
   void trace(const Scene& scene, std::span<CameraSample> samples, PathContext& context) const override {
