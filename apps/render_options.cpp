@@ -11,8 +11,6 @@
 #include "core/error.h"
 #include "declared_options.h"
 #include "defines.h"
-#include "integrators/controlled_path.h"
-#include "integrators/guided_path.h"
 #include "integrators/light_pass.h"
 #include "numbers.h"
 #include "plans/estimator_plans.h"
