@@ -21,6 +21,9 @@ struct ConvertOptions {
   std::vector<std::string> files;  // the last is the output
   std::string layer;
   double exposure = 0;
+  bool accept_changed = false;
+
+  ChecksumPolicy checksums() const { return accept_changed ? ChecksumPolicy::kIgnore : ChecksumPolicy::kCheck; }
 };
 
 /// The images from left to right, their upper edges in line, black below shorter ones.
@@ -40,10 +43,11 @@ Image side_by_side(const std::vector<Image>& images) {
   return result;
 }
 
-/// What is true of the new image: of several, nothing that one of them says.
+/// What is true of the new image: of several, nothing that one of them says; of a changed one, nothing that covary said.
 std::map<std::string, std::string> attributes_of(const ConvertOptions& options) {
   std::map<std::string, std::string> attributes;
-  if (options.files.size() == 2) attributes = inherited_attributes(inspect_image(options.files[0]).attributes);
+  if (options.files.size() == 2 && !options.accept_changed)
+    attributes = inherited_attributes(inspect_image(options.files[0]).attributes);
   const auto earlier = attributes.find(kExposureAttribute);
   const double exposure =
       options.exposure + (earlier == attributes.end() ? 0 : parse_real(earlier->second).value_or(0));
@@ -65,7 +69,7 @@ void convert(const ConvertOptions& options) {
   std::vector<Image> images;
   ImagePlace place;
   for (const std::string& input : inputs) {
-    PlacedImage image = read_image(input, options.layer);
+    PlacedImage image = read_image(input, options.layer, options.checksums());
     place = image.place;
     images.push_back(std::move(image.image));
   }
@@ -92,6 +96,8 @@ void add_convert(CLI::App& app) {
       ->check(real_number(-100, 100))
       ->capture_default_str();
   command->add_option("--layer", o->layer, "Layer (N, group03, …) or single channel (samples) in place of R G B");
+  command->add_flag("--accept-changed", o->accept_changed,
+                    "Take an image of covary that another program changed: the new one says nothing of its origin");
   command->callback([o] { convert(*o); });
 }
 

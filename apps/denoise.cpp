@@ -4,6 +4,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -33,6 +35,12 @@ void check(const Options& o) {
   fmt::print("Open Image Denoise {}\n{}\n", info.version, info.path);
 }
 
+void warn_of_values(const std::string& path, const Image& image) {
+  const auto n = std::count_if(image.data.begin(), image.data.end(), [](float v) { return !std::isfinite(v); });
+  if (n > 0)
+    fmt::print(stderr, "warning: {}: {} of {} values are not finite; they count as 0\n", path, n, image.data.size());
+}
+
 void run(const Options& o) {
   if (o.check) return check(o);
   if (o.input.empty() || o.output.empty())
@@ -46,6 +54,7 @@ void run(const Options& o) {
   progress.begin("loading");
   const ImageInfo info = inspect_image(o.input);
   const PlacedImage image = read_image(o.input);
+  warn_of_values(o.input, image.image);
   std::optional<Image> albedo, normal;
   if (!o.no_guides) {
     albedo = guide_layer(o.input, info, "Albedo");

@@ -9,7 +9,8 @@
 
 namespace covary {
 
-/// Layer `name` of the image at `path`, if it has one with three channels that begin so. Throws as read_image().
+/// Layer `name` of the image at `path`, if it has one with three channels that begin so. Throws as read_image() and
+/// check_guide().
 std::optional<Image> guide_layer(const std::string& path, const ImageInfo& info, const std::string& name);
 
 }  // namespace covary

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// covary info: what an image or film holds, without reading its pixels, or what a scene file describes.
+// covary info: what an image or film holds, and whether it is as covary wrote it, or what a scene file describes.
 #include <fmt/format.h>
 
 #include <filesystem>
@@ -87,19 +87,27 @@ void scene_info(const InfoOptions& options) {
              kNoEstimator, scene.content_hash);
 }
 
-void info(const InfoOptions& options) {
-  if (std::filesystem::path(options.path).extension() == ".xml") return scene_info(options);
-  if (!options.defines.empty()) throw Error(ErrorCode::kUsage, "-D is for scene files (.xml)");
-  const ImageInfo info = inspect_image(options.path);
-  if (options.json) return print_json(info, options.path);
+void print_text(const ImageInfo& info, const std::string& path) {
   const CropWindow& w = info.place.window;
-  fmt::print("{}: {} x {} pixels", options.path, w.width, w.height);
+  fmt::print("{}: {} x {} pixels", path, w.width, w.height);
   if (w.x || w.y || w.width != info.place.frame_width || w.height != info.place.frame_height)
     fmt::print(" at ({}, {}) of a frame of {} x {}", w.x, w.y, info.place.frame_width, info.place.frame_height);
   fmt::print(", {}{}{}\n", info.format, info.compression.empty() ? "" : ", compression ", info.compression);
   fmt::print("channels\n{}", describe_channels(info.channels));
   if (!info.attributes.empty()) fmt::print("attributes\n");
   for (const auto& [name, value] : info.attributes) fmt::print("  {}: {}\n", name, value);
+}
+
+void info(const InfoOptions& options) {
+  if (std::filesystem::path(options.path).extension() == ".xml") return scene_info(options);
+  if (!options.defines.empty()) throw Error(ErrorCode::kUsage, "-D is for scene files (.xml)");
+  const ImageInfo info = inspect_image(options.path, ChecksumPolicy::kIgnore);
+  if (options.json)
+    print_json(info, options.path);
+  else
+    print_text(info, options.path);
+  std::fflush(stdout);
+  check_image(options.path);  // last: what a damaged file says may help
 }
 
 }  // namespace

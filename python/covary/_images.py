@@ -7,7 +7,7 @@ from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any
 
 from . import _covary
-from ._arguments import array, attribute_texts, checked, either, empty_or, list_of, optional, path, text
+from ._arguments import array, attribute_texts, checked, either, empty_or, flag, list_of, optional, path, text
 
 if TYPE_CHECKING:
     from ._result import FloatArray
@@ -15,10 +15,13 @@ if TYPE_CHECKING:
 _FILES = either("the name of a file, or a list of them", path, list_of(path, "a list of names of files"))
 
 
-@checked(path=path, layer=text)
-def read_image(path: str | PathLike[str], layer: str = "") -> FloatArray:
-    """Linear RGB [H, W, 3] of a file of any format; `layer` chooses among those of an EXR: "N", "Albedo", …"""
-    image: FloatArray = _covary.read_image(fspath(path), layer)
+@checked(path=path, layer=text, accept_changed=flag)
+def read_image(path: str | PathLike[str], layer: str = "", *, accept_changed: bool = False) -> FloatArray:
+    """Linear RGB [H, W, 3] of a file of any format; `layer` chooses among those of an EXR: "N", "Albedo", …
+
+    accept_changed: take an EXR of covary, too, that another program changed, so that it does not fit its checksums.
+    """
+    image: FloatArray = _covary.read_image(fspath(path), layer, accept_changed)
     return image
 
 

@@ -18,9 +18,10 @@
 namespace covary::python {
 namespace {
 
-nb::object read(const std::string& path, const std::string& layer) {
+nb::object read(const std::string& path, const std::string& layer, bool accept_changed) {
   PlacedImage image;
-  run_work([&](WorkState&) { image = read_image(path, layer); }, nb::none());
+  const ChecksumPolicy checksums = accept_changed ? ChecksumPolicy::kIgnore : ChecksumPolicy::kCheck;
+  run_work([&](WorkState&) { image = read_image(path, layer, checksums); }, nb::none());
   return array_of(std::move(image.image));
 }
 
@@ -67,6 +68,8 @@ nb::object denoised(nb::object image, nb::object albedo, nb::object normal, cons
   if (!normal.is_none()) n = image_of(normal, "normal");
   if (a.data.empty() && !n.data.empty())
     throw Error(ErrorCode::kUsage, "normal: it is a guide only together with the albedo");
+  check_guide("albedo", a);
+  check_guide("normal", n);
   Image result;
   run_work(
       [&](WorkState&) {
@@ -82,7 +85,8 @@ nb::object denoised(nb::object image, nb::object albedo, nb::object normal, cons
 
 void bind_images(nb::module_& module) {
   using namespace nb::literals;
-  module.def("read_image", &read, "path"_a, "layer"_a, nb::sig("def read_image(path: str, layer: str) -> typing.Any"));
+  module.def("read_image", &read, "path"_a, "layer"_a, "accept_changed"_a = false,
+             nb::sig("def read_image(path: str, layer: str, accept_changed: bool = False) -> typing.Any"));
   module.def("write_image", &write, "path"_a, "image"_a.none(), "attributes"_a,
              nb::sig("def write_image(path: str, image: object, attributes: dict[str, str]) -> None"));
   module.def("read_groups", &read_groups, "paths"_a, "layer"_a,

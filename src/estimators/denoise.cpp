@@ -217,6 +217,15 @@ struct Denoiser::Library {
   }
 };
 
+void check_guide(const std::string& name, const Image& guide) {
+  const auto it = std::find_if(guide.data.begin(), guide.data.end(), [](float v) { return !std::isfinite(v); });
+  if (it == guide.data.end()) return;
+  const auto pixel = static_cast<int>((it - guide.data.begin()) / guide.channels);
+  throw Error(ErrorCode::kInput, fmt::format("{} holds the value {} at pixel ({}, {}); all values of a guide must be "
+                                             "finite",
+                                             name, *it, pixel % guide.width, pixel / guide.width));
+}
+
 Denoiser::Denoiser(const DenoiseOptions& options) : library_(std::make_unique<Library>(options)) {}
 Denoiser::~Denoiser() = default;
 

@@ -42,6 +42,10 @@ class Denoiser {
   std::unique_ptr<Library> library_;
 };
 
+/// Throws Error(kInput) where a guide has a value that is not finite, which would spread over the image. `name` stands
+/// in the message.
+void check_guide(const std::string& name, const Image& guide);
+
 /// Denoiser::denoise() once.
 Image denoise(const Image& rgb, const Image* albedo, const Image* normal, const DenoiseOptions& options = {});
 

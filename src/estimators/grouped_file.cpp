@@ -149,6 +149,11 @@ void GroupedFile::add_file(const std::string& path, const std::string& layer, bo
       has_half_ |= type == "half";
     }
 
+  std::vector<std::string> read;
+  for (size_t g = first_group; g < groups_.size(); ++g)
+    for (const char* c : {"R", "G", "B"}) read.push_back(groups_[g].prefix + c);
+  file.check(read);
+
   // What covary's films tell. The groups of one film follow from its counts; others must have equal numbers of samples.
   const double samples = samples_per_pixel(file, path);
   if (files_.size() > 1 && samples != samples_of_group_)
@@ -160,6 +165,9 @@ void GroupedFile::add_file(const std::string& path, const std::string& layer, bo
   const bool is_film = only_file && (numbered.size() > 1 || layer.empty()) && !attribute(file, "covary:film").empty();
   has_counts_ = is_film && counts && counts->type == "uint";
   has_variance_ = has_counts_ && file.find(std::string(kVariance) + ".R");
+  if (has_counts_) file.check({{kCounts}});
+  if (has_variance_)
+    for (const char* c : {".R", ".G", ".B"}) file.check({{std::string(kVariance) + c}});
   const auto agree = [&](const char* key, std::string& value) {
     const std::string here = attribute(file, std::string("covary:") + key);
     if (files_.size() > 1 && here != value)
@@ -185,6 +193,7 @@ void GroupedFile::take_counts(const std::string& path) {
   if (!is_only && !file->find(kCounts))
     fail(path, fmt::format("expected is one channel, or one that is named '{}'; {}", kCounts, list_layers(*file, {})));
   counts_channel_ = is_only ? file->channels()[0].name : kCounts;
+  file->check({&counts_channel_, 1});
   counts_file_ = std::move(file);
   counts_path_ = path;
   std::vector<uint32_t> counts;

@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "estimators/denoise.h"
 #include "estimators/feedback.h"
 #include "estimators/halves.h"
 #include "estimators/held_out_bias.h"
@@ -95,6 +96,8 @@ DenoiseMode denoise_mode(const std::string& name) {
 MixedDenoising denoise_by_mixture(const Estimator& base, const GroupedImage& crn, const GroupedImage& independent,
                                   const PairSettings& settings, const std::vector<CandidateMaker>& makers,
                                   DenoiseMode mode) {
+  if (settings.guides.albedo) check_guide("the guide albedo", *settings.guides.albedo);
+  if (settings.guides.normal) check_guide("the guide normal", *settings.guides.normal);
   long n_nonfinite = 0;
   const std::vector<unsigned char> valid = finite_pixels(crn, independent, n_nonfinite);
   const ModeSettings chosen = settings_of(mode);

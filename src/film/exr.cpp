@@ -12,6 +12,7 @@
 #include <OpenEXR/ImfStringAttribute.h>
 #include <OpenEXR/ImfThreading.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <tbb/global_control.h>
 #include <unistd.h>
 
@@ -20,6 +21,7 @@
 #include <filesystem>
 #include <mutex>
 
+#include "core/parallel.h"
 #include "film/output_file.h"
 #include "imageio/exr_header.h"
 
@@ -91,6 +93,33 @@ double largest_ratio(const std::string& compression) {
   return 1e5;
 }
 
+const char* type_name(ExrPlane::Type type) { return type == ExrPlane::Type::kUint ? "uint" : "float"; }
+
+/// Windows and channels (each "name type") as the checksum of the header takes them.
+std::string shape_text(const ImagePlace& place, const std::vector<std::string>& channels) {
+  const CropWindow& w = place.window;
+  return fmt::format("{} {} {} {} {} {}\n{}", place.frame_width, place.frame_height, w.x, w.y, w.width, w.height,
+                     fmt::join(channels, "\n"));
+}
+
+Checksums checksums_of(const ImagePlace& place, const std::map<std::string, std::string>& attributes,
+                       std::span<const ExrPlane> planes) {
+  std::map<std::string, const ExrPlane*> by_name;
+  for (const ExrPlane& plane : planes) by_name[plane.name] = &plane;
+  std::vector<const ExrPlane*> sorted;
+  std::vector<std::string> names;
+  for (const auto& [name, plane] : by_name) {
+    sorted.push_back(plane);
+    names.push_back(name + " " + type_name(plane->type));
+  }
+  Checksums sums{crc_of_header(shape_text(place, names), attributes), std::vector<uint32_t>(sorted.size())};
+  const size_t n_pixels = static_cast<size_t>(place.window.width) * static_cast<size_t>(place.window.height);
+  parallel_for(sorted.size(), [&](size_t i) {
+    sums.channels[i] = crc_of_values(0, sorted[i]->base, n_pixels, sorted[i]->pixel_stride);
+  });
+  return sums;
+}
+
 }  // namespace
 
 void add_image_planes(const std::string& name, Image& image, std::vector<ExrPlane>& planes) {
@@ -109,6 +138,7 @@ void write_exr(const std::string& path, const ImagePlace& place, const std::map<
   Imf::Header header(Imath::Box2i({0, 0}, {place.frame_width - 1, place.frame_height - 1}), window);
   header.compression() = compression == ExrCompression::kZip ? Imf::ZIP_COMPRESSION : Imf::NO_COMPRESSION;
   for (const auto& [key, value] : attributes) header.insert(key, Imf::StringAttribute(value));
+  header.insert(kChecksums, Imf::StringAttribute(checksums_of(place, attributes, planes).text()));
   Imf::FrameBuffer pixels;
   for (const ExrPlane& plane : planes) {
     header.channels().insert(plane.name, Imf::Channel(pixel_type(plane)));
@@ -137,7 +167,7 @@ struct ExrFile::Handle {
 
 ExrFile::~ExrFile() = default;
 
-ExrFile::ExrFile(const std::string& path) : path_(path) {
+ExrFile::ExrFile(const std::string& path, ChecksumPolicy checksums) : path_(path) {
   prepare_library();
   // OpenEXR's own messages do not tell a missing file from a damaged one.
   if (!is_exr(path)) fail(path, "not an EXR file");
@@ -181,13 +211,59 @@ ExrFile::ExrFile(const std::string& path) : path_(path) {
       channels_.push_back({name, type_name(channel.type)});
       handle_->parts[name] = {part, it.name()};
     }
-    for (auto it = header.begin(); it != header.end(); ++it)
+    for (auto it = header.begin(); it != header.end(); ++it) {
       if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&it.attribute()))
         attributes_.emplace(it.name(), text->value());
+      else if (it.name() == std::string(kChecksums) && checksums == ChecksumPolicy::kCheck)
+        fail(path, fmt::format("damaged: the attribute {} is of the type '{}', not 'string'", kChecksums,
+                               it.attribute().typeName()));
+    }
   }
   if (channels_.empty()) fail(path, "an EXR file without channels");
 
   check_pixels();
+  if (checksums == ChecksumPolicy::kCheck) check_header();
+}
+
+void ExrFile::check_header() {
+  checksums_ = find_checksums(path_, attributes_);
+  if (!checksums_) return;
+  if (const uint32_t found = crc_of_header(shape_text(), attributes_); found != checksums_->header)
+    fail_checksum(path_, "the header is one", found, checksums_->header);
+  if (checksums_->channels.size() != channels_.size())
+    fail(path_, fmt::format("damaged: {} channels and {} checksums", channels_.size(), checksums_->channels.size()));
+}
+
+std::string ExrFile::shape_text() const {
+  std::vector<std::string> names;
+  for (const Channel& channel : channels_) names.push_back(channel.name + " " + channel.type);
+  return covary::shape_text(place_, names);
+}
+
+void ExrFile::check_channel(const std::string& name, uint32_t crc) const {
+  const auto it = std::find_if(channels_.begin(), channels_.end(), [&](const Channel& c) { return c.name == name; });
+  const uint32_t stored = checksums_->channels[static_cast<size_t>(it - channels_.begin())];
+  if (crc != stored) fail_checksum(path_, fmt::format("the channel {} is one", name), crc, stored);
+}
+
+void ExrFile::check(std::span<const std::string> channels) const {
+  if (!checksums_) return;
+  constexpr size_t kValuesAtOnce = size_t{1} << 20;
+  const size_t width = static_cast<size_t>(place_.window.width), height = static_cast<size_t>(place_.window.height);
+  const size_t rows = std::min(std::max<size_t>(kValuesAtOnce / (width * channels.size()), 1), height);
+  std::vector<uint32_t> values(rows * width * channels.size()), sums(channels.size(), 0);
+  std::vector<ExrPlane> planes;
+  for (size_t c = 0; c < channels.size(); ++c) {
+    const auto type = find(channels[c])->type == "uint" ? ExrPlane::Type::kUint : ExrPlane::Type::kFloat;
+    planes.push_back({channels[c], type, values.data() + c * rows * width, sizeof(uint32_t)});
+  }
+  for (size_t y = 0; y < height; y += rows) {
+    const size_t n = std::min(rows, height - y);
+    read_rows(planes, static_cast<int>(y), static_cast<int>(n));
+    for (size_t c = 0; c < channels.size(); ++c)
+      sums[c] = crc_of_values(sums[c], planes[c].base, n * width, sizeof(uint32_t));
+  }
+  for (size_t c = 0; c < channels.size(); ++c) check_channel(channels[c], sums[c]);
 }
 
 void ExrFile::check_pixels() const {
@@ -212,7 +288,22 @@ const ExrFile::Channel* ExrFile::find(const std::string& name) const {
   return it == channels_.end() ? nullptr : &*it;
 }
 
-void ExrFile::read(std::span<const ExrPlane> planes) const { read_rows(planes, 0, place_.window.height); }
+void ExrFile::read(std::span<const ExrPlane> planes) const {
+  read_rows(planes, 0, place_.window.height);
+  if (!checksums_) return;
+  const size_t n_pixels = static_cast<size_t>(place_.window.width) * static_cast<size_t>(place_.window.height);
+  std::vector<uint32_t> sums(planes.size());
+  parallel_for(planes.size(),
+               [&](size_t i) { sums[i] = crc_of_values(0, planes[i].base, n_pixels, planes[i].pixel_stride); });
+  std::vector<std::string> converted;
+  for (size_t i = 0; i < planes.size(); ++i) {
+    if (find(planes[i].name)->type == type_name(planes[i].type))
+      check_channel(planes[i].name, sums[i]);
+    else
+      converted.push_back(planes[i].name);
+  }
+  if (!converted.empty()) check(converted);
+}
 
 void ExrFile::read_rows(std::span<const ExrPlane> planes, int first_row, int n_rows) const {
   COVARY_CHECK(first_row >= 0 && n_rows >= 1 && first_row + n_rows <= place_.window.height, "rows are in the window");

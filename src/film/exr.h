@@ -5,11 +5,13 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "film/film.h"
+#include "imageio/checksums.h"
 
 namespace covary {
 
@@ -35,10 +37,13 @@ struct ImagePlace {
 
 enum class ExrCompression { kZip, kNone };
 
-/// Writes the planes (which are only read) with string attributes; the file appears under its name only when complete.
-/// Throws Error(kIo).
+/// Writes the planes (which are only read) with string attributes, and their checksums; the file appears under its name
+/// only when complete. Throws Error(kIo).
 void write_exr(const std::string& path, const ImagePlace& place, const std::map<std::string, std::string>& attributes,
                std::span<const ExrPlane> planes, ExrCompression compression = ExrCompression::kZip);
+
+/// What to do with a file of covary that is not as covary wrote it, by its checksums.
+enum class ChecksumPolicy { kCheck, kIgnore };
 
 class ExrFile {
  public:
@@ -48,8 +53,9 @@ class ExrFile {
   };
 
   /// Opens the file and checks its header. Throws Error(kIo) when it cannot be opened, Error(kInput) when it is not an
-  /// EXR file, is damaged, absurdly large, or of a kind that is not supported (deep or sub-sampled pixels).
-  explicit ExrFile(const std::string& path);
+  /// EXR file, is damaged, absurdly large, of a kind that is not supported (deep or sub-sampled pixels), or its header
+  /// does not fit its checksum.
+  explicit ExrFile(const std::string& path, ChecksumPolicy checksums = ChecksumPolicy::kCheck);
   ~ExrFile();
 
   /// The window may stick out of the frame.
@@ -60,21 +66,31 @@ class ExrFile {
   const std::string& compression() const { return compression_; }
 
   /// Reads the named channels, all of which must exist; values are converted to the plane's type. Throws Error(kInput)
-  /// when the file ends early or its pixels are damaged.
+  /// when the file ends early, its pixels are damaged, or do not fit the checksums of these channels.
   void read(std::span<const ExrPlane> planes) const;
-  /// The same for `n_rows` rows from `first_row` of the window on; planes hold these rows only.
+  /// Reads the named channels for nothing but their checksums, in little memory; throws like read(). Nothing where the
+  /// file has no checksums.
+  void check(std::span<const std::string> channels) const;
+  /// Reads `n_rows` rows from `first_row` of the window on, whose checksums are not looked at; planes hold these rows
+  /// only.
   void read_rows(std::span<const ExrPlane> planes, int first_row, int n_rows) const;
 
  private:
   struct Handle;
   /// Throws where the header promises more pixels than fit in memory or than the file can hold.
   void check_pixels() const;
+  /// Takes the checksums of the file, if it has any; throws where that of the header is another one.
+  void check_header();
+  /// Throws where a channel has another checksum than the file says.
+  void check_channel(const std::string& name, uint32_t crc) const;
+  std::string shape_text() const;
   std::string path_;
   std::unique_ptr<Handle> handle_;
   ImagePlace place_;
   std::vector<Channel> channels_;
   std::map<std::string, std::string> attributes_;
   std::string compression_;
+  std::optional<Checksums> checksums_;  // those that are to be checked
 };
 
 }  // namespace covary

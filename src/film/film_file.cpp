@@ -2,7 +2,6 @@
 #include "film/film_file.h"
 
 #include <fmt/format.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <array>
@@ -16,8 +15,8 @@ constexpr const char* kPrefix = "covary:";
 constexpr const char* kFormat = "film";  // attribute covary:film, version of the format
 constexpr const char* kFormatVersion = "1";
 constexpr const char* kGroups = "groups";
-constexpr const char* kChecksum = "checksum";  // CRC-32 of counts, group means, auxiliary images and variances
-constexpr const char* kSamples = "samples";    // attribute covary:samples and channel `samples`
+constexpr const char* kFileChecksums = "checksums";
+constexpr const char* kSamples = "samples";              // attribute covary:samples and channel `samples`
 constexpr const char* kVariance = "variance_in_groups";  // channels .R .G .B, in some films
 constexpr const char* kStdError = "StdError";            // layer that follows from the groups
 constexpr const char* kShown = "shown";                  // "more": R G B hold more than the samples of the groups
@@ -26,23 +25,11 @@ constexpr const char* kMost = "samples_most";
 
 /// Attributes that follow from the film's numbers: written, and not kept in Film::attributes when read.
 bool is_derived(const std::string& key) {
-  return key == kFormat || key == kGroups || key == kSamples || key == kFewest || key == kMost || key == kChecksum ||
-         key == kShown;
+  return key == kFormat || key == kGroups || key == kSamples || key == kFewest || key == kMost ||
+         key == kFileChecksums || key == kShown;
 }
 
 std::string group_name(int group) { return fmt::format("group{:02d}", group); }
-
-std::string checksum(const Film& film) {
-  uLong crc = crc32_z(0, nullptr, 0);
-  const auto add = [&](const auto& values) {
-    crc = crc32_z(crc, reinterpret_cast<const Bytef*>(values.data()), values.size() * sizeof(values[0]));
-  };
-  add(film.counts());
-  add(film.data());
-  for (const auto& [name, image] : film.aovs) add(image.data);
-  if (film.keeps_sample_variance()) add(film.variance_in_groups());  // of no bytes, zlib starts anew
-  return fmt::format("{:08x}", crc);
-}
 
 /// The channels of a film and where their values lie; the same list serves writing and reading.
 /// `means` holds the image of R G B where these are not the channels of the one group.
@@ -129,7 +116,6 @@ void write_film(const std::string& path, const Film& film, const Image& std_erro
     derive(kFewest, fmt::to_string(*fewest));
     derive(kMost, fmt::to_string(*most));
   }
-  derive(kChecksum, checksum(film));
 
   if (!film.shown.data.empty()) derive(kShown, "more");
   Image means = !film.shown.data.empty() ? film.shown : film.groups() > 1 ? film.mean_image() : Image();
@@ -178,10 +164,6 @@ Film read_film(const std::string& path) {
         std::none_of(planes.begin(), planes.end(), [&](const ExrPlane& p) { return p.name == channel.name; }))
       fail(path, fmt::format("channel {} does not belong to a film with {} groups", channel.name, groups));
   file.read(planes);
-  if (const std::string stored = attributes[kChecksum], found = checksum(film); !stored.empty() && stored != found)
-    fail(path, fmt::format("the pixels have the checksum {}, not {} as the attribute covary:checksum says: the file is "
-                           "damaged, or another program changed it",
-                           found, stored));
   return film;
 }
 

@@ -97,19 +97,25 @@ std::vector<std::string> layer_channels(const std::string& path, const std::vect
   fail(path, fmt::format("no layer '{}'{} ({})", layer, did_you_mean(layer, candidates), have));
 }
 
-ImageInfo inspect_image(const std::string& path) {
+ImageInfo inspect_image(const std::string& path, ChecksumPolicy checksums) {
   if (is_film_or_exr(path)) {
-    const ExrFile file(path);
+    const ExrFile file(path, checksums);
     return {"openexr", file.compression(), file.place(), file.channels(), file.attributes()};
   }
   const ImageHeader header = open_image(path)->header();
   return {header.format, header.compression, place_of(header), channels_of(header), header.attributes};
 }
 
-PlacedImage read_image(const std::string& path, const std::string& layer) {
+void check_image(const std::string& path) {
+  if (!is_film_or_exr(path)) return;
+  const ExrFile file(path);
+  for (const ExrFile::Channel& channel : file.channels()) file.check({&channel.name, 1});
+}
+
+PlacedImage read_image(const std::string& path, const std::string& layer, ChecksumPolicy checksums) {
   PlacedImage result;
   if (is_film_or_exr(path)) {
-    const ExrFile file(path);
+    const ExrFile file(path, checksums);
     const std::vector<std::string> names = layer_channels(path, file.channels(), layer);
     result.place = file.place();
     result.image = Image(result.place.window.width, result.place.window.height, 3);

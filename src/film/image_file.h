@@ -26,13 +26,18 @@ struct PlacedImage {
 };
 
 /// Throws Error(kIo) when the file cannot be opened and Error(kInput) when it is damaged or of an unknown format.
-ImageInfo inspect_image(const std::string& path);
+ImageInfo inspect_image(const std::string& path, ChecksumPolicy checksums = ChecksumPolicy::kCheck);
+
+/// Reads all of a file that covary wrote, for nothing but its checksums; throws Error(kInput) where it is not as it was
+/// written. Files without checksums pass unread.
+void check_image(const std::string& path);
 
 /// Reads three channels as linear RGB (integer files are decoded from sRGB). `layer` chooses among the channels of a
 /// file: "N" for N.X N.Y N.Z, "group03" for group03.R/G/B, or a single channel's whole name, shown grey; "" is R G B,
 /// or Y, or the only layer there is. Throws like inspect_image; an unknown layer is Error(kInput) that names those
 /// there are.
-PlacedImage read_image(const std::string& path, const std::string& layer = "");
+PlacedImage read_image(const std::string& path, const std::string& layer = "",
+                       ChecksumPolicy checksums = ChecksumPolicy::kCheck);
 
 /// The three channels (one for grey, given three times) that `layer` means among `channels`; throws like read_image.
 std::vector<std::string> layer_channels(const std::string& path, const std::vector<ExrFile::Channel>& channels,

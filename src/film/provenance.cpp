@@ -60,7 +60,7 @@ bool is_integer(const ImageFacts& image) {
 }  // namespace
 
 std::map<std::string, std::string> inherited_attributes(const std::map<std::string, std::string>& attributes) {
-  static const std::set<std::string> of_films = {"covary:film", "covary:groups", "covary:checksum"};
+  static const std::set<std::string> of_films = {"covary:film", "covary:groups", kChecksums};
   std::map<std::string, std::string> result;
   for (const auto& [name, value] : attributes)
     if (name.starts_with(kPrefix) && !of_films.count(name)) result[name] = value;

@@ -82,7 +82,7 @@ TEST(Provenance, OneFileAsBoth) {
 
 TEST(Provenance, ImagesOfFilmsAreNoFilms) {
   const std::map<std::string, std::string> attributes = {{"covary:film", "1"},    {"covary:groups", "2"},
-                                                         {"covary:checksum", ""}, {"covary:seed", "1"},
+                                                         {"covary:checksums", ""}, {"covary:seed", "1"},
                                                          {"covary:samples", "4"}, {"owner", "somebody"}};
   EXPECT_EQ(inherited_attributes(attributes),
             (std::map<std::string, std::string>{{"covary:seed", "1"}, {"covary:samples", "4"}}));

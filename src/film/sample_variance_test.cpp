@@ -111,7 +111,7 @@ TEST(SampleVariance, TheChecksumCoversIt) {
   Film film = film_of(1, 2, 0, 9);
   const auto checksum = [&] {
     write_film(path, film);
-    return ExrFile(path).attributes().at("covary:checksum");
+    return ExrFile(path).attributes().at("covary:checksums");
   };
   const std::string before = checksum();
   film.variance_in_groups()[1] += 1;

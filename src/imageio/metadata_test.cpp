@@ -140,7 +140,7 @@ TEST(Metadata, IsDecodedByOneThreadAtATime) {
               }
             }),
             0);
-  for (int process = 0; process < 40; ++process) ASSERT_EQ(end_of_process([&] { read_all(paths); }), 0) << process;
+  for (int process = 0; process < 20; ++process) ASSERT_EQ(end_of_process([&] { read_all(paths); }), 0) << process;
 }
 
 }  // namespace

@@ -8,9 +8,11 @@
 #include <array>
 #include <cmath>
 #include <memory>
+#include <optional>
 
 #include "core/error.h"
 #include "core/srgb.h"
+#include "imageio/checksums.h"
 #include "imageio/image_io.h"
 
 namespace covary {
@@ -52,6 +54,23 @@ void check_finite(const TexelImage& image, const std::string& path) {
                                              pixel % image.width, pixel / image.width));
 }
 
+/// Throws where an EXR file of covary is not as covary wrote it.
+void check_checksums(const TexelImage& image, const ImageHeader& header, const std::vector<int>& channels,
+                     const std::string& path) {
+  if (header.format != "openexr" || header.type != "float") return;
+  const std::optional<Checksums> stored = find_checksums(path, header.attributes);
+  if (!stored || stored->channels.size() != header.channels.size()) return;
+  for (size_t c = 0; c < channels.size(); ++c) {
+    const std::string& name = header.channels[channels[c]];
+    // The file's order is that of names; OpenImageIO puts colours first.
+    const auto place = std::count_if(header.channels.begin(), header.channels.end(),
+                                     [&](const std::string& other) { return other < name; });
+    const uint32_t crc = crc_of_values(0, image.floats.data() + c, image.n_pixels(), channels.size() * sizeof(float));
+    if (crc != stored->channels[place])
+      fail_checksum(path, fmt::format("the channel {} is one", name), crc, stored->channels[place]);
+  }
+}
+
 }  // namespace
 
 TexelImage read_texels(const std::string& path) {
@@ -66,6 +85,7 @@ TexelImage read_texels(const std::string& path) {
     image.bytes = keep_channels(file->read_bytes(*first, *last + 1), image.n_pixels(), *first, channels);
   else
     image.floats = keep_channels(file->read_floats(*first, *last + 1), image.n_pixels(), *first, channels);
+  check_checksums(image, header, channels, path);
   check_finite(image, path);
   return image;
 }

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """--denoise of covary render and covary combine, and covary denoise --check, as a user runs them."""
 import json
+import math
 import os
+import struct
 import unittest
 
-from exr_reader import read_exr
+from exr_reader import header, read_exr
+from exr_writer import exr
 from render_test import ROOM, SMALL, RenderTest
 
 # Without Open Image Denoise, so that results do not depend on what is installed.
@@ -73,6 +76,18 @@ class Denoise(RenderTest):
         inputs = ("combine", "--crn", "films/crn.exr", "--independent", "films/independent.exr", "-o", "c.exr")
         self.bad(1, "--guides 'b.exr' has no layer Albedo", *inputs, "--denoise", "error", *PLAIN, "--guides", "b.exr")
         self.bad(2, "--guides is an option of --denoise", *inputs, "--guides", "b.exr")
+        size = struct.unpack("<4i", header((self.path / "b.exr").read_bytes())[0]["dataWindow"])
+        width, height = size[2] + 1, size[3] + 1
+        for value in (math.nan, math.inf, -math.inf):
+            layers = {f"{layer}.{c}": [0.5] * (width * height) for layer, names in (("Albedo", "RGB"), ("N", "XYZ"))
+                      for c in names}
+            for name, layer in (("Albedo.G", "Albedo"), ("N.X", "N")):
+                bad = {**layers, name: [0.5] * (width + 3) + [value] + [0.5] * (width * (height - 1) - 4)}
+                self.write("guides.exr", exr({**bad, **{c: [0.5] * (width * height) for c in "RGB"}}, (width, height)))
+                message = f"guides.exr: the layer {layer} holds the value {value} at pixel (3, 1); all values of a " \
+                          "guide must be finite"
+                self.bad(1, message, *inputs, "--denoise", "error", *PLAIN, "--guides", "guides.exr")
+                self.bad(1, message, "denoise", "guides.exr", "-o", "d.exr")
         self.bad(2, "--explain: with --denoise", *inputs, "--denoise", "error", *PLAIN, "--explain", "1,1")
 
     def test_clean_guides(self):

@@ -140,7 +140,7 @@ class Formats(OutputsTest):
             return self.assertIn("pip install pyoidn", done.stderr)
         attributes = json.loads(self.good("info", "o.exr", "--json").stdout)["attributes"]
         self.assertEqual(attributes["covary:seed"], "1")
-        self.assertFalse({"covary:film", "covary:groups", "covary:checksum"} & set(attributes))
+        self.assertFalse({"covary:film", "covary:groups", "covary:checksums"} & set(attributes))
 
 
 class Special(OutputsTest):

@@ -58,7 +58,7 @@ BAD = {
     "covary.set_threads": {"n": (-1, 5000, 1.5, *NO_NUMBERS)},
     "covary.combine": COMBINE,
     "covary.check_inputs": {"crn": NO_GROUPS, "independent": NO_GROUPS},
-    "covary.read_image": {"path": (None, *NO_PATH), "layer": (None, "Albdo", *NO_TEXT)},
+    "covary.read_image": {"path": (None, *NO_PATH), "layer": (None, "Albdo", *NO_TEXT), "accept_changed": NO_FLAG},
     "covary.write_image": {"path": ("x.webp", "x", None, *NO_PATH), "image": NO_GROUPS, "attributes": NO_TEXTS},
     "covary.read_groups": {"paths": (3, None, [], [3], "", [""]), "layer": (None, "Albdo", *NO_TEXT)},
     "covary.denoise": {"image": NO_GROUPS, "albedo": NO_IMAGE, "normal": NO_IMAGE, "library": ("/nowhere", *NO_TEXT)},

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What may come beside two images: light films, numbers of samples, denoising with guides. Values and messages of the
 command line."""
+import math
 import unittest
 
 import covary
@@ -132,6 +133,12 @@ class Denoise(BesideTest):
         self.assertIn("only together with the albedo", message(covary.UsageError, denoise="bias", normal=self.normal))
         self.assertIn("albedo: found the shape [19, 24, 3]; accepted is [20, 24, 3]",
                       message(ValueError, denoise="bias", albedo=self.albedo[1:]))
+        for guide in ("albedo", "normal"):
+            guides = {"albedo": self.albedo, "normal": self.normal}
+            guides[guide] = guides[guide].copy()
+            guides[guide][2, 5, 1] = math.nan
+            self.assertIn(f"the guide {guide} holds the value nan at pixel (5, 2); all values of a guide must be "
+                          "finite", message(covary.InputError, denoise="bias", oidn="off", **guides))
         self.assertIn("blured", message(covary.UsageError, denoise="blured"))
 
     def test_render(self):

@@ -25,6 +25,19 @@ class FilesTest(PackageTest):
         return self.path / "out.exr"
 
 
+class Changed(FilesTest):
+    def test_files_that_another_program_changed(self):
+        image = self.crn[0]
+        covary.write_image(self.path / "a.exr", image)
+        self.assert_same_bits(covary.read_image(self.path / "a.exr"), image)
+        data = (self.path / "a.exr").read_bytes()
+        at = data.index(b"crc32 ") + len("crc32 00000000 ")
+        (self.path / "b.exr").write_bytes(data[:at] + bytes([data[at] ^ 1]) + data[at + 1:])
+        self.assertIn("b.exr: the channel B is one with the checksum ",
+                      self.message_of(covary.InputError, covary.read_image, self.path / "b.exr"))
+        self.assert_same_bits(covary.read_image(self.path / "b.exr", accept_changed=True), image)
+
+
 class Combine(FilesTest):
     def test_bits_of_the_program(self):
         result = covary.combine(self.crn, self.independent)
