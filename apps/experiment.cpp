@@ -5,8 +5,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <atomic>
-#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -17,6 +15,7 @@
 #include "core/error.h"
 #include "film/output_file.h"
 #include "film/outputs.h"
+#include "interruption.h"
 #include "json_output.h"
 #include "lab/builtin_suites.h"
 #include "lab/experiment.h"
@@ -41,20 +40,6 @@ struct ExperimentCommand {
   int threads = 0;
   bool list = false, print = false, keep_passes = false, quiet = false;
 };
-
-std::atomic<bool> g_stop{false};
-
-extern "C" void stop_experiment(int signal) {
-  g_stop = true;
-  std::signal(signal, SIG_DFL);  // a second one ends the program at once
-}
-
-/// Ctrl-C, a request to end, the end of the terminal; whoever started the program may have it ignore some (nohup).
-void catch_signals() {
-  g_stop = false;
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP})
-    if (std::signal(signal, stop_experiment) == SIG_IGN) std::signal(signal, SIG_IGN);
-}
 
 std::string read_file(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
@@ -294,10 +279,11 @@ void experiment(ExperimentCommand command) {
   options.threads = command.threads;
   options.keep_passes = command.keep_passes;
   options.part = part;
-  options.stop = &g_stop;
+  std::optional<StopFlag> stop(std::in_place);
+  options.stop = stop->token();
   options.progress = [&](const lab::Progress& p) { show_progress(p, progress); };
-  catch_signals();
   lab::Results results = lab::run_experiment(suite, options);
+  stop.reset();
   progress.finish();
   if (part.of == 0) finish(results, options.context.program_version, command);
   if (!results.failures.empty())

@@ -16,6 +16,7 @@
 #include "core/error.h"
 #include "core/shell_text.h"
 #include "core/unfinished.h"
+#include "interruption.h"
 #include "version.h"
 
 namespace covary {
@@ -116,6 +117,7 @@ int main(int argc, char** argv) {
   covary::g_command_line = covary::shell_text(words);
   // A file that outgrows its limit is an error like a full disk, which leaves no half-written file behind.
   std::signal(SIGXFSZ, SIG_IGN);
+  covary::catch_signals();
   try {
     return covary::run(argc, argv);
   } catch (const covary::Error& error) {

@@ -5,9 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <csignal>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -21,6 +19,7 @@
 #include "film/display.h"
 #include "film/output_file.h"
 #include "film/outputs.h"
+#include "interruption.h"
 #include "json_output.h"
 #include "plans/render.h"
 #include "plans/result_files.h"
@@ -34,22 +33,6 @@ namespace covary {
 namespace {
 
 constexpr double kPreviewSeconds = 0.5;  // between images for a viewer
-
-std::atomic<bool> g_stop{false};
-volatile std::sig_atomic_t g_signal = 0;
-
-extern "C" void on_signal(int signal) {
-  g_signal = signal;
-  g_stop = true;
-  std::signal(signal, SIG_DFL);  // a second one ends the program at once
-}
-
-/// Ctrl-C, a request to end, the end of the terminal; whoever started the program may have it ignore some (nohup).
-void catch_signals() {
-  g_stop = false;
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP})
-    if (std::signal(signal, on_signal) == SIG_IGN) std::signal(signal, SIG_IGN);
-}
 
 void print_light_path(const RenderOptions& options, const LoadedScene& scene) {
   const uint64_t number = *options.replay_light;
@@ -85,10 +68,10 @@ const char* name_of(RenderStage stage, const RenderOptions& options) {
 
 /// Renders with a line of progress and, where there is one, a viewer.
 RenderResult render_watched(const RenderOptions& options, const LoadedScene& scene, Display* display,
-                            ProgressLine& progress) {
+                            ProgressLine& progress, const StopFlag& stop) {
   Stopwatch since_preview;
   RenderCallbacks callbacks;
-  callbacks.stop = &g_stop;
+  callbacks.stop = stop.token();
   callbacks.stage = [&](RenderStage stage) { progress.begin(name_of(stage, options)); };
   callbacks.progress = [&](uint64_t done, uint64_t total) {
     progress.update(done, options.seconds > 0 && !options.spp ? 0 : total);
@@ -104,7 +87,6 @@ RenderResult render_watched(const RenderOptions& options, const LoadedScene& sce
     progress.clear();
     fmt::print(stderr, "warning: {}\n", text);
   };
-  catch_signals();
   progress.limit(options.seconds);
   RenderResult result = covary::render(scene, make_plan(options), make_request(options, scene), callbacks);
   progress.finish();
@@ -133,11 +115,11 @@ std::string interruption(const RenderOptions& options, const RenderResult& resul
       options.output, result.kept == options.output ? "" : ", '" + result.kept + "' holds its films");
 }
 
-void report(const RenderReport& report) {
+void report(const RenderReport& report, const StopFlag& stop) {
   const auto& [options, scene, result, load_seconds, threads] = report;
   for (const Pass& pass : result.passes) report_bad_samples(options, pass);
   if (!options.json.empty()) write_text_output(options.json, json_text(statistics(report)));
-  if (result.interrupted) throw Unfinished(128 + g_signal, interruption(options, result));
+  if (result.interrupted) throw Unfinished(stop.exit_code(), interruption(options, result));
   if (!options.quiet) print_summary(report);
   if (!result.until_reached.value_or(true))
     throw Unfinished(
@@ -204,10 +186,14 @@ void render(RenderOptions options) {
     return print_replay(options, scene);
   }
   if (!options.debug_strategies.empty()) check_technique_folder(options.debug_strategies, scene);
-  const RenderResult result = render_watched(options, scene, display ? &*display : nullptr, progress);
+  std::optional<StopFlag> stop(std::in_place);
+  const RenderResult result = render_watched(options, scene, display ? &*display : nullptr, progress, *stop);
+  report({options, scene, result, load_seconds, threads}, *stop);
+  if (stop->is_set())
+    throw Unfinished(stop->exit_code(), fmt::format("interrupted when '{}' was written", options.output));
+  stop.reset();  // there is nothing more to keep
   if (result.complete) write_stages(options, result);
-  report({options, scene, result, load_seconds, threads});
-  if (!options.debug_strategies.empty() && !g_stop) write_techniques(options.debug_strategies, scene, result, &g_stop);
+  if (!options.debug_strategies.empty()) write_techniques(options.debug_strategies, scene, result, nullptr);
 }
 
 }  // namespace

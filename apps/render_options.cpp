@@ -244,13 +244,13 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
       .add_option("--time", o.seconds,
                   "Seconds for rendering and estimating together; loading and writing are not counted")
       ->check(positive_number());
-  CLI::Option* passes =
-      command.add_option("--passes,--save-passes", o.passes, "Folder that keeps the film of every pass");
+  command.add_option("--passes,--save-passes", o.passes, "Folder that keeps the film of every pass");
   CLI::Option* resume =
       command.add_flag("--resume", o.resume, "Continue the films of an interrupted render, or those in --passes");
-  command.add_flag("--overwrite", o.overwrite, "Replace films that are in --passes already")
-      ->excludes(resume)
-      ->needs(passes);
+  command
+      .add_flag("--overwrite", o.overwrite,
+                "Replace films that are there already, in --passes or of an interrupted render")
+      ->excludes(resume);
   command.add_option("--checkpoint", o.checkpoint_seconds, "Seconds between writing unfinished films; 0: never")
       ->capture_default_str()
       ->check(real_number(0, std::numeric_limits<double>::infinity()));

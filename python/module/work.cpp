@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "python/module/work.h"
 
-#include <tbb/task_group.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -14,6 +13,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/stop.h"
 
 namespace covary::python {
 namespace {
@@ -157,25 +157,7 @@ void run_work(const std::function<void(WorkState&)>& work, nb::handle progress) 
 }
 
 bool run_stoppable(WorkState& state, const std::function<void()>& body) {
-  if (state.stop) return false;
-  tbb::task_group_context context;
-  Event finished;
-  // Loops inside belong to the context, which cancels them.
-  std::thread watcher([&] {
-    while (!finished.wait())
-      if (state.stop) context.cancel_group_execution();
-  });
-  std::exception_ptr error;
-  try {
-    tbb::task_group group(context);
-    group.run_and_wait(body);
-  } catch (...) {
-    error = std::current_exception();
-  }
-  finished.set();
-  watcher.join();
-  if (error && !state.stop) std::rethrow_exception(error);
-  return !state.stop;
+  return covary::run_stoppable(&state.stop, body);
 }
 
 }  // namespace covary::python

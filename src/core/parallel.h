@@ -18,11 +18,13 @@
 #include <thread>
 #include <type_traits>
 
+#include "core/stop.h"
+
 namespace covary {
 
 /// Calls body(i) for every i of [0, n), in any order and on as many threads as `tbb::global_control` allows; a thread
 /// takes `chunk` (at least 1) neighbours at a time. Loops may be nested. The first exception of a body is thrown here,
-/// once all threads have stopped; iterations not begun by then are left out.
+/// once all threads have stopped; iterations not begun by then are left out. Throws Stopped inside run_stoppable().
 #ifndef COVARY_PLAIN_THREADS
 template <typename Index, typename Body>
 void parallel_for(Index n, std::type_identity_t<Index> chunk, const Body& body) {
@@ -32,6 +34,7 @@ void parallel_for(Index n, std::type_identity_t<Index> chunk, const Body& body) 
         for (Index i = range.begin(); i != range.end(); ++i) body(i);
       },
       tbb::simple_partitioner());
+  throw_if_stopped();
 }
 #else
 // For the thread sanitizer: TBB's library is built without it, so that the hand-overs between its threads look like

@@ -11,11 +11,13 @@
 #include <cstdlib>
 #include <deque>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string_view>
 #include <vector>
 
 #include "core/error.h"
+#include "core/stop.h"
 
 namespace covary {
 namespace {
@@ -37,6 +39,8 @@ struct Api {
   void (*set_image)(void* filter, const char* name, void* data, int format, size_t width, size_t height,
                     size_t byte_offset, size_t pixel_stride, size_t row_stride) = nullptr;
   void (*set_bool)(void* filter, const char* name, bool value) = nullptr;
+  /// `question` is asked while the filter works, which ends early once it says false.
+  void (*set_progress)(void* filter, bool (*question)(void* data, double done), void* data) = nullptr;
   void (*commit_filter)(void* filter) = nullptr;
   void (*execute_filter)(void* filter) = nullptr;
   void (*release_filter)(void* filter) = nullptr;
@@ -135,6 +139,7 @@ Api load(const DenoiseOptions& options, std::string* path = nullptr) {
   bind(library, "oidnNewFilter", api.new_filter);
   bind(library, "oidnSetSharedFilterImage", api.set_image);
   bind(library, "oidnSetFilterBool", api.set_bool);
+  bind(library, "oidnSetFilterProgressMonitorFunction", api.set_progress);
   bind(library, "oidnCommitFilter", api.commit_filter);
   bind(library, "oidnExecuteFilter", api.execute_filter);
   bind(library, "oidnReleaseFilter", api.release_filter);
@@ -209,6 +214,9 @@ struct Denoiser::Library {
     set("output", result);
     if (hdr) api.set_bool(filter.get(), "hdr", true);
     if (clean_guides) api.set_bool(filter.get(), "cleanAux", true);
+    std::function<bool()> stopped = stop_question();
+    api.set_progress(
+        filter.get(), [](void* data, double) { return !(*static_cast<std::function<bool()>*>(data))(); }, &stopped);
     api.commit_filter(filter.get());
     check();
     api.execute_filter(filter.get());

@@ -8,7 +8,6 @@
 #include <unistd.h>
 
 #include <array>
-#include <atomic>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -86,25 +85,18 @@ OutputFile::OutputFile(const std::string& path) : path_(path), target_(output_ta
   if (target_.is_special) {
     descriptor = memfd_create("covary", MFD_CLOEXEC);
   } else {
-    // The name is unique among processes and threads; a long file name is cut so that the temporary one is valid, too.
-    static std::atomic<unsigned> counter{0};
-    const fs::path target = target_.path;
-    const std::string name = target.filename().string().substr(0, 200);
-    temporary_ = (target.parent_path() / fmt::format(".{}.{}-{}.part", name, getpid(), counter++)).string();
-    descriptor = open(temporary_.c_str(), O_CREAT | O_EXCL | O_RDWR | O_CLOEXEC, 0666);
+    descriptor = temporary_.create(target_.path);
   }
   if (descriptor < 0) fail_to_write(path, std::strerror(errno));
   file_ = fdopen(descriptor, "w+b");
   if (file_) return;
   const int error = errno;
   close(descriptor);
-  if (!temporary_.empty()) unlink(temporary_.c_str());
   fail_to_write(path, std::strerror(error));
 }
 
 OutputFile::~OutputFile() {
   if (file_) std::fclose(file_);
-  if (!temporary_.empty()) unlink(temporary_.c_str());
 }
 
 void OutputFile::fail(const char* what) {
@@ -153,8 +145,8 @@ void OutputFile::commit() {
   if (target_.is_special) return send();
   if (fsync(fileno(file_)) != 0) fail("write");
   close_file();  // some network file systems tell of a failed write only here
-  if (std::rename(temporary_.c_str(), target_.path.c_str()) != 0) fail("put in place");
-  temporary_.clear();
+  if (std::rename(temporary_.path().c_str(), target_.path.c_str()) != 0) fail("put in place");
+  temporary_.release();
   // Makes the rename itself durable; a file system that cannot do this is no reason to fail.
   const std::string folder = fs::path(target_.path).parent_path().string();
   const int descriptor = open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);

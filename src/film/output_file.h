@@ -8,6 +8,8 @@
 #include <cstdio>
 #include <string>
 
+#include "film/unfinished_files.h"
+
 namespace covary {
 
 /// Where an output goes.
@@ -23,7 +25,8 @@ class OutputFile {
  public:
   /// Creates the temporary file; special files are kept in memory until commit(). Throws like output_target().
   explicit OutputFile(const std::string& path);
-  /// Removes the temporary file unless commit() succeeded.
+  /// Removes the temporary file unless commit() succeeded. So does a signal that ends the program, and after a death
+  /// of another kind the next OutputFile of the same path.
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
@@ -39,8 +42,9 @@ class OutputFile {
   [[noreturn]] void fail(const char* what);
   void close_file();
   void send();
-  std::string path_, temporary_;
+  std::string path_;
   OutputTarget target_;
+  UnfinishedFile temporary_;
   std::FILE* file_ = nullptr;
   int failure_ = 0;  // errno of the first failed write
 };

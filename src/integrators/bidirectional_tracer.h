@@ -113,7 +113,7 @@ class BidirectionalTracer final : public LightTracingIntegrator {
         for (size_t i = 0; i < batch.paths.size(); ++i)
           samples[batch.paths[i].sample].radiance +=
               emission(scene, lights, depth, batch.paths[i], batch.rays[i], batch.hits[i], state);
-      if (depth + 1 >= lengths_.max_depth) break;
+      if (depth + 1 >= lengths_.max_depth || context.stopped()) break;
       end_paths_without_surface(batch);
       const bool use_light_samples = depth + 2 >= lengths_.min_depth && !lights.empty();
       if (use_light_samples) sample_lights(scene, lights, samples, batch);

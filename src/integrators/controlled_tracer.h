@@ -100,7 +100,7 @@ class ControlledTracer {
       find_surfaces(scene_, depth, lengths_.hide_emitters, batch_, context_);
       for (size_t i = 0; i < batch_.paths.size(); ++i)
         meet_light(depth, batch_.paths[i], batch_.rays[i], batch_.hits[i]);
-      if (depth + 1 >= lengths_.max_depth) break;
+      if (depth + 1 >= lengths_.max_depth || context_.stopped()) break;
       keep_paths(batch_, [&](Path& path) { return path.found && (depth < lengths_.rr_depth || survives(path)); });
       const bool connect = depth + 2 >= lengths_.min_depth && any_light;
       choose_lights(*control_.lights, control_.environment, samples_, connect, batch_);

@@ -46,7 +46,7 @@ class GuidedTracer {
     for (int depth = 0; !batch_.paths.empty(); ++depth) {
       find_surfaces(scene_, depth, lengths_.hide_emitters, batch_, context_);
       for (size_t i = 0; i < batch_.paths.size(); ++i) arrive(depth, i);
-      if (depth + 1 >= lengths_.max_depth) break;
+      if (depth + 1 >= lengths_.max_depth || context_.stopped()) break;
       keep_paths(batch_, [&](Path& path) { return path.found && (depth < lengths_.rr_depth || survives(path)); });
       find_leaves();
       connecting_ = any_light && depth + 2 >= lengths_.min_depth;

@@ -2,6 +2,7 @@
 // Integrators estimate the radiance along camera rays. They know nothing of pixels, films or estimators.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -49,6 +50,10 @@ struct PathContext {
   Arena arena;
   uint64_t n_rays = 0;
   std::unique_ptr<ThreadState> state;
+  /// May be null. Once it is true, trace() may return early, with samples that are to be thrown away: paths that never
+  /// end are asked at each of their edges.
+  const std::atomic<bool>* stop = nullptr;
+  bool stopped() const { return stop && stop->load(std::memory_order_relaxed); }
   /// PassSettings::importance of the pixel of each sample that trace() is called with; empty where there is none.
   std::span<const Spectrum> importance;
   RadianceByLength by_length;  ///< filled by integrators that have Integrator::longest_path()

@@ -78,9 +78,11 @@ PassResult render_light_pass(const Scene& scene, const LightTracingIntegrator& i
     parallel_for(layer.end_bundle() - first, [&](uint32_t i) {
       if (limits.ended()) return;
       Worker& worker = workers.local(integrator);
+      worker.context.stop = settings.stop;
       const uint64_t first_path = uint64_t{first + i} * kBundlePaths;
       trace_sorted(scene, integrator, light_paths_of(settings, film.crop(), first_path, kBundlePaths), worker.splats,
                    worker.context);
+      if (worker.context.stopped()) return;
       for (const LightSplat& splat : worker.splats) layer.add(splat.path, splat.x, splat.y, splat.value);
       limits.advance(kBundlePaths);
     });

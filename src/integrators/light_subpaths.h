@@ -154,7 +154,7 @@ void LightSubpaths::trace(const Parts& parts, const Scene& scene, const PowerLig
     emit(parts, scene, lights, randoms);
   else
     paths_.clear(), rays_.clear();
-  for (int depth = 0; !paths_.empty(); ++depth) {
+  for (int depth = 0; !paths_.empty() && !context.stopped(); ++depth) {
     if (ray_hits_.size() < rays_.size()) ray_hits_.resize(rays_.size());
     scene.nearest(rays_, ray_hits_, false);
     context.n_rays += rays_.size();

@@ -41,6 +41,7 @@ class PathLengths {
 
   void trace_pixel(int x, int y, Worker& worker) {
     RadianceByLength& by_length = worker.context.by_length;
+    worker.context.stop = settings_.stop;
     by_length.n_lengths = images_.size();
     worker.sums.assign(3 * images_.size(), 0);
     const uint32_t n = film_.count(x, y);
@@ -49,6 +50,7 @@ class PathLengths {
       for (uint32_t s = first; s < std::min(n, first + kBatch); ++s)
         worker.samples.push_back(camera_sample(scene_, settings_, film_.crop().x + x, film_.crop().y + y, s));
       integrator_.trace(scene_, worker.samples, worker.context);
+      if (stopped()) return;
       for (size_t s = 0; s < worker.samples.size(); ++s) {
         if (!is_finite(worker.samples[s].radiance)) continue;  // black in the film, too
         for (size_t i = 0; i < images_.size(); ++i)

@@ -83,7 +83,7 @@ class PathTracer final : public Integrator {
         for (size_t i = 0; i < batch.paths.size(); ++i)
           samples[batch.paths[i].sample].radiance +=
               emission(scene, lights, batch.paths[i], batch.rays[i], batch.hits[i]);
-      if (depth + 1 >= lengths_.max_depth) break;
+      if (depth + 1 >= lengths_.max_depth || context.stopped()) break;
       end_paths_without_surface(batch);
 
       const bool connect = depth + 2 >= lengths_.min_depth && !lights.empty();

@@ -120,7 +120,7 @@ struct Wave {
   }
 };
 
-/// Traces the samples of worker.pixels and adds them to the film.
+/// Traces the samples of worker.pixels and adds them to the film; after a stop, neither.
 void trace_pixels(const Scene& scene, const Integrator& integrator, const PassSettings& settings, Film& film,
                   Worker& worker) {
   size_t n_samples = 0;
@@ -141,6 +141,7 @@ void trace_pixels(const Scene& scene, const Integrator& integrator, const PassSe
     worker.context.importance =
         std::span(worker.importance).subspan(worker.importance.empty() ? 0 : i, worker.importance.empty() ? 0 : n);
     integrator.trace(scene, std::span(worker.samples).subspan(i, n), worker.context);
+    if (worker.context.stopped()) return;  // the samples may be halves
   }
 
   CameraSample* sample = worker.samples.data();
@@ -276,6 +277,7 @@ PassResult render_pass(const Scene& scene, const Integrator& integrator, const P
     render_tiles(tiles.size(), settings.learner, integrator, workers, [&](size_t i) {
       if (limits.ended() || round_over.load(std::memory_order_relaxed)) return;
       Worker& worker = workers.local(integrator);
+      worker.context.stop = settings.stop;
       const Stopwatch tile_watch;
       const uint64_t n_new = render_tile(scene, integrator, settings, tiles[i], wave, film, worker);
       if (n_new == 0) return;

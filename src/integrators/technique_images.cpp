@@ -77,6 +77,7 @@ class Techniques {
   std::vector<TechniqueImage> render() {
     parallel_for(window_.height, [&](int y) {
       Recorder recorder(scene_, tracer_, window_);
+      recorder.context->stop = settings_.stop;
       for (int x = 0; x < window_.width && !stopped(); ++x) trace_pixel(x, y, recorder);
     });
     if (tracer_.traces_light()) trace_light();
@@ -92,7 +93,7 @@ class Techniques {
 
   void trace_pixel(int x, int y, Recorder& recorder) {
     recorder.recording.x = x, recorder.recording.y = y;
-    for (uint32_t s = 0; s < spp_; ++s) {
+    for (uint32_t s = 0; s < spp_ && !stopped(); ++s) {
       CameraSample sample = camera_sample(scene_, settings_, window_.x + x, window_.y + y, s);
       recorder.tracer.trace(scene_, {&sample, 1}, *recorder.context);
     }
@@ -105,7 +106,10 @@ class Techniques {
     const auto n_bundles = static_cast<uint32_t>(std::ceil(n_paths / kBundlePaths));
     constexpr uint32_t kRound = 64;
     std::vector<std::unique_ptr<Recorder>> recorders(kRound);
-    for (auto& recorder : recorders) recorder = std::make_unique<Recorder>(scene_, tracer_, window_);
+    for (auto& recorder : recorders) {
+      recorder = std::make_unique<Recorder>(scene_, tracer_, window_);
+      recorder->context->stop = settings_.stop;
+    }
     for (uint32_t first = 0; first < n_bundles && !stopped(); first += kRound) {
       const uint32_t n = std::min(kRound, n_bundles - first);
       parallel_for(n, [&](uint32_t i) {

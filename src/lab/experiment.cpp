@@ -11,6 +11,7 @@
 #include "core/content_hash.h"
 #include "core/error.h"
 #include "core/shell_text.h"
+#include "core/stop.h"
 #include "core/stopwatch.h"
 #include "core/unfinished.h"
 #include "film/image_file.h"
@@ -72,13 +73,14 @@ class Experiment {
     plan();
     for (size_t s = 0; s < n && !stopped(); ++s)
       if (usable_[s] && make_reference(s)) make_runs(s);
-    if (stopped())
-      throw Unfinished(kInterrupted,
-                       fmt::format("interrupted after {} of {} runs; the same command continues", done_, total_));
+    throw_if_interrupted();
     if (options_.part.of > 0) return std::move(results_);
-    for (size_t s = 0; s < n; ++s)
-      if (usable_[s]) measure_scene(s);
-    compare_cells(results_);
+    run_stoppable(options_.stop, [this, n] {
+      for (size_t s = 0; s < n && !stopped(); ++s)
+        if (usable_[s]) measure_scene(s);
+      compare_cells(results_);
+    });
+    throw_if_interrupted();
     collect_warnings();
     warn_of_noisy_references();
     results_.complete = results_.failures.empty();
@@ -87,6 +89,11 @@ class Experiment {
 
  private:
   bool stopped() const { return options_.stop && options_.stop->load(); }
+  void throw_if_interrupted() const {
+    if (stopped())
+      throw Unfinished(kInterrupted,
+                       fmt::format("interrupted after {} of {} runs; the same command continues", done_, total_));
+  }
 
   void report(Progress::Kind kind, const std::string& what) {
     if (options_.progress) options_.progress({done_, total_, clock_.seconds_left(), what, kind});

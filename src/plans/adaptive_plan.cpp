@@ -83,7 +83,7 @@ void check_budget(const Method& method, const PlanState& state, uint32_t first) 
 double samples_in_time(const PlanState& state) {
   const CropWindow window = window_of(state.scene, state.request);
   const FilterSettings filter = state.request.filter.value_or(state.scene.filter);
-  const double speed = samples_per_second(state.scene, *state.integrator, filter, window);
+  const double speed = samples_per_second(state.scene, *state.integrator, filter, window, state.stop);
   const double pixels = static_cast<double>(window.width) * window.height;
   return std::floor(std::max(1.0, kOverestimate * std::max(0.0, *state.seconds_left) * speed / pixels));
 }

@@ -62,11 +62,12 @@ void set_budget(const Shares& shares, const PlanState& state, std::span<Pass> pa
 }
 
 double samples_per_second(const LoadedScene& scene, const Integrator& integrator, const FilterSettings& filter,
-                          const CropWindow& window) {
+                          const CropWindow& window, const std::atomic<bool>* stop) {
   constexpr int kCells = 8, kSide = 16;  // a square of pixels in each cell of a grid
   PassSettings settings;
   settings.spp = 1;
   settings.filter = filter;
+  settings.stop = stop;
   const auto trial = [&](uint64_t seed) {
     settings.seed = seed;
     std::atomic<uint64_t> n_samples{0};

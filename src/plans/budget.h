@@ -40,9 +40,9 @@ int number_of_groups(const Shares& shares, const PlanState& state);
 /// for no number, rounded up to whole groups unless that is more than the request allows.
 void set_budget(const Shares& shares, const PlanState& state, std::span<Pass> passes);
 
-/// Samples per second, from trials all over the window: some ten milliseconds.
+/// Samples per second, from trials all over the window: some ten milliseconds. `stop` (may be null) ends them.
 double samples_per_second(const LoadedScene& scene, const Integrator& integrator, const FilterSettings& filter,
-                          const CropWindow& window);
+                          const CropWindow& window, const std::atomic<bool>* stop);
 
 /// The next budget on the way to a relMSE of `target`: error falls like 1 / samples, or more slowly.
 uint32_t next_budget(uint32_t budget, double predicted, double target, uint32_t limit);

@@ -183,7 +183,7 @@ TEST(LightPlan, AnyThreadsAndInterruptionsGiveTheSameBits) {
         if (--left <= 0) stop = true;
       };
       const RenderResult result = render(scene, plan, request, callbacks);
-      complete = result.complete;
+      complete = !result.interrupted;  // all samples may be there, and the image not
       interruptions += complete ? 0 : 1;
       if (!complete) continue;
       for (int i = 0; i < 3; ++i) EXPECT_TRUE(same_bits(result.passes[i].film, whole.passes[i].film)) << i;

@@ -60,8 +60,8 @@ void resume(const RenderRequest& request, Pass& pass) {
   Film film = read_film(pass.path);
   const auto differs = [&](const std::string& what, const std::string& old_value, const std::string& new_value) {
     throw Error(ErrorCode::kInput,
-                fmt::format("--resume: '{}' was rendered with {} {}, this command asks for {}{}", pass.path, what,
-                            old_value, new_value, request.passes.empty() ? "" : "; --overwrite replaces it"));
+                fmt::format("--resume: '{}' was rendered with {} {}, this command asks for {}; --overwrite replaces it",
+                            pass.path, what, old_value, new_value));
   };
   if (frame_text(film) != frame) differs("frame", frame_text(film), frame);
   const bool any_groups = fewest > 0 && film.groups() >= fewest;
@@ -75,10 +75,50 @@ void resume(const RenderRequest& request, Pass& pass) {
   for (const char* key : {film_key::kSceneHash, film_key::kSampling, film_key::kSeed, film_key::kSettings,
                           film_key::kTraining, film_key::kLightPaths, film_key::kLight})
     if (film.attributes[key] != wanted(key)) differs(key, film.attributes[key], wanted(key));
+  // A film that an earlier render was to keep is not removed by this one.
+  pass.temporary = pass.temporary && film.attributes.count(film_key::kTemporary) > 0;
+  const auto budgets = film.attributes.extract(film_key::kBudgets);
   film.attributes = attributes;
+  if (request.until > 0 && budgets) film.attributes[film_key::kBudgets] = budgets.mapped();
   film.aovs.clear();
   pass.film = std::move(film);
 }
+
+void make_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error)
+    throw Error(ErrorCode::kIo, fmt::format("cannot make the folder '{}': {}", folder.string(), error.message()));
+}
+
+/// The file is the film of a render that was interrupted, and not a sum of films, which are in a folder beside it.
+bool is_unfinished_film(const std::string& path) {
+  std::error_code ignored;
+  if (!fs::is_regular_file(path, ignored)) return false;
+  try {
+    const std::map<std::string, std::string> attributes = read_film_attributes(path);
+    const auto complete = attributes.find(film_key::kComplete);
+    return complete != attributes.end() && complete->second == "false" && !attributes.count(film_key::kLight);
+  } catch (const Error&) {
+    return false;  // an image like any other
+  }
+}
+
+/// Only a film, in the folder itself, is replaced.
+void check_replaceable(const std::string& path) {
+  try {
+    read_film_attributes(path);
+  } catch (const Error& error) {
+    throw Error(ErrorCode::kInput,
+                fmt::format("'{}' would be replaced by the film of a pass, and is no film: {}; give another name for "
+                            "the folder or the output",
+                            path, error.what()));
+  }
+}
+
+constexpr const char* kWaysOut =
+    "--resume continues it, or takes it as it is where it has enough samples, and "
+    "--overwrite replaces it";
 
 }  // namespace
 
@@ -97,35 +137,65 @@ std::string pass_path(const Plan& plan, const RenderRequest& request, const Pass
   return folder.empty() ? "" : (folder / (pass.id() + ".exr")).string();
 }
 
-void take_film_on_disk(const RenderRequest& request, const std::function<void(const std::string&)>& warn, Pass& pass) {
-  if (pass.path.empty() || !fs::exists(pass.path)) return;
-  const bool kept = !request.passes.empty();
+void check_earlier_films(const Plan& plan, const RenderRequest& request) {
+  if (request.output.empty() || request.overwrite) return;
+  const bool is_film = output_is_film(plan, request);
+  // With a folder for films, the output is a copy of one.
+  const bool continues = request.resume && (is_film || !request.passes.empty());
+  if (!continues && is_unfinished_film(request.output))
+    throw Error(ErrorCode::kInput,
+                fmt::format("'{}' is the film of an interrupted render; {}", request.output,
+                            request.resume ? "this command does not continue it, its own one does; --overwrite "
+                                             "replaces it"
+                                           : "--resume continues it, and --overwrite replaces it"));
+  std::error_code ignored;
+  if (is_film || request.resume || !request.passes.empty()) return;
+  for (const fs::directory_entry& entry : fs::directory_iterator(passes_folder(request), ignored))
+    if (entry.path().extension() == ".exr")
+      throw Error(ErrorCode::kInput,
+                  fmt::format("'{}' is there already, in the folder for the films of this render; {}",
+                              entry.path().string(), kWaysOut));
+}
+
+void take_film_on_disk(const Plan& plan, const RenderRequest& request,
+                       const std::function<void(const std::string&)>& warn, Pass& pass) {
+  const bool kept = !request.passes.empty(), is_output = output_is_film(plan, request);
+  pass.temporary = !kept && !is_output && !pass.path.empty();
+  if (pass.path.empty()) return;
+  if (!is_output && fs::is_symlink(pass.path))
+    throw Error(ErrorCode::kInput, fmt::format("'{}' is a link, which films are not written through; remove it, or "
+                                               "give another name for the folder or the output",
+                                               pass.path));
+  if (!fs::exists(pass.path)) return;
   if (request.resume) {
     resume(request, pass);
     if (kept && fs::exists(costs_path(pass))) read_costs(warn, pass);
-  } else if (kept && !request.overwrite) {
-    throw Error(ErrorCode::kInput,
-                fmt::format("'{}' is there already; --resume continues it, or takes it as it is where "
-                            "it has enough samples, and --overwrite replaces it",
-                            pass.path));
+  } else if (!is_output) {
+    if (!request.overwrite)
+      throw Error(ErrorCode::kInput, fmt::format("'{}' is there already; {}", pass.path, kWaysOut));
+    check_replaceable(pass.path);
   }
 }
 
 void save_passes(const RenderRequest& request, std::span<Pass> passes, bool complete) {
   for (Pass& pass : passes) {
     if (pass.path.empty()) continue;
-    if (pass.path != request.output) fs::create_directories(passes_folder(request));
+    if (pass.path != request.output) make_folder(passes_folder(request));
     pass.film.attributes[film_key::kComplete] = complete ? "true" : "false";
+    if (pass.temporary) pass.film.attributes[film_key::kTemporary] = "true";
     write_film(pass.path, pass.film);
+    pass.film.attributes.erase(film_key::kTemporary);  // of the file, not of the film
     if (!request.passes.empty()) write_costs(pass);
   }
 }
 
-void remove_passes(const Plan& plan, const RenderRequest& request, std::span<const Pass> passes) {
-  if (!request.passes.empty() || request.output.empty() || output_is_film(plan, request)) return;
+void remove_passes(const RenderRequest& request, std::span<const Pass> passes) {
   std::error_code ignored;
-  for (const Pass& pass : passes) fs::remove(pass.path, ignored);
-  fs::remove(passes_folder(request), ignored);  // only when empty
+  bool any = false;
+  for (const Pass& pass : passes)
+    if (pass.temporary) any = true, fs::remove(pass.path, ignored);
+  const fs::path folder = passes_folder(request);
+  if (any && !fs::is_symlink(folder, ignored)) fs::remove(folder, ignored);  // only when empty
 }
 
 }  // namespace covary

@@ -12,6 +12,12 @@
 
 namespace covary {
 
+/// Attributes of films beside those of film/film.h.
+namespace film_key {
+inline constexpr const char* kTemporary = "temporary";  ///< "true": removed once the image of the render is written
+inline constexpr const char* kBudgets = "budgets";      ///< of a render to a wanted error (error_rounds.h): "96 168"
+}  // namespace film_key
+
 /// Whether the result's file is the film itself, which can be continued.
 bool output_is_film(const Plan& plan, const RenderRequest& request);
 
@@ -21,16 +27,23 @@ std::filesystem::path passes_folder(const RenderRequest& request);
 /// Where the film of a pass is; empty where the request names no file.
 std::string pass_path(const Plan& plan, const RenderRequest& request, const PassPlan& pass);
 
+/// Before anything is rendered: throws Error(kInput) where the request, which neither resumes nor overwrites, would
+/// begin films of an interrupted render anew, at its output or in the folder beside it, or take that folder for its own
+/// although films are in it.
+void check_earlier_films(const Plan& plan, const RenderRequest& request);
+
 /// Looks for a film at pass.path. To resume, it takes the place of the empty one, which it must match, and where a
-/// folder keeps films their costs so far are read, too; costs that make no sense are left out with a warning. Throws
-/// Error(kInput) for a film that does not match, and in the folder that the request names for any film that it neither
-/// resumes nor overwrites.
-void take_film_on_disk(const RenderRequest& request, const std::function<void(const std::string&)>& warn, Pass& pass);
+/// folder keeps films their costs so far are read, too; costs that make no sense are left out with a warning. Says
+/// whether the file is temporary: it is when it belongs to no folder that the request names, nor to that of an earlier
+/// render. Throws Error(kInput) for a film that does not match, for any file that is neither resumed nor overwritten,
+/// for one that is no film, and for a link, which would lead out of the folder.
+void take_film_on_disk(const Plan& plan, const RenderRequest& request,
+                       const std::function<void(const std::string&)>& warn, Pass& pass);
 
 /// Keeps the films, so that the render can be resumed.
 void save_passes(const RenderRequest& request, std::span<Pass> passes, bool complete);
 
-/// Removes films that were kept for an interruption alone.
-void remove_passes(const Plan& plan, const RenderRequest& request, std::span<const Pass> passes);
+/// Removes the temporary files, and their folder when it is empty then.
+void remove_passes(const RenderRequest& request, std::span<const Pass> passes);
 
 }  // namespace covary

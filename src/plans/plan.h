@@ -52,13 +52,15 @@ struct Pass {
   std::shared_ptr<const Integrator> integrator;
   PassSettings settings;  ///< spp: samples per pixel to reach
   Film film;
-  std::string path;    ///< the file that keeps the film; empty where none does
+  std::string path;  ///< the file that keeps the film; empty where none does
+  /// The file is this render's alone, and goes once its image is written; otherwise it is kept.
+  bool temporary = false;
   uint32_t count = 0;  ///< samples that every pixel has which is to have so many
   /// Of a light pass: the samples that keep step with the camera's, which may be more than a film can hold where only
   /// time ends the render.
   double wanted = 0;
   bool misses_error = false;  ///< the plan was asked for an error that needs more samples than it may take
-  PassResult result;  ///< of all calls together, earlier ones included where a folder of passes keeps them
+  PassResult result;          ///< of all calls together, earlier ones included where a folder of passes keeps them
 };
 
 /// What phases read.

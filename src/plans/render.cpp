@@ -4,10 +4,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <exception>
+#include <filesystem>
 #include <utility>
 
 #include "combine/combine.h"
 #include "core/error.h"
+#include "core/stop.h"
 #include "core/stopwatch.h"
 #include "estimators/predicted_error.h"
 #include "film/splat_layer.h"
@@ -16,6 +19,7 @@
 #include "integrators/path_length_images.h"
 #include "integrators/training.h"
 #include "plans/budget.h"
+#include "plans/error_rounds.h"
 #include "plans/folder_lock.h"
 #include "plans/integrator_choice.h"
 #include "plans/light_plan.h"
@@ -28,8 +32,13 @@
 namespace covary {
 namespace {
 
+namespace fs = std::filesystem;
+
 constexpr int kTrialRows = 64;        // at least, where the time of the estimate is found out
 constexpr uint32_t kAovSamples = 16;  // per pixel of auxiliary images
+/// Seconds of work after which films that nobody asked for are worth writing before the image is made of them.
+constexpr double kWorthKeeping = 10;
+constexpr double kEstimateOfInterrupted = 0.5;  // seconds that it may take; after these the image is the mean
 
 std::string filter_text(const FilterSettings& filter) {
   switch (filter.kind) {
@@ -65,7 +74,8 @@ class PlanRun {
         window_(window_of(scene, request)),
         filter_(request.filter.value_or(scene.filter)),
         integrator_(prepared_integrator(scene, plan, request)),
-        state_{scene, request, callbacks.stop, integrator_, 0, 0, {}} {
+        state_{scene, request, callbacks.stop, integrator_, 0, 0, {}},
+        rounds_(first_budget(scene, request)) {
     plan_.traces_light = has_light_pass(scene, plan);
   }
 
@@ -78,13 +88,17 @@ class PlanRun {
   bool render_phase(size_t index, double share);
   double seconds_left(size_t phase, double share);
   void begin_phase(const Phase& phase);
-  Pass begin_pass(const PassPlan& plan) const;
+  Pass begin_pass(const PassPlan& plan);
   EstimatorResult estimate_rows(int first_row, int n_rows) const;
   void between_waves();
+  void keep_films_before_more();
+  bool try_to_keep_films(bool complete, const char* then);  // false: a warning says why
+  void keep_films_of_failure() noexcept;
+  std::span<Pass> films() { return result_.passes.empty() ? state_.passes : result_.passes; }
   void warn_of_other_samples(uint32_t asked) const;
   void warn_of_missing_light() const;
   void warn_of_other_sampler() const;
-  void estimate();
+  bool estimate();
   double time_estimate();
   void render_auxiliary_images();
   void add_path_lengths();
@@ -135,23 +149,66 @@ class PlanRun {
   const FilterSettings filter_;
   const std::shared_ptr<Integrator> integrator_;  // of this render alone
   PlanState state_;
+  ErrorRounds rounds_;                  // where an error is wanted
   std::vector<size_t> first_of_phase_;  // index of the first pass of each phase that has begun
   RenderResult result_;
   uint64_t done_ = 0;  // samples of this call, of earlier phases and rounds
   Stopwatch watch_, since_checkpoint_;
+  bool consistent_ = true;                  // the films are as they were between two waves
+  bool unsaved_ = false;                    // they have samples that are on no disk
   std::optional<double> estimate_seconds_;  // what the next estimate takes
 };
 
 RenderResult PlanRun::run() {
   std::optional<FolderLock> lock;
   if (!request_.passes.empty()) lock.emplace(request_.passes);
-  result_.interrupted = !render_to_limits();
-  result_.complete = complete();
-  if (result_.interrupted && can_estimate() && (!plan_.film_is_image || film_has_errors())) estimate();
-  const Stopwatch watch;
-  write_files();
-  result_.seconds.write += watch.seconds();
+  check_earlier_films(plan_, request_);
+  try {
+    result_.interrupted = !render_to_limits();
+    result_.complete = complete();
+    if (result_.interrupted && can_estimate() && (!plan_.film_is_image || film_has_errors())) {
+      keep_films_before_more();
+      estimate();
+    }
+    const Stopwatch watch;
+    write_files();
+    result_.seconds.write += watch.seconds();
+  } catch (...) {
+    keep_films_of_failure();
+    throw;
+  }
   return std::move(result_);
+}
+
+bool PlanRun::try_to_keep_films(bool complete, const char* then) {
+  const Stopwatch watch;
+  since_checkpoint_ = Stopwatch();
+  try {
+    save_passes(request_, films(), complete);
+    unsaved_ = false;
+  } catch (const std::exception& error) {
+    if (callbacks_.warning) callbacks_.warning(fmt::format("the films could not be kept: {}; {}", error.what(), then));
+  }
+  result_.seconds.write += watch.seconds();
+  return !unsaved_;
+}
+
+/// Films that have cost time are on disk before anything else is done with them.
+void PlanRun::keep_films_before_more() {
+  const bool asked = !request_.passes.empty();
+  if (unsaved_ && (asked || since_checkpoint_.seconds() > kWorthKeeping))
+    try_to_keep_films(!stopped(), "the image is made nevertheless");
+}
+
+/// After an error that came when all films were whole.
+void PlanRun::keep_films_of_failure() noexcept {
+  if (!consistent_ || !unsaved_ || done_ == 0 || films().empty() || films()[0].path.empty()) return;
+  try {
+    if (try_to_keep_films(false, "they are lost") && callbacks_.warning)
+      callbacks_.warning(fmt::format("the films are kept in '{}'; --resume continues with them",
+                                     fs::path(films()[0].path).parent_path().string()));
+  } catch (...) {  // no memory for the text of a warning
+  }
 }
 
 void PlanRun::write_files() {
@@ -162,14 +219,27 @@ void PlanRun::write_files() {
   if (result_.interrupted && result_.samples_per_pixel() == 0) return;
   if (plan_.film_is_image && has_training())
     result_.image.estimate = with_training(result_.passes[0].film, result_.training);
-  if (request_.path_lengths && !result_.interrupted) add_path_lengths();
-  if (!request_.passes.empty() || (result_.interrupted && !is_film))
-    save_passes(request_, result_.passes, !result_.interrupted);
+  if (request_.path_lengths && !result_.interrupted) {
+    keep_films_before_more();
+    add_path_lengths();
+    result_.interrupted = stopped();
+  }
+  std::exception_ptr failure;
+  if (unsaved_ && (!request_.passes.empty() || (result_.interrupted && !is_film))) {
+    try {
+      save_passes(request_, result_.passes, !result_.interrupted);
+      unsaved_ = false;
+    } catch (const Error&) {  // the image, which is smaller, may still find room
+      failure = std::current_exception();
+    }
+  }
   write_result_files(plan_, request_, result_);
+  if (failure) std::rethrow_exception(failure);
+  unsaved_ = unsaved_ && !is_film;
   if (result_.interrupted)
     result_.kept = is_film ? request_.output : passes_folder(request_).string();
   else
-    remove_passes(plan_, request_, result_.passes);
+    remove_passes(request_, result_.passes);
 }
 
 void PlanRun::add_path_lengths() {
@@ -203,10 +273,11 @@ bool PlanRun::render_to_limits() {
   if (integrator_->learning() && request_.load_training.empty()) begin(RenderStage::kTraining);
   if (!train(scene_, request_, *integrator_, settings, result_.seconds)) return false;
   const uint32_t limit = largest_budget(scene_, request_);
-  state_.budget = state_.group_budget = first_budget(scene_, request_);
+  state_.budget = state_.group_budget = rounds_.budget();
   if (timed() && plan_.groups_follow_speed) {
     // What half of the time is enough for, so that no more groups are begun than can be filled.
-    const double samples = 0.5 * request_.seconds * samples_per_second(scene_, *state_.integrator, filter_, window_);
+    const double samples =
+        0.5 * request_.seconds * samples_per_second(scene_, *state_.integrator, filter_, window_, callbacks_.stop);
     state_.group_budget =
         static_cast<uint32_t>(std::min<double>(state_.budget, samples / window_.width / window_.height));
   }
@@ -217,7 +288,14 @@ bool PlanRun::render_to_limits() {
       share += plan_.phases[i].share;
       if (!render_phase(i, first ? share : 1)) return false;
     }
-    if (!plan_.film_is_image || film_has_errors() || request_.until > 0) estimate();
+    if (rounds_.repeat()) {
+      state_.budget = rounds_.budget();
+      continue;
+    }
+    if (!plan_.film_is_image || film_has_errors() || request_.until > 0) {
+      keep_films_before_more();
+      if (!estimate()) return false;
+    }
     result_.seconds.limited = watch_.seconds();
     if (request_.until > 0) {
       result_.until_reached = error_to_limit() <= request_.until;
@@ -225,7 +303,8 @@ bool PlanRun::render_to_limits() {
     }
     const bool out_of_time = timed() && seconds_left(plan_.phases.size() - 1, 1) <= 0;
     if (result_.until_reached.value_or(true) || state_.budget >= limit || out_of_time) return true;
-    state_.budget = next_budget(state_.budget, error_to_limit(), request_.until, limit);
+    rounds_.add(next_budget(state_.budget, error_to_limit(), request_.until, limit));
+    state_.budget = rounds_.budget();
   }
 }
 
@@ -242,6 +321,10 @@ bool PlanRun::render_phase(size_t index, double share) {
   if (passes.empty()) return false;  // interrupted before its films were made
   if (index + 1 == plan_.phases.size() && needs_aovs() && result_.aovs.empty()) render_auxiliary_images();
   if (timed()) state_.seconds_left = request_.seconds - watch_.seconds();
+  if (request_.until > 0) {
+    state_.budget = rounds_.budget();  // a film may have told of an earlier call's
+    for (Pass& pass : state_.passes) pass.film.attributes[film_key::kBudgets] = rounds_.text();
+  }
   phase.set_targets(state_, passes.first(camera_passes(passes).size()));
   if (passes.back().plan.light) set_light_target(*state_.integrator, camera_passes(state_.passes), passes.back());
   for (Pass& pass : passes) pass.count = pass.settings.spp.reached(pass.film);
@@ -253,7 +336,11 @@ bool PlanRun::render_phase(size_t index, double share) {
   if (callbacks_.progress)
     limits.progress = [this](uint64_t done, uint64_t total) { callbacks_.progress(done_ + done, done_ + total); };
   limits.wave = [this] { between_waves(); };
-  done_ += render_passes(*scene_.scene, passes, limits);
+  consistent_ = false;
+  const uint64_t taken = render_passes(*scene_.scene, passes, limits);
+  consistent_ = true;
+  done_ += taken;
+  unsaved_ = unsaved_ || taken > 0;
   return !stopped() || complete();
 }
 
@@ -280,7 +367,7 @@ void PlanRun::begin_phase(const Phase& phase) {
   }
 }
 
-Pass PlanRun::begin_pass(const PassPlan& plan) const {
+Pass PlanRun::begin_pass(const PassPlan& plan) {
   Pass pass;
   pass.plan = plan;
   pass.integrator = state_.integrator;
@@ -309,18 +396,19 @@ Pass PlanRun::begin_pass(const PassPlan& plan) const {
   pass.film.attributes.insert_or_assign(film_key::kComplete, "false");
   if (plan.light) pass.film.attributes.insert_or_assign(film_key::kLightPaths, std::to_string(kBundlePaths));
   if (!plan.estimator.empty()) pass.film.attributes.insert_or_assign("estimator", plan.estimator);
-  take_film_on_disk(request_, callbacks_.warning, pass);
+  take_film_on_disk(plan_, request_, callbacks_.warning, pass);
+  if (const auto budgets = pass.film.attributes.find(film_key::kBudgets); budgets != pass.film.attributes.end())
+    rounds_.take(budgets->second, largest_budget(scene_, request_), pass.path);
   pass.settings.groups = pass.film.groups();
+  unsaved_ = unsaved_ || !request_.passes.empty();
   return pass;
 }
 
 void PlanRun::between_waves() {
   if (callbacks_.wave) callbacks_.wave(state_.passes);
   if (request_.checkpoint_seconds <= 0 || since_checkpoint_.seconds() < request_.checkpoint_seconds) return;
-  const Stopwatch watch;
-  save_passes(request_, state_.passes, false);
-  result_.seconds.write += watch.seconds();
-  since_checkpoint_ = Stopwatch();
+  unsaved_ = true;
+  try_to_keep_films(false, "rendering goes on, and the next checkpoint tries again");
 }
 
 void PlanRun::warn_of_other_samples(uint32_t asked) const {
@@ -350,10 +438,15 @@ EstimatorResult PlanRun::estimate_rows(int first_row, int n_rows) const {
   return image;
 }
 
-void PlanRun::estimate() {
+/// False when interrupted; of a render that was interrupted before, when it takes too long.
+bool PlanRun::estimate() {
   begin(RenderStage::kEstimating);
   const Stopwatch watch;
-  EstimatorResult image = estimate_rows(0, window_.height);
+  const auto ends = [&] { return result_.interrupted ? watch.seconds() > kEstimateOfInterrupted : stopped(); };
+  EstimatorResult image;
+  result_.image = {};
+  result_.predicted_relmse.reset(), result_.predicted_blocks.reset();
+  if (!run_stoppable(ends, [&] { image = estimate_rows(0, window_.height); })) return false;
   if (!image.std_error.data.empty()) {
     result_.predicted_relmse = predicted_relmse(image);
     result_.predicted_blocks = predicted_blocks(image);
@@ -366,6 +459,7 @@ void PlanRun::estimate() {
     result_.image = std::move(image);
   estimate_seconds_ = watch.seconds();
   result_.seconds.estimate += *estimate_seconds_;
+  return true;
 }
 
 /// Seconds that the estimate will take, from a trial on rows in the middle: it depends on sizes, not on samples.
@@ -373,7 +467,7 @@ double PlanRun::time_estimate() {
   if (plan_.film_is_image) return 0;  // a mean
   const Stopwatch watch;
   const int height = window_.height, n_rows = std::min(height, std::max(kTrialRows, height / 8));
-  estimate_rows((height - n_rows) / 2, n_rows);
+  run_stoppable(callbacks_.stop, [&] { estimate_rows((height - n_rows) / 2, n_rows); });
   const double seconds = watch.seconds();
   result_.seconds.trial += seconds;
   return seconds * height / n_rows;
@@ -426,43 +520,6 @@ Image preview_of(std::span<const Pass> passes) {
       for (int c = 0; c < 3; ++c) image.pixel(x, y)[c] += splats[c];
     }
   return image;
-}
-
-ReplayedSample replay(const LoadedScene& scene, const Plan& plan, const RenderRequest& request,
-                      const SampleAddress& address) {
-  if (address.x < 0 || address.y < 0 || address.x >= scene.width || address.y >= scene.height)
-    throw Error(ErrorCode::kUsage, fmt::format("pixel ({}, {}) is outside the {} x {} frame", address.x, address.y,
-                                               scene.width, scene.height));
-  PassSettings settings;
-  settings.sampling = address.sampling;
-  settings.sampler = sampler_of(scene, request);
-  if (settings.sampler == Sampler::kSobol && !address.groups)
-    throw Error(ErrorCode::kUsage,
-                "a sample of --sampler sobol is one of a group; --groups says how many groups the "
-                "film has, 'covary info FILM' shows it");
-  settings.groups = address.groups.value_or(1);
-  settings.crn_part = request.crn_part;
-  settings.seed = request.seed;
-  settings.pass = address.pass;
-  settings.filter = request.filter.value_or(scene.filter);
-  const auto integrator = prepared_integrator(scene, plan, request);
-  RenderSeconds seconds;
-  train(scene, request, *integrator, {window_of(scene, request), settings.filter, nullptr, nullptr, {}}, seconds);
-  return replay_sample(*scene.scene, *integrator, settings, address.x, address.y, address.sample);
-}
-
-ReplayedLightPath replay_light(const LoadedScene& scene, const Plan& plan, const RenderRequest& request,
-                               uint64_t path) {
-  const auto integrator = prepared_integrator(scene, plan, request);
-  const LightTracingIntegrator* tracer = light_tracer(*integrator);
-  if (!tracer)
-    throw Error(ErrorCode::kUsage,
-                fmt::format("there are no light paths: '{}' traces none here", integrator->description()));
-  PassSettings settings;
-  settings.seed = request.seed;
-  settings.pass = kLightPass;
-  settings.filter = request.filter.value_or(scene.filter);
-  return replay_light_path(*scene.scene, *tracer, settings, window_of(scene, request), path);
 }
 
 }  // namespace covary

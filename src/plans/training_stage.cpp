@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "core/stop.h"
 #include "core/stopwatch.h"
 #include "plans/pixel_importance.h"
 #include "plans/training_file.h"
@@ -21,7 +22,10 @@ bool train(const LoadedScene& scene, const RenderRequest& request, Integrator& i
     return importance;
   };
   if (!request.load_training.empty()) load_training(scene.content_hash, integrator, request.load_training);
-  if (learning && !train(*scene.scene, *learning, settings)) return false;
+  bool trained = !learning;
+  const bool whole =
+      run_stoppable(settings.stop, [&] { trained = trained || train(*scene.scene, *learning, settings); });
+  if (!whole || !trained) return false;
   if (!request.save_training.empty()) save_training(scene.content_hash, integrator, request.save_training);
   seconds.train = watch.seconds();
   if (learning) seconds.solve = learning->update_seconds();

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// One sample or light path of a render, alone.
+#include <fmt/format.h>
+
+#include "core/error.h"
+#include "integrators/light_pass.h"
+#include "plans/budget.h"
+#include "plans/light_plan.h"
+#include "plans/render.h"
+#include "plans/training_stage.h"
+
+namespace covary {
+
+ReplayedSample replay(const LoadedScene& scene, const Plan& plan, const RenderRequest& request,
+                      const SampleAddress& address) {
+  if (address.x < 0 || address.y < 0 || address.x >= scene.width || address.y >= scene.height)
+    throw Error(ErrorCode::kUsage, fmt::format("pixel ({}, {}) is outside the {} x {} frame", address.x, address.y,
+                                               scene.width, scene.height));
+  PassSettings settings;
+  settings.sampling = address.sampling;
+  settings.sampler = sampler_of(scene, request);
+  if (settings.sampler == Sampler::kSobol && !address.groups)
+    throw Error(ErrorCode::kUsage,
+                "a sample of --sampler sobol is one of a group; --groups says how many groups the "
+                "film has, 'covary info FILM' shows it");
+  settings.groups = address.groups.value_or(1);
+  settings.crn_part = request.crn_part;
+  settings.seed = request.seed;
+  settings.pass = address.pass;
+  settings.filter = request.filter.value_or(scene.filter);
+  const auto integrator = prepared_integrator(scene, plan, request);
+  RenderSeconds seconds;
+  train(scene, request, *integrator, {window_of(scene, request), settings.filter, nullptr, nullptr, {}}, seconds);
+  return replay_sample(*scene.scene, *integrator, settings, address.x, address.y, address.sample);
+}
+
+ReplayedLightPath replay_light(const LoadedScene& scene, const Plan& plan, const RenderRequest& request,
+                               uint64_t path) {
+  const auto integrator = prepared_integrator(scene, plan, request);
+  const LightTracingIntegrator* tracer = light_tracer(*integrator);
+  if (!tracer)
+    throw Error(ErrorCode::kUsage,
+                fmt::format("there are no light paths: '{}' traces none here", integrator->description()));
+  PassSettings settings;
+  settings.seed = request.seed;
+  settings.pass = kLightPass;
+  settings.filter = request.filter.value_or(scene.filter);
+  return replay_light_path(*scene.scene, *tracer, settings, window_of(scene, request), path);
+}
+
+}  // namespace covary
