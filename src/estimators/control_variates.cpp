@@ -270,7 +270,7 @@ class Regression {
     }
   }
 
-  /// V_h,i of Eq. (10) for the channels [first, first + count), summed over them.
+  /// V_h,i of [YM2025] Eq. (10) for the channels [first, first + count), summed over them.
   void find_penalties(int first, int count, Workspace& w) const {
     const int k = s_.k, n_tail = layout_.size - layout_.contrasts;
     vfloat homogeneous = {};
@@ -286,7 +286,7 @@ class Regression {
       vfloat penalty = homogeneous, smallest = {};
       if (in_.error_of_h) {
         const vfloat error = channel_sum(tail, layout_.error, first, count);
-        penalty = s_.symmetric ? 0.5f * (own + error) : error;
+        penalty = s_.symmetric ? 0.5f * (own + error) : error;  // [YM2025] Sec. 4, after Eq. (11)
         if (s_.sample_share > 0)
           penalty =
               (1 - s_.sample_share) * penalty + variance_share * channel_sum(tail, layout_.h_variance, first, count);

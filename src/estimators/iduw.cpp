@@ -98,7 +98,7 @@ class Iduw {
         vfloat sum = {};
         for_each_neighbour(x, y, [&](int qx, int qy) {
           const vfloat change = (a - load(z_half_[0].row(c, qy) + qx)) - (b - load(z_half_[1].row(c, qy) + qx));
-          const vfloat weight = exp_of_nonpositive(-gamma * n_ * change * change);
+          const vfloat weight = exp_of_nonpositive(-gamma * n_ * change * change);  // [Back2023], as iduw.h has it
           sum += weight * (centre - (load(z_.row(c, qy) + qx) - load(y_.row(c, qy) + qx)));
         });
         const vfloat value = load(y_.row(c, y) + x) + normalise_ * sum;

@@ -25,7 +25,7 @@ Rgb guided_mean(const Moments& g, const Planes& image, const Planes* counts, int
     for (int dx = -radius; dx <= radius; ++dx) {
       const Rgb q = load_rgb(g.mean, x + dx, y + dy), v = load_rgb(image, x + dx, y + dy);
       const vfloat dr = q.r - centre.r, dg = q.g - centre.g, db = q.b - centre.b;
-      vfloat w = exp_of_nonpositive((dr * dr + dg * dg + db * db) * inverse_bandwidth);
+      vfloat w = exp_of_nonpositive((dr * dr + dg * dg + db * db) * inverse_bandwidth);  // w_j of [YM2025] Eq. (11)
       if constexpr (kCounted) w *= load(counts->row(0, y + dy) + x + dx);
       weights += w;
       sum.r += w * v.r;
@@ -61,6 +61,7 @@ Planes pilot_error(const Moments& g, const Moments& h, int window, bool smoothed
     const Rgb value = load_rgb(h.mean, x, y);
     const vfloat r = pilot.r - value.r, gg = pilot.g - value.g, b = pilot.b - value.b;
     const vfloat count = counts && smoothed ? load(counts->row(0, y) + x) : splat(1.0f);
+    // [YM2025] Eq. (11) but for its factor n, which belongs to the groups (control_variates.h).
     store_rgb(squares, x, y, n, {r * r * count, gg * gg * count, b * b * count});
   });
   if (!smoothed) return squares;

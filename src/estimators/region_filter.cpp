@@ -42,7 +42,8 @@ struct Region {
   vfloat side = splat(1), size = splat(1), differences{};
 };
 
-/// Weights before they are divided by their sum.
+/// Weights before they are divided by their sum, [Csonka2002] Sec. 4: with f = 1/M + sqrt(N) / (3 sigma sqrt(M)) (mean
+/// of Delta - Delta_q) and d = m / sqrt(2) - distance, the weights are f* = max(f, 0) d over their sum.
 struct Kernel {
   vfloat slope, offset, height;  // f = offset - slope * Delta, d = height - distance
 
@@ -52,7 +53,7 @@ struct Kernel {
         height((pyramid == Pyramid::kSide ? region.side : region.size) * std::sqrt(0.5f)) {}
 
   vfloat weight(vfloat difference, float distance) const {
-    return max(offset - slope * difference, splat(0)) * max(height - distance, splat(0));
+    return max(offset - slope * difference, splat(0)) * max(height - distance, splat(0));  // f+ d, Sec. 4
   }
 };
 
@@ -97,7 +98,7 @@ class RegionBatch {
       vfloat sum{};
       for (size_t i = 0; i < places_.first[m]; ++i)
         sum += inside_[i] * kernel.weight(differences_[i], places_.list[i].distance);
-      const vfloat weight = kernel.weight(splat(0), 0) / sum;
+      const vfloat weight = kernel.weight(splat(0), 0) / sum;  // f*[0]; Sec. 5: stop where it falls too little
       grows &= centre_weight - weight >= splat(options_.min_centre_drop);
       accepted.side = grows ? region.side : accepted.side;
       accepted.size = grows ? region.size : accepted.size;
@@ -143,9 +144,9 @@ class RegionBatch {
     vfloat sum{}, squares{}, distortion{}, colour[3] = {};
     for (size_t i = 0; i < last; ++i) sum += weight_of(i);
     for (size_t i = 0; i < last; ++i) {
-      const vfloat weight = weight_of(i) / sum;
+      const vfloat weight = weight_of(i) / sum;  // f* of [Csonka2002] Sec. 4
       const int qx = x_ + places_.list[i].dx, qy = y_ + places_.list[i].dy;
-      for (int c = 0; c < 3; ++c) colour[c] += weight * load(input_.independent.row(c, qy) + qx);
+      for (int c = 0; c < 3; ++c) colour[c] += weight * load(input_.independent.row(c, qy) + qx);  // Eq. (1)
       squares += weight * weight;
       distortion += weight * differences_[i];
     }
@@ -154,6 +155,7 @@ class RegionBatch {
     squares = alone ? splat(1) : squares;
     distortion = alone ? splat(0) : distortion;
     const vfloat centre = alone ? splat(1) : kernel.weight(splat(0), 0) / sum;
+    // The error bound of [Csonka2002] Sec. 4.
     const vfloat bound = count_ > splat(0) ? 3.0f * sqrt(variance_ / count_ * squares) + distortion
                                            : splat(std::numeric_limits<float>::infinity());
     for (int l = 0; l < n; ++l) {

@@ -40,7 +40,8 @@ Planes brightness(const FilterInput& input) {
   return plane;
 }
 
-/// (3 sigma)^2 / |C|^2 of each pixel; other allocations than equal-error average |C|, too, and add 0.01 to its square.
+/// (3 sigma)^2 / |C|^2 of each pixel, of [Csonka2002] Sec. 5, N = (3 sigma / (eps |C|))^2 - n; other allocations than
+/// equal-error average |C|, too, and add 0.01 to its square.
 std::vector<double> squared_errors(const GroupedImage& image, const CountOptions& options) {
   long n_nonfinite = 0;
   const std::vector<unsigned char> valid = finite_pixels(image, image, n_nonfinite);
@@ -74,9 +75,9 @@ Demand demand_of(const GroupedImage& image, const CountOptions& options) {
   const double error = options.relative_error.value_or(1), per_error = 1 / (error * error);
   Demand demand;
   if (options.allocation == Allocation::kEqualError) {
-    demand.of_pixel = squared_errors(image, options);
-    if (options.first_pass_counts) demand.already = mean_count(image);
-    demand.for_error = per_error;
+    demand.of_pixel = squared_errors(image, options);                   // (3 sigma / |C|)^2
+    if (options.first_pass_counts) demand.already = mean_count(image);  // n of [Csonka2002] Sec. 5
+    demand.for_error = per_error;                                       // 1 / eps^2
     return demand;
   }
   std::vector<double> errors = squared_errors(image, options);
@@ -118,6 +119,7 @@ class Rounding {
 
 std::vector<uint32_t> counts_for(const Demand& demand, double factor, const Rounding& rounding) {
   std::vector<uint32_t> counts(demand.of_pixel.size());
+  // N[p] of [Csonka2002] Sec. 5, with 1 / eps^2 as the factor; below zero it is none, and classes are rounded up.
   for (size_t i = 0; i < counts.size(); ++i) counts[i] = rounding(factor * demand.of_pixel[i] - demand.already);
   return counts;
 }

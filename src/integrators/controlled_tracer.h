@@ -319,7 +319,7 @@ class ControlledTracer {
     if (vertex.cell != CoefficientTable::kNone) {
       Spectrum sum = table_.dense(vertex.cell, ControlledScene::kBsdf) * (1 - r_light);
       if (r_light > 0) sum += coefficient(vertex.cell, cluster) * r_light;
-      vertex.control = vertex.control - sum;
+      vertex.control = vertex.control - sum;  // − Σ_k β_k r_k(s), [Hua2023] Eq. (17)
       control = sum * table_.scale(vertex.cell);
     }
     if (!vertex.recorded) return;

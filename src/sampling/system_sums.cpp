@@ -66,6 +66,8 @@ uint32_t SystemSums::cell(CellKey key) {
   return number;
 }
 
+// The terms of one sample in A and b of [Hua2023] Eq. (21), in balance weights: r_k = N_k λ_k / p, λ_k being that of
+// Eq. (18); `weight` is that of Eqs. (25) and (29).
 void SystemSums::add(uint32_t cell, float weight, const ControlledSample& sample) {
   const Spectrum weighted = sample.value * weight;
   if (!(weight >= 0 && std::isfinite(weight)) || !is_finite(weighted)) {
@@ -80,15 +82,15 @@ void SystemSums::add(uint32_t cell, float weight, const ControlledSample& sample
     const double r = sample.r_dense[j];
     if (r == 0) continue;
     double* own = head + layout_.dense(j);
-    for (int c = 0; c < 3; ++c) own[c] += r * weighted[c];
-    for (uint32_t i = 0; i <= j; ++i) head[layout_.matrix(i, j)] += weight * r * sample.r_dense[i];
+    for (int c = 0; c < 3; ++c) own[c] += r * weighted[c];                                           // b_j, Eq. (21)
+    for (uint32_t i = 0; i <= j; ++i) head[layout_.matrix(i, j)] += weight * r * sample.r_dense[i];  // A_ij, Eq. (21)
   }
   if (sample.light == ControlledSample::kNoLight || sample.r_light == 0) return;
   const uint32_t number = rows_index_.insert(uint64_t{cell} << 32 | sample.light);
   rows_.resize(rows_index_.keys().size() * layout_.row_size());
   float* row = &rows_[size_t{number} * layout_.row_size()];
   const float r = sample.r_light;
-  row[SystemLayout::kDiagonal] += weight * r * r;
+  row[SystemLayout::kDiagonal] += weight * r * r;  // the light's own row of Eq. (32): A_kk, b_k, A_kj
   for (int c = 0; c < 3; ++c) row[SystemLayout::kRowValue + static_cast<uint32_t>(c)] += r * weighted[c];
   for (uint32_t j = 0; j < layout_.n_dense; ++j) row[SystemLayout::kRowDense + j] += weight * r * sample.r_dense[j];
 }
