@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -31,6 +32,7 @@
 #include "guide_layer.h"
 #include "json_output.h"
 #include "numbers.h"
+#include "progress.h"
 #include "stages.h"
 
 namespace covary {
@@ -251,6 +253,8 @@ void combine(const CombineOptions& o) {
   std::optional<tbb::global_control> control;
   if (o.threads > 0) control.emplace(tbb::global_control::max_allowed_parallelism, o.threads);
   Stopwatch watch;
+  ProgressLine progress(std::filesystem::path(o.output).stem().string(), o.quiet);
+  progress.begin("loading and checking");
   GroupedFile crn(o.crn, o.crn_layer), independent(o.independent, o.independent_layer);
   std::optional<GroupedFile> light;
   if (!o.light.empty()) light.emplace(std::vector{o.light});
@@ -273,22 +277,26 @@ void combine(const CombineOptions& o) {
   findings.insert(findings.end(), report.findings.begin(), report.findings.end());
   if (const std::string errors = errors_text(findings); !errors.empty() && !o.force)
     throw Error(ErrorCode::kInput, "the inputs do not fit: " + errors + " (--force combines them nevertheless)");
+  progress.clear();
   for (const Finding& f : findings) {
     const bool note = f.severity == Finding::Severity::kNote;
     if (!note || !o.quiet) std::fprintf(stderr, "%s: %s\n", note ? "note" : "warning", f.text.c_str());
   }
   const double check_seconds = watch.lap();
 
+  progress.begin(o.estimator.denoise == "none" ? "estimating" : "estimating and denoising");
   EstimatorResult result = estimate(estimator, settings, crn, bands);
   calibrate(result);
   if (light) add_light_file(*light, result);
   const double estimate_seconds = watch.lap();
+  progress.begin("writing");
   write(o, crn, independent, result);
   if (!o.stages.empty()) {
     bands.read(0, crn.height());
     save_stages(o.stages, estimator, bands.crn(), bands.independent(), settings, crn.place());
   }
   const double write_seconds = watch.lap();
+  progress.finish();
   nlohmann::ordered_json pixel;
   if (!o.explain.empty()) {
     pixel = explain(o, estimator, crn, bands);

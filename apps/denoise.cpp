@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <optional>
 
@@ -15,6 +16,7 @@
 #include "film/outputs.h"
 #include "film/provenance.h"
 #include "guide_layer.h"
+#include "progress.h"
 
 namespace covary {
 namespace {
@@ -40,6 +42,8 @@ void run(const Options& o) {
   Outputs outputs;
   outputs.reads(o.input);
   outputs.writes("-o", o.output, OutputKind::kFilm);
+  ProgressLine progress(std::filesystem::path(o.input).stem().string(), o.quiet);
+  progress.begin("loading");
   const ImageInfo info = inspect_image(o.input);
   const PlacedImage image = read_image(o.input);
   std::optional<Image> albedo, normal;
@@ -47,11 +51,13 @@ void run(const Options& o) {
     albedo = guide_layer(o.input, info, "Albedo");
     if (albedo) normal = guide_layer(o.input, info, "N");
   }
+  progress.begin("denoising");
   Denoiser denoiser(o.denoise);
   if (o.clean_guides && albedo) albedo = denoiser.denoise_guide("albedo", *albedo);
   if (o.clean_guides && normal) normal = denoiser.denoise_guide("normal", *normal);
   Image result =
       denoiser.denoise(image.image, albedo ? &*albedo : nullptr, normal ? &*normal : nullptr, o.clean_guides);
+  progress.begin("writing");
   std::map<std::string, std::string> attributes = inherited_attributes(info.attributes);
   attributes["covary:version"] = COVARY_VERSION;
   attributes["covary:command"] = command_line();
@@ -60,6 +66,7 @@ void run(const Options& o) {
   for (size_t c = 0; c < 3; ++c)
     planes.push_back({std::string(1, "RGB"[c]), ExrPlane::Type::kFloat, result.data.data() + c, 12});
   write_exr(o.output, image.place, attributes, planes);
+  progress.finish();
   if (!o.quiet)
     std::fprintf(stderr, "%s: %d x %d, %s, in %.2f s\n", o.output.c_str(), result.width, result.height,
                  normal   ? "guided by albedo and normal"

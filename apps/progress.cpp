@@ -2,14 +2,35 @@
 #include "progress.h"
 
 #include <fmt/format.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <utility>
 
 namespace covary {
+namespace {
+
+constexpr double kTerminalSeconds = 0.2, kLogSeconds = 10;  // between two drawings
+constexpr int kUsualColumns = 80, kBarColumns = 30;
+
+int terminal_columns() {
+  winsize size{};
+  return ioctl(2, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : kUsualColumns;
+}
+
+/// The first `columns` characters of UTF-8.
+std::string cut_to(const std::string& text, int columns) {
+  size_t end = 0;
+  for (int n = 0; end < text.size(); ++end)
+    if ((static_cast<unsigned char>(text[end]) & 0xc0) != 0x80 && n++ == columns) break;
+  return text.substr(0, end);
+}
+
+}  // namespace
 
 std::string format_duration(double seconds) {
   const auto s = static_cast<int64_t>(std::ceil(std::max(0.0, seconds)));
@@ -25,36 +46,108 @@ std::string format_count(double count) {
 }
 
 ProgressLine::ProgressLine(std::string label, bool quiet)
-    : label_(std::move(label)), quiet_(quiet), terminal_(isatty(2) == 1), next_(terminal_ ? 0.1 : 10) {}
+    : label_(std::move(label)), quiet_(quiet), terminal_(isatty(2) == 1), next_(terminal_ ? 0 : kLogSeconds) {}
 
-void ProgressLine::update(uint64_t done, uint64_t total, double seconds_limit) {
+ProgressLine::~ProgressLine() { finish(); }
+
+void ProgressLine::begin(const std::string& phase) {
+  const std::lock_guard lock(mutex_);
+  phase_ = phase, shown_.clear();
+  first_ = done_, total_ = 0;
+  of_phase_ = Stopwatch();
+  if (!terminal_ || quiet_) return;
+  draw();
+  if (!redrawing_.joinable()) redrawing_ = std::thread([this] { redraw_regularly(); });
+}
+
+void ProgressLine::update(uint64_t done, uint64_t total) {
   if (quiet_) return;
   const std::unique_lock lock(mutex_, std::try_to_lock);
-  if (!lock) return;
-  const double elapsed = watch_.seconds();
-  if (elapsed < next_) return;
-  next_ = elapsed + (terminal_ ? 0.2 : 10);
+  if (!lock) return;  // tiles do not wait for the terminal
+  if (done < first_) first_ = 0;
+  done_ = done, total_ = total;
+  if (of_line_.seconds() >= next_) draw();
+}
 
-  const double rate = static_cast<double>(done) / elapsed;
-  double fraction = total ? static_cast<double>(done) / static_cast<double>(total) : 0;
-  double left = fraction > 0 ? elapsed * (1 - fraction) / fraction : 0;
-  if (seconds_limit > 0 && (seconds_limit - elapsed < left || fraction == 0)) {
-    fraction = std::min(1.0, elapsed / seconds_limit);
-    left = seconds_limit - elapsed;
+void ProgressLine::limit(double seconds) {
+  const std::lock_guard lock(mutex_);
+  seconds_limit_ = seconds;
+  of_limit_ = Stopwatch();
+}
+
+void ProgressLine::toward(double reached, double goal) {
+  const std::lock_guard lock(mutex_);
+  note_ = fmt::format("  predicted relMSE {:.2g}, goal {:.2g}", reached, goal);
+  least_total_ = static_cast<uint64_t>(static_cast<double>(done_) * std::max(1.0, reached / goal));
+}
+
+void ProgressLine::show(const std::string& text) {
+  const std::lock_guard lock(mutex_);
+  shown_ = text;
+  if (terminal_ || !drawn_ || of_line_.seconds() >= next_) draw();
+}
+
+std::string ProgressLine::bar_text(int columns) const {
+  const uint64_t total = std::max(total_, least_total_);
+  const double rate = static_cast<double>(done_ - first_) / std::max(of_phase_.seconds(), 1e-9);
+  double fraction = total ? static_cast<double>(done_) / static_cast<double>(total) : 0;
+  double left = rate > 0 ? static_cast<double>(total - std::min(done_, total)) / rate : 0;
+  if (const double in_time = seconds_limit_ - of_limit_.seconds(); seconds_limit_ > 0 && (in_time < left || !total)) {
+    fraction = std::min(1.0, 1 - in_time / seconds_limit_);
+    left = in_time;
   }
-  constexpr int kWidth = 30;
-  const int filled = static_cast<int>(fraction * kWidth);
-  const std::string line =
-      fmt::format("{} [{}{}] {:3.0f} %  {} samples/s  {} left", label_, std::string(filled, '='),
-                  std::string(kWidth - filled, ' '), 100 * fraction, format_count(rate), format_duration(left));
+  fraction = std::clamp(fraction, 0.0, 1.0);
+  const std::string end = fmt::format(" {:3.0f} %  {} samples/s  {} left{}", 100 * fraction, format_count(rate),
+                                      format_duration(left), note_);
+  const std::string start = fmt::format("{}: {} ", label_, phase_);
+  const int room = columns - static_cast<int>(start.size() + end.size()) - 2, width = std::min(room, kBarColumns);
+  if (width < 4) return start + end;
+  const auto filled = static_cast<size_t>(fraction * width);
+  return fmt::format("{}[{}{}]{}", start, std::string(filled, '='), std::string(width - filled, ' '), end);
+}
+
+std::string ProgressLine::text(int columns) const {
+  if (!shown_.empty()) return shown_;
+  if (done_ > first_ && (total_ > 0 || seconds_limit_ > 0)) return bar_text(columns);
+  const double seconds = of_phase_.seconds();
+  return fmt::format("{}: {}{}{}", label_, phase_, seconds >= 1 ? " " + format_duration(std::floor(seconds)) : "",
+                     note_);
+}
+
+void ProgressLine::draw() {
+  if (quiet_ || finished_) return;
+  next_ = of_line_.seconds() + (terminal_ ? kTerminalSeconds : kLogSeconds);
+  const int columns = terminal_ ? terminal_columns() - 1 : 1000;  // the last column would wrap the line
+  const std::string line = cut_to(text(terminal_ ? columns : kUsualColumns + kBarColumns), columns);
   std::fprintf(stderr, terminal_ ? "\r%s\033[K" : "%s\n", line.c_str());
   std::fflush(stderr);
   drawn_ = true;
 }
 
-void ProgressLine::finish() {
+void ProgressLine::redraw_regularly() {
+  std::unique_lock lock(mutex_);
+  while (!end_.wait_for(lock, std::chrono::milliseconds(500), [this] { return finished_; }))
+    if (!phase_.empty() && shown_.empty() && of_line_.seconds() >= next_) draw();
+}
+
+void ProgressLine::erase() {
   if (terminal_ && drawn_) std::fputs("\r\033[K", stderr);
   drawn_ = false;
+}
+
+void ProgressLine::clear() {
+  const std::lock_guard lock(mutex_);
+  erase();
+}
+
+void ProgressLine::finish() {
+  {
+    const std::lock_guard lock(mutex_);
+    erase();
+    finished_ = true;
+  }
+  end_.notify_all();
+  if (redrawing_.joinable()) redrawing_.join();
 }
 
 }  // namespace covary

@@ -1,31 +1,62 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <atomic>
+#include <condition_variable>
 #include <cstdint>
 #include <mutex>
 #include <string>
+#include <thread>
 
 #include "core/stopwatch.h"
 
 namespace covary {
 
-/// A line on stderr that shows how far a render is, its rate and the time left. On a terminal the line is redrawn a few
-/// times a second; otherwise a new line appears every ten seconds, so that logs stay short.
+/// A line on stderr that shows what a command does, how far it is, its rate and the time left. On a terminal the line
+/// is redrawn a few times a second and no wider than the terminal; otherwise a new line with a bar appears every ten
+/// seconds, so that logs stay short. All functions may be called from any thread.
 class ProgressLine {
  public:
-  explicit ProgressLine(std::string label, bool quiet);
-  /// `total` == 0: unknown. `seconds_limit` > 0: the time budget that ends the work if `total` is not reached first.
-  void update(uint64_t done, uint64_t total, double seconds_limit);
+  ProgressLine(std::string label, bool quiet);
+  /// Like finish().
+  ~ProgressLine();
+  ProgressLine(const ProgressLine&) = delete;
+  ProgressLine& operator=(const ProgressLine&) = delete;
+
+  /// What is done from now on: "loading". It is shown with the seconds it takes until update() says how far it is.
+  void begin(const std::string& phase);
+  /// Samples of the phase. `total` == 0: unknown.
+  void update(uint64_t done, uint64_t total);
+  /// A time budget, from now on, that ends the work if `total` is not reached first.
+  void limit(double seconds);
+  /// The error that the samples so far have reached, where they go on until `goal`: shown, and as errors fall like
+  /// 1 / samples, the total is at least so many samples as that will take.
+  void toward(double reached, double goal);
+  /// This text in place of all that.
+  void show(const std::string& text);
   /// Clears the line (terminal) before other output.
+  void clear();
+  /// Clears it for good.
   void finish();
 
  private:
-  std::string label_;
-  bool quiet_, terminal_, drawn_ = false;
-  Stopwatch watch_;
-  double next_;  // when to draw, seconds
-  std::mutex mutex_;
+  std::string text(int columns) const;
+  std::string bar_text(int columns) const;
+  void draw();
+  void erase();
+  void redraw_regularly();
+
+  const std::string label_;
+  const bool quiet_, terminal_;
+  std::mutex mutex_;  // of all below
+  std::string phase_, shown_, note_;
+  uint64_t done_ = 0, total_ = 0, least_total_ = 0;
+  uint64_t first_ = 0;  // done_ when the phase began
+  bool drawn_ = false, finished_ = false;
+  Stopwatch of_line_, of_phase_, of_limit_;
+  double seconds_limit_ = 0;
+  double next_;  // when to draw, seconds of the line
+  std::condition_variable end_;
+  std::thread redrawing_;  // on a terminal: the seconds of phases that say nothing
 };
 
 /// 75 -> "1:15", 4000 -> "1:06:40".

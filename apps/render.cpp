@@ -69,25 +69,43 @@ void print_replay(const RenderOptions& options, const LoadedScene& scene) {
              sample.value.b);
 }
 
+const char* name_of(RenderStage stage, const RenderOptions& options) {
+  switch (stage) {
+    case RenderStage::kTraining:
+      return "training";
+    case RenderStage::kRendering:
+      return "rendering";
+    case RenderStage::kEstimating:
+      return options.estimator.denoise == "none" ? "estimating" : "estimating and denoising";
+    case RenderStage::kWriting:
+      return "writing";
+  }
+  throw Error(ErrorCode::kInternal, "unknown stage of a render");
+}
+
 /// Renders with a line of progress and, where there is one, a viewer.
-RenderResult render_watched(const RenderOptions& options, const LoadedScene& scene, Display* display) {
-  ProgressLine progress(std::filesystem::path(options.scene).stem().string(), options.quiet);
+RenderResult render_watched(const RenderOptions& options, const LoadedScene& scene, Display* display,
+                            ProgressLine& progress) {
   Stopwatch since_preview;
   RenderCallbacks callbacks;
   callbacks.stop = &g_stop;
+  callbacks.stage = [&](RenderStage stage) { progress.begin(name_of(stage, options)); };
   callbacks.progress = [&](uint64_t done, uint64_t total) {
-    progress.update(done, options.seconds > 0 && !options.spp ? 0 : total, options.seconds);
+    progress.update(done, options.seconds > 0 && !options.spp ? 0 : total);
   };
+  if (!options.until.empty())
+    callbacks.predicted = [&, goal = parse_until(options.until).error](double error) { progress.toward(error, goal); };
   callbacks.wave = [&](std::span<const Pass> passes) {
     if (!display || !display->ready() || since_preview.seconds() < kPreviewSeconds) return;
     display->update(preview_of(passes));
     since_preview = Stopwatch();
   };
   callbacks.warning = [&](const std::string& text) {
-    progress.finish();
+    progress.clear();
     fmt::print(stderr, "warning: {}\n", text);
   };
   catch_signals();
+  progress.limit(options.seconds);
   RenderResult result = covary::render(scene, make_plan(options), make_request(options, scene), callbacks);
   progress.finish();
   if (display && !result.passes.empty()) display->update(result.picture());
@@ -173,14 +191,20 @@ void render(RenderOptions options) {
       fmt::print(stderr, "{}warning: {}\n", isatty(2) == 1 ? "\r\033[K" : "", text);
     });
 
+  ProgressLine progress(std::filesystem::path(options.scene).stem().string(), options.quiet);
+  progress.begin("loading");
   const Stopwatch load_watch;
   const LoadedScene scene = load(options);
   const double load_seconds = load_watch.seconds() - scene.scene->build_seconds();
   outputs.reads(scene.files);
+  progress.clear();
   for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", warning);
-  if (options.is_replay()) return print_replay(options, scene);
+  if (options.is_replay()) {
+    progress.finish();
+    return print_replay(options, scene);
+  }
   if (!options.debug_strategies.empty()) check_technique_folder(options.debug_strategies, scene);
-  const RenderResult result = render_watched(options, scene, display ? &*display : nullptr);
+  const RenderResult result = render_watched(options, scene, display ? &*display : nullptr, progress);
   if (result.complete) write_stages(options, result);
   report({options, scene, result, load_seconds, threads});
   if (!options.debug_strategies.empty() && !g_stop) write_techniques(options.debug_strategies, scene, result, &g_stop);

@@ -89,11 +89,18 @@ class PlanRun {
   void add_path_lengths();
   void write_files();
 
+  void begin(RenderStage stage) const {
+    if (callbacks_.stage) callbacks_.stage(stage);
+  }
   bool has_training() const { return !result_.training.mean.data.empty(); }
   bool timed() const { return request_.seconds > 0; }
   /// What RenderRequest::until is about.
   double error_to_limit() const {
     return request_.until_in_blocks ? *result_.predicted_blocks : *result_.predicted_relmse;
+  }
+  /// The film is the image, and its groups tell its error.
+  bool film_has_errors() const {
+    return plan_.film_is_image && plan_.predicts_error && state_.passes[0].film.groups() > 1;
   }
   bool needs_aovs() const { return request_.aovs || plan_.reads_guides; }
   bool stopped() const { return callbacks_.stop && callbacks_.stop->load(); }
@@ -138,7 +145,7 @@ RenderResult PlanRun::run() {
   if (!request_.passes.empty()) lock.emplace(request_.passes);
   result_.interrupted = !render_to_limits();
   result_.complete = complete();
-  if (result_.interrupted && !plan_.film_is_image && can_estimate()) estimate();
+  if (result_.interrupted && can_estimate() && (!plan_.film_is_image || film_has_errors())) estimate();
   const Stopwatch watch;
   write_files();
   result_.seconds.write += watch.seconds();
@@ -146,6 +153,7 @@ RenderResult PlanRun::run() {
 }
 
 void PlanRun::write_files() {
+  begin(RenderStage::kWriting);
   const bool is_film = output_is_film(plan_, request_);
   result_.passes = std::move(state_.passes);
   if (result_.interrupted && result_.samples_per_pixel() == 0) return;
@@ -190,6 +198,8 @@ bool PlanRun::render_to_limits() {
   warn_of_other_sampler();
   TrainingSettings settings{window_, filter_, callbacks_.stop, callbacks_.progress, {}};
   if (plan_.takes_training) settings.image = &result_.training;
+  if (dynamic_cast<const LearningIntegrator*>(scene_.integrator.get()) && request_.load_training.empty())
+    begin(RenderStage::kTraining);
   if (!train(scene_, request_, settings, result_.seconds)) return false;
   const uint32_t limit = largest_budget(scene_, request_);
   state_.budget = state_.group_budget = first_budget(scene_, request_);
@@ -206,9 +216,12 @@ bool PlanRun::render_to_limits() {
       share += plan_.phases[i].share;
       if (!render_phase(i, first ? share : 1)) return false;
     }
-    if (!plan_.film_is_image || request_.until > 0) estimate();
+    if (!plan_.film_is_image || film_has_errors() || request_.until > 0) estimate();
     result_.seconds.limited = watch_.seconds();
-    if (request_.until > 0) result_.until_reached = error_to_limit() <= request_.until;
+    if (request_.until > 0) {
+      result_.until_reached = error_to_limit() <= request_.until;
+      if (callbacks_.predicted) callbacks_.predicted(error_to_limit());
+    }
     const bool out_of_time = timed() && seconds_left(plan_.phases.size() - 1, 1) <= 0;
     if (result_.until_reached.value_or(true) || state_.budget >= limit || out_of_time) return true;
     state_.budget = next_budget(state_.budget, error_to_limit(), request_.until, limit);
@@ -232,6 +245,7 @@ bool PlanRun::render_phase(size_t index, double share) {
   if (passes.back().plan.light) set_light_target(*state_.integrator, camera_passes(state_.passes), passes.back());
   for (Pass& pass : passes) pass.count = pass.settings.spp.reached(pass.film);
   if (index + 1 == plan_.phases.size() && !timed() && request_.until == 0) warn_of_other_samples(state_.budget);
+  begin(RenderStage::kRendering);
   WaveLimits limits;
   if (timed()) limits.seconds_left = [this, index, share] { return seconds_left(index, share); };
   limits.stop = callbacks_.stop;
@@ -335,6 +349,7 @@ EstimatorResult PlanRun::estimate_rows(int first_row, int n_rows) const {
 }
 
 void PlanRun::estimate() {
+  begin(RenderStage::kEstimating);
   const Stopwatch watch;
   EstimatorResult image = estimate_rows(0, window_.height);
   if (!image.std_error.data.empty()) {
@@ -343,7 +358,10 @@ void PlanRun::estimate() {
   }
   if (request_.until > 0 && !result_.predicted_relmse)
     throw Error(ErrorCode::kUsage, "an error can only be predicted from 2 or more groups");
-  if (!plan_.film_is_image) result_.image = std::move(image);
+  if (plan_.film_is_image)
+    result_.image.std_error = std::move(image.std_error);
+  else
+    result_.image = std::move(image);
   estimate_seconds_ = watch.seconds();
   result_.seconds.estimate += *estimate_seconds_;
 }

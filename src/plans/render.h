@@ -49,10 +49,16 @@ struct RenderRequest {
   std::map<std::string, std::string> attributes;
 };
 
+/// What a render does for a while. Rendering and estimating may come again, with RenderRequest::until.
+enum class RenderStage { kTraining, kRendering, kEstimating, kWriting };
+
 /// What the caller hears of a render. Any of them may be empty.
 struct RenderCallbacks {
   /// The render ends at the next tile once this is true; may be set from a signal handler.
   const std::atomic<bool>* stop = nullptr;
+  std::function<void(RenderStage)> stage;  ///< one begins
+  /// With RenderRequest::until, after each estimate: the predicted error that it is about.
+  std::function<void(double)> predicted;
   /// After each tile, from any thread; must be thread-safe. Counts the samples and light paths of the current phase.
   std::function<void(uint64_t done, uint64_t total)> progress;
   /// Between waves, when films may be read, and once in about half a second in passes of a single wave.
@@ -74,8 +80,8 @@ struct RenderSeconds {
 /// What has become of a plan.
 struct RenderResult {
   std::vector<Pass> passes;
-  /// Empty where the film alone is the image, and of a render that was interrupted before every pixel of every film had
-  /// samples.
+  /// Where the film alone is the image, at most its standard error. Empty of a render that was interrupted before every
+  /// pixel of every film had samples.
   EstimatorResult image;
   std::optional<double> predicted_relmse;
   std::optional<double> predicted_blocks;  ///< of predicted_error.h

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The line of progress, as a terminal shows it: what is done, how far it is, and nothing that stays."""
+import fcntl
+import os
+import pty
+import re
+import struct
+import termios
+import unittest
+from pathlib import Path
+
+from cli_test import COVARY, CliTest
+
+ROOM = str(Path(os.environ["SCENES"]) / "room.xml")
+RENDER = ("render", ROOM, "--resolution", "64x48", "--no-preview")
+
+
+class Progress(CliTest):
+    def shown(self, *arguments, columns=80):
+        """What the command writes to a terminal so wide; it must succeed."""
+        try:
+            pid, terminal = pty.fork()
+        except OSError as error:
+            self.skipTest(f"no pseudo-terminals here: {error}")
+        if pid == 0:
+            fcntl.ioctl(2, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
+            os.chdir(self.path)
+            os.execv(COVARY, (COVARY, *arguments))
+        text = b""
+        while True:
+            try:
+                part = os.read(terminal, 4096)
+            except OSError:  # how Linux tells that nobody has the terminal open any more
+                break
+            if not part:
+                break
+            text += part
+        os.close(terminal)
+        _, status = os.waitpid(pid, 0)
+        self.assertEqual(os.waitstatus_to_exitcode(status), 0, text)
+        return text.decode()
+
+    def in_order(self, text, *parts):
+        at = 0
+        for part in parts:
+            self.assertIn(part, text[at:])
+            at = text.index(part, at) + len(part)
+
+    def test_every_phase_is_shown_and_none_stays(self):
+        text = self.shown(*RENDER, "--spp", "8", "-o", "a.exr")
+        self.in_order(text, "room: loading", "room: rendering", "room: estimating", "room: writing", "\r\033[K",
+                      "a.exr: ")
+        self.assertNotIn("training", text)
+        self.assertNotIn("room: ", text[text.index("a.exr: "):])
+        text = self.shown(*RENDER, "--spp", "8", "--denoise", "balanced", "--integrator", "guided-path",
+                          "--guide-train", "4", "-o", "b.exr")
+        self.in_order(text, "loading", "training", "rendering", "estimating and denoising", "writing")
+        self.good(*RENDER, "--spp", "8", "-o", "c.exr", "--passes", "films")
+        text = self.shown("combine", "--crn", "films/crn.exr", "--independent", "films/independent.exr", "-o", "d.exr")
+        self.in_order(text, "d: loading", "d: estimating", "d: writing", "d.exr: ")
+
+    def test_until_shows_the_error_that_is_reached(self):
+        text = self.shown(*RENDER, "--until", "relmse=0.0015", "-o", "a.exr", columns=120)
+        self.in_order(text, "estimating", "rendering  predicted relMSE ", ", goal 0.0015", "estimating", "writing")
+        reached = [float(x) for x in re.findall(r"predicted relMSE ([0-9.e-]+), goal", text)]
+        self.assertGreater(reached[0], 0.0015)
+        self.assertLessEqual(reached[-1], 0.0015)
+
+    def test_the_line_fits_the_terminal(self):
+        text = self.shown(*RENDER, "--spp", "96", "-o", "a.exr", columns=30)
+        lines = [line.replace("\033[K", "") for line in text[:text.index("a.exr: ")].split("\r")]
+        self.assertGreater(len(lines), 3)
+        self.assertLess(max(map(len, lines)), 30, lines)
+
+    def test_silence(self):
+        self.assertEqual(self.shown(*RENDER, "--spp", "8", "-o", "a.exr", "--quiet"), "")
+        done = self.good(*RENDER, "--spp", "8", "-o", "b.exr")
+        self.assertNotRegex(done.stderr, "\r|loading|rendering|writing")
+
+
+if __name__ == "__main__":
+    unittest.main()
