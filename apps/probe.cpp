@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <filesystem>
 #include <memory>
+#include <vector>
 
 #include "commands.h"
 #include "film/image_writer.h"
@@ -11,11 +14,15 @@
 #include "integrators/guide_probe.h"
 #include "numbers.h"
 #include "plans/budget.h"
+#include "plans/result_files.h"
 #include "plans/training_stage.h"
+#include "progress.h"
 #include "render_options.h"
 
 namespace covary {
 namespace {
+
+namespace fs = std::filesystem;
 
 /// Samples per pixel that are asked for where none are taken but those of the training.
 constexpr uint32_t kAnyBudget = 1u << 20;
@@ -27,14 +34,29 @@ struct ProbeOptions {
   uint32_t samples = 64;
 };
 
-/// The three images side by side.
-Image side_by_side(const GuideProbe& probe) {
-  const int width = probe.radiance.width, height = probe.radiance.height;
+using Images = std::array<const Image*, 3>;
+
+Image side_by_side(const Images& images) {
+  const int width = images[0]->width, height = images[0]->height;
   Image all(3 * width, height, 3);
-  const Image* images[] = {&probe.radiance, &probe.density, &probe.control};
   for (int i = 0; i < 3; ++i)
     for (int y = 0; y < height; ++y) std::copy_n(images[i]->pixel(0, y), 3 * width, all.pixel(i * width, y));
   return all;
+}
+
+/// To look at: one percent of the values is above white. Radiance and density differ by orders of magnitude.
+Image exposed(Image image) {
+  std::vector<float> values = image.data;
+  const auto white = values.begin() + static_cast<ptrdiff_t>(0.99 * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), white, values.end());
+  if (*white > 0)
+    for (float& value : image.data) value /= *white;
+  return image;
+}
+
+void write_preview(const std::string& path, const GuideProbe& probe) {
+  const Image radiance = exposed(probe.radiance), density = exposed(probe.density), control = exposed(probe.control);
+  write_png(path, side_by_side({&radiance, &density, &control}));
 }
 
 void probe(ProbeOptions options) {
@@ -45,8 +67,14 @@ void probe(ProbeOptions options) {
   check_options(render);
   Outputs outputs;
   outputs.writes("-o", render.output, OutputKind::kImage);
+  const bool has_preview = render.preview && lower_extension(render.output) == ".exr";
+  const std::string preview = preview_path(render.output);
+  if (has_preview) outputs.writes_derived_png("the preview", preview, "use --no-preview, or another name for -o");
+  ProgressLine progress(fs::path(render.scene).stem().string(), render.quiet);
+  progress.begin("loading");
   const LoadedScene scene = load(render);
   outputs.reads(scene.files);
+  progress.clear();
   for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", warning);
   auto* guided = dynamic_cast<GuidedPath*>(scene.integrator.get());
   if (!guided) throw Error(ErrorCode::kUsage, "probe shows what guided-path has learnt, not " + render.integrator);
@@ -57,14 +85,19 @@ void probe(ProbeOptions options) {
   guided->prepare(*scene.scene);
   const RenderRequest request = make_request(render, scene);
   RenderSeconds seconds;
-  train(scene, request, {window_of(scene, request), scene.filter, nullptr, nullptr, {}}, seconds);
+  progress.begin("training");
+  const auto update = [&](uint64_t done, uint64_t total) { progress.update(done, total); };
+  train(scene, request, {window_of(scene, request), scene.filter, nullptr, update, {}}, seconds);
   const Ray ray =
       scene.scene->camera().ray({static_cast<float>(at[0]) + 0.5f, static_cast<float>(at[1]) + 0.5f}, {0.5f, 0.5f});
   const std::optional<GuideProbe> found =
       probe_guide(*scene.scene, *guided, ray, options.height, options.samples, render.seed);
   if (!found) throw Error(ErrorCode::kUsage, fmt::format("no surface lies behind the pixel {}", options.pixel));
-  const Image image = side_by_side(*found);
+  progress.finish();
+  const Image image = side_by_side({&found->radiance, &found->density, &found->control});
   write_image(render.output, image, {image.width, image.height, {0, 0, image.width, image.height}}, {});
+  if (has_preview) write_preview(preview, *found);
+  if (render.quiet) return;
   fmt::print(stderr, "{}: radiance, density and control at ({:g}, {:g}, {:g}), {} x {} pixels each\n", render.output,
              found->position.x, found->position.y, found->position.z, found->radiance.width, found->radiance.height);
 }
@@ -73,8 +106,8 @@ void probe(ProbeOptions options) {
 
 void add_probe(CLI::App& app) {
   const auto options = std::make_shared<ProbeOptions>();
-  CLI::App* command =
-      app.add_subcommand("probe", "What guided-path has learnt at the surface behind a pixel, as images (EXR)");
+  CLI::App* command = app.add_subcommand(
+      "probe", "What guided-path has learnt at the surface behind a pixel, as an image (EXR) and its preview (PNG)");
   add_render_options(*command, options->render);
   command->add_option("--pixel", options->pixel, "X,Y of the frame")->required();
   command->add_option("--height", options->height, "Rows of the images, which are twice as wide")

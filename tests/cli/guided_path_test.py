@@ -4,6 +4,7 @@ import json
 import math
 import os
 import re
+import struct
 import unittest
 from pathlib import Path
 
@@ -108,6 +109,9 @@ class Probe(CliTest):
                 sums[part] += area * sum(row)
         self.assertGreater(sums[0], 0.01)
         self.assertAlmostEqual(sums[1], 1, delta=0.05)
+        preview = (self.path / "a.png").read_bytes()
+        self.assertEqual(preview[:8], b"\x89PNG\r\n\x1a\n")
+        self.assertEqual(struct.unpack(">II", preview[16:24]), (3 * width, height))
         self.assertNotEqual(sums[2], 0)
 
     def test_uses_a_training(self):
