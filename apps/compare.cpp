@@ -8,17 +8,16 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <set>
 #include <vector>
 
 #include "commands.h"
+#include "comparison_warnings.h"
 #include "film/alignment.h"
 #include "film/error_map.h"
 #include "film/image_file.h"
 #include "film/image_writer.h"
 #include "film/metrics.h"
 #include "film/outputs.h"
-#include "film/provenance.h"
 #include "json_output.h"
 #include "numbers.h"
 
@@ -173,30 +172,6 @@ void check_files(const CompareOptions& options) {
     outputs.writes_derived_png("--error-map", path, "give it another name");
 }
 
-/// What the files say that makes their errors doubtful, for each image; what is wrong with the references stands first.
-std::vector<std::vector<std::string>> find_warnings(const CompareOptions& options) {
-  std::vector<ImageFacts> references{read_facts(options.reference)};
-  std::vector<std::string> of_references;
-  if (!options.reference2.empty()) {
-    references.push_back(read_facts(options.reference2));
-    of_references = comparison_warnings(references[0], references[1]);
-  }
-  std::vector<std::vector<std::string>> result;
-  for (const std::string& path : options.images) {
-    const ImageFacts image = read_facts(path);
-    result.push_back(of_references);
-    for (const ImageFacts& reference : references) {
-      const std::vector<std::string> found = comparison_warnings(image, reference);
-      result.back().insert(result.back().end(), found.begin(), found.end());
-    }
-  }
-  std::set<std::string> printed;
-  for (const auto& warnings : result)
-    for (const std::string& warning : warnings)
-      if (printed.insert(warning).second) fmt::print(stderr, "warning: {}\n", warning);
-  return result;
-}
-
 void compare(const CompareOptions& options) {
   check_options(options);
   check_files(options);
@@ -216,7 +191,9 @@ void compare(const CompareOptions& options) {
       for (MetricResult& result : comparisons.back().results) result.map = Image();
   }
 
-  const std::vector<std::vector<std::string>> warnings = find_warnings(options);
+  const std::vector<std::vector<std::string>> warnings = warn_of_comparison(
+      options.images,
+      options.reference2.empty() ? std::vector{options.reference} : std::vector{options.reference, options.reference2});
   const bool json_to_output = options.json && (options.json->empty() || *options.json == "-");
   std::string json;
   if (options.json)

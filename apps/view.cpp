@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "comparison_warnings.h"
 #include "core/error.h"
 #include "estimators/predicted_error.h"
 #include "film/alignment.h"
@@ -184,16 +185,34 @@ std::string names_of(const std::vector<Shown>& images) {
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
+/// Of images beside a reference or alone; an image that is both is no image here.
+std::vector<std::string> warnings_of(const ViewOptions& options) {
+  std::vector<std::string> images = options.images, references, all;
+  if (!options.reference.empty()) {
+    references.push_back(options.reference);
+    std::erase(images, options.reference);
+  }
+  for (const std::vector<std::string>& warnings : warn_of_comparison(images, references))
+    for (const std::string& warning : warnings)
+      if (std::find(all.begin(), all.end(), warning) == all.end()) all.push_back(warning);
+  return all;
+}
+
 void write_page(const ViewOptions& options, const std::string& path) {
   const std::vector<Shown> shown = read_images(options);
   Page page{window_of_all(shown), options.small};
+  for (const Shown& image : shown)
+    if (!(image.source.place.window == page.window))
+      fmt::print(stderr, "covary: {}: shown are the pixels in common, {}\n", image.path, text_of(page.window));
+  const std::vector<std::string> warnings = warnings_of(options);
   nlohmann::ordered_json entries = nlohmann::ordered_json::array(), insets = nlohmann::ordered_json::array();
   for (const Shown& image : shown) entries.push_back(page.add(image, options.layer));
   for (const std::string& inset : options.insets) insets.push_back(parse_inset(inset, page.window));
   const std::string title = options.title.empty() ? names_of(shown) : options.title;
   const nlohmann::ordered_json scene{{"name", title}, {"images", entries}, {"insets", insets}};
   const nlohmann::ordered_json block{{"type", "comparer"}, {"id", "view"}, {"scenes", {scene}}};
-  const nlohmann::ordered_json section{{"id", "images"}, {"blocks", {block}}};
+  nlohmann::ordered_json section{{"id", "images"}, {"blocks", {block}}};
+  if (!warnings.empty()) section["blocks"].push_back({{"type", "notes"}, {"kind", "warning"}, {"items", warnings}});
   write_report(path, {{"title", title}, {"sections", {section}}}, page.images);
 }
 

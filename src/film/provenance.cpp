@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <set>
 #include <sstream>
 
@@ -46,6 +47,9 @@ std::set<std::string> seeds_of(const ImageFacts& image) {
   return seeds;
 }
 
+/// Samples per pixel; 0 where the file does not tell.
+double samples_of(const ImageFacts& image) { return std::strtod(attribute(image, "samples", "0").c_str(), nullptr); }
+
 bool is_integer(const ImageFacts& image) {
   const auto& channels = image.info.channels;
   return image.info.format != "openexr" && std::any_of(channels.begin(), channels.end(), [](const ExrFile::Channel& c) {
@@ -65,6 +69,36 @@ std::map<std::string, std::string> inherited_attributes(const std::map<std::stri
 
 ImageFacts read_facts(const std::string& path, const std::string& name) {
   return {path, name.empty() ? path : name, inspect_image(path)};
+}
+
+std::vector<std::string> image_warnings(const ImageFacts& image) {
+  std::vector<std::string> warnings;
+  const bool is_film = !attribute(image, "film").empty();
+  if (!attribute(image, film_key::kLightPaths).empty())
+    warnings.push_back(image.name + " holds light paths alone, a part of an image; 'covary combine --light' adds it");
+  else if (is_film && attribute(image, film_key::kLight).empty() &&
+           Settings(attribute(image, "settings")).traces_light())
+    warnings.push_back(image.name +
+                       " lacks the light of its light film, usually light.exr beside it; 'covary combine --light' adds "
+                       "it");
+  if (attribute(image, film_key::kComplete) == "false")
+    warnings.push_back(image.name + " is of an interrupted render" +
+                       (is_film ? "" : ", which the same command with --resume completes"));
+  return warnings;
+}
+
+std::vector<std::string> reference_warnings(const ImageFacts& image, const ImageFacts& reference) {
+  if (is_same_file(image.path, reference.path)) return {};
+  std::vector<std::string> warnings;
+  const bool mixed = attribute(reference, "estimator").find("--denoise") != std::string::npos;
+  if (mixed || !attribute(reference, "denoiser").empty())
+    warnings.push_back(reference.name + " is denoised, and so biased: it is no reference for errors");
+  const double samples = samples_of(image), of_reference = samples_of(reference);
+  if (of_reference > 0 && of_reference <= samples)
+    warnings.push_back(
+        fmt::format("{} has {:g} samples per pixel, no more than {} with {:g}: its noise counts as error",
+                    reference.name, of_reference, image.name, samples));
+  return warnings;
 }
 
 std::vector<std::string> comparison_warnings(const ImageFacts& image, const ImageFacts& reference) {

@@ -257,7 +257,39 @@ class Warnings(OutputsTest):
                                  "white"])
 
 
+    def test_reference_that_is_none(self):
+        a, r = self.attributed("a.exr", 1, samples="96"), self.attributed("r.exr", 2, samples="48")
+        self.assertEqual(self.warnings(a, "-r", r),
+                         ["r.exr has 48 samples per pixel, no more than a.exr with 96: its noise counts as error"])
+        other = self.attributed("r2.exr", 3, samples="48")
+        self.assertEqual(self.warnings(a, "-r", r, "--reference2", other), [], "its noise cancels")
+        for changes in ({"denoiser": "Open Image Denoise"}, {"estimator": "iicv --denoise balanced"}):
+            r = self.attributed("r.exr", 2, **changes)
+            self.assertEqual(self.warnings(a, "-r", r),
+                             ["r.exr is denoised, and so biased: it is no reference for errors"])
+
+    def test_parts_of_images(self):
+        r = self.attributed("r.exr", 2, settings="bdpt light_tracing=on; filter box radius=0.5")
+        cases = (({"film": "1"}, "a.exr lacks the light of its light film"),
+                 ({"film": "1", "light_paths_per_sample": "256"}, "a.exr holds light paths alone"),
+                 ({"complete": "false"}, "a.exr is of an interrupted render"))
+        for changes, message in cases:
+            a = self.attributed("a.exr", 1, settings="bdpt light_tracing=on; filter box radius=0.5", **changes)
+            found = self.warnings(a, "-r", r)
+            self.assertEqual(len(found), 1, found)
+            self.assertIn(message, found[0])
+            self.assertIn(f"warning: {message}", self.good("view", a, "-o", "page.html").stderr)
+
+
 class View(OutputsTest):
+    def test_warns_as_compare_does(self):
+        a, r = self.attributed("a.exr", 7), self.attributed("r.exr", 7, exposure="1", samples="9")
+        compared = self.good("compare", a, "-r", r).stderr
+        self.assertEqual(compared.count("warning: "), 2)
+        self.assertEqual(self.good("view", a, "-r", r, "-o", "page.html").stderr, compared)
+        self.assertIn("have seed 7 in common", (self.path / "page.html").read_text())
+        self.assertEqual(self.good("view", a, "-o", "page.html").stderr, "")
+
     def test_without_a_browser(self):
         self.image("a.exr", (1, 1, 1))
         self.addCleanup(lambda: [p.unlink() for p in self.path.glob("covary-view-*")])
