@@ -249,7 +249,7 @@ void print_summary(const RenderReport& report) {
     if (const uint32_t fewest = fewest_reliable_samples(report))
       fmt::print(stderr, " (unreliable with fewer than {} samples per pixel)", fewest);
     fmt::print(stderr, "\n");
-  } else if (!options.until.empty()) {
+  } else if (result.predicted_relmse) {
     fmt::print(stderr, "predicted relMSE {:.3g}\n", *result.predicted_relmse);
   }
   if (options.seconds > 0 && result.seconds.limited > 1.05 * options.seconds)

@@ -19,6 +19,7 @@ constexpr const char* kGroups = "groups";
 constexpr const char* kChecksum = "checksum";  // CRC-32 of counts, group means, auxiliary images and variances
 constexpr const char* kSamples = "samples";    // attribute covary:samples and channel `samples`
 constexpr const char* kVariance = "variance_in_groups";  // channels .R .G .B, in some films
+constexpr const char* kStdError = "StdError";            // layer that follows from the groups
 constexpr const char* kShown = "shown";                  // "more": R G B hold more than the samples of the groups
 constexpr const char* kFewest = "samples_fewest";        // of any pixel; only where pixels differ
 constexpr const char* kMost = "samples_most";
@@ -78,13 +79,18 @@ std::vector<ExrPlane> film_planes(Film& film, Image& means) {
   throw Error(ErrorCode::kInput, path + ": " + what);
 }
 
-/// The names of the auxiliary images: every triple of channels that is no group, mean or variance.
+/// The layer of a channel: "Albedo" for "Albedo.R", "" for "R".
+std::string layer_of(const std::string& channel) {
+  const size_t dot = channel.rfind('.');
+  return channel.substr(0, dot == std::string::npos ? 0 : dot);
+}
+
+/// The names of the auxiliary images: every triple of channels that is no group, mean, error or variance.
 std::vector<std::string> find_aovs(const ExrFile& file, bool has_groups) {
   std::vector<std::string> names;
   for (const ExrFile::Channel& channel : file.channels()) {
-    const size_t dot = channel.name.rfind('.');
-    const std::string name = channel.name.substr(0, dot == std::string::npos ? 0 : dot);
-    if (name.empty() || name == kVariance || (name.starts_with("group") && has_groups)) continue;
+    const std::string name = layer_of(channel.name);
+    if (name.empty() || name == kVariance || name == kStdError || (name.starts_with("group") && has_groups)) continue;
     if (names.empty() || names.back() != name) names.push_back(name);
   }
   return names;
@@ -109,7 +115,7 @@ std::map<std::string, std::string> read_film_attributes(const std::string& path)
   return attributes;
 }
 
-void write_film(const std::string& path, const Film& film) {
+void write_film(const std::string& path, const Film& film, const Image& std_error) {
   std::map<std::string, std::string> attributes;
   for (const auto& [key, value] : film.attributes) attributes[kPrefix + key] = value;
   const auto derive = [&](const char* key, const std::string& value) {
@@ -128,8 +134,9 @@ void write_film(const std::string& path, const Film& film) {
   if (!film.shown.data.empty()) derive(kShown, "more");
   Image means = !film.shown.data.empty() ? film.shown : film.groups() > 1 ? film.mean_image() : Image();
   // The list of planes serves reading, too, and so wants a film it may write to; write_exr only reads.
-  write_exr(path, {film.frame_width(), film.frame_height(), film.crop()}, attributes,
-            film_planes(const_cast<Film&>(film), means),
+  std::vector<ExrPlane> planes = film_planes(const_cast<Film&>(film), means);
+  if (!std_error.data.empty()) add_image_planes(kStdError, const_cast<Image&>(std_error), planes);
+  write_exr(path, {film.frame_width(), film.frame_height(), film.crop()}, attributes, planes,
             film.groups() > 1 ? ExrCompression::kNone : ExrCompression::kZip);
 }
 
@@ -167,7 +174,8 @@ Film read_film(const std::string& path) {
       fail(path, fmt::format("channel {} is of type {}; expected is {}", plane.name, found->type, expected));
   }
   for (const ExrFile::Channel& channel : file.channels())
-    if (std::none_of(planes.begin(), planes.end(), [&](const ExrPlane& p) { return p.name == channel.name; }))
+    if (layer_of(channel.name) != kStdError &&
+        std::none_of(planes.begin(), planes.end(), [&](const ExrPlane& p) { return p.name == channel.name; }))
       fail(path, fmt::format("channel {} does not belong to a film with {} groups", channel.name, groups));
   file.read(planes);
   if (const std::string stored = attributes[kChecksum], found = checksum(film); !stored.empty() && stored != found)

@@ -9,8 +9,9 @@
 
 namespace covary {
 
-/// Writes `film`; the file appears under its name only when complete. Throws Error(kIo).
-void write_film(const std::string& path, const Film& film);
+/// Writes `film`; the file appears under its name only when complete. `std_error`, where not empty, is the standard
+/// error of what the file shows, for the layer StdError, which is not read. Throws Error(kIo).
+void write_film(const std::string& path, const Film& film, const Image& std_error = {});
 
 /// Reads a film written by write_film. Throws Error(kIo) when the file cannot be read and Error(kInput) when it is not
 /// a film or is damaged.

@@ -170,6 +170,18 @@ TEST(Film, AFileMayShowMoreThanItsSamples) {
   }
 }
 
+TEST(Film, AFileTellsStandardErrorsThatAreNotRead) {
+  const Film film = test_film(3, 1, 2);
+  Image std_error(17, 19, 3);
+  std_error.data[5] = 7;
+  const std::string path = test_file("film.exr");
+  write_film(path, film, std_error);
+  EXPECT_EQ(read_image(path, "StdError").image.data, std_error.data);
+  const Film read = read_film(path);
+  EXPECT_TRUE(same_bits(film, read));
+  EXPECT_TRUE(read.aovs.empty());
+}
+
 TEST(Film, AFileTellsHowCountsDiffer) {
   const std::string path = test_file("film.exr");
   Film film = test_film(3, 1, 2);

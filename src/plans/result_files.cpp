@@ -31,7 +31,7 @@ void write_result_files(const Plan& plan, const RenderRequest& request, RenderRe
     film.attributes[film_key::kComplete] = result.interrupted ? "false" : "true";
     film.aovs = aovs;
     film.shown = result.image.estimate;
-    write_film(request.output, film);
+    write_film(request.output, film, result.image.std_error);
   } else {
     const Film& film = last;
     std::map<std::string, std::string> attributes;

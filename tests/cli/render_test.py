@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Plans of passes and estimators: covary render with image-space control variates, as a user runs it."""
 import json
+import math
 import os
+import shlex
 import signal
+import statistics
 import subprocess
 import time
 import unittest
@@ -98,6 +101,45 @@ class Plans(RenderTest):
                 facts = self.statistics("-o", "b.exr", "--spp", spp, "--passes", "films" + spp, "--resume",
                                         "--estimator", estimator)
             self.same("a.exr", "b.exr")
+
+    def test_merging_images_names_what_to_merge_instead(self):
+        for seed in ("1", "2"):
+            self.statistics("-o", f"{seed}.exr", "--spp", "8", "--seed", seed)
+        refused = self.run_covary("merge", "1.exr", "2.exr", "-o", "both.exr").stderr
+        self.assertIn("covary: 1.exr is no film but an image that 'iicv' made of films", refused)
+        again = [line.strip() for line in refused.splitlines() if line.startswith("  covary render ")]
+        self.assertEqual([line.rsplit(" --passes ")[-1] for line in again], ["1.films", "2.films"])
+        for line in again:
+            self.good(*shlex.split(line)[1:])
+        refused = self.run_covary("merge", "1.exr", "2.exr", "-o", "both.exr").stderr
+        self.assertIn("its films are there", refused)
+        for line in refused.splitlines():
+            if line.startswith("  covary "):
+                self.good(*shlex.split(line)[1:])
+        info = json.loads(self.good("info", "both.exr", "--json").stdout)
+        self.assertEqual(info["attributes"]["covary:estimator"], "iicv")
+
+    def test_groups_give_standard_errors_to_plain_renders(self):
+        """StdError is sqrt(sum (m_t - m)^2 / (T - 1) / T) of the group means m_t, for resumed and merged films, too."""
+        def check(name):
+            channels = read_exr((self.path / name).read_bytes())
+            for c in "RGB":
+                for pixel in range(0, len(channels[c]), 101):
+                    groups = [channels[f"group{t:02}.{c}"][pixel] for t in range(12)]
+                    error = statistics.stdev(groups) / math.sqrt(12)
+                    self.assertAlmostEqual(channels[f"StdError.{c}"][pixel], error, delta=1e-6 + 1e-4 * error)
+        plain = ("--estimator", "none", "--groups", "12")
+        facts = self.statistics("-o", "a.exr", "--spp", "24", *plain)
+        self.assertGreater(facts["predicted_relmse"], 0)
+        check("a.exr")
+        self.statistics("-o", "a.exr", "--spp", "36", "--resume", *plain)
+        self.statistics("-o", "b.exr", "--spp", "36", "--seed", "5", *plain)
+        self.good("merge", "a.exr", "b.exr", "-o", "both.exr")
+        check("both.exr")
+        info = json.loads(self.good("info", "both.exr", "--json").stdout)
+        self.assertEqual(info["attributes"]["covary:samples"], "72")
+        self.statistics("-o", "one.exr", "--spp", "24", "--estimator", "none")
+        self.assertNotIn("StdError.R", read_exr((self.path / "one.exr").read_bytes()))
 
     def test_any_split_gives_the_bits_of_one_go(self):
         for options in (["--estimator", "none"], ["--estimator", "none", "--groups", "5"], []):
