@@ -3,11 +3,9 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -147,37 +145,16 @@ lab::Part parse_part(const std::string& text) {
 // ---- progress
 // --------------------------------------------------------------------------------------------------------
 
-/// One line on a terminal, drawn again and again; elsewhere a line every ten seconds. Failures stay.
-class ProgressPrinter {
- public:
-  explicit ProgressPrinter(bool quiet) : quiet_(quiet), terminal_(isatty(2) == 1) {}
-  ~ProgressPrinter() { clear(); }
-
-  void print(const lab::Progress& p) {
-    using Kind = lab::Progress::Kind;
-    if (p.kind == Kind::kFailed) {
-      clear();
-      fmt::print(stderr, "failed: {}\n", p.what);
-      return;
-    }
-    const auto now = std::chrono::steady_clock::now();
-    if (quiet_ || (!terminal_ && now < next_)) return;
-    next_ = now + std::chrono::seconds(10);
-    const std::string left = p.seconds_left > 0 ? ", " + format_duration(p.seconds_left) + " left" : "";
-    const std::string line = fmt::format("[{}/{}{}] {}", p.done, p.total, left, p.what);
-    fmt::print(stderr, fmt::runtime(terminal_ ? "\r{}\033[K" : "{}\n"), line);
-    std::fflush(stderr);
-    drawn_ = true;
+/// How far the experiment is, on a line of its own; failures stay above it.
+void show_progress(const lab::Progress& p, ProgressLine& line) {
+  if (p.kind == lab::Progress::Kind::kFailed) {
+    line.clear();
+    fmt::print(stderr, "failed: {}\n", p.what);
+    return;
   }
-  void clear() {
-    if (terminal_ && drawn_) std::fputs("\r\033[K", stderr);
-    drawn_ = false;
-  }
-
- private:
-  bool quiet_, terminal_, drawn_ = false;
-  std::chrono::steady_clock::time_point next_{};
-};
+  const std::string left = p.seconds_left > 0 ? ", " + format_duration(p.seconds_left) + " left" : "";
+  line.show(fmt::format("[{}/{}{}] {}", p.done, p.total, left, p.what));
+}
 
 // ---- the command
 // -----------------------------------------------------------------------------------------------------
@@ -273,6 +250,8 @@ void print_summary(const lab::Results& results, const std::string& folder) {
     fmt::print(stderr, "{:20} {:>10} {:>10.4g} {:>12.4g} {:>14} {:>14}\n", suite.methods[s.method].name,
                suite.budgets[s.budget].label(), s.samples_per_pixel, s.relmse, factor(s.equal_sample.value),
                factor(s.equal_time.value));
+  for (const std::string& verdict : lab::verdicts(results, lab::shown_budget(suite)))
+    fmt::print(stderr, "{}\n", verdict);
   for (const std::string& warning : results.warnings) fmt::print(stderr, "warning: {}\n", warning);
   fmt::print(stderr, "{}/report.html, results.json, results.csv\n", folder);
 }
@@ -305,7 +284,7 @@ void experiment(ExperimentCommand command) {
   const std::string scenes =
       command.scenes.empty() ? lab::scenes_folder(suite, command.suite, program_path()) : command.scenes;
   check_files(command, suite, scenes);
-  ProgressPrinter printer(command.quiet);
+  ProgressLine progress("", command.quiet);
   lab::ExperimentOptions options;
   options.program = program_path();
   options.cache_folder = fs::absolute(command.cache.empty() ? command.output + "/cache" : command.cache).string();
@@ -316,10 +295,10 @@ void experiment(ExperimentCommand command) {
   options.keep_passes = command.keep_passes;
   options.part = part;
   options.stop = &g_stop;
-  options.progress = [&](const lab::Progress& p) { printer.print(p); };
+  options.progress = [&](const lab::Progress& p) { show_progress(p, progress); };
   catch_signals();
   lab::Results results = lab::run_experiment(suite, options);
-  printer.clear();
+  progress.finish();
   if (part.of == 0) finish(results, options.context.program_version, command);
   if (!results.failures.empty())
     throw Error(ErrorCode::kInput, fmt::format("{} of the experiment's parts failed; {} which and why, and the same "

@@ -47,6 +47,20 @@ std::string part_name(const Part& part) {
   return part.of == 0 ? "" : fmt::format("{}-of-{}", part.number + 1, part.of);
 }
 
+std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
+
+/// What a command says, without its name before it.
+std::string complaint(const std::string& message) {
+  const std::string line = first_line(message), name = "covary: ";
+  return line.starts_with(name) ? line.substr(name.size()) : line;
+}
+
+/// The program refused, and was not ended by a signal or a fault of its own.
+bool says_why(const RunFailure& failure) {
+  return (failure.exit_code == 1 || failure.exit_code == 2) &&
+         failure.message.find("internal error") == std::string::npos;
+}
+
 class Experiment {
  public:
   Experiment(const Suite& suite, const ExperimentOptions& options)
@@ -189,11 +203,14 @@ class Experiment {
     const Suite& suite = results_.suite;
     const std::string& name = suite.scenes[s].name;
     std::map<std::pair<size_t, size_t>, size_t> failed_cells;  // method, budget -> index into failures
+    std::set<size_t> left_out;                                 // optional methods
     const std::vector<Run>& runs = runs_[s];
     for (size_t i = 0; i < runs.size() && !stopped(); ++i) {
       const Run& run = runs[i];
       const std::pair cell{run.method, run.budget};
-      if (const auto failed = failed_cells.find(cell); failed != failed_cells.end()) {
+      if (left_out.contains(run.method)) {
+        ++done_, clock_.remove_planned(run.work);
+      } else if (const auto failed = failed_cells.find(cell); failed != failed_cells.end()) {
         ++results_.failures[failed->second].not_tried;
         ++done_, clock_.remove_planned(run.work);
       } else {
@@ -202,6 +219,10 @@ class Experiment {
         const auto record = obtain(run, fmt::format("{}, {}, {}, seed {}", name, method, budget, run.seed), &failure);
         if (record) {
           records_[run.key] = *record;
+        } else if (!stopped() && suite.methods[run.method].optional && says_why(failure)) {
+          left_out.insert(run.method);
+          results_.warnings.push_back(
+              fmt::format("{}: the method '{}' is left out: {}", name, method, complaint(failure.message)));
         } else if (!stopped()) {
           failed_cells[cell] = results_.failures.size();
           fail({name, method, budget, failure.command, failure.message, failure.exit_code, 0});
@@ -336,8 +357,7 @@ class Experiment {
     while (!failure.message.empty() && failure.message.back() == '\n') failure.message.pop_back();
     report(Progress::Kind::kFailed,
            fmt::format("{}{}{}: {}", failure.scene, failure.method.empty() ? "" : ", " + failure.method,
-                       failure.budget.empty() ? "" : ", " + failure.budget,
-                       failure.message.substr(0, failure.message.find('\n'))));
+                       failure.budget.empty() ? "" : ", " + failure.budget, first_line(failure.message)));
     results_.failures.push_back(std::move(failure));
   }
 

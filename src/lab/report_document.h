@@ -23,6 +23,10 @@ void add_pictures(const Results& results, nlohmann::ordered_json& document, std:
 /// equal samples, or at equal time where the budget is in seconds). Empty where there is none.
 std::string best_method(const Results& results, size_t budget);
 
+/// What the numbers of a budget come to, in sentences: which method has the least error at equal samples, at equal time
+/// and by FLIP, and which are not clearly worse. Only methods that have every scene count.
+std::vector<std::string> verdicts(const Results& results, size_t budget);
+
 /// Index of the budget that pictures and single tables show: the suite's `show`, or the last.
 size_t shown_budget(const Suite& suite);
 

@@ -227,6 +227,34 @@ TEST(ReportDocument, TheBestMethodHasTheLargestRatioAtTheBudget) {
   EXPECT_EQ(best_method(results, 1), "crn") << "a budget in seconds has ratios at equal time only";
 }
 
+TEST(ReportDocument, SaysWhichMethodHasTheLeastError) {
+  Results results = three_cells();
+  results.suite.methods = {{"pt"}, {"iicv"}, {"crn"}, {"some"}};
+  results.suite.budgets = {{24, 0}, {0, 10}};
+  results.cells.clear();
+  const auto summary = [](size_t method, size_t budget, size_t scenes, Estimate sample, Estimate time) {
+    Summary s{method, budget, scenes};
+    s.equal_sample = sample, s.equal_time = time;
+    return s;
+  };
+  const Estimate one{1, kNone, 1, 1};
+  results.summaries = {summary(0, 0, 2, one, one),
+                       summary(1, 0, 2, {4, kNone, 3.5, 4.5}, {0.5, kNone, 0.4, 0.6}),
+                       summary(2, 0, 2, {3, kNone, 2, 3.75}, {0.8, kNone, 0.7, 0.9}),
+                       summary(3, 0, 1, {9, kNone, 8, 10}, {9, kNone, 8, 10}),
+                       summary(0, 1, 2, {}, one),
+                       summary(1, 1, 2, {}, {2})};
+  EXPECT_EQ(
+      verdicts(results, 0),
+      (std::vector<std::string>{
+          "At equal samples (24 spp) 'iicv' has the least error: 4 times less than 'pt' (3.5 to 4.5). Not clearly "
+          "worse: 'crn'.",
+          "At equal time no method has less error than 'pt': the nearest is 'crn', with 1.2 times as much."}))
+      << "a method that lacks a scene does not count";
+  EXPECT_EQ(verdicts(results, 1),
+            std::vector<std::string>{"At equal time (10 s) 'iicv' has the least error: 2 times less than 'pt'."});
+}
+
 TEST(ReportDocument, ShowsTheBudgetOfTheSuite) {
   Suite suite = three_cells().suite;
   suite.budgets = {{24, 0}, {48, 0}, {96, 0}};

@@ -118,28 +118,40 @@ std::string alternative(const std::string& start, const Json& series) {
 
 }  // namespace
 
+double mean_flip(const Results& results, size_t method, size_t budget) {
+  double sum = 0, n = 0;
+  for (const Cell& cell : results.cells)
+    if (cell.method == method && cell.budget == budget) sum += cell.flip.value, ++n;
+  return n > 0 ? sum / n : kNone;
+}
+
 Json summary_table(const Results& results, size_t budget) {
   const bool samples = results.suite.budgets[budget].spp > 0;
-  bool published = false;
+  bool published = false, other_samples = !samples;
   Json rows = Json::array();
   for (const Summary& s : results.summaries) {
     if (s.budget != budget) continue;
+    other_samples = other_samples || s.samples_per_pixel != results.suite.budgets[budget].spp;
     published = published || std::isfinite(s.published_ratio);
     rows.push_back({{"method", results.suite.methods[s.method].name},
                     {"n", fmt::format("{}", s.n_scenes)},
                     {"spp", number(s.samples_per_pixel)},
                     {"relmse", number(s.relmse)},
+                    {"flip", number(mean_flip(results, s.method, budget))},
                     {"sample", value_of(s.equal_sample)},
                     {"time", value_of(s.equal_time)},
                     {"published", number(s.published_ratio)}});
   }
-  Json columns{column("method", "Method", "text"), column("n", "Scenes", "text"), column("spp", "spp taken", "number"),
-               column("relmse", "relMSE", "number", "low")};
+  Json columns = Json::array({column("method", "Method", "text")});
+  if (results.suite.scenes.size() > 1) columns.push_back(column("n", "Scenes", "text"));
+  if (other_samples) columns.push_back(column("spp", "spp taken", "number"));
+  columns.push_back(column("relmse", "relMSE", "number", "low"));
   if (samples) columns.push_back(column("sample", "Equal samples", "ratio", "high"));
   if (published) columns.push_back(column("published", "Published", "ratio"));
   columns.push_back(column("time", "Equal time", "ratio", "high"));
+  columns.push_back(column("flip", "FLIP", "number", "low"));
   return table(
-      fmt::format("{}: geometric means over scenes; ratios are error of {} / error of the method{}",
+      fmt::format("{}: geometric means over scenes, of FLIP the mean; ratios are error of {} / error of the method{}",
                   results.suite.budgets[budget].label(), results.suite.baseline, normalised_note(results, budget)),
       columns, rows);
 }

@@ -78,6 +78,7 @@ Json json_of(const MethodEntry& method) {
   Json json{{"name", method.name}, {"options", method.options}};
   if (!method.then.empty()) json["then"] = method.then;
   if (method.unbiased) json["unbiased"] = true;
+  if (method.optional) json["optional"] = true;
   return json;
 }
 

@@ -46,6 +46,7 @@ struct MethodEntry {
   std::vector<std::string> options;            ///< of `covary render`
   std::vector<std::vector<std::string>> then;  ///< further commands "covary WORD… IN -o OUT"
   bool unbiased = false;                       ///< a squared bias then points to a wrong reference
+  bool optional = false;                       ///< left out, with a warning, on scenes and machines that lack its means
 };
 
 struct Suite {

@@ -81,12 +81,13 @@ class SuiteReader {
     MethodEntry method;
     method.name = reader.required_text("name");
     method.options = reader.texts("options");
-    if (const Json* value = reader.find("unbiased")) {
-      if (value->is_boolean())
-        method.unbiased = value->get<bool>();
-      else
-        reader.problem("unbiased", "expected true or false, found " + shown(*value));
-    }
+    for (const auto& [name, flag] : {std::pair{"unbiased", &method.unbiased}, {"optional", &method.optional}})
+      if (const Json* value = reader.find(name)) {
+        if (value->is_boolean())
+          *flag = value->get<bool>();
+        else
+          reader.problem(name, "expected true or false, found " + shown(*value));
+      }
     if (const Json* steps = reader.find("then")) {
       const auto is_step = [](const Json& step) {
         if (!step.is_array() || step.empty()) return false;

@@ -71,6 +71,16 @@ TEST(Suite, BuiltInSuitesAreRight) {
   }
 }
 
+TEST(Suite, MethodsMayBeOptional) {
+  const Suite suite = parse_suite(R"({"name": "x", "methods": [{"name": "a"}, {"name": "b", "optional": true}]})", "x");
+  EXPECT_FALSE(suite.methods[0].optional);
+  EXPECT_TRUE(suite.methods[1].optional);
+  EXPECT_EQ(to_json(suite)["methods"][1]["optional"], true);
+  EXPECT_TRUE(
+      contains(message_of([] { parse_suite(R"({"name": "x", "methods": [{"name": "a", "optional": 1}]})", "x"); }),
+               "methods[0].optional: expected true or false, found 1"));
+}
+
 TEST(Suite, ReportsAllMistakesWithTheirLines) {
   const std::string message = message_of([] {
     parse_suite(R"({

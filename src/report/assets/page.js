@@ -10,7 +10,7 @@ const NOTES_SHOWN = 5;
 
 /** Errors are shown in full; of warnings and other notes the first ones, the others unfold. */
 function draw_notes(block) {
-  const names = { error: "Errors", warning: "Warnings", info: "Notes" };
+  const names = { error: "Errors", warning: "Warnings", info: "Notes", result: "Result" };
   const shown = block.kind === "error" || block.items.length <= NOTES_SHOWN + 1 ? block.items.length : NOTES_SHOWN;
   const list = (items) => el("ul", {}, items.map((item) => el("li", {}, item)));
   const rest = block.items.slice(shown);
