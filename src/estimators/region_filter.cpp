@@ -42,8 +42,8 @@ struct Region {
   vfloat side = splat(1), size = splat(1), differences{};
 };
 
-/// Weights before they are divided by their sum, [Csonka2002] Sec. 4: with f = 1/M + sqrt(N) / (3 sigma sqrt(M)) (mean of
-/// Delta - Delta_q) and d = m / sqrt(2) - distance, the weights are f* = max(f, 0) d over their sum.
+/// Weights before they are divided by their sum, [Csonka2002] Sec. 4: with f = 1/M + sqrt(N) / (3 sigma sqrt(M)) (mean
+/// of Delta - Delta_q) and d = m / sqrt(2) - distance, the weights are f* = max(f, 0) d over their sum.
 struct Kernel {
   vfloat slope, offset, height;  // f = offset - slope * Delta, d = height - distance
 

@@ -40,7 +40,8 @@ Planes brightness(const FilterInput& input) {
   return plane;
 }
 
-/// (3 sigma)^2 / |C|^2 of each pixel, of [Csonka2002] Sec. 5, N = (3 sigma / (eps |C|))^2 - n; other allocations than equal-error average |C|, too, and add 0.01 to its square.
+/// (3 sigma)^2 / |C|^2 of each pixel, of [Csonka2002] Sec. 5, N = (3 sigma / (eps |C|))^2 - n; other allocations than
+/// equal-error average |C|, too, and add 0.01 to its square.
 std::vector<double> squared_errors(const GroupedImage& image, const CountOptions& options) {
   long n_nonfinite = 0;
   const std::vector<unsigned char> valid = finite_pixels(image, image, n_nonfinite);

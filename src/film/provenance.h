@@ -29,8 +29,8 @@ ImageFacts read_facts(const std::string& path, const std::string& name = "");
 /// integers against floating point. A file that does not tell is not suspected. Empty: none is known.
 std::vector<std::string> comparison_warnings(const ImageFacts& image, const ImageFacts& reference);
 
-/// Reasons why the image is not the picture of its scene that it seems: a film whose light film is missing, a light film
-/// alone, an interrupted render.
+/// Reasons why the image is not the picture of its scene that it seems: a film whose light film is missing, a light
+/// film alone, an interrupted render.
 std::vector<std::string> image_warnings(const ImageFacts& image);
 
 /// Reasons why errors of `image` against `reference` alone are those of the reference, too: it is denoised, or has no

@@ -50,6 +50,12 @@ std::string part_name(const Part& part) {
 
 std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
 
+/// What a command says, without its name before it.
+std::string complaint(const std::string& message) {
+  const std::string line = first_line(message), name = "covary: ";
+  return line.starts_with(name) ? line.substr(name.size()) : line;
+}
+
 /// The program refused, and was not ended by a signal or a fault of its own.
 bool says_why(const RunFailure& failure) {
   return (failure.exit_code == 1 || failure.exit_code == 2) &&
@@ -223,7 +229,7 @@ class Experiment {
         } else if (!stopped() && suite.methods[run.method].optional && says_why(failure)) {
           left_out.insert(run.method);
           results_.warnings.push_back(
-              fmt::format("{}: the method '{}' is left out: {}", name, method, first_line(failure.message)));
+              fmt::format("{}: the method '{}' is left out: {}", name, method, complaint(failure.message)));
         } else if (!stopped()) {
           failed_cells[cell] = results_.failures.size();
           fail({name, method, budget, failure.command, failure.message, failure.exit_code, 0});

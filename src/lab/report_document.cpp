@@ -213,16 +213,16 @@ std::string verdict(const Results& results, size_t budget, const std::string& co
   if (!best) return "";
   const Estimate& gain = best->*ratio;
   if (!(gain.value > 1))
-    return fmt::format("{} no method has less error than {}: the nearest is {}, with {:.2g} times as much.", condition,
-                       suite.baseline, suite.methods[best->method].name, 1 / gain.value);
-  std::string text = fmt::format("{} {} has the least error: {:.2g} times less than {}", condition,
+    return fmt::format("{} no method has less error than '{}': the nearest is '{}', with {:.2g} times as much.",
+                       condition, suite.baseline, suite.methods[best->method].name, 1 / gain.value);
+  std::string text = fmt::format("{} '{}' has the least error: {:.2g} times less than '{}'", condition,
                                  suite.methods[best->method].name, gain.value, suite.baseline);
   if (!std::isfinite(gain.low)) return text + ".";
   text += fmt::format(" ({:.2g} to {:.2g}).", gain.low, gain.high);
   std::vector<std::string> as_good;
   for (const Summary* s : all)
     if (s != best && (s->*ratio).high >= gain.low) as_good.push_back(suite.methods[s->method].name);
-  return as_good.empty() ? text : text + fmt::format(" Not clearly worse: {}.", fmt::join(as_good, ", "));
+  return as_good.empty() ? text : text + fmt::format(" Not clearly worse: '{}'.", fmt::join(as_good, "', '"));
 }
 
 std::string flip_verdict(const Results& results, size_t budget) {
@@ -236,8 +236,8 @@ std::string flip_verdict(const Results& results, size_t budget) {
     if (!(flip >= least)) least = flip, best = name;
   }
   if (best.empty() || best == suite.baseline || !std::isfinite(least)) return "";
-  return fmt::format("To the eye, as FLIP measures it, {} is nearest to the reference: {:.2g}, {} {:.2g}.", best, least,
-                     suite.baseline, of_baseline);
+  return fmt::format("To the eye, as FLIP measures it, '{}' is nearest to the reference: {:.2g}, '{}' {:.2g}.", best,
+                     least, suite.baseline, of_baseline);
 }
 
 }  // namespace

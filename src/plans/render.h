@@ -81,8 +81,8 @@ struct RenderSeconds {
 struct RenderResult {
   std::shared_ptr<const Integrator> integrator;  ///< of the last passes, with what it has learnt
   std::vector<Pass> passes;
-  /// Where the film alone is the image, at most its standard error. Empty of a render that was interrupted before every pixel of every film had
-  /// samples.
+  /// Where the film alone is the image, at most its standard error. Empty of a render that was interrupted before every
+  /// pixel of every film had samples.
   EstimatorResult image;
   std::optional<double> predicted_relmse;
   std::optional<double> predicted_blocks;  ///< of predicted_error.h

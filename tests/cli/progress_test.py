@@ -48,7 +48,8 @@ class Progress(CliTest):
 
     def test_every_phase_is_shown_and_none_stays(self):
         text = self.shown(*RENDER, "--spp", "8", "-o", "a.exr")
-        self.in_order(text, "room: loading", "room: rendering", "room: estimating", "room: writing", "\r\033[K", "a.exr: ")
+        self.in_order(text, "room: loading", "room: rendering", "room: estimating", "room: writing", "\r\033[K",
+                      "a.exr: ")
         self.assertNotIn("training", text)
         self.assertNotIn("room: ", text[text.index("a.exr: "):])
         text = self.shown(*RENDER, "--spp", "8", "--denoise", "balanced", "--integrator", "guided-path",

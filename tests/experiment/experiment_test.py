@@ -350,6 +350,20 @@ class Resume(ExperimentTest):
         self.assertEqual(json.loads(info.stdout)["attributes"]["covary:complete"], "false")
         self.assertEqual(without_times(self.results(*long)), expected)
 
+    def test_optional_methods_are_left_out(self):
+        """What the machine lacks is a warning for an optional method, and a failure for any other."""
+        self.suite["budgets"], self.suite["seeds"] = [{"spp": 24}], 1
+        method = {"name": "oidn", "options": ["--estimator", "none"], "then": [["denoise", "--oidn", "/nowhere"]]}
+        self.suite["methods"].append({**method, "optional": True})
+        results = self.results("--reference-spp", "64")
+        self.assertEqual(results["failures"], [])
+        self.assertEqual({cell["method"] for cell in results["cells"]}, {"pt", "iicv"})
+        self.assertIn("room: the method 'oidn' is left out: ", "".join(results["warnings"]))
+        self.assertIn("/nowhere", "".join(results["warnings"]))
+        self.assertIn("At equal samples (24 spp) 'iicv' has the least error", self.stderr)
+        self.suite["methods"][-1] = method
+        self.assertEqual(len(self.results("--reference-spp", "64", code=1)["failures"]), 1)
+
     def test_passes_are_shared(self):
         self.suite["methods"] += [{"name": "paper", "options": ["--paper", "--k", "9"]},
                                   {"name": "iduw", "options": ["--estimator=iduw"]},
@@ -524,8 +538,9 @@ class BuiltIn(ExperimentTest):
                                 "24x16", "--seeds", "1", "--spp", "24", "--reference-spp", "32", "--quiet"])
         self.assertEqual(done.returncode, 0, done.stderr)
         results = json.loads((self.path / "out" / "results.json").read_text())
+        left_out = {"oidn"} if any("'oidn' is left out" in text for text in results["warnings"]) else set()
         self.assertEqual({c["method"] for c in results["cells"]},
-                         {"pt", "crn", "iicv", "iicv-paper", "cv-baseline", "iduw"})
+                         {"pt", "oidn", "iicv", "balanced", "error", "bdpt", "controlled", "guided"} - left_out)
         self.assertEqual(results["scenes"][0]["name"], "room")
 
     def test_quick_scales_frames_down(self):

@@ -544,6 +544,19 @@ class SmallScreen(PageTest):
             self.open(hash)
             self.assertLessEqual(self.page.evaluate("document.documentElement.scrollWidth"), 390, hash)
 
+    def test_tables_wrap_or_scroll(self):
+        """Heads of columns wrap; a table that is still too wide scrolls, with a shade that tells so."""
+        self.open()
+        heads, figures = self.page.evaluate("""[
+            [...document.querySelectorAll('.table thead .number')].map(h => getComputedStyle(h).whiteSpace),
+            [...document.querySelectorAll('figure.table')].map(f => [f.getBoundingClientRect().right,
+                getComputedStyle(f).overflowX, getComputedStyle(f).backgroundAttachment])]""")
+        self.assertGreater(len(figures), 0)
+        self.assertEqual(set(heads), {"normal"})
+        for right, overflow, attachment in figures:
+            self.assertLessEqual(right, 390)
+            self.assertEqual((overflow, attachment), ("auto", "local, scroll"))
+
     def test_controls_picture_and_values_are_seen_together(self):
         self.open("#layout=grid&mode=error")
         self.page.evaluate("document.querySelector('#main').scrollIntoView({block: 'start', behavior: 'instant'})")
