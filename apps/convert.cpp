@@ -43,7 +43,8 @@ Image side_by_side(const std::vector<Image>& images) {
   return result;
 }
 
-/// What is true of the new image: of several, nothing that one of them says; of a changed one, nothing that covary said.
+/// What is true of the new image: of several, nothing that one of them says; of a changed one, nothing that covary
+/// said.
 std::map<std::string, std::string> attributes_of(const ConvertOptions& options) {
   std::map<std::string, std::string> attributes;
   if (options.files.size() == 2 && !options.accept_changed)

@@ -151,6 +151,7 @@ Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& opt
     throw Error(ErrorCode::kUsage,
                 fmt::format("--denoise needs an estimator of two passes that predicts its error ({}), not {}",
                             fmt::join(estimators_where(can_be_denoised), ", "), base.name));
+  if (options.use_oidn && !options.oidn.library.empty()) denoiser_info(options.oidn);  // throws before rendering
   const bool with_oidn = options.use_oidn && (!options.oidn.library.empty() || !find_denoiser(options.oidn).empty());
   Estimator estimator = base;
   estimator.text += fmt::format(" --denoise {}{}", settings_of(options.mode).name, with_oidn ? "" : " --oidn off");

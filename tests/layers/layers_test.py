@@ -41,7 +41,7 @@ class Planted(unittest.TestCase):
         self.write("tests/statistics/chi2.h", SPDX)
         self.write("docs/references.bib", "@article{Veach1995,\n}\n")
         self.write("README.md", "# Small\n")
-        self.write("docs/architecture.md", "      src/\n        core/\n        scene/        ──► core\n"
+        self.write("docs/architecture.md", "      src/\n        core/\n        scene/        ──► settings\n"
                    "        integrators/  ──► sampling, film\n")
         self.write("docs/scene-format.md", "# Scenes\n## Reflectance (`bsdfs`)\n")
 
@@ -89,13 +89,13 @@ class Planted(unittest.TestCase):
         for module in layers.ARROWS:
             for target in layers.visible_modules(module) - {module}:
                 self.assertNotIn(module, layers.visible_modules(target))
-        self.assertEqual({"core", "imageio", "film", "estimators"}, layers.visible_modules("estimators"))
+        self.assertEqual({"core", "settings", "imageio", "film", "estimators"}, layers.visible_modules("estimators"))
         self.assertNotIn("film", layers.visible_modules("io"))
         self.assertNotIn("bsdfs", layers.visible_modules("integrators"))
 
     def test_drawing_differs_from_arrows(self):
         self.write("docs/architecture.md",
-                   "        core/   ──► scene\n        scene/  ──► core\n        utils/  ──► core\n")
+                   "        core/   ──► scene\n        scene/  ──► settings\n        utils/  ──► core\n")
         self.expect(layers.architecture_draws_the_arrows, "architecture.md:1: lacks src/integrators",
                     "architecture.md:1: core has arrows to nothing",
                     "architecture.md:3: draws src/utils, which there is not")
