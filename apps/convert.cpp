@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <memory>
 #include <vector>
 
 #include "commands.h"
 #include "core/error.h"
 #include "film/image_writer.h"
+#include "film/output_file.h"
 #include "film/outputs.h"
 #include "film/provenance.h"
 #include "numbers.h"
@@ -21,7 +23,7 @@ struct ConvertOptions {
   std::vector<std::string> files;  // the last is the output
   std::string layer;
   double exposure = 0;
-  bool accept_changed = false;
+  bool accept_changed = false, overwrite = false;
 
   ChecksumPolicy checksums() const { return accept_changed ? ChecksumPolicy::kIgnore : ChecksumPolicy::kCheck; }
 };
@@ -60,6 +62,32 @@ std::map<std::string, std::string> attributes_of(const ConvertOptions& options) 
   return attributes;
 }
 
+/// Whether the file is a picture that tells by itself that it can be made again: an EXR by this command, a PNG by any.
+bool is_own_picture(const std::string& path) {
+  if (lower_extension(path) == ".png") return is_own_png(path);
+  if (lower_extension(path) != ".exr") return false;
+  try {
+    const std::map<std::string, std::string> attributes = inspect_image(path, ChecksumPolicy::kIgnore).attributes;
+    const auto command = attributes.find("covary:command");
+    return command != attributes.end() && command->second.starts_with("covary convert ");
+  } catch (const Error&) {
+    return false;  // damaged, or something else under this name
+  }
+}
+
+/// `convert *.exr` makes the last file that there is the output.
+void check_not_lost(const ConvertOptions& options) {
+  const std::string& output = options.files.back();
+  std::error_code ignored;
+  if (options.overwrite || !std::filesystem::is_regular_file(output, ignored) || output_target(output).is_special ||
+      is_own_picture(output))
+    return;
+  throw Error(ErrorCode::kUsage,
+              fmt::format("the output '{}', which is the last name given, is there already and not a picture that "
+                          "'covary convert' made; give another name, or --overwrite to replace it",
+                          output));
+}
+
 void convert(const ConvertOptions& options) {
   if (options.files.size() < 2) throw Error(ErrorCode::kUsage, "convert needs an image to read and one to write");
   const std::vector<std::string> inputs(options.files.begin(), options.files.end() - 1);
@@ -67,6 +95,7 @@ void convert(const ConvertOptions& options) {
   Outputs outputs;
   outputs.reads(inputs);
   outputs.writes("the output", output, OutputKind::kImage);
+  check_not_lost(options);
   std::vector<Image> images;
   ImagePlace place;
   for (const std::string& input : inputs) {
@@ -99,6 +128,7 @@ void add_convert(CLI::App& app) {
   command->add_option("--layer", o->layer, "Layer (N, group03, …) or single channel (samples) in place of R G B");
   command->add_flag("--accept-changed", o->accept_changed,
                     "Take an image of covary that another program changed: the new one says nothing of its origin");
+  command->add_flag("--overwrite", o->overwrite, "Replace OUT, whatever it is; else only pictures made by convert");
   command->callback([o] { convert(*o); });
 }
 

@@ -69,6 +69,9 @@ OutputTarget output_target(const std::string& path) {
   if (stat(path.c_str(), &status) == 0) {
     if (S_ISDIR(status.st_mode)) fail_to_write(path, "it is a folder");
     if (!S_ISREG(status.st_mode) || standard_stream(status) >= 0) return {path, true};
+    // A rename would replace it nevertheless; the superuser may write anything, whatever its mode says.
+    if ((status.st_mode & (S_IWUSR | S_IWGRP | S_IWOTH)) == 0 || access(path.c_str(), W_OK) != 0)
+      fail_to_write(path, "the file there is write-protected; give another name, or permit writing it");
   }
   OutputTarget target{follow_links(path)};
   const fs::path name = fs::path(target.path).filename(), folder = fs::path(target.path).parent_path();

@@ -18,7 +18,8 @@ struct OutputTarget {
   bool is_special = false;  ///< a device, a pipe, a socket, or the file that is this program's standard output
 };
 
-/// Throws Error(kIo) when the folder is missing or not writable, or `path` names a folder or nothing at all.
+/// Throws Error(kIo) when the folder is missing or not writable, or `path` names a folder, a file that is
+/// write-protected, or nothing at all.
 OutputTarget output_target(const std::string& path);
 
 class OutputFile {

@@ -95,6 +95,18 @@ TEST(Outputs, SayBeforeTheWorkThatNothingCanBeWritten) {
                        "it is a folder"));
 }
 
+TEST(Outputs, WriteProtectedFilesAreNotReplaced) {
+  const std::string path = test_file("a.exr");
+  write_text_file(path, "film");
+  fs::permissions(path, fs::perms::owner_read | fs::perms::group_read);  // also where the superuser runs this
+  const std::string expected =
+      "cannot write " + path + ": the file there is write-protected; give another name, or permit writing it";
+  EXPECT_EQ(message_of([&] { Outputs().writes("-o", path, OutputKind::kFilm); }, ErrorCode::kIo), expected);
+  EXPECT_EQ(message_of([&] { write_text_file(path, "another"); }, ErrorCode::kIo), expected);
+  fs::permissions(path, fs::perms::owner_all);
+  Outputs().writes("-o", path, OutputKind::kFilm);
+}
+
 TEST(Outputs, DerivedPicturesReplaceOnlyOnesOfOurs) {
   const std::string path = test_file("a.png");
   const auto message = [&] {

@@ -72,6 +72,30 @@ class Overwriting(OutputsTest):
         self.write("given.png", b"a photograph")
         self.good("compare", "a.exr", "-r", "r.exr", "--error-map", "given.png")
 
+    def test_convert_replaces_only_its_own(self):
+        before = (self.path / "b.exr").read_bytes()
+        self.write("photograph.png", b"a photograph")
+        self.write("old.hdr", b"#?RADIANCE")
+        for names in (("a.exr", "b.exr"), ("a.exr", "pt.exr", "b.exr"), ("a.exr", "photograph.png"),
+                      ("a.exr", "old.hdr")):
+            self.bad(2, f"the output '{names[-1]}', which is the last name given, is there already and not a picture "
+                     "that 'covary convert' made; give another name, or --overwrite", "convert", *names)
+        self.assertEqual((self.path / "b.exr").read_bytes(), before)
+        for name in ("new.exr", "new.png"):
+            self.good("convert", "a.exr", name)
+            self.good("convert", "b.exr", name)  # its own
+        self.good("convert", "--overwrite", "a.exr", "b.exr")
+        self.assertNotEqual((self.path / "b.exr").read_bytes(), before)
+
+    def test_write_protected_files_stay(self):
+        self.write("o.exr", b"kept")
+        (self.path / "o.exr").chmod(0o444)
+        message = "cannot write o.exr: the file there is write-protected"
+        self.bad(1, message, "merge", "a.exr", "b.exr", "-o", "o.exr")
+        self.bad(1, message, "convert", "--overwrite", "a.exr", "o.exr")
+        self.bad(1, message, "combine", "--crn", "a.exr", "--independent", "pt.exr", "-o", "o.exr")
+        self.assertEqual((self.path / "o.exr").read_bytes(), b"kept")
+
     def test_files_used_twice_are_refused_by_combine(self):
         combine = ("combine", "-o", "o.exr")
         self.bad(2, "--crn 'a.exr' and --independent 'a.exr' are the same file", *combine, "--crn", "a.exr",
