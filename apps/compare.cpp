@@ -104,7 +104,8 @@ void print_table(const CompareOptions& options, const std::vector<Comparison>& c
   for (size_t i = 0; i < comparisons.size(); ++i) {
     fmt::print("{:{}}", options.images[i], width);
     for (const MetricResult& result : comparisons[i].results) fmt::print("  {:12.6g}", result.value);
-    fmt::print("  {:10.6f}\n", comparisons[i].mean / comparisons[i].reference_mean);
+    const double reference_mean = comparisons[i].reference_mean;
+    fmt::print("  {:>10}\n", reference_mean == 0 ? "-" : fmt::format("{:.6f}", comparisons[i].mean / reference_mean));
   }
 }
 

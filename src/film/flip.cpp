@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "core/parallel.h"
 
@@ -191,7 +192,7 @@ constexpr float kAcesA = 0.6f * 0.6f * 2.51f, kAcesB = 0.6f * 0.03f, kAcesC = 0.
                 kAcesD = 0.6f * 0.59f, kAcesE = 0.14f;
 
 float aces(float x) {
-  x = std::max(x, 0.0f);
+  x = std::clamp(x, 0.0f, 1e9f);  // the curve is at its end, 1, long before, and squares of more overflow
   return clamp01((kAcesA * x * x + kAcesB * x) / (kAcesC * x * x + kAcesD * x + kAcesE));
 }
 
@@ -232,8 +233,9 @@ FlipExposures flip_exposures(const Image& reference) {
   std::nth_element(luminances.begin(), middle, luminances.end());
   // A reference that is mostly or all black has no such exposures; the smallest positive value stands in.
   constexpr float kSmallest = 1e-7f;
-  const float median = std::max(*middle, kSmallest);
-  const float largest = std::max(*std::max_element(luminances.begin(), luminances.end()), median);
+  const float median = std::clamp(*middle, kSmallest, std::numeric_limits<float>::max());
+  const float largest = std::clamp(*std::max_element(luminances.begin(), luminances.end()), median,
+                                   std::numeric_limits<float>::max());  // a sum of three may be infinite
   // The luminance that the tone curve maps to 0.85, [Andersson2021] Sec. 3: the positive root of k(x) = t.
   constexpr double kTarget = 0.85;
   const double a = kAcesA - kTarget * kAcesC, b = kAcesB - kTarget * kAcesD, c = -kTarget * kAcesE;

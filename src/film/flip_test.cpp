@@ -4,7 +4,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace covary {
 namespace {
@@ -75,6 +77,21 @@ TEST(Flip, BlackReferenceIsFinite) {
   const Image black(8, 8, 3);
   EXPECT_EQ(mean_of(flip_hdr(black, black)), 0);
   for (float v : flip_hdr(waves(0, 1, 0), Image(kWidth, kHeight, 3)).data) ASSERT_TRUE(v >= 0 && v <= 1);
+}
+
+// The tone curve ends at 1 and must not overflow before.
+TEST(Flip, HugeValuesAreWhite) {
+  Image white(8, 8, 3), huge(8, 8, 3);
+  const Image black(8, 8, 3);
+  for (const float value : {1e18f, 1e20f, 1e38f, std::numeric_limits<float>::max()}) {
+    std::fill(white.data.begin(), white.data.end(), 1e6f);
+    std::fill(huge.data.begin(), huge.data.end(), value);
+    const double expected = mean_of(flip_hdr(white, black));
+    EXPECT_GT(expected, 0.5);
+    EXPECT_NEAR(mean_of(flip_hdr(huge, black)), expected, 1e-6) << value;
+    EXPECT_GT(mean_of(flip_hdr(black, huge)), 0.5) << value;
+    EXPECT_EQ(mean_of(flip_hdr(huge, huge)), 0) << value;
+  }
 }
 
 }  // namespace

@@ -69,6 +69,12 @@ double pixel_error(Metric metric, const Pixel& p) {
   throw Error(ErrorCode::kInternal, "not a sum over single pixels");
 }
 
+/// A value of an error map: of errors that are too large for a float, the largest.
+float map_value(double error) {
+  constexpr double kLargest = std::numeric_limits<float>::max();
+  return static_cast<float>(std::clamp(error, -kLargest, kLargest));
+}
+
 /// Relative squared errors of single values, by the value's own reference; 0 where pixels are left out.
 std::vector<double> channel_errors(const Image& image, std::span<const Image> references,
                                    const std::vector<char>& finite) {
@@ -83,9 +89,9 @@ std::vector<double> channel_errors(const Image& image, std::span<const Image> re
   return errors;
 }
 
-/// kRelMseTrimmed: the largest values do not count.
-Image trimmed_map(const Image& image, std::span<const Image> references, const std::vector<char>& finite,
-                  uint64_t n_pixels) {
+/// kRelMseTrimmed of each pixel: the largest values do not count.
+std::vector<double> trimmed_errors(const Image& image, std::span<const Image> references,
+                                   const std::vector<char>& finite, uint64_t n_pixels) {
   std::vector<double> errors = channel_errors(image, references, finite);
   const auto n_dropped = static_cast<size_t>(kTrimmedPart * 3 * static_cast<double>(n_pixels));
   std::vector<size_t> order(errors.size());
@@ -94,12 +100,12 @@ Image trimmed_map(const Image& image, std::span<const Image> references, const s
   std::nth_element(order.begin(), order.end() - static_cast<ptrdiff_t>(n_dropped), order.end(),
                    [&](size_t a, size_t b) { return errors[a] != errors[b] ? errors[a] < errors[b] : a < b; });
   for (size_t i = order.size() - n_dropped; i < order.size(); ++i) errors[order[i]] = 0;
-  Image map(image.width, image.height, 1);
+  std::vector<double> result(finite.size());
   const double scale =
       static_cast<double>(n_pixels) / (3 * static_cast<double>(n_pixels) - static_cast<double>(n_dropped));
   for (size_t p = 0; p < finite.size(); ++p)
-    map.data[p] = static_cast<float>((errors[3 * p] + errors[3 * p + 1] + errors[3 * p + 2]) * scale);
-  return map;
+    result[p] = (errors[3 * p] + errors[3 * p + 1] + errors[3 * p + 2]) * scale;
+  return result;
 }
 
 /// FLIP looks at neighbourhoods: pixels that are left out become equal in both images.
@@ -108,7 +114,7 @@ Image flip_map(const Image& image, std::span<const Image> references, const std:
   Image f = image, r = references.front();
   for (size_t p = 0; p < finite.size(); ++p)
     for (size_t i = p * 3; i < p * 3 + 3; ++i) {
-      r.data[i] = 0.5f * (r.data[i] + references.back().data[i]);
+      r.data[i] = 0.5f * r.data[i] + 0.5f * references.back().data[i];  // their sum may be infinite
       if (!finite[p]) f.data[i] = r.data[i] = 0;
     }
   return low_dynamic_range ? flip_ldr(f, r) : flip_hdr(f, r);
@@ -165,18 +171,22 @@ MetricResult compute_metric(Metric metric, const Image& image, std::span<const I
     throw Error(ErrorCode::kInput,
                 fmt::format("none of the {} pixels is finite in the image and the reference", n_pixels));
 
-  const bool by_pixels = metric != Metric::kFlip && metric != Metric::kRelMseTrimmed;
-  result.map = metric == Metric::kFlip            ? flip_map(image, references, finite, low_dynamic_range)
-               : metric == Metric::kRelMseTrimmed ? trimmed_map(image, references, finite, result.n_pixels)
-                                                  : Image(image.width, image.height, 1);
+  if (metric == Metric::kFlip)
+    result.map = flip_map(image, references, finite, low_dynamic_range);
+  else
+    result.map = Image(image.width, image.height, 1);
+  std::vector<double> trimmed;
+  if (metric == Metric::kRelMseTrimmed) trimmed = trimmed_errors(image, references, finite, result.n_pixels);
   double sum = 0;
   for (size_t p = 0; p < n_pixels; ++p) {
     if (!finite[p]) {
       result.map.data[p] = std::numeric_limits<float>::quiet_NaN();
       continue;
     }
-    const double error = by_pixels ? pixel_error(metric, Pixel(image, references, p)) : result.map.data[p];
-    result.map.data[p] = static_cast<float>(error);
+    const double error = metric == Metric::kFlip ? result.map.data[p]
+                         : !trimmed.empty()      ? trimmed[p]
+                                                 : pixel_error(metric, Pixel(image, references, p));
+    result.map.data[p] = map_value(error);
     sum += error;
   }
   result.value = sum / static_cast<double>(result.n_pixels);

@@ -119,6 +119,23 @@ TEST(Metrics, NonFinitePixelsAreLeftOutAndCounted) {
                        "none of the 1 pixels is finite"));
 }
 
+// Squares of these are beyond floats, not beyond doubles.
+TEST(Metrics, LargestFloats) {
+  const float largest = std::numeric_limits<float>::max();
+  const double square = static_cast<double>(largest) * largest;
+  const Image black = image_of({0, 0, 0, 0, 0, 0}), f = image_of({largest, largest, largest, 0, 0, 0});
+  EXPECT_NEAR(value(Metric::kMse, f, {black}) / (square / 2), 1, 1e-6);
+  EXPECT_NEAR(value(Metric::kRelMse, f, {black}) / (square / 0.02), 1, 1e-6);
+  EXPECT_NEAR(value(Metric::kRelMseTrimmed, f, {black}) / (square / 0.02), 1, 1e-6);
+  EXPECT_NEAR(value(Metric::kMape, f, {black}) / (largest / 0.02), 1, 1e-6);
+  for (const MetricInfo& info : metrics()) {
+    EXPECT_EQ(value(info.metric, f, {f, f}), 0) << info.name;
+    const MetricResult result = compute_metric(info.metric, f, std::vector{black});
+    EXPECT_GT(result.value, 0) << info.name;
+    for (const float v : result.map.data) EXPECT_TRUE(std::isfinite(v)) << info.name;
+  }
+}
+
 TEST(Metrics, NamesAndSizes) {
   for (const MetricInfo& info : metrics()) EXPECT_EQ(find_metric(info.name).metric, info.metric);
   EXPECT_TRUE(contains(message_of([] { find_metric("relmsee"); }),
