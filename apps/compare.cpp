@@ -91,6 +91,12 @@ nlohmann::ordered_json json_of(const CompareOptions& options, const std::string&
   return object;
 }
 
+std::string ratio_text(double mean, double reference_mean) {
+  const double ratio = mean / reference_mean;
+  if (!std::isfinite(ratio)) return "-";
+  return std::abs(ratio) < 1e6 ? fmt::format("{:.6f}", ratio) : fmt::format("{:.6g}", ratio);
+}
+
 void print_table(const CompareOptions& options, const std::vector<Comparison>& comparisons) {
   size_t width = 5;
   for (const std::string& path : options.images) width = std::max(width, path.size());
@@ -104,8 +110,7 @@ void print_table(const CompareOptions& options, const std::vector<Comparison>& c
   for (size_t i = 0; i < comparisons.size(); ++i) {
     fmt::print("{:{}}", options.images[i], width);
     for (const MetricResult& result : comparisons[i].results) fmt::print("  {:12.6g}", result.value);
-    const double reference_mean = comparisons[i].reference_mean;
-    fmt::print("  {:>10}\n", reference_mean == 0 ? "-" : fmt::format("{:.6f}", comparisons[i].mean / reference_mean));
+    fmt::print("  {:>10}\n", ratio_text(comparisons[i].mean, comparisons[i].reference_mean));
   }
 }
 

@@ -168,6 +168,10 @@ def _integrator(mi: Any, scene: Any, given: Any) -> Any:
     if ".ad" in type(integrator).__module__ or name.lower().startswith("prb"):
         raise UsageError(f"the integrator {name} is made for derivatives, which the combination of two images does not "
                          "have; use path or another one for images")
+    # Its tensor then begins with the first of these channels in place of a colour.
+    if name == "AOVIntegrator" and "Integrator[" not in str(integrator)[len("AOVIntegrator["):]:
+        raise UsageError(f"the integrator aov has channels {', '.join(integrator.aov_names())} and no image; put an "
+                         'integrator into it, as in <integrator type="aov">…<integrator type="path"/></integrator>')
     return integrator
 
 

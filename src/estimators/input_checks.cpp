@@ -145,8 +145,9 @@ void check_values(const char* name, long pixels, const Values& v, std::vector<Fi
                      name, v.nonfinite, pixels, v.bad_x, v.bad_y, v.bad_group)});
   if (v.negative)
     findings.push_back({Severity::kWarning,
-                        fmt::format("{}: {} of {} pixels hold negative values; filters with negative lobes (Mitchell, "
-                                    "Lanczos) make such values and must not be used: use a box filter",
+                        fmt::format("{}: {} of {} pixels hold negative values; spectral renderers make them of colours "
+                                    "that sRGB does not have, which is right, and filters with negative lobes "
+                                    "(Mitchell, Lanczos), which must not be used: use a box filter",
                                     name, v.negative, pixels)});
   if (v.clipped * 500 > pixels)
     findings.push_back(
@@ -286,6 +287,12 @@ InputReport InputChecks::report() const {
   r.clipped_pixels = crn.clipped + independent.clipped;
   check_values("CRN", pixels, crn, r.findings);
   check_values("independent image", pixels, independent, r.findings);
+
+  const auto is_black = [](const Values& v) { return v.mean == 0 && v.negative == 0 && v.nonfinite == 0; };
+  if (is_black(crn) && is_black(independent))
+    r.findings.push_back({Severity::kWarning,
+                          "both images are black; files that Mitsuba's integrator aov makes without another one inside "
+                          "have channels R, G and B that are all 0"});
 
   r.crn_horizontal = s.crn_horizontal.result();
   r.crn_vertical = s.crn_vertical.result();

@@ -100,8 +100,15 @@ TEST(InputChecks, FindsBadValues) {
       std::string::npos);
   independent = good_independent();
   independent.pixel(7, 5)[4] = -0.1f;
-  EXPECT_NE(findings(crn, independent).find("?independent image: 1 of 4800 pixels hold negative values"),
+  EXPECT_NE(findings(crn, independent)
+                .find("?independent image: 1 of 4800 pixels hold negative values; spectral "
+                      "renderers make them of colours that sRGB does not have, which is right"),
             std::string::npos);
+  test::Grouped black = crn;
+  std::fill(black.data.begin(), black.data.end(), 0.0f);
+  EXPECT_NE(findings(black, black).find("?both images are black; files that Mitsuba's integrator aov makes"),
+            std::string::npos);
+  EXPECT_EQ(findings(crn, good_independent()).find("black"), std::string::npos);
   independent = good_independent();
   for (int x = 0; x < 20; ++x) std::fill_n(independent.pixel(x, 3), 36, 1.0f);
   EXPECT_NE(findings(crn, independent).find("!independent image: 20 of 4800 pixels are exactly 1"), std::string::npos);

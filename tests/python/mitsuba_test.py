@@ -137,6 +137,10 @@ class Refused(WithMitsuba):
     def test_integrators(self):
         self.assertIn("made for derivatives", self.refused(self.room(), 48, integrator="prb"))
         self.assertIn("follows light to pixels anywhere", self.refused(self.room(), 48, integrator="ptracer"))
+        aov = {"type": "aov", "aovs": "pp:position,dd:depth"}
+        self.assertIn("the integrator aov has channels pp.X, pp.Y, pp.Z, dd.T and no image; put an integrator into it",
+                      self.refused(self.room(), 12, groups=3, integrator=aov))
+        covary.mitsuba.render(self.room(), 12, groups=3, integrator=aov | {"image": {"type": "path"}})
 
     def test_numbers(self):
         self.assertIn("found 7 samples per pixel", self.refused(self.room(), 7))
