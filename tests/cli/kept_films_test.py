@@ -1,10 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Films that `covary render` made or found are lost by nothing: a later call, an error, a full disk, a kill."""
+import fcntl
+import functools
 import os
+import resource
 import signal
+import subprocess
 import unittest
 
-from exr_reader import read_exr
+from cli_test import COVARY, SLOWDOWN
+from exr_reader import header, read_exr
 from render_outputs_test import ROOM, SMALL, RenderTest
 
 RENDER = ("render", ROOM, *SMALL, "-o", "out.exr", "--spp", "24")
@@ -20,15 +25,18 @@ class FilmsTest(RenderTest):
         """A render that got a signal once all of its films had been written with samples in them."""
         process = self.start("-o", "out.exr", "--spp", "1000000", "--checkpoint", "0.05", "--quiet", "--no-preview",
                              *arguments)
-        path, written = self.path / film, set()
-
-        def has_samples():
-            if path.exists():
-                written.add(path.stat().st_mtime_ns)
-            return len(written) >= 3
-        self.wait_for(has_samples, process)
+        self.wait_until_written(film, 3, process)
         code, _, errors = self.stop(process, sent)
         return code, errors
+
+    def wait_until_written(self, film, times, process):
+        path, written = self.path / film, set()
+
+        def often_enough():
+            if path.exists():
+                written.add(path.stat().st_mtime_ns)
+            return len(written) >= times
+        self.wait_for(often_enough, process)
 
 
 class EarlierFilms(FilmsTest):
@@ -115,6 +123,114 @@ class EarlierFilms(FilmsTest):
             self.bad(1, "'out.passes/crn.exr' is ", *RENDER, *more)
             self.assertEqual(self.tree(), before)
         self.bad(1, "is a link, which films are not written through", *RENDER, "--overwrite")
+
+
+class Checkpoints(FilmsTest):
+    """The disk is full, as far as the films are concerned."""
+    LIMIT = 200 << 10  # bytes of a file: an image fits, the film of a pass does not
+
+    def limited(self):
+        return functools.partial(resource.setrlimit, resource.RLIMIT_FSIZE, (self.LIMIT, resource.RLIM_INFINITY))
+
+    def test_one_that_cannot_be_written_is_a_warning(self):
+        command = [*RENDER, "--checkpoint", "0.001"]
+        self.good(*command)
+        whole = read_exr((self.path / "out.exr").read_bytes())
+        result = self.good(*command, preexec_fn=self.limited())
+        self.assertIn("warning: the films could not be kept: cannot write out.passes/crn.exr: File too large; "
+                      "rendering goes on, and the next checkpoint tries again\n", result.stderr)
+        self.assertEqual(read_exr((self.path / "out.exr").read_bytes()), whole)
+        self.assertEqual([p.name for p in self.path.rglob("*.part")], [])
+
+    def test_the_next_one_tries_again(self):
+        process = subprocess.Popen([COVARY, "render", ROOM, *SMALL, "-o", "out.exr", "--spp", "1000000",
+                                    "--checkpoint", "0.05"], cwd=self.path, stderr=subprocess.PIPE, text=True,
+                                   preexec_fn=self.limited())
+        self.addCleanup(process.wait)
+        self.addCleanup(process.kill)
+        self.assertIn("the films could not be kept", process.stderr.readline())
+        self.assertFalse((self.path / "out.passes" / "crn.exr").exists())
+        resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+        self.wait_until_written("out.passes/independent.exr", 2, process)
+        process.send_signal(signal.SIGKILL)
+        process.communicate(timeout=60 * SLOWDOWN)
+        self.good("info", "out.passes/crn.exr")
+
+    def test_the_image_where_its_films_find_no_room(self):
+        result = self.run_covary(*RENDER, "--passes", "films", preexec_fn=self.limited())
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("covary: cannot write films/crn.exr: File too large\n", result.stderr)
+        self.good("info", "out.exr")
+
+
+class LeftOver(FilmsTest):
+    """Unfinished files, which are named .OUTPUT.PROCESS-NUMBER.part."""
+
+    def dead(self):
+        process = subprocess.Popen(["true"])
+        process.wait()
+        return process.pid
+
+    def test_of_the_dead_and_of_the_living(self):
+        dead = self.dead()
+        ours, others = f".out.exr.{dead}-0.part", f".else.exr.{dead}-0.part"
+        living, held, odd = f".out.exr.{os.getpid()}-0.part", f".out.exr.{dead}-1.part", ".out.exr.x-0.part"
+        for name in (ours, others, living, held, odd):
+            self.write(name, b"half")
+        with open(self.path / held, "rb") as file:  # on another machine its process may well live
+            fcntl.flock(file, fcntl.LOCK_SH)
+            self.good(*RENDER)
+        self.assertEqual(sorted(p.name for p in self.path.glob(".*.part")), sorted((others, living, held, odd)))
+
+    def test_of_a_killed_render(self):
+        parts = []
+        for _ in range(100):
+            process = self.start("-o", "out.exr", "--spp", "1000000", "--checkpoint", "0.001", "--quiet",
+                                 "--no-preview", "--estimator", "none", "--groups", "64", "--max-depth", "1",
+                                 "--overwrite")
+            self.wait_for(lambda: list(self.path.glob(".*.part")), process)
+            self.stop(process, signal.SIGKILL)
+            parts = list(self.path.glob(".*.part"))
+            if parts:
+                break
+        self.assertNotEqual(parts, [])
+        self.good(*RENDER, "--overwrite")
+        self.assertEqual(list(self.path.glob(".*.part")), [])
+
+    def test_none_of_a_render_that_is_told_twice_to_end(self):
+        for _ in range(10):  # where it is when the second signal comes is left to chance
+            process = self.start("-o", "out.exr", "--spp", "1000000", "--checkpoint", "0.001", "--quiet",
+                                 "--no-preview", "--estimator", "none", "--groups", "64", "--max-depth", "1",
+                                 "--overwrite")
+            self.wait_for(lambda: list(self.path.glob(".*.part")), process)
+            process.send_signal(signal.SIGINT)
+            code, _, errors = self.stop(process)
+            self.assertEqual(code, 130, errors)
+            self.assertEqual(list(self.path.glob(".*.part")), [])
+
+
+class WantedError(FilmsTest):
+    """--until decides on samples in rounds, and takes the same ones after an interruption."""
+    UNTIL = ("--until", "relmse=0.003", "--quiet", "--no-preview")
+
+    def test_interrupted_and_resumed(self):
+        self.good("render", ROOM, *SMALL, *self.UNTIL, "-o", "whole.exr")
+        whole = read_exr((self.path / "whole.exr").read_bytes())
+        for sent, code in ((signal.SIGKILL, -9), (signal.SIGTERM, 143)):
+            for samples in (12, 84):  # of each film: in the first round, which takes 24, and in the last, which takes 120
+                with self.subTest(code=code, samples=samples):
+                    process = self.start("-o", "out.exr", *self.UNTIL, "--checkpoint", "0.01", "--overwrite",
+                                         "--threads", "1")
+                    self.wait_for(lambda: self.samples("out.passes/crn.exr") >= samples, process)
+                    self.assertEqual(self.stop(process, sent)[0], code)
+                    self.good("render", ROOM, *SMALL, *self.UNTIL, "-o", "out.exr", "--resume")
+                    self.assertEqual(read_exr((self.path / "out.exr").read_bytes()), whole)
+
+    def samples(self, film):
+        path = self.path / film
+        if not path.exists():
+            return 0
+        return float(header(path.read_bytes())[0]["covary:samples"].decode())
 
 
 if __name__ == "__main__":
