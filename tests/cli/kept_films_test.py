@@ -217,7 +217,7 @@ class WantedError(FilmsTest):
         self.good("render", ROOM, *SMALL, *self.UNTIL, "-o", "whole.exr")
         whole = read_exr((self.path / "whole.exr").read_bytes())
         for sent, code in ((signal.SIGKILL, -9), (signal.SIGTERM, 143)):
-            for samples in (12, 84):  # of each film: in the first round, which takes 24, and in the last, which takes 120
+            for samples in (12, 84):  # of each film: of 24 in the first round, and of 120 in the last
                 with self.subTest(code=code, samples=samples):
                     process = self.start("-o", "out.exr", *self.UNTIL, "--checkpoint", "0.01", "--overwrite",
                                          "--threads", "1")
