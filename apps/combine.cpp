@@ -15,18 +15,13 @@
 #include <optional>
 #include <vector>
 
+#include "combine/combine.h"
 #include "combine_counts.h"
-#include "combine_light.h"
 #include "commands.h"
 #include "core/stopwatch.h"
 #include "estimator_options.h"
-#include "estimators/feedback.h"
-#include "estimators/grouped_file.h"
-#include "estimators/held_out_error.h"
-#include "estimators/input_checks.h"
 #include "estimators/mean.h"
 #include "estimators/pair_input.h"
-#include "estimators/planes.h"
 #include "estimators/result_file.h"
 #include "film/outputs.h"
 #include "guide_layer.h"
@@ -48,92 +43,6 @@ struct CombineOptions {
   std::vector<int> explain;  ///< x, y in the full frame
   int threads = 0;
 };
-
-/// What the file tells beside its pixels.
-ImageOrigin origin_of(const GroupedFile& file) {
-  return {file.name(),     file.place(),    file.sampling(),      file.scene_hash(),
-          file.settings(), file.has_half(), file.is_light_film(), file.has_light_added()};
-}
-
-/// Both images, some rows at a time.
-class Bands {
- public:
-  Bands(const GroupedFile& crn, const GroupedFile& independent, double memory_mib)
-      : crn_(crn), independent_(independent) {
-    // The values themselves, and about 40 floats per pixel that an estimator works with.
-    const double row_bytes = crn.width() * (12.0 * (crn.groups() + independent.groups()) + 160);
-    rows_ = static_cast<int>(std::min<double>(crn.height(), memory_mib * 1048576 / row_bytes));
-  }
-  /// Rows that fit in memory at once.
-  int rows() const { return rows_; }
-  void read(int first, int n) {
-    if (first == first_ && n == n_) return;
-    crn_.read_rows(first, n, crn_rows_);
-    independent_.read_rows(first, n, independent_rows_);
-    first_ = first;
-    n_ = n;
-  }
-  /// Reads the rows first … last - 1 with `reach` more on both sides, beginning at a multiple of a cell of the
-  /// feedback, so that bands give the bits of the whole. Returns the row that the band begins with.
-  int read_around(int first, int last, int reach) {
-    const int begin = std::max(0, first - reach) / kFeedbackCell * kFeedbackCell;
-    read(begin, std::min(crn_.height(), last + reach) - begin);
-    return begin;
-  }
-  GroupedImage crn() const { return crn_.view(crn_rows_, n_); }
-  GroupedImage independent() const { return independent_.view(independent_rows_, n_); }
-
- private:
-  const GroupedFile &crn_, &independent_;
-  int rows_, first_ = -1, n_ = 0;
-  GroupedFile::Rows crn_rows_, independent_rows_;
-};
-
-InputReport examine(const Estimator& estimator, const GroupedFile& crn, const GroupedFile& independent, Bands& bands) {
-  InputChecks checks(crn.width(), crn.height(), crn.groups(), independent.groups());
-  const int step = std::max(16, bands.rows());
-  for (int y = 0; y < crn.height(); y += step) {
-    bands.read(y, std::min(step, crn.height() - y));
-    if (estimator.adaptive && (lacks_samples(bands.crn()) || lacks_samples(bands.independent())))
-      return unchecked_report();
-    checks.add_rows(bands.crn(), bands.independent());
-  }
-  return checks.report();
-}
-
-EstimatorResult estimate(const Estimator& estimator, const PairSettings& settings, const GroupedFile& file,
-                         Bands& bands) {
-  const int height = file.height();
-  if (estimator.reach < 0 || bands.rows() >= height) {
-    bands.read(0, height);
-    return estimator.apply(bands.crn(), bands.independent(), settings);
-  }
-  const int step = std::max(16, bands.rows() - 2 * estimator.reach) / kFeedbackCell * kFeedbackCell;
-  EstimatorResult whole;
-  for (int y = 0; y < height; y += step) {
-    const int first = bands.read_around(y, y + step, estimator.reach);
-    const EstimatorResult part = estimator.apply(bands.crn(), bands.independent(), settings);
-    long n_nonfinite = 0;  // without the rows around, which other bands count
-    const auto own = [&](const GroupedImage& band) {
-      return GroupedImage{band.width, std::min(height, y + step) - y, band.groups, band.pixel(0, y - first)};
-    };
-    finite_pixels(own(bands.crn()), own(bands.independent()), n_nonfinite);
-    whole.nonfinite_pixels += n_nonfinite;
-    const auto append = [&](const Image& from, Image& to) {
-      if (from.data.empty()) return;
-      if (to.data.empty()) to = Image(from.width, height, 3);
-      std::copy_n(from.pixel(0, y - first), static_cast<size_t>(from.width) * 3 * (std::min(height, y + step) - y),
-                  to.pixel(0, y));
-    };
-    append(part.estimate, whole.estimate);
-    append(part.std_error, whole.std_error);
-    append(part.bias, whole.bias);
-    if (!part.held_out.empty())
-      whole.held_out.insert(whole.held_out.end(), part.held_out.begin() + (y - first),
-                            part.held_out.begin() + (std::min(height, y + step) - first));
-  }
-  return whole;
-}
 
 void write(const CombineOptions& o, const GroupedFile& crn, const GroupedFile& independent, EstimatorResult& result) {
   std::map<std::string, std::string> attributes = {{"covary:estimator", make_estimator(o.estimator).text},
@@ -160,18 +69,16 @@ void check_explain(const CombineOptions& o, const Estimator& estimator, const Gr
 }
 
 /// What one pixel is made of: f, and for each control variate its place, coefficients, CRN mean and independent mean.
-nlohmann::ordered_json explain(const CombineOptions& o, const Estimator& estimator, const GroupedFile& crn,
-                               Bands& bands) {
-  const CropWindow& window = crn.place().window;
+nlohmann::ordered_json explain(const CombineOptions& o, const CombineRequest& request) {
+  const CropWindow& window = request.crn.origin.place.window;
   const int x = o.explain[0] - window.x, y = o.explain[1] - window.y;
-  const int first = bands.read_around(y, y + 1, estimator.reach);
+  const auto [g, h, first] = band_around(request, y, y + 1);
   const auto mean = [&](const GroupedImage& image, int px, int py) {
     const uint32_t count = image.count(px, py);
     return mean_of_groups({1, 1, image.groups, image.pixel(px, py), &count}).estimate.data;
   };
-  const GroupedImage g = bands.crn(), h = bands.independent();
   nlohmann::ordered_json variates = nlohmann::ordered_json::array();
-  for (const ControlVariate& v : estimator.explain(g, h, x, y - first))
+  for (const ControlVariate& v : request.estimator.explain(g, h, x, y - first))
     variates.push_back({{"dx", v.dx},
                         {"dy", v.dy},
                         {"beta", v.beta},
@@ -248,86 +155,105 @@ void check_files_of_command(const CombineOptions& o) {
   outputs.writes("--json", o.json, OutputKind::kText);
 }
 
-void combine(const CombineOptions& o) {
+/// What the command combines, with the files that it reads from.
+struct Inputs {
+  GroupedFile crn, independent;
+  std::optional<GroupedFile> light;
+  GuideImages guides;
+  CombineRequest request;
+
+  explicit Inputs(const CombineOptions& o) : crn(o.crn, o.crn_layer), independent(o.independent, o.independent_layer) {
+    if (!o.light.empty()) light.emplace(std::vector{o.light});
+    request.estimator = make_estimator(o.estimator);
+    request.settings = pair_settings(
+        request.estimator, request.estimator.needs_sample_count || o.counts.empty() ? o.samples : std::nullopt,
+        crn.samples(), o.error);
+    guides = read_guides(o, request.estimator, crn);
+    request.settings.guides = guides.view();
+    check_explain(o, request.estimator, crn);
+    check_stages(o.stages, request.estimator);
+    take_counts(o.counts, o.samples, crn, independent);
+    request.crn = source_of(crn), request.independent = source_of(independent);
+    if (light) request.light = source_of(*light);
+    request.memory = o.memory_mib * 1048576;
+    request.force = o.force;
+  }
+  Inputs(const Inputs&) = delete;
+  Inputs& operator=(const Inputs&) = delete;
+};
+
+void print_findings(const CombineOptions& o, const std::vector<Finding>& findings) {
+  if (const std::string errors = errors_text(findings); !errors.empty() && !o.force)
+    throw Error(ErrorCode::kInput, "the inputs do not fit: " + errors + " (--force combines them nevertheless)");
+  for (const Finding& f : findings) {
+    const bool note = f.severity == Finding::Severity::kNote;
+    if (!note || !o.quiet) fmt::print(stderr, "{}: {}\n", note ? "note" : "warning", f.text);
+  }
+}
+
+nlohmann::ordered_json statistics(const CombineOptions& o, const CombineRequest& request, const CombinedImage& combined,
+                                  double write_seconds) {
+  const InputReport& report = combined.inputs.report;
+  nlohmann::ordered_json json = {{"output", o.output},
+                                 {"estimator", request.estimator.text},
+                                 {"width", request.crn.width},
+                                 {"height", request.crn.height},
+                                 {"crn_groups", request.crn.groups},
+                                 {"independent_groups", request.independent.groups},
+                                 {"nonfinite_pixels", combined.image.nonfinite_pixels},
+                                 {"negative_pixels", count_negative_pixels(combined.image.estimate)},
+                                 {"rank_correlation",
+                                  {{"crn_horizontal", json_of(report.crn_horizontal)},
+                                   {"crn_vertical", json_of(report.crn_vertical)},
+                                   {"independent_horizontal", json_of(report.independent_horizontal)},
+                                   {"independent_vertical", json_of(report.independent_vertical)},
+                                   {"crn_independent", json_of(report.crn_independent)}}},
+                                 {"mean", {{"crn", report.crn_mean}, {"independent", report.independent_mean}}},
+                                 {"seconds",
+                                  {{"read_and_check", combined.check_seconds},
+                                   {"estimate", combined.estimate_seconds},
+                                   {"write", write_seconds}}}};
+  if (request.light) json["light_groups"] = request.light->groups;
+  return json;
+}
+
+void write_stages(const CombineOptions& o, const CombineRequest& request) {
+  if (o.stages.empty()) return;
+  save_stages(o.stages, request.estimator, request.crn.all(), request.independent.all(), request.settings,
+              request.crn.origin.place);
+}
+
+void combine_files(const CombineOptions& o) {
   check_files_of_command(o);
   std::optional<tbb::global_control> control;
   if (o.threads > 0) control.emplace(tbb::global_control::max_allowed_parallelism, o.threads);
-  Stopwatch watch;
   ProgressLine progress(std::filesystem::path(o.output).stem().string(), o.quiet);
   progress.begin("loading and checking");
-  GroupedFile crn(o.crn, o.crn_layer), independent(o.independent, o.independent_layer);
-  std::optional<GroupedFile> light;
-  if (!o.light.empty()) light.emplace(std::vector{o.light});
-  const Estimator estimator = make_estimator(o.estimator);
-  PairSettings settings = pair_settings(
-      estimator, estimator.needs_sample_count || o.counts.empty() ? o.samples : std::nullopt, crn.samples(), o.error);
-  const GuideImages guides = read_guides(o, estimator, crn);
-  settings.guides = guides.view();
-  check_explain(o, estimator, crn);
-  check_stages(o.stages, estimator);
-  take_counts(o.counts, o.samples, crn, independent);
-
-  std::vector<Finding> findings;
-  const ImageOrigin crn_origin = origin_of(crn), independent_origin = origin_of(independent);
-  const std::optional<ImageOrigin> light_origin = light ? std::optional(origin_of(*light)) : std::nullopt;
-  check_origins(crn_origin, independent_origin, findings);
-  check_light(crn_origin, independent_origin, light_origin ? &*light_origin : nullptr, findings);
-  Bands bands(crn, independent, o.memory_mib);
-  const InputReport report = examine(estimator, crn, independent, bands);
-  findings.insert(findings.end(), report.findings.begin(), report.findings.end());
-  if (const std::string errors = errors_text(findings); !errors.empty() && !o.force)
-    throw Error(ErrorCode::kInput, "the inputs do not fit: " + errors + " (--force combines them nevertheless)");
-  progress.clear();
-  for (const Finding& f : findings) {
-    const bool note = f.severity == Finding::Severity::kNote;
-    if (!note || !o.quiet) std::fprintf(stderr, "%s: %s\n", note ? "note" : "warning", f.text.c_str());
-  }
-  const double check_seconds = watch.lap();
-
-  progress.begin(o.estimator.denoise == "none" ? "estimating" : "estimating and denoising");
-  EstimatorResult result = estimate(estimator, settings, crn, bands);
-  calibrate(result);
-  if (light) add_light_file(*light, result);
-  const double estimate_seconds = watch.lap();
+  Inputs inputs(o);
+  CombineRequest& request = inputs.request;
+  request.checked = [&](const InputFindings& found) {
+    progress.clear();
+    print_findings(o, found.findings);
+    progress.begin(o.estimator.denoise == "none" ? "estimating" : "estimating and denoising");
+  };
+  CombinedImage combined = combine(request);
+  Stopwatch watch;
   progress.begin("writing");
-  write(o, crn, independent, result);
-  if (!o.stages.empty()) {
-    bands.read(0, crn.height());
-    save_stages(o.stages, estimator, bands.crn(), bands.independent(), settings, crn.place());
-  }
+  write(o, inputs.crn, inputs.independent, combined.image);
+  write_stages(o, request);
   const double write_seconds = watch.lap();
   progress.finish();
-  nlohmann::ordered_json pixel;
-  if (!o.explain.empty()) {
-    pixel = explain(o, estimator, crn, bands);
-    if (o.json != "-") print_explanation(pixel);
-  }
 
+  nlohmann::ordered_json json = statistics(o, request, combined, write_seconds);
+  if (!o.explain.empty()) {
+    json["pixel"] = explain(o, request);
+    if (o.json != "-") print_explanation(json["pixel"]);
+  }
   if (!o.quiet)
-    std::fprintf(stderr, "%s: %d x %d, %s of %d + %d groups in %.2f s (read and check %.2f s, write %.2f s)\n",
-                 o.output.c_str(), crn.width(), crn.height(), o.estimator.name.c_str(), crn.groups(),
-                 independent.groups(), estimate_seconds, check_seconds, write_seconds);
-  if (o.json.empty()) return;
-  nlohmann::ordered_json json = {
-      {"output", o.output},
-      {"estimator", estimator.text},
-      {"width", crn.width()},
-      {"height", crn.height()},
-      {"crn_groups", crn.groups()},
-      {"independent_groups", independent.groups()},
-      {"nonfinite_pixels", result.nonfinite_pixels},
-      {"negative_pixels", count_negative_pixels(result.estimate)},
-      {"rank_correlation",
-       {{"crn_horizontal", json_of(report.crn_horizontal)},
-        {"crn_vertical", json_of(report.crn_vertical)},
-        {"independent_horizontal", json_of(report.independent_horizontal)},
-        {"independent_vertical", json_of(report.independent_vertical)},
-        {"crn_independent", json_of(report.crn_independent)}}},
-      {"mean", {{"crn", report.crn_mean}, {"independent", report.independent_mean}}},
-      {"seconds", {{"read_and_check", check_seconds}, {"estimate", estimate_seconds}, {"write", write_seconds}}}};
-  if (light) json["light_groups"] = light->groups();
-  if (!pixel.is_null()) json["pixel"] = pixel;
-  write_text_output(o.json, json_text(json));
+    fmt::print(stderr, "{}: {} x {}, {} of {} + {} groups in {:.2f} s (read and check {:.2f} s, write {:.2f} s)\n",
+               o.output, request.crn.width, request.crn.height, o.estimator.name, request.crn.groups,
+               request.independent.groups, combined.estimate_seconds, combined.check_seconds, write_seconds);
+  if (!o.json.empty()) write_text_output(o.json, json_text(json));
 }
 
 }  // namespace
@@ -379,7 +305,7 @@ void add_combine(CLI::App& app) {
   add_threads_option(*command, o->threads);
   command->add_option("--json", o->json, "File for statistics; '-': standard output");
   command->add_flag("--quiet", o->quiet, "Warnings and errors only");
-  command->callback([o] { combine(*o); });
+  command->callback([o] { combine_files(*o); });
 }
 
 }  // namespace covary

@@ -44,6 +44,7 @@ class Groups {
   GroupedImage view();
   int width() const { return static_cast<int>(source_.shape[2]); }
   int height() const { return static_cast<int>(source_.shape[1]); }
+  int groups() const { return static_cast<int>(source_.shape[0]); }
 
  private:
   Floats source_;

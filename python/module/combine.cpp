@@ -5,15 +5,12 @@
 #include <optional>
 #include <span>
 
+#include "combine/combine.h"
 #include "core/error.h"
-#include "estimators/held_out_error.h"
-#include "estimators/light_film.h"
 #include "estimators/mixed_denoising.h"
 #include "estimators/pair_input.h"
-#include "estimators/predicted_error.h"
 #include "estimators/registry.h"
 #include "film/splat_layer.h"
-#include "plans/plan.h"
 #include "python/module/arrays.h"
 #include "python/module/bindings.h"
 #include "python/module/work.h"
@@ -33,6 +30,7 @@ class Input {
   const Film* film() const { return film_; }
   int width() const { return film_ ? film_->width() : groups_->width(); }
   int height() const { return film_ ? film_->height() : groups_->height(); }
+  int groups() const { return film_ ? film_->groups() : groups_->groups(); }
   /// Per pixel, on average; 0 where that is not known.
   double samples() const { return samples_; }
   /// Of each pixel, all groups together. Raises where the image knows them.
@@ -81,17 +79,22 @@ class Input {
 /// The two images and what an estimator of pairs is to make of them.
 struct Pair {
   Input crn, independent;
-  std::vector<Finding> findings;
-  InputReport report;
+  CombineRequest request;
 
   Pair(nb::handle crn_object, nb::handle independent_object, const Film* light)
       : crn(crn_object, "crn"), independent(independent_object, "independent") {
-    const std::optional<ImageOrigin> added = light ? std::optional(Input::origin_of(*light, "light")) : std::nullopt;
-    const ImagePlace place = added ? added->place : ImagePlace{};
-    const ImageOrigin first = crn.origin(place), second = independent.origin(place);
-    if (crn.film() && independent.film()) check_origins(first, second, findings);
-    check_light(first, second, added ? &*added : nullptr, findings);
+    // An array has the place of a film beside it.
+    const Film* film = light ? light : crn.film() ? crn.film() : independent.film();
+    const ImagePlace place = film ? Input::origin_of(*film, "").place : ImagePlace{};
+    request.crn = source_of(crn, place), request.independent = source_of(independent, place);
+    if (light)
+      request.light = covary::source_of(rows_of(*light, 0, light->height()), Input::origin_of(*light, "light"));
+    std::vector<Finding> findings;
+    check_light(request.crn.origin, request.independent.origin, light ? &request.light->origin : nullptr, findings);
   }
+  Pair(const Pair&) = delete;
+  Pair& operator=(const Pair&) = delete;
+
   /// `samples`: of each pixel of the CRN image, where it does not tell them.
   void take_counts(const Counts& counts, std::optional<int> samples) {
     if (counts.shape(0) != static_cast<size_t>(independent.height()) ||
@@ -104,22 +107,26 @@ struct Pair {
     if (!samples) throw Error(ErrorCode::kUsage, "--counts needs --samples N, the samples per pixel of the CRN image");
     crn.take_counts(std::vector(static_cast<size_t>(crn.width()) * crn.height(), static_cast<uint32_t>(*samples)));
   }
-  void check(const Estimator& estimator) {
-    const GroupedImage g = crn.view(), h = independent.view();
+  /// Arrays may have any shape, and any counts. Needs no GIL.
+  void check_shapes() {
     std::vector<std::string> problems;
-    check_inputs(g, h, 1, 1, problems);
-    if (!estimator.adaptive) throw_if_any("inputs", problems);
-    report = examine_pair(estimator, g, h);
-    findings.insert(findings.end(), report.findings.begin(), report.findings.end());
+    check_inputs(crn.view(), independent.view(), 1, 1, problems);
+    if (!request.estimator.adaptive) throw_if_any("inputs", problems);
   }
-  std::vector<std::string> warnings() const {
-    std::vector<std::string> texts;
-    for (const Finding& f : findings) texts.push_back(f.text);
-    return texts;
+
+ private:
+  /// Rows of the arrays or films as they lie, which views bring into order when they are first asked for.
+  static GroupedSource source_of(Input& input, const ImagePlace& place) {
+    GroupedSource source;
+    source.origin = input.origin(place);
+    source.width = input.width(), source.height = input.height(), source.groups = input.groups();
+    source.samples = input.samples();
+    source.rows = [&input](int first, int n) { return rows_of(input.view(), first, n); };
+    return source;
   }
 };
 
-struct CombineRequest {
+struct CombineArguments {
   std::string estimator;
   OptionValues options;
   std::string denoise, oidn;
@@ -132,6 +139,12 @@ struct CombineRequest {
 struct Beside {
   nb::object counts, light, albedo, normal;
 };
+
+std::vector<std::string> texts_of(const std::vector<Finding>& findings) {
+  std::vector<std::string> texts;
+  for (const Finding& f : findings) texts.push_back(f.text);
+  return texts;
+}
 
 /// The guides of --denoise.
 struct GuideImages {
@@ -156,45 +169,44 @@ const Film* film_of(nb::handle light) {
   return film;
 }
 
-nb::dict combine(nb::object crn, nb::object independent, const Beside& beside, const CombineRequest& request,
+nb::dict combine(nb::object crn, nb::object independent, const Beside& beside, const CombineArguments& arguments,
                  nb::object progress) {
-  const Estimator estimator =
-      with_denoising(make_pair_estimator(request.estimator, request.options), request.denoise, request.oidn);
   const Film* light = film_of(beside.light);
   Pair pair(crn, independent, light);
+  CombineRequest& request = pair.request;
+  request.estimator =
+      with_denoising(make_pair_estimator(arguments.estimator, arguments.options), arguments.denoise, arguments.oidn);
+  const Estimator& estimator = request.estimator;
   const bool has_counts = !beside.counts.is_none();
-  PairSettings settings =
-      pair_settings(estimator, estimator.needs_sample_count || !has_counts ? request.samples : std::nullopt,
-                    pair.crn.samples(), request.std_error.value_or(estimator.predicts_error));
+  request.settings =
+      pair_settings(estimator, estimator.needs_sample_count || !has_counts ? arguments.samples : std::nullopt,
+                    pair.crn.samples(), arguments.std_error.value_or(estimator.predicts_error));
   const GuideImages guides(beside, estimator, pair.crn);
-  settings.guides = guides.view();
-  if (has_counts) pair.take_counts(nb::cast<Counts>(beside.counts), request.samples);
-  EstimatorResult result;
-  std::optional<double> predicted, samples;
+  request.settings.guides = guides.view();
+  if (has_counts) pair.take_counts(nb::cast<Counts>(beside.counts), arguments.samples);
+  request.force = arguments.force;
+  CombinedImage combined;
   const auto work = [&](WorkState& state) {
     state.total = 2;
-    pair.check(estimator);
-    if (const std::string errors = errors_text(pair.findings); !errors.empty() && !request.force)
-      throw Error(ErrorCode::kInput, "the inputs do not fit: " + errors + " (force=True combines them nevertheless)");
-    state.done = 1;
-    const bool whole =
-        run_stoppable(state, [&] { result = estimator.apply(pair.crn.view(), pair.independent.view(), settings); });
-    if (!whole) return;
-    calibrate(result);
-    if (light) add_light(rows_of(*light, 0, light->height()), result);
-    if (!result.std_error.data.empty()) predicted = predicted_relmse(result);
-    state.done = 2;
+    request.checked = [&](const InputFindings& inputs) {
+      if (const std::string errors = errors_text(inputs.findings); !errors.empty() && !request.force)
+        throw Error(ErrorCode::kInput, "the inputs do not fit: " + errors + " (force=True combines them nevertheless)");
+      state.done = 1;
+    };
+    pair.check_shapes();
+    if (run_stoppable(state, [&] { combined = covary::combine(request); })) state.done = 2;
   };
   run_work(work, progress);
+  std::optional<double> samples;
   if (pair.crn.samples() > 0 && pair.independent.samples() > 0)
     samples = pair.crn.samples() + pair.independent.samples();
   nb::dict d;
-  d["image"] = array_of(std::move(result.estimate));
-  d["std_error"] = array_of(std::move(result.std_error));
-  d["bias"] = array_of(std::move(result.bias));
-  d["predicted_relmse"] = predicted;
-  d["warnings"] = pair.warnings();
-  d["nonfinite_pixels"] = result.nonfinite_pixels;
+  d["image"] = array_of(std::move(combined.image.estimate));
+  d["std_error"] = array_of(std::move(combined.image.std_error));
+  d["bias"] = array_of(std::move(combined.image.bias));
+  d["predicted_relmse"] = combined.predicted_relmse;
+  d["warnings"] = texts_of(combined.inputs.findings);
+  d["nonfinite_pixels"] = combined.image.nonfinite_pixels;
   d["estimator"] = estimator.text;
   d["samples_per_pixel"] = samples;
   return d;
@@ -231,14 +243,20 @@ nb::object correlation(const Correlation& c) {
 
 nb::dict check(nb::object crn, nb::object independent) {
   Pair pair(crn, independent, nullptr);
-  run_work([&](WorkState&) { pair.check({}); }, nb::none());
+  InputFindings inputs;
+  run_work(
+      [&](WorkState&) {
+        pair.check_shapes();
+        inputs = examine(pair.request);
+      },
+      nb::none());
   nb::list errors, warnings, notes;
-  for (const Finding& f : pair.findings)
+  for (const Finding& f : inputs.findings)
     (f.severity == Finding::Severity::kError     ? errors
      : f.severity == Finding::Severity::kWarning ? warnings
                                                  : notes)
         .append(f.text);
-  const InputReport& r = pair.report;
+  const InputReport& r = inputs.report;
   nb::dict d;
   d["errors"] = errors;
   d["warnings"] = warnings;
