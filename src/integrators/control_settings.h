@@ -31,6 +31,7 @@ struct ControlSettings {
   uint32_t clusters = 256;         ///< most clusters of lights
   uint32_t memory_mib = 256;       ///< of sums and coefficients while training
   bool relative = true;            ///< least relative variance [Hua2023] §4.2.1, otherwise least variance
+  bool oidn = false;               ///< pixels' values from the first samples by Open Image Denoise
   bool prefix = true;              ///< samples weigh by the throughput before them [Hua2023] §4.4
   bool albedo = true;              ///< see by_albedo()
   bool indirect = false;           ///< see controls_indirect()
@@ -71,6 +72,7 @@ inline void declare(Settings& s, ControlSettings& v) {
                                                                            {"power", LightSelection::kPower},
                                                                            {"learned", LightSelection::kLearned}};
   static constexpr std::pair<const char*, bool> kVariances[] = {{"relative", true}, {"absolute", false}};
+  static constexpr std::pair<const char*, bool> kSurrogates[] = {{"filter", false}, {"oidn", true}};
   s.group("Integrator controlled-path", true);
   if (s.preset("cv-paper")) v = ControlSettings::published();
   s.choice("cv", v.kind, kControlKinds,
@@ -93,18 +95,24 @@ inline void declare(Settings& s, ControlSettings& v) {
           "MiB of sums and coefficients while learning, then cells become wider", {.film = "memory={}"});
   s.choice("cv-variance", v.relative, kVariances, "What is made least: relative or absolute variance",
            {.film = "variance={}"});
+  // Without a word in films where it is the default, as it is of all films from before there was the option.
+  s.choice("cv-surrogate", v.oidn, kSurrogates,
+           "What tells the values of pixels from the first samples: a filter of its own, or Open Image Denoise",
+           {.film = v.oidn ? "surrogate={}" : ""});
   s.on_off("cv-prefix", v.prefix, "Whether samples weigh by the throughput of the path before them",
            {.film = "prefix={}"});
   s.on_off("cv-albedo", v.albedo, "Whether coefficients are multiplied by the albedo of the surface",
            {.film = "albedo"});
   s.on_off("cv-indirect", v.indirect, "Whether light that other surfaces reflect is controlled, too",
            {.film = "indirect"});
-  s.only_if(v.learns(), {"cv-paper", "cv-grid", "cv-train", "cv-clusters", "cv-memory", "cv-variance", "cv-prefix"},
+  s.only_if(v.learns(),
+            {"cv-paper", "cv-grid", "cv-train", "cv-clusters", "cv-memory", "cv-variance", "cv-surrogate", "cv-prefix"},
             "with --cv off: nothing is learnt (unless --lights learned)");
   s.only_if(v.has_cells(), {"cv-albedo", "cv-indirect"},
             "with this --cv: only rgb and mono have coefficients of cells");
-  s.only_if(!v.per_pixel(), {"cv-grid", "cv-variance", "cv-prefix"},
+  s.only_if(!v.per_pixel(), {"cv-grid", "cv-variance", "cv-surrogate", "cv-prefix"},
             "with --cv optimal-mis: each pixel has coefficients of its own");
+  s.only_if(v.relative, {"cv-surrogate"}, "with --cv-variance absolute: values of pixels are not asked for");
 }
 
 }  // namespace covary

@@ -46,6 +46,8 @@ class LearningIntegrator : public Integrator {
   /// Samples per pixel of the training after which the importance of each pixel (PassSettings::importance) is made of
   /// the image so far; 0: it is not asked for.
   virtual uint32_t pilot_spp() const { return 0; }
+  /// Whether that image is denoised by Open Image Denoise for it, instead of a filter that is always there.
+  virtual bool pilot_by_oidn() const { return false; }
   /// Bytes that what is learnt may take, at most; 0: few.
   virtual size_t training_memory() const { return 0; }
   /// What trace() has recorded in a thread's state since the last call, or null. Not called when frozen. Thread-safe.

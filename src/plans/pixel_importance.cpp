@@ -10,7 +10,7 @@
 
 namespace covary {
 
-std::vector<Spectrum> pixel_importance(const Scene& scene, const FilterSettings& filter, const Film& film,
+std::vector<Spectrum> pixel_importance(const Scene& scene, const FilterSettings& filter, const Film& film, bool by_oidn,
                                        const std::atomic<bool>* stop) {
   constexpr float kSmallest = 0.01f;
   constexpr uint32_t kGuideSamples = 2;
@@ -20,8 +20,8 @@ std::vector<Spectrum> pixel_importance(const Scene& scene, const FilterSettings&
   render_aovs(scene, settings, kGuideSamples, guides, stop);
   if (!guides.aovs.contains("N")) return {};
   const Image &albedo = guides.aovs.at("Albedo"), &normal = guides.aovs.at("N");
-  const Image value = find_denoiser().empty() ? joint_bilateral(film.mean_image(), albedo, normal)
-                                              : denoise(film.mean_image(), &albedo, &normal);
+  const Image value =
+      by_oidn ? denoise(film.mean_image(), &albedo, &normal) : joint_bilateral(film.mean_image(), albedo, normal);
   std::vector<Spectrum> importance;
   for (int y = 0; y < value.height; ++y)
     for (int x = 0; x < value.width; ++x) {

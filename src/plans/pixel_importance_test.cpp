@@ -20,7 +20,7 @@ Film film_of(const Spectrum& value) {
 
 std::vector<Spectrum> importance_of(const Spectrum& value) {
   const LoadedScene scene = load_sized(kRoom);
-  return pixel_importance(*scene.scene, scene.filter, film_of(value), nullptr);
+  return pixel_importance(*scene.scene, scene.filter, film_of(value), false, nullptr);
 }
 
 TEST(PixelImportance, IsInverseToTheValue) {

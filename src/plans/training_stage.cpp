@@ -5,6 +5,7 @@
 
 #include "core/stop.h"
 #include "core/stopwatch.h"
+#include "estimators/denoise.h"
 #include "plans/pixel_importance.h"
 #include "plans/training_file.h"
 
@@ -15,9 +16,11 @@ bool train(const LoadedScene& scene, const RenderRequest& request, Integrator& i
   const Stopwatch watch;
   LearningIntegrator* learning = integrator.learning();
   settings.seed = request.seed;
-  settings.importance = [&](const Film& film) {
+  const bool by_oidn = learning && learning->pilot_by_oidn();
+  if (by_oidn && request.load_training.empty()) denoiser_info();  // throws before rendering where there is none
+  settings.importance = [&, by_oidn](const Film& film) {
     const Stopwatch surrogate;
-    std::vector<Spectrum> importance = pixel_importance(*scene.scene, settings.filter, film, settings.stop);
+    std::vector<Spectrum> importance = pixel_importance(*scene.scene, settings.filter, film, by_oidn, settings.stop);
     seconds.surrogate = surrogate.seconds();
     return importance;
   };

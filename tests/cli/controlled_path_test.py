@@ -29,7 +29,8 @@ class Options(CliTest):
     def test_refuses_options_without_effect(self):
         for option, *others in (("--cv-grid", "8", "--cv", "off"), ("--cv-albedo", "off", "--cv", "vevoda"),
                                 ("--cv-indirect", "on", "--cv", "vevoda"), ("--cv-prefix", "on", "--cv", "optimal-mis"),
-                                ("--cv-variance", "absolute", "--cv", "optimal-mis")):
+                                ("--cv-variance", "absolute", "--cv", "optimal-mis"),
+                                ("--cv-surrogate", "oidn", "--cv-variance", "absolute")):
             self.bad(2, f"{option} has no effect with", *RENDER, "-o", "a.exr", option, *others)
         self.good(*RENDER, "--estimator", "none", "--spp", "20", "-o", "a.exr", "--cv", "off", "--lights", "learned",
                   "--cv-train", "8")
@@ -106,6 +107,33 @@ class Albedo(LearningTest, CliTest):
         self.assertEqual(self.pixels("a.exr")["group00.R"], self.pixels("b.exr")["R"])
         self.bad(1, "a.training", *PLAIN, "--spp", "2", "-o", "c.exr", "--load-training", "a.training", "--cv-albedo",
                  "off")
+
+
+class Surrogate(LearningTest, CliTest):
+    def test_does_not_follow_from_what_is_installed(self):
+        self.good(*PLAIN, "--spp", "6", "-o", "a.exr")
+        self.good(*PLAIN, "--spp", "6", "-o", "b.exr", "--cv-surrogate", "filter",
+                  env={**os.environ, "COVARY_OIDN": "/nowhere"})
+        self.assertEqual(self.pixels("a.exr")["R"], self.pixels("b.exr")["R"])
+        attributes = json.loads(self.good("info", "a.exr", "--json").stdout)["attributes"]
+        self.assertNotIn("surrogate", attributes["covary:settings"])
+
+    def test_by_a_denoiser_that_is_missing(self):
+        result = self.run_covary(*PLAIN, "--spp", "6", "-o", "a.exr", "--passes", "films", "--cv-surrogate", "oidn",
+                                 env={**os.environ, "COVARY_OIDN": "/nowhere"})
+        self.assertEqual(result.returncode, 2, result.stderr)
+        self.assertIn("Open Image Denoise is not there (/nowhere", result.stderr)
+        self.assertFalse((self.path / "a.exr").exists())
+
+    def test_by_a_denoiser_that_is_there(self):
+        if self.run_covary("denoise", "--check").returncode != 0:
+            self.skipTest("Open Image Denoise is not installed")
+        self.good(*PLAIN, "--spp", "6", "-o", "a.exr")
+        self.good(*PLAIN, "--spp", "6", "-o", "b.exr", "--cv-surrogate", "oidn")
+        self.assertNotEqual(self.pixels("a.exr")["R"], self.pixels("b.exr")["R"])
+        attributes = json.loads(self.good("info", "b.exr", "--json").stdout)["attributes"]
+        self.assertIn("surrogate=oidn", attributes["covary:settings"])
+        self.bad(1, "surrogate=oidn", *PLAIN, "--spp", "8", "-o", "b.exr", "--resume")
 
 
 class PathLengths(CliTest):
