@@ -281,7 +281,8 @@ void add_combine(CLI::App& app) {
       ->check(one_of(pair_estimator_names()))
       ->capture_default_str();
   add_estimator_options(*command, o->estimator, pair_estimator_names(), kAdaptiveOptions);
-  add_denoise_options(*command, o->estimator);
+  add_denoise_option(*command, o->estimator);
+  add_oidn_option(*command, o->estimator);
   command->add_option("--guides", o->guides,
                       "For --denoise: image (EXR) of the same pixels whose layers Albedo and N show the surfaces");
   add_stages_option(*command, o->stages);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "command_description.h"
 
+#include <algorithm>
+
 namespace covary {
 namespace {
 
@@ -13,11 +15,31 @@ std::vector<std::string> split(const std::string& text, char separator) {
   return parts;
 }
 
+std::string names_of(const std::set<CLI::Option*>& options) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : options) names.push_back(option->get_name());
+  std::sort(names.begin(), names.end());
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+/// What the parser checks or does on its own, behind the description.
+std::string text_of(const CLI::Option& option) {
+  std::string text = option.get_description();
+  if (option.get_items_expected_max() > 0 && !option.get_default_str().empty())
+    text += "; default " + option.get_default_str();
+  if (option.get_required() && !option.get_positional()) text += " (required)";
+  if (!option.get_needs().empty()) text += "; with " + names_of(option.get_needs());
+  if (!option.get_excludes().empty()) text += "; not with " + names_of(option.get_excludes());
+  return text;
+}
+
 OptionDescription describe_option(const CLI::Option& option) {
   OptionDescription result;
   for (const std::string& name : option.get_snames()) result.names.push_back("-" + name);
   for (const std::string& name : option.get_lnames()) result.names.push_back("--" + name);
-  result.text = option.get_description();
+  result.text = text_of(option);
   result.group = option.get_group();
   if (option.get_items_expected_max() == 0) return result;
   // The parser writes the type first, then what its checks say: "TEXT:{a,b}", "UINT:UINT in [1 - 4]".
@@ -28,7 +50,8 @@ OptionDescription describe_option(const CLI::Option& option) {
     result.choices = split(type.substr(open + 1, close - open - 1), ',');
   else if (type.find('|') != std::string::npos)
     result.choices = split(type, '|');
-  result.takes_files = result.choices.empty() && (type.starts_with("TEXT") || type.find("FILE") != std::string::npos);
+  result.takes_files = result.choices.empty() &&
+                       (type.starts_with("TEXT") || type.find("FILE") != std::string::npos || type == "FOLDER");
   return result;
 }
 
@@ -41,6 +64,14 @@ CommandDescription describe_command(const CLI::App& app) {
   for (const CLI::Option* option : app.get_options())
     (option->get_positional() ? result.positionals : result.options).push_back(describe_option(*option));
   return result;
+}
+
+std::vector<std::string> groups_of(const CommandDescription& command) {
+  std::vector<std::string> groups;
+  for (const OptionDescription& option : command.options)
+    if (!option.group.empty() && std::find(groups.begin(), groups.end(), option.group) == groups.end())
+      groups.push_back(option.group);
+  return groups;
 }
 
 std::vector<CommandDescription> describe_subcommands(const CLI::App& app) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The program's commands and options as plain data, read from the command-line parser: what the man page and the shell
-// completions are made of.
+// completions are made of, and the help.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -32,6 +32,14 @@ struct CommandDescription {
 CommandDescription describe_command(const CLI::App& app);
 /// The subcommands of `app`, in their order.
 std::vector<CommandDescription> describe_subcommands(const CLI::App& app);
+
+/// Heading in the help of the options that everybody needs, those that have no group of their own.
+inline constexpr const char* kBasicOptions = "Options";
+/// The headings of the command's options, in the order in which they first appear.
+std::vector<std::string> groups_of(const CommandDescription& command);
+
+/// The help of a command, in lines of at most 100 columns; without `all`, of kBasicOptions alone.
+std::string help_text(const CLI::App& app, const std::string& name, bool all);
 
 /// Page of the section 1 of the manual, in the macros of man(7).
 std::string man_page(const CLI::App& app, const std::string& version);

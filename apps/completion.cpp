@@ -70,7 +70,7 @@ std::string bash_script(const std::vector<CommandDescription>& commands) {
          "  COMPREPLY=()\n"
          "  if [ \"$COMP_CWORD\" -eq 1 ]; then\n"
          "    COMPREPLY=($(compgen -W " +
-         quoted(names_of(commands) + " --help --version") +
+         quoted(names_of(commands) + " --help --help-all --version") +
          " -- \"$word\"))\n"
          "    return\n"
          "  fi\n"

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "command_description.h"
 #include "integrators/integrator.h"
 
 namespace covary {
@@ -58,7 +59,8 @@ void add_option(CLI::App& command, const Option& what, OptionValues& values) {
   }
   if (what.type != Option::Type::kFlag) option->type_name(value_name(what));
   if (what.repeats) option->expected(1)->take_all();
-  if (!what.group.empty()) option->group(what.group);
+  const bool is_basic = what.level == OptionLevel::kBasic || what.group.empty();
+  option->group(is_basic ? kBasicOptions : what.group);
 }
 
 }  // namespace

@@ -6,7 +6,8 @@
 namespace covary {
 
 void add_define_option(CLI::App& command, std::vector<std::string>& defines) {
-  command.add_option("-D,--define", defines, "name=value for the scene's <default> elements")
+  command.add_option("-D,--define", defines, "Value of one of the scene's <default> elements")
+      ->type_name("name=value")
       ->take_all()
       ->expected(1)
       ->allow_extra_args(false);

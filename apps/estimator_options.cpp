@@ -76,27 +76,25 @@ void add_estimator_options(CLI::App& command, EstimatorOptions& o, const std::ve
   }
 }
 
-void add_denoise_options(CLI::App& command, EstimatorOptions& o) {
+void add_denoise_option(CLI::App& command, EstimatorOptions& o) {
   command
       .add_option("--denoise", o.denoise,
                   "Mix the image with denoised ones where held-out samples find that better: for least bias, for least "
                   "error, or balanced")
       ->check(one_of(denoise_mode_names()))
       ->capture_default_str();
-  command.add_option(
-      "--oidn", o.oidn,
-      "For --denoise: Open Image Denoise's library or a folder of it; default: where it is found; 'off': "
-      "without it");
+}
+
+void add_oidn_option(CLI::App& command, EstimatorOptions& o) {
+  command
+      .add_option("--oidn", o.oidn,
+                  "For --denoise: Open Image Denoise's library or a folder of it; default: where it is found; 'off': "
+                  "without it")
+      ->type_name("FILE|FOLDER|off");
 }
 
 Estimator make_estimator(const EstimatorOptions& o) {
   return with_denoising(make_estimator(o.name, o.values), o.denoise, o.oidn);
-}
-
-std::string list_text(const std::vector<std::string>& words, const std::string& last) {
-  std::string text;
-  for (size_t i = 0; i < words.size(); ++i) text += (i == 0 ? "" : i + 1 == words.size() ? last : ", ") + words[i];
-  return text;
 }
 
 }  // namespace covary

@@ -30,14 +30,11 @@ struct EstimatorOptions {
 void add_estimator_options(CLI::App& command, EstimatorOptions& options, const std::vector<std::string>& estimators,
                            std::span<const char* const> left_out = {});
 
-/// Adds --denoise and --oidn.
-void add_denoise_options(CLI::App& command, EstimatorOptions& options);
+void add_denoise_option(CLI::App& command, EstimatorOptions& options);
+void add_oidn_option(CLI::App& command, EstimatorOptions& options);
 
 /// make_estimator() of the registry, and what --denoise makes of it: throws Error(kUsage) for options of another
 /// estimator, values out of range, and where there is nothing to denoise.
 Estimator make_estimator(const EstimatorOptions& options);
-
-/// "a, b or c".
-std::string list_text(const std::vector<std::string>& words, const std::string& last = " or ");
 
 }  // namespace covary

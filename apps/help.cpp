@@ -13,17 +13,16 @@ namespace {
 
 struct HelpOptions {
   std::string command, shell;
-  bool man = false;
+  bool man = false, all = false;
 };
 
-std::string help_text(const CLI::App& app, const HelpOptions& o) {
+std::string text_for(const CLI::App& app, const HelpOptions& o) {
   if (o.man) return man_page(app, version_text());
   if (!o.shell.empty()) return completion_script(app, o.shell);
-  // Not app.help(), which describes the selected command, this one.
-  if (o.command.empty()) return app.get_formatter()->make_help(&app, app.get_name(), CLI::AppFormatMode::Normal);
+  if (o.command.empty()) return help_text(app, app.get_name(), o.all);
   std::vector<std::string> names;
   for (const CLI::App* command : app.get_subcommands(nullptr)) {
-    if (command->get_name() == o.command) return command->help("covary");
+    if (command->get_name() == o.command) return help_text(*command, "covary " + o.command, o.all);
     names.push_back(command->get_name());
   }
   throw Error(ErrorCode::kUsage, "unknown command '" + o.command + "'" + did_you_mean(o.command, names));
@@ -35,12 +34,13 @@ void add_help(CLI::App& app) {
   const auto o = std::make_shared<HelpOptions>();
   CLI::App* command = app.add_subcommand("help", "Help on a command, the man page, completions for shells");
   CLI::Option* name = command->add_option("COMMAND", o->command, "The command; without it, all are listed");
+  command->add_flag("--all", o->all, "All options, as --help-all shows them");
   CLI::Option* man = command->add_flag("--man", o->man, "Print the page of all commands for man(1)")->excludes(name);
   command->add_option("--completion", o->shell, "Print the completion script of this shell")
       ->check(CLI::IsMember({"bash", "zsh", "fish"}))
       ->excludes(name)
       ->excludes(man);
-  command->callback([&app, o] { std::fputs(help_text(app, *o).c_str(), stdout); });
+  command->callback([&app, o] { std::fputs(text_for(app, *o).c_str(), stdout); });
 }
 
 }  // namespace covary

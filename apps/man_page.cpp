@@ -32,10 +32,11 @@ std::string term(const OptionDescription& option) {
   return result;
 }
 
-std::string list(const std::vector<OptionDescription>& options) {
+std::string list(const std::vector<OptionDescription>& options, const std::string& group) {
   std::string result;
   for (const OptionDescription& option : options)
-    result += fmt::format(".TP\n{}\n{}\n", term(option), escaped(option.text));
+    if (option.group == group || option.names.empty())
+      result += fmt::format(".TP\n{}\n{}\n", term(option), escaped(option.text));
   return result;
 }
 
@@ -55,7 +56,11 @@ std::string man_page(const CLI::App& app, const std::string& version) {
     for (const OptionDescription& positional : command.positionals)
       arguments += fmt::format(" \\fI{}\\fR", escaped(positional.value));
     page += fmt::format(".SS covary {} [options]{}\n{}.\n", command.name, arguments, escaped(command.text));
-    page += list(command.positionals) + list(command.options);
+    page += list(command.positionals, "");
+    for (const std::string& group : groups_of(command)) {
+      if (group != kBasicOptions) page += fmt::format(".PP\n\\fI{}\\fR\n", escaped(group));
+      page += list(command.options, group);
+    }
   }
   return page +
          ".SH EXIT STATUS\n.TP\n.B 0\nDone.\n.TP\n.B 1\nFailed; the message says why.\n.TP\n.B 2\nWrong usage.\n"

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "command_description.h"
 #include "commands.h"
 #include "core/error.h"
 #include "declared_options.h"
@@ -37,19 +38,6 @@ Until parse_until(const std::string& text) {
   throw Error(ErrorCode::kUsage,
               "--until '" + text + "': expected relmse=X or relmse-p95=X with X > 0, e.g. relmse=0.005");
 }
-
-namespace {
-
-/// "polynomials, for direct light, or none, the mean".
-std::string single_pass_estimators() {
-  std::vector<std::string> texts;
-  for (const std::string& name : estimator_names())
-    if (const Estimator e = make_estimator(name); e.passes != EstimatorPasses::kPair)
-      texts.push_back(name + ", " + e.summary);
-  return list_text(texts, ", or ");
-}
-
-}  // namespace
 
 void check_options(RenderOptions& options) {
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
@@ -187,66 +175,73 @@ SampleAddress replayed_sample(const RenderOptions& options) {
   return address;
 }
 
-void add_render_options(CLI::App& command, RenderOptions& o) {
+namespace {
+
+/// What a person needs who wants a picture: no heading of its own, so that `covary render --help` shows it.
+CLI::Option* add_basic_options(CLI::App& command, RenderOptions& o) {
   command.add_option("SCENE", o.scene, "Scene file, Mitsuba XML")->required();
-  command.add_option("-o,--output", o.output, "The image (EXR); a PNG preview appears beside it");
-  command
-      .add_option("--spp", o.spp,
-                  "Samples per pixel of all passes together, at least 4 in each of two; default: the scene's")
+  command.add_option("-o,--output", o.output, "The image (EXR); a PNG preview appears beside it")->type_name("FILE");
+  command.add_option("--spp", o.spp, "Samples per pixel of all passes together; default: the scene's")
       ->transform(whole_number(1u, 1u << 30));
+  command
+      .add_option("--until", o.until,
+                  "relmse=X: add samples until the predicted error is X, at most --spp; relmse-p95=X: until 95 % of "
+                  "the blocks of 16 x 16 pixels have no more")
+      ->type_name("relmse=X");
+  command.add_option("--time", o.seconds, "Seconds for rendering and estimating, not for loading or writing")
+      ->check(positive_number());
   command.add_option("--integrator", o.integrator, "Integrator instead of the scene's")
       ->type_name(fmt::format("{{{}}}", fmt::join(integrator_names(), ",")));
-  command
-      .add_option("--estimator", o.estimator.name,
-                  fmt::format("How passes become the image: {} of a pass with common random numbers and an "
-                              "independent one; of a single pass {}",
-                              list_text(pair_estimator_names()), single_pass_estimators()))
+  command.add_option("--estimator", o.estimator.name, "How samples become the image; none: the mean of one pass")
       ->check(one_of(estimator_names()))
       ->capture_default_str();
-  command.add_option("--split", o.split, "CRN:INDEPENDENT, parts of the samples for the two passes")
+  add_denoise_option(command, o.estimator);
+  command.add_option("--seed", o.seed, "Seed of the random numbers")
+      ->transform(whole_number(uint64_t{0}, std::numeric_limits<uint64_t>::max()))
       ->capture_default_str();
+  command.add_option("--resolution", o.resolution, "Size of the full frame; default: the scene's")
+      ->type_name("WIDTHxHEIGHT");
+  command.add_option("--crop", o.crop, "Render only these pixels of the frame")->type_name("X,Y,WIDTH,HEIGHT");
+  command.add_option("--passes,--save-passes", o.passes, "Keep the film of every pass here")->type_name("FOLDER");
+  CLI::Option* resume =
+      command.add_flag("--resume", o.resume, "Continue the films of an interrupted render, or those in --passes");
+  add_define_option(command, o.defines);
+  add_threads_option(command, o.threads);
+  command.add_option("--json", o.json, "Statistics; '-': to standard output")->type_name("FILE");
+  command.add_flag("--quiet", o.quiet, "No progress and no summary");
+  return resume;
+}
+
+void add_sampling_options(CLI::App& command, RenderOptions& o) {
+  command.option_defaults()->group("Sampling");
+  command
+      .add_option("--sampler", o.sampler,
+                  "Random numbers of the samples of a group: independent, or Owen-scrambled Sobol' points; default: "
+                  "the scene's, any but independent meaning sobol")
+      ->check(one_of({"independent", "sobol"}));
   command
       .add_option("--sampling", o.sampling,
                   "Random numbers per pixel, or common to all; a single pass (estimator none)")
       ->check(one_of({"independent", "crn"}));
+  command.add_option("--split", o.split, "Parts of the samples for the two passes")
+      ->type_name("CRN:INDEPENDENT")
+      ->capture_default_str();
   command
-      .add_option(
-          "--sampler", o.sampler,
-          "Random numbers of the samples of a group: independent, or Owen-scrambled Sobol' points; default: the "
-          "scene's, any but independent meaning sobol")
-      ->check(one_of({"independent", "sobol"}));
+      .add_option("--groups", o.groups,
+                  "Groups of samples whose means films keep; default: the largest from 12 to 8 that divides the "
+                  "samples, else 12, or as many as samples; 1 for a single independent pass")
+      ->transform(whole_number(1, Film::kMaxGroups));
   command
       .add_option("--crn-part", o.crn_part,
                   "Which part of a path has the common random numbers, for integrators that trace light")
       ->check(one_of({"both", "camera", "light"}))
       ->capture_default_str();
-  command
-      .add_option(
-          "--groups", o.groups,
-          "Groups of samples whose means films keep; default: the largest from 12 to 8 that divides the samples, "
-          "else 12, or as many as samples; 1 for a single independent pass")
-      ->transform(whole_number(1, Film::kMaxGroups));
-  command.add_option("--display-server", o.display_server,
-                     "HOST:PORT of a running tev, which shows the image while it renders");
-  command.add_option(
-      "--until", o.until,
-      "relmse=X: add samples until the predicted error is X, at most --spp; relmse-p95=X: until 95 % of the blocks "
-      "of 16 x 16 pixels have no more");
-  command.add_option("--seed", o.seed, "Seed of the random numbers")
-      ->transform(whole_number(uint64_t{0}, std::numeric_limits<uint64_t>::max()))
-      ->capture_default_str();
-  command.add_option("--resolution", o.resolution, "WIDTHxHEIGHT of the full frame; default: the scene's");
-  command.add_option("--crop", o.crop, "X,Y,WIDTH,HEIGHT: render only these pixels of the frame");
   command.add_option("--rfilter", o.rfilter, "Reconstruction filter instead of the scene's")
       ->check(one_of({"box", "tent", "gaussian"}));
-  add_threads_option(command, o.threads);
-  command
-      .add_option("--time", o.seconds,
-                  "Seconds for rendering and estimating together; loading and writing are not counted")
-      ->check(positive_number());
-  command.add_option("--passes,--save-passes", o.passes, "Folder that keeps the film of every pass");
-  CLI::Option* resume =
-      command.add_flag("--resume", o.resume, "Continue the films of an interrupted render, or those in --passes");
+}
+
+void add_output_options(CLI::App& command, RenderOptions& o, CLI::Option* resume) {
+  command.option_defaults()->group("Output");
   command
       .add_flag("--overwrite", o.overwrite,
                 "Replace films that are there already, in --passes or of an interrupted render")
@@ -254,24 +249,41 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
   command.add_option("--checkpoint", o.checkpoint_seconds, "Seconds between writing unfinished films; 0: never")
       ->capture_default_str()
       ->check(real_number(0, std::numeric_limits<double>::infinity()));
-  add_stages_option(command, o.stages);
-  add_define_option(command, o.defines);
-  command.add_flag("--aovs", o.aovs, "Add the images Albedo, N (normal) and P (position) to the output");
-  command.add_option("--replay", o.replay, "X,Y,SAMPLE[,PASS]: print one sample instead of rendering");
-  command.add_option("--debug-strategies", o.debug_strategies,
-                     "New folder for images of each technique (s, t) of bidirectional path tracing, rendered beside");
-  command.add_option("--json", o.json, "File for statistics; '-': standard output");
   command.add_flag("!--no-preview", o.preview, "Do not write the PNG");
-  command.add_flag("--quiet", o.quiet, "No progress and no summary");
+  command.add_option("--display-server", o.display_server, "A running tev, which shows the image while it renders")
+      ->type_name("HOST:PORT");
+  command.add_flag("--aovs", o.aovs, "Add the images Albedo, N (normal) and P (position) to the output");
   command.add_flag("--path-lengths", o.path_lengths,
                    "Add an image for each number of edges of paths (Edges01, …) to the output");
-  command.add_option("--replay-light", o.replay_light, "NUMBER: print what one light path adds to the image")
+  add_stages_option(command, o.stages);
+  command
+      .add_option("--debug-strategies", o.debug_strategies,
+                  "New folder for images of each technique (s, t) of bidirectional path tracing, rendered beside")
+      ->type_name("FOLDER");
+  command.add_option("--replay", o.replay, "Print one sample instead of rendering")->type_name("X,Y,SAMPLE[,PASS]");
+  command.add_option("--replay-light", o.replay_light, "Print what one light path adds to the image")
       ->transform(whole_number(uint64_t{0}, (uint64_t{1} << 40) - 1))
       ->type_name("NUMBER");
+}
+
+void add_training_options(CLI::App& command, RenderOptions& o) {
+  command.option_defaults()->group("Training of controlled-path and guided-path");
+  command.add_option("--save-training", o.save_training, "Keep here what was learnt")->type_name("FILE");
+  command.add_option("--load-training", o.load_training, "Such a file, to use in place of a training")
+      ->type_name("FILE");
+}
+
+}  // namespace
+
+void add_render_options(CLI::App& command, RenderOptions& o) {
+  CLI::Option* resume = add_basic_options(command, o);
+  add_sampling_options(command, o);
+  add_output_options(command, o, resume);
   add_options(command, options_of_integrators(), o.of_integrator);
-  command.add_option("--save-training", o.save_training, "File that keeps what controlled-path or guided-path learnt");
-  command.add_option("--load-training", o.load_training, "Such a file, to use in place of a training");
-  add_denoise_options(command, o.estimator);
+  add_training_options(command, o);
+  command.option_defaults()->group("Denoising");
+  add_oidn_option(command, o.estimator);
+  command.option_defaults()->group(kBasicOptions);
   add_estimator_options(command, o.estimator, estimator_names());
 }
 

@@ -29,8 +29,10 @@ Image coloured(Image map) {
 }  // namespace
 
 void add_stages_option(CLI::App& command, std::string& folder) {
-  command.add_option("--save-stages", folder,
-                     "Folder for images of the single steps (EXR and PNG); of estimators that have some");
+  command
+      .add_option("--save-stages", folder,
+                  "Folder for images of the single steps (EXR and PNG); of estimators that have some")
+      ->type_name("FOLDER");
 }
 
 void check_stages(const std::string& folder, const Estimator& estimator) {

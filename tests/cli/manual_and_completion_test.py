@@ -12,12 +12,14 @@ from cli_test import CliTest
 class HelpTest(CliTest):
     def setUp(self):
         super().setUp()
-        names = self.good("help").stdout.split("Subcommands:")[1]
+        names = self.good("help").stdout.split("\nCommands:")[1]
         self.commands = re.findall(r"^  (\w+) ", names, re.M)
-        self.options = {name: re.findall(r"(?:^  |,)(--[\w-]+)", self.good("help", name).stdout, re.M)
-                        for name in self.commands}
+        self.options = {name: self.options_in(self.good(name, "--help-all").stdout) for name in self.commands}
         self.assertIn("render", self.commands)
         self.assertIn("--estimator", self.options["render"])
+
+    def options_in(self, text):
+        return re.findall(r"(?:^ +|^  -\w, |, )(--[\w-]+)(?=[, ]|$)", text, re.M)
 
     def script(self, shell):
         self.write("script", self.good("help", "--completion", shell).stdout.encode())
@@ -33,9 +35,49 @@ class Help(HelpTest):
     def test_of_a_command(self):
         self.assertEqual(self.good("help", "render").stdout, self.good("render", "--help").stdout)
         self.assertEqual(self.good("help").stdout, self.good("--help").stdout)
+        self.assertEqual(self.good("help", "render", "--all").stdout, self.good("render", "--help-all").stdout)
         self.bad(2, "unknown command 'rendr'; did you mean 'render'?", "help", "rendr")
         self.bad(2, "--completion", "help", "--completion", "tcsh")
         self.bad(2, "COMMAND excludes --man", "help", "render", "--man")
+
+
+class OneScreen(HelpTest):
+    """What a person needs who wants a picture; the rest by group in --help-all."""
+
+    WANTED = ("--output --spp --until --time --integrator --estimator --denoise --seed --resolution --crop --max-depth "
+              "--passes --resume --threads --json --quiet --define --help-all").split()
+
+    def test_of_render(self):
+        lines = self.good("render", "--help").stdout.splitlines()
+        self.assertLessEqual(len(lines), 40)
+        self.assertLessEqual(max(map(len, lines)), 100)
+        shown = self.options_in("\n".join(lines))
+        self.assertLessEqual(set(self.WANTED), set(shown))
+        self.assertNotIn("--cv-grid", shown)
+        hidden = len({line for line in self.good("render", "--help-all").stdout.splitlines()
+                      if re.match(r" +-", line)}) - len({line for line in lines if re.match(r" +-", line)})
+        self.assertIn(f"{hidden} other options", lines[-1])
+
+    def test_all_options(self):
+        text = self.good("render", "--help-all").stdout
+        self.assertLessEqual(max(map(len, text.splitlines())), 100)
+        self.assertLessEqual({"--cv-grid", "--split", "--variance", "--oidn", *self.WANTED}, set(self.options_in(text)))
+        headings = re.findall(r"^(\S.*):$", text, re.M)
+        self.assertEqual(headings[:2], ["Arguments", "Options"])
+        self.assertLessEqual({"Sampling", "Paths", "Integrator controlled-path", "Estimator"}, set(headings))
+        self.assertEqual(len(headings), len(set(headings)))
+
+    def test_commands(self):
+        text = self.good("--help").stdout
+        main, laboratory = text.split("\nCommands:\n")[1].split("\nLaboratory:\n")
+        names = [re.findall(r"^  (\w+)", part, re.M) for part in (main, laboratory)]
+        self.assertEqual(names[0][:5], ["render", "combine", "denoise", "compare", "view"])
+        self.assertLessEqual({"experiment", "probe"}, set(names[1]))
+
+    def test_everything(self):
+        text = self.good("--help-all").stdout
+        for command in self.commands:
+            self.assertIn(self.good(command, "--help-all").stdout, text)
 
 
 class Manual(HelpTest):
@@ -65,7 +107,7 @@ class Bash(HelpTest):
                           'echo "${COMPREPLY[@]}"').split()
 
     def test_commands(self):
-        self.assertEqual(sorted(self.complete("")), sorted([*self.commands, "--help", "--version"]))
+        self.assertEqual(sorted(self.complete("")), sorted([*self.commands, "--help", "--help-all", "--version"]))
         self.assertEqual(self.complete("ren"), ["render"])
 
     def test_options(self):
