@@ -29,6 +29,7 @@
 #include "numbers.h"
 #include "progress.h"
 #include "stages.h"
+#include "value_names.h"
 
 namespace covary {
 namespace {
@@ -263,19 +264,27 @@ void add_combine(CLI::App& app) {
   CLI::App* command =
       app.add_subcommand("combine", "Combine a CRN and an independent image of any renderer into one with less noise");
   command->add_option("--crn", o->crn, "Image with common random numbers: one EXR with all groups, or one per group")
+      ->type_name(kFileValue)
       ->required()
       ->expected(1, 1000);
   command->add_option("--independent,--pt", o->independent, "Image with independent random numbers, likewise")
+      ->type_name(kFileValue)
       ->required()
       ->expected(1, 1000);
-  command->add_option("-o,--output", o->output, "The result (EXR)")->required();
-  command->add_option("--crn-layer", o->crn_layer, "Layer of the CRN image where its files hold several");
-  command->add_option("--independent-layer,--pt-layer", o->independent_layer,
-                      "Layer of the independent image where its files hold several");
-  command->add_option("--counts", o->counts,
-                      "EXR with the samples of each pixel of the independent image, all groups together, where its "
-                      "files do not tell and pixels differ");
-  command->add_option("--light", o->light, "Light film (light.exr of covary render --passes) to add to the result");
+  command->add_option("-o,--output", o->output, "The result (EXR)")->type_name(kFileValue)->required();
+  command->add_option("--crn-layer", o->crn_layer, "Layer of the CRN image where its files hold several")
+      ->type_name("LAYER");
+  command
+      ->add_option("--independent-layer,--pt-layer", o->independent_layer,
+                   "Layer of the independent image where its files hold several")
+      ->type_name("LAYER");
+  command
+      ->add_option("--counts", o->counts,
+                   "EXR with the samples of each pixel of the independent image, all groups together, where its "
+                   "files do not tell and pixels differ")
+      ->type_name(kFileValue);
+  command->add_option("--light", o->light, "Light film (light.exr of covary render --passes) to add to the result")
+      ->type_name(kFileValue);
   command->add_option("--estimator", o->estimator.name, "iicv, or a comparator")
       ->check(CLI::Validator([](std::string& name) { return needs_samples_text(name); }, ""))
       ->check(one_of(pair_estimator_names()))
@@ -283,8 +292,10 @@ void add_combine(CLI::App& app) {
   add_estimator_options(*command, o->estimator, pair_estimator_names(), kAdaptiveOptions);
   add_denoise_option(*command, o->estimator);
   add_oidn_option(*command, o->estimator);
-  command->add_option("--guides", o->guides,
-                      "For --denoise: image (EXR) of the same pixels whose layers Albedo and N show the surfaces");
+  command
+      ->add_option("--guides", o->guides,
+                   "For --denoise: image (EXR) of the same pixels whose layers Albedo and N show the surfaces")
+      ->type_name(kFileValue);
   add_stages_option(*command, o->stages);
   command
       ->add_option("--samples", o->samples,
@@ -304,7 +315,7 @@ void add_combine(CLI::App& app) {
       ->check(positive_number())
       ->capture_default_str();
   add_threads_option(*command, o->threads);
-  command->add_option("--json", o->json, "File for statistics; '-': standard output");
+  command->add_option("--json", o->json, "File for statistics; '-': standard output")->type_name(kFileValue);
   command->add_flag("--quiet", o->quiet, "Warnings and errors only");
   command->callback([o] { combine_files(*o); });
 }

@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "command_description.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
+
+#include "value_names.h"
 
 namespace covary {
 namespace {
@@ -42,20 +47,31 @@ OptionDescription describe_option(const CLI::Option& option) {
   result.text = text_of(option);
   result.group = option.get_group();
   if (option.get_items_expected_max() == 0) return result;
-  // The parser writes the type first, then what its checks say: "TEXT:{a,b}", "UINT:UINT in [1 - 4]".
+  // The parser writes the type first, then what its checks say: "TEXT:{a,b}".
   const std::string type = option.get_type_name();
   const size_t open = type.find('{'), close = type.find('}');
-  result.value = option.get_positional() ? option.get_name(true) : type.substr(0, type.find(':'));
+  result.value = option.get_positional() ? option.get_name(true) : type.find(":{") == std::string::npos ? type : "TEXT";
   if (open != std::string::npos && close != std::string::npos)
     result.choices = split(type.substr(open + 1, close - open - 1), ',');
   else if (type.find('|') != std::string::npos)
     result.choices = split(type, '|');
-  result.takes_files = result.choices.empty() &&
-                       (type.starts_with("TEXT") || type.find("FILE") != std::string::npos || type == "FOLDER");
+  // Of "off|LIBRARY", the words are choices, and what is named is none.
+  const auto is_path = [](const std::string& name) {
+    return name == kFileValue || name == "[FILE]" || name == kFolderValue || name == kLibraryValue || name == "TEXT";
+  };
+  const size_t n_choices = result.choices.size();
+  std::erase_if(result.choices, is_path);
+  result.takes_files = n_choices > result.choices.size() || (n_choices == 0 && is_path(type));
   return result;
 }
 
 }  // namespace
+
+std::string value_text(const OptionDescription& option) {
+  // Of "off|LIBRARY" the choices are not all.
+  const bool are_all = !option.choices.empty() && !option.takes_files;
+  return are_all ? fmt::format("{}", fmt::join(option.choices, "|")) : option.value;
+}
 
 CommandDescription describe_command(const CLI::App& app) {
   CommandDescription result;

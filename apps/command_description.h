@@ -28,6 +28,9 @@ struct CommandDescription {
   std::vector<OptionDescription> options, positionals;
 };
 
+/// What stands behind the option in the help: its choices, or what its value is.
+std::string value_text(const OptionDescription& option);
+
 /// The options of `app` itself.
 CommandDescription describe_command(const CLI::App& app);
 /// The subcommands of `app`, in their order.

@@ -21,6 +21,8 @@ void add_denoise(CLI::App& app);
 void add_experiment(CLI::App& app);
 void add_view(CLI::App& app);
 void add_help(CLI::App& app);
+/// All of them, with the help of the program.
+void add_commands(CLI::App& app);
 
 /// Exit code where a wanted error was not reached.
 inline constexpr int kTargetMissed = 3;

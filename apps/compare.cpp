@@ -20,6 +20,7 @@
 #include "film/outputs.h"
 #include "json_output.h"
 #include "numbers.h"
+#include "value_names.h"
 
 namespace covary {
 namespace {
@@ -215,23 +216,28 @@ void compare(const CompareOptions& options) {
 void add_compare(CLI::App& app) {
   const auto o = std::make_shared<CompareOptions>();
   CLI::App* command = app.add_subcommand("compare", "Errors of images against a reference");
-  command->add_option("IMAGES", o->images, "Images of any renderer (EXR, PNG, HDR, PFM, …)")->required();
-  command->add_option("-r,--reference", o->reference, "The reference image")->required();
-  command->add_option(
-      "--reference2", o->reference2,
-      "A second reference with samples of its own: products (F - R1)(F - R2) cancel the references' noise");
+  command->add_option("IMAGES", o->images, "Images of any renderer (EXR, PNG, HDR, PFM, …)")
+      ->type_name(kFileValue)
+      ->required();
+  command->add_option("-r,--reference", o->reference, "The reference image")->type_name(kFileValue)->required();
+  command
+      ->add_option("--reference2", o->reference2,
+                   "A second reference with samples of its own: products (F - R1)(F - R2) cancel the references' noise")
+      ->type_name(kFileValue);
   command
       ->add_option("-m,--metric", o->metrics,
                    "relmse, relmse-trimmed, mse, mae, mape, flip, above5; several separated by commas")
+      ->type_name("METRIC")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->capture_default_str();
-  command->add_option("--layer", o->layer, "Compare this layer (N, group03, …) in place of R G B");
+  command->add_option("--layer", o->layer, "Compare this layer (N, group03, …) in place of R G B")->type_name("LAYER");
   command
       ->add_option("--json", o->json, "One JSON object per image and line; to standard output without FILE or with -")
       ->expected(0, 1)
       ->type_name("[FILE]");
-  command->add_option("--error-map", o->error_map, "PNG of the first metric's error per pixel; its scale is printed");
+  command->add_option("--error-map", o->error_map, "PNG of the first metric's error per pixel; its scale is printed")
+      ->type_name(kFileValue);
   command->add_option("--error-range", o->error_range, "LOW,HIGH: ends of the error map's scale")
       ->delimiter(',')
       ->expected(2)

@@ -15,6 +15,7 @@
 #include "film/outputs.h"
 #include "film/provenance.h"
 #include "numbers.h"
+#include "value_names.h"
 
 namespace covary {
 namespace {
@@ -120,12 +121,14 @@ void add_convert(CLI::App& app) {
       ->add_option("FILES", o->files,
                    "Images of any renderer (EXR, HDR, PFM, …), put side by side, and last the new one: its name "
                    "tells the format (.exr .pfm .tif: 32-bit linear, .hdr: linear, .png .jpg: 8-bit sRGB)")
+      ->type_name(kFileValue)
       ->option_text("IN... OUT")
       ->required();
   command->add_option("-e,--exposure", o->exposure, "Stops: the image is multiplied by 2^E")
       ->check(real_number(-100, 100))
       ->capture_default_str();
-  command->add_option("--layer", o->layer, "Layer (N, group03, …) or single channel (samples) in place of R G B");
+  command->add_option("--layer", o->layer, "Layer (N, group03, …) or single channel (samples) in place of R G B")
+      ->type_name("LAYER");
   command->add_flag("--accept-changed", o->accept_changed,
                     "Take an image of covary that another program changed: the new one says nothing of its origin");
   command->add_flag("--overwrite", o->overwrite, "Replace OUT, whatever it is; else only pictures made by convert");

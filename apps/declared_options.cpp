@@ -6,6 +6,7 @@
 
 #include "command_description.h"
 #include "integrators/integrator.h"
+#include "value_names.h"
 
 namespace covary {
 namespace {
@@ -24,6 +25,7 @@ std::string names_of(const Option& option) {
 /// What the help shows behind the name.
 std::string value_name(const Option& option) {
   if (option.type == Option::Type::kChoice) return fmt::format("{{{}}}", fmt::join(option.choices, ","));
+  if (const char* named = value_name_of(option.names)) return named;
   if (option.type == Option::Type::kText) return option.form;
   return (option.choices.empty() ? "" : option.choices[0] + "|") +
          (option.type == Option::Type::kWhole ? "INT" : "FLOAT");

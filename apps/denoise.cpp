@@ -19,6 +19,7 @@
 #include "film/provenance.h"
 #include "guide_layer.h"
 #include "progress.h"
+#include "value_names.h"
 
 namespace covary {
 namespace {
@@ -89,11 +90,13 @@ void run(const Options& o) {
 void add_denoise(CLI::App& app) {
   const auto o = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand("denoise", "Denoise an image with Open Image Denoise (biased)");
-  command->add_option("IN", o->input, "Linear image (EXR); its layers Albedo and N are guides");
-  command->add_option("-o,--output", o->output, "The result (EXR)");
-  command->add_option("--oidn", o->denoise.library,
-                      "Open Image Denoise's library, its folder, the folder of Python's package pyoidn, or of an "
-                      "environment that holds it");
+  command->add_option("IN", o->input, "Linear image (EXR); its layers Albedo and N are guides")->type_name(kFileValue);
+  command->add_option("-o,--output", o->output, "The result (EXR)")->type_name(kFileValue);
+  command
+      ->add_option("--oidn", o->denoise.library,
+                   "Open Image Denoise's library, its folder, the folder of Python's package pyoidn, or of an "
+                   "environment that holds it")
+      ->type_name(kLibraryValue);
   command->add_flag("--check", o->check, "Print version and path of Open Image Denoise as it is found, and do nothing");
   command->add_flag("--no-guides", o->no_guides, "Do not use the layers Albedo and N");
   command->add_flag(

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "numbers.h"
+#include "value_names.h"
 
 namespace covary {
 namespace {
@@ -90,7 +91,7 @@ void add_oidn_option(CLI::App& command, EstimatorOptions& o) {
       .add_option("--oidn", o.oidn,
                   "For --denoise: Open Image Denoise's library or a folder of it; default: where it is found; 'off': "
                   "without it")
-      ->type_name("FILE|FOLDER|off");
+      ->type_name("off|LIBRARY");
 }
 
 Estimator make_estimator(const EstimatorOptions& o) {

@@ -39,7 +39,7 @@ std::string entry(const std::string& term, const std::string& text) {
 
 std::string option_entry(const OptionDescription& option) {
   if (option.names.empty()) return entry(option.value, option.text);
-  const std::string value = option.choices.empty() ? option.value : fmt::format("{}", fmt::join(option.choices, "|"));
+  const std::string value = value_text(option);
   // Long names of an option without a short one begin where those of the others do.
   const std::string indent = option.names[0].starts_with("--") ? "    " : "";
   return entry(fmt::format("{}{}{}{}", indent, fmt::join(option.names, ", "), value.empty() ? "" : " ", value),

@@ -17,6 +17,7 @@
 #include "plans/estimator_plans.h"
 #include "plans/memory.h"
 #include "plans/render.h"
+#include "value_names.h"
 
 namespace covary {
 namespace {
@@ -115,7 +116,9 @@ void info(const InfoOptions& options) {
 void add_info(CLI::App& app) {
   const auto options = std::make_shared<InfoOptions>();
   CLI::App* command = app.add_subcommand("info", "What a film, image or scene holds: size, channels, attributes");
-  command->add_option("FILE", options->path, "A film or image, or a scene file (.xml)")->required();
+  command->add_option("FILE", options->path, "A film or image, or a scene file (.xml)")
+      ->type_name(kFileValue)
+      ->required();
   add_define_option(*command, options->defines);
   command->add_flag("--json", options->json, "One JSON object");
   command->callback([options] { info(*options); });

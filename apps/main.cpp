@@ -60,22 +60,6 @@ std::string describe_extra(const CLI::App& app) {
   return "unknown option '" + extra + "'" + question + help;
 }
 
-void add_commands(CLI::App& app) {
-  app.set_help_flag("-h,--help", "Print this help and exit");
-  app.set_help_all_flag("--help-all", "Print the help of all options and exit");
-  app.formatter_fn([](const CLI::App* command, const std::string& name, CLI::AppFormatMode mode) {
-    return help_text(*command, name, mode == CLI::AppFormatMode::All);
-  });
-  for (const auto add : {add_render, add_combine, add_denoise, add_compare, add_view, add_info, add_convert, add_help})
-    add(app);
-  const std::vector<CLI::App*> everybodys = app.get_subcommands([](CLI::App*) { return true; });
-  for (const auto add : {add_experiment, add_merge, add_probe}) add(app);
-  for (CLI::App* command : app.get_subcommands([](CLI::App*) { return true; })) {
-    const bool is_everybodys = std::find(everybodys.begin(), everybodys.end(), command) != everybodys.end();
-    command->group(is_everybodys ? "Commands" : "Laboratory");
-  }
-}
-
 int run(int argc, char** argv) {
   CLI::App app("covary: Monte Carlo rendering with less noise by control variates and correlated sampling", "covary");
   app.set_version_flag("--version", "covary " + version_text(), "Print version and commit, and exit");
@@ -115,6 +99,22 @@ int run(int argc, char** argv) {
 }  // namespace
 
 const std::string& command_line() { return g_command_line; }
+
+void add_commands(CLI::App& app) {
+  app.set_help_flag("-h,--help", "Print this help and exit");
+  app.set_help_all_flag("--help-all", "Print the help of all options and exit");
+  app.formatter_fn([](const CLI::App* command, const std::string& name, CLI::AppFormatMode mode) {
+    return help_text(*command, name, mode == CLI::AppFormatMode::All);
+  });
+  for (const auto add : {add_render, add_combine, add_denoise, add_compare, add_view, add_info, add_convert, add_help})
+    add(app);
+  const std::vector<CLI::App*> everybodys = app.get_subcommands([](CLI::App*) { return true; });
+  for (const auto add : {add_experiment, add_merge, add_probe}) add(app);
+  for (CLI::App* command : app.get_subcommands([](CLI::App*) { return true; })) {
+    const bool is_everybodys = std::find(everybodys.begin(), everybodys.end(), command) != everybodys.end();
+    command->group(is_everybodys ? "Commands" : "Laboratory");
+  }
+}
 
 }  // namespace covary
 

@@ -27,7 +27,7 @@ std::string term(const OptionDescription& option) {
   std::string result;
   for (const std::string& name : option.names)
     result += fmt::format("{}\\fB{}\\fR", result.empty() ? "" : ", ", escaped(name));
-  const std::string value = option.choices.empty() ? option.value : fmt::format("{}", fmt::join(option.choices, "|"));
+  const std::string value = value_text(option);
   if (!value.empty()) result += fmt::format("{}\\fI{}\\fR", result.empty() ? "" : " ", escaped(value));
   return result;
 }

@@ -17,6 +17,7 @@
 #include "film/merge.h"
 #include "film/outputs.h"
 #include "plans/plan.h"
+#include "value_names.h"
 
 namespace covary {
 namespace {
@@ -128,9 +129,10 @@ void add_merge(CLI::App& app) {
   const auto options = std::make_shared<MergeOptions>();
   CLI::App* command = app.add_subcommand("merge", "Merge films of one scene with different seeds into one film");
   command->add_option("FILMS", options->inputs, "Films (EXR) that covary render --passes or --estimator none wrote")
+      ->type_name(kFileValue)
       ->required()
       ->expected(2, 100000);
-  command->add_option("-o,--output", options->output, "The merged film (EXR)")->required();
+  command->add_option("-o,--output", options->output, "The merged film (EXR)")->type_name(kFileValue)->required();
   command->callback([options] { merge(*options); });
 }
 

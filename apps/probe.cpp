@@ -111,7 +111,7 @@ void add_probe(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
       "probe", "What guided-path has learnt at the surface behind a pixel, as an image (EXR) and its preview (PNG)");
   add_render_options(*command, options->render);
-  command->add_option("--pixel", options->pixel, "X,Y of the frame")->required();
+  command->add_option("--pixel", options->pixel, "X,Y of the frame")->type_name("X,Y")->required();
   command->add_option("--height", options->height, "Rows of the images, which are twice as wide")
       ->transform(whole_number(1, 4096))
       ->capture_default_str();

@@ -18,6 +18,7 @@
 #include "plans/integrator_choice.h"
 #include "plans/request_options.h"
 #include "stages.h"
+#include "value_names.h"
 
 namespace covary {
 
@@ -180,7 +181,8 @@ namespace {
 /// What a person needs who wants a picture: no heading of its own, so that `covary render --help` shows it.
 CLI::Option* add_basic_options(CLI::App& command, RenderOptions& o) {
   command.add_option("SCENE", o.scene, "Scene file, Mitsuba XML")->required();
-  command.add_option("-o,--output", o.output, "The image (EXR); a PNG preview appears beside it")->type_name("FILE");
+  command.add_option("-o,--output", o.output, "The image (EXR); a PNG preview appears beside it")
+      ->type_name(kFileValue);
   command.add_option("--spp", o.spp, "Samples per pixel of all passes together; default: the scene's")
       ->transform(whole_number(1u, 1u << 30));
   command
@@ -202,12 +204,12 @@ CLI::Option* add_basic_options(CLI::App& command, RenderOptions& o) {
   command.add_option("--resolution", o.resolution, "Size of the full frame; default: the scene's")
       ->type_name("WIDTHxHEIGHT");
   command.add_option("--crop", o.crop, "Render only these pixels of the frame")->type_name("X,Y,WIDTH,HEIGHT");
-  command.add_option("--passes,--save-passes", o.passes, "Keep the film of every pass here")->type_name("FOLDER");
+  command.add_option("--passes,--save-passes", o.passes, "Keep the film of every pass here")->type_name(kFolderValue);
   CLI::Option* resume =
       command.add_flag("--resume", o.resume, "Continue the films of an interrupted render, or those in --passes");
   add_define_option(command, o.defines);
   add_threads_option(command, o.threads);
-  command.add_option("--json", o.json, "Statistics; '-': to standard output")->type_name("FILE");
+  command.add_option("--json", o.json, "Statistics; '-': to standard output")->type_name(kFileValue);
   command.add_flag("--quiet", o.quiet, "No progress and no summary");
   return resume;
 }
@@ -251,7 +253,7 @@ void add_output_options(CLI::App& command, RenderOptions& o, CLI::Option* resume
       ->check(real_number(0, std::numeric_limits<double>::infinity()));
   command.add_flag("!--no-preview", o.preview, "Do not write the PNG");
   command.add_option("--display-server", o.display_server, "A running tev, which shows the image while it renders")
-      ->type_name("HOST:PORT");
+      ->type_name(kServerValue);
   command.add_flag("--aovs", o.aovs, "Add the images Albedo, N (normal) and P (position) to the output");
   command.add_flag("--path-lengths", o.path_lengths,
                    "Add an image for each number of edges of paths (Edges01, …) to the output");
@@ -259,7 +261,7 @@ void add_output_options(CLI::App& command, RenderOptions& o, CLI::Option* resume
   command
       .add_option("--debug-strategies", o.debug_strategies,
                   "New folder for images of each technique (s, t) of bidirectional path tracing, rendered beside")
-      ->type_name("FOLDER");
+      ->type_name(kFolderValue);
   command.add_option("--replay", o.replay, "Print one sample instead of rendering")->type_name("X,Y,SAMPLE[,PASS]");
   command.add_option("--replay-light", o.replay_light, "Print what one light path adds to the image")
       ->transform(whole_number(uint64_t{0}, (uint64_t{1} << 40) - 1))
@@ -268,9 +270,9 @@ void add_output_options(CLI::App& command, RenderOptions& o, CLI::Option* resume
 
 void add_training_options(CLI::App& command, RenderOptions& o) {
   command.option_defaults()->group("Training of controlled-path and guided-path");
-  command.add_option("--save-training", o.save_training, "Keep here what was learnt")->type_name("FILE");
+  command.add_option("--save-training", o.save_training, "Keep here what was learnt")->type_name(kFileValue);
   command.add_option("--load-training", o.load_training, "Such a file, to use in place of a training")
-      ->type_name("FILE");
+      ->type_name(kFileValue);
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "core/error.h"
 #include "film/error_map.h"
 #include "film/image_writer.h"
+#include "value_names.h"
 
 namespace covary {
 namespace {
@@ -32,7 +33,7 @@ void add_stages_option(CLI::App& command, std::string& folder) {
   command
       .add_option("--save-stages", folder,
                   "Folder for images of the single steps (EXR and PNG); of estimators that have some")
-      ->type_name("FOLDER");
+      ->type_name(kFolderValue);
 }
 
 void check_stages(const std::string& folder, const Estimator& estimator) {

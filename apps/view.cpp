@@ -25,6 +25,7 @@
 #include "film/outputs.h"
 #include "numbers.h"
 #include "report/report.h"
+#include "value_names.h"
 
 extern char** environ;
 
@@ -263,18 +264,21 @@ void add_view(CLI::App& app) {
   const auto o = std::make_shared<ViewOptions>();
   CLI::App* command = app.add_subcommand("view", "Compare images in the browser: one page without a network");
   command->add_option("IMAGES", o->images, "Images of any renderer (EXR, PNG, HDR, PFM, …), all of one frame")
+      ->type_name(kFileValue)
       ->required();
-  command->add_option("-r,--reference", o->reference, "Shows errors relative to this image");
-  command->add_option("-o,--output", o->output, "Write the page (HTML) here instead of opening it");
-  command->add_option("--layer", o->layer, "Show this layer (N, group03, …) in place of R G B");
+  command->add_option("-r,--reference", o->reference, "Shows errors relative to this image")->type_name(kFileValue);
+  command->add_option("-o,--output", o->output, "Write the page (HTML) here instead of opening it")
+      ->type_name(kFileValue);
+  command->add_option("--layer", o->layer, "Show this layer (N, group03, …) in place of R G B")->type_name("LAYER");
   command->add_option("--inset", o->insets, "X,Y,WIDTH,HEIGHT: magnify this crop; may be given again")
+      ->type_name("X,Y,WIDTH,HEIGHT")
       ->take_all()
       ->expected(1)
       ->allow_extra_args(false);
   command->add_flag(
       "--small", o->small,
       "Leave out FLIP and the other layers of the files (StdError, Albedo, N, …): a smaller page, sooner");
-  command->add_option("--title", o->title, "Title of the page; default: the images' names");
+  command->add_option("--title", o->title, "Title of the page; default: the images' names")->type_name("TITLE");
   command->callback([o] { view(*o); });
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -73,9 +74,17 @@ struct Suite {
 /// Seeds of the two halves of a reference; no run may use them.
 inline constexpr uint64_t kReferenceSeeds[2] = {900000001, 900000002};
 
+/// What is wrong with a word of a command.
+struct WordProblem {
+  size_t word;
+  std::string text;
+};
+/// Says what a suite may not give: of "render" with the options of a method, and of each command that follows.
+using CommandCheck = std::function<std::vector<WordProblem>(const std::vector<std::string>& command)>;
+
 /// Reads a suite. `name` stands for the file in messages. Throws Error(kInput) that lists all problems with their
-/// lines.
-Suite parse_suite(const std::string& text, const std::string& name);
+/// lines, those of its commands as well where a `check` is given.
+Suite parse_suite(const std::string& text, const std::string& name, const CommandCheck& check = {});
 
 /// Every problem of the suite as a whole, after all settings were overridden; empty when it can be run.
 std::vector<std::string> validate(const Suite& suite);

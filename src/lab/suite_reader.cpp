@@ -2,6 +2,7 @@
 // Suite files: JSON to Suite.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <limits>
 
 #include "core/error.h"
@@ -19,7 +20,7 @@ constexpr size_t kMostSeeds = 100000;     // as of `covary experiment --seeds`
 
 class SuiteReader {
  public:
-  explicit SuiteReader(const LocatedJson& document) : document_(document) {}
+  SuiteReader(const LocatedJson& document, const CommandCheck& check) : document_(document), check_(check) {}
 
   Suite read() {
     if (!document_.value.is_object())
@@ -40,6 +41,7 @@ class SuiteReader {
     if (const auto pointer = top.object("reference")) suite.reference = reference(*pointer);
     if (const auto pointer = top.object("published")) published(*pointer, suite);
     top.finish();
+    if (check_) check_commands(suite);
     if (problems_.empty()) return suite;
     throw Error(ErrorCode::kInput, fmt::format("{}", fmt::join(problems_, "\n")));
   }
@@ -166,15 +168,48 @@ class SuiteReader {
     }
   }
 
+  void check_commands(const Suite& suite) {
+    const size_t n_common = suite.common_options.size();
+    for (size_t m = 0; m < suite.methods.size(); ++m) {
+      const MethodEntry& method = suite.methods[m];
+      std::vector<std::string> render = {"render"};
+      render.insert(render.end(), suite.common_options.begin(), suite.common_options.end());
+      render.insert(render.end(), method.options.begin(), method.options.end());
+      for (const WordProblem& p : check_(render)) {
+        if (p.word > 0 && p.word <= n_common)
+          add_once(fmt::format("common_options/{}", p.word - 1), p.text);
+        else
+          add_once(p.word == 0 ? fmt::format("methods/{}", m)
+                               : fmt::format("methods/{}/options/{}", m, p.word - 1 - n_common),
+                   of_method(method, p.text));
+      }
+      for (size_t i = 0; i < method.then.size(); ++i)
+        for (const WordProblem& p : check_(method.then[i]))
+          add_once(fmt::format("methods/{}/then/{}/{}", m, i, p.word), of_method(method, p.text));
+    }
+  }
+
+  static std::string of_method(const MethodEntry& method, const std::string& text) {
+    return fmt::format("method '{}': {}", method.name, text);
+  }
+
+  /// What is wrong with the common options is found with each method.
+  void add_once(const std::string& place, const std::string& text) {
+    at("").problem(place, text);
+    if (std::find(problems_.begin(), problems_.end() - 1, problems_.back()) != problems_.end() - 1)
+      problems_.pop_back();
+  }
+
   const LocatedJson& document_;
+  const CommandCheck& check_;
   std::vector<std::string> problems_;
 };
 
 }  // namespace
 
-Suite parse_suite(const std::string& text, const std::string& name) {
+Suite parse_suite(const std::string& text, const std::string& name, const CommandCheck& check) {
   const LocatedJson document = parse_located(text, name);
-  return SuiteReader(document).read();
+  return SuiteReader(document, check).read();
 }
 
 }  // namespace covary::lab

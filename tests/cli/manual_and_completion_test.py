@@ -88,6 +88,14 @@ class Manual(HelpTest):
             for option in self.options[command]:
                 self.assertIn(f"\\fB{option}\\fR", section)
 
+    def test_names_every_value(self):
+        """What a value is called decides whether a suite may give it: nothing is left a mere TEXT."""
+        page = self.good("help", "--man").stdout
+        self.assertNotRegex(page, r"\\fITEXT")
+        for name, value in (("oidn", "off|LIBRARY"), ("save\\-training", "FILE"), ("save\\-stages", "FOLDER"),
+                            ("display\\-server", "HOST:PORT"), ("crop", "X,Y,WIDTH,HEIGHT")):
+            self.assertIn(f"\\fB\\-\\-{name}\\fR \\fI{value}\\fR", page)
+
     def test_is_accepted_and_shown(self):
         self.write("covary.1", self.good("help", "--man").stdout.encode())
         self.shell("mandoc", "-T", "lint", "-W", "error", "covary.1")

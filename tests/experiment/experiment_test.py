@@ -461,6 +461,61 @@ class Mistakes(ExperimentTest):
             self.assertIn(message, done.stderr)
 
 
+class Foreign(ExperimentTest):
+    """A suite from elsewhere is data: its options name no file, folder, library or server."""
+
+    def refused(self, place, message):
+        done = self.run_covary(self.command("--print"))
+        self.assertEqual(done.returncode, 1, done.stdout)
+        line = done.stderr.splitlines()[0].removeprefix("covary: ")
+        self.assertRegex(line, r"^suite\.json:\d+: ")
+        number = int(line.split(":")[1])
+        self.assertIn(place, line)
+        self.assertIn(message, line)
+        self.assertEqual(sorted(p.name for p in self.path.iterdir()), ["suite.json"])
+        return (self.path / "suite.json").read_text().splitlines()[number - 1]
+
+    def test_options_of_methods(self):
+        for option, value, what in (("--oidn", "evil.so", "a library"), ("--save-training", "x", "a file"),
+                                    ("--load-training", "x", "a file"), ("--save-stages", "x", "a folder"),
+                                    ("--display-server", "example.org:80", "a server"), ("--json", "x", "a file"),
+                                    ("--debug-strategies", "x", "a folder"), ("--passes", "x", "a folder"),
+                                    ("--save-passes", "x", "a folder"), ("-o", "x", "a file"),
+                                    ("--output", "x", "a file")):
+            with self.subTest(option):
+                for words in [option, value], [option + ("=" if option.startswith("--") else "") + value]:
+                    self.suite["methods"] = [*SUITE["methods"], {"name": "evil", "options": ["--aovs", *words]}]
+                    line = self.refused("methods[2].options[1]: method 'evil': " + option,
+                                        f"'{value}' names {what}, which a suite may not")
+                    self.assertIn(words[0], line)
+
+    def test_options_of_all_methods(self):
+        self.suite["common_options"] = ["--aovs", "--json", "x"]
+        self.refused("common_options[1]: --json", "'x' names a file")
+        self.suite["common_options"] = ["other.xml"]  # a scene of its own
+        self.bad(2, "other.xml")
+
+    def test_commands_after_the_render(self):
+        for step, place, message in ((["denoise", "--oidn", "evil.so"], "[0][1]", "--oidn 'evil.so' names a library"),
+                                     (["combine", "--crn", "x", "--light", "y"], "[0][1]", "--crn 'x' names a file"),
+                                     (["combine", "--force", "--guides", "x"], "[0][2]", "--guides 'x' names a file"),
+                                     (["convert", "x.exr"], "[0][0]", "-o"),
+                                     (["denoise", "-o", "x"], "[0][1]", "-o 'x' names a file"),
+                                     (["view", "--quiet"], "[0][0]", "--quiet"),
+                                     (["remove"], "[0][0]", "remove")):
+            with self.subTest(step):
+                self.suite["methods"] = [*SUITE["methods"], {"name": "evil", "then": [step]}]
+                self.refused("methods[2].then" + place + ": method 'evil': ", message)
+
+    def test_values_are_allowed(self):
+        self.suite["methods"].append(
+            {"name": "all", "then": [["denoise", "--clean-guides"]],
+             "options": ["--denoise", "balanced", "--oidn", "off", "--split", "1:3", "--until", "relmse=0.1", "--crop",
+                         "0,0,8,8", "-D", "a=b", "--k", "3", "--integrator", "path", "--aovs"]})
+        done = self.run_covary(self.command("--print"))
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+
+
 class References(ExperimentTest):
     def render(self, name, seed, spp=128, rfilter="box", more=()):
         done = self.run_covary([COVARY, "render", str(SCENES / "room.xml"), "--resolution", "32x24", "--rfilter",

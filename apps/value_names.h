@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the help shows behind options whose text names something outside of the command. A suite may not give such
+// options (suite_words.h), nor any whose value has no name of its own but CLI11's "TEXT".
+#pragma once
+
+#include "settings/option.h"
+
+namespace covary {
+
+inline constexpr const char *kFileValue = "FILE", *kFolderValue = "FOLDER", *kLibraryValue = "LIBRARY",
+                            *kServerValue = "HOST:PORT";
+
+/// The name for what a declared option names; null for a value.
+constexpr const char* value_name_of(OptionNames names) {
+  switch (names) {
+    case OptionNames::kValue:
+      return nullptr;
+    case OptionNames::kFile:
+      return kFileValue;
+    case OptionNames::kFolder:
+      return kFolderValue;
+    case OptionNames::kLibrary:
+      return kLibraryValue;
+    case OptionNames::kServer:
+      return kServerValue;
+  }
+  return "TEXT";
+}
+
+}  // namespace covary
