@@ -194,6 +194,117 @@ TEST(Passes, AFileInPlaceOfTheFolderIsNamed) {
                        "films' is not a folder; films of passes are kept in one"));
 }
 
+/// A plan of two passes whose estimator fails.
+Plan failing_plan() {
+  Plan plan = average_plan();
+  plan.estimate = [](std::span<const Pass>, int, int, const Guides&) -> EstimatorResult {
+    throw Error(ErrorCode::kInput, "no image today");
+  };
+  return plan;
+}
+
+/// `path`, which fails where radiance is told apart by the number of edges.
+class FailingLengths : public Integrator {
+ public:
+  explicit FailingLengths(const Integrator& path) : path_(path.clone()) {}
+  std::shared_ptr<Integrator> clone() const override { return std::make_shared<FailingLengths>(*path_); }
+  void prepare(const Scene& scene) override { path_->prepare(scene); }
+  std::unique_ptr<ThreadState> make_thread_state() const override { return path_->make_thread_state(); }
+  void trace(const Scene& scene, std::span<CameraSample> samples, PathContext& context) const override {
+    if (context.by_length.n_lengths > 0) throw Error(ErrorCode::kInput, "no lengths today");
+    path_->trace(scene, samples, context);
+  }
+  std::string description() const override { return path_->description(); }
+  std::optional<int> longest_path() const override { return 3; }
+
+ private:
+  std::shared_ptr<Integrator> path_;
+};
+
+/// The warnings of a render that must fail with this message.
+std::vector<std::string> warnings_of_failure(const std::string& message, const LoadedScene& scene, const Plan& plan,
+                                             const RenderRequest& request) {
+  std::vector<std::string> warnings;
+  RenderCallbacks callbacks;
+  callbacks.warning = [&](const std::string& warning) { warnings.push_back(warning); };
+  EXPECT_TRUE(contains(message_of([&] { render(scene, plan, request, callbacks); }), message));
+  return warnings;
+}
+
+TEST(Failure, FilmsOfAFailedEstimateAreKeptAndContinued) {
+  const LoadedScene scene = load_sized(kRoom);
+  const TemporaryFolder folder;
+  RenderRequest request = request_of(24);
+  request.output = folder.file("whole.exr");
+  render(scene, average_plan(), request);
+  request.output = folder.file("a.exr");
+  const std::vector<std::string> warnings = warnings_of_failure("no image today", scene, failing_plan(), request);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_TRUE(contains(warnings[0], "the films are kept in '" + folder.file("a.passes") + "'; --resume continues"));
+  for (const char* name : {"a.passes/crn.exr", "a.passes/independent.exr"})
+    EXPECT_EQ(read_film(folder.file(name)).mean_count(), 12) << name;
+  request.resume = true;
+  uint64_t taken = 0;
+  RenderCallbacks callbacks;
+  callbacks.progress = [&](uint64_t done, uint64_t) { taken = std::max(taken, done); };
+  render(scene, average_plan(), request, callbacks);
+  EXPECT_EQ(taken, 0u) << "no sample was lost";
+  EXPECT_EQ(read_image(request.output).image.data, read_image(folder.file("whole.exr")).image.data);
+  EXPECT_FALSE(fs::exists(folder.file("a.passes")));
+}
+
+TEST(Failure, FilmsOfAFolderAreThereBeforeTheEstimate) {
+  const LoadedScene scene = load_sized(kRoom);
+  const TemporaryFolder folder;
+  RenderRequest request = request_of(24);
+  request.output = folder.file("a.exr"), request.passes = folder.file("films");
+  Plan plan = average_plan();
+  plan.estimate = [&, make = plan.estimate](std::span<const Pass> passes, int row, int n_rows, const Guides& guides) {
+    for (const char* name : {"films/crn.exr", "films/independent.exr"}) {
+      EXPECT_EQ(read_film(folder.file(name)).mean_count(), 12) << name;
+      EXPECT_EQ(attribute(folder.file(name), "complete"), "true") << name;
+    }
+    return make(passes, row, n_rows, guides);
+  };
+  render(scene, plan, request);
+}
+
+TEST(Failure, FilmsOfFailedPathLengthsAreKept) {
+  LoadedScene scene = load_sized(kRoom);
+  scene.integrator = std::make_shared<FailingLengths>(integrator_of(scene));
+  const TemporaryFolder folder;
+  RenderRequest request = request_of(24);
+  request.output = folder.file("a.exr");
+  request.path_lengths = true;
+  std::vector<std::string> warnings = warnings_of_failure("no lengths today", scene, average_plan(), request);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_TRUE(contains(warnings[0], "the films are kept in '" + folder.file("a.passes") + "'; --resume continues"));
+  EXPECT_EQ(read_film(folder.file("a.passes/crn.exr")).mean_count(), 12);
+
+  request.output = folder.file("plain.exr");
+  warnings = warnings_of_failure("no lengths today", scene, plain_plan(Sampling::kIndependent), request);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_TRUE(contains(warnings[0], "the film is kept in '" + request.output + "'; --resume continues"));
+  EXPECT_EQ(read_film(request.output).mean_count(), 24);
+  EXPECT_EQ(attribute(request.output, "complete"), "false");
+}
+
+TEST(Failure, FilmsOfAnImageThatCannotBeWrittenAreKept) {
+  const LoadedScene scene = load_sized(kRoom);
+  const TemporaryFolder folder;
+  fs::create_directory(folder.file("images"));
+  RenderRequest request = request_of(24);
+  request.output = folder.file("images/a.exr"), request.passes = folder.file("films");
+  Plan plan = average_plan();
+  plan.estimate = [&, make = plan.estimate](std::span<const Pass> passes, int row, int n_rows, const Guides& guides) {
+    fs::remove(folder.file("images"));
+    return make(passes, row, n_rows, guides);
+  };
+  warnings_of_failure("there is no folder", scene, plan, request);
+  EXPECT_EQ(read_film(folder.file("films/crn.exr")).mean_count(), 12);
+  EXPECT_FALSE(fs::exists(folder.file("films/.lock")));
+}
+
 TEST(FolderLock, NamesTheProcessThatHoldsTheFolder) {
   const TemporaryFolder folder;
   std::array<int, 2> ready{}, done{};
