@@ -15,7 +15,7 @@
 #                         /usr/local); ARCH=native builds for this machine alone, in a third of the time
 #   make wheel            the Python package as a wheel for every x86-64 processor, and its sources, in dist/
 #                         (docs/python.md); ARCH=native for machines like this alone
-#   make blender          the add-on of Blender as dist/covary-blender.zip, of the wheel in dist/ or a new one
+#   make blender          the add-on of Blender as dist/covary-blender.zip; with the program of a wheel in dist/, if any
 #   make asan|tsan        build and run the tests under the sanitizers of addresses, leaks and undefined behaviour;
 #                         under that of threads
 #   make dev|clang        the same with checks of the standard library, by GCC; by Clang
@@ -84,13 +84,9 @@ install: setup
 wheel: setup
 	@WERROR=$(WERROR) JOBS=$(JOBS) scripts/wheel $(if $(filter file,$(origin ARCH)),portable,$(ARCH)) dist
 
-# Blender 4.2 to 5.0 have Python 3.11.
-blender: setup
-	@ls dist/covary-*.whl > /dev/null 2>&1 || $(MAKE) --no-print-directory wheel
-	@build/venv/bin/pip download -q --disable-pip-version-check --no-deps --only-binary :all: --python-version 3.11 \
-	  --platform manylinux_2_28_x86_64 -d build/wheel nanobind-backend==1.0.0
-	@scripts/blender_addon $$(ls -t dist/covary-*.whl | head -n 1) build/wheel/nanobind_backend-*.whl \
-	  dist/covary-blender.zip
+# With the program of the newest wheel in dist/, if there is one.
+blender:
+	@scripts/blender_addon $$(ls -t dist/covary-*.whl 2> /dev/null | head -n 1) dist/covary-blender.zip
 
 dev clang:
 	@scripts/setup $@

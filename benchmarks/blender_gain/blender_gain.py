@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """blender_gain.py [--resolution 160x96] [--spp 192] [--seeds 2] [--reference-spp 1024]
 
-How much less error covary.blender has than Cycles in the closed room of tests/python/blender_test.py, with equal
-samples and in equal processor time, against Cycles with the sampler that is its default, and against the same with its
-denoiser. All have a box filter and no clamp. Errors are relMSE in product form against two references, means over the
+How much less error covary.blender has than Cycles in the closed room of tests/blender/room.py, with equal samples and
+in equal processor time, against Cycles with the sampler that is its default, and against the same with its denoiser.
+All have a box filter and no clamp. Errors are relMSE in product form against two references, means over the
 seeds; times are processor seconds of the whole process. Needs the Python packages covary and bpy."""
 import argparse
 import sys
@@ -16,15 +16,16 @@ import covary
 import covary.blender
 import numpy
 
-sys.path += [str(Path(__file__).resolve().parents[2] / "tests" / name) for name in ("python", "cli")]
-from blender_test import build_room  # noqa: E402
+sys.path.append(str(Path(__file__).resolve().parents[2] / "tests" / "blender"))
+from covary import _cycles  # noqa: E402
+from room import build_room  # noqa: E402
 
 DEFAULT = "TABULATED_SOBOL" if bpy.app.version < (4, 2) else "AUTOMATIC"
 
 
 def cycles(scene, spp, seed, sampler=DEFAULT, denoise=False):
     """Cycles in one go; image and processor seconds."""
-    with tempfile.TemporaryDirectory() as folder, covary.blender._settings(scene):
+    with tempfile.TemporaryDirectory() as folder, _cycles.settings(scene):
         scene.cycles.sampling_pattern, scene.cycles.scrambling_distance = sampler, 1
         scene.cycles.samples, scene.cycles.seed, scene.cycles.use_denoising = spp, seed, denoise
         scene.render.filepath = str(Path(folder) / "image.exr")

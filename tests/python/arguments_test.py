@@ -97,7 +97,7 @@ BAD = {
 }
 #: Classes that results are made of, which nobody calls, errors, and functions without arguments of ours.
 NOT_CALLED = ("Error", "Warning", "Result", "Report", "BadSample", "Scene", "Film", "View")
-WITHOUT_ARGUMENTS = ("program", "names", "tqdm", "register", "unregister")
+WITHOUT_ARGUMENTS = ("program", "names", "tqdm")
 
 
 def public_functions():

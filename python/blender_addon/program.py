@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The program covary, which combines the groups in a process of its own. Standard library alone."""
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+
+from .errors import UsageError
+
+#: Where scripts/blender_addon puts a copy of the program, if it is given one.
+OWN = Path(__file__).parent / "program" / "covary" / "bin" / "covary"
+DENOISE = ("none", "bias", "balanced", "error")
+
+
+def find(named: str, own: Path = OWN) -> Path:
+    """The program that the preferences name, the add-on's own copy, or one on the search path."""
+    if named:
+        path = Path(named).expanduser()
+        if not path.is_file():
+            raise UsageError(f"there is no program '{named}', which the add-on's preferences name")
+        return path
+    if own.is_file():
+        own.chmod(own.stat().st_mode | 0o111)  # what unpacks add-ons forgets it
+        return own
+    found = shutil.which("covary")
+    if not found:
+        raise UsageError("the program covary is missing: install it (pip install covary, or make install), or name it "
+                         "in the add-on's preferences (Edit, Preferences, Add-ons, covary)")
+    return Path(found)
+
+
+def check(program: Path) -> str:
+    """Its version. Raises UsageError where it does not run: better before the groups are rendered than afterwards."""
+    try:
+        run = subprocess.run([program, "--version"], capture_output=True, text=True, check=False, env=environment())
+    except OSError as error:
+        raise UsageError(f"'{program}' does not run: {error.strerror}") from error
+    words = run.stdout.split()
+    if run.returncode or not words:
+        raise UsageError(f"'{program}' does not run: {reason(run.stderr) or f'exit code {run.returncode}'}")
+    return words[min(1, len(words) - 1)]
+
+
+def environment() -> dict[str, str]:
+    """That of this process without what Blender set for its own Python and libraries."""
+    return {name: value for name, value in os.environ.items() if name not in ("PYTHONHOME", "PYTHONPATH")}
+
+
+def combine_command(program: Path, crn: Sequence[str], independent: Sequence[str], output: str, denoise: str,
+                    statistics: str) -> list[str]:
+    """Combines files of groups into one image."""
+    return [str(program), "combine", "--crn", *crn, "--independent", *independent, "-o", output, "--denoise", denoise,
+            "--json", statistics]
+
+
+def reason(messages: str) -> str:
+    """The last line of what a program wrote, without the program's name."""
+    lines = messages.strip().splitlines()
+    return lines[-1].strip().removeprefix("covary: ").removeprefix("error: ") if lines else ""
+
+
+def warnings(messages: str) -> list[str]:
+    """Those among the program's messages."""
+    return [line.removeprefix("warning: ") for line in messages.splitlines() if line.startswith("warning: ")]
+
+
+def verdict(statistics: str) -> str:
+    """What the program measured, as a sentence; "" where it did not."""
+    try:
+        values = json.loads(Path(statistics).read_text())
+    except (OSError, ValueError):
+        return ""
+    ours, theirs = values.get("predicted_relmse"), values.get("independent_predicted_relmse")
+    if ours is None or theirs is None:
+        return ""
+    return sentence(ours, theirs / 2)
+
+
+def sentence(ours: float, plain: float) -> str:
+    """Compares the predicted error with that of the independent half taken twice, as Cycles alone would."""
+    if ours < plain:
+        return f"Predicted error {ours:.2g}; plain samples would have about {plain:.2g}."
+    return (f"Predicted error {ours:.2g}, but plain samples would have about {plain:.2g}: this picture gains nothing, "
+            "render it by Cycles alone.")

@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What Cycles must render for covary: groups of samples, and the settings of the scene meanwhile (docs/blender.md).
+
+Standard library alone: the add-on of Blender has this file and errors.py, and no compiled part."""
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from .errors import UsageError
+
+OLDEST = (3, 4, 0)
+#: Of each of the two images.
+GROUPS = 12
+
+
+def blender() -> Any:
+    """The module bpy."""
+    try:
+        import bpy  # type: ignore[import-not-found,import-untyped,unused-ignore]
+    except ImportError as error:
+        raise ImportError("covary.blender needs Blender's Python: run it in Blender, or pip install bpy") from error
+    if bpy.app.version < OLDEST:
+        raise UsageError(f"found Blender {bpy.app.version_string}; 3.4 or newer is needed")
+    return bpy
+
+
+def pattern() -> str:
+    """The one whose numbers a scrambling distance makes common; its name changed with Blender 3.5."""
+    return "TABULATED_SOBOL" if blender().app.version >= (3, 5, 0) else "PROGRESSIVE_MULTI_JITTER"
+
+
+def compositor(scene: Any) -> tuple[Any, str, Any, str]:
+    """The entry of needed() that turns it off: from Blender 5.0 on there is one where it has nodes."""
+    reason = "the compositor would change the pixels of each group"
+    if hasattr(scene, "compositing_node_group"):
+        return scene.render, "use_compositing", False, reason if scene.compositing_node_group else ""
+    return scene, "use_nodes", False, reason
+
+
+def needed(scene: Any) -> list[tuple[Any, str, Any, str]]:
+    """(owner, name, value, reason) of each setting that both images need; "" for those that leave the picture as it
+    is."""
+    cycles, image = scene.cycles, scene.render.image_settings
+    mixes = "it mixes the errors of neighbouring pixels, which control variates take for independent"
+    clamps = "what it clamps is missing from the mean, differently in both images"
+    return [
+        (cycles, "use_adaptive_sampling", False, "counts would follow from the values of samples"),
+        (cycles, "use_denoising", False, mixes),
+        (cycles, "pixel_filter_type", "BOX", mixes),
+        (cycles, "filter_width", 1.0, ""),
+        (cycles, "sample_clamp_direct", 0.0, clamps),
+        (cycles, "sample_clamp_indirect", 0.0, clamps),
+        (cycles, "use_guiding", False, "it learns while it renders, so that samples depend on each other"),
+        (cycles, "use_animated_seed", False, ""),
+        (cycles, "auto_scrambling_distance", False, ""),
+        (cycles, "sampling_pattern", pattern(), ""),
+        (cycles, "time_limit", 0.0, ""),
+        compositor(scene),
+        (scene.render, "use_sequencer", False, ""),
+        (scene.render, "use_border", False, "the image would be a part of the frame"),
+        (scene.render, "use_multiview", False, "groups are of one view"),
+        (scene.render, "use_motion_blur", scene.render.use_motion_blur, ""),
+        (image, "file_format", "OPEN_EXR", ""),
+        (image, "color_mode", "RGB", ""),
+        (image, "color_depth", "32", ""),
+    ]
+
+
+def changed(scene: Any) -> list[tuple[str, Any, Any, str]]:
+    """(name, value, value while groups render, reason) of what changes the picture."""
+    return [(name, getattr(owner, name), value, reason) for owner, name, value, reason in needed(scene)
+            if reason and hasattr(owner, name) and getattr(owner, name) != value]
+
+
+@contextmanager
+def settings(scene: Any) -> Iterator[None]:
+    """The scene as it must be; everything is put back afterwards, also what a group changes."""
+    cycles, more = scene.cycles, ("samples", "sample_offset", "seed", "scrambling_distance", "use_sample_subset",
+                                  "sample_subset_length")
+    kept = [(owner, name, getattr(owner, name)) for owner, name, _, _ in needed(scene) if hasattr(owner, name)]
+    kept += [(cycles, name, getattr(cycles, name)) for name in more if hasattr(cycles, name)]
+    kept.append((scene.render, "filepath", scene.render.filepath))
+    try:
+        for owner, name, value, _ in needed(scene):
+            if hasattr(owner, name):
+                setattr(owner, name, value)
+        yield
+    finally:
+        for owner, name, value in kept:  # the format of files before its depths
+            setattr(owner, name, value)
+
+
+def check(scene: Any, spp: int, groups: int = GROUPS) -> None:
+    """Raises UsageError for a scene of which no groups can be rendered."""
+    if scene.render.engine != "CYCLES":
+        raise UsageError(f"found the engine {scene.render.engine}; only Cycles has common random numbers: "
+                         "scene.render.engine = 'CYCLES'")
+    if scene.camera is None:
+        raise UsageError(f"the scene '{scene.name}' has no camera: Add, Camera")
+    if spp % (2 * groups):
+        raise UsageError(f"spp: found {spp} samples in {groups} groups; a multiple of twice the number of groups is "
+                         "needed, half of it with common random numbers")
+
+
+@dataclass(frozen=True)
+class Group:
+    """Samples that Cycles renders in one go, of one of the two images."""
+
+    #: "crn", with common random numbers, or "independent".
+    kind: str
+    samples: int
+    seed: int
+
+    @contextmanager
+    def settings(self, scene: Any, path: str) -> Iterator[None]:
+        """Those of the scene that write this group into a file."""
+        cycles = scene.cycles
+        with settings(scene):
+            cycles.scrambling_distance = 0.0 if self.kind == "crn" else 1.0
+            cycles.seed = self.seed
+            # Samples n … 2 n - 1 of the pattern: its sample 0 lies at the pixel's centre for every seed.
+            cycles.sample_offset = self.samples
+            if hasattr(cycles, "use_sample_subset"):
+                cycles.use_sample_subset, cycles.sample_subset_length = True, self.samples
+                cycles.samples = 2 * self.samples
+            else:
+                cycles.samples = self.samples
+            scene.render.filepath = path
+            yield
+
+
+def groups_of(spp: int, groups: int, seed: int) -> list[Group]:
+    """Those of one picture: half of its samples with common random numbers, half with independent ones. Each has a seed
+    of its own."""
+    return [Group(kind, spp // (2 * groups), (2 * seed + number) * groups + group)
+            for number, kind in enumerate(("crn", "independent")) for group in range(groups)]
