@@ -51,6 +51,15 @@ double mean_of(const Image& image, const Image& map) {
   return sum / static_cast<double>(n);
 }
 
+/// Bytes per pixel that compare_one() takes beside the images that were read.
+double bytes_to_compare(const std::vector<std::string>& metrics, size_t n_references) {
+  constexpr double kImage = 3 * sizeof(float), kMap = sizeof(float), kFlip = 120, kTrimmed = 56;  // film/metrics.cpp
+  double most = 0;
+  for (const std::string& name : metrics)
+    most = std::max(most, name == "flip" ? kFlip : name == "relmse-trimmed" ? kTrimmed : 1);
+  return kImage * static_cast<double>(1 + n_references) + kMap * static_cast<double>(metrics.size()) + most;
+}
+
 Comparison compare_one(const CompareOptions& options, const std::vector<PlacedImage>& references,
                        const std::string& path) {
   const PlacedImage image = read_image(path, options.layer);
@@ -61,6 +70,8 @@ Comparison compare_one(const CompareOptions& options, const std::vector<PlacedIm
     comparison.window = common_window(path, image.place, comparison.window, options.reference2, references[1].place);
     low_dynamic_range = low_dynamic_range && references[1].low_dynamic_range;
   }
+  require_image_memory(path, comparison.window.width, comparison.window.height,
+                       bytes_to_compare(options.metrics, references.size()));
   const Image pixels = cut(image, comparison.window);
   std::vector<Image> aligned;
   for (const PlacedImage& reference : references) aligned.push_back(cut(reference, comparison.window));

@@ -89,6 +89,14 @@ void check_not_lost(const ConvertOptions& options) {
                           output));
 }
 
+/// What is made of the images: one beside them where they are several, and a copy to write.
+void check_memory(const std::vector<Image>& images, const std::string& output) {
+  constexpr double kPixel = 3 * sizeof(float);
+  int width = 0, height = 0;
+  for (const Image& image : images) width += image.width, height = std::max(height, image.height);
+  require_image_memory(output, width, height, (images.size() > 1 ? 2 : 1) * kPixel);
+}
+
 void convert(const ConvertOptions& options) {
   if (options.files.size() < 2) throw Error(ErrorCode::kUsage, "convert needs an image to read and one to write");
   const std::vector<std::string> inputs(options.files.begin(), options.files.end() - 1);
@@ -104,6 +112,7 @@ void convert(const ConvertOptions& options) {
     place = image.place;
     images.push_back(std::move(image.image));
   }
+  check_memory(images, output);
   Image image = images.size() == 1 ? std::move(images[0]) : side_by_side(images);
   if (inputs.size() > 1) place = {image.width, image.height, {0, 0, image.width, image.height}};
   const float factor = static_cast<float>(std::exp2(options.exposure));

@@ -34,6 +34,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr size_t kMostLayers = 100;  // of a file
+
 struct ViewOptions {
   std::vector<std::string> images, insets;
   std::string reference, layer, output, title;
@@ -142,8 +144,18 @@ void Page::add_errors(const Shown& image, const Image& pixels, nlohmann::ordered
 /// The other layers of the image's file, those of one channel as such.
 void Page::add_layers(const Shown& image, const std::string& shown, nlohmann::ordered_json& entry) {
   const ImageInfo info = inspect_image(image.path);
-  for (const std::string& layer : offered_layers(info.channels, shown)) {
-    Image pixels = cut(read_image(image.path, layer), window);
+  std::vector<std::string> layers = offered_layers(info.channels, shown);
+  if (layers.size() > kMostLayers) {
+    fmt::print(stderr,
+               "covary: {}: {} layers beside the image; the page has the first {} (--layer shows another one)\n",
+               image.path, layers.size(), kMostLayers);
+    layers.resize(kMostLayers);
+  }
+  if (layers.empty()) return;
+  std::vector<Image> read = read_layers(image.path, layers);
+  for (size_t l = 0; l < layers.size(); ++l) {
+    const std::string& layer = layers[l];
+    Image pixels = cut({image.source.place, std::move(read[l])}, window);
     const std::vector<std::string> names = layer_channels(image.path, info.channels, layer);
     if (names[0] == names[1]) {
       Image grey(pixels.width, pixels.height, 1);
@@ -159,6 +171,8 @@ void Page::add_layers(const Shown& image, const std::string& shown, nlohmann::or
 
 nlohmann::ordered_json Page::add(const Shown& image, const std::string& layer) {
   nlohmann::ordered_json entry{{"name", image.name}, {"image", image.path}};
+  constexpr double kPixels = 3 * sizeof(float), kFlip = 150;  // per pixel
+  require_image_memory(image.path, window.width, window.height, 2 * kPixels + (reference && !small ? kFlip : 0));
   Image pixels = cut(image.source, window);
   if (!small) add_layers(image, layer, entry);
   if (image.is_reference) {

@@ -7,10 +7,12 @@
 #include <array>
 #include <cctype>
 #include <filesystem>
-#include <iterator>
 #include <memory>
 #include <set>
+#include <unordered_map>
+#include <utility>
 
+#include "core/memory_limit.h"
 #include "imageio/exr_header.h"
 #include "imageio/image_io.h"
 
@@ -62,36 +64,60 @@ std::vector<std::string> find_layer(const std::vector<ExrFile::Channel>& channel
   return grey.empty() ? std::vector<std::string>{} : std::vector{grey, grey, grey};
 }
 
-/// What may be given as a layer: every prefix with three channels.
-std::vector<std::string> list_layers(const std::vector<ExrFile::Channel>& channels) {
-  std::vector<std::string> layers;
+struct Layer {
+  std::string name;
+  std::vector<std::string> channels;  ///< three, or one three times
+};
+
+/// What may be given as a layer: every prefix with three channels. Looks at each channel a few times, whatever their
+/// number.
+std::vector<Layer> find_layers(const std::vector<ExrFile::Channel>& channels) {
+  std::vector<std::string> names;
+  std::unordered_map<std::string, std::vector<ExrFile::Channel>> by_name;
   for (const ExrFile::Channel& c : channels) {
     const size_t dot = c.name.rfind('.');
-    const std::string layer = dot == std::string::npos ? "" : c.name.substr(0, dot);
-    if (std::find(layers.begin(), layers.end(), layer) == layers.end() && !find_layer(channels, layer).empty())
-      layers.push_back(layer);
+    const std::string name = dot == std::string::npos ? "" : c.name.substr(0, dot);
+    std::vector<ExrFile::Channel>& members = by_name[name];
+    if (members.empty()) names.push_back(name);
+    members.push_back(c);
   }
+  std::vector<Layer> layers;
+  for (const std::string& name : names)
+    if (std::vector<std::string> found = find_layer(by_name[name], name); !found.empty())
+      layers.push_back({name, std::move(found)});
   return layers;
 }
 
+constexpr size_t kMostNamed = 20;  // layers and channels in a message
+
+constexpr double kImageBytes = 3 * sizeof(float);  // per pixel
+
 }  // namespace
+
+void require_image_memory(const std::string& path, int width, int height, double bytes_per_pixel) {
+  require_memory(path, fmt::format("an image of {} x {} pixels", width, height),
+                 bytes_per_pixel * static_cast<double>(width) * height);
+}
 
 std::vector<std::string> layer_channels(const std::string& path, const std::vector<ExrFile::Channel>& channels,
                                         const std::string& layer) {
   std::vector<std::string> names = find_layer(channels, layer);
   if (!names.empty()) return names;
-  const std::vector<std::string> layers = list_layers(channels);
-  if (layer.empty() && layers.size() == 1) return find_layer(channels, layers[0]);
+  const std::vector<Layer> layers = find_layers(channels);
+  if (layer.empty() && layers.size() == 1) return layers[0].channels;
   for (const ExrFile::Channel& c : channels)
     if (!layer.empty() && c.name == layer) return {c.name, c.name, c.name};
   std::string known, all;
-  for (const std::string& name : layers) known += (known.empty() ? "" : ", ") + (name.empty() ? "R G B" : name);
-  for (size_t i = 0; i < std::min<size_t>(channels.size(), 20); ++i) all += (i ? " " : "") + channels[i].name;
-  if (channels.size() > 20) all += " …";
+  for (size_t i = 0; i < std::min(layers.size(), kMostNamed); ++i)
+    known += (known.empty() ? "" : ", ") + (layers[i].name.empty() ? "R G B" : layers[i].name);
+  if (layers.size() > kMostNamed) known += ", …";
+  for (size_t i = 0; i < std::min(channels.size(), kMostNamed); ++i) all += (i ? " " : "") + channels[i].name;
+  if (channels.size() > kMostNamed) all += " …";
   const std::string have = fmt::format("layers: {}; channels: {}", known.empty() ? "none" : known, all);
   if (layer.empty()) fail(path, "no channels R G B; choose a layer (" + have + ")");
   std::vector<std::string> candidates;
-  std::copy_if(layers.begin(), layers.end(), std::back_inserter(candidates), [](const auto& l) { return !l.empty(); });
+  for (const Layer& known_layer : layers)
+    if (!known_layer.name.empty()) candidates.push_back(known_layer.name);
   for (const ExrFile::Channel& c : channels)
     if (c.name.size() > 1 && c.name.find('.') == std::string::npos) candidates.push_back(c.name);
   fail(path, fmt::format("no layer '{}'{} ({})", layer, did_you_mean(layer, candidates), have));
@@ -112,21 +138,45 @@ void check_image(const std::string& path) {
   for (const ExrFile::Channel& channel : file.channels()) file.check({&channel.name, 1});
 }
 
+namespace {
+
+std::vector<Image> read_exr_layers(const ExrFile& file, const std::string& path, std::span<const std::string> layers) {
+  const CropWindow window = file.place().window;
+  require_image_memory(path, window.width, window.height, kImageBytes * static_cast<double>(layers.size()));
+  std::vector<Image> images;
+  std::vector<ExrPlane> planes;
+  std::vector<size_t> grey;
+  images.reserve(layers.size());  // planes point into them
+  for (const std::string& layer : layers) {
+    const std::vector<std::string> names = layer_channels(path, file.channels(), layer);
+    Image& image = images.emplace_back(window.width, window.height, 3);
+    if (names[0] == names[2]) grey.push_back(images.size() - 1);
+    for (size_t c = 0; c < (names[0] == names[2] ? 1 : 3); ++c)
+      planes.push_back({names[c], ExrPlane::Type::kFloat, image.data.data() + c, 3 * sizeof(float)});
+  }
+  file.read(planes);
+  for (const size_t i : grey) {
+    std::vector<float>& data = images[i].data;
+    for (size_t k = 0; k < data.size(); k += 3) data[k + 1] = data[k + 2] = data[k];
+  }
+  return images;
+}
+
+}  // namespace
+
+std::vector<Image> read_layers(const std::string& path, std::span<const std::string> layers) {
+  if (is_film_or_exr(path)) return read_exr_layers(ExrFile(path), path, layers);
+  std::vector<Image> images;
+  for (const std::string& layer : layers) images.push_back(read_image(path, layer).image);
+  return images;
+}
+
 PlacedImage read_image(const std::string& path, const std::string& layer, ChecksumPolicy checksums) {
   PlacedImage result;
   if (is_film_or_exr(path)) {
     const ExrFile file(path, checksums);
-    const std::vector<std::string> names = layer_channels(path, file.channels(), layer);
     result.place = file.place();
-    result.image = Image(result.place.window.width, result.place.window.height, 3);
-    std::vector<ExrPlane> planes;
-    const bool grey = names[0] == names[2];
-    for (size_t c = 0; c < (grey ? 1 : 3); ++c)
-      planes.push_back({names[c], ExrPlane::Type::kFloat, result.image.data.data() + c, 3 * sizeof(float)});
-    file.read(planes);
-    if (grey)
-      for (size_t i = 0; i < result.image.data.size(); i += 3)
-        result.image.data[i + 1] = result.image.data[i + 2] = result.image.data[i];
+    result.image = std::move(read_exr_layers(file, path, {&layer, 1})[0]);
     return result;
   }
 
@@ -136,6 +186,8 @@ PlacedImage read_image(const std::string& path, const std::string& layer, Checks
   result.place = place_of(header);
   result.low_dynamic_range = !header.floating_point;
   const size_t n_channels = header.channels.size();
+  require_image_memory(path, header.width, header.height,
+                       kImageBytes + static_cast<double>(n_channels * sizeof(float)));
   const std::vector<float> values = file->read_floats(0, static_cast<int>(n_channels));
   result.image = Image(header.width, header.height, 3);
   for (size_t c = 0; c < 3; ++c) {
@@ -149,13 +201,15 @@ PlacedImage read_image(const std::string& path, const std::string& layer, Checks
 }
 
 std::vector<std::string> image_layers(const std::vector<ExrFile::Channel>& channels) {
-  std::vector<std::string> layers = list_layers(channels);
+  std::vector<std::string> names;
   std::set<std::string> used;
-  for (const std::string& layer : layers)
-    for (const std::string& name : find_layer(channels, layer)) used.insert(name);
+  for (const Layer& layer : find_layers(channels)) {
+    names.push_back(layer.name);
+    used.insert(layer.channels.begin(), layer.channels.end());
+  }
   for (const ExrFile::Channel& c : channels)
-    if (!used.contains(c.name)) layers.push_back(c.name);
-  return layers;
+    if (!used.contains(c.name)) names.push_back(c.name);
+  return names;
 }
 
 }  // namespace covary

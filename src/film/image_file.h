@@ -2,6 +2,7 @@
 // Images of any renderer: EXR by OpenEXR, all other formats by imageio/image_io.h.
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -32,12 +33,17 @@ ImageInfo inspect_image(const std::string& path, ChecksumPolicy checksums = Chec
 /// written. Files without checksums pass unread.
 void check_image(const std::string& path);
 
+/// Throws where a file's pixels are more than memory_limit.h permits.
+void require_image_memory(const std::string& path, int width, int height, double bytes_per_pixel);
+
 /// Reads three channels as linear RGB (integer files are decoded from sRGB). `layer` chooses among the channels of a
 /// file: "N" for N.X N.Y N.Z, "group03" for group03.R/G/B, or a single channel's whole name, shown grey; "" is R G B,
 /// or Y, or the only layer there is. Throws like inspect_image; an unknown layer is Error(kInput) that names those
 /// there are.
 PlacedImage read_image(const std::string& path, const std::string& layer = "",
                        ChecksumPolicy checksums = ChecksumPolicy::kCheck);
+/// Several layers, which share no channel, of one reading of the file, in the file's window; throws like read_image.
+std::vector<Image> read_layers(const std::string& path, std::span<const std::string> layers);
 
 /// The three channels (one for grey, given three times) that `layer` means among `channels`; throws like read_image.
 std::vector<std::string> layer_channels(const std::string& path, const std::vector<ExrFile::Channel>& channels,

@@ -12,6 +12,7 @@
 #include <memory>
 
 #include "core/error.h"
+#include "core/memory_limit.h"
 #include "imageio/exr_header.h"
 #include "imageio/image_module.h"
 
@@ -86,7 +87,10 @@ std::vector<unsigned char> encode_pfm(const ImageToEncode& image) {
 template <typename T>
 std::vector<T> ImageReader::read_all(int first, int last) {
   COVARY_CHECK(first >= 0 && first < last && last <= static_cast<int>(header_.channels.size()), "channels exist");
-  std::vector<T> values(n_pixels() * static_cast<size_t>(last - first));
+  const size_t n_values = n_pixels() * static_cast<size_t>(last - first);
+  require_memory(path_, fmt::format("an image of {} x {} pixels", header_.width, header_.height),
+                 static_cast<double>(n_values) * sizeof(T));
+  std::vector<T> values(n_values);
   std::string problem;
   if (!read(first, last, values.data(), problem))
     throw Error(ErrorCode::kInput, fmt::format("{}: damaged or incomplete image: {}", path_, problem));

@@ -349,10 +349,10 @@ TEST(Memory, CountsFilmsAuxiliaryImagesAndEstimator) {
   EXPECT_EQ(render_memory(scene, plain_plan(Sampling::kIndependent), request).films, 100 * (12 + 4 + 36));
 }
 
-TEST(Memory, MoreThanTheMachineHasIsRefusedBeforeItIsTaken) {
+TEST(Memory, MoreThanTheLimitIsRefusedBeforeItIsTaken) {
   const LoadedScene scene = load_sized(kRoom);
   Plan plan = average_plan();
-  plan.estimate_memory.always = 2 * physical_memory();
+  plan.estimate_memory.always = memory_limit();
   EXPECT_TRUE(
       contains(message_of([&] { render(scene, plan, request_of(24)); }, ErrorCode::kUsage), "40 x 30 pixels need "));
 }

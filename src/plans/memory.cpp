@@ -2,7 +2,6 @@
 #include "plans/memory.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <limits>
@@ -60,26 +59,14 @@ double training_memory(const LoadedScene& scene) {
   return learning ? static_cast<double>(learning->training_memory()) : 0;
 }
 
-double physical_memory() {
-  return static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGE_SIZE));
-}
-
 void check_memory(const RenderMemory& memory, int width, int height) {
-  if (memory.total() <= physical_memory()) return;
+  if (memory.total() <= memory_limit()) return;
   throw Error(
       ErrorCode::kUsage,
-      fmt::format("{} x {} pixels need {} of memory ({} for films, {} for the estimator{}) and this machine "
-                  "has {}; render fewer pixels, a part of the frame, or with fewer groups",
+      fmt::format("{} x {} pixels need {} of memory ({} for films, {} for the estimator{}); render fewer "
+                  "pixels, a part of the frame, or with fewer groups; {}",
                   width, height, bytes_text(memory.total()), bytes_text(memory.films), bytes_text(memory.estimate),
-                  memory.training > 0 ? ", " + bytes_text(memory.training) + " to learn" : "",
-                  bytes_text(physical_memory())));
-}
-
-std::string bytes_text(double bytes) {
-  if (bytes >= 1e12) return fmt::format("{:.1f} TB", bytes / 1e12);
-  if (bytes >= 1e9) return fmt::format("{:.1f} GB", bytes / 1e9);
-  if (bytes >= 1e6) return fmt::format("{:.1f} MB", bytes / 1e6);
-  return fmt::format("{:.1f} kB", bytes / 1e3);
+                  memory.training > 0 ? ", " + bytes_text(memory.training) + " to learn" : "", memory_limit_text()));
 }
 
 }  // namespace covary

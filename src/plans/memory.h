@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 
+#include "core/memory_limit.h"
 #include "plans/plan.h"
 
 namespace covary {
@@ -25,13 +26,7 @@ double training_memory(const LoadedScene& scene);
 /// The same for the passes of the plan's first phase, which the scene and the request alone determine.
 RenderMemory render_memory(const LoadedScene& scene, const Plan& plan, const RenderRequest& request);
 
-/// Bytes of the machine.
-double physical_memory();
-
-/// Throws Error(kUsage) where the render needs more than the machine has.
+/// Throws Error(kUsage) where the render needs more than memory_limit().
 void check_memory(const RenderMemory& memory, int width, int height);
-
-/// "1.5 GB".
-std::string bytes_text(double bytes);
 
 }  // namespace covary

@@ -11,6 +11,7 @@
 #include <optional>
 
 #include "core/error.h"
+#include "core/memory_limit.h"
 #include "core/srgb.h"
 #include "imageio/checksums.h"
 #include "imageio/image_io.h"
@@ -71,9 +72,27 @@ void check_checksums(const TexelImage& image, const ImageHeader& header, const s
   }
 }
 
-}  // namespace
+/// Bytes of a texel in the file's channels, and of those that are kept.
+struct TexelBytes {
+  double read, kept;
+};
 
-TexelImage read_texels(const std::string& path) {
+/// What a use of texels takes per pixel at its peak.
+using BytesPerPixel = double (*)(const TexelBytes&, bool bytes_of_colours);
+
+/// The texels, and their copy in blocks; colours of bytes are words there.
+double bytes_of_texture(const TexelBytes& texel, bool bytes_of_colours) {
+  return texel.read + std::max(texel.read == texel.kept ? 0 : texel.kept,
+                               bytes_of_colours ? static_cast<double>(sizeof(uint32_t)) : texel.kept);
+}
+
+/// The texels with the linear image; then that with texels of four floats, and their tables.
+double bytes_of_environment(const TexelBytes& texel, bool) {
+  constexpr double kLinear = 3 * sizeof(float), kTexel = 4 * sizeof(float), kTables = 2;
+  return std::max(texel.read + kLinear, kLinear + kTexel + kTables);
+}
+
+TexelImage read(const std::string& path, BytesPerPixel bytes_per_pixel) {
   const std::unique_ptr<ImageReader> file = open_image(path, OtherColours::kKeep);
   const ImageHeader& header = file->header();
   const std::vector<int> channels = choose_channels(header, path);
@@ -81,7 +100,13 @@ TexelImage read_texels(const std::string& path) {
   TexelImage image;
   image.width = header.width, image.height = header.height, image.channels = static_cast<int>(channels.size());
   image.srgb = !header.floating_point;
-  if (header.type == "uint8")
+  const bool is_bytes = header.type == "uint8";
+  const double value = is_bytes ? 1 : sizeof(float);
+  require_memory(
+      path, fmt::format("a texture of {} x {} pixels", header.width, header.height),
+      bytes_per_pixel({(*last - *first + 1) * value, image.channels * value}, is_bytes && image.channels == 3) *
+          static_cast<double>(image.n_pixels()));
+  if (is_bytes)
     image.bytes = keep_channels(file->read_bytes(*first, *last + 1), image.n_pixels(), *first, channels);
   else
     image.floats = keep_channels(file->read_floats(*first, *last + 1), image.n_pixels(), *first, channels);
@@ -90,8 +115,12 @@ TexelImage read_texels(const std::string& path) {
   return image;
 }
 
+}  // namespace
+
+TexelImage read_texels(const std::string& path) { return read(path, bytes_of_texture); }
+
 TexelImage read_linear_rgb(const std::string& path) {
-  const TexelImage source = read_texels(path);
+  const TexelImage source = read(path, bytes_of_environment);
   const size_t n_values = source.n_pixels() * source.channels;
   TexelImage result;
   result.width = source.width, result.height = source.height, result.channels = 3;

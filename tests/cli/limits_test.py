@@ -9,6 +9,7 @@ import struct
 import subprocess
 import tempfile
 import unittest
+import zlib
 from pathlib import Path
 
 COVARY = os.environ["COVARY"]
@@ -40,12 +41,13 @@ class Limits(unittest.TestCase):
         (self.path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
         return name
 
-    def run_limited(self, *arguments):
+    def run_limited(self, *arguments, environment=None):
         """Exit code and what stands on stderr."""
         errors = self.path / "stderr"
         with open(errors, "wb") as stderr:
             child = subprocess.Popen([COVARY, *arguments, *(["--threads", "1"] if arguments[0] == "render" else [])],
-                                     cwd=self.path, stdout=subprocess.DEVNULL, stderr=stderr, preexec_fn=limit)
+                                     cwd=self.path, stdout=subprocess.DEVNULL, stderr=stderr, preexec_fn=limit,
+                                     env=os.environ | (environment or {}))
             _, status, usage = os.wait4(child.pid, 0)
         child.returncode = os.waitstatus_to_exitcode(status)
         text = errors.read_text(errors="replace")
@@ -57,8 +59,8 @@ class Limits(unittest.TestCase):
             self.assertLess(usage.ru_maxrss * 1024, MEMORY, arguments)
         return child.returncode, text
 
-    def refused(self, message, *arguments):
-        code, text = self.run_limited(*arguments)
+    def refused(self, message, *arguments, environment=None):
+        code, text = self.run_limited(*arguments, environment=environment)
         self.assertEqual(code, 1, text)
         self.assertIn(message, text)
 
@@ -122,7 +124,8 @@ class Limits(unittest.TestCase):
         """An EXR file of 4 x 4 pixels with these attributes besides the required ones."""
         def attribute(name, kind, value, size=None):
             return name + b"\0" + kind + b"\0" + struct.pack("<I", len(value) if size is None else size) + value
-        channels = b"".join(c + b"\0" + struct.pack("<iiii", 2, 0, 1, 1) for c in (b"B", b"G", b"R")) + b"\0"
+        names = attributes.pop("channels", ("B", "G", "R"))
+        channels = b"".join(c.encode() + b"\0" + struct.pack("<iiii", 2, 0, 1, 1) for c in names) + b"\0"
         size = attributes.pop("size", (4, 4))
         window = struct.pack("<iiii", 0, 0, size[0] - 1, size[1] - 1)
         header = b"".join([
@@ -134,6 +137,73 @@ class Limits(unittest.TestCase):
             attribute(b"screenWindowWidth", b"float", struct.pack("<f", 1)),
             *[attribute(n.encode(), *v) for n, v in attributes.items()]])
         return b"\x76\x2f\x31\x01\2\0\0\0" + header + b"\0" + body
+
+    def black_exr(self, width, height, channels=("B", "G", "R")):
+        """Whole, and small for its size: blocks of 16 rows, as the format's predictor and zlib pack zeros."""
+        header = self.exr({"size": (width, height), "channels": channels})
+        blocks = []
+        for y in range(0, height, 16):
+            n_bytes = min(16, height - y) * width * 4 * len(channels)
+            packed = zlib.compress(b"\0" + b"\x80" * (n_bytes - 1), 9) if y % 1600 == 0 or y + 16 > height else packed
+            blocks.append(struct.pack("<ii", y, len(packed)) + packed)
+        offsets, at = b"", len(header) + 8 * len(blocks)
+        for block in blocks:
+            offsets += struct.pack("<Q", at)
+            at += len(block)
+        return header + offsets + b"".join(blocks)
+
+    def black_png(self, width, height):
+        def chunk(kind, data):
+            return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+        deflate = zlib.compressobj(1)
+        rows = b"".join(deflate.compress(bytes(1 + 3 * width)) for _ in range(height)) + deflate.flush()
+        return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)) +
+                chunk(b"IDAT", rows) + chunk(b"IEND", b""))
+
+    def test_small_files_of_many_pixels(self):
+        """What their pixels need is known from headers, and refused where it is more than the limit."""
+        small = {"COVARY_MEMORY": "0.1"}
+        self.write("a.png", self.black_png(12000, 12000))
+        self.write("a.exr", self.black_exr(12000, 12000))
+        for name, texture, environment in (("a.png", "1.0 GB", "4.3 GB"), ("a.exr", "3.5 GB", "4.3 GB")):
+            self.assertLess((self.path / name).stat().st_size, 2e6)
+            file = f'<string name="filename" value="{name}"/>'
+            for needed, body in (
+                    (texture, '<shape type="sphere"><bsdf type="diffuse"><texture type="bitmap" name="reflectance">'
+                              f"{file}</texture></bsdf></shape>"),
+                    (environment, f'<emitter type="envmap">{file}</emitter>')):
+                self.write("s.xml", scene(body))
+                for arguments in (("info", "s.xml"), ("render", "s.xml", "-o", "out.exr", "--spp", "4", "--quiet")):
+                    self.refused(f"{name}: a texture of 12000 x 12000 pixels needs {needed} of memory beside the ",
+                                 *arguments, environment=small)
+            for arguments in (("compare", name, "-r", name), ("convert", name, "out.png"),
+                              ("view", name, "-o", "a.html")):
+                self.refused(f"{name}: an image of 12000 x 12000 pixels needs ", *arguments, environment=small)
+            self.assertEqual(self.run_limited("info", name, environment=small)[0], 0)
+        code, text = self.run_limited("compare", "a.exr", "-r", "a.exr", environment={"COVARY_MEMORY": "a lot"})
+        self.assertEqual(code, 2)
+        self.assertIn("the environment variable COVARY_MEMORY is 'a lot'; expected is a positive number of GB", text)
+
+    def test_what_is_made_of_images(self):
+        """The images themselves fit, but not what the command makes of them."""
+        self.write("a.exr", self.black_exr(2000, 2000))
+        limited = {"COVARY_MEMORY": "0.2"}
+        self.refused("an image of 2000 x 2000 pixels needs 592.0 MB ", "compare", "a.exr", "-r", "a.exr", "--metric",
+                     "flip", environment=limited)
+        self.refused("an image of 4000 x 2000 pixels needs 192.0 MB ", "convert", "a.exr", "a.exr", "out.exr",
+                     environment=limited)
+        self.write("b.exr", self.black_exr(2000, 2000, ["B", "G", "R", *(f"{c}.Y" for c in "CDE")]))
+        self.refused("an image of 2000 x 2000 pixels needs 144.0 MB ", "view", "b.exr", "-o", "a.html",
+                     environment=limited)
+
+    def test_files_of_many_layers(self):
+        channels = sorted(f"layer{i:05}.{c}" for i in range(20000) for c in "RGB")
+        self.write("a.exr", self.black_exr(1, 1, ["B", "G", "R"] + channels))
+        code, text = self.run_limited("view", "a.exr", "-o", "a.html")
+        self.assertEqual(code, 0, text)
+        self.assertIn("20000 layers beside the image; the page has the first 100 (--layer shows another one)", text)
+        self.write("b.exr", self.black_exr(1, 1, channels))
+        self.refused("choose a layer (layers: layer00000, layer00001, ", "view", "b.exr", "-o", "b.html")
 
     def test_attributes_that_claim_too_much(self):
         self.write("a.exr", self.exr({"owner": (b"string", b"me", 1980000000)}, bytes(4000)))
