@@ -37,6 +37,16 @@ std::string LearningIntegrator::description() const {
 
 std::string LearningIntegrator::training_text() const { return frozen_ ? hash_text(hash_) : "untrained"; }
 
+namespace {
+
+/// Whether the importance of pixels is made of the image so far, for the waves that are left.
+bool asks_for_importance(const LearningIntegrator& integrator) {
+  const uint32_t now = integrator.trained_spp(), pilot = integrator.pilot_spp();
+  return now == pilot || (pilot > 0 && now > pilot && now < integrator.training_spp() && integrator.pilot_goes_on());
+}
+
+}  // namespace
+
 bool train(const Scene& scene, LearningIntegrator& integrator, const TrainingSettings& settings) {
   integrator.restart();
   if (integrator.training_spp() > 0) {
@@ -46,13 +56,15 @@ bool train(const Scene& scene, LearningIntegrator& integrator, const TrainingSet
     pass.learner = &integrator;
     Film film(scene.camera().width(), scene.camera().height(), settings.window, settings.image ? 2 : 1);
     WaveCombination waves(integrator.wave_weights());
-    std::vector<Spectrum> importance;
+    // Waves are compared by the first importance throughout, so that their variances mean the same.
+    std::vector<Spectrum> first_importance, importance;
     pass.checkpoint = [&] {
-      if (settings.importance && integrator.trained_spp() == integrator.pilot_spp()) {
+      if (settings.importance && asks_for_importance(integrator)) {
         importance = settings.importance(film);
         pass.importance = importance;
+        if (first_importance.empty()) first_importance = importance;
       }
-      if (settings.image) waves.add(film, importance);
+      if (settings.image) waves.add(film, first_importance);
     };
     render_pass(scene, integrator, pass, film);
     if (integrator.trained_spp() != integrator.training_spp()) return false;

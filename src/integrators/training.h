@@ -46,6 +46,8 @@ class LearningIntegrator : public Integrator {
   /// Samples per pixel of the training after which the importance of each pixel (PassSettings::importance) is made of
   /// the image so far; 0: it is not asked for.
   virtual uint32_t pilot_spp() const { return 0; }
+  /// Whether the importance is made again after each later wave, of all samples so far.
+  virtual bool pilot_goes_on() const { return true; }
   /// Whether that image is denoised by Open Image Denoise for it, instead of a filter that is always there.
   virtual bool pilot_by_oidn() const { return false; }
   /// Bytes that what is learnt may take, at most; 0: few.
@@ -113,7 +115,8 @@ struct TrainingSettings {
   FilterSettings filter;
   const std::atomic<bool>* stop = nullptr;                      ///< as in PassSettings
   std::function<void(uint64_t done, uint64_t total)> progress;  ///< as in PassSettings
-  /// Makes the importance of each pixel from the film after pilot_spp() samples; empty: 1 everywhere.
+  /// Makes the importance of each pixel from the film after pilot_spp() samples, and of later waves; empty: 1
+  /// everywhere.
   std::function<std::vector<Spectrum>(const Film&)> importance;
   /// PassSettings::seed of the training: renders of different seeds learn from different samples.
   uint64_t seed = 0;

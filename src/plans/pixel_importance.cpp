@@ -2,6 +2,7 @@
 #include "plans/pixel_importance.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "estimators/denoise.h"
 #include "estimators/joint_bilateral.h"
@@ -12,7 +13,7 @@ namespace covary {
 
 std::vector<Spectrum> pixel_importance(const Scene& scene, const FilterSettings& filter, const Film& film, bool by_oidn,
                                        const std::atomic<bool>* stop) {
-  constexpr float kSmallest = 0.01f;
+  constexpr float kSmallest = 0.01f;  // as in relMSE
   constexpr uint32_t kGuideSamples = 2;
   PassSettings settings;
   settings.pass = kTrainingPass, settings.filter = filter;
@@ -26,7 +27,7 @@ std::vector<Spectrum> pixel_importance(const Scene& scene, const FilterSettings&
   for (int y = 0; y < value.height; ++y)
     for (int x = 0; x < value.width; ++x) {
       Spectrum weight;
-      for (int c = 0; c < 3; ++c) weight[c] = 1 / (std::max(value.pixel(x, y)[c], 0.0f) + kSmallest);
+      for (int c = 0; c < 3; ++c) weight[c] = 1 / std::sqrt(sqr(std::max(value.pixel(x, y)[c], 0.0f)) + kSmallest);
       importance.push_back(weight);
     }
   return importance;

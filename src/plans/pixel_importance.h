@@ -10,9 +10,9 @@
 
 namespace covary {
 
-/// How much an error counts in each channel of each pixel, so that relative errors count alike: 1 / (value + 0.01),
-/// with the value of the denoised film ([Hua2023] Eq. 25). Denoised by joint_bilateral(), or by Open Image
-/// Denoise, which then has to be installed. Empty when stopped.
+/// How much an error counts in each channel of each pixel, so that relative errors count alike: 1 / √(value² + 0.01),
+/// with the value of the denoised film ([Hua2023] Eq. 25) and the constant of relMSE. Denoised by joint_bilateral(), or
+/// by Open Image Denoise, which then has to be installed. Empty when stopped.
 std::vector<Spectrum> pixel_importance(const Scene& scene, const FilterSettings& filter, const Film& film, bool by_oidn,
                                        const std::atomic<bool>* stop);
 

@@ -21,7 +21,7 @@ bool train(const LoadedScene& scene, const RenderRequest& request, Integrator& i
   settings.importance = [&, by_oidn](const Film& film) {
     const Stopwatch surrogate;
     std::vector<Spectrum> importance = pixel_importance(*scene.scene, settings.filter, film, by_oidn, settings.stop);
-    seconds.surrogate = surrogate.seconds();
+    seconds.surrogate += surrogate.seconds();
     return importance;
   };
   if (!request.load_training.empty()) load_training(scene.content_hash, integrator, request.load_training);

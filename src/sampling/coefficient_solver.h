@@ -97,8 +97,8 @@ void solve_dense(const SystemView& system, const SolveSettings& settings, Coeffi
 Spectrum best_share(const SystemView& system, const Spectrum& parent, double prior_vertices, bool monochrome);
 
 /// Weight of a vertex's samples in the sums: the mean over RGB of (throughput · importance)². `throughput` is that of
-/// the path before the vertex ([Hua2023] Eq. 29), `importance` is 1 / (value of the pixel, about, + 0.01) for the
-/// relative variance (Eq. 25) and 1 for the absolute one.
+/// the path before the vertex ([Hua2023] Eq. 29), `importance` is 1 / √(value² + 0.01) with the value of the pixel,
+/// about, for the relative variance (Eq. 25) and 1 for the absolute one.
 inline float variance_weight(const Spectrum& throughput, const Spectrum& importance) {
   const Spectrum factor = throughput * importance;
   return mean(factor * factor);

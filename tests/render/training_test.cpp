@@ -7,6 +7,7 @@
 #include <tbb/global_control.h>
 
 #include <atomic>
+#include <tuple>
 
 #include "core/content_hash.h"
 #include "plans/estimator_plans.h"
@@ -34,7 +35,12 @@ class CellMeans final : public LearningIntegrator {
   bool backwards = false;
   std::vector<uint32_t> waves;  ///< trained_spp() before each update
 
+  uint32_t pilot = 0;  ///< pilot_spp()
+  bool pilot_once = false;
+
   uint32_t training_spp() const override { return spp_; }
+  uint32_t pilot_spp() const override { return pilot; }
+  bool pilot_goes_on() const override { return !pilot_once; }
   std::unique_ptr<ThreadState> make_thread_state() const override { return std::make_unique<State>(*inner_); }
   bool allows_negative() const override { return true; }
 
@@ -222,6 +228,23 @@ TEST(Training, StoppedIsNotTrainedAndCanStartAgain) {
   EXPECT_TRUE(train_room(scene));
   EXPECT_TRUE(train_room(other));
   EXPECT_EQ(scene.integrator().description(), other.integrator().description());
+}
+
+TEST(Training, ImportanceIsMadeAfterThePilotAndEachLaterWaveButTheLast) {
+  for (const auto& [pilot, once, expected] :
+       {std::tuple(2u, false, std::vector<int>{2, 4}), std::tuple(1u, false, std::vector<int>{1, 2, 4}),
+        std::tuple(1u, true, std::vector<int>{1}), std::tuple(0u, false, std::vector<int>{})}) {
+    const TestScene scene = load_room();
+    learner(scene).pilot = pilot, learner(scene).pilot_once = once;
+    std::vector<int> seen;
+    TrainingSettings settings{{0, 0, scene.loaded.width, scene.loaded.height}, scene.loaded.filter};
+    settings.importance = [&](const Film& film) {
+      seen.push_back(static_cast<int>(film.counts()[0]));
+      return std::vector<Spectrum>(film.counts().size(), Spectrum(1));
+    };
+    EXPECT_TRUE(train(scene.scene(), learner(scene), settings));
+    EXPECT_EQ(seen, expected) << pilot << once;
+  }
 }
 
 TEST(Training, ARenderByAPlanTrainsFirst) {
