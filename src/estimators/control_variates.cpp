@@ -35,13 +35,15 @@ struct RecordLayout {
         error(contrasts + 3),
         group_variance(contrasts + 6),
         h_variance(contrasts + 9),
-        size(contrasts + 12) {}
+        missing(contrasts + 12),
+        size(contrasts + 15) {}
   int group_contrasts;  ///< number of contrasts (or centred means) of the groups, all channels: [contrast][rgb], at 0
   int contrasts;        ///< the same with the row of the condition, which acts like one more contrast
   int difference;       ///< g - h
   int error;            ///< error variance of h for the penalty, times T
   int group_variance;   ///< sample variance of the CRN groups
   int h_variance;       ///< variance of h
+  int missing;          ///< light that g lacks
   int size;
 };
 
@@ -156,6 +158,8 @@ class Regression {
     }
   }
 
+  float missing(int c, int x, int y) const { return in_.missing ? in_.missing->row(c, y)[x] : 0.0f; }
+
   void make_records(const Tile& tile, Workspace& w) const {
     std::vector<float> weights(T_);
     for (int j = 1; j < T_; ++j) weights[j] = 1.0f / std::sqrt(static_cast<float>(j) * static_cast<float>(j + 1));
@@ -177,12 +181,13 @@ class Regression {
         else
           make_weighted_contrasts(in_.crn.pixel(x, y), in_.crn.count(x, y), record, squares);
         if (layout_.contrasts > layout_.group_contrasts)
-          for (int c = 0; c < 3; ++c) record[layout_.group_contrasts + c] = mean[c];
+          for (int c = 0; c < 3; ++c) record[layout_.group_contrasts + c] = mean[c] + missing(c, x, y);
         for (int c = 0; c < 3; ++c) {
           record[layout_.difference + c] = mean[c] - in_.h->row(c, y)[x];
           record[layout_.error + c] = in_.error_of_h ? static_cast<float>(T_) * in_.error_of_h->row(c, y)[x] : 0.0f;
           record[layout_.group_variance + c] = squares[c] / static_cast<float>(T_ - 1);
           record[layout_.h_variance + c] = in_.variance_of_h ? in_.variance_of_h->row(c, y)[x] : 0.0f;
+          record[layout_.missing + c] = missing(c, x, y);
         }
       }
   }
@@ -251,13 +256,16 @@ class Regression {
   }
 
   /// The condition on the coefficients as a row of X and y (one for each channel, like a contrast of the groups),
-  /// scaled by sqrt(conservation (T - 1) S / N).
+  /// scaled by sqrt(conservation (T - 1) S / N). The CRN mean has an error of the size of the light that it lacks; the
+  /// variance of a group is T times that of the mean.
   void scale_condition(int first, int count, Workspace& w) const {
     const int k = s_.k, n_tail = layout_.size - layout_.contrasts;
     vfloat S = {}, N = {};
     for (int i = 0; i < k; ++i) {
       S += channel_sum(w.tail.data() + i * n_tail, layout_.group_variance, first, count);
       for (int c = first; c < first + count; ++c) {
+        const vfloat missing = tail_value(w.tail.data() + i * n_tail, layout_.missing + c);
+        S += static_cast<float>(T_) * missing * missing;
         const vfloat g = w.x[static_cast<size_t>(i) * layout_.contrasts + layout_.group_contrasts + c];
         N += g * g;
       }
@@ -389,7 +397,7 @@ class Regression {
 
   /// The first three terms of [YM2025] Eq. (8): variance of f - sum_i beta_i g_i. The coefficients were fitted to the
   /// same groups, so that their residuals are too small; generalised cross-validation [GHW1979] corrects
-  /// that by the degrees of freedom.
+  /// that by the degrees of freedom. Light that the CRN image lacks is an error of f and all g_i at once.
   vfloat crn_variance(int c, const Workspace& w) const {
     vfloat squares = {};
     for (int r = c; r < layout_.group_contrasts; r += 3) {
@@ -398,7 +406,10 @@ class Regression {
       squares += residual * residual;
     }
     const vfloat left = max(1.0f - w.freedom, splat(kFewestFreedom));
-    return squares / (static_cast<float>(T_ * (T_ - 1)) * left * left);
+    vfloat missing = tail_value(w.y_tail.data(), layout_.missing + c);
+    for (int i = 0; i < s_.k; ++i)
+      missing -= w.beta[i] * tail_value(w.tail.data() + i * (layout_.size - layout_.contrasts), layout_.missing + c);
+    return squares / (static_cast<float>(T_ * (T_ - 1)) * left * left) + missing * missing;
   }
 
   /// The last term of Eq. (8): sum_i beta_i^2 var h_i. Penalties that contain the sample variance give large

@@ -55,6 +55,11 @@ struct ControlVariateInput {
   const Planes* h = nullptr;              ///< 3 planes: mean of the independent image; 0 outside and at invalid pixels
   const Planes* error_of_h = nullptr;     ///< 3 planes: estimated error variance of h; kUseless where there is none
   const Planes* variance_of_h = nullptr;  ///< 3 planes: variance of h; for std_error and sample_share
+  /// 3 planes, optional: c, light that the CRN image lacks (missing_light.h). The condition becomes
+  ///     sum_i beta_i (g_i + c_i) = f + c,   with group variances that are T c_i^2 larger in S,
+  /// so that the coefficients of a region where the CRN image is black add up to one; without a condition they stay.
+  /// Standard errors contain c - sum_i beta_i c_i.
+  const Planes* missing = nullptr;
 };
 
 /// Fills `result.estimate` and, where asked for, `result.std_error`; pixels marked 0 in `valid` are left as they come.

@@ -3,8 +3,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <optional>
+
 #include "estimators/common_options.h"
 #include "estimators/control_variates.h"
+#include "estimators/missing_light.h"
 #include "estimators/registry.h"
 
 namespace covary {
@@ -29,8 +33,8 @@ EstimatorResult cv_baseline(const GroupedImage& crn, const GroupedImage& indepen
 
   EstimatorResult result;
   const std::vector<unsigned char> valid = finite_pixels(crn, independent, result.nonfinite_pixels);
-  const Moments g = moments(crn, valid, options.window / 2, kFar),
-                h = moments(independent, valid, options.window / 2, 0.0f);
+  const int border = std::max(options.window, kMissingWindow) / 2;
+  const Moments g = moments(crn, valid, border, kFar), h = moments(independent, valid, border, 0.0f);
   ControlVariateSettings settings;
   settings.k = options.k;
   settings.window = options.window;
@@ -42,6 +46,8 @@ EstimatorResult cv_baseline(const GroupedImage& crn, const GroupedImage& indepen
   settings.std_error = options.std_error;
   settings.probe = options.probe;
   ControlVariateInput input{crn, &g, &h.mean, nullptr, &h.variance_of_mean};
+  std::optional<Planes> missing;
+  if (options.std_error) input.missing = &missing.emplace(missing_light(g, h, valid, border));
   apply_control_variates(input, settings, valid, result);
   fill_invalid(crn, independent, valid, result.estimate);
   return result;
@@ -62,7 +68,7 @@ Estimator make_cv_baseline(EstimatorParameters& parameters) {
   estimator.predicts_error = true;
   estimator.reliable_samples = kReliableSamples;
   estimator.fewest_groups = 3;
-  estimator.reach = o.window / 2;
+  estimator.reach = o.window / 2 + kMissingWindow / 2;
   estimator.memory.always = kCvBaselineBytesPerPixel;
   estimator.apply = [o](const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings) {
     CvBaselineOptions options = o;

@@ -36,6 +36,6 @@ EstimatorResult cv_baseline(const GroupedImage& crn, const GroupedImage& indepen
                             const CvBaselineOptions& options = {});
 
 /// Memory that cv_baseline() takes beside its input, its result included: bytes per pixel, about.
-inline constexpr double kCvBaselineBytesPerPixel = (2 * 6 + 6) * sizeof(float) + 1;
+inline constexpr double kCvBaselineBytesPerPixel = (2 * 6 + 6 + 3 + 6) * sizeof(float) + 1;
 
 }  // namespace covary

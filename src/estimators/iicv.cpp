@@ -3,8 +3,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <optional>
+
 #include "estimators/common_options.h"
 #include "estimators/control_variates.h"
+#include "estimators/missing_light.h"
 #include "estimators/pilot.h"
 #include "estimators/registry.h"
 
@@ -55,7 +59,7 @@ EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& independent, c
 
   EstimatorResult result;
   const std::vector<unsigned char> valid = finite_pixels(crn, independent, result.nonfinite_pixels);
-  const int border = std::max(options.window, options.pilot_window) / 2;
+  const int border = std::max({options.window, options.pilot_window, kMissingWindow}) / 2;
   const Moments g = moments(crn, valid, border, kFar), h = moments(independent, valid, border, 0.0f);
 
   ControlVariateSettings settings;
@@ -69,6 +73,12 @@ EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& independent, c
   settings.std_error = options.std_error || options.feedback;
   settings.probe = options.probe;
   ControlVariateInput input{crn, &g};
+  std::optional<Planes> missing;
+  const auto find_missing = [&](const Moments& independent_moments) {
+    if (!settings.std_error && settings.conservation <= 0) return;
+    missing.emplace(missing_light(g, independent_moments, valid, border));
+    input.missing = &*missing;
+  };
 
   if (halves) {
     // Halves: even and odd groups. Each half's pilot judges the other half's values, so that the penalty is independent
@@ -81,6 +91,7 @@ EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& independent, c
       input.h = &half[i].mean;
       input.error_of_h = &error;
       input.variance_of_h = &half[i].variance_of_mean;
+      find_missing(half[1 - i]);
       apply_control_variates(input, settings, valid, part[i]);
     }
     result.estimate = std::move(part[0].estimate);
@@ -95,6 +106,7 @@ EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& independent, c
     Planes error;
     input.h = &h.mean;
     input.variance_of_h = &h.variance_of_mean;
+    find_missing(h);
     switch (options.penalty) {
       case Penalty::kSample:
         input.error_of_h = &h.variance_of_mean;
@@ -119,13 +131,14 @@ EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& independent, c
 int iicv_reach(const IicvOptions& options) {
   const int pilot = options.pilot_window / 2 * (options.penalty == Penalty::kSmoothed ? 2 : 1);
   const int feedback = options.feedback ? feedback_reach(options.feedback_options) : 0;
-  return options.window / 2 + pilot + feedback;
+  return options.window / 2 + std::max(pilot, kMissingWindow / 2) + feedback;
 }
 
 double iicv_bytes_per_pixel(const IicvOptions& options) {
   const bool halves = options.penalty == Penalty::kCrossFit;
-  // Planes of floats: moments of both images, the result and its error, the pilot's error, residuals for the feedback.
-  int planes = 2 * 6 + 6 + 3;
+  // Planes of floats: moments of both images, the result and its error, the pilot's error, light that the CRN image
+  // lacks and what finds it, residuals for the feedback.
+  int planes = 2 * 6 + 6 + 3 + 3 + 6;
   if (options.penalty == Penalty::kSmoothed) planes += 3;
   if (halves) planes += 2 * 6 + 6;
   if (options.feedback) planes += 8 + 4;

@@ -8,7 +8,8 @@
 //
 // The defaults go beyond the paper in three places, each an option: errors common to all CRN pixels cancel
 // (`conservation`), the penalty contains the expected beside the realised error of independent pixels (`sample_share`),
-// and what the penalty takes away is given back (`feedback`). IicvOptions::paper() has none of them.
+// and what the penalty takes away is given back (`feedback`). IicvOptions::paper() has none of them. With the first,
+// regions where the CRN image misses the light fall back to the independent image (missing_light.h).
 //
 // Claim: consistent, not unbiased; coefficients and penalties are estimated from the samples they are applied to.
 // Pixels of the independent image must be independent of each other (box filter), values linear.

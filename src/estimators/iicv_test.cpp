@@ -6,6 +6,7 @@
 #include <tbb/global_control.h>
 
 #include <limits>
+#include <tuple>
 
 #include "core/error.h"
 #include "estimators/compare_with_reference.h"
@@ -101,6 +102,99 @@ TEST(Iicv, ConservationAgreesWithTheReference) {
   }
 }
 
+/// Rare light: a CRN image that misses it in whole regions, entirely or but for a little of its own.
+struct RareLight {
+  test::Grouped crn, independent;
+  explicit RareLight(uint64_t seed, int width = 41, int height = 27)
+      : crn(test::crn_image(width, height, 12, seed)),
+        independent(test::independent_image(width, height, 12, seed + 1)) {
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x)
+        for (int t = 0; t < 12; ++t) {
+          // One of three groups of the independent image has found the light.
+          const bool found = test::noise(seed + 9, static_cast<uint64_t>(y) * width + x, t) + 0.5f < 1.0f / 3;
+          for (int c = 0; c < 3; ++c) {
+            if (is_black(x)) crn.pixel(x, y)[3 * t + c] = 0;
+            if (is_dim(x)) crn.pixel(x, y)[3 * t + c] *= 0.02f;
+            if (is_black(x) || is_dim(x)) independent.pixel(x, y)[3 * t + c] *= found ? 3.0f : 0.0f;
+          }
+        }
+  }
+  static bool is_black(int x) { return x < 15; }
+  static bool is_dim(int x) { return x >= 26; }
+};
+
+TEST(Iicv, MissingLightAgreesWithTheReference) {
+  const RareLight in(1);
+  const RgbImage error = pilot_of(in.crn.view(), in.independent.view(), 11);
+  for (const auto& [k, shared, conservation] :
+       {std::tuple{25, true, 30.0f}, {25, false, 30.0f}, {50, true, 10.0f}, {8, false, 10.0f}, {25, true, 0.0f}}) {
+    IicvOptions options = IicvOptions::paper();
+    options.conservation = conservation;
+    options.sample_share = 0.5f;
+    options.k = k;
+    options.shared_coefficients = shared;
+    options.std_error = true;
+    const Difference d =
+        compare(iicv(in.crn.view(), in.independent.view(), options), in.crn.view(), in.independent.view(), error, k, 11,
+                true, {shared, true, 0, kSmallestPenalty, conservation, 0.5});
+    EXPECT_LT(d.estimate, 3e-3) << "k " << k << " shared " << shared << " conservation " << conservation;
+    EXPECT_LT(d.std_error, 3e-3) << "k " << k << " shared " << shared << " conservation " << conservation;
+  }
+}
+
+/// Where the CRN image is black it has no variance either, and yet it is not certain.
+TEST(Iicv, FindsTheLightThatTheCrnImageMisses) {
+  double error = 0, of_independent = 0, predicted = 0;
+  for (const uint64_t seed : {1, 5, 9}) {
+    const RareLight in(seed);
+    IicvOptions options;
+    options.std_error = true;
+    const EstimatorResult result = iicv(in.crn.view(), in.independent.view(), options);
+    for (int y = 0; y < 27; ++y)
+      for (int x = 0; x < 41; ++x)
+        for (int c = 0; c < 3; ++c) {
+          ASSERT_GT(result.std_error.pixel(x, y)[c], 0) << x << ", " << y;
+          if (!RareLight::is_black(x) && !RareLight::is_dim(x)) continue;
+          const double truth = test::expected(x, y, c), h = reference::mean(in.independent.view(), x, y)[c];
+          error += std::pow(result.estimate.pixel(x, y)[c] - truth, 2);
+          of_independent += std::pow(h - truth, 2);
+          predicted += std::pow(result.std_error.pixel(x, y)[c], 2);
+        }
+  }
+  EXPECT_LT(error, 0.25 * of_independent);
+  EXPECT_GT(predicted, 0.5 * error);
+  EXPECT_LT(predicted, 4 * error);
+}
+
+/// The published estimate stays; its error is told.
+TEST(Iicv, AsPublishedItIsBlackThereButSaysHowUncertain) {
+  const RareLight in(1);
+  IicvOptions options = IicvOptions::paper();
+  const EstimatorResult plain = iicv(in.crn.view(), in.independent.view(), options);
+  options.std_error = true;
+  const EstimatorResult result = iicv(in.crn.view(), in.independent.view(), options);
+  EXPECT_EQ(result.estimate.data, plain.estimate.data);
+  EXPECT_EQ(result.estimate.pixel(5, 13)[0], 0);
+  EXPECT_NEAR(result.std_error.pixel(5, 13)[0], test::expected(5, 13, 0), 0.4 * test::expected(5, 13, 0));
+}
+
+/// Light that is seen directly, and a background without any, are certain.
+TEST(Iicv, WhatIsTheSameInBothImagesIsCertain) {
+  test::Grouped crn = test::crn_image(41, 27, 12, 1), independent = test::independent_image(41, 27, 12, 2);
+  for (test::Grouped* image : {&crn, &independent})
+    for (int y = 0; y < 27; ++y)
+      for (int x = 0; x < 20; ++x) std::fill_n(image->pixel(x, y), 36, x < 10 ? 0.0f : 2.5f);
+  IicvOptions options;
+  options.std_error = true;
+  const EstimatorResult result = iicv(crn.view(), independent.view(), options);
+  for (int y = 0; y < 27; ++y)
+    for (int x = 0; x < 20; ++x) {
+      ASSERT_EQ(result.std_error.pixel(x, y)[0], 0) << x << ", " << y;
+      ASSERT_EQ(result.estimate.pixel(x, y)[0], x < 10 ? 0.0f : 2.5f) << x << ", " << y;
+    }
+}
+
 /// Everything the defaults add: mixed penalty, condition, feedback.
 TEST(Iicv, DefaultsAgreeWithTheReference) {
   for (const auto& [width, height] : {std::pair{41, 27}, {60, 6}, {1, 1}, {5, 40}}) {
@@ -113,12 +207,14 @@ TEST(Iicv, DefaultsAgreeWithTheReference) {
     const RgbImage variance = reference::map_pixels(
         independent_view, [&](int x, int y) { return reference::variance_of_mean(independent_view, x, y); });
     const RgbImage error = pilot_of(crn_view, independent_view, 11);
+    const RgbImage missing = reference::missing_light(crn_view, independent_view);
     const auto all = neighbours(crn_view, 25, 11, true);
     RgbImage estimate, std_error;
     for (int y = 0; y < height; ++y)
       for (int x = 0; x < width; ++x) {
-        const reference::Result r = reference::control_variates(
-            crn_view, h, error, variance, {x, y}, all[y * width + x], {true, true, 0, kSmallestPenalty, 30, 0.5});
+        const reference::Result r =
+            reference::control_variates(crn_view, h, error, variance, {x, y}, all[y * width + x],
+                                        {true, true, 0, kSmallestPenalty, 30, 0.5}, missing);
         estimate.push_back(r.estimate);
         std_error.push_back(r.std_error);
       }

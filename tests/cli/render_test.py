@@ -30,6 +30,47 @@ class RenderTest(CliTest):
         return json.loads(self.good("render", ROOM, *SMALL, "--json", "-", *arguments).stdout)
 
 
+def cube(scale, centre):
+    """A closed wall: half sides and centre."""
+    xyz = [" ".join(f'{axis}="{v}"' for axis, v in zip("xyz", values)) for values in (scale, centre)]
+    return (f'<shape type="cube"><transform name="to_world"><scale {xyz[0]}/><translate {xyz[1]}/></transform>'
+            '<bsdf type="diffuse"><rgb name="reflectance" value="0.7"/></bsdf></shape>')
+
+
+#: A room whose light comes through a small window in the wall on the left: few paths find it.
+WINDOW_ROOM = '<scene version="3.0.0"><integrator type="path"><integer name="max_depth" value="6"/></integrator>' \
+    '<sensor type="perspective"><float name="fov" value="84"/><transform name="to_world">' \
+    '<lookat origin="0,-3.6,1.5" target="0,2,1.1" up="0,0,1"/></transform><film type="hdrfilm">' \
+    '<integer name="width" value="40"/><integer name="height" value="24"/><rfilter type="box"/></film></sensor>' \
+    '<emitter type="constant"><rgb name="radiance" value="3"/></emitter>' + "".join(
+        cube(*wall) for wall in (((3, 4, .1), (0, 0, -.1)), ((3, 4, .1), (0, 0, 3.1)), ((3.2, .1, 1.7), (0, 4.1, 1.5)),
+                                 ((3.2, .1, 1.7), (0, -4.1, 1.5)), ((.1, 4, 1.7), (3.1, 0, 1.5)),
+                                 ((.1, 2.2, 1.7), (-3.1, -1.8, 1.5)), ((.1, 1.2, 1.7), (-3.1, 2.8, 1.5)),
+                                 ((.1, .6, .5), (-3.1, 1, .5)), ((.1, .6, .4), (-3.1, 1, 2.6)))) + "</scene>"
+
+
+class RareLight(RenderTest):
+    """Where no sample of the CRN image finds the window, whole regions of it are black, without any variance."""
+
+    def render(self, output, *arguments):
+        self.good("render", "window.xml", "-o", output, "--quiet", "--no-preview", *arguments)
+
+    def test_what_one_image_misses_is_not_black_and_not_certain(self):
+        (self.path / "window.xml").write_text(WINDOW_ROOM)
+        self.render("reference.exr", "--estimator", "none", "--spp", "1024", "--seed", "9")
+        self.render("plain.exr", "--estimator", "none", "--spp", "24")
+        for options in ((), ("--paper",), ("--estimator", "cv-baseline", "--ridge", "0.001")):
+            self.render("a.exr", "--spp", "24", *options, "--passes", "films", "--overwrite")
+            image, crn, independent = (read_exr((self.path / name).read_bytes())
+                                       for name in ("a.exr", "films/crn.exr", "films/independent.exr"))
+            blind = [c == 0 and i > 0 for c, i in zip(crn["R"], independent["R"])]
+            self.assertGreater(sum(blind), 100, "the scene has lost its point")
+            self.assertTrue(all(error > 0 for error, b in zip(image["StdError.R"], blind) if b), options)
+            if not options:
+                self.assertLess(self.relmse("a.exr", "reference.exr"),
+                                0.35 * self.relmse("plain.exr", "reference.exr"))
+
+
 class Plans(RenderTest):
     def test_default_is_iicv_and_equals_combine_of_the_two_passes(self):
         facts = self.statistics("-o", "a.exr", "--spp", "48", "--seed", "3")

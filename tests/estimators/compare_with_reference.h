@@ -31,7 +31,8 @@ inline std::vector<std::vector<Pixel>> neighbours(const GroupedImage& crn, int k
   return result;
 }
 
-/// Largest difference from the reference, in standard deviations of the CRN mean, of estimate and standard error.
+/// Largest difference from the reference, in standard deviations of the CRN mean and the light that it lacks, of
+/// estimate and standard error.
 struct Difference {
   double estimate = 0, std_error = 0;
 };
@@ -42,13 +43,15 @@ inline Difference compare(const EstimatorResult& fast, const GroupedImage& crn, 
   const auto all = neighbours(crn, k, window, include_target);
   const RgbImage h = map_pixels(independent, [&](int x, int y) { return mean(independent, x, y); });
   const RgbImage variance = map_pixels(independent, [&](int x, int y) { return variance_of_mean(independent, x, y); });
+  const RgbImage missing = missing_light(crn, independent);
   Difference worst;
   for (int y = 0; y < crn.height; ++y)
     for (int x = 0; x < crn.width; ++x) {
-      const Result exact = control_variates(crn, h, error_of_h, variance, {x, y}, all[y * crn.width + x], settings);
+      const Result exact =
+          control_variates(crn, h, error_of_h, variance, {x, y}, all[y * crn.width + x], settings, missing);
       const Rgb noise = variance_of_mean(crn, x, y);
       for (int c = 0; c < 3; ++c) {
-        const double unit = std::sqrt(noise[c]) + 1e-9;
+        const double unit = std::sqrt(noise[c]) + std::abs(missing[y * crn.width + x][c]) + 1e-9;
         worst.estimate = std::max(worst.estimate, std::abs(fast.estimate.pixel(x, y)[c] - exact.estimate[c]) / unit);
         if (!fast.std_error.data.empty())
           worst.std_error =

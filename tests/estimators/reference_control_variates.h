@@ -68,7 +68,7 @@ inline Rgb guided_mean(const GroupedImage& crn, const RgbImage& values, int wind
                        const GroupedImage& counted = {}) {
   const int r = window / 2;
   const Rgb centre = mean(crn, x, y), variance = variance_of_mean(crn, x, y);
-  const double bandwidth = variance[0] + variance[1] + variance[2];
+  const double bandwidth = std::max(variance[0] + variance[1] + variance[2], 1e-30);
   Rgb sum{};
   double weights = 0;
   for (int qy = std::max(0, y - r); qy <= std::min(crn.height - 1, y + r); ++qy)
@@ -91,6 +91,47 @@ inline RgbImage pilot_error(const GroupedImage& crn, const RgbImage& h, int wind
   });
 }
 
+/// What the CRN image lacks: missing_light.h.
+inline RgbImage missing_light(const GroupedImage& crn, const GroupedImage& independent) {
+  const int r = 5;
+  struct Of {
+    Rgb g, h, noise_g, noise_h;
+  };
+  std::vector<Of> of;
+  for (int y = 0; y < crn.height; ++y)
+    for (int x = 0; x < crn.width; ++x)
+      of.push_back(
+          {mean(crn, x, y), mean(independent, x, y), variance_of_mean(crn, x, y), variance_of_mean(independent, x, y)});
+  const auto sum = [](const Rgb& v) { return v[0] + v[1] + v[2]; };
+  return map_pixels(crn, [&](int x, int y) {
+    const Of& own = of[static_cast<size_t>(y) * crn.width + x];
+    const auto each = [&](const auto& visit) {
+      for (int qy = std::max(0, y - r); qy <= std::min(crn.height - 1, y + r); ++qy)
+        for (int qx = std::max(0, x - r); qx <= std::min(crn.width - 1, x + r); ++qx)
+          visit(of[static_cast<size_t>(qy) * crn.width + qx], independent.counts ? independent.count(qx, qy) : 1.0);
+    };
+    double n = 0, difference = 0, noise = 0;
+    each([&](const Of& q, double) { n += 1, difference += sum(q.h) - sum(q.g), noise += sum(q.noise_h); });
+    const double tau2 = std::max(0.0, std::pow(difference / n, 2) - 3 * noise / n / 121) / 48;
+    const double bandwidth = std::max(sum(own.noise_g) + tau2, 1e-30);
+    Rgb d{};
+    double weights = 0, variance = 0;
+    each([&](const Of& q, double count) {
+      const double w = count * std::exp(-distance2(q.g, own.g) / bandwidth);
+      weights += w;
+      variance += w * w * sum(q.noise_h);
+      for (int c = 0; c < 3; ++c) d[c] += w * (q.h[c] - q.g[c]);
+    });
+    for (double& v : d) v /= weights;
+    variance /= weights * weights;
+    const double own_noise = sum(own.noise_g), squares = std::max(distance2(d, {0, 0, 0}), 1e-30);
+    const double beyond = std::sqrt(std::max(0.0, 1 - 9 * (own_noise + variance) / squares));
+    const double part = own_noise > 0 ? (sum(d) > 0 ? beyond : 0) : 1;
+    for (double& v : d) v *= part;
+    return d;
+  });
+}
+
 struct Settings {
   bool shared = true, symmetric = true;
   double ridge = 0;             ///< > 0: replaces the errors of h
@@ -103,10 +144,11 @@ struct Result {
   Rgb estimate, std_error;
 };
 
-/// Eqs. (7), (8), (10) at `target` with the given neighbours. `error_of_h`: per pixel, of the mean.
+/// Eqs. (7), (8), (10) at `target` with the given neighbours. `error_of_h`: per pixel, of the mean. `missing`:
+/// missing_light(), or none.
 inline Result control_variates(const GroupedImage& crn, const RgbImage& h, const RgbImage& error_of_h,
                                const RgbImage& variance_of_h, Pixel target, const std::vector<Pixel>& neighbours,
-                               const Settings& s) {
+                               const Settings& s, const RgbImage& missing = {}) {
   const int T = crn.groups, k = static_cast<int>(neighbours.size());
   const auto index = [&](Pixel p) { return p.y * crn.width + p.x; };
   std::array<Eigen::MatrixXd, 3> X;
@@ -127,6 +169,8 @@ inline Result control_variates(const GroupedImage& crn, const RgbImage& h, const
   // V_h for the groups: a group mean has T times the variance of the mean. It is not taken to be smaller than a small
   // part of the variance of the CRN groups.
   const auto group_variance = [&](Pixel p, int c) { return T * variance_of_mean(crn, p.x, p.y)[c]; };
+  const auto lacks = [&](Pixel p, int c) { return missing.empty() ? 0.0 : missing[index(p)][c]; };
+  const auto light = [&](Pixel p, int c) { return mean(crn, p.x, p.y)[c] + lacks(p, c); };
   const auto penalty = [&](int first, int last, double condition) {
     const auto sum = [&](const auto& element) {
       double total = 0;
@@ -141,7 +185,7 @@ inline Result control_variates(const GroupedImage& crn, const RgbImage& h, const
       const double own = sum([&](int c) { return T * error_of_h[index(target)][c]; });
       const double error = sum([&](int c) { return T * error_of_h[index(q)][c]; });
       const double variance = sum([&](int c) { return T * variance_of_h[index(q)][c]; });
-      const double brightness = sum([&](int c) { return std::pow(mean(crn, q.x, q.y)[c], 2); });
+      const double brightness = sum([&](int c) { return std::pow(light(q, c), 2); });
       V(i) = (1 - s.sample_share) * (s.symmetric ? 0.5 * (own + error) : error) + s.sample_share * variance;
       V(i) = std::max({V(i), s.smallest_penalty * groups, s.smallest_penalty * condition * brightness});
       mean_diagonal += groups / k;
@@ -158,8 +202,8 @@ inline Result control_variates(const GroupedImage& crn, const RgbImage& h, const
     double noise = 0, squares = 0;
     for (const Pixel q : neighbours)
       for (int d = c; d <= last; ++d) {
-        noise += group_variance(q, d);
-        squares += std::pow(mean(crn, q.x, q.y)[d], 2);
+        noise += group_variance(q, d) + T * std::pow(lacks(q, d), 2);
+        squares += std::pow(light(q, d), 2);
       }
     const double condition = s.conservation > 0 ? noise / squares : 0;
     Eigen::MatrixXd A = penalty(c, last, condition).asDiagonal();
@@ -168,9 +212,9 @@ inline Result control_variates(const GroupedImage& crn, const RgbImage& h, const
       A += X[d].transpose() * X[d] / (T - 1);
       b += X[d].transpose() * y[d] / (T - 1);
       Eigen::VectorXd g(k);
-      for (int i = 0; i < k; ++i) g(i) = mean(crn, neighbours[i].x, neighbours[i].y)[d];
+      for (int i = 0; i < k; ++i) g(i) = light(neighbours[i], d);
       A += s.conservation * condition * g * g.transpose();
-      b += s.conservation * condition * g * mean(crn, target.x, target.y)[d];
+      b += s.conservation * condition * g * light(target, d);
     }
     const Eigen::LDLT<Eigen::MatrixXd> factored = A.ldlt();
     beta[c] = factored.solve(b);
@@ -187,6 +231,9 @@ inline Result control_variates(const GroupedImage& crn, const RgbImage& h, const
   for (int c = 0; c < 3; ++c) {
     // Eq. (8), the residuals by generalised cross-validation.
     double variance = (y[c] - X[c] * beta[c]).squaredNorm() / (T - 1) / T / (left[c] * left[c]);
+    double unseen = lacks(target, c);
+    for (int i = 0; i < k; ++i) unseen -= beta[c](i) * lacks(neighbours[i], c);
+    variance += unseen * unseen;
     double mean_variance = 0;
     for (const Pixel q : neighbours) mean_variance += variance_of_h[index(q)][c] / k;
     for (int i = 0; i < k; ++i) {

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the CRN image may have missed (ours). All its pixels share their samples, so that whole regions can be without
+// the light of rare paths, or without any; their sample variance then is too small, or zero, and says that they are
+// certain. The independent image knows better: each of its pixels has samples of its own. The mean difference of both
+// images over pixels that the CRN image shows alike,
+//
+//     D_i = sum_j w_ij (h_j - g_j) / sum_j w_ij,   w_ij = exp(-||g_j - g_i||^2 / (sigma^2(g_i) + tau_i^2)),
+//
+// is what is missing from g_i. tau is a quarter of the difference of both images over the whole window, beyond its own
+// noise, so that pixels count as alike that differ by little compared with the light they lack. With v the variance of
+// D, sigma^2(g_i) and v summed over RGB, the missing light is
+//
+//     c_i = D_i sqrt(1 - 9 (sigma^2(g_i) + v_i) / ||D_i||^2)^+    where D is positive,
+//         = D_i                                                   where sigma(g_i) = 0: no sample says how sure g_i is.
+//
+// So nothing is missing where the noise of both images explains the difference, as nearly everywhere, and where both
+// are equal in all pixels alike, such as lights seen directly.
+#pragma once
+
+#include <vector>
+
+#include "estimators/planes.h"
+
+namespace covary {
+
+/// Side of the window.
+inline constexpr int kMissingWindow = 11;
+
+/// 3 planes: c. `g`, `h`: moments of the CRN image, with kFar outside, and of the independent image, with 0 outside;
+/// their borders hold half of the window. The result has the border, and 0 outside and at invalid pixels. Pixels of
+/// unequal counts count by their numbers of independent samples.
+Planes missing_light(const Moments& g, const Moments& h, const std::vector<unsigned char>& valid, int border);
+
+}  // namespace covary
