@@ -5,6 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include "core/content_hash.h"
 #include "core/error.h"
@@ -174,28 +177,82 @@ Slope slope_of(const Results& results, size_t scene, size_t method) {
   return {scene, method, convergence_slope(samples, errors)};
 }
 
-Summary summary_of(const Results& results, size_t method, size_t budget) {
-  std::vector<Estimate> equal_sample, equal_time, error, published_ratio;
-  for (size_t s = 0; s < results.scenes.size(); ++s)
-    if (const Cell* cell = results.find(s, method, budget)) {
-      equal_sample.push_back(cell->equal_sample);
-      equal_time.push_back(cell->equal_time);
-      error.push_back(cell->split.relative.error);
-      published_ratio.push_back({cell->published_ratio, kNone, kNone, kNone});
-    }
+bool is_usable(const Estimate& e) { return e.value > 0 && std::isfinite(e.value); }
+
+/// An error above zero and ratios to the baseline. Unbiased estimates of small errors may be negative.
+bool is_usable(const Results& results, size_t scene, size_t method, size_t budget) {
+  const Cell* cell = results.find(scene, method, budget);
+  return cell && is_usable(cell->split.relative.error) && is_usable(cell->equal_time) &&
+         (results.suite.budgets[budget].spp == 0 || is_usable(cell->equal_sample));
+}
+
+/// The scenes that all summaries of a budget are about.
+std::vector<size_t> common_scenes(const Results& results, size_t budget) {
+  const size_t n_scenes = results.scenes.size(), n_methods = results.suite.methods.size();
+  std::vector<size_t> common;
+  for (size_t s = 0; s < n_scenes; ++s) common.push_back(s);
+  for (size_t m = 0; m < n_methods; ++m) {
+    std::vector<size_t> of_method;
+    for (size_t s = 0; s < n_scenes; ++s)
+      if (is_usable(results, s, m, budget)) of_method.push_back(s);
+    if (of_method.empty()) continue;
+    std::erase_if(common,
+                  [&](size_t s) { return std::find(of_method.begin(), of_method.end(), s) == of_method.end(); });
+  }
+  return common;
+}
+
+std::optional<Summary> summary_of(const Results& results, const std::vector<size_t>& common, size_t method,
+                                  size_t budget) {
   Summary summary{method, budget};
-  std::vector<double> samples;
-  for (size_t s = 0; s < results.scenes.size(); ++s)
-    if (const Cell* cell = results.find(s, method, budget)) {
-      samples.push_back(cell->samples_per_pixel);
-      summary.equal_sample_normalised = summary.equal_sample_normalised || cell->equal_sample_normalised;
-    }
+  bool has_cells = false;
+  for (size_t s = 0; s < results.scenes.size(); ++s) {
+    has_cells = has_cells || results.find(s, method, budget);
+    if (!is_usable(results, s, method, budget)) summary.unusable.push_back(s);
+  }
+  if (!has_cells) return {};
+  if (summary.unusable.size() == results.scenes.size()) return summary;
+  std::vector<Estimate> equal_sample, equal_time, error, published_ratio;
+  std::vector<double> samples, flip;
+  for (size_t s : common) {
+    const Cell& cell = *results.find(s, method, budget);
+    equal_sample.push_back(cell.equal_sample);
+    equal_time.push_back(cell.equal_time);
+    error.push_back(cell.split.relative.error);
+    published_ratio.push_back({cell.published_ratio, kNone, kNone, kNone});
+    samples.push_back(cell.samples_per_pixel);
+    flip.push_back(cell.flip.value);
+    summary.equal_sample_normalised = summary.equal_sample_normalised || cell.equal_sample_normalised;
+  }
+  summary.n_scenes = common.size();
+  if (common.empty()) return summary;
   summary.samples_per_pixel = mean(samples);
   summary.equal_sample = geometric_mean(equal_sample);
-  summary.equal_time = geometric_mean(equal_time, &summary.n_scenes);  // exists for samples and for seconds
+  summary.equal_time = geometric_mean(equal_time);
   summary.relmse = geometric_mean(error).value;
-  summary.published_ratio = geometric_mean(published_ratio).value;
+  summary.flip = mean(flip);
+  size_t n_published = 0;
+  const Estimate published = geometric_mean(published_ratio, &n_published);
+  if (n_published == common.size()) summary.published_ratio = published.value;
   return summary;
+}
+
+/// Which scenes no summary of the budget is about, and because of which methods.
+void warn_of_left_out(Results& results, const std::vector<size_t>& common, size_t budget) {
+  const Suite& suite = results.suite;
+  for (size_t s = 0; s < results.scenes.size(); ++s) {
+    if (std::find(common.begin(), common.end(), s) != common.end()) continue;
+    std::string methods;
+    for (const Summary& summary : results.summaries)
+      if (summary.budget == budget && summary.unusable.size() < results.scenes.size() &&
+          std::find(summary.unusable.begin(), summary.unusable.end(), s) != summary.unusable.end())
+        methods += (methods.empty() ? "" : ", ") + suite.methods[summary.method].name;
+    if (!methods.empty())
+      results.warnings.push_back(fmt::format(
+          "no summary at {} counts {}, where {} has no error above zero, or no ratio: more seeds, or better "
+          "references, would help",
+          suite.budgets[budget].label(), suite.scenes[s].name, methods));
+  }
 }
 
 }  // namespace
@@ -287,16 +344,19 @@ void compare_cells(Results& results) {
   for (size_t s = 0; s < results.scenes.size(); ++s)
     for (size_t m = 0; m < suite.methods.size(); ++m)
       if (Slope slope = slope_of(results, s, m); std::isfinite(slope.exponent.value)) results.slopes.push_back(slope);
-  for (size_t b = 0; b < suite.budgets.size(); ++b)
+  for (size_t b = 0; b < suite.budgets.size(); ++b) {
+    const std::vector<size_t> common = common_scenes(results, b);
     for (size_t m = 0; m < suite.methods.size(); ++m)
-      if (Summary summary = summary_of(results, m, b); summary.n_scenes > 0) {
-        results.summaries.push_back(summary);
-        if (summary.equal_sample_normalised)
+      if (const std::optional<Summary> summary = summary_of(results, common, m, b)) {
+        results.summaries.push_back(*summary);
+        if (summary->equal_sample_normalised)
           results.warnings.push_back(fmt::format(
               "{} took {:g} samples per pixel and {} another number at {}: their ratio for equal samples is of error × "
               "samples, as if errors fell like 1 / samples",
-              suite.methods[m].name, summary.samples_per_pixel, suite.baseline, suite.budgets[b].label()));
+              suite.methods[m].name, summary->samples_per_pixel, suite.baseline, suite.budgets[b].label()));
       }
+    warn_of_left_out(results, common, b);
+  }
 }
 
 }  // namespace covary::lab

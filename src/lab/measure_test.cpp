@@ -265,6 +265,49 @@ TEST(CompareCells, MissingRunsLeaveGaps) {
   for (const Summary& summary : without.summaries) EXPECT_EQ(summary.method, 1u);
 }
 
+/// Three scenes; where one method's error came out negative, no row counts the scene, and its row says so.
+TEST(CompareCells, RowsAverageTheSameScenes) {
+  const Results one = two_methods({0.3, 0.36, 0.3}, {0.1, 0.12, 0.1});
+  Results results = one;
+  for (size_t s : {1u, 2u}) {
+    results.suite.scenes.push_back(results.suite.scenes[0]);
+    results.suite.scenes[s].name = s == 1 ? "door" : "house";
+    results.scenes.push_back(results.scenes[0]);
+    for (Cell cell : one.cells) {
+      cell.scene = s;
+      // Door: ten times the error of the baseline, and a negative one of the method at the first budget.
+      for (RunResult& run : cell.runs)
+        if (s == 1) run.relmse *= cell.method == 0 ? 10 : (cell.budget == 0 ? -1 : 1);
+      std::vector<double> errors;
+      for (const RunResult& run : cell.runs) errors.push_back(run.relmse);
+      cell.split.relative.error = mean_estimate(errors);
+      results.cells.push_back(cell);
+    }
+  }
+  compare_cells(results);
+  ASSERT_EQ(results.summaries.size(), 4u);
+  const Summary &pt = results.summaries[0], &iicv = results.summaries[1];
+  EXPECT_EQ(pt.n_scenes, 2u) << "as many as iicv has";
+  EXPECT_EQ(iicv.n_scenes, 2u);
+  EXPECT_NEAR(pt.relmse, 0.32, 1e-9) << "without the door";
+  EXPECT_NEAR(iicv.equal_sample.value, 3, 1e-9);
+  EXPECT_TRUE(pt.unusable.empty());
+  EXPECT_EQ(iicv.unusable, std::vector<size_t>{1});
+  EXPECT_EQ(results.summaries[2].n_scenes, 3u) << "at the other budget all are usable";
+  ASSERT_EQ(results.warnings.size(), 1u);
+  EXPECT_TRUE(contains(results.warnings[0], "no summary at 24 spp counts door, where iicv has no error above zero"));
+
+  // A method that is usable nowhere has a row that says so and takes no scene from the others.
+  Results broken = one;
+  for (Cell& cell : broken.cells)
+    if (cell.method == 1)
+      for (RunResult& run : cell.runs) run.relmse = -0.1;
+  compare_cells(broken);
+  EXPECT_EQ(broken.summaries[0].n_scenes, 1u);
+  EXPECT_EQ(broken.summaries[1].n_scenes, 0u);
+  EXPECT_EQ(broken.summaries[1].unusable, std::vector<size_t>{0});
+}
+
 TEST(CompareCells, BudgetsInSecondsCompareTheErrorsThemselves) {
   Results results = two_methods({0.3, 0.36, 0.3}, {0.1, 0.12, 0.1});
   results.suite.budgets = {{0, 5}, {0, 10}};

@@ -230,7 +230,7 @@ std::string flip_verdict(const Results& results, size_t budget) {
   double least = kNone, of_baseline = kNone;
   std::string best;
   for (const Summary* s : comparable(results, budget)) {
-    const double flip = mean_flip(results, s->method, budget);
+    const double flip = s->flip;
     const std::string& name = suite.methods[s->method].name;
     if (name == suite.baseline) of_baseline = flip;
     if (!(flip >= least)) least = flip, best = name;

@@ -211,6 +211,20 @@ TEST(ReportDocument, OddTextsReachThePageUnchanged) {
   EXPECT_TRUE(contains(page, "\\\"quoted\\\""));
 }
 
+TEST(ReportTables, ARowSaysInWhichScenesItHasNoUsableValue) {
+  Results results = three_cells();
+  const auto has_column = [&] {
+    const std::vector<std::string> all = keys(summary_table(results, 0));
+    return std::find(all.begin(), all.end(), "unusable") != all.end();
+  };
+  results.summaries = {{.method = 0, .budget = 0, .n_scenes = 1}, {.method = 1, .budget = 0, .n_scenes = 1}};
+  EXPECT_FALSE(has_column());
+  results.summaries[1].unusable = {0};
+  EXPECT_TRUE(has_column());
+  EXPECT_EQ(summary_table(results, 0)["rows"][0]["unusable"], "");
+  EXPECT_EQ(summary_table(results, 0)["rows"][1]["unusable"], results.suite.scenes[0].name);
+}
+
 TEST(ReportDocument, TheBestMethodHasTheLargestRatioAtTheBudget) {
   Results results = three_cells();
   results.suite.methods.push_back({"crn", {}, {}, true});

@@ -118,16 +118,20 @@ std::string alternative(const std::string& start, const Json& series) {
 
 }  // namespace
 
-double mean_flip(const Results& results, size_t method, size_t budget) {
-  double sum = 0, n = 0;
-  for (const Cell& cell : results.cells)
-    if (cell.method == method && cell.budget == budget) sum += cell.flip.value, ++n;
-  return n > 0 ? sum / n : kNone;
+namespace {
+
+/// "door, house".
+std::string names_of(const Results& results, const std::vector<size_t>& scenes) {
+  std::string names;
+  for (size_t s : scenes) names += (names.empty() ? "" : ", ") + results.suite.scenes[s].name;
+  return names;
 }
+
+}  // namespace
 
 Json summary_table(const Results& results, size_t budget) {
   const bool samples = results.suite.budgets[budget].spp > 0;
-  bool published = false, other_samples = !samples;
+  bool published = false, other_samples = !samples, unusable = false;
   Json rows = Json::array();
   for (const Summary& s : results.summaries) {
     if (s.budget != budget) continue;
@@ -137,10 +141,12 @@ Json summary_table(const Results& results, size_t budget) {
                     {"n", fmt::format("{}", s.n_scenes)},
                     {"spp", number(s.samples_per_pixel)},
                     {"relmse", number(s.relmse)},
-                    {"flip", number(mean_flip(results, s.method, budget))},
+                    {"flip", number(s.flip)},
                     {"sample", value_of(s.equal_sample)},
                     {"time", value_of(s.equal_time)},
-                    {"published", number(s.published_ratio)}});
+                    {"published", number(s.published_ratio)},
+                    {"unusable", names_of(results, s.unusable)}});
+    unusable = unusable || !s.unusable.empty();
   }
   Json columns = Json::array({column("method", "Method", "text")});
   if (results.suite.scenes.size() > 1) columns.push_back(column("n", "Scenes", "text"));
@@ -150,8 +156,10 @@ Json summary_table(const Results& results, size_t budget) {
   if (published) columns.push_back(column("published", "Published", "ratio"));
   columns.push_back(column("time", "Equal time", "ratio", "high"));
   columns.push_back(column("flip", "FLIP", "number", "low"));
+  if (unusable) columns.push_back(column("unusable", "No usable value in", "text"));
   return table(
-      fmt::format("{}: geometric means over scenes, of FLIP the mean; ratios are error of {} / error of the method{}",
+      fmt::format("{}: geometric means over the scenes where all methods have values, of FLIP the mean; ratios are "
+                  "error of {} / error of the method{}",
                   results.suite.budgets[budget].label(), results.suite.baseline, normalised_note(results, budget)),
       columns, rows);
 }

@@ -9,9 +9,6 @@
 
 namespace covary::lab {
 
-/// Of a method at a budget, over the scenes that it has; not a number where it has none.
-double mean_flip(const Results& results, size_t method, size_t budget);
-
 /// Geometric means over scenes at one budget.
 nlohmann::ordered_json summary_table(const Results& results, size_t budget);
 /// relMSE of all scenes (rows) and methods (columns) at one budget.

@@ -153,7 +153,9 @@ Json to_json(const Results& results) {
     json["slopes"].push_back({{"scene", suite.scenes[slope.scene].name},
                               {"method", suite.methods[slope.method].name},
                               {"relmse", json_of(slope.exponent)}});
-  for (const Summary& s : results.summaries)
+  for (const Summary& s : results.summaries) {
+    Json unusable = Json::array();
+    for (size_t scene : s.unusable) unusable.push_back(suite.scenes[scene].name);
     json["summary"].push_back({{"method", suite.methods[s.method].name},
                                {"budget", json_of(suite.budgets[s.budget])},
                                {"scenes", s.n_scenes},
@@ -162,7 +164,9 @@ Json to_json(const Results& results) {
                                {"equal_sample", json_of(s.equal_sample)},
                                {"equal_sample_normalised", s.equal_sample_normalised},
                                {"equal_time", json_of(s.equal_time)},
-                               {"published_ratio", number(s.published_ratio)}});
+                               {"published_ratio", number(s.published_ratio)},
+                               {"unusable", unusable}});
+  }
   for (const Failure& f : results.failures)
     json["failures"].push_back({{"scene", f.scene},
                                 {"method", f.method},

@@ -75,13 +75,16 @@ struct Slope {
   Estimate exponent;
 };
 
-/// Geometric means over scenes.
+/// Geometric means over the scenes in which every method has usable numbers at the budget, so that rows compare;
+/// methods that have them in no scene do not decide.
 struct Summary {
   size_t method = 0, budget = 0, n_scenes = 0;
   double samples_per_pixel = kNone;      ///< taken, mean over scenes
   bool equal_sample_normalised = false;  ///< in any scene
   Estimate equal_sample, equal_time;
-  double relmse = kNone, published_ratio = kNone;
+  double relmse = kNone, published_ratio = kNone;  ///< the latter where all of these scenes have one
+  double flip = kNone;                             ///< arithmetic mean
+  std::vector<size_t> unusable;                    ///< scenes in which this method has no error above zero, or no ratio
 };
 
 struct Results {
