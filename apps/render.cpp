@@ -121,15 +121,19 @@ void report(const RenderReport& report, const StopFlag& stop) {
   if (!options.json.empty()) write_text_output(options.json, json_text(statistics(report)));
   if (result.interrupted) throw Unfinished(stop.exit_code(), interruption(options, result));
   if (!options.quiet) print_summary(report);
+  const std::string& doubt = result.prediction_doubt;
+  if (!doubt.empty() && result.until_reached.value_or(false))
+    fmt::print(stderr, "warning: --until {} was reached, but the predicted error is unreliable: {}\n", options.until,
+               doubt);
   if (!result.until_reached.value_or(true))
     throw Unfinished(
         kTargetMissed,
         fmt::format(
             "--until {} was not reached: '{}' has a predicted relMSE of {:.3g}{} after {:.4g} samples per "
-            "pixel",
+            "pixel{}",
             options.until, options.output, *result.predicted_relmse,
             parse_until(options.until).in_blocks ? fmt::format(", {:.3g} in blocks,", *result.predicted_blocks) : "",
-            result.samples_per_pixel()));
+            result.samples_per_pixel(), doubt.empty() ? "" : "; that is unreliable: " + doubt));
   if (std::any_of(result.passes.begin(), result.passes.end(), [](const Pass& p) { return p.misses_error; }))
     throw Unfinished(kTargetMissed,
                      fmt::format("--relative-error was not reached: '{}' has {:.4g} samples per pixel, as many as "

@@ -64,10 +64,9 @@ std::string replay_command(const RenderOptions& o, const Pass& pass, const BadSa
   return shell_text(words);
 }
 
-/// The samples per pixel that the predicted error would need to be reliable; 0 where it is, or where there is none.
-uint32_t fewest_reliable_samples(const RenderReport& report) {
-  const uint32_t fewest = make_estimator(report.options.estimator).reliable_samples;
-  return report.result.predicted_relmse && report.result.samples_per_pixel() < fewest ? fewest : 0;
+/// " (unreliable: 71 % of it lies in …)", or nothing where nothing speaks against the predicted error.
+std::string doubt_in_brackets(const RenderResult& result) {
+  return result.prediction_doubt.empty() ? "" : fmt::format(" (unreliable: {})", result.prediction_doubt);
 }
 
 nlohmann::ordered_json json_of(const IntegratorReport& report) {
@@ -171,7 +170,8 @@ nlohmann::ordered_json statistics(const RenderReport& report) {
   if (result.predicted_relmse) {
     json["predicted_relmse"] = *result.predicted_relmse;
     json["predicted_relmse_p95"] = *result.predicted_blocks;
-    json["predicted_relmse_reliable"] = fewest_reliable_samples(report) == 0;
+    json["predicted_relmse_reliable"] = result.prediction_doubt.empty();
+    if (!result.prediction_doubt.empty()) json["predicted_relmse_doubt"] = result.prediction_doubt;
   }
   if (result.until_reached) json["until_reached"] = *result.until_reached;
   return json;
@@ -198,11 +198,9 @@ void print_summary(const RenderReport& report) {
   if (estimator.passes != EstimatorPasses::kAny) {
     fmt::print(stderr, "{} in {:.2f} s", estimator.text, result.estimate_seconds());
     if (result.predicted_relmse) fmt::print(stderr, ", predicted relMSE {:.3g}", *result.predicted_relmse);
-    if (const uint32_t fewest = fewest_reliable_samples(report))
-      fmt::print(stderr, " (unreliable with fewer than {} samples per pixel)", fewest);
-    fmt::print(stderr, "\n");
+    fmt::print(stderr, "{}\n", doubt_in_brackets(result));
   } else if (result.predicted_relmse) {
-    fmt::print(stderr, "predicted relMSE {:.3g}\n", *result.predicted_relmse);
+    fmt::print(stderr, "predicted relMSE {:.3g}{}\n", *result.predicted_relmse, doubt_in_brackets(result));
   }
   if (options.seconds > 0 && result.seconds.limited > 1.05 * options.seconds)
     fmt::print(stderr, "warning: --time {:g} was exceeded: {:.2f} s for at least {} samples per pixel in each pass{}\n",

@@ -29,6 +29,9 @@ class Result:
     bias: FloatArray | None = field(repr=False)
     #: relMSE that the standard errors predict, with the image in place of a reference.
     predicted_relmse: float | None
+    #: Why that may be off by more than a factor of two, such as few samples, or few pixels that hold most of it; ""
+    #: where nothing speaks against it.
+    prediction_doubt: str
     #: What the checks of the inputs, or the render, warned of.
     warnings: list[str]
     #: Pixels with a value that is not finite in an input; the mean of their finite groups stands there.

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "core/error.h"
 #include "core/stopwatch.h"
@@ -109,7 +110,14 @@ CombinedImage combine(const CombineRequest& request) {
   if (request.light)
     for (int y = 0; y < request.light->height; y += kLightRows)
       add_light(request.light->rows(y, std::min(kLightRows, request.light->height - y)), combined.image, y);
-  if (!combined.image.std_error.data.empty()) combined.predicted_relmse = predicted_relmse(combined.image);
+  if (!combined.image.std_error.data.empty()) {
+    const bool counted = request.crn.samples > 0 && request.independent.samples > 0;
+    const double samples = request.crn.samples + request.independent.samples;
+    combined.predicted_relmse = predicted_relmse(combined.image);
+    combined.prediction_doubt =
+        doubt_of_prediction(combined.image, counted ? samples : std::numeric_limits<double>::infinity(),
+                            request.estimator.reliable_samples);
+  }
   combined.estimate_seconds = watch.lap();
   return combined;
 }

@@ -6,6 +6,7 @@
 #include <functional>
 #include <limits>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "combine/grouped_source.h"
@@ -36,6 +37,7 @@ struct CombineRequest {
 struct CombinedImage {
   EstimatorResult image;
   std::optional<double> predicted_relmse;  ///< predicted_error.h; where there is a standard error
+  std::string prediction_doubt;            ///< of predicted_error.h; empty where nothing speaks against it
   InputFindings inputs;
   double check_seconds = 0, estimate_seconds = 0;
 };

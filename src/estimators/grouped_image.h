@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -54,6 +55,12 @@ struct HeldOutRow {
   int parts = 0;
 };
 
+/// What calibrate() found of the predicted error.
+struct HeldOutVerdict {
+  double uncertainty = 0;  ///< relative standard error of the held-out error; infinite where that is not positive
+  double ratio = 1;        ///< squared error that held-out samples tell, over that which the estimator predicts
+};
+
 /// What an estimator returns. `estimate` has the three channels R, G, B. `std_error` and `bias` have them too, or are
 /// empty: the first where no error estimate was asked for, the second where no bias is known.
 struct EstimatorResult {
@@ -66,6 +73,7 @@ struct EstimatorResult {
   long nonfinite_pixels = 0;
   /// Of each row, for calibrate() of held_out_error.h; empty where nothing was held out.
   std::vector<HeldOutRow> held_out;
+  std::optional<HeldOutVerdict> verdict;  ///< by calibrate(); empty where nothing was held out
 };
 
 /// Throws Error(kUsage) that lists `problems` unless there are none. `name`: of the estimator.

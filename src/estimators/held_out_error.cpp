@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/parallel.h"
 #include "estimators/guided_cells.h"
@@ -33,12 +34,15 @@ HeldOutRow sum_of(const std::vector<HeldOutRow>& rows) {
   return all;
 }
 
-/// How much the held-out error counts, 0 to 1: with its relative standard error c, 1 / (1 + (c / kTrusted)^2).
-double trust_in(const HeldOutRow& all) {
-  if (all.parts < 2 || !(all.error > 0) || !std::isfinite(all.squares + all.variance)) return 0;
-  const double noise = std::max(0.0, all.squares - all.error * all.error / all.parts);
-  return 1 / (1 + noise / square(kTrusted * all.error));
+/// Squared relative standard error c^2 of the held-out error; infinite where that says nothing.
+double squared_uncertainty(const HeldOutRow& all) {
+  if (all.parts < 2 || !(all.error > 0) || !std::isfinite(all.squares + all.variance))
+    return std::numeric_limits<double>::infinity();
+  return std::max(0.0, all.squares - all.error * all.error / all.parts) / square(all.error);
 }
+
+/// How much the held-out error counts, 0 to 1: 1 / (1 + (c / kTrusted)^2).
+double trust_in(const HeldOutRow& all) { return 1 / (1 + squared_uncertainty(all) / square(kTrusted)); }
 
 /// The squared error of the image of all samples.
 double error_of_whole(const HeldOutRow& all) {
@@ -141,10 +145,13 @@ Estimator with_held_out_rows(const Estimator& base) {
 }
 
 void calibrate(EstimatorResult& result) {
+  if (result.held_out.empty()) return;
   const HeldOutRow all = sum_of(result.held_out);
   result.held_out.clear();
+  if (!(all.predicted > 0)) return;
   const double trust = trust_in(all);
-  if (trust == 0 || !(all.predicted > 0)) return;
+  result.verdict = {std::sqrt(squared_uncertainty(all)), error_of_whole(all) / all.predicted};
+  if (trust == 0) return;
   const auto factor = static_cast<float>(std::pow(error_of_whole(all) / all.predicted, 0.5 * trust));
   for (float& value : result.std_error.data) value *= factor;
 }

@@ -37,7 +37,7 @@ Estimator with_held_out_rows(const Estimator& base);
 /// Scales the standard error so that its relMSE is between what the estimator predicts and what held-out samples tell:
 /// nearer to the latter the better these know it. With their relative standard error c, the logarithm of the ratio of
 /// both counts 1 / (1 + (c / 0.3)^2). Held-out samples see bias; few of them may have missed rare light. Empties
-/// `result.held_out`; does nothing where it is empty.
+/// `result.held_out` and fills `result.verdict`; does nothing where it is empty.
 void calibrate(EstimatorResult& result);
 
 }  // namespace covary

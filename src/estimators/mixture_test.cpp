@@ -230,5 +230,20 @@ TEST(Calibration, TrustsHeldOutSamplesAsFarAsTheyKnow) {
   EXPECT_EQ(calibrated(with_rows(3, 2, 8, 0, 0)), 1);
 }
 
+TEST(Calibration, SaysHowFarBothPredictionsAgree) {
+  EstimatorResult known = with_rows(3, 2, 1, 0.3 * 3 * 10, 100);
+  calibrate(known);
+  ASSERT_TRUE(known.verdict);
+  EXPECT_NEAR(known.verdict->uncertainty, 0.3, 1e-6);
+  EXPECT_NEAR(known.verdict->ratio, 2, 1e-6);
+  EstimatorResult unknown = with_rows(-1, 2, 8, 0, 100);
+  calibrate(unknown);
+  ASSERT_TRUE(unknown.verdict);
+  EXPECT_FALSE(std::isfinite(unknown.verdict->uncertainty));
+  EstimatorResult without;
+  calibrate(without);
+  EXPECT_FALSE(without.verdict);
+}
+
 }  // namespace
 }  // namespace covary

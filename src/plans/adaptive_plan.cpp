@@ -123,6 +123,7 @@ Plan adaptive_plan(const Estimator& estimator, std::optional<int> groups) {
   plan.name = estimator.name;
   plan.estimator = estimator.text;
   plan.predicts_error = estimator.predicts_error;
+  plan.reliable_samples = estimator.reliable_samples;
   plan.takes_unfinished = is_pair && !method.sampling.reads_groups;
   plan.has_crn_pass = is_pair;
   plan.estimate = mean_of_last;

@@ -85,8 +85,8 @@ double samples_per_second(const LoadedScene& scene, const Integrator& integrator
   return trial(2);
 }
 
-uint32_t next_budget(uint32_t budget, double predicted, double target, uint32_t limit) {
-  const double factor = std::clamp(1.1 * predicted / target, 1.25, 4.0);
+uint32_t next_budget(uint32_t budget, double predicted, double target, uint32_t limit, double most) {
+  const double factor = std::clamp(1.1 * predicted / target, 1.25, most);
   return static_cast<uint32_t>(std::min<double>(limit, std::ceil(factor * budget)));
 }
 

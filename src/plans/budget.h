@@ -44,7 +44,8 @@ void set_budget(const Shares& shares, const PlanState& state, std::span<Pass> pa
 double samples_per_second(const LoadedScene& scene, const Integrator& integrator, const FilterSettings& filter,
                           const CropWindow& window, const std::atomic<bool>* stop);
 
-/// The next budget on the way to a relMSE of `target`: error falls like 1 / samples, or more slowly.
-uint32_t next_budget(uint32_t budget, double predicted, double target, uint32_t limit);
+/// The next budget on the way to a relMSE of `target`: error falls like 1 / samples, or more slowly. At most `most`
+/// times as large.
+uint32_t next_budget(uint32_t budget, double predicted, double target, uint32_t limit, double most);
 
 }  // namespace covary

@@ -99,6 +99,7 @@ Plan pair_plan(const PairMethod& method) {
   plan.estimator = method.estimator;
   plan.has_crn_pass = true;
   plan.predicts_error = method.predicts_error;
+  plan.reliable_samples = method.reliable_samples;
   plan.groups_follow_speed = !method.groups;
   plan.estimate_memory = method.memory;
   plan.reads_guides = method.reads_guides;
@@ -143,6 +144,7 @@ Plan estimator_plan(const Estimator& estimator, const PassChoice& choice) {
   method.groups = choice.groups;
   method.fewest_groups = estimator.fewest_groups;
   method.predicts_error = estimator.predicts_error;
+  method.reliable_samples = estimator.reliable_samples;
   method.memory = estimator.memory;
   method.reads_guides = estimator.reads_guides;
   method.estimate = [apply = estimator.apply, std_error = estimator.predicts_error](

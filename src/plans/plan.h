@@ -111,6 +111,7 @@ struct Plan {
   bool has_crn_pass = false;        ///< some pass takes common random numbers
   bool traces_light = false;        ///< set by render(): there is a light pass
   bool predicts_error = false;      ///< estimate() gives a standard error
+  uint32_t reliable_samples = 0;    ///< Estimator::reliable_samples
   bool fixed_samples = false;       ///< the number of samples must be known before: no limits of time or error
   /// With a time limit, the speed is measured before the passes begin, so that there are no more groups than samples.
   bool groups_follow_speed = false;

@@ -34,6 +34,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// Largest factor from one budget to the next towards a wanted error; and where the predicted error is unreliable, so
+/// that one that is far too large does not cost that many samples before it is seen again.
+constexpr double kMostGrowth = 4, kDoubtfulGrowth = 2;
 constexpr int kTrialRows = 64;        // at least, where the time of the estimate is found out
 constexpr uint32_t kAovSamples = 16;  // per pixel of auxiliary images
 /// Seconds of work after which films that nobody asked for are worth writing before the image is made of them.
@@ -305,7 +308,8 @@ bool PlanRun::render_to_limits() {
     }
     const bool out_of_time = timed() && seconds_left(plan_.phases.size() - 1, 1) <= 0;
     if (result_.until_reached.value_or(true) || state_.budget >= limit || out_of_time) return true;
-    rounds_.add(next_budget(state_.budget, error_to_limit(), request_.until, limit));
+    rounds_.add(next_budget(state_.budget, error_to_limit(), request_.until, limit,
+                            result_.prediction_doubt.empty() ? kMostGrowth : kDoubtfulGrowth));
     state_.budget = rounds_.budget();
   }
 }
@@ -447,11 +451,14 @@ bool PlanRun::estimate() {
   const auto ends = [&] { return result_.interrupted ? watch.seconds() > kEstimateOfInterrupted : stopped(); };
   EstimatorResult image;
   result_.image = {};
-  result_.predicted_relmse.reset(), result_.predicted_blocks.reset();
+  result_.predicted_relmse.reset(), result_.predicted_blocks.reset(), result_.prediction_doubt.clear();
   if (!run_stoppable(ends, [&] { image = estimate_rows(0, window_.height); })) return false;
   if (!image.std_error.data.empty()) {
     result_.predicted_relmse = predicted_relmse(image);
     result_.predicted_blocks = predicted_blocks(image);
+    double samples = 0;
+    for (const Pass& pass : camera_passes(films())) samples += pass.film.mean_count();
+    result_.prediction_doubt = doubt_of_prediction(image, samples, plan_.reliable_samples);
   }
   if (request_.until > 0 && !result_.predicted_relmse)
     throw Error(ErrorCode::kUsage, "an error can only be predicted from 2 or more groups");

@@ -86,6 +86,7 @@ struct RenderResult {
   EstimatorResult image;
   std::optional<double> predicted_relmse;
   std::optional<double> predicted_blocks;  ///< of predicted_error.h
+  std::string prediction_doubt;            ///< of predicted_error.h; empty where nothing speaks against it
   /// Image of the samples of the integrator's training, where they are a part of the image (Plan::takes_training).
   TrainingImage training;
   std::map<std::string, Image> aovs;

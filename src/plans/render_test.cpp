@@ -297,10 +297,11 @@ TEST(Budget, AContinuedFilmKeepsItsGroups) {
 }
 
 TEST(Budget, FollowsThePredictedError) {
-  EXPECT_EQ(next_budget(96, 0.02, 0.01, 1000), 212u) << "1.1 times what 1 / samples says";
-  EXPECT_EQ(next_budget(96, 1, 0.01, 1000), 384u) << "at most four times";
-  EXPECT_EQ(next_budget(96, 0.0101, 0.01, 1000), 120u) << "at least a quarter more";
-  EXPECT_EQ(next_budget(96, 1, 0.01, 300), 300u);
+  EXPECT_EQ(next_budget(96, 0.02, 0.01, 1000, 4), 212u) << "1.1 times what 1 / samples says";
+  EXPECT_EQ(next_budget(96, 1, 0.01, 1000, 4), 384u) << "at most four times";
+  EXPECT_EQ(next_budget(96, 0.0101, 0.01, 1000, 4), 120u) << "at least a quarter more";
+  EXPECT_EQ(next_budget(96, 1, 0.01, 300, 4), 300u);
+  EXPECT_EQ(next_budget(96, 1, 0.01, 1000, 2), 192u);
 }
 
 }  // namespace

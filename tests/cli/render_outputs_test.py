@@ -110,11 +110,22 @@ class Until(RenderTest):
                                      "-")
             self.assertEqual(result.returncode, 3, result.stderr)
             self.assertRegex(result.stderr, r"^covary: --until relmse=1e-9 was not reached: 'a.exr' has a predicted "
-                                            r"relMSE of \S+ after [\d.]+ samples per pixel\n$")
+                                            r"relMSE of \S+ after [\d.]+ samples per pixel(; that is "
+                                            r"unreliable: .*)?\n$")
             facts = json.loads(result.stdout)
             self.assertIs(facts["until_reached"], False)
             self.assertGreater(facts["predicted_relmse"], 1e-9)
             self.assertTrue((self.path / "a.exr").exists())
+
+    def test_a_prediction_that_hangs_on_few_pixels_is_called_unreliable(self):
+        result = self.good("render", str(SCENES / "caustic.xml"), "--resolution", "48x36", "-o", "a.exr", "--quiet",
+                           "--no-preview", "--until", "relmse=5", "--json", "-")
+        self.assertRegex(result.stderr, r"^warning: --until relmse=5 was reached, but the predicted error is "
+                                        r"unreliable: \d+ % of it lies in 1 % of the pixels\n$")
+        facts = json.loads(result.stdout)
+        self.assertIs(facts["until_reached"], True)
+        self.assertIs(facts["predicted_relmse_reliable"], False)
+        self.assertRegex(facts["predicted_relmse_doubt"], r"^\d+ % of it lies in 1 % of the pixels$")
 
     def test_reached(self):
         facts = json.loads(self.good("render", ROOM, *SMALL, "-o", "a.exr", "--until", "relmse=0.5", "--json",
