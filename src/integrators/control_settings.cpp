@@ -10,6 +10,7 @@ ControlSettings ControlSettings::published() {
   settings.paper = true;
   settings.lights = LightSelection::kTriangle;
   settings.grid = 64;
+  settings.train_spp = 8;
   settings.clusters = 5000;
   settings.albedo = false;
   return settings;
@@ -22,6 +23,7 @@ CacheSettings ControlSettings::cache(uint32_t resolution) const {
   else
     settings.resolution = resolution;
   settings.monochrome = kind == ControlKind::kMono;
+  settings.by_channel = solves_once();
   settings.memory_limit = (size_t{memory_mib} << 20) / (controls_indirect() ? 2 : 1);
   return settings;
 }
@@ -29,6 +31,7 @@ CacheSettings ControlSettings::cache(uint32_t resolution) const {
 CacheSettings ControlSettings::indirect_cache(uint32_t resolution) const {
   CacheSettings settings = cache(std::max(1u, resolution / 4));
   settings.prior_samples = 16;
+  settings.by_channel = false;
   return settings;
 }
 

@@ -2,6 +2,7 @@
 // The settings of `controlled-path`.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <utility>
 
@@ -35,9 +36,9 @@ struct ControlSettings {
   bool prefix = true;              ///< samples weigh by the throughput before them [Hua2023] §4.4
   bool albedo = true;              ///< see by_albedo()
   bool indirect = false;           ///< see controls_indirect()
-  bool paper = false;              ///< the cache as published, see CacheSettings::published()
+  bool paper = false;              ///< as published, see solves_once() and CacheSettings::published()
 
-  /// Those of [Hua2023] and its authors' program: triangles, 64 cells, 16 samples per pixel.
+  /// Those of [Hua2023] (Sec. 6.1): lights by triangle, 8 samples per pixel; 64 cells.
   static ControlSettings published();
 
   bool on() const { return kind != ControlKind::kOff; }
@@ -46,7 +47,12 @@ struct ControlSettings {
   /// Samples per pixel of training, if any.
   uint32_t training_spp() const { return learns() ? train_spp : 0; }
   /// Training samples per pixel that first make an estimate of each pixel's value, and no coefficients.
-  uint32_t pilot_spp() const { return learns() && relative && !per_pixel() ? (train_spp >= 4 ? 2 : train_spp / 2) : 0; }
+  uint32_t pilot_spp() const {
+    if (!learns() || !relative || per_pixel()) return 0;
+    return train_spp >= 4 && !paper ? 2 : std::min(train_spp / 2, 1u);
+  }
+  /// Whether the training is done by plain samples and coefficients are solved once after it, as published.
+  bool solves_once() const { return paper && !per_pixel(); }
   /// Whether each pixel has coefficients of its own, for the first surface, instead of each cell of space.
   bool per_pixel() const { return kind == ControlKind::kOptimalMis; }
   /// Whether there is a coefficient of each light and technique for each cell.
@@ -83,7 +89,7 @@ inline void declare(Settings& s, ControlSettings& v) {
            "How lights are chosen: uniformly over emissive triangles, over shapes, by power, or as training tells",
            {.film = "lights={}"});
   s.flag("cv-paper", v.paper,
-         "The published method: --lights triangle --cv-grid 64 --cv-train 16, cells by position alone",
+         "The published method: --lights triangle --cv-grid 64 --cv-train 8, cells by position alone, solved once",
          {.film = "paper"});
   s.whole<uint32_t>(
       "cv-grid", v.grid, {.low = 0, .high = CellGrid::kMaxResolution}, {"auto", ControlSettings::kAutomaticGrid},

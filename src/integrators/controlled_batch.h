@@ -25,6 +25,7 @@ struct ControlledVertex {
   bool recorded = false;
   uint32_t sums_cell = 0;  ///< of ControlledBatch::sums
   float weight = 0;        ///< of its samples in the sums
+  Spectrum weights;        ///< that of each channel, where the sums are by channel
   Spectrum plain;          ///< the plain estimate without the throughput, so far, in units
 };
 

@@ -153,11 +153,12 @@ void ControlledPath::on_restart() {
 void ControlledPath::update() {
   if (trained_spp() < pilot_spp()) return;
   const std::vector<float> selection = cache_.table().selection();
-  if (settings_.on()) cache_.update();
-  if (controlled_.indirect) indirect_cache_.update();
+  const uint32_t end = std::min(training_spp(), wave_end(trained_spp(), 1));
+  const bool solve = end == training_spp() || !settings_.solves_once();
+  if (settings_.on() && solve) cache_.update();
+  if (controlled_.indirect && solve) indirect_cache_.update();
   // Lights are chosen by what was learnt as soon as half of the samples have been taken: the other half then teaches
   // the coefficients of this choice.
-  const uint32_t end = std::min(training_spp(), wave_end(trained_spp(), 1));
   std::vector<float> best;
   if (controlled_.residuals && selection.empty() && 2 * end >= training_spp() && end < training_spp())
     best = cache_.best_selection();

@@ -49,6 +49,7 @@ class ControlledPath : public LearningIntegrator {
   /// 0 once coefficients were given.
   uint32_t training_spp() const override { return given_ ? 0 : settings_.training_spp(); }
   uint32_t pilot_spp() const override { return settings_.pilot_spp(); }
+  bool pilot_goes_on() const override { return !settings_.solves_once(); }
   bool pilot_by_oidn() const override { return settings_.oidn && pilot_spp() > 0; }
   size_t training_memory() const override { return settings_.learns() ? size_t{settings_.memory_mib} << 20 : 0; }
   std::unique_ptr<TrainingRecord> take_record(ThreadState& state) const override;

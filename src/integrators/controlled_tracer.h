@@ -258,15 +258,17 @@ class ControlledTracer {
     vertex.unit = control_.by_albedo && (controlled || control_.indirect) ? unit_of(hit) : Spectrum(1);
     if (!vertex.recorded) return;
     vertex.weight = weight_of(path, vertex.unit);
+    if (batch_.sums.layout().by_channel) vertex.weights = weights_of(path, vertex.unit);
     vertex.sums_cell = batch_.sums.cell(choice.key);
     vertex.plain = Spectrum();
   }
 
-  /// Weight of the samples of a vertex in the sums.
-  float weight_of(const Path& path, const Spectrum& unit) const {
+  /// Weights of the samples of a vertex in the sums, by channel, and their mean.
+  Spectrum weights_of(const Path& path, const Spectrum& unit) const {
     const Spectrum importance = context_.importance.empty() ? Spectrum(1) : context_.importance[path.sample];
-    return variance_weight((control_.prefix ? path.throughput : Spectrum(1)) * unit, importance);
+    return variance_weights((control_.prefix ? path.throughput : Spectrum(1)) * unit, importance);
   }
+  float weight_of(const Path& path, const Spectrum& unit) const { return mean(weights_of(path, unit)); }
 
   /// Control of the light that comes by way of the next surface, indirect_control.h; before the path's throughput holds
   /// the direction that `u` chose.
@@ -333,8 +335,12 @@ class ControlledTracer {
   void record(ControlledVertex& vertex, const Spectrum& value, uint32_t cluster, float r_light) {
     const bool of_light = cluster != kNoLight;
     const float r_dense[2] = {1 - r_light, of_light ? 0 : r_light};
-    batch_.sums.add(vertex.sums_cell, vertex.weight,
-                    {value, r_light > 0 ? cluster : kNoLight, of_light ? r_light : 0, {r_dense, control_.n_dense()}});
+    const ControlledSample sample{
+        value, r_light > 0 ? cluster : kNoLight, of_light ? r_light : 0, {r_dense, control_.n_dense()}};
+    if (batch_.sums.layout().by_channel)
+      batch_.sums.add_by_channel(vertex.sums_cell, vertex.weights, sample);
+    else
+      batch_.sums.add(vertex.sums_cell, vertex.weight, sample);
     vertex.plain += value;
   }
 

@@ -219,7 +219,7 @@ CoefficientCache::CoefficientCache(const Bounds3& bounds, std::vector<float> lig
     : settings_(settings),
       finest_(bounds, settings.resolution, settings.by_normal),
       light_counts_(std::move(light_counts)),
-      layout_{n_dense} {
+      layout_{n_dense, settings.by_channel && !settings.monochrome} {
   COVARY_CHECK(n_dense <= SystemLayout::kMaxDense, "too many techniques");
   restart();
 }

@@ -23,6 +23,7 @@ struct CacheSettings {
   bool pyramid = true;         ///< false: each cell stands alone, and without data is plain
   bool held_out = true;        ///< scale each cell's control by what the next wave says of it
   bool monochrome = false;     ///< one coefficient for all channels
+  bool by_channel = false;     ///< SystemLayout::by_channel, unless monochrome
   double prior_samples = 0.3;  ///< SolveSettings::prior_samples
   double prior_vertices = 32;  ///< how many held-out vertices the parent's scale counts as
   size_t memory_limit = size_t{256} << 20;  ///< bytes of sums and coefficients while training

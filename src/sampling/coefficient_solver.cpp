@@ -126,10 +126,38 @@ void add_differences(const std::vector<Rgb>& lights, const Dense& dense, Coeffic
     coefficients.dense[j] += spectrum(dense.col(static_cast<Eigen::Index>(j)).array());
 }
 
+/// A system by channel: each channel as a system of its own, of whose solution the others are dropped.
+void solve_by_channel(const SystemView& system, const SolveSettings& settings, CoefficientsView coefficients) {
+  const Layout& layout = system.layout;
+  const Layout single{layout.n_dense};
+  const std::vector<Spectrum> light_prior(coefficients.lights.begin(), coefficients.lights.end());
+  const std::vector<Spectrum> dense_prior(coefficients.dense.begin(), coefficients.dense.end());
+  std::vector<double> head(system.head.begin(), system.head.begin() + single.head_size());
+  std::vector<float> rows(system.lights.size() * single.row_size());
+  for (uint32_t c = 0; c < 3; ++c) {
+    const double* own = system.head.data() + layout.channel(c);
+    head[Layout::kWeight] = own[0], head[Layout::kWeightSquared] = own[1];
+    std::copy_n(own + 2, layout.matrix_size(), head.begin() + single.matrix(0, 0));
+    for (size_t k = 0; k < system.lights.size(); ++k) {
+      const float* from = system.rows.data() + k * layout.row_size();
+      float* to = rows.data() + k * single.row_size();
+      std::copy_n(from, single.row_size(), to);
+      to[Layout::kDiagonal] = from[layout.channel_row(c)];
+      std::copy_n(from + layout.channel_row(c) + 1, layout.n_dense, to + Layout::kRowDense);
+    }
+    std::vector<Spectrum> lights = light_prior, dense = dense_prior;
+    solve_block_arrow({single, head, system.lights, rows}, settings, {lights, dense});
+    const auto channel = static_cast<int>(c);
+    for (size_t k = 0; k < lights.size(); ++k) coefficients.lights[k][channel] = lights[k][channel];
+    for (size_t j = 0; j < dense.size(); ++j) coefficients.dense[j][channel] = dense[j][channel];
+  }
+}
+
 }  // namespace
 
 void solve_block_arrow(const SystemView& system, const SolveSettings& settings, CoefficientsView coefficients) {
   const Layout& layout = system.layout;
+  if (layout.by_channel) return solve_by_channel(system, settings, coefficients);
   const uint32_t m = layout.n_dense;
   Residuals right = residuals(system, coefficients, settings.monochrome);
 

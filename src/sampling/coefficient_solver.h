@@ -28,7 +28,8 @@ namespace covary {
 /// Where the numbers of a system lie in flat arrays: one head for the cell, and one row for each light seen there.
 struct SystemLayout {
   static constexpr uint32_t kMaxDense = 64;
-  uint32_t n_dense = 0;  ///< techniques of the dense block, at most kMaxDense
+  uint32_t n_dense = 0;     ///< techniques of the dense block, at most kMaxDense
+  bool by_channel = false;  ///< each colour channel has weights of its own, and so a matrix A of its own
 
   // Head. Σ is over samples, each with the weight w of its vertex; three numbers are RGB.
   static constexpr uint32_t kWeight = 0;         ///< Σ w
@@ -48,13 +49,19 @@ struct SystemLayout {
   uint32_t matrix(uint32_t i, uint32_t j) const {
     return kDense + 3 * n_dense + (i >= j ? i * (i + 1) / 2 + j : j * (j + 1) / 2 + i);
   }
-  uint32_t head_size() const { return kDense + 3 * n_dense + n_dense * (n_dense + 1) / 2; }
+  uint32_t matrix_size() const { return n_dense * (n_dense + 1) / 2; }
+  /// Where by_channel: the numbers Σ w, Σ w² and A's dense part of channel c; those above are then of the mean weight.
+  uint32_t channel(uint32_t c) const { return kDense + 3 * n_dense + matrix_size() + c * (2 + matrix_size()); }
+  uint32_t head_size() const { return channel(by_channel ? 3 : 0); }
 
   // Row of a light k.
   static constexpr uint32_t kDiagonal = 0;  ///< A_kk
   static constexpr uint32_t kRowValue = 1;  ///< b_k, RGB
   static constexpr uint32_t kRowDense = 4;  ///< A_kj for each dense technique j
-  uint32_t row_size() const { return kRowDense + n_dense; }
+  /// Where by_channel: A_kk and A_kj of channel c.
+  uint32_t channel_row(uint32_t c) const { return kRowDense + n_dense + c * (1 + n_dense); }
+  uint32_t row_size() const { return channel_row(by_channel ? 3 : 0); }
+  bool operator==(const SystemLayout&) const = default;
 };
 
 /// The sums of one cell; it does not own them.
@@ -84,10 +91,12 @@ struct SolveSettings {
 /// The solution is drawn to the prior up to a constant: the constant that makes the prior's residuals vanish in the
 /// mean is added, and not part of the result (equal coefficients have no effect, so prior and result can be compared
 /// and inherited). A technique without samples keeps its prior. A prior of zeros and no samples give zeros, the plain
-/// estimate. The result is finite whenever the sums are.
+/// estimate. The result is finite whenever the sums are. Where the layout is by channel, each channel is solved with
+/// its own matrix.
 void solve_block_arrow(const SystemView& system, const SolveSettings& settings, CoefficientsView coefficients);
 
-/// The same by a factorisation of the whole matrix, to check the former; cubic in the number of lights.
+/// The same by a factorisation of the whole matrix, one for all channels, to check the former; cubic in the number of
+/// lights.
 void solve_dense(const SystemView& system, const SolveSettings& settings, CoefficientsView coefficients);
 
 /// How much of a system's control to use, per channel in [0, 1]: the share s for which the mixture of plain and
@@ -96,12 +105,16 @@ void solve_dense(const SystemView& system, const SolveSettings& settings, Coeffi
 /// vertices as `prior_vertices`; with no data it is the result. The channels share one s when `monochrome`.
 Spectrum best_share(const SystemView& system, const Spectrum& parent, double prior_vertices, bool monochrome);
 
-/// Weight of a vertex's samples in the sums: the mean over RGB of (throughput · importance)². `throughput` is that of
+/// Weights of a vertex's samples in the sums of each channel: (throughput · importance)². `throughput` is that of
 /// the path before the vertex ([Hua2023] Eq. 29), `importance` is 1 / √(value² + 0.01) with the value of the pixel,
 /// about, for the relative variance (Eq. 25) and 1 for the absolute one.
-inline float variance_weight(const Spectrum& throughput, const Spectrum& importance) {
+inline Spectrum variance_weights(const Spectrum& throughput, const Spectrum& importance) {
   const Spectrum factor = throughput * importance;
-  return mean(factor * factor);
+  return factor * factor;
+}
+/// Their mean, for sums that the channels share.
+inline float variance_weight(const Spectrum& throughput, const Spectrum& importance) {
+  return mean(variance_weights(throughput, importance));
 }
 
 }  // namespace covary

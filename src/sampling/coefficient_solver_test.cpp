@@ -101,6 +101,38 @@ TEST(CoefficientSolver, BlockArrowEqualsDenseOnRandomSystems) {
       }
 }
 
+// Weights of each channel give what three systems give of which each has the weights of one channel.
+TEST(CoefficientSolver, ChannelsWithWeightsOfTheirOwnAreSystemsOfTheirOwn) {
+  Numbers numbers;
+  for (const uint32_t m : {1u, 2u}) {
+    SystemSums all(SystemLayout{m, true});
+    const uint32_t cell = all.cell({});
+    std::vector<OneCell> single(3, OneCell(m));
+    for (uint32_t i = 0; i < 60; ++i) {
+      const float u = numbers.next();
+      const std::vector<float> r = m == 1 ? std::vector{1 - u} : std::vector{0.7f * (1 - u), 0.3f * (1 - u)};
+      const Spectrum value(numbers.next(), numbers.next(), numbers.next());
+      const Spectrum weights(numbers.next(), 10 * numbers.next(), i % 3 == 0 ? 0 : numbers.next());
+      all.add_by_channel(cell, weights, {value, i / 20, u, r});
+      for (int c = 0; c < 3; ++c) single[static_cast<size_t>(c)].add(weights[c], value, i / 20, u, r);
+    }
+    SystemSums merged(SystemLayout{m, true});
+    merged.merge(all);
+    std::vector<float> rows;
+    for (size_t i = 0; i < merged.n_rows(); ++i) rows.insert(rows.end(), merged.row(i).begin(), merged.row(i).end());
+    const std::vector<uint32_t> lights = {0, 1, 2};
+    const SolveSettings settings{0.3, false};
+    Coefficients prior = single[0].zeros();
+    prior.lights[1] = Spectrum(0.5f, 0.1f, 0.9f);
+    const Coefficients result = fast({merged.layout(), merged.head(cell), lights, rows}, prior, settings);
+    for (int c = 0; c < 3; ++c) {
+      const Coefficients own = fast(single[static_cast<size_t>(c)].view(), prior, settings);
+      for (size_t k = 0; k < 3; ++k) EXPECT_NEAR(result.lights[k][c], own.lights[k][c], 1e-4f) << m << c << k;
+      for (size_t j = 0; j < m; ++j) EXPECT_NEAR(result.dense[j][c], own.dense[j][c], 1e-4f) << m << c << j;
+    }
+  }
+}
+
 /// Systems that leave combinations of coefficients open: they keep the prior.
 TEST(CoefficientSolver, BlockArrowEqualsDenseOnSingularSystems) {
   Numbers numbers;

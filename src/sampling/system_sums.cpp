@@ -95,6 +95,28 @@ void SystemSums::add(uint32_t cell, float weight, const ControlledSample& sample
   for (uint32_t j = 0; j < layout_.n_dense; ++j) row[SystemLayout::kRowDense + j] += weight * r * sample.r_dense[j];
 }
 
+void SystemSums::add_by_channel(uint32_t cell, const Spectrum& weights, ControlledSample sample) {
+  const float weight = mean(weights);
+  const uint64_t rejected = n_rejected_;
+  if (weight > 0) sample.value = sample.value * weights / Spectrum(weight);  // b_c has the weight of its channel
+  add(cell, weight, sample);
+  if (n_rejected_ != rejected) return;
+  const bool of_light = sample.light != ControlledSample::kNoLight && sample.r_light != 0;
+  float* row =
+      of_light ? &rows_[size_t{rows_index_.find(uint64_t{cell} << 32 | sample.light)} * layout_.row_size()] : nullptr;
+  for (uint32_t c = 0; c < 3; ++c) {
+    const float w = weights[static_cast<int>(c)];
+    double* own = &heads_[size_t{cell} * layout_.head_size() + layout_.channel(c)];
+    *own++ += w, *own++ += double{w} * w;
+    for (uint32_t j = 0; j < layout_.n_dense; ++j)
+      for (uint32_t i = 0; i <= j; ++i) *own++ += double{w} * sample.r_dense[j] * sample.r_dense[i];
+    if (!row) continue;
+    float* light = row + layout_.channel_row(c);
+    *light++ += w * sample.r_light * sample.r_light;
+    for (uint32_t j = 0; j < layout_.n_dense; ++j) *light++ += w * sample.r_light * sample.r_dense[j];
+  }
+}
+
 void SystemSums::add_held_out(uint32_t cell, float weight, const Spectrum& plain, const Spectrum& control) {
   const Spectrum both = plain * control * weight, squared = control * control * weight;
   if (!is_finite(both) || !is_finite(squared) || !is_finite(plain * weight) || !std::isfinite(weight)) return;
@@ -117,7 +139,7 @@ void SystemSums::add_residual(uint32_t light, float weight, const Spectrum& resi
 }
 
 void SystemSums::merge(const SystemSums& other) {
-  COVARY_CHECK(other.level_ <= level_ && other.layout_.n_dense == layout_.n_dense, "sums of other cells");
+  COVARY_CHECK(other.level_ <= level_ && other.layout_ == layout_, "sums of other cells");
   std::vector<uint32_t> own_cell(other.n_cells());
   for (uint32_t i = 0; i < other.n_cells(); ++i) {
     own_cell[i] = cell(other.key(i).coarser(level_ - other.level_));

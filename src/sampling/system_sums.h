@@ -86,6 +86,8 @@ class SystemSums {
   /// Adds one sample of a vertex in `cell`. A sample whose value or weight is not finite, or whose weight is negative,
   /// is left out and counted. Weights r must lie in [0, 1].
   void add(uint32_t cell, float weight, const ControlledSample& sample);
+  /// The same where the layout is by channel, with a weight for each channel.
+  void add_by_channel(uint32_t cell, const Spectrum& weights, ControlledSample sample);
   /// Adds what a vertex tells about the coefficients in use: `plain`, the sum of its f/p, and `control`, the unscaled
   /// control added to it. The coefficients must not be made of this vertex.
   void add_held_out(uint32_t cell, float weight, const Spectrum& plain, const Spectrum& control);

@@ -231,6 +231,35 @@ TEST(ControlledPath, TrainedOnTheFlyAgreesWithPath) {
   }
 }
 
+// [Hua2023] Sec. 6.1: 8 samples by plain MIS, the first of which gives the values of pixels; one solution after them.
+TEST(ControlledPath, AsPublishedThereIsNoControlBeforeTheTrainingHasEnded) {
+  const auto image_of_training = [](ControlSettings settings) {
+    settings.grid = 8, settings.lights = LightSelection::kPower;
+    const TestScene scene = controlled(coloured_lights(), settings);
+    TrainingImage image;
+    TrainingSettings training{{0, 0, scene.loaded.width, scene.loaded.height}, scene.loaded.filter};
+    training.image = &image;
+    EXPECT_TRUE(train(scene.scene(), integrator_of(scene), training));
+    EXPECT_GT(integrator_of(scene).table().n_cells(), 10u);
+    return image.mean;
+  };
+  const TestScene plain = with_coefficients(coloured_lights(), false);
+  PassSettings settings;
+  settings.pass = kTrainingPass, settings.spp = 8, settings.filter = plain.loaded.filter;
+  Film film(plain.loaded.width, plain.loaded.height, {0, 0, plain.loaded.width, plain.loaded.height}, 1);
+  render_pass(plain.scene(), plain.integrator(), settings, film);
+  const auto difference = [&](const Image& image) {
+    double sum = 0;
+    for (size_t i = 0; i < image.data.size(); ++i) sum += std::abs(image.data[i] - film.mean_image().data[i]);
+    return sum / static_cast<double>(image.data.size());
+  };
+  const ControlSettings published = ControlSettings::published();
+  EXPECT_EQ(published.training_spp(), 8u);
+  EXPECT_EQ(published.pilot_spp(), 1u);
+  EXPECT_LT(difference(image_of_training(published)), 1e-5);
+  EXPECT_GT(difference(image_of_training(options(ControlKind::kRgb))), 3e-4);  // solved after each wave
+}
+
 TEST(ControlledPath, HasLessNoiseWhereLightsDiffer) {
   const double plain = noise(with_coefficients(coloured_lights(), false));
   const double mono = noise(trained(coloured_lights(), options(ControlKind::kMono)));
