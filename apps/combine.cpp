@@ -16,13 +16,13 @@
 #include <vector>
 
 #include "combine/combine.h"
+#include "combine/pair_input.h"
+#include "combine/result_file.h"
 #include "combine_counts.h"
 #include "commands.h"
 #include "core/stopwatch.h"
 #include "estimator_options.h"
 #include "estimators/mean.h"
-#include "estimators/pair_input.h"
-#include "estimators/result_file.h"
 #include "film/outputs.h"
 #include "guide_layer.h"
 #include "json_output.h"

@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "estimators/grouped_file.h"
+#include "combine/grouped_file.h"
 
 namespace covary {
 

@@ -12,13 +12,13 @@
 
 #include "commands.h"
 #include "comparison_warnings.h"
-#include "film/alignment.h"
-#include "film/error_map.h"
 #include "film/image_file.h"
 #include "film/image_writer.h"
-#include "film/metrics.h"
 #include "film/outputs.h"
 #include "json_output.h"
+#include "metrics/alignment.h"
+#include "metrics/error_map.h"
+#include "metrics/metrics.h"
 #include "numbers.h"
 #include "value_names.h"
 

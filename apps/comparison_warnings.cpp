@@ -5,7 +5,7 @@
 
 #include <set>
 
-#include "film/provenance.h"
+#include "metrics/provenance.h"
 
 namespace covary {
 namespace {

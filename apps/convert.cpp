@@ -13,7 +13,7 @@
 #include "film/image_writer.h"
 #include "film/output_file.h"
 #include "film/outputs.h"
-#include "film/provenance.h"
+#include "metrics/provenance.h"
 #include "numbers.h"
 #include "value_names.h"
 

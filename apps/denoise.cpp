@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // covary denoise: Open Image Denoise on an image, guided by its albedo and normal where it has them.
-#include "estimators/denoise.h"
+#include "denoising/denoise.h"
 
 #include <fmt/format.h>
 
@@ -16,8 +16,8 @@
 #include "core/stopwatch.h"
 #include "film/image_file.h"
 #include "film/outputs.h"
-#include "film/provenance.h"
 #include "guide_layer.h"
+#include "metrics/provenance.h"
 #include "progress.h"
 #include "value_names.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The options of estimators (estimators/registry.h) on the command line: the same for `covary render` and
+// The options of estimators (combine/registry.h) on the command line: the same for `covary render` and
 // `covary combine`.
 #pragma once
 
@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "estimators/mixed_denoising.h"
-#include "estimators/registry.h"
+#include "combine/registry.h"
+#include "denoising/mixed_denoising.h"
 
 namespace covary {
 

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "estimators/denoise.h"
+#include "denoising/denoise.h"
 
 namespace covary {
 

@@ -7,10 +7,10 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "combine/registry.h"
 #include "commands.h"
 #include "core/error.h"
 #include "defines.h"
-#include "estimators/registry.h"
 #include "film/image_file.h"
 #include "io/load_scene.h"
 #include "json_output.h"

@@ -8,8 +8,8 @@
 
 #include "commands.h"
 #include "core/error.h"
-#include "film/error_map.h"
 #include "film/image_writer.h"
+#include "metrics/error_map.h"
 #include "value_names.h"
 
 namespace covary {

@@ -18,13 +18,13 @@
 #include "commands.h"
 #include "comparison_warnings.h"
 #include "core/error.h"
-#include "estimators/predicted_error.h"
-#include "film/alignment.h"
 #include "film/image_file.h"
-#include "film/metrics.h"
 #include "film/outputs.h"
+#include "metrics/alignment.h"
+#include "metrics/metrics.h"
 #include "numbers.h"
 #include "report/report.h"
+#include "risk/predicted_error.h"
 #include "value_names.h"
 
 extern char** environ;

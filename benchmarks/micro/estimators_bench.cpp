@@ -8,15 +8,15 @@
 #include <vector>
 
 #include "core/random.h"
+#include "dependent_tests/dependent_tests.h"
 #include "estimators/control_variates.h"
 #include "estimators/cv_baseline.h"
-#include "estimators/dependent_tests.h"
-#include "estimators/feedback.h"
 #include "estimators/iduw.h"
 #include "estimators/iicv.h"
-#include "estimators/neighbours.h"
 #include "estimators/pilot.h"
 #include "estimators/polynomials.h"
+#include "filters/feedback.h"
+#include "filters/neighbours.h"
 
 namespace covary {
 namespace {

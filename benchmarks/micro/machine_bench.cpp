@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "estimators/lanes.h"
+#include "filters/lanes.h"
 
 namespace covary {
 namespace {

@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "estimators/grouped_image.h"
 #include "film/film.h"
+#include "film/grouped_image.h"
 
 namespace covary::python {
 

@@ -6,10 +6,10 @@
 #include <span>
 
 #include "combine/combine.h"
+#include "combine/pair_input.h"
+#include "combine/registry.h"
 #include "core/error.h"
-#include "estimators/mixed_denoising.h"
-#include "estimators/pair_input.h"
-#include "estimators/registry.h"
+#include "denoising/mixed_denoising.h"
 #include "film/splat_layer.h"
 #include "python/module/arrays.h"
 #include "python/module/bindings.h"

@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <memory>
 
+#include "combine/grouped_file.h"
 #include "core/error.h"
-#include "estimators/denoise.h"
-#include "estimators/grouped_file.h"
+#include "denoising/denoise.h"
 #include "film/image_file.h"
 #include "film/image_writer.h"
-#include "film/metrics.h"
+#include "metrics/metrics.h"
 #include "python/module/arrays.h"
 #include "python/module/bindings.h"
 #include "python/module/work.h"

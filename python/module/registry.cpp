@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "estimators/registry.h"
+#include "combine/registry.h"
 
 #include <algorithm>
 #include <iterator>
 
-#include "estimators/mixed_denoising.h"
+#include "denoising/mixed_denoising.h"
 #include "estimators/sample_counts.h"
-#include "film/metrics.h"
+#include "metrics/metrics.h"
 #include "python/module/bindings.h"
 
 namespace covary::python {

@@ -6,8 +6,8 @@
 #include <span>
 #include <utility>
 
-#include "estimators/mixed_denoising.h"
-#include "estimators/registry.h"
+#include "combine/registry.h"
+#include "denoising/mixed_denoising.h"
 #include "plans/estimator_plans.h"
 #include "plans/integrator_choice.h"
 #include "plans/request_options.h"

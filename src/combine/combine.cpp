@@ -6,13 +6,13 @@
 #include <algorithm>
 #include <limits>
 
+#include "combine/light_film.h"
 #include "core/error.h"
 #include "core/stopwatch.h"
-#include "estimators/feedback.h"
-#include "estimators/held_out_error.h"
-#include "estimators/light_film.h"
-#include "estimators/planes.h"
-#include "estimators/predicted_error.h"
+#include "filters/feedback.h"
+#include "filters/planes.h"
+#include "risk/held_out_error.h"
+#include "risk/predicted_error.h"
 
 namespace covary {
 namespace {

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "combine/grouped_source.h"
+#include "combine/input_checks.h"
 #include "estimators/estimator.h"
-#include "estimators/input_checks.h"
 
 namespace covary {
 

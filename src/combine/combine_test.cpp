@@ -5,12 +5,12 @@
 
 #include <limits>
 
+#include "combine/light_film.h"
+#include "combine/registry.h"
 #include "core/error.h"
-#include "estimators/held_out_error.h"
-#include "estimators/light_film.h"
-#include "estimators/predicted_error.h"
-#include "estimators/registry.h"
 #include "estimators/test_images.h"
+#include "risk/held_out_error.h"
+#include "risk/predicted_error.h"
 #include "support/files.h"
 
 namespace covary {

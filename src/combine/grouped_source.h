@@ -4,9 +4,9 @@
 
 #include <functional>
 
-#include "estimators/grouped_file.h"
-#include "estimators/grouped_image.h"
-#include "estimators/pair_input.h"
+#include "combine/grouped_file.h"
+#include "combine/pair_input.h"
+#include "film/grouped_image.h"
 
 namespace covary {
 

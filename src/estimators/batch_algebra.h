@@ -5,7 +5,7 @@
 
 #include <cstddef>
 
-#include "estimators/lanes.h"
+#include "filters/lanes.h"
 
 namespace covary::batch {
 

@@ -13,8 +13,8 @@
 
 #include "core/parallel.h"
 #include "estimators/batch_algebra.h"
-#include "estimators/neighbours.h"
 #include "film/groups.h"
+#include "filters/neighbours.h"
 
 namespace covary {
 namespace {

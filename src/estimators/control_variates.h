@@ -13,9 +13,10 @@
 // of a group. Unequal counts of the independent image enter through V_h and Eq. (8).
 #pragma once
 
-#include "estimators/grouped_image.h"
+#include "estimators/estimator_result.h"
 #include "estimators/pixel_probe.h"
-#include "estimators/planes.h"
+#include "film/grouped_image.h"
+#include "filters/planes.h"
 
 namespace covary {
 

@@ -8,8 +8,8 @@
 
 #include "estimators/common_options.h"
 #include "estimators/control_variates.h"
+#include "estimators/estimator.h"
 #include "estimators/missing_light.h"
-#include "estimators/registry.h"
 
 namespace covary {
 
@@ -53,7 +53,7 @@ EstimatorResult cv_baseline(const GroupedImage& crn, const GroupedImage& indepen
   return result;
 }
 
-Estimator make_cv_baseline(EstimatorParameters& parameters) {
+Estimator make_cv_baseline(Settings& parameters) {
   EstimatorParameters& p = parameters;
   CvBaselineOptions o;
   p.whole("k", o.k, kVariatesRange, kVariatesHelp);

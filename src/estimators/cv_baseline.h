@@ -6,10 +6,14 @@
 // the standard error alone. Every group of every pixel needs a sample.
 #pragma once
 
-#include "estimators/grouped_image.h"
+#include "estimators/estimator_result.h"
 #include "estimators/pixel_probe.h"
+#include "film/grouped_image.h"
 
 namespace covary {
+
+class Settings;
+struct Estimator;
 
 struct CvBaselineOptions {
   /// Number of control variates; default 25, 1 … number of pixels in the window ([YM2025] Sec. 5).
@@ -37,5 +41,8 @@ EstimatorResult cv_baseline(const GroupedImage& crn, const GroupedImage& indepen
 
 /// Memory that cv_baseline() takes beside its input, its result included: bytes per pixel, about.
 inline constexpr double kCvBaselineBytesPerPixel = (2 * 6 + 6 + 3 + 6) * sizeof(float) + 1;
+
+/// The estimator `cv-baseline` with these options. Throws Error(kUsage) that lists everything that is wrong with them.
+Estimator make_cv_baseline(Settings& options);
 
 }  // namespace covary

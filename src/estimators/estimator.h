@@ -15,9 +15,10 @@
 #include <vector>
 
 #include "core/spectrum.h"
-#include "estimators/grouped_image.h"
+#include "estimators/estimator_result.h"
 #include "estimators/pixel_probe.h"
 #include "estimators/sample_counts.h"
+#include "film/grouped_image.h"
 
 namespace covary {
 

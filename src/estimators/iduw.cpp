@@ -7,8 +7,8 @@
 
 #include "core/parallel.h"
 #include "estimators/common_options.h"
-#include "estimators/planes.h"
-#include "estimators/registry.h"
+#include "estimators/estimator.h"
+#include "filters/planes.h"
 
 namespace covary {
 
@@ -174,7 +174,7 @@ EstimatorResult iduw(const GroupedImage& crn, const GroupedImage& independent, c
   return result;
 }
 
-Estimator make_iduw(EstimatorParameters& parameters) {
+Estimator make_iduw(Settings& parameters) {
   IduwOptions o;
   o.samples = 1;  // until an image is there
   parameters.whole("window", o.window, kWindowRange, kWindowHelp);

@@ -12,9 +12,13 @@
 // pixels with fewer samples than n are trusted too little, others too much. Every group of every pixel needs a sample.
 #pragma once
 
-#include "estimators/grouped_image.h"
+#include "estimators/estimator_result.h"
+#include "film/grouped_image.h"
 
 namespace covary {
+
+class Settings;
+struct Estimator;
 
 struct IduwOptions {
   /// Side of the window; default 15, as in the authors' program; odd, 3 … 63.
@@ -36,5 +40,8 @@ EstimatorResult iduw(const GroupedImage& crn, const GroupedImage& independent, c
 
 /// Memory that iduw() takes beside its input, its result included: bytes per pixel, about.
 inline constexpr double kIduwBytesPerPixel = (10 * 3 + 6 + 3) * sizeof(float) + 1;
+
+/// The estimator `iduw` with these options. Throws Error(kUsage) that lists everything that is wrong with them.
+Estimator make_iduw(Settings& options);
 
 }  // namespace covary

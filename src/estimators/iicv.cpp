@@ -8,9 +8,9 @@
 
 #include "estimators/common_options.h"
 #include "estimators/control_variates.h"
+#include "estimators/estimator.h"
 #include "estimators/missing_light.h"
 #include "estimators/pilot.h"
-#include "estimators/registry.h"
 
 namespace covary {
 
@@ -165,7 +165,7 @@ void check_effects(EstimatorParameters& p, const IicvOptions& o) {
 
 }  // namespace
 
-Estimator make_iicv(EstimatorParameters& parameters) {
+Estimator make_iicv(Settings& parameters) {
   static constexpr std::pair<const char*, Penalty> kPenalties[] = {{"pilot", Penalty::kPilot},
                                                                    {"sample", Penalty::kSample},
                                                                    {"smoothed", Penalty::kSmoothed},

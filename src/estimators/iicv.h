@@ -19,11 +19,15 @@
 // Every group of every pixel needs a sample.
 #pragma once
 
-#include "estimators/feedback.h"
-#include "estimators/grouped_image.h"
+#include "estimators/estimator_result.h"
 #include "estimators/pixel_probe.h"
+#include "film/grouped_image.h"
+#include "filters/feedback.h"
 
 namespace covary {
+
+class Settings;
+struct Estimator;
 
 /// How the error variances V_h of the independent image are estimated.
 enum class Penalty {
@@ -85,5 +89,8 @@ int iicv_reach(const IicvOptions& options);
 
 /// Memory that iicv() takes beside its input, its result included: bytes per pixel, about.
 double iicv_bytes_per_pixel(const IicvOptions& options);
+
+/// The estimator `iicv` with these options. Throws Error(kUsage) that lists everything that is wrong with them.
+Estimator make_iicv(Settings& options);
 
 }  // namespace covary

@@ -7,7 +7,7 @@
 #include "film/groups.h"
 
 #include "estimators/common_options.h"
-#include "estimators/registry.h"
+#include "estimators/estimator.h"
 
 namespace covary {
 namespace {
@@ -65,7 +65,7 @@ EstimatorResult mean_of_groups(const GroupedImage& image) {
   return result;
 }
 
-Estimator make_none(EstimatorParameters& parameters) {
+Estimator make_none(Settings& parameters) {
   EstimatorParameters& p = parameters;
   Estimator estimator;
   AdaptiveSampling standard;

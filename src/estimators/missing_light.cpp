@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "core/parallel.h"
-#include "estimators/filter_input.h"
+#include "filters/filter_input.h"
 
 namespace covary {
 namespace {

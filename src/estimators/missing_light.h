@@ -19,7 +19,7 @@
 
 #include <vector>
 
-#include "estimators/planes.h"
+#include "filters/planes.h"
 
 namespace covary {
 

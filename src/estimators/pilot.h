@@ -2,7 +2,7 @@
 // Error of the independent image by a pilot estimate: Yang & Moon 2025, Eq. (11).
 #pragma once
 
-#include "estimators/planes.h"
+#include "filters/planes.h"
 
 namespace covary {
 

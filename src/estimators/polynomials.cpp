@@ -7,8 +7,8 @@
 #include <cmath>
 #include <limits>
 
-#include "estimators/grouped_image.h"
-#include "estimators/registry.h"
+#include "estimators/estimator.h"
+#include "film/grouped_image.h"
 
 namespace covary {
 namespace {
@@ -93,7 +93,7 @@ Spectrum polynomials(std::span<const Spectrum> values, std::span<const float> co
   return {static_cast<float>(mean[0]), static_cast<float>(mean[1]), static_cast<float>(mean[2])};
 }
 
-Estimator make_polynomials(EstimatorParameters& parameters) {
+Estimator make_polynomials(Settings& parameters) {
   PolynomialsOptions o;
   parameters.whole("dimensions", o.dimensions, {.low = 1, .high = PolynomialsOptions::kMaxDimensions},
                    "polynomials: how many of a path's first random numbers they are functions of");

@@ -23,6 +23,9 @@
 
 namespace covary {
 
+class Settings;
+struct Estimator;
+
 struct PolynomialsOptions {
   static constexpr int kMaxDimensions = 6;
   /// d; default 4, 1 … kMaxDimensions.
@@ -44,5 +47,8 @@ struct PolynomialsOptions {
 /// negative where all samples are positive. Equal values give that value exactly. Where the coordinates do not
 /// determine the coefficients (all in a plane, say) the estimate is the mean of the samples.
 Spectrum polynomials(std::span<const Spectrum> values, std::span<const float> coordinates, int dimensions);
+
+/// The estimator `polynomials` with these options. Throws Error(kUsage) that lists everything that is wrong with them.
+Estimator make_polynomials(Settings& options);
 
 }  // namespace covary

@@ -9,7 +9,7 @@
 #include <numeric>
 
 #include "core/error.h"
-#include "estimators/filter_input.h"
+#include "filters/filter_input.h"
 
 namespace covary {
 namespace {

@@ -24,8 +24,8 @@
 #include <vector>
 
 #include "estimators/estimator_parameters.h"
-#include "estimators/grouped_image.h"
-#include "estimators/norm.h"
+#include "film/grouped_image.h"
+#include "filters/norm.h"
 
 namespace covary {
 

@@ -7,7 +7,7 @@
 #include <array>
 #include <cmath>
 
-#include "film/metrics.h"
+#include "metrics/metrics.h"
 
 namespace covary::lab {
 namespace {

@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "core/random.h"
-#include "film/metrics.h"
+#include "metrics/metrics.h"
 #include "support/files.h"
 
 namespace covary::lab {

@@ -16,10 +16,10 @@
 #include "core/unfinished.h"
 #include "film/image_file.h"
 #include "film/outputs.h"
-#include "film/provenance.h"
 #include "lab/measure.h"
 #include "lab/process.h"
 #include "lab/runner.h"
+#include "metrics/provenance.h"
 
 namespace covary::lab {
 namespace {

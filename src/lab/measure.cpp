@@ -12,9 +12,9 @@
 #include "core/content_hash.h"
 #include "core/error.h"
 #include "core/parallel.h"
-#include "film/alignment.h"
 #include "film/image_file.h"
-#include "film/metrics.h"
+#include "metrics/alignment.h"
+#include "metrics/metrics.h"
 
 namespace covary::lab {
 namespace {

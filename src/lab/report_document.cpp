@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "film/metrics.h"
 #include "lab/measure.h"
 #include "lab/report_tables.h"
+#include "metrics/metrics.h"
 
 namespace covary::lab {
 namespace {

@@ -8,8 +8,8 @@
 #include <cmath>
 #include <filesystem>
 
+#include "combine/registry.h"
 #include "core/random.h"
-#include "estimators/registry.h"
 #include "film/film_file.h"
 #include "film/merge.h"
 #include "plans/memory.h"

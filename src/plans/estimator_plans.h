@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The plans of the estimators there are (estimators/registry.h). Each has one phase, or two (adaptive_plan.h).
+// The plans of the estimators there are (combine/registry.h). Each has one phase, or two (adaptive_plan.h).
 #pragma once
 
 #include <array>

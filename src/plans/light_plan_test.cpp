@@ -8,14 +8,14 @@
 #include <filesystem>
 #include <random>
 
-#include "estimators/held_out_error.h"
-#include "estimators/light_film.h"
+#include "combine/light_film.h"
+#include "combine/registry.h"
 #include "estimators/mean.h"
-#include "estimators/predicted_error.h"
-#include "estimators/registry.h"
 #include "film/film_file.h"
 #include "film/splat_layer.h"
 #include "plans/memory.h"
+#include "risk/held_out_error.h"
+#include "risk/predicted_error.h"
 #include "scene/property_source.h"
 #include "support/files.h"
 #include "support/light_tracer.h"

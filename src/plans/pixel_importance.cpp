@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimators/denoise.h"
-#include "estimators/joint_bilateral.h"
+#include "denoising/denoise.h"
+#include "filters/joint_bilateral.h"
 #include "integrators/aov.h"
 #include "integrators/training.h"
 

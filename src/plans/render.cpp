@@ -12,7 +12,6 @@
 #include "core/error.h"
 #include "core/stop.h"
 #include "core/stopwatch.h"
-#include "estimators/predicted_error.h"
 #include "film/splat_layer.h"
 #include "integrators/aov.h"
 #include "integrators/light_pass.h"
@@ -28,6 +27,7 @@
 #include "plans/pass_waves.h"
 #include "plans/result_files.h"
 #include "plans/training_stage.h"
+#include "risk/predicted_error.h"
 
 namespace covary {
 namespace {

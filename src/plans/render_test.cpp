@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <thread>
 
-#include "estimators/registry.h"
+#include "combine/registry.h"
 #include "film/film_file.h"
 #include "film/image_file.h"
 #include "plans/budget.h"

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <map>
 
-#include "estimators/result_file.h"
+#include "combine/result_file.h"
 #include "film/film_file.h"
 #include "film/image_writer.h"
 #include "plans/light_plan.h"

@@ -5,7 +5,7 @@
 
 #include "core/stop.h"
 #include "core/stopwatch.h"
-#include "estimators/denoise.h"
+#include "denoising/denoise.h"
 #include "plans/pixel_importance.h"
 #include "plans/training_file.h"
 

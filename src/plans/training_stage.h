@@ -2,7 +2,7 @@
 // The training of a scene's integrator before the phases of a plan, and what its samples add to the image.
 #pragma once
 
-#include "estimators/grouped_image.h"
+#include "film/grouped_image.h"
 #include "integrators/training.h"
 #include "plans/render.h"
 

@@ -11,8 +11,8 @@
 
 #include "core/error.h"
 #include "core/parallel.h"
-#include "film/error_map.h"
 #include "film/output_file.h"
+#include "metrics/error_map.h"
 #include "report/embedded.h"
 #include "report/image_block.h"
 

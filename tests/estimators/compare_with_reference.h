@@ -6,8 +6,9 @@
 #include <cmath>
 #include <vector>
 
-#include "estimators/neighbours.h"
+#include "estimators/estimator_result.h"
 #include "estimators/reference_control_variates.h"
+#include "filters/neighbours.h"
 
 namespace covary::reference {
 

@@ -8,7 +8,7 @@
 #include <array>
 #include <vector>
 
-#include "estimators/grouped_image.h"
+#include "film/grouped_image.h"
 
 namespace covary::reference {
 

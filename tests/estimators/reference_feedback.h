@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Residual feedback (estimators/feedback.h) as plain double-precision loops.
+// Residual feedback (filters/feedback.h) as plain double-precision loops.
 #pragma once
 
 #include "estimators/reference_control_variates.h"

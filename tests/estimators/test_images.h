@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/random.h"
-#include "estimators/grouped_image.h"
+#include "film/grouped_image.h"
 
 namespace covary::test {
 

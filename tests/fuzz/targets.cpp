@@ -9,8 +9,8 @@
 #include <string>
 #include <string_view>
 
+#include "combine/grouped_file.h"
 #include "core/error.h"
-#include "estimators/grouped_file.h"
 #include "film/film_file.h"
 #include "film/image_file.h"
 #include "io/load_scene.h"

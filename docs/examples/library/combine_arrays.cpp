@@ -7,7 +7,7 @@
 // the first with the same random numbers in all pixels, in the second with each pixel's own. OUT is [y][x][rgb].
 #include <covary/core/error.h>
 #include <covary/estimators/iicv.h>
-#include <covary/estimators/predicted_error.h>
+#include <covary/risk/predicted_error.h>
 
 #include <cstdio>
 #include <fstream>

@@ -2,7 +2,7 @@
 // Renders a scene (Mitsuba XML) with the default method.
 //
 //     render_scene SCENE.xml OUT.exr
-#include <covary/estimators/registry.h>
+#include <covary/combine/registry.h>
 #include <covary/plans/estimator_plans.h>
 #include <covary/plans/integrator_choice.h>
 #include <covary/plans/render.h>

@@ -4,7 +4,7 @@
 const TONES = {
   srgb: { name: "sRGB", hint: "Values above 1 are white", curve: (v) => v },
   reinhard: { name: "Reinhard", hint: "v / (1 + v)", curve: (v) => v / (1 + v) },  // [Reinhard2002] Eq. (3)
-  // The rational approximation that HDR-FLIP uses, too (src/film/flip.cpp), [Andersson2021].
+  // The rational approximation that HDR-FLIP uses, too (src/metrics/flip.cpp), [Andersson2021].
   aces: { name: "ACES", hint: "Approximation of the ACES film curve",
     curve: (v) => (0.9036 * v * v + 0.018 * v) / (0.8748 * v * v + 0.354 * v + 0.14) },
 };

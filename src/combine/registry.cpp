@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "combine/registry.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "core/error.h"
+#include "denoising/mixed_denoising.h"
+#include "dependent_tests/dependent_tests.h"
+#include "estimators/cv_baseline.h"
+#include "estimators/iduw.h"
+#include "estimators/iicv.h"
+#include "estimators/mean.h"
+#include "estimators/polynomials.h"
+#include "risk/held_out_error.h"
+
+namespace covary {
+
+std::span<const EstimatorPlugin> estimator_plugins() {
+  static constexpr EstimatorPlugin kPlugins[] = {
+      {"iicv", make_iicv},
+      {"cv-baseline", make_cv_baseline},
+      {"iduw", make_iduw},
+      {"dependent-tests", make_dependent_tests},
+      {"polynomials", make_polynomials},
+      {"none", make_none},
+  };
+  return kPlugins;
+}
+
+namespace {
+
+const EstimatorPlugin& plugin_named(const std::string& name) {
+  for (const EstimatorPlugin& plugin : estimator_plugins())
+    if (name == plugin.name) return plugin;
+  const std::vector<std::string> names = estimator_names();
+  throw Error(ErrorCode::kUsage, fmt::format("no estimator is named '{}'{}; expected {}", name,
+                                             did_you_mean(name, names), fmt::join(names, ", ")));
+}
+
+bool has_option(const std::vector<EstimatorOption>& options, const std::string& name) {
+  return std::any_of(options.begin(), options.end(), [&](const EstimatorOption& o) { return o.name == name; });
+}
+
+void check_belongs(const std::string& estimator, const std::vector<EstimatorOption>& own, const std::string& option) {
+  if (has_option(own, option)) return;
+  const std::vector<std::string> owners = estimators_with_option(option);
+  if (!owners.empty())
+    throw Error(ErrorCode::kUsage, fmt::format("--{} is an option of --estimator {}, not of {}", option,
+                                               fmt::join(owners, ", "), estimator));
+  std::vector<std::string> names;
+  for (const EstimatorOption& o : own) names.push_back(o.name);
+  throw Error(ErrorCode::kUsage,
+              fmt::format("--{} is not an option of any estimator{}", option, did_you_mean(option, names)));
+}
+
+}  // namespace
+
+Estimator make_estimator(const std::string& name, const OptionValues& values) {
+  const EstimatorPlugin& plugin = plugin_named(name);
+  const std::vector<EstimatorOption> own = options_of_estimator(name);
+  for (const auto& [option, value] : values) check_belongs(name, own, option);
+  EstimatorParameters parameters(values);
+  Estimator estimator = plugin.make(parameters);
+  estimator.name = estimator.text = name;
+  for (const EstimatorOption& option : own) {
+    const auto given = values.find(option.name);
+    if (given == values.end()) continue;
+    estimator.text += " --" + option.name;
+    if (option.type != EstimatorOption::Type::kFlag) estimator.text += " " + given->second;
+  }
+  return with_held_out_rows(estimator);
+}
+
+std::vector<std::string> estimator_names() {
+  std::vector<std::string> names;
+  for (const EstimatorPlugin& plugin : estimator_plugins()) names.emplace_back(plugin.name);
+  return names;
+}
+
+std::vector<std::string> pair_estimator_names() {
+  return estimators_where([](const Estimator& e) { return e.passes == EstimatorPasses::kPair; });
+}
+
+std::vector<EstimatorOption> options_of_estimator(const std::string& name) {
+  EstimatorParameters parameters;
+  plugin_named(name).make(parameters);
+  return parameters.options();
+}
+
+Estimator with_denoising(const Estimator& base, const std::string& mode, const std::string& oidn) {
+  MixedDenoisingOptions options;
+  options.mode = denoise_mode(mode);
+  if (options.mode == DenoiseMode::kNone && !oidn.empty())
+    throw Error(ErrorCode::kUsage, "--oidn is an option of --denoise bias, balanced and error");
+  if (options.mode != DenoiseMode::kNone && !can_be_denoised(base))
+    throw Error(ErrorCode::kUsage,
+                fmt::format("--denoise needs an estimator of two passes that predicts its error ({}), not {}",
+                            fmt::join(estimators_where(can_be_denoised), ", "), base.name));
+  options.use_oidn = oidn != "off";
+  if (options.use_oidn) options.oidn.library = oidn;
+  return with_denoising(base, options);
+}
+
+std::vector<std::string> estimators_with_option(const std::string& option) {
+  std::vector<std::string> names;
+  for (const EstimatorPlugin& plugin : estimator_plugins())
+    if (has_option(options_of_estimator(plugin.name), option)) names.emplace_back(plugin.name);
+  return names;
+}
+
+}  // namespace covary

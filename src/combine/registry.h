@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// The estimators by name. A new estimator: one line in registry.cpp, one in CMake.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "estimators/estimator.h"
+#include "estimators/estimator_parameters.h"
+
+namespace covary {
+
+struct EstimatorPlugin {
+  const char* name;
+  /// Throws Error(kUsage) that lists everything that is wrong with the options.
+  Estimator (*make)(EstimatorParameters& parameters);
+};
+
+/// All estimators, the default first.
+std::span<const EstimatorPlugin> estimator_plugins();
+
+inline constexpr const char* kDefaultEstimator = "iicv";
+inline constexpr const char* kNoEstimator = "none";  ///< the film is the image
+
+/// Throws Error(kUsage) for a name that there is not, with the names there are; for an option that the estimator does
+/// not have, with those that have it; and for values out of range.
+Estimator make_estimator(const std::string& name, const OptionValues& values = {});
+
+/// Names of the estimators that `accepts` says yes to, with their default options.
+template <typename Predicate>
+std::vector<std::string> estimators_where(const Predicate& accepts) {
+  std::vector<std::string> names;
+  for (const EstimatorPlugin& plugin : estimator_plugins())
+    if (accepts(make_estimator(plugin.name))) names.emplace_back(plugin.name);
+  return names;
+}
+std::vector<std::string> estimator_names();
+/// Those of a CRN and an independent image.
+std::vector<std::string> pair_estimator_names();
+
+/// The options of an estimator with their defaults. Throws Error(kUsage) as make_estimator().
+std::vector<EstimatorOption> options_of_estimator(const std::string& name);
+/// Names of the estimators that have the option, without dashes; empty where none has.
+std::vector<std::string> estimators_with_option(const std::string& option);
+
+/// with_denoising() by words, as --denoise and --oidn have them: a name of denoise_mode_names(); a library or a folder
+/// of it, "" for where it is found, "off" to go without.
+Estimator with_denoising(const Estimator& base, const std::string& mode, const std::string& oidn);
+
+}  // namespace covary

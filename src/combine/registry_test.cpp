@@ -1,0 +1,370 @@
+// SPDX-License-Identifier: Apache-2.0
+// The estimators by name: defaults and values of options, ranges, messages, and docs/estimators.md.
+#include "combine/registry.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <set>
+#include <sstream>
+
+#include "dependent_tests/dependent_tests.h"
+#include "estimators/cv_baseline.h"
+#include "estimators/iduw.h"
+#include "estimators/iicv.h"
+#include "estimators/polynomials.h"
+#include "estimators/test_images.h"
+#include "support/files.h"
+
+namespace covary {
+namespace {
+
+using test_support::contains, test_support::message_of;
+using Type = EstimatorOption::Type;
+
+constexpr int kWidth = 12, kHeight = 10, kGroups = 4;
+const test::Grouped& crn() {
+  static const test::Grouped image = test::crn_image(kWidth, kHeight, kGroups, 1);
+  return image;
+}
+const test::Grouped& independent() {
+  static const test::Grouped image = test::independent_image(kWidth, kHeight, kGroups, 1);
+  return image;
+}
+
+std::vector<float> made(const std::string& name, const OptionValues& values,
+                        const PairSettings& settings = {48, true}) {
+  return make_estimator(name, values).apply(crn().view(), independent().view(), settings).estimate.data;
+}
+
+TEST(EstimatorRegistry, BeginsWithTheDefaultAndRepeatsNothing) {
+  const std::vector<std::string> names = estimator_names();
+  EXPECT_EQ(names.front(), kDefaultEstimator);
+  EXPECT_EQ(std::set<std::string>(names.begin(), names.end()).size(), names.size());
+  EXPECT_EQ(make_estimator(kNoEstimator).passes, EstimatorPasses::kAny);
+}
+
+/// Options of one name mean one thing on the command line, whichever estimators have them.
+TEST(EstimatorRegistry, OptionsOfOneNameAgree) {
+  std::map<std::string, EstimatorOption> seen;
+  for (const std::string& name : estimator_names())
+    for (const EstimatorOption& option : options_of_estimator(name)) {
+      const auto [first, is_new] = seen.emplace(option.name, option);
+      EXPECT_FALSE(option.help.empty());
+      if (is_new) continue;
+      EXPECT_EQ(first->second.type, option.type) << option.name;
+      EXPECT_EQ(first->second.choices, option.choices) << option.name;
+      EXPECT_EQ(first->second.aliases, option.aliases) << option.name;
+    }
+}
+
+TEST(EstimatorRegistry, DefaultsAreThoseOfTheOptions) {
+  const GroupedImage g = crn().view(), h = independent().view();
+  IicvOptions with_error;
+  with_error.std_error = true;
+  EXPECT_EQ(made("iicv", {}), iicv(g, h, with_error).estimate.data);
+  EXPECT_EQ(made("iicv", {{"paper", ""}}), iicv(g, h, IicvOptions::paper()).estimate.data);
+  EXPECT_EQ(made("cv-baseline", {}), cv_baseline(g, h).estimate.data);
+  IduwOptions iduw_options;
+  iduw_options.samples = 48;
+  EXPECT_EQ(made("iduw", {}), iduw(g, h, iduw_options).estimate.data);
+  EXPECT_EQ(made("dependent-tests", {}), dependent_tests(g, h).estimate.data);
+  EXPECT_EQ(made("dependent-tests", {{"paper", ""}}),
+            dependent_tests(g, h, DependentTestsOptions::paper()).estimate.data);
+  EXPECT_EQ(make_estimator("polynomials").dimensions, PolynomialsOptions().dimensions);
+}
+
+bool has(const std::vector<EstimatorOption>& options, const std::string& name) {
+  return std::any_of(options.begin(), options.end(), [&](const EstimatorOption& o) { return o.name == name; });
+}
+
+/// What must be given beside an option so that it has an effect.
+OptionValues with_what_it_needs(const std::string& name, OptionValues values) {
+  const auto given = [&](std::initializer_list<const char*> options) {
+    return std::any_of(options.begin(), options.end(), [&](const char* o) { return values.contains(o); });
+  };
+  if (given({"ridge"}) && name == "iicv") values["penalty"] = "homogeneous";
+  if (given({"max-region", "min-centre-drop", "pyramid", "region-sides"})) values["filter"] = "paper";
+  if (has(options_of_estimator(name), "adaptive")) values["adaptive"] = "";
+  return values;
+}
+
+/// Every default, given as a value, changes nothing.
+TEST(EstimatorRegistry, ListsTheDefaults) {
+  for (const std::string& name : pair_estimator_names())
+    for (const EstimatorOption& option : options_of_estimator(name)) {
+      if (option.default_value.empty()) continue;
+      const OptionValues values = with_what_it_needs(name, {{option.name, option.default_value}});
+      OptionValues without = values;
+      without.erase(option.name);
+      EXPECT_EQ(made(name, values), made(name, without)) << name << " " << option.name;
+    }
+}
+
+TEST(EstimatorRegistry, ValuesReachTheOptions) {
+  const GroupedImage g = crn().view(), h = independent().view();
+  IicvOptions o;
+  o.k = 9, o.window = 7, o.include_target = false, o.shared_coefficients = false, o.symmetric = false;
+  o.penalty = Penalty::kSmoothed, o.pilot_window = 5, o.sample_share = 0.25f, o.conservation = 3.5f;
+  o.feedback_options = {9, 2.5f};
+  EXPECT_EQ(made("iicv", {{"k", "9"},
+                          {"window", "7"},
+                          {"exclude-target", ""},
+                          {"coefficients", "per-channel"},
+                          {"asymmetric", ""},
+                          {"penalty", "smoothed"},
+                          {"pilot-window", "5"},
+                          {"sample-share", "0.25"},
+                          {"conservation", "3.5"},
+                          {"feedback-window", "9"},
+                          {"feedback-bandwidth", "2.5"}}),
+            iicv(g, h, o).estimate.data);
+  IicvOptions homogeneous;
+  homogeneous.penalty = Penalty::kHomogeneous, homogeneous.ridge = 0.5f, homogeneous.feedback = false;
+  EXPECT_EQ(made("iicv", {{"penalty", "homogeneous"}, {"ridge", "0.5"}, {"feedback", "off"}}),
+            iicv(g, h, homogeneous).estimate.data);
+  CvBaselineOptions baseline;
+  baseline.k = 9, baseline.window = 5, baseline.ridge = 0.001f, baseline.include_target = false;
+  baseline.shared_coefficients = true;
+  EXPECT_EQ(made("cv-baseline",
+                 {{"k", "9"}, {"window", "5"}, {"ridge", "0.001"}, {"exclude-target", ""}, {"coefficients", "shared"}}),
+            cv_baseline(g, h, baseline).estimate.data);
+  DependentTestsOptions tests;
+  tests.filter = DependentFilter::kPaper, tests.norm = Norm::kL2, tests.weights = CombinationWeights::kCounts;
+  tests.regions = {6, 0.001f, Pyramid::kCount, true}, tests.variance = VarianceSource::kDependent, tests.smoothing = 3;
+  EXPECT_EQ(made("dependent-tests", {{"filter", "paper"},
+                                     {"norm", "l2"},
+                                     {"weights", "counts"},
+                                     {"max-region", "6"},
+                                     {"min-centre-drop", "0.001"},
+                                     {"pyramid", "count"},
+                                     {"region-sides", "odd"},
+                                     {"sigma", "dependent"},
+                                     {"sigma-window", "3"}}),
+            dependent_tests(g, h, tests).estimate.data);
+  DependentTestsOptions exact;
+  exact.bound = {7, false}, exact.guard = 0;
+  EXPECT_EQ(made("dependent-tests", {{"window", "7"}, {"sigma-of", "each"}, {"guard", "off"}}),
+            dependent_tests(g, h, exact).estimate.data);
+  EXPECT_EQ(make_estimator("polynomials", {{"dimensions", "2"}}).film_settings, "polynomials dimensions=2");
+  EXPECT_EQ(make_estimator("iicv", {{"paper", ""}, {"k", "50"}}).text, "iicv --paper --k 50");
+}
+
+/// What each says of itself holds.
+TEST(EstimatorRegistry, EachEstimatorDoesWhatItSays) {
+  const auto groups = [](int n, uint64_t seed, bool common) {
+    return common ? test::crn_image(kWidth, kHeight, n, seed) : test::independent_image(kWidth, kHeight, n, seed);
+  };
+  for (const std::string& name : pair_estimator_names()) {
+    const Estimator estimator = make_estimator(name);
+    SCOPED_TRACE(name);
+    EXPECT_NEAR(estimator.split[0] + estimator.split[1], 1, 1e-12);
+    const auto run = [&](int n) {
+      const test::Grouped g = groups(n, 1, true), h = groups(n, 1, false);
+      return estimator.apply(g.view(), h.view(), {4 * n, estimator.predicts_error});
+    };
+    const EstimatorResult result = run(estimator.fewest_groups);
+    EXPECT_EQ(result.estimate.data.size(), size_t{kWidth} * kHeight * 3);
+    EXPECT_EQ(!result.std_error.data.empty(), estimator.predicts_error);
+    EXPECT_THROW(run(estimator.fewest_groups - 1), Error);
+    if (!estimator.explain) continue;
+    EXPECT_FALSE(estimator.explain(crn().view(), independent().view(), 5, 5).empty());
+  }
+  EXPECT_EQ(make_estimator("iicv", {{"penalty", "cross-fit"}}).fewest_groups, 4);
+}
+
+TEST(EstimatorRegistry, AdaptiveEstimatorsHaveTheirNumbers) {
+  const Estimator usual = make_estimator("dependent-tests");
+  ASSERT_TRUE(usual.adaptive);
+  EXPECT_EQ(usual.adaptive->counts.allocation, Allocation::kLeastError);
+  EXPECT_FALSE(usual.adaptive->counts.classes);
+  const Estimator paper = make_estimator("dependent-tests", {{"paper", ""}});
+  EXPECT_EQ(paper.adaptive->counts.allocation, Allocation::kEqualError);
+  EXPECT_TRUE(paper.adaptive->counts.classes);
+  EXPECT_EQ(paper.adaptive->counts.min_spp, 0);
+  EXPECT_FALSE(make_estimator("none").adaptive);
+  const Estimator plain = make_estimator("none", {{"adaptive", ""},
+                                                  {"dependent-spp", "7"},
+                                                  {"allocation", "uniform"},
+                                                  {"relative-error", "0.25"},
+                                                  {"min-spp", "3"},
+                                                  {"max-spp", "30"},
+                                                  {"norm", "l2"}});
+  ASSERT_TRUE(plain.adaptive);
+  EXPECT_EQ(plain.adaptive->first_spp, 7);
+  const CountOptions& counts = plain.adaptive->counts;
+  EXPECT_EQ(counts.allocation, Allocation::kUniform);
+  EXPECT_EQ(counts.relative_error, 0.25f);
+  EXPECT_EQ(counts.min_spp, 3);
+  EXPECT_EQ(counts.max_spp, 30);
+  EXPECT_EQ(counts.norm, Norm::kL2);
+  EXPECT_FALSE(counts.first_pass_counts);
+  const auto message = [](const std::string& name, const OptionValues& values) {
+    return message_of([&] { make_estimator(name, values); }, ErrorCode::kUsage);
+  };
+  EXPECT_TRUE(contains(message("none", {{"max-spp", "9"}}), "--max-spp has no effect without --adaptive"));
+  EXPECT_TRUE(contains(message("none", {{"adaptive", ""}, {"min-spp", "0"}}), "min-spp is 0, expected 1 or more"));
+  EXPECT_TRUE(contains(message("dependent-tests", {{"relative-error", "-1"}}), "relative error is -1"));
+  EXPECT_TRUE(contains(message("dependent-tests", {{"min-spp", "9"}, {"max-spp", "8"}}), "more than max-spp"));
+  EXPECT_TRUE(
+      contains(message("iduw", {{"relative-error", "1"}}), "is an option of --estimator iicv, dependent-tests, none"));
+  EXPECT_TRUE(contains(message("iicv", {{"allocation", "uniform"}}), "--allocation has no effect without --adaptive"));
+  EXPECT_TRUE(contains(message("none", {{"norm", "l2"}}), "--norm has no effect without --adaptive"));
+  const Estimator iicv = make_estimator("iicv", {{"adaptive", ""}, {"max-spp", "99"}});
+  ASSERT_TRUE(iicv.adaptive);
+  EXPECT_EQ(iicv.adaptive->counts.max_spp, 99);
+  EXPECT_TRUE(iicv.adaptive->reads_groups);
+  EXPECT_FALSE(make_estimator("iicv").adaptive);
+}
+
+TEST(EstimatorRegistry, SamplesOfAPixel) {
+  const Estimator estimator = make_estimator("polynomials", {{"dimensions", "1"}});
+  ASSERT_EQ(estimator.passes, EstimatorPasses::kSamples);
+  const std::vector<Spectrum> values(5, Spectrum(2.0f));
+  const std::vector<float> coordinates = {0.1f, 0.3f, 0.5f, 0.7f, 0.9f};
+  EXPECT_EQ(estimator.estimate_pixel(values, coordinates).r, 2.0f);
+  EXPECT_TRUE(estimator.check_samples(4).empty());
+  EXPECT_FALSE(estimator.check_samples(3).empty());
+}
+
+TEST(EstimatorRegistry, RangesAreThoseThatAreChecked) {
+  for (const std::string& name : estimator_names())
+    for (const EstimatorOption& option : options_of_estimator(name)) {
+      if (option.type != Type::kWhole && option.type != Type::kReal) continue;
+      SCOPED_TRACE(name + " " + option.name);
+      const auto accepts = [&](double value) {
+        OptionValues values{{option.name, fmt::format("{:g}", value)}};
+        const std::vector<EstimatorOption> all = options_of_estimator(name);
+        if (option.name == "window" && has(all, "k")) values["k"] = "1";  // of few pixels
+        values = with_what_it_needs(name, values);
+        return message_of([&] { make_estimator(name, values); }) == "no error";
+      };
+      const OptionRange& range = option.range;
+      const double step = option.type == Type::kWhole ? (range.odd ? 2 : 1) : 0.25;
+      EXPECT_TRUE(option.default_value.empty() || range.contains(std::stod(option.default_value)));
+      EXPECT_EQ(accepts(range.low), !range.above_low);
+      EXPECT_TRUE(accepts(range.low + step));
+      EXPECT_FALSE(accepts(range.low - step));
+      if (!std::isfinite(range.high)) continue;
+      EXPECT_TRUE(accepts(range.high));
+      EXPECT_FALSE(accepts(range.high + step));
+      EXPECT_EQ(accepts(range.high - 1), !range.odd && range.high - 1 >= range.low);
+    }
+  EXPECT_TRUE((OptionRange{.low = 3, .high = 7, .odd = true}.contains(5)));
+  EXPECT_FALSE((OptionRange{.low = 3, .high = 7, .odd = true}.contains(4)));
+  EXPECT_EQ((OptionRange{.low = 0, .above_low = true}.text()), "above 0");
+}
+
+TEST(EstimatorRegistry, OptionsWithoutEffectAreErrors) {
+  const auto message = [](const std::string& name, const OptionValues& values) {
+    return message_of([&] { make_estimator(name, values); }, ErrorCode::kUsage);
+  };
+  EXPECT_EQ(message("iicv", {{"penalty", "sample"}, {"pilot-window", "5"}}),
+            "--pilot-window has no effect with this --penalty: only pilot, smoothed and cross-fit have a pilot");
+  EXPECT_EQ(message("iicv", {{"feedback", "off"}, {"feedback-window", "21"}, {"feedback-bandwidth", "1"}}),
+            "--feedback-window, --feedback-bandwidth have no effect without feedback (--feedback on), which --paper "
+            "leaves out");
+  struct Case {
+    const char *estimator, *option;
+    OptionValues values;
+  };
+  const Case cases[] = {
+      {"iicv", "pilot-window", {{"penalty", "homogeneous"}, {"pilot-window", "11"}}},
+      {"iicv", "ridge", {{"penalty", "pilot"}, {"ridge", "1"}}},
+      {"iicv", "ridge", {{"ridge", "1"}}},
+      {"iicv", "sample-share", {{"penalty", "homogeneous"}, {"sample-share", "0.5"}}},
+      {"iicv", "asymmetric", {{"penalty", "homogeneous"}, {"asymmetric", ""}}},
+      {"iicv", "asymmetric", {{"sample-share", "1"}, {"asymmetric", ""}}},
+      {"iicv", "sample-share", {{"penalty", "sample"}, {"asymmetric", ""}, {"sample-share", "0.5"}}},
+      {"iicv", "feedback-window", {{"paper", ""}, {"feedback-window", "41"}}},
+      {"iicv", "max-spp", {{"max-spp", "99"}}},
+      {"dependent-tests", "max-region", {{"max-region", "3"}}},
+      {"dependent-tests", "min-centre-drop", {{"min-centre-drop", "0.1"}}},
+      {"dependent-tests", "pyramid", {{"pyramid", "count"}}},
+      {"dependent-tests", "region-sides", {{"region-sides", "odd"}}},
+      {"dependent-tests", "window", {{"paper", ""}, {"window", "5"}}},
+      {"dependent-tests", "guard", {{"paper", ""}, {"guard", "on"}}},
+      {"dependent-tests", "sigma-of", {{"paper", ""}, {"sigma-of", "each"}}},
+      {"dependent-tests", "window", {{"filter", "paper"}, {"window", "5"}}},
+      {"dependent-tests", "measure-window", {{"paper", ""}, {"measure-window", "5"}}},
+      {"dependent-tests", "measure-window", {{"weights", "effective"}, {"measure-window", "5"}}},
+  };
+  for (const Case& c : cases)
+    EXPECT_TRUE(message(c.estimator, c.values).starts_with(fmt::format("--{} has no effect ", c.option)))
+        << message(c.estimator, c.values);
+  // These decide themselves that the others have one.
+  for (const OptionValues& values : {OptionValues{{"paper", ""}, {"feedback", "on"}, {"feedback-window", "21"}},
+                                     OptionValues{{"penalty", "cross-fit"}, {"pilot-window", "5"}}})
+    EXPECT_NO_THROW(make_estimator("iicv", values));
+  EXPECT_NO_THROW(make_estimator("dependent-tests", {{"paper", ""}, {"weights", "measured"}, {"measure-window", "5"}}));
+  EXPECT_NO_THROW(make_estimator("dependent-tests", {{"filter", "paper"}, {"max-region", "5"}}));
+}
+
+TEST(EstimatorRegistry, SaysWhatIsWrong) {
+  const auto message = [](const std::string& name, const OptionValues& values) {
+    return message_of([&] { make_estimator(name, values); });
+  };
+  EXPECT_EQ(message("iidw", {}),
+            "no estimator is named 'iidw'; did you mean 'iduw' or 'iicv'?; expected iicv, cv-baseline, iduw, "
+            "dependent-tests, polynomials, none");
+  EXPECT_EQ(message("iduw", {{"k", "3"}}), "--k is an option of --estimator iicv, cv-baseline, not of iduw");
+  EXPECT_EQ(message("iicv", {{"windwo", "3"}}), "--windwo is not an option of any estimator; did you mean 'window'?");
+  EXPECT_EQ(message("iicv", {{"k", "3x"}}), "--k '3x': expected a whole number of at least 1");
+  EXPECT_EQ(message("iicv", {{"ridge", "nan"}}), "--ridge 'nan': expected a number above 0");
+  EXPECT_EQ(message("iicv", {{"feedback", "of"}}), "--feedback 'of'; did you mean 'off' or 'on'?: expected on, off");
+  EXPECT_TRUE(contains(message("iicv", {{"k", "500"}}), "k is 500, expected 1 to 121"));
+  EXPECT_TRUE(contains(message("polynomials", {{"dimensions", "7"}}), "dimensions is 7, expected 1 to 6"));
+}
+
+// ---- docs/estimators.md ---------------------------------------------------------------------------------------------
+
+std::string yes_or_no(bool value) { return value ? "yes" : "no"; }
+
+std::string row_of(const Estimator& e) {
+  const bool pair = e.passes == EstimatorPasses::kPair;
+  const char* passes = pair                                    ? "CRN and independent"
+                       : e.passes == EstimatorPasses::kSamples ? "independent, all samples of a pixel"
+                                                               : "one of either kind";
+  const std::string combine = !pair ? "no" : e.reach < 0 ? "whole images" : "in bands";
+  return fmt::format("| `{}` | {} | {} | {} | {} | {} |", e.name, passes, e.fewest_groups, yes_or_no(e.predicts_error),
+                     yes_or_no(e.explain != nullptr), combine);
+}
+
+std::string row_of(const EstimatorOption& o) {
+  const std::string values = o.type == Type::kFlag     ? "flag"
+                             : o.type == Type::kChoice ? fmt::format("{}", fmt::join(o.choices, ", "))
+                             : o.type == Type::kWhole  ? "whole, " + o.range.text()
+                                                       : o.range.text();
+  std::string names = "`--" + o.name + "`";
+  for (const std::string& alias : o.aliases) names += "/`--" + alias + "`";
+  return fmt::format("| {} | {} | {} | {} |", names, values, o.type == Type::kFlag ? "off" : o.default_value, o.help);
+}
+
+/// The page has a row for each estimator, and below its heading one for each of its options; and no others.
+TEST(EstimatorRegistry, IsDocumented) {
+  std::string expected;
+  for (const std::string& name : estimator_names()) expected += row_of(make_estimator(name)) + "\n";
+  for (const std::string& name : estimator_names()) {
+    expected += "## `" + name + "`\n";
+    for (const EstimatorOption& option : options_of_estimator(name)) expected += row_of(option) + "\n";
+  }
+  std::ifstream file(std::string(COVARY_SOURCE_DIR) + "/docs/estimators.md");
+  std::string line, found;
+  while (std::getline(file, line))
+    if (line.starts_with("| `") || line.starts_with("## `")) found += line + "\n";
+  EXPECT_EQ(found, expected);
+}
+
+TEST(EstimatorRegistry, IsNamedInTheReadme) {
+  std::ifstream file(std::string(COVARY_SOURCE_DIR) + "/README.md");
+  std::stringstream text;
+  text << file.rdbuf();
+  std::string list;
+  for (const std::string& name : estimator_names()) list += (list.empty() ? "`" : ", `") + name + "`";
+  EXPECT_TRUE(contains(text.str(), "Estimators: " + list)) << list;
+}
+
+}  // namespace
+}  // namespace covary

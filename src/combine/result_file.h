@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// The image an estimator made, on disk.
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "estimators/estimator_result.h"
+#include "film/exr.h"
+#include "film/grouped_image.h"
+
+namespace covary {
+
+/// Writes R, G, B, where there are an error estimate StdError.R, .G, .B and Bias.R, .G, .B, and the auxiliary images by
+/// name, with string attributes. The file appears under its name only when complete. Throws Error(kIo). The arguments
+/// are only read.
+void write_result(const std::string& path, const ImagePlace& place,
+                  const std::map<std::string, std::string>& attributes, EstimatorResult& result,
+                  std::map<std::string, Image>& aovs);
+
+}  // namespace covary

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "denoising/candidates.h"
+
+#include <algorithm>
+#include <functional>
+#include <memory>
+
+#include "core/parallel.h"
+#include "filters/nl_means.h"
+
+namespace covary {
+namespace {
+
+/// What differences of guides are divided by, and the least albedo to divide by.
+constexpr float kAlbedoUnit = 0.07f, kNormalUnit = 0.2f, kLeastAlbedo = 0.02f;
+/// Bandwidths of the sharp and the smooth filter.
+constexpr float kSharp = 0.5f, kSmooth = 1;
+
+/// Appends an image's channels, over `unit`, to planes from number `first` on.
+void copy_guide(const Image& image, float unit, int first, Planes& planes) {
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x)
+      for (int c = 0; c < 3; ++c) planes.row(first + c, y)[x] = image.pixel(x, y)[c] / unit;
+}
+
+/// operation(a, b) of every value.
+template <typename Operation>
+Image combined(const Image& a, const Image& b, const Operation& operation) {
+  Image result = a;
+  std::transform(a.data.begin(), a.data.end(), b.data.begin(), result.data.begin(), operation);
+  return result;
+}
+
+struct FilterGuides {
+  Planes all, normal;
+  Image albedo;  // at least kLeastAlbedo; empty where there is none
+};
+
+FilterGuides filter_guides(const Guides& guides) {
+  FilterGuides result;
+  const auto planes = [&](const Image& like, int count) {
+    return Planes(like.width, like.height, count, kNlMeansRadius, 0.0f);
+  };
+  if (!guides.albedo) return result;
+  result.all = planes(*guides.albedo, guides.normal ? 6 : 3);
+  copy_guide(*guides.albedo, kAlbedoUnit, 0, result.all);
+  result.albedo = *guides.albedo;
+  for (float& value : result.albedo.data) value = std::max(value, kLeastAlbedo);
+  if (!guides.normal) return result;
+  result.normal = planes(*guides.normal, 3);
+  copy_guide(*guides.normal, kNormalUnit, 3, result.all);
+  copy_guide(*guides.normal, kNormalUnit, 0, result.normal);
+  return result;
+}
+
+const Planes* or_null(const Planes& planes) { return planes.count() > 0 ? &planes : nullptr; }
+
+std::vector<Image> filtered(const FilterGuides& guides, const CandidateInput& in) {
+  const NlMeansTask tasks[] = {{kSharp, {in.estimate, in.independent}}, {kSmooth, {in.estimate}}};
+  std::vector<Image> images = nl_means({in.estimate, in.std_error, or_null(guides.all), in.valid}, tasks);
+  if (guides.albedo.data.empty()) return images;
+  const Image image = combined(*in.estimate, guides.albedo, std::divides<>());
+  const Image error = combined(*in.std_error, guides.albedo, std::divides<>());
+  const NlMeansTask demodulated[] = {{kSharp, {&image}}};
+  const std::vector<Image> result = nl_means({&image, &error, or_null(guides.normal), in.valid}, demodulated);
+  images.push_back(combined(result[0], guides.albedo, std::multiplies<>()));
+  return images;
+}
+
+}  // namespace
+
+CandidateMaker filtered_candidates(const Guides& guides) {
+  const auto kept = std::make_shared<FilterGuides>(filter_guides(guides));
+  CandidateMaker maker;
+  maker.names = {"sharp", "sharp-independent", "smooth"};
+  if (!kept->albedo.data.empty()) maker.names.emplace_back("demodulated");
+  maker.make = [kept](const CandidateInput& in) { return filtered(*kept, in); };
+  return maker;
+}
+
+CandidateMaker neural_candidates(const Guides& guides, const DenoiseOptions& options) {
+  const auto denoiser = std::make_shared<Denoiser>(options);
+  const auto albedo = std::make_shared<Image>(), normal = std::make_shared<Image>();
+  if (guides.albedo) *albedo = denoiser->denoise_guide("albedo", *guides.albedo);
+  if (guides.albedo && guides.normal) *normal = denoiser->denoise_guide("normal", *guides.normal);
+  CandidateMaker maker;
+  maker.names = {"oidn", "oidn-independent"};
+  maker.error_over_variance = 1.1;
+  maker.make = [=](const CandidateInput& in) {
+    std::vector<Image> images;
+    for (const Image* image : {in.estimate, in.independent})
+      images.push_back(denoiser->denoise(*image, albedo->data.empty() ? nullptr : albedo.get(),
+                                         normal->data.empty() ? nullptr : normal.get(), true));
+    return images;
+  };
+  return maker;
+}
+
+}  // namespace covary

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// Images with less noise and more bias than the one they are made of: candidates for mixture.h.
+//
+// Without a neural network (nl_means.h, steered by the estimator's image and its standard error, guided by albedo and
+// normal): that image with two bandwidths; the independent image with the same weights; and the image over the albedo,
+// filtered with the normal as the only guide, times the albedo. With Open Image Denoise: both images denoised, with
+// guides that were denoised before.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "denoising/denoise.h"
+#include "estimators/estimator.h"
+
+namespace covary {
+
+/// What candidates are made of: the images of one set of samples. All values are finite.
+struct CandidateInput {
+  const Image* estimate = nullptr;
+  const Image* std_error = nullptr;    ///< of the estimate
+  const Image* independent = nullptr;  ///< mean of the independent image
+  const std::vector<unsigned char>* valid = nullptr;
+};
+
+/// Makes candidates, the same of any samples.
+struct CandidateMaker {
+  std::vector<std::string> names;  ///< of its images, in their order
+  std::function<std::vector<Image>(const CandidateInput&)> make;
+  /// What the squared error of a mixture that has these usually is, over the variance of mixtures of half of the
+  /// samples: the more of it they take away, the more of the error is bias. Measured (docs/methods/error-estimates.md).
+  double error_over_variance = 0.65;
+};
+
+/// Filters without a network. The guides are copied.
+CandidateMaker filtered_candidates(const Guides& guides);
+/// Images denoised by a neural network. Throws like denoise().
+CandidateMaker neural_candidates(const Guides& guides, const DenoiseOptions& options);
+
+}  // namespace covary

@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "denoising/denoise.h"
+
+#include <dlfcn.h>
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <deque>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string_view>
+#include <vector>
+
+#include "core/error.h"
+#include "core/stop.h"
+
+namespace covary {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kLibrary = "libOpenImageDenoise.so.2";
+
+/// The part of the library's C interface (version 2) that is used here; handles are opaque.
+struct Api {
+  static constexpr int kDeviceCpu = 1, kFormatFloat3 = 3;
+  void* (*new_device)(int type) = nullptr;
+  void (*commit_device)(void* device) = nullptr;
+  void (*release_device)(void* device) = nullptr;
+  void (*set_device_int)(void* device, const char* name, int value) = nullptr;
+  int (*get_device_int)(void* device, const char* name) = nullptr;
+  int (*device_error)(void* device, const char** message) = nullptr;
+  void* (*new_filter)(void* device, const char* type) = nullptr;
+  void (*set_image)(void* filter, const char* name, void* data, int format, size_t width, size_t height,
+                    size_t byte_offset, size_t pixel_stride, size_t row_stride) = nullptr;
+  void (*set_bool)(void* filter, const char* name, bool value) = nullptr;
+  /// `question` is asked while the filter works, which ends early once it says false.
+  void (*set_progress)(void* filter, bool (*question)(void* data, double done), void* data) = nullptr;
+  void (*commit_filter)(void* filter) = nullptr;
+  void (*execute_filter)(void* filter) = nullptr;
+  void (*release_filter)(void* filter) = nullptr;
+};
+
+/// Where Python's wheel `pyoidn` puts the library, from the root of an environment down; a star is any ending.
+constexpr std::array<const char*, 6> kWheelFolders = {"lib", "python3*", "*-packages", "pyoidn", "oidn", "lib"};
+
+bool matches(const std::string& name, std::string_view pattern) {
+  const size_t star = pattern.find('*');
+  if (star == std::string_view::npos) return name == pattern;
+  const std::string_view before = pattern.substr(0, star), after = pattern.substr(star + 1);
+  return name.size() >= before.size() + after.size() && name.starts_with(before) && name.ends_with(after);
+}
+
+/// The library in `folder` if it holds it, or else below it, along the wheel's folders from number `first` on.
+void find_along_wheel(const fs::path& folder, size_t first, std::vector<std::string>& found) {
+  std::error_code ignored;
+  if (first == kWheelFolders.size()) {
+    if (fs::exists(folder / kLibrary, ignored)) found.push_back((folder / kLibrary).string());
+    return;
+  }
+  std::vector<fs::path> below;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored))
+    if (matches(entry.path().filename().string(), kWheelFolders[first])) below.push_back(entry.path());
+  std::sort(below.begin(), below.end());
+  for (const fs::path& next : below) find_along_wheel(next, first + 1, found);
+}
+
+/// What a user's path may mean: the library, its folder, any folder of the wheel above it up to the environment's root.
+std::vector<std::string> libraries_at(const std::string& path) {
+  std::vector<std::string> found;
+  if (!fs::is_directory(path)) return {path};
+  for (size_t first = kWheelFolders.size() + 1; first-- > 0;) find_along_wheel(path, first, found);
+  if (found.empty()) found.push_back((fs::path(path) / kLibrary).string());  // for the message
+  return found;
+}
+
+std::string environment(const char* name) {
+  const char* value = std::getenv(name);
+  return value ? value : "";
+}
+
+/// Where the library may be, in order. A name without a folder is left to the loader.
+std::vector<std::string> candidates(const DenoiseOptions& options) {
+  if (!options.library.empty()) return libraries_at(options.library);
+  if (const std::string path = environment("COVARY_OIDN"); !path.empty()) return libraries_at(path);
+  std::vector<std::string> all = {kLibrary};
+  if (const std::string path = environment("VIRTUAL_ENV"); !path.empty()) find_along_wheel(path, 0, all);
+  if (const std::string home = environment("HOME"); !home.empty()) find_along_wheel(fs::path(home) / ".local", 0, all);
+  find_along_wheel("/usr/local", 0, all);
+  find_along_wheel("/usr", 0, all);
+  return all;
+}
+
+struct LibraryFile {
+  std::string path;
+  void* handle = nullptr;
+};
+
+/// The library stays loaded until the program ends: its threads and ours may share a scheduler.
+LibraryFile open_library(const DenoiseOptions& options, std::string& why) {
+  for (const std::string& path : candidates(options)) {
+    if (void* handle = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL)) return {path, handle};
+    why = dlerror();
+  }
+  return {};
+}
+
+template <typename Function>
+void bind(const LibraryFile& library, const char* name, Function& function) {
+  function = reinterpret_cast<Function>(dlsym(library.handle, name));
+  if (!function)
+    throw Error(ErrorCode::kIo,
+                fmt::format("{} has no function {}; version 2 of Open Image Denoise is needed", library.path, name));
+}
+
+Api load(const DenoiseOptions& options, std::string* path = nullptr) {
+  std::string why;
+  const LibraryFile library = open_library(options, why);
+  if (!library.handle)
+    throw Error(
+        ErrorCode::kUsage,
+        fmt::format(
+            "Open Image Denoise is not there ({}); install it with `pip install pyoidn`, or name {}, its "
+            "folder or the Python environment that holds it with --oidn or the environment variable COVARY_OIDN",
+            why, kLibrary));
+  if (path) *path = library.path;
+  Api api;
+  bind(library, "oidnNewDevice", api.new_device);
+  bind(library, "oidnSetDeviceInt", api.set_device_int);
+  bind(library, "oidnGetDeviceInt", api.get_device_int);
+  bind(library, "oidnCommitDevice", api.commit_device);
+  bind(library, "oidnReleaseDevice", api.release_device);
+  bind(library, "oidnGetDeviceError", api.device_error);
+  bind(library, "oidnNewFilter", api.new_filter);
+  bind(library, "oidnSetSharedFilterImage", api.set_image);
+  bind(library, "oidnSetFilterBool", api.set_bool);
+  bind(library, "oidnSetFilterProgressMonitorFunction", api.set_progress);
+  bind(library, "oidnCommitFilter", api.commit_filter);
+  bind(library, "oidnExecuteFilter", api.execute_filter);
+  bind(library, "oidnReleaseFilter", api.release_filter);
+  return api;
+}
+
+void check_size(const char* name, const Image& rgb, const Image* guide) {
+  if (guide && (guide->width != rgb.width || guide->height != rgb.height || guide->channels != 3))
+    throw Error(ErrorCode::kInput,
+                fmt::format("denoise: the {} is {} x {} with {} channels, the image {} x {}; expected "
+                            "are 3 channels and the same size",
+                            name, guide->width, guide->height, guide->channels, rgb.width, rgb.height));
+}
+
+Image finite(const Image& image) {
+  Image copy = image;
+  for (float& value : copy.data)
+    if (!std::isfinite(value)) value = 0;
+  return copy;
+}
+
+void check_images(const Image& rgb, const Image* albedo, const Image* normal) {
+  if (rgb.width < 1 || rgb.height < 1 || rgb.channels != 3)
+    throw Error(ErrorCode::kInput,
+                fmt::format("denoise: the image is {} x {} with {} channels; expected are 3 channels", rgb.width,
+                            rgb.height, rgb.channels));
+  check_size("albedo", rgb, albedo);
+  check_size("normal", rgb, normal);
+  if (normal && !albedo) throw Error(ErrorCode::kInput, "denoise: a normal without an albedo; the denoiser needs both");
+}
+
+}  // namespace
+
+std::string find_denoiser(const DenoiseOptions& options) {
+  std::string why;
+  return open_library(options, why).path;
+}
+
+struct Denoiser::Library {
+  std::string path;
+  Api api;
+  std::unique_ptr<void, void (*)(void*)> device;
+
+  explicit Library(const DenoiseOptions& options)
+      : api(load(options, &path)), device(api.new_device(Api::kDeviceCpu), api.release_device) {
+    check();
+    const auto threads = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
+    api.set_device_int(device.get(), "numThreads", static_cast<int>(threads));
+    // Pinned threads of two processes on one machine get in each other's way.
+    api.set_device_int(device.get(), "setAffinity", 0);
+    api.commit_device(device.get());
+    check();
+  }
+
+  void check() const {
+    const char* message = nullptr;
+    if (api.device_error(device.get(), &message) != 0 || !device)
+      throw Error(ErrorCode::kIo, fmt::format("Open Image Denoise: {}", message ? message : "no processor device"));
+  }
+
+  /// Runs the filter "RT" with these inputs, some of which may be null.
+  Image run(std::initializer_list<std::pair<const char*, const Image*>> inputs, bool hdr, bool clean_guides) const {
+    const std::unique_ptr<void, void (*)(void*)> filter(api.new_filter(device.get(), "RT"), api.release_filter);
+    check();
+    std::deque<Image> kept;
+    const auto set = [&](const char* name, Image& image) {
+      api.set_image(filter.get(), name, image.data.data(), Api::kFormatFloat3, image.width, image.height, 0, 0, 0);
+    };
+    for (const auto& [name, image] : inputs)
+      if (image) set(name, kept.emplace_back(finite(*image)));
+    Image result(kept.front().width, kept.front().height, 3);
+    set("output", result);
+    if (hdr) api.set_bool(filter.get(), "hdr", true);
+    if (clean_guides) api.set_bool(filter.get(), "cleanAux", true);
+    std::function<bool()> stopped = stop_question();
+    api.set_progress(
+        filter.get(), [](void* data, double) { return !(*static_cast<std::function<bool()>*>(data))(); }, &stopped);
+    api.commit_filter(filter.get());
+    check();
+    api.execute_filter(filter.get());
+    check();
+    return result;
+  }
+};
+
+void check_guide(const std::string& name, const Image& guide) {
+  const auto it = std::find_if(guide.data.begin(), guide.data.end(), [](float v) { return !std::isfinite(v); });
+  if (it == guide.data.end()) return;
+  const auto pixel = static_cast<int>((it - guide.data.begin()) / guide.channels);
+  throw Error(ErrorCode::kInput, fmt::format("{} holds the value {} at pixel ({}, {}); all values of a guide must be "
+                                             "finite",
+                                             name, *it, pixel % guide.width, pixel / guide.width));
+}
+
+Denoiser::Denoiser(const DenoiseOptions& options) : library_(std::make_unique<Library>(options)) {}
+Denoiser::~Denoiser() = default;
+
+Image Denoiser::denoise(const Image& rgb, const Image* albedo, const Image* normal, bool clean_guides) {
+  check_images(rgb, albedo, normal);
+  return library_->run({{"color", &rgb}, {"albedo", albedo}, {"normal", normal}}, true, clean_guides && albedo);
+}
+
+Image Denoiser::denoise_guide(const std::string& name, const Image& guide) {
+  COVARY_CHECK(name == "albedo" || name == "normal", "a guide is an albedo or a normal");
+  check_images(guide, nullptr, nullptr);
+  return library_->run({{name.c_str(), &guide}}, false, false);
+}
+
+Image denoise(const Image& rgb, const Image* albedo, const Image* normal, const DenoiseOptions& options) {
+  check_images(rgb, albedo, normal);
+  return Denoiser(options).denoise(rgb, albedo, normal);
+}
+
+DenoiserInfo denoiser_info(const DenoiseOptions& options) {
+  DenoiserInfo info;
+  const Api api = load(options, &info.path);
+  const std::unique_ptr<void, void (*)(void*)> device(api.new_device(Api::kDeviceCpu), api.release_device);
+  const int version = device ? api.get_device_int(device.get(), "version") : 0;
+  if (version == 0) throw Error(ErrorCode::kIo, "Open Image Denoise: no processor device");
+  info.version = fmt::format("{}.{}.{}", version / 10000, version / 100 % 100, version % 100);
+  return info;
+}
+
+}  // namespace covary

@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: Apache-2.0
+// --denoise as a whole, on synthetic images; planted candidates; pictures that are unusual.
+#include "denoising/mixed_denoising.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "combine/registry.h"
+#include "core/error.h"
+#include "estimators/test_images.h"
+#include "support/files.h"
+
+namespace covary {
+namespace {
+
+using test_support::message_of;
+
+constexpr int kWidth = 72, kHeight = 56;
+
+struct Inputs {
+  test::Grouped crn, independent;
+  explicit Inputs(uint64_t seed, int width = kWidth, int height = kHeight, int groups = 12, float outliers = 0.01f)
+      : crn(test::noisy_image(width, height, groups, seed, 0.2f, outliers)),
+        independent(test::noisy_image(width, height, groups, seed + 1000, 1.0f, outliers)) {}
+  /// Multiplies all values of both images.
+  void scale(float factor) {
+    for (test::Grouped* image : {&crn, &independent})
+      for (float& value : image->data) value *= factor;
+  }
+};
+
+Estimator denoiser(DenoiseMode mode) {
+  MixedDenoisingOptions options;
+  options.mode = mode;
+  options.use_oidn = false;
+  return with_denoising(make_estimator("iicv"), options);
+}
+
+EstimatorResult denoised(const Inputs& in, DenoiseMode mode, const Guides& guides = {}) {
+  PairSettings settings;
+  settings.std_error = true;
+  settings.guides = guides;
+  return denoiser(mode).apply(in.crn.view(), in.independent.view(), settings);
+}
+
+Image iicv_of(const Inputs& in) {
+  return make_estimator("iicv").apply(in.crn.view(), in.independent.view(), {}).estimate;
+}
+
+/// What the outliers, 5 times as bright on 1 % of the values, add to the mean.
+constexpr float kOutliers = 1.05f;
+
+Image truth(float scale = 1) {
+  Image image(kWidth, kHeight, 3);
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x)
+      for (int c = 0; c < 3; ++c)
+        image.pixel(x, y)[c] = scale * static_cast<float>(test::expected(x, y, c)) * kOutliers;
+  return image;
+}
+
+double square_error(const Image& image, float scale = 1) {
+  const Image exact = truth(scale);
+  double sum = 0;
+  for (size_t i = 0; i < exact.data.size(); ++i) sum += std::pow((image.data[i] - exact.data[i]) / scale, 2);
+  return sum / static_cast<double>(exact.data.size());
+}
+
+TEST(MixedDenoising, HasLessErrorThanItsEstimator) {
+  const Inputs in(1);
+  const double before = square_error(iicv_of(in));
+  EXPECT_LT(square_error(denoised(in, DenoiseMode::kBias).estimate), before);
+  EXPECT_LT(square_error(denoised(in, DenoiseMode::kBalanced).estimate), 0.9 * before);
+  EXPECT_LT(square_error(denoised(in, DenoiseMode::kError).estimate), 0.8 * before);
+}
+
+TEST(MixedDenoising, IsTheEstimatorWithoutAMode) {
+  const Inputs in(1);
+  const Estimator none = with_denoising(make_estimator("iicv"), {DenoiseMode::kNone});
+  EXPECT_EQ(none.apply(in.crn.view(), in.independent.view(), {}).estimate.data, iicv_of(in).data);
+  EXPECT_EQ(none.text, make_estimator("iicv").text);
+}
+
+TEST(MixedDenoising, UsesGuides) {
+  const Inputs in(2);
+  Image albedo(kWidth, kHeight, 3), normal(kWidth, kHeight, 3);
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x)
+      for (int c = 0; c < 3; ++c) {
+        albedo.pixel(x, y)[c] = x + y > 45 ? 0.2f : 0.7f;
+        normal.pixel(x, y)[c] = c == 2;
+      }
+  const EstimatorResult guided = denoised(in, DenoiseMode::kError, {&albedo, &normal});
+  EXPECT_NE(guided.estimate.data, denoised(in, DenoiseMode::kError).estimate.data);
+  EXPECT_LT(square_error(guided.estimate), 0.8 * square_error(iicv_of(in)));
+}
+
+TEST(MixedDenoising, DoesNotDependOnThreads) {
+  const Inputs in(3);
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  const EstimatorResult alone = denoised(in, DenoiseMode::kBalanced);
+  const tbb::global_control four(tbb::global_control::max_allowed_parallelism, 4);
+  const EstimatorResult together = denoised(in, DenoiseMode::kBalanced);
+  EXPECT_EQ(together.estimate.data, alone.estimate.data);
+  EXPECT_EQ(together.std_error.data, alone.std_error.data);
+}
+
+/// Candidates that a broken denoiser might give, beside the good ones.
+TEST(MixedDenoising, GivesBadCandidatesNoWeightAndAPerfectOneMost) {
+  const Inputs in(4, kWidth, kHeight, 12, 0);
+  CandidateMaker planted;
+  planted.names = {"blurred", "constant", "shifted", "perfect"};
+  planted.make = [](const CandidateInput& input) {
+    const Image& f = *input.estimate;
+    std::vector<Image> images(3, Image(f.width, f.height, 3));
+    for (int y = 0; y < f.height; ++y)
+      for (int x = 0; x < f.width; ++x)
+        for (int c = 0; c < 3; ++c) {
+          float sum = 0;
+          for (int dx = -20; dx <= 20; ++dx) sum += f.pixel(std::clamp(x + dx, 0, f.width - 1), y)[c];
+          images[0].pixel(x, y)[c] = sum / 41;
+          images[1].pixel(x, y)[c] = 0.5f;
+          images[2].pixel(x, y)[c] = f.pixel((x + 30) % f.width, y)[c];
+        }
+    images.push_back(truth(1 / kOutliers));
+    return images;
+  };
+  const MixedDenoising all = denoise_by_mixture(make_estimator("iicv"), in.crn.view(), in.independent.view(), {},
+                                                {filtered_candidates({}), planted}, DenoiseMode::kError);
+  ASSERT_EQ(all.names, (std::vector<std::string>{"sharp", "sharp-independent", "smooth", "blurred", "constant",
+                                                 "shifted", "perfect"}));
+  std::vector<double> weights;
+  for (const Image& image : all.weights) {
+    double sum = 0;
+    for (float w : image.data) sum += w;
+    weights.push_back(sum / static_cast<double>(image.data.size()));
+  }
+  for (int bad : {3, 4, 5}) EXPECT_LT(weights[bad], 0.05) << all.names[bad];
+  EXPECT_GT(weights[6], 0.65);
+}
+
+TEST(MixedDenoising, KeepsBlackBordersBlack) {
+  Inputs in(5);
+  for (test::Grouped* image : {&in.crn, &in.independent})
+    for (int y = 0; y < kHeight; ++y)
+      for (int x = 0; x < kWidth; ++x)
+        if (x < 9 || y >= kHeight - 6) std::fill_n(image->pixel(x, y), image->groups * 3, 0.0f);
+  const EstimatorResult result = denoised(in, DenoiseMode::kBalanced);
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x)
+      for (int c = 0; c < 3; ++c) {
+        ASSERT_TRUE(std::isfinite(result.estimate.pixel(x, y)[c]));
+        const bool is_border = x < 9 || y >= kHeight - 6;
+        ASSERT_TRUE(!is_border || result.estimate.pixel(x, y)[c] == 0) << x << " " << y;
+      }
+}
+
+TEST(MixedDenoising, TakesAnyRange) {
+  for (const float scale : {1e-2f, 1e5f}) {
+    Inputs in(6);
+    in.scale(scale);
+    const EstimatorResult result = denoised(in, DenoiseMode::kError);
+    EXPECT_LT(square_error(result.estimate, scale), 0.85 * square_error(iicv_of(in), scale)) << scale;
+    for (float value : result.std_error.data) ASSERT_TRUE(std::isfinite(value) && value >= 0);
+  }
+}
+
+TEST(MixedDenoising, SurvivesFirefliesAndValuesThatAreNotFinite) {
+  Inputs in(7);
+  for (int c = 0; c < 3; ++c) in.independent.pixel(20, 20)[c] = 1e7f;
+  in.crn.pixel(40, 30)[4] = std::numeric_limits<float>::quiet_NaN();
+  const EstimatorResult result = denoised(in, DenoiseMode::kError);
+  EXPECT_EQ(result.nonfinite_pixels, 1);
+  for (float value : result.estimate.data) ASSERT_TRUE(std::isfinite(value));
+  for (float value : result.std_error.data) ASSERT_TRUE(std::isfinite(value));
+}
+
+TEST(MixedDenoising, TakesTinyImages) {
+  for (const auto& [width, height] : {std::pair{1, 1}, {2, 3}, {17, 1}, {1, 40}}) {
+    const Inputs in(8, width, height, 6);
+    const EstimatorResult result = denoised(in, DenoiseMode::kBalanced);
+    ASSERT_EQ(result.estimate.data.size(), static_cast<size_t>(width) * height * 3);
+    for (float value : result.estimate.data) ASSERT_TRUE(std::isfinite(value));
+  }
+}
+
+TEST(MixedDenoising, SaysWhatItCannotDo) {
+  EXPECT_EQ(message_of([] { denoise_mode("much"); }), "--denoise 'much': expected none, bias, balanced, error");
+  EXPECT_NE(message_of([] {
+              with_denoising(make_estimator("iduw"), {DenoiseMode::kError});
+            }).find("--denoise needs an estimator of two passes that predicts its error (iicv"),
+            std::string::npos);
+  MixedDenoisingOptions elsewhere;
+  elsewhere.oidn.library = "/nowhere/libOpenImageDenoise.so.2";
+  const Inputs in(9);
+  EXPECT_NE(message_of([&] {
+              with_denoising(make_estimator("iicv"), elsewhere).apply(in.crn.view(), in.independent.view(), {});
+            }).find("Open Image Denoise is not there (/nowhere/"),
+            std::string::npos);
+  EXPECT_EQ(denoiser(DenoiseMode::kError).fewest_groups, 6);
+}
+
+}  // namespace
+}  // namespace covary

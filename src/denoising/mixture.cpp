@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "denoising/mixture.h"
+
+#include <algorithm>
+
+#include "core/error.h"
+#include "core/parallel.h"
+#include "filters/guided_cells.h"
+#include "risk/relative_weight.h"
+
+namespace covary {
+namespace {
+
+using namespace lanes;
+
+/// Ridge of the normal equations, relative to their mean diagonal: candidates that are alike share a weight.
+constexpr float kRidge = 1e-3f;
+/// Sweeps over all pairs of candidates; more change weights by less than 0.01 (mixture_test).
+constexpr int kSweeps = 24;
+
+/// Planes of normal equations: the upper triangle of the matrix row by row, the right-hand side, and the variance of
+/// the halves' U_p, summed over p.
+constexpr int n_planes(int m) { return m * (m + 1) / 2 + m + 1; }
+/// Sums of normal equations in every lane.
+using Sums = std::array<vfloat, n_planes(kMostCandidates)>;
+using Weights = std::array<float, kMostCandidates>;
+
+/// Adds the normal equations of one pixel to `sums`, in 1 / (squared radiance).
+void add_pixel(const MixtureInput& in, int m, int x, int y, float* sums) {
+  std::array<std::array<float, 3>, kMostCandidates> u[2];
+  std::array<float, 3> residual[2], base[2];
+  float weight[2];
+  for (int half : {0, 1}) {
+    const CandidateSet& set = *in.halves[half];
+    const float* f = set.base.pixel(x, y);
+    weight[half] = relative_weight(f);
+    for (int c = 0; c < 3; ++c) {
+      base[half][c] = f[c];
+      residual[half][c] = in.independent[1 - half]->mean.row(c, y)[x] - f[c];
+      for (int p = 0; p < m; ++p) u[half][p][c] = set.candidates[p].pixel(x, y)[c] - f[c];
+    }
+  }
+  // Error of the halves without 1 - 1 / bias_share of the variance: squared bias + variance / bias_share.
+  const float variance = 0.25f * (weight[0] + weight[1]), removed = (1 - 1 / in.bias_share) * variance;
+  int plane = 0;
+  for (int p = 0; p < m; ++p)
+    for (int q = p; q < m; ++q, ++plane)
+      for (int c = 0; c < 3; ++c) {
+        for (int half : {0, 1}) sums[plane] += 0.5f * weight[half] * u[half][p][c] * u[half][q][c];
+        sums[plane] -= removed * (u[0][p][c] - u[1][p][c]) * (u[0][q][c] - u[1][q][c]);
+      }
+  for (int p = 0; p < m; ++p, ++plane)
+    for (int c = 0; c < 3; ++c) {
+      for (int half : {0, 1}) sums[plane] += 0.5f * weight[half] * u[half][p][c] * residual[half][c];
+      sums[plane] += removed * (u[0][p][c] - u[1][p][c]) * (base[0][c] - base[1][c]);
+    }
+  for (int p = 0; p < m; ++p)
+    for (int c = 0; c < 3; ++c) sums[plane] += variance * sqr(u[0][p][c] - u[1][p][c]);
+}
+
+/// Minimises x'Ax/2 - b'x + strength v ||x - prior||^2 / 2 over x >= 0, sum x <= 1, in every lane, by exact steps along
+/// the edges between two candidates; v: mean variance of the U_p. The base image, number m, has zero rows.
+void solve(int m, const Sums& sums, const Weights& prior, float strength, std::array<vfloat, kMostCandidates + 1>& x) {
+  std::array<std::array<vfloat, kMostCandidates>, kMostCandidates> a;
+  std::array<vfloat, kMostCandidates> b;
+  int plane = 0;
+  for (int p = 0; p < m; ++p)
+    for (int q = p; q < m; ++q, ++plane) a[p][q] = a[q][p] = sums[plane];
+  for (int p = 0; p < m; ++p, ++plane) b[p] = sums[plane];
+  vfloat ridge = {};
+  for (int p = 0; p < m; ++p) ridge += max(a[p][p], vfloat{});
+  ridge = (ridge * kRidge + sums[plane] * strength) / static_cast<float>(m) + 1e-30f;
+  for (int p = 0; p < m; ++p) {
+    a[p][p] += ridge;
+    b[p] += ridge * prior[p];
+  }
+  std::array<vfloat, kMostCandidates + 1> gradient;
+  for (int p = 0; p < m; ++p) {
+    x[p] = splat(1.0f / static_cast<float>(m + 1));
+    gradient[p] = -b[p];
+    for (int q = 0; q < m; ++q) gradient[p] += a[p][q] * (1.0f / static_cast<float>(m + 1));
+  }
+  x[m] = splat(1.0f / static_cast<float>(m + 1));
+  gradient[m] = vfloat{};
+  const auto element = [&](int p, int q) { return p < m && q < m ? a[p][q] : vfloat{}; };
+  for (int sweep = 0; sweep < kSweeps; ++sweep)
+    for (int p = 0; p < m; ++p)
+      for (int q = p + 1; q <= m; ++q) {
+        // Moves `step` of weight from q to p. Along an edge that is not convex, to its better end.
+        const vfloat curvature = element(p, p) + element(q, q) - 2 * element(p, q);
+        const vfloat slope = gradient[q] - gradient[p];
+        const vfloat wanted =
+            curvature > ridge ? slope / max(curvature, ridge) : (slope > 0.0f ? splat(1.0f) : splat(-1.0f));
+        const vfloat step = min(max(wanted, -x[p]), x[q]);
+        x[p] += step;
+        x[q] -= step;
+        for (int i = 0; i < m; ++i) gradient[i] += step * (element(i, p) - element(i, q));
+      }
+}
+
+/// The weights that are best for the whole image, if all pixels have the same.
+Weights weights_everywhere(const MixtureInput& in, int m) {
+  const int width = in.guide->width, height = in.guide->height;
+  std::vector<std::array<float, std::tuple_size_v<Sums>>> rows(static_cast<size_t>(height));
+  parallel_for(height, 8, [&](int y) {
+    for (int x = 0; x < width; ++x)
+      if ((*in.valid)[static_cast<size_t>(y) * width + x]) add_pixel(in, m, x, y, rows[static_cast<size_t>(y)].data());
+  });
+  Sums sums{};
+  for (int i = 0; i < n_planes(m); ++i) {
+    double sum = 0;
+    for (const auto& row : rows) sum += row[i];
+    sums[i] = splat(static_cast<float>(sum));
+  }
+  std::array<vfloat, kMostCandidates + 1> x;
+  solve(m, sums, {}, 0, x);
+  Weights weights{};
+  for (int p = 0; p < m; ++p) weights[p] = x[p][0];
+  return weights;
+}
+
+/// base + sum x (candidates - base), where valid.
+Image mixed(const CandidateSet& set, const std::vector<Image>& weights, const std::vector<unsigned char>& valid) {
+  Image result = set.base;
+  parallel_for(result.height, 8, [&](int y) {
+    for (int x = 0; x < result.width; ++x) {
+      if (!valid[static_cast<size_t>(y) * result.width + x]) continue;
+      const float* base = set.base.pixel(x, y);
+      for (int c = 0; c < 3; ++c) {
+        float sum = base[c];
+        for (size_t p = 0; p < weights.size(); ++p)
+          sum += weights[p].pixel(x, y)[0] * (set.candidates[p].pixel(x, y)[c] - base[c]);
+        result.pixel(x, y)[c] = sum;
+      }
+    }
+  });
+  return result;
+}
+
+}  // namespace
+
+Mixture mix(const MixtureInput& input) {
+  const int m = static_cast<int>(input.whole->candidates.size());
+  const int width = input.guide->width, height = input.guide->height;
+  COVARY_CHECK(m >= 1 && m <= kMostCandidates, "between one and kMostCandidates candidates");
+  const GuidedCells cells(*input.guide, *input.valid, n_planes(m),
+                          [&](int x, int y, float* sums) { add_pixel(input, m, x, y, sums); });
+  Mixture mixture;
+  mixture.weights.assign(m, Image(width, height, 1));
+  const Weights everywhere = input.prior > 0 ? weights_everywhere(input, m) : Weights{};
+  for_each_batch(width, height, [&](int x, int y, int n) {
+    Sums sums;
+    cells.sum(x, y, sums.data());
+    std::array<vfloat, kMostCandidates + 1> weights;
+    solve(m, sums, everywhere, input.prior, weights);
+    for (int p = 0; p < m; ++p)
+      for (int l = 0; l < n; ++l) mixture.weights[p].pixel(x + l, y)[0] = weights[p][l];
+  });
+  mixture.image = mixed(*input.whole, mixture.weights, *input.valid);
+  for (int half : {0, 1}) mixture.halves[half] = mixed(*input.halves[half], mixture.weights, *input.valid);
+  return mixture;
+}
+
+}  // namespace covary

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+// Mixtures of images by cross-validation (ours): which of several images of the same scene is best at a pixel, and in
+// which proportions, is measured with samples that these images were not made of.
+//
+// F: an image with little bias, C_p: candidates with less noise and more bias. From one half of the samples, A, the
+// same methods make F_A and C_A,p; the independent image h_B of the other half has the right expectation and errors
+// that are independent of theirs. So with U_p = C_p - F the mean over both directions of
+//
+//     ||h_B - F_A - sum_p x_p U_A,p||^2 / (F'_A^2 + 0.01),   F'_A: mean of the pixel's channels,
+//
+// is the squared error of the half's mixture, up to a constant. Its coefficients are summed over a window of pixels
+// like the target, w_ij = exp(-||G_j - G_i||^2 / ((0.5 G'_i)^2 + 1e-4)) with a guide G, over cells of 4 x 4 pixels.
+//
+// The variance of the half's mixture is known from both halves, ||M_A - M_B||^2 / 2, and the rest is squared bias. With
+// both, the weights x minimise
+//
+//     bias_share * squared bias + variance,   x >= 0, sum x <= 1.
+//
+// Where that is told by noise more than by anything else, weights are near those of the whole image, x0: to the sum is
+// added prior * v ||x - x0||^2, v: mean variance of the U_p. It vanishes with more samples.
+//
+// The whole image has half of that variance. Its bias is smaller than that of a half, too, so that bias_share = 1
+// leaves less error than 2 (docs/notes/denoising.md).
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "filters/planes.h"
+
+namespace covary {
+
+/// An image and the candidates that were made of the same samples.
+struct CandidateSet {
+  Image base;                     ///< F
+  std::vector<Image> candidates;  ///< C_p
+};
+
+struct MixtureInput {
+  const CandidateSet* whole = nullptr;
+  std::array<const CandidateSet*, 2> halves = {};
+  std::array<const Moments*, 2> independent = {};  ///< of the halves' independent images
+  const Image* guide = nullptr;
+  const std::vector<unsigned char>* valid = nullptr;  ///< pixels with 0 are left out, and keep the base image
+  float bias_share = 1;                               ///< weight of the squared bias, > 0
+  float prior = 0;                                    ///< how much the weights of the whole image count, >= 0
+};
+
+struct Mixture {
+  Image image;
+  std::array<Image, 2> halves;  ///< the halves' images, mixed with the same weights
+  std::vector<Image> weights;   ///< x_p, one channel each; what is missing to one is the base image's
+};
+
+/// At most this many candidates.
+inline constexpr int kMostCandidates = 8;
+
+/// Bit-identical for any number of threads.
+Mixture mix(const MixtureInput& input);
+
+}  // namespace covary

@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: Apache-2.0
+// Weights where the best ones are known, and the error estimate from held-out samples on data of known error.
+#include "denoising/mixture.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "estimators/test_images.h"
+#include "risk/held_out_error.h"
+
+namespace covary {
+namespace {
+
+constexpr int kSize = 48;
+constexpr float kTruth = 0.5f;
+
+/// A flat picture with uniform noise of this variance in every value, and an offset.
+Image flat(float offset, double variance, uint64_t seed) {
+  Image image(kSize, kSize, 3);
+  const auto width = static_cast<float>(std::sqrt(12 * variance));
+  for (size_t i = 0; i < image.data.size(); ++i) image.data[i] = kTruth + offset + width * test::noise(seed, i, 0);
+  return image;
+}
+
+Moments moments_of(const Image& image, float variance) {
+  Moments m{Planes(kSize, kSize, 3, 0, 0), Planes(kSize, kSize, 3, 0, variance), {}};
+  for (int y = 0; y < kSize; ++y)
+    for (int x = 0; x < kSize; ++x)
+      for (int c = 0; c < 3; ++c) m.mean.row(c, y)[x] = image.pixel(x, y)[c];
+  return m;
+}
+
+Image average(const Image& a, const Image& b) {
+  Image mean = a;
+  for (size_t i = 0; i < mean.data.size(); ++i) mean.data[i] = 0.5f * (a.data[i] + b.data[i]);
+  return mean;
+}
+
+/// Independent images of two halves with these variances, and what methods made of them.
+struct Experiment {
+  static constexpr double kVariance = 0.04;  // of a half's independent image
+  Moments independent[2];
+  std::vector<unsigned char> valid = std::vector<unsigned char>(size_t{kSize} * kSize, 1);
+  Image guide = flat(0, 0, 0);
+  explicit Experiment(uint64_t seed)
+      : independent{moments_of(flat(0, kVariance, 100 * seed + 1), kVariance),
+                    moments_of(flat(0, kVariance, 100 * seed + 2), kVariance)} {}
+
+  /// `make(half)`: base and candidates of a half; the whole is the mean of both.
+  Mixture run(const std::function<CandidateSet(int)>& make, float bias_share, float prior = 0) const {
+    const CandidateSet halves[2] = {make(0), make(1)};
+    CandidateSet whole{average(halves[0].base, halves[1].base), {}};
+    for (size_t p = 0; p < halves[0].candidates.size(); ++p)
+      whole.candidates.push_back(average(halves[0].candidates[p], halves[1].candidates[p]));
+    return mix(
+        {&whole, {&halves[0], &halves[1]}, {&independent[0], &independent[1]}, &guide, &valid, bias_share, prior});
+  }
+};
+
+double mean_weight(const Mixture& mixture, size_t candidate) {
+  double sum = 0;
+  for (float w : mixture.weights[candidate].data) sum += w;
+  return sum / (kSize * kSize);
+}
+
+/// Base without bias and with variance v in a half, candidate with bias b and no variance: the half's error is
+/// x^2 b^2 + (1 - x)^2 v, least at x = v / (b^2 + v).
+TEST(Mixture, FindsTheWeightOfLeastError) {
+  const Experiment experiment(1);
+  const double v = 0.01;
+  for (const float b : {0.03f, 0.0707f, 0.2f})
+    for (const float bias_share : {1.0f, 2.0f, 4.0f}) {
+      const Mixture mixture = experiment.run(
+          [&](int half) {
+            return CandidateSet{flat(0, v, 7 + half), {flat(b, 0, 0)}};
+          },
+          bias_share);
+      const double weighted = bias_share * b * b, best = v / (weighted + v);
+      // Noise of h in the sums leaves about 0.03 of the weight uncertain.
+      EXPECT_NEAR(mean_weight(mixture, 0), best, 0.1) << b << " " << bias_share;
+    }
+}
+
+TEST(Mixture, GivesAPerfectCandidateTheWholeAndBadOnesNothing) {
+  const Experiment experiment(2);
+  const auto perfect_and_bad = [&](int half) {
+    return CandidateSet{flat(0, 0.01, 7 + half), {flat(0.5f, 0, 0), flat(0, 0, 0), flat(-0.3f, 0.02, 9 + half)}};
+  };
+  const Mixture mixture = experiment.run(perfect_and_bad, 1);
+  EXPECT_LT(mean_weight(mixture, 0), 0.05);
+  EXPECT_GT(mean_weight(mixture, 1), 0.9);
+  EXPECT_LT(mean_weight(mixture, 2), 0.05);
+  const auto bad = [&](int half) {
+    return CandidateSet{flat(0, 0.001, 7 + half), {flat(0.5f, 0, 0), flat(0.3f, 0, 0)}};
+  };
+  const Mixture base = experiment.run(bad, 1);
+  EXPECT_LT(mean_weight(base, 0), 0.02);
+  EXPECT_LT(mean_weight(base, 1), 0.02);
+}
+
+/// A candidate that is right on the left, two thirds of the picture, and wrong on the right, which the guide tells
+/// apart: its weight there.
+float weight_where_wrong(double variance, float prior) {
+  Experiment experiment(5);
+  const auto is_right = [](int x) { return x >= 2 * kSize / 3; };
+  for (int y = 0; y < kSize; ++y)
+    for (int x = 0; x < kSize; ++x)
+      for (int c = 0; c < 3; ++c) experiment.guide.pixel(x, y)[c] = is_right(x) ? 9.0f : 0.5f;
+  const auto make = [&](int half) {
+    Image wrong = flat(0, 0, 0);
+    for (int y = 0; y < kSize; ++y)
+      for (int x = 0; x < kSize; ++x)
+        for (int c = 0; c < 3; ++c) wrong.pixel(x, y)[c] += is_right(x) ? 0.3f : 0.0f;
+    return CandidateSet{flat(0, variance, 7 + half), {wrong}};
+  };
+  return experiment.run(make, 1, prior).weights[0].pixel(kSize - 1, 5)[0];
+}
+
+TEST(Mixture, TheWholeImagesWeightsCountOnlyWhereThereIsNoise) {
+  // v / (b^2 + v) is 0.25 there, 0.5 with the mean b^2 of the whole image, and (v + 10 v 0.5) / (b^2 + v + 10 v) 0.43.
+  EXPECT_NEAR(weight_where_wrong(0.03, 0), 0.25, 0.1);
+  EXPECT_NEAR(weight_where_wrong(0.03, 10), 0.43, 0.08);
+  EXPECT_LT(weight_where_wrong(1e-4, 10), 0.02);
+}
+
+TEST(Mixture, WeightsAreSharesOfOne) {
+  const Experiment experiment(3);
+  const auto many = [&](int half) {
+    CandidateSet set{flat(0, 0.01, 7 + half), {}};
+    for (int p = 0; p < kMostCandidates; ++p)
+      set.candidates.push_back(flat(0.02f * static_cast<float>(p), 0.005, 20 + 2 * p + half));
+    return set;
+  };
+  const Mixture mixture = experiment.run(many, 1);
+  for (int i = 0; i < kSize * kSize; ++i) {
+    float sum = 0;
+    for (const Image& weights : mixture.weights) {
+      ASSERT_GE(weights.data[i], -1e-6f);
+      sum += weights.data[i];
+    }
+    ASSERT_LE(sum, 1 + 1e-5f);
+  }
+}
+
+TEST(Mixture, KeepsTheBaseWhereNothingIsValid) {
+  Experiment experiment(4);
+  std::fill_n(experiment.valid.begin(), kSize, 0);
+  const auto make = [&](int half) { return CandidateSet{flat(0, 0.01, 7 + half), {flat(0, 0, 0)}}; };
+  const Mixture mixture = experiment.run(make, 1);
+  const Image base = average(make(0).base, make(1).base);
+  for (int x = 0; x < kSize; ++x) EXPECT_EQ(mixture.image.pixel(x, 0)[1], base.pixel(x, 0)[1]);
+  EXPECT_NE(mixture.image.pixel(5, 1)[1], base.pixel(5, 1)[1]);
+}
+
+/// Student's t of the predicted minus the true squared error over 32 experiments: |t| beyond 5.5 has a probability of
+/// 5e-6. The standard deviation of a difference is about 7 % of the error, so that 7 % too much or too little is seen.
+double t_of_prediction(float bias, bool held_out) {
+  constexpr int kRuns = 32;
+  double sum = 0, squares = 0;
+  for (uint64_t seed = 1; seed <= kRuns; ++seed) {
+    const Experiment e(seed);
+    const Image a = flat(bias, 0.002, 100 * seed + 11), b = flat(bias, 0.002, 100 * seed + 12);
+    // Held out: the other half's samples. Otherwise, as a planted error, the images judge themselves.
+    const Moments own[2] = {moments_of(a, 0.002f), moments_of(b, 0.002f)};
+    const Image error =
+        held_out_error({{&a, &b},
+                        {held_out ? &e.independent[0] : &own[0], held_out ? &e.independent[1] : &own[1]},
+                        &e.guide,
+                        &e.valid});
+    const Image whole = average(a, b);
+    double difference = 0;
+    for (size_t i = 0; i < whole.data.size(); ++i)
+      difference += error.data[i] * error.data[i] - std::pow(whole.data[i] - kTruth, 2);
+    sum += difference;
+    squares += difference * difference;
+  }
+  const double mean = sum / kRuns, variance = (squares / kRuns - mean * mean) / (kRuns - 1);
+  return mean / std::sqrt(variance);
+}
+
+TEST(HeldOutError, IsUnbiased) {
+  EXPECT_LT(std::abs(t_of_prediction(0.05f, true)), 5.5);
+  EXPECT_LT(std::abs(t_of_prediction(0.1f, true)), 5.5);
+  // Images that are judged by themselves seem to have no bias.
+  EXPECT_GT(std::abs(t_of_prediction(0.1f, false)), 5.5);
+}
+
+TEST(HeldOutError, IsTheUsualOneWhereHeldOutSamplesAreNoise) {
+  Experiment e(5);
+  for (int c = 0; c < 3; ++c) e.independent[0].mean.row(c, 20)[30] += 30;  // a light that one path has found
+  const Image a = flat(0, 0.002, 11), b = flat(0, 0.002, 12);
+  const Image error = held_out_error({{&a, &b}, {&e.independent[0], &e.independent[1]}, &e.guide, &e.valid, 0.65});
+  double sum = 0;
+  for (const float value : error.data) sum += value * value;
+  const double over_variance = sum / static_cast<double>(error.data.size()) / 0.002;
+  EXPECT_GT(over_variance, 0.6);
+  EXPECT_LT(over_variance, 1.3) << "the light alone makes the squared error 30 times as large";
+}
+
+/// Rows of an image whose held-out error is `error` in each of `n` parts, give or take `spread`.
+EstimatorResult with_rows(double error, double variance, double predicted, double spread, int n) {
+  EstimatorResult result;
+  result.std_error = Image(1, 1, 3);
+  std::fill(result.std_error.data.begin(), result.std_error.data.end(), 1.0f);
+  for (int i = 0; i < n; ++i) {
+    const double value = error + (i % 2 ? spread : -spread);
+    result.held_out.push_back({value, variance, predicted, value * value, 1});
+  }
+  return result;
+}
+
+double calibrated(EstimatorResult result) {
+  calibrate(result);
+  EXPECT_TRUE(result.held_out.empty());
+  return std::pow(result.std_error.data[0], 2);
+}
+
+TEST(Calibration, TrustsHeldOutSamplesAsFarAsTheyKnow) {
+  // Without noise: squared bias 1 and variance 2 of a half make 2 of the whole.
+  EXPECT_NEAR(calibrated(with_rows(3, 2, 1, 0, 100)), 2, 1e-5);
+  EXPECT_NEAR(calibrated(with_rows(3, 2, 4, 0, 100)), 0.5, 1e-5);
+  // A relative standard error of 0.3: half of the way, in logarithms.
+  EXPECT_NEAR(calibrated(with_rows(3, 2, 8, 0.3 * 3 * 10, 100)), 0.5, 1e-3);
+  // Noise alone, or nothing: the estimator's own prediction.
+  EXPECT_NEAR(calibrated(with_rows(3, 2, 8, 1e4, 100)), 1, 0.01);
+  EXPECT_EQ(calibrated(with_rows(-1, 2, 8, 0, 100)), 1);
+  EXPECT_EQ(calibrated(with_rows(3, 2, 8, 0, 0)), 1);
+}
+
+TEST(Calibration, SaysHowFarBothPredictionsAgree) {
+  EstimatorResult known = with_rows(3, 2, 1, 0.3 * 3 * 10, 100);
+  calibrate(known);
+  ASSERT_TRUE(known.verdict);
+  EXPECT_NEAR(known.verdict->uncertainty, 0.3, 1e-6);
+  EXPECT_NEAR(known.verdict->ratio, 2, 1e-6);
+  EstimatorResult unknown = with_rows(-1, 2, 8, 0, 100);
+  calibrate(unknown);
+  ASSERT_TRUE(unknown.verdict);
+  EXPECT_FALSE(std::isfinite(unknown.verdict->uncertainty));
+  EstimatorResult without;
+  calibrate(without);
+  EXPECT_FALSE(without.verdict);
+}
+
+}  // namespace
+}  // namespace covary

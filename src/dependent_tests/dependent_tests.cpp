@@ -1,0 +1,294 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dependent_tests/dependent_tests.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "dependent_tests/least_error_mixture.h"
+#include "estimators/common_options.h"
+#include "estimators/estimator.h"
+
+namespace covary {
+namespace {
+
+/// Factors for the differences of the CRN image: where few of its samples found the light, all of it is too dark, and
+/// so are its differences. Brightness over brightness of the windows' means, at least 1; kFar where only the
+/// independent image has light.
+Planes difference_scale(const FilterInput& input, const std::vector<unsigned char>& valid, int window) {
+  const auto brightness = [&](const Planes& colours) {
+    Planes planes(input.width(), input.height(), 1, 0, 0);
+    parallel_for(input.height(), 8, [&](int y) {
+      for (int x = 0; x < input.width(); ++x)
+        planes.row(0, y)[x] = length(input.norm, {colours.row(0, y)[x], colours.row(1, y)[x], colours.row(2, y)[x]});
+    });
+    return planes;
+  };
+  // Pixels without independent samples have no brightness to compare.
+  std::vector<unsigned char> both = valid;
+  for (int y = 0; y < input.height(); ++y)
+    for (int x = 0; x < input.width(); ++x)
+      if (input.count.row(0, y)[x] <= 0) both[static_cast<size_t>(y) * input.width() + x] = 0;
+  Planes scale = box_mean(brightness(input.independent), both, window, 0, 1);
+  const Planes dependent = box_mean(brightness(input.dependent), both, window, 0, 1);
+  parallel_for(input.height(), 8, [&](int y) {
+    for (int x = 0; x < input.width(); ++x) {
+      const float independent = scale.row(0, y)[x];
+      scale.row(0, y)[x] =
+          independent <= dependent.row(0, y)[x] ? 1.0f : std::min(kFar, independent / dependent.row(0, y)[x]);
+    }
+  });
+  return scale;
+}
+
+/// The mean of both images, weighted by samples, [Csonka2002] Sec. 5: C = (n C_d + N C_i') / (n + N).
+Image combine(const GroupedImage& crn, const FilterInput& input, const FilteredImage& filtered,
+              CombinationWeights weights) {
+  Image result(crn.width, crn.height, 3);
+  parallel_for(crn.height, 8, [&](int y) {
+    for (int x = 0; x < crn.width; ++x) {
+      const auto n = static_cast<double>(crn.count(x, y));
+      const double N =
+          weights == CombinationWeights::kCounts ? input.count.row(0, y)[x] : filtered.effective_samples.pixel(x, y)[0];
+      const double part = n + N > 0 ? N / (n + N) : 0;
+      for (int c = 0; c < 3; ++c)
+        result.pixel(x, y)[c] =
+            static_cast<float>((1 - part) * input.dependent.row(c, y)[x] + part * filtered.colour.pixel(x, y)[c]);
+    }
+  });
+  return result;
+}
+
+Image image_of(const Planes& planes) {
+  Image image(planes.width(), planes.height(), planes.count());
+  for (int y = 0; y < planes.height(); ++y)
+    for (int x = 0; x < planes.width(); ++x)
+      for (int c = 0; c < planes.count(); ++c) image.pixel(x, y)[c] = planes.row(c, y)[x];
+  return image;
+}
+
+/// v of least_error_mixture.h: variance of the independent image's means, by its own samples where these tell.
+Planes noise_of_means(const GroupedImage& crn, const GroupedImage& independent) {
+  Planes noise(crn.width, crn.height, 1, 0, 0);
+  parallel_for(crn.height, 8, [&](int y) {
+    for (int x = 0; x < crn.width; ++x) {
+      const bool tells = variance_freedom(independent, x, y) > 0;
+      const Spectrum variance = (tells ? independent : crn).sample_variance(x, y);
+      if (const uint32_t count = independent.count(x, y); count > 0)
+        noise.row(0, y)[x] = (variance.r + variance.g + variance.b) / static_cast<float>(count);
+    }
+  });
+  return noise;
+}
+
+/// Writes the mixture of least measured error where pixels have independent samples.
+void mix(const GroupedImage& crn, const GroupedImage& independent, const std::vector<unsigned char>& valid,
+         const DependentTestsOptions& options, const FilterInput& input, const FilteredImage& filtered,
+         const Planes* scale, Image& result) {
+  const Image dependent = image_of(input.dependent);
+  std::vector<MixtureCandidate> candidates = {{&dependent, nullptr}, {&filtered.colour, &filtered.centre_weight}};
+  std::optional<FilteredImage> narrow;
+  if (options.filter == DependentFilter::kExact && options.bound.window > 3) {
+    narrow.emplace(bound_filter(input, {3, options.bound.common_sigma}, scale));
+    candidates.push_back({&narrow->colour, &narrow->centre_weight});
+  }
+  const Image mixture =
+      least_error_mixture(input, noise_of_means(crn, independent), valid, candidates, options.measure_window);
+  for (int y = 0; y < crn.height; ++y)
+    for (int x = 0; x < crn.width; ++x)
+      if (input.count.row(0, y)[x] > 0) std::copy_n(mixture.pixel(x, y), 3, result.pixel(x, y));
+}
+
+void check(const GroupedImage& crn, const GroupedImage& independent, std::vector<std::string>& problems) {
+  // Pixels may lack samples, which check_inputs() looks for where counts are given.
+  GroupedImage without_counts[2] = {crn, independent};
+  for (GroupedImage& image : without_counts) image.counts = nullptr;
+  check_inputs(without_counts[0], without_counts[1], 1, 1, problems);
+  if (problems.empty() && crn.groups < 2 && !crn.variance_in_groups)
+    problems.push_back("the CRN image has 1 group, at least 2 are needed where films do not keep sample variances");
+}
+
+/// The image of the whole of two images at once, whose pixels with valid = 0 are left out.
+Image filter_and_combine(const GroupedImage& crn, const GroupedImage& independent,
+                         const std::vector<unsigned char>& valid, const DependentTestsOptions& options,
+                         DependentTestsStages* stages) {
+  const bool exact = options.filter == DependentFilter::kExact;
+  const int border = exact ? options.bound.window / 2 : options.regions.max_region;
+  const FilterInput input =
+      filter_input(crn, independent, valid, options.norm, options.variance, options.smoothing, border);
+  std::optional<Planes> scale;
+  if (exact && options.guard > 0) scale = difference_scale(input, valid, options.guard);
+  FilteredImage filtered =
+      exact ? bound_filter(input, options.bound, scale ? &*scale : nullptr) : region_filter(input, options.regions);
+  Image estimate = combine(crn, input, filtered, options.weights);
+  if (options.weights == CombinationWeights::kMeasured)
+    mix(crn, independent, valid, options, input, filtered, scale ? &*scale : nullptr, estimate);
+  fill_invalid(crn, independent, valid, estimate);
+  if (!stages) return estimate;
+  *stages = {{"dependent", image_of(input.dependent)},
+             {"independent", image_of(input.independent)},
+             {"combined", estimate},
+             {"samples", image_of(input.count)},
+             {"filtered", std::move(filtered.colour)},
+             {"region", std::move(filtered.region)},
+             {"bound", std::move(filtered.bound)},
+             {"centre_weight", std::move(filtered.centre_weight)}};
+  return estimate;
+}
+
+/// Rows of a band without those around it that it needs; small ones would spend their time on these.
+int rows_of_band(int width, int reach) {
+  constexpr int kFewest = 64;
+  const double rows = kDependentTestsBand / (kDependentTestsBytesPerPixel * width);
+  return std::max(kFewest, static_cast<int>(rows) - 2 * reach);
+}
+
+}  // namespace
+
+DependentTestsOptions DependentTestsOptions::paper() {
+  DependentTestsOptions options;
+  options.filter = DependentFilter::kPaper;
+  options.weights = CombinationWeights::kCounts;
+  options.variance = VarianceSource::kDependent;
+  options.smoothing = 1;
+  options.guard = 0;
+  return options;
+}
+
+std::vector<std::string> DependentTestsOptions::validate() const {
+  std::vector<std::string> problems;
+  const auto check_window = [&](const char* name, int value, int least) {
+    if (value < least || value > 63 || value % 2 == 0)
+      problems.push_back(fmt::format("{} is {}, expected an odd number from {} to 63", name, value, least));
+  };
+  if (regions.max_region < 1 || regions.max_region > 63)
+    problems.push_back(fmt::format("max-region is {}, expected 1 to 63", regions.max_region));
+  if (!(regions.min_centre_drop >= 0))
+    problems.push_back(
+        fmt::format("min-centre-drop is {}, expected zero or a positive number", regions.min_centre_drop));
+  check_window("window", bound.window, 3);
+  check_window("sigma-window", smoothing, 1);
+  check_window("measure-window", measure_window, 3);
+  if (guard != 0) check_window("guard-window", guard, 1);
+  return problems;
+}
+
+EstimatorResult dependent_tests(const GroupedImage& crn, const GroupedImage& independent,
+                                const DependentTestsOptions& options, DependentTestsStages* stages) {
+  std::vector<std::string> problems = options.validate();
+  check(crn, independent, problems);
+  throw_if_any("dependent-tests", problems);
+
+  const int width = crn.width, height = crn.height, reach = dependent_tests_reach(options);
+  const int step = rows_of_band(width, reach);
+  EstimatorResult result;
+  const std::vector<unsigned char> valid = finite_pixels(crn, independent, result.nonfinite_pixels);
+  if (stages || step >= height) {
+    result.estimate = filter_and_combine(crn, independent, valid, options, stages);
+    return result;
+  }
+  result.estimate = Image(width, height, 3);
+  for (int y = 0; y < height; y += step) {
+    const int own = std::min(step, height - y), first = std::max(0, y - reach);
+    const int rows = std::min(height, y + own + reach) - first;
+    const auto valid_rows = valid.begin() + static_cast<std::ptrdiff_t>(first) * width;
+    const Image band =
+        filter_and_combine(rows_of(crn, first, rows), rows_of(independent, first, rows),
+                           {valid_rows, valid_rows + static_cast<std::ptrdiff_t>(rows) * width}, options, nullptr);
+    std::copy_n(band.pixel(0, y - first), 3 * static_cast<size_t>(width) * own, result.estimate.pixel(0, y));
+  }
+  return result;
+}
+
+int dependent_tests_reach(const DependentTestsOptions& options) {
+  const bool paper = options.filter == DependentFilter::kPaper;
+  const int window = paper ? options.regions.max_region : options.bound.window;
+  const int filter = std::max(window / 2 + options.smoothing / 2, paper ? 0 : options.guard / 2);
+  const bool measured = options.weights == CombinationWeights::kMeasured;
+  return filter + (measured ? least_error_mixture_reach(options.measure_window) : 0);
+}
+
+namespace {
+
+/// Options that others leave without an effect.
+void check_effects(EstimatorParameters& p, const DependentTestsOptions& o) {
+  const bool exact = o.filter == DependentFilter::kExact;
+  p.only_if(exact, {"window", "sigma-of", "guard"}, "with the published filter (--paper, --filter paper)");
+  p.only_if(!exact, {"max-region", "min-centre-drop", "pyramid", "region-sides"},
+            "with --filter exact: only the published filter (--filter paper) has regions");
+  p.only_if(o.weights == CombinationWeights::kMeasured, {"measure-window"},
+            "unless errors are measured (--weights measured)");
+}
+
+}  // namespace
+
+Estimator make_dependent_tests(Settings& parameters) {
+  static constexpr std::pair<const char*, DependentFilter> kFilters[] = {{"exact", DependentFilter::kExact},
+                                                                         {"paper", DependentFilter::kPaper}};
+  static constexpr std::pair<const char*, Pyramid> kPyramids[] = {{"side", Pyramid::kSide}, {"count", Pyramid::kCount}};
+  static constexpr std::pair<const char*, bool> kSides[] = {{"all", false}, {"odd", true}};
+  static constexpr std::pair<const char*, CombinationWeights> kWeights[] = {
+      {"measured", CombinationWeights::kMeasured},
+      {"effective", CombinationWeights::kEffective},
+      {"counts", CombinationWeights::kCounts}};
+  static constexpr std::pair<const char*, VarianceSource> kSources[] = {{"both", VarianceSource::kBoth},
+                                                                        {"dependent", VarianceSource::kDependent}};
+  static constexpr std::pair<const char*, bool> kOwners[] = {{"centre", true}, {"each", false}};
+  static constexpr std::pair<const char*, int> kGuards[] = {{"on", DependentTestsOptions().guard}, {"off", 0}};
+  EstimatorParameters& p = parameters;
+  const bool paper = p.flag("paper", "dependent-tests as published: its filter, weights and allocation");
+  DependentTestsOptions o = paper ? DependentTestsOptions::paper() : DependentTestsOptions();
+  AdaptiveSampling adaptive;
+  if (paper) adaptive.counts.allocation = Allocation::kEqualError, adaptive.counts.min_spp = 0;
+  if (paper) adaptive.counts.smoothing = 1;
+  ask_for(p, adaptive);
+  p.choice<DependentFilter>("filter", o.filter, kFilters,
+                            "Weights that minimise the error bound, or the published ones");
+  p.choice<Norm>("norm", o.norm, kNorms, kNormHelp);
+  p.whole("window", o.bound.window, kWindowRange, kWindowHelp);
+  p.choice<VarianceSource>("sigma", o.variance, kSources, "Passes that tell the noise of a sample");
+  p.choice<bool>("sigma-of", o.bound.common_sigma, kOwners,
+                 "Whose noise pixels of a window have: its centre's, or their own");
+  p.whole("sigma-window", o.smoothing, {.low = 1, .high = 63, .odd = true},
+          "Side of the window that averages the noise");
+  p.choice<int>("guard", o.guard, kGuards, "Trust the CRN image less where it is too dark");
+  p.whole("max-region", o.regions.max_region, {.low = 1, .high = 63}, "Largest side of a region of --filter paper");
+  p.real("min-centre-drop", o.regions.min_centre_drop, {.low = 0},
+         "Regions grow while the weight of their centre falls by so much");
+  p.choice<Pyramid>("pyramid", o.regions.pyramid, kPyramids,
+                    "Height of the pyramid: side of the region, or its pixels");
+  p.choice<bool>("region-sides", o.regions.odd_sides, kSides, "Sides of regions: all, or the odd, which do not shift");
+  p.choice<CombinationWeights>("weights", o.weights, kWeights,
+                               "Mixture of the images: by measured error, worth, or samples");
+  p.whole("measure-window", o.measure_window, kWindowRange, "Side of the windows over which errors are measured");
+  adaptive.counts.norm = o.norm;
+  adaptive.counts.classes = o.filter == DependentFilter::kPaper;
+  check_effects(p, o);
+  std::vector<std::string> problems = o.validate();
+  const std::vector<std::string> of_counts = adaptive.validate();
+  problems.insert(problems.end(), of_counts.begin(), of_counts.end());
+  throw_if_any("dependent-tests", problems);
+
+  Estimator estimator;
+  estimator.summary = "dependent tests driven filtering";
+  estimator.fewest_groups = 2;
+  estimator.adaptive = adaptive;
+  estimator.pass_options = {"paper",   "dependent-spp", "pilot-spp", "allocation", "relative-error",
+                            "min-spp", "max-spp",       "filter",    "norm"};
+  estimator.reach = dependent_tests_reach(o);
+  estimator.memory.always = kDependentTestsBytesPerPixel;
+  estimator.memory.largest_part = kDependentTestsBand;
+  estimator.apply = [o](const GroupedImage& crn, const GroupedImage& independent, const PairSettings&) {
+    return dependent_tests(crn, independent, o);
+  };
+  estimator.stages = [o](const GroupedImage& crn, const GroupedImage& independent, const PairSettings&) {
+    DependentTestsStages stages;
+    dependent_tests(crn, independent, o, &stages);
+    return stages;
+  };
+  return estimator;
+}
+
+}  // namespace covary

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "dependent_tests/least_error_mixture.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/error.h"
+
+namespace covary {
+namespace {
+
+using namespace lanes;
+
+constexpr int kBrightnessWindow = 7;  // side of the means of the weights' brightness
+constexpr float kOffset = 0.01f;      // of squared brightness, as in relMSE
+constexpr double kRidge = 1e-3;       // of the mean diagonal of A
+constexpr int kBlock = 32;            // rows that are worked on together
+
+/// 1 / (brightness^2 + 0.01) of each pixel, 0 where it is left out.
+Planes error_weights(const FilterInput& input, std::vector<unsigned char> used) {
+  Planes brightness(input.width(), input.height(), 1, 0, 0);
+  parallel_for(input.height(), 8, [&](int y) {
+    for (int x = 0; x < input.width(); ++x) {
+      if (input.count.row(0, y)[x] <= 0) used[static_cast<size_t>(y) * input.width() + x] = 0;
+      for (int c = 0; c < 3; ++c) brightness.row(0, y)[x] += input.independent.row(c, y)[x] / 3;
+    }
+  });
+  Planes weights = box_mean(brightness, used, kBrightnessWindow, 0, 0);
+  parallel_for(input.height(), 8, [&](int y) {
+    for (int x = 0; x < input.width(); ++x) {
+      float& weight = weights.row(0, y)[x];
+      weight = used[static_cast<size_t>(y) * input.width() + x] ? 1 / (weight * weight + kOffset) : 0.0f;
+    }
+  });
+  return weights;
+}
+
+/// The sums of A and b: the triangle of A row by row, then b.
+class Mixer {
+ public:
+  Mixer(const FilterInput& input, const Planes& noise, const Planes& weights,
+        std::span<const MixtureCandidate> candidates, int window)
+      : input_(input),
+        noise_(noise),
+        weights_(weights),
+        candidates_(candidates),
+        radius_(window / 2),
+        n_(static_cast<int>(candidates.size())),
+        n_sums_(n_ * (n_ + 1) / 2 + n_) {}
+
+  void mix_rows(int first, int last, Image& result) const {
+    const int top = std::max(0, first - radius_), bottom = std::min(input_.height(), last + radius_);
+    Planes terms(input_.width(), bottom - top, n_sums_, radius_, 0);
+    for (int y = top; y < bottom; ++y)
+      for (int x = 0; x < input_.width(); ++x) set_terms(x, y, terms, y - top);
+    Planes columns(input_.width(), 1, n_sums_, radius_, 0);
+    for (int y = first; y < last; ++y) {
+      for (int i = 0; i < n_sums_; ++i)
+        add_columns(terms, i, std::max(top, y - radius_) - top, std::min(bottom, y + radius_ + 1) - top, columns);
+      mix_row(y, columns, result);
+    }
+  }
+
+ private:
+  void set_terms(int x, int y, Planes& terms, int row) const {
+    const float weight = weights_.row(0, y)[x];
+    if (weight == 0) return;
+    float difference[kMixtureCandidates][3];
+    for (int j = 0; j < n_; ++j)
+      for (int c = 0; c < 3; ++c)
+        difference[j][c] = candidates_[j].colour->pixel(x, y)[c] - input_.independent.row(c, y)[x];
+    int i = 0;
+    for (int j = 0; j < n_; ++j)
+      for (int k = 0; k <= j; ++k) {
+        float product = 0;
+        for (int c = 0; c < 3; ++c) product += difference[j][c] * difference[k][c];
+        terms.row(i++, row)[x] = weight * product;
+      }
+    for (int j = 0; j < n_; ++j) {
+      const float own = candidates_[j].own_weight ? candidates_[j].own_weight->pixel(x, y)[0] : 0.0f;
+      terms.row(i++, row)[x] = weight * noise_.row(0, y)[x] * (1 - own);
+    }
+  }
+
+  /// Sums of rows first … last - 1, column by column, with the borders.
+  void add_columns(const Planes& terms, int i, int first, int last, Planes& columns) const {
+    for (int x = 0; x < input_.width(); x += kLanes) {
+      vfloat sum{};
+      for (int y = first; y < last; ++y) sum += load(terms.row(i, y) + x);
+      store(columns.row(i, 0) + x, sum);
+    }
+    std::fill_n(columns.row(i, 0) + input_.width(), radius_, 0.0f);
+  }
+
+  void mix_row(int y, const Planes& columns, Image& result) const {
+    vfloat sums[kMixtureCandidates * (kMixtureCandidates + 3) / 2];
+    for (int x = 0; x < input_.width(); x += kLanes) {
+      for (int i = 0; i < n_sums_; ++i) {
+        sums[i] = vfloat{};
+        for (int dx = -radius_; dx <= radius_; ++dx) sums[i] += load(columns.row(i, 0) + x + dx);
+      }
+      for (int l = 0; l < std::min(kLanes, input_.width() - x); ++l) {
+        std::array<double, kMixtureCandidates*(kMixtureCandidates + 3) / 2> of_pixel{};
+        for (int i = 0; i < n_sums_; ++i) of_pixel[i] = sums[i][l];
+        write(x + l, y, of_pixel.data(), result);
+      }
+    }
+  }
+
+  /// Solves A a = b by Cholesky's decomposition.
+  std::array<double, kMixtureCandidates> coefficients(const double* sums) const {
+    double factor[kMixtureCandidates][kMixtureCandidates], trace = 0;
+    for (int j = 0; j < n_; ++j) trace += sums[j * (j + 3) / 2];
+    std::array<double, kMixtureCandidates> a{};
+    if (!(trace > 0) || !std::isfinite(trace)) return a;
+    const double* b = sums + n_ * (n_ + 1) / 2;
+    for (int j = 0; j < n_; ++j)
+      for (int k = 0; k <= j; ++k) {
+        double value = sums[j * (j + 1) / 2 + k] + (j == k ? kRidge * trace / n_ : 0);
+        for (int i = 0; i < k; ++i) value -= factor[j][i] * factor[k][i];
+        factor[j][k] = j == k ? std::sqrt(std::max(value, 1e-12 * trace)) : value / factor[k][k];
+      }
+    for (int j = 0; j < n_; ++j) {
+      a[j] = b[j];
+      for (int i = 0; i < j; ++i) a[j] -= factor[j][i] * a[i];
+      a[j] /= factor[j][j];
+    }
+    for (int j = n_ - 1; j >= 0; --j) {
+      for (int i = j + 1; i < n_; ++i) a[j] -= factor[i][j] * a[i];
+      a[j] /= factor[j][j];
+    }
+    for (double& value : a) value = value > 0 ? std::min(value, 1.0) : 0.0;
+    return a;
+  }
+
+  void write(int x, int y, const double* sums, Image& result) const {
+    float* out = result.pixel(x, y);
+    for (int c = 0; c < 3; ++c) out[c] = input_.independent.row(c, y)[x];
+    if (weights_.row(0, y)[x] == 0) return;
+    const std::array<double, kMixtureCandidates> a = coefficients(sums);
+    for (int c = 0; c < 3; ++c) {
+      const double own = out[c];
+      double value = own;
+      for (int j = 0; j < n_; ++j) value += a[j] * (candidates_[j].colour->pixel(x, y)[c] - own);
+      out[c] = static_cast<float>(value);
+    }
+  }
+
+  const FilterInput& input_;
+  const Planes &noise_, &weights_;
+  std::span<const MixtureCandidate> candidates_;
+  int radius_, n_, n_sums_;
+};
+
+}  // namespace
+
+Image least_error_mixture(const FilterInput& input, const Planes& noise, const std::vector<unsigned char>& valid,
+                          std::span<const MixtureCandidate> candidates, int window) {
+  COVARY_CHECK(!candidates.empty() && candidates.size() <= kMixtureCandidates, "one to three candidates");
+  Image result(input.width(), input.height(), 3);
+  const Planes weights = error_weights(input, valid);
+  const Mixer mixer(input, noise, weights, candidates, window);
+  parallel_for((input.height() + kBlock - 1) / kBlock, 1, [&](int block) {
+    mixer.mix_rows(block * kBlock, std::min(input.height(), (block + 1) * kBlock), result);
+  });
+  return result;
+}
+
+int least_error_mixture_reach(int window) { return window / 2 + kBrightnessWindow / 2; }
+
+}  // namespace covary

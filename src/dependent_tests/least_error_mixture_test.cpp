@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+// Mixtures of images: coefficients against sums and solutions written out, and images whose errors are known.
+#include "dependent_tests/least_error_mixture.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+
+#include "estimators/test_images.h"
+
+namespace covary {
+namespace {
+
+constexpr int kWidth = 60, kHeight = 50;
+
+/// An image of one colour with noise of standard deviation `noise` in each channel.
+struct Scene {
+  FilterInput input;
+  Planes noise = Planes(kWidth, kHeight, 1, 0, 0);
+  std::vector<unsigned char> valid = std::vector<unsigned char>(kWidth * kHeight, 1);
+
+  explicit Scene(double deviation) {
+    input.independent = Planes(kWidth, kHeight, 3, 0, 0);
+    input.count = Planes(kWidth, kHeight, 1, 0, 8);
+    for (int y = 0; y < kHeight; ++y)
+      for (int x = 0; x < kWidth; ++x) {
+        for (int c = 0; c < 3; ++c) input.independent.row(c, y)[x] = 1 + random(1, x, y, c, deviation);
+        noise.row(0, y)[x] = static_cast<float>(3 * deviation * deviation);
+      }
+  }
+  /// Uniform with the standard deviation `deviation`.
+  static float random(uint64_t seed, int x, int y, int c, double deviation) {
+    const double uniform = test::noise(seed, static_cast<uint64_t>(y * kWidth + x), static_cast<uint64_t>(c));
+    return static_cast<float>(uniform * std::sqrt(12.0) * deviation);
+  }
+  Image mix(const std::vector<MixtureCandidate>& candidates, int window) const {
+    return least_error_mixture(input, noise, valid, candidates, window);
+  }
+};
+
+Image noisy(uint64_t seed, double value, double deviation) {
+  Image image(kWidth, kHeight, 3);
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x)
+      for (int c = 0; c < 3; ++c)
+        image.pixel(x, y)[c] = static_cast<float>(value) + Scene::random(seed, x, y, c, deviation);
+  return image;
+}
+
+double mean_square_error(const Image& image) {
+  double sum = 0;
+  for (const float value : image.data) sum += std::pow(value - 1.0, 2);
+  return sum / static_cast<double>(image.data.size());
+}
+
+TEST(LeastErrorMixture, EqualsTheSolutionWrittenOut) {
+  Scene scene(0.3);
+  const Image a = noisy(2, 0.9, 0.3), b = noisy(3, 1.1, 0.2), c = noisy(4, 1, 0.4);
+  Image own(kWidth, kHeight, 1);
+  for (size_t i = 0; i < own.data.size(); ++i) own.data[i] = static_cast<float>(i % 7) / 10;
+  scene.valid[9 * kWidth + 12] = 0;
+  scene.input.count.row(0, 20)[21] = 0;
+  const std::vector<MixtureCandidate> candidates = {{&a, nullptr}, {&b, &own}, {&c, nullptr}};
+  const Image result = scene.mix(candidates, 5);
+  const auto h = [&](int x, int y, int k) { return double{scene.input.independent.row(k, y)[x]}; };
+  const auto used = [&](int x, int y) {
+    return x >= 0 && y >= 0 && x < kWidth && y < kHeight && !(x == 12 && y == 9) && !(x == 21 && y == 20);
+  };
+  for (const auto& [px, py] : {std::pair{11, 8}, {0, 0}, {59, 49}, {21, 19}, {40, 31}, {40, 32}}) {
+    Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d right = Eigen::Vector3d::Zero();
+    for (int y = py - 2; y <= py + 2; ++y)
+      for (int x = px - 2; x <= px + 2; ++x) {
+        if (!used(x, y)) continue;
+        double brightness = 0, n = 0;
+        for (int qy = y - 3; qy <= y + 3; ++qy)
+          for (int qx = x - 3; qx <= x + 3; ++qx)
+            if (used(qx, qy)) brightness += (h(qx, qy, 0) + h(qx, qy, 1) + h(qx, qy, 2)) / 3, ++n;
+        const double weight = 1 / (std::pow(brightness / n, 2) + 0.01);
+        for (int j = 0; j < 3; ++j) {
+          for (int k = 0; k < 3; ++k)
+            for (int i = 0; i < 3; ++i)
+              A(j, k) += weight * (candidates[j].colour->pixel(x, y)[i] - h(x, y, i)) *
+                         (candidates[k].colour->pixel(x, y)[i] - h(x, y, i));
+          const double own_weight = j == 1 ? own.pixel(x, y)[0] : 0;
+          right[j] += weight * scene.noise.row(0, y)[x] * (1 - own_weight);
+        }
+      }
+    A += 1e-3 * A.trace() / 3 * Eigen::Matrix3d::Identity();
+    const Eigen::Vector3d solution = A.inverse() * right;
+    for (int i = 0; i < 3; ++i) {
+      double expected = h(px, py, i);
+      for (int j = 0; j < 3; ++j)
+        expected += std::clamp(solution[j], 0.0, 1.0) * (candidates[j].colour->pixel(px, py)[i] - h(px, py, i));
+      EXPECT_NEAR(result.pixel(px, py)[i], expected, 1e-4) << px << " " << py;
+    }
+  }
+  EXPECT_EQ(result.pixel(12, 9)[0], scene.input.independent.row(0, 9)[12]) << "left out";
+}
+
+/// Two images with independent errors of variances v and w have the least error v w / (v + w) together.
+TEST(LeastErrorMixture, WeightsIndependentErrorsByTheirVariance) {
+  const Scene scene(0.3);
+  const Image other = noisy(5, 1, 0.15);
+  const double v = 0.09, w = 0.0225;
+  EXPECT_NEAR(mean_square_error(scene.mix({{&other, nullptr}}, 31)), v * w / (v + w), 0.03 * w);
+}
+
+/// An error that is common to all pixels of an image is seen as one of any other kind.
+TEST(LeastErrorMixture, LeavesAnImageThatIsWrong) {
+  const Scene scene(0.1);
+  const Image wrong = noisy(6, 1.7, 0.01), right = noisy(7, 1, 0.01);
+  EXPECT_NEAR(mean_square_error(scene.mix({{&wrong, nullptr}}, 31)), 0.01, 0.0005);
+  EXPECT_LT(mean_square_error(scene.mix({{&wrong, nullptr}, {&right, nullptr}}, 31)), 0.0003);
+}
+
+/// An image a quarter of which is the pixel's own samples, the rest as many others: half of each is best.
+TEST(LeastErrorMixture, CountsThePixelsOwnSamplesOnce) {
+  const Scene scene(0.3);
+  const Image other = noisy(8, 1, 0.3);
+  Image image(kWidth, kHeight, 3), own(kWidth, kHeight, 1);
+  std::fill(own.data.begin(), own.data.end(), 0.25f);
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x)
+      for (int c = 0; c < 3; ++c)
+        image.pixel(x, y)[c] = 0.25f * scene.input.independent.row(c, y)[x] + 0.75f * other.pixel(x, y)[c];
+  EXPECT_NEAR(mean_square_error(scene.mix({{&image, &own}}, 31)), 0.045, 0.002);
+  EXPECT_GT(mean_square_error(scene.mix({{&image, nullptr}}, 31)), 0.048) << "too little of its own";
+}
+
+TEST(LeastErrorMixture, WithoutNoiseOrDifferenceItIsTheImageItself) {
+  Scene silent(0.3);
+  for (int y = 0; y < kHeight; ++y) std::fill_n(silent.noise.row(0, y), kWidth, 0.0f);
+  const Image other = noisy(9, 1, 0.3);
+  const Scene scene(0.3);
+  Image same(kWidth, kHeight, 3);
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x)
+      for (int c = 0; c < 3; ++c) same.pixel(x, y)[c] = scene.input.independent.row(c, y)[x];
+  EXPECT_EQ(silent.mix({{&other, nullptr}}, 7).data, same.data);
+  EXPECT_EQ(scene.mix({{&same, nullptr}}, 7).data, same.data);
+  Image far = other;
+  far.pixel(30, 30)[1] = 1e25f;
+  for (const float value : scene.mix({{&far, nullptr}}, 7).data) EXPECT_TRUE(std::isfinite(value));
+}
+
+}  // namespace
+}  // namespace covary

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "film/grouped_image.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "core/error.h"
+#include "film/sample_variance.h"
+
+namespace covary {
+namespace {
+
+/// Every group must have samples, or it has no mean.
+void check_counts(const char* name, const GroupedImage& image, std::vector<std::string>& problems) {
+  if (!image.counts) return;
+  const size_t n_pixels = static_cast<size_t>(image.width) * image.height;
+  const auto groups = static_cast<uint32_t>(image.groups);
+  const uint32_t* few = std::find_if(image.counts, image.counts + n_pixels, [&](uint32_t n) { return n < groups; });
+  if (few == image.counts + n_pixels) return;
+  const auto pixel = static_cast<int>(few - image.counts);
+  problems.push_back(fmt::format("pixel ({}, {}) of the {} image has {} sample{}, fewer than the {} groups",
+                                 pixel % image.width, pixel / image.width, name, *few, *few == 1 ? "" : "s", groups));
+}
+
+}  // namespace
+
+Spectrum GroupedImage::sample_variance(int x, int y) const {
+  const size_t index = static_cast<size_t>(y) * width + x;
+  return covary::sample_variance(pixel(x, y), variance_in_groups ? variance_in_groups + index * 3 : nullptr, groups,
+                                 count(x, y));
+}
+
+GroupedImage rows_of(const GroupedImage& image, int first_row, int n_rows) {
+  GroupedImage rows = image;
+  const size_t skipped = static_cast<size_t>(first_row) * image.width;
+  rows.height = n_rows;
+  rows.data = image.pixel(0, first_row);
+  if (image.counts) rows.counts = image.counts + skipped;
+  if (image.variance_in_groups) rows.variance_in_groups = image.variance_in_groups + skipped * 3;
+  return rows;
+}
+
+GroupedImage rows_of(const Film& film, int first_row, int n_rows) {
+  const GroupedImage all{film.width(),
+                         film.height(),
+                         film.groups(),
+                         film.groups_of(0, 0),
+                         film.counts().data(),
+                         film.mean_count(),
+                         film.keeps_sample_variance() ? film.variance_in_groups().data() : nullptr};
+  return rows_of(all, first_row, n_rows);
+}
+
+Image rows_of(const Image& image, int first_row, int n_rows) {
+  Image rows(image.width, n_rows, image.channels);
+  std::copy_n(image.pixel(0, first_row), rows.data.size(), rows.data.begin());
+  return rows;
+}
+
+void throw_if_any(const std::string& name, const std::vector<std::string>& problems) {
+  if (problems.empty()) return;
+  std::string text = name + ": ";
+  for (size_t i = 0; i < problems.size(); ++i) text += (i ? "; " : "") + problems[i];
+  throw Error(ErrorCode::kUsage, text);
+}
+
+void check_inputs(const GroupedImage& crn, const GroupedImage& independent, int min_crn_groups,
+                  int min_independent_groups, std::vector<std::string>& problems) {
+  if (crn.width < 1 || crn.height < 1 || !crn.data) problems.push_back("the CRN image is empty");
+  if (independent.width < 1 || independent.height < 1 || !independent.data)
+    problems.push_back("the independent image is empty");
+  if (crn.width != independent.width || crn.height != independent.height)
+    problems.push_back(
+        fmt::format("the CRN image is {} x {} and the independent image {} x {}; they must have the same size",
+                    crn.width, crn.height, independent.width, independent.height));
+  if (crn.groups < min_crn_groups)
+    problems.push_back(fmt::format("the CRN image has {} group{}, at least {} are needed (12 are recommended)",
+                                   crn.groups, crn.groups == 1 ? "" : "s", min_crn_groups));
+  if (independent.groups < min_independent_groups)
+    problems.push_back(fmt::format("the independent image has {} group{}, at least {} are needed with these settings",
+                                   independent.groups, independent.groups == 1 ? "" : "s", min_independent_groups));
+  if (!problems.empty()) return;
+  check_counts("CRN", crn, problems);
+  check_counts("independent", independent, problems);
+}
+
+}  // namespace covary

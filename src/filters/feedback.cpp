@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "filters/feedback.h"
+
+#include <algorithm>
+#include <array>
+
+#include "core/parallel.h"
+#include "filters/planes.h"
+
+namespace covary {
+
+using namespace lanes;
+
+namespace {
+
+constexpr int kGuide = 0, kResidual = 3, kWeight = 6, kVariance = 7, kPlanes = 8;
+/// Side of the cells of the wide mean.
+constexpr int kCell = 2;
+/// Bandwidths of the wide mean and of the second feedback over that of the narrow mean.
+constexpr float kWidening = 4, kSecondWidening = 12;
+/// Variance of the narrow mean, relative to that of the estimate, at which both means count equally. 0.1 to 3 trade
+/// bias for error, slowly (docs/notes/iicv.md).
+constexpr float kNoise = 0.2f;
+/// Variance of a wide mean, relative to that of the estimate, at which half of it is given back.
+constexpr float kWideNoise = 1;
+
+/// Cells of side x side pixels, one row of cells per row, repeated horizontally so that column x holds the cell of
+/// pixel x: mean of F^ (kFar for cells without valid pixels), sums over the valid pixels of n (h - F^), n and n^2 var h
+/// (over RGB), with n the pixel's count over the image's mean.
+Planes make_cells(int side, const Moments& h, const std::vector<unsigned char>& valid, const Image& f, int border) {
+  const int width = f.width, height = f.height, cell_rows = (height + side - 1) / side;
+  Planes cells(width, cell_rows, kPlanes, border, 0.0f);
+  for (int c = 0; c < 3; ++c)
+    for (int row = -border; row < cell_rows + border; ++row)
+      std::fill_n(cells.row(kGuide + c, row) - border, cells.stride(), kFar);
+  parallel_for(cell_rows, [&](int row) {
+    const int y0 = side * row, y1 = std::min(height, y0 + side);
+    for (int x0 = 0; x0 < width; x0 += side) {
+      float guide[3] = {}, residual[3] = {}, variance = 0, weight = 0, count = 0;
+      for (int y = y0; y < y1; ++y)
+        for (int x = x0; x < std::min(width, x0 + side); ++x) {
+          if (!valid[static_cast<size_t>(y) * width + x]) continue;
+          const float n = h.relative_count ? h.relative_count->row(0, y)[x] : 1.0f;
+          count += 1;
+          weight += n;
+          for (int c = 0; c < 3; ++c) {
+            guide[c] += f.pixel(x, y)[c];
+            residual[c] += n * (h.mean.row(c, y)[x] - f.pixel(x, y)[c]);
+            variance += n * n * h.variance_of_mean.row(c, y)[x];
+          }
+        }
+      if (count == 0) continue;
+      // Beyond the last column, too: neighbouring cells are read a multiple of `side` from any column of a cell.
+      for (int x = x0; x < x0 + side; ++x) {
+        for (int c = 0; c < 3; ++c) {
+          cells.row(kGuide + c, row)[x] = guide[c] / count;
+          cells.row(kResidual + c, row)[x] = residual[c];
+        }
+        cells.row(kWeight, row)[x] = weight;
+        cells.row(kVariance, row)[x] = variance;
+      }
+    }
+  });
+  return cells;
+}
+
+/// Weighted mean of residuals around kLanes pixels.
+struct GuidedMean {
+  vfloat weights = {}, residuals[3] = {}, squares = {};  ///< squares: sum of w^2 var h
+  /// Where nothing is alike, there is nothing to give back.
+  vfloat value(int c) const { return residuals[c] / max(weights, splat(1e-20f)); }
+  /// t / (t + v), v the mean's variance, summed over RGB, t = `tolerated`. 0 without weights, or beyond the range of
+  /// floats.
+  vfloat share(vfloat tolerated) const {
+    const vfloat excess = (squares + splat(1e-30f)) / max(tolerated * weights * weights, splat(1e-37f));
+    return excess >= 0.0f ? 1 / (1 + excess) : vfloat{};
+  }
+};
+
+/// r of feedback.h at the pixels (x + lane, y) with values f, over (2 radius + 1)^2 cells.
+GuidedMean guided_mean(const Planes& cells, int side, int radius, int x, int y, const vfloat* f,
+                       vfloat squared_bandwidth) {
+  const vfloat factor = -1.0f / max(squared_bandwidth, splat(1e-30f));
+  const int row = y / side, reach = radius * side;
+  GuidedMean mean;
+  for (int dy = -radius; dy <= radius; ++dy) {
+    const float* p[kPlanes];
+    for (int i = 0; i < kPlanes; ++i) p[i] = cells.row(i, row + dy) + x;
+    for (int dx = -reach; dx <= reach; dx += side) {
+      const vfloat d0 = load(p[kGuide] + dx) - f[0], d1 = load(p[kGuide + 1] + dx) - f[1],
+                   d2 = load(p[kGuide + 2] + dx) - f[2];
+      const vfloat w = exp_of_nonpositive((d0 * d0 + d1 * d1 + d2 * d2) * factor);
+      mean.weights += w * load(p[kWeight] + dx);
+      mean.squares += w * w * load(p[kVariance] + dx);
+      for (int c = 0; c < 3; ++c) mean.residuals[c] += w * load(p[kResidual + c] + dx);
+    }
+  }
+  return mean;
+}
+
+/// Adds to each valid pixel what `feedback(x, y, f, variance)` gives, three vfloats for the pixels (x + lane, y) whose
+/// values are f and whose squared standard errors, summed over RGB, are `variance`.
+template <typename Feedback>
+void add_everywhere(const std::vector<unsigned char>& valid, const Image& std_error, const Feedback& feedback,
+                    Image& estimate) {
+  const int width = estimate.width;
+  for_each_batch(width, estimate.height, [&](int x, int y, int n) {
+    vfloat f[3], variance = {};
+    for (int c = 0; c < 3; ++c) {
+      vfloat error;
+      for (int l = 0; l < kLanes; ++l) {
+        f[c][l] = estimate.pixel(std::min(x + l, width - 1), y)[c];
+        error[l] = std_error.pixel(std::min(x + l, width - 1), y)[c];
+      }
+      variance += error * error;
+    }
+    const std::array<vfloat, 3> added = feedback(x, y, f, variance);
+    for (int l = 0; l < n; ++l)
+      if (valid[static_cast<size_t>(y) * width + x + l])
+        for (int c = 0; c < 3; ++c) estimate.pixel(x + l, y)[c] += added[c][l];
+  });
+}
+
+}  // namespace
+
+void add_feedback(const Moments& h, const FeedbackOptions& options, const std::vector<unsigned char>& valid,
+                  const Image& std_error, Image& estimate) {
+  const float bandwidth = options.bandwidth * options.bandwidth;
+  {
+    const int wide_radius = options.window / 2 / kCell, narrow_radius = options.window / 4;
+    const Planes cells = make_cells(kCell, h, valid, estimate, wide_radius * kCell);
+    const Planes pixels = make_cells(1, h, valid, estimate, narrow_radius);
+    const auto mixed = [&](int x, int y, const vfloat* f, vfloat variance) {
+      const GuidedMean narrow = guided_mean(pixels, 1, narrow_radius, x, y, f, variance * bandwidth);
+      const GuidedMean wide =
+          guided_mean(cells, kCell, wide_radius, x, y, f, variance * (bandwidth * kWidening * kWidening));
+      const vfloat a = narrow.share(kNoise * variance), b = (1 - a) * wide.share(kWideNoise * variance);
+      std::array<vfloat, 3> result;
+      for (int c = 0; c < 3; ++c) result[c] = a * narrow.value(c) + b * wide.value(c);
+      return result;
+    };
+    add_everywhere(valid, std_error, mixed, estimate);
+  }
+  const int radius = options.window / 2 / kFeedbackCell;
+  const Planes cells = make_cells(kFeedbackCell, h, valid, estimate, radius * kFeedbackCell);
+  const auto second = [&](int x, int y, const vfloat* f, vfloat variance) {
+    const GuidedMean mean =
+        guided_mean(cells, kFeedbackCell, radius, x, y, f, variance * (bandwidth * kSecondWidening * kSecondWidening));
+    const vfloat b = mean.share(kWideNoise * variance);
+    return std::array<vfloat, 3>{b * mean.value(0), b * mean.value(1), b * mean.value(2)};
+  };
+  add_everywhere(valid, std_error, second, estimate);
+}
+
+}  // namespace covary

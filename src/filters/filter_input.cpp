@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "filters/filter_input.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/parallel.h"
+#include "film/groups.h"
+
+namespace covary {
+namespace {
+
+/// Mean of all samples of a pixel.
+Spectrum mean_of(const GroupedImage& image, int x, int y) {
+  const float* groups = image.pixel(x, y);
+  const uint32_t count = image.count(x, y);
+  double sum[3] = {};
+  for (int t = 0; t < image.groups; ++t)
+    for (int c = 0; c < 3; ++c) sum[c] += static_cast<double>(group_size(count, image.groups, t)) * groups[3 * t + c];
+  const double scale = count > 0 ? 1.0 / count : 0;
+  return {static_cast<float>(sum[0] * scale), static_cast<float>(sum[1] * scale), static_cast<float>(sum[2] * scale)};
+}
+
+float pooled_variance(const GroupedImage& a, const GroupedImage& b, int x, int y, Norm norm) {
+  const double of_a = variance_freedom(a, x, y), of_b = variance_freedom(b, x, y);
+  if (of_a + of_b <= 0) return 0;
+  const double sum =
+      of_a * scalar_variance(norm, a.sample_variance(x, y)) + of_b * scalar_variance(norm, b.sample_variance(x, y));
+  return static_cast<float>(sum / (of_a + of_b));
+}
+
+}  // namespace
+
+double variance_freedom(const GroupedImage& image, int x, int y) {
+  const double count = image.count(x, y);
+  return std::max(0.0, (image.variance_in_groups ? count : std::min<double>(count, image.groups)) - 1);
+}
+
+Planes mean_planes(const GroupedImage& image, const std::vector<unsigned char>& valid, int border, float outside) {
+  Planes planes(image.width, image.height, 3, border, outside);
+  parallel_for(image.height, 8, [&](int y) {
+    for (int x = 0; x < image.width; ++x) {
+      if (!valid[static_cast<size_t>(y) * image.width + x]) continue;
+      const Spectrum mean = mean_of(image, x, y);
+      for (int c = 0; c < 3; ++c) planes.row(c, y)[x] = mean[c];
+    }
+  });
+  return planes;
+}
+
+Planes box_mean(const Planes& image, const std::vector<unsigned char>& valid, int window, int border, float outside) {
+  const int width = image.width(), height = image.height(), radius = window / 2;
+  std::vector<double> sums(valid.size());
+  std::vector<int> numbers(valid.size());
+  parallel_for(height, 8, [&](int y) {
+    for (int x = 0; x < width; ++x)
+      for (int q = std::max(0, x - radius); q <= std::min(width - 1, x + radius); ++q) {
+        const size_t pixel = static_cast<size_t>(y) * width + q;
+        if (!valid[pixel]) continue;
+        sums[static_cast<size_t>(y) * width + x] += image.row(0, y)[q];
+        ++numbers[static_cast<size_t>(y) * width + x];
+      }
+  });
+  Planes result(width, height, 1, border, outside);
+  parallel_for(height, 8, [&](int y) {
+    for (int x = 0; x < width; ++x) {
+      double sum = 0;
+      int number = 0;
+      for (int q = std::max(0, y - radius); q <= std::min(height - 1, y + radius); ++q) {
+        sum += sums[static_cast<size_t>(q) * width + x];
+        number += numbers[static_cast<size_t>(q) * width + x];
+      }
+      result.row(0, y)[x] = number ? static_cast<float>(sum / number) : 0.0f;
+    }
+  });
+  return result;
+}
+
+FilterInput filter_input(const GroupedImage& crn, const GroupedImage& independent,
+                         const std::vector<unsigned char>& valid, Norm norm, VarianceSource source, int smoothing,
+                         int border) {
+  FilterInput input;
+  input.norm = norm;
+  input.dependent = mean_planes(crn, valid, border, kFar);
+  input.independent = mean_planes(independent, valid, border, 0);
+  input.count = Planes(crn.width, crn.height, 1, border, 0);
+  input.variance = Planes(crn.width, crn.height, 1, border, 0);
+  parallel_for(crn.height, 8, [&](int y) {
+    for (int x = 0; x < crn.width; ++x) {
+      if (!valid[static_cast<size_t>(y) * crn.width + x]) continue;
+      input.count.row(0, y)[x] = static_cast<float>(independent.count(x, y));
+      input.variance.row(0, y)[x] = source == VarianceSource::kBoth ? pooled_variance(crn, independent, x, y, norm)
+                                                                    : scalar_variance(norm, crn.sample_variance(x, y));
+    }
+  });
+  if (smoothing > 1) input.variance = box_mean(input.variance, valid, smoothing, border, 0);
+  return input;
+}
+
+}  // namespace covary

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// The k pixels of a window whose CRN means are nearest to the target's (Yang & Moon 2025, Sec. 4): the control variates
+// of a pixel. kLanes horizontally adjacent targets at a time.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "filters/planes.h"
+
+namespace covary {
+
+class NeighbourSearch {
+ public:
+  /// `k` at most the number of candidates: window^2, one less where the target itself is left out.
+  NeighbourSearch(int k, int window, bool include_target);
+
+  int k() const { return k_; }
+  /// Candidates, from the centre outwards.
+  const std::vector<Offset>& offsets() const { return offsets_; }
+
+  /// Chooses for the pixels (x + lane, y). chosen[lane * k + i] is an index into offsets(), ascending in i. `guide`:
+  /// three planes with a border of at least window / 2, kFar where there is no pixel; such candidates are taken only
+  /// when nothing else is left. Distances that agree to 14 bits count as equal; of equals the one nearer to the target
+  /// wins. `keys`: scratch for offsets().size() vectors.
+  void find(const Planes& guide, int x, int y, lanes::vint* keys, uint16_t* chosen) const;
+
+ private:
+  int k_;
+  std::vector<Offset> offsets_;
+  int index_mask_;  ///< low bits of a key that hold the candidate's index
+};
+
+}  // namespace covary

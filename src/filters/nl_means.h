@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// NL-means steered by an image and its estimated error: Rousselle, Knaus, Zwicker, ACM Trans. Graph. 31(6), 2012
+// [RKZ2012], Eq. (1), with guides as in Rousselle, Manzi, Zwicker, Comput. Graph. Forum 32(7), 2013 [RMZ2013]. For the
+// pixels j of a window around i
+//
+//     d_ij = mean over 3 x 3 patch and RGB of ((f_i - f_j)^2 - (s_i^2 + min(s_i^2, s_j^2))) / (s_i^2 + s_j^2),
+//     w_ij = exp(-max(d_ij / k^2, ||q_i - q_j||^2, 0)),
+//
+// f: the steering image, s: its standard error, q: guides in units of what they tolerate, k: bandwidth. Patches that
+// reach beyond the frame repeat its outermost pixels.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "filters/planes.h"
+
+namespace covary {
+
+struct NlMeansSteering {
+  const Image* image = nullptr;      ///< f
+  const Image* std_error = nullptr;  ///< s; where both are zero, only equal pixels are alike
+  const Planes* guides = nullptr;    ///< q, any number of planes; border of at least kNlMeansRadius; may be null
+  const std::vector<unsigned char>* valid = nullptr;  ///< pixels with 0 are left out of all sums
+};
+
+/// Images that are averaged with the same weights.
+struct NlMeansTask {
+  float bandwidth = 0.5f;  ///< k > 0
+  std::vector<const Image*> sources;
+};
+
+/// How far from a pixel its weights reach.
+inline constexpr int kNlMeansRadius = 10;
+
+/// The weighted means of all sources of all tasks, in their order. Weights of different tasks share their distances, so
+/// that a second task costs little. Pixels without any weight keep the source's value. All images have three channels
+/// and one size; values are finite. Bit-identical for any number of threads.
+std::vector<Image> nl_means(const NlMeansSteering& steering, std::span<const NlMeansTask> tasks);
+
+}  // namespace covary

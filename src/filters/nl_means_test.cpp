@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+// NL-means against its formula in double precision, and what windows and masks do to it.
+#include "filters/nl_means.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <tuple>
+
+#include "estimators/test_images.h"
+
+namespace covary {
+namespace {
+
+struct Picture {
+  Image f, s, other;
+  Planes guides;
+  std::vector<unsigned char> valid;
+
+  Picture(int width, int height) : f(width, height, 3), s(f), other(f), guides(width, height, 2, kNlMeansRadius, 0) {
+    valid.assign(static_cast<size_t>(width) * height, 1);
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x) {
+        const uint64_t pixel = static_cast<uint64_t>(y) * width + x;
+        for (int c = 0; c < 3; ++c) {
+          s.pixel(x, y)[c] = 0.1f + 0.05f * test::noise(3, pixel, c);
+          f.pixel(x, y)[c] = static_cast<float>(test::expected(x, y, c)) + 0.3f * test::noise(4, pixel, c);
+          other.pixel(x, y)[c] = test::noise(5, pixel, c);
+        }
+        for (int i : {0, 1}) guides.row(i, y)[x] = test::noise(6, pixel, i);
+      }
+  }
+  NlMeansSteering steering() const { return {&f, &s, &guides, &valid}; }
+};
+
+/// The formula of nl_means.h at one pixel.
+std::array<double, 3> expected_mean(const Picture& p, const Image& source, int x, int y, double bandwidth) {
+  const int width = p.f.width, height = p.f.height;
+  std::array<double, 3> sum{};
+  double weights = 0;
+  for (int dy = -kNlMeansRadius; dy <= kNlMeansRadius; ++dy)
+    for (int dx = -kNlMeansRadius; dx <= kNlMeansRadius; ++dx) {
+      const int qx = x + dx, qy = y + dy;
+      if (qx < 0 || qy < 0 || qx >= width || qy >= height || !p.valid[qy * width + qx]) continue;
+      double distance = 0, guide = 0;
+      for (int v = -1; v <= 1; ++v)
+        for (int u = -1; u <= 1; ++u)
+          for (int c = 0; c < 3; ++c) {
+            const auto at = [&](const Image& image, int px, int py) {
+              return static_cast<double>(image.pixel(std::clamp(px, 0, width - 1), std::clamp(py, 0, height - 1))[c]);
+            };
+            const double difference = at(p.f, x + u, y + v) - at(p.f, qx + u, qy + v);
+            const double own = std::pow(at(p.s, x + u, y + v), 2), other = std::pow(at(p.s, qx + u, qy + v), 2);
+            distance += (difference * difference - own - std::min(own, other)) / (own + other + 1e-10) / 27;
+          }
+      for (int i : {0, 1}) guide += std::pow(p.guides.row(i, y)[x] - p.guides.row(i, qy)[qx], 2);
+      const double weight = std::exp(-std::max({distance / (bandwidth * bandwidth), guide, 0.0}));
+      weights += weight;
+      for (int c = 0; c < 3; ++c) sum[c] += weight * source.pixel(qx, qy)[c];
+    }
+  for (double& value : sum) value /= weights;
+  return sum;
+}
+
+TEST(NlMeans, IsItsFormula) {
+  Picture p(150, 37);  // more than one tile in both directions
+  p.valid[20 * 150 + 70] = 0;
+  const NlMeansTask tasks[] = {{0.5f, {&p.f, &p.other}}, {1.0f, {&p.f}}};
+  const std::vector<Image> images = nl_means(p.steering(), tasks);
+  ASSERT_EQ(images.size(), 3u);
+  for (const auto& [x, y] : {std::pair{0, 0}, {149, 36}, {125, 15}, {126, 16}, {69, 20}, {149, 5}})
+    for (const auto& [image, source, bandwidth] : {std::tuple{0, &p.f, 0.5}, {1, &p.other, 0.5}, {2, &p.f, 1.0}}) {
+      const std::array<double, 3> expected = expected_mean(p, *source, x, y, bandwidth);
+      for (int c = 0; c < 3; ++c)
+        EXPECT_NEAR(images[image].pixel(x, y)[c], expected[c], 2e-5) << x << " " << y << " image " << image;
+    }
+}
+
+TEST(NlMeans, LeavesOutWhatIsNotValid) {
+  Picture p(20, 20);
+  for (int c = 0; c < 3; ++c) p.other.pixel(9, 9)[c] = 1e30f;
+  p.valid[9 * 20 + 9] = 0;
+  const NlMeansTask tasks[] = {{1.0f, {&p.other}}};
+  const Image image = nl_means(p.steering(), tasks)[0];
+  for (float value : image.data) ASSERT_LT(value, 1.0f);
+}
+
+TEST(NlMeans, KeepsWhatHasNoErrorAndNoEqual) {
+  Picture p(5, 4);
+  std::fill(p.s.data.begin(), p.s.data.end(), 0.0f);
+  const NlMeansTask tasks[] = {{0.5f, {&p.f}}};
+  EXPECT_EQ(nl_means(p.steering(), tasks)[0].data, p.f.data);
+  const Picture one(1, 1);
+  const NlMeansTask task[] = {{0.5f, {&one.f}}};
+  EXPECT_EQ(nl_means(one.steering(), task)[0].data, one.f.data);
+}
+
+TEST(NlMeans, DoesNotDependOnThreads) {
+  const Picture p(140, 40);
+  const NlMeansTask tasks[] = {{0.5f, {&p.f}}};
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  const std::vector<float> alone = nl_means(p.steering(), tasks)[0].data;
+  const tbb::global_control four(tbb::global_control::max_allowed_parallelism, 4);
+  EXPECT_EQ(nl_means(p.steering(), tasks)[0].data, alone);
+}
+
+}  // namespace
+}  // namespace covary

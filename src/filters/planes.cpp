@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "filters/planes.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <numeric>
+
+#include "core/parallel.h"
+#include "film/groups.h"
+
+namespace covary {
+
+Planes::Planes(int width, int height, int count, int border, float value)
+    : width_(width), height_(height), count_(count), border_(border), stride_(width + 2 * border + lanes::kLanes) {
+  data_.assign(static_cast<size_t>(count) * (height + 2 * border) * stride_ + lanes::kLanes, value);
+}
+
+std::vector<unsigned char> finite_pixels(const GroupedImage& a, const GroupedImage& b, long& n_nonfinite) {
+  std::vector<unsigned char> valid(static_cast<size_t>(a.width) * a.height, 1);
+  std::atomic<long> bad{0};
+  parallel_for(a.height, 8, [&](int y) {
+    long bad_in_row = 0;
+    for (int x = 0; x < a.width; ++x) {
+      // 0 * v is NaN for infinite and NaN values and zero otherwise.
+      float test = 0;
+      for (const GroupedImage* image : {&a, &b}) {
+        const float* p = image->pixel(x, y);
+        for (int i = 0; i < 3 * image->groups; ++i) test += 0.0f * p[i];
+      }
+      if (test != 0.0f) {
+        valid[static_cast<size_t>(y) * a.width + x] = 0;
+        ++bad_in_row;
+      }
+    }
+    bad += bad_in_row;
+  });
+  n_nonfinite = bad;
+  return valid;
+}
+
+namespace {
+
+/// Mean of the groups first, first + step, … of one pixel and its variance, per channel.
+struct PixelMoments {
+  float mean[3] = {}, variance[3] = {};
+};
+
+/// Groups of equal sizes.
+PixelMoments equal_moments(const float* p, int groups, int first, int step) {
+  const int n = (groups - first + step - 1) / step;
+  PixelMoments m;
+  float squares[3] = {};
+  for (int t = first; t < groups; t += step)
+    for (int c = 0; c < 3; ++c) m.mean[c] += p[3 * t + c];
+  for (float& s : m.mean) s /= static_cast<float>(n);
+  for (int t = first; t < groups; t += step)
+    for (int c = 0; c < 3; ++c) squares[c] += (p[3 * t + c] - m.mean[c]) * (p[3 * t + c] - m.mean[c]);
+  for (int c = 0; c < 3; ++c)
+    m.variance[c] = n > 1 ? squares[c] / (static_cast<float>(n) * static_cast<float>(n - 1)) : 0.0f;
+  return m;
+}
+
+/// Groups of `count` samples, weighted by their sizes n_t: m = sum n_t m_t / N, sum n_t (m_t - m)^2 / ((n - 1) N).
+PixelMoments weighted_moments(const float* p, int groups, uint32_t count, int first, int step) {
+  const int n = (groups - first + step - 1) / step;
+  const auto size = [&](int t) { return static_cast<float>(group_size(count, groups, t)); };
+  PixelMoments m;
+  float samples = 0, squares[3] = {};
+  for (int t = first; t < groups; t += step) {
+    samples += size(t);
+    for (int c = 0; c < 3; ++c) m.mean[c] += size(t) * p[3 * t + c];
+  }
+  for (float& s : m.mean) s /= samples;
+  for (int t = first; t < groups; t += step)
+    for (int c = 0; c < 3; ++c) squares[c] += size(t) * (p[3 * t + c] - m.mean[c]) * (p[3 * t + c] - m.mean[c]);
+  for (int c = 0; c < 3; ++c) m.variance[c] = n > 1 ? squares[c] / (samples * static_cast<float>(n - 1)) : 0.0f;
+  return m;
+}
+
+/// Moments::relative_count.
+std::optional<Planes> relative_counts(const GroupedImage& image, int border) {
+  if (!image.counts) return std::nullopt;
+  const uint32_t* end = image.counts + static_cast<size_t>(image.width) * image.height;
+  const double mean = image.mean_count > 0
+                          ? image.mean_count
+                          : std::accumulate(image.counts, end, 0.0) / static_cast<double>(end - image.counts);
+  if (std::all_of(image.counts, end, [&](uint32_t n) { return n == mean; })) return std::nullopt;
+  Planes planes(image.width, image.height, 1, border, 1.0f);
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x) planes.row(0, y)[x] = static_cast<float>(image.count(x, y) / mean);
+  return planes;
+}
+
+}  // namespace
+
+Moments moments(const GroupedImage& image, const std::vector<unsigned char>& valid, int border, float outside,
+                int first, int step) {
+  Moments m{Planes(image.width, image.height, 3, border, outside),
+            Planes(image.width, image.height, 3, border, kUseless), relative_counts(image, border)};
+  parallel_for(image.height, 8, [&](int y) {
+    for (int x = 0; x < image.width; ++x) {
+      if (!valid[static_cast<size_t>(y) * image.width + x]) continue;
+      const float* p = image.pixel(x, y);
+      const PixelMoments pixel = image.has_equal_groups(x, y)
+                                     ? equal_moments(p, image.groups, first, step)
+                                     : weighted_moments(p, image.groups, image.count(x, y), first, step);
+      for (int c = 0; c < 3; ++c) {
+        m.mean.row(c, y)[x] = pixel.mean[c];
+        m.variance_of_mean.row(c, y)[x] = pixel.variance[c];
+      }
+    }
+  });
+  return m;
+}
+
+void fill_invalid(const GroupedImage& a, const GroupedImage& b, const std::vector<unsigned char>& valid,
+                  Image& result) {
+  for (int y = 0; y < a.height; ++y)
+    for (int x = 0; x < a.width; ++x) {
+      if (valid[static_cast<size_t>(y) * a.width + x]) continue;
+      for (int c = 0; c < 3; ++c) {
+        double sum = 0;
+        int n = 0;
+        for (const GroupedImage* image : {&a, &b})
+          for (int t = 0; t < image->groups; ++t) {
+            const float v = image->pixel(x, y)[3 * t + c];
+            if (!std::isfinite(v)) continue;
+            sum += v;
+            ++n;
+          }
+        result.pixel(x, y)[c] = n ? static_cast<float>(sum / n) : 0.0f;
+      }
+    }
+}
+
+std::vector<Offset> window_offsets(int window) {
+  const int r = window / 2;
+  std::vector<Offset> offsets;
+  for (int dy = -r; dy <= r; ++dy)
+    for (int dx = -r; dx <= r; ++dx) offsets.push_back({dx, dy});
+  std::stable_sort(offsets.begin(), offsets.end(), [](const Offset& a, const Offset& b) {
+    return a.dx * a.dx + a.dy * a.dy < b.dx * b.dx + b.dy * b.dy;
+  });
+  return offsets;
+}
+
+}  // namespace covary

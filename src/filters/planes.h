@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+// Planar images with a border, so that windows can be read with plain vector loads and no index tests.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "core/parallel.h"
+#include "film/grouped_image.h"
+#include "filters/lanes.h"
+
+namespace covary {
+
+/// `count` images of width x height floats, each with `border` more pixels on every side (and room to read kLanes
+/// floats from any column inside). The border keeps the value it was made with.
+class Planes {
+ public:
+  Planes() = default;
+  Planes(int width, int height, int count, int border, float value);
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+  int count() const { return count_; }
+  int border() const { return border_; }
+  ptrdiff_t stride() const { return stride_; }
+  /// Address of column 0 of row y of plane c; y in [-border, height + border).
+  float* row(int c, int y) { return data_.data() + offset(c, y); }
+  const float* row(int c, int y) const { return data_.data() + offset(c, y); }
+
+ private:
+  size_t offset(int c, int y) const {
+    return (static_cast<size_t>(c) * (height_ + 2 * border_) + (y + border_)) * stride_ + border_;
+  }
+  int width_ = 0, height_ = 0, count_ = 0, border_ = 0;
+  ptrdiff_t stride_ = 0;
+  std::vector<float> data_;
+};
+
+/// Calls batch(x, y, n) for the pixels (x … x + n - 1, y), n <= kLanes, of all batches of an image, rows in parallel.
+template <typename Batch>
+void for_each_batch(int width, int height, const Batch& batch) {
+  parallel_for(height, 4, [&](int y) {
+    for (int x = 0; x < width; x += lanes::kLanes) batch(x, y, std::min(lanes::kLanes, width - x));
+  });
+}
+
+/// Value of guide images outside the frame and at pixels with non-finite input: farther from every real pixel than any
+/// bandwidth, and its square is still finite.
+inline constexpr float kFar = 1e18f;
+/// Error variance of such pixels: no coefficient.
+inline constexpr float kUseless = 1e30f;
+
+/// Mean and variance of a grouped image as planes. Groups of unequal sizes are weighted by them.
+struct Moments {
+  Planes mean;              ///< 3 planes; `outside` beyond the frame and at invalid pixels
+  Planes variance_of_mean;  ///< 3 planes: sample variance of the groups / T; kUseless outside; zero where T = 1
+  /// 1 plane: samples of the pixel over the image's mean, 1 outside; null where pixels all have the same number.
+  std::optional<Planes> relative_count;
+};
+
+/// Marks pixels whose values are all finite in both images (1) or not (0).
+std::vector<unsigned char> finite_pixels(const GroupedImage& a, const GroupedImage& b, long& n_nonfinite);
+
+/// Moments of `image` from the groups first, first + step, first + 2 step, …
+Moments moments(const GroupedImage& image, const std::vector<unsigned char>& valid, int border, float outside,
+                int first = 0, int step = 1);
+
+/// Writes, at every invalid pixel of `result`, the mean of the finite groups of both images, or zero.
+void fill_invalid(const GroupedImage& a, const GroupedImage& b, const std::vector<unsigned char>& valid, Image& result);
+
+/// Offsets of the window x window square around a pixel, from the centre outwards: by squared distance, then row, then
+/// column.
+struct Offset {
+  int dx, dy;
+};
+std::vector<Offset> window_offsets(int window);
+
+}  // namespace covary

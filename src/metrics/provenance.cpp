@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "metrics/provenance.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <set>
+#include <sstream>
+
+#include "film/outputs.h"
+#include "film/splat_layer.h"
+
+namespace covary {
+namespace {
+
+constexpr const char* kPrefix = "covary:";
+
+std::string attribute(const ImageFacts& image, const std::string& key, const std::string& otherwise = "") {
+  const auto it = image.info.attributes.find(kPrefix + key);
+  return it == image.info.attributes.end() ? otherwise : it->second;
+}
+
+/// Integrator and its parameters, pixel filter and sampler of the attribute `settings`: "path …; filter …; …".
+struct Settings {
+  std::string integrator, filter, sampler = "independent";
+  explicit Settings(const std::string& text) {
+    std::stringstream parts(text);
+    for (std::string part; std::getline(parts, part, ';');) {
+      part.erase(0, part.find_first_not_of(' '));
+      if (part.starts_with("filter "))
+        filter = part.substr(7);
+      else if (part.starts_with("sampler "))
+        sampler = part.substr(8);
+      else if (integrator.empty())
+        integrator = part;
+    }
+  }
+  /// Light paths are independent whatever the sampler.
+  bool traces_light() const { return has_light_film(integrator); }
+};
+
+std::set<std::string> seeds_of(const ImageFacts& image) {
+  std::set<std::string> seeds;
+  std::stringstream words(attribute(image, "seed"));
+  for (std::string seed; std::getline(words, seed, ',');) seeds.insert(seed);
+  return seeds;
+}
+
+/// Samples per pixel; 0 where the file does not tell.
+double samples_of(const ImageFacts& image) { return std::strtod(attribute(image, "samples", "0").c_str(), nullptr); }
+
+bool is_integer(const ImageFacts& image) {
+  const auto& channels = image.info.channels;
+  return image.info.format != "openexr" && std::any_of(channels.begin(), channels.end(), [](const ExrFile::Channel& c) {
+           return c.type.find("int") != std::string::npos;
+         });
+}
+
+}  // namespace
+
+std::map<std::string, std::string> inherited_attributes(const std::map<std::string, std::string>& attributes) {
+  static const std::set<std::string> of_films = {"covary:film", "covary:groups", kChecksums};
+  std::map<std::string, std::string> result;
+  for (const auto& [name, value] : attributes)
+    if (name.starts_with(kPrefix) && !of_films.count(name)) result[name] = value;
+  return result;
+}
+
+ImageFacts read_facts(const std::string& path, const std::string& name) {
+  return {path, name.empty() ? path : name, inspect_image(path)};
+}
+
+std::vector<std::string> image_warnings(const ImageFacts& image) {
+  std::vector<std::string> warnings;
+  const bool is_film = !attribute(image, "film").empty();
+  if (!attribute(image, film_key::kLightPaths).empty())
+    warnings.push_back(image.name + " holds light paths alone, a part of an image; 'covary combine --light' adds it");
+  else if (is_film && attribute(image, film_key::kLight).empty() &&
+           Settings(attribute(image, "settings")).traces_light())
+    warnings.push_back(image.name +
+                       " lacks the light of its light film, usually light.exr beside it; 'covary combine --light' adds "
+                       "it");
+  if (attribute(image, film_key::kComplete) == "false")
+    warnings.push_back(image.name + " is of an interrupted render" +
+                       (is_film ? "" : ", which the same command with --resume completes"));
+  return warnings;
+}
+
+std::vector<std::string> reference_warnings(const ImageFacts& image, const ImageFacts& reference) {
+  if (is_same_file(image.path, reference.path)) return {};
+  std::vector<std::string> warnings;
+  const bool mixed = attribute(reference, "estimator").find("--denoise") != std::string::npos;
+  if (mixed || !attribute(reference, "denoiser").empty())
+    warnings.push_back(reference.name + " is denoised, and so biased: it is no reference for errors");
+  const double samples = samples_of(image), of_reference = samples_of(reference);
+  if (of_reference > 0 && of_reference <= samples)
+    warnings.push_back(
+        fmt::format("{} has {:g} samples per pixel, no more than {} with {:g}: its noise counts as error",
+                    reference.name, of_reference, image.name, samples));
+  return warnings;
+}
+
+std::vector<std::string> comparison_warnings(const ImageFacts& image, const ImageFacts& reference) {
+  if (is_same_file(image.path, reference.path))
+    return {fmt::format("{} and {} are the same file", image.name, reference.name)};
+  std::vector<std::string> warnings;
+  const auto warn = [&](const std::string& what) {
+    warnings.push_back(fmt::format("{} and {} {}", image.name, reference.name, what));
+  };
+  const auto compare = [&](const std::string& what, const std::string& a, const std::string& b) {
+    if (!a.empty() && !b.empty() && a != b) warn(fmt::format("{}: '{}' and '{}'", what, a, b));
+  };
+  const std::set<std::string> seeds = seeds_of(image), other_seeds = seeds_of(reference);
+  std::vector<std::string> common;
+  std::set_intersection(seeds.begin(), seeds.end(), other_seeds.begin(), other_seeds.end(), std::back_inserter(common));
+  // Passes of common and of independent random numbers share no samples, whatever their seeds, nor do samplers.
+  const Settings settings(attribute(image, "settings")), other(attribute(reference, "settings"));
+  const bool same_sampler = settings.sampler == other.sampler || settings.traces_light();
+  const std::string sampling = attribute(image, "sampling"), other_sampling = attribute(reference, "sampling");
+  if (!common.empty() && same_sampler && (sampling.empty() || other_sampling.empty() || sampling == other_sampling))
+    warn(fmt::format("have seed {} in common and so share samples, which makes errors between them wrong",
+                     fmt::join(common, ", ")));
+  if (const std::string a = attribute(image, "scene_hash"), b = attribute(reference, "scene_hash");
+      !a.empty() && !b.empty() && a != b)
+    warn("show different scenes, or versions of one (attribute covary:scene_hash)");
+  compare("were rendered with different settings", settings.integrator, other.integrator);
+  compare("were rendered with different pixel filters", settings.filter, other.filter);
+  // An exposure of 0 is not written.
+  compare("have different exposures in stops", attribute(image, "exposure", "0"),
+          attribute(reference, "exposure", "0"));
+  if (is_integer(image) != is_integer(reference)) {
+    const ImageFacts& rounded = is_integer(image) ? image : reference;
+    warn(fmt::format("differ in precision: {} holds {} values, rounded and cut off at white", rounded.name,
+                     rounded.info.channels[0].type));
+  }
+  return warnings;
+}
+
+}  // namespace covary

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every second group of an image: half of its samples, independent of the other half, so that what was made of one can
+// be judged by the other.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "film/grouped_image.h"
+
+namespace covary {
+
+/// A copy of the groups first, first + 2, … of an image.
+class HalfImage {
+ public:
+  /// `first`: 0 or 1; `image` has two groups or more.
+  HalfImage(const GroupedImage& image, int first);
+  /// Valid while this object lives.
+  GroupedImage view() const;
+
+ private:
+  GroupedImage shape_;
+  std::vector<float> data_;
+  std::vector<uint32_t> counts_;  // empty where the image has none
+};
+
+}  // namespace covary

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "risk/held_out_error.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/parallel.h"
+#include "filters/guided_cells.h"
+#include "risk/halves.h"
+#include "risk/held_out_bias.h"
+#include "risk/relative_weight.h"
+
+namespace covary {
+namespace {
+
+using namespace lanes;
+
+double square(double value) { return value * value; }
+
+/// Pixels of a part of a row, whose errors are taken together.
+constexpr int kPart = 16;
+/// Relative standard error of the held-out error at which it counts as much as the estimator's own prediction.
+constexpr double kTrusted = 0.3;
+/// Least error of the whole over the variance of the halves: half, but for noise.
+constexpr double kLeastOverVariance = 0.25;
+
+HeldOutRow sum_of(const std::vector<HeldOutRow>& rows) {
+  HeldOutRow all;
+  for (const HeldOutRow& row : rows) {
+    all.error += row.error, all.variance += row.variance, all.predicted += row.predicted;
+    all.squares += row.squares, all.parts += row.parts;
+  }
+  return all;
+}
+
+/// Squared relative standard error c^2 of the held-out error; infinite where that says nothing.
+double squared_uncertainty(const HeldOutRow& all) {
+  if (all.parts < 2 || !(all.error > 0) || !std::isfinite(all.squares + all.variance))
+    return std::numeric_limits<double>::infinity();
+  return std::max(0.0, all.squares - all.error * all.error / all.parts) / square(all.error);
+}
+
+/// How much the held-out error counts, 0 to 1: 1 / (1 + (c / kTrusted)^2).
+double trust_in(const HeldOutRow& all) { return 1 / (1 + squared_uncertainty(all) / square(kTrusted)); }
+
+/// The squared error of the image of all samples.
+double error_of_whole(const HeldOutRow& all) {
+  return std::max(all.error - 0.5 * all.variance, kLeastOverVariance * all.variance);
+}
+
+/// Squared errors and variance of the halves in a row; weights_at(x): those of both halves' squared errors.
+template <typename WeightsAt>
+HeldOutRow row_of_halves(const HeldOutInput& in, int width, int y, const WeightsAt& weights_at) {
+  HeldOutRow row;
+  double part = 0;
+  for (int x = 0; x < width; ++x) {
+    if ((*in.valid)[static_cast<size_t>(y) * width + x]) {
+      const float* m[2] = {in.halves[0]->pixel(x, y), in.halves[1]->pixel(x, y)};
+      const std::array<double, 2> weights = weights_at(x);
+      for (int c = 0; c < 3; ++c) {
+        for (int half : {0, 1}) {
+          const Moments& h = *in.independent[1 - half];
+          part += 0.5 * weights[half] * (square(h.mean.row(c, y)[x] - m[half][c]) - h.variance_of_mean.row(c, y)[x]);
+        }
+        row.variance += 0.25 * (weights[0] + weights[1]) * square(m[0][c] - m[1][c]);
+      }
+    }
+    if (x % kPart != kPart - 1 && x != width - 1) continue;
+    row.error += part, row.squares += part * part, row.parts += 1;
+    part = 0;
+  }
+  return row;
+}
+
+/// The image's squared error over half of the variance of the halves.
+double factor_of_image(const HeldOutInput& in) {
+  std::vector<HeldOutRow> rows(static_cast<size_t>(in.guide->height));
+  parallel_for(in.guide->height, 8, [&](int y) {
+    rows[static_cast<size_t>(y)] = row_of_halves(in, in.guide->width, y, [&](int x) {
+      const double weight = relative_weight(in.guide->pixel(x, y));
+      return std::array{weight, weight};
+    });
+  });
+  const HeldOutRow all = sum_of(rows);
+  const double trust = all.variance > 0 ? trust_in(all) : 0, usual = in.error_over_variance;
+  if (trust == 0) return 2 * usual;
+  return 2 * usual * std::pow(error_of_whole(all) / (usual * all.variance), trust);
+}
+
+/// The weight of each squared error is that of the image it belongs to: independent of the held-out samples.
+HeldOutRow held_out_row(const HeldOutInput& in, const EstimatorResult& whole, int y) {
+  const int width = whole.estimate.width;
+  HeldOutRow row = row_of_halves(in, width, y, [&](int x) {
+    return std::array<double, 2>{relative_weight(in.halves[0]->pixel(x, y)),
+                                 relative_weight(in.halves[1]->pixel(x, y))};
+  });
+  for (int x = 0; x < width; ++x) {
+    if (!(*in.valid)[static_cast<size_t>(y) * width + x]) continue;
+    const double w = relative_weight(whole.estimate.pixel(x, y));
+    for (int c = 0; c < 3; ++c) row.predicted += w * square(whole.std_error.pixel(x, y)[c]);
+  }
+  return row;
+}
+
+EstimatorResult apply_with_rows(const Estimator& base, const GroupedImage& crn, const GroupedImage& independent,
+                                const PairSettings& settings) {
+  EstimatorResult whole = base.apply(crn, independent, settings);
+  if (!settings.std_error || !settings.held_out || crn.groups < 2 * base.fewest_groups ||
+      independent.groups < 2 * base.fewest_groups)
+    return whole;
+  PairSettings half_settings = settings;
+  half_settings.std_error = false;
+  half_settings.crn_samples = std::max<int64_t>(1, settings.crn_samples / 2);
+  long ignored = 0;
+  const std::vector<unsigned char> valid = finite_pixels(crn, independent, ignored);
+  std::array<Image, 2> images;
+  std::array<Moments, 2> h;
+  for (int half : {0, 1}) {
+    const HalfImage half_crn(crn, half), half_independent(independent, half);
+    images[half] = base.apply(half_crn.view(), half_independent.view(), half_settings).estimate;
+    h[half] = moments(half_independent.view(), valid, 0, 0.0f);
+  }
+  const HeldOutInput input{{&images[0], &images[1]}, {&h[0], &h[1]}, nullptr, &valid};
+  whole.bias = held_out_bias({input.halves, input.halves, input.independent, &valid});
+  whole.held_out.resize(static_cast<size_t>(crn.height));
+  parallel_for(crn.height, 8, [&](int y) { whole.held_out[static_cast<size_t>(y)] = held_out_row(input, whole, y); });
+  return whole;
+}
+
+}  // namespace
+
+Estimator with_held_out_rows(const Estimator& base) {
+  if (!base.holds_out || base.adaptive) return base;
+  Estimator estimator = base;
+  // The images and moments of both halves, and half of the groups of both images.
+  estimator.memory.of_halves = 2 * (3 + 6) * sizeof(float);
+  estimator.memory.of_halves_per_group = 3 * sizeof(float);
+  estimator.memory.groups_for_halves = 2 * base.fewest_groups;
+  if (base.reach >= 0) estimator.reach += kBiasReach;
+  estimator.apply = [base](const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings) {
+    return apply_with_rows(base, crn, independent, settings);
+  };
+  return estimator;
+}
+
+void calibrate(EstimatorResult& result) {
+  if (result.held_out.empty()) return;
+  const HeldOutRow all = sum_of(result.held_out);
+  result.held_out.clear();
+  if (!(all.predicted > 0)) return;
+  const double trust = trust_in(all);
+  result.verdict = {std::sqrt(squared_uncertainty(all)), error_of_whole(all) / all.predicted};
+  if (trust == 0) return;
+  const auto factor = static_cast<float>(std::pow(error_of_whole(all) / all.predicted, 0.5 * trust));
+  for (float& value : result.std_error.data) value *= factor;
+}
+
+Image held_out_error(const HeldOutInput& input) {
+  const int width = input.guide->width, height = input.guide->height;
+  // Half of the variance of a half, and the number of pixels, each times the weight of relMSE.
+  const GuidedCells cells(*input.guide, *input.valid, 4, [&](int x, int y, float* sums) {
+    const float weight = relative_weight(input.guide->pixel(x, y));
+    for (int c = 0; c < 3; ++c)
+      sums[c] += 0.25f * weight * sqr(input.halves[0]->pixel(x, y)[c] - input.halves[1]->pixel(x, y)[c]);
+    sums[3] += 1;
+  });
+  const double factor = factor_of_image(input);
+  Image result(width, height, 3);
+  for_each_batch(width, height, [&](int x, int y, int n) {
+    std::array<vfloat, 4> sums;
+    cells.sum(x, y, sums.data());
+    for (int l = 0; l < n; ++l) {
+      if (!(*input.valid)[static_cast<size_t>(y) * width + x + l]) continue;
+      const float scale =
+          static_cast<float>(factor) / (std::max(sums[3][l], 1e-20f) * relative_weight(input.guide->pixel(x + l, y)));
+      for (int c = 0; c < 3; ++c) result.pixel(x + l, y)[c] = std::sqrt(scale * sums[c][l]);
+    }
+  });
+  return result;
+}
+
+}  // namespace covary

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "risk/predicted_error.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+
+namespace covary {
+namespace {
+
+constexpr int kBlock = 16;
+constexpr double kShareOfBlocks = 0.95;
+
+/// Of doubt_of_prediction(). Fewer pixels than kFewestPixels have no hundredth to speak of.
+constexpr double kFewPixels = 0.01, kMostInFewPixels = 0.4, kMostUncertainty = 0.5, kMostDisagreement = 4;
+constexpr size_t kFewestPixels = 400;
+
+/// Sum over the pixels of a part of the image, and their number.
+struct PartSum {
+  double total = 0;
+  size_t n_pixels = 0;
+  double mean() const { return n_pixels ? total / static_cast<double>(n_pixels) : 0.0; }
+};
+
+/// Predicted relative squared error of a pixel.
+double predicted_at(const EstimatorResult& result, int x, int y) {
+  double sum = 0, squares = 0;
+  for (int c = 0; c < 3; ++c) {
+    sum += result.estimate.pixel(x, y)[c];
+    squares += static_cast<double>(result.std_error.pixel(x, y)[c]) * result.std_error.pixel(x, y)[c];
+  }
+  return squares / 3 / (sum * sum / 9 + 0.01);
+}
+
+PartSum sum_over(const EstimatorResult& result, int x0, int y0, int x1, int y1) {
+  if (result.std_error.data.empty())
+    throw Error(ErrorCode::kUsage, "predicted_relmse: the result has no standard error; set std_error in the options");
+  PartSum part;
+  for (int y = y0; y < y1; ++y)
+    for (int x = x0; x < x1; ++x) {
+      const double relative = predicted_at(result, x, y);
+      if (!std::isfinite(relative)) continue;
+      part.total += relative;
+      ++part.n_pixels;
+    }
+  return part;
+}
+
+/// Part of the predicted error that the pixels with most of it hold, kFewPixels of all.
+double share_of_few(const EstimatorResult& result) {
+  std::vector<double> errors;
+  for (int y = 0; y < result.estimate.height; ++y)
+    for (int x = 0; x < result.estimate.width; ++x)
+      if (const double error = predicted_at(result, x, y); std::isfinite(error)) errors.push_back(error);
+  if (errors.size() < kFewestPixels) return 0;
+  const auto few = errors.begin() + static_cast<ptrdiff_t>(kFewPixels * static_cast<double>(errors.size()));
+  std::nth_element(errors.begin(), few, errors.end(), std::greater<>());
+  const double all = std::accumulate(errors.begin(), errors.end(), 0.0);
+  return all > 0 ? std::accumulate(errors.begin(), few, 0.0) / all : 0;
+}
+
+}  // namespace
+
+double predicted_relmse(const EstimatorResult& result) {
+  return sum_over(result, 0, 0, result.estimate.width, result.estimate.height).mean();
+}
+
+double predicted_blocks(const EstimatorResult& result) {
+  const int width = result.estimate.width, height = result.estimate.height;
+  std::vector<double> blocks;
+  for (int y = 0; y < height; y += kBlock)
+    for (int x = 0; x < width; x += kBlock)
+      blocks.push_back(sum_over(result, x, y, std::min(width, x + kBlock), std::min(height, y + kBlock)).mean());
+  if (blocks.empty()) return 0;
+  const auto rank = static_cast<ptrdiff_t>(std::ceil(kShareOfBlocks * static_cast<double>(blocks.size()))) - 1;
+  std::nth_element(blocks.begin(), blocks.begin() + rank, blocks.end());
+  return blocks[static_cast<size_t>(rank)];
+}
+
+std::string doubt_of_prediction(const EstimatorResult& result, double samples, uint32_t reliable_samples) {
+  if (samples < reliable_samples) return fmt::format("fewer than {} samples per pixel", reliable_samples);
+  if (const double share = share_of_few(result); share > kMostInFewPixels)
+    return fmt::format("{:.0f} % of it lies in {:.0f} % of the pixels", 100 * share, 100 * kFewPixels);
+  if (!result.verdict) return "";
+  const auto& [uncertainty, ratio] = *result.verdict;
+  if (!std::isfinite(uncertainty)) return "held-out samples do not confirm it";
+  if (uncertainty > kMostUncertainty)
+    return fmt::format("held-out samples know it only to ±{:.0f} %", 100 * uncertainty);
+  if (ratio > kMostDisagreement || ratio < 1 / kMostDisagreement)
+    return fmt::format("held-out samples tell {:.2g} times as much as the estimator itself", ratio);
+  return "";
+}
+
+}  // namespace covary

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// What an estimator's own error estimate says about the whole image.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "estimators/estimator_result.h"
+#include "film/grouped_image.h"
+
+namespace covary {
+
+/// relMSE that the standard errors of `result` predict, with the estimate in place of the reference:
+///     1 / (3N) sum ||StdError||^2 / (F'^2 + 0.01),   F': mean of the pixel's three values.
+/// Pixels that are not finite are left out. Throws Error(kUsage) where `result` has no standard error.
+double predicted_relmse(const EstimatorResult& result);
+
+/// The same of the block of 16 x 16 pixels (smaller at the right and lower edge) that 95 % of the blocks do not exceed:
+/// how bad the worst regions are.
+double predicted_blocks(const EstimatorResult& result);
+
+/// Why the prediction may be off by more than a factor of about two; empty where nothing says so. That is with fewer
+/// than `reliable_samples` (Estimator::reliable_samples) per pixel, where a hundredth of the pixels hold more than two
+/// fifths of it, where held-out samples know it only to more than half of itself, and where they tell more than four
+/// times as much as the estimator, or less than a quarter (of results that calibrate() scaled). Light that no sample
+/// has found is not seen here either. `samples`: per pixel, of all passes together; infinite where nobody knows.
+/// Measured in docs/methods/error-estimates.md.
+std::string doubt_of_prediction(const EstimatorResult& result, double samples, uint32_t reliable_samples);
+
+}  // namespace covary

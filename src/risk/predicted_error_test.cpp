@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+// The predicted error of an image, by hand.
+#include "risk/predicted_error.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/error.h"
+
+namespace covary {
+namespace {
+
+TEST(PredictedError, IsTheMeanOfRelativeSquares) {
+  EstimatorResult result;
+  result.estimate = Image(3, 1, 3);
+  result.std_error = Image(3, 1, 3);
+  result.estimate.data = {1, 2, 3, 0, 0, 0, 1, 1, 1};
+  result.std_error.data = {0.1f, 0.2f, 0.3f, 0.1f, 0, 0, std::numeric_limits<float>::quiet_NaN(), 0, 0};
+  // The third pixel is not finite and does not count.
+  const double first = (0.01 + 0.04 + 0.09) / 3 / (4 + 0.01), second = 0.01 / 3 / 0.01;
+  EXPECT_NEAR(predicted_relmse(result), (first + second) / 2, 1e-7);
+}
+
+/// 4 x 5 blocks, the last ones smaller, of which block i has the error i.
+TEST(PredictedError, OfBlocksIsTheirPercentile) {
+  EstimatorResult result;
+  result.estimate = Image(60, 70, 3);
+  result.std_error = Image(60, 70, 3);
+  for (int y = 0; y < 70; ++y)
+    for (int x = 0; x < 60; ++x)
+      for (int c = 0; c < 3; ++c)
+        result.std_error.pixel(x, y)[c] = std::sqrt(0.01f * static_cast<float>(y / 16 * 4 + x / 16));
+  EXPECT_NEAR(predicted_blocks(result), 18, 1e-4);  // 19 of 20 have no more
+  EXPECT_EQ(doubt_of_prediction(result, 47, 48), "fewer than 48 samples per pixel");
+  EXPECT_EQ(doubt_of_prediction(result, 1, 0), "");
+  result.estimate = result.std_error = Image(3, 2, 3);
+  EXPECT_EQ(predicted_blocks(result), 0);
+}
+
+TEST(PredictedError, IsDoubtedWhereFewPixelsHoldIt) {
+  EstimatorResult result;
+  result.estimate = result.std_error = Image(40, 25, 3);
+  std::fill(result.std_error.data.begin(), result.std_error.data.end(), 0.1f);
+  EXPECT_EQ(doubt_of_prediction(result, 48, 48), "");
+  // 990 pixels with 1 each and 10 with 70 each: 0.41 of 1690.
+  for (int x = 0; x < 10; ++x)
+    for (int c = 0; c < 3; ++c) result.std_error.pixel(3 * x, 7)[c] = 0.1f * std::sqrt(70.0f);
+  EXPECT_EQ(doubt_of_prediction(result, 48, 48), "41 % of it lies in 1 % of the pixels");
+  for (int x = 0; x < 10; ++x)
+    for (int c = 0; c < 3; ++c) result.std_error.pixel(3 * x, 7)[c] = 0.1f * std::sqrt(60.0f);  // 0.38
+  EXPECT_EQ(doubt_of_prediction(result, 48, 48), "");
+  std::fill(result.std_error.data.begin(), result.std_error.data.end(), 0.0f);
+  EXPECT_EQ(doubt_of_prediction(result, 48, 48), "");
+  EXPECT_EQ(doubt_of_prediction(result, 47, 48), "fewer than 48 samples per pixel");
+  EXPECT_EQ(doubt_of_prediction(result, 1, 0), "");
+  result.estimate = result.std_error = Image(3, 2, 3);
+  result.std_error.pixel(1, 1)[0] = 1;
+  EXPECT_EQ(doubt_of_prediction(result, 48, 48), "") << "six pixels have no hundredth";
+}
+
+TEST(PredictedError, IsDoubtedWhereHeldOutSamplesDoNotConfirmIt) {
+  EstimatorResult result;
+  result.estimate = result.std_error = Image(2, 2, 3);
+  const auto doubt = [&](double uncertainty, double ratio) {
+    result.verdict = {uncertainty, ratio};
+    return doubt_of_prediction(result, 48, 48);
+  };
+  EXPECT_EQ(doubt(0.2, 1), "");
+  EXPECT_EQ(doubt(0.49, 3.9), "");
+  EXPECT_EQ(doubt(0.49, 0.26), "");
+  EXPECT_EQ(doubt(0.8, 1), "held-out samples know it only to ±80 %");
+  EXPECT_EQ(doubt(std::numeric_limits<double>::infinity(), 1), "held-out samples do not confirm it");
+  EXPECT_EQ(doubt(0.2, 33), "held-out samples tell 33 times as much as the estimator itself");
+  EXPECT_EQ(doubt(0.2, 0.2), "held-out samples tell 0.2 times as much as the estimator itself");
+}
+
+TEST(PredictedError, NeedsAStandardError) {
+  EstimatorResult result;
+  result.estimate = Image(2, 2, 3);
+  try {
+    predicted_relmse(result);
+    FAIL() << "no error";
+  } catch (const Error& e) {
+    EXPECT_STREQ(e.what(), "predicted_relmse: the result has no standard error; set std_error in the options");
+  }
+}
+
+}  // namespace
+}  // namespace covary
