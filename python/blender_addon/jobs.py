@@ -14,7 +14,7 @@ from typing import Any
 import bpy
 
 from . import program
-from ._cycles import GROUPS, Group, check, groups_of, settings
+from ._cycles import GROUPS, Group, check, groups_of, kept_in_memory, settings
 from .errors import UsageError
 
 
@@ -51,8 +51,12 @@ class Rendering:
         self._ended = self._cancelled = True
 
     def ended(self) -> bool:
-        """Whether the next may begin: a render that is complete is a job still for a moment."""
-        return self._ended and (bpy.app.background or not bpy.app.is_job_running("RENDER"))
+        """In a window. A render that is complete is a job still for a moment, and Esc in the render window ends the job
+        without a word to handlers."""
+        if bpy.app.is_job_running("RENDER"):
+            return False
+        self._cancelled = self._cancelled or not self._ended
+        return True
 
     def close(self) -> None:
         """Puts the settings of the scene back."""
@@ -172,11 +176,12 @@ class Job:
     def _picture(self, frame: int, folder: Path) -> Iterator[Rendering | Combining]:
         files: dict[str, list[str]] = {"crn": [], "independent": []}
         # Each frame has seeds of its own: equal noise in all of them would look like dirt on the lens.
-        for group in groups_of(self.samples, GROUPS, self.seed * 10007 + frame % 10007):
-            path = str(folder / f"{group.kind}{len(files[group.kind])}.exr")
-            files[group.kind].append(path)
-            yield Rendering(self.scene, group, path)
-            self.done += 1
+        with kept_in_memory(self.scene):
+            for group in groups_of(self.samples, GROUPS, self.seed * 10007 + frame % 10007):
+                path = str(folder / f"{group.kind}{len(files[group.kind])}.exr")
+                files[group.kind].append(path)
+                yield Rendering(self.scene, group, path)
+                self.done += 1
         statistics, output = str(folder / "statistics.json"), str(output_of(self.scene, frame))
         combining = Combining(program.combine_command(self.program, files["crn"], files["independent"], output,
                                                       self.denoise, statistics), output)

@@ -107,11 +107,12 @@ class RENDER_OT_covary(bpy.types.Operator):  # type: ignore[misc,name-defined,un
         self.step = None
         try:
             self._prepare(context)
-            self._open_window(context)
         except Exception as error:  # noqa: BLE001
             return self._failed(context, error)
+        # Before another window opens: it would become the operator's, and closing it would end the operator.
         self.timer = context.window_manager.event_timer_add(0.1, window=context.window)
         context.window_manager.modal_handler_add(self)
+        self._open_window(context)
         return {"RUNNING_MODAL"}
 
     def modal(self, context: Any, event: Any) -> set[str]:
@@ -264,6 +265,15 @@ class RENDER_PT_covary_changes(OfCycles, bpy.types.Panel):  # type: ignore[misc,
             self.layout.label(text="Nothing that changes the picture")
 
 
+def of_menu(menu: Any, context: Any) -> None:
+    """What the menu Render has of it, with Cycles."""
+    if context.engine in OfCycles.COMPAT_ENGINES:
+        name = RENDER_OT_covary.bl_idname
+        menu.layout.separator()
+        menu.layout.operator(name, text="Render Image with covary")
+        menu.layout.operator(name, text="Render Animation with covary").animation = True
+
+
 def redraw(context: Any) -> None:
     """The properties editors of all windows."""
     for window in context.window_manager.windows:
@@ -282,10 +292,12 @@ def register() -> None:
         bpy.utils.register_class(cls)
     bpy.types.Scene.covary = bpy.props.PointerProperty(type=Choice)
     bpy.types.WindowManager.covary = bpy.props.PointerProperty(type=State)
+    bpy.types.TOPBAR_MT_render.append(of_menu)
 
 
 def unregister() -> None:
     """Takes them away."""
+    bpy.types.TOPBAR_MT_render.remove(of_menu)
     del bpy.types.Scene.covary
     del bpy.types.WindowManager.covary
     for cls in reversed(CLASSES):

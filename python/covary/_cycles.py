@@ -93,6 +93,17 @@ def settings(scene: Any) -> Iterator[None]:
             setattr(owner, name, value)
 
 
+@contextmanager
+def kept_in_memory(scene: Any) -> Iterator[None]:
+    """Around the groups of one picture: Cycles prepares the scene once, not for each group."""
+    render = scene.render
+    before, render.use_persistent_data = render.use_persistent_data, True
+    try:
+        yield
+    finally:
+        render.use_persistent_data = before
+
+
 def check(scene: Any, spp: int, groups: int = GROUPS) -> None:
     """Raises UsageError for a scene of which no groups can be rendered."""
     if scene.render.engine != "CYCLES":

@@ -43,7 +43,7 @@ def changes(scene: Any) -> list[str]:
 
 def _images(bpy: Any, scene: Any, groups: list[Group]) -> Iterator[tuple[str, Any]]:
     """Renders one group after the other: its kind and image."""
-    with tempfile.TemporaryDirectory(prefix="covary-blender-") as folder:
+    with tempfile.TemporaryDirectory(prefix="covary-blender-") as folder, _cycles.kept_in_memory(scene):
         path = str(Path(folder) / "group.exr")
         for group in groups:
             with group.settings(scene, path):
