@@ -17,12 +17,15 @@
 
 #include "combine/combine.h"
 #include "combine/pair_input.h"
+#include "combine/registry.h"
 #include "combine/result_file.h"
 #include "combine_counts.h"
 #include "commands.h"
 #include "core/stopwatch.h"
-#include "estimator_options.h"
+#include "declared_options.h"
+#include "denoising/mixed_denoising.h"
 #include "estimators/mean.h"
+#include "estimators/sample_counts.h"
 #include "film/outputs.h"
 #include "guide_layer.h"
 #include "json_output.h"
@@ -37,7 +40,8 @@ namespace {
 struct CombineOptions {
   std::vector<std::string> crn, independent;
   std::string output, crn_layer, independent_layer, counts, light, guides, stages, json;
-  EstimatorOptions estimator;
+  std::string estimator = kDefaultEstimator;
+  OptionValues of_estimator, denoising;
   bool error = false, force = false, quiet = false;
   std::optional<int> samples;
   double memory_mib = 4096;
@@ -45,8 +49,14 @@ struct CombineOptions {
   int threads = 0;
 };
 
+DenoisingChoice denoising_of(const CombineOptions& o) { return settings_from<DenoisingChoice>(o.denoising); }
+
+Estimator estimator_of(const CombineOptions& o) {
+  return with_denoising(make_estimator(o.estimator, o.of_estimator), denoising_of(o));
+}
+
 void write(const CombineOptions& o, const GroupedFile& crn, const GroupedFile& independent, EstimatorResult& result) {
-  std::map<std::string, std::string> attributes = {{"covary:estimator", make_estimator(o.estimator).text},
+  std::map<std::string, std::string> attributes = {{"covary:estimator", estimator_of(o).text},
                                                    {"covary:version", COVARY_VERSION},
                                                    {"covary:command", command_line()}};
   if (crn.samples() && independent.samples())
@@ -62,7 +72,7 @@ void check_explain(const CombineOptions& o, const Estimator& estimator, const Gr
   if (estimator.reads_guides)
     throw Error(ErrorCode::kUsage, "--explain: with --denoise, a pixel is no sum of control variates");
   if (!estimator.explain)
-    throw Error(ErrorCode::kUsage, "--explain: " + o.estimator.name + " has no control variates with coefficients");
+    throw Error(ErrorCode::kUsage, "--explain: " + o.estimator + " has no control variates with coefficients");
   if (x < 0 || y < 0 || x >= window.width || y >= window.height)
     throw Error(ErrorCode::kUsage,
                 fmt::format("--explain {},{} is outside the image: {} x {} pixels at ({}, {})", o.explain[0],
@@ -165,7 +175,7 @@ struct Inputs {
 
   explicit Inputs(const CombineOptions& o) : crn(o.crn, o.crn_layer), independent(o.independent, o.independent_layer) {
     if (!o.light.empty()) light.emplace(std::vector{o.light});
-    request.estimator = make_estimator(o.estimator);
+    request.estimator = estimator_of(o);
     request.settings = pair_settings(
         request.estimator, request.estimator.needs_sample_count || o.counts.empty() ? o.samples : std::nullopt,
         crn.samples(), o.error);
@@ -235,7 +245,7 @@ void combine_files(const CombineOptions& o) {
   request.checked = [&](const InputFindings& found) {
     progress.clear();
     print_findings(o, found.findings);
-    progress.begin(o.estimator.denoise == "none" ? "estimating" : "estimating and denoising");
+    progress.begin(denoising_of(o).denoises() ? "estimating and denoising" : "estimating");
   };
   CombinedImage combined = combine(request);
   Stopwatch watch;
@@ -252,7 +262,7 @@ void combine_files(const CombineOptions& o) {
   }
   if (!o.quiet)
     fmt::print(stderr, "{}: {} x {}, {} of {} + {} groups in {:.2f} s (read and check {:.2f} s, write {:.2f} s)\n",
-               o.output, request.crn.width, request.crn.height, o.estimator.name, request.crn.groups,
+               o.output, request.crn.width, request.crn.height, o.estimator, request.crn.groups,
                request.independent.groups, combined.estimate_seconds, combined.check_seconds, write_seconds);
   if (!o.json.empty()) write_text_output(o.json, json_text(json));
 }
@@ -285,13 +295,17 @@ void add_combine(CLI::App& app) {
       ->type_name(kFileValue);
   command->add_option("--light", o->light, "Light film (light.exr of covary render --passes) to add to the result")
       ->type_name(kFileValue);
-  command->add_option("--estimator", o->estimator.name, "iicv, or a comparator")
+  command->add_option("--estimator", o->estimator, "iicv, or a comparator")
       ->check(CLI::Validator([](std::string& name) { return needs_samples_text(name); }, ""))
       ->check(one_of(pair_estimator_names()))
       ->capture_default_str();
-  add_estimator_options(*command, o->estimator, pair_estimator_names(), kAdaptiveOptions);
-  add_denoise_option(*command, o->estimator);
-  add_oidn_option(*command, o->estimator);
+  std::vector<Option> of_estimator = options_of_estimators(pair_estimator_names());
+  std::erase_if(of_estimator, [](const Option& option) {
+    return std::find(std::begin(kAdaptiveOptions), std::end(kAdaptiveOptions), option.name) !=
+           std::end(kAdaptiveOptions);
+  });
+  add_options(*command, of_estimator, o->of_estimator);
+  add_options(*command, options_of<DenoisingChoice>(), o->denoising);
   command
       ->add_option("--guides", o->guides,
                    "For --denoise: image (EXR) of the same pixels whose layers Albedo and N show the surfaces")

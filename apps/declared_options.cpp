@@ -5,7 +5,6 @@
 #include <fmt/ranges.h>
 
 #include "command_description.h"
-#include "integrators/integrator.h"
 #include "value_names.h"
 
 namespace covary {
@@ -25,7 +24,9 @@ std::string names_of(const Option& option) {
 /// What the help shows behind the name.
 std::string value_name(const Option& option) {
   if (option.type == Option::Type::kChoice) return fmt::format("{{{}}}", fmt::join(option.choices, ","));
-  if (const char* named = value_name_of(option.names)) return named;
+  // Of a text that may also be a word: "off|LIBRARY".
+  if (const char* named = value_name_of(option.names))
+    return option.form.ends_with(std::string("|") + named) ? option.form : named;
   if (option.type == Option::Type::kText) return option.form;
   return (option.choices.empty() ? "" : option.choices[0] + "|") +
          (option.type == Option::Type::kWhole ? "INT" : "FLOAT");
@@ -69,13 +70,6 @@ void add_option(CLI::App& command, const Option& what, OptionValues& values) {
 
 void add_options(CLI::App& command, const std::vector<Option>& options, OptionValues& values) {
   for (const Option& option : options) add_option(command, option, values);
-}
-
-std::vector<Option> options_of_integrators() {
-  const std::vector<std::string> names = integrator_names();
-  std::vector<std::vector<Option>> lists;
-  for (const std::string& name : names) lists.push_back(options_of_integrator(name));
-  return merged_options(names, lists);
 }
 
 }  // namespace covary

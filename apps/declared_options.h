@@ -13,7 +13,4 @@ namespace covary {
 /// checked as the declaration says. `values` must live as long as the command.
 void add_options(CLI::App& command, const std::vector<Option>& options, OptionValues& values);
 
-/// The options of all integrators; equal names are one option.
-std::vector<Option> options_of_integrators();
-
 }  // namespace covary

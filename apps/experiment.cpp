@@ -106,7 +106,7 @@ std::vector<uint64_t> parse_seeds(const std::string& text) {
   std::vector<uint64_t> seeds;
   std::stringstream words(text);
   for (std::string word; std::getline(words, word, ',');) {
-    const std::optional<uint64_t> seed = parse_whole<uint64_t>(word);
+    const std::optional<uint64_t> seed = parse_number<uint64_t>(word);
     if (!seed)
       throw Error(ErrorCode::kUsage,
                   "--seeds '" + text + "': expected a number of seeds, or seeds separated by commas");
@@ -146,22 +146,22 @@ void show_progress(const lab::Progress& p, ProgressLine& line) {
 // ---- the command
 // -----------------------------------------------------------------------------------------------------
 
+/// Options of a method as `covary render` reads them.
+RenderOptions parsed(std::vector<std::string> words) {
+  CLI::App command;
+  RenderOptions options;
+  add_render_options(command, options);
+  words.insert(words.end(), {"scene.xml", "-o", "out.exr"});
+  std::reverse(words.begin(), words.end());
+  command.parse(words);
+  return options;
+}
+
 lab::PlanContext plan_context() {
-  lab::PlanContext context;
-  context.program_version = program_version();
-  context.default_estimator = kDefaultEstimator;
-  for (const std::string& name : pair_estimator_names()) {
-    const Estimator estimator = make_estimator(name);
-    if (!estimator.adaptive) context.pair_estimators.insert(name);
-    std::set<std::string>& own = context.estimator_options[name];
-    own.insert({"--denoise", "--oidn"});
-    for (const EstimatorOption& option : options_of_estimator(name)) {
-      if (estimator.pass_options.contains(option.name)) continue;
-      own.insert("--" + option.name);
-      for (const std::string& alias : option.aliases) own.insert("--" + alias);
-    }
-  }
-  return context;
+  return {program_version(), [](const std::vector<std::string>& words) {
+            const RenderOptions options = parsed(words);
+            return pass_words(options.values, options.of_integrator, options.of_estimator);
+          }};
 }
 
 constexpr const char *kResults = "/results.json", *kTable = "/results.csv", *kReport = "/report.html";
@@ -200,15 +200,10 @@ void check_methods(const lab::Suite& suite) {
   if (!lab::validate(suite).empty()) return;
   std::vector<std::string> problems;
   for (const lab::MethodEntry& method : suite.methods) {
-    CLI::App command;
-    RenderOptions options;
-    add_render_options(command, options);
-    std::vector<std::string> words = {"scene.xml", "-o", "out.exr"};
-    words.insert(words.end(), suite.common_options.begin(), suite.common_options.end());
+    std::vector<std::string> words = suite.common_options;
     words.insert(words.end(), method.options.begin(), method.options.end());
-    std::reverse(words.begin(), words.end());
     try {
-      command.parse(words);
+      RenderOptions options = parsed(words);
       check_options(options);
     } catch (const std::runtime_error& error) {
       problems.push_back(fmt::format("method '{}': {}", method.name, error.what()));

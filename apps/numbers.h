@@ -4,33 +4,20 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
-#include <charconv>
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
+#include "settings/number_text.h"
+
 namespace covary {
-
-/// The whole number that the text is, with an optional sign; nothing where it is none or T does not hold it.
-template <typename T>
-std::optional<T> parse_whole(std::string_view text) {
-  if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
-  T value{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return value;
-}
-
-/// The finite number that the text is, with an optional sign, fraction and exponent.
-std::optional<double> parse_real(std::string_view text);
 
 /// For CLI::Option::transform(): a whole number from `low` to `high`.
 template <typename T>
 CLI::Validator whole_number(T low, T high) {
   const auto check = [low, high](std::string& text) -> std::string {
-    const std::optional<T> value = parse_whole<T>(text);
+    const std::optional<T> value = parse_number<T>(text);
     if (!value || *value < low || *value > high)
       return "'" + text + "': expected a whole number from " + std::to_string(low) + " to " + std::to_string(high);
     text = std::to_string(*value);  // without zeros in front, which CLI11 would take for octal

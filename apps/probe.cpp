@@ -62,14 +62,15 @@ void write_preview(const std::string& path, const GuideProbe& probe) {
 
 void probe(ProbeOptions options) {
   RenderOptions& render = options.render;
-  if (render.output.empty()) throw Error(ErrorCode::kUsage, "no output given; use -o OUT.exr");
-  if (render.integrator.empty()) render.integrator = "guided-path";
-  render.spp = kAnyBudget;
+  if (!render.values.contains("output")) throw Error(ErrorCode::kUsage, "no output given; use -o OUT.exr");
+  render.values.insert({"integrator", "guided-path"});
+  render.values["spp"] = std::to_string(kAnyBudget);
   check_options(render);
+  const std::string& output = render.request().output;
   Outputs outputs;
-  outputs.writes("-o", render.output, OutputKind::kImage);
-  const bool has_preview = render.preview && lower_extension(render.output) == ".exr";
-  const std::string preview = preview_path(render.output);
+  outputs.writes("-o", output, OutputKind::kImage);
+  const bool has_preview = render.request().preview && lower_extension(output) == ".exr";
+  const std::string preview = preview_path(output);
   if (has_preview) outputs.writes_derived_png("the preview", preview, "use --no-preview, or another name for -o");
   ProgressLine progress(fs::path(render.scene).stem().string(), render.quiet);
   progress.begin("loading");
@@ -81,7 +82,7 @@ void probe(ProbeOptions options) {
   const std::shared_ptr<Integrator> integrator = prepared_integrator(scene, make_plan(render), request);
   const LearningIntegrator* learning = integrator->learning();
   if (!learning || !learning->learns_directions())
-    throw Error(ErrorCode::kUsage, "probe shows what guided-path has learnt, not " + render.integrator);
+    throw Error(ErrorCode::kUsage, "probe shows what guided-path has learnt, not " + render.settings.integrator);
   const auto at = parse_numbers("--pixel", options.pixel, ',', 2, "X,Y, e.g. 640,360");
   if (at[0] < 0 || at[1] < 0 || at[0] >= scene.width || at[1] >= scene.height)
     throw Error(ErrorCode::kUsage,
@@ -93,14 +94,14 @@ void probe(ProbeOptions options) {
   const Ray ray =
       scene.scene->camera().ray({static_cast<float>(at[0]) + 0.5f, static_cast<float>(at[1]) + 0.5f}, {0.5f, 0.5f});
   const std::optional<GuideProbe> found =
-      learning->probe(*scene.scene, ray, options.height, options.samples, render.seed);
+      learning->probe(*scene.scene, ray, options.height, options.samples, render.request().seed);
   if (!found) throw Error(ErrorCode::kUsage, fmt::format("no surface lies behind the pixel {}", options.pixel));
   progress.finish();
   const Image image = side_by_side({&found->radiance, &found->density, &found->control});
-  write_image(render.output, image, {image.width, image.height, {0, 0, image.width, image.height}}, {});
+  write_image(output, image, {image.width, image.height, {0, 0, image.width, image.height}}, {});
   if (has_preview) write_preview(preview, *found);
   if (render.quiet) return;
-  fmt::print(stderr, "{}: radiance, density and control at ({:g}, {:g}, {:g}), {} x {} pixels each\n", render.output,
+  fmt::print(stderr, "{}: radiance, density and control at ({:g}, {:g}, {:g}), {} x {} pixels each\n", output,
              found->position.x, found->position.y, found->position.z, found->radiance.width, found->radiance.height);
 }
 

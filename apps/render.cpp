@@ -59,7 +59,7 @@ const char* name_of(RenderStage stage, const RenderOptions& options) {
     case RenderStage::kRendering:
       return "rendering";
     case RenderStage::kEstimating:
-      return options.estimator.denoise == "none" ? "estimating" : "estimating and denoising";
+      return options.settings.denoising.denoises() ? "estimating and denoising" : "estimating";
     case RenderStage::kWriting:
       return "writing";
   }
@@ -74,10 +74,10 @@ RenderResult render_watched(const RenderOptions& options, const LoadedScene& sce
   callbacks.stop = stop.token();
   callbacks.stage = [&](RenderStage stage) { progress.begin(name_of(stage, options)); };
   callbacks.progress = [&](uint64_t done, uint64_t total) {
-    progress.update(done, options.seconds > 0 && !options.spp ? 0 : total);
+    progress.update(done, options.request().seconds > 0 && !options.request().spp ? 0 : total);
   };
-  if (!options.until.empty())
-    callbacks.predicted = [&, goal = parse_until(options.until).error](double error) { progress.toward(error, goal); };
+  if (options.request().until > 0)
+    callbacks.predicted = [&](double error) { progress.toward(error, options.request().until); };
   callbacks.wave = [&](std::span<const Pass> passes) {
     if (!display || !display->ready() || since_preview.seconds() < kPreviewSeconds) return;
     display->update(preview_of(passes));
@@ -87,7 +87,7 @@ RenderResult render_watched(const RenderOptions& options, const LoadedScene& sce
     progress.clear();
     fmt::print(stderr, "warning: {}\n", text);
   };
-  progress.limit(options.seconds);
+  progress.limit(options.request().seconds);
   RenderResult result = covary::render(scene, make_plan(options), make_request(options, scene), callbacks);
   progress.finish();
   if (display && !result.passes.empty()) display->update(result.picture());
@@ -101,7 +101,7 @@ void write_stages(const RenderOptions& options, const RenderResult& result) {
   PairSettings settings;
   settings.crn_samples = std::llround(crn.mean_count());
   if (!result.aovs.empty()) settings.guides = {&result.aovs.at("Albedo"), &result.aovs.at("N")};
-  save_stages(options.stages, make_estimator(options.estimator), rows_of(crn, 0, crn.height()),
+  save_stages(options.stages, estimator_of(options), rows_of(crn, 0, crn.height()),
               rows_of(independent, 0, independent.height()), settings,
               {crn.frame_width(), crn.frame_height(), crn.crop()});
 }
@@ -112,7 +112,8 @@ std::string interruption(const RenderOptions& options, const RenderResult& resul
       "interrupted after {:.1f} of {:g} samples per pixel; '{}' is the image so far{}; the same command "
       "with --resume continues",
       result.samples_per_pixel(), result.camera_sum([](const Pass& p) { return p.settings.spp.mean(); }),
-      options.output, result.kept == options.output ? "" : ", '" + result.kept + "' holds its films");
+      options.request().output,
+      result.kept == options.request().output ? "" : ", '" + result.kept + "' holds its films");
 }
 
 void report(const RenderReport& report, const StopFlag& stop) {
@@ -123,22 +124,22 @@ void report(const RenderReport& report, const StopFlag& stop) {
   if (!options.quiet) print_summary(report);
   const std::string& doubt = result.prediction_doubt;
   if (!doubt.empty() && result.until_reached.value_or(false))
-    fmt::print(stderr, "warning: --until {} was reached, but the predicted error is unreliable: {}\n", options.until,
-               doubt);
+    fmt::print(stderr, "warning: --until {} was reached, but the predicted error is unreliable: {}\n",
+               options.values.at("until"), doubt);
   if (!result.until_reached.value_or(true))
     throw Unfinished(
         kTargetMissed,
         fmt::format(
             "--until {} was not reached: '{}' has a predicted relMSE of {:.3g}{} after {:.4g} samples per "
             "pixel{}",
-            options.until, options.output, *result.predicted_relmse,
-            parse_until(options.until).in_blocks ? fmt::format(", {:.3g} in blocks,", *result.predicted_blocks) : "",
+            options.values.at("until"), options.request().output, *result.predicted_relmse,
+            options.request().until_in_blocks ? fmt::format(", {:.3g} in blocks,", *result.predicted_blocks) : "",
             result.samples_per_pixel(), doubt.empty() ? "" : "; that is unreliable: " + doubt));
   if (std::any_of(result.passes.begin(), result.passes.end(), [](const Pass& p) { return p.misses_error; }))
     throw Unfinished(kTargetMissed,
                      fmt::format("--relative-error was not reached: '{}' has {:.4g} samples per pixel, as many as "
                                  "--spp, --time and --max-spp allow, and some pixels need more",
-                                 options.output, result.samples_per_pixel()));
+                                 options.request().output, result.samples_per_pixel()));
 }
 
 /// What the command reads and writes, as far as it is known before the scene is loaded.
@@ -146,21 +147,23 @@ Outputs files_of(const RenderOptions& options) {
   Outputs outputs;
   outputs.reads(options.scene);
   outputs.writes("--json", options.json, OutputKind::kText);
-  if (!options.save_training.empty()) outputs.writes("--save-training", options.save_training, OutputKind::kText);
+  if (!options.request().save_training.empty())
+    outputs.writes("--save-training", options.request().save_training, OutputKind::kText);
   if (options.is_replay()) return outputs;
-  outputs.writes("-o", options.output, OutputKind::kFilm);
-  if (output_target(options.output).is_special)
+  outputs.writes("-o", options.request().output, OutputKind::kFilm);
+  if (output_target(options.request().output).is_special)
     throw Error(ErrorCode::kUsage, fmt::format("-o '{}' is no regular file, which a render needs to continue after an "
                                                "interruption",
-                                               options.output));
-  if (std::filesystem::is_directory(options.passes))
+                                               options.request().output));
+  if (std::filesystem::is_directory(options.request().passes))
     for (const char* name : {"crn", "independent", "pilot-1", "light"}) {
-      const std::string path = (std::filesystem::path(options.passes) / name).string();
+      const std::string path = (std::filesystem::path(options.request().passes) / name).string();
       outputs.writes("--passes", path + ".exr", OutputKind::kFilm);
       outputs.writes("--passes", path + ".json", OutputKind::kText);
     }
-  if (options.preview)
-    outputs.writes_derived_png("the preview", preview_path(options.output), "use --no-preview, or another name for -o");
+  if (options.request().preview)
+    outputs.writes_derived_png("the preview", preview_path(options.request().output),
+                               "use --no-preview, or another name for -o");
   return outputs;
 }
 
@@ -172,7 +175,7 @@ void render(RenderOptions options) {
 
   std::optional<Display> display;
   if (!options.display_server.empty())
-    display.emplace(options.display_server, options.output, [](const std::string& text) {
+    display.emplace(options.display_server, options.request().output, [](const std::string& text) {
       // On a terminal over the line of progress.
       fmt::print(stderr, "{}warning: {}\n", isatty(2) == 1 ? "\r\033[K" : "", text);
     });
@@ -194,7 +197,7 @@ void render(RenderOptions options) {
   const RenderResult result = render_watched(options, scene, display ? &*display : nullptr, progress, *stop);
   report({options, scene, result, load_seconds, threads}, *stop);
   if (stop->is_set())
-    throw Unfinished(stop->exit_code(), fmt::format("interrupted when '{}' was written", options.output));
+    throw Unfinished(stop->exit_code(), fmt::format("interrupted when '{}' was written", options.request().output));
   stop.reset();  // there is nothing more to keep
   if (result.complete) write_stages(options, result);
   if (!options.debug_strategies.empty()) write_techniques(options.debug_strategies, scene, result, nullptr);

@@ -10,7 +10,6 @@
 
 #include "commands.h"
 #include "core/shell_text.h"
-#include "declared_options.h"
 #include "film/splat_layer.h"
 #include "integrators/light_pass.h"
 #include "integrators/training.h"
@@ -29,38 +28,13 @@ double peak_memory_bytes() {
 
 const char* sampling_name(const Pass& pass) { return pass.settings.sampling == Sampling::kCrn ? "crn" : "independent"; }
 
-/// What decides on the weights of strategies beside the scene: whether light is traced, and for how many pixels.
-void add_light_words(const RenderOptions& o, const Pass& pass, std::vector<std::string>& words) {
-  if (!pass.integrator->light_tracing()) return;
-  words.insert(words.end(), {"--light-tracing", light_tracer(*pass.integrator) ? "on" : "off"});
-  if (!o.crop.empty()) words.insert(words.end(), {"--crop", o.crop});
-}
-
 /// Command that repeats one sample of a pass: the user's own, with the sample in place of the outputs.
 std::string replay_command(const RenderOptions& o, const Pass& pass, const BadSample& bad) {
   std::vector<std::string> words = {"covary", "render", o.scene};
-  const auto add = [&](const char* option, const std::string& value) { words.insert(words.end(), {option, value}); };
-  for (const std::string& define : o.defines) add("-D", define);
-  if (!o.resolution.empty()) add("--resolution", o.resolution);
-  if (!o.integrator.empty()) add("--integrator", o.integrator);
-  OptionValues of_integrator = o.of_integrator;
-  of_integrator.erase("light-tracing");  // add_light_words() tells what became of it
-  for (const std::string& word : option_words(options_of_integrators(), of_integrator)) words.push_back(word);
-  if (!o.load_training.empty()) add("--load-training", o.load_training);
-  if (!o.rfilter.empty()) add("--rfilter", o.rfilter);
-  add_light_words(o, pass, words);
-  if (!pass.plan.light) add("--sampling", sampling_name(pass));
-  if (pass.settings.sampling == Sampling::kCrn && o.crn_part != "both") add("--crn-part", o.crn_part);
-  add("--seed", std::to_string(o.seed));
-  const bool is_sobol = pass.settings.sampler == Sampler::kSobol;
-  if (is_sobol || !o.sampler.empty()) add("--sampler", sampler_name(pass.settings.sampler));
-  if (is_sobol) add("--groups", std::to_string(pass.settings.groups));
-  if (pass.plan.light) {
-    add("--replay-light", std::to_string(bad.sample));
-    return shell_text(words);
-  }
-  add("--replay", fmt::format("{},{},{}", bad.x, bad.y, bad.sample) +
-                      (pass.plan.number ? fmt::format(",{}", pass.plan.number) : ""));
+  for (const std::string& define : o.defines) words.insert(words.end(), {"-D", define});
+  OptionValues given = o.values;
+  given.insert(o.of_integrator.begin(), o.of_integrator.end());
+  for (const std::string& word : replay_words(std::move(given), pass, bad)) words.push_back(word);
   return shell_text(words);
 }
 
@@ -78,7 +52,7 @@ nlohmann::ordered_json json_of(const IntegratorReport& report) {
 /// Samples per pixel of the training; 0 without one, and where a file took its place.
 uint32_t training_samples_taken(const RenderReport& report) {
   const LearningIntegrator* learning = report.result.integrator->learning();
-  return learning && report.options.load_training.empty() ? learning->trained_spp() : 0;
+  return learning && report.options.request().load_training.empty() ? learning->trained_spp() : 0;
 }
 
 }  // namespace
@@ -130,16 +104,16 @@ nlohmann::ordered_json statistics(const RenderReport& report) {
   nlohmann::ordered_json json = {
       {"version", COVARY_VERSION},
       {"command", command_line()},
-      {"output", options.output},
+      {"output", request.output},
       {"scene", options.scene},
       {"scene_hash", scene.content_hash},
       {"width", window.width},
       {"height", window.height},
-      {"estimator", make_estimator(options.estimator).text},
+      {"estimator", estimator_of(options).text},
       {"samples_per_pixel", result.samples_per_pixel()},
       {"training_samples_per_pixel", training_samples_taken(report)},
       {"training_counts_as_samples", (result.training.samples[0] + result.training.samples[1]) / 2},
-      {"seed", options.seed},
+      {"seed", request.seed},
       {"threads", threads},
       {"complete", result.complete},
       {"interrupted", result.interrupted},
@@ -187,14 +161,14 @@ void print_summary(const RenderReport& report) {
     samples += fmt::format(" + {} light paths", format_count(static_cast<double>(light_paths(light->film))));
   const double seconds = std::max(result.render_seconds(), 1e-9);
   fmt::print(stderr, "{}: {} x {}, {} in {:.2f} s (load {:.2f} s, build {:.2f} s, {} samples/s, {} rays/s)\n",
-             options.output, result.passes[0].film.width(), result.passes[0].film.height(), samples, seconds,
+             options.request().output, result.passes[0].film.width(), result.passes[0].film.height(), samples, seconds,
              load_seconds, scene.scene->build_seconds(),
              format_count(result.camera_sum([](const Pass& p) { return p.result.n_samples; }) / seconds),
              format_count(result.sum([](const Pass& p) { return p.result.n_rays; }) / seconds));
   const IntegratorReport of = result.integrator->report();
   if (!of.summary.empty()) fmt::print(stderr, "{} in {:.2f} s\n", of.summary, result.seconds.train);
   for (const std::string& warning : of.warnings) fmt::print(stderr, "warning: {}\n", warning);
-  const Estimator estimator = make_estimator(options.estimator);
+  const Estimator estimator = estimator_of(options);
   if (estimator.passes != EstimatorPasses::kAny) {
     fmt::print(stderr, "{} in {:.2f} s", estimator.text, result.estimate_seconds());
     if (result.predicted_relmse) fmt::print(stderr, ", predicted relMSE {:.3g}", *result.predicted_relmse);
@@ -202,9 +176,10 @@ void print_summary(const RenderReport& report) {
   } else if (result.predicted_relmse) {
     fmt::print(stderr, "predicted relMSE {:.3g}{}\n", *result.predicted_relmse, doubt_in_brackets(result));
   }
-  if (options.seconds > 0 && result.seconds.limited > 1.05 * options.seconds)
+  const double limit = options.request().seconds;
+  if (limit > 0 && result.seconds.limited > 1.05 * limit)
     fmt::print(stderr, "warning: --time {:g} was exceeded: {:.2f} s for at least {} samples per pixel in each pass{}\n",
-               options.seconds, result.seconds.limited, result.passes[0].film.groups(),
+               limit, result.seconds.limited, result.passes[0].film.groups(),
                estimator.passes == EstimatorPasses::kPair ? " and the estimate" : "");
 }
 

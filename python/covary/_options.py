@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterable, Mapping
+from os import PathLike, fspath
 from typing import Any, Union
 
 from . import _covary
@@ -48,6 +49,21 @@ def text_options(options: Mapping[str, OptionValue], estimator: str) -> dict[str
         if taken is not None and taken is not False:
             texts[name] = "" if taken is True else str(taken)
     return texts
+
+
+#: Between the numbers of one value, where it is no comma.
+_SEPARATORS = {"resolution": "x", "split": ":"}
+
+
+def option_texts(values: Mapping[str, Any]) -> dict[str, str]:
+    """Values of options of rendering as the command line has them; None and False are left out."""
+    def text_of(name: str, value: Any) -> str:
+        if isinstance(value, tuple):
+            return _SEPARATORS.get(name, ",").join(map(repr, value))
+        return repr(value) if isinstance(value, float) else fspath(value) if isinstance(value, PathLike) else str(value)
+
+    return {name: "" if value is True else text_of(name, value) for name, value in values.items()
+            if value is not None and value is not False}
 
 
 @functools.cache

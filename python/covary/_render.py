@@ -14,7 +14,7 @@ from ._arguments import (
     text, whole,
 )
 from ._combine import DENOISE, DenoiseMode, Progress
-from ._options import OptionValue, passes_of, text_options
+from ._options import OptionValue, option_texts, passes_of, text_options
 from ._result import BadSample, RenderResult, text_of_bad_samples
 from .errors import BadSamplesWarning, UsageError
 
@@ -196,15 +196,22 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator = "i
     chosen = chosen.with_integrator(integrator)
     if checkpoint is None:
         checkpoint = _CHECKPOINT_SECONDS if output is not None or passes is not None else 0
-    request: dict[str, Any] = {
-        "spp": spp, "seed": seed, "until": until if until_p95 is None else until_p95,
-        "until_in_blocks": until_p95 is not None, "seconds": time, "output": output, "passes": passes,
-        "resume": resume, "overwrite": overwrite, "checkpoint": checkpoint, "preview": preview, "aovs": aovs,
-        "crop": crop, "filter": filter, "sampler": sampler, "crn_part": crn_part, "path_lengths": path_lengths,
-        "save_training": save_training, "load_training": load_training}
-    made = _covary.render(chosen._loaded, estimator, texts, denoise, fspath(oidn), sampling or "independent", groups,
-                          split, films_only, request, progress)
-    made["bad_samples"] = [_bad_sample(chosen, request, bad) for bad in made["bad_samples"]]
+    loading = chosen._loading
+    until_words = {"relmse": until, "relmse-p95": until_p95}
+    values = option_texts({
+        "output": output, "spp": spp, "time": time, "seed": seed,
+        "until": next((f"{name}={error!r}" for name, error in until_words.items() if error is not None), None),
+        "integrator": loading["integrator"] or None, "estimator": estimator, "denoise": denoise,
+        "oidn": fspath(oidn) or None, "resolution": loading["resolution"], "crop": crop, "passes": passes,
+        "resume": resume, "overwrite": overwrite, "checkpoint": checkpoint, "no-preview": not preview, "aovs": aovs,
+        "path-lengths": path_lengths, "sampling": sampling, "sampler": sampler, "split": split, "groups": groups,
+        "crn-part": None if crn_part == "both" else crn_part, "rfilter": filter, "save-training": save_training,
+        "load-training": load_training})
+    properties = {"min_depth": loading["min_depth"], "max_depth": loading["max_depth"], **loading["integrator_options"]}
+    of_integrator = {name.replace("_", "-"): {"True": "on", "False": "off"}.get(str(value), str(value))
+                     for name, value in properties.items() if value is not None}
+    made = _covary.render(chosen._loaded, values, of_integrator, texts, films_only, progress)
+    made["bad_samples"] = [_bad_sample(chosen, bad) for bad in made["bad_samples"]]
     report_bad_samples(made)
     return RenderResult(**made)
 
@@ -217,34 +224,11 @@ def report_bad_samples(made: dict[str, Any], depth: int = 4) -> None:
         warnings.warn(report, BadSamplesWarning, stacklevel=depth)
 
 
-def _bad_sample(scene: Scene, request: Mapping[str, Any], bad: dict[str, Any]) -> BadSample:
+def _bad_sample(scene: Scene, bad: dict[str, Any]) -> BadSample:
     """With the command that replays it: what chose the scene and the numbers, with the sample in place of outputs."""
-    loading = scene._loading
-    words = ["covary", "render", scene.path]
-    for name, value in loading["defines"].items():
-        words += ["-D", f"{name}={value}"]
-    given = {"resolution": loading["resolution"] and "{}x{}".format(*loading["resolution"]),
-             "integrator": loading["integrator"] or None, "min-depth": loading["min_depth"],
-             "max-depth": loading["max_depth"],
-             **{name.replace("_", "-"): value for name, value in loading["integrator_options"].items()},
-             "load-training": request["load_training"], "rfilter": request["filter"],
-             "crop": request["crop"] and ",".join(map(str, request["crop"])), "seed": request["seed"]}
-    if not bad["light_path"]:
-        given["sampling"] = bad["sampling"]
-    if bad["sampling"] == "crn" and request["crn_part"] != "both":
-        given["crn-part"] = request["crn_part"]
-    if bad["sampler"] == "sobol":
-        given |= {"sampler": "sobol", "groups": bad["groups"]}
-    elif request["sampler"] is not None:
-        given["sampler"] = request["sampler"]
-    number = [bad["number"]] if bad["number"] else []
-    given |= ({"replay-light": bad["sample"]} if bad["light_path"] else
-              {"replay": ",".join(map(str, [bad["x"], bad["y"], bad["sample"], *number]))})
-    for name, value in given.items():
-        if value is not None:
-            words += [f"--{name}", {True: "on", False: "off"}[value] if isinstance(value, bool) else str(value)]
-    return BadSample(**{key: bad[key] for key in ("film", "x", "y", "sample", "value", "light_path")},
-                     replay=shlex.join(words))
+    defines = [word for name, value in scene._loading["defines"].items() for word in ("-D", f"{name}={value}")]
+    replay = shlex.join(["covary", "render", scene.path, *defines, *bad["replay"]])
+    return BadSample(**{**bad, "replay": replay})
 
 
 @checked(n=whole(0, 4096))

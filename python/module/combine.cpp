@@ -146,6 +146,12 @@ std::vector<std::string> texts_of(const std::vector<Finding>& findings) {
   return texts;
 }
 
+DenoisingChoice denoising_of(const std::string& mode, const std::string& oidn) {
+  OptionValues values{{"denoise", mode}};
+  if (!oidn.empty()) values["oidn"] = oidn;
+  return settings_from<DenoisingChoice>(values);
+}
+
 /// The guides of --denoise.
 struct GuideImages {
   Image albedo, normal;
@@ -174,8 +180,8 @@ nb::dict combine(nb::object crn, nb::object independent, const Beside& beside, c
   const Film* light = film_of(beside.light);
   Pair pair(crn, independent, light);
   CombineRequest& request = pair.request;
-  request.estimator =
-      with_denoising(make_pair_estimator(arguments.estimator, arguments.options), arguments.denoise, arguments.oidn);
+  request.estimator = with_denoising(make_pair_estimator(arguments.estimator, arguments.options),
+                                     denoising_of(arguments.denoise, arguments.oidn));
   const Estimator& estimator = request.estimator;
   const bool has_counts = !beside.counts.is_none();
   request.settings =
@@ -225,7 +231,7 @@ std::vector<float> some_values(size_t n, size_t step) {
 void check_pair_estimator(const std::string& name, const OptionValues& options, const std::string& denoise,
                           const std::string& oidn) {
   constexpr int kSide = 8, kGroups = 24;
-  const Estimator estimator = with_denoising(make_pair_estimator(name, options), denoise, oidn);
+  const Estimator estimator = with_denoising(make_pair_estimator(name, options), denoising_of(denoise, oidn));
   const std::optional<int> samples = estimator.needs_sample_count ? std::optional(kGroups) : std::nullopt;
   const PairSettings settings = pair_settings(estimator, samples, kGroups, estimator.predicts_error);
   const std::vector<float> first = some_values(kSide * kSide * kGroups * 3, 37),

@@ -7,6 +7,7 @@
 #include "denoising/mixed_denoising.h"
 #include "estimators/sample_counts.h"
 #include "metrics/metrics.h"
+#include "plans/render_settings.h"
 #include "python/module/bindings.h"
 
 namespace covary::python {
@@ -57,6 +58,12 @@ nb::dict option_dict(const EstimatorOption& option) {
   return d;
 }
 
+nb::list list_of(const std::vector<Option>& options) {
+  nb::list list;
+  for (const Option& option : options) list.append(option_dict(option));
+  return list;
+}
+
 nb::list estimators() {
   nb::list list;
   for (const std::string& name : estimator_names()) {
@@ -68,9 +75,7 @@ nb::list estimators() {
     d["predicts_error"] = estimator.predicts_error;
     d["denoises"] = can_be_denoised(estimator);
     d["fewest_groups"] = estimator.fewest_groups;
-    nb::list options;
-    for (const EstimatorOption& option : options_of_estimator(name)) options.append(option_dict(option));
-    d["options"] = options;
+    d["options"] = list_of(options_of_estimator(name));
     list.append(d);
   }
   return list;
@@ -92,6 +97,17 @@ nb::list metric_list() {
 
 void bind_registry(nb::module_& module) {
   module.def("estimators", &estimators, nb::sig("def estimators() -> list[dict[str, typing.Any]]"));
+  module.def(
+      "render_options", [] { return list_of(options_of<RenderSettings>()); },
+      nb::sig("def render_options() -> list[dict[str, typing.Any]]"));
+  module.def(
+      "integrator_options",
+      [] {
+        nb::dict lists;
+        for (const std::string& name : integrator_names()) lists[name.c_str()] = list_of(options_of_integrator(name));
+        return lists;
+      },
+      nb::sig("def integrator_options() -> dict[str, list[dict[str, typing.Any]]]"));
   module.def("metrics", &metric_list, nb::sig("def metrics() -> list[dict[str, str]]"));
 }
 

@@ -7,10 +7,8 @@
 #include <utility>
 
 #include "combine/registry.h"
-#include "denoising/mixed_denoising.h"
-#include "plans/estimator_plans.h"
 #include "plans/integrator_choice.h"
-#include "plans/request_options.h"
+#include "plans/render_settings.h"
 #include "python/module/arrays.h"
 #include "python/module/bindings.h"
 #include "python/module/work.h"
@@ -57,28 +55,14 @@ std::shared_ptr<LoadedScene> load(const std::string& path, const SceneChoice& ch
   return scene;
 }
 
-/// What render() is asked for beside the numbers of RenderRequest.
+/// What render() is asked for.
 struct Choice {
-  std::string estimator;
-  Options options;
-  std::string denoise, oidn;
-  std::string sampling;
-  std::optional<int> groups;
-  std::optional<std::array<double, 2>> split;
-  bool films_only = false;  ///< no image is made of the films
+  Options values, of_estimator;  ///< as the command line has them
+  bool films_only = false;       ///< no image is made of the films
 };
 
-Plan plan_of(const Choice& choice) {
-  PassChoice passes;
-  passes.sampling = choice.sampling == "crn" ? Sampling::kCrn : Sampling::kIndependent;
-  passes.groups = choice.groups;
-  if (choice.split) {
-    const auto [crn, independent] = *choice.split;
-    passes.split = {crn / (crn + independent), independent / (crn + independent)};
-  }
-  const Estimator estimator =
-      with_denoising(make_estimator(choice.estimator, choice.options), choice.denoise, choice.oidn);
-  Plan plan = estimator_plan(estimator, passes);
+Plan plan_of(const RenderSettings& settings, const Choice& choice) {
+  Plan plan = estimator_plan(estimator_of(settings, choice.of_estimator), settings.passes);
   if (choice.films_only) {
     plan.estimate = [](std::span<const Pass>, int, int, const Guides&) { return EstimatorResult(); };
     plan.estimate_memory = {};
@@ -89,22 +73,20 @@ Plan plan_of(const Choice& choice) {
 }
 
 /// The first samples of a pass that count as black, with what replays them.
-void add_bad_samples(const Pass& pass, nb::list& list) {
+void add_bad_samples(const Pass& pass, const Options& given, nb::list& list) {
   for (const BadSample& bad : pass.result.bad_samples) {
     nb::dict d;
     d["film"] = pass.plan.id();
     d["x"] = bad.x, d["y"] = bad.y, d["sample"] = bad.sample;
     d["value"] = nb::make_tuple(bad.value.r, bad.value.g, bad.value.b);
-    d["number"] = pass.plan.number;
     d["light_path"] = pass.plan.light;
-    d["sampling"] = pass.settings.sampling == Sampling::kCrn ? "crn" : "independent";
-    d["sampler"] = sampler_name(pass.settings.sampler);
-    d["groups"] = pass.settings.groups;
+    d["replay"] = replay_words(given, pass, bad);
     list.append(d);
   }
 }
 
-nb::dict dict_of(RenderResult&& result, const std::string& estimator, const std::vector<std::string>& warnings) {
+nb::dict dict_of(RenderResult&& result, const std::string& estimator, const std::vector<std::string>& warnings,
+                 const Options& given) {
   nb::dict films, aovs, d;
   d["estimator"] = estimator;
   Image picture = result.passes.empty() ? Image() : result.picture();
@@ -112,7 +94,7 @@ nb::dict dict_of(RenderResult&& result, const std::string& estimator, const std:
   d["render_seconds"] = result.render_seconds();
   d["estimate_seconds"] = result.estimate_seconds();
   nb::list bad;
-  for (const Pass& pass : result.passes) add_bad_samples(pass, bad);
+  for (const Pass& pass : result.passes) add_bad_samples(pass, given, bad);
   d["bad_samples"] = bad;
   d["not_finite_samples"] = static_cast<uint64_t>(result.sum([](const Pass& p) { return p.result.n_not_finite; }));
   d["negative_samples"] = static_cast<uint64_t>(result.sum([](const Pass& p) { return p.result.n_negative; }));
@@ -133,8 +115,11 @@ nb::dict dict_of(RenderResult&& result, const std::string& estimator, const std:
   return d;
 }
 
-nb::dict render_scene(const LoadedScene& scene, const Choice& choice, RenderRequest request, nb::object progress) {
-  const Plan plan = plan_of(choice);
+nb::dict render_scene(const LoadedScene& scene, const Choice& choice, const Options& of_integrator,
+                      nb::object progress) {
+  const RenderSettings settings = settings_from<RenderSettings>(choice.values);
+  const Plan plan = plan_of(settings, choice);
+  RenderRequest request = settings.request;
   request.attributes[film_key::kVersion] = COVARY_VERSION;
   if (request.load_training.empty()) take_training(scene, request);
   std::vector<std::string> warnings(scene.warnings);
@@ -152,30 +137,9 @@ nb::dict render_scene(const LoadedScene& scene, const Choice& choice, RenderRequ
         result = render(scene, plan, request, callbacks);
       },
       progress);
-  return dict_of(std::move(result), plan.estimator, warnings);
-}
-
-/// Request by name: Python's render() passes what it was given.
-RenderRequest request_of(const nb::dict& given) {
-  RenderRequest r;
-  const auto take = [&](const char* name, auto& value) {
-    if (given.contains(name) && !given[name].is_none())
-      value = nb::cast<std::decay_t<decltype(value)>>(nb::object(given[name]));
-  };
-  take("seed", r.seed), take("spp", r.spp), take("seconds", r.seconds), take("until", r.until), take("aovs", r.aovs);
-  take("until_in_blocks", r.until_in_blocks), take("path_lengths", r.path_lengths);
-  take("output", r.output), take("preview", r.preview), take("passes", r.passes), take("resume", r.resume);
-  take("overwrite", r.overwrite), take("checkpoint", r.checkpoint_seconds);
-  take("save_training", r.save_training), take("load_training", r.load_training), take("attributes", r.attributes);
-  std::string filter, sampler, crn_part;
-  take("filter", filter), take("sampler", sampler), take("crn_part", crn_part);
-  if (!filter.empty()) r.filter = filter_named(filter);
-  if (!sampler.empty()) r.sampler = sampler_named(sampler);
-  if (!crn_part.empty()) r.crn_part = crn_part_named(crn_part);
-  std::array<int, 4> crop{};
-  take("crop", crop);
-  if (crop[2] != 0 || crop[3] != 0) r.crop = {crop[0], crop[1], crop[2], crop[3]};
-  return r;
+  Options given = choice.values;
+  given.insert(of_integrator.begin(), of_integrator.end());
+  return dict_of(std::move(result), plan.estimator, warnings, given);
 }
 
 }  // namespace
@@ -204,17 +168,14 @@ void bind_render(nb::module_& module) {
           "min_depth: int | None, max_depth: int | None, integrator_options: dict[str, typing.Any]) -> LoadedScene"));
   module.def(
       "render",
-      [](const std::shared_ptr<LoadedScene>& scene, const std::string& estimator, const Options& options,
-         const std::string& denoise, const std::string& oidn, const std::string& sampling, std::optional<int> groups,
-         std::optional<std::array<double, 2>> split, bool films_only, nb::dict request, nb::object progress) {
-        return render_scene(*scene, {estimator, options, denoise, oidn, sampling, groups, split, films_only},
-                            request_of(request), progress);
+      [](const std::shared_ptr<LoadedScene>& scene, const Options& values, const Options& of_integrator,
+         const Options& of_estimator, bool films_only, nb::object progress) {
+        return render_scene(*scene, {values, of_estimator, films_only}, of_integrator, progress);
       },
-      "scene"_a, "estimator"_a, "options"_a, "denoise"_a, "oidn"_a, "sampling"_a, "groups"_a.none(), "split"_a.none(),
-      "films_only"_a, "request"_a, "progress"_a.none(),
-      nb::sig("def render(scene: LoadedScene, estimator: str, options: dict[str, str], denoise: str, oidn: str, "
-              "sampling: str, groups: int | None, split: tuple[float, float] | None, films_only: bool, "
-              "request: dict[str, typing.Any], progress: typing.Any) -> dict[str, typing.Any]"));
+      "scene"_a, "values"_a, "of_integrator"_a, "of_estimator"_a, "films_only"_a, "progress"_a.none(),
+      nb::sig("def render(scene: LoadedScene, values: dict[str, str], of_integrator: dict[str, str], "
+              "of_estimator: dict[str, str], films_only: bool, progress: typing.Any) "
+              "-> dict[str, typing.Any]"));
 }
 
 }  // namespace covary::python

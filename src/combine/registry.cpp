@@ -86,21 +86,26 @@ std::vector<std::string> pair_estimator_names() {
 
 std::vector<EstimatorOption> options_of_estimator(const std::string& name) {
   EstimatorParameters parameters;
+  parameters.group("Estimator");
   plugin_named(name).make(parameters);
   return parameters.options();
 }
 
-Estimator with_denoising(const Estimator& base, const std::string& mode, const std::string& oidn) {
+std::vector<EstimatorOption> options_of_estimators(const std::vector<std::string>& names) {
+  std::vector<std::vector<EstimatorOption>> lists;
+  for (const std::string& name : names) lists.push_back(options_of_estimator(name));
+  return merged_options(names, lists);
+}
+
+Estimator with_denoising(const Estimator& base, const DenoisingChoice& choice) {
   MixedDenoisingOptions options;
-  options.mode = denoise_mode(mode);
-  if (options.mode == DenoiseMode::kNone && !oidn.empty())
-    throw Error(ErrorCode::kUsage, "--oidn is an option of --denoise bias, balanced and error");
+  options.mode = denoise_mode(choice.mode);
   if (options.mode != DenoiseMode::kNone && !can_be_denoised(base))
     throw Error(ErrorCode::kUsage,
                 fmt::format("--denoise needs an estimator of two passes that predicts its error ({}), not {}",
                             fmt::join(estimators_where(can_be_denoised), ", "), base.name));
-  options.use_oidn = oidn != "off";
-  if (options.use_oidn) options.oidn.library = oidn;
+  options.use_oidn = choice.oidn != "off";
+  if (options.use_oidn) options.oidn.library = choice.oidn;
   return with_denoising(base, options);
 }
 

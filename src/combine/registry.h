@@ -11,6 +11,8 @@
 
 namespace covary {
 
+struct DenoisingChoice;
+
 struct EstimatorPlugin {
   const char* name;
   /// Throws Error(kUsage) that lists everything that is wrong with the options.
@@ -41,11 +43,12 @@ std::vector<std::string> pair_estimator_names();
 
 /// The options of an estimator with their defaults. Throws Error(kUsage) as make_estimator().
 std::vector<EstimatorOption> options_of_estimator(const std::string& name);
+/// Those of several; equal names are one option.
+std::vector<EstimatorOption> options_of_estimators(const std::vector<std::string>& names);
 /// Names of the estimators that have the option, without dashes; empty where none has.
 std::vector<std::string> estimators_with_option(const std::string& option);
 
-/// with_denoising() by words, as --denoise and --oidn have them: a name of denoise_mode_names(); a library or a folder
-/// of it, "" for where it is found, "off" to go without.
-Estimator with_denoising(const Estimator& base, const std::string& mode, const std::string& oidn);
+/// The estimator denoised as the words say. Throws Error(kUsage) where it cannot be.
+Estimator with_denoising(const Estimator& base, const DenoisingChoice& choice);
 
 }  // namespace covary

@@ -182,4 +182,16 @@ Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& opt
   return estimator;
 }
 
+void declare(Settings& s, DenoisingChoice& v) {
+  s.group("Denoising");
+  s.one_of("denoise", v.mode, denoise_mode_names(),
+           "Mix the image with denoised ones where held-out samples find that better: for least bias, for least error, "
+           "or balanced",
+           {.level = OptionLevel::kBasic});
+  s.text("oidn", v.oidn, "off|LIBRARY",
+         "For --denoise: Open Image Denoise's library or a folder of it; default: where it is found; 'off': without it",
+         {.names = OptionNames::kLibrary});
+  s.only_if(v.denoises(), {"oidn"}, "without --denoise bias, balanced or error");
+}
+
 }  // namespace covary

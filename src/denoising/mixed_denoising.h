@@ -13,6 +13,7 @@
 
 #include "denoising/candidates.h"
 #include "estimators/estimator.h"
+#include "settings/settings.h"
 
 namespace covary {
 
@@ -36,6 +37,14 @@ Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& opt
 
 /// Whether an estimator can be the base.
 bool can_be_denoised(const Estimator& estimator);
+
+/// MixedDenoisingOptions by words, as options have them.
+struct DenoisingChoice {
+  std::string mode = "none";  ///< of denoise_mode_names()
+  std::string oidn;           ///< a library or a folder of it; "": where it is found, "off": without it
+  bool denoises() const { return mode != "none"; }
+};
+void declare(Settings& settings, DenoisingChoice& choice);
 
 /// What with_denoising() does, with any candidates.
 struct MixedDenoising {

@@ -237,16 +237,17 @@ Estimator make_dependent_tests(Settings& parameters) {
                                                                         {"dependent", VarianceSource::kDependent}};
   static constexpr std::pair<const char*, bool> kOwners[] = {{"centre", true}, {"each", false}};
   static constexpr std::pair<const char*, int> kGuards[] = {{"on", DependentTestsOptions().guard}, {"off", 0}};
+  static constexpr OptionTraits kPasses{.effect = OptionEffect::kPasses};
   EstimatorParameters& p = parameters;
-  const bool paper = p.flag("paper", "dependent-tests as published: its filter, weights and allocation");
+  const bool paper = p.flag("paper", "dependent-tests as published: its filter, weights and allocation", kPasses);
   DependentTestsOptions o = paper ? DependentTestsOptions::paper() : DependentTestsOptions();
   AdaptiveSampling adaptive;
   if (paper) adaptive.counts.allocation = Allocation::kEqualError, adaptive.counts.min_spp = 0;
   if (paper) adaptive.counts.smoothing = 1;
   ask_for(p, adaptive);
   p.choice<DependentFilter>("filter", o.filter, kFilters,
-                            "Weights that minimise the error bound, or the published ones");
-  p.choice<Norm>("norm", o.norm, kNorms, kNormHelp);
+                            "Weights that minimise the error bound, or the published ones", kPasses);
+  p.choice<Norm>("norm", o.norm, kNorms, kNormHelp, kPasses);
   p.whole("window", o.bound.window, kWindowRange, kWindowHelp);
   p.choice<VarianceSource>("sigma", o.variance, kSources, "Passes that tell the noise of a sample");
   p.choice<bool>("sigma-of", o.bound.common_sigma, kOwners,
@@ -275,8 +276,6 @@ Estimator make_dependent_tests(Settings& parameters) {
   estimator.summary = "dependent tests driven filtering";
   estimator.fewest_groups = 2;
   estimator.adaptive = adaptive;
-  estimator.pass_options = {"paper",   "dependent-spp", "pilot-spp", "allocation", "relative-error",
-                            "min-spp", "max-spp",       "filter",    "norm"};
   estimator.reach = dependent_tests_reach(o);
   estimator.memory.always = kDependentTestsBytesPerPixel;
   estimator.memory.largest_part = kDependentTestsBand;

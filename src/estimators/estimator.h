@@ -9,7 +9,6 @@
 #include <limits>
 #include <map>
 #include <optional>
-#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -83,7 +82,6 @@ struct Estimator {
   std::array<double, 2> split = {0.5, 0.5};
 
   std::optional<AdaptiveSampling> adaptive;  ///< not of estimators of the samples of a pixel
-  std::set<std::string> pass_options;        ///< its options that change the samples of its passes
 
   // Of a pair.
   std::function<EstimatorResult(const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings)>

@@ -200,8 +200,6 @@ Estimator make_iicv(Settings& parameters) {
   Estimator estimator;
   estimator.adaptive =
       ask_for_adaptive(p, standard, "As many independent samples in each pixel as the CRN pass says", problems);
-  estimator.pass_options.insert(std::begin(kAdaptiveOptions), std::end(kAdaptiveOptions));
-  estimator.pass_options.insert("pilot-spp");
   throw_if_any("iicv", problems);
 
   estimator.summary = "imperfect image-space control variates";

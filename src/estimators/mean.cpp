@@ -75,7 +75,7 @@ Estimator make_none(Settings& parameters) {
   estimator.adaptive = ask_for_adaptive(
       p, standard, "As many samples in each pixel as a first pass says that is not averaged in", problems);
   Norm norm = standard.counts.norm;
-  p.choice<Norm>("norm", norm, kNorms, kNormHelp);
+  p.choice<Norm>("norm", norm, kNorms, kNormHelp, {.effect = OptionEffect::kPasses});
   if (estimator.adaptive) estimator.adaptive->counts.norm = norm;
   p.only_if(estimator.adaptive.has_value(), {"norm"}, "without --adaptive: no noise is compared with a brightness");
   throw_if_any("none", problems);

@@ -9,7 +9,7 @@ std::shared_ptr<Integrator> make_bdpt(Settings& settings, const PathLengthSettin
                                                                       {"balance", Heuristic::kBalance}};
   BidirectionalSettings own;
   own.lengths = lengths;
-  settings.group("Integrator bdpt", true);
+  settings.group("Integrator bdpt", OptionEffect::kSamples);
   declare(settings, own.light_tracing);
   settings.choice("heuristic", own.heuristic, kHeuristics, "How techniques are weighted: with exponent 2, or balanced");
   return std::make_shared<BidirectionalTracer<BidirectionalParts>>(own);

@@ -79,7 +79,7 @@ inline void declare(Settings& s, ControlSettings& v) {
                                                                            {"learned", LightSelection::kLearned}};
   static constexpr std::pair<const char*, bool> kVariances[] = {{"relative", true}, {"absolute", false}};
   static constexpr std::pair<const char*, bool> kSurrogates[] = {{"filter", false}, {"oidn", true}};
-  s.group("Integrator controlled-path", true);
+  s.group("Integrator controlled-path", OptionEffect::kSamples);
   if (s.preset("cv-paper")) v = ControlSettings::published();
   s.choice("cv", v.kind, kControlKinds,
            "Control variates: one coefficient for each colour, for all, of light samples alone, by pixel for the first "

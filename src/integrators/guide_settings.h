@@ -37,7 +37,7 @@ struct GuideSettings {
 inline void declare(Settings& s, GuideSettings& v) {
   static constexpr std::pair<const char*, ControlKind> kControls[] = {
       {"rgb", ControlKind::kRgb}, {"mono", ControlKind::kMono}, {"off", ControlKind::kOff}};
-  s.group("Integrator guided-path", true);
+  s.group("Integrator guided-path", OptionEffect::kSamples);
   s.whole("guide-lobes", v.lobes, {.low = 1, .high = VmfLobes::kMax},
           "Lobes of a leaf at first; splitting makes up to twice as many", {.film = "lobes={}"});
   s.whole("guide-leaf", v.leaf_samples, {.low = GuideSettings::kMinLeafSamples, .high = GuideSettings::kMaxLeafSamples},

@@ -136,6 +136,8 @@ std::span<const IntegratorPlugin> integrator_plugins();
 const IntegratorPlugin* find_integrator(std::string_view name);
 /// What their settings are: those of paths and those of their own. `name` is registered.
 std::vector<Option> options_of_integrator(const std::string& name);
+/// Those of all; equal names are one option.
+std::vector<Option> options_of_integrators();
 std::vector<std::string> integrator_names();
 /// Names of those that have the option, without dashes; empty where none has.
 std::vector<std::string> integrators_with_option(const std::string& option);

@@ -31,6 +31,13 @@ std::vector<Option> options_of_integrator(const std::string& name) {
   return settings.options();
 }
 
+std::vector<Option> options_of_integrators() {
+  const std::vector<std::string> names = integrator_names();
+  std::vector<std::vector<Option>> lists;
+  for (const std::string& name : names) lists.push_back(options_of_integrator(name));
+  return merged_options(names, lists);
+}
+
 std::vector<std::string> integrator_names() {
   std::vector<std::string> names;
   for (const IntegratorPlugin& plugin : integrator_plugins()) names.emplace_back(plugin.name);
@@ -53,7 +60,7 @@ std::shared_ptr<Integrator> make_integrator(const IntegratorPlugin& plugin, Sett
 void declare(Settings& s, PathLengthSettings& v) {
   constexpr int kMost = 1 << 30;
   int max_depth = v.max_depth == PathLengthSettings::kUnlimited ? -1 : v.max_depth;
-  s.group("Paths", true);
+  s.group("Paths", OptionEffect::kSamples);
   s.whole("max-depth", max_depth, {.low = -1, .high = kMost},
           "Largest number of path edges: 1 is emission seen directly, 2 direct light; -1: no limit",
           {.level = OptionLevel::kBasic});

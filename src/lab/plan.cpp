@@ -47,48 +47,6 @@ std::string key_of(const std::string& kind, const PlanContext& context, const Sc
   return key_text(text);
 }
 
-bool is_option(const std::string& word) {
-  return word.size() > 1 && word[0] == '-' && !(word[1] >= '0' && word[1] <= '9') && word[1] != '.';
-}
-
-/// One option with its values, or a value without an option.
-struct Option {
-  std::string name;
-  Words values, words;
-};
-
-std::vector<Option> parsed(const Words& words) {
-  std::vector<Option> options;
-  for (size_t i = 0; i < words.size();) {
-    const size_t first = i++, equals = words[first].find('=');
-    Option option{words[first].substr(0, equals), {}, {}};
-    if (equals != std::string::npos) option.values.push_back(words[first].substr(equals + 1));
-    while (i < words.size() && !is_option(words[i])) option.values.push_back(words[i++]);
-    option.words.assign(words.begin() + static_cast<std::ptrdiff_t>(first),
-                        words.begin() + static_cast<std::ptrdiff_t>(i));
-    options.push_back(option);
-  }
-  return options;
-}
-
-/// The method's options that change the passes: without those that only its estimator reads, and one word for all
-/// estimators of the same pair of passes.
-Words pass_options(const Words& words, const PlanContext& context) {
-  const std::vector<Option> options = parsed(words);
-  std::string estimator = context.default_estimator;
-  for (const Option& option : options)
-    if (option.name == "--estimator" && !option.values.empty()) estimator = option.values[0];
-  const auto own = context.estimator_options.find(estimator);
-  Words kept;
-  for (const Option& option : options) {
-    const bool is_own = own != context.estimator_options.end() && own->second.contains(option.name);
-    if (option.name == "--estimator" || is_own) continue;
-    kept.insert(kept.end(), option.words.begin(), option.words.end());
-  }
-  kept.push_back(context.pair_estimators.contains(estimator) ? "pair" : estimator);
-  return kept;
-}
-
 Words joined(std::initializer_list<Words> lists) {
   Words all;
   for (const Words& words : lists) all.insert(all.end(), words.begin(), words.end());
@@ -188,7 +146,7 @@ std::vector<Run> runs_of_scene(const Suite& suite, size_t index, const SceneInst
         // What a time budget renders depends on the method's speed: such passes belong to one run alone.
         run.passes_key = budget.spp ? key_of("passes", context, scene,
                                              {scene.options(), suite.common_options, amount, seed_words,
-                                              pass_options(method.options, context)})
+                                              context.pass_words(method.options)})
                                     : run.key;
         runs.push_back(std::move(run));
       }

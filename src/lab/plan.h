@@ -2,8 +2,7 @@
 // From a suite to command lines: what to run, in which order, and under which keys results are kept.
 #pragma once
 
-#include <map>
-#include <set>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -46,11 +45,8 @@ struct Run {
 /// What does not change from run to run.
 struct PlanContext {
   std::string program_version;  ///< part of every key
-  /// Options that only estimators read ("--k"), of each of them: they leave its passes as they are.
-  std::map<std::string, std::set<std::string>> estimator_options;
-  /// Estimators that need the same pair of passes.
-  std::set<std::string> pair_estimators;
-  std::string default_estimator;  ///< of a method that names none
+  /// What a method's options of `covary render` say of the samples that its passes take: equal words, equal passes.
+  std::function<std::vector<std::string>(const std::vector<std::string>&)> pass_words;
 };
 
 /// Both halves of the reference that is to be rendered for a scene.

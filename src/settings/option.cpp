@@ -5,41 +5,27 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 
 #include "core/error.h"
+#include "settings/number_text.h"
 
 namespace covary {
 namespace {
 
-std::string_view without_plus(std::string_view text) {
-  if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
-  return text;
-}
-
-template <typename T>
-std::optional<T> parsed(std::string_view text) {
-  text = without_plus(text);
-  T value{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size()) return {};
-  return value;
-}
-
 std::optional<std::string> accepted_whole(const Option& option, const std::string& text, bool in_range) {
-  if (const std::optional<uint64_t> value = parsed<uint64_t>(text)) {
+  if (const std::optional<uint64_t> value = parse_number<uint64_t>(text)) {
     const bool good = *value <= option.most && (!in_range || option.range.contains(static_cast<double>(*value)));
     return good ? std::optional(std::to_string(*value)) : std::nullopt;
   }
-  const std::optional<int64_t> value = parsed<int64_t>(text);
+  const std::optional<int64_t> value = parse_number<int64_t>(text);
   const bool good =
       value && *value >= option.least && (!in_range || option.range.contains(static_cast<double>(*value)));
   return good ? std::optional(std::to_string(*value)) : std::nullopt;
 }
 
 std::optional<std::string> accepted_real(const Option& option, const std::string& text, bool in_range) {
-  const std::optional<double> value = parsed<double>(text);
+  const std::optional<double> value = parse_number<double>(text);
   if (!value || !std::isfinite(static_cast<float>(*value)) || (in_range && !option.range.contains(*value))) return {};
   return std::string(without_plus(text));
 }

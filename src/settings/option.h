@@ -28,6 +28,10 @@ struct OptionRange {
 /// What the text of an option names outside of the render. A suite from elsewhere may use values only.
 enum class OptionNames { kValue, kFile, kFolder, kLibrary, kServer };
 
+/// What a value changes: what is made of films alone; which samples are taken; or the values of samples, so that the
+/// command that repeats one needs it.
+enum class OptionEffect { kImage, kPasses, kSamples };
+
 /// Who needs it: everybody who wants a picture, or those who know the method.
 enum class OptionLevel { kBasic, kExpert };
 
@@ -47,10 +51,10 @@ struct Option {
   std::string group;  ///< heading in the help
   OptionLevel level = OptionLevel::kExpert;
   OptionNames names = OptionNames::kValue;
-  bool changes_samples = false;  ///< a sample's value hangs on it: it is in the command that repeats the sample
-  bool repeats = false;          ///< may be given more than once; its value is a line for each
-  std::string film;              ///< see Settings::film_text()
-  bool has_effect = true;        ///< false where values of other options leave it without one
+  OptionEffect effect = OptionEffect::kImage;
+  bool repeats = false;    ///< may be given more than once; its value is a line for each
+  std::string film;        ///< see Settings::film_text()
+  bool has_effect = true;  ///< false where values of other options leave it without one
 
   /// Of exactly the words "on" and "off"; a boolean in scene files.
   bool is_switch() const;

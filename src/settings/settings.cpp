@@ -41,7 +41,7 @@ Option Settings::made(Option::Type type, const std::string& name, const std::str
   Option option;
   option.name = name, option.type = type, option.help = help, option.group = group_;
   option.aliases = traits.aliases, option.level = traits.level, option.names = traits.names;
-  option.changes_samples = traits.changes_samples || changes_samples_, option.film = traits.film;
+  option.effect = std::max(traits.effect, effect_), option.film = traits.film;
   return option;
 }
 

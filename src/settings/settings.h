@@ -4,7 +4,7 @@
 //   void declare(Settings& s, FogSettings& v) {
 //     s.group("Fog");
 //     s.whole("fog-steps", v.steps, {.low = 1, .high = 64}, "Steps of each ray");
-//     s.on_off("fog-jitter", v.jitter, "Whether steps begin at random", {.changes_samples = true});
+//     s.on_off("fog-jitter", v.jitter, "Whether steps begin at random", {.effect = OptionEffect::kSamples});
 //     s.only_if(v.steps > 1, {"fog-jitter"}, "with --fog-steps 1");
 //   }
 //
@@ -38,8 +38,8 @@ struct OptionTraits {
   std::vector<std::string> aliases = {};
   OptionLevel level = OptionLevel::kExpert;
   OptionNames names = OptionNames::kValue;
-  bool changes_samples = false;  ///< as all of the group do, or this one alone
-  std::string film = {};         ///< see Settings::film_text()
+  OptionEffect effect = OptionEffect::kImage;  ///< the group's where that is more
+  std::string film = {};                       ///< see Settings::film_text()
 };
 
 /// A number that may be a word: "auto" for `value`.
@@ -75,9 +75,9 @@ class Settings {
   Settings(const Settings&) = delete;
   Settings& operator=(const Settings&) = delete;
 
-  /// Heading in the help of the options that follow, and whether all of them change samples.
-  void group(const std::string& heading, bool changes_samples = false) {
-    group_ = heading, changes_samples_ = changes_samples;
+  /// Heading in the help of the options that follow, and what all of them change.
+  void group(const std::string& heading, OptionEffect effect = OptionEffect::kImage) {
+    group_ = heading, effect_ = effect;
   }
 
   /// Whether a flag that is yet to be declared was given which sets many options at once. A caller's takes the place of
@@ -131,6 +131,18 @@ class Settings {
   /// Any text; `form` says what it looks like.
   void text(const std::string& name, std::string& value, const std::string& form, const std::string& help,
             const OptionTraits& traits = {});
+  /// A text that `read(text, value)` understands; it returns what was expected otherwise, or an empty text.
+  template <typename T, typename Read>
+  void text_as(const std::string& name, T& value, const std::string& form, const Read& read, const std::string& help,
+               const OptionTraits& traits = {}) {
+    Option option = made(Option::Type::kText, name, help, traits);
+    option.form = form;
+    const std::optional<std::string> given = declare(std::move(option));
+    if (!given) return;
+    const std::string problem = read(*given, value);
+    if (!problem.empty()) source_->refuse(options_.back(), "'" + *given + "': expected " + problem);
+    set_value(*given);
+  }
   /// Texts, one each time the option is given.
   void texts(const std::string& name, std::vector<std::string>& values, const std::string& form,
              const std::string& help, const OptionTraits& traits = {});
@@ -229,9 +241,23 @@ class Settings {
   std::unique_ptr<SettingsSource> own_source_;
   SettingsSource* source_ = nullptr;
   std::string group_;
-  bool changes_samples_ = false;
+  OptionEffect effect_ = OptionEffect::kImage;
   std::vector<Option> options_;
 };
+
+/// The options of a struct that has a declare(), and what values make of it.
+template <typename T>
+std::vector<Option> options_of(T settings = {}) {
+  Settings list;
+  declare(list, settings);
+  return list.options();
+}
+template <typename T>
+T settings_from(const OptionValues& values, T settings = {}) {
+  Settings reader(values);
+  declare(reader, settings);
+  return settings;
+}
 
 /// Settings::film_text() of a struct that has a declare().
 template <typename T>

@@ -2,10 +2,12 @@
 // One declaration: reading, listing, checks, options without effect, and the text in films.
 #include "settings/settings.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <limits>
 
+#include "settings/number_text.h"
 #include "support/files.h"
 
 namespace covary {
@@ -25,11 +27,19 @@ struct Fog {
   bool jitter = true, thick = false;
   std::string file, mode = "a";
   std::vector<std::string> names;
+  int side = 0;
 };
+
+std::string read_side(const std::string& text, int& side) {
+  const auto sides = parse_whole_numbers(text, 'x', 2);
+  if (!sides || (*sides)[0] != (*sides)[1]) return "SIDExSIDE";
+  side = static_cast<int>((*sides)[0]);
+  return "";
+}
 
 void declare(Settings& s, Fog& v) {
   static constexpr std::pair<const char*, Colour> kColours[] = {{"red", Colour::kRed}, {"blue", Colour::kBlue}};
-  s.group("Fog", true);
+  s.group("Fog", OptionEffect::kPasses);
   if (s.preset("fog-thick")) v.steps = 32;
   s.whole("fog-steps", v.steps, {.low = 1, .high = 64}, "Steps of each ray", {.film = "steps={}"});
   s.whole<uint32_t>("fog-grid", v.grid, {.low = 1, .high = 9}, {"auto", 0}, "Cells", {.film = "grid={}"});
@@ -41,6 +51,7 @@ void declare(Settings& s, Fog& v) {
   s.text("fog-file", v.file, "FILE", "File of densities", {.names = OptionNames::kFile});
   s.texts("fog-name", v.names, "NAME", "Names");
   s.one_of("fog-mode", v.mode, {"a", "b"}, "Mode");
+  s.text_as("fog-size", v.side, "SIDExSIDE", read_side, "Size", {.effect = OptionEffect::kSamples});
   s.only_if(v.steps > 1, {"fog-jitter", "fog-height"}, "with --fog-steps 1");
 }
 
@@ -71,7 +82,8 @@ TEST(Settings, ValuesReachTheStruct) {
                         {"fog-jitter", "off"},
                         {"fog-file", "a b.vol"},
                         {"fog-name", "x\ny"},
-                        {"fog-mode", "b"}});
+                        {"fog-mode", "b"},
+                        {"fog-size", "7x7"}});
   EXPECT_EQ(fog.steps, 8);
   EXPECT_EQ(fog.grid, 3u);
   EXPECT_EQ(fog.density, 0.25f);
@@ -82,6 +94,7 @@ TEST(Settings, ValuesReachTheStruct) {
   EXPECT_EQ(fog.file, "a b.vol");
   EXPECT_EQ(fog.names, (Words{"x", "y"}));
   EXPECT_EQ(fog.mode, "b");
+  EXPECT_EQ(fog.side, 7);
   EXPECT_EQ(read({{"fog-grid", "auto"}}).grid, 0u);
 }
 
@@ -103,7 +116,7 @@ TEST(Settings, DefaultsAreThoseOfTheStruct) {
   EXPECT_EQ(standard("fog-thick"), "");
   for (const Option& option : options) {
     EXPECT_EQ(option.group, "Fog");
-    EXPECT_TRUE(option.changes_samples);
+    EXPECT_EQ(option.effect, option.name == "fog-size" ? OptionEffect::kSamples : OptionEffect::kPasses);
     EXPECT_EQ(option.level == OptionLevel::kBasic, option.name == "fog-colour");
     EXPECT_EQ(option.names == OptionNames::kFile, option.name == "fog-file");
   }
@@ -116,6 +129,8 @@ TEST(Settings, WhatIsNoValueIsRefused) {
   EXPECT_EQ(problem({{"fog-density", "nan"}}), "--fog-density 'nan': expected a number above 0 to 1");
   EXPECT_EQ(problem({{"fog-height", "1x"}}), "--fog-height '1x': expected a number");
   EXPECT_EQ(problem({{"fog-colour", "blu"}}), "--fog-colour 'blu'; did you mean 'blue'?: expected red, blue");
+  for (const char* size : {"7x8", "7", "7x", "-1x-1", "7x7x7", "x", ""})
+    EXPECT_EQ(problem({{"fog-size", size}}), fmt::format("--fog-size '{}': expected SIDExSIDE", size));
   EXPECT_EQ(problem({{"fog-jitter", "yes"}}), "--fog-jitter 'yes': expected on, off");
 }
 
@@ -133,6 +148,14 @@ TEST(Settings, FilmTextHasWhatHasAnEffect) {
   EXPECT_EQ(film_text_of(fog), "steps=4 grid=7 density=0.500000 thick");
   fog.jitter = true, fog.steps = 1;
   EXPECT_EQ(film_text_of(fog), "steps=1 grid=7 density=0.500000 thick");
+}
+
+TEST(NumberText, ListsOfNumbers) {
+  EXPECT_EQ(parse_whole_numbers("3,010", ',', 2), (std::vector<int64_t>{3, 10}));
+  EXPECT_EQ(parse_reals("0.5:+2e1", ':', 2), (std::vector<double>{0.5, 20}));
+  for (const char* text : {"3", "3,4,5", "3,", ",3", "3,-1", "3, 4", "3,4.5", "3,9223372036854775807"})
+    EXPECT_FALSE(parse_whole_numbers(text, ',', 2)) << text;
+  for (const char* text : {"1:nan", "1:inf", "1:", "1:-1"}) EXPECT_FALSE(parse_reals(text, ':', 2)) << text;
 }
 
 TEST(Options, AcceptedTextsAreThoseOfNumbers) {

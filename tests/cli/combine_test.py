@@ -194,7 +194,7 @@ class Combine(CliTest):
     def test_wrong_usage(self):
         inputs = ["combine", "--crn", "crn.exr", "--independent", "independent.exr", "-o", "out.exr"]
         self.bad(2, "k is 500, expected 1 to 121", *inputs, "--k", "500")
-        self.bad(2, "window is 10, expected an odd number from 3 to 63", *inputs, "--window", "10")
+        self.bad(2, "--window: '10': expected an odd whole number from 3 to 63", *inputs, "--window", "10")
         self.bad(2, "--penalty is an option of --estimator iicv, not of iduw", *inputs, "--estimator", "iduw",
                  "--penalty", "pilot")
         self.bad(2, "--samples is an option of --counts and --estimator iduw, not of iicv", *inputs, "--samples", "3")

@@ -124,7 +124,7 @@ class Adaptive(RenderTest):
         render = ("render", ROOM, *SMALL, "-o", "a.exr", "--estimator", "none")
         self.bad(2, "--max-spp has no effect without --adaptive", *render, "--max-spp", "8")
         self.bad(2, "--adaptive always takes independent random numbers", *render, "--adaptive", "--sampling", "crn")
-        self.bad(2, "min-spp is 0, expected 1 or more", *render, "--adaptive", "--min-spp", "0")
+        self.bad(2, "--min-spp: '0': expected a whole number of at least 1", *render, "--adaptive", "--min-spp", "0")
         self.bad(2, "iicv: max-spp is 1, expected at least 12, one sample for each group", "render", ROOM, *SMALL,
                  "-o", "a.exr", "--adaptive", "--max-spp", "1", "--spp", "96")
 

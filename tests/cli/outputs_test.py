@@ -379,7 +379,7 @@ class Numbers(OutputsTest):
     def test_a_window_beyond_all_bounds(self):
         self.write("crn.exr", film(1, groups=3))
         self.write("pt.exr", film(2, groups=3, sampling="independent"))
-        result = self.bad(2, "window is 2147483647, expected an odd number from 3 to 63", "combine", "--crn",
+        result = self.bad(2, "--window: '2147483647': expected an odd whole number from 3 to 63", "combine", "--crn",
                           "crn.exr", "--independent",
                           "pt.exr", "-o", "o.exr", "--window", "2147483647")
         self.assertNotIn("k is", result.stderr)

@@ -294,7 +294,7 @@ class Files(RenderTest):
             for text in ("0x20", "99999999999999999999", "1e3"):
                 self.bad(2, f"--{option}: '{text}': expected a whole number", *render, f"--{option}={text}")
         for text in ("nan", "inf", "1e400"):
-            self.bad(2, f"--time: '{text}': expected a positive number", *render, f"--time={text}")
+            self.bad(2, f"--time: '{text}': expected a number above 0", *render, f"--time={text}")
             self.bad(2, f"--checkpoint: '{text}': expected a number of at least 0", *render, f"--checkpoint={text}")
             self.bad(2, f"--until 'relmse={text}': expected relmse=X", *render, f"--until=relmse={text}")
 

@@ -3,7 +3,12 @@
 is accepted. An argument without such a value here, and a public function that is missing here, fails the test."""
 import importlib
 import inspect
+import os
+import re
+import subprocess
+import tempfile
 import unittest
+from pathlib import Path
 
 import covary
 import covary.blender
@@ -227,6 +232,40 @@ class Arguments(PackageTest):
         from covary._arguments import checked, flag
         self.assertIn("the rules are of ['b'], the arguments ['a']", self.message_of(
             TypeError, checked(b=flag), lambda a: a))
+
+    def test_options_of_rendering_are_arguments(self):
+        """All that the library declares, under their names; these differ."""
+        declared = {option["name"].replace("-", "_") for option in covary._covary.render_options()}
+        other = {"rfilter": "filter", "no_preview": "preview"}
+        taken = set(inspect.signature(covary.render).parameters) - {"scene", "options", "films_only", "progress",
+                                                                    "until_p95"}
+        self.assertEqual({other.get(name, name) for name in declared} - {"resolution"}, taken)
+        self.assertIn("resolution", inspect.signature(covary.Scene.load).parameters)
+
+    def test_options_of_integrators_are_those_of_scene_files_and_of_the_program(self):
+        """Each with its default, in all three."""
+        room = Path(ROOM).read_text()
+        words = subprocess.run([os.environ["COVARY_PROGRAM"], "render", "--help-all"], capture_output=True, text=True,
+                               check=True).stdout
+        kinds = {"whole": "integer", "real": "float", "choice": "string"}
+        for integrator, options in covary._covary.integrator_options().items():
+            self.assertGreaterEqual(len(options), 4)
+            for option in options:
+                name, value = option["name"].replace("-", "_"), option["default"]
+                is_switch = option["type"] == "flag" or option["choices"] == ["on", "off"]
+                kind = "boolean" if is_switch else "string" if value in option["choices"] else kinds[option["type"]]
+                value = {"on": "true", "": "false", "off": "false"}[value] if is_switch else value
+                element = f'<integrator type="{integrator}"><{kind} name="{name}" value="{value}"/></integrator>'
+                with self.subTest(element), tempfile.TemporaryDirectory() as folder:
+                    self.assertRegex(words, rf"\n +--{option['name']}[ ,\n]")
+                    file = Path(folder, "scene.xml")
+                    file.write_text(re.sub("<integrator.*?</integrator>", element, room, count=1, flags=re.S))
+                    covary.Scene.load(file)
+                    given = {name: value == "true" if is_switch else value}
+                    try:
+                        covary.Scene.load(ROOM, integrator=integrator, integrator_options=given)
+                    except covary.UsageError as error:  # where it needs another one
+                        self.assertIn("has no effect with", str(error))
 
     def test_names_are_those_of_the_library(self):
         """Each that the signatures list is one that the library takes."""

@@ -71,8 +71,8 @@ class Combine(FilesTest):
         message = self.message_of(covary.InputError, covary.combine, self.independent, self.crn)
         self.assertEqual(message.replace("force=True", "--force"), swapped)
         wrong = self.failure_of_program("combine", "--crn", "crn.exr", "--independent", "independent.exr", "-o",
-                                        "x.exr", "--window", "4")
-        self.assertEqual(self.message_of(covary.UsageError, covary.combine, self.crn, self.independent, window=4),
+                                        "x.exr", "--k", "500")
+        self.assertEqual(self.message_of(covary.UsageError, covary.combine, self.crn, self.independent, k=500),
                          wrong)
 
     def test_less_noise(self):

@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plans/render_settings.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "core/error.h"
+#include "integrators/light_pass.h"
+#include "integrators/training.h"
+#include "plans/integrator_choice.h"
+#include "settings/number_text.h"
+
+namespace covary {
+namespace {
+
+constexpr int kLargestSide = 65536;
+constexpr double kMostSamples = 1 << 30;
+constexpr OptionTraits kBasicPasses{.level = OptionLevel::kBasic, .effect = OptionEffect::kPasses};
+constexpr OptionTraits kBasicSamples{.level = OptionLevel::kBasic, .effect = OptionEffect::kSamples};
+
+std::string read_resolution(const std::string& text, RenderSettings& v) {
+  const auto size = parse_whole_numbers(text, 'x', 2);
+  if (!size || (*size)[0] < 1 || (*size)[1] < 1 || (*size)[0] > kLargestSide || (*size)[1] > kLargestSide)
+    return fmt::format("WIDTHxHEIGHT, each from 1 to {}, e.g. 1280x720", kLargestSide);
+  v.width = static_cast<int>((*size)[0]), v.height = static_cast<int>((*size)[1]);
+  return "";
+}
+
+std::string read_crop(const std::string& text, std::optional<CropWindow>& crop) {
+  const auto c = parse_whole_numbers(text, ',', 4);
+  if (!c || *std::max_element(c->begin(), c->end()) > kLargestSide)
+    return "X,Y,WIDTH,HEIGHT in pixels, e.g. 240,560,240,160";
+  const auto at = [&](size_t i) { return static_cast<int>((*c)[i]); };
+  crop = {at(0), at(1), at(2), at(3)};
+  return "";
+}
+
+std::string read_split(const std::string& text, std::optional<std::array<double, 2>>& split) {
+  const auto parts = parse_reals(text, ':', 2);
+  if (!parts || (*parts)[0] <= 0 || (*parts)[1] <= 0) return "CRN:INDEPENDENT, two numbers above 0, e.g. 1:1";
+  const double sum = (*parts)[0] + (*parts)[1];
+  split = {(*parts)[0] / sum, (*parts)[1] / sum};
+  return "";
+}
+
+std::string read_until(const std::string& text, RenderRequest& v) {
+  for (const std::string key : {"relmse=", "relmse-p95="})
+    if (text.starts_with(key)) {
+      const std::optional<double> value = parse_real(std::string_view(text).substr(key.size()));
+      if (!value || *value <= 0) break;
+      v.until = *value, v.until_in_blocks = key != "relmse=";
+      return "";
+    }
+  return "relmse=X or relmse-p95=X with X > 0, e.g. relmse=0.005";
+}
+
+FilterSettings filter_named(const std::string& name) {
+  if (name == "box") return {FilterKind::kBox, 0.5f, 0};
+  if (name == "tent") return {FilterKind::kTent, 1.0f, 0};
+  return {FilterKind::kGaussian, 2.0f, 0.5f};
+}
+
+void declare_basic(Settings& s, RenderSettings& v) {
+  RenderRequest& r = v.request;
+  s.group("Rendering");
+  s.text("output", r.output, "FILE", "The image (EXR); a PNG preview appears beside it",
+         {.aliases = {"o"}, .level = OptionLevel::kBasic, .names = OptionNames::kFile});
+  s.whole("spp", r.spp, {.low = 1, .high = kMostSamples},
+          "Samples per pixel of all passes together; default: the scene's", kBasicPasses);
+  s.text_as(
+      "until", r, "relmse=X", read_until,
+      "relmse=X: add samples until the predicted error is X, at most --spp; relmse-p95=X: until 95 % of the blocks "
+      "of 16 x 16 pixels have no more",
+      kBasicPasses);
+  std::optional<double> seconds;
+  s.real("time", seconds, {.low = 0, .above_low = true},
+         "Seconds for rendering and estimating, not for loading or writing", kBasicPasses);
+  if (seconds) r.seconds = *seconds;
+  s.one_of("integrator", v.integrator, integrator_names(), "Integrator instead of the scene's", kBasicSamples);
+  s.one_of("estimator", v.estimator, estimator_names(), "How samples become the image; none: the mean of one pass",
+           kBasicPasses);
+  declare(s, v.denoising);
+  s.group("Rendering");
+  s.whole("seed", r.seed, {.low = 0}, "Seed of the random numbers", kBasicSamples);
+  s.text_as("resolution", v, "WIDTHxHEIGHT", read_resolution, "Size of the full frame; default: the scene's",
+            kBasicSamples);
+  s.text_as("crop", r.crop, "X,Y,WIDTH,HEIGHT", read_crop, "Render only these pixels of the frame", kBasicSamples);
+  s.text("passes", r.passes, "FOLDER", "Keep the film of every pass here",
+         {.aliases = {"save-passes"}, .level = OptionLevel::kBasic, .names = OptionNames::kFolder});
+  s.flag("resume", r.resume, "Continue the films of an interrupted render, or those in --passes",
+         {.level = OptionLevel::kBasic});
+}
+
+void declare_sampling(Settings& s, RenderSettings& v) {
+  static constexpr std::pair<const char*, Sampling> kSamplings[] = {{"independent", Sampling::kIndependent},
+                                                                    {"crn", Sampling::kCrn}};
+  static constexpr std::pair<const char*, CrnPart> kParts[] = {
+      {"both", CrnPart::kBoth}, {"camera", CrnPart::kCamera}, {"light", CrnPart::kLight}};
+  s.group("Sampling", OptionEffect::kPasses);
+  std::string sampler, filter;
+  s.one_of("sampler", sampler, {"independent", "sobol"},
+           "Random numbers of the samples of a group: independent, or Owen-scrambled Sobol' points; default: the "
+           "scene's, any but independent meaning sobol",
+           {.effect = OptionEffect::kSamples});
+  if (!sampler.empty()) v.request.sampler = sampler == "sobol" ? Sampler::kSobol : Sampler::kIndependent;
+  s.choice("sampling", v.passes.sampling, kSamplings,
+           "Random numbers per pixel, or common to all; a single pass (estimator none)",
+           {.effect = OptionEffect::kSamples});
+  s.text_as("split", v.passes.split, "CRN:INDEPENDENT", read_split,
+            "Parts of the samples for the two passes; default: the estimator's, 1:1 of most");
+  s.whole(
+      "groups", v.passes.groups, {.low = 1, .high = Film::kMaxGroups},
+      "Groups of samples whose means films keep; default: the largest from 12 to 8 that divides the samples, else 12, "
+      "or as many as samples; 1 for a single independent pass");
+  s.choice("crn-part", v.request.crn_part, kParts,
+           "Which part of a path has the common random numbers, for integrators that trace light",
+           {.effect = OptionEffect::kSamples});
+  s.one_of("rfilter", filter, {"box", "tent", "gaussian"}, "Reconstruction filter instead of the scene's",
+           {.effect = OptionEffect::kSamples});
+  if (!filter.empty()) v.request.filter = filter_named(filter);
+}
+
+void declare_output(Settings& s, RenderRequest& r) {
+  s.group("Output");
+  s.flag("overwrite", r.overwrite, "Replace films that are there already, in --passes or of an interrupted render");
+  s.real("checkpoint", r.checkpoint_seconds, {.low = 0}, "Seconds between writing unfinished films; 0: never");
+  r.preview = !s.flag("no-preview", "Do not write the PNG");
+  s.flag("aovs", r.aovs, "Add the images Albedo, N (normal) and P (position) to the output");
+  s.flag("path-lengths", r.path_lengths, "Add an image for each number of edges of paths (Edges01, …) to the output",
+         {.effect = OptionEffect::kPasses});
+  s.group("Training of controlled-path and guided-path");
+  s.text("save-training", r.save_training, "FILE", "Keep here what was learnt", {.names = OptionNames::kFile});
+  s.text("load-training", r.load_training, "FILE", "Such a file, to use in place of a training",
+         {.names = OptionNames::kFile, .effect = OptionEffect::kSamples});
+}
+
+}  // namespace
+
+void declare(Settings& settings, RenderSettings& v) {
+  declare_basic(settings, v);
+  declare_sampling(settings, v);
+  declare_output(settings, v.request);
+  if (v.request.resume && v.request.overwrite) throw Error(ErrorCode::kUsage, "--overwrite excludes --resume");
+}
+
+Estimator estimator_of(const RenderSettings& settings, const OptionValues& of_estimator) {
+  return with_denoising(make_estimator(settings.estimator, of_estimator), settings.denoising);
+}
+
+void take_training(const LoadedScene& scene, RenderRequest& request) {
+  const LearningIntegrator* learning = integrator_of(scene).learning();
+  const uint32_t training = learning ? learning->training_spp() : 0;
+  const bool open_ended = request.seconds > 0 || request.until > 0;
+  if (training == 0 || (!request.spp && open_ended)) return;
+  const uint32_t all = request.spp.value_or(static_cast<uint32_t>(scene.spp));
+  if (all <= training)
+    throw Error(ErrorCode::kUsage, fmt::format("{} samples per pixel, of which the training takes {}, leave none for "
+                                               "the image; use a larger --spp or a shorter training "
+                                               "(--cv-train, --guide-train)",
+                                               all, training));
+  request.spp = all - training;
+}
+
+std::vector<std::string> replay_words(OptionValues values, const Pass& pass, const BadSample& bad) {
+  std::vector<Option> options = options_of<RenderSettings>();
+  for (const Option& option : options)
+    if (option.effect != OptionEffect::kSamples) values.erase(option.name);
+  values["seed"] = std::to_string(pass.settings.seed);
+  const bool is_crn = pass.settings.sampling == Sampling::kCrn, is_sobol = pass.settings.sampler == Sampler::kSobol;
+  if (!pass.plan.light) values["sampling"] = is_crn ? "crn" : "independent";
+  if (!is_crn) values.erase("crn-part");
+  if (is_sobol) values["groups"] = std::to_string(pass.settings.groups);
+  if (is_sobol || values.contains("sampler")) values["sampler"] = sampler_name(pass.settings.sampler);
+  // Whether light is traced decides on the weights of strategies.
+  if (pass.integrator->light_tracing()) values["light-tracing"] = light_tracer(*pass.integrator) ? "on" : "off";
+  const std::vector<Option> of_integrators = options_of_integrators();
+  options.insert(options.end(), of_integrators.begin(), of_integrators.end());
+  std::vector<std::string> words = option_words(options, values);
+  const std::string sample =
+      pass.plan.light ? std::to_string(bad.sample) : fmt::format("{},{},{}", bad.x, bad.y, bad.sample);
+  const std::string number = !pass.plan.light && pass.plan.number ? fmt::format(",{}", pass.plan.number) : "";
+  words.insert(words.end(), {pass.plan.light ? "--replay-light" : "--replay", sample + number});
+  return words;
+}
+
+std::vector<std::string> pass_words(OptionValues given, const OptionValues& of_integrator, OptionValues of_estimator) {
+  const std::string name = settings_from<RenderSettings>(given).estimator;
+  const Estimator estimator = make_estimator(name, of_estimator);
+  given.erase("estimator");
+  std::vector<std::string> words;
+  const auto add = [&](const std::vector<Option>& options, OptionValues& values) {
+    for (const Option& option : options)
+      if (option.effect == OptionEffect::kImage) values.erase(option.name);
+    const std::vector<std::string> more = option_words(options, values);
+    words.insert(words.end(), more.begin(), more.end());
+  };
+  add(options_of<RenderSettings>(), given);
+  add(options_of_estimator(name), of_estimator);
+  for (const auto& [option, value] : of_integrator) words.insert(words.end(), {"--" + option, value});
+  const bool is_plain_pair = estimator.passes == EstimatorPasses::kPair && !estimator.adaptive;
+  words.push_back(is_plain_pair ? "pair" : name);
+  return words;
+}
+
+}  // namespace covary
