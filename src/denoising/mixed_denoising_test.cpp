@@ -192,7 +192,7 @@ TEST(MixedDenoising, SaysWhatItCannotDo) {
   EXPECT_EQ(message_of([] { denoise_mode("much"); }), "--denoise 'much': expected none, bias, balanced, error");
   EXPECT_NE(message_of([] {
               with_denoising(make_estimator("iduw"), {DenoiseMode::kError});
-            }).find("--denoise needs an estimator of two passes that predicts its error (iicv"),
+            }).find("denoising needs an estimator of two passes that predicts its error, not iduw"),
             std::string::npos);
   MixedDenoisingOptions elsewhere;
   elsewhere.oidn.library = "/nowhere/libOpenImageDenoise.so.2";

@@ -96,8 +96,8 @@ class ExperimentTest(unittest.TestCase):
     def run_covary(self, command, **more):
         return subprocess.run(command, cwd=self.path, capture_output=True, text=True, timeout=TIMEOUT, **more)
 
-    def results(self, *arguments, out="out", code=0):
-        done = self.run_covary(self.command(*arguments, out=out))
+    def results(self, *arguments, out="out", code=0, **more):
+        done = self.run_covary(self.command(*arguments, out=out), **more)
         self.assertEqual(done.returncode, code, done.stderr)
         self.stderr = done.stderr
         return json.loads((self.path / out / "results.json").read_text())
@@ -353,16 +353,17 @@ class Resume(ExperimentTest):
     def test_optional_methods_are_left_out(self):
         """What the machine lacks is a warning for an optional method, and a failure for any other."""
         self.suite["budgets"], self.suite["seeds"] = [{"spp": 24}], 1
-        method = {"name": "oidn", "options": ["--estimator", "none"], "then": [["denoise", "--oidn", "/nowhere"]]}
+        method = {"name": "oidn", "options": ["--estimator", "none"], "then": [["denoise"]]}
+        without = {"env": os.environ | {"COVARY_OIDN": "/nowhere"}}
         self.suite["methods"].append({**method, "optional": True})
-        results = self.results("--reference-spp", "64")
+        results = self.results("--reference-spp", "64", **without)
         self.assertEqual(results["failures"], [])
         self.assertEqual({cell["method"] for cell in results["cells"]}, {"pt", "iicv"})
         self.assertIn("room: the method 'oidn' is left out: ", "".join(results["warnings"]))
         self.assertIn("/nowhere", "".join(results["warnings"]))
         self.assertIn("At equal samples (24 spp) 'iicv' has the least error", self.stderr)
         self.suite["methods"][-1] = method
-        self.assertEqual(len(self.results("--reference-spp", "64", code=1)["failures"]), 1)
+        self.assertEqual(len(self.results("--reference-spp", "64", code=1, **without)["failures"]), 1)
 
     def test_passes_are_shared(self):
         self.suite["methods"] += [{"name": "paper", "options": ["--paper", "--k", "9"]},

@@ -506,13 +506,15 @@ TEST(ControlledPath, TakesScenesThatHaveLittleToLearn) {
 TEST(ControlledPath, LeavesOutTrainingSamplesThatAreNotFinite) {
   TestScene scene = controlled(everything(), options(ControlKind::kRgb));
   TrainingSettings settings{{0, 0, kSide, kSide}, scene.loaded.filter};
-  settings.importance = [](const Film& film) {
-    EXPECT_EQ(film.count(0, 0), 2u);
+  std::vector<uint32_t> counts;
+  settings.importance = [&](const Film& film) {
+    counts.push_back(film.count(0, 0));
     std::vector<Spectrum> importance(kSide * kSide, Spectrum(1));
     for (size_t i = 0; i < importance.size(); i += 2) importance[i] = Spectrum(std::nanf(""));
     return importance;
   };
   ASSERT_TRUE(train(scene.scene(), integrator_of(scene), settings));
+  EXPECT_EQ(counts, (std::vector<uint32_t>{2, 4}));  // after the pilot, and after the wave that follows it
   EXPECT_GT(integrator_of(scene).cache().n_rejected(), 100u);
   EXPECT_GT(image_mean(render(scene, 2, 0)), 0.1);  // and no sample is bad
 }
