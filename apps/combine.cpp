@@ -61,6 +61,7 @@ void write(const CombineOptions& o, const GroupedFile& crn, const GroupedFile& i
                                                    {"covary:command", command_line()}};
   if (crn.samples() && independent.samples())
     attributes["covary:samples"] = fmt::to_string(crn.samples() + independent.samples());
+  if (!o.error) result.std_error = {}, result.bias = {};  // asked for by --json alone
   std::map<std::string, Image> no_aovs;
   write_result(o.output, crn.place(), attributes, result, no_aovs);
 }
@@ -178,7 +179,7 @@ struct Inputs {
     request.estimator = estimator_of(o);
     request.settings = pair_settings(
         request.estimator, request.estimator.needs_sample_count || o.counts.empty() ? o.samples : std::nullopt,
-        crn.samples(), o.error);
+        crn.samples(), o.error || (!o.json.empty() && request.estimator.predicts_error));
     guides = read_guides(o, request.estimator, crn);
     request.settings.guides = guides.view();
     check_explain(o, request.estimator, crn);
@@ -224,6 +225,13 @@ nlohmann::ordered_json statistics(const CombineOptions& o, const CombineRequest&
                                   {{"read_and_check", combined.check_seconds},
                                    {"estimate", combined.estimate_seconds},
                                    {"write", write_seconds}}}};
+  if (combined.predicted_relmse) {
+    json["predicted_relmse"] = *combined.predicted_relmse;
+    json["predicted_relmse_reliable"] = combined.prediction_doubt.empty();
+    if (!combined.prediction_doubt.empty()) json["predicted_relmse_doubt"] = combined.prediction_doubt;
+    json["independent_predicted_relmse"] =
+        predicted_relmse_of_mean(request.independent, std::max(1, rows_in_memory(request)));
+  }
   if (request.light) json["light_groups"] = request.light->groups;
   return json;
 }

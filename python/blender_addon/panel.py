@@ -245,15 +245,15 @@ class RENDER_PT_covary(OfCycles, bpy.types.Panel):  # type: ignore[misc,name-def
         except Error as error:
             wrapped(layout, context, str(error), "ERROR")
             return
-        row = layout.row(align=True)
-        row.operator(RENDER_OT_covary.bl_idname, icon="RENDER_STILL")
-        row.operator(RENDER_OT_covary.bl_idname, text="Animation", icon="RENDER_ANIMATION").animation = True
+        column = layout.column(align=True)
+        column.operator(RENDER_OT_covary.bl_idname, icon="RENDER_STILL")
+        column.operator(RENDER_OT_covary.bl_idname, text="Render Animation", icon="RENDER_ANIMATION").animation = True
         if state.text:
             wrapped(layout, context, state.text, "INFO")
 
 
 class RENDER_PT_covary_changes(OfCycles, bpy.types.Panel):  # type: ignore[misc,name-defined,unused-ignore]
-    bl_label = "Changed While Rendering"
+    bl_label = "Changed Settings"
     bl_parent_id = "RENDER_PT_covary"
     bl_options = {"DEFAULT_CLOSED"}
 

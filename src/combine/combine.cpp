@@ -9,6 +9,7 @@
 #include "combine/light_film.h"
 #include "core/error.h"
 #include "core/stopwatch.h"
+#include "estimators/mean.h"
 #include "filters/feedback.h"
 #include "filters/planes.h"
 #include "risk/held_out_error.h"
@@ -90,6 +91,15 @@ InputFindings examine(const CombineRequest& request) {
   inputs.report = checkable ? checks.report() : unchecked_report();
   inputs.findings.insert(inputs.findings.end(), inputs.report.findings.begin(), inputs.report.findings.end());
   return inputs;
+}
+
+double predicted_relmse_of_mean(const GroupedSource& image, int rows) {
+  double sum = 0;
+  for (int y = 0; y < image.height; y += rows) {
+    const int n = std::min(rows, image.height - y);
+    sum += n * predicted_relmse(mean_of_groups(image.rows(y, n)));
+  }
+  return sum / image.height;
 }
 
 void finish(EstimatorResult& result, const GroupedImage* light) {

@@ -48,6 +48,9 @@ InputFindings examine(const CombineRequest& request);
 /// Throws Error(kInput) where the findings hold errors and `force` is not set, and what the estimator throws.
 CombinedImage combine(const CombineRequest& request);
 
+/// relMSE that the groups of `image` predict of their mean, read so many rows at a time: what the samples have alone.
+double predicted_relmse_of_mean(const GroupedSource& image, int rows);
+
 /// Rows that combine() works on at a time.
 int rows_in_memory(const CombineRequest& request);
 

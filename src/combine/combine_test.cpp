@@ -8,6 +8,7 @@
 #include "combine/light_film.h"
 #include "combine/registry.h"
 #include "core/error.h"
+#include "estimators/mean.h"
 #include "estimators/test_images.h"
 #include "risk/held_out_error.h"
 #include "risk/predicted_error.h"
@@ -35,6 +36,14 @@ struct Images {
     return request;
   }
 };
+
+TEST(Combine, PredictsTheErrorOfTheMeanInBands) {
+  const Images images;
+  const GroupedSource source = images.request().independent;
+  const double whole = predicted_relmse(mean_of_groups(images.independent.view()));
+  EXPECT_GT(whole, 0);
+  for (const int rows : {7, kHeight, 2 * kHeight}) EXPECT_NEAR(predicted_relmse_of_mean(source, rows), whole, 1e-12);
+}
 
 TEST(Combine, IsEstimateCalibrationAndPrediction) {
   const Images images;

@@ -59,7 +59,8 @@ def picture():
     assert settings_of(scene) == before
     image = bpy.data.images["covary"]
     assert tuple(image.size) == (24, 16) and image.is_float and Path(image.filepath) == file
-    assert str(file) in bpy.context.window_manager.covary.text
+    text = bpy.context.window_manager.covary.text
+    assert str(file) in text and "Predicted error (relMSE) 0." in text, text
     scene.covary.seed, scene.covary.denoise = 1, "balanced"
     assert bpy.ops.render.covary() == {"FINISHED"}
     assert file.read_bytes() != first and b"denoise" in file.read_bytes() and b"denoise" not in first.split(b"-o ")[0]

@@ -75,6 +75,11 @@ class Combine(CliTest):
         self.assertGreater(statistics["rank_correlation"]["crn_horizontal"]["value"], 0.5)
         self.assertLess(abs(statistics["rank_correlation"]["independent_horizontal"]["value"]), 0.1)
         self.assertEqual(result.stderr, "")
+        # Half of the samples by themselves, and all of them: the image has neither more layers nor other bits for it.
+        self.assertLess(4 * statistics["predicted_relmse"], statistics["independent_predicted_relmse"])
+        self.good("combine", "--crn", "crn.exr", "--independent", "independent.exr", "-o", "plain.exr", "--quiet")
+        out, plain = self.read("out.exr"), self.read("plain.exr")
+        self.assertEqual(out, plain)
         info = self.good("info", "out.exr").stdout
         self.assertIn("covary:estimator: iicv", info)
         self.assertIn("covary:samples: 192", info)
