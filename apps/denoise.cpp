@@ -58,8 +58,10 @@ void run(const Options& o) {
   warn_of_values(o.input, image.image);
   std::optional<Image> albedo, normal;
   if (!o.no_guides) {
-    albedo = guide_layer(o.input, info, "Albedo");
-    if (albedo) normal = guide_layer(o.input, info, "N");
+    albedo = guide_layer(o.input, info, "DenoisingAlbedo");
+    if (albedo) normal = guide_layer(o.input, info, "DenoisingNormal");
+    if (!albedo) albedo = guide_layer(o.input, info, "Albedo");
+    if (albedo && !normal) normal = guide_layer(o.input, info, "N");
   }
   progress.begin("denoising");
   Denoiser denoiser(o.denoise);
@@ -90,7 +92,10 @@ void run(const Options& o) {
 void add_denoise(CLI::App& app) {
   const auto o = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand("denoise", "Denoise an image with Open Image Denoise (biased)");
-  command->add_option("IN", o->input, "Linear image (EXR); its layers Albedo and N are guides")->type_name(kFileValue);
+  command
+      ->add_option("IN", o->input,
+                   "Linear image (EXR); its layers DenoisingAlbedo and DenoisingNormal, or Albedo and N, are guides")
+      ->type_name(kFileValue);
   command->add_option("-o,--output", o->output, "The result (EXR)")->type_name(kFileValue);
   command
       ->add_option("--oidn", o->denoise.library,
@@ -98,10 +103,10 @@ void add_denoise(CLI::App& app) {
                    "environment that holds it")
       ->type_name(kLibraryValue);
   command->add_flag("--check", o->check, "Print version and path of Open Image Denoise as it is found, and do nothing");
-  command->add_flag("--no-guides", o->no_guides, "Do not use the layers Albedo and N");
+  command->add_flag("--no-guides", o->no_guides, "Do not use these layers");
   command->add_flag(
       "--clean-guides", o->clean_guides,
-      "Denoise Albedo and N first, each alone: less error where they are noisy, for three times the time");
+      "Denoise these layers first, each alone: less error where they are noisy, for three times the time");
   command->add_flag("--quiet", o->quiet, "No summary");
   command->callback([o] { run(*o); });
 }

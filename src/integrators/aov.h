@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Auxiliary images: what the first surface behind each pixel looks like.
+// Auxiliary images: what the surfaces behind each pixel look like.
 #pragma once
 
 #include <atomic>
@@ -9,10 +9,24 @@
 
 namespace covary {
 
-/// Fills film.aovs with `Albedo` (reflectance in [0, 1]), `N` (shading normal in world space) and `P` (position in
-/// world space), each the mean over `spp` filtered camera rays; rays that leave the scene count as zero. The film
-/// positions are those of the first `spp` samples of the pass of these settings, whose own number of samples is not
-/// read. Ends at the next row once `stop` is true, and leaves film.aovs as it is.
+/// The names of all auxiliary images, in film.aovs and as layers of files.
+inline constexpr const char* kAuxiliaryImages[] = {"Albedo", "N", "P", "DenoisingAlbedo", "DenoisingNormal"};
+
+/// Mirrors and glass that are followed to the surface behind them.
+inline constexpr int kFollowedBounces = 8;
+
+/// Fills film.aovs with the images, each the mean over `spp` filtered camera rays:
+///
+///     Albedo           reflectance of the first surface, in [0, 1]
+///     N, P             its shading normal and position in world space
+///     DenoisingAlbedo  reflectance of the first surface that scatters light in more than single directions, times what
+///                      the mirrors and panes of glass before it let through, in [0, 1]
+///     DenoisingNormal  its shading normal in world space
+///
+/// Where a ray meets a surface of mirror or glass, one direction is drawn as a path's is, at most kFollowedBounces
+/// times; a ray that is still between mirrors then takes the last of them. Rays that leave the scene count as zero. The
+/// film positions and random numbers are those of the first `spp` samples of the pass of these settings, whose own
+/// number of samples is not read. Ends at the next row once `stop` is true, and leaves film.aovs as it is.
 void render_aovs(const Scene& scene, const PassSettings& settings, uint32_t spp, Film& film,
                  const std::atomic<bool>* stop = nullptr);
 

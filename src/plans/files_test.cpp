@@ -98,7 +98,7 @@ TEST(Interrupted, AFilmThatIsTheOutputSaysThatItIsNotComplete) {
   ASSERT_TRUE(result.interrupted);
   EXPECT_EQ(result.kept, request.output);
   EXPECT_EQ(read_film_attributes(request.output).at("complete"), "false");
-  EXPECT_EQ(read_film(request.output).aovs.size(), 3u);
+  EXPECT_EQ(read_film(request.output).aovs.size(), std::size(kAuxiliaryImages));
   request.resume = true;
   EXPECT_TRUE(render(scene, plain_plan(Sampling::kIndependent), request).complete);
   EXPECT_EQ(read_film_attributes(request.output).at("complete"), "true");
@@ -111,7 +111,7 @@ TEST(AuxiliaryImages, AreTimedAsRenderingAndEndWithTheRender) {
   RenderResult result = render(scene, average_plan(), request);
   EXPECT_GT(result.seconds.auxiliary, 0);
   EXPECT_GE(result.render_seconds(), result.seconds.auxiliary + result.passes[0].result.seconds);
-  EXPECT_EQ(result.aovs.size(), 3u);
+  EXPECT_EQ(result.aovs.size(), std::size(kAuxiliaryImages));
   EXPECT_TRUE(result.passes[1].film.aovs.empty());
   request.seconds = 1e-6;
   request.spp.reset();
@@ -131,7 +131,7 @@ TEST(AuxiliaryImages, EndAtOnceWhenStopped) {
   EXPECT_TRUE(film.aovs.empty());
   stop = false;
   render_aovs(*scene.scene, settings, 4, film, &stop);
-  EXPECT_EQ(film.aovs.size(), 3u);
+  EXPECT_EQ(film.aovs.size(), std::size(kAuxiliaryImages));
 }
 
 TEST(Passes, FilmsThatAreThereAreNeitherUsedNorReplacedUnasked) {
@@ -344,9 +344,9 @@ TEST(Memory, CountsFilmsAuxiliaryImagesAndEstimator) {
   plan.estimate_memory.groups_for_halves = 13;
   EXPECT_EQ(render_memory(scene, plan, request).estimate, 5000 * (100 + 12));
   request.aovs = true;
-  EXPECT_EQ(render_memory(scene, plan, request).films - memory.films, 5000 * 36);
+  EXPECT_EQ(render_memory(scene, plan, request).films - memory.films, 5000 * 60);
   request.crop = CropWindow{0, 0, 10, 10};
-  EXPECT_EQ(render_memory(scene, plain_plan(Sampling::kIndependent), request).films, 100 * (12 + 4 + 36));
+  EXPECT_EQ(render_memory(scene, plain_plan(Sampling::kIndependent), request).films, 100 * (12 + 4 + 60));
 }
 
 TEST(Memory, MoreThanTheLimitIsRefusedBeforeItIsTaken) {

@@ -4,9 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
 
 #include "core/error.h"
+#include "integrators/aov.h"
 #include "integrators/path_length_images.h"
 #include "integrators/training.h"
 #include "plans/budget.h"
@@ -18,7 +20,6 @@ namespace covary {
 namespace {
 
 constexpr double kImageBytes = 3 * sizeof(float);  // per pixel
-constexpr int kAuxiliaryImages = 3;
 constexpr double kSplatBytes = 16e6;  // of a round of light paths, about
 
 }  // namespace
@@ -33,7 +34,7 @@ RenderMemory render_memory(const Plan& plan, std::span<const PassPlan> passes, i
     memory.films += film + (pass.light ? kSplatBytes : 0);
     if (pass.light && plan.film_is_image) memory.estimate += film;  // the sum of both films
   }
-  if (aovs) memory.films += n_pixels * kAuxiliaryImages * kImageBytes;
+  if (aovs) memory.films += n_pixels * std::size(kAuxiliaryImages) * kImageBytes;
   // A picture for a viewer or the preview.
   memory.estimate += plan.estimate_memory.bytes(n_pixels, fewest_groups) + n_pixels * kImageBytes;
   return memory;

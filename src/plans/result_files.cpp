@@ -9,6 +9,7 @@
 #include "combine/result_file.h"
 #include "film/film_file.h"
 #include "film/image_writer.h"
+#include "integrators/aov.h"
 #include "plans/light_plan.h"
 
 namespace covary {
@@ -21,7 +22,7 @@ void write_result_files(const Plan& plan, const RenderRequest& request, RenderRe
   if (request.output.empty()) return;
   std::map<std::string, Image> aovs = result.aovs;
   if (!request.aovs)  // only the estimator asked for these
-    for (const char* name : {"Albedo", "N", "P"}) aovs.erase(name);
+    for (const char* name : kAuxiliaryImages) aovs.erase(name);
   Film& last = result.passes[camera_passes(result.passes).size() - 1].film;
   if (plan.film_is_image) {
     const Pass* light = light_pass(result.passes);
