@@ -127,6 +127,16 @@ class Until(RenderTest):
         self.assertIs(facts["predicted_relmse_reliable"], False)
         self.assertRegex(facts["predicted_relmse_doubt"], r"^\d+ % of it lies in 1 % of the pixels$")
 
+    def test_an_unreliable_prediction_at_most_doubles_the_samples(self):
+        for scene, resolution, doubt, budgets in (("caustic", "48x36", True, "96 192 384 500"),
+                                                  ("room", "96x64", False, "96 384 500")):
+            result = self.run_covary("render", str(SCENES / f"{scene}.xml"), "--resolution", resolution, "-o", "a.exr",
+                                     "--quiet", "--no-preview", "--until", "relmse=1e-9", "--spp", "500", "--passes",
+                                     scene)
+            self.assertEqual(result.returncode, 3, result.stderr)
+            self.assertEqual("; that is unreliable: " in result.stderr, doubt, result.stderr)
+            self.assertIn(f"covary:budgets: {budgets}\n", self.good("info", f"{scene}/crn.exr").stdout)
+
     def test_reached(self):
         facts = json.loads(self.good("render", ROOM, *SMALL, "-o", "a.exr", "--until", "relmse=0.5", "--json",
                                      "-").stdout)
