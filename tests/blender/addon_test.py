@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The add-on of Blender. Pack and Program need no Blender; Blender runs the program of that name without a window (the
-package bpy where BLENDER names a Python), and COVARY names the program that combines."""
+package bpy where BLENDER names a Python), Window with one, and COVARY names the program that combines."""
 import os
 import subprocess
 import sys
@@ -123,25 +123,31 @@ class Program(AddonTest):
         self.assertEqual(self.program.verdict(str(file)), "")
 
 
-class Blender(AddonTest):
-    """Installed into a Blender, and used."""
+class InBlender(AddonTest):
+    #: What starts Blender where it is no package of Python.
+    start = ("--background",)
+    before: tuple = ()
 
     def run_case(self, case, **environment):
         blender = os.environ["BLENDER"]
         script = [str(SOURCE / "tests" / "blender" / "in_blender.py")]
         start = script if "python" in Path(blender).name else [
-            "--background", "--factory-startup", "--python-exit-code", "3", "--python", *script, "--"]
+            *self.start, "--factory-startup", "--python-exit-code", "3", "--python", *script, "--"]
         output = self.path / "output"
         output.mkdir()
         environment = {**os.environ, "PATH": f"{PROGRAM.parent}:{os.environ['PATH']}", **environment,
                        "PYTHONDONTWRITEBYTECODE": "1", "BLENDER_USER_RESOURCES": str(self.path / "user"),
                        "BLENDER_USER_SCRIPTS": str(self.path / "user"), "BLENDER_USER_CONFIG": str(self.path / "user")}
-        run = subprocess.run([blender, *start, case, self.pack(), output], env=environment, capture_output=True,
+        run = subprocess.run([*self.before, blender, *start, case, self.pack(), output], env=environment, capture_output=True,
                              text=True, check=False)
         messages = run.stdout + run.stderr
         self.assertEqual(run.returncode, 0, messages)
         self.assertIn("as it must be", messages)
         self.assertNotIn("Traceback", messages)
+
+
+class Blender(InBlender):
+    """Installed into a Blender without a window, and used."""
 
     def test_picture(self):
         self.run_case("picture")
@@ -157,6 +163,16 @@ class Blender(AddonTest):
 
     def test_disabled(self):
         self.run_case("disabled")
+
+
+class Window(InBlender):
+    """In a window, on a display that nobody sees (xvfb-run)."""
+
+    start = ("--window-geometry", "0", "0", "1000", "700")
+    before = ("xvfb-run", "--auto-servernum", "--server-args", "-screen 0 1000x700x24")
+
+    def test_alive_shown_and_cancelled(self):
+        self.run_case("window")
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ import importlib
 import os
 import shutil
 import sys
+import traceback
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -120,8 +121,74 @@ def disabled():
     assert not hasattr(bpy.types.Scene, "covary") and not hasattr(bpy.types, "RENDER_PT_covary")
 
 
+def seen_in_window():
+    """What a window shows, from step to step: a generator that goes on when Blender has handled its events."""
+    scene, state = small_room(), bpy.context.window_manager.covary
+    for area in bpy.context.screen.areas:  # what is slow to draw without a graphics card
+        if area.type in ("VIEW_3D", "OUTLINER", "DOPESHEET_EDITOR"):
+            area.type = "INFO"
+    properties = next(area for area in bpy.context.screen.areas if area.type == "PROPERTIES")
+    properties.spaces.active.context = "RENDER"
+    region = next(region for region in properties.regions if region.type == "WINDOW")
+    before, file = settings_of(scene), Path(FOLDER) / "covary_0001.exr"
+
+    def press():
+        with bpy.context.temp_override(window=bpy.context.window_manager.windows[0], area=properties, region=region):
+            assert bpy.ops.render.covary("INVOKE_DEFAULT") == {"RUNNING_MODAL"}
+            assert message_of_running(bpy.ops.render.covary) == "covary: renders already"
+
+    yield
+    press()
+    shares = set()
+    while state.running:  # the window is not frozen meanwhile
+        shares.add(state.progress)
+        yield
+    assert len(shares) > 3 and settings_of(scene) == before, shares
+    assert file.exists() and str(file) in state.text, state.text
+    shown = [area.spaces.active.image.name for window in bpy.context.window_manager.windows
+             for area in window.screen.areas if area.type == "IMAGE_EDITOR"]
+    assert shown == ["covary"], shown
+    assert bpy.context.preferences.view.render_display_type == "WINDOW"
+    file.unlink()
+    scene.covary.samples = 240
+    yield
+    press()
+    while state.progress < 20:
+        yield
+    assert bpy.ops.render.covary_cancel() == {"FINISHED"}
+    while state.running:
+        yield
+    assert state.text == "Cancelled; the settings are as before" and settings_of(scene) == before and not file.exists()
+
+
+def message_of_running(operator):
+    try:
+        operator("INVOKE_DEFAULT")
+    except RuntimeError as error:
+        return str(error).strip().removeprefix("Error: ")
+    return ""
+
+
+def window():
+    steps = seen_in_window()
+
+    def step():
+        try:
+            next(steps)
+            return 0.05
+        except StopIteration:
+            print("as it must be", flush=True)
+            os._exit(0)
+        except BaseException:  # noqa: BLE001  a timer's exception would end nothing
+            traceback.print_exc()
+            os._exit(3)
+
+    bpy.app.timers.register(step, first_interval=1)
+
+
 install()
 globals()[CASE]()
-print("as it must be", flush=True)
+if CASE != "window":
+    print("as it must be", flush=True)
 if sys.argv[0] == __file__:
     os._exit(0)  # the package bpy 4.2 crashes at its end wherever a class with a method was registered
