@@ -138,8 +138,8 @@ class InBlender(AddonTest):
         environment = {**os.environ, "PATH": f"{PROGRAM.parent}:{os.environ['PATH']}", **environment,
                        "PYTHONDONTWRITEBYTECODE": "1", "BLENDER_USER_RESOURCES": str(self.path / "user"),
                        "BLENDER_USER_SCRIPTS": str(self.path / "user"), "BLENDER_USER_CONFIG": str(self.path / "user")}
-        run = subprocess.run([*self.before, blender, *start, case, self.pack(), output], env=environment, capture_output=True,
-                             text=True, check=False)
+        run = subprocess.run([*self.before, blender, *start, case, self.pack(), output], env=environment, check=False,
+                             capture_output=True, text=True)
         messages = run.stdout + run.stderr
         self.assertEqual(run.returncode, 0, messages)
         self.assertIn("as it must be", messages)
