@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 
 from . import jobs, program
-from ._cycles import GROUPS, changed
+from ._cycles import GROUPS, OLDEST, blender, changed
 from .errors import Error
 
 DENOISE = (("none", "None", "Nothing but the samples"),
@@ -241,6 +241,7 @@ class RENDER_PT_covary(OfCycles, bpy.types.Panel):  # type: ignore[misc,name-def
             row.operator(RENDER_OT_covary_cancel.bl_idname, text="", icon="X")
             return
         try:
+            blender()
             program.find(named_program(context))
         except Error as error:
             wrapped(layout, context, str(error), "ERROR")
@@ -256,6 +257,10 @@ class RENDER_PT_covary_changes(OfCycles, bpy.types.Panel):  # type: ignore[misc,
     bl_label = "Changed Settings"
     bl_parent_id = "RENDER_PT_covary"
     bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        return super().poll(context) and bpy.app.version >= OLDEST
 
     def draw(self, context: Any) -> None:
         found = changed(context.scene)

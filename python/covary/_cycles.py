@@ -23,7 +23,7 @@ def blender() -> Any:
     except ImportError as error:
         raise ImportError("covary.blender needs Blender's Python: run it in Blender, or pip install bpy") from error
     if bpy.app.version < OLDEST:
-        raise UsageError(f"found Blender {bpy.app.version_string}; 3.4 or newer is needed")
+        raise UsageError(f"found Blender {bpy.app.version_string}; {'.'.join(map(str, OLDEST[:2]))} or newer is needed")
     return bpy
 
 
@@ -105,7 +105,8 @@ def kept_in_memory(scene: Any) -> Iterator[None]:
 
 
 def check(scene: Any, spp: int, groups: int = GROUPS) -> None:
-    """Raises UsageError for a scene of which no groups can be rendered."""
+    """Raises UsageError for a scene of which no groups can be rendered, and in an old Blender."""
+    blender()
     if scene.render.engine != "CYCLES":
         raise UsageError(f"found the engine {scene.render.engine}; only Cycles has common random numbers: "
                          "scene.render.engine = 'CYCLES'")

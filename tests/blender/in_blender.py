@@ -94,6 +94,10 @@ def refused():
     scene.render.filepath = ADDON + "/below/a/file/"
     assert "cannot be written" in message_of(scene) and "output path" in message_of(scene)
     scene.render.filepath = FOLDER + "/"
+    cycles = importlib.import_module(MODULE + "._cycles")
+    cycles.OLDEST = (99, 1, 0)
+    assert message_of(scene).endswith("99.1 or newer is needed")
+    cycles.OLDEST = (3, 4, 0)
     jobs = importlib.import_module(MODULE + ".jobs")
     jobs.shutil = SimpleNamespace(disk_usage=lambda path: SimpleNamespace(free=5000))
     assert "has 0 MiB left" in message_of(scene)
