@@ -45,11 +45,16 @@ void print_light_path(const RenderOptions& options, const LoadedScene& scene) {
 
 void print_replay(const RenderOptions& options, const LoadedScene& scene) {
   if (options.replay_light) return print_light_path(options, scene);
-  const SampleAddress at = replayed_sample(options);
-  const ReplayedSample sample = replay(scene, make_plan(options), make_request(options, scene), at);
-  fmt::print("pixel ({}, {}), sample {}, film position ({}, {}), {} rays\nradiance ({:.9g}, {:.9g}, {:.9g})\n", at.x,
-             at.y, at.sample, sample.position.x, sample.position.y, sample.n_rays, sample.value.r, sample.value.g,
-             sample.value.b);
+  const std::vector<SampleAddress> addresses = replayed_samples(options);
+  const auto samples = replay(scene, make_plan(options), make_request(options, scene), addresses);
+  for (size_t i = 0; i < samples.size(); ++i) {
+    const SampleAddress& at = addresses[i];
+    const ReplayedSample& sample = samples[i];
+    if (samples.size() > 1) fmt::print("{}: ", at.sampling == Sampling::kCrn ? "crn" : "independent");
+    fmt::print("pixel ({}, {}), sample {}, film position ({}, {}), {} rays\nradiance ({:.9g}, {:.9g}, {:.9g})\n", at.x,
+               at.y, at.sample, sample.position.x, sample.position.y, sample.n_rays, sample.value.r, sample.value.g,
+               sample.value.b);
+  }
 }
 
 const char* name_of(RenderStage stage, const RenderOptions& options) {

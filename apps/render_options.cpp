@@ -103,7 +103,7 @@ RenderRequest make_request(const RenderOptions& options, const LoadedScene& scen
   return request;
 }
 
-SampleAddress replayed_sample(const RenderOptions& options) {
+std::vector<SampleAddress> replayed_samples(const RenderOptions& options) {
   const bool with_pass = std::count(options.replay.begin(), options.replay.end(), ',') == 3;
   const auto at = parse_numbers("--replay", options.replay, ',', with_pass ? 4 : 3,
                                 "X,Y,SAMPLE, e.g. 640,360,17, or X,Y,SAMPLE,PASS");
@@ -116,7 +116,11 @@ SampleAddress replayed_sample(const RenderOptions& options) {
   address.sample = static_cast<uint64_t>(at[2]);
   if (with_pass) address.pass = static_cast<uint32_t>(at[3]);
   address.groups = options.settings.passes.groups;
-  return address;
+  if (estimator_of(options).passes != EstimatorPasses::kPair) return {address};
+  address.sampling = Sampling::kIndependent;
+  std::vector<SampleAddress> both(2, address);
+  both[0].sampling = Sampling::kCrn;
+  return both;
 }
 
 namespace {
@@ -130,7 +134,8 @@ void add_output_options(CLI::App& command, RenderOptions& o) {
       .add_option("--debug-strategies", o.debug_strategies,
                   "New folder for images of each technique (s, t) of bidirectional path tracing, rendered beside")
       ->type_name(kFolderValue);
-  command.add_option("--replay", o.replay, "Print one sample instead of rendering")->type_name("X,Y,SAMPLE[,PASS]");
+  command.add_option("--replay", o.replay, "Print one sample of each film instead of rendering")
+      ->type_name("X,Y,SAMPLE[,PASS]");
   command.add_option("--replay-light", o.replay_light, "Print what one light path adds to the image")
       ->transform(whole_number(uint64_t{0}, (uint64_t{1} << 40) - 1))
       ->type_name("NUMBER");

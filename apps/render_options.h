@@ -39,7 +39,7 @@ LoadedScene load(const RenderOptions& options);
 Estimator estimator_of(const RenderOptions& options);
 Plan make_plan(const RenderOptions& options);
 RenderRequest make_request(const RenderOptions& options, const LoadedScene& scene);
-/// The sample that --replay names.
-SampleAddress replayed_sample(const RenderOptions& options);
+/// The sample that --replay names: of each film of the plan, or of that one which --sampling names.
+std::vector<SampleAddress> replayed_samples(const RenderOptions& options);
 
 }  // namespace covary

@@ -194,11 +194,17 @@ def _check_sensor(sensor: Any) -> list[str]:
     if sensor.needs_aperture_sample() or sensor.shutter_open_time() > 0:
         raise UsageError(f"the sensor {type(sensor).__name__} draws points on its lens or in time, which the sensor "
                          "around it would not; accepted are pinhole cameras at one moment")
+    warnings = []
+    sampler = repr(sensor.sampler()).split("[")[0].strip()
+    if sampler != "IndependentSampler":
+        warnings.append(f"the sensor's sampler {sampler} was replaced by independent numbers and common ones, because "
+                        "control variates need both; covary.render(scene, spp, sampler=\"sobol\") of the same file, "
+                        "or covary render --sampler sobol, has stratified samples")
     rfilter = type(sensor.film().rfilter()).__name__
-    if "Box" in repr(sensor.film().rfilter()):
-        return []
-    return [f"the film's filter {rfilter} was replaced by a box one pixel wide, because a wider one mixes the errors "
-            "of neighbouring pixels, which control variates take for independent"]
+    if "Box" not in repr(sensor.film().rfilter()):
+        warnings.append(f"the film's filter {rfilter} was replaced by a box one pixel wide, because a wider one mixes "
+                        "the errors of neighbouring pixels, which control variates take for independent")
+    return warnings
 
 
 _ANY = "a mitsuba.Scene or the name of its file"
@@ -224,8 +230,9 @@ def render(scene: Any, spp: int, seed: int = 0, integrator: Any = None, sensor: 
     progress: called with (done, total) groups.
     options: of the estimator.
 
-    The film's filter is replaced by a box, with a warning. As many groups as fit are traced at once. Raises
-    UsageError for what cannot work: a scalar variant, integrators of derivatives or of light paths alone.
+    The film's filter is replaced by a box, and a sampler other than `independent` by one, with warnings. As many groups
+    as fit are traced at once. Raises UsageError for what cannot work: a scalar variant, integrators of derivatives or
+    of light paths alone.
     """
     check_options(estimator, options)
     mi = _module()

@@ -27,6 +27,21 @@ void check_belong(const std::string& integrator, const OptionValues& options) {
   }
 }
 
+/// Mitsuba, too, takes depths for which there are no paths. Their images are black, which is seldom what is meant.
+void warn_of_black(Parameters& parameters, const Settings& settings) {
+  const auto depth = [&](const char* name) { return std::stoi(find_option(settings.options(), name)->default_value); };
+  const int most = depth("max-depth"), least = depth("min-depth");
+  if (most == 0)
+    parameters.warn(
+        "the image is black, because paths of max_depth 0 have no light; 1 shows lights that are seen "
+        "directly, 2 direct light, and -1 is no limit");
+  else if (most > 0 && least > most)
+    parameters.warn(
+        fmt::format("the image is black, because no path has min_depth {} edges and not more than "
+                    "max_depth {}",
+                    least, most));
+}
+
 }  // namespace
 
 std::function<std::shared_ptr<SceneObject>(Parameters&)> integrator_maker(const IntegratorChoice& choice) {
@@ -42,7 +57,9 @@ std::function<std::shared_ptr<SceneObject>(Parameters&)> integrator_maker(const 
     if (name != of_scene && find_integrator(of_scene)) ignore_properties(parameters, options_of_integrator(of_scene));
     PropertySource source(parameters, choice.options);
     Settings settings(source);
-    return make_integrator(*plugin, settings);
+    auto integrator = make_integrator(*plugin, settings);
+    warn_of_black(parameters, settings);
+    return integrator;
   };
 }
 

@@ -145,8 +145,11 @@ struct SampleAddress {
   uint64_t sample = 0;
   std::optional<int> groups;  ///< of the film; needed where sampler_of() is Sampler::kSobol
 };
-/// The value of the sample, as render() adds it to a film of the plan with this request's seed, filter and crop. Throws
-/// Error(kUsage) for a pixel outside the frame, and where the number of groups is needed and not given.
+/// The values of the samples, as render() adds them to films of the plan with this request's seed, filter and crop.
+/// Throws Error(kUsage) for a pixel outside the frame, and where the number of groups is needed and not given.
+std::vector<ReplayedSample> replay(const LoadedScene& scene, const Plan& plan, const RenderRequest& request,
+                                   std::span<const SampleAddress> addresses);
+/// A single one.
 ReplayedSample replay(const LoadedScene& scene, const Plan& plan, const RenderRequest& request,
                       const SampleAddress& address);
 

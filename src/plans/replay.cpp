@@ -10,9 +10,9 @@
 #include "plans/training_stage.h"
 
 namespace covary {
+namespace {
 
-ReplayedSample replay(const LoadedScene& scene, const Plan& plan, const RenderRequest& request,
-                      const SampleAddress& address) {
+PassSettings settings_of(const LoadedScene& scene, const RenderRequest& request, const SampleAddress& address) {
   if (address.x < 0 || address.y < 0 || address.x >= scene.width || address.y >= scene.height)
     throw Error(ErrorCode::kUsage, fmt::format("pixel ({}, {}) is outside the {} x {} frame", address.x, address.y,
                                                scene.width, scene.height));
@@ -28,10 +28,30 @@ ReplayedSample replay(const LoadedScene& scene, const Plan& plan, const RenderRe
   settings.seed = request.seed;
   settings.pass = address.pass;
   settings.filter = request.filter.value_or(scene.filter);
+  return settings;
+}
+
+}  // namespace
+
+std::vector<ReplayedSample> replay(const LoadedScene& scene, const Plan& plan, const RenderRequest& request,
+                                   std::span<const SampleAddress> addresses) {
+  std::vector<PassSettings> passes;
+  for (const SampleAddress& address : addresses) passes.push_back(settings_of(scene, request, address));
   const auto integrator = prepared_integrator(scene, plan, request);
+  const FilterSettings filter = request.filter.value_or(scene.filter);
   RenderSeconds seconds;
-  train(scene, request, *integrator, {window_of(scene, request), settings.filter, nullptr, nullptr, {}}, seconds);
-  return replay_sample(*scene.scene, *integrator, settings, address.x, address.y, address.sample);
+  train(scene, request, *integrator, {window_of(scene, request), filter, nullptr, nullptr, {}}, seconds);
+  std::vector<ReplayedSample> samples;
+  for (size_t i = 0; i < addresses.size(); ++i) {
+    const SampleAddress& at = addresses[i];
+    samples.push_back(replay_sample(*scene.scene, *integrator, passes[i], at.x, at.y, at.sample));
+  }
+  return samples;
+}
+
+ReplayedSample replay(const LoadedScene& scene, const Plan& plan, const RenderRequest& request,
+                      const SampleAddress& address) {
+  return replay(scene, plan, request, std::span(&address, 1))[0];
 }
 
 ReplayedLightPath replay_light(const LoadedScene& scene, const Plan& plan, const RenderRequest& request,

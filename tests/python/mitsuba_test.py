@@ -122,6 +122,15 @@ class Render(WithMitsuba):
         result = covary.mitsuba.render(self.mi.load_dict(self.scene_with({"type": "gaussian"})), 12)
         self.assertIn("was replaced by a box one pixel wide, because", result.warnings[0])
 
+    def test_sampler(self):
+        for sampler, name in (("multijitter", "Multijitter"), ("ldsampler", "LowDiscrepancy")):
+            scene = self.scene_with({"type": "box"}, sampler={"type": sampler, "sample_count": 16})
+            warnings = covary.mitsuba.render(self.mi.load_dict(scene), 12).warnings
+            self.assertEqual(len(warnings), 1)
+            self.assertIn(f"the sensor's sampler {name}Sampler was replaced by independent numbers and common ones",
+                          warnings[0])
+            self.assertIn("--sampler sobol", warnings[0])
+
     def scene_with(self, rfilter, **sensor):
         return {"type": "scene", "integrator": {"type": "path"}, "light": {"type": "constant", "radiance": 0.7},
                 "ball": {"type": "sphere"},
