@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "declared_options.h"
 #include "film/image_writer.h"
 #include "film/outputs.h"
 #include "integrators/guide_probe.h"
@@ -29,11 +30,31 @@ namespace fs = std::filesystem;
 constexpr uint32_t kAnyBudget = 1u << 20;
 
 struct ProbeOptions {
+  const CLI::App* command = nullptr;
   RenderOptions render;
   std::string pixel;
   int height = 64;
   uint32_t samples = 64;
 };
+
+/// A probe trains and renders no image: refuses what only an image would show, which the help leaves out.
+bool has_effect(const CLI::Option& option) {
+  static constexpr const char* kUsed[] = {"help",  "help-all", "output",  "integrator",    "resolution",   "crop",
+                                          "seed",  "define",   "threads", "quiet",         "no-preview",   "rfilter",
+                                          "pixel", "height",   "samples", "load-training", "save-training"};
+  if (option.get_positional()) return true;
+  for (const std::string& name : option.get_lnames())
+    if (std::count(std::begin(kUsed), std::end(kUsed), name) > 0 || find_option(options_of_integrators(), name))
+      return true;
+  return false;
+}
+
+void check_effects(const CLI::App& command) {
+  for (const CLI::Option* option : command.get_options())
+    if (option->count() > 0 && !has_effect(*option))
+      throw Error(ErrorCode::kUsage,
+                  "--" + option->get_lnames()[0] + " has no effect on a probe, which renders no image");
+}
 
 using Images = std::array<const Image*, 3>;
 
@@ -62,6 +83,7 @@ void write_preview(const std::string& path, const GuideProbe& probe) {
 
 void probe(ProbeOptions options) {
   RenderOptions& render = options.render;
+  check_effects(*options.command);
   if (!render.values.contains("output")) throw Error(ErrorCode::kUsage, "no output given; use -o OUT.exr");
   render.values.insert({"integrator", "guided-path"});
   render.values["spp"] = std::to_string(kAnyBudget);
@@ -90,7 +112,8 @@ void probe(ProbeOptions options) {
   RenderSeconds seconds;
   progress.begin("training");
   const auto update = [&](uint64_t done, uint64_t total) { progress.update(done, total); };
-  train(scene, request, *integrator, {window_of(scene, request), scene.filter, nullptr, update, {}}, seconds);
+  train(scene, request, *integrator,
+        {window_of(scene, request), request.filter.value_or(scene.filter), nullptr, update, {}}, seconds);
   const Ray ray =
       scene.scene->camera().ray({static_cast<float>(at[0]) + 0.5f, static_cast<float>(at[1]) + 0.5f}, {0.5f, 0.5f});
   const std::optional<GuideProbe> found =
@@ -119,6 +142,9 @@ void add_probe(CLI::App& app) {
   command->add_option("--samples", options->samples, "Samples of the radiance of each direction")
       ->transform(whole_number(1u, 1u << 20))
       ->capture_default_str();
+  for (CLI::Option* option : command->get_options([](const CLI::Option* o) { return !has_effect(*o); }))
+    option->group("");
+  options->command = command;
   command->callback([options] { probe(*options); });
 }
 

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "integrators/render_pass.h"
+
 namespace covary {
 
 ControlSettings ControlSettings::published() {
@@ -14,6 +16,14 @@ ControlSettings ControlSettings::published() {
   settings.clusters = 5000;
   settings.albedo = false;
   return settings;
+}
+
+bool ControlSettings::learns_lights() const {
+  for (uint32_t begin = 0, end = 0; begin < train_spp; begin = end) {
+    end = wave_end(begin, 1);
+    if (begin >= pilot_spp() && ends_selection(end)) return true;
+  }
+  return false;
 }
 
 CacheSettings ControlSettings::cache(uint32_t resolution) const {

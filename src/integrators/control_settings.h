@@ -46,6 +46,9 @@ struct ControlSettings {
   bool learns() const { return on() || lights == LightSelection::kLearned; }
   /// Samples per pixel of training, if any.
   uint32_t training_spp() const { return learns() ? train_spp : 0; }
+  /// Whether lights are chosen as learnt: by a wave that ends when half of the training has been taken, or later.
+  bool learns_lights() const;
+  bool ends_selection(uint32_t wave_end) const { return 2 * wave_end >= train_spp && wave_end < train_spp; }
   /// Training samples per pixel that first make an estimate of each pixel's value, and no coefficients.
   uint32_t pilot_spp() const {
     if (!learns() || !relative || per_pixel()) return 0;
@@ -114,6 +117,8 @@ inline void declare(Settings& s, ControlSettings& v) {
   s.only_if(v.learns(),
             {"cv-paper", "cv-grid", "cv-train", "cv-clusters", "cv-memory", "cv-variance", "cv-surrogate", "cv-prefix"},
             "with --cv off: nothing is learnt (unless --lights learned)");
+  s.only_if(v.lights != LightSelection::kLearned || v.learns_lights(), {"lights"},
+            "with --cv-train " + std::to_string(v.train_spp) + ": no sample is left to learn it from; use 8 or more");
   s.only_if(v.has_cells(), {"cv-albedo", "cv-indirect"},
             "with this --cv: only rgb and mono have coefficients of cells");
   s.only_if(!v.per_pixel(), {"cv-grid", "cv-variance", "cv-surrogate", "cv-prefix"},

@@ -30,7 +30,8 @@ class Options(CliTest):
         for option, *others in (("--cv-grid", "8", "--cv", "off"), ("--cv-albedo", "off", "--cv", "vevoda"),
                                 ("--cv-indirect", "on", "--cv", "vevoda"), ("--cv-prefix", "on", "--cv", "optimal-mis"),
                                 ("--cv-variance", "absolute", "--cv", "optimal-mis"),
-                                ("--cv-surrogate", "oidn", "--cv-variance", "absolute")):
+                                ("--cv-surrogate", "oidn", "--cv-variance", "absolute"),
+                                ("--lights", "learned", "--cv-train", "4")):
             self.bad(2, f"{option} has no effect with", *RENDER, "-o", "a.exr", option, *others)
         self.good(*RENDER, "--estimator", "none", "--spp", "20", "-o", "a.exr", "--cv", "off", "--lights", "learned",
                   "--cv-train", "8")

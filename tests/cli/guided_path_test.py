@@ -118,6 +118,16 @@ class Probe(CliTest):
         self.good(*PLAIN, "--spp", "8", "-o", "b.exr", "--save-training", "a.training")
         self.good(*self.PROBE, "--pixel", "24,28", "--samples", "1", "--load-training", "a.training", "--height", "8")
 
+    def test_refuses_options_of_images(self):
+        listed = self.good("probe", "--help-all").stdout
+        for option in (("--spp", "8"), ("--time", "1"), ("--until", "relmse=1"), ("--estimator", "none"), ("--aovs",),
+                       ("--sampler", "sobol"), ("--denoise", "error"), ("--passes", "x"), ("--k", "7"), ("--resume",),
+                       ("--json", "-"), ("--replay", "1,2,3"), ("--oidn", "off"), ("--checkpoint", "4")):
+            self.bad(2, option[0] + " has no effect on a probe", *self.PROBE, "--pixel", "4,4", *option)
+            self.assertNotIn(option[0] + " ", listed)
+        for option in ("--seed", "--crop", "--guide-lobes", "--load-training", "--pixel"):
+            self.assertIn(option + " ", listed)
+
     def test_refuses_what_it_cannot_show(self):
         self.bad(2, "--pixel '48,0' is outside the 48 x 32 frame", *self.PROBE, "--pixel", "48,0")
         self.bad(2, "probe shows what guided-path has learnt, not path", "probe", *RENDER[1:4], "--integrator", "path",

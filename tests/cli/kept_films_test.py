@@ -3,9 +3,12 @@
 import fcntl
 import functools
 import os
+import random
 import resource
+import shutil
 import signal
 import subprocess
+import time
 import unittest
 
 from cli_test import COVARY, SLOWDOWN
@@ -231,6 +234,41 @@ class WantedError(FilmsTest):
         if not path.exists():
             return 0
         return float(header(path.read_bytes())[0]["covary:samples"].decode())
+
+
+class Kills(FilmsTest):
+    """Nightly: whenever a render is killed, what is left continues to the bits of one that never was."""
+    KILLS = 75
+
+    def test_at_any_time(self):
+        chance = random.Random(75)
+        renders = ((), ("--integrator", "bdpt", "--light-tracing", "on"), ("--estimator", "none", "--sampler", "sobol"))
+        for number, options in enumerate(renders):
+            command = (*RENDER[:-1], "96", "--passes", f"films{number}", "--checkpoint", "0.02", *options)
+            begun = time.monotonic()
+            self.good(*command)
+            seconds, whole = time.monotonic() - begun, self.finished(number)
+            for _ in range(self.KILLS // len(renders)):
+                process = subprocess.Popen([COVARY, *command, "--resume"], cwd=self.path, stderr=subprocess.PIPE)
+                try:
+                    errors = process.communicate(timeout=chance.uniform(0, seconds))[1]
+                except subprocess.TimeoutExpired:
+                    process.kill()
+                    process.communicate()
+                    continue
+                self.assertEqual(process.returncode, 0, errors)
+                self.assertEqual(self.finished(number), whole)
+                shutil.rmtree(self.path / f"films{number}")
+                (self.path / "out.exr").unlink()
+            self.good(*command, "--resume")
+            self.assertEqual(self.finished(number), whole)
+            self.assertEqual([name for name in self.tree() if ".part" in name], [])
+
+    def finished(self, number):
+        """Pixels of the image and the films."""
+        files = sorted((self.path / f"films{number}").glob("*.exr"))
+        self.assertTrue(files)
+        return [read_exr(path.read_bytes()) for path in (self.path / "out.exr", *files)]
 
 
 if __name__ == "__main__":

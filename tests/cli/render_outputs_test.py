@@ -223,6 +223,15 @@ class Numbers(RenderTest):
         self.bad(2, "--time", "render", ROOM, *SMALL, "-o", "a.exr", "--time", "0")
 
 
+    def test_depths_without_light(self):
+        for depths, said in ((("0",), "paths of max_depth 0 have no light; 1 shows lights"), (("1", "0"), None),
+                             (("3", "4"), "no path has min_depth 4 edges and not more than max_depth 3")):
+            options = [word for pair in zip(("--max-depth", "--min-depth"), depths) for word in pair]
+            errors = self.good("render", ROOM, *SMALL, "-o", "a.exr", "--spp", "8", "--overwrite", *options).stderr
+            self.assertEqual("the image is black" in errors, said is not None, errors)
+            self.assertIn(said or "", errors)
+
+
 class Memory(RenderTest):
     def test_more_than_there_is(self):
         start = time.monotonic()

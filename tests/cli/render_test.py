@@ -208,6 +208,11 @@ class Plans(RenderTest):
 
     def test_wrong_options(self):
         render = ("render", ROOM, "-o", "a.exr")
+        for options, noted in ((("--sampling", "crn"), True), (("--sampling", "crn", "--estimator", "none"), False)):
+            errors = self.good("render", ROOM, "--resolution", "8x6", "--no-preview", "-o", "s.exr", "--overwrite",
+                               "--spp", "4", *options).stderr
+            self.assertEqual("note: --sampling takes one film, as --estimator none does, and leaves out iicv" in errors,
+                             noted)
         self.bad(2, "--sampling is an option of --estimator none", *render, "--estimator", "iicv", "--sampling", "crn")
         self.bad(2, "--split is an option of estimators with two passes", *render, "--estimator", "none", "--split",
                  "1:2")

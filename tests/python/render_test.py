@@ -164,6 +164,13 @@ class BadSamples(PackageTest):
         with self.assertWarns(covary.BadSamplesWarning):
             result = covary.render(scene, 8, "none")
         self.assertIn("inf", self.replayed(result.bad_samples[0]))
+        # Light is traced beside independent numbers alone, unless asked for: the independent film of two is not that of
+        # one, and says so.
+        scene = covary.Scene.load(self.file, integrator="bdpt")
+        with self.assertWarns(covary.BadSamplesWarning):
+            of_iicv = covary.render(scene, 24)
+        self.assertIn("--light-tracing off --", of_iicv.bad_samples[-1].replay)
+        self.assertIn("inf", self.replayed(of_iicv.bad_samples[-1]))
 
 
 LONG = """
