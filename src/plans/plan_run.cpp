@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plans/plan_run.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "core/error.h"
+#include "film/splat_layer.h"
+#include "integrators/light_pass.h"
+#include "integrators/training.h"
+#include "plans/budget.h"
+#include "plans/folder_lock.h"
+#include "plans/integrator_choice.h"
+#include "plans/light_plan.h"
+#include "plans/memory.h"
+#include "plans/pass_files.h"
+#include "plans/pass_waves.h"
+#include "plans/training_stage.h"
+
+namespace covary {
+namespace {
+
+/// Largest factor from one budget to the next towards a wanted error; and where the predicted error is unreliable, so
+/// that one that is far too large does not cost that many samples before it is seen again.
+constexpr double kMostGrowth = 4, kDoubtfulGrowth = 2;
+
+std::string filter_text(const FilterSettings& filter) {
+  switch (filter.kind) {
+    case FilterKind::kBox:
+      return fmt::format("box radius={}", filter.radius);
+    case FilterKind::kTent:
+      return fmt::format("tent radius={}", filter.radius);
+    case FilterKind::kGaussian:
+      return fmt::format("gaussian radius={} stddev={}", filter.radius, filter.stddev);
+  }
+  throw Error(ErrorCode::kInternal, "unknown reconstruction filter");
+}
+
+}  // namespace
+
+PlanRun::PlanRun(const LoadedScene& scene, const Plan& plan, const RenderRequest& request,
+                 const RenderCallbacks& callbacks)
+    : scene_(scene),
+      plan_(plan),
+      request_(request),
+      callbacks_(callbacks),
+      window_(window_of(scene, request)),
+      filter_(request.filter.value_or(scene.filter)),
+      integrator_(prepared_integrator(scene, plan, request)),
+      state_{scene, request, callbacks.stop, integrator_, 0, 0, {}},
+      rounds_(first_budget(scene, request)) {
+  plan_.traces_light = has_light_pass(scene, plan);
+}
+
+RenderResult PlanRun::run() {
+  std::optional<FolderLock> lock;
+  if (!request_.passes.empty()) lock.emplace(request_.passes);
+  check_earlier_films(plan_, request_);
+  try {
+    result_.interrupted = !render_to_limits();
+    result_.complete = complete();
+    if (result_.interrupted && can_estimate() && (!plan_.film_is_image || film_has_errors())) {
+      keep_films_before_more();
+      estimate();
+    }
+    const Stopwatch watch;
+    write_files();
+    result_.seconds.write += watch.seconds();
+  } catch (...) {
+    keep_films_of_failure();
+    throw;
+  }
+  return std::move(result_);
+}
+
+void PlanRun::warn_of_missing_light() const {
+  if (plan_.traces_light || !scene_.has_delta_lights_and_surfaces || !callbacks_.warning ||
+      !integrator_->light_tracing())
+    return;
+  callbacks_.warning(
+      "without light tracing the image lacks what mirrors and glass cast of lights that are a point or a direction");
+}
+
+void PlanRun::warn_of_other_sampler() const {
+  const std::string& type = scene_.sampler_type;
+  const bool is_other = sampler_of(scene_, request_) == Sampler::kSobol && type != "sobol";
+  if (request_.sampler || !callbacks_.warning || !is_other) return;
+  callbacks_.warning(fmt::format("the scene's sampler '{}' is rendered as 'sobol' (--sampler)", type));
+}
+
+bool PlanRun::render_to_limits() {
+  warn_of_missing_light();
+  warn_of_other_sampler();
+  TrainingSettings settings{window_, filter_, callbacks_.stop, callbacks_.progress, {}};
+  if (plan_.takes_training) settings.image = &result_.training;
+  if (integrator_->learning() && request_.load_training.empty()) begin(RenderStage::kTraining);
+  if (!train(scene_, request_, *integrator_, settings, result_.seconds)) return false;
+  const uint32_t limit = largest_budget(scene_, request_);
+  state_.budget = state_.group_budget = rounds_.budget();
+  if (timed() && plan_.groups_follow_speed) {
+    // What half of the time is enough for, so that no more groups are begun than can be filled.
+    const double samples =
+        0.5 * request_.seconds * samples_per_second(scene_, *state_.integrator, filter_, window_, callbacks_.stop);
+    state_.group_budget =
+        static_cast<uint32_t>(std::min<double>(state_.budget, samples / window_.width / window_.height));
+  }
+  if (timed()) result_.seconds.trial = watch_.seconds();
+  for (bool first = true;; first = false) {
+    double share = 0;
+    for (size_t i = 0; i < plan_.phases.size(); ++i) {
+      share += plan_.phases[i].share;
+      if (!render_phase(i, first ? share : 1)) return false;
+    }
+    if (rounds_.repeat()) {
+      state_.budget = rounds_.budget();
+      continue;
+    }
+    if (!plan_.film_is_image || film_has_errors() || request_.until > 0) {
+      keep_films_before_more();
+      if (!estimate()) return false;
+    }
+    result_.seconds.limited = watch_.seconds();
+    if (request_.until > 0) {
+      result_.until_reached = error_to_limit() <= request_.until;
+      if (callbacks_.predicted) callbacks_.predicted(error_to_limit());
+    }
+    const bool out_of_time = timed() && seconds_left(plan_.phases.size() - 1, 1) <= 0;
+    if (result_.until_reached.value_or(true) || state_.budget >= limit || out_of_time) return true;
+    rounds_.add(next_budget(state_.budget, error_to_limit(), request_.until, limit,
+                            result_.prediction_doubt.empty() ? kMostGrowth : kDoubtfulGrowth));
+    state_.budget = rounds_.budget();
+  }
+}
+
+double PlanRun::seconds_left(size_t phase, double share) {
+  if (phase + 1 < plan_.phases.size()) return share * request_.seconds - watch_.seconds();
+  if (!estimate_seconds_) estimate_seconds_ = time_estimate();
+  return request_.seconds - watch_.seconds() - *estimate_seconds_;
+}
+
+bool PlanRun::render_phase(size_t index, double share) {
+  const Phase& phase = plan_.phases[index];
+  if (index == first_of_phase_.size()) begin_phase(phase);
+  const std::span<Pass> passes = passes_of(index);
+  if (passes.empty()) return false;  // interrupted before its films were made
+  if (index + 1 == plan_.phases.size() && needs_aovs() && result_.aovs.empty()) render_auxiliary_images();
+  if (timed()) state_.seconds_left = request_.seconds - watch_.seconds();
+  if (request_.until > 0) {
+    state_.budget = rounds_.budget();  // a film may have told of an earlier call's
+    for (Pass& pass : state_.passes) pass.film.attributes[film_key::kBudgets] = rounds_.text();
+  }
+  phase.set_targets(state_, passes.first(camera_passes(passes).size()));
+  if (passes.back().plan.light) set_light_target(*state_.integrator, camera_passes(state_.passes), passes.back());
+  for (Pass& pass : passes) pass.count = pass.settings.spp.reached(pass.film);
+  if (index + 1 == plan_.phases.size() && !timed() && request_.until == 0) warn_of_other_samples(state_.budget);
+  begin(RenderStage::kRendering);
+  WaveLimits limits;
+  if (timed()) limits.seconds_left = [this, index, share] { return seconds_left(index, share); };
+  limits.stop = callbacks_.stop;
+  if (callbacks_.progress)
+    limits.progress = [this](uint64_t done, uint64_t total) { callbacks_.progress(done_ + done, done_ + total); };
+  limits.wave = [this] { between_waves(); };
+  consistent_ = false;
+  const uint64_t taken = render_passes(*scene_.scene, passes, limits);
+  consistent_ = true;
+  done_ += taken;
+  unsaved_ = unsaved_ || taken > 0;
+  return !stopped() || complete();
+}
+
+void PlanRun::begin_phase(const Phase& phase) {
+  first_of_phase_.push_back(state_.passes.size());
+  if (phase.prepare) phase.prepare(state_);
+  if (stopped()) return;
+  std::vector<PassPlan> plans = phase.passes(state_);
+  COVARY_CHECK(!plans.empty(), "a phase has passes");
+  const bool is_last = first_of_phase_.size() == plan_.phases.size();
+  if (plan_.traces_light && is_last) plans.push_back(light_pass_plan(plan_, plans));
+  std::vector<PassPlan> all = plans;
+  for (const Pass& pass : state_.passes) all.push_back(pass.plan);
+  RenderMemory memory = render_memory(plan_, all, window_.width, window_.height, needs_aovs());
+  memory.training = training_memory(scene_);
+  check_memory(memory, window_.width, window_.height);
+  for (PassPlan& plan : plans) {
+    if (plan.light) plan.groups = light_groups(plan_, std::span(state_.passes).subspan(first_of_phase_.back()));
+    for (const Pass& other : state_.passes)
+      COVARY_CHECK(other.plan.id() != plan.id() && (other.plan.sampling != plan.sampling ||
+                                                    other.plan.number != plan.number || other.plan.light != plan.light),
+                   "passes '" + other.plan.id() + "' and '" + plan.id() + "' of a plan have identities of their own");
+    state_.passes.push_back(begin_pass(plan));
+  }
+}
+
+Pass PlanRun::begin_pass(const PassPlan& plan) {
+  Pass pass;
+  pass.plan = plan;
+  pass.integrator = state_.integrator;
+  pass.settings.sampling = plan.sampling;
+  const Sampler sampler = sampler_of(scene_, request_);
+  pass.settings.sampler = plan.light ? Sampler::kIndependent : sampler;
+  pass.settings.crn_part = request_.crn_part;
+  pass.settings.seed = request_.seed;
+  pass.settings.pass = plan.light ? kLightPass + plan.number : plan.number;
+  pass.settings.filter = filter_;
+  pass.settings.estimate = plan.estimate;
+  pass.path = pass_path(plan_, request_, plan);
+  pass.film = Film(scene_.width, scene_.height, window_, plan.groups);
+  if (plan.sample_variance) pass.film.keep_sample_variance();
+  const std::string number = plan.number ? fmt::format("; pass {}", plan.number) : "";
+  pass.film.attributes = request_.attributes;
+  pass.film.attributes.insert_or_assign(film_key::kSeed, std::to_string(request_.seed));
+  pass.film.attributes.insert_or_assign(film_key::kSampling, sampling_name(plan.sampling, request_.crn_part));
+  pass.film.attributes.insert_or_assign(film_key::kSceneHash, scene_.content_hash);
+  const LearningIntegrator* learning = state_.integrator->learning();
+  pass.film.attributes.insert_or_assign(
+      film_key::kSettings, (learning ? learning->settings_text() : state_.integrator->description()) + "; filter " +
+                               filter_text(filter_) + number + plan.settings +
+                               (sampler == Sampler::kSobol ? "; sampler sobol" : ""));
+  if (learning) pass.film.attributes.insert_or_assign(film_key::kTraining, learning->training_text());
+  pass.film.attributes.insert_or_assign(film_key::kComplete, "false");
+  if (plan.light) pass.film.attributes.insert_or_assign(film_key::kLightPaths, std::to_string(kBundlePaths));
+  if (!plan.estimator.empty()) pass.film.attributes.insert_or_assign("estimator", plan.estimator);
+  take_film_on_disk(plan_, request_, callbacks_.warning, pass);
+  if (const auto budgets = pass.film.attributes.find(film_key::kBudgets); budgets != pass.film.attributes.end())
+    rounds_.take(budgets->second, largest_budget(scene_, request_), pass.path);
+  pass.settings.groups = pass.film.groups();
+  unsaved_ = unsaved_ || !request_.passes.empty();
+  return pass;
+}
+
+void PlanRun::between_waves() {
+  if (callbacks_.wave) callbacks_.wave(state_.passes);
+  if (request_.checkpoint_seconds <= 0 || since_checkpoint_.seconds() < request_.checkpoint_seconds) return;
+  unsaved_ = true;
+  try_to_keep_films(false, "rendering goes on, and the next checkpoint tries again");
+}
+
+void PlanRun::warn_of_other_samples(uint32_t asked) const {
+  double planned = 0;
+  for (const Pass& pass : camera_passes(state_.passes)) {
+    if (pass.settings.spp.is_map()) return;  // its numbers are about what was asked for, or limited by other options
+    planned += pass.settings.spp.largest();
+  }
+  if (planned != asked && callbacks_.warning)
+    callbacks_.warning(fmt::format("{:g} samples per pixel instead of {}: each of {} groups needs one in every pass",
+                                   planned, asked, state_.passes[0].film.groups()));
+}
+
+}  // namespace covary

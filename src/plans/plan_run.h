@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+// What render() does: carries a plan out, once. Inside plans/ only.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/stopwatch.h"
+#include "plans/error_rounds.h"
+#include "plans/render.h"
+
+namespace covary {
+
+/// The phases and files of a render are in plan_run.cpp, the image made of its films in plan_run_image.cpp.
+class PlanRun {
+ public:
+  PlanRun(const LoadedScene& scene, const Plan& plan, const RenderRequest& request, const RenderCallbacks& callbacks);
+
+  RenderResult run();
+
+ private:
+  /// Renders and estimates, once or until the predicted error is small enough. False when interrupted.
+  bool render_to_limits();
+  /// Renders a phase, until `share` of the time limit is used. False when interrupted.
+  bool render_phase(size_t index, double share);
+  double seconds_left(size_t phase, double share);
+  void begin_phase(const Phase& phase);
+  Pass begin_pass(const PassPlan& plan);
+  EstimatorResult estimate_rows(int first_row, int n_rows) const;
+  void between_waves();
+  void keep_films_before_more();
+  bool try_to_keep_films(bool complete, const char* then);  // false: a warning says why
+  void keep_films_of_failure() noexcept;
+  std::span<Pass> films() { return result_.passes.empty() ? state_.passes : result_.passes; }
+  void warn_of_other_samples(uint32_t asked) const;
+  void warn_of_missing_light() const;
+  void warn_of_other_sampler() const;
+  bool estimate();
+  double time_estimate();
+  void render_auxiliary_images();
+  void add_path_lengths();
+  void write_files();
+
+  void begin(RenderStage stage) const {
+    if (callbacks_.stage) callbacks_.stage(stage);
+  }
+  bool has_training() const { return !result_.training.mean.data.empty(); }
+  bool timed() const { return request_.seconds > 0; }
+  /// What RenderRequest::until is about.
+  double error_to_limit() const {
+    return request_.until_in_blocks ? *result_.predicted_blocks : *result_.predicted_relmse;
+  }
+  /// The film is the image, and its groups tell its error.
+  bool film_has_errors() const {
+    return plan_.film_is_image && plan_.predicts_error && state_.passes[0].film.groups() > 1;
+  }
+  bool needs_aovs() const { return request_.aovs || plan_.reads_guides; }
+  bool stopped() const { return callbacks_.stop && callbacks_.stop->load(); }
+  /// The passes of every phase are there.
+  bool all_begun() const {
+    return first_of_phase_.size() == plan_.phases.size() && first_of_phase_.back() < state_.passes.size();
+  }
+  /// All passes have the samples they should.
+  bool complete() const {
+    return all_begun() && std::all_of(state_.passes.begin(), state_.passes.end(),
+                                      [](const Pass& p) { return p.count >= p.settings.spp.largest(); });
+  }
+  /// Every group of every pixel has samples, so that an estimator can work.
+  bool can_estimate() const {
+    return all_begun() && std::all_of(state_.passes.begin(), state_.passes.end(), [this](const Pass& p) {
+             return plan_.takes_unfinished ||
+                    std::all_of(p.film.counts().begin(), p.film.counts().end(),
+                                [T = static_cast<uint32_t>(p.film.groups())](uint32_t n) { return n >= T; });
+           });
+  }
+  std::span<Pass> passes_of(size_t phase) {
+    const size_t end = phase + 1 < first_of_phase_.size() ? first_of_phase_[phase + 1] : state_.passes.size();
+    return std::span(state_.passes).subspan(first_of_phase_[phase], end - first_of_phase_[phase]);
+  }
+
+  const LoadedScene& scene_;
+  Plan plan_;
+  const RenderRequest& request_;
+  const RenderCallbacks& callbacks_;
+  const CropWindow window_;
+  const FilterSettings filter_;
+  const std::shared_ptr<Integrator> integrator_;  // of this render alone
+  PlanState state_;
+  ErrorRounds rounds_;                  // where an error is wanted
+  std::vector<size_t> first_of_phase_;  // index of the first pass of each phase that has begun
+  RenderResult result_;
+  uint64_t done_ = 0;  // samples of this call, of earlier phases and rounds
+  Stopwatch watch_, since_checkpoint_;
+  bool consistent_ = true;                  // the films are as they were between two waves
+  bool unsaved_ = false;                    // they have samples that are on no disk
+  std::optional<double> estimate_seconds_;  // what the next estimate takes
+};
+
+}  // namespace covary

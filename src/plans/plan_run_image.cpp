@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plans/plan_run.h"
+
+#include <fmt/format.h>
+
+#include <exception>
+#include <filesystem>
+#include <utility>
+
+#include "combine/combine.h"
+#include "core/error.h"
+#include "core/stop.h"
+#include "integrators/aov.h"
+#include "integrators/path_length_images.h"
+#include "plans/light_plan.h"
+#include "plans/pass_files.h"
+#include "plans/result_files.h"
+#include "plans/training_stage.h"
+#include "risk/predicted_error.h"
+
+namespace covary {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kTrialRows = 64;        // at least, where the time of the estimate is found out
+constexpr uint32_t kAovSamples = 16;  // per pixel of auxiliary images
+/// Seconds of work after which films that nobody asked for are worth writing before the image is made of them.
+constexpr double kWorthKeeping = 10;
+constexpr double kEstimateOfInterrupted = 0.5;  // seconds that it may take; after these the image is the mean
+
+}  // namespace
+
+EstimatorResult PlanRun::estimate_rows(int first_row, int n_rows) const {
+  Image albedo, normal;
+  Guides guides;
+  if (plan_.reads_guides && !result_.aovs.empty()) {  // empty where the render was stopped before
+    albedo = rows_of(result_.aovs.at("Albedo"), first_row, n_rows);
+    normal = rows_of(result_.aovs.at("N"), first_row, n_rows);
+    guides = {&albedo, &normal};
+  }
+  EstimatorResult image = plan_.estimate(camera_passes(state_.passes), first_row, n_rows, guides);
+  const Pass* light = light_pass(state_.passes);
+  const GroupedImage light_rows = light ? rows_of(light->film, first_row, n_rows) : GroupedImage{};
+  finish(image, light ? &light_rows : nullptr);
+  if (has_training()) add_training(state_.passes[0].film, result_.training, first_row, image);
+  return image;
+}
+
+/// False when interrupted; of a render that was interrupted before, when it takes too long.
+bool PlanRun::estimate() {
+  begin(RenderStage::kEstimating);
+  const Stopwatch watch;
+  const auto ends = [&] { return result_.interrupted ? watch.seconds() > kEstimateOfInterrupted : stopped(); };
+  EstimatorResult image;
+  result_.image = {};
+  result_.predicted_relmse.reset(), result_.predicted_blocks.reset(), result_.prediction_doubt.clear();
+  if (!run_stoppable(ends, [&] { image = estimate_rows(0, window_.height); })) return false;
+  if (!image.std_error.data.empty()) {
+    result_.predicted_relmse = predicted_relmse(image);
+    result_.predicted_blocks = predicted_blocks(image);
+    double samples = 0;
+    for (const Pass& pass : camera_passes(films())) samples += pass.film.mean_count();
+    result_.prediction_doubt = doubt_of_prediction(image, samples, plan_.reliable_samples);
+  }
+  if (request_.until > 0 && !result_.predicted_relmse)
+    throw Error(ErrorCode::kUsage, "an error can only be predicted from 2 or more groups");
+  if (plan_.film_is_image)
+    result_.image.std_error = std::move(image.std_error);
+  else
+    result_.image = std::move(image);
+  estimate_seconds_ = watch.seconds();
+  result_.seconds.estimate += *estimate_seconds_;
+  return true;
+}
+
+/// Seconds that the estimate will take, from a trial on rows in the middle: it depends on sizes, not on samples.
+double PlanRun::time_estimate() {
+  if (plan_.film_is_image) return 0;  // a mean
+  const Stopwatch watch;
+  const int height = window_.height, n_rows = std::min(height, std::max(kTrialRows, height / 8));
+  run_stoppable(callbacks_.stop, [&] { estimate_rows((height - n_rows) / 2, n_rows); });
+  const double seconds = watch.seconds();
+  result_.seconds.trial += seconds;
+  return seconds * height / n_rows;
+}
+
+void PlanRun::render_auxiliary_images() {
+  const Stopwatch watch;
+  Pass& last = state_.passes[camera_passes(state_.passes).size() - 1];
+  render_aovs(*scene_.scene, last.settings, kAovSamples, last.film, callbacks_.stop);
+  result_.aovs = std::exchange(last.film.aovs, {});
+  result_.seconds.auxiliary = watch.seconds();
+}
+
+bool PlanRun::try_to_keep_films(bool complete, const char* then) {
+  const Stopwatch watch;
+  since_checkpoint_ = Stopwatch();
+  try {
+    save_passes(request_, films(), complete);
+    unsaved_ = false;
+  } catch (const std::exception& error) {
+    if (callbacks_.warning) callbacks_.warning(fmt::format("the films could not be kept: {}; {}", error.what(), then));
+  }
+  result_.seconds.write += watch.seconds();
+  return !unsaved_;
+}
+
+/// Films that have cost time are on disk before anything else is done with them.
+void PlanRun::keep_films_before_more() {
+  const bool asked = !request_.passes.empty();
+  if (unsaved_ && (asked || since_checkpoint_.seconds() > kWorthKeeping))
+    try_to_keep_films(!stopped(), "the image is made nevertheless");
+}
+
+/// After an error that came when all films were whole.
+void PlanRun::keep_films_of_failure() noexcept {
+  if (!consistent_ || !unsaved_ || done_ == 0 || films().empty() || films()[0].path.empty()) return;
+  try {
+    if (try_to_keep_films(false, "they are lost") && callbacks_.warning)
+      callbacks_.warning(
+          output_is_film(plan_, request_)
+              ? fmt::format("the film is kept in '{}'; --resume continues it", request_.output)
+              : fmt::format("the films are kept in '{}'; --resume continues them", passes_folder(request_).string()));
+  } catch (...) {  // no memory for the text of a warning
+  }
+}
+
+void PlanRun::write_files() {
+  begin(RenderStage::kWriting);
+  const bool is_film = output_is_film(plan_, request_);
+  result_.integrator = state_.integrator;
+  result_.passes = std::move(state_.passes);
+  if (result_.interrupted && result_.samples_per_pixel() == 0) return;
+  if (plan_.film_is_image && has_training())
+    result_.image.estimate = with_training(result_.passes[0].film, result_.training);
+  if (request_.path_lengths && !result_.interrupted) {
+    keep_films_before_more();
+    add_path_lengths();
+    result_.interrupted = stopped();
+  }
+  std::exception_ptr failure;
+  if (unsaved_ && (!request_.passes.empty() || (result_.interrupted && !is_film))) {
+    try {
+      save_passes(request_, result_.passes, !result_.interrupted);
+      unsaved_ = false;
+    } catch (const Error&) {  // the image, which is smaller, may still find room
+      failure = std::current_exception();
+    }
+  }
+  write_result_files(plan_, request_, result_);
+  if (failure) std::rethrow_exception(failure);
+  unsaved_ = unsaved_ && !is_film;
+  if (result_.interrupted)
+    result_.kept = is_film ? request_.output : passes_folder(request_).string();
+  else
+    remove_passes(request_, result_.passes);
+}
+
+void PlanRun::add_path_lengths() {
+  const Pass& pass = camera_passes(result_.passes).back();
+  PassSettings settings = pass.settings;
+  settings.stop = callbacks_.stop;
+  std::vector<Image> images = path_length_images(*scene_.scene, *pass.integrator, settings, pass.film);
+  for (size_t i = 0; i < images.size(); ++i) result_.aovs[fmt::format("Edges{:02}", i + 1)] = std::move(images[i]);
+}
+
+}  // namespace covary
