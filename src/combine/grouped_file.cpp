@@ -153,8 +153,10 @@ void GroupedFile::add_file(const std::string& path, const std::string& layer, bo
   for (size_t g = first_group; g < groups_.size(); ++g)
     for (const char* c : {"R", "G", "B"}) read.push_back(groups_[g].prefix + c);
   file.check(read);
+  take_film_facts(path, file, only_file && (numbered.size() > 1 || layer.empty()));
+}
 
-  // What covary's films tell. The groups of one film follow from its counts; others must have equal numbers of samples.
+void GroupedFile::take_film_facts(const std::string& path, const ExrFile& file, bool may_be_film) {
   const double samples = samples_per_pixel(file, path);
   if (files_.size() > 1 && samples != samples_of_group_)
     fail(path, fmt::format("has {} samples per pixel, the group before it {}; all groups must have the same number",
@@ -162,7 +164,7 @@ void GroupedFile::add_file(const std::string& path, const std::string& layer, bo
   samples_of_group_ = samples;
   samples_ += samples;
   const ExrFile::Channel* counts = file.find(kCounts);
-  const bool is_film = only_file && (numbered.size() > 1 || layer.empty()) && !attribute(file, "covary:film").empty();
+  const bool is_film = may_be_film && !attribute(file, "covary:film").empty();
   has_counts_ = is_film && counts && counts->type == "uint";
   has_variance_ = has_counts_ && file.find(std::string(kVariance) + ".R");
   if (has_counts_) file.check({{kCounts}});

@@ -66,6 +66,8 @@ class GroupedFile {
     std::string prefix;  ///< of the channel names: "" or "name."
   };
   void add_file(const std::string& path, const std::string& layer, bool only_file);
+  /// What films of covary tell. Groups of one film follow from its counts; others must have equal numbers of samples.
+  void take_film_facts(const std::string& path, const ExrFile& file, bool may_be_film);
   void read_counts(int first_row, int n_rows, std::vector<uint32_t>& counts) const;
 
   std::vector<std::unique_ptr<ExrFile>> files_;

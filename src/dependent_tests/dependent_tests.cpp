@@ -222,9 +222,10 @@ void check_effects(EstimatorParameters& p, const DependentTestsOptions& o) {
             "unless errors are measured (--weights measured)");
 }
 
-}  // namespace
+const OptionTraits kPasses{.effect = OptionEffect::kPasses};
 
-Estimator make_dependent_tests(Settings& parameters) {
+/// Its own options; those of --adaptive are asked for before.
+void declare(Settings& p, DependentTestsOptions& o) {
   static constexpr std::pair<const char*, DependentFilter> kFilters[] = {{"exact", DependentFilter::kExact},
                                                                          {"paper", DependentFilter::kPaper}};
   static constexpr std::pair<const char*, Pyramid> kPyramids[] = {{"side", Pyramid::kSide}, {"count", Pyramid::kCount}};
@@ -237,14 +238,6 @@ Estimator make_dependent_tests(Settings& parameters) {
                                                                         {"dependent", VarianceSource::kDependent}};
   static constexpr std::pair<const char*, bool> kOwners[] = {{"centre", true}, {"each", false}};
   static constexpr std::pair<const char*, int> kGuards[] = {{"on", DependentTestsOptions().guard}, {"off", 0}};
-  static constexpr OptionTraits kPasses{.effect = OptionEffect::kPasses};
-  EstimatorParameters& p = parameters;
-  const bool paper = p.flag("paper", "dependent-tests as published: its filter, weights and allocation", kPasses);
-  DependentTestsOptions o = paper ? DependentTestsOptions::paper() : DependentTestsOptions();
-  AdaptiveSampling adaptive;
-  if (paper) adaptive.counts.allocation = Allocation::kEqualError, adaptive.counts.min_spp = 0;
-  if (paper) adaptive.counts.smoothing = 1;
-  ask_for(p, adaptive);
   p.choice<DependentFilter>("filter", o.filter, kFilters,
                             "Weights that minimise the error bound, or the published ones", kPasses);
   p.choice<Norm>("norm", o.norm, kNorms, kNormHelp, kPasses);
@@ -264,9 +257,21 @@ Estimator make_dependent_tests(Settings& parameters) {
   p.choice<CombinationWeights>("weights", o.weights, kWeights,
                                "Mixture of the images: by measured error, worth, or samples");
   p.whole("measure-window", o.measure_window, kWindowRange, "Side of the windows over which errors are measured");
+  check_effects(p, o);
+}
+
+}  // namespace
+
+Estimator make_dependent_tests(Settings& p) {
+  const bool paper = p.flag("paper", "dependent-tests as published: its filter, weights and allocation", kPasses);
+  DependentTestsOptions o = paper ? DependentTestsOptions::paper() : DependentTestsOptions();
+  AdaptiveSampling adaptive;
+  if (paper) adaptive.counts.allocation = Allocation::kEqualError, adaptive.counts.min_spp = 0;
+  if (paper) adaptive.counts.smoothing = 1;
+  ask_for(p, adaptive);
+  declare(p, o);
   adaptive.counts.norm = o.norm;
   adaptive.counts.classes = o.filter == DependentFilter::kPaper;
-  check_effects(p, o);
   std::vector<std::string> problems = o.validate();
   const std::vector<std::string> of_counts = adaptive.validate();
   problems.insert(problems.end(), of_counts.begin(), of_counts.end());

@@ -49,6 +49,82 @@ std::vector<std::string> IicvOptions::validate() const {
   return problems;
 }
 
+namespace {
+
+/// What the control variates of all pixels read, but for the independent image, its errors and its penalty.
+struct Prepared {
+  const GroupedImage& crn;
+  const GroupedImage& independent;
+  const IicvOptions& options;
+  std::vector<unsigned char> valid;
+  int border = 0;
+  Moments g, h;  ///< of the CRN image and of the independent one
+
+  ControlVariateSettings settings() const {
+    ControlVariateSettings settings;
+    settings.k = options.k;
+    settings.window = options.window;
+    settings.include_target = options.include_target;
+    settings.shared = options.shared_coefficients;
+    settings.symmetric = options.symmetric;
+    settings.conservation = options.conservation;
+    settings.sample_share = options.sample_share;
+    settings.std_error = options.std_error || options.feedback;
+    settings.probe = options.probe;
+    return settings;
+  }
+  /// `judge`: the independent image by which light that the CRN image lacks is found.
+  void apply(const Moments& h_used, const Moments& judge, const Planes* error, const ControlVariateSettings& settings,
+             EstimatorResult& result) const {
+    ControlVariateInput input{crn, &g};
+    input.h = &h_used.mean;
+    input.variance_of_h = &h_used.variance_of_mean;
+    input.error_of_h = error;
+    std::optional<Planes> missing;
+    if (settings.std_error || settings.conservation > 0) {
+      missing.emplace(missing_light(g, judge, valid, border));
+      input.missing = &*missing;
+    }
+    apply_control_variates(input, settings, valid, result);
+  }
+};
+
+/// Halves: even and odd groups. Each half's pilot judges the other half's values, so that the penalty is independent of
+/// the value it belongs to.
+void apply_by_halves(const Prepared& p, EstimatorResult& result) {
+  const Moments half[2] = {moments(p.independent, p.valid, p.border, 0.0f, 0, 2),
+                           moments(p.independent, p.valid, p.border, 0.0f, 1, 2)};
+  EstimatorResult part[2];
+  for (int i : {0, 1}) {
+    const Planes error = pilot_error(p.g, half[1 - i], p.options.pilot_window, false, p.border);
+    p.apply(half[i], half[1 - i], &error, p.settings(), part[i]);
+  }
+  result.estimate = std::move(part[0].estimate);
+  result.std_error = std::move(part[0].std_error);
+  // The two estimates share the CRN image: their errors may be fully correlated, so that standard errors are averaged.
+  for (size_t i = 0; i < result.estimate.data.size(); ++i)
+    result.estimate.data[i] = 0.5f * (result.estimate.data[i] + part[1].estimate.data[i]);
+  for (size_t i = 0; i < result.std_error.data.size(); ++i)
+    result.std_error.data[i] = 0.5f * (result.std_error.data[i] + part[1].std_error.data[i]);
+}
+
+void apply_at_once(const Prepared& p, EstimatorResult& result) {
+  ControlVariateSettings settings = p.settings();
+  switch (p.options.penalty) {
+    case Penalty::kSample:
+      return p.apply(p.h, p.h, &p.h.variance_of_mean, settings, result);
+    case Penalty::kHomogeneous:
+      settings.ridge = p.options.ridge;
+      return p.apply(p.h, p.h, nullptr, settings, result);
+    default:
+      const Planes error =
+          pilot_error(p.g, p.h, p.options.pilot_window, p.options.penalty == Penalty::kSmoothed, p.border);
+      p.apply(p.h, p.h, &error, settings, result);
+  }
+}
+
+}  // namespace
+
 EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& independent, const IicvOptions& options) {
   std::vector<std::string> problems = options.validate();
   const bool needs_variance = options.penalty == Penalty::kSample || options.std_error || options.feedback ||
@@ -58,73 +134,19 @@ EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& independent, c
   throw_if_any("iicv", problems);
 
   EstimatorResult result;
-  const std::vector<unsigned char> valid = finite_pixels(crn, independent, result.nonfinite_pixels);
-  const int border = std::max({options.window, options.pilot_window, kMissingWindow}) / 2;
-  const Moments g = moments(crn, valid, border, kFar), h = moments(independent, valid, border, 0.0f);
-
-  ControlVariateSettings settings;
-  settings.k = options.k;
-  settings.window = options.window;
-  settings.include_target = options.include_target;
-  settings.shared = options.shared_coefficients;
-  settings.symmetric = options.symmetric;
-  settings.conservation = options.conservation;
-  settings.sample_share = options.sample_share;
-  settings.std_error = options.std_error || options.feedback;
-  settings.probe = options.probe;
-  ControlVariateInput input{crn, &g};
-  std::optional<Planes> missing;
-  const auto find_missing = [&](const Moments& independent_moments) {
-    if (!settings.std_error && settings.conservation <= 0) return;
-    missing.emplace(missing_light(g, independent_moments, valid, border));
-    input.missing = &*missing;
-  };
-
-  if (halves) {
-    // Halves: even and odd groups. Each half's pilot judges the other half's values, so that the penalty is independent
-    // of the value it belongs to.
-    const Moments half[2] = {moments(independent, valid, border, 0.0f, 0, 2),
-                             moments(independent, valid, border, 0.0f, 1, 2)};
-    EstimatorResult part[2];
-    for (int i : {0, 1}) {
-      const Planes error = pilot_error(g, half[1 - i], options.pilot_window, false, border);
-      input.h = &half[i].mean;
-      input.error_of_h = &error;
-      input.variance_of_h = &half[i].variance_of_mean;
-      find_missing(half[1 - i]);
-      apply_control_variates(input, settings, valid, part[i]);
-    }
-    result.estimate = std::move(part[0].estimate);
-    result.std_error = std::move(part[0].std_error);
-    // The two estimates share the CRN image: their errors may be fully correlated, so that standard errors are
-    // averaged.
-    for (size_t i = 0; i < result.estimate.data.size(); ++i)
-      result.estimate.data[i] = 0.5f * (result.estimate.data[i] + part[1].estimate.data[i]);
-    for (size_t i = 0; i < result.std_error.data.size(); ++i)
-      result.std_error.data[i] = 0.5f * (result.std_error.data[i] + part[1].std_error.data[i]);
-  } else {
-    Planes error;
-    input.h = &h.mean;
-    input.variance_of_h = &h.variance_of_mean;
-    find_missing(h);
-    switch (options.penalty) {
-      case Penalty::kSample:
-        input.error_of_h = &h.variance_of_mean;
-        break;
-      case Penalty::kHomogeneous:
-        settings.ridge = options.ridge;
-        break;
-      default:
-        error = pilot_error(g, h, options.pilot_window, options.penalty == Penalty::kSmoothed, border);
-        input.error_of_h = &error;
-    }
-    apply_control_variates(input, settings, valid, result);
-  }
+  Prepared p{crn, independent, options, finite_pixels(crn, independent, result.nonfinite_pixels), 0, {}, {}};
+  p.border = std::max({options.window, options.pilot_window, kMissingWindow}) / 2;
+  p.g = moments(crn, p.valid, p.border, kFar);
+  p.h = moments(independent, p.valid, p.border, 0.0f);
+  if (halves)
+    apply_by_halves(p, result);
+  else
+    apply_at_once(p, result);
   if (options.feedback) {
-    add_feedback(h, options.feedback_options, valid, result.std_error, result.estimate);
+    add_feedback(p.h, options.feedback_options, p.valid, result.std_error, result.estimate);
     if (!options.std_error) result.std_error = Image();
   }
-  fill_invalid(crn, independent, valid, result.estimate);
+  fill_invalid(crn, independent, p.valid, result.estimate);
   return result;
 }
 
