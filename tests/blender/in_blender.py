@@ -69,6 +69,18 @@ def picture():
     assert not list(Path(bpy.app.tempdir).glob("covary-*")), "temporary files are left"
 
 
+def plain_worlds():
+    """All white, which looks clipped, and all black, where nothing has an error."""
+    scene = small_room()
+    for thing in [thing for thing in bpy.data.objects if thing.type != "CAMERA"]:
+        bpy.data.objects.remove(thing)
+    scene.world.use_nodes = True
+    for value in (1, 0):
+        scene.world.node_tree.nodes["Background"].inputs[0].default_value = (value, value, value, 1)
+        assert bpy.ops.render.covary() == {"FINISHED"}
+        assert bpy.data.images["covary"].pixels[:3] == (value, value, value)
+
+
 def animation():
     """All frames, with noise of their own, and the current frame as before."""
     scene = small_room()

@@ -73,6 +73,17 @@ class Render(PackageTest):
         self.scene.render.engine, self.scene.camera = "CYCLES", None
         self.assertIn("the scene 'Scene' has no camera", refused(96))
 
+    def test_white_world(self):
+        """Looks clipped, and is rendered."""
+        for thing in [thing for thing in self.bpy.data.objects if thing.type != "CAMERA"]:
+            self.bpy.data.objects.remove(thing)
+        self.scene.world = self.bpy.data.worlds.new("white")
+        self.scene.world.use_nodes = True
+        self.scene.world.node_tree.nodes["Background"].inputs[0].default_value = (1, 1, 1, 1)
+        result = covary.blender.render(self.scene, 72)
+        self.assertTrue((result.image == 1).all())
+        self.assertIn("clipped", " ".join(result.warnings))
+
     def test_compositor(self):
         """Is off while groups render, and said to be where it has nodes."""
         self.assertNotIn("compositor", " ".join(covary.blender.changes(self.scene)))
