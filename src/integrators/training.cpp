@@ -56,15 +56,17 @@ bool train(const Scene& scene, LearningIntegrator& integrator, const TrainingSet
     pass.learner = &integrator;
     Film film(scene.camera().width(), scene.camera().height(), settings.window, settings.image ? 2 : 1);
     WaveCombination waves(integrator.wave_weights());
-    // Waves are compared by the first importance throughout, so that their variances mean the same.
-    std::vector<Spectrum> first_importance, importance;
+    std::vector<Spectrum> importance;
+    const auto make_importance = [&] {
+      importance = settings.importance(film);
+      pass.importance = importance;
+    };
     pass.checkpoint = [&] {
-      if (settings.importance && asks_for_importance(integrator)) {
-        importance = settings.importance(film);
-        pass.importance = importance;
-        if (first_importance.empty()) first_importance = importance;
-      }
-      if (settings.image) waves.add(film, first_importance);
+      const bool asks = settings.importance && asks_for_importance(integrator), first = importance.empty();
+      if (asks && first) make_importance();
+      // But for the first, a wave's variance is weighed by an importance that is not made of it.
+      if (settings.image) waves.add(film, importance);
+      if (asks && !first) make_importance();
     };
     render_pass(scene, integrator, pass, film);
     if (integrator.trained_spp() != integrator.training_spp()) return false;
