@@ -54,8 +54,8 @@ def combine_command(program: Path, crn: Sequence[str], independent: Sequence[str
                     statistics: str) -> list[str]:
     """Combines files of groups into one image. What its checks take for mistakes are warnings here: who rendered these
     files has made none, and a white world only looks like clipped values."""
-    return [str(program), "combine", "--force", "--crn", *crn, "--independent", *independent, "-o", output, "--denoise", denoise,
-            "--json", statistics]
+    return [str(program), "combine", "--force", "--crn", *crn, "--independent", *independent, "-o", output,
+            "--denoise", denoise, "--json", statistics]
 
 
 def reason(messages: str) -> str:
