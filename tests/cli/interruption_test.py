@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Ctrl-C ends every command. Each is made to wait at a pipe that nobody serves, so that nothing else can end it."""
+import os
+import re
+import signal
+import subprocess
+import time
+import unittest
+from pathlib import Path
+
+from cli_test import COVARY, SLOWDOWN, CliTest
+from exr_writer import film
+
+COMMANDS = (("info", "pipe.xml"), ("render", "pipe.xml", "-o", "a.exr"), ("experiment", "pipe.xml", "-o", "folder"),
+            ("probe", "pipe.xml", "--pixel", "1,1", "-o", "a.exr"),
+            ("compare", "1.exr", "--reference", "2.exr", "--json", "pipe.json"), ("convert", "1.exr", "pipe.pfm"),
+            ("merge", "1.exr", "2.exr", "-o", "pipe.exr"), ("view", "1.exr", "-o", "pipe.html"),
+            ("combine", "--crn", "1.exr", "--independent", "2.exr", "-o", "pipe.exr", "--force"))
+
+
+class EveryCommand(CliTest):
+    def setUp(self):
+        super().setUp()
+        for seed in (1, 2):
+            self.write(f"{seed}.exr", film(seed=seed, groups=4))
+
+    def catches_signals(self, process):
+        status = Path(f"/proc/{process.pid}/status").read_text()
+        return int(re.search(r"SigCgt:\s*(\w+)", status)[1], 16) >> (signal.SIGINT - 1) & 1
+
+    def test_ends(self):
+        for command in COMMANDS:
+            with self.subTest(command[0]):
+                pipe = self.path / next(word for word in command if word.startswith("pipe."))
+                os.mkfifo(pipe)
+                process = subprocess.Popen([COVARY, *command], cwd=self.path, stdout=subprocess.DEVNULL,
+                                           stderr=subprocess.PIPE, text=True)
+                self.addCleanup(process.kill)
+                while process.poll() is None and not self.catches_signals(process):
+                    time.sleep(0.01)
+                process.send_signal(signal.SIGINT)
+                errors = process.communicate(timeout=60 * SLOWDOWN)[1]
+                self.assertEqual(process.returncode, 130, errors)
+                self.assertIn("covary: interrupted", errors)
+                pipe.unlink()
+
+
+if __name__ == "__main__":
+    unittest.main()
