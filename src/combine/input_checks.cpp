@@ -204,7 +204,7 @@ void check_correlations(const InputReport& r, std::vector<Finding>& findings) {
                "sampler "
                "spreads errors as blue noise. Use independent random numbers: in Mitsuba <sampler "
                "type=\"independent\"/>, in pbrt Sampler \"independent\", in Blender scene.cycles.sampling_pattern = "
-               "'TABULATED_SOBOL' with scrambling_distance = 1",
+               "'TABULATED_SOBOL' ('PROGRESSIVE_MULTI_JITTER' before 3.5) with scrambling_distance = 1",
                signed_value(independent))});
   }
   if (significant(r.crn_independent, kMaxIndependentCorrelation))
@@ -223,7 +223,8 @@ void check_correlations(const InputReport& r, std::vector<Finding>& findings) {
              "CRN: errors of neighbouring pixels have a rank correlation of only {}; common random numbers give 0.3 to "
              "0.9. The pixels do not share their random numbers. Seed the generator by the sample alone, not by the "
              "pixel: in Mitsuba and pbrt this needs a sampler of your own (independent numbers whose seed leaves the "
-             "pixel out), in Blender scene.cycles.sampling_pattern = 'TABULATED_SOBOL', "
+             "pixel out), in Blender scene.cycles.sampling_pattern = 'TABULATED_SOBOL' ('PROGRESSIVE_MULTI_JITTER' "
+             "before 3.5), "
              "auto_scrambling_distance = False and scrambling_distance = 0, with another seed for every group",
              signed_value(r.crn_horizontal))});
   }

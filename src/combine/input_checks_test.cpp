@@ -77,6 +77,7 @@ TEST(InputChecks, FindsSwappedAndNotCommonImages) {
   const std::string independent = findings(test::independent_image(kWidth, kHeight, kGroups, 9), good_independent());
   EXPECT_NE(independent.find("!CRN: errors of neighbouring pixels have a rank correlation of only"), std::string::npos);
   EXPECT_NE(independent.find("scrambling_distance = 0"), std::string::npos);
+  EXPECT_NE(independent.find("'PROGRESSIVE_MULTI_JITTER' before 3.5"), std::string::npos);
 }
 
 TEST(InputChecks, FindsImagesThatShareRandomNumbers) {

@@ -20,22 +20,23 @@ class AddonTest(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.path = Path(folder.name)
 
+    def wheel(self, **texts):
+        """Of a package covary with these texts in place of its files."""
+        path = self.path / "covary-0.1.0-cp310-abi3-manylinux_2_35_x86_64.whl"
+        with zipfile.ZipFile(path, "w") as archive:
+            for name in ("covary/bin/covary", "covary/lib/libcovary.so.0", "covary.libs/libtbb.so", "covary/film.py",
+                         "covary/_covary.abi3.so", "covary-0.1.0.dist-info/METADATA"):
+                archive.writestr(name, texts.get(Path(name).name, name))
+        return path
+
     def pack(self, *wheel):
         run = subprocess.run([SOURCE / "scripts" / "blender_addon", *wheel, self.path / "covary.zip"], check=False,
-                             capture_output=True, text=True)
+                             check=False, capture_output=True, text=True)
         self.assertEqual(run.returncode, 0, run.stderr)
         return self.path / "covary.zip"
 
 
 class Pack(AddonTest):
-    def wheel(self):
-        path = self.path / "covary-0.1.0-cp310-abi3-manylinux_2_35_x86_64.whl"
-        with zipfile.ZipFile(path, "w") as archive:
-            for name in ("covary/bin/covary", "covary/lib/libcovary.so.0", "covary.libs/libtbb.so", "covary/film.py",
-                         "covary/_covary.abi3.so", "covary-0.1.0.dist-info/METADATA"):
-                archive.writestr(name, name)
-        return path
-
     def test_holds_nothing_compiled_for_a_python(self):
         names = zipfile.ZipFile(self.pack()).namelist()
         self.assertIn("covary_addon/_cycles.py", names)
@@ -128,7 +129,7 @@ class InBlender(AddonTest):
     start = ("--background",)
     before: tuple = ()
 
-    def run_case(self, case, **environment):
+    def run_case(self, case, *wheel, **environment):
         blender = os.environ["BLENDER"]
         script = [str(SOURCE / "tests" / "blender" / "in_blender.py")]
         start = script if "python" in Path(blender).name else [
@@ -138,8 +139,8 @@ class InBlender(AddonTest):
         environment = {**os.environ, "PATH": f"{PROGRAM.parent}:{os.environ['PATH']}", **environment,
                        "PYTHONDONTWRITEBYTECODE": "1", "BLENDER_USER_RESOURCES": str(self.path / "user"),
                        "BLENDER_USER_SCRIPTS": str(self.path / "user"), "BLENDER_USER_CONFIG": str(self.path / "user")}
-        run = subprocess.run([*self.before, blender, *start, case, self.pack(), output], env=environment, check=False,
-                             capture_output=True, text=True)
+        run = subprocess.run([*self.before, blender, *start, case, self.pack(*wheel), output], env=environment,
+                             check=False, capture_output=True, text=True)
         messages = run.stdout + run.stderr
         self.assertEqual(run.returncode, 0, messages)
         self.assertIn("as it must be", messages)
@@ -163,6 +164,10 @@ class Blender(InBlender):
 
     def test_missing_program(self):
         self.run_case("missing_program", PATH="/usr/bin:/bin")
+
+    def test_own_program(self):
+        """That of a wheel; nothing else of the wheel is in the add-on."""
+        self.run_case("plain_worlds", self.wheel(covary=PROGRAM.read_bytes()), PATH="/usr/bin:/bin")
 
     def test_disabled(self):
         self.run_case("disabled")
