@@ -78,7 +78,8 @@ CommandDescription describe_command(const CLI::App& app) {
   result.name = app.get_name();
   result.text = app.get_description();
   for (const CLI::Option* option : app.get_options())
-    (option->get_positional() ? result.positionals : result.options).push_back(describe_option(*option));
+    if (option->get_positional() || !option->get_group().empty())  // the others are hidden
+      (option->get_positional() ? result.positionals : result.options).push_back(describe_option(*option));
   return result;
 }
 

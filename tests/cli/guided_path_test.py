@@ -120,11 +120,14 @@ class Probe(CliTest):
 
     def test_refuses_options_of_images(self):
         listed = self.good("probe", "--help-all").stdout
+        completed = self.good("help", "--completion", "bash").stdout
         for option in (("--spp", "8"), ("--time", "1"), ("--until", "relmse=1"), ("--estimator", "none"), ("--aovs",),
                        ("--sampler", "sobol"), ("--denoise", "error"), ("--passes", "x"), ("--k", "7"), ("--resume",),
                        ("--json", "-"), ("--replay", "1,2,3"), ("--oidn", "off"), ("--checkpoint", "4")):
             self.bad(2, option[0] + " has no effect on a probe", *self.PROBE, "--pixel", "4,4", *option)
             self.assertNotIn(option[0] + " ", listed)
+            self.assertNotIn(f"'probe {option[0]}'", completed)
+        self.assertIn("'probe --seed'", completed)
         for option in ("--seed", "--crop", "--guide-lobes", "--load-training", "--pixel"):
             self.assertIn(option + " ", listed)
 
