@@ -31,7 +31,7 @@ class AddonTest(unittest.TestCase):
 
     def pack(self, *wheel):
         run = subprocess.run([SOURCE / "scripts" / "blender_addon", *wheel, self.path / "covary.zip"], check=False,
-                             check=False, capture_output=True, text=True)
+                             capture_output=True, text=True)
         self.assertEqual(run.returncode, 0, run.stderr)
         return self.path / "covary.zip"
 
