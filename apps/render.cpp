@@ -174,10 +174,6 @@ Outputs files_of(const RenderOptions& options) {
 
 void render(RenderOptions options) {
   check_options(options);
-  const bool is_chosen = options.values.contains("sampling") && !options.values.contains("estimator");
-  if (is_chosen && !options.is_replay() && !options.quiet)
-    fmt::print(stderr, "note: --sampling takes one film, as --estimator none does, and leaves out {}\n",
-               RenderSettings().estimator);
   Outputs outputs = files_of(options);
   const int threads = options.threads > 0 ? options.threads : static_cast<int>(std::thread::hardware_concurrency());
   const tbb::global_control control(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(threads));
@@ -197,6 +193,10 @@ void render(RenderOptions options) {
   outputs.reads(scene.files);
   progress.clear();
   for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", warning);
+  const bool is_chosen = options.values.contains("sampling") && !options.values.contains("estimator");
+  if (is_chosen && !options.is_replay() && !options.quiet)
+    fmt::print(stderr, "note: --sampling takes one film, as --estimator none does, and leaves out {}\n",
+               RenderSettings().estimator);
   if (options.is_replay()) {
     progress.finish();
     return print_replay(options, scene);
