@@ -88,7 +88,11 @@ std::optional<std::string> accepted(const Option& option, const std::string& tex
 
 std::string problem_of(const Option& option, const std::string& text) {
   const std::string hint = option.type == Option::Type::kChoice ? did_you_mean(text, option.choices) : "";
-  return fmt::format("'{}'{}: expected {}", text, hint, option.expected());
+  // Of a whole number without a bound of its own, the one that the program's numbers have.
+  const bool is_too_large = option.type == Option::Type::kWhole && !std::isfinite(option.range.high) &&
+                            parse_real(text).value_or(0) >= static_cast<double>(option.most);
+  const std::string most = is_too_large ? fmt::format(", at most {}", option.most) : "";
+  return fmt::format("'{}'{}: expected {}{}", text, hint, option.expected(), most);
 }
 
 const Option* find_option(const std::vector<Option>& options, std::string_view name) {

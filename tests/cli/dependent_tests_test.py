@@ -90,10 +90,10 @@ class DependentTests(RenderTest):
         render = ("render", ROOM, *SMALL, "-o", "a.exr", *METHOD)
         self.bad(2, "--split: the first pass of dependent-tests has its own number", *render, "--split", "1:2")
         self.bad(2, "does not estimate its error; see --relative-error", *render, "--until", "relmse=0.1")
-        self.bad(2, "relative error is 0, expected a number above 0", *render, "--relative-error", "0")
+        self.bad(2, "--relative-error: '0': expected a number above 0", *render, "--relative-error", "0")
         self.bad(2, "expected a whole number from 1 to 63", *render, "--max-region", "0")
         self.bad(2, "min-spp is 9, more than max-spp, which is 8", *render, "--min-spp", "9", "--max-spp", "8")
-        self.bad(2, "dependent-spp is 0, expected 1 or more", *render, "--dependent-spp", "0")
+        self.bad(2, "--dependent-spp: '0': expected a whole number of at least 1", *render, "--dependent-spp", "0")
         self.bad(2, "20 samples per pixel are too few for dependent-tests: its first pass takes 20", *render, "--spp",
                  "20", "--dependent-spp", "20")
         self.bad(2, "--k is an option of --estimator iicv, cv-baseline, not of dependent-tests", *render, "--k", "3")

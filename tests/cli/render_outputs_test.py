@@ -160,7 +160,7 @@ class Passes(RenderTest):
             self.assertIn("--overwrite replaces it", message)
         message = self.bad(1, "this command asks for 7", *self.RENDER, "--spp", "48", "--seed", "7", "--resume").stderr
         self.assertIn("--overwrite replaces it", message)
-        self.bad(2, "--resume excludes --overwrite", *self.RENDER, "--resume", "--overwrite")
+        self.bad(2, "--overwrite excludes --resume", *self.RENDER, "--resume", "--overwrite")
         self.assertEqual(before, self.films())
         self.good(*self.RENDER, "--spp", "24", "--seed", "7", "--overwrite")
         self.assertEqual(self.attributes("films/crn.exr")["covary:seed"], "7")

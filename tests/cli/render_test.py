@@ -293,8 +293,8 @@ class Files(RenderTest):
         facts = json.loads(self.good(*render, "--seed", "18446744073709551615", "--json", "-").stdout)
         self.assertEqual(facts["seed"], 18446744073709551615)
         for text in ("-1", "18446744073709551616", "0x10", "1.0", "ten"):
-            self.bad(2, f"--seed: '{text}': expected a whole number from 0 to 18446744073709551615", *render,
-                     f"--seed={text}")
+            self.bad(2, f"--seed: '{text}': expected a whole number of at least 0", *render, f"--seed={text}")
+        self.bad(2, "of at least 0, at most 18446744073709551615", *render, "--seed=18446744073709551616")
         for option in ("spp", "groups", "min-depth", "max-depth", "threads", "k"):
             for text in ("0x20", "99999999999999999999", "1e3"):
                 self.bad(2, f"--{option}: '{text}': expected a whole number", *render, f"--{option}={text}")
