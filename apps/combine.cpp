@@ -31,6 +31,7 @@
 #include "json_output.h"
 #include "numbers.h"
 #include "progress.h"
+#include "settings/option_names.h"
 #include "stages.h"
 #include "value_names.h"
 
@@ -199,7 +200,7 @@ void print_findings(const CombineOptions& o, const std::vector<Finding>& finding
     throw Error(ErrorCode::kInput, "the inputs do not fit: " + errors + " (--force combines them nevertheless)");
   for (const Finding& f : findings) {
     const bool note = f.severity == Finding::Severity::kNote;
-    if (!note || !o.quiet) fmt::print(stderr, "{}: {}\n", note ? "note" : "warning", f.text);
+    if (!note || !o.quiet) fmt::print(stderr, "{}: {}\n", note ? "note" : "warning", as_flags(f.text));
   }
 }
 

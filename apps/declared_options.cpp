@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include "command_description.h"
+#include "settings/option_names.h"
 #include "value_names.h"
 
 namespace covary {
@@ -43,7 +44,7 @@ CLI::Validator checked(const Option& option) {
 }
 
 void add_option(CLI::App& command, const Option& what, OptionValues& values) {
-  const std::string names = names_of(what), help = help_with_default(what);
+  const std::string names = names_of(what), help = as_flags(help_with_default(what));
   CLI::Option* option = nullptr;
   if (what.type == Option::Type::kFlag) {
     option = command.add_flag_callback(

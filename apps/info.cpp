@@ -17,6 +17,7 @@
 #include "plans/estimator_plans.h"
 #include "plans/memory.h"
 #include "plans/render.h"
+#include "settings/option_names.h"
 #include "value_names.h"
 
 namespace covary {
@@ -66,7 +67,7 @@ void scene_info(const InfoOptions& options) {
   LoadOptions load_options;
   load_options.defines = parse_defines(options.defines);
   const LoadedScene scene = load_scene(options.path, load_options);
-  for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", warning);
+  for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", as_flags(warning));
   const std::map<std::string, double> memory = memory_of_renders(scene);
   if (options.json) {
     const nlohmann::ordered_json object{{"file", options.path},

@@ -18,6 +18,7 @@
 #include "core/shell_text.h"
 #include "core/unfinished.h"
 #include "interruption.h"
+#include "settings/option_names.h"
 #include "version.h"
 
 namespace covary {
@@ -27,7 +28,7 @@ std::string g_command_line;
 
 int report(const char* program, const Error& error) {
   std::fprintf(stderr, "%s: %s%s\n", program, error.code() == ErrorCode::kInternal ? "internal error: " : "",
-               error.what());
+               as_flags(error.what()).c_str());
   if (const auto* unfinished = dynamic_cast<const Unfinished*>(&error)) return unfinished->exit_code();
   return error.code() == ErrorCode::kUsage ? 2 : 1;
 }

@@ -20,6 +20,7 @@
 #include "plans/training_stage.h"
 #include "progress.h"
 #include "render_options.h"
+#include "settings/option_names.h"
 
 namespace covary {
 namespace {
@@ -99,7 +100,7 @@ void probe(ProbeOptions options) {
   const LoadedScene scene = load(render);
   outputs.reads(scene.files);
   progress.clear();
-  for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", warning);
+  for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", as_flags(warning));
   const RenderRequest request = make_request(render, scene);
   const std::shared_ptr<Integrator> integrator = prepared_integrator(scene, make_plan(render), request);
   const LearningIntegrator* learning = integrator->learning();

@@ -26,6 +26,7 @@
 #include "progress.h"
 #include "render_options.h"
 #include "render_report.h"
+#include "settings/option_names.h"
 #include "stages.h"
 #include "technique_files.h"
 
@@ -90,7 +91,7 @@ RenderResult render_watched(const RenderOptions& options, const LoadedScene& sce
   };
   callbacks.warning = [&](const std::string& text) {
     progress.clear();
-    fmt::print(stderr, "warning: {}\n", text);
+    fmt::print(stderr, "warning: {}\n", as_flags(text));
   };
   progress.limit(options.request().seconds);
   RenderResult result = covary::render(scene, make_plan(options), make_request(options, scene), callbacks);
@@ -192,7 +193,7 @@ void render(RenderOptions options) {
   const double load_seconds = load_watch.seconds() - scene.scene->build_seconds();
   outputs.reads(scene.files);
   progress.clear();
-  for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", warning);
+  for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", as_flags(warning));
   const bool is_chosen = options.values.contains("sampling") && !options.values.contains("estimator");
   if (is_chosen && !options.is_replay() && !options.quiet)
     fmt::print(stderr, "note: --sampling takes one film, as --estimator none does, and leaves out {}\n",

@@ -16,6 +16,7 @@
 #include "plans/budget.h"
 #include "plans/memory.h"
 #include "progress.h"
+#include "settings/option_names.h"
 
 namespace covary {
 namespace {
@@ -167,7 +168,7 @@ void print_summary(const RenderReport& report) {
              format_count(result.sum([](const Pass& p) { return p.result.n_rays; }) / seconds));
   const IntegratorReport of = result.integrator->report();
   if (!of.summary.empty()) fmt::print(stderr, "{} in {:.2f} s\n", of.summary, result.seconds.train);
-  for (const std::string& warning : of.warnings) fmt::print(stderr, "warning: {}\n", warning);
+  for (const std::string& warning : of.warnings) fmt::print(stderr, "warning: {}\n", as_flags(warning));
   const Estimator estimator = estimator_of(options);
   if (estimator.passes != EstimatorPasses::kAny) {
     fmt::print(stderr, "{} in {:.2f} s", estimator.text, result.estimate_seconds());

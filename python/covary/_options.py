@@ -76,4 +76,5 @@ def check_no_passes(names: Iterable[str], reason: str) -> None:
     """Raises UsageError for keywords that say how passes share their samples among pixels."""
     found = _of_passes().intersection(name.replace("_", "-") for name in names)
     if found:
-        raise UsageError(f"--{min(found)} says how many samples pixels get while they are rendered; {reason}")
+        name = min(found).replace("-", "_")
+        raise UsageError(f"{name} says how many samples pixels get while they are rendered; {reason}")

@@ -14,6 +14,7 @@
 #include "python/module/arrays.h"
 #include "python/module/bindings.h"
 #include "python/module/work.h"
+#include "settings/option_names.h"
 
 namespace covary::python {
 namespace {
@@ -104,7 +105,7 @@ struct Pair {
                                 .c_str());
     independent.take_counts({counts.data(), counts.size()});
     if (crn.film()) return;
-    if (!samples) throw Error(ErrorCode::kUsage, "--counts needs --samples N, the samples per pixel of the CRN image");
+    if (!samples) throw Error(ErrorCode::kUsage, "`counts` needs `samples`, the samples per pixel of the CRN image");
     crn.take_counts(std::vector(static_cast<size_t>(crn.width()) * crn.height(), static_cast<uint32_t>(*samples)));
   }
   /// Arrays may have any shape, and any counts. Needs no GIL.
@@ -142,7 +143,7 @@ struct Beside {
 
 std::vector<std::string> texts_of(const std::vector<Finding>& findings) {
   std::vector<std::string> texts;
-  for (const Finding& f : findings) texts.push_back(f.text);
+  for (const Finding& f : findings) texts.push_back(as_arguments(f.text));
   return texts;
 }
 

@@ -8,6 +8,7 @@
 #include "film/film.h"
 #include "plans/budget.h"
 #include "python/module/bindings.h"
+#include "settings/option_names.h"
 
 namespace covary::python {
 namespace {
@@ -28,7 +29,7 @@ const char* class_of(ErrorCode code) {
 
 void raise(const Error& error) {
   const nb::object type = nb::module_::import_("covary.errors").attr(class_of(error.code()));
-  PyErr_SetString(type.ptr(), error.what());
+  PyErr_SetString(type.ptr(), as_arguments(error.what()).c_str());
 }
 
 std::unique_ptr<tbb::global_control> g_threads;

@@ -9,21 +9,22 @@
 #include "metrics/metrics.h"
 #include "plans/render_settings.h"
 #include "python/module/bindings.h"
+#include "settings/option_names.h"
 
 namespace covary::python {
 namespace {
 
-const char* name_of(EstimatorOption::Type type) {
+const char* name_of(Option::Type type) {
   switch (type) {
-    case EstimatorOption::Type::kFlag:
+    case Option::Type::kFlag:
       return "flag";
-    case EstimatorOption::Type::kWhole:
+    case Option::Type::kWhole:
       return "whole";
-    case EstimatorOption::Type::kReal:
+    case Option::Type::kReal:
       return "real";
-    case EstimatorOption::Type::kChoice:
+    case Option::Type::kChoice:
       return "choice";
-    case EstimatorOption::Type::kText:
+    case Option::Type::kText:
       return "text";
   }
   return "";
@@ -45,7 +46,7 @@ bool is_adaptive_option(const std::string& name) {
   return std::find(std::begin(kAdaptiveOptions), std::end(kAdaptiveOptions), name) != std::end(kAdaptiveOptions);
 }
 
-nb::dict option_dict(const EstimatorOption& option) {
+nb::dict option_dict(const Option& option) {
   nb::dict d;
   d["name"] = option.name;
   d["aliases"] = option.aliases;
@@ -53,7 +54,7 @@ nb::dict option_dict(const EstimatorOption& option) {
   d["default"] = option.default_value;
   d["range"] = option.range.text();
   d["choices"] = option.choices;
-  d["help"] = option.help;
+  d["help"] = as_arguments(option.help);
   d["of_passes"] = is_adaptive_option(option.name);
   return d;
 }

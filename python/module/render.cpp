@@ -12,6 +12,7 @@
 #include "python/module/arrays.h"
 #include "python/module/bindings.h"
 #include "python/module/work.h"
+#include "settings/option_names.h"
 
 namespace covary::python {
 namespace {
@@ -132,7 +133,7 @@ nb::dict render_scene(const LoadedScene& scene, const Choice& choice, const Opti
         callbacks.progress = [&](uint64_t done, uint64_t total) { state.done = done, state.total = total; };
         callbacks.warning = [&](const std::string& text) {
           const std::lock_guard lock(mutex);
-          warnings.push_back(text);
+          warnings.push_back(as_arguments(text));
         };
         result = render(scene, plan, request, callbacks);
       },

@@ -31,7 +31,7 @@ void check_origins(const ImageOrigin& crn, const ImageOrigin& independent, std::
     findings.push_back({Severity::kError, "the files say that the CRN image was rendered with sampling '" +
                                               crn.sampling + "' and the independent image with '" +
                                               independent.sampling +
-                                              "'; expected are --sampling crn and --sampling independent"});
+                                              "'; expected are `sampling` crn and `sampling` independent"});
   if (!crn.scene_hash.empty() && !independent.scene_hash.empty() && crn.scene_hash != independent.scene_hash)
     findings.push_back({Severity::kError, "the files say that they show different scenes (attribute scene_hash)"});
   if (!crn.settings.empty() && !independent.settings.empty() && crn.settings != independent.settings)
@@ -53,19 +53,19 @@ void check_light(const ImageOrigin& crn, const ImageOrigin& independent, const I
                  std::vector<Finding>& findings) {
   for (const ImageOrigin* image : {&crn, &independent}) {
     if (image->is_light_film)
-      findings.push_back({Severity::kError, image->name + " is a light film, which --light adds"});
+      findings.push_back({Severity::kError, image->name + " is a light film, which `light` adds"});
     else if (light && image->has_light_added)
       findings.push_back({Severity::kError, image->name + " has a light film added already"});
     else if (!light && !image->has_light_added && has_light_film(image->settings))
-      findings.push_back({Severity::kWarning, image->name + " lacks the light of a light film; --light adds it"});
+      findings.push_back({Severity::kWarning, image->name + " lacks the light of a light film; `light` adds it"});
   }
   if (!light) return;
   if (!light->is_light_film)
-    throw Error(ErrorCode::kInput, fmt::format("--light '{}' is no light film: it lacks the attribute "
+    throw Error(ErrorCode::kInput, fmt::format("`light` '{}' is no light film: it lacks the attribute "
                                                "covary:light_paths_per_sample",
                                                light->name));
   if (!(light->place == crn.place))
-    throw Error(ErrorCode::kInput, fmt::format("--light '{}' shows other pixels than '{}'", light->name, crn.name));
+    throw Error(ErrorCode::kInput, fmt::format("`light` '{}' shows other pixels than '{}'", light->name, crn.name));
   if (!crn.scene_hash.empty() && light->scene_hash != crn.scene_hash)
     findings.push_back({Severity::kError, "the light film says that it shows another scene (attribute scene_hash)"});
   if (!crn.settings.empty() && light->settings != crn.settings)
@@ -107,12 +107,12 @@ PairSettings pair_settings(const Estimator& estimator, std::optional<int> sample
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
   const std::string& name = estimator.name;
   if (samples && !estimator.needs_sample_count)
-    usage(fmt::format("--samples is an option of --counts and --estimator {}, not of {}",
+    usage(fmt::format("`samples` is an option of `counts` and `estimator` {}, not of {}",
                       fmt::join(estimators_with_samples(), ", "), name));
-  if (std_error && !estimator.predicts_error) usage("--error: " + name + " does not estimate its error");
+  if (std_error && !estimator.predicts_error) usage("`error`: " + name + " does not estimate its error");
   const int64_t count = samples ? *samples : std::llround(known_samples);
   if (estimator.needs_sample_count && count == 0)
-    usage("--estimator " + name + " needs --samples N, the samples per pixel of the CRN image");
+    usage("`estimator` " + name + " needs `samples` N, the samples per pixel of the CRN image");
   PairSettings settings;
   settings.crn_samples = count;
   settings.std_error = std_error;

@@ -10,8 +10,8 @@
 
 #include "combine/input_checks.h"
 #include "estimators/estimator.h"
-#include "estimators/estimator_parameters.h"
 #include "film/exr.h"
+#include "settings/settings.h"
 
 namespace covary {
 

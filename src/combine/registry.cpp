@@ -40,36 +40,36 @@ const EstimatorPlugin& plugin_named(const std::string& name) {
                                              did_you_mean(name, names), fmt::join(names, ", ")));
 }
 
-bool has_option(const std::vector<EstimatorOption>& options, const std::string& name) {
-  return std::any_of(options.begin(), options.end(), [&](const EstimatorOption& o) { return o.name == name; });
+bool has_option(const std::vector<Option>& options, const std::string& name) {
+  return std::any_of(options.begin(), options.end(), [&](const Option& o) { return o.name == name; });
 }
 
-void check_belongs(const std::string& estimator, const std::vector<EstimatorOption>& own, const std::string& option) {
+void check_belongs(const std::string& estimator, const std::vector<Option>& own, const std::string& option) {
   if (has_option(own, option)) return;
   const std::vector<std::string> owners = estimators_with_option(option);
   if (!owners.empty())
-    throw Error(ErrorCode::kUsage, fmt::format("--{} is an option of --estimator {}, not of {}", option,
+    throw Error(ErrorCode::kUsage, fmt::format("`{}` is an option of `estimator` {}, not of {}", option,
                                                fmt::join(owners, ", "), estimator));
   std::vector<std::string> names;
-  for (const EstimatorOption& o : own) names.push_back(o.name);
+  for (const Option& o : own) names.push_back(o.name);
   throw Error(ErrorCode::kUsage,
-              fmt::format("--{} is not an option of any estimator{}", option, did_you_mean(option, names)));
+              fmt::format("`{}` is not an option of any estimator{}", option, did_you_mean(option, names)));
 }
 
 }  // namespace
 
 Estimator make_estimator(const std::string& name, const OptionValues& values) {
   const EstimatorPlugin& plugin = plugin_named(name);
-  const std::vector<EstimatorOption> own = options_of_estimator(name);
+  const std::vector<Option> own = options_of_estimator(name);
   for (const auto& [option, value] : values) check_belongs(name, own, option);
-  EstimatorParameters parameters(values);
+  Settings parameters(values);
   Estimator estimator = plugin.make(parameters);
   estimator.name = estimator.text = name;
-  for (const EstimatorOption& option : own) {
+  for (const Option& option : own) {
     const auto given = values.find(option.name);
     if (given == values.end()) continue;
     estimator.text += " --" + option.name;
-    if (option.type != EstimatorOption::Type::kFlag) estimator.text += " " + given->second;
+    if (option.type != Option::Type::kFlag) estimator.text += " " + given->second;
   }
   return with_held_out_rows(estimator);
 }
@@ -84,15 +84,15 @@ std::vector<std::string> pair_estimator_names() {
   return estimators_where([](const Estimator& e) { return e.passes == EstimatorPasses::kPair; });
 }
 
-std::vector<EstimatorOption> options_of_estimator(const std::string& name) {
-  EstimatorParameters parameters;
+std::vector<Option> options_of_estimator(const std::string& name) {
+  Settings parameters;
   parameters.group("Estimator");
   plugin_named(name).make(parameters);
   return parameters.options();
 }
 
-std::vector<EstimatorOption> options_of_estimators(const std::vector<std::string>& names) {
-  std::vector<std::vector<EstimatorOption>> lists;
+std::vector<Option> options_of_estimators(const std::vector<std::string>& names) {
+  std::vector<std::vector<Option>> lists;
   for (const std::string& name : names) lists.push_back(options_of_estimator(name));
   return merged_options(names, lists);
 }
@@ -102,7 +102,7 @@ Estimator with_denoising(const Estimator& base, const DenoisingChoice& choice) {
   options.mode = denoise_mode(choice.mode);
   if (options.mode != DenoiseMode::kNone && !can_be_denoised(base))
     throw Error(ErrorCode::kUsage,
-                fmt::format("--denoise needs an estimator of two passes that predicts its error ({}), not {}",
+                fmt::format("`denoise` needs an estimator of two passes that predicts its error ({}), not {}",
                             fmt::join(estimators_where(can_be_denoised), ", "), base.name));
   options.use_oidn = choice.oidn != "off";
   if (options.use_oidn) options.oidn.library = choice.oidn;

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "estimators/estimator.h"
-#include "estimators/estimator_parameters.h"
+#include "settings/settings.h"
 
 namespace covary {
 
@@ -16,7 +16,7 @@ struct DenoisingChoice;
 struct EstimatorPlugin {
   const char* name;
   /// Throws Error(kUsage) that lists everything that is wrong with the options.
-  Estimator (*make)(EstimatorParameters& parameters);
+  Estimator (*make)(Settings& parameters);
 };
 
 /// All estimators, the default first.
@@ -42,9 +42,9 @@ std::vector<std::string> estimator_names();
 std::vector<std::string> pair_estimator_names();
 
 /// The options of an estimator with their defaults. Throws Error(kUsage) as make_estimator().
-std::vector<EstimatorOption> options_of_estimator(const std::string& name);
+std::vector<Option> options_of_estimator(const std::string& name);
 /// Those of several; equal names are one option.
-std::vector<EstimatorOption> options_of_estimators(const std::vector<std::string>& names);
+std::vector<Option> options_of_estimators(const std::vector<std::string>& names);
 /// Names of the estimators that have the option, without dashes; empty where none has.
 std::vector<std::string> estimators_with_option(const std::string& option);
 

@@ -126,7 +126,7 @@ Api load(const DenoiseOptions& options, std::string* path = nullptr) {
         ErrorCode::kUsage,
         fmt::format(
             "Open Image Denoise is not there ({}); install it with `pip install pyoidn`, or name {}, its "
-            "folder or the Python environment that holds it with --oidn or the environment variable COVARY_OIDN",
+            "folder or the Python environment that holds it with `oidn` or the environment variable COVARY_OIDN",
             why, kLibrary));
   if (path) *path = library.path;
   Api api;

@@ -91,7 +91,7 @@ TEST(Denoise, SaysWhatIsMissing) {
   EXPECT_NE(message.find("Open Image Denoise is not there (/nowhere/libOpenImageDenoise.so.2: "), std::string::npos)
       << message;
   EXPECT_NE(message.find("; install it with `pip install pyoidn`, or name libOpenImageDenoise.so.2, its folder or "
-                         "the Python environment that holds it with --oidn or the environment variable COVARY_OIDN"),
+                         "the Python environment that holds it with `oidn` or the environment variable COVARY_OIDN"),
             std::string::npos)
       << message;
   EXPECT_EQ(message_of([&] { denoise(image, &other, nullptr); }),

@@ -89,7 +89,7 @@ DenoiseMode denoise_mode(const std::string& name) {
   for (const ModeSettings& mode : kModes)
     if (name == mode.name) return mode.mode;
   throw Error(ErrorCode::kUsage,
-              fmt::format("--denoise '{}': expected {}", name, fmt::join(denoise_mode_names(), ", ")));
+              fmt::format("`denoise` '{}': expected {}", name, fmt::join(denoise_mode_names(), ", ")));
 }
 
 MixedDenoising denoise_by_mixture(const Estimator& base, const GroupedImage& crn, const GroupedImage& independent,
@@ -189,9 +189,9 @@ void declare(Settings& s, DenoisingChoice& v) {
            "or balanced",
            {.level = OptionLevel::kBasic});
   s.text("oidn", v.oidn, "off|LIBRARY",
-         "For --denoise: Open Image Denoise's library or a folder of it; default: where it is found; 'off': without it",
+         "For `denoise`: Open Image Denoise's library or a folder of it; default: where it is found; 'off': without it",
          {.names = OptionNames::kLibrary});
-  s.only_if(v.denoises(), {"oidn"}, "without --denoise bias, balanced or error");
+  s.only_if(v.denoises(), {"oidn"}, "without `denoise` bias, balanced or error");
 }
 
 }  // namespace covary

@@ -189,7 +189,7 @@ TEST(MixedDenoising, TakesTinyImages) {
 }
 
 TEST(MixedDenoising, SaysWhatItCannotDo) {
-  EXPECT_EQ(message_of([] { denoise_mode("much"); }), "--denoise 'much': expected none, bias, balanced, error");
+  EXPECT_EQ(message_of([] { denoise_mode("much"); }), "`denoise` 'much': expected none, bias, balanced, error");
   EXPECT_NE(message_of([] {
               with_denoising(make_estimator("iduw"), {DenoiseMode::kError});
             }).find("denoising needs an estimator of two passes that predicts its error, not iduw"),

@@ -213,13 +213,11 @@ int dependent_tests_reach(const DependentTestsOptions& options) {
 namespace {
 
 /// Options that others leave without an effect.
-void check_effects(EstimatorParameters& p, const DependentTestsOptions& o) {
+void check_effects(Settings& p, const DependentTestsOptions& o) {
   const bool exact = o.filter == DependentFilter::kExact;
-  p.only_if(exact, {"window", "sigma-of", "guard"}, "with the published filter (--paper, --filter paper)");
+  p.only_if(exact, {"window", "guard"}, "with the published filter (`paper`, `filter` paper)");
   p.only_if(!exact, {"max-region", "min-centre-drop", "pyramid", "region-sides"},
-            "with --filter exact: only the published filter (--filter paper) has regions");
-  p.only_if(o.weights == CombinationWeights::kMeasured, {"measure-window"},
-            "unless errors are measured (--weights measured)");
+            "with `filter` exact: only the published filter (`filter` paper) has regions");
 }
 
 const OptionTraits kPasses{.effect = OptionEffect::kPasses};
@@ -236,19 +234,16 @@ void declare(Settings& p, DependentTestsOptions& o) {
       {"counts", CombinationWeights::kCounts}};
   static constexpr std::pair<const char*, VarianceSource> kSources[] = {{"both", VarianceSource::kBoth},
                                                                         {"dependent", VarianceSource::kDependent}};
-  static constexpr std::pair<const char*, bool> kOwners[] = {{"centre", true}, {"each", false}};
   static constexpr std::pair<const char*, int> kGuards[] = {{"on", DependentTestsOptions().guard}, {"off", 0}};
   p.choice<DependentFilter>("filter", o.filter, kFilters,
                             "Weights that minimise the error bound, or the published ones", kPasses);
   p.choice<Norm>("norm", o.norm, kNorms, kNormHelp, kPasses);
   p.whole("window", o.bound.window, kWindowRange, kWindowHelp);
   p.choice<VarianceSource>("sigma", o.variance, kSources, "Passes that tell the noise of a sample");
-  p.choice<bool>("sigma-of", o.bound.common_sigma, kOwners,
-                 "Whose noise pixels of a window have: its centre's, or their own");
   p.whole("sigma-window", o.smoothing, {.low = 1, .high = 63, .odd = true},
           "Side of the window that averages the noise");
   p.choice<int>("guard", o.guard, kGuards, "Trust the CRN image less where it is too dark");
-  p.whole("max-region", o.regions.max_region, {.low = 1, .high = 63}, "Largest side of a region of --filter paper");
+  p.whole("max-region", o.regions.max_region, {.low = 1, .high = 63}, "Largest side of a region of `filter` paper");
   p.real("min-centre-drop", o.regions.min_centre_drop, {.low = 0},
          "Regions grow while the weight of their centre falls by so much");
   p.choice<Pyramid>("pyramid", o.regions.pyramid, kPyramids,
@@ -256,7 +251,6 @@ void declare(Settings& p, DependentTestsOptions& o) {
   p.choice<bool>("region-sides", o.regions.odd_sides, kSides, "Sides of regions: all, or the odd, which do not shift");
   p.choice<CombinationWeights>("weights", o.weights, kWeights,
                                "Mixture of the images: by measured error, worth, or samples");
-  p.whole("measure-window", o.measure_window, kWindowRange, "Side of the windows over which errors are measured");
   check_effects(p, o);
 }
 

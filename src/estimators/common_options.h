@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <utility>
 
-#include "estimators/estimator_parameters.h"
+#include "settings/settings.h"
 
 namespace covary {
 

@@ -54,7 +54,7 @@ EstimatorResult cv_baseline(const GroupedImage& crn, const GroupedImage& indepen
 }
 
 Estimator make_cv_baseline(Settings& parameters) {
-  EstimatorParameters& p = parameters;
+  Settings& p = parameters;
   CvBaselineOptions o;
   p.whole("k", o.k, kVariatesRange, kVariatesHelp);
   p.whole("window", o.window, kWindowRange, kWindowHelp);

@@ -170,19 +170,17 @@ double iicv_bytes_per_pixel(const IicvOptions& options) {
 namespace {
 
 /// Options that others leave without an effect.
-void check_effects(EstimatorParameters& p, const IicvOptions& o) {
+void check_effects(Settings& p, const IicvOptions& o) {
   const bool homogeneous = o.penalty == Penalty::kHomogeneous, sample = o.penalty == Penalty::kSample;
   p.only_if(!homogeneous && !sample, {"pilot-window"},
-            "with this --penalty: only pilot, smoothed and cross-fit have a pilot");
-  p.only_if(homogeneous, {"ridge"}, "with this --penalty: it is the factor of homogeneous");
+            "with this `penalty`: only pilot, smoothed and cross-fit have a pilot");
+  p.only_if(homogeneous, {"ridge"}, "with this `penalty`: it is the factor of homogeneous");
   p.only_if(!homogeneous, {"sample-share", "asymmetric"},
-            "with --penalty homogeneous: all neighbours have the same penalty");
+            "with `penalty` homogeneous: all neighbours have the same penalty");
   p.only_if(!sample || o.symmetric, {"sample-share"},
-            "with --penalty sample and --asymmetric: the penalty is the neighbour's sample variance already");
+            "with `penalty` sample and `asymmetric`: the penalty is the neighbour's sample variance already");
   p.only_if(o.sample_share < 1, {"asymmetric"},
-            "with --sample-share 1: the penalty is the neighbour's sample variance already");
-  p.only_if(o.feedback, {"feedback-window", "feedback-bandwidth"},
-            "without feedback (--feedback on), which --paper leaves out");
+            "with `sample-share` 1: the penalty is the neighbour's sample variance already");
 }
 
 }  // namespace
@@ -194,7 +192,7 @@ Estimator make_iicv(Settings& parameters) {
                                                                    {"homogeneous", Penalty::kHomogeneous},
                                                                    {"cross-fit", Penalty::kCrossFit}};
   static constexpr std::pair<const char*, bool> kOnOff[] = {{"on", true}, {"off", false}};
-  EstimatorParameters& p = parameters;
+  Settings& p = parameters;
   IicvOptions o = p.flag("paper", "iicv as published: no sample share, no conservation, no feedback")
                       ? IicvOptions::paper()
                       : IicvOptions();
@@ -209,10 +207,6 @@ Estimator make_iicv(Settings& parameters) {
   p.real("sample-share", o.sample_share, {.low = 0, .high = 1}, "Part of the penalty that is the sample variance");
   p.real("conservation", o.conservation, {.low = 0}, "Weight of the condition sum beta g = f");
   p.choice<bool>("feedback", o.feedback, kOnOff, "Give back what the penalty takes away");
-  p.whole("feedback-window", o.feedback_options.window, {.low = 5, .high = 125, .odd = true},
-          "Side of the feedback's window");
-  p.real("feedback-bandwidth", o.feedback_options.bandwidth, {.low = 0, .above_low = true},
-         "Bandwidth of the feedback in standard errors");
   check_effects(p, o);
   std::vector<std::string> problems = o.validate();
   AdaptiveSampling standard;

@@ -66,7 +66,7 @@ EstimatorResult mean_of_groups(const GroupedImage& image) {
 }
 
 Estimator make_none(Settings& parameters) {
-  EstimatorParameters& p = parameters;
+  Settings& p = parameters;
   Estimator estimator;
   AdaptiveSampling standard;
   standard.least_min_spp = 1;  // a mean needs a sample
@@ -77,7 +77,7 @@ Estimator make_none(Settings& parameters) {
   Norm norm = standard.counts.norm;
   p.choice<Norm>("norm", norm, kNorms, kNormHelp, {.effect = OptionEffect::kPasses});
   if (estimator.adaptive) estimator.adaptive->counts.norm = norm;
-  p.only_if(estimator.adaptive.has_value(), {"norm"}, "without --adaptive: no noise is compared with a brightness");
+  p.only_if(estimator.adaptive.has_value(), {"norm"}, "without `adaptive`: no noise is compared with a brightness");
   throw_if_any("none", problems);
   estimator.passes = EstimatorPasses::kAny;
   estimator.summary = "the mean";

@@ -181,7 +181,7 @@ std::vector<std::string> CountOptions::validate(uint32_t multiple) const {
   const auto most = static_cast<uint32_t>(*max_spp);
   if (most < multiple)
     problems.push_back(
-        fmt::format("max-spp is {}, expected at least {}, one sample for each group (--groups)", most, multiple));
+        fmt::format("max-spp is {}, expected at least {}, one sample for each group (`groups`)", most, multiple));
   else if (most / multiple * multiple < static_cast<uint32_t>(min_spp))
     problems.push_back(
         fmt::format("min-spp is {} and max-spp {}, expected a multiple of {}, the number of groups, "
@@ -224,32 +224,32 @@ std::vector<std::string> AdaptiveSampling::validate() const {
   return problems;
 }
 
-void ask_for(EstimatorParameters& parameters, AdaptiveSampling& sampling) {
+void ask_for(Settings& parameters, AdaptiveSampling& sampling) {
   static constexpr std::pair<const char*, Allocation> kAllocations[] = {{"equal-error", Allocation::kEqualError},
                                                                         {"least-error", Allocation::kLeastError},
                                                                         {"uniform", Allocation::kUniform}};
   static constexpr OptionTraits kPasses{.effect = OptionEffect::kPasses};
-  EstimatorParameters& p = parameters;
+  Settings& p = parameters;
   CountOptions& o = sampling.counts;
   p.whole("dependent-spp", sampling.first_spp, {.low = 1}, "Samples of the first pass; else half, up to 50 (not iicv)",
           {.aliases = {"pilot-spp"}, .effect = OptionEffect::kPasses});
   p.choice<Allocation>("allocation", o.allocation, kAllocations, "How pixels share the samples of the last pass",
                        kPasses);
   p.real("relative-error", o.relative_error, {.low = 0, .above_low = true},
-         "Error that pixels shall have, as three standard deviations; --spp then is a limit", kPasses);
+         "Error that pixels shall have, as three standard deviations; `spp` then is a limit", kPasses);
   p.whole("min-spp", o.min_spp, {.low = static_cast<double>(sampling.least_min_spp)},
           "Samples that each pixel of the last pass has at least", kPasses);
   p.whole("max-spp", o.max_spp, {.low = 1}, "Samples that each pixel of the last pass has at most", kPasses);
 }
 
-std::optional<AdaptiveSampling> ask_for_adaptive(EstimatorParameters& parameters, AdaptiveSampling standard,
+std::optional<AdaptiveSampling> ask_for_adaptive(Settings& parameters, AdaptiveSampling standard,
                                                  const std::string& help, std::vector<std::string>& problems) {
   const bool is_adaptive = parameters.flag("adaptive", help, {.effect = OptionEffect::kPasses});
   ask_for(parameters, standard);
   const std::vector<std::string> wrong = standard.validate();
   problems.insert(problems.end(), wrong.begin(), wrong.end());
   if (is_adaptive) return standard;
-  parameters.only_if(false, kAdaptiveOptions, "without --adaptive: all pixels get the same number of samples");
+  parameters.only_if(false, kAdaptiveOptions, "without `adaptive`: all pixels get the same number of samples");
   return {};
 }
 

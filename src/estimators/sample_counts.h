@@ -23,9 +23,9 @@
 #include <string>
 #include <vector>
 
-#include "estimators/estimator_parameters.h"
 #include "film/grouped_image.h"
 #include "filters/norm.h"
+#include "settings/settings.h"
 
 namespace covary {
 
@@ -77,10 +77,10 @@ struct AdaptiveSampling {
 inline constexpr const char* kAdaptiveOptions[] = {"adaptive",       "dependent-spp", "allocation",
                                                    "relative-error", "min-spp",       "max-spp"};
 /// Asks for these but the first.
-void ask_for(EstimatorParameters& parameters, AdaptiveSampling& sampling);
+void ask_for(Settings& parameters, AdaptiveSampling& sampling);
 /// Asks for all of these, with `standard` for defaults and the help of --adaptive; nothing where that is not given.
 /// Appends what is wrong with them to `problems`.
-std::optional<AdaptiveSampling> ask_for_adaptive(EstimatorParameters& parameters, AdaptiveSampling standard,
+std::optional<AdaptiveSampling> ask_for_adaptive(Settings& parameters, AdaptiveSampling standard,
                                                  const std::string& help, std::vector<std::string>& problems);
 
 }  // namespace covary

@@ -90,7 +90,7 @@ Attributes merge_attributes(std::span<const Attributes> films, std::span<const s
       const auto [it, is_new] = owner.emplace(seed, i);
       if (!is_new)
         throw Error(ErrorCode::kInput, fmt::format("films cannot be merged: {} and {} have the same seed {} and so the "
-                                                   "same samples; render with another --seed",
+                                                   "same samples; render with another `seed`",
                                                    names[it->second], names[i], seed));
     }
   }

@@ -84,21 +84,18 @@ inline void declare(Settings& s, ControlSettings& v) {
   static constexpr std::pair<const char*, bool> kSurrogates[] = {{"filter", false}, {"oidn", true}};
   s.group("Integrator controlled-path", OptionEffect::kSamples);
   if (s.preset("cv-paper")) v = ControlSettings::published();
-  s.choice("cv", v.kind, kControlKinds,
-           "Control variates: one coefficient for each colour, for all, of light samples alone, by pixel for the first "
-           "surface, or none",
+  s.choice("cv", v.kind, kControlKinds, "Coefficients by colour, for all, of light samples alone, by pixel",
            {.film = "cv={}"});
-  s.choice("lights", v.lights, kSelections,
-           "How lights are chosen: uniformly over emissive triangles, over shapes, by power, or as training tells",
+  s.choice("lights", v.lights, kSelections, "Choice of lights: any triangle, any shape, by power, as learnt",
            {.film = "lights={}"});
   s.flag("cv-paper", v.paper,
-         "The published method: --lights triangle --cv-grid 64 --cv-train 8, cells by position alone, solved once",
+         "As published: `lights` triangle `cv-grid` 64 `cv-train` 8, cells by position, solved once",
          {.film = "paper"});
-  s.whole<uint32_t>(
-      "cv-grid", v.grid, {.low = 0, .high = CellGrid::kMaxResolution}, {"auto", ControlSettings::kAutomaticGrid},
-      "Cells along the longest side of the scene; auto: by the size of pixels, 32 to 256", {.film = "grid={}"});
+  s.whole<uint32_t>("cv-grid", v.grid, {.low = 0, .high = CellGrid::kMaxResolution},
+                    {"auto", ControlSettings::kAutomaticGrid},
+                    "Cells along the scene's longest side; auto: 32 to 256 by pixel size", {.film = "grid={}"});
   s.whole("cv-train", v.train_spp, {.low = 1, .high = ControlSettings::kMaxTrainingSpp},
-          "Samples per pixel to learn from, a part of --spp", {.film = "train={}"});
+          "Samples per pixel to learn from, a part of `spp`", {.film = "train={}"});
   s.whole("cv-clusters", v.clusters, {.low = 1, .high = 1 << 30}, "Most clusters of lights", {.film = "clusters={}"});
   s.whole("cv-memory", v.memory_mib, {.low = 1, .high = 1 << 30},
           "MiB of sums and coefficients while learning, then cells become wider", {.film = "memory={}"});
@@ -106,7 +103,7 @@ inline void declare(Settings& s, ControlSettings& v) {
            {.film = "variance={}"});
   // Without a word in films where it is the default, as it is of all films from before there was the option.
   s.choice("cv-surrogate", v.oidn, kSurrogates,
-           "What tells the values of pixels from the first samples: a filter of its own, or Open Image Denoise",
+           "Values of pixels from the first samples: by a filter or Open Image Denoise",
            {.film = v.oidn ? "surrogate={}" : ""});
   s.on_off("cv-prefix", v.prefix, "Whether samples weigh by the throughput of the path before them",
            {.film = "prefix={}"});
@@ -116,14 +113,14 @@ inline void declare(Settings& s, ControlSettings& v) {
            {.film = "indirect"});
   s.only_if(v.learns(),
             {"cv-paper", "cv-grid", "cv-train", "cv-clusters", "cv-memory", "cv-variance", "cv-surrogate", "cv-prefix"},
-            "with --cv off: nothing is learnt (unless --lights learned)");
+            "with `cv` off: nothing is learnt (unless `lights` learned)");
   s.only_if(v.lights != LightSelection::kLearned || v.learns_lights(), {"lights"},
-            "with --cv-train " + std::to_string(v.train_spp) + ": no sample is left to learn it from; use 8 or more");
+            "with `cv-train` " + std::to_string(v.train_spp) + ": no sample is left to learn it from; use 8 or more");
   s.only_if(v.has_cells(), {"cv-albedo", "cv-indirect"},
-            "with this --cv: only rgb and mono have coefficients of cells");
+            "with this `cv`: only rgb and mono have coefficients of cells");
   s.only_if(!v.per_pixel(), {"cv-grid", "cv-variance", "cv-surrogate", "cv-prefix"},
-            "with --cv optimal-mis: each pixel has coefficients of its own");
-  s.only_if(v.relative, {"cv-surrogate"}, "with --cv-variance absolute: values of pixels are not asked for");
+            "with `cv` optimal-mis: each pixel has coefficients of its own");
+  s.only_if(v.relative, {"cv-surrogate"}, "with `cv-variance` absolute: values of pixels are not asked for");
 }
 
 }  // namespace covary

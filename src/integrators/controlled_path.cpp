@@ -188,7 +188,7 @@ IntegratorReport ControlledPath::report() const {
       {}};
   if (const uint32_t n = cache_.n_coarsened(); n > 0)
     report.warnings.push_back(
-        fmt::format("{} MiB for control variates (--cv-memory) were reached; cells are {} times as wide",
+        fmt::format("{} MiB for control variates (`cv-memory`) were reached; cells are {} times as wide",
                     settings_.memory_mib, uint64_t{1} << n));
   if (const uint64_t n = cache_.n_rejected(); n > 0)
     report.warnings.push_back(fmt::format("{} samples of the training were not finite and are left out", n));

@@ -43,9 +43,9 @@ inline void declare(Settings& s, GuideSettings& v) {
   s.whole("guide-leaf", v.leaf_samples, {.low = GuideSettings::kMinLeafSamples, .high = GuideSettings::kMaxLeafSamples},
           "Samples of a leaf; one with more is split", {.film = "leaf={}"});
   s.whole("guide-train", v.train_spp, {.low = 1, .high = GuideSettings::kMaxTrainingSpp},
-          "Samples per pixel to learn from, a part of --spp", {.film = "train={}"});
+          "Samples per pixel to learn from, a part of `spp`", {.film = "train={}"});
   s.real<float>("guide-fraction", v.fraction, {.low = 0, .high = 1, .above_low = true, .below_high = true},
-                {"learned", GuideSettings::kLearnedFraction}, "Fraction of guided directions, or learned for each leaf",
+                {"learned", GuideSettings::kLearnedFraction}, "Fraction of guided directions, or learned by leaf",
                 {.film = "fraction={}"});
   s.real("guide-roughness", v.roughness, {.low = 0, .high = 1}, "Lobes of BSDFs that are less rough are not guided",
          {.film = "roughness={:f}"});
@@ -53,7 +53,7 @@ inline void declare(Settings& s, GuideSettings& v) {
   s.choice("cv", v.control, kControls, "Control variates on the lobes", {.film = "cv={}"});
   s.whole("cv-train", v.control_train_spp, {.low = 1, .high = GuideSettings::kMaxTrainingSpp},
           "Samples per pixel to learn their coefficients from, after the lobes", {.film = "cv_train={}"});
-  s.only_if(v.controlled(), {"cv-train"}, "without control variates (--cv rgb or mono)");
+  s.only_if(v.controlled(), {"cv-train"}, "without control variates (`cv` rgb or mono)");
 }
 
 }  // namespace covary

@@ -37,11 +37,11 @@ inline void declare(Settings& s, LightTracingSettings& v) {
   static constexpr std::pair<const char*, LightTracing> kModes[] = {
       {"auto", LightTracing::kAuto}, {"on", LightTracing::kOn}, {"off", LightTracing::kOff}};
   s.choice("light-tracing", v.mode, kModes,
-           "A pass of light paths beside the camera's, added to the image; auto: not beside common random numbers");
+           "Light paths in a pass beside the camera's; auto: unless numbers are common");
   auto paths = static_cast<float>(v.paths_per_sample);
   s.real("light-paths", paths, {.low = 1e-3, .high = 1e3}, "Light paths for each camera sample");
   v.paths_per_sample = paths;
-  s.only_if(v.mode != LightTracing::kOff, {"light-paths"}, "without light tracing (--light-tracing off)");
+  s.only_if(v.mode != LightTracing::kOff, {"light-paths"}, "without light tracing (`light-tracing` off)");
 }
 
 /// PassSettings::pass of light passes begin here, so that they share no numbers with passes of camera samples.

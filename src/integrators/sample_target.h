@@ -26,8 +26,7 @@ class SampleTarget {
   bool is_map() const { return !map_.empty(); }
   /// Of all pixels.
   double mean() const {
-    return map_.empty() ? largest_
-                        : std::accumulate(map_.begin(), map_.end(), 0.0) / static_cast<double>(map_.size());
+    return map_.empty() ? largest_ : std::accumulate(map_.begin(), map_.end(), 0.0) / static_cast<double>(map_.size());
   }
   /// Whether it is a number, or a map of the film's size.
   bool fits(const Film& film) const { return map_.empty() || map_.size() == film.counts().size(); }

@@ -61,7 +61,7 @@ void check_groups(const Method& method, const PlanState& state, uint32_t first) 
                 fmt::format("{} groups are too few: {} needs at least {}", groups, method.name, method.fewest_groups));
   if (first < groups)
     throw Error(ErrorCode::kUsage, fmt::format("dependent-spp is {}, expected at least {}, one sample for each group "
-                                               "(--groups)",
+                                               "(`groups`)",
                                                first, groups));
 }
 
@@ -74,7 +74,7 @@ void check_budget(const Method& method, const PlanState& state, uint32_t first) 
   const int least = std::max({1, method.sampling.counts.min_spp, static_cast<int>(method.groups_of(state))});
   if (budget >= static_cast<double>(first) + least) return;
   throw Error(ErrorCode::kUsage,
-              fmt::format("{} samples per pixel are too few for {}: its first pass takes {} (--dependent-spp), and at "
+              fmt::format("{} samples per pixel are too few for {}: its first pass takes {} (`dependent-spp`), and at "
                           "least {} must be left for the last one",
                           budget, method.name, first, least));
 }

@@ -110,7 +110,7 @@ TEST(AdaptivePlan, TooSmallABudgetIsAnError) {
   };
   EXPECT_TRUE(contains(message(40, {{"dependent-spp", "40"}}),
                        "40 samples per pixel are too few for dependent-tests: "
-                       "its first pass takes 40 (--dependent-spp), and at "
+                       "its first pass takes 40 (`dependent-spp`), and at "
                        "least 1 must be left"));
   EXPECT_TRUE(contains(message(40, {{"min-spp", "21"}}), "at least 21 must be left"));
   EXPECT_TRUE(contains(message(1, {}), "too few"));
@@ -119,7 +119,7 @@ TEST(AdaptivePlan, TooSmallABudgetIsAnError) {
     return message_of([&] { render(scene, adaptive_plan(iicv, groups), request_of(48)); }, ErrorCode::kUsage);
   };
   EXPECT_EQ(of_iicv("24", 2), "2 groups are too few: iicv needs at least 3");
-  EXPECT_EQ(of_iicv("2", {}), "dependent-spp is 2, expected at least 12, one sample for each group (--groups)");
+  EXPECT_EQ(of_iicv("2", {}), "dependent-spp is 2, expected at least 12, one sample for each group (`groups`)");
   EXPECT_EQ(message(2, {}), "no error");
 }
 

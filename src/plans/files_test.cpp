@@ -144,13 +144,13 @@ TEST(Passes, FilmsThatAreThereAreNeitherUsedNorReplacedUnasked) {
   for (uint32_t spp : {12, 24, 48}) {
     request.spp = spp;
     const std::string message = message_of([&] { render(scene, average_plan(), request); }, ErrorCode::kInput);
-    EXPECT_TRUE(contains(message, "films/crn.exr' is there already; --resume continues it"));
-    EXPECT_TRUE(contains(message, "--overwrite replaces it"));
+    EXPECT_TRUE(contains(message, "films/crn.exr' is there already; `resume` continues it"));
+    EXPECT_TRUE(contains(message, "`overwrite` replaces it"));
   }
   request.resume = true;
   request.seed = 6;
   EXPECT_TRUE(contains(message_of([&] { render(scene, average_plan(), request); }, ErrorCode::kInput),
-                       "was rendered with seed 5, this command asks for 6; --overwrite replaces it"));
+                       "was rendered with seed 5, this command asks for 6; `overwrite` replaces it"));
   EXPECT_EQ(read_film(request.passes + "/crn.exr").data(), film.data());
   request.resume = false;
   request.overwrite = true;
@@ -240,7 +240,7 @@ TEST(Failure, FilmsOfAFailedEstimateAreKeptAndContinued) {
   request.output = folder.file("a.exr");
   const std::vector<std::string> warnings = warnings_of_failure("no image today", scene, failing_plan(), request);
   ASSERT_EQ(warnings.size(), 1u);
-  EXPECT_TRUE(contains(warnings[0], "the films are kept in '" + folder.file("a.passes") + "'; --resume continues"));
+  EXPECT_TRUE(contains(warnings[0], "the films are kept in '" + folder.file("a.passes") + "'; `resume` continues"));
   for (const char* name : {"a.passes/crn.exr", "a.passes/independent.exr"})
     EXPECT_EQ(read_film(folder.file(name)).mean_count(), 12) << name;
   request.resume = true;
@@ -278,13 +278,13 @@ TEST(Failure, FilmsOfFailedPathLengthsAreKept) {
   request.path_lengths = true;
   std::vector<std::string> warnings = warnings_of_failure("no lengths today", scene, average_plan(), request);
   ASSERT_EQ(warnings.size(), 1u);
-  EXPECT_TRUE(contains(warnings[0], "the films are kept in '" + folder.file("a.passes") + "'; --resume continues"));
+  EXPECT_TRUE(contains(warnings[0], "the films are kept in '" + folder.file("a.passes") + "'; `resume` continues"));
   EXPECT_EQ(read_film(folder.file("a.passes/crn.exr")).mean_count(), 12);
 
   request.output = folder.file("plain.exr");
   warnings = warnings_of_failure("no lengths today", scene, plain_plan(Sampling::kIndependent), request);
   ASSERT_EQ(warnings.size(), 1u);
-  EXPECT_TRUE(contains(warnings[0], "the film is kept in '" + request.output + "'; --resume continues"));
+  EXPECT_TRUE(contains(warnings[0], "the film is kept in '" + request.output + "'; `resume` continues"));
   EXPECT_EQ(read_film(request.output).mean_count(), 24);
   EXPECT_EQ(attribute(request.output, "complete"), "false");
 }

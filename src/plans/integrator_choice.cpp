@@ -18,12 +18,12 @@ void check_belong(const std::string& integrator, const OptionValues& options) {
     if (find_option(own, name)) continue;
     const std::vector<std::string> owners = integrators_with_option(name);
     if (!owners.empty())
-      throw Error(ErrorCode::kUsage, fmt::format("--{} is an option of --integrator {}, not of {}", name,
+      throw Error(ErrorCode::kUsage, fmt::format("`{}` is an option of `integrator` {}, not of {}", name,
                                                  fmt::join(owners, ", "), integrator));
     std::vector<std::string> names;
     for (const Option& option : own) names.push_back(option.name);
     throw Error(ErrorCode::kUsage,
-                fmt::format("--{} is not an option of any integrator{}", name, did_you_mean(name, names)));
+                fmt::format("`{}` is not an option of any integrator{}", name, did_you_mean(name, names)));
   }
 }
 

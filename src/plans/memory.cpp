@@ -20,7 +20,7 @@ namespace covary {
 namespace {
 
 constexpr double kImageBytes = 3 * sizeof(float);  // per pixel
-constexpr double kSplatBytes = 16e6;  // of a round of light paths, about
+constexpr double kSplatBytes = 16e6;               // of a round of light paths, about
 
 }  // namespace
 

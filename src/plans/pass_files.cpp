@@ -60,7 +60,7 @@ void resume(const RenderRequest& request, Pass& pass) {
   Film film = read_film(pass.path);
   const auto differs = [&](const std::string& what, const std::string& old_value, const std::string& new_value) {
     throw Error(ErrorCode::kInput,
-                fmt::format("--resume: '{}' was rendered with {} {}, this command asks for {}; --overwrite replaces it",
+                fmt::format("`resume`: '{}' was rendered with {} {}, this command asks for {}; `overwrite` replaces it",
                             pass.path, what, old_value, new_value));
   };
   if (frame_text(film) != frame) differs("frame", frame_text(film), frame);
@@ -117,8 +117,8 @@ void check_replaceable(const std::string& path) {
 }
 
 constexpr const char* kWaysOut =
-    "--resume continues it, or takes it as it is where it has enough samples, and "
-    "--overwrite replaces it";
+    "`resume` continues it, or takes it as it is where it has enough samples, and "
+    "`overwrite` replaces it";
 
 }  // namespace
 
@@ -145,9 +145,9 @@ void check_earlier_films(const Plan& plan, const RenderRequest& request) {
   if (!continues && is_unfinished_film(request.output))
     throw Error(ErrorCode::kInput,
                 fmt::format("'{}' is the film of an interrupted render; {}", request.output,
-                            request.resume ? "this command does not continue it, its own one does; --overwrite "
+                            request.resume ? "this command does not continue it, its own one does; `overwrite` "
                                              "replaces it"
-                                           : "--resume continues it, and --overwrite replaces it"));
+                                           : "`resume` continues it, and `overwrite` replaces it"));
   std::error_code ignored;
   if (is_film || request.resume || !request.passes.empty()) return;
   for (const fs::directory_entry& entry : fs::directory_iterator(passes_folder(request), ignored))

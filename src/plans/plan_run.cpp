@@ -86,7 +86,7 @@ void PlanRun::warn_of_other_sampler() const {
   const std::string& type = scene_.sampler_type;
   const bool is_other = sampler_of(scene_, request_) == Sampler::kSobol && type != "sobol";
   if (request_.sampler || !callbacks_.warning || !is_other) return;
-  callbacks_.warning(fmt::format("the scene's sampler '{}' is rendered as 'sobol' (--sampler)", type));
+  callbacks_.warning(fmt::format("the scene's sampler '{}' is rendered as 'sobol' (`sampler`)", type));
 }
 
 bool PlanRun::render_to_limits() {

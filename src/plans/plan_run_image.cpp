@@ -120,8 +120,8 @@ void PlanRun::keep_films_of_failure() noexcept {
     if (try_to_keep_films(false, "they are lost") && callbacks_.warning)
       callbacks_.warning(
           output_is_film(plan_, request_)
-              ? fmt::format("the film is kept in '{}'; --resume continues it", request_.output)
-              : fmt::format("the films are kept in '{}'; --resume continues them", passes_folder(request_).string()));
+              ? fmt::format("the film is kept in '{}'; `resume` continues it", request_.output)
+              : fmt::format("the films are kept in '{}'; `resume` continues them", passes_folder(request_).string()));
   } catch (...) {  // no memory for the text of a warning
   }
 }

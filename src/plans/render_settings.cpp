@@ -70,7 +70,7 @@ void declare_basic(Settings& s, RenderSettings& v) {
           "Samples per pixel of all passes together; default: the scene's", kBasicPasses);
   s.text_as(
       "until", r, "relmse=X", read_until,
-      "relmse=X: add samples until the predicted error is X, at most --spp; relmse-p95=X: until 95 % of the blocks "
+      "relmse=X: add samples until the predicted error is X, at most `spp`; relmse-p95=X: until 95 % of the blocks "
       "of 16 x 16 pixels have no more",
       kBasicPasses);
   std::optional<double> seconds;
@@ -88,7 +88,7 @@ void declare_basic(Settings& s, RenderSettings& v) {
   s.text_as("crop", r.crop, "X,Y,WIDTH,HEIGHT", read_crop, "Render only these pixels of the frame", kBasicSamples);
   s.text("passes", r.passes, "FOLDER", "Keep the film of every pass here",
          {.aliases = {"save-passes"}, .level = OptionLevel::kBasic, .names = OptionNames::kFolder});
-  s.flag("resume", r.resume, "Continue the films of an interrupted render, or those in --passes",
+  s.flag("resume", r.resume, "Continue the films of an interrupted render, or those in `passes`",
          {.level = OptionLevel::kBasic});
 }
 
@@ -123,7 +123,7 @@ void declare_sampling(Settings& s, RenderSettings& v) {
 
 void declare_output(Settings& s, RenderRequest& r) {
   s.group("Output");
-  s.flag("overwrite", r.overwrite, "Replace films that are there already, in --passes or of an interrupted render");
+  s.flag("overwrite", r.overwrite, "Replace films that are there already, in `passes` or of an interrupted render");
   s.real("checkpoint", r.checkpoint_seconds, {.low = 0}, "Seconds between writing unfinished films; 0: never");
   r.preview = !s.flag("no-preview", "Do not write the PNG");
   s.flag("aovs", r.aovs, "Add the images Albedo, N (normal) and P (position) to the output");
@@ -141,7 +141,7 @@ void declare(Settings& settings, RenderSettings& v) {
   declare_basic(settings, v);
   declare_sampling(settings, v);
   declare_output(settings, v.request);
-  if (v.request.resume && v.request.overwrite) throw Error(ErrorCode::kUsage, "--overwrite excludes --resume");
+  if (v.request.resume && v.request.overwrite) throw Error(ErrorCode::kUsage, "`overwrite` excludes `resume`");
 }
 
 Estimator estimator_of(const RenderSettings& settings, const OptionValues& of_estimator) {
@@ -156,8 +156,8 @@ void take_training(const LoadedScene& scene, RenderRequest& request) {
   const uint32_t all = request.spp.value_or(static_cast<uint32_t>(scene.spp));
   if (all <= training)
     throw Error(ErrorCode::kUsage, fmt::format("{} samples per pixel, of which the training takes {}, leave none for "
-                                               "the image; use a larger --spp or a shorter training "
-                                               "(--cv-train, --guide-train)",
+                                               "the image; use a larger `spp` or a shorter training "
+                                               "(`cv-train`, `guide-train`)",
                                                all, training));
   request.spp = all - training;
 }

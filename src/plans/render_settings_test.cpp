@@ -49,20 +49,20 @@ TEST(RenderSettings, WhatIsNoValueIsRefused) {
   };
   for (const char* text : {"640", "0x5", "5x65537", "5x5x5", "-5x5", "axb"})
     EXPECT_EQ(problem("resolution", text),
-              fmt::format("--resolution '{}': expected WIDTHxHEIGHT, each from 1 to 65536, e.g. 1280x720", text));
+              fmt::format("`resolution` '{}': expected WIDTHxHEIGHT, each from 1 to 65536, e.g. 1280x720", text));
   for (const char* text : {"1,2,3", "1,2,3,4,5", "-1,2,3,4", "1,2,3,65537"})
     EXPECT_EQ(problem("crop", text),
-              fmt::format("--crop '{}': expected X,Y,WIDTH,HEIGHT in pixels, e.g. 240,560,240,160", text));
+              fmt::format("`crop` '{}': expected X,Y,WIDTH,HEIGHT in pixels, e.g. 240,560,240,160", text));
   for (const char* text : {"1", "0:1", "1:0", "1:2:3", "half"})
     EXPECT_EQ(problem("split", text),
-              fmt::format("--split '{}': expected CRN:INDEPENDENT, two numbers above 0, e.g. 1:1", text));
+              fmt::format("`split` '{}': expected CRN:INDEPENDENT, two numbers above 0, e.g. 1:1", text));
   for (const char* text : {"0.1", "relmse=0", "relmse=x", "relmse-p95=-1", "mse=1"})
     EXPECT_EQ(problem("until", text),
-              fmt::format("--until '{}': expected relmse=X or relmse-p95=X with X > 0, e.g. relmse=0.005", text));
+              fmt::format("`until` '{}': expected relmse=X or relmse-p95=X with X > 0, e.g. relmse=0.005", text));
   EXPECT_EQ(message_of([] {
               settings_from<RenderSettings>({{"resume", ""}, {"overwrite", ""}});
             }),
-            "--overwrite excludes --resume");
+            "`overwrite` excludes `resume`");
 }
 
 /// Two methods of a suite may share films where these are equal.

@@ -21,7 +21,7 @@ PassSettings settings_of(const LoadedScene& scene, const RenderRequest& request,
   settings.sampler = sampler_of(scene, request);
   if (settings.sampler == Sampler::kSobol && !address.groups)
     throw Error(ErrorCode::kUsage,
-                "a sample of --sampler sobol is one of a group; --groups says how many groups the "
+                "a sample of `sampler` sobol is one of a group; `groups` says how many groups the "
                 "film has, 'covary info FILM' shows it");
   settings.groups = address.groups.value_or(1);
   settings.crn_part = request.crn_part;

@@ -59,7 +59,7 @@ std::optional<std::string> PropertySource::find(const Option& option) {
 }
 
 void PropertySource::refuse(const Option& option, const std::string& problem) {
-  if (is_of_caller(option)) throw Error(ErrorCode::kUsage, fmt::format("--{} {}", option.name, problem));
+  if (is_of_caller(option)) throw Error(ErrorCode::kUsage, fmt::format("`{}` {}", option.name, problem));
   parameters_.error_at(underscored(option.name), "is " + problem);
 }
 

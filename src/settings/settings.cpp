@@ -21,7 +21,7 @@ class TextSource final : public SettingsSource {
   }
   bool is_of_caller(const Option& option) override { return values_.contains(option.name); }
   void refuse(const Option& option, const std::string& problem) override {
-    throw Error(ErrorCode::kUsage, fmt::format("--{} {}", option.name, problem));
+    throw Error(ErrorCode::kUsage, fmt::format("`{}` {}", option.name, problem));
   }
   bool checks_ranges() const override { return false; }
 
@@ -113,7 +113,7 @@ void Settings::only_if(bool applies, std::span<const char* const> names, const s
     const auto option = std::find_if(options_.begin(), options_.end(), [&](const Option& o) { return o.name == name; });
     COVARY_CHECK(option != options_.end(), "only options that were declared can be without effect");
     option->has_effect = false;
-    if (source_->is_of_caller(*option)) given.push_back(std::string("--") + name);
+    if (source_->is_of_caller(*option)) given.push_back(fmt::format("`{}`", name));
   }
   if (given.empty()) return;
   throw Error(ErrorCode::kUsage,

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "settings/number_text.h"
+#include "settings/option_names.h"
 #include "support/files.h"
 
 namespace covary {
@@ -52,7 +53,7 @@ void declare(Settings& s, Fog& v) {
   s.texts("fog-name", v.names, "NAME", "Names");
   s.one_of("fog-mode", v.mode, {"a", "b"}, "Mode");
   s.text_as("fog-size", v.side, "SIDExSIDE", read_side, "Size", {.effect = OptionEffect::kSamples});
-  s.only_if(v.steps > 1, {"fog-jitter", "fog-height"}, "with --fog-steps 1");
+  s.only_if(v.steps > 1, {"fog-jitter", "fog-height"}, "with `fog-steps` 1");
 }
 
 Fog read(const OptionValues& values) {
@@ -123,21 +124,21 @@ TEST(Settings, DefaultsAreThoseOfTheStruct) {
 }
 
 TEST(Settings, WhatIsNoValueIsRefused) {
-  EXPECT_EQ(problem({{"fog-steps", "4.5"}}), "--fog-steps '4.5': expected a whole number from 1 to 64");
-  EXPECT_EQ(problem({{"fog-steps", "99999999999"}}), "--fog-steps '99999999999': expected a whole number from 1 to 64");
-  EXPECT_EQ(problem({{"fog-grid", "-1"}}), "--fog-grid '-1': expected auto or a whole number from 1 to 9");
-  EXPECT_EQ(problem({{"fog-density", "nan"}}), "--fog-density 'nan': expected a number above 0 to 1");
-  EXPECT_EQ(problem({{"fog-height", "1x"}}), "--fog-height '1x': expected a number");
-  EXPECT_EQ(problem({{"fog-colour", "blu"}}), "--fog-colour 'blu'; did you mean 'blue'?: expected red, blue");
+  EXPECT_EQ(problem({{"fog-steps", "4.5"}}), "`fog-steps` '4.5': expected a whole number from 1 to 64");
+  EXPECT_EQ(problem({{"fog-steps", "99999999999"}}), "`fog-steps` '99999999999': expected a whole number from 1 to 64");
+  EXPECT_EQ(problem({{"fog-grid", "-1"}}), "`fog-grid` '-1': expected auto or a whole number from 1 to 9");
+  EXPECT_EQ(problem({{"fog-density", "nan"}}), "`fog-density` 'nan': expected a number above 0 to 1");
+  EXPECT_EQ(problem({{"fog-height", "1x"}}), "`fog-height` '1x': expected a number");
+  EXPECT_EQ(problem({{"fog-colour", "blu"}}), "`fog-colour` 'blu'; did you mean 'blue'?: expected red, blue");
   for (const char* size : {"7x8", "7", "7x", "-1x-1", "7x7x7", "x", ""})
-    EXPECT_EQ(problem({{"fog-size", size}}), fmt::format("--fog-size '{}': expected SIDExSIDE", size));
-  EXPECT_EQ(problem({{"fog-jitter", "yes"}}), "--fog-jitter 'yes': expected on, off");
+    EXPECT_EQ(problem({{"fog-size", size}}), fmt::format("`fog-size` '{}': expected SIDExSIDE", size));
+  EXPECT_EQ(problem({{"fog-jitter", "yes"}}), "`fog-jitter` 'yes': expected on, off");
 }
 
 TEST(Settings, OptionsWithoutEffectAreErrors) {
-  EXPECT_EQ(problem({{"fog-steps", "1"}, {"fog-height", "2"}}), "--fog-height has no effect with --fog-steps 1");
+  EXPECT_EQ(problem({{"fog-steps", "1"}, {"fog-height", "2"}}), "`fog-height` has no effect with `fog-steps` 1");
   EXPECT_EQ(problem({{"fog-steps", "1"}, {"fog-height", "2"}, {"fog-jitter", "on"}}),
-            "--fog-jitter, --fog-height have no effect with --fog-steps 1");
+            "`fog-jitter`, `fog-height` have no effect with `fog-steps` 1");
   EXPECT_EQ(read({{"fog-steps", "1"}}).steps, 1);
 }
 
@@ -148,6 +149,13 @@ TEST(Settings, FilmTextHasWhatHasAnEffect) {
   EXPECT_EQ(film_text_of(fog), "steps=4 grid=7 density=0.500000 thick");
   fog.jitter = true, fog.steps = 1;
   EXPECT_EQ(film_text_of(fog), "steps=1 grid=7 density=0.500000 thick");
+}
+
+TEST(OptionNames, AreShownAsTheReaderKnowsThem) {
+  const std::string text = "`cv-grid`, `k` have no effect with `cv` off; 'a`b', ``, `No name` and `x y` `z`";
+  EXPECT_EQ(as_flags(text), "--cv-grid, --k have no effect with --cv off; 'a`b', ``, `No name` and `x y` --z");
+  EXPECT_EQ(as_arguments(text), "cv_grid, k have no effect with cv off; 'a`b', ``, `No name` and `x y` z");
+  for (const char* same : {"", "`", "no names", "an open `name"}) EXPECT_EQ(as_flags(same), same);
 }
 
 TEST(NumberText, ListsOfNumbers) {

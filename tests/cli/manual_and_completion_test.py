@@ -8,6 +8,8 @@ from pathlib import Path
 
 from cli_test import CliTest
 
+SOURCE = Path(__file__).resolve().parents[2]
+
 
 class HelpTest(CliTest):
     def setUp(self):
@@ -62,6 +64,10 @@ class OneScreen(HelpTest):
         text = self.good("render", "--help-all").stdout
         self.assertLessEqual(max(map(len, text.splitlines())), 100)
         self.assertLessEqual({"--cv-grid", "--split", "--variance", "--oidn", *self.WANTED}, set(self.options_in(text)))
+        lines = text.splitlines()
+        for line, below in zip(lines, [*lines[1:], ""], strict=True):
+            if re.match(r" {2,6}-", line):
+                self.assertTrue(re.search(r"\S  +\S", line) or below.startswith(27 * " "), line)
         headings = re.findall(r"^(\S.*):$", text, re.M)
         self.assertEqual(headings[:2], ["Arguments", "Options"])
         self.assertLessEqual({"Sampling", "Paths", "Integrator controlled-path", "Estimator"}, set(headings))
@@ -78,6 +84,21 @@ class OneScreen(HelpTest):
         text = self.good("--help-all").stdout
         for command in self.commands:
             self.assertIn(self.good(command, "--help-all").stdout, text)
+
+
+class Pages(HelpTest):
+    """The pages name options that there are."""
+
+    #: Of Dask, `covary experiment --cluster`, and scripts that the pages name.
+    OTHERS = {"--cluster", "--scheduler-file", "--local-directory", "--variants", "--each-trained"}
+
+    def test_options(self):
+        known = {option for options in self.options.values() for option in options} | self.OTHERS
+        pages = [SOURCE / "README.md", *sorted((SOURCE / "docs").rglob("*.md"))]
+        self.assertGreater(len(pages), 20)
+        unknown = {f"{page.relative_to(SOURCE)}: {option}" for page in pages
+                   for option in re.findall(r"`(--[a-z][a-z-]*)", page.read_text()) if option not in known}
+        self.assertEqual(unknown, set())
 
 
 class Manual(HelpTest):

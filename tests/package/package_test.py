@@ -103,6 +103,18 @@ class Package(unittest.TestCase):
         self.assertRegex(printed, r"^24 samples per pixel in .* predicted relMSE 0\.\d+\n$")
         self.assertEqual(rgb(self.work / "a.exr"), rgb(self.work / "b.exr"))
 
+    def test_an_integrator_of_the_caller_renders(self):
+        """Radiance 1 everywhere and albedo 1/2: after n reflections, 1 + 1/2 + ... + 1/2^n in every sample."""
+        furnace = (SOURCE / "scenes" / "furnace.xml").read_text()
+        own = '<integrator type="reflections"><integer name="max_reflections" value="2"/></integrator>'
+        (self.work / "furnace.xml").write_text(re.sub("<integrator.*?</integrator>", own, furnace, flags=re.S))
+        program = self.examples / "own_integrator"
+        for given, expected in (((), 1.75), (("max-reflections=0",), 1), (("max-reflections=5",), 1.96875)):
+            printed = self.run_in_folder(program, "furnace.xml", *given)
+            self.assertAlmostEqual(float(printed.removeprefix("mean ")), expected, 5)
+        with self.assertRaisesRegex(AssertionError, "`max-reflections` 'x': expected a whole number from 0 to 1000"):
+            self.run_in_folder(program, "furnace.xml", "max-reflections=x")
+
     def test_textures_are_read(self):
         """Through libcovary_imageio.so, which the library finds beside itself."""
         (self.work / "two.ppm").write_bytes(b"P6\n2 1\n255\n\xff\x00\x00\xff\x00\x00")
@@ -115,7 +127,7 @@ class Package(unittest.TestCase):
 
     def test_programs_are_compiled_for_every_processor(self):
         commands = json.loads((self.examples / "compile_commands.json").read_text())
-        self.assertEqual(len(commands), 2)
+        self.assertEqual(len(commands), 3)
         for command in commands:
             self.assertNotRegex(command["command"], r"\s-(m|f(?!sanitize)|O|W)")
 

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// An integrator of one's own, with an option: light after at most so many reflections.
+//
+//     own_integrator SCENE.xml [max-reflections=N]
+#include <covary/combine/registry.h>
+#include <covary/plans/estimator_plans.h>
+#include <covary/plans/render.h>
+#include <covary/scene/property_source.h>
+
+#include <cstdio>
+#include <cstring>
+#include <exception>
+
+using namespace covary;
+
+struct Reflections final : Integrator {
+  int most = 1;
+
+  std::shared_ptr<Integrator> clone() const override { return std::make_shared<Reflections>(*this); }
+  std::string description() const override { return "reflections most=" + std::to_string(most); }
+  void trace(const Scene& scene, std::span<CameraSample> samples, PathContext& context) const override {
+    for (CameraSample& sample : samples) {
+      Spectrum throughput(1);
+      Ray ray = sample.ray;
+      SurfaceHit hit;
+      for (uint32_t vertex = 1; ++context.n_rays, scene.intersect(ray, hit); ++vertex) {
+        if (hit.emitter) sample.radiance += throughput * hit.emitter->surface_radiance(hit, -ray.d);
+        const Vec3 wo = hit.frame.to_local(-ray.d);
+        const BsdfClosure* bsdf = hit.bsdf->bind(hit, wo.z > 0, TransportMode::kRadiance, context.arena);
+        const BsdfSample next = bsdf->sample(wo, sample.random.get_1d(vertex, Event::kLobe),
+                                             sample.random.get_2d(vertex, Event::kDirection));
+        if (vertex > static_cast<uint32_t>(most) || !next.valid()) break;
+        throughput *= next.weight;
+        const Vec3 wi = hit.frame.to_world(next.wi);
+        ray = {offset_origin(hit, wi), wi};
+      }
+    }
+  }
+};
+
+int main(int argc, char** argv) try {
+  if (argc < 2) return std::fprintf(stderr, "own_integrator SCENE.xml [max-reflections=N]\n"), 2;
+  OptionValues given;
+  if (argc == 3 && std::strncmp(argv[2], "max-reflections=", 16) == 0) given["max-reflections"] = argv[2] + 16;
+  LoadOptions load;
+  load.make_integrator = [&](Parameters& parameters) {
+    PropertySource source(parameters, given);  // of the scene file, and what is given in place of it
+    Settings settings(source);
+    const auto integrator = std::make_shared<Reflections>();
+    settings.whole("max-reflections", integrator->most, {.low = 0, .high = 1000}, "Most reflections");
+    return integrator;
+  };
+  const LoadedScene scene = load_scene(argv[1], load);
+  const RenderResult result = render(scene, estimator_plan(make_estimator(kNoEstimator)), {});
+  const Image image = result.picture();
+  double sum = 0;
+  for (const float value : image.data) sum += value;
+  std::printf("mean %.6f\n", sum / static_cast<double>(image.data.size()));
+  return 0;
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "own_integrator: %s\n", error.what());
+  return 1;
+}
