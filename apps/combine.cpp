@@ -21,6 +21,7 @@
 #include "combine/result_file.h"
 #include "combine_counts.h"
 #include "commands.h"
+#include "core/memory_limit.h"
 #include "core/stopwatch.h"
 #include "declared_options.h"
 #include "denoising/mixed_denoising.h"
@@ -45,7 +46,7 @@ struct CombineOptions {
   OptionValues of_estimator, denoising;
   bool error = false, force = false, quiet = false;
   std::optional<int> samples;
-  double memory_mib = 4096;
+  std::optional<double> memory_mib;
   std::vector<int> explain;  ///< x, y in the full frame
   int threads = 0;
 };
@@ -188,7 +189,9 @@ struct Inputs {
     take_counts(o.counts, o.samples, crn, independent);
     request.crn = source_of(crn), request.independent = source_of(independent);
     if (light) request.light = source_of(*light);
-    request.memory = o.memory_mib * 1048576;
+    constexpr double kMebibyte = 1 << 20, kUsual = 4096 * kMebibyte;
+    if (o.memory_mib) request.most_memory = *o.memory_mib * kMebibyte;
+    request.memory = request.most_memory.value_or(std::min(kUsual, memory_limit()));
     request.force = o.force;
   }
   Inputs(const Inputs&) = delete;
@@ -222,6 +225,8 @@ nlohmann::ordered_json statistics(const CombineOptions& o, const CombineRequest&
                                    {"independent_vertical", json_of(report.independent_vertical)},
                                    {"crn_independent", json_of(report.crn_independent)}}},
                                  {"mean", {{"crn", report.crn_mean}, {"independent", report.independent_mean}}},
+                                 {"planned_memory_bytes", combined.planned_memory},
+                                 {"peak_memory_bytes", peak_memory_bytes()},
                                  {"seconds",
                                   {{"read_and_check", combined.check_seconds},
                                    {"estimate", combined.estimate_seconds},
@@ -334,9 +339,9 @@ void add_combine(CLI::App& app) {
   command->add_flag("--force", o->force, "Combine even where the check of the inputs finds errors");
   command
       ->add_option("--memory", o->memory_mib,
-                   "MiB to work in: larger images are worked on in bands, with the same bits")
-      ->check(positive_number())
-      ->capture_default_str();
+                   "MiB to work in: larger images are worked on in bands, with the same bits, or refused by estimators "
+                   "that need whole images; default: 4096 for bands, most of the machine's for whole images")
+      ->check(positive_number());
   add_threads_option(*command, o->threads);
   command->add_option("--json", o->json, "File for statistics; '-': standard output")->type_name(kFileValue);
   command->add_flag("--quiet", o->quiet, "Warnings and errors only");

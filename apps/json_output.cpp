@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "json_output.h"
 
+#include <sys/resource.h>
 #include <cstdio>
 
 #include "film/output_file.h"
@@ -16,6 +17,12 @@ void write_text_output(const std::string& path, const std::string& text) {
     std::fputs(text.c_str(), stdout);  // main() looks whether that could be written
   else
     write_text_file(path, text);
+}
+
+double peak_memory_bytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) * 1024;
 }
 
 }  // namespace covary

@@ -2,7 +2,6 @@
 #include "render_report.h"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 
 #include <algorithm>
 #include <string>
@@ -13,6 +12,7 @@
 #include "film/splat_layer.h"
 #include "integrators/light_pass.h"
 #include "integrators/training.h"
+#include "json_output.h"
 #include "plans/budget.h"
 #include "plans/memory.h"
 #include "progress.h"
@@ -20,12 +20,6 @@
 
 namespace covary {
 namespace {
-
-double peak_memory_bytes() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_maxrss) * 1024;
-}
 
 const char* sampling_name(const Pass& pass) { return pass.settings.sampling == Sampling::kCrn ? "crn" : "independent"; }
 

@@ -8,6 +8,7 @@
 
 #include "combine/light_film.h"
 #include "core/error.h"
+#include "core/memory_limit.h"
 #include "core/stopwatch.h"
 #include "estimators/mean.h"
 #include "filters/feedback.h"
@@ -40,6 +41,16 @@ void append(const EstimatorResult& part, int skipped, int y, int n, int height, 
     whole.held_out.insert(whole.held_out.end(), part.held_out.begin() + skipped, part.held_out.begin() + skipped + n);
 }
 
+void check_memory(const CombineRequest& request, double planned) {
+  if (planned < kUnnoticedMemory || planned <= request.most_memory.value_or(memory_limit())) return;
+  throw Error(ErrorCode::kUsage,
+              fmt::format("{} x {} pixels of {} + {} groups need {} of memory for {}{}; {}", request.crn.width,
+                          request.crn.height, request.crn.groups, request.independent.groups, bytes_text(planned),
+                          request.estimator.text, request.estimator.reach < 0 ? ", which works on whole images" : "",
+                          request.most_memory ? "permitted are " + bytes_text(*request.most_memory) + " (--memory)"
+                                              : memory_limit_text()));
+}
+
 EstimatorResult estimate(const CombineRequest& request) {
   const Estimator& estimator = request.estimator;
   const int height = request.crn.height, in_memory = rows_in_memory(request);
@@ -61,10 +72,28 @@ EstimatorResult estimate(const CombineRequest& request) {
 
 }  // namespace
 
+double memory_of_rows(const CombineRequest& request, int rows) {
+  constexpr double kImage = 3 * sizeof(float), kCount = sizeof(uint32_t);
+  const double width = request.crn.width, n_pixels = width * rows;
+  const bool holds_out = request.settings.std_error && request.settings.held_out;
+  const int groups = holds_out ? std::min(request.crn.groups, request.independent.groups) : 0;
+  const double values = kImage * (request.crn.groups + request.independent.groups) + 2 * kCount;
+  // Of bands, the estimate of the whole image, its standard error and bias are beside them.
+  const double results = rows < request.crn.height ? 3 * kImage * width * request.crn.height : 0;
+  return n_pixels * values + request.estimator.memory.bytes(n_pixels, groups) + results;
+}
+
 int rows_in_memory(const CombineRequest& request) {
-  // The values themselves, and about 40 floats per pixel that an estimator works with.
-  const double row_bytes = request.crn.width * (12.0 * (request.crn.groups + request.independent.groups) + 160);
-  return static_cast<int>(std::min<double>(request.crn.height, request.memory / row_bytes));
+  const int height = request.crn.height;
+  if (memory_of_rows(request, height) <= request.memory) return height;
+  const double results = memory_of_rows(request, 0), row = memory_of_rows(request, 1) - results;
+  return static_cast<int>(std::clamp((request.memory - results) / row, 0.0, static_cast<double>(height)));
+}
+
+double planned_memory(const CombineRequest& request) {
+  const int height = request.crn.height, reach = request.estimator.reach;
+  const int fewest = reach < 0 ? height : std::min(height, kFewestRows + 2 * reach);
+  return memory_of_rows(request, std::max(fewest, rows_in_memory(request)));
 }
 
 Band band_around(const CombineRequest& request, int first, int last) {
@@ -109,6 +138,8 @@ void finish(EstimatorResult& result, const GroupedImage* light) {
 
 CombinedImage combine(const CombineRequest& request) {
   CombinedImage combined;
+  combined.planned_memory = planned_memory(request);
+  check_memory(request, combined.planned_memory);
   Stopwatch watch;
   combined.inputs = examine(request);
   if (request.checked) request.checked(combined.inputs);

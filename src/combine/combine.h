@@ -30,6 +30,8 @@ struct CombineRequest {
   /// Bytes to work in: larger images are combined in bands of rows, with the same bits, by estimators whose reach is
   /// limited.
   double memory = std::numeric_limits<double>::infinity();
+  /// Bytes that it may take where bands do not help; memory_limit() (core/memory_limit.h) where not given.
+  std::optional<double> most_memory;
   /// Called when the inputs have been looked at, before errors among the findings are thrown.
   std::function<void(const InputFindings&)> checked;
 };
@@ -39,19 +41,25 @@ struct CombinedImage {
   std::optional<double> predicted_relmse;  ///< predicted_error.h; where there is a standard error
   std::string prediction_doubt;            ///< of predicted_error.h; empty where nothing speaks against it
   InputFindings inputs;
+  double planned_memory = 0;  ///< planned_memory() of the request
   double check_seconds = 0, estimate_seconds = 0;
 };
 
 /// Looks at the two images as combine() does. Throws Error(kInput) where they do not show the same pixels.
 InputFindings examine(const CombineRequest& request);
 
-/// Throws Error(kInput) where the findings hold errors and `force` is not set, and what the estimator throws.
+/// Throws Error(kUsage) where it would take too much memory, Error(kInput) where the findings hold errors and `force`
+/// is not set, and what the estimator throws.
 CombinedImage combine(const CombineRequest& request);
 
 /// relMSE that the groups of `image` predict of their mean, read so many rows at a time: what the samples have alone.
 double predicted_relmse_of_mean(const GroupedSource& image, int rows);
 
-/// Rows that combine() works on at a time.
+/// Bytes that combine() takes at its peak, about: input, what the estimator works with, and the result.
+double planned_memory(const CombineRequest& request);
+/// The same of as many rows at a time.
+double memory_of_rows(const CombineRequest& request, int rows);
+/// Rows that combine() has in memory at a time.
 int rows_in_memory(const CombineRequest& request);
 
 /// Rows of both images.

@@ -65,7 +65,7 @@ TEST(Combine, BandsHaveTheBitsOfTheWhole) {
   request.force = true;
   const CombinedImage whole = combine(request);
   EXPECT_EQ(rows_in_memory(request), kHeight);
-  request.memory = 20.0 * kWidth * (12 * 2 * kGroups + 160);
+  request.memory = memory_of_rows(request, 20) + 1;
   ASSERT_EQ(rows_in_memory(request), 20);
   int n_reads = 0;
   request.crn.rows = [&n_reads, rows = request.crn.rows](int first, int n) { return ++n_reads, rows(first, n); };

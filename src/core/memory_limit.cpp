@@ -16,9 +16,8 @@ namespace covary {
 namespace {
 
 constexpr const char* kVariable = "COVARY_MEMORY";
-constexpr double kShare = 0.75;       // of the machine
-constexpr double kUnlimited = 1e18;   // a control group without a limit says "max", or a number of this size
-constexpr double kUnnoticed = 100e6;  // bytes: less is not looked at
+constexpr double kShare = 0.75;      // of the machine
+constexpr double kUnlimited = 1e18;  // a control group without a limit says "max", or a number of this size
 
 double page_bytes() { return static_cast<double>(sysconf(_SC_PAGESIZE)); }
 
@@ -59,7 +58,7 @@ double memory_limit() {
 }
 
 void require_memory(const std::string& file, const std::string& what, double bytes) {
-  if (bytes < kUnnoticed) return;
+  if (bytes < kUnnoticedMemory) return;
   const double held = held_bytes(), limit = memory_limit();
   if (held + bytes <= limit) return;
   throw Error(ErrorCode::kInput, fmt::format("{}: {} needs {} of memory beside the {} in use; {}", file, what,

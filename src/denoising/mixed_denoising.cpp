@@ -34,8 +34,9 @@ ModeSettings settings_of(DenoiseMode mode) {
   return *std::find_if(std::begin(kModes), std::end(kModes), [&](const ModeSettings& m) { return m.mode == mode; });
 }
 
-/// Memory beside that of the estimator, about: images of three sets of samples, planes of filters and sums.
-constexpr double kBytesPerPixel = 1200;
+/// Memory beside that of the estimator, about: images of three sets of samples, planes of filters and sums, half of 12
+/// groups; with the network, what that takes and its candidates.
+constexpr double kBytesPerPixel = 510, kBytesWithOidn = 1280;
 
 /// The image of one set of samples, and what candidates are made of.
 struct Part {
@@ -157,7 +158,7 @@ Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& opt
   estimator.reads_guides = true;
   estimator.reach = -1;
   estimator.explain = nullptr;
-  estimator.memory.always += kBytesPerPixel;
+  estimator.memory.always += with_oidn ? kBytesWithOidn : kBytesPerPixel;
   const auto makers = [options, with_oidn](const Guides& guides) {
     std::vector<CandidateMaker> all = {filtered_candidates(guides)};
     if (with_oidn) all.push_back(neural_candidates(guides, options.oidn));

@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """covary combine, as a user runs it, on small images with the layouts of several renderers."""
 import json
+import os
 import random
 import unittest
+from pathlib import Path
 
 from cli_test import CliTest
 from exr_reader import read_exr
 from exr_writer import FLOAT, HALF, UINT, exr
 
+ROOM = str(Path(os.environ["SCENES"]) / "room.xml")
 SIZE = WIDTH, HEIGHT = 24, 20
 GROUPS = 12
 
@@ -139,6 +142,40 @@ class Combine(CliTest):
             result = self.good("combine", "--crn", "tall_crn.exr", "--independent", "tall_independent.exr", "--force",
                                "--quiet", "-o", "out.exr", "--json", "-", "--memory", memory)
             self.assertEqual(json.loads(result.stdout)["nonfinite_pixels"], 20)
+
+    def films(self, *resolutions):
+        """Of a small scene: inputs of combine for each resolution."""
+        inputs = []
+        for size in resolutions:
+            for sampling in ("crn", "independent"):
+                self.good("render", ROOM, "--resolution", size, "--max-depth", "1", "--spp", "12", "--groups", "12",
+                          "--estimator", "none", "--sampling", sampling, "--seed", str(len(sampling)), "--no-preview",
+                          "--quiet", "-o", f"{sampling}-{size}.exr")
+            inputs.append(["combine", "--crn", f"crn-{size}.exr", "--independent", f"independent-{size}.exr",
+                           "--quiet", "-o", "out.exr", "--json", "-", "--force"])  # groups may be alike
+        return inputs
+
+    @unittest.skipIf("SANITIZED" in os.environ, "sanitizers take memory of their own")
+    def test_memory(self):
+        """What is planned beforehand is about what is taken; as much as is permitted."""
+        small, large = self.films("80x60", "800x600")
+        for options in ([], ["--error"], ["--estimator", "cv-baseline", "--error"], ["--estimator", "iduw"],
+                        ["--denoise", "balanced", "--oidn", "off"], ["--denoise", "error", "--error", "--oidn", "off"]):
+            with self.subTest(options):
+                facts = [json.loads(self.good(*inputs, *options).stdout) for inputs in (small, large)]
+                planned, taken = (facts[1][key] - facts[0][key]
+                                  for key in ("planned_memory_bytes", "peak_memory_bytes"))
+                self.assertGreater(planned, 0.8 * taken)
+                self.assertLess(planned, 1.3 * taken)
+        bands = json.loads(self.good(*large, "--error", "--memory", "150").stdout)
+        self.assertLess(bands["planned_memory_bytes"], 150 << 20)
+        self.assertLess(bands["peak_memory_bytes"], 200e6)
+        self.bad(2, "800 x 600 pixels of 12 + 12 groups need 217.4 MB of memory for iduw, which works on whole "
+                 "images; permitted are 157.3 MB (--memory)", *large, "--estimator", "iduw", "--memory", "150")
+        self.bad(2, "of memory for iicv --denoise balanced --oidn off, which works on whole images", *large, "--denoise",
+                 "balanced", "--oidn", "off", "--memory", "200")
+        self.bad(2, "the limit is 150.0 MB: use less, or raise it by the environment variable COVARY_MEMORY", *large,
+                 "--estimator", "iduw", env=os.environ | {"COVARY_MEMORY": "0.15"})
 
     def test_estimators_differ(self):
         results = []
