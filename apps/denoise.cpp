@@ -54,6 +54,8 @@ void run(const Options& o) {
   ProgressLine progress(std::filesystem::path(o.input).stem().string(), o.quiet);
   progress.begin("loading");
   const ImageInfo info = inspect_image(o.input);
+  constexpr double kImages = 4 * 3 * sizeof(float), kNetwork = 600;  // per pixel; image, guides, result
+  require_image_memory(o.input, info.place.window.width, info.place.window.height, kImages + kNetwork);
   const PlacedImage image = read_image(o.input);
   warn_of_values(o.input, image.image);
   std::optional<Image> albedo, normal;

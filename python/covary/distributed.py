@@ -84,6 +84,16 @@ def _tiles(width: int, height: int, side: int) -> Iterator[tuple[int, int, int, 
             yield x, y, min(side, width - x), min(side, height - y)
 
 
+def _first_of_each_film(samples: list[BadSample]) -> list[BadSample]:
+    """The first few by pixel and sample, as many as a render of the whole frame tells."""
+    kept: dict[str, list[BadSample]] = {}
+    for bad in sorted(samples, key=lambda bad: (bad.y, bad.x, bad.sample)):
+        of_film = kept.setdefault(bad.film, [])
+        if len(of_film) < 10:
+            of_film.append(bad)
+    return [bad for film in sorted(kept) for bad in kept[film]]
+
+
 class _Canvas:
     """Films of the whole frame in the making, one for each pass and seed."""
 
@@ -104,7 +114,7 @@ class _Canvas:
         self.parts.add(part.number)
         self.not_finite_samples += rendered.not_finite_samples
         self.negative_samples += rendered.negative_samples
-        self.bad_samples += rendered.bad_samples
+        self.bad_samples = _first_of_each_film(self.bad_samples + list(rendered.bad_samples))
         self.warnings.update(dict.fromkeys(rendered.warnings))
         x, y, width, height = part.crop
         for name, image in rendered.aovs.items():

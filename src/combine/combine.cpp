@@ -42,7 +42,7 @@ void append(const EstimatorResult& part, int skipped, int y, int n, int height, 
 }
 
 void check_memory(const CombineRequest& request, double planned) {
-  if (planned < kUnnoticedMemory || planned <= request.most_memory.value_or(memory_limit())) return;
+  if (planned <= std::max(kLeastMemoryLimit, request.most_memory.value_or(memory_limit()))) return;
   throw Error(ErrorCode::kUsage,
               fmt::format("{} x {} pixels of {} + {} groups need {} of memory for {}{}; {}", request.crn.width,
                           request.crn.height, request.crn.groups, request.independent.groups, bytes_text(planned),

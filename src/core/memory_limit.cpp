@@ -50,15 +50,15 @@ double memory_limit() {
   const std::string_view text = given;
   double gigabytes = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), gigabytes);
-  if (error != std::errc() || end != text.data() + text.size() || !(gigabytes > 0 && gigabytes < 1e9))
-    throw Error(
-        ErrorCode::kUsage,
-        fmt::format("the environment variable {} is '{}'; expected is a positive number of GB", kVariable, text));
+  const bool is_number = error == std::errc() && end == text.data() + text.size();
+  if (!is_number || !(gigabytes * 1e9 >= kLeastMemoryLimit && gigabytes < 1e9))
+    throw Error(ErrorCode::kUsage, fmt::format("the environment variable {} is '{}'; expected is a number of GB, at "
+                                               "least {:g}",
+                                               kVariable, text, kLeastMemoryLimit / 1e9));
   return gigabytes * 1e9;
 }
 
 void require_memory(const std::string& file, const std::string& what, double bytes) {
-  if (bytes < kUnnoticedMemory) return;
   const double held = held_bytes(), limit = memory_limit();
   if (held + bytes <= limit) return;
   throw Error(ErrorCode::kInput, fmt::format("{}: {} needs {} of memory beside the {} in use; {}", file, what,

@@ -159,6 +159,7 @@ Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& opt
   estimator.reach = -1;
   estimator.explain = nullptr;
   estimator.memory.always += with_oidn ? kBytesWithOidn : kBytesPerPixel;
+  estimator.memory.of_halves = estimator.memory.of_halves_per_group = 0;  // part of that
   const auto makers = [options, with_oidn](const Guides& guides) {
     std::vector<CandidateMaker> all = {filtered_candidates(guides)};
     if (with_oidn) all.push_back(neural_candidates(guides, options.oidn));

@@ -7,6 +7,7 @@
 #include <array>
 
 #include "film/exr.h"
+#include "film/image_file.h"
 
 namespace covary {
 namespace {
@@ -138,6 +139,8 @@ Film read_film(const std::string& path) {
   if (!file.find(group_name(groups - 1) + ".R") && groups > 1)
     fail(path, fmt::format("channel {}.R of a film with {} groups is missing", group_name(groups - 1), groups));
 
+  require_image_memory(path, file.place().window.width, file.place().window.height,
+                       static_cast<double>(file.channels().size() * sizeof(float)));
   Film film;
   try {
     film = Film(file.place().frame_width, file.place().frame_height, file.place().window, groups);

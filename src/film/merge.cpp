@@ -11,6 +11,7 @@
 
 #include "film/film_file.h"
 #include "film/groups.h"
+#include "film/image_file.h"
 #include "film/splat_layer.h"
 
 namespace covary {
@@ -266,6 +267,10 @@ Film merge_film_files(std::span<const std::string> paths) {
   COVARY_CHECK(!paths.empty(), "at least one film");
   std::vector<Attributes> attributes;
   for (const std::string& path : paths) attributes.push_back(read_film_attributes(path));
+  const ImageInfo first = inspect_image(paths[0]);
+  constexpr double kValue = 2 * sizeof(float) + sizeof(double);  // of the film that is read, the merged one, and sums
+  require_image_memory(paths[0], first.place.window.width, first.place.window.height,
+                       kValue * static_cast<double>(first.channels.size()));
   return merge(attributes, paths, [&](size_t i, const auto& use) { use(read_film(paths[i])); });
 }
 

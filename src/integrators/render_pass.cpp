@@ -10,6 +10,7 @@
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "core/warp.h"
+#include "integrators/first_bad_samples.h"
 #include "integrators/pass_limits.h"
 #include "integrators/training.h"
 
@@ -89,14 +90,6 @@ PathRandom sample_random(const PassSettings& settings, const Camera& camera, int
   const auto groups = static_cast<uint32_t>(settings.groups);
   return PathRandom::sobol(sampling, settings.seed, pass, pixel, static_cast<uint32_t>(sample % groups),
                            static_cast<uint32_t>(sample / groups));
-}
-
-/// Sorts by pixel and sample and keeps the first few; which ones does not depend on the order they came in.
-void keep_first(std::vector<BadSample>& samples) {
-  std::sort(samples.begin(), samples.end(), [](const BadSample& a, const BadSample& b) {
-    return std::tie(a.y, a.x, a.sample) < std::tie(b.y, b.x, b.sample);
-  });
-  if (samples.size() > kMaxBadSamples) samples.resize(kMaxBadSamples);
 }
 
 /// True when the sample may enter the film; otherwise it is counted and remembered.
@@ -212,6 +205,13 @@ void check_learner(const Integrator& integrator, const PassSettings& settings, c
 }
 
 }  // namespace
+
+void keep_first(std::vector<BadSample>& samples) {
+  std::sort(samples.begin(), samples.end(), [](const BadSample& a, const BadSample& b) {
+    return std::tie(a.y, a.x, a.sample) < std::tie(b.y, b.x, b.sample);
+  });
+  if (samples.size() > kMaxBadSamples) samples.resize(kMaxBadSamples);
+}
 
 const char* sampling_name(Sampling sampling, CrnPart part) {
   if (sampling != Sampling::kCrn) return "independent";

@@ -6,15 +6,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
 #include <unordered_set>
 
 #include "core/content_hash.h"
+#include "core/memory_limit.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "emitters/area.h"
 #include "io/description_key.h"
 #include "io/file_view.h"
 #include "io/object_factory.h"
+#include "io/scene_memory.h"
 #include "io/sensor.h"
 #include "io/shapes.h"
 #include "io/xml_reader.h"
@@ -72,6 +75,7 @@ class Loader {
     hash_files();
     result_.warnings = diagnostics_.warnings();
     diagnostics_.throw_if_errors();
+    require_table_memory(name, parts_);
     result_.read_seconds = watch.seconds();
     result_.has_delta_lights_and_surfaces = has_delta_lights() && has_delta_surfaces();
     result_.scene = std::make_unique<Scene>(std::move(parts_));
@@ -300,6 +304,30 @@ class Loader {
     return shapes;
   }
 
+  /// Before the first instance of a group with shapes that emit: throws where the copies for all of them need too much
+  /// memory.
+  void check_copies(const ObjectDescription& instance, const ShapeGroup& group) {
+    const auto lights = group_lights_.find(&group);
+    if (lights == group_lights_.end() || !groups_checked_.insert(&group).second) return;
+    const auto group_of = [](const ObjectDescription& description) -> const ObjectDescription* {
+      if (description.kind != "shape" || description.type != "instance") return nullptr;
+      for (const Property& property : description.properties)
+        if (const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value))
+          if (*child && (*child)->kind == "shape") return child->get();
+      return nullptr;
+    };
+    const ObjectDescription* placed = group_of(instance);
+    const auto n = std::count_if(xml_.scene->properties.begin(), xml_.scene->properties.end(), [&](const Property& p) {
+      const ObjectPtr* other = std::get_if<ObjectPtr>(&p.value);
+      return other && *other && group_of(**other) == placed;
+    });
+    double bytes = 0;
+    for (const GroupLight& light : lights->second) bytes += array_bytes(*light.shape) + table_bytes(*light.shape, true);
+    require_memory(instance.where.text(),
+                   fmt::format("{} instances of a shapegroup, of whose shapes those that emit light are copied,", n),
+                   static_cast<double>(n) * bytes);
+  }
+
   void place_instance(const ObjectPtr& object) {
     Parameters p(*object, factory_, diagnostics_);
     // Groups are made by the loader, not by the factory: make them known before asking for children.
@@ -323,6 +351,7 @@ class Loader {
       p.error(fmt::format("refers to {} shapegroups; expected one", groups.size()));
       return;
     }
+    check_copies(*object, *groups[0]);
     // Shapes that emit are copied to their place, so that each copy is a light with its own area and position.
     for (const GroupLight& member : group_lights_[groups[0].get()]) {
       const ShapePtr placed = member.shape->transformed(instance.to_world);
@@ -425,6 +454,7 @@ class Loader {
     const AreaLight* light;
   };
   std::map<const ShapeGroup*, std::vector<GroupLight>> group_lights_;
+  std::set<const ShapeGroup*> groups_checked_;
   struct DefaultBsdf {
     ObjectPtr description;
     BsdfPtr bsdf;

@@ -10,6 +10,7 @@
 #include <type_traits>
 
 #include "core/error.h"
+#include "core/memory_limit.h"
 #include "io/mesh_file.h"
 
 namespace covary {
@@ -135,6 +136,10 @@ MeshFile read_serialized(std::span<const std::byte> bytes, int shape_index) {
       n_vertices >= std::numeric_limits<uint32_t>::max())
     fail(fmt::format("the header promises {} vertices and {} triangles, more than the file can hold", n_vertices,
                      n_triangles));
+
+  require_memory(fmt::format("mesh {}", shape_index),
+                 fmt::format("a mesh of {} vertices and {} triangles", n_vertices, n_triangles),
+                 2.0 * static_cast<double>(n_vertices * vertex_size + n_triangles * triangle_size));
 
   MeshFile file;
   file.mesh.positions = read_vectors<Vec3>(in, n_vertices, double_precision);

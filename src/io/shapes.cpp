@@ -15,6 +15,7 @@
 
 #include <fmt/format.h>
 
+#include "core/memory_limit.h"
 #include "io/file_view.h"
 #include "io/mesh_file.h"
 #include "scene/analytic_shape.h"
@@ -46,6 +47,8 @@ std::shared_ptr<Shape> make_from_file(Parameters& p, const MeshPlacement& placem
   if (path.empty()) return nullptr;
   try {
     const FileView view(path);
+    // Arrays of the file's size, about, as they are read and as they are kept.
+    require_memory(path, "its mesh", 3 * static_cast<double>(view.bytes().size()));
     return finish(p, read(view), placement);
   } catch (const Error& error) {
     p.error_at("filename", fmt::format("names '{}': {}", p.get_string("filename", ""), error.what()));

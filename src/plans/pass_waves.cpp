@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "film/splat_layer.h"
+#include "integrators/first_bad_samples.h"
 #include "integrators/light_pass.h"
 
 namespace covary {
@@ -19,6 +20,7 @@ void add(const PassResult& from, PassResult& to) {
   to.seconds += from.seconds;
   to.estimate_seconds += from.estimate_seconds;
   to.bad_samples.insert(to.bad_samples.end(), from.bad_samples.begin(), from.bad_samples.end());
+  keep_first(to.bad_samples);
 }
 
 /// Part of the pass that is done.

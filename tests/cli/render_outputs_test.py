@@ -203,6 +203,10 @@ class Replay(RenderTest):
         stored = [sample["replay"] for sample in json.loads((self.path / "facts.json").read_text())["bad_samples"]]
         self.assertTrue(printed)
         self.assertEqual(printed, stored)
+        many = json.loads(self.good("render", name, *strong, "-o", "b.exr", "--estimator", "none", "--spp", "64",
+                                    "--seed", "9", "--no-preview", "--quiet", "--json", "-").stdout)
+        self.assertGreater(many["not_finite_samples"], 100)
+        self.assertEqual(len(many["bad_samples"]), 10, "the first few, however many waves and rounds there were")
         (self.path / "bin").mkdir()
         (self.path / "bin" / "covary").symlink_to(COVARY)
         environment = {**os.environ, "PATH": f"{self.path / 'bin'}:{os.environ['PATH']}"}
