@@ -105,7 +105,7 @@ struct Pair {
                                 .c_str());
     independent.take_counts({counts.data(), counts.size()});
     if (crn.film()) return;
-    if (!samples) throw Error(ErrorCode::kUsage, "`counts` needs `samples`, the samples per pixel of the CRN image");
+    if (!samples) throw Error(ErrorCode::kUsage, "`counts` needs `samples` N, the samples per pixel of the CRN image");
     crn.take_counts(std::vector(static_cast<size_t>(crn.width()) * crn.height(), static_cast<uint32_t>(*samples)));
   }
   /// Arrays may have any shape, and any counts. Needs no GIL.
