@@ -47,7 +47,7 @@ void check_memory(const CombineRequest& request, double planned) {
               fmt::format("{} x {} pixels of {} + {} groups need {} of memory for {}{}; {}", request.crn.width,
                           request.crn.height, request.crn.groups, request.independent.groups, bytes_text(planned),
                           request.estimator.text, request.estimator.reach < 0 ? ", which works on whole images" : "",
-                          request.most_memory ? "permitted are " + bytes_text(*request.most_memory) + " (--memory)"
+                          request.most_memory ? "permitted are " + bytes_text(*request.most_memory) + " (`memory`)"
                                               : memory_limit_text()));
 }
 
