@@ -57,15 +57,15 @@ Estimator estimator_of(const CombineOptions& o) {
   return with_denoising(make_estimator(o.estimator, o.of_estimator), denoising_of(o));
 }
 
-void write(const CombineOptions& o, const GroupedFile& crn, const GroupedFile& independent, EstimatorResult& result) {
+void write(const CombineOptions& o, const CombineRequest& request, EstimatorResult& result) {
   std::map<std::string, std::string> attributes = {{"covary:estimator", estimator_of(o).text},
                                                    {"covary:version", COVARY_VERSION},
                                                    {"covary:command", command_line()}};
-  if (crn.samples() && independent.samples())
-    attributes["covary:samples"] = fmt::to_string(crn.samples() + independent.samples());
+  const double crn = request.crn ? request.crn->samples : 0, independent = request.independent.samples;
+  if ((crn > 0 || !request.crn) && independent > 0) attributes["covary:samples"] = fmt::to_string(crn + independent);
   if (!o.error) result.std_error = {}, result.bias = {};  // asked for by --json alone
   std::map<std::string, Image> no_aovs;
-  write_result(o.output, crn.place(), attributes, result, no_aovs);
+  write_result(o.output, request.independent.origin.place, attributes, result, no_aovs);
 }
 
 void check_explain(const CombineOptions& o, const Estimator& estimator, const GroupedFile& file) {
@@ -84,7 +84,7 @@ void check_explain(const CombineOptions& o, const Estimator& estimator, const Gr
 
 /// What one pixel is made of: f, and for each control variate its place, coefficients, CRN mean and independent mean.
 nlohmann::ordered_json explain(const CombineOptions& o, const CombineRequest& request) {
-  const CropWindow& window = request.crn.origin.place.window;
+  const CropWindow& window = request.independent.origin.place.window;
   const int x = o.explain[0] - window.x, y = o.explain[1] - window.y;
   const auto [g, h, first] = band_around(request, y, y + 1);
   const auto mean = [&](const GroupedImage& image, int px, int py) {
@@ -171,23 +171,26 @@ void check_files_of_command(const CombineOptions& o) {
 
 /// What the command combines, with the files that it reads from.
 struct Inputs {
-  GroupedFile crn, independent;
+  std::optional<GroupedFile> crn;
+  GroupedFile independent;
   std::optional<GroupedFile> light;
   GuideImages guides;
   CombineRequest request;
 
-  explicit Inputs(const CombineOptions& o) : crn(o.crn, o.crn_layer), independent(o.independent, o.independent_layer) {
+  explicit Inputs(const CombineOptions& o) : independent(o.independent, o.independent_layer) {
+    if (!o.crn.empty()) crn.emplace(o.crn, o.crn_layer);
     if (!o.light.empty()) light.emplace(std::vector{o.light});
     request.estimator = estimator_of(o);
     request.settings = pair_settings(
         request.estimator, request.estimator.needs_sample_count || o.counts.empty() ? o.samples : std::nullopt,
-        crn.samples(), o.error || (!o.json.empty() && request.estimator.predicts_error));
-    guides = read_guides(o, request.estimator, crn);
+        crn ? crn->samples() : 0, o.error || (!o.json.empty() && request.estimator.predicts_error));
+    guides = read_guides(o, request.estimator, independent);
     request.settings.guides = guides.view();
-    check_explain(o, request.estimator, crn);
+    check_explain(o, request.estimator, independent);
     check_stages(o.stages, request.estimator);
-    take_counts(o.counts, o.samples, crn, independent);
-    request.crn = source_of(crn), request.independent = source_of(independent);
+    take_counts(o.counts, o.samples, crn ? &*crn : nullptr, independent);
+    if (crn) request.crn = source_of(*crn);
+    request.independent = source_of(independent);
     if (light) request.light = source_of(*light);
     constexpr double kMebibyte = 1 << 20, kUsual = 4096 * kMebibyte;
     if (o.memory_mib) request.most_memory = *o.memory_mib * kMebibyte;
@@ -212,9 +215,9 @@ nlohmann::ordered_json statistics(const CombineOptions& o, const CombineRequest&
   const InputReport& report = combined.inputs.report;
   nlohmann::ordered_json json = {{"output", o.output},
                                  {"estimator", request.estimator.text},
-                                 {"width", request.crn.width},
-                                 {"height", request.crn.height},
-                                 {"crn_groups", request.crn.groups},
+                                 {"width", request.independent.width},
+                                 {"height", request.independent.height},
+                                 {"crn_groups", request.crn ? request.crn->groups : 0},
                                  {"independent_groups", request.independent.groups},
                                  {"nonfinite_pixels", combined.image.nonfinite_pixels},
                                  {"negative_pixels", count_negative_pixels(combined.image.estimate)},
@@ -239,16 +242,31 @@ nlohmann::ordered_json statistics(const CombineOptions& o, const CombineRequest&
         predicted_relmse_of_mean(request.independent, std::max(1, rows_in_memory(request)));
   }
   if (request.light) json["light_groups"] = request.light->groups;
+  if (!combined.image.note.empty()) json["note"] = combined.image.note;
   return json;
 }
 
 void write_stages(const CombineOptions& o, const CombineRequest& request) {
   if (o.stages.empty()) return;
-  save_stages(o.stages, request.estimator, request.crn.all(), request.independent.all(), request.settings,
-              request.crn.origin.place);
+  save_stages(o.stages, request.estimator, request.crn ? request.crn->all() : GroupedImage{}, request.independent.all(),
+              request.settings, request.independent.origin.place);
 }
 
-void combine_files(const CombineOptions& o) {
+/// Without a CRN image, the mean of the other is denoised.
+void check_passes(CombineOptions& o, const CLI::App& command) {
+  if (!o.crn.empty()) return;
+  const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
+  if (!denoising_of(o).denoises())
+    usage(
+        "without --crn, independent images can only be denoised: --denoise bias, balanced or error (their mean is "
+        "made by covary merge)");
+  for (const char* option : {"--estimator", "--crn-layer", "--samples", "--explain"})
+    if (command.count(option) > 0) usage(fmt::format("{} needs the image with common random numbers, --crn", option));
+  o.estimator = kNoEstimator;
+}
+
+void combine_files(CombineOptions o, const CLI::App& command) {
+  check_passes(o, command);
   check_files_of_command(o);
   std::optional<tbb::global_control> control;
   if (o.threads > 0) control.emplace(tbb::global_control::max_allowed_parallelism, o.threads);
@@ -264,7 +282,7 @@ void combine_files(const CombineOptions& o) {
   CombinedImage combined = combine(request);
   Stopwatch watch;
   progress.begin("writing");
-  write(o, inputs.crn, inputs.independent, combined.image);
+  write(o, request, combined.image);
   write_stages(o, request);
   const double write_seconds = watch.lap();
   progress.finish();
@@ -275,9 +293,11 @@ void combine_files(const CombineOptions& o) {
     if (o.json != "-") print_explanation(json["pixel"]);
   }
   if (!o.quiet)
-    fmt::print(stderr, "{}: {} x {}, {} of {} + {} groups in {:.2f} s (read and check {:.2f} s, write {:.2f} s)\n",
-               o.output, request.crn.width, request.crn.height, o.estimator, request.crn.groups,
-               request.independent.groups, combined.estimate_seconds, combined.check_seconds, write_seconds);
+    fmt::print(stderr, "{}: {} x {}, {} of {}{} groups in {:.2f} s (read and check {:.2f} s, write {:.2f} s)\n",
+               o.output, request.independent.width, request.independent.height, request.estimator.text,
+               request.crn ? fmt::format("{} + ", request.crn->groups) : "", request.independent.groups,
+               combined.estimate_seconds, combined.check_seconds, write_seconds);
+  if (!o.quiet && !combined.image.note.empty()) fmt::print(stderr, "note: {}\n", combined.image.note);
   if (!o.json.empty()) write_text_output(o.json, json_text(json));
 }
 
@@ -287,9 +307,11 @@ void add_combine(CLI::App& app) {
   const auto o = std::make_shared<CombineOptions>();
   CLI::App* command =
       app.add_subcommand("combine", "Combine a CRN and an independent image of any renderer into one with less noise");
-  command->add_option("--crn", o->crn, "Image with common random numbers: one EXR with all groups, or one per group")
+  command
+      ->add_option("--crn", o->crn,
+                   "Image with common random numbers: one EXR with all groups, or one per group; without it, --denoise "
+                   "works on the mean of the independent image")
       ->type_name(kFileValue)
-      ->required()
       ->expected(1, 1000);
   command->add_option("--independent,--pt", o->independent, "Image with independent random numbers, likewise")
       ->type_name(kFileValue)
@@ -345,7 +367,7 @@ void add_combine(CLI::App& app) {
   add_threads_option(*command, o->threads);
   command->add_option("--json", o->json, "File for statistics; '-': standard output")->type_name(kFileValue);
   command->add_flag("--quiet", o->quiet, "Warnings and errors only");
-  command->callback([o] { combine_files(*o); });
+  command->callback([o, command] { combine_files(*o, *command); });
 }
 
 }  // namespace covary

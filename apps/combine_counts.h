@@ -9,8 +9,9 @@
 
 namespace covary {
 
-/// `path`: of the independent image's counts; empty: nothing is done. All pixels of the CRN image have `crn_samples`,
-/// or what its files tell on average. Throws Error(kUsage) where neither is known, and as GroupedFile::take_counts().
-void take_counts(const std::string& path, std::optional<int> crn_samples, GroupedFile& crn, GroupedFile& independent);
+/// `path`: of the independent image's counts; empty: nothing is done. All pixels of the CRN image (may be null) have
+/// `crn_samples`, or what its files tell on average. Throws Error(kUsage) where neither is known, and as
+/// GroupedFile::take_counts().
+void take_counts(const std::string& path, std::optional<int> crn_samples, GroupedFile* crn, GroupedFile& independent);
 
 }  // namespace covary

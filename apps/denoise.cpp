@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// covary denoise: Open Image Denoise on an image, guided by its albedo and normal where it has them.
+// covary denoise: an image denoised by Open Image Denoise; several renders, or a film with groups, by mixtures that
+// their halves judge.
 #include "denoising/denoise.h"
 
 #include <fmt/format.h>
@@ -11,28 +12,38 @@
 #include <memory>
 #include <optional>
 
+#include "combine/combine.h"
+#include "combine/registry.h"
+#include "combine/result_file.h"
 #include "commands.h"
 #include "core/error.h"
 #include "core/stopwatch.h"
+#include "denoising/mixed_denoising.h"
 #include "film/image_file.h"
 #include "film/outputs.h"
 #include "guide_layer.h"
 #include "metrics/provenance.h"
+#include "numbers.h"
 #include "progress.h"
 #include "value_names.h"
 
 namespace covary {
 namespace {
 
+/// --mode: Open Image Denoise alone, or what a mixture is to be good at.
+constexpr const char* kNetwork = "oidn";
+
 struct Options {
-  std::string input, output;
-  DenoiseOptions denoise;
+  std::vector<std::string> inputs;
+  std::string output, mode, oidn;
   bool no_guides = false, clean_guides = false, check = false, quiet = false;
+
+  DenoiseOptions denoiser() const { return {oidn}; }
 };
 
 /// --check: which library there is.
 void check(const Options& o) {
-  const DenoiserInfo info = denoiser_info(o.denoise);
+  const DenoiserInfo info = denoiser_info(o.denoiser());
   fmt::print("Open Image Denoise {}\n{}\n", info.version, info.path);
 }
 
@@ -42,31 +53,55 @@ void warn_of_values(const std::string& path, const Image& image) {
     fmt::print(stderr, "warning: {}: {} of {} values are not finite; they count as 0\n", path, n, image.data.size());
 }
 
-void run(const Options& o) {
-  if (o.check) return check(o);
-  if (o.input.empty() || o.output.empty())
-    throw Error(ErrorCode::kUsage, "expected are IN.exr and -o OUT.exr, or --check");
-  if (o.no_guides && o.clean_guides) throw Error(ErrorCode::kUsage, "--clean-guides: with --no-guides there are none");
-  const Stopwatch watch;
-  Outputs outputs;
-  outputs.reads(o.input);
-  outputs.writes("-o", o.output, OutputKind::kFilm);
-  ProgressLine progress(std::filesystem::path(o.input).stem().string(), o.quiet);
-  progress.begin("loading");
-  const ImageInfo info = inspect_image(o.input);
-  constexpr double kImages = 4 * 3 * sizeof(float), kNetwork = 600;  // per pixel; image, guides, result
-  require_image_memory(o.input, info.place.window.width, info.place.window.height, kImages + kNetwork);
-  const PlacedImage image = read_image(o.input);
-  warn_of_values(o.input, image.image);
+/// The layers DenoisingAlbedo and DenoisingNormal, or Albedo and N, each the mean of the files that have it.
+struct GuideLayers {
   std::optional<Image> albedo, normal;
-  if (!o.no_guides) {
-    albedo = guide_layer(o.input, info, "DenoisingAlbedo");
-    if (albedo) normal = guide_layer(o.input, info, "DenoisingNormal");
-    if (!albedo) albedo = guide_layer(o.input, info, "Albedo");
-    if (albedo && !normal) normal = guide_layer(o.input, info, "N");
+
+  explicit GuideLayers(const Options& o) {
+    if (o.no_guides) return;
+    albedo = mean_layer(o.inputs, "DenoisingAlbedo");
+    if (albedo) normal = mean_layer(o.inputs, "DenoisingNormal");
+    if (!albedo) albedo = mean_layer(o.inputs, "Albedo");
+    if (albedo && !normal) normal = mean_layer(o.inputs, "N");
   }
+  Guides view() const { return {albedo ? &*albedo : nullptr, normal ? &*normal : nullptr}; }
+  const char* text() const {
+    return normal ? "guided by albedo and normal" : albedo ? "guided by albedo" : "without guides";
+  }
+
+ private:
+  static std::optional<Image> mean_layer(const std::vector<std::string>& paths, const std::string& name) {
+    std::optional<Image> sum;
+    float n = 0;
+    for (const std::string& path : paths) {
+      const std::optional<Image> layer = guide_layer(path, inspect_image(path), name);
+      if (!layer) continue;
+      n += 1;
+      if (!sum)
+        sum = layer;
+      else if (sum->data.size() != layer->data.size())
+        throw Error(ErrorCode::kInput, fmt::format("'{}' has {} x {} pixels, others have {} x {}", path, layer->width,
+                                                   layer->height, sum->width, sum->height));
+      else
+        std::transform(sum->data.begin(), sum->data.end(), layer->data.begin(), sum->data.begin(), std::plus<>());
+    }
+    if (sum)
+      for (float& value : sum->data) value /= n;
+    return sum;
+  }
+};
+
+void denoise_by_network(const Options& o, const GuideLayers& guides, ProgressLine& progress) {
+  const Stopwatch watch;
+  const std::string& input = o.inputs[0];
+  const ImageInfo info = inspect_image(input);
+  constexpr double kImages = 4 * 3 * sizeof(float), kNetworkBytes = 600;  // per pixel; image, guides, result
+  require_image_memory(input, info.place.window.width, info.place.window.height, kImages + kNetworkBytes);
+  const PlacedImage image = read_image(input);
+  warn_of_values(input, image.image);
   progress.begin("denoising");
-  Denoiser denoiser(o.denoise);
+  Denoiser denoiser(o.denoiser());
+  std::optional<Image> albedo = guides.albedo, normal = guides.normal;
   if (o.clean_guides && albedo) albedo = denoiser.denoise_guide("albedo", *albedo);
   if (o.clean_guides && normal) normal = denoiser.denoise_guide("normal", *normal);
   Image result =
@@ -82,33 +117,115 @@ void run(const Options& o) {
   write_exr(o.output, image.place, attributes, planes);
   progress.finish();
   if (!o.quiet)
-    std::fprintf(stderr, "%s: %d x %d, %s, in %.2f s\n", o.output.c_str(), result.width, result.height,
-                 normal   ? "guided by albedo and normal"
-                 : albedo ? "guided by albedo"
-                          : "without guides",
-                 watch.seconds());
+    fmt::print(stderr, "{}: {} x {}, {}, in {:.2f} s\n", o.output, result.width, result.height, guides.text(),
+               watch.seconds());
+}
+
+void print_findings(const std::vector<Finding>& findings, bool quiet) {
+  for (const Finding& f : findings) {
+    const bool note = f.severity == Finding::Severity::kNote;
+    if (f.severity != Finding::Severity::kError && !(note && quiet))
+      fmt::print(stderr, "{}: {}\n", note ? "note" : "warning", f.text);
+  }
+}
+
+void denoise_by_mixture(const Options& o, const GroupedFile& file, const GuideLayers& guides, ProgressLine& progress) {
+  CombineRequest request;
+  request.independent = source_of(file);
+  request.estimator =
+      with_denoising(make_estimator(kNoEstimator), DenoisingChoice{o.mode.empty() ? "error" : o.mode, o.oidn});
+  request.settings.std_error = true;
+  request.settings.guides = guides.view();
+  request.checked = [&](const InputFindings& found) {
+    progress.clear();
+    print_findings(found.findings, o.quiet);
+    progress.begin("denoising");
+  };
+  CombinedImage combined = combine(request);
+  progress.begin("writing");
+  std::map<std::string, std::string> attributes = inherited_attributes(inspect_image(o.inputs[0]).attributes);
+  attributes["covary:version"] = COVARY_VERSION;
+  attributes["covary:command"] = command_line();
+  attributes["covary:estimator"] = request.estimator.text;
+  if (file.samples() > 0) attributes["covary:samples"] = fmt::to_string(file.samples());
+  std::map<std::string, Image> no_aovs;
+  write_result(o.output, file.place(), attributes, combined.image, no_aovs);
+  progress.finish();
+  if (o.quiet) return;
+  fmt::print(stderr, "{}: {} x {}, {} of {} groups, {}, in {:.2f} s", o.output, file.width(), file.height(),
+             request.estimator.text, file.groups(), guides.text(), combined.check_seconds + combined.estimate_seconds);
+  if (combined.predicted_relmse) fmt::print(stderr, ", predicted relMSE {:.3g}", *combined.predicted_relmse);
+  fmt::print(stderr, "\n");
+  if (!combined.image.note.empty()) fmt::print(stderr, "note: {}\n", combined.image.note);
+}
+
+/// Whatever the image is.
+bool is_by_network(const Options& o) { return o.mode == kNetwork || (o.mode.empty() && o.clean_guides); }
+
+void check_options(const Options& o) {
+  const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
+  if (o.inputs.empty() || o.output.empty()) usage("expected are IN.exr and -o OUT.exr, or --check");
+  if (o.no_guides && o.clean_guides) usage("--clean-guides: with --no-guides there are none");
+  for (size_t i = 0; i < o.inputs.size(); ++i)
+    for (size_t k = 0; k < i; ++k)
+      if (is_same_file(o.inputs[i], o.inputs[k]))
+        usage(fmt::format("'{}' and '{}' are the same file; renders of different seeds are needed", o.inputs[k],
+                          o.inputs[i]));
+  if (o.inputs.size() > 1 && is_by_network(o))
+    usage("--mode oidn and --clean-guides are for one image; covary merge makes one of films");
+  if (o.clean_guides && !is_by_network(o))
+    usage("--clean-guides is an option of --mode oidn; mixtures always denoise their guides first");
+}
+
+void run(const Options& o) {
+  if (o.check) return check(o);
+  check_options(o);
+  Outputs outputs;
+  outputs.reads(o.inputs);
+  outputs.writes("-o", o.output, OutputKind::kFilm);
+  ProgressLine progress(std::filesystem::path(o.inputs[0]).stem().string(), o.quiet);
+  progress.begin("loading");
+  const GuideLayers guides(o);
+  std::optional<GroupedFile> file;
+  if (!is_by_network(o)) file.emplace(o.inputs);
+  if (file && file->groups() < 2 && !o.mode.empty())
+    throw Error(ErrorCode::kUsage, fmt::format("--mode {} needs a second render of another seed, or a film with two "
+                                               "groups or more (--groups); '{}' has one",
+                                               o.mode, o.inputs[0]));
+  if (!file || file->groups() < 2) return denoise_by_network(o, guides, progress);
+  denoise_by_mixture(o, *file, guides, progress);
 }
 
 }  // namespace
 
 void add_denoise(CLI::App& app) {
   const auto o = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand("denoise", "Denoise an image with Open Image Denoise (biased)");
+  CLI::App* command = app.add_subcommand("denoise", "Denoise an image, or several renders of different seeds");
   command
-      ->add_option("IN", o->input,
-                   "Linear image (EXR); its layers DenoisingAlbedo and DenoisingNormal, or Albedo and N, are guides")
-      ->type_name(kFileValue);
+      ->add_option("IN", o->inputs,
+                   "Linear image (EXR); its layers DenoisingAlbedo and DenoisingNormal, or Albedo and N, are guides. "
+                   "Several renders of any renderer that "
+                   "differ in their seed alone, or a film with groups, give a better image and its error")
+      ->type_name(kFileValue)
+      ->expected(1, 1000);
   command->add_option("-o,--output", o->output, "The result (EXR)")->type_name(kFileValue);
+  std::vector<std::string> modes = {kNetwork};
+  modes.insert(modes.end(), denoise_mode_names().begin() + 1, denoise_mode_names().end());
   command
-      ->add_option("--oidn", o->denoise.library,
+      ->add_option("--mode", o->mode,
+                   "Open Image Denoise alone, or a mixture of denoised images with little bias, balanced, or with the "
+                   "least error; default: error for several renders or groups, oidn for a single image")
+      ->check(one_of(modes));
+  command
+      ->add_option("--oidn", o->oidn,
                    "Open Image Denoise's library, its folder, the folder of Python's package pyoidn, or of an "
-                   "environment that holds it")
-      ->type_name(kLibraryValue);
+                   "environment that holds it; 'off': mixtures without it")
+      ->type_name("off|LIBRARY");
   command->add_flag("--check", o->check, "Print version and path of Open Image Denoise as it is found, and do nothing");
   command->add_flag("--no-guides", o->no_guides, "Do not use these layers");
-  command->add_flag(
-      "--clean-guides", o->clean_guides,
-      "Denoise these layers first, each alone: less error where they are noisy, for three times the time");
+  command->add_flag("--clean-guides", o->clean_guides,
+                    "With --mode oidn, denoise these layers first, each alone: less error where they are noisy, for "
+                    "three times the time");
   command->add_flag("--quiet", o->quiet, "No summary");
   command->callback([o] { run(*o); });
 }

@@ -100,16 +100,18 @@ RenderResult render_watched(const RenderOptions& options, const LoadedScene& sce
   return result;
 }
 
-/// --save-stages, of films of two passes.
+/// --save-stages, of films of two passes or of one.
 void write_stages(const RenderOptions& options, const RenderResult& result) {
   if (options.stages.empty()) return;
-  const Film &crn = result.passes[0].film, &independent = result.passes[1].film;
+  const std::span<const Pass> passes = camera_passes(result.passes);
+  const Film &first = passes.front().film, &independent = passes.back().film;
+  const bool is_pair = passes.size() > 1;
   PairSettings settings;
-  settings.crn_samples = std::llround(crn.mean_count());
+  settings.crn_samples = std::llround(first.mean_count());
   if (!result.aovs.empty()) settings.guides = {&result.aovs.at("Albedo"), &result.aovs.at("N")};
-  save_stages(options.stages, estimator_of(options), rows_of(crn, 0, crn.height()),
+  save_stages(options.stages, estimator_of(options), is_pair ? rows_of(first, 0, first.height()) : GroupedImage{},
               rows_of(independent, 0, independent.height()), settings,
-              {crn.frame_width(), crn.frame_height(), crn.crop()});
+              {first.frame_width(), first.frame_height(), first.crop()});
 }
 
 std::string interruption(const RenderOptions& options, const RenderResult& result) {

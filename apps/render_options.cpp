@@ -31,7 +31,11 @@ void check_options(RenderOptions& options) {
   if (given("sampling") && !given("estimator")) settings.estimator = kNoEstimator;
   const Estimator estimator = estimator_of(options);
   const EstimatorPasses passes = estimator.passes;
-  if (given("sampling") && passes != EstimatorPasses::kAny)
+  const bool is_denoised_mean = passes == EstimatorPasses::kIndependent;
+  if (is_denoised_mean && settings.passes.sampling == Sampling::kCrn)
+    usage(
+        "--denoise of a single pass needs --sampling independent: errors that all pixels share show in no difference");
+  if (given("sampling") && passes != EstimatorPasses::kAny && !is_denoised_mean)
     usage(fmt::format("--sampling is an option of --estimator {}; {} renders one pass {}", kNoEstimator, name,
                       passes == EstimatorPasses::kSamples
                           ? "with independent random numbers"

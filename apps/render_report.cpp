@@ -142,6 +142,7 @@ nlohmann::ordered_json statistics(const RenderReport& report) {
     json["predicted_relmse_reliable"] = result.prediction_doubt.empty();
     if (!result.prediction_doubt.empty()) json["predicted_relmse_doubt"] = result.prediction_doubt;
   }
+  if (!result.image.note.empty()) json["note"] = result.image.note;
   if (result.until_reached) json["until_reached"] = *result.until_reached;
   return json;
 }
@@ -171,6 +172,7 @@ void print_summary(const RenderReport& report) {
   } else if (result.predicted_relmse) {
     fmt::print(stderr, "predicted relMSE {:.3g}{}\n", *result.predicted_relmse, doubt_in_brackets(result));
   }
+  if (!result.image.note.empty()) fmt::print(stderr, "note: {}\n", result.image.note);
   const double limit = options.request().seconds;
   if (limit > 0 && result.seconds.limited > 1.05 * limit)
     fmt::print(stderr, "warning: --time {:g} was exceeded: {:.2f} s for at least {} samples per pixel in each pass{}\n",

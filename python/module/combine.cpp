@@ -91,7 +91,7 @@ struct Pair {
     if (light)
       request.light = covary::source_of(rows_of(*light, 0, light->height()), Input::origin_of(*light, "light"));
     std::vector<Finding> findings;
-    check_light(request.crn.origin, request.independent.origin, light ? &request.light->origin : nullptr, findings);
+    check_light(request.crn->origin, request.independent.origin, light ? &request.light->origin : nullptr, findings);
   }
   Pair(const Pair&) = delete;
   Pair& operator=(const Pair&) = delete;

@@ -36,6 +36,8 @@ const char* name_of(EstimatorPasses passes) {
       return "pair";
     case EstimatorPasses::kSamples:
       return "samples";
+    case EstimatorPasses::kIndependent:
+      return "independent";
     case EstimatorPasses::kAny:
       return "any";
   }

@@ -22,6 +22,12 @@ namespace {
 constexpr int kLightRows = 64;  // of the light film in memory at a time
 constexpr int kFewestRows = 16;
 
+int groups_of(const std::optional<GroupedSource>& source) { return source ? source->groups : 0; }
+
+GroupedImage rows_of(const std::optional<GroupedSource>& source, int first, int n) {
+  return source ? source->rows(first, n) : GroupedImage{};
+}
+
 void throw_errors(const InputFindings& inputs) {
   if (const std::string errors = errors_text(inputs.findings); !errors.empty())
     throw Error(ErrorCode::kInput, "the inputs do not fit: " + errors);
@@ -43,19 +49,20 @@ void append(const EstimatorResult& part, int skipped, int y, int n, int height, 
 
 void check_memory(const CombineRequest& request, double planned) {
   if (planned <= std::max(kLeastMemoryLimit, request.most_memory.value_or(memory_limit()))) return;
-  throw Error(ErrorCode::kUsage,
-              fmt::format("{} x {} pixels of {} + {} groups need {} of memory for {}{}; {}", request.crn.width,
-                          request.crn.height, request.crn.groups, request.independent.groups, bytes_text(planned),
-                          request.estimator.text, request.estimator.reach < 0 ? ", which works on whole images" : "",
-                          request.most_memory ? "permitted are " + bytes_text(*request.most_memory) + " (`memory`)"
-                                              : memory_limit_text()));
+  throw Error(
+      ErrorCode::kUsage,
+      fmt::format("{} x {} pixels of {} + {} groups need {} of memory for {}{}; {}", request.independent.width,
+                  request.independent.height, groups_of(request.crn), request.independent.groups, bytes_text(planned),
+                  request.estimator.text, request.estimator.reach < 0 ? ", which works on whole images" : "",
+                  request.most_memory ? "permitted are " + bytes_text(*request.most_memory) + " (`memory`)"
+                                      : memory_limit_text()));
 }
 
 EstimatorResult estimate(const CombineRequest& request) {
   const Estimator& estimator = request.estimator;
-  const int height = request.crn.height, in_memory = rows_in_memory(request);
+  const int height = request.independent.height, in_memory = rows_in_memory(request);
   if (estimator.reach < 0 || in_memory >= height)
-    return estimator.apply(request.crn.all(), request.independent.all(), request.settings);
+    return estimator.apply(rows_of(request.crn, 0, height), request.independent.all(), request.settings);
   const int step = std::max(kFewestRows, in_memory - 2 * estimator.reach) / kFeedbackCell * kFeedbackCell;
   EstimatorResult whole;
   for (int y = 0; y < height; y += step) {
@@ -63,7 +70,8 @@ EstimatorResult estimate(const CombineRequest& request) {
     const Band band = band_around(request, y, y + n);
     const EstimatorResult part = estimator.apply(band.crn, band.independent, request.settings);
     long n_nonfinite = 0;  // without the rows around, which other bands count
-    finite_pixels(rows_of(band.crn, y - band.first, n), rows_of(band.independent, y - band.first, n), n_nonfinite);
+    finite_pixels(covary::rows_of(band.crn, y - band.first, n), covary::rows_of(band.independent, y - band.first, n),
+                  n_nonfinite);
     whole.nonfinite_pixels += n_nonfinite;
     append(part, y - band.first, y, n, height, whole);
   }
@@ -74,24 +82,25 @@ EstimatorResult estimate(const CombineRequest& request) {
 
 double memory_of_rows(const CombineRequest& request, int rows) {
   constexpr double kImage = 3 * sizeof(float), kCount = sizeof(uint32_t);
-  const double width = request.crn.width, n_pixels = width * rows;
+  const double width = request.independent.width, n_pixels = width * rows;
+  const int crn_groups = groups_of(request.crn), all_groups = crn_groups + request.independent.groups;
   const bool holds_out = request.settings.std_error && request.settings.held_out;
-  const int groups = holds_out ? std::min(request.crn.groups, request.independent.groups) : 0;
-  const double values = kImage * (request.crn.groups + request.independent.groups) + 2 * kCount;
+  const int groups = holds_out ? std::min(request.crn ? crn_groups : all_groups, request.independent.groups) : 0;
+  const double values = kImage * all_groups + 2 * kCount;
   // Of bands, the estimate of the whole image, its standard error and bias are beside them.
-  const double results = rows < request.crn.height ? 3 * kImage * width * request.crn.height : 0;
+  const double results = rows < request.independent.height ? 3 * kImage * width * request.independent.height : 0;
   return n_pixels * values + request.estimator.memory.bytes(n_pixels, groups) + results;
 }
 
 int rows_in_memory(const CombineRequest& request) {
-  const int height = request.crn.height;
+  const int height = request.independent.height;
   if (memory_of_rows(request, height) <= request.memory) return height;
   const double results = memory_of_rows(request, 0), row = memory_of_rows(request, 1) - results;
   return static_cast<int>(std::clamp((request.memory - results) / row, 0.0, static_cast<double>(height)));
 }
 
 double planned_memory(const CombineRequest& request) {
-  const int height = request.crn.height, reach = request.estimator.reach;
+  const int height = request.independent.height, reach = request.estimator.reach;
   const int fewest = reach < 0 ? height : std::min(height, kFewestRows + 2 * reach);
   return memory_of_rows(request, std::max(fewest, rows_in_memory(request)));
 }
@@ -99,21 +108,22 @@ double planned_memory(const CombineRequest& request) {
 Band band_around(const CombineRequest& request, int first, int last) {
   // Beginning at a multiple of a cell of the feedback.
   const int begin = std::max(0, first - request.estimator.reach) / kFeedbackCell * kFeedbackCell;
-  const int n = std::min(request.crn.height, last + request.estimator.reach) - begin;
-  return {request.crn.rows(begin, n), request.independent.rows(begin, n), begin};
+  const int n = std::min(request.independent.height, last + request.estimator.reach) - begin;
+  return {rows_of(request.crn, begin, n), request.independent.rows(begin, n), begin};
 }
 
 InputFindings examine(const CombineRequest& request) {
-  const GroupedSource &crn = request.crn, &independent = request.independent;
+  const GroupedSource& independent = request.independent;
+  const ImageOrigin& crn_origin = request.crn ? request.crn->origin : independent.origin;
   InputFindings inputs;
-  check_origins(crn.origin, independent.origin, inputs.findings);
-  check_light(crn.origin, independent.origin, request.light ? &request.light->origin : nullptr, inputs.findings);
-  InputChecks checks(crn.width, crn.height, crn.groups, independent.groups);
+  if (request.crn) check_origins(crn_origin, independent.origin, inputs.findings);
+  check_light(crn_origin, independent.origin, request.light ? &request.light->origin : nullptr, inputs.findings);
+  InputChecks checks(independent.width, independent.height, request.crn ? request.crn->groups : 0, independent.groups);
   const int step = std::max(kFewestRows, rows_in_memory(request));
   bool checkable = true;
-  for (int y = 0; y < crn.height && checkable; y += step) {
-    const int n = std::min(step, crn.height - y);
-    const GroupedImage g = crn.rows(y, n), h = independent.rows(y, n);
+  for (int y = 0; y < independent.height && checkable; y += step) {
+    const int n = std::min(step, independent.height - y);
+    const GroupedImage g = rows_of(request.crn, y, n), h = independent.rows(y, n);
     checkable = !request.estimator.adaptive || (!lacks_samples(g) && !lacks_samples(h));
     if (checkable) checks.add_rows(g, h);
   }
@@ -152,8 +162,8 @@ CombinedImage combine(const CombineRequest& request) {
     for (int y = 0; y < request.light->height; y += kLightRows)
       add_light(request.light->rows(y, std::min(kLightRows, request.light->height - y)), combined.image, y);
   if (!combined.image.std_error.data.empty()) {
-    const bool counted = request.crn.samples > 0 && request.independent.samples > 0;
-    const double samples = request.crn.samples + request.independent.samples;
+    const double crn = request.crn ? request.crn->samples : 0, samples = crn + request.independent.samples;
+    const bool counted = (crn > 0 || !request.crn) && request.independent.samples > 0;
     combined.predicted_relmse = predicted_relmse(combined.image);
     combined.prediction_doubt =
         doubt_of_prediction(combined.image, counted ? samples : std::numeric_limits<double>::infinity(),

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// From two grouped images to one image with less noise: look at the inputs, estimate, calibrate the error estimate, add
-// the light film. The one pipeline of `covary combine`, Python and C++; renders end with its last two steps.
+// From two grouped images, or an independent one, to one with less noise: look at the inputs, estimate, calibrate the
+// error, add the light film. The one pipeline of `covary combine`, Python and C++; renders end with its last two steps.
 #pragma once
 
 #include <functional>
@@ -22,9 +22,10 @@ struct InputFindings {
 };
 
 struct CombineRequest {
-  GroupedSource crn, independent;
+  std::optional<GroupedSource> crn;  ///< none with an estimator of EstimatorPasses::kIndependent
+  GroupedSource independent;
   std::optional<GroupedSource> light;  ///< a light film (film/splat_layer.h), to be added
-  Estimator estimator;                 ///< of a pair of images
+  Estimator estimator;                 ///< of a pair of images, or of an independent one
   PairSettings settings;
   bool force = false;  ///< combine even where the findings hold errors
   /// Bytes to work in: larger images are combined in bands of rows, with the same bits, by estimators whose reach is
@@ -62,7 +63,7 @@ double memory_of_rows(const CombineRequest& request, int rows);
 /// Rows that combine() has in memory at a time.
 int rows_in_memory(const CombineRequest& request);
 
-/// Rows of both images.
+/// Rows of both images; of a missing one none.
 struct Band {
   GroupedImage crn, independent;
   int first = 0;

@@ -3,11 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
 
 #include "combine/light_film.h"
 #include "combine/registry.h"
 #include "core/error.h"
+#include "denoising/mixed_denoising.h"
 #include "estimators/mean.h"
 #include "estimators/test_images.h"
 #include "risk/held_out_error.h"
@@ -68,7 +70,7 @@ TEST(Combine, BandsHaveTheBitsOfTheWhole) {
   request.memory = memory_of_rows(request, 20) + 1;
   ASSERT_EQ(rows_in_memory(request), 20);
   int n_reads = 0;
-  request.crn.rows = [&n_reads, rows = request.crn.rows](int first, int n) { return ++n_reads, rows(first, n); };
+  request.crn->rows = [&n_reads, rows = request.crn->rows](int first, int n) { return ++n_reads, rows(first, n); };
   const CombinedImage bands = combine(request);
   EXPECT_GT(n_reads, 4);
   EXPECT_EQ(bands.image.estimate.data, whole.image.estimate.data);
@@ -92,6 +94,27 @@ TEST(Combine, LightIsAddedAfterCalibration) {
   EXPECT_EQ(with.image.std_error.data, without.image.std_error.data);
   request.light->origin.is_light_film = false;
   EXPECT_TRUE(contains(message_of([&] { combine(request); }, ErrorCode::kInput), "light.exr"));
+}
+
+TEST(Combine, AnIndependentImageAloneIsDenoised) {
+  const Images images;
+  CombineRequest request = images.request();
+  request.crn.reset();
+  MixedDenoisingOptions options;
+  options.mode = DenoiseMode::kError;
+  options.use_oidn = false;
+  request.estimator = with_denoising(make_estimator("none"), options);
+  const CombinedImage combined = combine(request);
+  const EstimatorResult expected = request.estimator.apply({}, images.independent.view(), request.settings);
+  EXPECT_EQ(combined.image.estimate.data, expected.estimate.data);
+  EXPECT_EQ(*combined.predicted_relmse, predicted_relmse(expected));
+  EXPECT_GT(combined.inputs.report.independent_mean, 0);
+  // Groups that are one render are found.
+  test::Grouped twice = images.independent;
+  for (int y = 0; y < kHeight; ++y)
+    for (int x = 0; x < kWidth; ++x) std::copy_n(twice.pixel(x, y), 3, twice.pixel(x, y) + 3);
+  request.independent = source_of(twice.view(), origin("b.exr"));
+  EXPECT_TRUE(contains(message_of([&] { combine(request); }, ErrorCode::kInput), "groups 0 and 1 are identical"));
 }
 
 TEST(Combine, ErrorsOfTheInputsAreThrownUnlessForced) {

@@ -248,6 +248,7 @@ struct InputChecks::State {
     crn.group_means.resize(crn_groups), crn.group_samples.resize(crn_groups);
     independent.group_means.resize(independent_groups), independent.group_samples.resize(independent_groups);
   }
+  bool has_crn() const { return !crn.group_means.empty(); }
   int width, height, next_row = 0;
   Values crn, independent;
   PairStatistics crn_horizontal, crn_vertical, independent_horizontal, independent_vertical, crn_independent;
@@ -260,17 +261,18 @@ InputChecks::~InputChecks() = default;
 void InputChecks::add_rows(const GroupedImage& crn, const GroupedImage& independent) {
   State& s = *state_;
   std::vector<std::string> problems;
-  check_inputs(crn, independent, 1, 1, problems);
+  check_inputs(s.has_crn() ? crn : independent, independent, 1, 1, problems);
   throw_if_any("inputs", problems);
-  COVARY_CHECK(crn.width == s.width && s.next_row + crn.height <= s.height, "rows belong to the image");
-  add_values(crn, s.next_row, s.crn);
+  COVARY_CHECK(independent.width == s.width && s.next_row + independent.height <= s.height, "rows belong to the image");
   add_values(independent, s.next_row, s.independent);
+  s.next_row += independent.height;
+  if (!s.has_crn()) return;
+  add_values(crn, s.next_row - crn.height, s.crn);
   s.crn_horizontal.add_rows(crn, crn);
   s.crn_vertical.add_rows(crn, crn);
   s.independent_horizontal.add_rows(independent, independent);
   s.independent_vertical.add_rows(independent, independent);
   s.crn_independent.add_rows(crn, independent);
-  s.next_row += crn.height;
 }
 
 InputReport InputChecks::report() const {
@@ -286,8 +288,16 @@ InputReport InputChecks::report() const {
   r.nonfinite_pixels = crn.nonfinite + independent.nonfinite;
   r.negative_pixels = crn.negative + independent.negative;
   r.clipped_pixels = crn.clipped + independent.clipped;
-  check_values("CRN", pixels, crn, r.findings);
+  if (s.has_crn()) check_values("CRN", pixels, crn, r.findings);
   check_values("independent image", pixels, independent, r.findings);
+  if (!s.has_crn()) {
+    const bool identical = independent.group_means.size() > 1 && independent.variance_of_mean == 0;
+    if (identical && independent.mean > 0)
+      r.findings.push_back({Severity::kError,
+                            "independent image: all groups are identical: the same seed was rendered twice, or there "
+                            "is no noise to take away; give every render its own seed"});
+    return r;
+  }
 
   const auto is_black = [](const Values& v) { return v.mean == 0 && v.negative == 0 && v.nonfinite == 0; };
   if (is_black(crn) && is_black(independent))

@@ -43,7 +43,8 @@ class InputChecks {
  public:
   /// Groups of unequal sizes: ranks of values do not look at sizes, means of groups are weighted by their samples. The
   /// images need not have the same number of groups; with fewer than 3, correlations cannot be measured, which is a
-  /// warning.
+  /// warning. `crn_groups` 0: there is no CRN image, and pixels of the other need not be independent of each other,
+  /// only its groups.
   InputChecks(int width, int height, int crn_groups, int independent_groups);
   ~InputChecks();
   /// The next rows of both images. Throws Error(kUsage) where sizes differ or there is nothing.

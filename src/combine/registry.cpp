@@ -101,9 +101,9 @@ Estimator with_denoising(const Estimator& base, const DenoisingChoice& choice) {
   MixedDenoisingOptions options;
   options.mode = denoise_mode(choice.mode);
   if (options.mode != DenoiseMode::kNone && !can_be_denoised(base))
-    throw Error(ErrorCode::kUsage,
-                fmt::format("`denoise` needs an estimator of two passes that predicts its error ({}), not {}",
-                            fmt::join(estimators_where(can_be_denoised), ", "), base.name));
+    throw Error(ErrorCode::kUsage, fmt::format("`denoise` needs an estimator that predicts its error ({}), not {}{}",
+                                               fmt::join(estimators_where(can_be_denoised), ", "), base.name,
+                                               base.adaptive ? " with adaptive numbers of samples" : ""));
   options.use_oidn = choice.oidn != "off";
   if (options.use_oidn) options.oidn.library = choice.oidn;
   return with_denoising(base, options);

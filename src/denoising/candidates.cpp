@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "core/parallel.h"
+#include "filters/feedback.h"
 #include "filters/nl_means.h"
 
 namespace covary {
@@ -15,6 +16,8 @@ namespace {
 constexpr float kAlbedoUnit = 0.07f, kNormalUnit = 0.2f, kLeastAlbedo = 0.02f;
 /// Bandwidths of the sharp and the smooth filter.
 constexpr float kSharp = 0.5f, kSmooth = 1;
+/// What a denoiser took away, given back to pixels more or less alike.
+constexpr ResidualOptions kWideResidual = {0.5f, 61, 4}, kNarrowResidual = {0.3f, 41, 2};
 
 /// Appends an image's channels, over `unit`, to planes from number `first` on.
 void copy_guide(const Image& image, float unit, int first, Planes& planes) {
@@ -55,8 +58,10 @@ FilterGuides filter_guides(const Guides& guides) {
 
 const Planes* or_null(const Planes& planes) { return planes.count() > 0 ? &planes : nullptr; }
 
-std::vector<Image> filtered(const FilterGuides& guides, const CandidateInput& in) {
-  const NlMeansTask tasks[] = {{kSharp, {in.estimate, in.independent}}, {kSmooth, {in.estimate}}};
+std::vector<Image> filtered(const FilterGuides& guides, CandidateBase base, const CandidateInput& in) {
+  std::vector<const Image*> sharp = {in.estimate};
+  if (base == CandidateBase::kPair) sharp.push_back(in.independent);
+  const NlMeansTask tasks[] = {{kSharp, sharp}, {kSmooth, {in.estimate}}};
   std::vector<Image> images = nl_means({in.estimate, in.std_error, or_null(guides.all), in.valid}, tasks);
   if (guides.albedo.data.empty()) return images;
   const Image image = combined(*in.estimate, guides.albedo, std::divides<>());
@@ -69,28 +74,40 @@ std::vector<Image> filtered(const FilterGuides& guides, const CandidateInput& in
 
 }  // namespace
 
-CandidateMaker filtered_candidates(const Guides& guides) {
+CandidateMaker filtered_candidates(const Guides& guides, CandidateBase base) {
   const auto kept = std::make_shared<FilterGuides>(filter_guides(guides));
   CandidateMaker maker;
-  maker.names = {"sharp", "sharp-independent", "smooth"};
+  maker.names = {"sharp"};
+  if (base == CandidateBase::kPair) maker.names.emplace_back("sharp-independent");
+  maker.names.emplace_back("smooth");
   if (!kept->albedo.data.empty()) maker.names.emplace_back("demodulated");
-  maker.make = [kept](const CandidateInput& in) { return filtered(*kept, in); };
+  maker.make = [kept, base](const CandidateInput& in) { return filtered(*kept, base, in); };
   return maker;
 }
 
-CandidateMaker neural_candidates(const Guides& guides, const DenoiseOptions& options) {
+CandidateMaker neural_candidates(const Guides& guides, const DenoiseOptions& options, CandidateBase base) {
   const auto denoiser = std::make_shared<Denoiser>(options);
   const auto albedo = std::make_shared<Image>(), normal = std::make_shared<Image>();
   if (guides.albedo) *albedo = denoiser->denoise_guide("albedo", *guides.albedo);
   if (guides.albedo && guides.normal) *normal = denoiser->denoise_guide("normal", *guides.normal);
+  const auto denoised = [=](const Image& image) {
+    return denoiser->denoise(image, albedo->data.empty() ? nullptr : albedo.get(),
+                             normal->data.empty() ? nullptr : normal.get(), true);
+  };
   CandidateMaker maker;
-  maker.names = {"oidn", "oidn-independent"};
   maker.error_over_variance = 1.1;
-  maker.make = [=](const CandidateInput& in) {
-    std::vector<Image> images;
-    for (const Image* image : {in.estimate, in.independent})
-      images.push_back(denoiser->denoise(*image, albedo->data.empty() ? nullptr : albedo.get(),
-                                         normal->data.empty() ? nullptr : normal.get(), true));
+  if (base == CandidateBase::kPair) {
+    maker.names = {"oidn", "oidn-independent"};
+    maker.make = [denoised](const CandidateInput& in) {
+      return std::vector<Image>{denoised(*in.estimate), denoised(*in.independent)};
+    };
+    return maker;
+  }
+  maker.names = {"oidn", "oidn-wide", "oidn-narrow"};
+  maker.make = [denoised](const CandidateInput& in) {
+    std::vector<Image> images(3, denoised(*in.estimate));
+    add_residual(*in.moments, kWideResidual, *in.valid, images[1]);
+    add_residual(*in.moments, kNarrowResidual, *in.valid, images[2]);
     return images;
   };
   return maker;

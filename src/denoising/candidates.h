@@ -5,6 +5,9 @@
 // normal): that image with two bandwidths; the independent image with the same weights; and the image over the albedo,
 // filtered with the normal as the only guide, times the albedo. With Open Image Denoise: both images denoised, with
 // guides that were denoised before.
+//
+// Where the image is the mean of the independent samples itself, the images of the one are left out, and those of Open
+// Image Denoise come with what they took away from pixels alike given back (ResidualOptions of feedback.h).
 #pragma once
 
 #include <functional>
@@ -13,6 +16,7 @@
 
 #include "denoising/denoise.h"
 #include "estimators/estimator.h"
+#include "filters/planes.h"
 
 namespace covary {
 
@@ -21,6 +25,7 @@ struct CandidateInput {
   const Image* estimate = nullptr;
   const Image* std_error = nullptr;    ///< of the estimate
   const Image* independent = nullptr;  ///< mean of the independent image
+  const Moments* moments = nullptr;    ///< of the independent image
   const std::vector<unsigned char>* valid = nullptr;
 };
 
@@ -31,11 +36,17 @@ struct CandidateMaker {
   /// What the squared error of a mixture that has these usually is, over the variance of mixtures of half of the
   /// samples: the more of it they take away, the more of the error is bias. Measured (docs/methods/error-estimates.md).
   double error_over_variance = 0.65;
+  /// Number of the one to show where samples are too few to judge.
+  int best_of_few = 0;
 };
 
+/// Whose images: an estimator's of two passes, or the mean of independent samples.
+enum class CandidateBase { kPair, kMean };
+
 /// Filters without a network. The guides are copied.
-CandidateMaker filtered_candidates(const Guides& guides);
+CandidateMaker filtered_candidates(const Guides& guides, CandidateBase base = CandidateBase::kPair);
 /// Images denoised by a neural network. Throws like denoise().
-CandidateMaker neural_candidates(const Guides& guides, const DenoiseOptions& options);
+CandidateMaker neural_candidates(const Guides& guides, const DenoiseOptions& options,
+                                 CandidateBase base = CandidateBase::kPair);
 
 }  // namespace covary

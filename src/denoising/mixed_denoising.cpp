@@ -9,12 +9,13 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/parallel.h"
 #include "denoising/denoise.h"
 #include "denoising/mixture.h"
 #include "filters/feedback.h"
-#include "risk/halves.h"
 #include "risk/held_out_bias.h"
 #include "risk/held_out_error.h"
+#include "risk/relative_weight.h"
 
 namespace covary {
 namespace {
@@ -36,44 +37,44 @@ ModeSettings settings_of(DenoiseMode mode) {
 
 /// Memory beside that of the estimator, about: images of three sets of samples, planes of filters and sums, half of 12
 /// groups; with the network, what that takes and its candidates.
-constexpr double kBytesPerPixel = 510, kBytesWithOidn = 1280;
+constexpr double kBytesPerPixel = 380, kBytesWithOidn = 1280;
 
-/// The image of one set of samples, and what candidates are made of.
-struct Part {
-  EstimatorResult base;
-  Moments independent;
+/// Of the mean: what its variance counts beside its square, and how much the weights of the whole image count; both
+/// measured (docs/methods/denoising.md).
+constexpr float kCountOfVariance = 2, kPriorOfMean = 5;
+
+CandidateSet candidates_of(const DenoisingPart& part, const std::vector<unsigned char>& valid,
+                           const std::vector<CandidateMaker>& makers) {
+  const Image h = mean_image(part.independent);
   CandidateSet set;
-};
-
-Image interior(const Planes& planes) {
-  Image image(planes.width(), planes.height(), 3);
-  for (int y = 0; y < image.height; ++y)
-    for (int x = 0; x < image.width; ++x)
-      for (int c = 0; c < 3; ++c) image.pixel(x, y)[c] = planes.row(c, y)[x];
-  return image;
-}
-
-Part make_part(const Estimator& base, const GroupedImage& crn, const GroupedImage& independent, PairSettings settings,
-               const std::vector<unsigned char>& valid, const std::vector<CandidateMaker>& makers) {
-  settings.std_error = true;
-  settings.held_out = false;
-  Part part;
-  part.base = base.apply(crn, independent, settings);
-  part.independent = moments(independent, valid, 0, 0.0f);
-  const Image h = interior(part.independent.mean);
-  // Pixels that the estimator leaves out may hold anything.
-  for (Image* image : {&part.base.estimate, &part.base.std_error})
-    for (float& value : image->data)
-      if (!std::isfinite(value)) value = 0;
+  set.base = part.image.estimate;
   for (const CandidateMaker& maker : makers)
-    for (Image& image : maker.make({&part.base.estimate, &part.base.std_error, &h, &valid}))
-      part.set.candidates.push_back(std::move(image));
-  part.set.base = part.base.estimate;
-  return part;
+    for (Image& image : maker.make({&part.image.estimate, &part.image.std_error, &h, &part.independent, &valid}))
+      set.candidates.push_back(std::move(image));
+  return set;
 }
 
-/// The first candidate: the estimator's image with little noise.
-const Image& guide_of(const Part& part) { return part.set.candidates[0]; }
+/// The first candidate: the image with little noise.
+const Image& guide_of(const CandidateSet& set) { return set.candidates[0]; }
+
+/// What errors of a half's pixels count where its image is noisy: 1 / (G'^2 + 0.01 + 2 s^2), G: the image with little
+/// noise, s: the standard error. By the noisy image itself, pixels that are bright by chance would count little.
+Image counts_of(const DenoisingPart& part, const Image& guide) {
+  Image counts(guide.width, guide.height, 1);
+  parallel_for(guide.height, 16, [&](int y) {
+    for (int x = 0; x < guide.width; ++x) {
+      float variance = 0;
+      for (int c = 0; c < 3; ++c) variance += sqr(part.image.std_error.pixel(x, y)[c]) / 3;
+      *counts.pixel(x, y) = 1 / (1 / relative_weight(guide.pixel(x, y)) + kCountOfVariance * variance);
+    }
+  });
+  return counts;
+}
+
+void check_guides(const Guides& guides) {
+  if (guides.albedo) check_guide("the guide albedo", *guides.albedo);
+  if (guides.normal) check_guide("the guide normal", *guides.normal);
+}
 
 }  // namespace
 
@@ -93,41 +94,37 @@ DenoiseMode denoise_mode(const std::string& name) {
               fmt::format("`denoise` '{}': expected {}", name, fmt::join(denoise_mode_names(), ", ")));
 }
 
-MixedDenoising denoise_by_mixture(const Estimator& base, const GroupedImage& crn, const GroupedImage& independent,
-                                  const PairSettings& settings, const std::vector<CandidateMaker>& makers,
-                                  DenoiseMode mode) {
-  if (settings.guides.albedo) check_guide("the guide albedo", *settings.guides.albedo);
-  if (settings.guides.normal) check_guide("the guide normal", *settings.guides.normal);
-  long n_nonfinite = 0;
-  const std::vector<unsigned char> valid = finite_pixels(crn, independent, n_nonfinite);
+MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<CandidateMaker>& makers, DenoiseMode mode,
+                                  bool std_error) {
   const ModeSettings chosen = settings_of(mode);
-  Part whole = make_part(base, crn, independent, settings, valid, makers);
-  std::array<Part, 2> halves;
-  for (int half : {0, 1}) {
-    const HalfImage half_crn(crn, half), half_independent(independent, half);
-    PairSettings half_settings = settings;
-    half_settings.crn_samples = std::max<int64_t>(1, settings.crn_samples / 2);
-    halves[half] = make_part(base, half_crn.view(), half_independent.view(), half_settings, valid, makers);
-  }
+  const std::vector<unsigned char>& valid = parts.valid;
+  CandidateSet whole = candidates_of(parts.whole, valid, makers);
+  const std::array<CandidateSet, 2> halves = {candidates_of(parts.halves[0], valid, makers),
+                                              candidates_of(parts.halves[1], valid, makers)};
   MixtureInput input;
-  input.whole = &whole.set;
-  input.halves = {&halves[0].set, &halves[1].set};
-  input.independent = {&halves[0].independent, &halves[1].independent};
+  input.whole = &whole;
+  input.halves = {&halves[0], &halves[1]};
+  input.independent = {&parts.halves[0].independent, &parts.halves[1].independent};
   input.guide = &guide_of(whole);
   input.valid = &valid;
   input.bias_share = chosen.bias_share;
-  input.prior = chosen.prior;
+  input.prior = parts.is_mean ? kPriorOfMean : chosen.prior;
+  std::array<Image, 2> counts;
+  for (int half = 0; parts.is_mean && half < 2; ++half) {
+    counts[half] = counts_of(parts.halves[half], guide_of(halves[half]));
+    input.counts[half] = &counts[half];
+  }
   Mixture mixture = mix(input);
-  if (chosen.feedback) {
-    add_feedback(whole.independent, {}, valid, whole.base.std_error, mixture.image);
+  if (chosen.feedback && !parts.is_mean) {
+    add_feedback(parts.whole.independent, {}, valid, parts.whole.image.std_error, mixture.image);
     for (int half : {0, 1})
-      add_feedback(halves[half].independent, {}, valid, halves[half].base.std_error, mixture.halves[half]);
+      add_feedback(parts.halves[half].independent, {}, valid, parts.halves[half].image.std_error, mixture.halves[half]);
   }
 
   MixedDenoising out;
-  out.result = std::move(whole.base);
+  out.result = std::move(parts.whole.image);
   out.result.std_error = Image();
-  if (settings.std_error) {
+  if (std_error) {
     const std::array<const Image*, 2> images = {&mixture.halves[0], &mixture.halves[1]};
     double usual = 0.5;
     for (const CandidateMaker& maker : makers) usual = std::max(usual, maker.error_over_variance);
@@ -137,19 +134,78 @@ MixedDenoising denoise_by_mixture(const Estimator& base, const GroupedImage& crn
   out.result.estimate = std::move(mixture.image);
   for (const CandidateMaker& maker : makers) out.names.insert(out.names.end(), maker.names.begin(), maker.names.end());
   out.weights = std::move(mixture.weights);
-  out.candidates = std::move(whole.set.candidates);
+  out.candidates = std::move(whole.candidates);
   return out;
 }
 
+namespace {
+
+bool is_mean(const Estimator& estimator) { return estimator.passes == EstimatorPasses::kAny; }
+
+/// Whether halves of the samples are enough to judge candidates.
+bool can_be_mixed(const GroupedImage& image) {
+  if (image.groups < 2) return false;
+  const size_t n_pixels = static_cast<size_t>(image.width) * image.height;
+  return !image.counts ||
+         std::all_of(image.counts, image.counts + n_pixels, [](uint32_t n) { return n >= kFewestMixedSamples; });
+}
+
+/// The candidate that was measured to be best where samples are few; without any the mean itself.
+MixedDenoising single_candidate(const GroupedImage& independent, const std::vector<CandidateMaker>& makers) {
+  DenoisingParts parts = whole_of_mean(independent);
+  CandidateSet set = candidates_of(parts.whole, parts.valid, makers);
+  MixedDenoising out;
+  for (const CandidateMaker& maker : makers) out.names.insert(out.names.end(), maker.names.begin(), maker.names.end());
+  const size_t best = static_cast<size_t>(makers[0].best_of_few);
+  out.result = std::move(parts.whole.image);
+  out.result.std_error = Image();
+  for (size_t i = 0; i < parts.valid.size(); ++i)
+    if (parts.valid[i]) std::copy_n(&set.candidates[best].data[3 * i], 3, &out.result.estimate.data[3 * i]);
+  out.result.note = fmt::format(
+      "fewer than {} samples per pixel are too few to judge denoised images by: the picture is the candidate '{}', and "
+      "its error is not known",
+      kFewestMixedSamples, out.names[best]);
+  out.weights.assign(set.candidates.size(), Image(independent.width, independent.height, 1));
+  std::fill(out.weights[best].data.begin(), out.weights[best].data.end(), 1.0f);
+  out.candidates = std::move(set.candidates);
+  return out;
+}
+
+/// What Estimator::apply and Estimator::stages have in common.
+using Run = std::function<MixedDenoising(const GroupedImage& crn, const GroupedImage& independent,
+                                         const PairSettings& settings)>;
+
+Run run_of_pair(const Estimator& base, const MixedDenoisingOptions& options, bool with_oidn) {
+  return [=](const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings) {
+    check_guides(settings.guides);
+    std::vector<CandidateMaker> makers = {filtered_candidates(settings.guides)};
+    if (with_oidn) makers.push_back(neural_candidates(settings.guides, options.oidn));
+    return denoise_by_mixture(parts_of_pair(base, crn, independent, settings), makers, options.mode,
+                              settings.std_error);
+  };
+}
+
+Run run_of_mean(const MixedDenoisingOptions& options, bool with_oidn) {
+  return [=](const GroupedImage&, const GroupedImage& independent, const PairSettings& settings) {
+    check_guides(settings.guides);
+    std::vector<CandidateMaker> makers;
+    if (with_oidn) makers.push_back(neural_candidates(settings.guides, options.oidn, CandidateBase::kMean));
+    makers.push_back(filtered_candidates(settings.guides, CandidateBase::kMean));
+    if (!can_be_mixed(independent)) return single_candidate(independent, makers);
+    return denoise_by_mixture(parts_of_mean(independent), makers, options.mode, settings.std_error);
+  };
+}
+
+}  // namespace
+
 bool can_be_denoised(const Estimator& estimator) {
-  return estimator.apply && estimator.predicts_error && !estimator.adaptive;
+  return (estimator.apply || is_mean(estimator)) && estimator.predicts_error && !estimator.adaptive;
 }
 
 Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& options) {
   if (options.mode == DenoiseMode::kNone) return base;
   if (!can_be_denoised(base))
-    throw Error(ErrorCode::kUsage,
-                "denoising needs an estimator of two passes that predicts its error, not " + base.name);
+    throw Error(ErrorCode::kUsage, "denoising needs an estimator that predicts its error, not " + base.name);
   if (options.use_oidn && !options.oidn.library.empty()) denoiser_info(options.oidn);  // throws before rendering
   const bool with_oidn = options.use_oidn && (!options.oidn.library.empty() || !find_denoiser(options.oidn).empty());
   Estimator estimator = base;
@@ -160,15 +216,8 @@ Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& opt
   estimator.explain = nullptr;
   estimator.memory.always += with_oidn ? kBytesWithOidn : kBytesPerPixel;
   estimator.memory.of_halves = estimator.memory.of_halves_per_group = 0;  // part of that
-  const auto makers = [options, with_oidn](const Guides& guides) {
-    std::vector<CandidateMaker> all = {filtered_candidates(guides)};
-    if (with_oidn) all.push_back(neural_candidates(guides, options.oidn));
-    return all;
-  };
-  const auto run = [base, options, makers](const GroupedImage& crn, const GroupedImage& independent,
-                                           const PairSettings& settings) {
-    return denoise_by_mixture(base, crn, independent, settings, makers(settings.guides), options.mode);
-  };
+  if (is_mean(base)) estimator.passes = EstimatorPasses::kIndependent, estimator.fewest_groups = 1;
+  const Run run = is_mean(base) ? run_of_mean(options, with_oidn) : run_of_pair(base, options, with_oidn);
   estimator.apply = [run](const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings) {
     return run(crn, independent, settings).result;
   };

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Denoising that knows its error (ours): the image of an estimator and images with less noise and more bias
-// (candidates.h), mixed at each pixel in the proportions that held-out samples find best (mixture.h).
+// (candidates.h), mixed at each pixel in the proportions that held-out samples find best (mixture.h). The estimator is
+// one of two passes, or the mean of a single one.
 //
 // Claim: consistent where the estimator is, because the weights of candidates that are wrong vanish as samples tell so.
 // Its error is measured, bias included (held_out_error.h).
@@ -12,6 +13,7 @@
 #include <vector>
 
 #include "denoising/candidates.h"
+#include "denoising/denoising_parts.h"
 #include "estimators/estimator.h"
 #include "settings/settings.h"
 
@@ -31,8 +33,10 @@ struct MixedDenoisingOptions {
   DenoiseOptions oidn;   ///< where it is; a library that is named and is not there is an error
 };
 
-/// The estimator's image denoised. `base` is an estimator of a pair that predicts its error. The result reads guides,
-/// needs the whole image, and twice the groups. Throws Error(kUsage) for another base.
+/// The estimator's image denoised. `base` is an estimator of a pair that predicts its error, and the result needs twice
+/// its groups; or the mean, and the result is one of a single pass (EstimatorPasses::kIndependent), mixed where there
+/// are kFewestMixedSamples, and the best candidate where there are fewer. It reads guides and needs the whole image.
+/// Throws Error(kUsage) for another base.
 Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& options);
 
 /// Whether an estimator can be the base.
@@ -53,9 +57,12 @@ struct MixedDenoising {
   std::vector<Image> candidates;   ///< made of all samples
   std::vector<Image> weights;      ///< one channel each
 };
-MixedDenoising denoise_by_mixture(const Estimator& base, const GroupedImage& crn, const GroupedImage& independent,
-                                  const PairSettings& settings, const std::vector<CandidateMaker>& makers,
-                                  DenoiseMode mode);
+/// `std_error`: with the error of the result.
+MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<CandidateMaker>& makers, DenoiseMode mode,
+                                  bool std_error);
+
+/// Samples per pixel, in two groups or more, whose halves can judge candidates.
+inline constexpr int kFewestMixedSamples = 4;
 
 /// The modes by name, "none" first.
 const std::vector<std::string>& denoise_mode_names();

@@ -11,7 +11,9 @@
 
 #include "combine/registry.h"
 #include "core/error.h"
+#include "estimators/mean.h"
 #include "estimators/test_images.h"
+#include "filters/feedback.h"
 #include "support/files.h"
 
 namespace covary {
@@ -85,6 +87,87 @@ TEST(MixedDenoising, IsTheEstimatorWithoutAMode) {
   EXPECT_EQ(none.text, make_estimator("iicv").text);
 }
 
+Estimator mean_denoiser(DenoiseMode mode) {
+  MixedDenoisingOptions options;
+  options.mode = mode;
+  options.use_oidn = false;
+  return with_denoising(make_estimator("none"), options);
+}
+
+EstimatorResult denoised_mean(const test::Grouped& image, DenoiseMode mode) {
+  PairSettings settings;
+  settings.std_error = true;
+  return mean_denoiser(mode).apply({}, image.view(), settings);
+}
+
+double mean_square(const Image& image) {
+  double sum = 0;
+  for (float value : image.data) sum += static_cast<double>(value) * value;
+  return sum / static_cast<double>(image.data.size());
+}
+
+TEST(MixedDenoising, OfASinglePassHasLessErrorThanItsMean) {
+  const Inputs in(1);
+  const Estimator estimator = mean_denoiser(DenoiseMode::kError);
+  EXPECT_EQ(estimator.passes, EstimatorPasses::kIndependent);
+  EXPECT_EQ(estimator.text, "none --denoise error --oidn off");
+  const double before = square_error(mean_of_groups(in.independent.view()).estimate);
+  EXPECT_LT(square_error(denoised_mean(in.independent, DenoiseMode::kBias).estimate), 0.75 * before);
+  EXPECT_LT(square_error(denoised_mean(in.independent, DenoiseMode::kBalanced).estimate), 0.35 * before);
+  const EstimatorResult result = denoised_mean(in.independent, DenoiseMode::kError);
+  EXPECT_LT(square_error(result.estimate), 0.3 * before);
+  EXPECT_NEAR(mean_square(result.std_error) / square_error(result.estimate), 1, 0.5);
+  EXPECT_EQ(result.note, "");
+}
+
+TEST(MixedDenoising, OfASinglePassTakesTwoGroupsOfManySamples) {
+  const Inputs in(2, kWidth, kHeight, 2);
+  const EstimatorResult result = denoised_mean(in.independent, DenoiseMode::kError);
+  EXPECT_LT(square_error(result.estimate), 0.6 * square_error(mean_of_groups(in.independent.view()).estimate));
+  for (float error : result.std_error.data) ASSERT_TRUE(std::isfinite(error));
+  EXPECT_GT(mean_square(result.std_error), 0.5 * square_error(result.estimate));
+  EXPECT_LT(mean_square(result.std_error), 10 * square_error(result.estimate));
+}
+
+TEST(MixedDenoising, OfASinglePassSaysWhenSamplesAreTooFewToJudge) {
+  for (const uint32_t samples : {1u, 3u, 4u}) {
+    const Inputs in(3, kWidth, kHeight, static_cast<int>(samples));
+    const std::vector<uint32_t> counts(static_cast<size_t>(kWidth) * kHeight, samples);
+    GroupedImage image = in.independent.view();
+    image.counts = counts.data();
+    PairSettings settings;
+    settings.std_error = true;
+    const EstimatorResult result = mean_denoiser(DenoiseMode::kError).apply({}, image, settings);
+    const bool is_few = samples < 4;
+    EXPECT_EQ(result.note.find("fewer than 4 samples per pixel") != std::string::npos, is_few) << samples;
+    EXPECT_EQ(result.std_error.data.empty(), is_few) << samples;
+    const double before = square_error(mean_of_groups(in.independent.view()).estimate);
+    EXPECT_LT(square_error(result.estimate), samples == 1 ? 1.001 * before : 0.8 * before) << samples;
+  }
+}
+
+TEST(MixedDenoising, OfASinglePassDoesNotDependOnThreads) {
+  const Inputs in(3);
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  const EstimatorResult alone = denoised_mean(in.independent, DenoiseMode::kError);
+  const tbb::global_control four(tbb::global_control::max_allowed_parallelism, 4);
+  const EstimatorResult together = denoised_mean(in.independent, DenoiseMode::kError);
+  EXPECT_EQ(together.estimate.data, alone.estimate.data);
+  EXPECT_EQ(together.std_error.data, alone.std_error.data);
+}
+
+/// A denoiser that makes everything too dark, and keeps the edges.
+TEST(MixedDenoising, ResidualGivesBackWhatPixelsAlikeLack) {
+  const Inputs in(10, kWidth, kHeight, 12, 0);
+  const std::vector<unsigned char> valid(static_cast<size_t>(kWidth) * kHeight, 1);
+  const Moments h = moments(in.independent.view(), valid, 0, 0.0f);
+  const Image dark = truth(0.8f / kOutliers);
+  Image corrected = dark;
+  add_residual(h, {}, valid, corrected);
+  const float scale = 1 / kOutliers;
+  EXPECT_LT(square_error(corrected, scale), 0.2 * square_error(dark, scale));
+}
+
 TEST(MixedDenoising, UsesGuides) {
   const Inputs in(2);
   Image albedo(kWidth, kHeight, 3), normal(kWidth, kHeight, 3);
@@ -129,8 +212,9 @@ TEST(MixedDenoising, GivesBadCandidatesNoWeightAndAPerfectOneMost) {
     images.push_back(truth(1 / kOutliers));
     return images;
   };
-  const MixedDenoising all = denoise_by_mixture(make_estimator("iicv"), in.crn.view(), in.independent.view(), {},
-                                                {filtered_candidates({}), planted}, DenoiseMode::kError);
+  const MixedDenoising all =
+      denoise_by_mixture(parts_of_pair(make_estimator("iicv"), in.crn.view(), in.independent.view(), {}),
+                         {filtered_candidates({}), planted}, DenoiseMode::kError, false);
   ASSERT_EQ(all.names, (std::vector<std::string>{"sharp", "sharp-independent", "smooth", "blurred", "constant",
                                                  "shifted", "perfect"}));
   std::vector<double> weights;
@@ -192,7 +276,7 @@ TEST(MixedDenoising, SaysWhatItCannotDo) {
   EXPECT_EQ(message_of([] { denoise_mode("much"); }), "`denoise` 'much': expected none, bias, balanced, error");
   EXPECT_NE(message_of([] {
               with_denoising(make_estimator("iduw"), {DenoiseMode::kError});
-            }).find("denoising needs an estimator of two passes that predicts its error, not iduw"),
+            }).find("denoising needs an estimator that predicts its error, not iduw"),
             std::string::npos);
   MixedDenoisingOptions elsewhere;
   elsewhere.oidn.library = "/nowhere/libOpenImageDenoise.so.2";

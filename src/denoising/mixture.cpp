@@ -33,7 +33,7 @@ void add_pixel(const MixtureInput& in, int m, int x, int y, float* sums) {
   for (int half : {0, 1}) {
     const CandidateSet& set = *in.halves[half];
     const float* f = set.base.pixel(x, y);
-    weight[half] = relative_weight(f);
+    weight[half] = in.counts[half] ? *in.counts[half]->pixel(x, y) : relative_weight(f);
     for (int c = 0; c < 3; ++c) {
       base[half][c] = f[c];
       residual[half][c] = in.independent[1 - half]->mean.row(c, y)[x] - f[c];

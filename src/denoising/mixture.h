@@ -44,6 +44,8 @@ struct MixtureInput {
   const std::vector<unsigned char>* valid = nullptr;  ///< pixels with 0 are left out, and keep the base image
   float bias_share = 1;                               ///< weight of the squared bias, > 0
   float prior = 0;                                    ///< how much the weights of the whole image count, >= 0
+  /// What squared errors of each half's pixels count, one channel, made of the same half; null: 1 / (F'_A^2 + 0.01).
+  std::array<const Image*, 2> counts = {};
 };
 
 struct Mixture {

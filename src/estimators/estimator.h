@@ -25,6 +25,8 @@ namespace covary {
 enum class EstimatorPasses {
   kPair,     ///< one with common random numbers and one with independent ones: Estimator::apply
   kSamples,  ///< an independent one, whose pixels are made of all their samples: Estimator::estimate_pixel
+  /// An independent one, in groups: Estimator::apply, whose first image is empty.
+  kIndependent,
   kAny,      ///< one of either kind, whose mean is the image: the film needs no estimator
 };
 
@@ -83,7 +85,7 @@ struct Estimator {
 
   std::optional<AdaptiveSampling> adaptive;  ///< not of estimators of the samples of a pixel
 
-  // Of a pair.
+  // Of a pair, and of an independent pass in groups.
   std::function<EstimatorResult(const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings)>
       apply;
   int reach = 0;           ///< rows beyond its own that a band of rows needs; -1: the whole image is needed

@@ -37,6 +37,7 @@ struct EstimatorResult {
   long nonfinite_pixels = 0;
   /// Of each row, for calibrate() of risk/held_out_error.h; empty where nothing was held out.
   std::vector<HeldOutRow> held_out;
+  std::string note;  ///< what whoever asked for the image should know of how it was made; mostly empty
   std::optional<HeldOutVerdict> verdict;  ///< by calibrate(); empty where nothing was held out
 };
 

@@ -23,6 +23,7 @@ constexpr float kWidening = 4, kSecondWidening = 12;
 constexpr float kNoise = 0.2f;
 /// Variance of a wide mean, relative to that of the estimate, at which half of it is given back.
 constexpr float kWideNoise = 1;
+constexpr float kLeastSquare = 1e-4f;  // of the bandwidth of the residual
 
 /// Cells of side x side pixels, one row of cells per row, repeated horizontally so that column x holds the cell of
 /// pixel x: mean of F^ (kFar for cells without valid pixels), sums over the valid pixels of n (h - F^), n and n^2 var h
@@ -150,6 +151,23 @@ void add_feedback(const Moments& h, const FeedbackOptions& options, const std::v
     return std::array<vfloat, 3>{b * mean.value(0), b * mean.value(1), b * mean.value(2)};
   };
   add_everywhere(valid, std_error, second, estimate);
+}
+
+void add_residual(const Moments& h, const ResidualOptions& options, const std::vector<unsigned char>& valid,
+                  Image& estimate) {
+  const int radius = options.window / 2 / options.cell;
+  const Planes cells = make_cells(options.cell, h, valid, estimate, radius * options.cell);
+  for_each_batch(estimate.width, estimate.height, [&](int x, int y, int n) {
+    vfloat f[3], brightness = {};
+    for (int c = 0; c < 3; ++c) {
+      for (int l = 0; l < kLanes; ++l) f[c][l] = estimate.pixel(std::min(x + l, estimate.width - 1), y)[c];
+      brightness += f[c] * (options.bandwidth / 3);
+    }
+    const GuidedMean mean = guided_mean(cells, options.cell, radius, x, y, f, brightness * brightness + kLeastSquare);
+    for (int l = 0; l < n; ++l)
+      if (valid[static_cast<size_t>(y) * estimate.width + x + l])
+        for (int c = 0; c < 3; ++c) estimate.pixel(x + l, y)[c] += mean.value(c)[l];
+  });
 }
 
 }  // namespace covary

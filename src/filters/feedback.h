@@ -42,6 +42,16 @@ struct FeedbackOptions {
   float bandwidth = 1.25f;
 };
 
+/// The wide mean alone, of an image whose standard error is not known, and all of it:
+///     f_i + sum_j w_ij (h_j - f_j) / sum_j w_ij,   w_ij = exp(-||f_j - f_i||^2 / ((k f'_i)^2 + 1e-4)),
+/// f'_i: mean of the channels. A denoiser's bias that is shared by pixels alike goes, and texture that it lost stays
+/// lost.
+struct ResidualOptions {
+  float bandwidth = 0.5f;  ///< k > 0
+  int window = 61;         ///< side, in pixels
+  int cell = 4;            ///< side of the cells over which it is taken
+};
+
 /// Cells are aligned with coordinates that are multiples of this.
 inline constexpr int kFeedbackCell = 4;
 /// How far from a pixel, in rows or columns, the input can influence its feedback.
@@ -51,5 +61,9 @@ inline int feedback_reach(const FeedbackOptions& options) { return 2 * (options.
 /// variance. Pixels with 0 in `valid` are left out and left alone.
 void add_feedback(const Moments& h, const FeedbackOptions& options, const std::vector<unsigned char>& valid,
                   const Image& std_error, Image& estimate);
+
+/// Adds the residual to `estimate`; the rest as above.
+void add_residual(const Moments& h, const ResidualOptions& options, const std::vector<unsigned char>& valid,
+                  Image& estimate);
 
 }  // namespace covary

@@ -71,6 +71,31 @@ Plan plain_plan(Sampling sampling, std::optional<int> groups) {
   return plan;
 }
 
+Plan independent_plan(const Estimator& estimator, std::optional<int> groups) {
+  Plan plan = plain_plan(Sampling::kIndependent, groups);
+  plan.name = estimator.name;
+  plan.estimator = estimator.text;
+  plan.film_is_image = plan.takes_training = false;
+  plan.groups_follow_speed = !groups;
+  plan.estimate_memory = estimator.memory;
+  plan.reads_guides = estimator.reads_guides;
+  plan.estimate = [apply = estimator.apply](std::span<const Pass> passes, int first_row, int n_rows,
+                                            const Guides& guides) {
+    PairSettings settings;
+    settings.std_error = true;
+    settings.guides = guides;
+    return apply({}, rows_of(passes[0].film, first_row, n_rows), settings);
+  };
+  plan.phases[0].passes = [groups](const PlanState& state) {
+    PassPlan pass;
+    pass.name = "independent";
+    pass.groups = groups.value_or(number_of_groups(whole_budget(1), state));
+    pass.fewest_groups = groups ? 0 : 1;
+    return std::vector{pass};
+  };
+  return plan;
+}
+
 Plan samples_plan(const Estimator& estimator) {
   Plan plan;
   plan.name = estimator.name;
@@ -136,6 +161,7 @@ Plan pair_plan(const PairMethod& method) {
 Plan estimator_plan(const Estimator& estimator, const PassChoice& choice) {
   if (estimator.adaptive) return adaptive_plan(estimator, choice.groups);
   if (estimator.passes == EstimatorPasses::kAny) return plain_plan(choice.sampling, choice.groups);
+  if (estimator.passes == EstimatorPasses::kIndependent) return independent_plan(estimator, choice.groups);
   if (estimator.passes == EstimatorPasses::kSamples) return samples_plan(estimator);
   PairMethod method;
   method.name = estimator.name;

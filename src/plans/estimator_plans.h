@@ -17,6 +17,9 @@ namespace covary {
 /// numbers and for a render to a wanted error, which is read from the groups, otherwise 1.
 Plan plain_plan(Sampling sampling, std::optional<int> groups = {});
 
+/// One independent pass in groups (EstimatorPasses::kIndependent), by default as many as number_of_groups() has it.
+Plan independent_plan(const Estimator& estimator, std::optional<int> groups = {});
+
 /// One independent pass, whose pixels an estimator makes of all their samples (EstimatorPasses::kSamples). Throws
 /// Error(kUsage) when rendered with a number of samples that the estimator does not take.
 Plan samples_plan(const Estimator& estimator);

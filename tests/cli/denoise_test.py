@@ -66,8 +66,10 @@ class Denoise(RenderTest):
         self.assertEqual(facts["samples_per_pixel"], 12, "six groups in each pass")
 
     def test_what_cannot_be(self):
-        self.bad(2, "--denoise needs an estimator of two passes that predicts its error (", "render", ROOM, "-o",
-                 "a.exr", "--estimator", "none", "--denoise", "error")
+        self.bad(2, "--denoise needs an estimator that predicts its error (", "render", ROOM, "-o", "a.exr",
+                 "--estimator", "iduw", "--denoise", "error")
+        self.bad(2, "--denoise of a single pass needs --sampling independent", "render", ROOM, "-o", "a.exr",
+                 "--sampling", "crn", "--denoise", "error")
         self.bad(2, "--oidn has no effect without --denoise bias, balanced or error", "render", ROOM, "-o", "a.exr",
                  *PLAIN)
         self.bad(2, "--denoise", "render", ROOM, "-o", "a.exr", "--denoise", "much")
@@ -90,6 +92,46 @@ class Denoise(RenderTest):
                 self.bad(1, message, *inputs, "--denoise", "error", *PLAIN, "--guides", "guides.exr")
                 self.bad(1, message, "denoise", "guides.exr", "-o", "d.exr")
         self.bad(2, "--explain: with --denoise", *inputs, "--denoise", "error", *PLAIN, "--explain", "1,1")
+
+    def test_single_pass(self):
+        self.good("render", ROOM, *SMALL, "-o", "r.exr", "--estimator", "none", "--spp", "512", "--seed", "9")
+        single = ("--estimator", "none", "--spp", "24")
+        self.good("render", ROOM, *SMALL, "-o", "plain.exr", *single)
+        facts = self.statistics("-o", "a.exr", *single, "--denoise", "error", *PLAIN, "--aovs", "--passes", "films",
+                                "--save-stages", "steps")
+        self.assertEqual(facts["estimator"], "none --denoise error --oidn off")
+        self.assertNotIn("note", facts)
+        self.assertTrue((self.path / "steps/weight-sharp.exr").exists())
+        self.assertLess(self.relmse("a.exr", "r.exr"), 0.5 * self.relmse("plain.exr", "r.exr"))
+        # The independent film alone.
+        alone = ("combine", "--independent", "films/independent.exr", "-o", "b.exr", "--quiet", "--error")
+        self.good(*alone, "--denoise", "error", *PLAIN, "--guides", "a.exr")
+        self.same("a.exr", "b.exr")
+        self.bad(2, "without --crn, independent images can only be denoised", *alone)
+        self.bad(2, "--estimator needs the image with common random numbers, --crn", *alone, "--denoise", "error",
+                 *PLAIN, "--estimator", "iicv")
+        # A film with groups, the same samples; two renders of other seeds.
+        self.good("render", ROOM, *SMALL, "-o", "film.exr", *single, "--groups", "12", "--aovs")
+        self.good("denoise", "film.exr", "-o", "c.exr", *PLAIN, "--quiet")
+        self.assertLess(self.relmse("c.exr", "r.exr"), 0.5 * self.relmse("plain.exr", "r.exr"))
+        self.good("render", ROOM, *SMALL, "-o", "other.exr", *single, "--seed", "1")
+        self.good("denoise", "plain.exr", "other.exr", "-o", "d.exr", *PLAIN, "--quiet")
+        self.assertLess(self.relmse("d.exr", "r.exr"), 0.5 * self.relmse("plain.exr", "r.exr"))
+        self.assertIn("StdError.G", self.channels("d.exr"))
+        self.bad(2, "are the same file", "denoise", "plain.exr", "plain.exr", "-o", "e.exr", *PLAIN)
+        self.bad(2, "--mode error needs a second render of another seed", "denoise", "plain.exr", "-o", "e.exr",
+                 "--mode", "error")
+        (self.path / "copy.exr").write_bytes((self.path / "plain.exr").read_bytes())
+        self.bad(1, "all groups are identical: the same seed was rendered twice", "denoise", "plain.exr", "copy.exr",
+                 "-o", "e.exr", *PLAIN)
+
+    def test_few_samples_of_a_single_pass(self):
+        options = ("--estimator", "none", "--denoise", "error", *PLAIN)
+        self.assertIn("fewer than 4 samples per pixel",
+                      self.statistics("-o", "a.exr", *options, "--spp", "3")["note"])
+        facts = self.statistics("-o", "b.exr", *options, "--spp", "4")
+        self.assertNotIn("note", facts)
+        self.assertEqual(facts["samples_per_pixel"], 4)
 
     def test_clean_guides(self):
         self.bad(2, "--clean-guides: with --no-guides there are none", "denoise", "a.exr", "-o", "b.exr",

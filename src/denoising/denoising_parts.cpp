@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "denoising/denoising_parts.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/parallel.h"
+#include "risk/halves.h"
+
+namespace covary {
+namespace {
+
+/// What the pixels around count, in groups, and how far they reach.
+constexpr float kPriorFreedom = 2;
+constexpr int kVarianceRadius = 2;
+
+/// Pixels that the estimator leaves out may hold anything.
+void make_finite(Image& image) {
+  for (float& value : image.data)
+    if (!std::isfinite(value)) value = 0;
+}
+
+DenoisingPart part_of_pair(const Estimator& base, const GroupedImage& crn, const GroupedImage& independent,
+                           PairSettings settings, const std::vector<unsigned char>& valid) {
+  settings.std_error = true;
+  settings.held_out = false;
+  DenoisingPart part;
+  part.image = base.apply(crn, independent, settings);
+  part.independent = moments(independent, valid, 0, 0.0f);
+  make_finite(part.image.estimate), make_finite(part.image.std_error);
+  return part;
+}
+
+/// Mean of the valid pixels around one.
+float mean_around(const Planes& plane, const std::vector<unsigned char>& valid, int c, int x, int y) {
+  float sum = 0, n = 0;
+  for (int j = std::max(0, y - kVarianceRadius); j <= std::min(plane.height() - 1, y + kVarianceRadius); ++j)
+    for (int i = std::max(0, x - kVarianceRadius); i <= std::min(plane.width() - 1, x + kVarianceRadius); ++i) {
+      if (!valid[static_cast<size_t>(j) * plane.width() + i]) continue;
+      sum += plane.row(c, j)[i], n += 1;
+    }
+  return n > 0 ? sum / n : 0;
+}
+
+/// `scale` times the variance, of which `freedom` groups more than one tell, drawn to that around.
+Image std_error_of(const Planes& variance, const std::vector<unsigned char>& valid, int freedom, float scale) {
+  Image result(variance.width(), variance.height(), 3);
+  const float own = static_cast<float>(freedom) / (static_cast<float>(freedom) + kPriorFreedom);
+  parallel_for(result.height, 8, [&](int y) {
+    for (int x = 0; x < result.width; ++x)
+      for (int c = 0; c < 3; ++c) {
+        if (!valid[static_cast<size_t>(y) * result.width + x]) continue;
+        const float mean = mean_around(variance, valid, c, x, y);
+        result.pixel(x, y)[c] = std::sqrt(scale * (own * variance.row(c, y)[x] + (1 - own) * mean));
+      }
+  });
+  return result;
+}
+
+DenoisingPart part_of_mean(Moments moments, const std::vector<unsigned char>& valid, int groups) {
+  DenoisingPart part;
+  part.independent = std::move(moments);
+  part.image.estimate = mean_image(part.independent);
+  part.image.std_error = std_error_of(part.independent.variance_of_mean, valid, groups - 1, 1);
+  return part;
+}
+
+}  // namespace
+
+Image mean_image(const Moments& moments) {
+  const Planes& planes = moments.mean;
+  Image image(planes.width(), planes.height(), 3);
+  parallel_for(image.height, 16, [&](int y) {
+    for (int x = 0; x < image.width; ++x)
+      for (int c = 0; c < 3; ++c) image.pixel(x, y)[c] = planes.row(c, y)[x];
+  });
+  return image;
+}
+
+DenoisingParts parts_of_pair(const Estimator& base, const GroupedImage& crn, const GroupedImage& independent,
+                             const PairSettings& settings) {
+  DenoisingParts parts;
+  long ignored = 0;  // the base counts them
+  parts.valid = finite_pixels(crn, independent, ignored);
+  parts.whole = part_of_pair(base, crn, independent, settings, parts.valid);
+  for (int half : {0, 1}) {
+    const HalfImage half_crn(crn, half), half_independent(independent, half);
+    PairSettings half_settings = settings;
+    half_settings.crn_samples = std::max<int64_t>(1, settings.crn_samples / 2);
+    parts.halves[half] = part_of_pair(base, half_crn.view(), half_independent.view(), half_settings, parts.valid);
+  }
+  return parts;
+}
+
+DenoisingParts whole_of_mean(const GroupedImage& independent) {
+  DenoisingParts parts;
+  parts.is_mean = true;
+  long n_nonfinite = 0;
+  parts.valid = finite_pixels(independent, independent, n_nonfinite);
+  parts.whole = part_of_mean(moments(independent, parts.valid, 0, 0.0f), parts.valid, independent.groups);
+  fill_invalid(independent, independent, parts.valid, parts.whole.image.estimate);
+  parts.whole.image.nonfinite_pixels = n_nonfinite;
+  return parts;
+}
+
+DenoisingParts parts_of_mean(const GroupedImage& independent) {
+  DenoisingParts parts = whole_of_mean(independent);
+  for (int half : {0, 1}) {
+    const HalfImage image(independent, half);
+    const int groups = image.view().groups;
+    DenoisingPart& part = parts.halves[half];
+    part = part_of_mean(moments(image.view(), parts.valid, 0, 0.0f), parts.valid, groups);
+    if (groups > 1) continue;
+    // One group has no variance of its own. What is compared with the pixel itself may not know the other half's.
+    const float more = static_cast<float>(independent.groups) / static_cast<float>(groups);
+    const Planes& all = parts.whole.independent.variance_of_mean;
+    part.image.std_error = std_error_of(all, parts.valid, 0, more);
+    for (int c = 0; c < 3; ++c)
+      for (int y = 0; y < independent.height; ++y)
+        std::transform(all.row(c, y), all.row(c, y) + independent.width, part.independent.variance_of_mean.row(c, y),
+                       [more](float v) { return more * v; });
+  }
+  return parts;
+}
+
+}  // namespace covary
