@@ -27,7 +27,7 @@ enum class EstimatorPasses {
   kSamples,  ///< an independent one, whose pixels are made of all their samples: Estimator::estimate_pixel
   /// An independent one, in groups: Estimator::apply, whose first image is empty.
   kIndependent,
-  kAny,      ///< one of either kind, whose mean is the image: the film needs no estimator
+  kAny,  ///< one of either kind, whose mean is the image: the film needs no estimator
 };
 
 /// What the surfaces behind the pixels look like: images of three channels, of the same size as the image. Null where

@@ -121,9 +121,9 @@ inline constexpr const char* kSceneHash = "scene_hash";  ///< content of the sce
 inline constexpr const char* kSettings = "settings";     ///< all options that change the samples except the seed
 inline constexpr const char* kTraining = "training";     ///< hash of what the integrator learned, if it learns
 inline constexpr const char* kLightPaths = "light_paths_per_sample";  ///< light films only (splat_layer.h)
-inline constexpr const char* kVersion = "version";       ///< of the program
-inline constexpr const char* kCommand = "command";       ///< command line
-inline constexpr const char* kComplete = "complete";     ///< "true", or "false" for an interrupted render
+inline constexpr const char* kVersion = "version";                    ///< of the program
+inline constexpr const char* kCommand = "command";                    ///< command line
+inline constexpr const char* kComplete = "complete";                  ///< "true", or "false" for an interrupted render
 }  // namespace film_key
 
 }  // namespace covary

@@ -160,8 +160,7 @@ void ControlledPath::update() {
   // Lights are chosen by what was learnt as soon as half of the samples have been taken: the other half then teaches
   // the coefficients of this choice.
   std::vector<float> best;
-  if (controlled_.residuals && selection.empty() && settings_.ends_selection(end))
-    best = cache_.best_selection();
+  if (controlled_.residuals && selection.empty() && settings_.ends_selection(end)) best = cache_.best_selection();
   cache_.forget_residuals();
   if (!best.empty()) {
     select(best);

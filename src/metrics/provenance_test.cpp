@@ -81,9 +81,9 @@ TEST(Provenance, OneFileAsBoth) {
 }
 
 TEST(Provenance, ImagesOfFilmsAreNoFilms) {
-  const std::map<std::string, std::string> attributes = {{"covary:film", "1"},    {"covary:groups", "2"},
+  const std::map<std::string, std::string> attributes = {{"covary:film", "1"},     {"covary:groups", "2"},
                                                          {"covary:checksums", ""}, {"covary:seed", "1"},
-                                                         {"covary:samples", "4"}, {"owner", "somebody"}};
+                                                         {"covary:samples", "4"},  {"owner", "somebody"}};
   EXPECT_EQ(inherited_attributes(attributes),
             (std::map<std::string, std::string>{{"covary:seed", "1"}, {"covary:samples", "4"}}));
 }

@@ -35,8 +35,8 @@ struct PairMethod {
   int fewest_groups = 3;  ///< that the estimator works with
   bool predicts_error = false;
   uint32_t reliable_samples = 0;  ///< Estimator::reliable_samples
-  EstimatorMemory memory;     ///< that `estimate` takes
-  bool reads_guides = false;  ///< `estimate` reads PairSettings::guides
+  EstimatorMemory memory;         ///< that `estimate` takes
+  bool reads_guides = false;      ///< `estimate` reads PairSettings::guides
   std::function<EstimatorResult(const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings)>
       estimate;
 };

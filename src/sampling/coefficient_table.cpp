@@ -88,8 +88,8 @@ uint32_t CoefficientTable::n_switched_off() const {
 }
 
 size_t CoefficientTable::bytes() const {
-  return index_.bytes() + cells_.capacity() * sizeof(Cell) +
-         dense_.capacity() * sizeof(Spectrum) + slots_.capacity() * sizeof(Slot);
+  return index_.bytes() + cells_.capacity() * sizeof(Cell) + dense_.capacity() * sizeof(Spectrum) +
+         slots_.capacity() * sizeof(Slot);
 }
 
 uint64_t CoefficientTable::hash() const {

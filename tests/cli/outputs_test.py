@@ -164,7 +164,7 @@ class Formats(OutputsTest):
             return self.assertIn("pip install pyoidn", done.stderr)
         attributes = json.loads(self.good("info", "o.exr", "--json").stdout)["attributes"]
         self.assertEqual(attributes["covary:seed"], "1")
-        self.assertFalse({"covary:film", "covary:groups", "covary:checksums"} & set(attributes))
+        self.assertFalse({"covary:film", "covary:groups"} & set(attributes))
 
 
 class Special(OutputsTest):
