@@ -4,8 +4,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <algorithm>
-
 #include "core/error.h"
 #include "denoising/mixed_denoising.h"
 #include "dependent_tests/dependent_tests.h"
@@ -40,28 +38,13 @@ const EstimatorPlugin& plugin_named(const std::string& name) {
                                              did_you_mean(name, names), fmt::join(names, ", ")));
 }
 
-bool has_option(const std::vector<Option>& options, const std::string& name) {
-  return std::any_of(options.begin(), options.end(), [&](const Option& o) { return o.name == name; });
-}
-
-void check_belongs(const std::string& estimator, const std::vector<Option>& own, const std::string& option) {
-  if (has_option(own, option)) return;
-  const std::vector<std::string> owners = estimators_with_option(option);
-  if (!owners.empty())
-    throw Error(ErrorCode::kUsage, fmt::format("`{}` is an option of `estimator` {}, not of {}", option,
-                                               fmt::join(owners, ", "), estimator));
-  std::vector<std::string> names;
-  for (const Option& o : own) names.push_back(o.name);
-  throw Error(ErrorCode::kUsage,
-              fmt::format("`{}` is not an option of any estimator{}", option, did_you_mean(option, names)));
-}
-
 }  // namespace
 
 Estimator make_estimator(const std::string& name, const OptionValues& values) {
   const EstimatorPlugin& plugin = plugin_named(name);
   const std::vector<Option> own = options_of_estimator(name);
-  for (const auto& [option, value] : values) check_belongs(name, own, option);
+  for (const auto& [option, value] : values)
+    if (!find_option(own, option)) refuse_option("estimator", name, own, option, estimators_with_option(option));
   Settings parameters(values);
   Estimator estimator = plugin.make(parameters);
   estimator.name = estimator.text = name;
@@ -112,7 +95,7 @@ Estimator with_denoising(const Estimator& base, const DenoisingChoice& choice) {
 std::vector<std::string> estimators_with_option(const std::string& option) {
   std::vector<std::string> names;
   for (const EstimatorPlugin& plugin : estimator_plugins())
-    if (has_option(options_of_estimator(plugin.name), option)) names.emplace_back(plugin.name);
+    if (find_option(options_of_estimator(plugin.name), option)) names.emplace_back(plugin.name);
   return names;
 }
 

@@ -14,17 +14,8 @@ namespace {
 
 void check_belong(const std::string& integrator, const OptionValues& options) {
   const std::vector<Option> own = options_of_integrator(integrator);
-  for (const auto& [name, value] : options) {
-    if (find_option(own, name)) continue;
-    const std::vector<std::string> owners = integrators_with_option(name);
-    if (!owners.empty())
-      throw Error(ErrorCode::kUsage, fmt::format("`{}` is an option of `integrator` {}, not of {}", name,
-                                                 fmt::join(owners, ", "), integrator));
-    std::vector<std::string> names;
-    for (const Option& option : own) names.push_back(option.name);
-    throw Error(ErrorCode::kUsage,
-                fmt::format("`{}` is not an option of any integrator{}", name, did_you_mean(name, names)));
-  }
+  for (const auto& [name, value] : options)
+    if (!find_option(own, name)) refuse_option("integrator", integrator, own, name, integrators_with_option(name));
 }
 
 /// Mitsuba, too, takes depths for which there are no paths. Their images are black, which is seldom what is meant.

@@ -102,6 +102,17 @@ const Option* find_option(const std::vector<Option>& options, std::string_view n
   return nullptr;
 }
 
+void refuse_option(const std::string& kind, const std::string& owner, const std::vector<Option>& own,
+                   const std::string& option, const std::vector<std::string>& others) {
+  if (!others.empty())
+    throw Error(ErrorCode::kUsage,
+                fmt::format("`{}` is an option of `{}` {}, not of {}", option, kind, fmt::join(others, ", "), owner));
+  std::vector<std::string> names;
+  for (const Option& o : own) names.push_back(o.name);
+  throw Error(ErrorCode::kUsage,
+              fmt::format("`{}` is not an option of any {}{}", option, kind, did_you_mean(option, names)));
+}
+
 std::string underscored(std::string name) {
   std::replace(name.begin(), name.end(), '-', '_');
   return name;

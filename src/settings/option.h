@@ -73,6 +73,11 @@ std::string problem_of(const Option& option, const std::string& text);
 
 const Option* find_option(const std::vector<Option>& options, std::string_view name);
 
+/// Throws Error(kUsage) of an option that is not among `own`: the options of the `kind` ("estimator") that is named
+/// `owner`. `others`: names of those of this kind that have it.
+[[noreturn]] void refuse_option(const std::string& kind, const std::string& owner, const std::vector<Option>& own,
+                                const std::string& option, const std::vector<std::string>& others);
+
 /// "cv-grid" as scene files and Python have it: "cv_grid". And back.
 std::string underscored(std::string name);
 std::string dashed(std::string name);
