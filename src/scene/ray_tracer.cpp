@@ -1,6 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scene/ray_tracer.h"
 
+// CMakeLists.txt takes Embree 4 where both are installed, too.
+#if __has_include(<embree4/rtcore.h>)
+#include <embree4/rtcore.h>
+#else
+#include <embree3/rtcore.h>
+#endif
+
 #include <algorithm>
 #include <map>
 #include <string>
@@ -79,6 +86,43 @@ void set_ray(RTCRay16& packet, size_t i, const Ray& ray) {
   packet.id[i] = 0, packet.flags[i] = 0;
 }
 
+/// What a query says of itself: Embree 3 has it in the context, Embree 4 beside it.
+class Query {
+ public:
+#if RTC_VERSION_MAJOR >= 4
+  explicit Query(bool coherent) {
+    rtcInitRayQueryContext(&context_);
+    rtcInitIntersectArguments(&nearest_);
+    rtcInitOccludedArguments(&occluded_);
+    nearest_.flags = coherent ? RTC_RAY_QUERY_FLAG_COHERENT : RTC_RAY_QUERY_FLAG_INCOHERENT;
+    nearest_.context = occluded_.context = &context_;
+  }
+  void nearest(const int* valid, RTCScene scene, RTCRayHit16& packet) {
+    rtcIntersect16(valid, scene, &packet, &nearest_);
+  }
+  void occluded(const int* valid, RTCScene scene, RTCRay16& packet) {
+    rtcOccluded16(valid, scene, &packet, &occluded_);
+  }
+
+ private:
+  RTCRayQueryContext context_;
+  RTCIntersectArguments nearest_;
+  RTCOccludedArguments occluded_;
+#else
+  explicit Query(bool coherent) {
+    rtcInitIntersectContext(&context_);
+    context_.flags = coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+  }
+  void nearest(const int* valid, RTCScene scene, RTCRayHit16& packet) {
+    rtcIntersect16(valid, scene, &context_, &packet);
+  }
+  void occluded(const int* valid, RTCScene scene, RTCRay16& packet) { rtcOccluded16(valid, scene, &context_, &packet); }
+
+ private:
+  RTCIntersectContext context_;
+#endif
+};
+
 /// Moves a hit found in a group's space to the world.
 void place(SurfaceHit& hit, const Transform& to_world, bool with_derivatives) {
   hit.p = to_world.point(hit.p);
@@ -147,9 +191,7 @@ RayTracer::~RayTracer() {
 }
 
 void RayTracer::nearest(std::span<const Ray> rays, std::span<RayHit> hits, bool coherent) const {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  context.flags = coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+  Query query(coherent);
   for (size_t first = 0; first < rays.size(); first += kPacket) {
     const size_t n = std::min(kPacket, rays.size() - first);
     RTCRayHit16 packet;
@@ -160,7 +202,7 @@ void RayTracer::nearest(std::span<const Ray> rays, std::span<RayHit> hits, bool 
       packet.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
       packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
     }
-    rtcIntersect16(valid, top_.scene, &context, &packet);
+    query.nearest(valid, top_.scene, packet);
     for (size_t i = 0; i < n; ++i)
       hits[first + i] = {packet.ray.tfar[i],
                          {packet.hit.u[i], packet.hit.v[i]},
@@ -177,8 +219,7 @@ void RayTracer::nearest(std::span<const Ray> rays, std::span<RayHit> hits, bool 
 }
 
 void RayTracer::occluded(std::span<const Ray> rays, std::span<uint8_t> blocked) const {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
+  Query query(false);
   for (size_t first = 0; first < rays.size(); first += kPacket) {
     const size_t n = std::min(kPacket, rays.size() - first);
     RTCRay16 packet;
@@ -187,14 +228,13 @@ void RayTracer::occluded(std::span<const Ray> rays, std::span<uint8_t> blocked) 
       valid[i] = i < n ? -1 : 0;
       set_ray(packet, i, rays[first + std::min(i, n - 1)]);
     }
-    rtcOccluded16(valid, top_.scene, &context, &packet);
+    query.occluded(valid, top_.scene, packet);
     for (size_t i = 0; i < n; ++i) blocked[first + i] = packet.tfar[i] < 0;
   }
 }
 
 void RayTracer::resolve(const Ray& ray, const RayHit& found, SurfaceHit& hit) const {
-  const Placed* placed =
-      found.instance == RTC_INVALID_GEOMETRY_ID ? nullptr : &placed_[found.instance - top_.shapes.size()];
+  const Placed* placed = found.instance == RayHit::kNone ? nullptr : &placed_[found.instance - top_.shapes.size()];
   const Shape* shape = (placed ? *placed->group : top_).shapes[found.geometry];
   hit.t = found.t;
   hit.primitive = found.primitive;

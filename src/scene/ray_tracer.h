@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The one place that knows Embree.
+// The one place that knows Embree, version 3 or 4.
 #pragma once
-
-#include <embree3/rtcore.h>
 
 #include <memory>
 #include <span>
@@ -10,6 +8,9 @@
 
 #include "scene/mesh.h"
 #include "scene/scene.h"
+
+struct RTCDeviceTy;
+struct RTCSceneTy;
 
 namespace covary {
 
@@ -26,17 +27,17 @@ class RayTracer {
 
  private:
   struct Group {  // shapes of one Embree scene, indexed by geometry id
-    RTCScene scene = nullptr;
+    RTCSceneTy* scene = nullptr;
     std::vector<const Shape*> shapes;
     std::vector<const TriangleMesh*> meshes;  // the same; null where it is no mesh
   };
   /// The mesh that was hit in the world's own space, or null.
   const TriangleMesh* mesh_of(const RayHit& hit) const {
-    return hit.found() && hit.instance == RTC_INVALID_GEOMETRY_ID ? top_.meshes[hit.geometry] : nullptr;
+    return hit.found() && hit.instance == RayHit::kNone ? top_.meshes[hit.geometry] : nullptr;
   }
   Group make_group(std::span<const ShapePtr> shapes) const;
 
-  RTCDevice device_ = nullptr;
+  RTCDeviceTy* device_ = nullptr;
   Group top_;  // shapes, then instances
   std::vector<Group> groups_;
   struct Placed {
