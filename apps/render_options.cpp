@@ -101,7 +101,7 @@ Estimator estimator_of(const RenderOptions& options) { return estimator_of(optio
 Plan make_plan(const RenderOptions& options) { return estimator_plan(estimator_of(options), options.settings.passes); }
 
 RenderRequest make_request(const RenderOptions& options, const LoadedScene& scene) {
-  RenderRequest request = options.request();
+  RenderRequest request = request_of(options.settings, scene);
   if (options.replay.empty() && request.load_training.empty()) take_training(scene, request);
   request.attributes = {{film_key::kVersion, COVARY_VERSION}, {film_key::kCommand, command_line()}};
   return request;

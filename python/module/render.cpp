@@ -120,7 +120,7 @@ nb::dict render_scene(const LoadedScene& scene, const Choice& choice, const Opti
                       nb::object progress) {
   const RenderSettings settings = settings_from<RenderSettings>(choice.values);
   const Plan plan = plan_of(settings, choice);
-  RenderRequest request = settings.request;
+  RenderRequest request = request_of(settings, scene);
   request.attributes[film_key::kVersion] = COVARY_VERSION;
   if (request.load_training.empty()) take_training(scene, request);
   std::vector<std::string> warnings(scene.warnings);

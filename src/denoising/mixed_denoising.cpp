@@ -233,16 +233,17 @@ Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& opt
   return estimator;
 }
 
-void declare(Settings& s, DenoisingChoice& v) {
+void declare(Settings& s, DenoisingChoice& v, bool is_all) {
   s.group("Denoising");
   s.one_of("denoise", v.mode, denoise_mode_names(),
            "Mix the image with denoised ones where held-out samples find that better: for least bias, for least error, "
            "or balanced",
            {.level = OptionLevel::kBasic});
   s.text("oidn", v.oidn, "off|LIBRARY",
-         "For `denoise`: Open Image Denoise's library or a folder of it; default: where it is found; 'off': without it",
+         std::string(is_all ? "For `denoise`" : "For `denoise` and `cv-surrogate` oidn") +
+             ": Open Image Denoise's library or a folder of it; default: where it is found; 'off': without it",
          {.names = OptionNames::kLibrary});
-  s.only_if(v.denoises(), {"oidn"}, "without `denoise` bias, balanced or error");
+  s.only_if(v.denoises() || !is_all, {"oidn"}, kNotDenoised);
 }
 
 }  // namespace covary

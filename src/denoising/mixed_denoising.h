@@ -48,7 +48,9 @@ struct DenoisingChoice {
   std::string oidn;           ///< a library or a folder of it; "": where it is found, "off": without it
   bool denoises() const { return mode != "none"; }
 };
-void declare(Settings& settings, DenoisingChoice& choice);
+/// `is_all`: nothing else of the caller's is done by Open Image Denoise, so that `oidn` is an error without `denoise`.
+void declare(Settings& settings, DenoisingChoice& choice, bool is_all = true);
+constexpr const char* kNotDenoised = "without `denoise` bias, balanced or error";
 
 /// What with_denoising() does, with any candidates.
 struct MixedDenoising {

@@ -4,15 +4,14 @@
 #include <algorithm>
 #include <cmath>
 
-#include "denoising/denoise.h"
 #include "filters/joint_bilateral.h"
 #include "integrators/aov.h"
 #include "integrators/training.h"
 
 namespace covary {
 
-std::vector<Spectrum> pixel_importance(const Scene& scene, const FilterSettings& filter, const Film& film, bool by_oidn,
-                                       const std::atomic<bool>* stop) {
+std::vector<Spectrum> pixel_importance(const Scene& scene, const FilterSettings& filter, const Film& film,
+                                       const std::optional<DenoiseOptions>& oidn, const std::atomic<bool>* stop) {
   constexpr float kSmallest = 0.01f;  // as in relMSE
   constexpr uint32_t kGuideSamples = 2;
   PassSettings settings;
@@ -22,7 +21,7 @@ std::vector<Spectrum> pixel_importance(const Scene& scene, const FilterSettings&
   if (!guides.aovs.contains("N")) return {};
   const Image &albedo = guides.aovs.at("Albedo"), &normal = guides.aovs.at("N");
   const Image value =
-      by_oidn ? denoise(film.mean_image(), &albedo, &normal) : joint_bilateral(film.mean_image(), albedo, normal);
+      oidn ? denoise(film.mean_image(), &albedo, &normal, *oidn) : joint_bilateral(film.mean_image(), albedo, normal);
   std::vector<Spectrum> importance;
   for (int y = 0; y < value.height; ++y)
     for (int x = 0; x < value.width; ++x) {

@@ -22,7 +22,7 @@ Film film_of(const Spectrum& value) {
 
 std::vector<Spectrum> importance_of(const Spectrum& value) {
   const LoadedScene scene = load_sized(kRoom);
-  return pixel_importance(*scene.scene, scene.filter, film_of(value), false, nullptr);
+  return pixel_importance(*scene.scene, scene.filter, film_of(value), std::nullopt, nullptr);
 }
 
 TEST(PixelImportance, IsInverseToTheValue) {

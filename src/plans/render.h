@@ -41,6 +41,7 @@ struct RenderRequest {
   /// Files that keep what the integrator learns (training_file.h), written after the training and read in place of it;
   /// empty: none.
   std::string save_training, load_training;
+  std::string oidn;        ///< where Open Image Denoise is, for integrators that use it; empty: where it is found
   std::string passes;      ///< folder that keeps the films; empty: only while they are not finished
   bool resume = false;     ///< continue films that are there
   bool overwrite = false;  ///< films that are in `passes` may be replaced; without it and `resume` they are an error

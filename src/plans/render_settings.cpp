@@ -80,7 +80,7 @@ void declare_basic(Settings& s, RenderSettings& v) {
   s.one_of("integrator", v.integrator, integrator_names(), "Integrator instead of the scene's", kBasicSamples);
   s.one_of("estimator", v.estimator, estimator_names(), "How samples become the image; none: the mean of one pass",
            kBasicPasses);
-  declare(s, v.denoising);
+  declare(s, v.denoising, false);
   s.group("Rendering");
   s.whole("seed", r.seed, {.low = 0}, "Seed of the random numbers", kBasicSamples);
   s.text_as("resolution", v, "WIDTHxHEIGHT", read_resolution, "Size of the full frame; default: the scene's",
@@ -148,6 +148,20 @@ Estimator estimator_of(const RenderSettings& settings, const OptionValues& of_es
   return with_denoising(make_estimator(settings.estimator, of_estimator), settings.denoising);
 }
 
+RenderRequest request_of(const RenderSettings& settings, const LoadedScene& scene) {
+  RenderRequest request = settings.request;
+  const LearningIntegrator* learning = integrator_of(scene).learning();
+  const std::string& oidn = settings.denoising.oidn;
+  const bool is_surrogate = learning && learning->pilot_by_oidn() && request.load_training.empty();
+  if (is_surrogate && oidn == "off")
+    throw Error(ErrorCode::kUsage, "`cv-surrogate` oidn needs Open Image Denoise, which `oidn` off leaves out");
+  if (!oidn.empty() && !is_surrogate && !settings.denoising.denoises())
+    throw Error(ErrorCode::kUsage,
+                fmt::format("`oidn` has no effect {}, and no training with `cv-surrogate` oidn", kNotDenoised));
+  if (is_surrogate) request.oidn = oidn;
+  return request;
+}
+
 void take_training(const LoadedScene& scene, RenderRequest& request) {
   const LearningIntegrator* learning = integrator_of(scene).learning();
   const uint32_t training = learning ? learning->training_spp() : 0;
@@ -164,8 +178,10 @@ void take_training(const LoadedScene& scene, RenderRequest& request) {
 
 std::vector<std::string> replay_words(OptionValues values, const Pass& pass, const BadSample& bad) {
   std::vector<Option> options = options_of<RenderSettings>();
+  const LearningIntegrator* learning = pass.integrator->learning();
+  const bool is_by_oidn = learning && learning->pilot_by_oidn() && !values.contains("load-training");
   for (const Option& option : options)
-    if (option.effect != OptionEffect::kSamples) values.erase(option.name);
+    if (option.effect != OptionEffect::kSamples && !(option.name == "oidn" && is_by_oidn)) values.erase(option.name);
   values["seed"] = std::to_string(pass.settings.seed);
   const bool is_crn = pass.settings.sampling == Sampling::kCrn, is_sobol = pass.settings.sampler == Sampler::kSobol;
   if (!pass.plan.light) values["sampling"] = is_crn ? "crn" : "independent";

@@ -28,6 +28,10 @@ void declare(Settings& settings, RenderSettings& render);
 /// The estimator with these options of its own, denoised as the settings say. Throws Error(kUsage).
 Estimator estimator_of(const RenderSettings& settings, const OptionValues& of_estimator);
 
+/// The request, with what the scene's integrator takes of the settings. Throws Error(kUsage) for an option that nothing
+/// takes.
+RenderRequest request_of(const RenderSettings& settings, const LoadedScene& scene);
+
 /// Takes the samples of the integrator's training, where it has one, off those of the passes, where their number is
 /// known. Throws Error(kUsage) where none are left.
 void take_training(const LoadedScene& scene, RenderRequest& request);

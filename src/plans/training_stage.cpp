@@ -2,6 +2,7 @@
 #include "plans/training_stage.h"
 
 #include <cmath>
+#include <optional>
 
 #include "core/stop.h"
 #include "core/stopwatch.h"
@@ -17,10 +18,11 @@ bool train(const LoadedScene& scene, const RenderRequest& request, Integrator& i
   LearningIntegrator* learning = integrator.learning();
   settings.seed = request.seed;
   const bool by_oidn = learning && learning->pilot_by_oidn();
-  if (by_oidn && request.load_training.empty()) denoiser_info();  // throws before rendering where there is none
+  if (by_oidn && request.load_training.empty()) denoiser_info({request.oidn});  // throws before rendering
   settings.importance = [&, by_oidn](const Film& film) {
     const Stopwatch surrogate;
-    std::vector<Spectrum> importance = pixel_importance(*scene.scene, settings.filter, film, by_oidn, settings.stop);
+    const std::optional<DenoiseOptions> oidn = by_oidn ? std::optional(DenoiseOptions{request.oidn}) : std::nullopt;
+    std::vector<Spectrum> importance = pixel_importance(*scene.scene, settings.filter, film, oidn, settings.stop);
     seconds.surrogate += surrogate.seconds();
     return importance;
   };

@@ -126,6 +126,25 @@ class Surrogate(LearningTest, CliTest):
         self.assertIn("Open Image Denoise is not there (/nowhere", result.stderr)
         self.assertFalse((self.path / "a.exr").exists())
 
+    def test_by_the_denoiser_that_is_named(self):
+        """Another one that the machine has is not taken."""
+        library = os.environ["STAND_IN_DENOISER"]
+        by_oidn = (*PLAIN, "--spp", "6", "--cv-surrogate", "oidn")
+        nowhere = {**os.environ, "COVARY_OIDN": "/nowhere"}
+        self.good(*PLAIN, "--spp", "6", "-o", "a.exr")
+        self.good(*by_oidn, "-o", "b.exr", "--oidn", library, env=nowhere)
+        self.assertNotEqual(self.pixels("a.exr")["R"], self.pixels("b.exr")["R"])
+        self.good(*by_oidn, "-o", "c.exr", env={**os.environ, "COVARY_OIDN": library})
+        self.assertEqual(self.pixels("b.exr")["R"], self.pixels("c.exr")["R"])
+        replay = self.good(*by_oidn, "--oidn", library, "--replay", "7,5,0", env=nowhere).stdout
+        self.assertNotEqual(replay, self.good(*PLAIN, "--spp", "6", "--replay", "7,5,0").stdout)
+        self.bad(2, "Open Image Denoise is not there (/nowhere/lib.so", *by_oidn, "-o", "d.exr", "--oidn",
+                 "/nowhere/lib.so")
+        self.bad(2, "--cv-surrogate oidn needs Open Image Denoise, which --oidn off leaves out", *by_oidn, "-o",
+                 "d.exr", "--oidn", "off")
+        self.bad(2, "--oidn has no effect without --denoise bias, balanced or error, and no training with "
+                 "--cv-surrogate oidn", *PLAIN, "--spp", "6", "-o", "d.exr", "--oidn", library)
+
     def test_by_a_denoiser_that_is_there(self):
         if self.run_covary("denoise", "--check").returncode != 0:
             self.skipTest("Open Image Denoise is not installed")

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import unittest
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import covary
@@ -78,6 +79,20 @@ class Render(PackageTest):
         self.assert_same_bits(whole.image, resumed.image)
         self.assert_same_bits(resumed.image.reshape(-1, 3), rgb(out))
         self.assertIn("seed", covary.Film.load(str(passes / "crn.exr")).attributes)
+
+    def test_threads_render_one_scene(self):
+        """What an integrator learns belongs to the render, and each of these learns something else."""
+        for integrator in ("controlled-path", "guided-path"):
+            scene = self.scene(integrator=integrator)
+
+            def bits(seed, scene=scene):
+                return covary.render(scene, 24, "none", seed=seed).image.tobytes()
+
+            alone = [bits(seed) for seed in range(4)]
+            self.assertEqual(len(set(alone)), 4)
+            for _ in range(3):
+                with ThreadPoolExecutor(4) as threads:
+                    self.assertEqual(list(threads.map(bits, range(4))), alone, integrator)
 
     def test_progress(self):
         seen = []

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Stands in for Open Image Denoise where tests need one that is at a place of its own: the functions of its interface
+// that covary calls (denoising/denoise.cpp). Its image is the input turned upside down, which no filter makes.
+#include <cstddef>
+#include <map>
+#include <string>
+
+namespace {
+
+struct Plane {
+  float* data;
+  size_t width, height;
+};
+using Filter = std::map<std::string, Plane>;
+
+}  // namespace
+
+extern "C" {
+
+void* oidnNewDevice(int) {
+  static int device;
+  return &device;
+}
+void oidnCommitDevice(void*) {}
+void oidnReleaseDevice(void*) {}
+void oidnSetDeviceInt(void*, const char*, int) {}
+int oidnGetDeviceInt(void*, const char*) { return 20000; }
+int oidnGetDeviceError(void*, const char**) { return 0; }
+void* oidnNewFilter(void*, const char*) { return new Filter; }
+void oidnSetSharedFilterImage(void* filter, const char* name, void* data, int, size_t width, size_t height, size_t,
+                              size_t, size_t) {
+  static_cast<Filter*>(filter)->insert_or_assign(name, Plane{static_cast<float*>(data), width, height});
+}
+void oidnSetFilterBool(void*, const char*, bool) {}
+void oidnSetFilterProgressMonitorFunction(void*, bool (*)(void*, double), void*) {}
+void oidnCommitFilter(void*) {}
+void oidnExecuteFilter(void* filter) {
+  const Plane from = static_cast<Filter*>(filter)->at("color"), to = static_cast<Filter*>(filter)->at("output");
+  const size_t n = 3 * from.width * from.height;
+  for (size_t i = 0; i < n; ++i) to.data[i] = from.data[n - 1 - i];
+}
+void oidnReleaseFilter(void* filter) { delete static_cast<Filter*>(filter); }
+}
