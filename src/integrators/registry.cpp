@@ -6,6 +6,8 @@ namespace covary {
 
 std::shared_ptr<Integrator> make_bdpt(Settings&, const PathLengthSettings&);
 std::shared_ptr<Integrator> make_controlled_path(Settings&, const PathLengthSettings&);
+std::shared_ptr<Integrator> make_depth(Settings&, const PathLengthSettings&);
+std::shared_ptr<Integrator> make_direct(Settings&, const PathLengthSettings&);
 std::shared_ptr<Integrator> make_guided_path(Settings&, const PathLengthSettings&);
 std::shared_ptr<Integrator> make_path(Settings&, const PathLengthSettings&);
 
@@ -13,6 +15,8 @@ std::span<const IntegratorPlugin> integrator_plugins() {
   static constexpr IntegratorPlugin kPlugins[] = {
       {"bdpt", make_bdpt},
       {"controlled-path", make_controlled_path},
+      {"depth", make_depth},
+      {"direct", make_direct},
       {"guided-path", make_guided_path},
       {"path", make_path},
   };

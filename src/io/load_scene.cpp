@@ -16,6 +16,8 @@
 #include "emitters/area.h"
 #include "io/description_key.h"
 #include "io/file_view.h"
+#include "io/held_objects.h"
+#include "io/nested_integrator.h"
 #include "io/object_factory.h"
 #include "io/scene_memory.h"
 #include "io/sensor.h"
@@ -171,6 +173,7 @@ class Loader {
   // ---- putting it together ----
 
   void assemble() {
+    held_ = held_objects(*xml_.scene);
     for (const Property& property : xml_.scene->properties) {
       const ObjectPtr* pointer = std::get_if<ObjectPtr>(&property.value);
       if (!pointer) {
@@ -221,6 +224,9 @@ class Loader {
       place_integrator(object);
     } else if (kind == "bsdf" || kind == "texture") {
       factory_.make(object);  // also those nothing uses, so that their mistakes are found
+    } else if ((kind == "sampler" || kind == "film" || kind == "rfilter") && !object->id.empty()) {
+      factory_.make(object);
+      if (!held_.contains(object.get())) warn_unused(*object);
     } else {
       diagnostics_.error(object->where, fmt::format("<{}> cannot stand inside <scene>", kind));
     }
@@ -367,7 +373,12 @@ class Loader {
     const auto emitter = std::dynamic_pointer_cast<const Emitter>(factory_.make(object));
     if (!emitter) return;
     if (dynamic_cast<const AreaLight*>(emitter.get())) {
-      diagnostics_.error(object->where, "emitter 'area' must stand inside the shape that emits");
+      if (object->id.empty())
+        diagnostics_.error(
+            object->where,
+            "emitter 'area' must stand inside the shape that emits, or have an id to which shapes refer");
+      else if (!held_.contains(object.get()))
+        warn_unused(*object);
       return;
     }
     if (emitter->is_environment()) {
@@ -379,7 +390,15 @@ class Loader {
     parts_.emitters.push_back(emitter);
   }
 
-  void place_integrator(const ObjectPtr& object) {
+  void warn_unused(const ObjectDescription& object) {
+    diagnostics_.warn(object.where, fmt::format("{} '{}' is not used: nothing refers to the id '{}'", object.kind,
+                                                object.type, object.id));
+  }
+
+  void place_integrator(const ObjectPtr& outer) {
+    if (held_.contains(outer.get())) return;  // another one wraps it
+    const ObjectPtr object = rendered_integrator(outer, diagnostics_);
+    if (!object) return;
     if (integrator_) {
       diagnostics_.error(object->where, "a second integrator; the first is at " + integrator_->where.text());
       return;
@@ -448,6 +467,7 @@ class Loader {
   std::vector<std::unique_ptr<ShapeJob>> jobs_;
   std::unordered_map<const ObjectDescription*, ShapeJob*> jobs_by_description_;
   std::unordered_set<const ObjectDescription*> placed_;
+  std::unordered_set<const ObjectDescription*> held_;  // by other objects than the scene
   SceneParts parts_;
   struct GroupLight {
     ShapePtr shape;

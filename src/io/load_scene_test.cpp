@@ -263,7 +263,7 @@ TEST_F(LoadScene, ReportsEveryProblemOfShapesAtOnce) {
       "scene.xml:12:1: shape 'cube': has 2 bsdfs; expected one",
       "scene.xml:12:1: shape 'cube': only an emitter 'area' can be part of a shape",
       "scene.xml:13:20: shape 'cube' cannot hold medium 'homogeneous'",
-      "scene.xml:14:1: emitter 'area' must stand inside the shape that emits",
+      "scene.xml:14:1: emitter 'area' must stand inside the shape that emits, or have an id to which shapes refer",
       "scene.xml:15:1: <medium> cannot stand inside <scene>",
       "scene.xml:16:1: <scene> has no parameter 'gravity'",
   };

@@ -51,6 +51,19 @@ void XmlDefines::add_default(const std::string& name, const std::string& value) 
   entries_.try_emplace(name, Entry{value}).first->second.has_default = true;
 }
 
+namespace {
+
+std::string undefined_parameter(const std::string& name, const std::vector<std::string>& known) {
+  const std::string hint = did_you_mean(name, known);
+  std::string text = fmt::format("parameter '${}' is not defined{}", name, hint);
+  if (!name.empty())
+    text += fmt::format("{}ive it a value by -D {}=VALUE, or by <default name=\"{}\" value=\"…\"/>",
+                        hint.empty() ? "; g" : " Or g", name, name);
+  return text;
+}
+
+}  // namespace
+
 std::string XmlDefines::substitute(std::string_view text) {
   // A few nested defaults could otherwise grow without bound, and many attributes with them.
   constexpr size_t kLongest = size_t{1} << 20, kAll = size_t{1} << 24;
@@ -75,7 +88,7 @@ std::string XmlDefines::substitute(std::string_view text) {
       const std::string name(text.substr(i + 1, end - i - 1));
       std::vector<std::string> known;
       for (const auto& entry : entries_) known.push_back(entry.first);
-      throw Error(ErrorCode::kInput, fmt::format("parameter '${}' is not defined{}", name, did_you_mean(name, known)));
+      throw Error(ErrorCode::kInput, undefined_parameter(name, known));
     }
     best->used = true;
     result += best->value;

@@ -282,7 +282,7 @@ class Reader {
     if (fs::is_directory(folder, ignored)) {
       files_.add_folder(folder.string());
     } else {
-      diagnostics_.error(where, fmt::format("folder '{}' not found", folder.string()));
+      diagnostics_.warn(where, fmt::format("folder '{}' not found", folder.string()));  // an error where a file is not
     }
   }
 
