@@ -132,10 +132,17 @@ GuideImages read_guides(const CombineOptions& o, const Estimator& estimator, con
   if (!estimator.reads_guides)
     throw Error(ErrorCode::kUsage, "--guides is an option of --denoise bias, balanced and error");
   const ImageInfo info = inspect_image(o.guides);
-  GuideImages guides{guide_layer(o.guides, info, "Albedo"), guide_layer(o.guides, info, "N")};
+  const auto find = [&](const char* own, GuideKind kind) {  // own films' as `render` itself has them
+    const bool is_own = std::any_of(info.channels.begin(), info.channels.end(),
+                                    [&](const auto& c) { return c.name.starts_with(std::string(own) + "."); });
+    return is_own ? named_guide(o.guides, info, own) : find_guide(o.guides, info, kind);
+  };
+  GuideImages guides{find("Albedo", GuideKind::kAlbedo), find("N", GuideKind::kNormal)};
   if (!guides.albedo)
     throw Error(ErrorCode::kInput,
-                fmt::format("--guides '{}' has no layer Albedo (Albedo.R, .G, .B), and may have a layer N", o.guides));
+                fmt::format("--guides '{}' has no layer Albedo (Albedo.R, .G, .B) nor what other renderers call "
+                            "so, and may have a layer N",
+                            o.guides));
   for (const auto& guide : {guides.albedo, guides.normal})
     if (guide && (guide->width != file.width() || guide->height != file.height()))
       throw Error(ErrorCode::kInput, fmt::format("--guides '{}' has {} x {} pixels, the images have {} x {}", o.guides,

@@ -35,8 +35,8 @@ constexpr const char* kNetwork = "oidn";
 
 struct Options {
   std::vector<std::string> inputs;
-  std::string output, mode, oidn;
-  bool no_guides = false, clean_guides = false, check = false, quiet = false;
+  std::string output, mode, oidn, albedo, normal;
+  bool no_guides = false, clean_guides = false, check = false, quiet = false, force = false;
 
   DenoiseOptions denoiser() const { return {oidn}; }
 };
@@ -53,16 +53,21 @@ void warn_of_values(const std::string& path, const Image& image) {
     fmt::print(stderr, "warning: {}: {} of {} values are not finite; they count as 0\n", path, n, image.data.size());
 }
 
-/// The layers DenoisingAlbedo and DenoisingNormal, or Albedo and N, each the mean of the files that have it.
-struct GuideLayers {
+/// The layers that guide, each the mean of the files that have it.
+class GuideLayers {
+ public:
   std::optional<Image> albedo, normal;
 
   explicit GuideLayers(const Options& o) {
     if (o.no_guides) return;
-    albedo = mean_layer(o.inputs, "DenoisingAlbedo");
-    if (albedo) normal = mean_layer(o.inputs, "DenoisingNormal");
-    if (!albedo) albedo = mean_layer(o.inputs, "Albedo");
-    if (albedo && !normal) normal = mean_layer(o.inputs, "N");
+    for (const std::string& path : o.inputs) {
+      const ImageInfo info = inspect_image(path);
+      add(path, guide(path, info, o.albedo, GuideKind::kAlbedo), albedo, n_albedo_);
+      add(path, guide(path, info, o.normal, GuideKind::kNormal), normal, n_normal_);
+    }
+    divide(albedo, n_albedo_);
+    divide(normal, n_normal_);
+    if (!albedo) normal.reset();  // Open Image Denoise takes normals beside an albedo alone
   }
   Guides view() const { return {albedo ? &*albedo : nullptr, normal ? &*normal : nullptr}; }
   const char* text() const {
@@ -70,25 +75,35 @@ struct GuideLayers {
   }
 
  private:
-  static std::optional<Image> mean_layer(const std::vector<std::string>& paths, const std::string& name) {
-    std::optional<Image> sum;
-    float n = 0;
-    for (const std::string& path : paths) {
-      const std::optional<Image> layer = guide_layer(path, inspect_image(path), name);
-      if (!layer) continue;
-      n += 1;
-      if (!sum)
-        sum = layer;
-      else if (sum->data.size() != layer->data.size())
-        throw Error(ErrorCode::kInput, fmt::format("'{}' has {} x {} pixels, others have {} x {}", path, layer->width,
-                                                   layer->height, sum->width, sum->height));
-      else
-        std::transform(sum->data.begin(), sum->data.end(), layer->data.begin(), sum->data.begin(), std::plus<>());
-    }
+  static std::optional<Image> guide(const std::string& path, const ImageInfo& info, const std::string& name,
+                                    GuideKind kind) {
+    if (name.empty()) return find_guide(path, info, kind);
+    Image found = named_guide(path, info, name);
+    if (found.width != info.place.window.width || found.height != info.place.window.height)
+      throw Error(ErrorCode::kInput,
+                  fmt::format("'{}' has {} x {} pixels, '{}' {} x {}", name, found.width, found.height, path,
+                              info.place.window.width, info.place.window.height));
+    return found;
+  }
+
+  static void add(const std::string& path, std::optional<Image> layer, std::optional<Image>& sum, float& n) {
+    if (!layer) return;
+    n += 1;
+    if (!sum)
+      sum = std::move(layer);
+    else if (sum->data.size() != layer->data.size())
+      throw Error(ErrorCode::kInput, fmt::format("'{}' has {} x {} pixels, others have {} x {}", path, layer->width,
+                                                 layer->height, sum->width, sum->height));
+    else
+      std::transform(sum->data.begin(), sum->data.end(), layer->data.begin(), sum->data.begin(), std::plus<>());
+  }
+
+  static void divide(std::optional<Image>& sum, float n) {
     if (sum)
       for (float& value : sum->data) value /= n;
-    return sum;
   }
+
+  float n_albedo_ = 0, n_normal_ = 0;
 };
 
 void denoise_by_network(const Options& o, const GuideLayers& guides, ProgressLine& progress) {
@@ -136,6 +151,7 @@ void denoise_by_mixture(const Options& o, const GroupedFile& file, const GuideLa
       with_denoising(make_estimator(kNoEstimator), DenoisingChoice{o.mode.empty() ? "error" : o.mode, o.oidn});
   request.settings.std_error = true;
   request.settings.guides = guides.view();
+  request.force = o.force;
   request.checked = [&](const InputFindings& found) {
     progress.clear();
     print_findings(found.findings, o.quiet);
@@ -165,6 +181,7 @@ bool is_by_network(const Options& o) { return o.mode == kNetwork || (o.mode.empt
 void check_options(const Options& o) {
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
   if (o.inputs.empty() || o.output.empty()) usage("expected are IN.exr and -o OUT.exr, or --check");
+  if (o.no_guides && !(o.albedo + o.normal).empty()) usage("--albedo and --normal: with --no-guides there are none");
   if (o.no_guides && o.clean_guides) usage("--clean-guides: with --no-guides there are none");
   for (size_t i = 0; i < o.inputs.size(); ++i)
     for (size_t k = 0; k < i; ++k)
@@ -203,7 +220,7 @@ void add_denoise(CLI::App& app) {
   CLI::App* command = app.add_subcommand("denoise", "Denoise an image, or several renders of different seeds");
   command
       ->add_option("IN", o->inputs,
-                   "Linear image (EXR); its layers DenoisingAlbedo and DenoisingNormal, or Albedo and N, are guides. "
+                   "Linear image (EXR); its layers of albedo and normal are guides, by the names of any renderer. "
                    "Several renders of any renderer that "
                    "differ in their seed alone, or a film with groups, give a better image and its error")
       ->type_name(kFileValue)
@@ -222,10 +239,17 @@ void add_denoise(CLI::App& app) {
                    "environment that holds it; 'off': mixtures without it")
       ->type_name("off|LIBRARY");
   command->add_flag("--check", o->check, "Print version and path of Open Image Denoise as it is found, and do nothing");
+  command
+      ->add_option("--albedo", o->albedo,
+                   "The guide of reflectance, where its layer has another name, or a file of its own; default: what "
+                   "the renderer calls so")
+      ->type_name("LAYER|FILE");
+  command->add_option("--normal", o->normal, "The same for normals, from -1 to 1")->type_name("LAYER|FILE");
   command->add_flag("--no-guides", o->no_guides, "Do not use these layers");
   command->add_flag("--clean-guides", o->clean_guides,
                     "With --mode oidn, denoise these layers first, each alone: less error where they are noisy, for "
                     "three times the time");
+  command->add_flag("--force", o->force, "Denoise even where the renders do not fit each other");
   command->add_flag("--quiet", o->quiet, "No summary");
   command->callback([o] { run(*o); });
 }

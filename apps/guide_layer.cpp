@@ -2,18 +2,65 @@
 #include "guide_layer.h"
 
 #include <algorithm>
+#include <array>
+#include <filesystem>
+#include <span>
 
 #include "denoising/denoise.h"
 
 namespace covary {
+namespace {
 
-std::optional<Image> guide_layer(const std::string& path, const ImageInfo& info, const std::string& name) {
-  const auto n = std::count_if(info.channels.begin(), info.channels.end(),
-                               [&](const ExrFile::Channel& c) { return c.name.starts_with(name + "."); });
-  if (n != 3) return std::nullopt;
-  Image guide = read_image(path, name).image;
-  check_guide(path + ": the layer " + name, guide);
+/// Last parts of layers' names, those first that see through mirrors and glass. Sources: docs/other-renderers.md.
+constexpr std::array<std::string_view, 7> kAlbedo = {
+    "DenoisingAlbedo",   // covary --aovs
+    "Denoising Albedo",  // Blender
+    "denoise_albedo",    // Arnold
+    "Albedo",            // covary, pbrt-v4
+    "albedo",            // Mitsuba 3 by our example, RenderMan
+    "ALBEDO",            // LuxCore
+    "VRayDiffuseFilter"  // V-Ray
+};
+constexpr std::array<std::string_view, 9> kNormal = {
+    "DenoisingNormal",     // covary --aovs
+    "Denoising Normal",    // Blender
+    "Ns",                  // pbrt-v4: of shading
+    "N",                   // covary, Arnold, pbrt-v4: of the geometry
+    "sh_normal",           // Mitsuba 3
+    "normal",              // RenderMan
+    "AVG_SHADING_NORMAL",  // LuxCore
+    "bump_normals",        // V-Ray
+    "normals"              // V-Ray
+};
+
+bool has_three_channels(const ImageInfo& info, const std::string& layer) {
+  return std::count_if(info.channels.begin(), info.channels.end(), [&](const ExrFile::Channel& c) {
+           return c.name.starts_with(layer + ".") && c.name.find('.', layer.size() + 1) == std::string::npos;
+         }) == 3;
+}
+
+Image checked_guide(const std::string& path, const std::string& layer) {
+  Image guide = read_image(path, layer).image;
+  check_guide(path + (layer.empty() ? "" : ": the layer " + layer), guide);
   return guide;
+}
+
+}  // namespace
+
+std::optional<Image> find_guide(const std::string& path, const ImageInfo& info, GuideKind kind) {
+  const std::vector<std::string> layers = image_layers(info.channels);
+  const auto names = kind == GuideKind::kAlbedo ? std::span<const std::string_view>(kAlbedo) : std::span(kNormal);
+  for (const std::string_view name : names)
+    for (const std::string& layer : layers)
+      if (last_part(layer) == name && has_three_channels(info, layer)) return checked_guide(path, layer);
+  return std::nullopt;
+}
+
+Image named_guide(const std::string& path, const ImageInfo& info, const std::string& layer_or_file) {
+  const std::vector<std::string> layers = image_layers(info.channels);
+  if (std::find(layers.begin(), layers.end(), layer_or_file) != layers.end()) return checked_guide(path, layer_or_file);
+  if (std::filesystem::exists(layer_or_file)) return checked_guide(layer_or_file, "");
+  return checked_guide(path, layer_or_file);  // says which layers there are
 }
 
 }  // namespace covary

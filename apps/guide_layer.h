@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Layers of an image that guide a denoiser.
+// Layers of an image that guide a denoiser, by the names that renderers give them.
 #pragma once
 
 #include <optional>
@@ -9,8 +9,15 @@
 
 namespace covary {
 
-/// Layer `name` of the image at `path`, if it has one with three channels that begin so. Throws as read_image() and
+/// Albedo and normal of the first surface that is not a mirror or glass, or of the first one.
+enum class GuideKind { kAlbedo, kNormal };
+
+/// The layer of the image at `path` that some renderer calls so (docs/other-renderers.md has the table); where several
+/// do, the first of the table. Throws as read_image() and check_guide().
+std::optional<Image> find_guide(const std::string& path, const ImageInfo& info, GuideKind kind);
+
+/// A guide that the user names: a layer of the image at `path`, or a file of its own. Throws as read_image() and
 /// check_guide().
-std::optional<Image> guide_layer(const std::string& path, const ImageInfo& info, const std::string& name);
+Image named_guide(const std::string& path, const ImageInfo& info, const std::string& layer_or_file);
 
 }  // namespace covary

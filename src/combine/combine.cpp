@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "combine/difference_checks.h"
 #include "combine/light_film.h"
 #include "core/error.h"
 #include "core/memory_limit.h"
@@ -119,6 +120,9 @@ InputFindings examine(const CombineRequest& request) {
   if (request.crn) check_origins(crn_origin, independent.origin, inputs.findings);
   check_light(crn_origin, independent.origin, request.light ? &request.light->origin : nullptr, inputs.findings);
   InputChecks checks(independent.width, independent.height, request.crn ? request.crn->groups : 0, independent.groups);
+  // Of renders by others: films of covary tell by themselves how they were made.
+  const bool by_others = !request.crn && independent.origin.sampling.empty();
+  DifferenceChecks differences(independent.width, independent.height, by_others ? independent.groups : 0);
   const int step = std::max(kFewestRows, rows_in_memory(request));
   bool checkable = true;
   for (int y = 0; y < independent.height && checkable; y += step) {
@@ -126,8 +130,10 @@ InputFindings examine(const CombineRequest& request) {
     const GroupedImage g = rows_of(request.crn, y, n), h = independent.rows(y, n);
     checkable = !request.estimator.adaptive || (!lacks_samples(g) && !lacks_samples(h));
     if (checkable) checks.add_rows(g, h);
+    differences.add_rows(h);
   }
   inputs.report = checkable ? checks.report() : unchecked_report();
+  if (errors_text(inputs.report.findings).empty()) differences.report(inputs.report.findings);
   inputs.findings.insert(inputs.findings.end(), inputs.report.findings.begin(), inputs.report.findings.end());
   return inputs;
 }

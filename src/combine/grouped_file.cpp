@@ -11,6 +11,7 @@
 #include <numeric>
 
 #include "core/error.h"
+#include "film/image_file.h"
 #include "film/splat_layer.h"
 
 namespace covary {
@@ -28,27 +29,28 @@ std::string attribute(const ExrFile& file, const std::string& key) {
   return it == file.attributes().end() ? "" : it->second;
 }
 
-/// Prefixes P ("" or "name.") for which PR, PG, PB exist, in the file's order.
-std::vector<std::string> layer_prefixes(const ExrFile& file) {
-  std::vector<std::string> prefixes;
-  for (const ExrFile::Channel& channel : file.channels()) {
-    if (channel.name != "R" && !channel.name.ends_with(".R")) continue;
-    const std::string prefix = channel.name.substr(0, channel.name.size() - 1);
-    if (file.find(prefix + "G") && file.find(prefix + "B")) prefixes.push_back(prefix);
-  }
-  return prefixes;
+/// The attribute that holds the samples per pixel: of covary's films, or cycles.LAYER.samples of Blender's images; ""
+/// where there is none, or one for each of several layers.
+std::string samples_key(const ExrFile& file) {
+  const char* own = "covary:samples";
+  if (file.attributes().contains(own)) return own;
+  std::string found;
+  for (const auto& [key, text] : file.attributes())
+    if (key.starts_with("cycles.") && key.ends_with(".samples")) {
+      if (!found.empty()) return "";
+      found = key;
+    }
+  return found;
 }
 
-std::string layer_name(const std::string& prefix) { return prefix.empty() ? "" : prefix.substr(0, prefix.size() - 1); }
-
-/// Mean number of samples per pixel as covary's films tell it; 0: not told.
+/// Mean number of samples per pixel as the file tells it; 0: not told.
 double samples_per_pixel(const ExrFile& file, const std::string& path) {
-  const std::string text = attribute(file, "covary:samples");
+  const std::string key = samples_key(file), text = key.empty() ? "" : attribute(file, key);
   if (text.empty()) return 0;
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size() || !(value >= 0 && value < 1e15))
-    fail(path, fmt::format("attribute covary:samples is '{}'; expected is a number of samples per pixel", text));
+    fail(path, fmt::format("attribute {} is '{}'; expected is a number of samples per pixel", key, text));
   return value;
 }
 
@@ -60,52 +62,46 @@ std::pair<std::string, int> split_number(const std::string& name) {
   return {name.substr(0, digits), std::stoi(name.substr(digits))};
 }
 
-std::string list_layers(const ExrFile& file, const std::vector<std::string>& prefixes) {
+std::string list_layers(const ExrFile& file, const std::vector<ColourLayer>& layers) {
   std::vector<std::string> names;
-  for (const std::string& p : prefixes) names.push_back(p.empty() ? "R,G,B" : fmt::format("'{}'", layer_name(p)));
+  for (const ColourLayer& l : layers) names.push_back(l.name.empty() ? "R,G,B" : fmt::format("'{}'", l.name));
   if (!names.empty()) return fmt::format("images in it: {}", fmt::join(names, ", "));
   for (const ExrFile::Channel& c : file.channels()) names.push_back(c.name);
   return fmt::format("channels in it: {}", fmt::join(names, ", "));
 }
 
 /// Numbered layers STEM0, STEM1, …, in the order of their numbers; `stem` "" takes the only stem there is.
-std::vector<std::string> numbered_layers(const std::vector<std::string>& prefixes, const std::string& stem) {
-  std::vector<std::pair<int, std::string>> found;
+std::vector<ColourLayer> numbered_layers(const std::vector<ColourLayer>& layers, const std::string& stem) {
+  std::vector<std::pair<int, const ColourLayer*>> found;
   std::string first_stem;
-  for (const std::string& prefix : prefixes) {
-    const auto [name, number] = split_number(layer_name(prefix));
+  for (const ColourLayer& layer : layers) {
+    const auto [name, number] = split_number(layer.name);
     if (number < 0 || (!stem.empty() && name != stem)) continue;
     if (found.empty()) first_stem = name;
     if (name != first_stem) return {};
-    found.emplace_back(number, prefix);
+    found.emplace_back(number, &layer);
   }
-  std::sort(found.begin(), found.end());
-  std::vector<std::string> result;
-  for (const auto& [number, prefix] : found) result.push_back(prefix);
+  std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::vector<ColourLayer> result;
+  for (const auto& [number, layer] : found) result.push_back(*layer);
   return result;
 }
 
 /// The one image of a file.
-std::string single_layer(const std::string& path, const ExrFile& file, const std::vector<std::string>& prefixes,
-                         const std::string& layer) {
-  const auto has = [&](const std::string& prefix) {
-    return std::find(prefixes.begin(), prefixes.end(), prefix) != prefixes.end();
-  };
-  if (!layer.empty()) {
-    if (has(layer + ".")) return layer + ".";
-    std::vector<std::string> names;
-    for (const std::string& p : prefixes) names.push_back(layer_name(p));
-    fail(path, fmt::format("no image '{}'{}; {}", layer, did_you_mean(layer, names), list_layers(file, prefixes)));
+const ColourLayer& single_layer(const std::string& path, const ExrFile& file, const std::vector<ColourLayer>& layers,
+                                const std::string& name) {
+  if (name.empty()) {
+    if (const ColourLayer* picture = find_picture(layers)) return *picture;
+    fail(path, fmt::format("{}; {}",
+                           layers.empty() ? "no image of channels R, G and B" : "several images; name one by its layer",
+                           list_layers(file, layers)));
   }
-  if (has("")) return "";
-  if (prefixes.size() == 1) return prefixes[0];
-  std::vector<std::string> combined;
-  for (const std::string& p : prefixes)
-    if (p.ends_with("Combined.")) combined.push_back(p);
-  if (combined.size() == 1) return combined[0];
-  fail(path, fmt::format("{}; {}",
-                         prefixes.empty() ? "no image of channels R, G and B" : "several images; name one by its layer",
-                         list_layers(file, prefixes)));
+  std::vector<std::string> names;
+  for (const ColourLayer& layer : layers) {
+    if (layer.name == name) return layer;
+    names.push_back(layer.name);
+  }
+  fail(path, fmt::format("no image '{}'{}; {}", name, did_you_mean(name, names), list_layers(file, layers)));
 }
 
 }  // namespace
@@ -129,29 +125,26 @@ void GroupedFile::add_file(const std::string& path, const std::string& layer, bo
              file.place().frame_width, file.place().frame_height, place_.window.width, place_.window.height,
              place_.window.x, place_.window.y, place_.frame_width, place_.frame_height));
 
-  const std::vector<std::string> prefixes = layer_prefixes(file);
-  const std::vector<std::string> numbered = numbered_layers(prefixes, layer);
+  const std::vector<ColourLayer> layers = colour_layers(file.channels());
+  const std::vector<ColourLayer> numbered = numbered_layers(layers, layer);
   const size_t first_group = groups_.size();
   if (numbered.size() > 1) {
     if (!only_file)
       fail(path,
            fmt::format("holds {} groups; give one file with all groups, or one file with one image for each group",
                        numbered.size()));
-    for (const std::string& prefix : numbered) groups_.push_back({0, prefix});
+    for (const ColourLayer& group : numbered) groups_.push_back({0, group.channels});
   } else {
-    groups_.push_back({files_.size() - 1, single_layer(path, file, prefixes, layer)});
+    groups_.push_back({files_.size() - 1, single_layer(path, file, layers, layer).channels});
   }
-  for (size_t g = first_group; g < groups_.size(); ++g)
-    for (const char* c : {"R", "G", "B"}) {
-      const std::string& type = file.find(groups_[g].prefix + c)->type;
-      if (type == "uint")
-        fail(path, fmt::format("channel {}{} holds integers; expected are float values", groups_[g].prefix, c));
-      has_half_ |= type == "half";
-    }
-
   std::vector<std::string> read;
   for (size_t g = first_group; g < groups_.size(); ++g)
-    for (const char* c : {"R", "G", "B"}) read.push_back(groups_[g].prefix + c);
+    for (const std::string& channel : groups_[g].channels) {
+      const std::string& type = file.find(channel)->type;
+      if (type == "uint") fail(path, fmt::format("channel {} holds integers; expected are float values", channel));
+      has_half_ |= type == "half";
+      read.push_back(channel);
+    }
   file.check(read);
   take_film_facts(path, file, only_file && (numbered.size() > 1 || layer.empty()));
 }
@@ -245,8 +238,8 @@ void GroupedFile::read_rows(int first_row, int n_rows, Rows& rows) const {
     for (size_t g = 0; g < groups_.size(); ++g) {
       if (groups_[g].file != f) continue;
       for (size_t c = 0; c < 3; ++c)
-        planes.push_back({groups_[g].prefix + "RGB"[c], ExrPlane::Type::kFloat, rows.data.data() + 3 * g + c,
-                          per_pixel * sizeof(float)});
+        planes.push_back(
+            {groups_[g].channels[c], ExrPlane::Type::kFloat, rows.data.data() + 3 * g + c, per_pixel * sizeof(float)});
     }
     for (size_t c = 0; has_variance_ && c < 3; ++c)
       planes.push_back({std::string(kVariance) + "." + "RGB"[c], ExrPlane::Type::kFloat,

@@ -4,6 +4,7 @@
 // height.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -17,9 +18,9 @@ namespace covary {
 class GroupedFile {
  public:
   /// One path: all groups, as layers that differ in a number (group00.R, group00.G, …), or a single image. Several
-  /// paths: one image each, the groups in the order given. An image is R, G, B, or NAME.R, NAME.G, NAME.B; where a file
-  /// holds several, Blender's "Combined" pass is taken if there is one, and `layer` names it otherwise (or the layers
-  /// of the groups without their number). Throws Error(kIo), and Error(kInput) with the layers there are.
+  /// paths: one image each, the groups in the order given. An image is a colour layer of film/image_file.h; where a
+  /// file holds several, the picture among them is taken if there is one, and `layer` names it otherwise (or the
+  /// layers of the groups without their number). Throws Error(kIo), and Error(kInput) with the layers there are.
   explicit GroupedFile(const std::vector<std::string>& paths, const std::string& layer = "");
 
   int width() const { return place_.window.width; }
@@ -63,7 +64,7 @@ class GroupedFile {
  private:
   struct Group {
     size_t file;
-    std::string prefix;  ///< of the channel names: "" or "name."
+    std::array<std::string, 3> channels;
   };
   void add_file(const std::string& path, const std::string& layer, bool only_file);
   /// What films of covary tell. Groups of one film follow from its counts; others must have equal numbers of samples.

@@ -84,6 +84,8 @@ TEST_F(GroupedFileTest, ReadsPassesOfOtherRenderers) {
   const std::vector<std::string> blender = {"ViewLayer.Combined", "ViewLayer.DiffCol", "ViewLayer.Emit"};
   expect_groups(GroupedFile({write("blender0.exr", blender, 0), write("blender1.exr", blender, 5)}), {0, 5});
   expect_groups(GroupedFile({write("blender0.exr", blender)}, "ViewLayer.Emit"), {2});
+  // RenderMan.
+  expect_groups(GroupedFile({write("renderman.exr", {"albedo", "Ci"})}), {1});
   // pbrt-v4 (GBufferFilm) and Mitsuba 3 (AOV integrator): R G B beside named images.
   expect_groups(GroupedFile({write("pbrt.exr", {"", "Albedo"}, 0)}), {0});
   expect_groups(GroupedFile({write("mitsuba.exr", {"", "nn"}, 0)}, "nn"), {1});
@@ -120,10 +122,10 @@ TEST_F(GroupedFileTest, ReadsTheCountsOfAFilm) {
 }
 
 TEST_F(GroupedFileTest, SaysWhatIsWrong) {
-  const std::string two = write("two.exr", {"beauty", "depth"}), plain = write("plain.exr", {""});
-  EXPECT_EQ(message({two}), "two.exr: several images; name one by its layer; images in it: 'beauty', 'depth'");
-  EXPECT_EQ(message({two}, "beuty"),
-            "two.exr: no image 'beuty'; did you mean 'beauty'?; images in it: 'beauty', 'depth'");
+  const std::string two = write("two.exr", {"ambient", "depth"}), plain = write("plain.exr", {""});
+  EXPECT_EQ(message({two}), "two.exr: several images; name one by its layer; images in it: 'ambient', 'depth'");
+  EXPECT_EQ(message({two}, "ambiant"),
+            "two.exr: no image 'ambiant'; did you mean 'ambient'?; images in it: 'ambient', 'depth'");
   EXPECT_EQ(message({plain, write("groups.exr", {"", "g0", "g1"})}),
             "groups.exr: holds 2 groups; give one file with all groups, or one file with one image for each group");
   EXPECT_EQ(message({plain, write("wide.exr", {""}, 0, {}, 9)}),

@@ -46,6 +46,11 @@ std::string lower(std::string text) {
   return text;
 }
 
+/// How renderers name the channels of a colour, in small letters.
+constexpr std::array kSuffixes = {std::array{"r", "g", "b"}, std::array{"red", "green", "blue"}};
+/// What they call the picture among their layers, in small letters (docs/other-renderers.md).
+constexpr std::array kPictures = {"combined", "ci", "c", "rgba", "rgb", "beauty"};
+
 /// The channels of `layer` when it has three that belong together, or one of luminance; empty when not.
 std::vector<std::string> find_layer(const std::vector<ExrFile::Channel>& channels, const std::string& layer) {
   const std::string prefix = layer.empty() ? "" : layer + ".";
@@ -54,7 +59,7 @@ std::vector<std::string> find_layer(const std::vector<ExrFile::Channel>& channel
       if (c.name.starts_with(prefix) && lower(c.name.substr(prefix.size())) == suffix) return c.name;
     return std::string();
   };
-  for (const auto& suffixes : {std::array{"r", "g", "b"}, std::array{"x", "y", "z"}}) {
+  for (const auto& suffixes : {kSuffixes[0], kSuffixes[1], std::array{"x", "y", "z"}}) {
     std::vector<std::string> names{find(suffixes[0]), find(suffixes[1]), find(suffixes[2])};
     // X Y Z without a layer would be a colour space, not the components of a vector.
     if (!names[0].empty() && !names[1].empty() && !names[2].empty() && (suffixes[0][0] == 'r' || !layer.empty()))
@@ -64,6 +69,22 @@ std::vector<std::string> find_layer(const std::vector<ExrFile::Channel>& channel
   return grey.empty() ? std::vector<std::string>{} : std::vector{grey, grey, grey};
 }
 
+/// Channels by the layer they are of, and the layers' names in the file's order.
+struct ChannelsByLayer {
+  std::vector<std::string> names;
+  std::unordered_map<std::string, std::vector<ExrFile::Channel>> channels;
+
+  explicit ChannelsByLayer(const std::vector<ExrFile::Channel>& all) {
+    for (const ExrFile::Channel& c : all) {
+      const size_t dot = c.name.rfind('.');
+      const std::string name = dot == std::string::npos ? "" : c.name.substr(0, dot);
+      std::vector<ExrFile::Channel>& members = channels[name];
+      if (members.empty()) names.push_back(name);
+      members.push_back(c);
+    }
+  }
+};
+
 struct Layer {
   std::string name;
   std::vector<std::string> channels;  ///< three, or one three times
@@ -72,18 +93,10 @@ struct Layer {
 /// What may be given as a layer: every prefix with three channels. Looks at each channel a few times, whatever their
 /// number.
 std::vector<Layer> find_layers(const std::vector<ExrFile::Channel>& channels) {
-  std::vector<std::string> names;
-  std::unordered_map<std::string, std::vector<ExrFile::Channel>> by_name;
-  for (const ExrFile::Channel& c : channels) {
-    const size_t dot = c.name.rfind('.');
-    const std::string name = dot == std::string::npos ? "" : c.name.substr(0, dot);
-    std::vector<ExrFile::Channel>& members = by_name[name];
-    if (members.empty()) names.push_back(name);
-    members.push_back(c);
-  }
+  const ChannelsByLayer by_layer(channels);
   std::vector<Layer> layers;
-  for (const std::string& name : names)
-    if (std::vector<std::string> found = find_layer(by_name[name], name); !found.empty())
+  for (const std::string& name : by_layer.names)
+    if (std::vector<std::string> found = find_layer(by_layer.channels.at(name), name); !found.empty())
       layers.push_back({name, std::move(found)});
   return layers;
 }
@@ -105,6 +118,8 @@ std::vector<std::string> layer_channels(const std::string& path, const std::vect
   if (!names.empty()) return names;
   const std::vector<Layer> layers = find_layers(channels);
   if (layer.empty() && layers.size() == 1) return layers[0].channels;
+  const std::vector<ColourLayer> colours = layer.empty() ? colour_layers(channels) : std::vector<ColourLayer>();
+  if (const ColourLayer* picture = find_picture(colours)) return {picture->channels.begin(), picture->channels.end()};
   for (const ExrFile::Channel& c : channels)
     if (!layer.empty() && c.name == layer) return {c.name, c.name, c.name};
   std::string known, all;
@@ -198,6 +213,42 @@ PlacedImage read_image(const std::string& path, const std::string& layer, Checks
     }
   }
   return result;
+}
+
+std::vector<ColourLayer> colour_layers(const std::vector<ExrFile::Channel>& channels) {
+  const ChannelsByLayer by_layer(channels);
+  std::vector<ColourLayer> layers;
+  for (const std::string& name : by_layer.names)
+    for (const auto& suffixes : kSuffixes) {
+      ColourLayer layer{name, {}};
+      for (const ExrFile::Channel& c : by_layer.channels.at(name)) {
+        const std::string suffix = lower(std::string(last_part(c.name)));
+        const auto found = std::find(suffixes.begin(), suffixes.end(), suffix);
+        if (found != suffixes.end()) layer.channels[found - suffixes.begin()] = c.name;
+      }
+      const auto is_missing = [](const std::string& channel) { return channel.empty(); };
+      if (std::none_of(layer.channels.begin(), layer.channels.end(), is_missing)) layers.push_back(std::move(layer));
+    }
+  return layers;
+}
+
+const ColourLayer* find_picture(std::span<const ColourLayer> layers) {
+  for (const ColourLayer& layer : layers)
+    if (layer.name.empty()) return &layer;
+  if (layers.size() == 1) return &layers[0];
+  const ColourLayer* picture = nullptr;
+  for (const ColourLayer& layer : layers) {
+    if (std::find(kPictures.begin(), kPictures.end(), lower(std::string(last_part(layer.name)))) == kPictures.end())
+      continue;
+    if (picture) return nullptr;
+    picture = &layer;
+  }
+  return picture;
+}
+
+std::string_view last_part(std::string_view name) {
+  const size_t dot = name.rfind('.');
+  return dot == std::string_view::npos ? name : name.substr(dot + 1);
 }
 
 std::vector<std::string> image_layers(const std::vector<ExrFile::Channel>& channels) {

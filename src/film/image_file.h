@@ -2,8 +2,10 @@
 // Images of any renderer: EXR by OpenEXR, all other formats by imageio/image_io.h.
 #pragma once
 
+#include <array>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/srgb.h"
@@ -37,9 +39,9 @@ void check_image(const std::string& path);
 void require_image_memory(const std::string& path, int width, int height, double bytes_per_pixel);
 
 /// Reads three channels as linear RGB (integer files are decoded from sRGB). `layer` chooses among the channels of a
-/// file: "N" for N.X N.Y N.Z, "group03" for group03.R/G/B, or a single channel's whole name, shown grey; "" is R G B,
-/// or Y, or the only layer there is. Throws like inspect_image; an unknown layer is Error(kInput) that names those
-/// there are.
+/// file: "N" for N.X N.Y N.Z, "group03" for group03.R/G/B, or a single channel's whole name, shown grey; "" is the
+/// picture (find_picture), or Y, or the only layer there is. Throws like inspect_image; an unknown layer is
+/// Error(kInput) that names those there are.
 PlacedImage read_image(const std::string& path, const std::string& layer = "",
                        ChecksumPolicy checksums = ChecksumPolicy::kCheck);
 /// Several layers, which share no channel, of one reading of the file, in the file's window; throws like read_image.
@@ -48,6 +50,23 @@ std::vector<Image> read_layers(const std::string& path, std::span<const std::str
 /// The three channels (one for grey, given three times) that `layer` means among `channels`; throws like read_image.
 std::vector<std::string> layer_channels(const std::string& path, const std::vector<ExrFile::Channel>& channels,
                                         const std::string& layer);
+
+/// Three channels of one colour image in a file.
+struct ColourLayer {
+  std::string name;  ///< "" for R G B
+  std::array<std::string, 3> channels;
+};
+
+/// Layers of red, green and blue in the file's order: R G B, as covary, Mitsuba, pbrt and Blender name them, r g b
+/// (RenderMan), red green blue (V-Ray).
+std::vector<ColourLayer> colour_layers(const std::vector<ExrFile::Channel>& channels);
+
+/// Which of them is the picture, where no layer is named: the one without a name, the only one, or the only one that
+/// some renderer calls its picture: Combined (Blender), Ci (RenderMan), C, RGBA, rgb, beauty. Null where none is.
+const ColourLayer* find_picture(std::span<const ColourLayer> layers);
+
+/// The last part of a layer's name: "Combined" of "ViewLayer.Combined".
+std::string_view last_part(std::string_view name);
 
 /// Every layer that read_image takes from these channels, in their order: "" for R G B, names of three channels that
 /// belong together ("N"), then each channel that is in none of these by its whole name.

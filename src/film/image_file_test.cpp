@@ -83,7 +83,7 @@ TEST(ImageFile, ReadsTiles) {
 TEST(ImageFile, ReadsPartsAsLayers) {
   const std::string path = test_file("parts.exr");
   std::vector<Imf::Header> headers;
-  for (const char* name : {"beauty", "depth"}) {
+  for (const char* name : {"ambient", "depth"}) {
     Imf::Header header(4, 3);
     header.setName(name);
     header.setType(Imf::SCANLINEIMAGE);
@@ -103,9 +103,9 @@ TEST(ImageFile, ReadsPartsAsLayers) {
     }
   }
   EXPECT_EQ(read_image(path, "depth").image.rgb(3, 2), Spectrum(2));
-  EXPECT_EQ(read_image(path, "beauty").image.rgb(0, 0), Spectrum(1));
+  EXPECT_EQ(read_image(path, "ambient").image.rgb(0, 0), Spectrum(1));
   EXPECT_TRUE(
-      contains(message_of([&] { read_image(path); }), "choose a layer (layers: beauty, depth; channels: beauty.B"));
+      contains(message_of([&] { read_image(path); }), "choose a layer (layers: ambient, depth; channels: ambient.B"));
 }
 
 TEST(ImageFile, RejectsDeepPixels) {

@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import random
 import struct
 import unittest
 
@@ -12,6 +13,12 @@ from render_test import ROOM, SMALL, RenderTest
 
 # Without Open Image Denoise, so that results do not depend on what is installed.
 PLAIN = ("--oidn", "off")
+
+
+def exponential_noise(seed):
+    """Numbers of an exponential distribution, as noise of renders is skewed."""
+    generator = random.Random(seed)
+    return lambda: generator.expovariate(1)
 
 
 class Denoise(RenderTest):
@@ -124,6 +131,68 @@ class Denoise(RenderTest):
         (self.path / "copy.exr").write_bytes((self.path / "plain.exr").read_bytes())
         self.bad(1, "all groups are identical: the same seed was rendered twice", "denoise", "plain.exr", "copy.exr",
                  "-o", "e.exr", *PLAIN)
+
+    def test_layers_of_other_renderers(self):
+        """Picture, albedo and normal by each renderer's names (docs/other-renderers.md)."""
+        noise, n, size = exponential_noise(5), 48 * 32, (48, 32)
+        names = {
+            "blender": ("ViewLayer.Combined.R G B", "ViewLayer.Denoising Albedo.R G B",
+                        "ViewLayer.Denoising Normal.X Y Z"),
+            "mitsuba": ("R G B", "albedo.R G B", "sh_normal.X Y Z"),
+            "pbrt": ("R G B", "Albedo.R G B", "Ns.X Y Z"),
+            "arnold": ("R G B", "denoise_albedo.R G B", "N.X Y Z"),
+            "renderman": ("Ci.r g b", "albedo.r g b", "normal.r g b"),
+            "v-ray": ("R G B", "VRayDiffuseFilter.red green blue", "bump_normals.X Y Z"),
+        }
+
+        def channels(layer):
+            first, *others = layer.rsplit(" ", 2)
+            stem, dot, letter = first.rpartition(".")
+            return [stem + dot + c for c in (letter, *others)]
+
+        results = set()
+        albedo, normal = [0.2 + 0.6 * (i % 48 > 24) for i in range(n)], [0.5] * n
+        pictures = [[a * noise() for a in albedo] for _ in range(2)]
+        for renderer, (picture, albedo_name, normal_name) in names.items():
+            for i, values in enumerate(pictures):
+                layers = {c: values for c in channels(picture)}
+                layers.update({c: albedo for c in channels(albedo_name)})
+                layers.update({c: normal for c in channels(normal_name)})
+                layers.update({f"other.{c}": normal for c in "RGB"})
+                self.write(f"{renderer}{i}.exr", exr(layers, size))
+            files = (f"{renderer}0.exr", f"{renderer}1.exr")
+            said = self.good("denoise", *files, "-o", f"{renderer}.exr", *PLAIN).stderr
+            self.assertIn("guided by albedo and normal", said, renderer)
+            results.add(tuple(read_exr((self.path / f"{renderer}.exr").read_bytes())["R"]))
+        self.assertEqual(len(results), 1, "the same pixels by every renderer's names")
+        # Guides by name, and in files of their own as LuxCore writes them.
+        self.write("albedo.exr", exr({c: albedo for c in "RGB"}, size))
+        two = ("denoise", "mitsuba0.exr", "mitsuba1.exr", "-o", "a.exr", *PLAIN)
+        said = self.good(*two, "--albedo", "albedo.exr", "--normal", "sh_normal").stderr
+        self.assertIn("guided by albedo and normal", said)
+        self.bad(1, "no layer 'albdo'; did you mean 'albedo'?", *two, "--albedo", "albdo")
+        self.write("small.exr", exr({c: [0.5] * 6 for c in "RGB"}, (3, 2)))
+        self.bad(1, "'small.exr' has 3 x 2 pixels, 'mitsuba0.exr' 48 x 32", *two, "--albedo", "small.exr")
+        self.bad(2, "--albedo and --normal: with --no-guides there are none", *two, "--no-guides", "--albedo", "x")
+
+    def test_renders_that_do_not_fit(self):
+        noise, n, size = exponential_noise(6), 96 * 64, (96, 64)
+        grey = lambda values, **more: exr({c: values for c in "RGB"}, size, **more)  # noqa: E731
+        first, second = ([noise() for _ in range(n)] for _ in range(2))
+        self.write("a.exr", grey(first))
+        self.write("b.exr", grey(second))
+        self.write("bright.exr", grey([1.5 * v for v in second]))
+        smooth = [[sum(values[max(0, i - 7):i + 8]) / 15 for i in range(n)] for values in (first, second)]
+        self.write("smooth0.exr", grey(smooth[0]))
+        self.write("smooth1.exr", grey(smooth[1]))
+        out = ("-o", "out.exr", *PLAIN)
+        self.good("denoise", "a.exr", "b.exr", *out)
+        self.bad(1, "exposure", "denoise", "a.exr", "bright.exr", *out)
+        self.bad(1, "they were denoised before", "denoise", "smooth0.exr", "smooth1.exr", *out)
+        self.good("denoise", "smooth0.exr", "smooth1.exr", *out, "--force")
+        for name, samples in (("few", "16"), ("many", "64")):
+            self.write(f"{name}.exr", grey(first, attributes={"cycles.ViewLayer.samples": samples}))
+        self.bad(1, "has 64 samples per pixel, the group before it 16", "denoise", "few.exr", "many.exr", *out)
 
     def test_few_samples_of_a_single_pass(self):
         options = ("--estimator", "none", "--denoise", "error", *PLAIN)

@@ -1,0 +1,30 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""blender -b SCENE.blend -P denoise_blender.py: two renders by Cycles with different seeds, a.exr and b.exr. Then:
+
+    covary denoise a.exr b.exr -o out.exr
+
+Runs as well where `import bpy` does (pip install bpy): python denoise_blender.py SCENE.blend [SAMPLES]
+"""
+import os
+import sys
+
+import bpy
+
+arguments = [] if bpy.data.filepath else sys.argv[1:]
+if arguments:
+    bpy.ops.wm.open_mainfile(filepath=os.path.abspath(arguments[0]))
+scene = bpy.context.scene
+scene.render.engine = "CYCLES"
+if len(arguments) > 1:
+    scene.cycles.samples = int(arguments[1])
+scene.cycles.use_denoising = False  # covary denoises
+scene.cycles.use_adaptive_sampling = False
+for layer in scene.view_layers:
+    layer.cycles.denoising_store_passes = True  # albedo and normal
+scene.render.image_settings.file_format = "OPEN_EXR_MULTILAYER"
+scene.render.image_settings.color_depth = "32"
+for seed, name in enumerate(("a.exr", "b.exr")):
+    scene.cycles.seed = seed
+    scene.render.filepath = os.path.abspath(name)
+    bpy.ops.render.render(write_still=True)
