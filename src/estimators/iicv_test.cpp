@@ -104,19 +104,21 @@ TEST(Iicv, ConservationAgreesWithTheReference) {
 
 /// Rare light: a CRN image that misses it in whole regions, entirely or but for a little of its own.
 struct RareLight {
+  static constexpr int width = 41, height = 27;
   test::Grouped crn, independent;
-  explicit RareLight(uint64_t seed, int width = 41, int height = 27)
+  /// `trace`: of other light, part of all, in the black regions. One of `rarity` groups of the independent image has
+  /// found the light.
+  explicit RareLight(uint64_t seed, float trace = 0, float rarity = 3)
       : crn(test::crn_image(width, height, 12, seed)),
         independent(test::independent_image(width, height, 12, seed + 1)) {
     for (int y = 0; y < height; ++y)
       for (int x = 0; x < width; ++x)
         for (int t = 0; t < 12; ++t) {
-          // One of three groups of the independent image has found the light.
-          const bool found = test::noise(seed + 9, static_cast<uint64_t>(y) * width + x, t) + 0.5f < 1.0f / 3;
+          const bool found = test::noise(seed + 9, static_cast<uint64_t>(y) * width + x, t) + 0.5f < 1 / rarity;
           for (int c = 0; c < 3; ++c) {
-            if (is_black(x)) crn.pixel(x, y)[3 * t + c] = 0;
+            if (is_black(x)) crn.pixel(x, y)[3 * t + c] *= trace;
             if (is_dim(x)) crn.pixel(x, y)[3 * t + c] *= 0.02f;
-            if (is_black(x) || is_dim(x)) independent.pixel(x, y)[3 * t + c] *= found ? 3.0f : 0.0f;
+            if (is_black(x) || is_dim(x)) independent.pixel(x, y)[3 * t + c] *= found ? rarity : trace;
           }
         }
   }
@@ -165,6 +167,27 @@ TEST(Iicv, FindsTheLightThatTheCrnImageMisses) {
   EXPECT_LT(error, 0.25 * of_independent);
   EXPECT_GT(predicted, 0.5 * error);
   EXPECT_LT(predicted, 4 * error);
+}
+
+/// A little light of another lamp leaves a variance that is as little, and no certainty either.
+TEST(Iicv, FindsTheLightThatTheCrnImageMissesButForATrace) {
+  for (const float trace : {0.0f, 1e-5f, 1e-3f, 1e-2f}) {
+    int dark = 0, certain = 0, all = 0;
+    for (const uint64_t seed : {1, 5, 9}) {
+      const RareLight in(seed, trace, 50);
+      IicvOptions options;
+      options.std_error = true;
+      const EstimatorResult result = iicv(in.crn.view(), in.independent.view(), options);
+      for (int y = 0; y < RareLight::height; ++y)
+        for (int x = 0; RareLight::is_black(x + 3); ++x, ++all) {
+          const double truth = test::expected(x, y, 1), value = result.estimate.pixel(x, y)[1];
+          dark += value < truth / 5;
+          certain += 10 * result.std_error.pixel(x, y)[1] < std::abs(value - truth);
+        }
+    }
+    EXPECT_LT(dark, all / 20) << trace;
+    EXPECT_LT(certain, all / 50) << trace;
+  }
 }
 
 /// The published estimate stays; its error is told.

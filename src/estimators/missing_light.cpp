@@ -13,6 +13,10 @@ using namespace lanes;
 
 /// Squared: how many standard deviations a difference must have to be beyond noise.
 constexpr float kSignificant = 9;
+/// The same where the CRN image does not tell its own noise: of K bright pixels alone, a difference has K.
+constexpr float kLeastSignificant = 2;
+/// Least variance of a CRN pixel, relative to that of an independent one, that is believed.
+constexpr float kCredible = 0.01f;
 /// Squared: differences between pixels that are alike, relative to the missing light.
 constexpr float kAlike = 1.0f / 16;
 
@@ -42,9 +46,9 @@ Planes tolerance(const Moments& g, const Moments& h, const std::vector<unsigned 
   return result;
 }
 
-/// D of missing_light.h and its variance, summed over RGB.
+/// D of missing_light.h, and summed over RGB its variance v and the variance V of a pixel of h.
 struct Difference {
-  vfloat mean[3] = {}, variance = {};
+  vfloat mean[3] = {}, variance = {}, of_pixel = {};
 };
 
 Difference guided_difference(const Moments& g, const Moments& h, int x, int y, vfloat squared_bandwidth) {
@@ -69,9 +73,11 @@ Difference guided_difference(const Moments& g, const Moments& h, int x, int y, v
         variance += load(h.variance_of_mean.row(c, y + dy) + x + dx);
       }
       sum.variance += w * w * variance;
+      sum.of_pixel += w * variance;
     }
   for (vfloat& m : sum.mean) m /= weights;
   sum.variance /= weights * weights;
+  sum.of_pixel /= weights;
   return sum;
 }
 
@@ -86,7 +92,8 @@ Planes missing_light(const Moments& g, const Moments& h, const std::vector<unsig
     for (int c = 0; c < 3; ++c) own += load(g.variance_of_mean.row(c, y) + x);
     const Difference d = guided_difference(g, h, x, y, own + load(alike.row(0, y) + x));
     const vfloat squares = d.mean[0] * d.mean[0] + d.mean[1] * d.mean[1] + d.mean[2] * d.mean[2];
-    const vfloat noise = kSignificant * (own + d.variance);
+    const vfloat known = min(own / max(kCredible * d.of_pixel, splat(1e-30f)), splat(1));
+    const vfloat noise = max(kSignificant * known, splat(kLeastSignificant)) * (own + d.variance);
     const vfloat beyond = lanes::sqrt(max(1.0f - noise / max(squares, splat(1e-30f)), vfloat{}));
     const vfloat brighter = d.mean[0] + d.mean[1] + d.mean[2] > 0.0f ? beyond : vfloat{};
     const vfloat part = own > 0.0f ? brighter : splat(1);

@@ -8,13 +8,16 @@
 //
 // is what is missing from g_i. tau is a quarter of the difference of both images over the whole window, beyond its own
 // noise, so that pixels count as alike that differ by little compared with the light they lack. With v the variance of
-// D, sigma^2(g_i) and v summed over RGB, the missing light is
+// D, V the mean variance of h in the same pixels, and sigma^2(g_i), all summed over RGB, the missing light is
 //
-//     c_i = D_i sqrt(1 - 9 (sigma^2(g_i) + v_i) / ||D_i||^2)^+    where D is positive,
-//         = D_i                                                   where sigma(g_i) = 0: no sample says how sure g_i is.
+//     c_i = D_i sqrt(1 - s_i (sigma^2(g_i) + v_i) / ||D_i||^2)^+    where D is positive,
+//     s_i = 9 min(1, 100 sigma^2(g_i) / V_i), but at least 2,
+//     c_i = D_i                                                     where sigma(g_i) = 0.
 //
 // So nothing is missing where the noise of both images explains the difference, as nearly everywhere, and where both
-// are equal in all pixels alike, such as lights seen directly.
+// are equal in all pixels alike, such as lights seen directly. Samples of g_i have the distribution of those of h_i:
+// where their variance is far below that of h, it does not tell how sure g_i is, and less evidence will do: light of
+// more than two samples.
 #pragma once
 
 #include <vector>

@@ -115,17 +115,19 @@ inline RgbImage missing_light(const GroupedImage& crn, const GroupedImage& indep
     const double tau2 = std::max(0.0, std::pow(difference / n, 2) - 3 * noise / n / 121) / 48;
     const double bandwidth = std::max(sum(own.noise_g) + tau2, 1e-30);
     Rgb d{};
-    double weights = 0, variance = 0;
+    double weights = 0, variance = 0, of_pixel = 0;
     each([&](const Of& q, double count) {
       const double w = count * std::exp(-distance2(q.g, own.g) / bandwidth);
       weights += w;
+      of_pixel += w * sum(q.noise_h);
       variance += w * w * sum(q.noise_h);
       for (int c = 0; c < 3; ++c) d[c] += w * (q.h[c] - q.g[c]);
     });
     for (double& v : d) v /= weights;
     variance /= weights * weights;
     const double own_noise = sum(own.noise_g), squares = std::max(distance2(d, {0, 0, 0}), 1e-30);
-    const double beyond = std::sqrt(std::max(0.0, 1 - 9 * (own_noise + variance) / squares));
+    const double known = std::min(1.0, own_noise / std::max(0.01 * of_pixel / weights, 1e-30));
+    const double beyond = std::sqrt(std::max(0.0, 1 - std::max(9 * known, 2.0) * (own_noise + variance) / squares));
     const double part = own_noise > 0 ? (sum(d) > 0 ? beyond : 0) : 1;
     for (double& v : d) v *= part;
     return d;
