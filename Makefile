@@ -13,6 +13,8 @@
 #   make lint             formatting, static analysis, rules of the tree    ALL=1 analyses all files, not changed ones
 #   make install          build for every x86-64 processor (docs/library.md) and install under PREFIX (default
 #                         /usr/local); ARCH=native builds for this machine alone, in a third of the time
+#   make deb              a package of Debian, of what `make install` installs, in dist/
+#   make docs             the documentation as a site, build/site/index.html (Sphinx, from PyPI)
 #   make wheel            the Python package as a wheel for every x86-64 processor, and its sources, in dist/
 #                         (docs/python.md); ARCH=native for machines like this alone
 #   make blender          the add-on of Blender as dist/covary-blender.zip; with the program of a wheel in dist/, if any
@@ -37,7 +39,8 @@ CONFIGURE = -DCOVARY_ARCH=$(ARCH) -DCOVARY_WERROR=$(WERROR)
 # Install for every processor unless ARCH was given.
 INSTALL = $(if $(filter file,$(origin ARCH)),portable,release)
 
-.PHONY: all setup configure build demo test check nightly bench lint install wheel blender dev clang asan tsan clean
+.PHONY: all setup configure build demo test check nightly bench lint install deb docs wheel blender dev clang asan tsan
+.PHONY: clean
 all: build
 
 setup:
@@ -80,6 +83,15 @@ install: setup
 	  -DCOVARY_WERROR=$(WERROR) > /dev/null
 	@cmake --build build/$(INSTALL) -j $(JOBS) --target covary
 	@cmake --install build/$(INSTALL) --prefix $(PREFIX)
+
+deb: setup
+	@cmake --preset $(INSTALL) $(if $(filter release,$(INSTALL)),-DCOVARY_ARCH=$(ARCH)) \
+	  -DCOVARY_WERROR=$(WERROR) > /dev/null
+	@cmake --build build/$(INSTALL) -j $(JOBS) --target covary
+	@cd build/$(INSTALL) && cpack -G DEB -B $(CURDIR)/dist
+
+docs:
+	@scripts/docs build/site
 
 wheel: setup
 	@WERROR=$(WERROR) JOBS=$(JOBS) scripts/wheel $(if $(filter file,$(origin ARCH)),portable,$(ARCH)) dist
