@@ -192,6 +192,24 @@ void solve_cell(Level& level, uint32_t i, const Level* above, const std::vector<
     level.scales[i] = best_share(level.system(i), level.scales[i], settings.prior_vertices, settings.monochrome);
 }
 
+/// Finest first; `resolution` of that, or 0 for no others.
+std::vector<Level> levels_of(const SystemSums& sums, uint32_t resolution, size_t n_lights) {
+  std::vector<Level> levels;
+  levels.push_back(finest_level(sums, n_lights));
+  if (resolution == 0) return levels;
+  for (; resolution > kCoarsest; resolution = (resolution + 1) / 2)
+    levels.push_back(coarser_level(levels.back(), n_lights, false));
+  levels.push_back(coarser_level(levels.back(), n_lights, true));
+  return levels;
+}
+
+std::vector<size_t> lights_per_cell(const std::vector<Level>& levels) {
+  std::vector<size_t> lights;
+  for (const Level& level : levels)
+    for (uint32_t i = 0; i < level.n_cells(); ++i) lights.push_back(level.n_lights(i));
+  return lights;
+}
+
 /// Adds the cells of a level to a table; `first_above` is the number of the first cell of the level above there.
 void add_to_table(Level& level, uint32_t first_above, CoefficientTable& table) {
   std::vector<CoefficientTable::NewCell> cells(level.n_cells());
@@ -232,31 +250,30 @@ void CoefficientCache::restart() {
 
 void CoefficientCache::absorb(const SystemSums& sums) {
   sums_.merge(sums);
-  const auto needed = [&] { return sums_.bytes() + CoefficientTable::expected_bytes(sums_.n_cells(), sums_.n_rows()); };
-  while (needed() > settings_.memory_limit && settings_.resolution >> sums_.level() > 0) {
-    SystemSums coarser(layout_, sums_.level() + 1);
-    coarser.merge(sums_);
-    sums_ = std::move(coarser);
-  }
+  const auto needed = [&] {
+    return sums_.bytes() + std::max(table_.bytes(), CoefficientTable::expected_bytes(sums_.n_cells(), sums_.n_rows()));
+  };
+  while (needed() > settings_.memory_limit && can_coarsen()) coarsen();
+}
+
+void CoefficientCache::coarsen() {
+  SystemSums coarser(layout_, sums_.level() + 1);
+  coarser.merge(sums_);
+  sums_ = std::move(coarser);
 }
 
 void CoefficientCache::update() {
-  CellGrid grid = finest_;
-  for (level_ = 0; level_ < sums_.level(); ++level_) grid = grid.coarser();
-  table_ = CoefficientTable(grid, static_cast<uint32_t>(light_counts_.size()), layout_.n_dense);
-  if (sums_.n_cells() == 0) return;
-
-  std::vector<Level> levels;  // finest first
-  levels.push_back(finest_level(sums_, light_counts_.size()));
-  if (settings_.pyramid) {
-    for (uint32_t resolution = grid.resolution(); resolution > kCoarsest; resolution = (resolution + 1) / 2)
-      levels.push_back(coarser_level(levels.back(), light_counts_.size(), false));
-    levels.push_back(coarser_level(levels.back(), light_counts_.size(), true));
+  std::vector<Level> levels;
+  for (;;) {
+    CellGrid grid = finest_;
+    for (level_ = 0; level_ < sums_.level(); ++level_) grid = grid.coarser();
+    table_ = CoefficientTable(grid, static_cast<uint32_t>(light_counts_.size()), layout_.n_dense);
+    if (sums_.n_cells() == 0) return;
+    levels = levels_of(sums_, settings_.pyramid ? grid.resolution() : 0, light_counts_.size());
+    table_.reserve(lights_per_cell(levels));
+    if (sums_.bytes() + table_.bytes() <= settings_.memory_limit || !can_coarsen()) break;
+    coarsen();
   }
-  std::vector<size_t> lights_per_cell;
-  for (const Level& level : levels)
-    for (uint32_t i = 0; i < level.n_cells(); ++i) lights_per_cell.push_back(level.n_lights(i));
-  table_.reserve(lights_per_cell);
   uint32_t first_above = 0, first = 0;
   for (size_t l = levels.size(); l-- > 0; first_above = first, first = table_.n_cells()) {
     const Level* above = l + 1 < levels.size() ? &levels[l + 1] : nullptr;

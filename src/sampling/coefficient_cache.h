@@ -70,6 +70,9 @@ class CoefficientCache {
   const CacheSettings& settings() const { return settings_; }
 
  private:
+  bool can_coarsen() const { return settings_.resolution >> sums_.level() > 0; }
+  void coarsen();
+
   CacheSettings settings_;
   CellGrid finest_;
   std::vector<float> light_counts_;

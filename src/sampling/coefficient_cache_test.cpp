@@ -307,6 +307,20 @@ TEST(CoefficientCache, BecomesCoarserWhenMemoryIsShort) {
   EXPECT_NEAR(m.plain, m.controlled, 4 * std::sqrt(m.plain_squared / 20000));
 }
 
+TEST(CoefficientCache, KeepsToAnyLimitOfMemory) {
+  const Room room(40, smooth_light);
+  CacheSettings settings;
+  settings.resolution = 256;
+  for (double limit = 1 << 19; limit < 1 << 23; limit *= 1.15) {
+    settings.memory_limit = static_cast<size_t>(limit);
+    CoefficientCache cache = make_cache(room, settings);
+    for (uint32_t first : {0u, 30u, 60u}) {
+      room.train(cache, first, 30);
+      EXPECT_LE(cache.bytes(), settings.memory_limit) << cache.n_coarsened() << " times coarser";
+    }
+  }
+}
+
 std::string refused(std::string_view bytes, const std::string& key) {
   try {
     CoefficientTable::from_bytes(bytes, key, "a.training");

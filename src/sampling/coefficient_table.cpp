@@ -104,7 +104,7 @@ void CoefficientTable::reserve(std::span<const size_t> lights_per_cell) {
   size_t n_slots = slots_.size();
   for (const size_t n : lights_per_cell) n_slots += n_slots_of(slots_for(n));
   const size_t n_cells = cells_.size() + lights_per_cell.size();
-  cells_.reserve(n_cells), dense_.reserve(n_cells * n_dense_), slots_.reserve(n_slots);
+  index_.reserve(n_cells), cells_.reserve(n_cells), dense_.reserve(n_cells * n_dense_), slots_.reserve(n_slots);
 }
 
 uint32_t CoefficientTable::slots_for(size_t n_lights) const {
