@@ -43,6 +43,9 @@ enum class Event : uint32_t {
   kTechnique,       ///< choice between BSDF and guiding
   kGuide,           ///< direction from guiding
   kConnection,      ///< choices of bidirectional connections
+  kDistance,        ///< to the next collision with a medium (streams of flights: medium_flight.h)
+  kCollision,       ///< what happens there; at vertex 0: the channel after which distances are drawn
+  kShadowDistance,  ///< as kDistance, on the way to a light sample
 };
 inline constexpr uint32_t kEventsPerVertex = 16;
 

@@ -7,6 +7,7 @@
 
 #include "core/arena.h"
 #include "core/parallel.h"
+#include "integrators/medium_flight.h"
 #include "integrators/path_steps.h"
 
 namespace covary {
@@ -39,16 +40,45 @@ bool follow(const Scene& scene, const PathRandom& random, Arena& arena, Ray ray,
   return true;
 }
 
+/// Where there are media: goes on to the first surface that is more than a boundary, as the sample's path does, or to
+/// the collision before it. Then the values are the scattering albedo there, no normal, and the position; true. False:
+/// `ray` is the one to that surface, or leaves the scene.
+bool ends_in_medium(const Scene& scene, const PathRandom& random, Ray& ray, AuxiliarySample& values) {
+  const Medium* medium = scene.camera_medium();
+  const int channel = channel_of(random);
+  FlightNumbers numbers(random, 0);
+  SpectralWeights weights;
+  SurfaceHit hit;
+  for (;;) {
+    const bool found = scene.intersect(ray, hit);
+    const float far = found ? hit.t : ray.t_max;
+    if (const float t = medium ? fly(*medium, ray, far, channel, numbers, weights, nullptr) : kInfinity;
+        t < kInfinity) {
+      values[2] = ray.at(t);
+      const Medium::Coefficients here = medium->at(values[2]);
+      for (int c = 0; c < 3; ++c)
+        values[0][c] = here.extinction[c] > 0 ? std::clamp(here.scattering[c] / here.extinction[c], 0.0f, 1.0f) : 0;
+      values[3] = values[0];
+      return true;
+    }
+    if (!found || hit.bsdf_flags != kNullTransmission) return false;
+    if (hit.shape->bounds_medium()) medium = hit.shape->medium_towards(hit.ng, ray.d);
+    ray = Ray{offset_origin(hit, ray.d), ray.d, kInfinity};
+  }
+}
+
 AuxiliarySample auxiliary_sample(const Scene& scene, const CameraSample& sample, Arena& arena) {
   AuxiliarySample values{};
+  Ray ray = sample.ray;
+  if (scene.has_media() && ends_in_medium(scene, sample.random, ray, values)) return values;
   SurfaceHit hit;
-  if (!scene.intersect(sample.ray, hit)) return values;
+  if (!scene.intersect(ray, hit)) return values;
   values[0] = values[3] = to_vec(hit.bsdf->albedo(hit));
   values[1] = values[4] = hit.frame.n;
   values[2] = hit.p;
   if (hit.bsdf_flags & kSmooth) return values;
   Spectrum throughput(1);
-  if (!follow(scene, sample.random, arena, sample.ray, hit, throughput)) {
+  if (!follow(scene, sample.random, arena, ray, hit, throughput)) {
     values[3] = values[4] = {};
     return values;
   }

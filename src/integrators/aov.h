@@ -23,6 +23,9 @@ inline constexpr int kFollowedBounces = 8;
 ///                      the mirrors and panes of glass before it let through, in [0, 1]
 ///     DenoisingNormal  its shading normal in world space
 ///
+/// In participating media a ray ends where the sample's path first scatters, if that comes before a surface: with the
+/// scattering albedo there, no normal, and the position. Boundaries of media (bsdf `null`) are then passed.
+///
 /// Where a ray meets a surface of mirror or glass, one direction is drawn as a path's is, at most kFollowedBounces
 /// times; a ray that is still between mirrors then takes the last of them. Rays that leave the scene count as zero. The
 /// film positions and random numbers are those of the first `spp` samples of the pass of these settings, whose own

@@ -19,6 +19,7 @@ class DepthIntegrator final : public Integrator {
     for (size_t i = 0; i < samples.size(); ++i)
       if (batch.ray_hits[i].found()) samples[i].radiance = Spectrum(batch.ray_hits[i].t);
   }
+  bool sees_media() const override { return true; }  // distances do not depend on them
   std::string description() const override { return "depth"; }
 };
 

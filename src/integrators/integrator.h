@@ -108,9 +108,14 @@ class Integrator : public SceneObject {
   virtual std::optional<int> longest_path() const { return {}; }
   /// What it cannot see of the scene, as warnings.
   virtual std::vector<std::string> blind_spots(const Scene& /*scene*/) const { return {}; }
+  /// Whether it follows light through participating media.
+  virtual bool sees_media() const { return false; }
   /// After the render.
   virtual IntegratorReport report() const { return {}; }
 };
+
+/// Throws Error(kInput), "FILE:LINE: medium '…': …", where the scene has media and the integrator does not see them.
+void require_sees_media(const Integrator& integrator, const Scene& scene);
 
 inline PathContext::PathContext(const Integrator& integrator) : state(integrator.make_thread_state()) {}
 

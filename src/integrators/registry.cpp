@@ -2,6 +2,8 @@
 // One line per integrator.
 #include "integrators/integrator.h"
 
+#include "core/error.h"
+
 namespace covary {
 
 std::shared_ptr<Integrator> make_bdpt(Settings&, const PathLengthSettings&);
@@ -13,12 +15,8 @@ std::shared_ptr<Integrator> make_path(Settings&, const PathLengthSettings&);
 
 std::span<const IntegratorPlugin> integrator_plugins() {
   static constexpr IntegratorPlugin kPlugins[] = {
-      {"bdpt", make_bdpt},
-      {"controlled-path", make_controlled_path},
-      {"depth", make_depth},
-      {"direct", make_direct},
-      {"guided-path", make_guided_path},
-      {"path", make_path},
+      {"bdpt", make_bdpt},     {"controlled-path", make_controlled_path}, {"depth", make_depth},
+      {"direct", make_direct}, {"guided-path", make_guided_path},         {"path", make_path},
   };
   return kPlugins;
 }
@@ -59,6 +57,13 @@ std::shared_ptr<Integrator> make_integrator(const IntegratorPlugin& plugin, Sett
   PathLengthSettings lengths;
   declare(settings, lengths);
   return plugin.make(settings, lengths);
+}
+
+void require_sees_media(const Integrator& integrator, const Scene& scene) {
+  if (!scene.has_media() || integrator.sees_media()) return;
+  const std::string text = integrator.description();
+  throw Error(ErrorCode::kInput, scene.first_medium() + ": the integrator '" + text.substr(0, text.find(' ')) +
+                                     "' does not see participating media; 'path' does");
 }
 
 void declare(Settings& s, PathLengthSettings& v) {

@@ -17,6 +17,7 @@
 #include "io/description_key.h"
 #include "io/file_view.h"
 #include "io/held_objects.h"
+#include "io/media.h"
 #include "io/nested_integrator.h"
 #include "io/object_factory.h"
 #include "io/scene_memory.h"
@@ -222,7 +223,7 @@ class Loader {
       sensor_made_ = std::dynamic_pointer_cast<const SensorSettings>(factory_.make(object));
     } else if (kind == "integrator") {
       place_integrator(object);
-    } else if (kind == "bsdf" || kind == "texture") {
+    } else if (kind == "bsdf" || kind == "texture" || is_part_of_media(kind)) {
       factory_.make(object);  // also those nothing uses, so that their mistakes are found
     } else if ((kind == "sampler" || kind == "film" || kind == "rfilter") && !object->id.empty()) {
       factory_.make(object);
@@ -238,10 +239,12 @@ class Loader {
     if (bsdfs.size() > 1) p.error(fmt::format("has {} bsdfs; expected one", bsdfs.size()));
     const auto emitters = p.children<Emitter>("emitter");
     if (emitters.size() > 1) p.error(fmt::format("has {} emitters; expected one", emitters.size()));
+    const ShapeMedia media = read_media(p, job.in_group);
     if (job.asked_everything) p.report_unknown();
     if (!job.shape) return;
 
     job.shape->set_bsdf(bsdfs.empty() ? default_bsdf(!emitters.empty()) : bsdfs[0]);
+    use_media(media, p, *job.shape, bsdfs.empty(), parts_);
     if (!emitters.empty()) {
       const auto* area = dynamic_cast<const AreaLight*>(emitters[0].get());
       if (!area) {
@@ -404,9 +407,10 @@ class Loader {
       return;
     }
     integrator_ = object;
-    result_.integrator_type = object->type;
-    if (!options_.make_integrator) return;
     ObjectDescription changed = *object;
+    name_path(changed);
+    result_.integrator_type = changed.type;
+    if (!options_.make_integrator) return;
     for (const Property& property : options_.integrator_properties) {
       std::erase_if(changed.properties, [&](const Property& p) { return p.name == property.name; });
       changed.properties.push_back(property);
@@ -416,6 +420,7 @@ class Loader {
   }
 
   void set_up_camera(const SensorSettings& sensor) {
+    if (sensor.medium) use_camera_medium(sensor.medium, *sensor_, parts_);
     FilmSettings film = sensor.film;
     if (options_.width > 0 || options_.height > 0) {
       if (options_.width > 0) film.width = options_.width;

@@ -242,7 +242,7 @@ TEST_F(LoadScene, ReportsEveryProblemOfShapesAtOnce) {
 <shape type="cube"><bsdf type="diffuse"/><bsdf type="diffuse"/><emitter type="point"/></shape>
 <shape type="cube"><medium type="homogeneous"/></shape>
 <emitter type="area"/>
-<medium type="homogeneous"/>
+<subsurface type="dipole"/>
 <float name="gravity" value="9.81"/>)");
   const char* expected[] = {
       "scene.xml:6:1: unknown shape 'pli'; did you mean 'ply'? Supported: 'cube', 'cylinder', 'disk', 'instance', "
@@ -251,8 +251,8 @@ TEST_F(LoadScene, ReportsEveryProblemOfShapesAtOnce) {
       "scene.xml:7:19: parameter 'filename' of shape 'ply' names 'short.ply': PLY: the file ends, or a number cannot "
       "be read, in "
       "face 1 of 2",
-      "scene.xml:7:62: unknown parameter 'smooth' of shape 'ply'; known: 'face_normals', 'filename', 'flip_normals', "
-      "'flip_tex_coords', 'to_world'",
+      "scene.xml:7:62: unknown parameter 'smooth' of shape 'ply'; known: 'exterior', 'face_normals', 'filename', "
+      "'flip_normals', 'flip_tex_coords', 'interior', 'to_world'",
       "scene.xml:8:19: parameter 'filename' of shape 'obj' names 'bad.obj': OBJ: line 2: vertex 2 does not exist; "
       "there are 1",
       "scene.xml:9:1: shape 'ply': the string 'filename' is missing",
@@ -264,7 +264,7 @@ TEST_F(LoadScene, ReportsEveryProblemOfShapesAtOnce) {
       "scene.xml:12:1: shape 'cube': only an emitter 'area' can be part of a shape",
       "scene.xml:13:20: shape 'cube' cannot hold medium 'homogeneous'",
       "scene.xml:14:1: emitter 'area' must stand inside the shape that emits, or have an id to which shapes refer",
-      "scene.xml:15:1: <medium> cannot stand inside <scene>",
+      "scene.xml:15:1: <subsurface> cannot stand inside <scene>",
       "scene.xml:16:1: <scene> has no parameter 'gravity'",
   };
   size_t from = 0;  // in this order

@@ -9,6 +9,7 @@
 #include "bsdfs/registry.h"
 #include "emitters/registry.h"
 #include "io/sensor.h"
+#include "media/registry.h"
 #include "textures/registry.h"
 
 namespace covary {
@@ -76,6 +77,9 @@ std::shared_ptr<const SceneObject> SceneFactory::create(const ObjectDescription&
   if (description.kind == "texture") return through(texture_plugins());
   if (description.kind == "bsdf") return through(bsdf_plugins());
   if (description.kind == "emitter") return through(emitter_plugins());
+  if (description.kind == "medium") return through(medium_plugins());
+  if (description.kind == "phase") return through(phase_plugins());
+  if (description.kind == "volume") return through(volume_plugins());
   const auto settings = setting_plugins(description.kind);
   if (!settings.empty()) return through(settings);
   diagnostics_.error(description.where, fmt::format("<{}> is not supported here", description.kind));

@@ -132,6 +132,7 @@ std::shared_ptr<SensorSettings> make_sensor(Parameters& p) {
                                      p.get_float("principal_point_offset_y", 0)};
   }
   for (const char* time : {"shutter_open", "shutter_close"}) p.get_float(time, 0);  // nothing moves
+  sensor->medium = only_child<Medium>(p, "medium");
   if (const auto film = only_child<FilmSettings>(p, "film")) sensor->film = *film;
   if (const auto sampler = only_child<SamplerSettings>(p, "sampler")) sensor->sampler = *sampler;
   return sensor;

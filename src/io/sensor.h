@@ -26,6 +26,7 @@ struct SamplerSettings : SceneObject {
 /// <sensor>: the camera still without its film size, which the command line may change.
 struct SensorSettings : SceneObject {
   CameraSettings camera;
+  MediumPtr medium;  ///< in which the camera stands; null: none
   FilmSettings film;
   SamplerSettings sampler;
 };

@@ -46,6 +46,7 @@ std::shared_ptr<Integrator> prepared_integrator(const LoadedScene& scene, const 
     throw Error(ErrorCode::kUsage,
                 "the paths of this integrator have no light part that could have numbers of its own; "
                 "integrators that trace light have");
+  require_sees_media(*integrator, *scene.scene);
   integrator->prepare(*scene.scene);
   if (tracer) {
     const CropWindow window = window_of(scene, request);

@@ -259,6 +259,20 @@ TexturePtr Parameters::get_texture(const std::string& name, float fallback) {
   return get_texture(name, Spectrum(fallback));
 }
 
+bool Parameters::holds_object(const std::string& name) {
+  const Property* property = find(name);
+  return property && std::holds_alternative<ObjectPtr>(property->value);
+}
+
+std::shared_ptr<const SceneObject> Parameters::find_object(const std::string& name, const std::string& kind) {
+  const Property* property = find(name);
+  if (!property) return nullptr;
+  const ObjectPtr* object = std::get_if<ObjectPtr>(&property->value);
+  if (object && (*object)->kind == kind) return factory_.make(*object);
+  error_at(name, fmt::format("must be a {}, not {}", kind, type_name(property->value)));
+  return nullptr;
+}
+
 std::string Parameters::require_file(const std::string& name) {
   const Property* property = find(name);
   const std::string file = require_string(name);

@@ -128,6 +128,11 @@ class Parameters {
     return result;
   }
 
+  /// Whether the parameter is a nested object, or a reference to one.
+  bool holds_object(const std::string& name);
+  /// The nested object of that name, null when absent; an error where it is not a <kind>.
+  std::shared_ptr<const SceneObject> find_object(const std::string& name, const std::string& kind);
+
   /// Records an error about this object, or about one of its parameters.
   void error(const std::string& message);
   void error_at(const std::string& parameter, const std::string& message);

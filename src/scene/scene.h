@@ -32,6 +32,8 @@ struct SceneParts {
   std::vector<Instance> instances;
   std::vector<std::shared_ptr<const Emitter>> emitters;  ///< in file order, area lights of `shapes` included
   std::shared_ptr<const Camera> camera;
+  MediumPtr camera_medium;   ///< in which the camera stands; null: none
+  std::string first_medium;  ///< where the file names the first medium that is used; empty: there is none
 };
 
 enum class FilterKind { kBox, kTent, kGaussian };
@@ -80,6 +82,10 @@ class Scene {
   std::span<const std::shared_ptr<const Emitter>> emitters() const { return parts_.emitters; }
   /// The light at infinity that rays leaving the scene meet, or null.
   const Emitter* environment() const { return environment_; }
+  bool has_media() const { return !parts_.first_medium.empty(); }
+  /// SceneParts::first_medium
+  const std::string& first_medium() const { return parts_.first_medium; }
+  const Medium* camera_medium() const { return parts_.camera_medium.get(); }
   const Bounds3& bounds() const { return bounds_; }
   /// Distance off a surface at `p` at which rays that leave it begin, against self-intersection.
   float ray_offset(const Vec3& p) const { return (offset_unit_ + max_component(abs(p))) * kRayEpsilon; }

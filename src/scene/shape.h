@@ -9,6 +9,7 @@
 #include "core/transform.h"
 #include "scene/bsdf.h"
 #include "scene/emitter.h"
+#include "scene/medium.h"
 #include "scene/object.h"
 #include "scene/surface_hit.h"
 
@@ -87,6 +88,18 @@ class Shape : public SceneObject {
   const Texture* main_texture() const { return main_texture_; }
   /// Whether hits on this shape need dp_du, dp_dv and an aligned frame.
   bool needs_derivatives() const { return needs_derivatives_; }
+  /// The media on the sides of the surface; null: none, or nothing is known. `interior` is where the geometric normal
+  /// does not point.
+  void set_media(MediumPtr interior, MediumPtr exterior) {
+    bounds_medium_ = interior || exterior;
+    interior_ = std::move(interior), exterior_ = std::move(exterior);
+  }
+  /// Whether other media may lie on the sides than the one that a ray comes through.
+  bool bounds_medium() const { return bounds_medium_; }
+  /// The medium into which `w` leads from a point of the geometric normal `ng`.
+  const Medium* medium_towards(const Vec3& ng, const Vec3& w) const {
+    return (dot(ng, w) > 0 ? exterior_ : interior_).get();
+  }
   void set_emitter(std::shared_ptr<const Emitter> emitter) { emitter_ = std::move(emitter); }
 
  private:
@@ -95,6 +108,8 @@ class Shape : public SceneObject {
   uint32_t bsdf_flags_ = 0;
   const Texture* main_texture_ = nullptr;
   std::shared_ptr<const Emitter> emitter_;
+  MediumPtr interior_, exterior_;
+  bool bounds_medium_ = false;
 };
 
 using ShapePtr = std::shared_ptr<Shape>;

@@ -29,7 +29,8 @@ ARROWS = {
     "textures": ["scene", "imageio"],
     "bsdfs": ["textures"],
     "emitters": ["textures"],
-    "io": ["bsdfs", "emitters"],
+    "media": ["scene"],
+    "io": ["bsdfs", "emitters", "media"],
     "sampling": ["scene"],
     "integrators": ["sampling", "film"],
     "plans": ["combine", "integrators", "io"],
@@ -189,6 +190,7 @@ REGISTRIES = {
     "textures": ["registry.cpp"],
     "bsdfs": ["registry.cpp"],
     "emitters": ["registry.cpp"],
+    "media": ["registry.cpp"],
     "integrators": ["registry.cpp"],
 }
 

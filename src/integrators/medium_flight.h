@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+// How far light gets in a medium. Where the extinction varies, flights are drawn for the largest one, and collisions
+// with the difference, null collisions, change nothing [Novak2018] (delta tracking, ratio tracking).
+// Colour channels share paths: distances are drawn for one channel, and each channel is weighted by the mean of the
+// densities that the three have for the same path, which is the balance heuristic over the channel [Miller2019].
+// Numbers are addressed by the vertex before the flight and the count of collisions since.
+#pragma once
+
+#include <atomic>
+#include <cmath>
+
+#include "core/random.h"
+#include "scene/medium.h"
+
+namespace covary {
+
+/// A path's throughput and densities, channel by channel, all divided by the density of the path's own channel.
+struct SpectralWeights {
+  Spectrum throughput{1};
+  Spectrum pdf_path{1};   ///< density of the path as it is sampled
+  Spectrum pdf_light{1};  ///< the same if its last edges were a connection to a light
+  /// Divides all three by the same, which changes no estimate and keeps them in the range of floats.
+  void normalise() {
+    const float scale = 1 / mean(pdf_path);
+    throughput *= scale, pdf_path *= scale, pdf_light *= scale;
+  }
+};
+
+/// The numbers of flights between two vertices at which light scatters.
+class FlightNumbers {
+ public:
+  /// `vertex`: how many such vertices lie before.
+  FlightNumbers(const PathRandom& path, uint32_t vertex) : random_(path.subpath(Subpath::kCamera, vertex + 1)) {}
+  float distance(Event event) const { return random_.get_1d(step_, event); }
+  float collision() { return random_.get_1d(step_++, Event::kCollision); }
+  void next() { ++step_; }
+
+ private:
+  PathRandom random_;
+  uint32_t step_ = 0;
+};
+
+/// The channel after which a path draws its distances; 0 … 2.
+inline int channel_of(const PathRandom& path) {
+  return std::min(static_cast<int>(3 * path.get_1d(0, Event::kCollision)), 2);
+}
+
+inline Spectrum transmittance(const Spectrum& extinction, float distance) {
+  const auto part = [&](float sigma) { return sigma > 0 ? std::exp(-sigma * distance) : 1; };
+  return {part(extinction.r), part(extinction.g), part(extinction.b)};
+}
+
+inline float free_distance(float extinction, float u) {
+  return extinction > 0 ? -std::log1p(-u) / extinction : kInfinity;
+}
+
+/// What is left of the largest extinction.
+inline Spectrum null_extinction(const Spectrum& majorant, const Spectrum& extinction) {
+  const Spectrum rest = majorant - extinction;
+  return {std::max(rest.r, 0.0f), std::max(rest.g, 0.0f), std::max(rest.b, 0.0f)};
+}
+
+/// Flies along `ray` up to `far`, drawing for `channel`. Returns the distance at which light scatters; infinity where
+/// it comes through, or `stop` became true.
+inline float fly(const Medium& medium, const Ray& ray, float far, int channel, FlightNumbers& numbers,
+                 SpectralWeights& weights, const std::atomic<bool>* stop) {
+  float t = 0;
+  if (!medium.clip(ray, t, far)) return kInfinity;
+  const Spectrum& majorant = medium.majorant();
+  while (!(stop && stop->load(std::memory_order_relaxed))) {
+    const float step = free_distance(majorant[channel], numbers.distance(Event::kDistance));
+    if (!(t + step < far)) {
+      numbers.next();
+      const Spectrum through = transmittance(majorant, far - t);
+      const float pdf = 1 / through[channel];
+      weights.throughput *= through * pdf, weights.pdf_path *= through * pdf;
+      weights.pdf_light *= medium.homogeneous() ? Spectrum(pdf) : through * pdf;
+      break;
+    }
+    t += step;
+    const Spectrum through = transmittance(majorant, step);
+    const Medium::Coefficients medium_here = medium.at(ray.at(t));
+    const float u = numbers.collision();
+    const Spectrum& extinction = medium_here.extinction;
+    if (medium.homogeneous() || u * majorant[channel] < extinction[channel]) {
+      const float pdf = 1 / (through[channel] * extinction[channel]);
+      weights.throughput *= through * medium_here.scattering * pdf;
+      weights.pdf_path *= through * extinction * pdf;
+      weights.normalise();
+      return t;
+    }
+    const Spectrum null = null_extinction(majorant, extinction);
+    const float pdf = 1 / (through[channel] * null[channel]);
+    weights.throughput *= through * null * pdf;
+    weights.pdf_path *= through * null * pdf;
+    weights.pdf_light *= through * majorant * pdf;
+    weights.normalise();
+  }
+  weights.normalise();
+  return kInfinity;
+}
+
+/// Estimates what comes through from 0 to `far`, exactly where the extinction is constant. Here `pdf_path` is that of
+/// fly(), `pdf_light` that of this function.
+inline void come_through(const Medium& medium, const Ray& ray, float far, int channel, FlightNumbers& numbers,
+                         SpectralWeights& weights, const std::atomic<bool>* stop) {
+  float t = 0;
+  if (!medium.clip(ray, t, far)) return;
+  const Spectrum& majorant = medium.majorant();
+  if (medium.homogeneous()) {
+    const Spectrum through = transmittance(majorant, far - t);
+    weights.throughput *= through, weights.pdf_path *= through;
+    return;
+  }
+  while (!(stop && stop->load(std::memory_order_relaxed)) && !is_black(weights.throughput)) {
+    const float step = free_distance(majorant[channel], numbers.distance(Event::kShadowDistance));
+    numbers.next();
+    if (!(t + step < far)) {
+      const Spectrum through = transmittance(majorant, far - t);
+      const Spectrum factor = through * (1 / through[channel]);
+      weights.throughput *= factor, weights.pdf_path *= factor, weights.pdf_light *= factor;
+      return;
+    }
+    t += step;
+    const Spectrum through = transmittance(majorant, step);
+    const Spectrum null = null_extinction(majorant, medium.at(ray.at(t)).extinction);
+    const float pdf = 1 / (through[channel] * majorant[channel]);
+    weights.throughput *= through * null * pdf;
+    weights.pdf_path *= through * null * pdf;
+    weights.pdf_light *= through * majorant * pdf;
+  }
+}
+
+}  // namespace covary

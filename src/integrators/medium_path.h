@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+// Path tracing through participating media: `path` in scenes that have some. One path at a time.
+//
+// At each vertex, on a surface or in a medium, a light sample and a direction sample are combined by the balance
+// heuristic over both techniques and the colour channel [Miller2019]. Light samples see through surfaces that are
+// nothing but boundaries (bsdf `null`); other surfaces that let light straight through, masks and panes, block them,
+// and directions behind these carry full weight. Such passages are no edges of a path, as in Mitsuba's `volpath`.
+#pragma once
+
+#include "integrators/integrator.h"
+#include "integrators/light_selection.h"
+#include "integrators/medium_flight.h"
+
+namespace covary {
+
+class MediumPath {
+ public:
+  MediumPath(const Scene& scene, const PathLengthSettings& lengths, CameraSample& sample, PathContext& context);
+  /// Sets the radiance of the sample.
+  void trace() {
+    while (advance()) {
+    }
+  }
+
+ private:
+  bool advance();
+  bool scatter_in_medium(const Vec3& p);
+  bool scatter_on_surface(const SurfaceHit& hit);
+  bool play_roulette(uint32_t vertex);
+  void add_emission(const Emitter& emitter, const SurfaceHit* hit);
+  void start_flight() { numbers_ = FlightNumbers(sample_.random, n_smooth_); }
+  void go_through(const SurfaceHit& hit, const Vec3& w);
+
+  EmitterSample sample_light(const Vec3& p, uint32_t vertex, float& pmf) const;
+  void connect(const EmitterSample& light, float pmf, const Ray& shadow, const Medium* medium, const Spectrum& value,
+               float pdf_direction);
+  bool light_arrives(Ray ray, const Medium* medium, SpectralWeights& weights);
+
+  const Scene& scene_;
+  const PathLengthSettings& lengths_;
+  CameraSample& sample_;
+  PathContext& context_;
+  UniformLights lights_;
+  int channel_;
+  FlightNumbers numbers_;
+
+  Ray ray_;
+  const Medium* medium_;
+  SpectralWeights weights_;
+  float eta_ = 1;
+  int depth_ = 0;  // edges so far
+  uint32_t n_smooth_ = 0, n_delta_ = 0;
+  Vec3 previous_p_;             // where the last direction was drawn
+  bool only_direction_ = true;  // no light sample could have found what the ray meets
+  bool only_null_ = true;       // nothing that scatters met so far
+};
+
+/// Whether light passes a surface as if it were not there.
+inline bool is_boundary(const SurfaceHit& hit) { return hit.bsdf_flags == kNullTransmission; }
+
+}  // namespace covary

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+// homogeneous: the same extinction everywhere. heterogeneous: one that varies, inside the box around its volume.
+//
+// | name           | type          | default | meaning                                                            |
+// |----------------|---------------|---------|--------------------------------------------------------------------|
+// | sigma_t        | colour/volume | 1       | extinction per unit of length; `homogeneous`: constant             |
+// | albedo         | colour/volume | 0.75    | fraction of it that is scattering, in [0, 1]                       |
+// | scale          | float         | 1       | factor on sigma_t                                                  |
+// | sample_emitters | boolean      | true    | whether points in the medium sample lights                         |
+// | has_spectral_extinction | boolean |       | accepted, no effect                                                |
+// | (nested)       | phase         | isotropic |                                                                  |
+#include <fmt/format.h>
+
+#include "media/constant_volume.h"
+#include "media/registry.h"
+
+namespace covary {
+namespace {
+
+bool not_negative(const Spectrum& s) { return is_finite(s) && s.r >= 0 && s.g >= 0 && s.b >= 0; }
+
+/// A volume; numbers and colours are constant ones. Null after recording an error.
+VolumePtr volume(Parameters& p, const std::string& name, float fallback, SpectrumRole role) {
+  if (p.holds_object(name)) return std::dynamic_pointer_cast<const Volume>(p.find_object(name, "volume"));
+  return std::make_shared<ConstantVolume>(p.get_spectrum(name, Spectrum(fallback), role));
+}
+
+std::shared_ptr<Medium> make_medium(Parameters& p, bool homogeneous) {
+  MediumSettings settings;
+  settings.homogeneous = homogeneous;
+  settings.extinction = volume(p, "sigma_t", 1, SpectrumRole::kIndex);
+  settings.albedo = volume(p, "albedo", 0.75f, SpectrumRole::kReflectance);
+  settings.scale = p.get_float("scale", 1, 0);
+  settings.sample_lights = p.get_bool("sample_emitters", true);
+  p.get_bool("has_spectral_extinction", true);
+  const auto phases = p.children<PhaseFunction>("phase");
+  if (phases.size() > 1) p.error(fmt::format("has {} phases; expected one", phases.size()));
+  if (!settings.extinction || !settings.albedo) return nullptr;
+  if (homogeneous && !settings.extinction->is_constant())
+    p.error_at("sigma_t", "varies; a medium of varying extinction is a medium 'heterogeneous'");
+  if (!not_negative(settings.extinction->smallest()) || !not_negative(settings.extinction->largest() * settings.scale))
+    p.error_at("sigma_t", "has values that are negative or not finite");
+  if (!not_negative(settings.albedo->smallest()) || !(max_component(settings.albedo->largest()) <= 1))
+    p.error_at("albedo", "has values outside [0, 1]");
+  settings.phase = phases.empty() ? isotropic_phase() : phases[0];
+  return std::make_shared<Medium>(std::move(settings));
+}
+
+}  // namespace
+
+std::shared_ptr<Medium> make_homogeneous(Parameters& p) { return make_medium(p, true); }
+std::shared_ptr<Medium> make_heterogeneous(Parameters& p) { return make_medium(p, false); }
+
+}  // namespace covary

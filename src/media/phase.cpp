@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+// isotropic: all directions are equally likely. It has no parameters.
+//
+// hg: more light goes forwards or backwards [HenyeyGreenstein1941].
+//
+// | name | type  | default | meaning                                                                      |
+// |------|-------|---------|------------------------------------------------------------------------------|
+// | g    | float | 0.8     | mean cosine of the angle by which light turns, in (-1, 1); forwards where positive |
+#include <algorithm>
+#include <cmath>
+
+#include "core/frame.h"
+#include "core/trigonometry.h"
+#include "core/warp.h"
+#include "media/registry.h"
+
+namespace covary {
+namespace {
+
+class Isotropic final : public PhaseFunction {
+ public:
+  float pdf(const Vec3&, const Vec3&) const override { return warp::sphere_pdf_solid_angle(); }
+  Vec3 sample(const Vec3&, Vec2 u) const override { return warp::square_to_sphere(u); }
+};
+
+class HenyeyGreenstein final : public PhaseFunction {
+ public:
+  explicit HenyeyGreenstein(float g) : g_(g) {}
+
+  float pdf(const Vec3& d, const Vec3& w) const override {
+    // [HenyeyGreenstein1941] (1 - g²) / (4π (1 + g² - 2 g cos)^1.5); the base as a sum of what is not negative.
+    const float base = g_ >= 0 ? sqr(1 - g_) + g_ * length_squared(d - w) : sqr(1 + g_) - g_ * length_squared(d + w);
+    return (1 - g_ * g_) / (4 * kPi * base * std::sqrt(base));
+  }
+  Vec3 sample(const Vec3& d, Vec2 u) const override {
+    const float z = cosine(u.x);
+    const float r = safe_sqrt(1 - z * z);
+    const SinCos phi = sincos_turns(u.y);
+    return Frame(d).to_world({r * phi.cos, r * phi.sin, z});
+  }
+
+ private:
+  /// The distribution function inverted.
+  float cosine(float u) const {
+    if (std::abs(g_) < 1e-3f) {  // to first order in g, where the formula divides by it
+      const float z = 1 - 2 * u;
+      return std::clamp(z + 1.5f * g_ * (1 - z * z), -1.0f, 1.0f);
+    }
+    const float s = (1 - g_ * g_) / (1 + g_ - 2 * g_ * u);
+    return std::clamp((1 + g_ * g_ - s * s) / (2 * g_), -1.0f, 1.0f);
+  }
+  float g_;
+};
+
+}  // namespace
+
+PhasePtr isotropic_phase() { return std::make_shared<Isotropic>(); }
+std::shared_ptr<PhaseFunction> make_isotropic(Parameters&) { return std::make_shared<Isotropic>(); }
+
+std::shared_ptr<PhaseFunction> make_hg(Parameters& p) {
+  constexpr float kLargest = 0.9999f;  // beyond it floats cannot tell the forward directions apart
+  return std::make_shared<HenyeyGreenstein>(p.get_float("g", 0.8f, -kLargest, kLargest));
+}
+
+}  // namespace covary
