@@ -92,8 +92,8 @@ void one_regression(benchmark::State& state) {
   const Input& in = input();
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
   ControlVariateSettings settings;
-  settings.sample_share = IicvOptions().sample_share;
-  settings.conservation = IicvOptions().conservation;
+  settings.sample_fraction = IicvOptions().sample_fraction;
+  settings.mean_constraint = IicvOptions().mean_constraint;
   settings.std_error = state.range(0) != 0;
   const ControlVariateInput data{in.crn, &in.g, &in.h.mean, &in.error, &in.h.variance_of_mean};
   for (auto _ : state) {
@@ -108,7 +108,7 @@ void one_feedback(benchmark::State& state) {
   const Input& in = input();
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
   IicvOptions options;
-  options.feedback = false;
+  options.residual_correction = false;
   options.std_error = true;
   const EstimatorResult before = iicv(in.crn, in.independent, options);
   for (auto _ : state) {

@@ -108,7 +108,7 @@ TEST(EstimatorRegistry, ValuesReachTheOptions) {
   const GroupedImage g = crn().view(), h = independent().view();
   IicvOptions o;
   o.k = 9, o.window = 7, o.include_target = false, o.shared_coefficients = false, o.symmetric = false;
-  o.penalty = Penalty::kSmoothed, o.pilot_window = 5, o.sample_share = 0.25f, o.conservation = 3.5f;
+  o.penalty = Penalty::kSmoothed, o.pilot_window = 5, o.sample_fraction = 0.25f, o.mean_constraint = 3.5f;
   EXPECT_EQ(made("iicv", {{"k", "9"},
                           {"window", "7"},
                           {"exclude-target", ""},
@@ -116,12 +116,12 @@ TEST(EstimatorRegistry, ValuesReachTheOptions) {
                           {"asymmetric", ""},
                           {"penalty", "smoothed"},
                           {"pilot-window", "5"},
-                          {"sample-share", "0.25"},
-                          {"conservation", "3.5"}}),
+                          {"sample-fraction", "0.25"},
+                          {"mean-constraint", "3.5"}}),
             iicv(g, h, o).estimate.data);
   IicvOptions homogeneous;
-  homogeneous.penalty = Penalty::kHomogeneous, homogeneous.ridge = 0.5f, homogeneous.feedback = false;
-  EXPECT_EQ(made("iicv", {{"penalty", "homogeneous"}, {"ridge", "0.5"}, {"feedback", "off"}}),
+  homogeneous.penalty = Penalty::kHomogeneous, homogeneous.ridge = 0.5f, homogeneous.residual_correction = false;
+  EXPECT_EQ(made("iicv", {{"penalty", "homogeneous"}, {"ridge", "0.5"}, {"residual-correction", "off"}}),
             iicv(g, h, homogeneous).estimate.data);
   CvBaselineOptions baseline;
   baseline.k = 9, baseline.window = 5, baseline.ridge = 0.001f, baseline.include_target = false;
@@ -260,8 +260,8 @@ TEST(EstimatorRegistry, OptionsWithoutEffectAreErrors) {
   };
   EXPECT_EQ(message("iicv", {{"penalty", "sample"}, {"pilot-window", "5"}}),
             "`pilot-window` has no effect with this `penalty`: only pilot, smoothed and cross-fit have a pilot");
-  EXPECT_EQ(message("iicv", {{"penalty", "homogeneous"}, {"sample-share", "0.5"}, {"asymmetric", ""}}),
-            "`sample-share`, `asymmetric` have no effect with `penalty` homogeneous: all neighbours have the same "
+  EXPECT_EQ(message("iicv", {{"penalty", "homogeneous"}, {"sample-fraction", "0.5"}, {"asymmetric", ""}}),
+            "`sample-fraction`, `asymmetric` have no effect with `penalty` homogeneous: all neighbours have the same "
             "penalty");
   struct Case {
     const char *estimator, *option;
@@ -271,10 +271,10 @@ TEST(EstimatorRegistry, OptionsWithoutEffectAreErrors) {
       {"iicv", "pilot-window", {{"penalty", "homogeneous"}, {"pilot-window", "11"}}},
       {"iicv", "ridge", {{"penalty", "pilot"}, {"ridge", "1"}}},
       {"iicv", "ridge", {{"ridge", "1"}}},
-      {"iicv", "sample-share", {{"penalty", "homogeneous"}, {"sample-share", "0.5"}}},
+      {"iicv", "sample-fraction", {{"penalty", "homogeneous"}, {"sample-fraction", "0.5"}}},
       {"iicv", "asymmetric", {{"penalty", "homogeneous"}, {"asymmetric", ""}}},
-      {"iicv", "asymmetric", {{"sample-share", "1"}, {"asymmetric", ""}}},
-      {"iicv", "sample-share", {{"penalty", "sample"}, {"asymmetric", ""}, {"sample-share", "0.5"}}},
+      {"iicv", "asymmetric", {{"sample-fraction", "1"}, {"asymmetric", ""}}},
+      {"iicv", "sample-fraction", {{"penalty", "sample"}, {"asymmetric", ""}, {"sample-fraction", "0.5"}}},
       {"iicv", "max-spp", {{"max-spp", "99"}}},
       {"dependent-tests", "max-region", {{"max-region", "3"}}},
       {"dependent-tests", "min-centre-drop", {{"min-centre-drop", "0.1"}}},
@@ -304,7 +304,8 @@ TEST(EstimatorRegistry, SaysWhatIsWrong) {
   EXPECT_EQ(message("iicv", {{"windwo", "3"}}), "`windwo` is not an option of any estimator; did you mean 'window'?");
   EXPECT_EQ(message("iicv", {{"k", "3x"}}), "`k` '3x': expected a whole number of at least 1");
   EXPECT_EQ(message("iicv", {{"ridge", "nan"}}), "`ridge` 'nan': expected a number above 0");
-  EXPECT_EQ(message("iicv", {{"feedback", "of"}}), "`feedback` 'of'; did you mean 'off' or 'on'?: expected on, off");
+  EXPECT_EQ(message("iicv", {{"residual-correction", "of"}}),
+            "`residual-correction` 'of'; did you mean 'off' or 'on'?: expected on, off");
   EXPECT_TRUE(contains(message("iicv", {{"k", "500"}}), "k is 500, expected 1 to 121"));
   EXPECT_TRUE(contains(message("polynomials", {{"dimensions", "7"}}), "dimensions is 7, expected 1 to 6"));
 }

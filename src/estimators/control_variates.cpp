@@ -76,7 +76,7 @@ class Regression {
         result_(result),
         T_(input.crn.groups),
         weights_differ_(input.crn_moments->relative_count.has_value()),
-        layout_(weights_differ_ ? T_ : T_ - 1, settings.conservation > 0),
+        layout_(weights_differ_ ? T_ : T_ - 1, settings.mean_constraint > 0),
         search_(settings.k, settings.window, settings.include_target),
         radius_(settings.window / 2) {}
 
@@ -256,8 +256,8 @@ class Regression {
   }
 
   /// The condition on the coefficients as a row of X and y (one for each channel, like a contrast of the groups),
-  /// scaled by sqrt(conservation (T - 1) S / N). The CRN mean has an error of the size of the light that it lacks; the
-  /// variance of a group is T times that of the mean.
+  /// scaled by sqrt(mean_constraint (T - 1) S / N). The CRN mean has an error of the size of the light that it lacks;
+  /// the variance of a group is T times that of the mean.
   void scale_condition(int first, int count, Workspace& w) const {
     const int k = s_.k, n_tail = layout_.size - layout_.contrasts;
     vfloat S = {}, N = {};
@@ -270,7 +270,7 @@ class Regression {
         N += g * g;
       }
     }
-    const vfloat factor = lanes::sqrt(S / max(N, splat(1e-30f)) * (s_.conservation * static_cast<float>(T_ - 1)));
+    const vfloat factor = lanes::sqrt(S / max(N, splat(1e-30f)) * (s_.mean_constraint * static_cast<float>(T_ - 1)));
     for (int c = first; c < first + count; ++c) {
       for (int i = 0; i < k; ++i)
         w.x[static_cast<size_t>(i) * layout_.contrasts + layout_.group_contrasts + c] *= factor;
@@ -288,25 +288,25 @@ class Regression {
       homogeneous *= (s_.ridge > 0 ? s_.ridge : kNegligibleRidge) / static_cast<float>(k);
     }
     const vfloat own = channel_sum(w.y_tail.data(), layout_.error, first, count);
-    const float variance_share = s_.sample_share * static_cast<float>(T_);
+    const float variance_share = s_.sample_fraction * static_cast<float>(T_);
     for (int i = 0; i < k; ++i) {
       const vfloat* tail = w.tail.data() + i * n_tail;
       vfloat penalty = homogeneous, smallest = {};
       if (in_.error_of_h) {
         const vfloat error = channel_sum(tail, layout_.error, first, count);
         penalty = s_.symmetric ? 0.5f * (own + error) : error;  // [YM2025] Sec. 4, after Eq. (11)
-        if (s_.sample_share > 0)
+        if (s_.sample_fraction > 0)
           penalty =
-              (1 - s_.sample_share) * penalty + variance_share * channel_sum(tail, layout_.h_variance, first, count);
+              (1 - s_.sample_fraction) * penalty + variance_share * channel_sum(tail, layout_.h_variance, first, count);
         smallest = kSmallestPenalty * channel_sum(tail, layout_.group_variance, first, count);
       }
-      if (s_.conservation > 0) {
+      if (s_.mean_constraint > 0) {
         vfloat squares = {};
         for (int c = first; c < first + count; ++c) {
           const vfloat element = w.x[static_cast<size_t>(i) * layout_.contrasts + layout_.group_contrasts + c];
           squares += element * element;
         }
-        smallest = max(smallest, squares * (kSmallestPenalty / (s_.conservation * static_cast<float>(T_ - 1))));
+        smallest = max(smallest, squares * (kSmallestPenalty / (s_.mean_constraint * static_cast<float>(T_ - 1))));
       }
       w.penalty[i] = max(penalty, smallest) + 1e-30f;
     }
@@ -322,7 +322,7 @@ class Regression {
     const int k = s_.k, all = layout_.contrasts, step = count == 3 ? 1 : 3, rows = all / step;
     const int group_rows = layout_.group_contrasts / step;
     const float T1 = static_cast<float>(T_ - 1);
-    if (s_.conservation > 0) scale_condition(first, count, w);
+    if (s_.mean_constraint > 0) scale_condition(first, count, w);
     find_penalties(first, count, w);
     const vfloat* X = w.x.data() + first;
     const vfloat* Y = w.y.data() + first;
@@ -425,7 +425,7 @@ class Regression {
       variances += variance;
       count += w.beta[i] != 0.0f ? splat(1.0f) : vfloat{};  // places outside the frame have no coefficient
     }
-    return (1 - s_.sample_share) * own + s_.sample_share * squares * variances / max(count, splat(1.0f));
+    return (1 - s_.sample_fraction) * own + s_.sample_fraction * squares * variances / max(count, splat(1.0f));
   }
 
   const ControlVariateInput& in_;

@@ -37,12 +37,12 @@ struct ControlVariateSettings {
   /// V_h,i = (error of the target + error of neighbour i) / 2 instead of the error of neighbour i.
   bool symmetric = true;
   /// Part of V_h,i that is the variance of h_i (`variance_of_h`) instead of `error_of_h`. Not in the paper.
-  float sample_share = 0;
+  float sample_fraction = 0;
   /// Weight of the condition sum_i beta_i g_i = f (in each channel); 0: none. X^T X / (T - 1) gets the additional term
-  ///     conservation * (S / N) g g^T,   S, N: means over the neighbours of the group variance and of g_i^2,
-  /// as if errors in proportion to the brightness, `conservation` times as large as the errors there are, were common
-  /// to all pixels. Not in the paper.
-  float conservation = 0;
+  ///     mean_constraint * (S / N) g g^T,   S, N: means over the neighbours of the group variance and of g_i^2,
+  /// as if errors in proportion to the brightness, `mean_constraint` times as large as the errors there are, were
+  /// common to all pixels. Not in the paper.
+  float mean_constraint = 0;
   /// Where positive: V_h = ridge * (mean diagonal of X^T X / (T - 1)) * I instead of `error_of_h`.
   float ridge = 0;
   /// Also estimate the standard error of F^ by Eq. (8), its first part by generalised cross-validation.
@@ -55,7 +55,7 @@ struct ControlVariateInput {
   const Moments* crn_moments = nullptr;   ///< mean: kFar outside and at invalid pixels
   const Planes* h = nullptr;              ///< 3 planes: mean of the independent image; 0 outside and at invalid pixels
   const Planes* error_of_h = nullptr;     ///< 3 planes: estimated error variance of h; kUseless where there is none
-  const Planes* variance_of_h = nullptr;  ///< 3 planes: variance of h; for std_error and sample_share
+  const Planes* variance_of_h = nullptr;  ///< 3 planes: variance of h; for std_error and sample_fraction
   /// 3 planes, optional: c, light that the CRN image lacks (missing_light.h). The condition becomes
   ///     sum_i beta_i (g_i + c_i) = f + c,   with group variances that are T c_i^2 larger in S,
   /// so that the coefficients of a region where the CRN image is black add up to one; without a condition they stay.

@@ -16,9 +16,9 @@ namespace covary {
 
 IicvOptions IicvOptions::paper() {
   IicvOptions options;
-  options.sample_share = 0;
-  options.conservation = 0;
-  options.feedback = false;
+  options.sample_fraction = 0;
+  options.mean_constraint = 0;
+  options.residual_correction = false;
   return options;
 }
 
@@ -37,15 +37,16 @@ std::vector<std::string> IicvOptions::validate() const {
   if (probe && penalty == Penalty::kCrossFit)
     problems.push_back("the penalty cross-fit has two sets of coefficients, so that no pixel can be explained by one");
   if (!(ridge > 0)) problems.push_back(fmt::format("ridge is {}, expected a positive number", ridge));
-  if (!(sample_share >= 0 && sample_share <= 1))
-    problems.push_back(fmt::format("sample_share is {}, expected a number from 0 to 1", sample_share));
-  if (!(conservation >= 0))
-    problems.push_back(fmt::format("conservation is {}, expected zero or a positive number", conservation));
-  if (feedback_options.window < 5 || feedback_options.window > 125 || feedback_options.window % 2 == 0)
+  if (!(sample_fraction >= 0 && sample_fraction <= 1))
+    problems.push_back(fmt::format("sample_fraction is {}, expected a number from 0 to 1", sample_fraction));
+  if (!(mean_constraint >= 0))
+    problems.push_back(fmt::format("mean_constraint is {}, expected zero or a positive number", mean_constraint));
+  if (residual_options.window < 5 || residual_options.window > 125 || residual_options.window % 2 == 0)
+    problems.push_back(fmt::format("residual correction: window is {}, expected an odd number from 5 to 125",
+                                   residual_options.window));
+  if (!(residual_options.bandwidth > 0))
     problems.push_back(
-        fmt::format("feedback window is {}, expected an odd number from 5 to 125", feedback_options.window));
-  if (!(feedback_options.bandwidth > 0))
-    problems.push_back(fmt::format("feedback bandwidth is {}, expected a positive number", feedback_options.bandwidth));
+        fmt::format("residual correction: bandwidth is {}, expected a positive number", residual_options.bandwidth));
   return problems;
 }
 
@@ -67,9 +68,9 @@ struct Prepared {
     settings.include_target = options.include_target;
     settings.shared = options.shared_coefficients;
     settings.symmetric = options.symmetric;
-    settings.conservation = options.conservation;
-    settings.sample_share = options.sample_share;
-    settings.std_error = options.std_error || options.feedback;
+    settings.mean_constraint = options.mean_constraint;
+    settings.sample_fraction = options.sample_fraction;
+    settings.std_error = options.std_error || options.residual_correction;
     settings.probe = options.probe;
     return settings;
   }
@@ -81,7 +82,7 @@ struct Prepared {
     input.variance_of_h = &h_used.variance_of_mean;
     input.error_of_h = error;
     std::optional<Planes> missing;
-    if (settings.std_error || settings.conservation > 0) {
+    if (settings.std_error || settings.mean_constraint > 0) {
       missing.emplace(missing_light(g, judge, valid, border));
       input.missing = &*missing;
     }
@@ -127,8 +128,8 @@ void apply_at_once(const Prepared& p, EstimatorResult& result) {
 
 EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& independent, const IicvOptions& options) {
   std::vector<std::string> problems = options.validate();
-  const bool needs_variance = options.penalty == Penalty::kSample || options.std_error || options.feedback ||
-                              (options.sample_share > 0 && options.penalty != Penalty::kHomogeneous);
+  const bool needs_variance = options.penalty == Penalty::kSample || options.std_error || options.residual_correction ||
+                              (options.sample_fraction > 0 && options.penalty != Penalty::kHomogeneous);
   const bool halves = options.penalty == Penalty::kCrossFit;
   check_inputs(crn, independent, 3, halves ? (needs_variance ? 4 : 2) : (needs_variance ? 2 : 1), problems);
   throw_if_any("iicv", problems);
@@ -142,8 +143,8 @@ EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& independent, c
     apply_by_halves(p, result);
   else
     apply_at_once(p, result);
-  if (options.feedback) {
-    add_feedback(p.h, options.feedback_options, p.valid, result.std_error, result.estimate);
+  if (options.residual_correction) {
+    add_feedback(p.h, options.residual_options, p.valid, result.std_error, result.estimate);
     if (!options.std_error) result.std_error = Image();
   }
   fill_invalid(crn, independent, p.valid, result.estimate);
@@ -152,7 +153,7 @@ EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& independent, c
 
 int iicv_reach(const IicvOptions& options) {
   const int pilot = options.pilot_window / 2 * (options.penalty == Penalty::kSmoothed ? 2 : 1);
-  const int feedback = options.feedback ? feedback_reach(options.feedback_options) : 0;
+  const int feedback = options.residual_correction ? feedback_reach(options.residual_options) : 0;
   return options.window / 2 + std::max(pilot, kMissingWindow / 2) + feedback;
 }
 
@@ -163,7 +164,7 @@ double iicv_bytes_per_pixel(const IicvOptions& options) {
   int planes = 2 * 6 + 6 + 3 + 3 + 6;
   if (options.penalty == Penalty::kSmoothed) planes += 3;
   if (halves) planes += 2 * 6 + 6;
-  if (options.feedback) planes += 8 + 4;
+  if (options.residual_correction) planes += 8 + 4;
   return planes * sizeof(float) + 1;
 }
 
@@ -175,12 +176,12 @@ void check_effects(Settings& p, const IicvOptions& o) {
   p.only_if(!homogeneous && !sample, {"pilot-window"},
             "with this `penalty`: only pilot, smoothed and cross-fit have a pilot");
   p.only_if(homogeneous, {"ridge"}, "with this `penalty`: it is the factor of homogeneous");
-  p.only_if(!homogeneous, {"sample-share", "asymmetric"},
+  p.only_if(!homogeneous, {"sample-fraction", "asymmetric"},
             "with `penalty` homogeneous: all neighbours have the same penalty");
-  p.only_if(!sample || o.symmetric, {"sample-share"},
+  p.only_if(!sample || o.symmetric, {"sample-fraction"},
             "with `penalty` sample and `asymmetric`: the penalty is the neighbour's sample variance already");
-  p.only_if(o.sample_share < 1, {"asymmetric"},
-            "with `sample-share` 1: the penalty is the neighbour's sample variance already");
+  p.only_if(o.sample_fraction < 1, {"asymmetric"},
+            "with `sample-fraction` 1: the penalty is the neighbour's sample variance already");
 }
 
 }  // namespace
@@ -193,7 +194,7 @@ Estimator make_iicv(Settings& parameters) {
                                                                    {"cross-fit", Penalty::kCrossFit}};
   static constexpr std::pair<const char*, bool> kOnOff[] = {{"on", true}, {"off", false}};
   Settings& p = parameters;
-  IicvOptions o = p.flag("paper", "iicv as published: no sample share, no conservation, no feedback")
+  IicvOptions o = p.flag("paper", "iicv as published: no sample fraction, mean constraint or residual correction")
                       ? IicvOptions::paper()
                       : IicvOptions();
   p.whole("k", o.k, kVariatesRange, kVariatesHelp);
@@ -204,9 +205,12 @@ Estimator make_iicv(Settings& parameters) {
   if (p.flag("asymmetric", "Penalty of the neighbour alone, not averaged with the target's")) o.symmetric = false;
   if (p.flag("exclude-target", kExcludeTargetHelp)) o.include_target = false;
   p.choice<bool>("coefficients", o.shared_coefficients, kCoefficients, kCoefficientsHelp);
-  p.real("sample-share", o.sample_share, {.low = 0, .high = 1}, "Part of the penalty that is the sample variance");
-  p.real("conservation", o.conservation, {.low = 0}, "Weight of the condition sum beta g = f");
-  p.choice<bool>("feedback", o.feedback, kOnOff, "Give back what the penalty takes away");
+  p.real("sample-fraction", o.sample_fraction, {.low = 0, .high = 1}, "Part of the penalty that is the sample variance",
+         {.aliases = {"sample-share"}});
+  p.real("mean-constraint", o.mean_constraint, {.low = 0}, "Weight of the condition sum beta g = f",
+         {.aliases = {"conservation"}});
+  p.choice<bool>("residual-correction", o.residual_correction, kOnOff, "Give back what the penalty takes away",
+                 {.aliases = {"feedback"}});
   check_effects(p, o);
   std::vector<std::string> problems = o.validate();
   AdaptiveSampling standard;
@@ -220,8 +224,8 @@ Estimator make_iicv(Settings& parameters) {
 
   estimator.summary = "imperfect image-space control variates";
   estimator.predicts_error = true;
-  // Without feedback the bias of a half is too much larger than that of the whole (docs/methods/error-estimates.md).
-  estimator.holds_out = o.feedback;
+  // Without it the bias of a half is too much larger than that of the whole (docs/methods/error-estimates.md).
+  estimator.holds_out = o.residual_correction;
   estimator.reliable_samples = kReliableSamples;
   estimator.fewest_groups = o.penalty == Penalty::kCrossFit ? 4 : 3;
   estimator.reach = iicv_reach(o);

@@ -7,16 +7,17 @@
 // coefficients allow for its errors.
 //
 // The defaults go beyond the paper in three places, each an option: errors common to all CRN pixels cancel
-// (`conservation`), the penalty contains the expected beside the realised error of independent pixels (`sample_share`),
-// and what the penalty takes away is given back (`feedback`). IicvOptions::paper() has none of them. With the first,
-// regions where the CRN image misses the light fall back to the independent image (missing_light.h).
+// (`mean_constraint`), the penalty contains the expected beside the realised error of independent pixels
+// (`sample_fraction`), and what the penalty takes away is given back (`residual_correction`). IicvOptions::paper() has
+// none of them. With the first, regions where the CRN image misses the light fall back to the independent image
+// (missing_light.h).
 //
 // Claim: consistent, not unbiased; coefficients and penalties are estimated from the samples they are applied to.
 // Pixels of the independent image must be independent of each other (box filter), values linear.
 //
 // Groups of unequal sizes are weighted by their sizes (control_variates.h). Where pixels of the independent image have
-// unequal counts, the pilot and the feedback weight them by their counts, as if all had the same variance per sample.
-// Every group of every pixel needs a sample.
+// unequal counts, the pilot and the residual correction weight them by their counts, as if all had the same variance
+// per sample. Every group of every pixel needs a sample.
 #pragma once
 
 #include "estimators/estimator_result.h"
@@ -59,16 +60,16 @@ struct IicvOptions {
   /// Part of the penalty that is the sample variance of h instead of what `penalty` says (and never symmetric), 0 … 1.
   /// The realised error of a pilot tells outliers but depends on the value it judges; the sample variance is right on
   /// average. Not used by kHomogeneous. Default 0.5 (measured); the paper has 0.
-  float sample_share = 0.5f;
+  float sample_fraction = 0.5f;
   /// Weight of the condition that the coefficients reproduce the CRN mean, sum_i beta_i g_i = f; >= 0. It treats errors
   /// in proportion to brightness, so many times as large as the errors there are, as common to all pixels of the CRN
   /// image, and so cancels them. Default 30 (measured); the paper has 0.
-  float conservation = 30.0f;
-  /// Residual feedback (feedback.h). Default on; the paper has none.
-  bool feedback = true;
-  FeedbackOptions feedback_options;
+  float mean_constraint = 30.0f;
+  /// Default on; the paper has none (filters/feedback.h).
+  bool residual_correction = true;
+  FeedbackOptions residual_options;
   /// Also estimate the standard error of the result: [YM2025] Eq. (8), with the residuals of the fit corrected for its
-  /// degrees of freedom. It is the error before the feedback, which changes it little.
+  /// degrees of freedom. It is the error before the residual correction, which changes it little.
   bool std_error = false;
   PixelProbe* probe = nullptr;  ///< optional; inside the image; not with kCrossFit, which has two sets of coefficients
 

@@ -90,8 +90,8 @@ TEST(Iicv, ConservationAgreesWithTheReference) {
   const RgbImage error = pilot_of(crn.view(), independent.view(), 11);
   for (const auto& [k, shared] : {std::pair{25, true}, {25, false}, {50, true}, {8, false}}) {
     IicvOptions options = IicvOptions::paper();
-    options.conservation = 10;
-    options.sample_share = 0.25f;
+    options.mean_constraint = 10;
+    options.sample_fraction = 0.25f;
     options.k = k;
     options.shared_coefficients = shared;
     options.std_error = true;
@@ -129,19 +129,19 @@ struct RareLight {
 TEST(Iicv, MissingLightAgreesWithTheReference) {
   const RareLight in(1);
   const RgbImage error = pilot_of(in.crn.view(), in.independent.view(), 11);
-  for (const auto& [k, shared, conservation] :
+  for (const auto& [k, shared, mean_constraint] :
        {std::tuple{25, true, 30.0f}, {25, false, 30.0f}, {50, true, 10.0f}, {8, false, 10.0f}, {25, true, 0.0f}}) {
     IicvOptions options = IicvOptions::paper();
-    options.conservation = conservation;
-    options.sample_share = 0.5f;
+    options.mean_constraint = mean_constraint;
+    options.sample_fraction = 0.5f;
     options.k = k;
     options.shared_coefficients = shared;
     options.std_error = true;
     const Difference d =
         compare(iicv(in.crn.view(), in.independent.view(), options), in.crn.view(), in.independent.view(), error, k, 11,
-                true, {shared, true, 0, kSmallestPenalty, conservation, 0.5});
-    EXPECT_LT(d.estimate, 3e-3) << "k " << k << " shared " << shared << " conservation " << conservation;
-    EXPECT_LT(d.std_error, 3e-3) << "k " << k << " shared " << shared << " conservation " << conservation;
+                true, {shared, true, 0, kSmallestPenalty, mean_constraint, 0.5});
+    EXPECT_LT(d.estimate, 3e-3) << "k " << k << " shared " << shared << " mean_constraint " << mean_constraint;
+    EXPECT_LT(d.std_error, 3e-3) << "k " << k << " shared " << shared << " mean_constraint " << mean_constraint;
   }
 }
 
@@ -414,7 +414,7 @@ TEST(Iicv, BitsDoNotDependOnThreadsTilesOrCrops) {
   IicvOptions options;
   options.std_error = true;
   options.penalty = Penalty::kSmoothed;
-  options.feedback_options.window = 17;
+  options.residual_options.window = 17;
   const auto with_threads = [&](int n) {
     tbb::global_control control(tbb::global_control::max_allowed_parallelism, n);
     return iicv(crn.view(), independent.view(), options);
@@ -482,20 +482,22 @@ TEST(Iicv, ReportsEveryProblemAtOnce) {
   options.k = 200;
   options.pilot_window = 10;
   options.ridge = 0;
-  options.sample_share = 2;
-  options.conservation = -1;
-  options.feedback_options = {4, 0};
+  options.sample_fraction = 2;
+  options.mean_constraint = -1;
+  options.residual_options = {4, 0};
   options.penalty = Penalty::kSample;
-  EXPECT_EQ(message_of([&] { iicv(two.view(), one.view(), options); }, ErrorCode::kUsage),
-            "iicv: pilot_window is 10, expected an odd number from 3 to 63; k is 200, expected 1 to 121, the number of "
-            "pixels "
-            "in a window of 11 x 11; ridge is 0, expected a positive number; "
-            "sample_share is 2, expected a number from 0 to 1; conservation is -1, expected zero or a positive number; "
-            "feedback window is 4, expected an odd number from 5 to 125; feedback bandwidth is 0, expected a positive "
-            "number; "
-            "the CRN image is 8 x 6 and the independent image 8 x 5; "
-            "they must have the same size; the CRN image has 2 groups, at least 3 are needed (12 are recommended); the "
-            "independent image has 1 group, at least 2 are needed with these settings");
+  EXPECT_EQ(
+      message_of([&] { iicv(two.view(), one.view(), options); }, ErrorCode::kUsage),
+      "iicv: pilot_window is 10, expected an odd number from 3 to 63; k is 200, expected 1 to 121, the number of "
+      "pixels "
+      "in a window of 11 x 11; ridge is 0, expected a positive number; "
+      "sample_fraction is 2, expected a number from 0 to 1; mean_constraint is -1, expected zero or a positive number; "
+      "residual correction: window is 4, expected an odd number from 5 to 125; residual correction: bandwidth is 0, "
+      "expected a positive "
+      "number; "
+      "the CRN image is 8 x 6 and the independent image 8 x 5; "
+      "they must have the same size; the CRN image has 2 groups, at least 3 are needed (12 are recommended); the "
+      "independent image has 1 group, at least 2 are needed with these settings");
 }
 
 }  // namespace

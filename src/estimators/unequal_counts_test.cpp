@@ -82,7 +82,7 @@ Expected reference_result(const GroupedImage& crn, const GroupedImage& independe
       expected.estimate.push_back(r.estimate);
       expected.std_error.push_back(r.std_error);
     }
-  if (settings.conservation > 0)
+  if (settings.mean_constraint > 0)
     expected.estimate = reference::feedback(expected.estimate, expected.std_error, h, variance, crn.width, crn.height,
                                             41, 1.25, independent);
   return expected;

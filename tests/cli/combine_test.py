@@ -181,7 +181,8 @@ class Combine(CliTest):
         results = []
         for options in ([], ["--paper"], ["--penalty", "homogeneous"], ["--variance", "sample"],
                         ["--coefficients", "per-channel"],
-                        ["--asymmetric"], ["--exclude-target"], ["--k", "9"], ["--window", "7"], ["--feedback", "off"],
+                        ["--asymmetric"], ["--exclude-target"], ["--k", "9"], ["--window", "7"],
+                        ["--residual-correction", "off"],
                         ["--estimator", "cv-baseline"], ["--estimator", "cv-baseline", "--ridge", "0.1"],
                         ["--estimator", "iduw"], ["--estimator", "iduw", "--window", "7"]):
             self.good("combine", "--crn", "crn.exr", "--independent", "independent.exr", "-o", "out.exr", "--quiet",

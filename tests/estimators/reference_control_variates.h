@@ -138,8 +138,8 @@ struct Settings {
   bool shared = true, symmetric = true;
   double ridge = 0;             ///< > 0: replaces the errors of h
   double smallest_penalty = 0;  ///< relative to the variance of the CRN groups
-  double conservation = 0;      ///< weight of the condition sum beta g = f, relative to the noise
-  double sample_share = 0;      ///< part of the penalty that is the variance of h
+  double mean_constraint = 0;      ///< weight of the condition sum beta g = f, relative to the noise
+  double sample_fraction = 0;      ///< part of the penalty that is the variance of h
 };
 
 struct Result {
@@ -188,7 +188,7 @@ inline Result control_variates(const GroupedImage& crn, const RgbImage& h, const
       const double error = sum([&](int c) { return T * error_of_h[index(q)][c]; });
       const double variance = sum([&](int c) { return T * variance_of_h[index(q)][c]; });
       const double brightness = sum([&](int c) { return std::pow(light(q, c), 2); });
-      V(i) = (1 - s.sample_share) * (s.symmetric ? 0.5 * (own + error) : error) + s.sample_share * variance;
+      V(i) = (1 - s.sample_fraction) * (s.symmetric ? 0.5 * (own + error) : error) + s.sample_fraction * variance;
       V(i) = std::max({V(i), s.smallest_penalty * groups, s.smallest_penalty * condition * brightness});
       mean_diagonal += groups / k;
     }
@@ -200,14 +200,14 @@ inline Result control_variates(const GroupedImage& crn, const RgbImage& h, const
   std::array<double, 3> left;  // 1 - degrees of freedom of the fit / degrees of freedom of the groups
   for (int c = 0; c < (s.shared ? 1 : 3); ++c) {
     const int last = s.shared ? 2 : c;
-    // The condition: conservation times the group variance, as a common error in proportion to the brightness.
+    // The condition: mean_constraint times the group variance, as a common error in proportion to the brightness.
     double noise = 0, squares = 0;
     for (const Pixel q : neighbours)
       for (int d = c; d <= last; ++d) {
         noise += group_variance(q, d) + T * std::pow(lacks(q, d), 2);
         squares += std::pow(light(q, d), 2);
       }
-    const double condition = s.conservation > 0 ? noise / squares : 0;
+    const double condition = s.mean_constraint > 0 ? noise / squares : 0;
     Eigen::MatrixXd A = penalty(c, last, condition).asDiagonal();
     Eigen::VectorXd b = Eigen::VectorXd::Zero(k);
     for (int d = c; d <= last; ++d) {
@@ -215,8 +215,8 @@ inline Result control_variates(const GroupedImage& crn, const RgbImage& h, const
       b += X[d].transpose() * y[d] / (T - 1);
       Eigen::VectorXd g(k);
       for (int i = 0; i < k; ++i) g(i) = light(neighbours[i], d);
-      A += s.conservation * condition * g * g.transpose();
-      b += s.conservation * condition * g * light(target, d);
+      A += s.mean_constraint * condition * g * g.transpose();
+      b += s.mean_constraint * condition * g * light(target, d);
     }
     const Eigen::LDLT<Eigen::MatrixXd> factored = A.ldlt();
     beta[c] = factored.solve(b);
@@ -242,7 +242,7 @@ inline Result control_variates(const GroupedImage& crn, const RgbImage& h, const
       const Pixel q = neighbours[i];
       result.estimate[c] -= beta[c](i) * (mean(crn, q.x, q.y)[c] - h[index(q)][c]);  // Eq. (7)
       variance += beta[c](i) * beta[c](i) *
-                  ((1 - s.sample_share) * variance_of_h[index(q)][c] + s.sample_share * mean_variance);
+                  ((1 - s.sample_fraction) * variance_of_h[index(q)][c] + s.sample_fraction * mean_variance);
     }
     result.std_error[c] = std::sqrt(variance);
   }

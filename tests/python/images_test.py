@@ -49,7 +49,7 @@ class Combine(FilesTest):
     def test_options(self):
         for options, words in (({"paper": True}, ["--paper"]), ({"k": 9, "penalty": "homogeneous", "ridge": 0.1},
                                 ["--k", 9, "--penalty", "homogeneous", "--ridge", 0.1]),
-                               ({"feedback": "off"}, ["--feedback", "off"])):
+                               ({"residual_correction": "off"}, ["--feedback", "off"])):
             result = covary.combine(self.crn, self.independent, **options)
             self.assert_same_bits(result.image.reshape(-1, 3), rgb(self.combine_files(*words)))
 
