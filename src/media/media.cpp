@@ -17,6 +17,9 @@
 namespace covary {
 namespace {
 
+/// Collisions of a ray with a medium of varying extinction, at most: more would take too long, or no ray would move.
+constexpr float kMostCollisions = 1e6f;
+
 bool not_negative(const Spectrum& s) { return is_finite(s) && s.r >= 0 && s.g >= 0 && s.b >= 0; }
 
 /// A volume; numbers and colours are constant ones. Null after recording an error.
@@ -42,6 +45,13 @@ std::shared_ptr<Medium> make_medium(Parameters& p, bool homogeneous) {
     p.error_at("sigma_t", "has values that are negative or not finite");
   if (!not_negative(settings.albedo->smallest()) || !(max_component(settings.albedo->largest()) <= 1))
     p.error_at("albedo", "has values outside [0, 1]");
+  const Bounds3 box = settings.extinction->bounds();
+  const float collisions =
+      max_component(settings.extinction->largest() * settings.scale) * length(box.upper - box.lower);
+  if (!homogeneous && !(collisions <= kMostCollisions))
+    p.error_at("sigma_t", fmt::format("makes a ray collide {:.3g} times on the way through the box; at most {:.0f} are "
+                                      "accepted (is 'scale' right?)",
+                                      collisions, kMostCollisions));
   settings.phase = phases.empty() ? isotropic_phase() : phases[0];
   return std::make_shared<Medium>(std::move(settings));
 }

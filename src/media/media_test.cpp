@@ -56,6 +56,9 @@ TEST(Media, ValuesOutsideTheirRangesAreErrors) {
   EXPECT_EQ(make("homogeneous", {{"albedo", 1.5}}).errors,
             "test.xml:2:1: parameter 'albedo' of medium 'homogeneous' has values outside [0, 1]");
   EXPECT_TRUE(contains(make("homogeneous", {{"scale", -1.0}}).errors, "it must be at least 0"));
+  EXPECT_TRUE(contains(make("heterogeneous", {{"sigma_t", 1e6}}).errors,
+                       "makes a ray collide 1.73e+06 times on the way through the box; at most 1000000 are accepted"));
+  EXPECT_EQ(make("homogeneous", {{"sigma_t", 1e6}}).errors, "");
   EXPECT_TRUE(contains(make("homogeneous", {{"density", 1.0}}).errors, "unknown parameter 'density'"));
 }
 
