@@ -65,6 +65,8 @@ const Case kCases[] = {
     {"principled", kPrincipled},
     {"principledthin", kThin},
     {"null", {{"type", "null"}}},
+    {"polarizer", {{"type", "polarizer"}, {"transmittance", 0.6}}},
+    {"pplastic", {{"type", "pplastic"}, {"alpha", 0.3}}},
     {"mask", mask(kPlastic)},
     {"mask_of_glass", mask(kGlass)},
     {"blend", blend(kPlastic, kRoughGlass)},

@@ -45,7 +45,7 @@ AreaSample AreaLight::sample_position(Vec2 u, float u_primitive) const {
 
 EmitterSample AreaLight::sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const {
   // Meshes with colours are sampled by area, and the colour is that of a triangle, which an EmitterSample has not.
-  if (samples_uv_ || (textured_ && shape_->has_vertex_colour()))
+  if (samples_uv_ || (textured_ && shape_->has_attributes()))
     return towards(reference, sample_position(u, u_primitive));
   EmitterSample sample = shape_->sample_towards(reference, u, u_primitive);
   if (sample.pdf_solid_angle > 0 && dot(sample.n, sample.wi) < 0)

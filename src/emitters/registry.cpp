@@ -6,7 +6,8 @@ namespace covary {
 std::span<const Plugin<Emitter>> emitter_plugins() {
   static constexpr Plugin<Emitter> kPlugins[] = {
       {"area", make_area},     {"constant", make_constant}, {"directional", make_directional},
-      {"envmap", make_envmap}, {"point", make_point},       {"spot", make_spot},
+      {"envmap", make_envmap}, {"point", make_point},       {"projector", make_projector},
+      {"spot", make_spot},
   };
   return kPlugins;
 }

@@ -20,6 +20,7 @@ std::shared_ptr<Emitter> make_constant(Parameters& parameters);
 std::shared_ptr<Emitter> make_directional(Parameters& parameters);
 std::shared_ptr<Emitter> make_envmap(Parameters& parameters);
 std::shared_ptr<Emitter> make_point(Parameters& parameters);
+std::shared_ptr<Emitter> make_projector(Parameters& parameters);
 std::shared_ptr<Emitter> make_spot(Parameters& parameters);
 
 }  // namespace covary

@@ -92,6 +92,11 @@ class BidirectionalTracer final : public LightTracingIntegrator {
   }
   const BidirectionalSettings* bidirectional() const override { return &settings_; }
   void prepare(const Scene& scene) override {
+    if (scene.camera().is_orthographic())
+      throw Error(
+          ErrorCode::kInput,
+          "integrator bdpt cannot render for an orthographic sensor: no light path finds a camera whose rays are "
+          "parallel; use path");
     emission_lights_.emplace(scene);
     to_camera_ = scene.camera().settings().to_world.inverse();
   }

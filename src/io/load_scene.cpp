@@ -18,6 +18,7 @@
 #include "io/file_view.h"
 #include "io/held_objects.h"
 #include "io/media.h"
+#include "io/mesh_attributes.h"
 #include "io/nested_integrator.h"
 #include "io/object_factory.h"
 #include "io/scene_memory.h"
@@ -243,6 +244,10 @@ class Loader {
     if (job.asked_everything) p.report_unknown();
     if (!job.shape) return;
 
+    for (const std::string& name : wanted_attributes(*job.description))
+      if (!job.shape->has_attribute(name))
+        p.warn(fmt::format("has no attribute '{}' for a texture 'mesh_attribute', which is white there", name));
+    if (!emitters.empty() && !job.shape->can_emit()) p.error("cannot emit light");
     job.shape->set_bsdf(bsdfs.empty() ? default_bsdf(!emitters.empty()) : bsdfs[0]);
     use_media(media, p, *job.shape, bsdfs.empty(), parts_);
     if (!emitters.empty()) {

@@ -245,8 +245,8 @@ TEST_F(LoadScene, ReportsEveryProblemOfShapesAtOnce) {
 <subsurface type="dipole"/>
 <float name="gravity" value="9.81"/>)");
   const char* expected[] = {
-      "scene.xml:6:1: unknown shape 'pli'; did you mean 'ply'? Supported: 'cube', 'cylinder', 'disk', 'instance', "
-      "'obj', 'ply', "
+      "scene.xml:6:1: unknown shape 'pli'; did you mean 'ply'? Supported: 'bsplinecurve', 'cube', 'cylinder', 'disk', "
+      "'instance', 'linearcurve', 'obj', 'ply', "
       "'rectangle', 'serialized', 'shapegroup', 'sphere'",
       "scene.xml:7:19: parameter 'filename' of shape 'ply' names 'short.ply': PLY: the file ends, or a number cannot "
       "be read, in "

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -25,8 +26,10 @@ struct MeshFile {
 
 /// Stanford PLY: ascii, binary little and big endian. Polygons become fans around their first vertex. Reads x y z, nx
 /// ny nz, texture coordinates ("u v", "s t", "texture_u texture_v") and colours ("r g b", "red green blue", "color_r
-/// …"; integers are divided by their largest value); skips everything else.
-MeshFile read_ply(std::span<const std::byte> bytes);
+/// …"; integers are divided by their largest value), and of the `attributes` asked for those it has; skips everything
+/// else. An attribute "vertex_NAME" or "face_NAME" is a property "NAME" or "NAME_0" (or "NAME_1", "NAME_x", "NAME_r"),
+/// or three, "NAME_0 NAME_1 NAME_2", "NAME_1 …", "NAME_x …", "NAME_r …"; "color" also "r g b", "red green blue".
+MeshFile read_ply(std::span<const std::byte> bytes, std::span<const std::string> attributes = {});
 
 /// Wavefront OBJ: v, vt, vn, f (negative indices count from the end); other statements are skipped. All groups and
 /// objects of the file become one mesh.

@@ -26,7 +26,8 @@ std::span<const Plugin<SceneObject>> setting_plugins(const std::string& kind) {
   static const Plugin<SceneObject> kSamplers[] = {
       {"independent", kSampler}, {"halton", kSampler},     {"hammersley", kSampler}, {"ldsampler", kSampler},
       {"multijitter", kSampler}, {"orthogonal", kSampler}, {"sobol", kSampler},      {"stratified", kSampler}};
-  static const Plugin<SceneObject> kSensors[] = {{"perspective", kSensor}, {"thinlens", kSensor}};
+  static const Plugin<SceneObject> kSensors[] = {
+      {"orthographic", kSensor}, {"perspective", kSensor}, {"thinlens", kSensor}};
   if (kind == "rfilter") return kFilters;
   if (kind == "film") return kFilms;
   if (kind == "sampler") return kSamplers;

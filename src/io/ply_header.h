@@ -24,6 +24,7 @@ struct PlyProperty {
   bool is_list = false;
   PlyType count_type = PlyType::kUint8;
   PlySlot slot = kSkip;
+  int attribute = -1, channel = 0;  ///< which attribute of the mesh it is a channel of; -1: none
 };
 
 struct PlyElement {

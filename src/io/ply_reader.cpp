@@ -13,6 +13,7 @@
 
 #include "core/error.h"
 #include "io/mesh_file.h"
+#include "io/ply_attributes.h"
 #include "io/ply_header.h"
 
 namespace covary {
@@ -196,6 +197,12 @@ void skip_list(Body& body, const PlyProperty& property, const PlyElement& elemen
   for (uint64_t k = 0; k < length; ++k) read_value(body, property.type, element, index);
 }
 
+/// Integers of colours are divided by their largest value.
+float attribute_value(const PlyProperty& p, const MeshAttribute& attribute, double value) {
+  const bool colour = attribute.name.find("color") != std::string::npos;
+  return static_cast<float>(value) * (colour ? colour_scale(p.type) : 1);
+}
+
 /// Vertices of plain single-precision numbers in the machine's byte order. False: not that layout.
 bool read_float_vertices(BinaryBody& body, const PlyElement& element, const Contents& contents, MeshData& mesh) {
   if (body.swap() || element.has_lists()) return false;
@@ -218,8 +225,12 @@ bool read_float_vertices(BinaryBody& body, const PlyElement& element, const Cont
 template <typename Body>
 void read_vertices(Body& body, const PlyElement& element, const Contents& contents, MeshData& mesh) {
   allocate(mesh, contents, element.count);
+  const auto in_attribute = [](const PlyProperty& p) { return p.attribute >= 0; };
+  const bool attributes = std::any_of(element.properties.begin(), element.properties.end(), in_attribute);
+  for (MeshAttribute& a : mesh.attributes)
+    if (!a.per_face) a.values.resize(element.count * static_cast<size_t>(a.channels));
   if constexpr (std::is_same_v<Body, BinaryBody>)
-    if (read_float_vertices(body, element, contents, mesh)) return;
+    if (!attributes && read_float_vertices(body, element, contents, mesh)) return;
   float values[kSlots] = {};
   for (uint64_t i = 0; i < element.count; ++i) {
     for (const PlyProperty& p : element.properties) {
@@ -228,6 +239,10 @@ void read_vertices(Body& body, const PlyElement& element, const Contents& conten
         continue;
       }
       const double value = read_value(body, p.type, element, i);
+      if (p.attribute >= 0) {
+        MeshAttribute& a = mesh.attributes[p.attribute];
+        a.values[i * a.channels + p.channel] = attribute_value(p, a, value);
+      }
       if (p.slot != kSkip) values[p.slot] = static_cast<float>(value) * (p.slot >= kR ? colour_scale(p.type) : 1);
     }
     store(mesh, contents, i, values);
@@ -256,6 +271,16 @@ bool read_plain_faces(BinaryBody& body, const PlyElement& element, MeshData& mes
   return true;
 }
 
+/// The values of a face for each of its `n` triangles.
+void add_face_values(MeshData& mesh, const std::vector<std::array<float, 3>>& values, size_t n) {
+  for (size_t a = 0; a < mesh.attributes.size(); ++a) {
+    MeshAttribute& attribute = mesh.attributes[a];
+    if (!attribute.per_face) continue;
+    for (size_t i = 0; i < n; ++i)
+      attribute.values.insert(attribute.values.end(), values[a].begin(), values[a].begin() + attribute.channels);
+  }
+}
+
 template <typename Body>
 void read_faces(Body& body, const PlyElement& element, MeshData& mesh) {
   const auto is_indices = [](const PlyProperty& p) {
@@ -267,10 +292,13 @@ void read_faces(Body& body, const PlyElement& element, MeshData& mesh) {
   if constexpr (std::is_same_v<Body, BinaryBody>)
     if (read_plain_faces(body, element, mesh)) return;
   constexpr double kMaxIndex = std::numeric_limits<uint32_t>::max();
-  for (uint64_t i = 0; i < element.count; ++i)
+  std::vector<std::array<float, 3>> of_face(mesh.attributes.size());
+  for (uint64_t i = 0; i < element.count; ++i) {
+    const size_t n_before = mesh.triangles.size();
     for (const PlyProperty& p : element.properties) {
       if (!p.is_list) {
-        read_value(body, p.type, element, i);
+        const double value = read_value(body, p.type, element, i);
+        if (p.attribute >= 0) of_face[p.attribute][p.channel] = attribute_value(p, mesh.attributes[p.attribute], value);
       } else if (!is_indices(p)) {
         skip_list(body, p, element, i);
       } else {
@@ -286,16 +314,19 @@ void read_faces(Body& body, const PlyElement& element, MeshData& mesh) {
         }
       }
     }
+    add_face_values(mesh, of_face, mesh.triangles.size() - n_before);
+  }
 }
 
 template <typename Body>
-void read_body(Body body, PlyHeader& header, MeshData& mesh) {
+void read_body(Body body, PlyHeader& header, std::span<const std::string> attributes, MeshData& mesh) {
   for (PlyElement& element : header.elements) {
     const bool is_vertex = element.name == "vertex", is_face = element.name == "face";
     if (element.properties.empty() && !is_vertex && !is_face) continue;
     if (element.count > body.capacity(element) || element.count >= std::numeric_limits<uint32_t>::max())
       fail_ply(fmt::format("the header promises {} elements '{}', more than the file can hold", element.count,
                            element.name));
+    if (is_vertex || is_face) assign_attributes(element, attributes, mesh);
     if (is_vertex) {
       const Contents contents = assign_slots(element);
       read_vertices(body, element, contents, mesh);
@@ -316,7 +347,7 @@ void read_body(Body body, PlyHeader& header, MeshData& mesh) {
 
 }  // namespace
 
-MeshFile read_ply(std::span<const std::byte> bytes) {
+MeshFile read_ply(std::span<const std::byte> bytes, std::span<const std::string> attributes) {
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   PlyHeader header = parse_ply_header(text);
   for (const char* needed : {"vertex", "face"})
@@ -325,9 +356,10 @@ MeshFile read_ply(std::span<const std::byte> bytes) {
       fail_ply(fmt::format("the file has no element '{}'", needed));
   MeshFile file;
   if (header.format == PlyFormat::kAscii) {
-    read_body(AsciiBody(text.substr(header.size)), header, file.mesh);
+    read_body(AsciiBody(text.substr(header.size)), header, attributes, file.mesh);
   } else {
-    read_body(BinaryBody(bytes.subspan(header.size), header.format == PlyFormat::kBigEndian), header, file.mesh);
+    read_body(BinaryBody(bytes.subspan(header.size), header.format == PlyFormat::kBigEndian), header, attributes,
+              file.mesh);
   }
   check_mesh(file);
   return file;

@@ -4,11 +4,9 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
 #include <limits>
-#include <numbers>
 
-#include "io/xml_values.h"
+#include "scene/field_of_view.h"
 
 namespace covary {
 namespace {
@@ -23,43 +21,6 @@ std::shared_ptr<const T> only_child(Parameters& p, const std::string& kind) {
   const auto children = p.children<T>(kind);
   if (children.size() > 1) p.error(fmt::format("has {} {}s; expected one", children.size(), kind));
   return children.empty() ? nullptr : children[0];
-}
-
-void read_field_of_view(Parameters& p, CameraSettings& camera) {
-  static const std::vector<std::string> kAxes = {"x", "y", "diagonal", "smaller", "larger"};
-  const bool has_fov = p.has("fov"), has_length = p.has("focal_length");
-  if (has_fov && has_length) p.error_at("focal_length", "cannot stand beside 'fov'");
-  if (has_fov) {
-    camera.fov_degrees = p.get_float("fov", 50);
-    if (!(camera.fov_degrees > 0 && camera.fov_degrees < 180)) {
-      p.error_at("fov", fmt::format("is {}; it must lie in (0, 180)", camera.fov_degrees));
-      camera.fov_degrees = 50;
-    }
-    const std::string axis = p.get_choice("fov_axis", "x", kAxes);
-    camera.fov_axis = axis == "y"          ? FovAxis::kY
-                      : axis == "diagonal" ? FovAxis::kDiagonal
-                      : axis == "smaller"  ? FovAxis::kSmaller
-                      : axis == "larger"   ? FovAxis::kLarger
-                                           : FovAxis::kX;
-    return;
-  }
-  // Focal length of a lens before a 36 x 24 mm film, as photographers say it.
-  std::string text = p.get_string("focal_length", "50mm");
-  if (text.ends_with("mm")) text.resize(text.size() - 2);
-  double length = 50;
-  try {
-    length = parse_number(text);
-  } catch (const Error& error) {
-    p.error_at("focal_length", fmt::format("{}; expected a length like '50mm'", error.what()));
-  }
-  if (!(length > 0)) {
-    p.error_at("focal_length", fmt::format("is {} mm; it must be positive", length));
-    length = 50;
-  }
-  camera.fov_degrees =
-      static_cast<float>(2 * 180 / std::numbers::pi * std::atan(std::sqrt(36.0 * 36 + 24 * 24) / (2 * length)));
-  camera.fov_axis = FovAxis::kDiagonal;
-  if (p.has("fov_axis")) p.get_choice("fov_axis", "diagonal", {"diagonal"});
 }
 
 }  // namespace
@@ -116,18 +77,22 @@ std::shared_ptr<SensorSettings> make_sensor(Parameters& p) {
   auto sensor = std::make_shared<SensorSettings>();
   CameraSettings& camera = sensor->camera;
   camera.to_world = p.get_transform("to_world");
-  read_field_of_view(p, camera);
+  camera.orthographic = p.type() == "orthographic";
+  if (!camera.orthographic) {
+    const FieldOfView view = get_field_of_view(p);
+    camera.fov_degrees = view.degrees, camera.fov_axis = view.axis;
+  }
   camera.near_clip = p.get_float("near_clip", 1e-2f, 0, kHuge);
   camera.far_clip = p.get_float("far_clip", 1e4f, 0, kHuge);
   if (!(camera.near_clip > 0 && camera.near_clip < camera.far_clip))
     p.error(fmt::format("near_clip is {} and far_clip {}; expected 0 < near_clip < far_clip", camera.near_clip,
                         camera.far_clip));
-  camera.focus_distance = p.get_float("focus_distance", camera.far_clip, 0, kHuge);
+  if (!camera.orthographic) camera.focus_distance = p.get_float("focus_distance", camera.far_clip, 0, kHuge);
   if (p.type() == "thinlens") {
     if (!p.has("aperture_radius")) p.error("the float 'aperture_radius' is missing");
     camera.aperture_radius = p.get_float("aperture_radius", 0, 0, kHuge);
     if (!(camera.focus_distance > 0)) p.error_at("focus_distance", "is 0; it must be positive");
-  } else {
+  } else if (!camera.orthographic) {
     camera.principal_point_offset = {p.get_float("principal_point_offset_x", 0),
                                      p.get_float("principal_point_offset_y", 0)};
   }

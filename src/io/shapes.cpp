@@ -6,7 +6,7 @@
 // | to_world        | transform | none    | from the shape's space into the scene                                |
 // | flip_normals    | boolean   | false   | turn the surface inside out                                          |
 // | face_normals    | boolean   | false   | meshes: flat shading                                                 |
-// | filename        | string    |         | obj, ply, serialized                                                 |
+// | filename        | string    |         | obj, ply, serialized, linearcurve, bsplinecurve                      |
 // | flip_tex_coords | boolean   | see     | obj (true), ply (false): v becomes 1 - v                             |
 // | shape_index     | integer   | 0       | serialized: which mesh of the file                                   |
 // | center, radius  |           | 0, 1    | sphere                                                               |
@@ -16,7 +16,9 @@
 #include <fmt/format.h>
 
 #include "core/memory_limit.h"
+#include "io/curve_file.h"
 #include "io/file_view.h"
+#include "io/mesh_attributes.h"
 #include "io/mesh_file.h"
 #include "scene/analytic_shape.h"
 #include "scene/mesh.h"
@@ -65,7 +67,8 @@ std::shared_ptr<Shape> make_obj(Parameters& p) {
 std::shared_ptr<Shape> make_ply(Parameters& p) {
   MeshPlacement placement = placement_of(p);
   placement.flip_tex_coords = p.get_bool("flip_tex_coords", false);
-  return make_from_file(p, placement, [](const FileView& view) { return read_ply(view.bytes()); });
+  const std::vector<std::string> wanted = wanted_attributes(p.object());
+  return make_from_file(p, placement, [&](const FileView& view) { return read_ply(view.bytes(), wanted); });
 }
 
 std::shared_ptr<Shape> make_serialized(Parameters& p) {
@@ -132,13 +135,33 @@ std::shared_ptr<Shape> make_cylinder(Parameters& p) {
   return std::make_shared<Cylinder>(p.get_transform("to_world"), p0, p1, radius, p.get_bool("flip_normals", false));
 }
 
+std::shared_ptr<Shape> make_curves(Parameters& p, CurveKind kind) {
+  const Transform to_world = p.get_transform("to_world");
+  p.get_float("silhouette_sampling_weight", 1);  // of Mitsuba's derivatives
+  const std::string path = p.require_file("filename");
+  if (path.empty()) return nullptr;
+  try {
+    const FileView view(path);
+    require_memory(path, "its curves", 3 * static_cast<double>(view.bytes().size()));
+    return read_curves(view.text(), kind, to_world);
+  } catch (const Error& error) {
+    p.error_at("filename", fmt::format("names '{}': {}", p.get_string("filename", ""), error.what()));
+    return nullptr;
+  }
+}
+
+std::shared_ptr<Shape> make_bsplinecurve(Parameters& p) { return make_curves(p, CurveKind::kBspline); }
+std::shared_ptr<Shape> make_linearcurve(Parameters& p) { return make_curves(p, CurveKind::kLinear); }
+
 }  // namespace
 
 std::span<const Plugin<Shape>> shape_plugins() {
   static constexpr Plugin<Shape> kPlugins[] = {
+      {"bsplinecurve", make_bsplinecurve},
       {"cube", make_cube},
       {"cylinder", make_cylinder},
       {"disk", make_disk},
+      {"linearcurve", make_linearcurve},
       {"obj", make_obj},
       {"ply", make_ply},
       {"rectangle", make_rectangle},

@@ -5,9 +5,7 @@
 #include "core/warp.h"
 
 namespace covary {
-namespace {
 
-/// Half extent along x of the image plane at distance 1.
 float half_extent_x(float fov_degrees, FovAxis axis, float aspect) {
   const float t = std::tan(fov_degrees * (kPi / 360));
   switch (axis) {
@@ -25,8 +23,6 @@ float half_extent_x(float fov_degrees, FovAxis axis, float aspect) {
   throw Error(ErrorCode::kInternal, "unknown field-of-view axis");
 }
 
-}  // namespace
-
 Camera::Camera(const CameraSettings& settings, int width, int height)
     : settings_(settings), width_(width), height_(height) {
   COVARY_CHECK(width > 0 && height > 0, "a camera needs a film of positive size");
@@ -37,6 +33,10 @@ Camera::Camera(const CameraSettings& settings, int width, int height)
   x_ = settings.to_world.vector({1, 0, 0});
   y_ = settings.to_world.vector({0, 1, 0});
   z_ = settings.to_world.vector({0, 0, 1});
+  if (settings.orthographic) {
+    tan_x_ = 1, tan_y_ = 1 / aspect;
+    return;
+  }
   const float tolerance = 1e-3f;
   if (std::abs(length(x_) - 1) > tolerance || std::abs(length(y_) - 1) > tolerance ||
       std::abs(length(z_) - 1) > tolerance)
@@ -57,6 +57,7 @@ Ray Camera::ray(Vec2 film, Vec2 lens) const {
   // The camera's x axis points left in the image, its y axis up.
   const float sx = film.x / static_cast<float>(width_) + settings_.principal_point_offset.x;
   const float sy = film.y / static_cast<float>(height_) + settings_.principal_point_offset.y;
+  if (settings_.orthographic) return orthographic_ray(sx, sy);
   Vec3 d{(1 - 2 * sx) * tan_x_, (1 - 2 * sy) * tan_y_, 1};
   Vec3 o{0, 0, 0};
   if (settings_.aperture_radius > 0) {
@@ -68,6 +69,11 @@ Ray Camera::ray(Vec2 film, Vec2 lens) const {
   const float near_t = settings_.near_clip / d.z, far_t = settings_.far_clip / d.z;
   o += d * near_t;
   return {origin_ + x_ * o.x + y_ * o.y + z_ * o.z, x_ * d.x + y_ * d.y + z_ * d.z, far_t - near_t};
+}
+
+Ray Camera::orthographic_ray(float sx, float sy) const {
+  const Vec3 on_film = x_ * ((1 - 2 * sx) * tan_x_) + y_ * ((1 - 2 * sy) * tan_y_);
+  return {origin_ + on_film + z_ * settings_.near_clip, normalize(z_), settings_.far_clip - settings_.near_clip};
 }
 
 float Camera::pdf_direction(const Vec3& d) const {

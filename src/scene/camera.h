@@ -13,10 +13,14 @@ namespace covary {
 /// Which extent of the film the field of view spans (Mitsuba's names).
 enum class FovAxis { kX, kY, kDiagonal, kSmaller, kLarger };
 
-/// Perspective camera with a pinhole or a thin lens.
+/// Half of the extent along x at distance 1 of an image of that field of view; `aspect`: width over height.
+float half_extent_x(float fov_degrees, FovAxis axis, float aspect);
+
+/// Perspective camera with a pinhole or a thin lens, or one whose rays are parallel.
 struct CameraSettings {
   Transform to_world;
-  float fov_degrees = 50;  ///< full angle, in (0, 180)
+  bool orthographic = false;  ///< rays along z from the square [-1, 1]^2, as high as the film is for its width
+  float fov_degrees = 50;     ///< full angle, in (0, 180)
   FovAxis fov_axis = FovAxis::kX;
   float near_clip = 1e-2f, far_clip = 1e4f;  ///< distances along the viewing axis
   Vec2 principal_point_offset{0, 0};         ///< relative to the film's size
@@ -52,6 +56,9 @@ class Camera : public SceneObject {
   // of film area: the measurement is that of one pixel. Directions `d` are unit vectors that leave the camera.
   /// Pinhole: the position of the lens is a delta.
   bool is_delta() const { return !(settings_.aperture_radius > 0); }
+  /// All rays are parallel. What describes directions, project() and sample_towards() are then of no use: no light path
+  /// finds the camera.
+  bool is_orthographic() const { return settings_.orthographic; }
   /// Density of the lens position, per unit area of the lens; 1 for a pinhole.
   float pdf_position() const { return pdf_position_; }
   /// Density of the ray's direction per unit solid angle; the same for every point of the lens. 0 behind the camera.
@@ -75,7 +82,8 @@ class Camera : public SceneObject {
   float tan_x_, tan_y_;  // half extents of the image plane at distance 1
   Vec3 origin_, x_, y_, z_;
   Vec3 to_x_, to_y_, to_z_;  // rows of the inverse of (x_, y_, z_): local coordinates of world vectors
-  Vec3 lens_normal_;         // unit, along the viewing axis
+  Ray orthographic_ray(float sx, float sy) const;
+  Vec3 lens_normal_;  // unit, along the viewing axis
   float pdf_position_ = 1;
   float pixels_per_area_;  // film area in pixels over area of the image plane at distance 1, in world units
 };

@@ -78,5 +78,18 @@ TEST(Camera, RefusesScale) {
   }
 }
 
+TEST(Camera, OrthographicRaysAreParallel) {
+  CameraSettings settings;
+  settings.orthographic = true, settings.near_clip = 2, settings.far_clip = 10;
+  settings.to_world = Transform::translate({5, 0, 0}) * Transform::scale({3, 3, 1});
+  const Camera camera(settings, 100, 50);
+  const Ray middle = camera.ray({50, 25}, {}), corner = camera.ray({0, 0}, {});
+  EXPECT_EQ(middle.d, (Vec3{0, 0, 1}));
+  EXPECT_EQ(corner.d, middle.d);
+  EXPECT_EQ(middle.t_max, 8);
+  EXPECT_LT(length(middle.o - Vec3{5, 0, 2}), 1e-5f);
+  EXPECT_LT(length(corner.o - Vec3{8, 1.5f, 2}), 1e-5f);  // x to the left, y up
+}
+
 }  // namespace
 }  // namespace covary

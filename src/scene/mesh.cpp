@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scene/mesh.h"
 
+#include <algorithm>
 #include <string>
 #include <utility>
 
@@ -22,12 +23,18 @@ void check_length(const char* what, size_t length, size_t n_vertices) {
 TriangleMesh::TriangleMesh(MeshData data)
     : triangles_(std::move(data.triangles)),
       colours_(std::move(data.colours)),
+      attributes_(std::move(data.attributes)),
       has_normals_(!data.normals.empty()),
       has_uvs_(!data.uvs.empty()) {
   const size_t n = data.positions.size();
   check_length("normals", data.normals.size(), n);
   check_length("texture coordinates", data.uvs.size(), n);
   check_length("vertex colours", colours_.size(), n);
+
+  for (const MeshAttribute& a : attributes_)
+    if (a.values.size() != (a.per_face ? triangles_.size() : n) * static_cast<size_t>(a.channels))
+      throw Error(ErrorCode::kInput, "attribute '" + a.name + "' of a mesh has " + std::to_string(a.values.size()) +
+                                         " values, which does not fit the mesh");
 
   const float sign = data.flip_normals ? -1.0f : 1.0f;
   vertices_.resize(n);
@@ -49,7 +56,10 @@ TriangleMesh::TriangleMesh(MeshData data)
     if (data.flip_normals) std::swap(t[1], t[2]);
     const Vec3 p0 = vertices_[t[0]].p;
     const Vec3 normal = cross(vertices_[t[1]].p - p0, vertices_[t[2]].p - p0);
-    if (length_squared(normal) > 0) triangles_[kept++] = t;
+    if (!(length_squared(normal) > 0)) continue;
+    for (MeshAttribute& a : attributes_)
+      if (a.per_face) std::copy_n(&a.values[i * a.channels], a.channels, &a.values[kept * a.channels]);
+    triangles_[kept++] = t;
   }
   n_degenerate_ = triangles_.size() - kept;
   triangles_.resize(kept);
@@ -95,7 +105,7 @@ TriangleMesh::Parallelogram TriangleMesh::find_parallelogram() const {
 AreaSample TriangleMesh::sample_uv(Vec2 uv) const {
   const Parallelogram& q = parallelogram_;
   AreaSample at = {q.origin + q.dp_du * uv.x + q.dp_dv * uv.y, q.n, uv, q.inverse_area};
-  if (!colours_.empty() && is_parallelogram()) find_triangle(at);
+  if (TriangleMesh::has_attributes() && is_parallelogram()) find_triangle(at);
   return at;
 }
 
@@ -193,6 +203,9 @@ std::shared_ptr<Shape> TriangleMesh::transformed(const Transform& to_world) cons
   MeshData data;
   data.triangles = triangles_;
   data.colours = colours_;
+  data.attributes = attributes_;
+  for (MeshAttribute& a : data.attributes)
+    if (a.per_face) a.values.resize(triangles_.size() * static_cast<size_t>(a.channels));
   for (const Vertex& vertex : vertices_) {
     data.positions.push_back(to_world.point(vertex.p));
     if (has_normals_) data.normals.push_back(normalize(to_world.normal(vertex.n)));
@@ -208,6 +221,25 @@ Spectrum TriangleMesh::vertex_colour(const SurfaceHit& hit) const {
   const auto& t = triangles_[hit.primitive];
   const float b1 = hit.barycentric.x, b2 = hit.barycentric.y;
   return colours_[t[0]] * (1 - b1 - b2) + colours_[t[1]] * b1 + colours_[t[2]] * b2;
+}
+
+bool TriangleMesh::has_attribute(std::string_view name) const {
+  if (name == "vertex_color" && !colours_.empty()) return true;
+  return std::any_of(attributes_.begin(), attributes_.end(), [&](const MeshAttribute& a) { return a.name == name; });
+}
+
+Spectrum TriangleMesh::attribute(std::string_view name, const SurfaceHit& hit) const {
+  if (name == "vertex_color" && !colours_.empty()) return TriangleMesh::vertex_colour(hit);
+  const auto a = std::find_if(attributes_.begin(), attributes_.end(), [&](const auto& b) { return b.name == name; });
+  if (a == attributes_.end()) return Spectrum(1);
+  const auto at = [&](size_t i) {
+    const float* v = &a->values[i * static_cast<size_t>(a->channels)];
+    return a->channels == 1 ? Spectrum(v[0]) : Spectrum(v[0], v[1], v[2]);
+  };
+  if (a->per_face) return at(hit.primitive);
+  const auto& t = triangles_[hit.primitive];
+  const float b1 = hit.barycentric.x, b2 = hit.barycentric.y;
+  return at(t[0]) * (1 - b1 - b2) + at(t[1]) * b1 + at(t[2]) * b2;
 }
 
 }  // namespace covary

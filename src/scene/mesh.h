@@ -2,6 +2,8 @@
 #pragma once
 
 #include <array>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/distribution.h"
@@ -10,6 +12,14 @@
 
 namespace covary {
 
+/// Numbers stored with a mesh under a name, `vertex_…` or `face_…`: one or three for each vertex or triangle.
+struct MeshAttribute {
+  std::string name;
+  bool per_face = false;
+  int channels = 1;
+  std::vector<float> values;
+};
+
 /// Vertex and index arrays of a triangle mesh in world space (or in the space of its shape group).
 struct MeshData {
   std::vector<Vec3> positions;
@@ -17,7 +27,8 @@ struct MeshData {
   std::vector<Vec2> uvs;          ///< one per vertex, or empty
   std::vector<Spectrum> colours;  ///< one per vertex, or empty
   std::vector<std::array<uint32_t, 3>> triangles;
-  bool flip_normals = false;  ///< reverse geometric and shading normals
+  std::vector<MeshAttribute> attributes;  ///< others than the colours of the vertices
+  bool flip_normals = false;              ///< reverse geometric and shading normals
 };
 
 class TriangleMesh final : public Shape {
@@ -43,6 +54,9 @@ class TriangleMesh final : public Shape {
   AreaSample sample_uv(Vec2 uv) const override;
   std::shared_ptr<Shape> transformed(const Transform& to_world) const override;
   Spectrum vertex_colour(const SurfaceHit& hit) const override;
+  Spectrum attribute(std::string_view name, const SurfaceHit& hit) const override;
+  bool has_attribute(std::string_view name) const override;
+  bool has_attributes() const override { return !colours_.empty() || !attributes_.empty(); }
   bool has_vertex_colour() const override { return !colours_.empty(); }
   /// Makes sample_area(), area() and all about parts ready; called by the scene for meshes that emit. Not needed
   /// otherwise.
@@ -61,6 +75,7 @@ class TriangleMesh final : public Shape {
   LargeVector<Vertex> vertices_;
   std::vector<std::array<uint32_t, 3>> triangles_;
   std::vector<Spectrum> colours_;
+  std::vector<MeshAttribute> attributes_;
   Bounds3 bounds_;
   bool has_normals_ = false, has_uvs_ = false;
   size_t n_degenerate_ = 0;

@@ -14,6 +14,7 @@
 
 #include "core/error.h"
 #include "scene/analytic_shape.h"
+#include "scene/curve.h"
 #include "scene/mesh.h"
 
 namespace covary {
@@ -74,6 +75,36 @@ RTCGeometry analytic_geometry(RTCDevice device, const AnalyticShape& shape) {
   rtcSetGeometryIntersectFunction(geometry, analytic_intersect);
   rtcSetGeometryOccludedFunction(geometry, analytic_occluded);
   return geometry;
+}
+
+/// Curves are seen from outside alone, as in Mitsuba; Embree has that as an option of its own compilation.
+void pass_from_inside(const RTCFilterFunctionNArguments* args) {
+  for (unsigned i = 0; i < args->N; ++i) {
+    if (!args->valid[i]) continue;
+    const Vec3 d = to_ray(args->ray, args->N, i).d;
+    const Vec3 n{RTCHitN_Ng_x(args->hit, args->N, i), RTCHitN_Ng_y(args->hit, args->N, i),
+                 RTCHitN_Ng_z(args->hit, args->N, i)};
+    if (dot(d, n) > 0) args->valid[i] = 0;
+  }
+}
+
+RTCGeometry curve_geometry(RTCDevice device, const CurveShape& curve) {
+  const bool linear = curve.kind() == CurveKind::kLinear;
+  const RTCGeometry geometry =
+      rtcNewGeometry(device, linear ? RTC_GEOMETRY_TYPE_ROUND_LINEAR_CURVE : RTC_GEOMETRY_TYPE_ROUND_BSPLINE_CURVE);
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, curve.points().data(), 0,
+                             sizeof(CurvePoint), curve.points().size());
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT, curve.segments().data(), 0,
+                             sizeof(uint32_t), curve.segments().size());
+  rtcSetGeometryIntersectFilterFunction(geometry, pass_from_inside);
+  rtcSetGeometryOccludedFilterFunction(geometry, pass_from_inside);
+  return geometry;
+}
+
+RTCGeometry geometry_of(RTCDevice device, const Shape& shape) {
+  if (const auto* mesh = dynamic_cast<const TriangleMesh*>(&shape)) return mesh_geometry(device, *mesh);
+  if (const auto* curve = dynamic_cast<const CurveShape*>(&shape)) return curve_geometry(device, *curve);
+  return analytic_geometry(device, dynamic_cast<const AnalyticShape&>(shape));
 }
 
 /// Rays are handed to Embree in packets: camera rays gain most, scattered ones a little, single ones lose little.
@@ -144,14 +175,12 @@ RayTracer::Group RayTracer::make_group(std::span<const ShapePtr> shapes) const {
   group.scene = rtcNewScene(device_);
   rtcSetSceneBuildQuality(group.scene, RTC_BUILD_QUALITY_MEDIUM);
   for (const ShapePtr& shape : shapes) {
-    const auto* mesh = dynamic_cast<const TriangleMesh*>(shape.get());
-    const RTCGeometry geometry =
-        mesh ? mesh_geometry(device_, *mesh) : analytic_geometry(device_, dynamic_cast<const AnalyticShape&>(*shape));
+    const RTCGeometry geometry = geometry_of(device_, *shape);
     rtcCommitGeometry(geometry);
     rtcAttachGeometryByID(group.scene, geometry, static_cast<unsigned>(group.shapes.size()));
     rtcReleaseGeometry(geometry);
     group.shapes.push_back(shape.get());
-    group.meshes.push_back(mesh);
+    group.meshes.push_back(dynamic_cast<const TriangleMesh*>(shape.get()));
   }
   return group;
 }

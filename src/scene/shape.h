@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <string_view>
 
 #include "core/ray.h"
 #include "core/transform.h"
@@ -67,6 +68,13 @@ class Shape : public SceneObject {
   /// Interpolated colour stored at the vertices ("vertex_color"), white where the mesh has none.
   virtual Spectrum vertex_colour(const SurfaceHit& /*hit*/) const { return Spectrum(1); }
   virtual bool has_vertex_colour() const { return false; }
+  /// What a mesh stores under a name such as "face_color", interpolated where it is by vertex; white where it has none.
+  virtual Spectrum attribute(std::string_view /*name*/, const SurfaceHit& /*hit*/) const { return Spectrum(1); }
+  virtual bool has_attribute(std::string_view /*name*/) const { return false; }
+  /// Whether there are such values, or colours of vertices.
+  virtual bool has_attributes() const { return false; }
+  /// Whether it can be a light: whether area() and the functions that sample it are there.
+  virtual bool can_emit() const { return true; }
 
   /// Cosines below this count as zero.
   static constexpr float kGrazing = 1e-12f;

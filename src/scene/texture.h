@@ -24,6 +24,9 @@ class Texture : public SceneObject {
   /// Mean of eval_1 over the texture, used for the probability of sampling lobes (not for values).
   virtual float mean() const = 0;
 
+  /// Width over height of the image that a projector throws; 1 where it has no pixels.
+  virtual float aspect() const { return 1; }
+
   struct PositionSample {
     Vec2 uv;
     float pdf;  ///< per unit area of the (u, v) unit square

@@ -169,6 +169,7 @@ class Bitmap final : public Texture {
   Spectrum eval(const SurfaceHit& hit) const override { return Spectrum(lookup(hit.uv)); }
   float eval_1(const SurfaceHit& hit) const override { return grey(lookup(hit.uv)); }
   float mean() const override { return mean_; }
+  float aspect() const override { return static_cast<float>(width_) / static_cast<float>(height_); }
 
   void prefetch(Vec2 uv) const override {
     const Vec2 st = settings_.to_uv.apply(uv);

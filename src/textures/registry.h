@@ -18,6 +18,7 @@ std::span<const Plugin<Texture>> texture_plugins();
 std::shared_ptr<Texture> make_bitmap(Parameters& parameters);
 std::shared_ptr<Texture> make_checkerboard(Parameters& parameters);
 std::shared_ptr<Texture> make_mesh_attribute(Parameters& parameters);
+std::shared_ptr<Texture> make_rawconstant(Parameters& parameters);
 std::shared_ptr<Texture> make_scaled(Parameters& parameters);
 std::shared_ptr<Texture> make_uniform(Parameters& parameters);
 std::shared_ptr<Texture> make_vertex_colour(Parameters& parameters);

@@ -38,15 +38,47 @@ TEST(VertexColour, IsWhiteOnMeshesWithoutColours) {
   EXPECT_EQ(make_plugin<Texture>(texture_plugins(), "texture", "vertexcolor", {}).object->eval(hit), Spectrum(1));
 }
 
-TEST(VertexColour, NamesTheAttributeItDoesNotKnow) {
+TEST(VertexColour, RefusesOtherNames) {
   const auto made =
-      make_plugin<Texture>(texture_plugins(), "texture", "mesh_attribute", {{"name", std::string("face_color")}});
+      make_plugin<Texture>(texture_plugins(), "texture", "mesh_attribute", {{"name", std::string("colour")}});
   EXPECT_EQ(made.object, nullptr);
-  EXPECT_NE(
-      made.errors.find("test.xml:2:1: parameter 'name' of texture 'mesh_attribute' is 'face_color'; the only mesh "
-                       "attribute known is 'vertex_color'"),
-      std::string::npos)
+  EXPECT_NE(made.errors.find("'name' of texture 'mesh_attribute' is 'colour'; expected a name that begins with "
+                             "'vertex_' or 'face_'"),
+            std::string::npos)
       << made.errors;
+}
+
+/// Two triangles of which the first has no area: what the second has must stay with it.
+TEST(MeshAttribute, IsOfTheVertexOrTheFace) {
+  MeshData data;
+  data.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  data.triangles = {{0, 1, 1}, {0, 1, 2}};
+  data.attributes = {{"face_color", true, 3, {9, 9, 9, 1, 2, 3}}, {"vertex_weight", false, 1, {0, 4, 8}}};
+  const TriangleMesh mesh(std::move(data));
+  ASSERT_EQ(mesh.n_degenerate(), 1u);
+  SurfaceHit hit;
+  hit.shape = &mesh, hit.barycentric = {0.25f, 0.5f};
+  const auto made = [](const char* name) {
+    return make_plugin<Texture>(texture_plugins(), "texture", "mesh_attribute", {{"name", std::string(name)}}).object;
+  };
+  EXPECT_EQ(made("face_color")->eval(hit), Spectrum(1, 2, 3));
+  EXPECT_EQ(made("vertex_weight")->eval(hit), Spectrum(5));
+  EXPECT_FLOAT_EQ(made("vertex_weight")->eval_1(hit), 5);
+  EXPECT_EQ(made("face_weight")->eval(hit), Spectrum(1));
+  EXPECT_TRUE(mesh.has_attribute("face_color"));
+  EXPECT_FALSE(mesh.has_attribute("vertex_color"));
+  const auto moved = mesh.transformed(Transform::scale({-1, 1, 1}));
+  hit.shape = moved.get();
+  EXPECT_EQ(made("face_color")->eval(hit), Spectrum(1, 2, 3));
+}
+
+TEST(RawConstant, TakesNumbersAndVectors) {
+  const auto number = make_plugin<Texture>(texture_plugins(), "texture", "rawconstant", {{"value", 7.5}});
+  EXPECT_EQ(number.object->eval({}), Spectrum(7.5f));
+  const auto vector = make_plugin<Texture>(texture_plugins(), "texture", "rawconstant", {{"value", Vec3{0.5f, -2, 3}}});
+  EXPECT_EQ(vector.object->eval({}), Spectrum(0.5f, -2, 3));
+  EXPECT_NE(make_plugin<Texture>(texture_plugins(), "texture", "rawconstant", {}).errors.find("'value' is missing"),
+            std::string::npos);
 }
 
 }  // namespace

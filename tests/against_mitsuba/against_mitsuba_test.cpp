@@ -151,6 +151,8 @@ void check(const std::string& name, const std::string& scene_path) {
 TEST(AgainstMitsuba, Room) { check("room", "scenes/room.xml"); }
 TEST(AgainstMitsuba, Materials) { check("materials", "scenes/materials.xml"); }
 TEST(AgainstMitsuba, Lights) { check("lights", "tests/against_mitsuba/lights.xml"); }
+/// The reference is of scalar_rgb, 512 samples per pixel.
+TEST(AgainstMitsuba, Plugins) { check("plugins", "tests/against_mitsuba/plugins.xml"); }
 
 TEST(AgainstMitsuba, MissingReferenceFails) {
   try {

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// `polarizer`, `circular`, `retarder`: films that act on the polarisation of light. Light is not polarised here, and of
+// such light they let pass, straight through, what Mitsuba's variants without polarisation do: half of it times the
+// transmittance for polarisers, all of it times the transmittance for retarders.
+//
+// | name          | of         | type           | default | meaning                   |
+// |---------------|------------|----------------|---------|---------------------------|
+// | transmittance | all        | colour/texture | 1       | factor                    |
+// | theta         | all but circular | number/texture | 0 | accepted, no effect       |
+// | delta         | retarder   | number/texture | 90      | accepted, no effect       |
+// | polarizing    | polarizer  | bool           | true    | accepted, no effect       |
+// | left_handed   | circular   | bool           | false   | accepted, no effect       |
+#include "bsdfs/inputs.h"
+#include "bsdfs/registry.h"
+
+namespace covary {
+namespace {
+
+class FilterClosure final : public BsdfClosure {
+ public:
+  explicit FilterClosure(const Spectrum& transmittance) : transmittance_(transmittance) {}
+  uint32_t flags() const override { return kNullTransmission; }
+  BsdfValue eval(const Vec3&, const Vec3&) const override { return {}; }
+  BsdfSample sample(const Vec3& wo, float, Vec2) const override {
+    return {.wi = -wo, .weight = transmittance_, .pdf = 1, .eta = 1, .flags = kNullTransmission};
+  }
+  int n_lobes() const override { return 1; }
+  void lobe_pmfs(const Vec3&, float* pmfs) const override { pmfs[0] = 1; }
+  void lobe_pdfs(const Vec3&, const Vec3&, float* pdfs) const override { pdfs[0] = 0; }
+
+ private:
+  Spectrum transmittance_;
+};
+
+class Filter final : public Bsdf {
+ public:
+  Filter(float factor, ColourInput transmittance) : factor_(factor), transmittance_(std::move(transmittance)) {}
+  uint32_t flags() const override { return kNullTransmission; }
+  const BsdfClosure* bind(const SurfaceHit& hit, bool, TransportMode, Arena& arena) const override {
+    return arena.make<FilterClosure>(transmittance_.eval(hit) * factor_);
+  }
+  Spectrum albedo(const SurfaceHit& hit) const override { return clamp01(transmittance_.eval(hit) * factor_); }
+
+ private:
+  float factor_;
+  ColourInput transmittance_;
+};
+
+std::shared_ptr<Bsdf> make_filter(Parameters& parameters, float factor) {
+  return std::make_shared<Filter>(factor, ColourInput(parameters.get_texture("transmittance", Spectrum(1))));
+}
+
+}  // namespace
+
+std::shared_ptr<Bsdf> make_polarizer(Parameters& parameters) {
+  parameters.find_texture("theta", SpectrumRole::kEmission);
+  parameters.get_bool("polarizing", true);
+  return make_filter(parameters, 0.5f);
+}
+
+std::shared_ptr<Bsdf> make_circular(Parameters& parameters) {
+  parameters.get_bool("left_handed", false);
+  return make_filter(parameters, 0.5f);
+}
+
+std::shared_ptr<Bsdf> make_retarder(Parameters& parameters) {
+  parameters.find_texture("theta", SpectrumRole::kEmission);
+  parameters.find_texture("delta", SpectrumRole::kEmission);
+  return make_filter(parameters, 1);
+}
+
+}  // namespace covary

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+// pplastic: the plastic of Baek et al. 2018 for light that is not polarised: microfacets of a dielectric above a
+// diffuse base, on the side of the normal; black from the other side.
+//
+// | name                 | type           | default       | meaning                                             |
+// |----------------------|----------------|---------------|-----------------------------------------------------|
+// | diffuse_reflectance  | colour/texture | 0.5           | reflectance of the base                             |
+// | int_ior              | number/string  | polypropylene | index of refraction of the coating                  |
+// | ext_ior              | number/string  | air           | index of refraction outside                         |
+// | eta                  | number         |               | relative index of refraction, instead of both       |
+// | specular_reflectance | colour/texture | 1             | factor on the coating's reflection                  |
+// | distribution         | string         | beckmann      | distribution of microfacet normals: beckmann or ggx |
+// | alpha, alpha_u, alpha_v, sample_visible |  |           | see roughness.h                                     |
+//
+// f = F D G / (4 cos cos) + rho / pi (1 - F(wo)) (1 - F(wi)), as Mitsuba's variants without polarisation.
+#include "bsdfs/fresnel.h"
+#include "bsdfs/registry.h"
+#include "bsdfs/roughness.h"
+
+namespace covary {
+namespace {
+
+class PPlasticClosure final : public BsdfClosure {
+ public:
+  PPlasticClosure(const RoughSurface& surface, float eta, float specular_weight, const Spectrum& base,
+                  const Spectrum& specular)
+      : surface_(surface), eta_(eta), specular_weight_(specular_weight), base_(base), specular_(specular) {}
+
+  uint32_t flags() const override { return kGlossyReflection | kDiffuseReflection; }
+  BsdfValue eval(const Vec3& wo, const Vec3& wi) const override {
+    if (!(wo.z > 0 && wi.z > 0)) return {};
+    const Vec3 m = normalize(wo + wi);
+    const Microfacet& normals = surface_.normals;
+    const float om = dot(wo, m);
+    const float coating =
+        fresnel_dielectric(om, eta_).reflectance * normals.eval(m) * normals.smith_g(wo, wi, m) / (4 * wo.z);
+    const float through = (1 - fresnel_dielectric(wo.z, eta_).reflectance) *
+                          (1 - fresnel_dielectric(wi.z, eta_).reflectance) * kInvPi * wi.z;
+    return {specular_ * coating + base_ * through,
+            specular_weight_ * surface_.pdf(wo, m) / (4 * om) +
+                (1 - specular_weight_) * warp::cosine_hemisphere_pdf_solid_angle(wi.z)};
+  }
+  BsdfSample sample(const Vec3& wo, float u_lobe, Vec2 u) const override {
+    BsdfSample s;
+    if (!(wo.z > 0)) return s;
+    if (u_lobe < specular_weight_) {
+      s.wi = reflect(wo, surface_.sample(wo, u).m);
+      s.flags = kGlossyReflection;
+    } else {
+      s.wi = warp::square_to_cosine_hemisphere(u);
+      s.flags = kDiffuseReflection;
+      s.lobe = 1;
+    }
+    const BsdfValue v = eval(wo, s.wi);
+    if (!(v.pdf_solid_angle > 0)) return s;
+    s.pdf = v.pdf_solid_angle;
+    s.weight = v.value / s.pdf;
+    return s;
+  }
+  int n_lobes() const override { return 2; }
+  void lobe_pmfs(const Vec3& wo, float* pmfs) const override {
+    pmfs[0] = wo.z > 0 ? specular_weight_ : 0;
+    pmfs[1] = wo.z > 0 ? 1 - specular_weight_ : 0;
+  }
+  void lobe_pdfs(const Vec3& wo, const Vec3& wi, float* pdfs) const override {
+    pdfs[0] = pdfs[1] = 0;
+    if (!(wo.z > 0 && wi.z > 0)) return;
+    const Vec3 m = normalize(wo + wi);
+    pdfs[0] = surface_.pdf(wo, m) / (4 * dot(wo, m));
+    pdfs[1] = warp::cosine_hemisphere_pdf_solid_angle(wi.z);
+  }
+
+ private:
+  RoughSurface surface_;
+  float eta_, specular_weight_;
+  Spectrum base_, specular_;
+};
+
+class PPlastic final : public Bsdf {
+ public:
+  PPlastic(RoughnessInput roughness, float eta, ColourInput diffuse, ColourInput specular)
+      : roughness_(std::move(roughness)), eta_(eta), diffuse_(std::move(diffuse)), specular_(std::move(specular)) {
+    const float sum = diffuse_.mean() + specular_.mean();
+    specular_weight_ = sum > 0 ? specular_.mean() / sum : 0.5f;
+  }
+
+  uint32_t flags() const override { return kGlossyReflection | kDiffuseReflection; }
+  const BsdfClosure* bind(const SurfaceHit& hit, bool, TransportMode, Arena& arena) const override {
+    return arena.make<PPlasticClosure>(roughness_.eval(hit), eta_, specular_weight_, diffuse_.eval(hit),
+                                       specular_.eval(hit));
+  }
+  bool needs_derivatives() const override { return roughness_.anisotropic; }
+  const Texture* main_texture() const override { return diffuse_.texture(); }
+  Spectrum albedo(const SurfaceHit& hit) const override { return clamp01(diffuse_.eval(hit)); }
+
+ private:
+  RoughnessInput roughness_;
+  float eta_, specular_weight_;
+  ColourInput diffuse_, specular_;
+};
+
+}  // namespace
+
+std::shared_ptr<Bsdf> make_pplastic(Parameters& parameters) {
+  RoughnessInput roughness = get_roughness(parameters);
+  const bool relative = parameters.has("eta");
+  const float eta =
+      relative ? parameters.get_float("eta", 1.5f, 1e-3f, 100) : get_relative_ior(parameters, "polypropylene");
+  ColourInput diffuse(parameters.get_texture("diffuse_reflectance", Spectrum(0.5f)));
+  ColourInput specular(parameters.get_texture("specular_reflectance", Spectrum(1)));
+  if (eta == 1) {
+    parameters.error(relative ? "'eta' is 1; it must not be" : "'int_ior' and 'ext_ior' are equal; they must differ");
+    return nullptr;
+  }
+  return std::make_shared<PPlastic>(std::move(roughness), eta, std::move(diffuse), std::move(specular));
+}
+
+}  // namespace covary

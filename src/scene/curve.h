@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "scene/shape.h"
+
+namespace covary {
+
+enum class CurveKind { kLinear, kBspline };
+
+/// A control point: x, y, z and the radius there, laid out as the ray tracer reads it.
+using CurvePoint = std::array<float, 4>;
+
+/// Round tubes around curves of straight pieces or of cubic B-splines, the latter with open ends; seen from outside
+/// alone. (u, v) = (angle around the curve / 2 pi, position along all segments in [0, 1]). They cannot emit light.
+class CurveShape final : public Shape {
+ public:
+  /// `segments`: the first control point of each; a segment has 2 of them (linear) or 4 (B-spline). Throws
+  /// Error(kInput) for an index out of range, or numbers that are not finite.
+  CurveShape(CurveKind kind, std::vector<CurvePoint> points, std::vector<uint32_t> segments);
+
+  Bounds3 bounds() const override { return bounds_; }
+  void fill(const Ray& ray, SurfaceHit& hit, bool with_derivatives) const override;
+  float area() const override { return 0; }
+  size_t n_primitives() const override { return segments_.size(); }
+  AreaSample sample_area(Vec2, float) const override { return {}; }
+  bool can_emit() const override { return false; }
+  std::shared_ptr<Shape> transformed(const Transform& to_world) const override;
+
+  CurveKind kind() const { return kind_; }
+  const std::vector<CurvePoint>& points() const { return points_; }
+  const std::vector<uint32_t>& segments() const { return segments_; }
+
+ private:
+  /// Centre line and radius at the parameter v of a segment, with derivatives by v.
+  struct Centre {
+    Vec3 c, dc, ddc;
+    float dr;  // of the radius
+  };
+  Centre centre(uint32_t segment, float v) const;
+
+  CurveKind kind_;
+  std::vector<CurvePoint> points_;
+  std::vector<uint32_t> segments_;
+  Bounds3 bounds_;
+};
+
+}  // namespace covary
