@@ -247,7 +247,7 @@ TEST_F(LoadScene, ReportsEveryProblemOfShapesAtOnce) {
   const char* expected[] = {
       "scene.xml:6:1: unknown shape 'pli'; did you mean 'ply'? Supported: 'bsplinecurve', 'cube', 'cylinder', 'disk', "
       "'instance', 'linearcurve', 'obj', 'ply', "
-      "'rectangle', 'serialized', 'shapegroup', 'sphere'",
+      "'rectangle', 'sdfgrid', 'serialized', 'shapegroup', 'sphere'",
       "scene.xml:7:19: parameter 'filename' of shape 'ply' names 'short.ply': PLY: the file ends, or a number cannot "
       "be read, in "
       "face 1 of 2",

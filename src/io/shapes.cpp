@@ -20,8 +20,10 @@
 #include "io/file_view.h"
 #include "io/mesh_attributes.h"
 #include "io/mesh_file.h"
+#include "media/volume_file.h"
 #include "scene/analytic_shape.h"
 #include "scene/mesh.h"
+#include "scene/sdf_grid.h"
 
 namespace covary {
 namespace {
@@ -150,6 +152,24 @@ std::shared_ptr<Shape> make_curves(Parameters& p, CurveKind kind) {
   }
 }
 
+std::shared_ptr<Shape> make_sdfgrid(Parameters& p) {
+  const Transform to_world = p.get_transform("to_world");
+  const bool smooth = p.get_choice("normals", "smooth", {"smooth", "analytic"}) == "smooth";
+  const bool flip_normals = p.get_bool("flip_normals", false);
+  const std::string path = p.require_file("filename");
+  if (path.empty()) return nullptr;
+  try {
+    VolumeFile file = read_volume_file(path);
+    if (file.channels != 1)
+      throw Error(ErrorCode::kInput, fmt::format("it has {} channels; expected one", file.channels));
+    return std::make_shared<SdfGrid>(
+        to_world, SdfValues{{file.size[0], file.size[1], file.size[2]}, std::move(file.values)}, smooth, flip_normals);
+  } catch (const Error& error) {
+    p.error_at("filename", fmt::format("names '{}': {}", p.get_string("filename", ""), error.what()));
+    return nullptr;
+  }
+}
+
 std::shared_ptr<Shape> make_bsplinecurve(Parameters& p) { return make_curves(p, CurveKind::kBspline); }
 std::shared_ptr<Shape> make_linearcurve(Parameters& p) { return make_curves(p, CurveKind::kLinear); }
 
@@ -165,6 +185,7 @@ std::span<const Plugin<Shape>> shape_plugins() {
       {"obj", make_obj},
       {"ply", make_ply},
       {"rectangle", make_rectangle},
+      {"sdfgrid", make_sdfgrid},
       {"serialized", make_serialized},
       {"sphere", make_sphere},
   };
