@@ -4,7 +4,7 @@
 #
 #   make setup            install missing packages (needs root or sudo only when something is missing)
 #   make build            build/release/covary
-#   make demo             render a small scene plainly and with IICV into out/
+#   make demo             render a small scene plainly, with IICV and by the default into out/
 #   make test             build and run all tests but the nightly ones      TESTS=regex selects some
 #   make check            all there is: lint of every file, the tests under sanitizers and of a build by Clang with the
 #                         checks of the standard library, a minute of each fuzz target; takes hours

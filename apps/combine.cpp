@@ -32,6 +32,7 @@
 #include "json_output.h"
 #include "numbers.h"
 #include "progress.h"
+#include "risk_report.h"
 #include "settings/option_names.h"
 #include "stages.h"
 #include "value_names.h"
@@ -130,7 +131,7 @@ struct GuideImages {
 GuideImages read_guides(const CombineOptions& o, const Estimator& estimator, const GroupedFile& file) {
   if (o.guides.empty()) return {};
   if (!estimator.reads_guides)
-    throw Error(ErrorCode::kUsage, "--guides is an option of --denoise bias, balanced and error");
+    throw Error(ErrorCode::kUsage, "--guides is an option of --denoise auto, bias, balanced and error");
   const ImageInfo info = inspect_image(o.guides);
   const auto find = [&](const char* own, GuideKind kind) {  // own films' as `render` itself has them
     const bool is_own = std::any_of(info.channels.begin(), info.channels.end(),
@@ -249,6 +250,8 @@ nlohmann::ordered_json statistics(const CombineOptions& o, const CombineRequest&
         predicted_relmse_of_mean(request.independent, std::max(1, rows_in_memory(request)));
   }
   if (request.light) json["light_groups"] = request.light->groups;
+  add_risks(combined.image.risks, json);
+  add_network(request.estimator.network, denoising_of(o), json);
   if (!combined.image.note.empty()) json["note"] = combined.image.note;
   return json;
 }
@@ -265,7 +268,8 @@ void check_passes(CombineOptions& o, const CLI::App& command) {
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
   if (!denoising_of(o).denoises())
     usage(
-        "without --crn, independent images can only be denoised: --denoise bias, balanced or error (their mean is "
+        "without --crn, independent images can only be denoised: --denoise auto, bias, balanced or error (their mean "
+        "is "
         "made by covary merge)");
   for (const char* option : {"--estimator", "--crn-layer", "--samples", "--explain"})
     if (command.count(option) > 0) usage(fmt::format("{} needs the image with common random numbers, --crn", option));
@@ -304,7 +308,7 @@ void combine_files(CombineOptions o, const CLI::App& command) {
                o.output, request.independent.width, request.independent.height, request.estimator.text,
                request.crn ? fmt::format("{} + ", request.crn->groups) : "", request.independent.groups,
                combined.estimate_seconds, combined.check_seconds, write_seconds);
-  if (!o.quiet && !combined.image.note.empty()) fmt::print(stderr, "note: {}\n", combined.image.note);
+  if (!o.quiet) print_risks(combined.image, combined.predicted_relmse, denoising_of(o));
   if (!o.json.empty()) write_text_output(o.json, json_text(json));
 }
 

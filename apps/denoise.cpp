@@ -25,6 +25,7 @@
 #include "metrics/provenance.h"
 #include "numbers.h"
 #include "progress.h"
+#include "risk_report.h"
 #include "value_names.h"
 
 namespace covary {
@@ -125,7 +126,7 @@ void denoise_by_network(const Options& o, const GuideLayers& guides, ProgressLin
   std::map<std::string, std::string> attributes = inherited_attributes(info.attributes);
   attributes["covary:version"] = COVARY_VERSION;
   attributes["covary:command"] = command_line();
-  attributes["covary:denoiser"] = "Open Image Denoise";
+  attributes["covary:denoiser"] = "Open Image Denoise " + denoiser_info(o.denoiser()).version;
   std::vector<ExrPlane> planes;
   for (size_t c = 0; c < 3; ++c)
     planes.push_back({std::string(1, "RGB"[c]), ExrPlane::Type::kFloat, result.data.data() + c, 12});
@@ -147,8 +148,8 @@ void print_findings(const std::vector<Finding>& findings, bool quiet) {
 void denoise_by_mixture(const Options& o, const GroupedFile& file, const GuideLayers& guides, ProgressLine& progress) {
   CombineRequest request;
   request.independent = source_of(file);
-  request.estimator =
-      with_denoising(make_estimator(kNoEstimator), DenoisingChoice{o.mode.empty() ? "error" : o.mode, o.oidn});
+  const DenoisingChoice choice{o.mode.empty() ? "auto" : o.mode, o.oidn};
+  request.estimator = with_denoising(make_estimator(kNoEstimator), choice);
   request.settings.std_error = true;
   request.settings.guides = guides.view();
   request.force = o.force;
@@ -163,16 +164,15 @@ void denoise_by_mixture(const Options& o, const GroupedFile& file, const GuideLa
   attributes["covary:version"] = COVARY_VERSION;
   attributes["covary:command"] = command_line();
   attributes["covary:estimator"] = request.estimator.text;
+  if (!request.estimator.network.empty()) attributes["covary:denoiser"] = request.estimator.network;
   if (file.samples() > 0) attributes["covary:samples"] = fmt::to_string(file.samples());
   std::map<std::string, Image> no_aovs;
   write_result(o.output, file.place(), attributes, combined.image, no_aovs);
   progress.finish();
   if (o.quiet) return;
-  fmt::print(stderr, "{}: {} x {}, {} of {} groups, {}, in {:.2f} s", o.output, file.width(), file.height(),
+  fmt::print(stderr, "{}: {} x {}, {} of {} groups, {}, in {:.2f} s\n", o.output, file.width(), file.height(),
              request.estimator.text, file.groups(), guides.text(), combined.check_seconds + combined.estimate_seconds);
-  if (combined.predicted_relmse) fmt::print(stderr, ", predicted relMSE {:.3g}", *combined.predicted_relmse);
-  fmt::print(stderr, "\n");
-  if (!combined.image.note.empty()) fmt::print(stderr, "note: {}\n", combined.image.note);
+  print_risks(combined.image, combined.predicted_relmse, choice);
 }
 
 /// Whatever the image is.
@@ -231,7 +231,7 @@ void add_denoise(CLI::App& app) {
   command
       ->add_option("--mode", o->mode,
                    "Open Image Denoise alone, or a mixture of denoised images with little bias, balanced, or with the "
-                   "least error; default: error for several renders or groups, oidn for a single image")
+                   "least error; default: auto for several renders or groups, oidn for a single image")
       ->check(one_of(modes));
   command
       ->add_option("--oidn", o->oidn,

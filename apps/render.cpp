@@ -196,10 +196,9 @@ void render(RenderOptions options) {
   outputs.reads(scene.files);
   progress.clear();
   for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", as_flags(warning));
-  const bool is_chosen = options.values.contains("sampling") && !options.values.contains("estimator");
-  if (is_chosen && !options.is_replay() && !options.quiet)
-    fmt::print(stderr, "note: --sampling takes one film, as --estimator none does, and leaves out {}\n",
-               RenderSettings().estimator);
+  const auto given = [&](const char* option) { return options.values.contains(option); };
+  if (given("sampling") && !given("estimator") && !given("denoise") && !options.is_replay() && !options.quiet)
+    fmt::print(stderr, "note: --sampling takes one film, as --estimator none does, and leaves out --denoise\n");
   if (options.is_replay()) {
     progress.finish();
     return print_replay(options, scene);

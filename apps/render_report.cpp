@@ -16,6 +16,7 @@
 #include "plans/budget.h"
 #include "plans/memory.h"
 #include "progress.h"
+#include "risk_report.h"
 #include "settings/option_names.h"
 
 namespace covary {
@@ -83,6 +84,7 @@ nlohmann::ordered_json statistics_of(const Pass& pass) {
 nlohmann::ordered_json statistics(const RenderReport& report) {
   const auto& [options, scene, result, load_seconds, threads] = report;
   const RenderRequest request = make_request(options, scene);
+  const Estimator estimator = estimator_of(options);
   const CropWindow window = window_of(scene, request);
   const double samples = result.camera_sum([](const Pass& p) { return p.result.n_samples; });
   const double rays = result.sum([](const Pass& p) { return p.result.n_rays; });
@@ -104,7 +106,7 @@ nlohmann::ordered_json statistics(const RenderReport& report) {
       {"scene_hash", scene.content_hash},
       {"width", window.width},
       {"height", window.height},
-      {"estimator", estimator_of(options).text},
+      {"estimator", estimator.text},
       {"samples_per_pixel", result.samples_per_pixel()},
       {"training_samples_per_pixel", training_samples_taken(report)},
       {"training_counts_as_samples", (result.training.samples[0] + result.training.samples[1]) / 2},
@@ -142,6 +144,8 @@ nlohmann::ordered_json statistics(const RenderReport& report) {
     json["predicted_relmse_reliable"] = result.prediction_doubt.empty();
     if (!result.prediction_doubt.empty()) json["predicted_relmse_doubt"] = result.prediction_doubt;
   }
+  add_risks(result.image.risks, json);
+  add_network(estimator.network, options.settings.denoising, json);
   if (!result.image.note.empty()) json["note"] = result.image.note;
   if (result.until_reached) json["until_reached"] = *result.until_reached;
   return json;
@@ -166,18 +170,23 @@ void print_summary(const RenderReport& report) {
   for (const std::string& warning : of.warnings) fmt::print(stderr, "warning: {}\n", as_flags(warning));
   const Estimator estimator = estimator_of(options);
   if (estimator.passes != EstimatorPasses::kAny) {
-    fmt::print(stderr, "{} in {:.2f} s", estimator.text, result.estimate_seconds());
-    if (result.predicted_relmse) fmt::print(stderr, ", predicted relMSE {:.3g}", *result.predicted_relmse);
-    fmt::print(stderr, "{}\n", doubt_in_brackets(result));
+    fmt::print(stderr, "{}{} in {:.2f} s", estimator.text,
+               estimator.network.empty() ? "" : " with " + estimator.network, result.estimate_seconds());
+    if (result.predicted_relmse && !result.image.risks)
+      fmt::print(stderr, ", predicted relMSE {:.3g}", *result.predicted_relmse);
+    fmt::print(stderr, "{}\n", result.image.risks ? "" : doubt_in_brackets(result));
   } else if (result.predicted_relmse) {
     fmt::print(stderr, "predicted relMSE {:.3g}{}\n", *result.predicted_relmse, doubt_in_brackets(result));
   }
-  if (!result.image.note.empty()) fmt::print(stderr, "note: {}\n", result.image.note);
+  for (const std::string& note : {missing_network(options.settings.denoising), result.image.note})
+    if (!note.empty()) fmt::print(stderr, "note: {}\n", as_flags(note));
   const double limit = options.request().seconds;
   if (limit > 0 && result.seconds.limited > 1.05 * limit)
     fmt::print(stderr, "warning: --time {:g} was exceeded: {:.2f} s for at least {} samples per pixel in each pass{}\n",
                limit, result.seconds.limited, result.passes[0].film.groups(),
                estimator.passes == EstimatorPasses::kPair ? " and the estimate" : "");
+  if (result.predicted_relmse && result.image.risks)
+    fmt::print(stderr, "{}{}\n", risks_text(*result.predicted_relmse, *result.image.risks), doubt_in_brackets(result));
 }
 
 }  // namespace covary

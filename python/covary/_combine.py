@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Progress = Callable[[int, int], object]
 #: What `--denoise` of the command line takes.
-DenoiseMode = Literal["none", "bias", "balanced", "error"]
+DenoiseMode = Literal["none", "auto", "bias", "balanced", "error"]
 DENOISE = choice(get_args(DenoiseMode))
 OIDN = empty_or(path)
 #: Checked with the pixels, by the module.
@@ -44,9 +44,10 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = "iicv", *, li
     counts: samples of each pixel of the independent image, all groups together, where these differ: whole numbers
         [H, W]; a Film knows its own. With them, samples.
     samples: samples per pixel of the CRN image, for counts and for estimators that need them.
-    denoise: mix the image with denoised ones where held-out samples find that better: for least bias, for least error,
-        or balanced. albedo, normal: guides [H, W, 3] for it, the normal only together with the albedo; oidn: Open Image
-        Denoise's library or a folder of it, by default where it is found; "off": without it.
+    denoise: mix the image with denoised ones where held-out samples find that better: for the least error ("auto",
+        "error"), for least bias, or balanced. albedo, normal: guides [H, W, 3] for it, the normal only together with
+        the albedo; oidn: Open Image Denoise's library or a folder of it, by default where it is found; "off": without
+        it.
     std_error: estimate the error, too; by default where the estimator can.
     force: combine even where the checks of the inputs find errors.
     progress: called with (done, total) steps.

@@ -113,7 +113,7 @@ SEED = whole(0, (1 << 64) - 1)
 SPP = whole(1, _covary.most_samples)
 
 
-def _check_together(estimator: str, given: Mapping[str, Any]) -> None:
+def _check_together(estimator: str | None, given: Mapping[str, Any]) -> None:
     """Raises UsageError for arguments that have no effect beside, or without, others."""
     def needs(names: tuple[str, ...], others: tuple[str, ...], what: str) -> None:
         for name in names:
@@ -125,7 +125,7 @@ def _check_together(estimator: str, given: Mapping[str, Any]) -> None:
     for first, second in (("resume", "overwrite"), ("until", "until_p95")):
         if given[first] and given[second]:
             raise UsageError(f"found {first} and {second}; accepted is one of them")
-    passes = passes_of(estimator)
+    passes = passes_of(estimator or "none")
     if given["sampling"] is not None and passes not in ("any", None):
         raise UsageError(f"sampling: found {given['sampling']!r} with estimator {estimator!r}, which chooses itself; "
                          "it is an argument of estimator 'none'")
@@ -142,9 +142,10 @@ def _check_scene_arguments(scene: PathOrScene, options: Mapping[str, Any]) -> No
         raise UsageError(f"{', '.join(found)}: not of render(), but of Scene.load(): render(Scene.load({load}), …)")
 
 
-@checked(scene=SCENE, spp=optional(SPP), estimator=text, integrator=text, until=optional(real(0, above=True)),
-         until_p95=optional(real(0, above=True)), time=optional(real(0, above=True)), seed=SEED, denoise=DENOISE,
-         oidn=empty_or(path), output=optional(path), passes=optional(path), resume=flag, overwrite=flag,
+@checked(scene=SCENE, spp=optional(SPP), estimator=optional(text), integrator=text, until=optional(real(0, above=True)),
+         until_p95=optional(real(0, above=True)), time=optional(real(0, above=True)), seed=SEED,
+         denoise=optional(DENOISE), oidn=empty_or(path), output=optional(path), passes=optional(path), resume=flag,
+         overwrite=flag,
          checkpoint=optional(real(0)), preview=flag, aovs=flag, path_lengths=flag,
          crop=optional(several("(x, y, width, height) in pixels", whole(0, 65535), whole(0, 65535), whole(1, 65536),
                                whole(1, 65536))),
@@ -153,9 +154,9 @@ def _check_scene_arguments(scene: PathOrScene, options: Mapping[str, Any]) -> No
          groups=optional(whole(1, _covary.most_groups)),
          split=optional(several("(CRN, independent), two numbers above 0", real(0, above=True), real(0, above=True))),
          films_only=flag, save_training=optional(path), load_training=optional(path), progress=optional(function))
-def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator = "iicv", *, integrator: str = "",
+def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | None = None, *, integrator: str = "",
            until: float | None = None, until_p95: float | None = None, time: float | None = None, seed: int = 0,
-           denoise: DenoiseMode = "none", oidn: str | PathLike[str] = "",
+           denoise: DenoiseMode | None = None, oidn: str | PathLike[str] = "",
            output: str | PathLike[str] | None = None, passes: str | PathLike[str] | None = None, resume: bool = False,
            overwrite: bool = False, checkpoint: float | None = None, preview: bool = False, aovs: bool = False,
            path_lengths: bool = False, crop: tuple[int, int, int, int] | None = None,
@@ -167,13 +168,14 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator = "i
     """Renders a scene, or the file of one, as `covary render` does; the values are the same in every bit.
 
     spp: samples per pixel of all passes together; by default the scene's, or no limit with `until` or `time`.
-    estimator: "iicv" takes half of the samples with common random numbers; "none" is the mean. Its options follow as
-        keywords.
+    estimator: "none", the default, is the mean of independent samples; "iicv" takes half of the samples with common
+        random numbers. Its options follow as keywords.
     integrator: in place of the scene's.
     until: adds samples until the predicted relMSE is this; until_p95: until 95 % of the blocks of 16 x 16 pixels have
         no more.
     time: seconds for rendering and estimating together.
-    denoise, oidn: as combine() has them; the guides are rendered.
+    denoise, oidn: as combine() has them; the guides are rendered. The default is "auto", and "none" where an estimator
+        or `sampling` is named.
     output: EXR file of the result; preview: also a PNG beside it.
     passes: folder that keeps the films; resume: continues those that are there; overwrite: replaces them;
         checkpoint: seconds between writing unfinished films, by default 300 where there is a place for them; 0: never.
@@ -191,7 +193,9 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator = "i
     _check_together(estimator, {"resume": resume, "overwrite": overwrite, "checkpoint": checkpoint, "preview": preview,
                                 "output": output, "passes": passes, "until": until, "until_p95": until_p95,
                                 "sampling": sampling, "split": split})
-    texts = text_options(options, estimator)
+    texts = text_options(options, estimator or "none")
+    if "adaptive" in texts and estimator is None:
+        raise UsageError("adaptive: name the estimator, such as estimator='iicv' or 'none'")
     chosen = scene if isinstance(scene, Scene) else Scene.load(scene, integrator=integrator)
     chosen = chosen.with_integrator(integrator)
     if checkpoint is None:

@@ -104,6 +104,12 @@ class RenderResult(Result):
     complete: bool
     #: Whether the predicted error is at most the wanted one, where one was.
     until_reached: bool | None
+    #: Of denoised images: the part of predicted_relmse that is squared bias, and the relMSE that the mean of the
+    #: samples and each denoised image alone would have had, by name.
+    bias_share: float | None
+    risks: dict[str, float]
+    #: Name and version of the neural network that took part; "" without one.
+    network: str
     #: What 95 % of the blocks of 16 x 16 pixels do not exceed of the predicted error; None as predicted_relmse.
     predicted_relmse_p95: float | None
     #: Samples of all passes that were not finite, and that were negative where none may be. They count as black.

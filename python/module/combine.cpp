@@ -159,7 +159,7 @@ struct GuideImages {
   GuideImages(const Beside& beside, const Estimator& estimator, const Input& image) {
     if (beside.albedo.is_none() && beside.normal.is_none()) return;
     if (!estimator.reads_guides)
-      throw Error(ErrorCode::kUsage, "albedo, normal: guides are of denoise='bias', 'balanced' and 'error'");
+      throw Error(ErrorCode::kUsage, "albedo, normal: guides are of denoise='auto', 'bias', 'balanced' and 'error'");
     if (beside.albedo.is_none()) throw Error(ErrorCode::kUsage, "normal: it is a guide only together with the albedo");
     const std::string shape = fmt::format("{}, {}, 3", image.height(), image.width());
     albedo = image_of(beside.albedo, "albedo", shape);

@@ -67,6 +67,7 @@ Plan plan_of(const RenderSettings& settings, const Choice& choice) {
   if (choice.films_only) {
     plan.estimate = [](std::span<const Pass>, int, int, const Guides&) { return EstimatorResult(); };
     plan.estimate_memory = {};
+    plan.network.clear();
     plan.estimator = kNoEstimator;
     plan.predicts_error = false;
   }
@@ -113,6 +114,14 @@ nb::dict dict_of(RenderResult&& result, const std::string& estimator, const std:
   d["aovs"] = aovs;
   d["complete"] = result.complete;
   d["until_reached"] = result.until_reached;
+  nb::dict risks;
+  std::optional<double> bias_share;
+  if (result.image.risks) {
+    bias_share = result.image.risks->bias_share;
+    for (const auto& [name, relmse] : result.image.risks->images) risks[name.c_str()] = relmse;
+  }
+  d["bias_share"] = bias_share;
+  d["risks"] = risks;
   return d;
 }
 
@@ -140,7 +149,11 @@ nb::dict render_scene(const LoadedScene& scene, const Choice& choice, const Opti
       progress);
   Options given = choice.values;
   given.insert(of_integrator.begin(), of_integrator.end());
-  return dict_of(std::move(result), plan.estimator, warnings, given);
+  if (const std::string text = missing_network(settings.denoising); !text.empty() && !choice.films_only)
+    warnings.push_back(as_arguments(text));
+  nb::dict made = dict_of(std::move(result), plan.estimator, warnings, given);
+  made["network"] = plan.network;
+  return made;
 }
 
 }  // namespace

@@ -59,6 +59,14 @@ void check_memory(const CombineRequest& request, double planned) {
                                       : memory_limit_text()));
 }
 
+/// The error of the light film is that of every image it is added to, and no bias. `before`: predicted without it.
+void add_risk_of_light(double before, EstimatorResult& result) {
+  if (!result.risks) return;
+  const double after = predicted_relmse(result);
+  if (after > 0) result.risks->bias_share *= before / after;
+  for (MeasuredRisks::OfImage& image : result.risks->images) image.relmse += after - before;
+}
+
 EstimatorResult estimate(const CombineRequest& request) {
   const Estimator& estimator = request.estimator;
   const int height = request.independent.height, in_memory = rows_in_memory(request);
@@ -149,7 +157,10 @@ double predicted_relmse_of_mean(const GroupedSource& image, int rows) {
 
 void finish(EstimatorResult& result, const GroupedImage* light) {
   calibrate(result);
-  if (light) add_light(*light, result);
+  if (!light) return;
+  const double before = result.risks ? predicted_relmse(result) : 0;
+  add_light(*light, result);
+  add_risk_of_light(before, result);
 }
 
 CombinedImage combine(const CombineRequest& request) {
@@ -164,9 +175,11 @@ CombinedImage combine(const CombineRequest& request) {
 
   combined.image = estimate(request);
   finish(combined.image, nullptr);
+  const double before = combined.image.risks && request.light ? predicted_relmse(combined.image) : 0;
   if (request.light)
     for (int y = 0; y < request.light->height; y += kLightRows)
       add_light(request.light->rows(y, std::min(kLightRows, request.light->height - y)), combined.image, y);
+  if (request.light) add_risk_of_light(before, combined.image);
   if (!combined.image.std_error.data.empty()) {
     const double crn = request.crn ? request.crn->samples : 0, samples = crn + request.independent.samples;
     const bool counted = (crn > 0 || !request.crn) && request.independent.samples > 0;

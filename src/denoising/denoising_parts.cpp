@@ -80,6 +80,7 @@ Image mean_image(const Moments& moments) {
 DenoisingParts parts_of_pair(const Estimator& base, const GroupedImage& crn, const GroupedImage& independent,
                              const PairSettings& settings) {
   DenoisingParts parts;
+  parts.name = base.name;
   long ignored = 0;  // the base counts them
   parts.valid = finite_pixels(crn, independent, ignored);
   parts.whole = part_of_pair(base, crn, independent, settings, parts.valid);

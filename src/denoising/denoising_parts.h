@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <string>
 #include <vector>
 
 #include "estimators/estimator.h"
@@ -23,6 +24,7 @@ struct DenoisingParts {
   std::vector<unsigned char> valid;  ///< 0: a pixel that is left out
   /// The image is the mean of independent samples: noisy, but without a bias that residual feedback could take away.
   bool is_mean = false;
+  std::string name = "mean";  ///< of the image
 };
 
 /// Means of all pixels.

@@ -15,6 +15,7 @@
 #include "filters/feedback.h"
 #include "risk/held_out_bias.h"
 #include "risk/held_out_error.h"
+#include "risk/predicted_error.h"
 #include "risk/relative_weight.h"
 
 namespace covary {
@@ -27,6 +28,7 @@ struct ModeSettings {
   bool feedback;
 };
 constexpr ModeSettings kModes[] = {{DenoiseMode::kNone, "none", 1, 0, false},
+                                   {DenoiseMode::kAuto, "auto", 1, 1, false},
                                    {DenoiseMode::kBias, "bias", 4, 0, true},
                                    {DenoiseMode::kBalanced, "balanced", 2, 0, true},
                                    {DenoiseMode::kError, "error", 1, 1, false}};
@@ -69,6 +71,34 @@ Image counts_of(const DenoisingPart& part, const Image& guide) {
     }
   });
   return counts;
+}
+
+/// relMSE of the image itself, by its standard error.
+double risk_of_base(const DenoisingPart& part, const Image& guide, const std::vector<unsigned char>& valid) {
+  double sum = 0, n = 0;
+  for (size_t i = 0; i < valid.size(); ++i) {
+    if (!valid[i]) continue;
+    const float weight = relative_weight(&guide.data[3 * i]);
+    for (size_t c = 0; c < 3; ++c) sum += weight * sqr(part.image.std_error.data[3 * i + c]);
+    n += 3;
+  }
+  return n > 0 ? sum / n : 0;
+}
+
+/// Those of the parts from the predicted one, by how held-out samples tell them apart.
+MeasuredRisks risks_of(const DenoisingParts& parts, const std::array<CandidateSet, 2>& halves,
+                       const std::vector<std::string>& names, const HeldOutInput& mixture, double predicted) {
+  const HalvesRisk mixed = risk_of_halves(mixture);
+  MeasuredRisks risks;
+  if (predicted > 0) risks.bias_share = std::clamp(1 - 0.5 * mixed.variance / predicted, 0.0, 1.0);
+  risks.images.push_back({parts.name, risk_of_base(parts.whole, *mixture.guide, parts.valid)});
+  for (size_t p = 0; p < names.size(); ++p) {
+    HeldOutInput candidate = mixture;
+    candidate.halves = {&halves[0].candidates[p], &halves[1].candidates[p]};
+    const HalvesRisk risk = risk_of_halves(candidate);
+    risks.images.push_back({names[p], std::max(predicted + risk.of_whole() - mixed.of_whole(), 0.5 * risk.variance)});
+  }
+  return risks;
 }
 
 void check_guides(const Guides& guides) {
@@ -122,17 +152,19 @@ MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<Candid
   }
 
   MixedDenoising out;
-  out.result = std::move(parts.whole.image);
-  out.result.std_error = Image();
+  for (const CandidateMaker& maker : makers) out.names.insert(out.names.end(), maker.names.begin(), maker.names.end());
+  EstimatorResult& result = out.result;
+  result.nonfinite_pixels = parts.whole.image.nonfinite_pixels;
+  result.estimate = std::move(mixture.image);
   if (std_error) {
     const std::array<const Image*, 2> images = {&mixture.halves[0], &mixture.halves[1]};
     double usual = 0.5;
     for (const CandidateMaker& maker : makers) usual = std::max(usual, maker.error_over_variance);
-    out.result.std_error = held_out_error({images, input.independent, input.guide, &valid, usual});
-    out.result.bias = held_out_bias({images, {&guide_of(halves[0]), &guide_of(halves[1])}, input.independent, &valid});
+    const HeldOutInput held_out{images, input.independent, input.guide, &valid, usual};
+    result.std_error = held_out_error(held_out);
+    result.bias = held_out_bias({images, {&guide_of(halves[0]), &guide_of(halves[1])}, input.independent, &valid});
+    result.risks = risks_of(parts, halves, out.names, held_out, predicted_relmse(result));
   }
-  out.result.estimate = std::move(mixture.image);
-  for (const CandidateMaker& maker : makers) out.names.insert(out.names.end(), maker.names.begin(), maker.names.end());
   out.weights = std::move(mixture.weights);
   out.candidates = std::move(whole.candidates);
   return out;
@@ -206,9 +238,9 @@ Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& opt
   if (options.mode == DenoiseMode::kNone) return base;
   if (!can_be_denoised(base))
     throw Error(ErrorCode::kUsage, "denoising needs an estimator that predicts its error, not " + base.name);
-  if (options.use_oidn && !options.oidn.library.empty()) denoiser_info(options.oidn);  // throws before rendering
   const bool with_oidn = options.use_oidn && (!options.oidn.library.empty() || !find_denoiser(options.oidn).empty());
   Estimator estimator = base;
+  if (with_oidn) estimator.network = "Open Image Denoise " + denoiser_info(options.oidn).version;  // or throws
   estimator.text += fmt::format(" --denoise {}{}", settings_of(options.mode).name, with_oidn ? "" : " --oidn off");
   estimator.fewest_groups = 2 * base.fewest_groups;
   estimator.reads_guides = true;
@@ -236,14 +268,20 @@ Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& opt
 void declare(Settings& s, DenoisingChoice& v, bool is_all) {
   s.group("Denoising");
   s.one_of("denoise", v.mode, denoise_mode_names(),
-           "Mix the image with denoised ones where held-out samples find that better: for least bias, for least error, "
-           "or balanced",
+           "Mix the image with denoised ones where held-out samples find that better: for the least error (auto), or "
+           "with less bias",
            {.level = OptionLevel::kBasic});
   s.text("oidn", v.oidn, "off|LIBRARY",
          std::string(is_all ? "For `denoise`" : "For `denoise` and `cv-surrogate` oidn") +
              ": Open Image Denoise's library or a folder of it; default: where it is found; 'off': without it",
          {.names = OptionNames::kLibrary});
   s.only_if(v.denoises() || !is_all, {"oidn"}, kNotDenoised);
+}
+
+std::string missing_network(const DenoisingChoice& choice) {
+  if (!choice.uses_oidn() || !choice.oidn.empty() || !find_denoiser().empty()) return "";
+  return "Open Image Denoise is not installed, so that the image is denoised by filters alone; `pip install pyoidn` "
+         "brings it (`oidn` off: without these words)";
 }
 
 }  // namespace covary

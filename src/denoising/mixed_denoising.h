@@ -22,6 +22,7 @@ namespace covary {
 /// What the mixture minimises, from least bias to least error.
 enum class DenoiseMode {
   kNone,      ///< no denoising
+  kAuto,      ///< what leaves the least error, the default of renders
   kBias,      ///< squared bias counts four times as much as variance; residual feedback
   kBalanced,  ///< twice as much; residual feedback
   kError,     ///< least error
@@ -47,10 +48,15 @@ struct DenoisingChoice {
   std::string mode = "none";  ///< of denoise_mode_names()
   std::string oidn;           ///< a library or a folder of it; "": where it is found, "off": without it
   bool denoises() const { return mode != "none"; }
+  bool uses_oidn() const { return denoises() && oidn != "off"; }
 };
 /// `is_all`: nothing else of the caller's is done by Open Image Denoise, so that `oidn` is an error without `denoise`.
 void declare(Settings& settings, DenoisingChoice& choice, bool is_all = true);
-constexpr const char* kNotDenoised = "without `denoise` bias, balanced or error";
+constexpr const char* kNotDenoised = "without `denoise` auto, bias, balanced or error";
+
+/// What is to be said where Open Image Denoise would take part and is not there: that it is missing, and how to get it.
+/// Empty where it is there, or not wanted.
+std::string missing_network(const DenoisingChoice& choice);
 
 /// What with_denoising() does, with any candidates.
 struct MixedDenoising {

@@ -14,6 +14,7 @@
 #include "estimators/mean.h"
 #include "estimators/test_images.h"
 #include "filters/feedback.h"
+#include "risk/relative_weight.h"
 #include "support/files.h"
 
 namespace covary {
@@ -118,6 +119,38 @@ TEST(MixedDenoising, OfASinglePassHasLessErrorThanItsMean) {
   EXPECT_LT(square_error(result.estimate), 0.3 * before);
   EXPECT_NEAR(mean_square(result.std_error) / square_error(result.estimate), 1, 0.5);
   EXPECT_EQ(result.note, "");
+}
+
+TEST(MixedDenoising, TellsItsBiasAndTheErrorsOfItsParts) {
+  const Inputs in(1);
+  const test::Grouped& image = in.independent;
+  PairSettings settings;
+  settings.std_error = true;
+  const Estimator estimator = mean_denoiser(DenoiseMode::kAuto);
+  const EstimatorResult result = estimator.apply({}, image.view(), settings);
+  ASSERT_TRUE(result.risks);
+  ASSERT_GE(result.risks->images.size(), 3u);
+  EXPECT_EQ(result.risks->images[0].name, "mean");
+  EXPECT_EQ(result.risks->images[1].name, "sharp");
+  EXPECT_GE(result.risks->bias_share, 0);
+  EXPECT_LT(result.risks->bias_share, 1);
+  std::map<std::string, Image> stages = estimator.stages({}, image.view(), settings);
+  stages["candidate-mean"] = mean_of_groups(image.view()).estimate;
+  const Image exact = truth();
+  for (const auto& [name, relmse] : result.risks->images) {
+    const Image& part = stages.at("candidate-" + name);
+    double error = 0;
+    for (int y = 0; y < kHeight; ++y)
+      for (int x = 0; x < kWidth; ++x)
+        for (int c = 0; c < 3; ++c)
+          error += std::pow(part.pixel(x, y)[c] - exact.pixel(x, y)[c], 2) * relative_weight(exact.pixel(x, y));
+    // Halves of so few pixels tell little of the bias of all samples.
+    const double ratio = relmse / (error / (3 * kWidth * kHeight)), most = name == "mean" ? 1.2 : 3;
+    EXPECT_LT(std::max(ratio, 1 / ratio), most) << name;
+  }
+  EXPECT_EQ(denoised(in, DenoiseMode::kAuto).risks->images[0].name, "iicv");
+  settings.std_error = false;
+  EXPECT_FALSE(estimator.apply({}, image.view(), settings).risks);
 }
 
 TEST(MixedDenoising, OfASinglePassTakesTwoGroupsOfManySamples) {
@@ -273,7 +306,7 @@ TEST(MixedDenoising, TakesTinyImages) {
 }
 
 TEST(MixedDenoising, SaysWhatItCannotDo) {
-  EXPECT_EQ(message_of([] { denoise_mode("much"); }), "`denoise` 'much': expected none, bias, balanced, error");
+  EXPECT_EQ(message_of([] { denoise_mode("much"); }), "`denoise` 'much': expected none, auto, bias, balanced, error");
   EXPECT_NE(message_of([] {
               with_denoising(make_estimator("iduw"), {DenoiseMode::kError});
             }).find("denoising needs an estimator that predicts its error, not iduw"),

@@ -71,6 +71,8 @@ struct Estimator {
   std::string summary;  ///< a few words, for lists
   std::string text;     ///< name and options as given: "iicv --paper --k 50"
 
+  std::string network;  ///< name and version of the neural network that takes part; empty where none does
+
   bool predicts_error = false;  ///< that of its result
   /// Its predicted error is to be calibrated by held-out samples (held_out_error.h).
   bool holds_out = false;

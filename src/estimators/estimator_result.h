@@ -3,6 +3,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "film/film.h"
@@ -25,6 +26,16 @@ struct HeldOutVerdict {
   double ratio = 1;        ///< squared error that held-out samples tell, over that which the estimator predicts
 };
 
+/// What a mixture of images tells of its error and of those of its parts, each alone, as relMSE of all samples.
+struct MeasuredRisks {
+  double bias_share = 0;  ///< of the mixture's predicted error: what is squared bias
+  struct OfImage {
+    std::string name;  ///< "mean", or the estimator's; then those of the candidates
+    double relmse = 0;
+  };
+  std::vector<OfImage> images;
+};
+
 /// What an estimator returns. `estimate` has the three channels R, G, B. `std_error` and `bias` have them too, or are
 /// empty: the first where no error estimate was asked for, the second where no bias is known.
 struct EstimatorResult {
@@ -38,6 +49,7 @@ struct EstimatorResult {
   /// Of each row, for calibrate() of risk/held_out_error.h; empty where nothing was held out.
   std::vector<HeldOutRow> held_out;
   std::string note;  ///< what whoever asked for the image should know of how it was made; mostly empty
+  std::optional<MeasuredRisks> risks;     ///< of mixtures with a predicted error
   std::optional<HeldOutVerdict> verdict;  ///< by calibrate(); empty where nothing was held out
 };
 

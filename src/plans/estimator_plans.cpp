@@ -75,6 +75,7 @@ Plan independent_plan(const Estimator& estimator, std::optional<int> groups) {
   Plan plan = plain_plan(Sampling::kIndependent, groups);
   plan.name = estimator.name;
   plan.estimator = estimator.text;
+  plan.network = estimator.network;
   plan.film_is_image = plan.takes_training = false;
   plan.groups_follow_speed = !groups;
   plan.estimate_memory = estimator.memory;
@@ -122,6 +123,7 @@ Plan pair_plan(const PairMethod& method) {
   Plan plan;
   plan.name = method.name;
   plan.estimator = method.estimator;
+  plan.network = method.network;
   plan.has_crn_pass = true;
   plan.predicts_error = method.predicts_error;
   plan.reliable_samples = method.reliable_samples;
@@ -166,6 +168,7 @@ Plan estimator_plan(const Estimator& estimator, const PassChoice& choice) {
   PairMethod method;
   method.name = estimator.name;
   method.estimator = estimator.text;
+  method.network = estimator.network;
   method.split = choice.split.value_or(estimator.split);
   method.groups = choice.groups;
   method.fewest_groups = estimator.fewest_groups;

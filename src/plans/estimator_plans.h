@@ -28,6 +28,7 @@ Plan samples_plan(const Estimator& estimator);
 struct PairMethod {
   std::string name;       ///< for messages
   std::string estimator;  ///< with its options, for the image's attribute
+  std::string network;    ///< Estimator::network
   /// Parts of the samples for the CRN and the independent pass; they add up to 1.
   std::array<double, 2> split = {0.5, 0.5};
   /// Of each pass; default: number_of_groups() of budget.h, 4 to 12. A pass takes at least one sample for each.

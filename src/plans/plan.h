@@ -99,6 +99,7 @@ struct Phase {
 struct Plan {
   std::string name;       ///< of the estimator, for messages
   std::string estimator;  ///< the same with its options, for the image's attribute
+  std::string network;    ///< Estimator::network
   std::vector<Phase> phases;
   /// The image of rows first_row … first_row + n_rows - 1 of the films so far, with the guides of these rows where the
   /// plan reads them. Its cost depends on the size, not on counts.

@@ -78,8 +78,12 @@ void declare_basic(Settings& s, RenderSettings& v) {
          "Seconds for rendering and estimating, not for loading or writing", kBasicPasses);
   if (seconds) r.seconds = *seconds;
   s.one_of("integrator", v.integrator, integrator_names(), "Integrator instead of the scene's", kBasicSamples);
-  s.one_of("estimator", v.estimator, estimator_names(), "How samples become the image; none: the mean of one pass",
+  const bool is_named = s.is_given("estimator") || s.is_given("sampling");
+  s.one_of("estimator", v.estimator, estimator_names(),
+           "How samples become the image; none: the mean of one pass. One that is named is not denoised unless "
+           "`denoise` is given, too",
            kBasicPasses);
+  v.denoising.mode = is_named ? "none" : "auto";
   declare(s, v.denoising, false);
   s.group("Rendering");
   s.whole("seed", r.seed, {.low = 0}, "Seed of the random numbers", kBasicSamples);
@@ -201,7 +205,8 @@ std::vector<std::string> replay_words(OptionValues values, const Pass& pass, con
 }
 
 std::vector<std::string> pass_words(OptionValues given, const OptionValues& of_integrator, OptionValues of_estimator) {
-  const std::string name = settings_from<RenderSettings>(given).estimator;
+  const RenderSettings settings = settings_from<RenderSettings>(given);
+  const std::string name = settings.estimator;
   const Estimator estimator = make_estimator(name, of_estimator);
   given.erase("estimator");
   std::vector<std::string> words;
@@ -215,7 +220,8 @@ std::vector<std::string> pass_words(OptionValues given, const OptionValues& of_i
   add(options_of_estimator(name), of_estimator);
   for (const auto& [option, value] : of_integrator) words.insert(words.end(), {"--" + option, value});
   const bool is_plain_pair = estimator.passes == EstimatorPasses::kPair && !estimator.adaptive;
-  words.push_back(is_plain_pair ? "pair" : name);
+  const bool is_denoised_mean = estimator.passes == EstimatorPasses::kAny && settings.denoising.denoises();
+  words.push_back(is_plain_pair ? "pair" : is_denoised_mean ? "groups" : name);
   return words;
 }
 

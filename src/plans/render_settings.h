@@ -20,9 +20,11 @@ struct RenderSettings {
   int width = 0, height = 0;  ///< in place of the scene's; 0: that
   RenderRequest request;      ///< as far as options say it
   PassChoice passes;
-  std::string estimator = kDefaultEstimator;
+  std::string estimator = kNoEstimator;
   DenoisingChoice denoising;
 };
+/// The default is the mean of independent samples with `denoise` auto. Who names an estimator or a kind of sampling
+/// gets exactly that, and no denoising that is not asked for.
 void declare(Settings& settings, RenderSettings& render);
 
 /// The estimator with these options of its own, denoised as the settings say. Throws Error(kUsage).

@@ -65,24 +65,49 @@ TEST(RenderSettings, WhatIsNoValueIsRefused) {
             "`overwrite` excludes `resume`");
 }
 
+TEST(RenderSettings, TheDefaultIsDenoisedAndANamedEstimatorIsNot) {
+  const auto modes = [](const OptionValues& values) {
+    const RenderSettings s = settings_from<RenderSettings>(values);
+    return s.estimator + " " + s.denoising.mode;
+  };
+  EXPECT_EQ(modes({}), "none auto");
+  EXPECT_EQ(modes({{"denoise", "bias"}}), "none bias");
+  EXPECT_EQ(modes({{"denoise", "none"}}), "none none");
+  EXPECT_EQ(modes({{"oidn", "off"}}), "none auto");
+  EXPECT_EQ(modes({{"estimator", "iicv"}}), "iicv none");
+  EXPECT_EQ(modes({{"estimator", "none"}}), "none none");
+  EXPECT_EQ(modes({{"estimator", "iicv"}, {"denoise", "auto"}}), "iicv auto");
+  EXPECT_EQ(modes({{"sampling", "crn"}}), "none none");
+  EXPECT_EQ(estimator_of(settings_from<RenderSettings>({{"oidn", "off"}}), {}).text, "none --denoise auto --oidn off");
+}
+
 /// Two methods of a suite may share films where these are equal.
 TEST(RenderSettings, WordsOfPassesLeaveOutWhatOnlyTheImageNeeds) {
-  const Words pair = pass_words({}, {}, {});
+  const Words standard = pass_words({}, {}, {}), pair = pass_words({{"estimator", "iicv"}}, {}, {});
   EXPECT_EQ(pair, Words{"pair"});
+  EXPECT_EQ(pass_words({{"denoise", "bias"}}, {}, {}), standard);
+  EXPECT_EQ(pass_words({{"estimator", "none"}, {"denoise", "auto"}, {"oidn", "off"}}, {}, {}), standard);
+  EXPECT_NE(pass_words({{"estimator", "none"}}, {}, {}), standard) << "a film without groups";
   const auto of_estimator = [](const char* name, const OptionValues& values) {
     return pass_words({{"estimator", name}}, {}, values);
   };
   EXPECT_EQ(of_estimator("iduw", {}), pair);
   EXPECT_EQ(of_estimator("iicv", {{"paper", ""}, {"k", "5"}}), pair);
-  EXPECT_EQ(pass_words({{"denoise", "error"}, {"oidn", "off"}, {"output", "a.exr"}, {"aovs", ""}}, {}, {}), pair);
+  EXPECT_EQ(
+      pass_words({{"estimator", "iicv"}, {"denoise", "error"}, {"oidn", "off"}, {"output", "a.exr"}, {"aovs", ""}}, {},
+                 {}),
+      pair);
+  const auto more = [](const OptionValues::value_type& option) {
+    return pass_words({{"estimator", "iicv"}, option}, {}, {});
+  };
   // The same option leaves the passes of one estimator as they are and changes those of another.
   EXPECT_NE(of_estimator("dependent-tests", {{"paper", ""}}), of_estimator("dependent-tests", {}));
   EXPECT_EQ(of_estimator("dependent-tests", {{"window", "5"}}), of_estimator("dependent-tests", {}));
   for (const Words& other :
        {of_estimator("none", {}), of_estimator("dependent-tests", {}), of_estimator("polynomials", {}),
-        of_estimator("iicv", {{"adaptive", ""}}), pass_words({{"groups", "4"}}, {}, {}),
-        pass_words({{"split", "1:3"}}, {}, {}), pass_words({{"sampler", "sobol"}}, {}, {}),
-        pass_words({{"integrator", "bdpt"}}, {}, {}), pass_words({}, {{"max-depth", "3"}}, {})})
+        of_estimator("iicv", {{"adaptive", ""}}), more({"groups", "4"}), more({"split", "1:3"}),
+        more({"sampler", "sobol"}), more({"integrator", "bdpt"}),
+        pass_words({{"estimator", "iicv"}}, {{"max-depth", "3"}}, {}), standard})
     EXPECT_NE(other, pair);
   EXPECT_NE(of_estimator("polynomials", {{"dimensions", "2"}}), of_estimator("polynomials", {}));
 }

@@ -41,6 +41,7 @@ void write_result_files(const Plan& plan, const RenderRequest& request, RenderRe
       if (film.attributes.count(key)) attributes[std::string("covary:") + key] = film.attributes.at(key);
     const bool estimated = !result.image.estimate.data.empty();
     attributes["covary:estimator"] = estimated ? plan.estimator : "none";
+    if (estimated && !plan.network.empty()) attributes["covary:denoiser"] = plan.network;
     if (result.interrupted) attributes[std::string("covary:") + film_key::kComplete] = "false";
     attributes["covary:samples"] = fmt::format("{:g}", result.samples_per_pixel());
     const ImagePlace place{film.frame_width(), film.frame_height(), film.crop()};

@@ -73,8 +73,8 @@ HeldOutRow row_of_halves(const HeldOutInput& in, int width, int y, const Weights
   return row;
 }
 
-/// The image's squared error over half of the variance of the halves.
-double factor_of_image(const HeldOutInput& in) {
+/// Of all rows, with the guide's weights.
+HeldOutRow sum_of_halves(const HeldOutInput& in) {
   std::vector<HeldOutRow> rows(static_cast<size_t>(in.guide->height));
   parallel_for(in.guide->height, 8, [&](int y) {
     rows[static_cast<size_t>(y)] = row_of_halves(in, in.guide->width, y, [&](int x) {
@@ -82,7 +82,12 @@ double factor_of_image(const HeldOutInput& in) {
       return std::array{weight, weight};
     });
   });
-  const HeldOutRow all = sum_of(rows);
+  return sum_of(rows);
+}
+
+/// The image's squared error over half of the variance of the halves.
+double factor_of_image(const HeldOutInput& in) {
+  const HeldOutRow all = sum_of_halves(in);
   const double trust = all.variance > 0 ? trust_in(all) : 0, usual = in.error_over_variance;
   if (trust == 0) return 2 * usual;
   return 2 * usual * std::pow(error_of_whole(all) / (usual * all.variance), trust);
@@ -154,6 +159,14 @@ void calibrate(EstimatorResult& result) {
   if (trust == 0) return;
   const auto factor = static_cast<float>(std::pow(error_of_whole(all) / all.predicted, 0.5 * trust));
   for (float& value : result.std_error.data) value *= factor;
+}
+
+HalvesRisk risk_of_halves(const HeldOutInput& input) {
+  const HeldOutRow all = sum_of_halves(input);
+  const auto n_valid =
+      static_cast<double>(std::count_if(input.valid->begin(), input.valid->end(), [](auto v) { return v != 0; }));
+  const double n_values = std::max(3 * n_valid, 1.0);
+  return {all.error / n_values, all.variance / n_values};
 }
 
 Image held_out_error(const HeldOutInput& input) {

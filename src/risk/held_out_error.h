@@ -30,6 +30,17 @@ struct HeldOutInput {
 /// threads.
 Image held_out_error(const HeldOutInput& input);
 
+/// What both halves tell of their images, as means over the values, each over G'^2 + 0.01.
+struct HalvesRisk {
+  double error = 0;     ///< squared error of a half's image, bias included; may be negative, as it is noisy
+  double variance = 0;  ///< of a half's image
+  /// Of the image of all samples: the bias of a half and half of its variance.
+  double of_whole() const { return error - 0.5 * variance; }
+};
+/// With the guide. Differences between images of the same halves have less noise than the errors themselves, since the
+/// held-out samples are the same.
+HalvesRisk risk_of_halves(const HeldOutInput& input);
+
 /// An estimator that fills EstimatorResult::held_out beside its standard error where both halves of the groups are
 /// enough for it; only of those with Estimator::holds_out, others are returned as they are.
 Estimator with_held_out_rows(const Estimator& base);

@@ -55,6 +55,12 @@ std::optional<std::string> Settings::declare(Option option) {
   return value;
 }
 
+bool Settings::is_given(const std::string& name) {
+  Option option;
+  option.name = name;
+  return source_->find(option).has_value();
+}
+
 bool Settings::preset(const std::string& name) {
   Option option;
   option.name = name;

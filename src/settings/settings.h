@@ -80,6 +80,9 @@ class Settings {
     group_ = heading, effect_ = effect;
   }
 
+  /// Whether an option has a value that is yet to be declared, for defaults that depend on it.
+  bool is_given(const std::string& name);
+
   /// Whether a flag that is yet to be declared was given which sets many options at once. A caller's takes the place of
   /// all that a file says.
   bool preset(const std::string& name);

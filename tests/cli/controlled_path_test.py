@@ -142,7 +142,7 @@ class Surrogate(LearningTest, CliTest):
                  "/nowhere/lib.so")
         self.bad(2, "--cv-surrogate oidn needs Open Image Denoise, which --oidn off leaves out", *by_oidn, "-o",
                  "d.exr", "--oidn", "off")
-        self.bad(2, "--oidn has no effect without --denoise bias, balanced or error, and no training with "
+        self.bad(2, "--oidn has no effect without --denoise auto, bias, balanced or error, and no training with "
                  "--cv-surrogate oidn", *PLAIN, "--spp", "6", "-o", "d.exr", "--oidn", library)
 
     def test_by_a_denoiser_that_is_there(self):

@@ -9,7 +9,7 @@ import unittest
 
 from exr_reader import header, read_exr
 from exr_writer import exr
-from render_test import ROOM, SMALL, RenderTest
+from render_test import IICV, ROOM, SMALL, RenderTest
 
 # Without Open Image Denoise, so that results do not depend on what is installed.
 PLAIN = ("--oidn", "off")
@@ -30,15 +30,15 @@ class Denoise(RenderTest):
         errors = {}
         for mode in ("none", "bias", "balanced", "error"):
             options = () if mode == "none" else PLAIN
-            self.good("render", ROOM, *SMALL, "-o", f"{mode}.exr", "--denoise", mode, *options, "--spp", "48")
+            self.good("render", ROOM, *SMALL, "-o", f"{mode}.exr", *IICV, "--denoise", mode, *options, "--spp", "48")
             errors[mode] = self.relmse(f"{mode}.exr", "r.exr")
         self.assertLess(errors["bias"], 1.1 * errors["none"])
         self.assertLess(errors["balanced"], 0.9 * errors["none"])
         self.assertLess(errors["error"], 0.8 * errors["none"])
 
     def test_combine_of_films_and_guides_gives_the_same_bits(self):
-        self.good("render", ROOM, *SMALL, "-o", "a.exr", "--denoise", "balanced", *PLAIN, "--spp", "24", "--aovs",
-                  "--passes", "films", "--save-stages", "steps")
+        self.good("render", ROOM, *SMALL, "-o", "a.exr", *IICV, "--denoise", "balanced", *PLAIN, "--spp", "24",
+                  "--aovs", "--passes", "films", "--save-stages", "steps")
         self.good("combine", "--crn", "films/crn.exr", "--independent", "films/independent.exr", "-o", "b.exr",
                   "--denoise", "balanced", *PLAIN, "--guides", "a.exr", "--quiet", "--error")
         self.same("a.exr", "b.exr")
@@ -53,7 +53,7 @@ class Denoise(RenderTest):
         self.assertNotEqual((self.path / "b.exr").read_bytes(), (self.path / "c.exr").read_bytes())
 
     def test_threads_resume_and_attributes(self):
-        options = ("--denoise", "error", *PLAIN, "--spp", "24")
+        options = (*IICV, "--denoise", "error", *PLAIN, "--spp", "24")
         self.good("render", ROOM, *SMALL, "-o", "a.exr", *options, "--threads", "1")
         self.good("render", ROOM, *SMALL, "-o", "b.exr", *options, "--threads", "3", "--passes", "films")
         self.same("a.exr", "b.exr")
@@ -64,12 +64,12 @@ class Denoise(RenderTest):
         self.assertEqual(info["attributes"]["covary:estimator"], "iicv --denoise error --oidn off")
 
     def test_until_and_few_samples(self):
-        facts = self.statistics("-o", "a.exr", "--denoise", "error", *PLAIN, "--until", "relmse=0.01")
+        facts = self.statistics("-o", "a.exr", *IICV, "--denoise", "error", *PLAIN, "--until", "relmse=0.01")
         self.assertLessEqual(facts["predicted_relmse"], 0.01)
-        facts = self.statistics("-o", "c.exr", "--denoise", "error", *PLAIN, "--until", "relmse-p95=0.03")
+        facts = self.statistics("-o", "c.exr", *IICV, "--denoise", "error", *PLAIN, "--until", "relmse-p95=0.03")
         self.assertLessEqual(facts["predicted_relmse_p95"], 0.03)
         self.assertGreater(facts["predicted_relmse_p95"], facts["predicted_relmse"])
-        facts = self.statistics("-o", "b.exr", "--denoise", "error", *PLAIN, "--spp", "4")
+        facts = self.statistics("-o", "b.exr", *IICV, "--denoise", "error", *PLAIN, "--spp", "4")
         self.assertEqual(facts["samples_per_pixel"], 12, "six groups in each pass")
 
     def test_what_cannot_be(self):
@@ -77,12 +77,12 @@ class Denoise(RenderTest):
                  "--estimator", "iduw", "--denoise", "error")
         self.bad(2, "--denoise of a single pass needs --sampling independent", "render", ROOM, "-o", "a.exr",
                  "--sampling", "crn", "--denoise", "error")
-        self.bad(2, "--oidn has no effect without --denoise bias, balanced or error", "render", ROOM, "-o", "a.exr",
-                 *PLAIN)
+        self.bad(2, "--oidn has no effect without --denoise auto, bias, balanced or error", "render", ROOM, "-o",
+                 "a.exr", *IICV, *PLAIN)
         self.bad(2, "--denoise", "render", ROOM, "-o", "a.exr", "--denoise", "much")
         self.bad(2, "Open Image Denoise is not there (/nowhere/lib.so", "render", ROOM, *SMALL, "-o", "a.exr",
                  "--denoise", "error", "--oidn", "/nowhere/lib.so", "--spp", "24")
-        self.good("render", ROOM, *SMALL, "-o", "b.exr", "--spp", "24", "--passes", "films")
+        self.good("render", ROOM, *SMALL, "-o", "b.exr", *IICV, "--spp", "24", "--passes", "films")
         inputs = ("combine", "--crn", "films/crn.exr", "--independent", "films/independent.exr", "-o", "c.exr")
         self.bad(1, "--guides 'b.exr' has no layer Albedo", *inputs, "--denoise", "error", *PLAIN, "--guides", "b.exr")
         self.bad(2, "--guides is an option of --denoise", *inputs, "--guides", "b.exr")

@@ -78,7 +78,7 @@ class DependentTests(RenderTest):
         self.assertTrue(timed["complete"] or timed["samples_per_pixel"] > 1)
 
     def test_a_relative_error_that_is_not_reached_ends_like_until(self):
-        for method in (METHOD, ("--adaptive",), ("--estimator", "none", "--adaptive")):
+        for method in (METHOD, ("--estimator", "iicv", "--adaptive"), ("--estimator", "none", "--adaptive")):
             for limit in (("--spp", "48"), ("--max-spp", "24")):
                 result = self.run_covary("render", ROOM, *SMALL, "-o", "a.exr", *method, "--relative-error", "1e-9",
                                          *limit)
@@ -97,9 +97,10 @@ class DependentTests(RenderTest):
         self.bad(2, "20 samples per pixel are too few for dependent-tests: its first pass takes 20", *render, "--spp",
                  "20", "--dependent-spp", "20")
         self.bad(2, "--k is an option of --estimator iicv, cv-baseline, not of dependent-tests", *render, "--k", "3")
-        self.bad(2, "--max-region is an option of --estimator dependent-tests, not of iicv", "render", ROOM, "-o",
+        self.bad(2, "--max-region is an option of --estimator dependent-tests, not of none", "render", ROOM, "-o",
                  "a.exr", "--max-region", "3")
-        self.bad(2, "--save-stages: iicv has no single steps", "render", ROOM, "-o", "a.exr", "--save-stages", "s")
+        self.bad(2, "--save-stages: iicv has no single steps", "render", ROOM, "-o", "a.exr", "--save-stages", "s",
+                 "--estimator", "iicv")
         self.bad(2, "--save-stages: none has no single steps", "render", ROOM, "-o", "a.exr", "--save-stages", "s",
                  "--estimator", "none", "--adaptive")
 
@@ -126,7 +127,7 @@ class Adaptive(RenderTest):
         self.bad(2, "--adaptive always takes independent random numbers", *render, "--adaptive", "--sampling", "crn")
         self.bad(2, "--min-spp: '0': expected a whole number of at least 1", *render, "--adaptive", "--min-spp", "0")
         self.bad(2, "iicv: max-spp is 1, expected at least 12, one sample for each group", "render", ROOM, *SMALL,
-                 "-o", "a.exr", "--adaptive", "--max-spp", "1", "--spp", "96")
+                 "-o", "a.exr", "--estimator", "iicv", "--adaptive", "--max-spp", "1", "--spp", "96")
 
 
 if __name__ == "__main__":

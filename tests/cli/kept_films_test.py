@@ -15,7 +15,9 @@ from cli_test import COVARY, SLOWDOWN
 from exr_reader import header, read_exr
 from render_outputs_test import ROOM, SMALL, RenderTest
 
-RENDER = ("render", ROOM, *SMALL, "-o", "out.exr", "--spp", "24")
+IICV = ("--estimator", "iicv")
+PLAIN = ("render", ROOM, *SMALL, "-o", "out.exr", "--spp", "24")
+RENDER = (*PLAIN, *IICV)
 
 
 class FilmsTest(RenderTest):
@@ -58,8 +60,10 @@ class EarlierFilms(FilmsTest):
         films = self.tree("out.passes")
         self.assertEqual(sorted(films), [f"out.passes/{name}" for name in ("crn.exr", "crn.json", "independent.exr",
                                                                            "independent.json")])
-        for more in ((), ("--seed", "7"), ("--estimator", "iduw"), ("--max-depth", "2")):
+        for more in ((), ("--seed", "7"), ("--max-depth", "2")):
             self.refused("'out.passes/", *RENDER, *more)
+        self.refused("'out.passes/", *PLAIN, "--estimator", "iduw")
+        self.refused("'out.passes/", *PLAIN)
         # Continued, they are kept: they belong to the render that named the folder.
         before = (self.path / "out.exr").read_bytes()
         self.good(*RENDER, "--resume")
@@ -71,7 +75,7 @@ class EarlierFilms(FilmsTest):
         self.assertFalse((self.path / "out.passes" / "crn.exr").exists())
 
     def test_an_interrupted_render(self):
-        code, errors = self.interrupt(film="out.passes/independent.exr")
+        code, errors = self.interrupt(*IICV, film="out.passes/independent.exr")
         self.assertEqual(code, 130, errors)
         self.refused("'out.passes/", *RENDER)
         self.good(*RENDER, "--overwrite")
@@ -82,11 +86,11 @@ class EarlierFilms(FilmsTest):
         plain = ("--estimator", "none")
         code, errors = self.interrupt(*plain, film="out.exr")
         self.assertEqual(code, 130, errors)
-        self.refused("'out.exr' is the film of an interrupted render", *RENDER, *plain)
+        self.refused("'out.exr' is the film of an interrupted render", *PLAIN, *plain)
         self.refused("'out.exr' is the film of an interrupted render", *RENDER)
-        self.good(*RENDER, *plain, "--overwrite")
+        self.good(*PLAIN, *plain, "--overwrite")
         self.assertEqual(self.attributes("out.exr")["covary:complete"], "true")
-        self.good(*RENDER, *plain)  # a finished film is an image like any other
+        self.good(*PLAIN, *plain)  # a finished film is an image like any other
 
     def test_files_that_are_no_films(self):
         (self.path / "out.passes").mkdir()
@@ -104,7 +108,7 @@ class EarlierFilms(FilmsTest):
         self.bad(1, "and is no film", *RENDER, "--overwrite")
 
     def test_a_linked_folder(self):
-        self.good("render", ROOM, *SMALL, "-o", "else.exr", "--spp", "24", "--passes", "elsewhere")
+        self.good("render", ROOM, *SMALL, "-o", "else.exr", "--spp", "24", *IICV, "--passes", "elsewhere")
         (self.path / "out.passes").symlink_to("elsewhere")
         self.refused("'out.passes/", *RENDER)
         films = self.tree("elsewhere")
@@ -118,7 +122,7 @@ class EarlierFilms(FilmsTest):
         self.assertTrue((self.path / "elsewhere").is_dir())
 
     def test_a_linked_film(self):
-        self.good("render", ROOM, *SMALL, "-o", "else.exr", "--spp", "24", "--passes", "elsewhere")
+        self.good("render", ROOM, *SMALL, "-o", "else.exr", "--spp", "24", *IICV, "--passes", "elsewhere")
         (self.path / "out.passes").mkdir()
         (self.path / "out.passes" / "crn.exr").symlink_to("../elsewhere/crn.exr")
         before = self.tree()
@@ -147,7 +151,7 @@ class Checkpoints(FilmsTest):
 
     def test_the_next_one_tries_again(self):
         process = subprocess.Popen([COVARY, "render", ROOM, *SMALL, "-o", "out.exr", "--spp", "1000000",
-                                    "--checkpoint", "0.05"], cwd=self.path, stderr=subprocess.PIPE, text=True,
+                                    *IICV, "--checkpoint", "0.05"], cwd=self.path, stderr=subprocess.PIPE, text=True,
                                    preexec_fn=self.limited())
         self.addCleanup(process.wait)
         self.addCleanup(process.kill)
@@ -214,7 +218,7 @@ class LeftOver(FilmsTest):
 
 class WantedError(FilmsTest):
     """--until decides on samples in rounds, and takes the same ones after an interruption."""
-    UNTIL = ("--until", "relmse=0.003", "--quiet", "--no-preview")
+    UNTIL = (*IICV, "--until", "relmse=0.003", "--quiet", "--no-preview")
 
     def test_interrupted_and_resumed(self):
         self.good("render", ROOM, *SMALL, *self.UNTIL, "-o", "whole.exr")
@@ -242,9 +246,10 @@ class Kills(FilmsTest):
 
     def test_at_any_time(self):
         chance = random.Random(75)
-        renders = ((), ("--integrator", "bdpt", "--light-tracing", "on"), ("--estimator", "none", "--sampler", "sobol"))
+        renders = (IICV, ("--oidn", "off", "--integrator", "bdpt", "--light-tracing", "on"),
+                   ("--estimator", "none", "--sampler", "sobol"))
         for number, options in enumerate(renders):
-            command = (*RENDER[:-1], "96", "--passes", f"films{number}", "--checkpoint", "0.02", *options)
+            command = (*PLAIN[:-1], "96", "--passes", f"films{number}", "--checkpoint", "0.02", *options)
             begun = time.monotonic()
             self.good(*command)
             seconds, whole = time.monotonic() - begun, self.finished(number)

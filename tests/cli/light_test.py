@@ -13,6 +13,7 @@ from exr_reader import read_exr
 
 CAUSTIC = str(Path(os.environ["SCENES"]) / "caustic.xml")
 SMALL = ("--resolution", "32x24", "--quiet", "--no-preview")
+IICV = ("--estimator", "iicv")
 PIXELS = 32 * 24
 
 
@@ -52,16 +53,16 @@ class Render(LightTest):
         self.assertIn("light_tracing=off", self.attributes("c.exr")["covary:settings"])
 
     def test_light_paths_without_a_light_pass_are_an_error(self):
-        for given in ((), ("--estimator", "dependent-tests"), ("--sampling", "crn")):
+        for given in (IICV, ("--estimator", "dependent-tests"), ("--sampling", "crn")):
             self.bad(2, "--light-paths has no effect beside a pass with common random numbers", "render", CAUSTIC,
                      "-o", "a.exr", "--light-paths", "2", *given)
         self.bad(2, "--light-paths has no effect without light tracing", "render", CAUSTIC, "-o", "a.exr",
                  "--estimator", "none", "--light-tracing", "off", "--light-paths", "2")
 
     def test_beside_common_random_numbers(self):
-        facts = self.render("-o", "off.exr", "--spp", "24")
+        facts = self.render("-o", "off.exr", *IICV, "--spp", "24")
         self.assertNotIn("light_paths", facts)
-        facts = self.render("-o", "on.exr", "--spp", "24", "--light-tracing", "on", "--passes", "films")
+        facts = self.render("-o", "on.exr", *IICV, "--spp", "24", "--light-tracing", "on", "--passes", "films")
         self.assertEqual(facts["light_paths"], 24 * PIXELS)
         self.assertGreater(facts["predicted_relmse"], 0)
         combine = ("combine", "--crn", "films/crn.exr", "--independent", "films/independent.exr", "--error", "--quiet")
@@ -93,7 +94,7 @@ class Render(LightTest):
         self.assertEqual(self.good(*common, "--replay-light", "0").stdout, first)
         self.bad(2, "--replay and --replay-light exclude each other", *common, "--replay-light", "0", "--replay",
                  "1,2,0")
-        self.bad(2, "there are no light paths", "render", CAUSTIC, "--replay-light", "0")
+        self.bad(2, "there are no light paths", "render", CAUSTIC, *IICV, "--replay-light", "0")
 
     def test_other_integrators_have_no_such_options(self):
         for option in (("--light-tracing", "on"), ("--light-paths", "2"), ("--heuristic", "balance")):
@@ -118,11 +119,12 @@ class Render(LightTest):
         lamp = '<emitter type="point"><point name="position" x="1.3" y="2" z="0.3"/></emitter>'
         self.write("point.xml", (text[:start] + lamp + text[end:]).encode())
         lacks = "without light tracing the image lacks what mirrors and glass cast"
-        render = ("render", "point.xml", *SMALL, "-o", "a.exr", "--spp", "24")
+        render = ("render", "point.xml", *SMALL, "-o", "a.exr", *IICV, "--spp", "24")
         self.assertIn(lacks, self.good(*render).stderr)
         self.assertNotIn(lacks, self.good(*render, "--light-tracing", "on").stderr)
         self.assertNotIn(lacks, self.good(*render, "--integrator", "path").stderr)
-        self.assertNotIn(lacks, self.good("render", CAUSTIC, *SMALL, "-o", "a.exr", "--spp", "24").stderr)
+        self.assertNotIn(lacks, self.good("render", CAUSTIC, *SMALL, "-o", "a.exr", *IICV, "--spp", "24").stderr)
+        self.assertNotIn(lacks, self.good(*(word for word in render if word not in IICV)).stderr, "it traces light")
 
     def test_time(self):
         facts = self.render("-o", "a.exr", "--estimator", "none", "--time", "0.5")

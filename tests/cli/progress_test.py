@@ -55,12 +55,12 @@ class Progress(CliTest):
         text = self.shown(*RENDER, "--spp", "8", "--denoise", "balanced", "--integrator", "guided-path",
                           "--guide-train", "4", "-o", "b.exr")
         self.in_order(text, "loading", "training", "rendering", "estimating and denoising", "writing")
-        self.good(*RENDER, "--spp", "8", "-o", "c.exr", "--passes", "films")
+        self.good(*RENDER, "--estimator", "iicv", "--spp", "8", "-o", "c.exr", "--passes", "films")
         text = self.shown("combine", "--crn", "films/crn.exr", "--independent", "films/independent.exr", "-o", "d.exr")
         self.in_order(text, "d: loading", "d: estimating", "d: writing", "d.exr: ")
 
     def test_until_shows_the_error_that_is_reached(self):
-        text = self.shown(*RENDER, "--until", "relmse=0.0015", "-o", "a.exr", columns=120)
+        text = self.shown(*RENDER, "--estimator", "iicv", "--until", "relmse=0.0015", "-o", "a.exr", columns=120)
         self.in_order(text, "estimating", "rendering  predicted relMSE ", ", goal 0.0015", "estimating", "writing")
         reached = [float(x) for x in re.findall(r"predicted relMSE ([0-9.e-]+), goal", text)]
         self.assertGreater(reached[0], 0.0015)

@@ -15,6 +15,7 @@ from exr_reader import read_exr
 SCENES = Path(os.environ["SCENES"])
 ROOM = str(SCENES / "room.xml")
 SMALL = ("--resolution", "64x48", "--quiet", "--no-preview")
+IICV = ("--estimator", "iicv")
 
 # Two lights so strong that the sum of what they send to the wall is not finite.
 OVERFLOW = """<scene version="3.0.0">
@@ -75,7 +76,7 @@ class Signals(RenderTest):
                 for path in (*self.path.glob("a.passes/*"), *self.path.glob("a.[ep]*")):
                     if path.is_file():
                         path.unlink()
-                result, _, errors = self.interrupt(sent, film="a.passes/independent.exr")
+                result, _, errors = self.interrupt(sent, *IICV, film="a.passes/independent.exr")
                 self.assertEqual(result, code, errors)
                 self.assertIn("'a.exr' is the image so far, 'a.passes' holds its films", errors)
                 attributes = self.attributes("a.exr")
@@ -106,8 +107,8 @@ class Signals(RenderTest):
 class Until(RenderTest):
     def test_not_reached(self):
         for limit in (("--spp", "48"), ("--time", "0.05")):
-            result = self.run_covary("render", ROOM, *SMALL, "-o", "a.exr", "--until", "relmse=1e-9", *limit, "--json",
-                                     "-")
+            result = self.run_covary("render", ROOM, *SMALL, "-o", "a.exr", *IICV, "--until", "relmse=1e-9", *limit,
+                                     "--json", "-")
             self.assertEqual(result.returncode, 3, result.stderr)
             self.assertRegex(result.stderr, r"^covary: --until relmse=1e-9 was not reached: 'a.exr' has a predicted "
                                             r"relMSE of \S+ after [\d.]+ samples per pixel(; that is "
@@ -119,7 +120,7 @@ class Until(RenderTest):
 
     def test_a_prediction_that_hangs_on_few_pixels_is_called_unreliable(self):
         result = self.good("render", str(SCENES / "caustic.xml"), "--resolution", "48x36", "-o", "a.exr", "--quiet",
-                           "--no-preview", "--until", "relmse=5", "--json", "-")
+                           "--no-preview", *IICV, "--until", "relmse=5", "--json", "-")
         self.assertRegex(result.stderr, r"^warning: --until relmse=5 was reached, but the predicted error is "
                                         r"unreliable: \d+ % of it lies in 1 % of the pixels\n$")
         facts = json.loads(result.stdout)
@@ -131,8 +132,8 @@ class Until(RenderTest):
         for scene, resolution, doubt, budgets in (("caustic", "48x36", True, "96 192 384 500"),
                                                   ("room", "96x64", False, "96 384 500")):
             result = self.run_covary("render", str(SCENES / f"{scene}.xml"), "--resolution", resolution, "-o", "a.exr",
-                                     "--quiet", "--no-preview", "--until", "relmse=1e-9", "--spp", "500", "--passes",
-                                     scene)
+                                     "--quiet", "--no-preview", *IICV, "--until", "relmse=1e-9", "--spp", "500",
+                                     "--passes", scene)
             self.assertEqual(result.returncode, 3, result.stderr)
             self.assertEqual("; that is unreliable: " in result.stderr, doubt, result.stderr)
             self.assertIn(f"covary:budgets: {budgets}\n", self.good("info", f"{scene}/crn.exr").stdout)
@@ -146,7 +147,7 @@ class Until(RenderTest):
 
 
 class Passes(RenderTest):
-    RENDER = ("render", ROOM, *SMALL, "-o", "a.exr", "--passes", "films")
+    RENDER = ("render", ROOM, *SMALL, "-o", "a.exr", *IICV, "--passes", "films")
 
     def films(self):
         return {p.name: p.read_bytes() for p in (self.path / "films").iterdir() if p.suffix == ".exr"}
@@ -166,9 +167,9 @@ class Passes(RenderTest):
         self.assertEqual(self.attributes("films/crn.exr")["covary:seed"], "7")
 
     def test_two_processes_on_one_folder(self):
-        process = self.start("-o", "a.exr", "--passes", "films", "--spp", "1000000", "--checkpoint", "0.05")
+        process = self.start("-o", "a.exr", *IICV, "--passes", "films", "--spp", "1000000", "--checkpoint", "0.05")
         self.wait_for((self.path / "films" / "crn.exr").exists, process)
-        again = ("render", ROOM, *SMALL, "-o", "b.exr", "--passes", "films", "--resume", "--spp", "24")
+        again = ("render", ROOM, *SMALL, "-o", "b.exr", *IICV, "--passes", "films", "--resume", "--spp", "24")
         result = self.run_covary(*again)
         self.assertEqual(result.returncode, 1)
         self.assertIn(f"process {process.pid} renders into the folder 'films'", result.stderr)
@@ -240,7 +241,7 @@ class Memory(RenderTest):
     def test_more_than_there_is(self):
         start = time.monotonic()
         self.bad(2, "65536 x 65536 pixels need 75.3 TB of memory", "render", ROOM, "-o", "a.exr", "--resolution",
-                 "65536x65536", "--spp", "48", "--groups", "480")
+                 "65536x65536", "--spp", "48", "--groups", "480", *IICV)
         self.assertLess(time.monotonic() - start, 5 * SLOWDOWN)
 
     def test_known_beforehand(self):

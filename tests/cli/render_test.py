@@ -17,6 +17,7 @@ from exr_reader import read_exr
 SCENES = Path(os.environ["SCENES"])
 ROOM = str(SCENES / "room.xml")
 SMALL = ("--resolution", "64x48", "--quiet", "--no-preview")
+IICV = ("--estimator", "iicv")
 
 
 class RenderTest(CliTest):
@@ -59,21 +60,53 @@ class RareLight(RenderTest):
         (self.path / "window.xml").write_text(WINDOW_ROOM)
         self.render("reference.exr", "--estimator", "none", "--spp", "1024", "--seed", "9")
         self.render("plain.exr", "--estimator", "none", "--spp", "24")
-        for options in ((), ("--paper",), ("--estimator", "cv-baseline", "--ridge", "0.001")):
+        for options in (IICV, (*IICV, "--paper"), ("--estimator", "cv-baseline", "--ridge", "0.001")):
             self.render("a.exr", "--spp", "24", *options, "--passes", "films", "--overwrite")
             image, crn, independent = (read_exr((self.path / name).read_bytes())
                                        for name in ("a.exr", "films/crn.exr", "films/independent.exr"))
             blind = [c == 0 and i > 0 for c, i in zip(crn["R"], independent["R"])]
             self.assertGreater(sum(blind), 100, "the scene has lost its point")
             self.assertTrue(all(error > 0 for error, b in zip(image["StdError.R"], blind) if b), options)
-            if not options:
+            if options == IICV:
                 self.assertLess(self.relmse("a.exr", "reference.exr"),
                                 0.35 * self.relmse("plain.exr", "reference.exr"))
 
 
 class Plans(RenderTest):
-    def test_default_is_iicv_and_equals_combine_of_the_two_passes(self):
-        facts = self.statistics("-o", "a.exr", "--spp", "48", "--seed", "3")
+    def test_default_is_the_denoised_mean_of_independent_samples(self):
+        default = ("--spp", "24", "--seed", "3", "--oidn", "off")
+        facts = self.statistics("-o", "a.exr", *default, "--passes", "films")
+        self.assertEqual(facts["estimator"], "none --denoise auto --oidn off")
+        self.assertEqual([(p["sampling"], p["samples_per_pixel"], p["groups"]) for p in facts["passes"]],
+                         [("independent", 24, 12)])
+        self.assertLess(facts["predicted_relmse"], facts["risks"]["mean"])
+        self.assertTrue(0 <= facts["predicted_bias_share"] < 1)
+        self.assertNotIn("denoiser_missing", facts, "--oidn off: nothing is missing")
+        self.good("render", ROOM, *SMALL, "-o", "b.exr", *default, "--estimator", "none", "--denoise", "auto")
+        self.same("a.exr", "b.exr")
+        self.good("combine", "--independent", "films/independent.exr", "-o", "c.exr", "--denoise", "auto", "--oidn",
+                  "off", "--quiet")
+        self.assertGreater(self.relmse("c.exr", "a.exr"), 0, "without guides")
+        last = self.good("render", ROOM, *SMALL[:2], "-o", "b.exr", *default).stderr.splitlines()[-1]
+        self.assertRegex(last, r"^predicted relMSE 0\.0\d+, \d+ % of it squared bias; the mean of the samples has 0\.")
+
+    def test_what_is_named_is_not_denoised(self):
+        for options in (("--estimator", "none"), ("--denoise", "none"), ("--sampling", "independent")):
+            self.assertEqual(self.statistics("-o", "a.exr", "--spp", "4", *options)["estimator"], "none")
+        self.assertEqual(self.statistics("-o", "a.exr", "--spp", "8", *IICV)["estimator"], "iicv")
+        self.bad(2, "--adaptive: name the estimator", "render", ROOM, "-o", "a.exr", "--adaptive")
+
+    def test_a_missing_network_is_said_once_and_is_no_error(self):
+        if self.run_covary("denoise", "--check").returncode == 0:
+            self.assertRegex(self.statistics("-o", "a.exr", "--spp", "4")["denoiser"], r"^Open Image Denoise 2\.")
+            return
+        facts = self.statistics("-o", "a.exr", "--spp", "4")
+        self.assertIn("Open Image Denoise is not installed", facts["denoiser_missing"])
+        errors = self.good("render", ROOM, *SMALL[:2], "-o", "b.exr", "--spp", "4").stderr
+        self.assertEqual(errors.count("note: Open Image Denoise is not installed"), 1)
+
+    def test_iicv_equals_combine_of_the_two_passes(self):
+        facts = self.statistics("-o", "a.exr", *IICV, "--spp", "48", "--seed", "3")
         self.assertEqual(facts["estimator"], "iicv")
         self.assertEqual([(p["sampling"], p["samples_per_pixel"], p["groups"]) for p in facts["passes"]],
                          [("crn", 24, 12), ("independent", 24, 12)])
@@ -94,11 +127,11 @@ class Plans(RenderTest):
     def test_less_error_than_plain_at_equal_samples(self):
         self.good("render", ROOM, *SMALL, "-o", "r.exr", "--estimator", "none", "--spp", "1024", "--seed", "9")
         self.good("render", ROOM, *SMALL, "-o", "plain.exr", "--estimator", "none", "--spp", "48", "--seed", "3")
-        self.good("render", ROOM, *SMALL, "-o", "iicv.exr", "--spp", "48", "--seed", "3")
+        self.good("render", ROOM, *SMALL, "-o", "iicv.exr", *IICV, "--spp", "48", "--seed", "3")
         self.assertLess(self.relmse("iicv.exr", "r.exr"), 0.7 * self.relmse("plain.exr", "r.exr"))
 
     def test_estimators_share_passes(self):
-        first = self.statistics("-o", "a.exr", "--spp", "48", "--passes", "films")
+        first = self.statistics("-o", "a.exr", *IICV, "--spp", "48", "--passes", "films")
         self.assertEqual(sorted(p.name for p in (self.path / "films").iterdir()),
                          ["crn.exr", "crn.json", "independent.exr", "independent.json"])
         films = {p.name: p.stat().st_mtime_ns for p in (self.path / "films").iterdir() if p.suffix == ".exr"}
@@ -113,30 +146,31 @@ class Plans(RenderTest):
         self.assertEqual(set(films), {"crn.exr", "independent.exr"})
 
     def test_split(self):
-        facts = self.statistics("-o", "a.exr", "--spp", "96", "--split", "1:3")
+        facts = self.statistics("-o", "a.exr", *IICV, "--spp", "96", "--split", "1:3")
         self.assertEqual([p["samples_per_pixel"] for p in facts["passes"]], [24, 72])
 
     def test_few_samples_have_fewer_groups(self):
-        facts = self.statistics("-o", "a.exr", "--spp", "8")
+        facts = self.statistics("-o", "a.exr", *IICV, "--spp", "8")
         self.assertEqual([(p["samples_per_pixel"], p["groups"]) for p in facts["passes"]], [(4, 4), (4, 4)])
-        facts = self.statistics("-o", "a.exr", "--spp", "1")
+        facts = self.statistics("-o", "a.exr", *IICV, "--spp", "1")
         self.assertEqual([(p["samples_per_pixel"], p["groups"]) for p in facts["passes"]], [(4, 4), (4, 4)])
-        facts = self.statistics("-o", "a.exr", "--spp", "7", "--groups", "3")
+        facts = self.statistics("-o", "a.exr", *IICV, "--spp", "7", "--groups", "3")
         self.assertEqual([(p["samples_per_pixel"], p["groups"]) for p in facts["passes"]], [(4, 3), (3, 3)])
 
     def test_samples_are_those_that_were_asked_for(self):
-        for spp, options, passes in (("32", [], [(16, 8), (16, 8)]), ("25", [], [(13, 12), (12, 12)]),
+        for spp, options, passes in (("32", IICV, [(16, 8), (16, 8)]), ("25", IICV, [(13, 12), (12, 12)]),
+                                     ("32", [], [(32, 8)]), ("7", [], [(7, 7)]),
                                      ("32", ["--sampling", "crn"], [(32, 8)]),
                                      ("32", ["--estimator", "none"], [(32, 1)]),
                                      ("32", ["--estimator", "none", "--groups", "12"], [(32, 12)])):
             facts = self.statistics("-o", "a.exr", "--spp", spp, *options)
             self.assertEqual([(p["samples_per_pixel"], p["groups"]) for p in facts["passes"]], passes)
-        result = self.good("render", ROOM, *SMALL, "-o", "a.exr", "--spp", "7")
+        result = self.good("render", ROOM, *SMALL, "-o", "a.exr", *IICV, "--spp", "7")
         self.assertIn("8 samples per pixel instead of 7: each of 4 groups needs one in every pass", result.stderr)
 
     def test_methods_share_films_of_few_samples(self):
         for spp in ("6", "7", "9", "13"):
-            self.statistics("-o", "a.exr", "--spp", spp, "--passes", "films" + spp)
+            self.statistics("-o", "a.exr", *IICV, "--spp", spp, "--passes", "films" + spp)
             for estimator in ("iduw", "cv-baseline", "iicv"):
                 facts = self.statistics("-o", "b.exr", "--spp", spp, "--passes", "films" + spp, "--resume",
                                         "--estimator", estimator)
@@ -144,7 +178,7 @@ class Plans(RenderTest):
 
     def test_merging_images_names_what_to_merge_instead(self):
         for seed in ("1", "2"):
-            self.statistics("-o", f"{seed}.exr", "--spp", "8", "--seed", seed)
+            self.statistics("-o", f"{seed}.exr", *IICV, "--spp", "8", "--seed", seed)
         refused = self.run_covary("merge", "1.exr", "2.exr", "-o", "both.exr").stderr
         self.assertIn("covary: 1.exr is no film but an image that 'iicv' made of films", refused)
         again = [line.strip() for line in refused.splitlines() if line.startswith("  covary render ")]
@@ -182,22 +216,24 @@ class Plans(RenderTest):
         self.assertNotIn("StdError.R", read_exr((self.path / "one.exr").read_bytes()))
 
     def test_any_split_gives_the_bits_of_one_go(self):
-        for options in (["--estimator", "none"], ["--estimator", "none", "--groups", "5"], []):
+        for options in (["--estimator", "none"], ["--estimator", "none", "--groups", "5"], ["--oidn", "off"], [*IICV]):
             self.statistics("-o", "whole.exr", "--spp", "200", "--passes", "whole", *options)
             for spp in ("70", "100", "113", "200"):
                 self.statistics("-o", "part.exr", "--spp", spp, "--passes", "part", "--resume", *options,
-                                *([] if options else ["--groups", "10"]))
+                                *([] if "none" in options else ["--groups", "10"]))
             self.same("part.exr", "whole.exr")
             for folder in ("whole", "part"):
                 for file in (self.path / folder).iterdir():
                     file.unlink()
 
     def test_until(self):
-        facts = self.statistics("-o", "a.exr", "--until", "relmse=0.0015")
+        facts = self.statistics("-o", "a.exr", *IICV, "--until", "relmse=0.0015")
         self.assertLessEqual(facts["predicted_relmse"], 0.0015)
         self.assertGreater(facts["samples_per_pixel"], 96)
-        self.good("render", ROOM, *SMALL, "-o", "b.exr", "--spp", str(int(facts["samples_per_pixel"])))
+        self.good("render", ROOM, *SMALL, "-o", "b.exr", *IICV, "--spp",
+                  str(int(facts["samples_per_pixel"])))
         self.same("a.exr", "b.exr")
+        self.assertLessEqual(self.statistics("-o", "c.exr", "--until", "relmse=0.001")["predicted_relmse"], 0.001)
         facts = self.statistics("-o", "d.exr", "--until", "relmse=0.02", "--estimator", "none")
         self.assertLessEqual(facts["predicted_relmse"], 0.02)
 
@@ -211,8 +247,8 @@ class Plans(RenderTest):
         for options, noted in ((("--sampling", "crn"), True), (("--sampling", "crn", "--estimator", "none"), False)):
             errors = self.good("render", ROOM, "--resolution", "8x6", "--no-preview", "-o", "s.exr", "--overwrite",
                                "--spp", "4", *options).stderr
-            self.assertEqual("note: --sampling takes one film, as --estimator none does, and leaves out iicv" in errors,
-                             noted)
+            self.assertEqual("note: --sampling takes one film, as --estimator none does, and leaves out --denoise"
+                             in errors, noted)
         self.bad(2, "--sampling is an option of --estimator none", *render, "--estimator", "iicv", "--sampling", "crn")
         self.bad(2, "--split is an option of estimators with two passes", *render, "--estimator", "none", "--split",
                  "1:2")
@@ -223,9 +259,9 @@ class Plans(RenderTest):
         self.bad(2, "--paper is an option of --estimator iicv, dependent-tests, not of cv-baseline", *render,
                  "--estimator", "cv-baseline", "--paper")
         self.bad(2, "--k is an option of", *render, "--estimator", "none", "--k", "3")
-        self.bad(2, "at least 3 groups", *render, "--groups", "2")
+        self.bad(2, "at least 3 groups", *render, *IICV, "--groups", "2")
         self.bad(2, "at least 4 groups", *render, "--groups", "3", "--estimator", "iduw")
-        self.bad(2, "window", *render, "--window", "4")
+        self.bad(2, "window", *render, *IICV, "--window", "4")
 
     def test_predictions_from_few_samples_are_called_unreliable(self):
         words = "(unreliable: fewer than 48 samples per pixel)"
@@ -277,7 +313,7 @@ class Files(RenderTest):
         self.bad(2, "-o 'films/crn.exr' and --passes 'films/crn.exr' are the same file", *self.RENDER, "-o",
                  "films/crn.exr",
                  "--passes", "films")
-        self.good(*self.RENDER, "-o", "films/image.exr", "--passes", "films")
+        self.good(*self.RENDER, *IICV, "-o", "films/image.exr", "--passes", "films")
 
     def test_statistics_of_a_name_that_is_not_utf_8(self):
         output = b"caf\xe9.exr"
@@ -366,7 +402,7 @@ class Polynomials(RenderTest):
         self.bad(2, "--until: polynomials does not estimate its error", *render, "--until", "relmse=0.1")
         self.bad(2, "so their number must be known; use --spp", *render, "--time", "1")
         self.bad(2, "--k is an option of --estimator iicv, cv-baseline, not of polynomials", *render, "--k", "3")
-        self.bad(2, "--dimensions is an option of --estimator polynomials, not of iicv", "render", ROOM, "-o", "a.exr",
+        self.bad(2, "--dimensions is an option of --estimator polynomials, not of none", "render", ROOM, "-o", "a.exr",
                  "--dimensions", "2")
         self.bad(2, "--dimensions: '7': expected a whole number from 1 to 6", *render, "--dimensions", "7")
         self.bad(2, "28 samples per pixel are too few to fit the 28 coefficients of 6 dimensions, expected at least 29",
@@ -421,7 +457,7 @@ class Time(RenderTest):
         self.assertGreaterEqual(min(samples), 1)
         facts = self.timed(0.001, "iicv")
         self.assertEqual([(p["groups"], p["samples_per_pixel"]) for p in facts["passes"]], [(4, 4), (4, 4)])
-        result = self.good("render", ROOM, "--resolution", "400x300", "-o", "b.exr", "--time", "0.001")
+        result = self.good("render", ROOM, "--resolution", "400x300", "-o", "b.exr", *IICV, "--time", "0.001")
         self.assertIn("warning: --time 0.001 was exceeded", result.stderr)
 
     def test_pixels_differ_by_a_factor_of_two_at_most(self):
@@ -438,7 +474,7 @@ class Time(RenderTest):
         self.assertLess(facts["seconds"]["render"] + facts["seconds"]["estimate"], 3 * SLOWDOWN)
 
     def test_interrupted_and_resumed(self):
-        command = [COVARY, "render", ROOM, "--resolution", "128x96", "--no-preview", "-o", "a.exr"]
+        command = [COVARY, "render", ROOM, "--resolution", "128x96", "--no-preview", "-o", "a.exr", *IICV]
         process = subprocess.Popen([*command, "--time", "60"], cwd=self.path, stderr=subprocess.PIPE, text=True)
         time.sleep(1.5 * SLOWDOWN)
         process.send_signal(signal.SIGINT)

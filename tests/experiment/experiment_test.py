@@ -24,7 +24,7 @@ SUITE = {
     "name": "tiny",
     "scenes": [{"name": "room", "file": "room.xml", "resolution": "32x24"}],
     "methods": [{"name": "pt", "options": ["--estimator", "none"], "unbiased": True},
-                {"name": "iicv", "options": []}],
+                {"name": "iicv", "options": ["--estimator", "iicv"]}],
     "budgets": [{"spp": 24}, {"spp": 48}],
     "seeds": 2,
     "common_options": ["--rfilter", "box"],
@@ -269,7 +269,7 @@ class Parts(ExperimentTest):
         self.assertEqual(sizes, [1, 1, 2, 2, 1, 1, 2, 2, 0])
 
     def test_failures(self):
-        self.suite["methods"].append({"name": "wrong", "options": ["--groups", "2"]})
+        self.suite["methods"].append({"name": "wrong", "options": ["--estimator", "iicv", "--groups", "2"]})
         done = self.run_covary(self.command("--part", "1/1"))
         self.assertEqual(done.returncode, 1)
         self.assertIn("failed: room, wrong, 24 spp: ", done.stderr)
@@ -366,9 +366,9 @@ class Resume(ExperimentTest):
         self.assertEqual(len(self.results("--reference-spp", "64", code=1, **without)["failures"]), 1)
 
     def test_passes_are_shared(self):
-        self.suite["methods"] += [{"name": "paper", "options": ["--paper", "--k", "9"]},
+        self.suite["methods"] += [{"name": "paper", "options": ["--estimator", "iicv", "--paper", "--k", "9"]},
                                   {"name": "iduw", "options": ["--estimator=iduw"]},
-                                  {"name": "other split", "options": ["--split", "3:1"]},
+                                  {"name": "other split", "options": ["--estimator", "iicv", "--split", "3:1"]},
                                   *({"name": f"polynomials {d}",
                                      "options": ["--estimator", "polynomials", "--dimensions", d]}
                                     for d in ("2", "3"))]
@@ -396,7 +396,7 @@ class Resume(ExperimentTest):
 class Failures(ExperimentTest):
     def test_the_rest_goes_on(self):
         self.suite["scenes"].append({"name": "gone", "file": "gone.xml"})
-        self.suite["methods"].append({"name": "wrong", "options": ["--groups", "2"]})
+        self.suite["methods"].append({"name": "wrong", "options": ["--estimator", "iicv", "--groups", "2"]})
         self.suite["methods"].append({"name": "late", "options": ["--estimator", "none"],
                                       "then": [["merge", "nothing.exr"]]})
         self.suite["budgets"] = [{"spp": 24}]
@@ -599,7 +599,8 @@ class BuiltIn(ExperimentTest):
         results = json.loads((self.path / "out" / "results.json").read_text())
         left_out = {"oidn"} if any("'oidn' is left out" in text for text in results["warnings"]) else set()
         self.assertEqual({c["method"] for c in results["cells"]},
-                         {"pt", "oidn", "iicv", "balanced", "error", "bdpt", "controlled", "guided"} - left_out)
+                         {"pt", "oidn", "default", "own filters", "balanced", "iicv", "iicv, error", "bdpt",
+                          "controlled", "guided"} - left_out)
         self.assertEqual(results["scenes"][0]["name"], "room")
 
     def test_quick_scales_frames_down(self):

@@ -83,7 +83,8 @@ class Package(unittest.TestCase):
 
     def test_combining_arrays_gives_the_image_of_the_program(self):
         self.run_in_folder(self.prefix / "bin" / "covary", "render", ROOM, "-o", "out.exr", "--resolution", "48x32",
-                           "--spp", 4 * GROUPS, "--groups", GROUPS, "--passes", "passes", "--no-preview", "--quiet")
+                           "--spp", 4 * GROUPS, "--groups", GROUPS, "--estimator", "iicv", "--passes", "passes",
+                           "--no-preview", "--quiet")
         for name in ("crn", "independent"):
             write_groups(self.work / "passes" / f"{name}.exr", self.work / name)
         printed = self.run_in_folder(self.examples / "combine_arrays", 48, 32, GROUPS, "crn", "independent", "out")
@@ -98,7 +99,7 @@ class Package(unittest.TestCase):
 
     def test_rendering_gives_the_image_of_the_program(self):
         self.run_in_folder(self.prefix / "bin" / "covary", "render", ROOM, "-o", "a.exr", "--resolution", "120x80",
-                           "--spp", 24, "--no-preview", "--quiet")
+                           "--spp", 24, "--estimator", "iicv", "--no-preview", "--quiet")
         printed = self.run_in_folder(self.examples / "render_scene", ROOM, "b.exr")
         self.assertRegex(printed, r"^24 samples per pixel in .* predicted relMSE 0\.\d+\n$")
         self.assertEqual(rgb(self.work / "a.exr"), rgb(self.work / "b.exr"))

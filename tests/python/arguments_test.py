@@ -48,7 +48,7 @@ RENDER = {"scene": (*NO_SCENE, ""), "spp": without_none(NO_SPP), "estimator": ("
           "resume": (True, *NO_FLAG), "overwrite": (True, *NO_FLAG), "checkpoint": (-1, 5, "1", True),
           "preview": (True, *NO_FLAG), "aovs": NO_FLAG, "path_lengths": NO_FLAG,
           "crop": (3, "0,0,4,4", (0, 0, 4), (0, 0, 0, 0), (-1, 0, 4, 4), (0, 0, 4.5, 4), (0, 0, 400, 4)),
-          "filter": ("bx", *NO_TEXT), "sampling": ("common", "crn", *NO_TEXT), "sampler": ("halton", *NO_TEXT),
+          "filter": ("bx", *NO_TEXT), "sampling": ("common", *NO_TEXT), "sampler": ("halton", *NO_TEXT),
           "crn_part": ("all", None, *NO_TEXT), "groups": (0, -1, 1025, 2.5, "12"),
           "split": (1, "1:1", (1,), (1, 0), (1, -1), ("1", 1)), "films_only": NO_FLAG, "save_training": NO_PATH,
           "load_training": NO_PATH, "progress": NO_FUNCTION}
@@ -136,7 +136,7 @@ class Arguments(PackageTest):
     @classmethod
     def setUpClass(cls):
         cls.scene = covary.Scene.load(ROOM, resolution=(24, 20))
-        cls.result = covary.render(cls.scene, 24)
+        cls.result = covary.render(cls.scene, 24, "iicv")
         cls.film = cls.result.films["crn"]
         cls.crn, cls.independent = pair()
 

@@ -37,7 +37,8 @@ class Light(BesideTest):
     def setUp(self):
         super().setUp()
         self.run_program("render", ROOM, "-o", "whole.exr", *SIZE, "--integrator", "bdpt", "--light-tracing", "on",
-                         "--spp", 24, "--max-depth", 3, "--passes", ".", "--quiet", "--no-preview")
+                         "--spp", 24, "--max-depth", 3, "--estimator", "iicv", "--passes", ".", "--quiet",
+                         "--no-preview")
         self.films = {name: covary.Film.load(self.path / f"{name}.exr") for name in ("crn", "independent", "light")}
 
     def test_bits_of_the_program(self):
@@ -125,8 +126,9 @@ class Denoise(BesideTest):
         def message(error, estimator="iicv", **keywords):
             return self.message_of(error, covary.combine, *self.images, estimator, **keywords)
         self.write("guides", {f"Albedo.{c}": self.albedo[:, :, i] for i, c in enumerate("RGB")})
-        self.assertIn("option of --denoise bias", self.failure_of_program(*FILES, "--guides", "guides.exr"))
-        self.assertIn("albedo, normal: guides are of denoise='bias'", message(covary.UsageError, albedo=self.albedo))
+        self.assertIn("option of --denoise auto, bias", self.failure_of_program(*FILES, "--guides", "guides.exr"))
+        self.assertIn("albedo, normal: guides are of denoise='auto', 'bias'",
+                      message(covary.UsageError, albedo=self.albedo))
         self.assertEqual(message(covary.UsageError, oidn="off"),
                          self.failure_of_program(*FILES, "--oidn", "off").replace("--", ""))
         self.assertEqual(message(covary.UsageError, "dependent-tests", denoise="bias"),
@@ -145,9 +147,9 @@ class Denoise(BesideTest):
 
     def test_render(self):
         scene = covary.Scene.load(ROOM, resolution=(24, 20))
-        result = covary.render(scene, spp=48, denoise="balanced", oidn="off", progress=lambda done, total: None)
-        self.run_program("render", ROOM, "-o", "out.exr", *SIZE, "--spp", 48, "--denoise", "balanced", "--oidn", "off",
-                         "--quiet", "--no-preview")
+        result = covary.render(scene, 48, "iicv", denoise="balanced", oidn="off", progress=lambda done, total: None)
+        self.run_program("render", ROOM, "-o", "out.exr", *SIZE, "--spp", 48, "--estimator", "iicv", "--denoise",
+                         "balanced", "--oidn", "off", "--quiet", "--no-preview")
         self.assert_same_bits(result.image.reshape(-1, 3), rgb(self.path / "out.exr"))
         again = covary.combine(result.films["crn"], result.films["independent"], denoise="balanced", oidn="off",
                                albedo=result.aovs["Albedo"], normal=result.aovs["N"])

@@ -20,7 +20,8 @@ from render_test import OVERFLOW
 
 SIZE = (72, 48)
 SUITE = {"name": "tiny", "scenes": [{"name": "room", "file": "room.xml", "resolution": "32x24"}],
-         "methods": [{"name": "pt", "options": ["--estimator", "none"]}, {"name": "iicv", "options": []}],
+         "methods": [{"name": "pt", "options": ["--estimator", "none"]},
+                     {"name": "iicv", "options": ["--estimator", "iicv"]}],
          "budgets": [{"spp": 24}], "seeds": 2, "common_options": ["--rfilter", "box"], "reference": {"spp": 32}}
 
 
@@ -44,7 +45,7 @@ class Parts(PackageTest):
         self.assert_same_bits(canvas.films()["independent"].groups, film.groups)
 
     def test_films_go_through_pickle(self):
-        film = covary.render(ROOM, 24, crop=(3, 4, 20, 10)).films["crn"]
+        film = covary.render(ROOM, 24, "iicv", crop=(3, 4, 20, 10)).films["crn"]
         other = pickle.loads(pickle.dumps(film))
         self.assert_same_bits(film.groups, other.groups)
         self.assertEqual((film.crop, film.frame, film.attributes), (other.crop, other.frame, other.attributes))
@@ -95,7 +96,7 @@ class Parts(PackageTest):
     def test_parts_on_disk(self):
         """With the same bits; one that is damaged, or of other settings, is not taken."""
         part = covary.distributed.Part((2, 1, 20, 10), 3, 0)
-        made = covary.render(ROOM, 24, seed=3, crop=part.crop, films_only=True, aovs=True)
+        made = covary.render(ROOM, 24, "iicv", seed=3, crop=part.crop, films_only=True, aovs=True)
         bad = covary.BadSample("crn", 2, 3, 4, (1.0, -2.0, 0.0), False, "covary render …")
         rendered = covary.distributed.Rendered(made.films, made.aovs, ("a warning",), 5, 6, (bad,))
         folder = covary._parts.PartFolder(str(self.path), {"scene": "a"})
@@ -152,7 +153,7 @@ class Cluster(PackageTest):
         return covary.Scene.load(ROOM, resolution=SIZE, **keywords)
 
     def test_bits_of_one_machine(self):
-        here = covary.render(self.scene(), 24, seed=3)
+        here = covary.render(self.scene(), 24, "iicv", seed=3)
         seen = []
         there = covary.distributed.render(self.client, self.scene(), 24, seed=3, tile=20,
                                           progress=lambda done, total: seen.append((done, total)))
@@ -169,7 +170,7 @@ class Cluster(PackageTest):
 
     def test_denoised(self):
         """With guides that the workers render, and the denoiser of the frame, not of tiles."""
-        here = covary.render(self.scene(), 48, denoise="error", oidn="off")
+        here = covary.render(self.scene(), 48, "iicv", denoise="error", oidn="off")
         there = covary.distributed.render(self.client, self.scene(), 48, tile=30, denoise="error", oidn="off")
         self.assert_same_bits(here.image, there.image)
         self.assert_same_bits(here.std_error, there.std_error)
@@ -185,7 +186,7 @@ class Cluster(PackageTest):
 
     def test_workers_that_die(self):
         """One is killed in the middle; what it had is rendered again, on the one that takes its place, too."""
-        here = covary.render(self.scene(), 48, seed=4)
+        here = covary.render(self.scene(), 48, "iicv", seed=4)
         killed = []
 
         def kill(done, total):
@@ -234,7 +235,8 @@ class Cluster(PackageTest):
         self.assertIn("--spp", run.stderr)
 
     def test_experiment_that_fails(self):
-        suite = {**SUITE, "methods": [*SUITE["methods"], {"name": "wrong", "options": ["--groups", "2"]}], "seeds": 1}
+        suite = {**SUITE, "methods": [*SUITE["methods"], {"name": "wrong", "options": ["--estimator", "iicv",
+                                                                            "--groups", "2"]}], "seeds": 1}
         (self.path / "suite.json").write_text(json.dumps(suite))
         message = self.message_of(covary.Error, covary.distributed.experiment, self.client, self.path / "suite.json",
                                   self.path / "out", ["--scenes", str(SOURCE / "scenes")])
@@ -353,7 +355,7 @@ class Kept(PackageTest):
                                                      denoise="error", oidn="off", **more)
                 there = call(6, progress=lambda done, total: seen.append(done))
                 again, other = call(6), call(7)
-        here = covary.render(scene, 24, seed=6, denoise="error", oidn="off")
+        here = covary.render(scene, 24, "iicv", seed=6, denoise="error", oidn="off")
         self.assertEqual((there.parts, there.parts_kept, seen[0]), (12, 5, 5))
         self.assertEqual((again.parts_kept, other.parts_kept), (12, 0))
         for made in (there, again):

@@ -31,19 +31,26 @@ class Render(PackageTest):
 
     def test_bits_of_the_program(self):
         scene = self.scene()
-        result = covary.render(scene, spp=24)
-        self.same(result, "--spp", 24)
+        result = covary.render(scene, spp=24, oidn="off")
+        self.same(result, "--spp", 24, "--oidn", "off")
+        self.assertEqual((sorted(result.films), result.estimator), (["independent"], "none --denoise auto --oidn off"))
+        self.assertLess(result.predicted_relmse, result.risks["mean"])
+        self.assertEqual(("sharp" in result.risks, 0 <= result.bias_share < 1, result.network), (True, True, ""))
+        self.assertEqual(covary.render(scene, spp=4, denoise="none").estimator, "none")
+        result = covary.render(scene, 24, "iicv")
+        self.same(result, "--spp", 24, "--estimator", "iicv")
+        self.assertEqual((result.risks, result.bias_share), ({}, None))
         self.assertEqual(sorted(result.films), ["crn", "independent"])
         self.assertEqual((result.samples_per_pixel, result.complete, result.estimator), (24, True, "iicv"))
         self.assertEqual(result.prediction_doubt, "fewer than 48 samples per pixel")
         self.same(covary.render(scene, 6, "none", seed=5, filter="tent"), "--spp", 6, "--estimator", "none", "--seed",
                   5, "--rfilter", "tent")
-        self.same(covary.render(scene, 24, "iicv", k=9, split=(1, 2), groups=4), "--spp", 24, "--k", 9, "--split",
-                  "1:2", "--groups", 4)
+        self.same(covary.render(scene, 24, "iicv", k=9, split=(1, 2), groups=4), "--spp", 24, "--estimator", "iicv",
+                  "--k", 9, "--split", "1:2", "--groups", 4)
         self.same(covary.render(scene, 8, "none", sampler="sobol"), "--spp", 8, "--estimator", "none", "--sampler",
                   "sobol")
-        self.same(covary.render(scene, 24, integrator="controlled-path", aovs=True), "--spp", 24, "--integrator",
-                  "controlled-path", "--aovs")
+        self.same(covary.render(scene, 24, "iicv", integrator="controlled-path", aovs=True), "--spp", 24,
+                  "--estimator", "iicv", "--integrator", "controlled-path", "--aovs")
 
     def test_bidirectional_with_properties(self):
         scene = self.scene(integrator="bdpt", integrator_options={"light_paths": 2.0}, max_depth=3)
@@ -57,7 +64,7 @@ class Render(PackageTest):
         self.assertLess(result.samples_per_pixel, 400)
 
     def test_films_only(self):
-        whole, films = (covary.render(self.scene(), 24, films_only=only) for only in (False, True))
+        whole, films = (covary.render(self.scene(), 24, "iicv", films_only=only) for only in (False, True))
         for name in ("crn", "independent"):
             self.assert_same_bits(whole.films[name].groups, films.films[name].groups)
         self.assertEqual((films.std_error, films.estimator), (None, "none"))
@@ -72,10 +79,10 @@ class Render(PackageTest):
         self.assertEqual(len(scene.content_hash), len(self.scene().content_hash))
 
     def test_files_and_resume(self):
-        whole = covary.render(self.scene(), spp=48)
+        whole = covary.render(self.scene(), 48, "iicv")
         out, passes = self.path / "a.exr", self.path / "passes"
-        covary.render(self.scene(), spp=24, output=out, passes=passes, groups=12)
-        resumed = covary.render(self.scene(), spp=48, output=out, passes=passes, groups=12, resume=True)
+        covary.render(self.scene(), 24, "iicv", output=out, passes=passes, groups=12)
+        resumed = covary.render(self.scene(), 48, "iicv", output=out, passes=passes, groups=12, resume=True)
         self.assert_same_bits(whole.image, resumed.image)
         self.assert_same_bits(resumed.image.reshape(-1, 3), rgb(out))
         self.assertIn("seed", covary.Film.load(str(passes / "crn.exr")).attributes)
@@ -167,8 +174,8 @@ class BadSamples(PackageTest):
         self.assertIn("they count as black", result.warnings[-1])
         with self.assertWarns(covary.BadSamplesWarning):
             of_iicv = covary.render(covary.Scene.load(self.file, resolution=(8, 6), max_depth=2,
-                                                      defines={"strength": 2e38}), 24, seed=5, crop=(1, 2, 5, 3),
-                                    sampler="sobol")
+                                                      defines={"strength": 2e38}), 24, "iicv", seed=5,
+                                    crop=(1, 2, 5, 3), sampler="sobol")
         self.assertEqual({bad.film for bad in of_iicv.bad_samples}, {"crn", "independent"})
         for bad in (*result.bad_samples[:2], of_iicv.bad_samples[0], of_iicv.bad_samples[-1]):
             self.assertEqual(bad.value, (math.inf,) * 3)
@@ -183,7 +190,7 @@ class BadSamples(PackageTest):
         # one, and says so.
         scene = covary.Scene.load(self.file, integrator="bdpt")
         with self.assertWarns(covary.BadSamplesWarning):
-            of_iicv = covary.render(scene, 24)
+            of_iicv = covary.render(scene, 24, "iicv")
         self.assertIn("--light-tracing off --", of_iicv.bad_samples[-1].replay)
         self.assertIn("inf", self.replayed(of_iicv.bad_samples[-1]))
 

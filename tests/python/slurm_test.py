@@ -11,7 +11,8 @@ import covary.distributed
 from common import PROGRAM, ROOM, SOURCE, PackageTest
 
 SUITE = {"name": "tiny", "scenes": [{"name": "room", "file": "room.xml", "resolution": "32x24"}],
-         "methods": [{"name": "pt", "options": ["--estimator", "none"]}, {"name": "iicv", "options": []}],
+         "methods": [{"name": "pt", "options": ["--estimator", "none"]},
+                     {"name": "iicv", "options": ["--estimator", "iicv"]}],
          "budgets": [{"spp": 24}], "seeds": 2, "common_options": ["--rfilter", "box"], "reference": {"spp": 32}}
 
 
@@ -36,7 +37,7 @@ class Slurm(PackageTest):
         """Bits of one machine, though one of the jobs is cancelled in the middle."""
         from distributed import Client
         scene = covary.Scene.load(ROOM, resolution=(72, 48))
-        here = covary.render(scene, 48, seed=4)
+        here = covary.render(scene, 48, "iicv", seed=4)
         with self.cluster() as cluster, Client(cluster) as client:
             cluster.adapt(minimum_jobs=2, maximum_jobs=2, interval="200ms")
             client.wait_for_workers(2, timeout=100)

@@ -10,7 +10,7 @@ from common import SOURCE, PackageTest, examples_of_page
 LINES = """
 import covary
 scene = covary.Scene.load(covary.scenes.path("room"), resolution=(60, 40))
-result = covary.render(scene, spp=24)
+result = covary.render(scene, 24, "iicv")
 again = covary.combine(result.films["crn"].groups, result.films["independent"].groups)
 assert (again.image == result.image).all()
 result.save("room.png")
