@@ -12,7 +12,8 @@
 #   make bench            build and run the micro benchmarks                BENCH=regex selects some
 #   make lint             formatting, static analysis, rules of the tree    ALL=1 analyses all files, not changed ones
 #   make install          build for every x86-64 processor (docs/library.md) and install under PREFIX (default
-#                         /usr/local); ARCH=native builds for this machine alone, in a third of the time
+#                         /usr/local); ARCH=native builds for this machine alone, in a third of the time; with Open
+#                         Image Denoise of PyPI (scripts/oidn), but for OIDN=OFF
 #   make deb              a package of Debian, of what `make install` installs, in dist/
 #   make docs             the documentation as a site, build/site/index.html (Sphinx, from PyPI)
 #   make wheel            the Python package as a wheel for every x86-64 processor, and its sources, in dist/
@@ -53,7 +54,8 @@ build: configure
 	@cmake --build build/release -j $(JOBS) --target covary
 
 demo: build
-	@scripts/demo build/release/covary out
+	@scripts/oidn build/oidn || echo "demo: without Open Image Denoise, which PyPI has"
+	@COVARY_OIDN=$${COVARY_OIDN-$$([ ! -d build/oidn ] || echo build/oidn)} scripts/demo build/release/covary out
 
 test: configure
 	@cmake --build build/release -j $(JOBS)
@@ -83,6 +85,7 @@ install: setup
 	  -DCOVARY_WERROR=$(WERROR) > /dev/null
 	@cmake --build build/$(INSTALL) -j $(JOBS) --target covary
 	@cmake --install build/$(INSTALL) --prefix $(PREFIX)
+	@[ "$(OIDN)" = OFF ] || scripts/oidn $(PREFIX) || echo "install: without Open Image Denoise; scripts/oidn $(PREFIX)"
 
 deb: setup
 	@cmake --preset $(INSTALL) $(if $(filter release,$(INSTALL)),-DCOVARY_ARCH=$(ARCH)) \
