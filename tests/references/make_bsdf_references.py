@@ -119,6 +119,14 @@ def cases():
                        {"type": "roughplastic", "distribution": distribution, **more}, tolerance,
                        density_tolerance=8e-3)
 
+    # Models of polarised light, as variants without it have them.
+    for more in [{}, {"alpha": 0.3, "diffuse_reflectance": blue, "int_ior": 1.7},
+                 {"alpha": 0.2, "specular_reflectance": warm}]:
+        yield case(f"pplastic {list(more)}", {"type": "pplastic", "distribution": "ggx", **more})
+    for model in ["polarizer", "circular", "retarder"]:
+        yield case(model, {"type": model}, samples=True)
+    yield case("polarizer, coloured", {"type": "polarizer", "transmittance": warm}, samples=True)
+
     # Wrappers.
     metal = {"type": "roughconductor", "distribution": "ggx", "alpha": 0.25, "material": "Au"}
     yield case("mask", {"type": "mask", "opacity": 0.3, "nested": diffuse}, samples=True)
