@@ -134,6 +134,26 @@ TEST_P(Adjoint, ValuesForImportanceAreThoseForRadianceExchanged) {
   }
 }
 
+// What a path passes by chance, drawn with 4000 numbers at equal distances, and what light passes with certainty.
+TEST_P(Adjoint, NullPassageIsWhatSamplesPass) {
+  constexpr int kNumbers = 4000;
+  for (int i = 0; i < 20; ++i) {
+    const Vec3 wo = any_direction(random(i), 1);
+    if (std::abs(wo.z) < 0.02f) continue;
+    arena_.reset();
+    const BsdfClosure& closure = bind(wo, TransportMode::kRadiance);
+    Spectrum weights(0);
+    int n_passed = 0;
+    for (int k = 0; k < kNumbers; ++k) {
+      const BsdfSample s = closure.sample(wo, (static_cast<float>(k) + 0.5f) / kNumbers, {0.3f, 0.6f});
+      if (s.valid() && (s.flags & kNullTransmission)) weights += s.weight, ++n_passed;
+    }
+    const NullPassage passage = closure.null_passage(wo);
+    EXPECT_NEAR(passage.pmf, static_cast<float>(n_passed) / kNumbers, 2e-3f);
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(passage.transmittance[c], weights[c] / kNumbers, 2e-3f);
+  }
+}
+
 // The density of the other end, from this closure and from the model bound at the other end.
 TEST_P(Adjoint, ReverseDensitiesAreThoseOfTheOtherEnd) {
   int n_both = 0;

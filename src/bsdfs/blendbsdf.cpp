@@ -40,6 +40,10 @@ class BlendClosure final : public BsdfClosure {
     s.weight = value / s.pdf;
     return s;
   }
+  NullPassage null_passage(const Vec3& wo) const override {
+    const NullPassage a = nested_[0]->null_passage(wo), b = nested_[1]->null_passage(wo);
+    return {a.transmittance * share_[0] + b.transmittance * share_[1], a.pmf * share_[0] + b.pmf * share_[1]};
+  }
   int n_lobes() const override { return nested_[0]->n_lobes() + nested_[1]->n_lobes(); }
   void lobe_pmfs(const Vec3& wo, float* pmfs) const override {
     for (int i = 0; i < 2; pmfs += nested_[i++]->n_lobes()) {

@@ -35,6 +35,10 @@ class MaskClosure final : public BsdfClosure {
             .flags = kNullTransmission,
             .lobe = static_cast<uint32_t>(nested_->n_lobes())};
   }
+  NullPassage null_passage(const Vec3& wo) const override {
+    const NullPassage nested = nested_->null_passage(wo);
+    return {Spectrum(1 - opacity_) + nested.transmittance * opacity_, 1 - opacity_ + nested.pmf * opacity_};
+  }
   int n_lobes() const override { return nested_->n_lobes() + 1; }
   void lobe_pmfs(const Vec3& wo, float* pmfs) const override {
     const int n = nested_->n_lobes();

@@ -51,6 +51,9 @@ class PerturbedClosure final : public BsdfClosure {
     }
     return s;
   }
+  NullPassage null_passage(const Vec3& wo) const override {
+    return wo.z == 0 ? NullPassage{} : nested_->null_passage(frame(flips(wo)).to_local(wo));
+  }
   int n_lobes() const override { return nested_->n_lobes(); }
   void lobe_pmfs(const Vec3& wo, float* pmfs) const override {
     nested_->lobe_pmfs(frame(flips(wo)).to_local(wo), pmfs);

@@ -24,6 +24,7 @@ class FilterClosure final : public BsdfClosure {
   BsdfSample sample(const Vec3& wo, float, Vec2) const override {
     return {.wi = -wo, .weight = transmittance_, .pdf = 1, .eta = 1, .flags = kNullTransmission};
   }
+  NullPassage null_passage(const Vec3&) const override { return {transmittance_, 1}; }
   int n_lobes() const override { return 1; }
   void lobe_pmfs(const Vec3&, float* pmfs) const override { pmfs[0] = 1; }
   void lobe_pdfs(const Vec3&, const Vec3&, float* pdfs) const override { pdfs[0] = 0; }

@@ -29,6 +29,10 @@ class ThinDielectricClosure final : public BsdfClosure {
     if (u_lobe < r) return {.wi = reflect(wo), .weight = reflectance_, .pdf = r, .eta = 1, .flags = kDeltaReflection};
     return {.wi = -wo, .weight = transmittance_, .pdf = 1 - r, .eta = 1, .flags = kNullTransmission, .lobe = 1};
   }
+  NullPassage null_passage(const Vec3& wo) const override {
+    const float passing = 1 - pane_reflectance(wo);
+    return {transmittance_ * passing, passing};
+  }
   int n_lobes() const override { return 2; }
   void lobe_pmfs(const Vec3& wo, float* pmfs) const override {
     pmfs[0] = pane_reflectance(wo);

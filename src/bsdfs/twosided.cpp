@@ -25,6 +25,7 @@ class MirroredClosure final : public BsdfClosure {
     s.wi.z = -s.wi.z;
     return s;
   }
+  NullPassage null_passage(const Vec3& wo) const override { return nested_->null_passage(mirror(wo)); }
   int n_lobes() const override { return nested_->n_lobes(); }
   void lobe_pmfs(const Vec3& wo, float* pmfs) const override { nested_->lobe_pmfs(mirror(wo), pmfs); }
   void lobe_pdfs(const Vec3& wo, const Vec3& wi, float* pdfs) const override {
@@ -65,6 +66,10 @@ class TransmittingClosure final : public BsdfClosure {
     if (s.is_delta()) return passes(s) ? s : BsdfSample{};
     s.weight = side(s.wi).eval(wo, s.wi).value / s.pdf;
     return s;
+  }
+  /// For importance only what is the same from both sides.
+  NullPassage null_passage(const Vec3& wo) const override {
+    return same_ || !importance_ ? side(wo).null_passage(wo) : NullPassage{};
   }
   int n_lobes() const override { return std::max(front_->n_lobes(), back_->n_lobes()); }
   void lobe_pmfs(const Vec3& wo, float* pmfs) const override {

@@ -7,6 +7,16 @@
 #include "integrators/roulette.h"
 
 namespace covary {
+namespace {
+
+/// What passes the surface that a ray along `d` hit.
+NullPassage null_passage(const SurfaceHit& hit, const Vec3& d) {
+  const Vec3 wo = hit.frame.to_local(-d);
+  Arena arena;  // the path's own still holds the closure at its vertex
+  return hit.bsdf->bind(hit, wo.z > 0, TransportMode::kRadiance, arena)->null_passage(wo);
+}
+
+}  // namespace
 
 MediumPath::MediumPath(const Scene& scene, const PathLengthSettings& lengths, CameraSample& sample,
                        PathContext& context)
@@ -38,6 +48,7 @@ bool MediumPath::advance() {
   const bool hidden = hit.emitter && lengths_.hide_emitters && only_null_;
   if (hit.emitter && !hidden) add_emission(*hit.emitter, &hit);
   if (!hidden && !is_boundary(hit)) return scatter_on_surface(hit);
+  if (!hidden) weights_.throughput *= null_passage(hit, ray_.d).transmittance;
   go_through(hit, ray_.d);
   return true;
 }
@@ -96,7 +107,9 @@ bool MediumPath::scatter_on_surface(const SurfaceHit& hit) {
   if (last && !passes) return false;
   weights_.throughput *= next.weight;
   eta_ *= next.eta;
-  if (next.is_delta()) {
+  if (passes) {  // goes on as the direction before; a light sample passes with certainty
+    weights_.pdf_light *= 1 / bsdf->null_passage(wo).pmf;
+  } else if (next.is_delta()) {
     only_direction_ = true;
   } else {
     weights_.pdf_light = weights_.pdf_path * (1 / next.pdf);
@@ -166,9 +179,11 @@ bool MediumPath::light_arrives(Ray ray, const Medium* medium, SpectralWeights& w
   while (!context_.stopped()) {
     ++context_.n_rays;
     const bool found = scene_.intersect(ray, hit);
-    if (found && !is_boundary(hit)) return false;
+    if (found && !(hit.bsdf_flags & kNullTransmission)) return false;
     if (medium) come_through(*medium, ray, found ? hit.t : ray.t_max, channel_, numbers, weights, context_.stop);
     if (!found || is_black(weights.throughput)) return !is_black(weights.throughput);
+    const NullPassage passage = null_passage(hit, ray.d);
+    weights.throughput *= passage.transmittance, weights.pdf_path *= passage.pmf;
     if (hit.shape->bounds_medium()) medium = hit.shape->medium_towards(hit.ng, ray.d);
     ray.o = offset_origin(hit, ray.d);
     ray.t_max -= hit.t;

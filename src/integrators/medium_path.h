@@ -2,9 +2,9 @@
 // Path tracing through participating media: `path` in scenes that have some. One path at a time.
 //
 // At each vertex, on a surface or in a medium, a light sample and a direction sample are combined by the balance
-// heuristic over both techniques and the colour channel [Miller2019]. Light samples see through surfaces that are
-// nothing but boundaries (bsdf `null`); other surfaces that let light straight through, masks and panes, block them,
-// and directions behind these carry full weight. Such passages are no edges of a path, as in Mitsuba's `volpath`.
+// heuristic over both techniques and the colour channel [Miller2019]. Both see through surfaces that let light pass
+// straight (boundaries of bsdf `null`, masks, panes): light samples by the transmittance, directions by chance. Such
+// passages are no edges of a path, as in Mitsuba's `volpath`.
 #pragma once
 
 #include "integrators/integrator.h"

@@ -68,6 +68,13 @@ struct BsdfSample {
   bool is_delta() const { return (flags & kDelta) != 0; }
 };
 
+/// What passes a surface as if it were not there: the fraction of the light, and the probability with which
+/// BsdfClosure::sample() lets a path pass.
+struct NullPassage {
+  Spectrum transmittance{0};
+  float pmf = 0;
+};
+
 /// Largest number of lobes of any closure, nested models included.
 inline constexpr int kMaxLobes = 8;
 
@@ -87,6 +94,9 @@ class BsdfClosure {
   virtual void lobe_pmfs(const Vec3& wo, float* pmfs) const = 0;
   /// Writes n_lobes() densities per unit solid angle of wi; 0 for delta lobes.
   virtual void lobe_pdfs(const Vec3& wo, const Vec3& wi, float* pdfs) const = 0;
+
+  /// The sum of the null lobes for a path that arrives from wo.
+  virtual NullPassage null_passage(const Vec3& /*wo*/) const { return {}; }
 
   // The other end of a bidirectional path meets the same pair of directions with their parts exchanged and in the
   // opposite transport mode. Its densities, without binding the model again:

@@ -6,11 +6,18 @@
 namespace covary {
 namespace {
 
+/// Axes at right angles to the unit vector n [Duff2017]. Unlike those of Frame they jump where n.z changes sign, but
+/// they are Mitsuba's, and textures begin at the first.
+Frame axes_around(const Vec3& n) {
+  const float sign = std::copysign(1.0f, n.z), a = -1 / (sign + n.z), b = n.x * n.y * a;
+  return {{1 + sign * n.x * n.x * a, sign * b, -sign * n.x}, {b, sign + n.y * n.y * a, -n.y}, n};
+}
+
 Transform unit_cylinder_to_world(const Transform& to_world, const Vec3& p0, const Vec3& p1, float radius) {
   const Vec3 axis = p1 - p0;
   const float l = length(axis);
   if (!(l > 0)) throw Error(ErrorCode::kInput, "the end points of a cylinder are the same");
-  const Frame frame(axis * (1 / l));
+  const Frame frame = axes_around(axis * (1 / l));
   Matrix4 m{};
   for (int i = 0; i < 3; ++i)
     m[i][0] = frame.s[i] * radius, m[i][1] = frame.t[i] * radius, m[i][2] = axis[i], m[i][3] = p0[i];

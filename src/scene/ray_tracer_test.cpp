@@ -84,6 +84,22 @@ TEST(RayTracer, DiskRespectsItsEdgeAndOrientation) {
   expect_derivatives(*scene, {{0.5f, 0.3f, 3}, normalize(Vec3{0.1f, 0, -1})});
 }
 
+// Mitsuba 3.9.1, scalar_rgb: the points of u = 0 and u = 0.25, v = 0.5 of cylinders of radius 1 from the origin.
+TEST(RayTracer, CylinderHasTheTextureCoordinatesOfMitsuba) {
+  struct Case {
+    Vec3 axis, at_0, at_quarter;
+  };
+  for (const Case& c : {Case{{0, 0, 1}, {1, 0, 0.5f}, {0, 1, 0.5f}}, Case{{0, 0, -1}, {1, 0, -0.5f}, {0, -1, -0.5f}},
+                        Case{{0, 1, 0}, {1, 0.5f, 0}, {0, 0.5f, -1}},
+                        Case{{2.0f / 3, -1.0f / 3, -2.0f / 3}, {1.06667f, -0.033333f, 0.333333f}, {0.2f, -1.1f, 0}},
+                        Case{{0.6f, 0, 0.8f}, {1.1f, 0, -0.2f}, {0.3f, 1, 0.4f}},
+                        Case{{0.48f, 0.64f, -0.6f}, {1.096f, 0.128f, 0.18f}, {0.432f, -0.424f, -0.94f}}}) {
+    const Cylinder cylinder(Transform(), Vec3(0), c.axis, 1, false);
+    EXPECT_LT(length(cylinder.sample_area({0, 0.5f}, 0).p - c.at_0), 1e-5f);
+    EXPECT_LT(length(cylinder.sample_area({0.25f, 0.5f}, 0).p - c.at_quarter), 1e-5f);
+  }
+}
+
 TEST(RayTracer, CylinderIsOpenAtBothEnds) {
   const auto cylinder = std::make_shared<Cylinder>(Transform(), Vec3{0, 0, -1}, Vec3{0, 0, 2}, 0.5f, false);
   const auto scene = scene_of({cylinder});

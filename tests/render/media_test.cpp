@@ -47,8 +47,8 @@ std::string grid_medium(const std::vector<float>& cells, const std::string& albe
 }
 
 /// The box [-1, 1]² x [4, 6].
-std::string box(const std::string& inside) {
-  return "<shape type='cube'><transform name='to_world'><translate z='5'/></transform>" + kBoundary + inside +
+std::string box(const std::string& inside, const std::string& boundary = kBoundary) {
+  return "<shape type='cube'><transform name='to_world'><translate z='5'/></transform>" + boundary + inside +
          "</shape>";
 }
 std::string wall(const std::string& inside) {
@@ -119,6 +119,36 @@ TEST(Media, WhatScattersEverythingIsInvisible) {
     const Film film = render(load(box(inside) + kSky), 256, 6);
     for (int c = 0; c < 3; ++c) expect_mean(film, c, 1, 0.05);
   }
+}
+
+const std::string kMask =
+    "<bsdf type='mask'><float name='opacity' value='0.3'/><bsdf type='diffuse'><rgb name='reflectance' "
+    "value='0'/></bsdf></bsdf>";
+const std::string kPane = "<bsdf type='thindielectric'><float name='int_ior' value='1.5'/></bsdf>";
+
+// The lamp at the camera again, which directions never find: its light crosses two surfaces there and two back.
+TEST(Media, LightSamplesSeeThroughMasksAndPanes) {
+  const std::string lamp =
+      "<emitter type='point'><point name='position' x='0' y='0' z='3.5'/><rgb name='intensity' "
+      "value='10'/></emitter>";
+  const std::string body = wall("<bsdf type='diffuse'><rgb name='reflectance' value='0.5'/></bsdf>") + lamp;
+  const double unhidden = 10 / (4.5 * 4.5) * 0.5 / 3.14159265358979 * std::exp(-2 * 0.4);
+  expect_mean(render(load(box(medium("0.1", "0"), kMask) + body, 2), 1024, 4), 0, unhidden * std::pow(0.7, 4));
+  const double pane = 1 - 2 * 0.04 / (1 + 0.04);
+  expect_mean(render(load(box(medium("0.1", "0"), kPane) + body, 2), 512, 5), 0, unhidden * std::pow(pane, 4));
+}
+
+// Panes reflect what they do not let pass, so nothing is lost, and the weights of both techniques add up to 1.
+TEST(Media, WhatScattersEverythingBehindPanesIsInvisible) {
+  for (const std::string& inside : {medium("0.6", "1"), medium("0.1, 0.4, 1", "1")}) {
+    const Film film = render(load(box(inside, kPane) + kSky), 256, 6);
+    for (int c = 0; c < 3; ++c) expect_mean(film, c, 1, 0.05);
+  }
+}
+
+TEST(Media, FiltersOfPolarisationDimAtBoundaries) {
+  const Film film = render(load(box(medium("0", "0"), "<bsdf type='polarizer'/>") + kLitWall), 1, 1);
+  EXPECT_EQ(film.mean(3, 5), Spectrum(1, 2, 3) * 0.25f);
 }
 
 TEST(Media, WithoutLightSamplesToo) {
