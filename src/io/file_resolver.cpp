@@ -5,6 +5,13 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <utility>
+#include <vector>
+
+#include "core/content_hash.h"
+#include "core/error.h"
+#include "core/parallel.h"
+#include "io/file_view.h"
 
 namespace covary {
 namespace fs = std::filesystem;
@@ -58,6 +65,22 @@ std::string FileResolver::resolve(const std::string& name, const SourceLocation&
 std::map<std::string, std::string> FileResolver::files() const {
   const std::lock_guard lock(mutex_);
   return files_;
+}
+
+std::string FileResolver::content_hash(const std::string& scene_hash) const {
+  std::vector<std::pair<std::string, std::string>> files;  // name in the scene, path; afterwards: name, hash
+  for (const auto& [path, name] : this->files()) files.emplace_back(name, path);
+  parallel_for(files.size(), [&](size_t i) {
+    try {
+      files[i].second = hash_text(hash_bytes(FileView(files[i].second).bytes()));
+    } catch (const Error&) {
+      files[i].second = "unreadable";  // whoever needed the file has recorded why
+    }
+  });
+  std::sort(files.begin(), files.end());
+  std::string digest = scene_hash + "\n";
+  for (const auto& [name, hash] : files) digest += fmt::format("{}\n{}\n", name, hash);
+  return hash_text(hash_bytes(digest));
 }
 
 }  // namespace covary

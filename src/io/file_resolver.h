@@ -23,6 +23,9 @@ class FileResolver {
   /// Every file found so far by resolve(), by its path, with the name the scene used.
   std::map<std::string, std::string> files() const;
 
+  /// Hash of names and contents of these files; one that cannot be read counts as such.
+  std::string content_hash(const std::string& scene_hash) const;
+
  private:
   std::vector<std::string> folders_;
   mutable std::mutex mutex_;

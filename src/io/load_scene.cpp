@@ -11,60 +11,27 @@
 
 #include "core/content_hash.h"
 #include "core/memory_limit.h"
-#include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "emitters/area.h"
-#include "io/description_key.h"
 #include "io/file_view.h"
 #include "io/held_objects.h"
 #include "io/media.h"
 #include "io/mesh_attributes.h"
 #include "io/nested_integrator.h"
 #include "io/object_factory.h"
+#include "io/scene_jobs.h"
 #include "io/scene_memory.h"
 #include "io/sensor.h"
-#include "io/shapes.h"
 #include "io/xml_reader.h"
 #include "scene/mesh.h"
 
 namespace covary {
 namespace {
 
-/// Whether other objects are nested in it.
-bool is_leaf(const ObjectDescription& object) {
-  return std::none_of(object.properties.begin(), object.properties.end(),
-                      [](const Property& p) { return std::holds_alternative<ObjectPtr>(p.value); });
-}
-
-/// A shape while it is made: its surface in parallel, then material and light.
-struct ShapeJob {
-  ShapeJob(ObjectPtr object, MadeObjects& made, FileResolver& files)
-      : description(std::move(object)),
-        factory(made, files, diagnostics),
-        parameters(*description, factory, diagnostics) {}
-  ShapeJob(const ShapeJob&) = delete;
-  ShapeJob& operator=(const ShapeJob&) = delete;
-
-  ObjectPtr description;
-  Diagnostics diagnostics;
-  SceneFactory factory;
-  Parameters parameters;
-  ShapePtr shape;
-  bool in_group = false;
-  const AreaLight* light = nullptr;  // of a shape in a group
-  bool asked_everything = false;     // else what is left over says nothing about unknown parameters
-};
-
-/// A texture or emitter that holds no other object. Equal textures are made once.
-struct LeafJob {
-  std::vector<ObjectPtr> descriptions;
-  Diagnostics diagnostics;
-};
-
 class Loader {
  public:
   Loader(const LoadOptions& options, LoadedScene& result)
-      : options_(options), result_(result), factory_(made_, files_, diagnostics_) {}
+      : options_(options), result_(result), factory_(made_, files_, diagnostics_), jobs_(made_, files_) {}
 
   void load(std::string_view text, const std::string& name) {
     const Stopwatch watch;
@@ -73,10 +40,11 @@ class Loader {
       diagnostics_.throw_if_errors();
       throw Error(ErrorCode::kInput, name + ": the file holds no scene");
     }
-    collect_jobs();
-    run_jobs();
+    jobs_.collect(*xml_.scene);
+    jobs_.run(diagnostics_);
     assemble();
-    hash_files();
+    for (const auto& file : files_.files()) result_.files.push_back(file.first);
+    result_.content_hash = files_.content_hash(hash_text(xml_.hash));
     result_.warnings = diagnostics_.warnings();
     diagnostics_.throw_if_errors();
     require_table_memory(name, parts_);
@@ -99,79 +67,6 @@ class Loader {
                                              [&](const Instance& instance) { return any(instance.group->shapes); });
   }
 
-  // ---- what can be made in parallel ----
-
-  void collect_jobs() {
-    std::unordered_set<const ObjectDescription*> seen;
-    for (const Property& property : xml_.scene->properties)
-      if (const ObjectPtr* object = std::get_if<ObjectPtr>(&property.value)) collect_leaves(*object, seen);
-    for (const Property& property : xml_.scene->properties) {
-      const ObjectPtr* object = std::get_if<ObjectPtr>(&property.value);
-      if (!object || !*object || (*object)->kind != "shape") continue;
-      if ((*object)->type == "shapegroup") {
-        for (const Property& member : (*object)->properties)
-          if (const ObjectPtr* shape = std::get_if<ObjectPtr>(&member.value); shape && *shape && has_surface(**shape))
-            add_shape_job(*shape, true);
-      } else if (has_surface(**object)) {
-        add_shape_job(*object, false);
-      }
-    }
-  }
-
-  /// False for the shapes that only place others.
-  static bool has_surface(const ObjectDescription& shape) {
-    return shape.type != "instance" && shape.type != "shapegroup";
-  }
-
-  void collect_leaves(const ObjectPtr& object, std::unordered_set<const ObjectDescription*>& seen) {
-    if (!object || !seen.insert(object.get()).second) return;
-    if ((object->kind == "texture" || object->kind == "emitter") && is_leaf(*object)) {
-      LeafJob*& same = leaves_by_key_[description_key(*object)];
-      if (!same || object->kind != "texture") {
-        leaves_.push_back(std::make_unique<LeafJob>());
-        same = leaves_.back().get();
-      }
-      same->descriptions.push_back(object);
-    }
-    for (const Property& property : object->properties)
-      if (const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value)) collect_leaves(*child, seen);
-  }
-
-  void add_shape_job(const ObjectPtr& object, bool in_group) {
-    if (!object || object->kind != "shape" || jobs_by_description_.contains(object.get())) return;
-    jobs_.push_back(std::make_unique<ShapeJob>(object, made_, files_));
-    jobs_.back()->in_group = in_group;
-    jobs_by_description_[object.get()] = jobs_.back().get();
-  }
-
-  void run_jobs() {
-    // Textures first: one of them takes longer than many meshes.
-    parallel_for(leaves_.size() + jobs_.size(), [&](size_t i) {
-      if (i < leaves_.size()) {
-        SceneFactory factory(made_, files_, leaves_[i]->diagnostics);
-        const auto& same = leaves_[i]->descriptions;
-        const auto object = factory.make(same[0]);
-        for (size_t k = 1; k < same.size(); ++k) made_.add(same[k].get(), object);
-      } else {
-        make_surface(*jobs_[i - leaves_.size()]);
-      }
-    });
-    for (const auto& leaf : leaves_) diagnostics_.append(leaf->diagnostics);
-  }
-
-  static void make_surface(ShapeJob& job) {
-    const Plugin<Shape>* plugin =
-        find_plugin(shape_plugins(), *job.description, job.diagnostics, {"instance", "shapegroup"});
-    if (!plugin) return;
-    try {
-      job.shape = plugin->make(job.parameters);
-      job.asked_everything = true;
-    } catch (const Error& error) {
-      if (error.code() == ErrorCode::kInternal) throw;
-      job.parameters.error(error.what());
-    }
-  }
-
   // ---- putting it together ----
 
   void assemble() {
@@ -189,7 +84,7 @@ class Loader {
       description->kind = "integrator", description->type = "path", description->where = xml_.scene->where;
       place_integrator(description);
     }
-    for (const auto& job : jobs_) diagnostics_.append(job->diagnostics);
+    jobs_.append_diagnostics_of_shapes(diagnostics_);
     if (n_degenerate_ > 0)
       diagnostics_.warn({}, fmt::format("{} triangles of zero area in {} meshes were left out, the first in {}",
                                         n_degenerate_, n_degenerate_meshes_, first_degenerate_.text()));
@@ -208,7 +103,7 @@ class Loader {
       } else if (object->type == "instance") {
         place_instance(object);
       } else {
-        ShapeJob& job = *jobs_by_description_.at(object.get());
+        ShapeJob& job = *jobs_.shape(object.get());
         finish_shape(job);
         if (job.shape) parts_.shapes.push_back(job.shape);
       }
@@ -295,8 +190,8 @@ class Loader {
     for (const Property& property : object->properties) {
       const ObjectPtr* member = std::get_if<ObjectPtr>(&property.value);
       if (member && !*member) continue;
-      const auto job = member ? jobs_by_description_.find(member->get()) : jobs_by_description_.end();
-      if (job == jobs_by_description_.end()) {
+      ShapeJob* job = member ? jobs_.shape(member->get()) : nullptr;
+      if (!job) {
         const bool shape = member && (*member)->kind == "shape";
         diagnostics_.error(property.where, shape
                                                ? fmt::format("a shapegroup cannot hold a shape '{}', only shapes that "
@@ -305,12 +200,12 @@ class Loader {
                                                : "a shapegroup can hold shapes only");
         continue;
       }
-      finish_shape(*job->second);
-      if (!job->second->shape) continue;
-      if (job->second->light)
-        group_lights_[shapes.get()].push_back({job->second->shape, job->second->light});
+      finish_shape(*job);
+      if (!job->shape) continue;
+      if (job->light)
+        group_lights_[shapes.get()].push_back({job->shape, job->light});
       else
-        shapes->shapes.push_back(job->second->shape);
+        shapes->shapes.push_back(job->shape);
     }
     if (shapes->shapes.empty() && group_lights_[shapes.get()].empty())
       diagnostics_.error(object->where, "shape 'shapegroup': holds no shape");
@@ -446,25 +341,6 @@ class Loader {
     }
   }
 
-  // ---- content hash ----
-
-  void hash_files() {
-    const auto names = files_.files();
-    std::vector<std::pair<std::string, std::string>> files;  // name in the scene, path; afterwards: name, hash
-    for (const auto& [path, name] : names) files.emplace_back(name, path), result_.files.push_back(path);
-    parallel_for(files.size(), [&](size_t i) {
-      try {
-        files[i].second = hash_text(hash_bytes(FileView(files[i].second).bytes()));
-      } catch (const Error&) {
-        files[i].second = "unreadable";  // whoever needed the file has recorded why
-      }
-    });
-    std::sort(files.begin(), files.end());
-    std::string digest = hash_text(xml_.hash) + "\n";
-    for (const auto& [name, hash] : files) digest += fmt::format("{}\n{}\n", name, hash);
-    result_.content_hash = hash_text(hash_bytes(digest));
-  }
-
   const LoadOptions& options_;
   LoadedScene& result_;
   Diagnostics diagnostics_;
@@ -472,10 +348,7 @@ class Loader {
   MadeObjects made_;
   SceneFactory factory_;
   SceneXml xml_;
-  std::vector<std::unique_ptr<LeafJob>> leaves_;
-  std::unordered_map<std::string, LeafJob*> leaves_by_key_;
-  std::vector<std::unique_ptr<ShapeJob>> jobs_;
-  std::unordered_map<const ObjectDescription*, ShapeJob*> jobs_by_description_;
+  SceneJobs jobs_;
   std::unordered_set<const ObjectDescription*> placed_;
   std::unordered_set<const ObjectDescription*> held_;  // by other objects than the scene
   SceneParts parts_;

@@ -10,6 +10,7 @@
 
 #include "core/content_hash.h"
 #include "io/file_view.h"
+#include "io/scene_references.h"
 #include "io/spectrum_objects.h"
 #include "io/upgrade.h"
 #include "io/xml_document.h"
@@ -25,7 +26,6 @@ constexpr int kMaxIncludes = 1000;
 constexpr size_t kMaxTextBytes = size_t{1} << 28;  // of all files together
 constexpr size_t kMaxObjects = 1000000;
 constexpr size_t kMaxNesting = 64;
-constexpr size_t kMaxExpanded = 4096;  // objects that one holds when every reference is followed
 constexpr int kNewestVersion = 3;
 
 const std::vector<std::string> kObjectTags = {"scene",  "bsdf",  "texture", "emitter",    "shape",
@@ -57,8 +57,8 @@ class Reader {
       return result;
     }
     if (!holder->properties.empty()) {
-      resolve_references();
-      limit_expansion(break_cycles());
+      resolve_references(objects_, std::move(ids_), aliases_, diagnostics_);
+      limit_expansion(break_cycles(objects_, diagnostics_), kMaxNesting, diagnostics_);
       evaluate_spectra();
       defines_.report_unused(name, diagnostics_);
       result.scene = std::get<ObjectPtr>(holder->properties[0].value);
@@ -74,10 +74,6 @@ class Reader {
   };
   /// A limit was passed: reading ends at once, because going on would take the time and memory that the limit is for.
   struct Stop {};
-  struct Alias {
-    std::string id, as;
-    SourceLocation where;
-  };
 
   [[noreturn]] void stop(const SourceLocation& where, const std::string& message) {
     diagnostics_.error(where, message);
@@ -299,123 +295,6 @@ class Reader {
     return true;
   }
 
-  // ---- after everything is read ----
-
-  void resolve_references() {
-    // An alias may name another alias: repeat while something changes.
-    std::vector<Alias> open = aliases_;
-    for (bool progress = true; progress && !open.empty();) {
-      progress = false;
-      std::vector<Alias> left;
-      for (const Alias& alias : open) {
-        const auto source = ids_.find(alias.id);
-        if (source == ids_.end()) {
-          left.push_back(alias);
-          continue;
-        }
-        progress = true;
-        const std::shared_ptr<ObjectDescription> object = source->second;
-        const auto [other, inserted] = ids_.emplace(alias.as, object);
-        if (!inserted)
-          diagnostics_.error(alias.where,
-                             fmt::format("id '{}' is used twice; first at {}", alias.as, other->second->where.text()));
-      }
-      open = std::move(left);
-    }
-    std::vector<std::string> known;
-    for (const auto& entry : ids_) known.push_back(entry.first);
-    std::sort(known.begin(), known.end());
-    for (const Alias& alias : open)
-      diagnostics_.error(alias.where,
-                         fmt::format("alias of the unknown id '{}'{}", alias.id, did_you_mean(alias.id, known)));
-    for (const auto& object : objects_) {
-      for (Property& property : object->properties) {
-        const ObjectPtr* reference = std::get_if<ObjectPtr>(&property.value);
-        if (!reference || !*reference || (*reference)->kind != "ref") continue;
-        const std::string id = (*reference)->id;
-        const auto found = ids_.find(id);
-        if (found == ids_.end())
-          diagnostics_.error(property.where,
-                             fmt::format("reference to the unknown id '{}'{}", id, did_you_mean(id, known)));
-        property.value = found != ids_.end() ? ObjectPtr(found->second) : ObjectPtr();
-      }
-    }
-  }
-
-  // References can make long chains, and a few objects that hold each other twice stand for very many. Both are found
-  // without recursion, and cut, so that everything later may follow references one by one.
-
-  /// Records an error for every reference that leads back to an object it is part of, and cuts it. Returns all objects,
-  /// each after everything it holds.
-  std::vector<ObjectDescription*> break_cycles() {
-    std::unordered_map<const ObjectDescription*, ObjectDescription*> writable;
-    for (const auto& object : objects_) writable[object.get()] = object.get();
-    std::vector<ObjectDescription*> done;
-    enum class State { kOpen, kDone };
-    std::unordered_map<const ObjectDescription*, State> states;
-    struct Step {
-      ObjectDescription* object;
-      size_t next;
-    };
-    for (const auto& start : objects_) {
-      if (!states.emplace(start.get(), State::kOpen).second) continue;
-      std::vector<Step> stack = {{start.get(), 0}};
-      while (!stack.empty()) {
-        Step& step = stack.back();
-        if (step.next == step.object->properties.size()) {
-          states[step.object] = State::kDone;
-          done.push_back(step.object);
-          stack.pop_back();
-          continue;
-        }
-        Property& property = step.object->properties[step.next++];
-        ObjectPtr* child = std::get_if<ObjectPtr>(&property.value);
-        if (!child || !*child) continue;
-        const auto [state, fresh] = states.emplace(child->get(), State::kOpen);
-        if (fresh) {
-          stack.push_back({writable.at(child->get()), 0});
-        } else if (state->second == State::kOpen) {
-          diagnostics_.error(property.where, fmt::format("'{}' refers to itself", (*child)->id));
-          child->reset();
-        }
-      }
-    }
-    return done;
-  }
-
-  /// Records an error for objects that hold too many others, or too deep ones, when every reference is followed, and
-  /// takes these out. `objects`: each after everything it holds.
-  void limit_expansion(const std::vector<ObjectDescription*>& objects) {
-    struct Expanded {
-      size_t count = 1, depth = 1;
-    };
-    std::unordered_map<const ObjectDescription*, Expanded> expanded;
-    for (ObjectDescription* object : objects) {
-      Expanded& whole = expanded[object];
-      if (object->kind == "scene") continue;
-      for (const Property& property : object->properties)
-        if (const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value); child && *child) {
-          const Expanded part = expanded.at(child->get());
-          whole.count += part.count;
-          whole.depth = std::max(whole.depth, part.depth + 1);
-        }
-      if (object->kind == "shape") whole.count = 1;  // a group may be large: shapes are looked at once
-      if (object->kind == "bsdf" && object->type == "twosided") whole.count = 2 * whole.count - 1;  // both sides look
-      const bool too_deep = whole.depth > kMaxNesting;
-      if (!too_deep && whole.count <= kMaxExpanded) continue;
-      diagnostics_.error(object->where,
-                         too_deep ? fmt::format("{} '{}' holds {} objects inside each other when every reference is "
-                                                "followed; at most {} are accepted",
-                                                object->kind, object->type, whole.depth, kMaxNesting)
-                                  : fmt::format("{} '{}' holds {} objects when every reference is followed; at most {} "
-                                                "are accepted",
-                                                object->kind, object->type, whole.count, kMaxExpanded));
-      for (Property& property : object->properties)
-        if (ObjectPtr* child = std::get_if<ObjectPtr>(&property.value)) child->reset();
-      whole = {};
-    }
-  }
-
   /// <spectrum type="…"> objects become plain values wherever they are used.
   void evaluate_spectra() {
     for (const auto& object : objects_) {
@@ -431,9 +310,9 @@ class Reader {
   FileResolver& files_;
   Diagnostics& diagnostics_;
   std::string digest_;
-  std::vector<std::shared_ptr<ObjectDescription>> objects_;  // all of them
-  std::unordered_map<std::string, std::shared_ptr<ObjectDescription>> ids_;
-  std::vector<Alias> aliases_;
+  SceneObjects objects_;  // all of them
+  ObjectIds ids_;
+  std::vector<SceneAlias> aliases_;
   size_t n_text_bytes_ = 0;
   int n_includes_ = 0;
 };

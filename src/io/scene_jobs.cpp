@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/scene_jobs.h"
+
+#include <algorithm>
+
+#include "core/parallel.h"
+#include "io/description_key.h"
+#include "io/shapes.h"
+
+namespace covary {
+namespace {
+
+/// Whether no other objects are nested in it.
+bool is_leaf(const ObjectDescription& object) {
+  return std::none_of(object.properties.begin(), object.properties.end(),
+                      [](const Property& p) { return std::holds_alternative<ObjectPtr>(p.value); });
+}
+
+/// False for the shapes that only place others.
+bool has_surface(const ObjectDescription& shape) { return shape.type != "instance" && shape.type != "shapegroup"; }
+
+void make_surface(ShapeJob& job) {
+  const Plugin<Shape>* plugin =
+      find_plugin(shape_plugins(), *job.description, job.diagnostics, {"instance", "shapegroup"});
+  if (!plugin) return;
+  try {
+    job.shape = plugin->make(job.parameters);
+    job.asked_everything = true;
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::kInternal) throw;
+    job.parameters.error(error.what());
+  }
+}
+
+}  // namespace
+
+void SceneJobs::collect(const ObjectDescription& scene) {
+  std::unordered_set<const ObjectDescription*> seen;
+  for (const Property& property : scene.properties)
+    if (const ObjectPtr* object = std::get_if<ObjectPtr>(&property.value)) collect_leaves(*object, seen);
+  for (const Property& property : scene.properties) {
+    const ObjectPtr* object = std::get_if<ObjectPtr>(&property.value);
+    if (!object || !*object || (*object)->kind != "shape") continue;
+    if ((*object)->type == "shapegroup") {
+      for (const Property& member : (*object)->properties)
+        if (const ObjectPtr* shape = std::get_if<ObjectPtr>(&member.value); shape && *shape && has_surface(**shape))
+          add_shape(*shape, true);
+    } else if (has_surface(**object)) {
+      add_shape(*object, false);
+    }
+  }
+}
+
+void SceneJobs::collect_leaves(const ObjectPtr& object, std::unordered_set<const ObjectDescription*>& seen) {
+  if (!object || !seen.insert(object.get()).second) return;
+  if ((object->kind == "texture" || object->kind == "emitter") && is_leaf(*object)) {
+    LeafJob*& same = leaves_by_key_[description_key(*object)];
+    if (!same || object->kind != "texture") {
+      leaves_.push_back(std::make_unique<LeafJob>());
+      same = leaves_.back().get();
+    }
+    same->descriptions.push_back(object);
+  }
+  for (const Property& property : object->properties)
+    if (const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value)) collect_leaves(*child, seen);
+}
+
+void SceneJobs::add_shape(const ObjectPtr& object, bool in_group) {
+  if (object->kind != "shape" || shapes_by_description_.contains(object.get())) return;
+  shapes_.push_back(std::make_unique<ShapeJob>(object, made_, files_));
+  shapes_.back()->in_group = in_group;
+  shapes_by_description_[object.get()] = shapes_.back().get();
+}
+
+void SceneJobs::run(Diagnostics& diagnostics) {
+  // Textures first: one of them takes longer than many meshes.
+  parallel_for(leaves_.size() + shapes_.size(), [&](size_t i) {
+    if (i < leaves_.size()) {
+      SceneFactory factory(made_, files_, leaves_[i]->diagnostics);
+      const auto& same = leaves_[i]->descriptions;
+      const auto object = factory.make(same[0]);
+      for (size_t k = 1; k < same.size(); ++k) made_.add(same[k].get(), object);
+    } else {
+      make_surface(*shapes_[i - leaves_.size()]);
+    }
+  });
+  for (const auto& leaf : leaves_) diagnostics.append(leaf->diagnostics);
+}
+
+ShapeJob* SceneJobs::shape(const ObjectDescription* description) const {
+  const auto found = shapes_by_description_.find(description);
+  return found == shapes_by_description_.end() ? nullptr : found->second;
+}
+
+void SceneJobs::append_diagnostics_of_shapes(Diagnostics& diagnostics) const {
+  for (const auto& job : shapes_) diagnostics.append(job->diagnostics);
+}
+
+}  // namespace covary
