@@ -2,10 +2,6 @@
 // Layout of the work: tiles of the image in parallel; in a tile, kLanes pixels at a time, one per lane. Per pixel, what
 // a neighbour contributes (a "record") lies contiguous in memory, so that a neighbour is a few vector loads and a
 // transposition.
-//
-// The T centred group means of a pixel span only T - 1 dimensions. They are replaced by T - 1 orthonormal contrasts
-// (Helmert), which have the same inner products: no centring, and systems of T - 1 instead of T rows. Weights of groups
-// (control_variates.h) turn that space; where they differ between pixels, the T weighted and centred means are kept.
 #include "estimators/control_variates.h"
 
 #include <array>
@@ -13,7 +9,7 @@
 
 #include "core/parallel.h"
 #include "estimators/batch_algebra.h"
-#include "film/groups.h"
+#include "estimators/pixel_records.h"
 #include "filters/neighbours.h"
 
 namespace covary {
@@ -25,27 +21,6 @@ constexpr int kTileWidth = 64, kTileHeight = 32;
 /// Part of the degrees of freedom that a fit leaves at least, for the error estimate; less is the fit of an
 /// interpolation.
 constexpr float kFewestFreedom = 0.1f;
-
-/// Offsets in the record of a pixel.
-struct RecordLayout {
-  RecordLayout(int rows, bool condition)
-      : group_contrasts(3 * rows),
-        contrasts(group_contrasts + (condition ? 3 : 0)),
-        difference(contrasts),
-        error(contrasts + 3),
-        group_variance(contrasts + 6),
-        h_variance(contrasts + 9),
-        missing(contrasts + 12),
-        size(contrasts + 15) {}
-  int group_contrasts;  ///< number of contrasts (or centred means) of the groups, all channels: [contrast][rgb], at 0
-  int contrasts;        ///< the same with the row of the condition, which acts like one more contrast
-  int difference;       ///< g - h
-  int error;            ///< error variance of h for the penalty, times T
-  int group_variance;   ///< sample variance of the CRN groups
-  int h_variance;       ///< variance of h
-  int missing;          ///< light that g lacks
-  int size;
-};
 
 /// Scratch memory of one thread.
 struct Workspace {
@@ -75,14 +50,16 @@ class Regression {
         valid_(valid),
         result_(result),
         T_(input.crn.groups),
-        weights_differ_(input.crn_moments->relative_count.has_value()),
-        layout_(weights_differ_ ? T_ : T_ - 1, settings.mean_constraint > 0),
+        records_(input, settings.mean_constraint > 0, valid),
+        layout_(records_.layout()),
         search_(settings.k, settings.window, settings.include_target),
         radius_(settings.window / 2) {}
 
   void run_tile(const Tile& tile, Workspace& w) const {
     prepare(w);
-    make_records(tile, w);
+    for (int y = tile.y0 - radius_; y < tile.y1 + radius_; ++y)
+      for (int x = tile.x0 - radius_; x < tile.x1 + radius_; ++x)
+        records_.fill(x, y, w.records.data() + record_index(tile, x, y));
     for (int y = tile.y0; y < tile.y1; ++y)
       for (int x = tile.x0; x < tile.x1; x += kLanes) run_batch(tile, x, y, w);
   }
@@ -111,85 +88,6 @@ class Regression {
     w.inverse.resize(m);
     w.b.resize(std::max<size_t>(m, rows));
     w.gamma.resize(k);
-  }
-
-  /// Contrast j: (x_0 + … + x_{j-1} - j x_j) / sqrt(j (j + 1)). `squares`: sums of their squares per channel.
-  void make_contrasts(const float* p, const std::vector<float>& weights, float* record, float* squares) const {
-    float sum[3] = {p[0], p[1], p[2]};
-    for (int j = 1; j < T_; ++j)
-      for (int c = 0; c < 3; ++c) {
-        const float value = p[3 * j + c];
-        const float contrast = (sum[c] - static_cast<float>(j) * value) * weights[j];
-        sum[c] += value;
-        squares[c] += contrast * contrast;
-        record[3 * (j - 1) + c] = contrast;
-      }
-  }
-
-  /// The same for groups of unequal sizes, with weights w_t = size T / count of mean 1: with W = w_0 + … + w_{j-1},
-  /// ((w_0 x_0 + … + w_{j-1} x_{j-1}) / W - x_j) sqrt(w_j W / (W + w_j)). The squares add up to sum w_t (x_t - mean)^2.
-  void make_weighted_contrasts(const float* p, uint32_t count, float* record, float* squares) const {
-    const auto weight = [&, unit = static_cast<float>(T_) / static_cast<float>(count)](int t) {
-      return unit * static_cast<float>(group_size(count, T_, t));
-    };
-    float total = weight(0), sum[3] = {total * p[0], total * p[1], total * p[2]};
-    for (int j = 1; j < T_; ++j) {
-      const float w = weight(j), factor = std::sqrt(w * total / (total + w));
-      for (int c = 0; c < 3; ++c) {
-        const float value = p[3 * j + c], contrast = (sum[c] / total - value) * factor;
-        sum[c] += w * value;
-        squares[c] += contrast * contrast;
-        record[3 * (j - 1) + c] = contrast;
-      }
-      total += w;
-    }
-  }
-
-  /// For pixels whose weights w_t differ from their neighbours': sqrt(w_t) (x_t - mean).
-  void make_centred_means(const float* p, uint32_t count, const float* mean, float* record, float* squares) const {
-    for (int t = 0; t < T_; ++t) {
-      const float weight =
-          static_cast<float>(T_) * static_cast<float>(group_size(count, T_, t)) / static_cast<float>(count);
-      for (int c = 0; c < 3; ++c) {
-        const float value = std::sqrt(weight) * (p[3 * t + c] - mean[c]);
-        squares[c] += value * value;
-        record[3 * t + c] = value;
-      }
-    }
-  }
-
-  float missing(int c, int x, int y) const { return in_.missing ? in_.missing->row(c, y)[x] : 0.0f; }
-
-  void make_records(const Tile& tile, Workspace& w) const {
-    std::vector<float> weights(T_);
-    for (int j = 1; j < T_; ++j) weights[j] = 1.0f / std::sqrt(static_cast<float>(j) * static_cast<float>(j + 1));
-    for (int y = tile.y0 - radius_; y < tile.y1 + radius_; ++y)
-      for (int x = tile.x0 - radius_; x < tile.x1 + radius_; ++x) {
-        float* record = w.records.data() + record_index(tile, x, y);
-        const bool inside = x >= 0 && y >= 0 && x < in_.crn.width && y < in_.crn.height;
-        if (!inside || !valid_[static_cast<size_t>(y) * in_.crn.width + x]) {
-          std::fill(record, record + layout_.size, 0.0f);
-          for (int c = 0; c < 3; ++c) record[layout_.error + c] = kUseless;
-          continue;
-        }
-        float squares[3] = {}, mean[3];
-        for (int c = 0; c < 3; ++c) mean[c] = in_.crn_moments->mean.row(c, y)[x];
-        if (weights_differ_)
-          make_centred_means(in_.crn.pixel(x, y), in_.crn.count(x, y), mean, record, squares);
-        else if (in_.crn.has_equal_groups(x, y))
-          make_contrasts(in_.crn.pixel(x, y), weights, record, squares);
-        else
-          make_weighted_contrasts(in_.crn.pixel(x, y), in_.crn.count(x, y), record, squares);
-        if (layout_.contrasts > layout_.group_contrasts)
-          for (int c = 0; c < 3; ++c) record[layout_.group_contrasts + c] = mean[c] + missing(c, x, y);
-        for (int c = 0; c < 3; ++c) {
-          record[layout_.difference + c] = mean[c] - in_.h->row(c, y)[x];
-          record[layout_.error + c] = in_.error_of_h ? static_cast<float>(T_) * in_.error_of_h->row(c, y)[x] : 0.0f;
-          record[layout_.group_variance + c] = squares[c] / static_cast<float>(T_ - 1);
-          record[layout_.h_variance + c] = in_.variance_of_h ? in_.variance_of_h->row(c, y)[x] : 0.0f;
-          record[layout_.missing + c] = missing(c, x, y);
-        }
-      }
   }
 
   /// Reads the records at `source` (one per lane) into lanes: first the contrasts, then the tail.
@@ -433,7 +331,7 @@ class Regression {
   const std::vector<unsigned char>& valid_;
   EstimatorResult& result_;
   const int T_;
-  const bool weights_differ_;  // between pixels
+  const PixelRecords records_;
   const RecordLayout layout_;
   const NeighbourSearch search_;
   const int radius_;
