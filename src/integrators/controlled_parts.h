@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a path tracer with control variates (controlled_tracer.h) is given: lights and coefficients, and its parts, which
-// tests exchange to plant bugs.
+// What a path tracer with control variates (controlled_tracer.h) is given: lights, coefficients, and parts that tests
+// exchange to plant bugs.
 #pragma once
 
 #include <cstdint>
