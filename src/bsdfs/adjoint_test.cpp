@@ -67,6 +67,7 @@ const Case kCases[] = {
     {"null", {{"type", "null"}}},
     {"polarizer", {{"type", "polarizer"}, {"transmittance", 0.6}}},
     {"pplastic", {{"type", "pplastic"}, {"alpha", 0.3}}},
+    {"hair", {{"type", "hair"}, {"scale_tilt", 3.0}}},
     {"mask", mask(kPlastic)},
     {"mask_of_glass", mask(kGlass)},
     {"blend", blend(kPlastic, kRoughGlass)},

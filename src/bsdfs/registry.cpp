@@ -11,6 +11,7 @@ std::span<const Plugin<Bsdf>> bsdf_plugins() {
       {"conductor", make_conductor},
       {"dielectric", make_dielectric},
       {"diffuse", make_diffuse},
+      {"hair", make_hair},
       {"mask", make_mask},
       {"normalmap", make_normalmap},
       {"null", make_null},

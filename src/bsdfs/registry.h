@@ -19,6 +19,7 @@ std::shared_ptr<Bsdf> make_circular(Parameters& parameters);
 std::shared_ptr<Bsdf> make_conductor(Parameters& parameters);
 std::shared_ptr<Bsdf> make_dielectric(Parameters& parameters);
 std::shared_ptr<Bsdf> make_diffuse(Parameters& parameters);
+std::shared_ptr<Bsdf> make_hair(Parameters& parameters);
 std::shared_ptr<Bsdf> make_mask(Parameters& parameters);
 std::shared_ptr<Bsdf> make_normalmap(Parameters& parameters);
 std::shared_ptr<Bsdf> make_null(Parameters& parameters);

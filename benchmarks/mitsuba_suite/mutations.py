@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Renders mutations of Mitsuba's scene files: every one must load or be refused with a message.
+
+    mutations.py FOLDER [--count N] [--seed S]      exit code 1 where a process was killed by a signal
+
+FOLDER is a copy of github.com/mitsuba-renderer/mitsuba-data; the files are those of tests/scenes and docs/scenes. A
+mutation is one to three of: a number becomes another or an extreme one, a line is left out, doubled or exchanged, the
+name of a plugin or property becomes one of another file, a byte changes, the end is cut off. It is rendered at 12 x 12
+pixels and two samples, within 2 GB (COVARY_MEMORY) and 60 s of processor time.
+"""
+import argparse
+import collections
+import os
+import pathlib
+import random
+import re
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+
+NUMBER = re.compile(r"-?\d+\.?\d*(?:e-?\d+)?")
+NAME = re.compile(r'(?<=type=")[a-z_]+|(?<=name=")[a-z_0-9]+')
+EXTREMES = ["0", "-1", "1e30", "-1e30", "nan", "inf", "1e-30", "4294967296", "2", "0.5", ""]
+SECONDS = 60
+
+
+def replace_one(text, pattern, replacement):
+    places = list(pattern.finditer(text))
+    if not places:
+        return text
+    place = RANDOM.choice(places)
+    return text[:place.start()] + replacement() + text[place.end():]
+
+
+def change_lines(text):
+    lines = text.splitlines(keepends=True)
+    i, j = RANDOM.randrange(len(lines)), RANDOM.randrange(len(lines))
+    kind = RANDOM.randrange(3)
+    if kind == 0:
+        del lines[i]
+    elif kind == 1:
+        lines.insert(j, lines[i])
+    else:
+        lines[i], lines[j] = lines[j], lines[i]
+    return "".join(lines)
+
+
+def mutate(text, names):
+    for _ in range(RANDOM.randint(1, 3)):
+        kind = RANDOM.randrange(10)
+        if kind < 4:
+            text = replace_one(text, NUMBER, lambda: RANDOM.choice(EXTREMES + [str(RANDOM.uniform(-10, 10))]))
+        elif kind < 6:
+            text = replace_one(text, NAME, lambda: RANDOM.choice(names))
+        elif kind < 8 and text:
+            text = change_lines(text)
+        elif kind == 8 and text:
+            i = RANDOM.randrange(len(text))
+            text = text[:i] + chr(RANDOM.randrange(32, 127)) + text[i + 1:]
+        else:
+            text = text[:RANDOM.randrange(len(text) // 2, len(text) + 1)]
+    return text
+
+
+def links_of(folder, copy):
+    """`copy` becomes a tree as `folder` whose scene folders are real, so that mutations lie beside what they name."""
+    for part in folder.iterdir():
+        if part.name not in ("tests", "docs"):
+            (copy / part.name).symlink_to(part.resolve())
+    for scenes in [folder / "docs" / "scenes", *sorted((folder / "tests" / "scenes").iterdir())]:
+        target = copy / scenes.relative_to(folder)
+        target.mkdir(parents=True)
+        for part in scenes.iterdir():
+            (target / part.name).symlink_to(part.resolve())
+
+
+def limit_time():
+    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS + 5))
+
+
+def outcome(program, scene, out):
+    command = [program, "render", str(scene), "--resolution", "12x12", "--spp", "2", "--estimator", "none", "--groups",
+               "1", "--no-preview", "--overwrite", "-D", "integrator=path", "-D", "spp=2", "-o", str(out)]
+    result = subprocess.run(command, capture_output=True, preexec_fn=limit_time, check=False,
+                            env={**os.environ, "COVARY_MEMORY": "2"})
+    if result.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
+        return "takes too long"
+    if result.returncode < 0 or result.returncode > 3:
+        return f"exit code {result.returncode}"
+    if result.returncode and not result.stderr.strip():
+        return "refused without a message"
+    return "renders" if result.returncode == 0 else "refused"
+
+
+def main(arguments):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=pathlib.Path)
+    parser.add_argument("--covary", default="build/release/covary", metavar="PROGRAM")
+    parser.add_argument("--count", type=int, default=2000)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--progress", action="store_true", help="count on stderr although it is no terminal")
+    parser.add_argument("--keep", type=pathlib.Path, metavar="DIR", help="folder of the files that are no success")
+    options = parser.parse_args(arguments)
+    scenes = sorted(options.folder.glob("docs/scenes/*.xml")) + sorted(options.folder.glob("tests/scenes/*/*.xml"))
+    names = sorted({name for scene in scenes for name in NAME.findall(scene.read_text())})
+    counts = collections.Counter()
+    with tempfile.TemporaryDirectory() as folder:
+        copy = pathlib.Path(folder)
+        links_of(options.folder, copy)
+        for i in range(options.count):
+            RANDOM.seed(options.seed * 1000003 + i)
+            scene = scenes[i % len(scenes)]
+            mutation = copy / scene.relative_to(options.folder).parent / "mutation.xml"
+            mutation.write_text(mutate(scene.read_text(), names))
+            what = outcome(options.covary, mutation, copy / "out.exr")
+            counts[what] += 1
+            if sys.stderr.isatty() or options.progress:
+                print(f"\r{i + 1}", end="", file=sys.stderr, flush=True)
+            if what not in ("renders", "refused"):
+                print(f"{i} {scene.stem}: {what}", flush=True)
+                if options.keep:
+                    (options.keep / f"{i}-{scene.name}").write_text(mutation.read_text())
+    print(f"{options.count} mutations of {len(scenes)} files, seed {options.seed}: " +
+          ", ".join(f"{n} {what}" for what, n in sorted(counts.items())))
+    return 1 if set(counts) - {"renders", "refused", "takes too long"} else 0
+
+
+RANDOM = random.Random()
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
