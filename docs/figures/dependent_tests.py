@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""dependent_tests.py COVARY KITCHEN.xml FOLDER: the pictures and tables of docs/methods/dependent-tests.md, after the
+"""dependent_tests.py COVARY KITCHEN.xml FOLDER: the pictures and tables of docs/notes/dependent-tests.md, after the
 figures of Csonka et al. 2002, and the pyramids of docs/methods/bdpt.md. Needs `pip install pillow`.
 
 Bidirectional path tracing without light tracing, seed 1; errors against two references by path tracing, seeds 900000001
