@@ -14,6 +14,7 @@
 #include "core/error.h"
 #include "core/memory_limit.h"
 #include "imageio/exr_header.h"
+#include "imageio/exr_image.h"
 #include "imageio/image_module.h"
 
 namespace covary {
@@ -102,9 +103,13 @@ std::vector<uint8_t> ImageReader::read_bytes(int first, int last) { return read_
 
 std::unique_ptr<ImageReader> open_image(const std::string& path, OtherColours colours) {
   const size_t file_bytes = size_of_readable(path);
-  if (is_exr(path)) check_exr_header(path);
+  std::unique_ptr<ImageReader> reader;
+  if (is_exr(path)) {
+    check_exr_header(path);
+    reader = open_plain_exr(path);
+  }
   std::string problem;
-  std::unique_ptr<ImageReader> reader = image_module().open(path, colours, problem);
+  if (!reader) reader = image_module().open(path, colours, problem);
   if (!reader) throw Error(ErrorCode::kInput, fmt::format("{}: not an image that can be read: {}", path, problem));
   check_size(reader->header(), file_bytes, path);
   return reader;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Image files in every format OpenImageIO knows. OpenImageIO brings some 250 shared libraries, which take longer to
-// load than a small scene to render. So it lies behind a shared module, libcovary_imageio.so, which the first call of a
-// function of this header loads. EXR films and PNG files do not need it: film/exr.h, imageio/png.h.
+// load than a small scene to render. So it lies behind a shared module, libcovary_imageio.so, which is loaded when a
+// function of this header needs it. EXR files of ordinary channels, films, and PNG files that are written do not:
+// imageio/exr_image.h, film/exr.h, imageio/png.h.
 #pragma once
 
 #include <cstdint>
