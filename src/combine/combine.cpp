@@ -12,8 +12,8 @@
 #include "core/memory_limit.h"
 #include "core/stopwatch.h"
 #include "estimators/mean.h"
-#include "filters/feedback.h"
 #include "filters/planes.h"
+#include "filters/residual_correction.h"
 #include "risk/held_out_error.h"
 #include "risk/predicted_error.h"
 
@@ -72,7 +72,7 @@ EstimatorResult estimate(const CombineRequest& request) {
   const int height = request.independent.height, in_memory = rows_in_memory(request);
   if (estimator.reach < 0 || in_memory >= height)
     return estimator.apply(rows_of(request.crn, 0, height), request.independent.all(), request.settings);
-  const int step = std::max(kFewestRows, in_memory - 2 * estimator.reach) / kFeedbackCell * kFeedbackCell;
+  const int step = std::max(kFewestRows, in_memory - 2 * estimator.reach) / kResidualCell * kResidualCell;
   EstimatorResult whole;
   for (int y = 0; y < height; y += step) {
     const int n = std::min(step, height - y);
@@ -115,8 +115,8 @@ double planned_memory(const CombineRequest& request) {
 }
 
 Band band_around(const CombineRequest& request, int first, int last) {
-  // Beginning at a multiple of a cell of the feedback.
-  const int begin = std::max(0, first - request.estimator.reach) / kFeedbackCell * kFeedbackCell;
+  // Beginning at a multiple of a cell of the residual correction.
+  const int begin = std::max(0, first - request.estimator.reach) / kResidualCell * kResidualCell;
   const int n = std::min(request.independent.height, last + request.estimator.reach) - begin;
   return {rows_of(request.crn, begin, n), request.independent.rows(begin, n), begin};
 }

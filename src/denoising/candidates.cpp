@@ -6,8 +6,8 @@
 #include <memory>
 
 #include "core/parallel.h"
-#include "filters/feedback.h"
 #include "filters/nl_means.h"
+#include "filters/residual_correction.h"
 
 namespace covary {
 namespace {

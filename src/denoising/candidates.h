@@ -7,7 +7,7 @@
 // guides that were denoised before.
 //
 // Where the image is the mean of the independent samples itself, the images of the one are left out, and those of Open
-// Image Denoise come with what they took away from pixels alike given back (ResidualOptions of feedback.h).
+// Image Denoise come with what they took away from pixels alike given back (ResidualOptions of residual_correction.h).
 #pragma once
 
 #include <functional>

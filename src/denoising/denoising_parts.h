@@ -22,7 +22,7 @@ struct DenoisingParts {
   DenoisingPart whole;
   std::array<DenoisingPart, 2> halves;
   std::vector<unsigned char> valid;  ///< 0: a pixel that is left out
-  /// The image is the mean of independent samples: noisy, but without a bias that residual feedback could take away.
+  /// The image is the mean of independent samples: noisy, but without a bias that residual correction could take away.
   bool is_mean = false;
   std::string name = "mean";  ///< of the image
 };

@@ -12,7 +12,7 @@
 #include "core/parallel.h"
 #include "denoising/denoise.h"
 #include "denoising/mixture.h"
-#include "filters/feedback.h"
+#include "filters/residual_correction.h"
 #include "risk/held_out_bias.h"
 #include "risk/held_out_error.h"
 #include "risk/predicted_error.h"
@@ -25,7 +25,7 @@ struct ModeSettings {
   DenoiseMode mode;
   const char* name;
   float bias_share, prior;
-  bool feedback;
+  bool residual_correction;
 };
 constexpr ModeSettings kModes[] = {{DenoiseMode::kNone, "none", 1, 0, false},
                                    {DenoiseMode::kAuto, "auto", 1, 1, false},
@@ -145,10 +145,11 @@ MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<Candid
     input.counts[half] = &counts[half];
   }
   Mixture mixture = mix(input);
-  if (chosen.feedback && !parts.is_mean) {
-    add_feedback(parts.whole.independent, {}, valid, parts.whole.image.std_error, mixture.image);
+  if (chosen.residual_correction && !parts.is_mean) {
+    add_residual_correction(parts.whole.independent, {}, valid, parts.whole.image.std_error, mixture.image);
     for (int half : {0, 1})
-      add_feedback(parts.halves[half].independent, {}, valid, parts.halves[half].image.std_error, mixture.halves[half]);
+      add_residual_correction(parts.halves[half].independent, {}, valid, parts.halves[half].image.std_error,
+                              mixture.halves[half]);
   }
 
   MixedDenoising out;

@@ -23,8 +23,8 @@ namespace covary {
 enum class DenoiseMode {
   kNone,      ///< no denoising
   kAuto,      ///< what leaves the least error, the default of renders
-  kBias,      ///< squared bias counts four times as much as variance; residual feedback
-  kBalanced,  ///< twice as much; residual feedback
+  kBias,      ///< squared bias counts four times as much as variance; residual correction
+  kBalanced,  ///< twice as much; residual correction
   kError,     ///< least error
 };
 

@@ -13,7 +13,7 @@
 #include "core/error.h"
 #include "estimators/mean.h"
 #include "estimators/test_images.h"
-#include "filters/feedback.h"
+#include "filters/residual_correction.h"
 #include "risk/relative_weight.h"
 #include "support/files.h"
 

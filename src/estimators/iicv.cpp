@@ -144,7 +144,7 @@ EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& independent, c
   else
     apply_at_once(p, result);
   if (options.residual_correction) {
-    add_feedback(p.h, options.residual_options, p.valid, result.std_error, result.estimate);
+    add_residual_correction(p.h, options.residual_options, p.valid, result.std_error, result.estimate);
     if (!options.std_error) result.std_error = Image();
   }
   fill_invalid(crn, independent, p.valid, result.estimate);
@@ -153,14 +153,14 @@ EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& independent, c
 
 int iicv_reach(const IicvOptions& options) {
   const int pilot = options.pilot_window / 2 * (options.penalty == Penalty::kSmoothed ? 2 : 1);
-  const int feedback = options.residual_correction ? feedback_reach(options.residual_options) : 0;
-  return options.window / 2 + std::max(pilot, kMissingWindow / 2) + feedback;
+  const int correction = options.residual_correction ? residual_correction_reach(options.residual_options) : 0;
+  return options.window / 2 + std::max(pilot, kMissingWindow / 2) + correction;
 }
 
 double iicv_bytes_per_pixel(const IicvOptions& options) {
   const bool halves = options.penalty == Penalty::kCrossFit;
   // Planes of floats: moments of both images, the result and its error, the pilot's error, light that the CRN image
-  // lacks and what finds it, residuals for the feedback.
+  // lacks and what finds it, residuals for their correction.
   int planes = 2 * 6 + 6 + 3 + 3 + 6;
   if (options.penalty == Penalty::kSmoothed) planes += 3;
   if (halves) planes += 2 * 6 + 6;

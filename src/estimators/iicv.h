@@ -23,7 +23,7 @@
 #include "estimators/estimator_result.h"
 #include "estimators/pixel_probe.h"
 #include "film/grouped_image.h"
-#include "filters/feedback.h"
+#include "filters/residual_correction.h"
 
 namespace covary {
 
@@ -65,9 +65,9 @@ struct IicvOptions {
   /// in proportion to brightness, so many times as large as the errors there are, as common to all pixels of the CRN
   /// image, and so cancels them. Default 30 (measured); the paper has 0.
   float mean_constraint = 30.0f;
-  /// Default on; the paper has none (filters/feedback.h).
+  /// Default on; the paper has none (filters/residual_correction.h).
   bool residual_correction = true;
-  FeedbackOptions residual_options;
+  ResidualCorrectionOptions residual_options;
   /// Also estimate the standard error of the result: [YM2025] Eq. (8), with the residuals of the fit corrected for its
   /// degrees of freedom. It is the error before the residual correction, which changes it little.
   bool std_error = false;
@@ -85,7 +85,7 @@ struct IicvOptions {
 EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& independent, const IicvOptions& options = {});
 
 /// How far from a pixel, in rows or columns, the input can influence it. A part of an image that begins at a row and
-/// column that are multiples of kFeedbackCell gives, farther than this from its cut edges, the bits of the whole image.
+/// column that are multiples of kResidualCell gives, farther than this from its cut edges, the bits of the whole image.
 int iicv_reach(const IicvOptions& options);
 
 /// Memory that iicv() takes beside its input, its result included: bytes per pixel, about.

@@ -12,7 +12,7 @@
 #include "estimators/compare_with_reference.h"
 #include "estimators/control_variates.h"
 #include "estimators/reference_control_variates.h"
-#include "estimators/reference_feedback.h"
+#include "estimators/reference_residual_correction.h"
 #include "estimators/test_images.h"
 #include "support/files.h"
 
@@ -218,7 +218,7 @@ TEST(Iicv, WhatIsTheSameInBothImagesIsCertain) {
     }
 }
 
-/// Everything the defaults add: mixed penalty, condition, feedback.
+/// Everything the defaults add: mixed penalty, condition, residual correction.
 TEST(Iicv, DefaultsAgreeWithTheReference) {
   for (const auto& [width, height] : {std::pair{41, 27}, {60, 6}, {1, 1}, {5, 40}}) {
     const test::Grouped crn = test::crn_image(width, height, 12, 1),
@@ -241,7 +241,7 @@ TEST(Iicv, DefaultsAgreeWithTheReference) {
         estimate.push_back(r.estimate);
         std_error.push_back(r.std_error);
       }
-    estimate = reference::feedback(estimate, std_error, h, variance, width, height, 41, 1.25);
+    estimate = reference::residual_correction(estimate, std_error, h, variance, width, height, 41, 1.25);
     for (int y = 0; y < height; ++y)
       for (int x = 0; x < width; ++x) {
         const Rgb noise = reference::variance_of_mean(crn_view, x, y);
@@ -346,7 +346,7 @@ TEST(Iicv, BandsGiveTheSameBits) {
   const EstimatorResult whole = iicv(crn.view(), independent.view(), options);
   const int reach = iicv_reach(options);
   for (int y0 = 0; y0 < 140; y0 += 34) {
-    const int first = std::max(0, (y0 - reach) / kFeedbackCell * kFeedbackCell), last = std::min(140, y0 + 34 + reach);
+    const int first = std::max(0, (y0 - reach) / kResidualCell * kResidualCell), last = std::min(140, y0 + 34 + reach);
     const auto band = [&](const GroupedImage& image) {
       return GroupedImage{50, last - first, 6, image.pixel(0, first)};
     };
@@ -426,7 +426,7 @@ TEST(Iicv, BitsDoNotDependOnThreadsTilesOrCrops) {
     EXPECT_EQ(one.std_error.data, more.std_error.data);
   }
 
-  const int x0 = 12, y0 = 8, width = 101, height = 90;  // multiples of kFeedbackCell
+  const int x0 = 12, y0 = 8, width = 101, height = 90;  // multiples of kResidualCell
   const auto crop = [&](const test::Grouped& image) {
     test::Grouped part = test::constant_image(width, height, image.groups, 0);
     for (int y = 0; y < height; ++y)

@@ -11,7 +11,7 @@
 #include "estimators/iduw.h"
 #include "estimators/iicv.h"
 #include "estimators/mean.h"
-#include "estimators/reference_feedback.h"
+#include "estimators/reference_residual_correction.h"
 #include "estimators/test_images.h"
 #include "film/groups.h"
 #include "support/files.h"
@@ -83,8 +83,8 @@ Expected reference_result(const GroupedImage& crn, const GroupedImage& independe
       expected.std_error.push_back(r.std_error);
     }
   if (settings.mean_constraint > 0)
-    expected.estimate = reference::feedback(expected.estimate, expected.std_error, h, variance, crn.width, crn.height,
-                                            41, 1.25, independent);
+    expected.estimate = reference::residual_correction(expected.estimate, expected.std_error, h, variance, crn.width,
+                                                       crn.height, 41, 1.25, independent);
   return expected;
 }
 

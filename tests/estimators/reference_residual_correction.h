@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Residual feedback (filters/feedback.h) as plain double-precision loops.
+// Residual correction (filters/residual_correction.h) as plain double-precision loops.
 #pragma once
 
 #include "estimators/reference_control_variates.h"
@@ -43,9 +43,9 @@ inline GuidedMean guided_mean(const RgbImage& estimate, const RgbImage& h, const
 
 /// Twice F^ + means of h - F^: first with bandwidths kappa and 4 kappa, then with 12 kappa; weighted by the counts of
 /// the image that h is of, where it has any.
-inline RgbImage feedback(const RgbImage& estimate, const RgbImage& std_error, const RgbImage& h,
-                         const RgbImage& variance_of_h, int width, int height, int window, double kappa,
-                         const GroupedImage& counted = {}) {
+inline RgbImage residual_correction(const RgbImage& estimate, const RgbImage& std_error, const RgbImage& h,
+                                    const RgbImage& variance_of_h, int width, int height, int window, double kappa,
+                                    const GroupedImage& counted = {}) {
   RgbImage first = estimate;
   const auto mean = [&](const RgbImage& f, int x, int y, int side, int radius, double bandwidth) {
     const double variance = distance2(std_error[static_cast<size_t>(y) * width + x], {0, 0, 0});

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "filters/feedback.h"
+#include "filters/residual_correction.h"
 
 #include <algorithm>
 #include <array>
@@ -16,7 +16,7 @@ namespace {
 constexpr int kGuide = 0, kResidual = 3, kWeight = 6, kVariance = 7, kPlanes = 8;
 /// Side of the cells of the wide mean.
 constexpr int kCell = 2;
-/// Bandwidths of the wide mean and of the second feedback over that of the narrow mean.
+/// Bandwidths of the wide mean and of the second correction over that of the narrow mean.
 constexpr float kWidening = 4, kSecondWidening = 12;
 /// Variance of the narrow mean, relative to that of the estimate, at which both means count equally. 0.1 to 3 trade
 /// bias for error, slowly (docs/notes/iicv.md).
@@ -78,7 +78,7 @@ struct GuidedMean {
   }
 };
 
-/// r of feedback.h at the pixels (x + lane, y) with values f, over (2 radius + 1)^2 cells.
+/// r of residual_correction.h at the pixels (x + lane, y) with values f, over (2 radius + 1)^2 cells.
 GuidedMean guided_mean(const Planes& cells, int side, int radius, int x, int y, const vfloat* f,
                        vfloat squared_bandwidth) {
   const vfloat factor = -1.0f / max(squared_bandwidth, splat(1e-30f));
@@ -99,10 +99,10 @@ GuidedMean guided_mean(const Planes& cells, int side, int radius, int x, int y, 
   return mean;
 }
 
-/// Adds to each valid pixel what `feedback(x, y, f, variance)` gives, three vfloats for the pixels (x + lane, y) whose
-/// values are f and whose squared standard errors, summed over RGB, are `variance`.
-template <typename Feedback>
-void add_everywhere(const std::vector<unsigned char>& valid, const Image& std_error, const Feedback& feedback,
+/// Adds to each valid pixel what `correction(x, y, f, variance)` gives, three vfloats for the pixels (x + lane, y)
+/// whose values are f and whose squared standard errors, summed over RGB, are `variance`.
+template <typename Correction>
+void add_everywhere(const std::vector<unsigned char>& valid, const Image& std_error, const Correction& correction,
                     Image& estimate) {
   const int width = estimate.width;
   for_each_batch(width, estimate.height, [&](int x, int y, int n) {
@@ -115,7 +115,7 @@ void add_everywhere(const std::vector<unsigned char>& valid, const Image& std_er
       }
       variance += error * error;
     }
-    const std::array<vfloat, 3> added = feedback(x, y, f, variance);
+    const std::array<vfloat, 3> added = correction(x, y, f, variance);
     for (int l = 0; l < n; ++l)
       if (valid[static_cast<size_t>(y) * width + x + l])
         for (int c = 0; c < 3; ++c) estimate.pixel(x + l, y)[c] += added[c][l];
@@ -124,8 +124,8 @@ void add_everywhere(const std::vector<unsigned char>& valid, const Image& std_er
 
 }  // namespace
 
-void add_feedback(const Moments& h, const FeedbackOptions& options, const std::vector<unsigned char>& valid,
-                  const Image& std_error, Image& estimate) {
+void add_residual_correction(const Moments& h, const ResidualCorrectionOptions& options,
+                             const std::vector<unsigned char>& valid, const Image& std_error, Image& estimate) {
   const float bandwidth = options.bandwidth * options.bandwidth;
   {
     const int wide_radius = options.window / 2 / kCell, narrow_radius = options.window / 4;
@@ -142,11 +142,11 @@ void add_feedback(const Moments& h, const FeedbackOptions& options, const std::v
     };
     add_everywhere(valid, std_error, mixed, estimate);
   }
-  const int radius = options.window / 2 / kFeedbackCell;
-  const Planes cells = make_cells(kFeedbackCell, h, valid, estimate, radius * kFeedbackCell);
+  const int radius = options.window / 2 / kResidualCell;
+  const Planes cells = make_cells(kResidualCell, h, valid, estimate, radius * kResidualCell);
   const auto second = [&](int x, int y, const vfloat* f, vfloat variance) {
     const GuidedMean mean =
-        guided_mean(cells, kFeedbackCell, radius, x, y, f, variance * (bandwidth * kSecondWidening * kSecondWidening));
+        guided_mean(cells, kResidualCell, radius, x, y, f, variance * (bandwidth * kSecondWidening * kSecondWidening));
     const vfloat b = mean.share(kWideNoise * variance);
     return std::array<vfloat, 3>{b * mean.value(0), b * mean.value(1), b * mean.value(2)};
   };

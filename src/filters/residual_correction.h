@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Residual feedback (ours): gives back, where it is shared, what an estimator took away.
+// Residual correction (ours): gives back, where it is shared, what an estimator took away.
 //
 // Penalties that contain the noise they judge lose energy: bright outliers of the independent image h are penalised
 // more than dark ones. The bias E[h - F^] varies slowly over the image, so that a wide mean of h - F^ over pixels like
@@ -18,8 +18,8 @@
 // light say, can have more than all the light of the darker pixels around; without b all that are like it in F^ got it.
 //
 // The first runs over the pixels of half the window, the second over cells of 2 x 2 pixels of the whole one. Outliers
-// raise their own guide, so that narrow means leave them out, and the image stays a little too dark. A second feedback,
-// of F^' by means over cells of 4 x 4 pixels, brings that back:
+// raise their own guide, so that narrow means leave them out, and the image stays a little too dark. A second one, of
+// F^' by means over cells of 4 x 4 pixels, brings that back:
 //
 //     F^''_i = F^'_i + b'_i(12 kappa) r'_i(12 kappa).
 //
@@ -34,7 +34,7 @@ namespace covary {
 
 struct Moments;
 
-struct FeedbackOptions {
+struct ResidualCorrectionOptions {
   /// Side of the window of the wide mean; odd, 5 … 125. Default 41 (measured; 61 gains less than 1 %, 21 loses 3 %).
   int window = 41;
   /// kappa: pixels that differ by so many standard errors of the estimate have weight 1 / e; > 0. Less leaves less bias
@@ -53,14 +53,16 @@ struct ResidualOptions {
 };
 
 /// Cells are aligned with coordinates that are multiples of this.
-inline constexpr int kFeedbackCell = 4;
-/// How far from a pixel, in rows or columns, the input can influence its feedback.
-inline int feedback_reach(const FeedbackOptions& options) { return 2 * (options.window / 2 + kFeedbackCell); }
+inline constexpr int kResidualCell = 4;
+/// How far from a pixel, in rows or columns, the input can influence its correction.
+inline int residual_correction_reach(const ResidualCorrectionOptions& options) {
+  return 2 * (options.window / 2 + kResidualCell);
+}
 
-/// Adds the feedback to `estimate`, whose standard error is `std_error`. `h`: mean of the independent image and its
+/// Adds the correction to `estimate`, whose standard error is `std_error`. `h`: mean of the independent image and its
 /// variance. Pixels with 0 in `valid` are left out and left alone.
-void add_feedback(const Moments& h, const FeedbackOptions& options, const std::vector<unsigned char>& valid,
-                  const Image& std_error, Image& estimate);
+void add_residual_correction(const Moments& h, const ResidualCorrectionOptions& options,
+                             const std::vector<unsigned char>& valid, const Image& std_error, Image& estimate);
 
 /// Adds the residual to `estimate`; the rest as above.
 void add_residual(const Moments& h, const ResidualOptions& options, const std::vector<unsigned char>& valid,
