@@ -230,6 +230,20 @@ void check_correlations(const InputReport& r, std::vector<Finding>& findings) {
   }
 }
 
+/// Whether both images have the same mean, within their noise.
+void check_means(const Values& crn, const Values& independent, InputReport& r) {
+  const double deviation = std::sqrt(crn.variance_of_mean + independent.variance_of_mean),
+               difference = crn.mean - independent.mean;
+  if (deviation > 0) r.mean_difference_sigmas = difference / deviation;
+  const double scale = std::max(std::abs(crn.mean), std::abs(independent.mean));
+  if (std::abs(difference) > std::max(kMaxSigmas * deviation, 1e-4 * scale))
+    r.findings.push_back(
+        {Severity::kError,
+         fmt::format("the image means {:.5g} (CRN) and {:.5g} (independent) differ by {:.1f} standard errors: the "
+                     "images do not show the same scene with the same settings",
+                     crn.mean, independent.mean, std::abs(r.mean_difference_sigmas))});
+}
+
 }  // namespace
 
 bool InputReport::has_errors() const {
@@ -325,18 +339,7 @@ InputReport InputChecks::report() const {
          fmt::format("independent image: only {} pairs of pixels with noise; correlations are little tested",
                      r.independent_horizontal.pairs)});
 
-  if (crn_groups >= 3 && independent_groups >= 3 && r.nonfinite_pixels == 0) {
-    const double deviation = std::sqrt(crn.variance_of_mean + independent.variance_of_mean),
-                 difference = crn.mean - independent.mean;
-    if (deviation > 0) r.mean_difference_sigmas = difference / deviation;
-    const double scale = std::max(std::abs(crn.mean), std::abs(independent.mean));
-    if (std::abs(difference) > std::max(kMaxSigmas * deviation, 1e-4 * scale))
-      r.findings.push_back(
-          {Severity::kError,
-           fmt::format("the image means {:.5g} (CRN) and {:.5g} (independent) differ by {:.1f} standard errors: the "
-                       "images do not show the same scene with the same settings",
-                       crn.mean, independent.mean, std::abs(r.mean_difference_sigmas))});
-  }
+  if (crn_groups >= 3 && independent_groups >= 3 && r.nonfinite_pixels == 0) check_means(crn, independent, r);
   return r;
 }
 
