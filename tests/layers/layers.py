@@ -41,6 +41,7 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*"([^"]+)"')
 CITATION = re.compile(r"\[([A-Z][A-Za-z]+\d{4}[a-z]?)\]")
 LONG_FILE = 450
 COLUMNS = 120  # of code and prose
+LINES = 400  # of a file of code, tests apart
 WRAPPED = (".h", ".cpp", ".cu", ".cuh", ".py", ".md", ".js", ".cmake", "CMakeLists.txt", "Makefile")
 
 
@@ -261,7 +262,14 @@ def lines_fit(root):
     return problems
 
 
-CHECKS = [lines_fit, includes_follow_arrows, links_follow_arrows, architecture_draws_the_arrows,
+def files_fit(root):
+    """No file of code has more than LINES lines, but for tests: what is longer does more than one thing."""
+    counts = {path: sum(1 for _ in lines(root, path))
+              for path in files(root, ["src", "apps", "python"], (".cpp", ".h")) if not is_test(path)}
+    return [f"{path}:{n}: {n} lines; at most {LINES}" for path, n in counts.items() if n > LINES]
+
+
+CHECKS = [lines_fit, files_fit, includes_follow_arrows, links_follow_arrows, architecture_draws_the_arrows,
           licence_lines, no_leftovers, citations_have_entries,
           documented_names_match_registries, documented_parameters, documented_commands]
 

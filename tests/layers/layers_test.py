@@ -71,6 +71,12 @@ class Planted(unittest.TestCase):
         self.write(".gitignore", "x" * 200)
         self.expect(layers.lines_fit, "scripts/run:2: 125 columns; at most 120")
 
+    def test_long_file(self):
+        self.write("src/film/film.cpp", "\n" * 401)
+        self.write("src/film/film_test.cpp", "\n" * 401)
+        self.write("src/film/film.h", "\n" * 400)
+        self.expect(layers.files_fit, "src/film/film.cpp:401: 401 lines; at most 400")
+
     def test_include_against_an_arrow(self):
         self.write("src/film/film.cpp", SPDX + '#include "core/vec.h"\n#include "scene/scene.h"\n')
         self.expect(layers.includes_follow_arrows, "src/film/film.cpp:3: film may not include 'scene/scene.h'")
