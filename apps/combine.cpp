@@ -124,8 +124,14 @@ nlohmann::ordered_json json_of(const Correlation& c) {
 
 /// The layers of --guides.
 struct GuideImages {
-  std::optional<Image> albedo, normal;
-  Guides view() const { return {albedo ? &*albedo : nullptr, albedo && normal ? &*normal : nullptr}; }
+  std::optional<Image> albedo, normal;                      // of the first surface, where the file has both
+  std::optional<Image> denoising_albedo, denoising_normal;  // behind mirrors and glass
+  Guides view() const {
+    const auto or_null = [](const std::optional<Image>& image) { return image ? &*image : nullptr; };
+    Guides guides{or_null(albedo), or_null(normal), or_null(denoising_albedo), or_null(denoising_normal)};
+    if (!albedo) guides.normal = nullptr;
+    return guides;
+  }
 };
 
 GuideImages read_guides(const CombineOptions& o, const Estimator& estimator, const GroupedFile& file) {
@@ -133,18 +139,20 @@ GuideImages read_guides(const CombineOptions& o, const Estimator& estimator, con
   if (!estimator.reads_guides)
     throw Error(ErrorCode::kUsage, "--guides is an option of --denoise auto, bias, balanced and error");
   const ImageInfo info = inspect_image(o.guides);
-  const auto find = [&](const char* own, GuideKind kind) {  // own films' as `render` itself has them
-    const bool is_own = std::any_of(info.channels.begin(), info.channels.end(),
-                                    [&](const auto& c) { return c.name.starts_with(std::string(own) + "."); });
-    return is_own ? named_guide(o.guides, info, own) : find_guide(o.guides, info, kind);
+  const auto own = [&](const char* name) -> std::optional<Image> {  // own films' as `render` itself has them
+    const bool is_there = std::any_of(info.channels.begin(), info.channels.end(),
+                                      [&](const auto& c) { return c.name.starts_with(std::string(name) + "."); });
+    return is_there ? std::optional(named_guide(o.guides, info, name)) : std::nullopt;
   };
-  GuideImages guides{find("Albedo", GuideKind::kAlbedo), find("N", GuideKind::kNormal)};
+  GuideImages guides{own("Albedo"), own("N"), own("DenoisingAlbedo"), own("DenoisingNormal")};
+  if (!guides.albedo) guides.albedo = find_guide(o.guides, info, GuideKind::kAlbedo);
+  if (!guides.normal) guides.normal = find_guide(o.guides, info, GuideKind::kNormal);
   if (!guides.albedo)
     throw Error(ErrorCode::kInput,
                 fmt::format("--guides '{}' has no layer Albedo (Albedo.R, .G, .B) nor what other renderers call "
                             "so, and may have a layer N",
                             o.guides));
-  for (const auto& guide : {guides.albedo, guides.normal})
+  for (const auto& guide : {guides.albedo, guides.normal, guides.denoising_albedo, guides.denoising_normal})
     if (guide && (guide->width != file.width() || guide->height != file.height()))
       throw Error(ErrorCode::kInput, fmt::format("--guides '{}' has {} x {} pixels, the images have {} x {}", o.guides,
                                                  guide->width, guide->height, file.width(), file.height()));

@@ -2,6 +2,7 @@
 #include "denoising/candidates.h"
 
 #include <algorithm>
+#include <deque>
 #include <functional>
 #include <memory>
 
@@ -58,21 +59,41 @@ FilterGuides filter_guides(const Guides& guides) {
 
 const Planes* or_null(const Planes& planes) { return planes.count() > 0 ? &planes : nullptr; }
 
-std::vector<Image> filtered(const FilterGuides& guides, CandidateBase base, const CandidateInput& in) {
-  std::vector<const Image*> sharp = {in.estimate};
-  if (base == CandidateBase::kPair) sharp.push_back(in.independent);
-  const NlMeansTask tasks[] = {{kSharp, sharp}, {kSmooth, {in.estimate}}};
-  std::vector<Image> images = nl_means({in.estimate, in.std_error, or_null(guides.all), in.valid}, tasks);
-  if (guides.albedo.data.empty()) return images;
-  const Image image = combined(*in.estimate, guides.albedo, std::divides<>());
-  const Image error = combined(*in.std_error, guides.albedo, std::divides<>());
-  const NlMeansTask demodulated[] = {{kSharp, {&image}}};
-  const std::vector<Image> result = nl_means({&image, &error, or_null(guides.normal), in.valid}, demodulated);
-  images.push_back(combined(result[0], guides.albedo, std::multiplies<>()));
-  return images;
+/// Candidates of each of the inputs.
+std::vector<std::vector<Image>> filtered(const FilterGuides& guides, CandidateBase base,
+                                         std::span<const CandidateInput> inputs) {
+  std::vector<NlMeansSteering> steerings;
+  for (const CandidateInput& in : inputs) {
+    std::vector<const Image*> sharp = {in.estimate};
+    if (base == CandidateBase::kPair) sharp.push_back(in.independent);
+    steerings.push_back({in.estimate, in.std_error, {{kSharp, sharp}, {kSmooth, {in.estimate}}}});
+  }
+  std::vector<Image> images = nl_means(steerings, or_null(guides.all), *inputs[0].valid);
+  const size_t n = images.size() / inputs.size();
+  std::vector<std::vector<Image>> all(inputs.size());
+  for (size_t i = 0; i < images.size(); ++i) all[i / n].push_back(std::move(images[i]));
+  if (guides.albedo.data.empty()) return all;
+  std::deque<Image> demodulated;
+  steerings.clear();
+  for (const CandidateInput& in : inputs) {
+    const Image& image = demodulated.emplace_back(combined(*in.estimate, guides.albedo, std::divides<>()));
+    const Image& error = demodulated.emplace_back(combined(*in.std_error, guides.albedo, std::divides<>()));
+    steerings.push_back({&image, &error, {{kSharp, {&image}}}});
+  }
+  images = nl_means(steerings, or_null(guides.normal), *inputs[0].valid);
+  for (size_t i = 0; i < all.size(); ++i) all[i].push_back(combined(images[i], guides.albedo, std::multiplies<>()));
+  return all;
 }
 
 }  // namespace
+
+CandidateMaker::Make one_by_one(std::function<std::vector<Image>(const CandidateInput&)> make) {
+  return [make = std::move(make)](std::span<const CandidateInput> inputs) {
+    std::vector<std::vector<Image>> all;
+    for (const CandidateInput& in : inputs) all.push_back(make(in));
+    return all;
+  };
+}
 
 CandidateMaker filtered_candidates(const Guides& guides, CandidateBase base) {
   const auto kept = std::make_shared<FilterGuides>(filter_guides(guides));
@@ -81,15 +102,22 @@ CandidateMaker filtered_candidates(const Guides& guides, CandidateBase base) {
   if (base == CandidateBase::kPair) maker.names.emplace_back("sharp-independent");
   maker.names.emplace_back("smooth");
   if (!kept->albedo.data.empty()) maker.names.emplace_back("demodulated");
-  maker.make = [kept, base](const CandidateInput& in) { return filtered(*kept, base, in); };
+  maker.make = [kept, base](std::span<const CandidateInput> inputs) { return filtered(*kept, base, inputs); };
   return maker;
+}
+
+Guides network_guides(const Guides& guides) {
+  const bool has_both = guides.denoising_albedo && (guides.denoising_normal || !guides.normal);
+  if (!has_both) return {guides.albedo, guides.normal, nullptr, nullptr};
+  return {guides.denoising_albedo, guides.denoising_normal, nullptr, nullptr};
 }
 
 CandidateMaker neural_candidates(const Guides& guides, const DenoiseOptions& options, CandidateBase base) {
   const auto denoiser = std::make_shared<Denoiser>(options);
   const auto albedo = std::make_shared<Image>(), normal = std::make_shared<Image>();
-  if (guides.albedo) *albedo = denoiser->denoise_guide("albedo", *guides.albedo);
-  if (guides.albedo && guides.normal) *normal = denoiser->denoise_guide("normal", *guides.normal);
+  const Guides seen = network_guides(guides);
+  if (seen.albedo) *albedo = denoiser->denoise_guide("albedo", *seen.albedo);
+  if (seen.albedo && seen.normal) *normal = denoiser->denoise_guide("normal", *seen.normal);
   const auto denoised = [=](const Image& image) {
     return denoiser->denoise(image, albedo->data.empty() ? nullptr : albedo.get(),
                              normal->data.empty() ? nullptr : normal.get(), true);
@@ -98,18 +126,18 @@ CandidateMaker neural_candidates(const Guides& guides, const DenoiseOptions& opt
   maker.error_over_variance = 1.1;
   if (base == CandidateBase::kPair) {
     maker.names = {"oidn", "oidn-independent"};
-    maker.make = [denoised](const CandidateInput& in) {
+    maker.make = one_by_one([denoised](const CandidateInput& in) {
       return std::vector<Image>{denoised(*in.estimate), denoised(*in.independent)};
-    };
+    });
     return maker;
   }
   maker.names = {"oidn", "oidn-wide", "oidn-narrow"};
-  maker.make = [denoised](const CandidateInput& in) {
+  maker.make = one_by_one([denoised](const CandidateInput& in) {
     std::vector<Image> images(3, denoised(*in.estimate));
     add_residual(*in.moments, kWideResidual, *in.valid, images[1]);
     add_residual(*in.moments, kNarrowResidual, *in.valid, images[2]);
     return images;
-  };
+  });
   return maker;
 }
 

@@ -11,6 +11,7 @@
 #pragma once
 
 #include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -31,8 +32,11 @@ struct CandidateInput {
 
 /// Makes candidates, the same of any samples.
 struct CandidateMaker {
+  /// The images of each of several sets of samples, all with the same valid pixels.
+  using Make = std::function<std::vector<std::vector<Image>>(std::span<const CandidateInput>)>;
+
   std::vector<std::string> names;  ///< of its images, in their order
-  std::function<std::vector<Image>(const CandidateInput&)> make;
+  Make make;
   /// What the squared error of a mixture that has these usually is, over the variance of mixtures of half of the
   /// samples: the more of it they take away, the more of the error is bias. Measured (docs/methods/error-estimates.md).
   double error_over_variance = 0.65;
@@ -40,11 +44,16 @@ struct CandidateMaker {
   int best_of_few = 0;
 };
 
+/// Candidates of one set of samples after the other.
+CandidateMaker::Make one_by_one(std::function<std::vector<Image>(const CandidateInput&)> make);
+
 /// Whose images: an estimator's of two passes, or the mean of independent samples.
 enum class CandidateBase { kPair, kMean };
 
 /// Filters without a network. The guides are copied.
 CandidateMaker filtered_candidates(const Guides& guides, CandidateBase base = CandidateBase::kPair);
+/// The guides of a neural network: those of what is seen in mirrors and through glass, where they are known.
+Guides network_guides(const Guides& guides);
 /// Images denoised by a neural network. Throws like denoise().
 CandidateMaker neural_candidates(const Guides& guides, const DenoiseOptions& options,
                                  CandidateBase base = CandidateBase::kPair);

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/parallel.h"
+#include "denoising/limited_groups.h"
 #include "risk/halves.h"
 
 namespace covary {
@@ -57,11 +58,21 @@ Image std_error_of(const Planes& variance, const std::vector<unsigned char>& val
   return result;
 }
 
-DenoisingPart part_of_mean(Moments moments, const std::vector<unsigned char>& valid, int groups) {
+LimitedMean limited_mean(const GroupedImage& image, const std::vector<unsigned char>& valid) {
+  const LimitedGroups limited(image, valid);
+  LimitedMean mean;
+  mean.independent = moments(limited.view(), valid, 0, 0.0f);
+  mean.estimate = mean_image(mean.independent);
+  mean.std_error = std_error_of(mean.independent.variance_of_mean, valid, image.groups - 1, 1);
+  return mean;
+}
+
+DenoisingPart part_of_mean(const GroupedImage& image, const std::vector<unsigned char>& valid) {
   DenoisingPart part;
-  part.independent = std::move(moments);
+  part.independent = moments(image, valid, 0, 0.0f);
   part.image.estimate = mean_image(part.independent);
-  part.image.std_error = std_error_of(part.independent.variance_of_mean, valid, groups - 1, 1);
+  part.image.std_error = std_error_of(part.independent.variance_of_mean, valid, image.groups - 1, 1);
+  if (image.groups > 1) part.limited = limited_mean(image, valid);
   return part;
 }
 
@@ -98,7 +109,7 @@ DenoisingParts whole_of_mean(const GroupedImage& independent) {
   parts.is_mean = true;
   long n_nonfinite = 0;
   parts.valid = finite_pixels(independent, independent, n_nonfinite);
-  parts.whole = part_of_mean(moments(independent, parts.valid, 0, 0.0f), parts.valid, independent.groups);
+  parts.whole = part_of_mean(independent, parts.valid);
   fill_invalid(independent, independent, parts.valid, parts.whole.image.estimate);
   parts.whole.image.nonfinite_pixels = n_nonfinite;
   return parts;
@@ -110,7 +121,7 @@ DenoisingParts parts_of_mean(const GroupedImage& independent) {
     const HalfImage image(independent, half);
     const int groups = image.view().groups;
     DenoisingPart& part = parts.halves[half];
-    part = part_of_mean(moments(image.view(), parts.valid, 0, 0.0f), parts.valid, groups);
+    part = part_of_mean(image.view(), parts.valid);
     if (groups > 1) continue;
     // One group has no variance of its own. What is compared with the pixel itself may not know the other half's.
     const float more = static_cast<float>(independent.groups) / static_cast<float>(groups);

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,10 +13,18 @@
 
 namespace covary {
 
+/// What candidates are made of where that is not the image itself.
+struct LimitedMean {
+  Image estimate, std_error;
+  Moments independent;
+};
+
 /// The image of some samples.
 struct DenoisingPart {
   EstimatorResult image;  ///< with its standard error; all values are finite
   Moments independent;    ///< of those samples that are independent from pixel to pixel
+  /// The mean without fireflies (limited_groups.h); none of a pair.
+  std::optional<LimitedMean> limited;
 };
 
 struct DenoisingParts {
@@ -36,7 +45,8 @@ DenoisingParts parts_of_pair(const Estimator& base, const GroupedImage& crn, con
 
 /// Of independent samples alone: means of their groups, at least two. The variance of a pixel is that between its
 /// groups, drawn to the mean of those around it as if these were two groups more: few groups tell little.
-/// Halves of one group have that of all groups, from the pixels around alone.
+/// Halves of one group have that of all groups, from the pixels around alone. Fireflies are judged by the part itself,
+/// so that halves remain independent.
 DenoisingParts parts_of_mean(const GroupedImage& independent);
 /// The same without halves, of any number of groups. A single group has the standard error 0.
 DenoisingParts whole_of_mean(const GroupedImage& independent);

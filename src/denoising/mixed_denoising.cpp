@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <deque>
+#include <iterator>
 
 #include "core/error.h"
 #include "core/parallel.h"
@@ -38,22 +40,35 @@ ModeSettings settings_of(DenoiseMode mode) {
 }
 
 /// Memory beside that of the estimator, about: images of three sets of samples, planes of filters and sums, half of 12
-/// groups; with the network, what that takes and its candidates.
-constexpr double kBytesPerPixel = 380, kBytesWithOidn = 1280;
+/// groups; of the mean, it without fireflies; with the network, what that takes and its candidates.
+constexpr double kBytesPerPixel = 480, kBytesOfMean = 220, kBytesWithOidn = 1400;
 
 /// Of the mean: what its variance counts beside its square, and how much the weights of the whole image count; both
 /// measured (docs/methods/denoising.md).
 constexpr float kCountOfVariance = 2, kPriorOfMean = 5;
 
-CandidateSet candidates_of(const DenoisingPart& part, const std::vector<unsigned char>& valid,
-                           const std::vector<CandidateMaker>& makers) {
-  const Image h = mean_image(part.independent);
-  CandidateSet set;
-  set.base = part.image.estimate;
-  for (const CandidateMaker& maker : makers)
-    for (Image& image : maker.make({&part.image.estimate, &part.image.std_error, &h, &part.independent, &valid}))
-      set.candidates.push_back(std::move(image));
-  return set;
+/// Of each of the parts.
+std::vector<CandidateSet> candidates_of(const std::vector<const DenoisingPart*>& parts,
+                                        const std::vector<unsigned char>& valid,
+                                        const std::vector<CandidateMaker>& makers) {
+  std::deque<Image> h;
+  std::vector<CandidateInput> inputs;
+  std::vector<CandidateSet> sets;
+  for (const DenoisingPart* part : parts) {
+    h.push_back(mean_image(part->independent));
+    const Image *estimate = &part->image.estimate, *std_error = &part->image.std_error;
+    const Moments* independent = &part->independent;
+    if (const auto& limited = part->limited)
+      estimate = &limited->estimate, std_error = &limited->std_error, independent = &limited->independent;
+    inputs.push_back({estimate, std_error, &h.back(), independent, &valid});
+    sets.push_back({part->image.estimate, {}});
+  }
+  for (const CandidateMaker& maker : makers) {
+    std::vector<std::vector<Image>> images = maker.make(inputs);
+    for (size_t i = 0; i < sets.size(); ++i)
+      std::move(images[i].begin(), images[i].end(), std::back_inserter(sets[i].candidates));
+  }
+  return sets;
 }
 
 /// The first candidate: the image with little noise.
@@ -104,6 +119,8 @@ MeasuredRisks risks_of(const DenoisingParts& parts, const std::array<CandidateSe
 void check_guides(const Guides& guides) {
   if (guides.albedo) check_guide("the guide albedo", *guides.albedo);
   if (guides.normal) check_guide("the guide normal", *guides.normal);
+  if (guides.denoising_albedo) check_guide("the guide albedo behind glass", *guides.denoising_albedo);
+  if (guides.denoising_normal) check_guide("the guide normal behind glass", *guides.denoising_normal);
 }
 
 }  // namespace
@@ -128,9 +145,9 @@ MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<Candid
                                   bool std_error) {
   const ModeSettings chosen = settings_of(mode);
   const std::vector<unsigned char>& valid = parts.valid;
-  CandidateSet whole = candidates_of(parts.whole, valid, makers);
-  const std::array<CandidateSet, 2> halves = {candidates_of(parts.halves[0], valid, makers),
-                                              candidates_of(parts.halves[1], valid, makers)};
+  std::vector<CandidateSet> sets = candidates_of({&parts.whole, &parts.halves[0], &parts.halves[1]}, valid, makers);
+  CandidateSet whole = std::move(sets[0]);
+  const std::array<CandidateSet, 2> halves = {std::move(sets[1]), std::move(sets[2])};
   MixtureInput input;
   input.whole = &whole;
   input.halves = {&halves[0], &halves[1]};
@@ -186,7 +203,7 @@ bool can_be_mixed(const GroupedImage& image) {
 /// The candidate that was measured to be best where samples are few; without any the mean itself.
 MixedDenoising single_candidate(const GroupedImage& independent, const std::vector<CandidateMaker>& makers) {
   DenoisingParts parts = whole_of_mean(independent);
-  CandidateSet set = candidates_of(parts.whole, parts.valid, makers);
+  CandidateSet set = std::move(candidates_of({&parts.whole}, parts.valid, makers)[0]);
   MixedDenoising out;
   for (const CandidateMaker& maker : makers) out.names.insert(out.names.end(), maker.names.begin(), maker.names.end());
   const size_t best = static_cast<size_t>(makers[0].best_of_few);
@@ -247,7 +264,7 @@ Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& opt
   estimator.reads_guides = true;
   estimator.reach = -1;
   estimator.explain = nullptr;
-  estimator.memory.always += with_oidn ? kBytesWithOidn : kBytesPerPixel;
+  estimator.memory.always += with_oidn ? kBytesWithOidn : kBytesPerPixel + (is_mean(base) ? kBytesOfMean : 0);
   estimator.memory.of_halves = estimator.memory.of_halves_per_group = 0;  // part of that
   if (is_mean(base)) estimator.passes = EstimatorPasses::kIndependent, estimator.fewest_groups = 1;
   const Run run = is_mean(base) ? run_of_mean(options, with_oidn) : run_of_pair(base, options, with_oidn);

@@ -215,6 +215,38 @@ TEST(MixedDenoising, UsesGuides) {
   EXPECT_LT(square_error(guided.estimate), 0.8 * square_error(iicv_of(in)));
 }
 
+TEST(MixedDenoising, GivesTheNetworkGuidesBehindGlass) {
+  const Image images[4];
+  const Guides first{&images[0], &images[1], nullptr, nullptr}, all{&images[0], &images[1], &images[2], &images[3]};
+  EXPECT_EQ(network_guides(first).albedo, &images[0]);
+  EXPECT_EQ(network_guides(first).normal, &images[1]);
+  EXPECT_EQ(network_guides(all).albedo, &images[2]);
+  EXPECT_EQ(network_guides(all).normal, &images[3]);
+  const Guides half{&images[0], &images[1], &images[2], nullptr};
+  EXPECT_EQ(network_guides(half).albedo, &images[0]) << "both of the same surface";
+}
+
+/// A denoiser sees no fireflies, the mean keeps them.
+TEST(MixedDenoising, OfASinglePassKeepsFirefliesFromCandidates) {
+  test::Grouped image = test::noisy_image(kWidth, kHeight, 12, 5, 1.0f, 0);
+  float* group = &image.data[((20 * kWidth + 30) * 12 + 4) * 3];
+  for (int c = 0; c < 3; ++c) group[c] += 1200;
+  std::vector<Image> seen, independent;
+  CandidateMaker maker;
+  maker.names = {"seen"};
+  maker.make = one_by_one([&](const CandidateInput& in) {
+    seen.push_back(*in.estimate);
+    independent.push_back(*in.independent);
+    return std::vector<Image>{*in.estimate};
+  });
+  denoise_by_mixture(parts_of_mean(image.view()), {maker}, DenoiseMode::kError, false);
+  ASSERT_EQ(seen.size(), 3u);
+  EXPECT_GT(independent[0].pixel(30, 20)[0], 100);
+  EXPECT_GT(independent[1].pixel(30, 20)[0], 200) << "the half with the groups 0, 2, …";
+  for (const Image& part : seen)
+    for (float value : part.data) ASSERT_LT(value, 10);
+}
+
 TEST(MixedDenoising, DoesNotDependOnThreads) {
   const Inputs in(3);
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
@@ -230,7 +262,7 @@ TEST(MixedDenoising, GivesBadCandidatesNoWeightAndAPerfectOneMost) {
   const Inputs in(4, kWidth, kHeight, 12, 0);
   CandidateMaker planted;
   planted.names = {"blurred", "constant", "shifted", "perfect"};
-  planted.make = [](const CandidateInput& input) {
+  planted.make = one_by_one([](const CandidateInput& input) {
     const Image& f = *input.estimate;
     std::vector<Image> images(3, Image(f.width, f.height, 3));
     for (int y = 0; y < f.height; ++y)
@@ -244,7 +276,7 @@ TEST(MixedDenoising, GivesBadCandidatesNoWeightAndAPerfectOneMost) {
         }
     images.push_back(truth(1 / kOutliers));
     return images;
-  };
+  });
   const MixedDenoising all =
       denoise_by_mixture(parts_of_pair(make_estimator("iicv"), in.crn.view(), in.independent.view(), {}),
                          {filtered_candidates({}), planted}, DenoiseMode::kError, false);

@@ -35,6 +35,9 @@ enum class EstimatorPasses {
 struct Guides {
   const Image* albedo = nullptr;  ///< reflectance, in [0, 1]
   const Image* normal = nullptr;  ///< in [-1, 1]
+  /// The same of what is seen in mirrors and through glass, in their colour; null: as above.
+  const Image* denoising_albedo = nullptr;
+  const Image* denoising_normal = nullptr;
 };
 
 /// What an estimator of a pair is told beside the images.

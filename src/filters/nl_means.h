@@ -17,25 +17,28 @@
 
 namespace covary {
 
-struct NlMeansSteering {
-  const Image* image = nullptr;      ///< f
-  const Image* std_error = nullptr;  ///< s; where both are zero, only equal pixels are alike
-  const Planes* guides = nullptr;    ///< q, any number of planes; border of at least kNlMeansRadius; may be null
-  const std::vector<unsigned char>* valid = nullptr;  ///< pixels with 0 are left out of all sums
-};
-
 /// Images that are averaged with the same weights.
 struct NlMeansTask {
   float bandwidth = 0.5f;  ///< k > 0
   std::vector<const Image*> sources;
 };
 
+/// What steers the weights of some tasks.
+struct NlMeansSteering {
+  const Image* image = nullptr;      ///< f
+  const Image* std_error = nullptr;  ///< s; where both are zero, only equal pixels are alike
+  std::vector<NlMeansTask> tasks;
+};
+
 /// How far from a pixel its weights reach.
 inline constexpr int kNlMeansRadius = 10;
 
-/// The weighted means of all sources of all tasks, in their order. Weights of different tasks share their distances, so
-/// that a second task costs little. Pixels without any weight keep the source's value. All images have three channels
-/// and one size; values are finite. Bit-identical for any number of threads.
-std::vector<Image> nl_means(const NlMeansSteering& steering, std::span<const NlMeansTask> tasks);
+/// The weighted means of all sources of all tasks of all steerings, in their order. Tasks of one steering share their
+/// distances, and all steerings those of the guides: the second ones cost less. Pixels without any weight keep the
+/// source's value. All images have three channels and one size; values are finite. Bit-identical for any number of
+/// threads. `guides`: q, any number of planes, border of at least kNlMeansRadius; may be null. `valid`: pixels with 0
+/// are left out of all sums.
+std::vector<Image> nl_means(std::span<const NlMeansSteering> steerings, const Planes* guides,
+                            const std::vector<unsigned char>& valid);
 
 }  // namespace covary

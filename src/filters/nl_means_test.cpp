@@ -33,7 +33,10 @@ struct Picture {
         for (int i : {0, 1}) guides.row(i, y)[x] = test::noise(6, pixel, i);
       }
   }
-  NlMeansSteering steering() const { return {&f, &s, &guides, &valid}; }
+  std::vector<Image> filtered(const std::vector<NlMeansTask>& tasks) const {
+    const NlMeansSteering steering[] = {{&f, &s, tasks}};
+    return nl_means(steering, &guides, valid);
+  }
 };
 
 /// The formula of nl_means.h at one pixel.
@@ -68,11 +71,11 @@ std::array<double, 3> expected_mean(const Picture& p, const Image& source, int x
 TEST(NlMeans, IsItsFormula) {
   Picture p(150, 37);  // more than one tile in both directions
   p.valid[20 * 150 + 70] = 0;
-  const NlMeansTask tasks[] = {{0.5f, {&p.f, &p.other}}, {1.0f, {&p.f}}};
-  const std::vector<Image> images = nl_means(p.steering(), tasks);
-  ASSERT_EQ(images.size(), 3u);
+  const std::vector<Image> images = p.filtered({{0.5f, {&p.f, &p.other}}, {1.0f, {&p.f}}, {0.7f, {&p.other}}});
+  ASSERT_EQ(images.size(), 4u);
   for (const auto& [x, y] : {std::pair{0, 0}, {149, 36}, {125, 15}, {126, 16}, {69, 20}, {149, 5}})
-    for (const auto& [image, source, bandwidth] : {std::tuple{0, &p.f, 0.5}, {1, &p.other, 0.5}, {2, &p.f, 1.0}}) {
+    for (const auto& [image, source, bandwidth] :
+         {std::tuple{0, &p.f, 0.5}, {1, &p.other, 0.5}, {2, &p.f, 1.0}, {3, &p.other, 0.7}}) {
       const std::array<double, 3> expected = expected_mean(p, *source, x, y, bandwidth);
       for (int c = 0; c < 3; ++c)
         EXPECT_NEAR(images[image].pixel(x, y)[c], expected[c], 2e-5) << x << " " << y << " image " << image;
@@ -83,28 +86,46 @@ TEST(NlMeans, LeavesOutWhatIsNotValid) {
   Picture p(20, 20);
   for (int c = 0; c < 3; ++c) p.other.pixel(9, 9)[c] = 1e30f;
   p.valid[9 * 20 + 9] = 0;
-  const NlMeansTask tasks[] = {{1.0f, {&p.other}}};
-  const Image image = nl_means(p.steering(), tasks)[0];
+  const Image image = p.filtered({{1.0f, {&p.other}}})[0];
   for (float value : image.data) ASSERT_LT(value, 1.0f);
 }
 
 TEST(NlMeans, KeepsWhatHasNoErrorAndNoEqual) {
   Picture p(5, 4);
   std::fill(p.s.data.begin(), p.s.data.end(), 0.0f);
-  const NlMeansTask tasks[] = {{0.5f, {&p.f}}};
-  EXPECT_EQ(nl_means(p.steering(), tasks)[0].data, p.f.data);
+  EXPECT_EQ(p.filtered({{0.5f, {&p.f}}})[0].data, p.f.data);
   const Picture one(1, 1);
-  const NlMeansTask task[] = {{0.5f, {&one.f}}};
-  EXPECT_EQ(nl_means(one.steering(), task)[0].data, one.f.data);
+  EXPECT_EQ(one.filtered({{0.5f, {&one.f}}})[0].data, one.f.data);
 }
 
 TEST(NlMeans, DoesNotDependOnThreads) {
   const Picture p(140, 40);
-  const NlMeansTask tasks[] = {{0.5f, {&p.f}}};
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
-  const std::vector<float> alone = nl_means(p.steering(), tasks)[0].data;
+  const std::vector<float> alone = p.filtered({{0.5f, {&p.f}}})[0].data;
   const tbb::global_control four(tbb::global_control::max_allowed_parallelism, 4);
-  EXPECT_EQ(nl_means(p.steering(), tasks)[0].data, alone);
+  EXPECT_EQ(p.filtered({{0.5f, {&p.f}}})[0].data, alone);
+}
+
+TEST(NlMeans, OfSeveralImagesIsThatOfEach) {
+  const Picture p(140, 40);
+  const NlMeansSteering both[] = {{&p.f, &p.s, {{0.5f, {&p.f}}}}, {&p.other, &p.s, {{1.0f, {&p.other, &p.f}}}}};
+  const std::vector<Image> images = nl_means(both, &p.guides, p.valid);
+  ASSERT_EQ(images.size(), 3u);
+  const std::vector<Image> second = nl_means(std::span(both).last(1), &p.guides, p.valid);
+  EXPECT_EQ(images[0].data, p.filtered({{0.5f, {&p.f}}})[0].data);
+  EXPECT_EQ(images[1].data, second[0].data);
+  EXPECT_EQ(images[2].data, second[1].data);
+}
+
+TEST(NlMeans, KeepsToValuesOfAnySize) {
+  for (const float scale : {0.1f, 1e14f}) {
+    Picture p(40, 20), scaled = p;
+    for (Image* image : {&scaled.f, &scaled.s})
+      for (float& value : image->data) value *= scale;
+    const Image expected = p.filtered({{0.5f, {&p.f}}})[0], image = scaled.filtered({{0.5f, {&scaled.f}}})[0];
+    for (size_t i = 0; i < image.data.size(); ++i)
+      ASSERT_NEAR(image.data[i] / scale, expected.data[i], 1e-4 * (1 + std::abs(expected.data[i])));
+  }
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <atomic>
 #include <filesystem>
 #include <fstream>
+#include <map>
 
 #include "film/film_file.h"
 #include "film/image_file.h"
@@ -267,6 +268,26 @@ TEST(Failure, FilmsOfAFolderAreThereBeforeTheEstimate) {
     return make(passes, row, n_rows, guides);
   };
   render(scene, plan, request);
+}
+
+TEST(Estimate, GetsGuidesOfTheFirstSurfaceAndOfThatBehindGlass) {
+  const LoadedScene scene = load_sized(kRoom);
+  const TemporaryFolder folder;
+  RenderRequest request = request_of(24);
+  request.output = folder.file("a.exr");
+  Plan plan = average_plan();
+  plan.reads_guides = true;
+  std::map<std::string, std::vector<float>> guided;
+  plan.estimate = [&, make = plan.estimate](std::span<const Pass> passes, int row, int n_rows, const Guides& guides) {
+    guided = {{"Albedo", guides.albedo->data},
+              {"N", guides.normal->data},
+              {"DenoisingAlbedo", guides.denoising_albedo->data},
+              {"DenoisingNormal", guides.denoising_normal->data}};
+    return make(passes, row, n_rows, guides);
+  };
+  const RenderResult result = render(scene, plan, request);
+  for (const auto& [name, data] : guided) EXPECT_EQ(data, result.aovs.at(name).data) << name;
+  EXPECT_EQ(guided.size(), 4u);
 }
 
 TEST(Failure, FilmsOfFailedPathLengthsAreKept) {

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <exception>
 #include <filesystem>
 #include <utility>
@@ -32,12 +33,12 @@ constexpr double kEstimateOfInterrupted = 0.5;  // seconds that it may take; aft
 }  // namespace
 
 EstimatorResult PlanRun::estimate_rows(int first_row, int n_rows) const {
-  Image albedo, normal;
+  std::array<Image, 4> layers;
   Guides guides;
   if (plan_.reads_guides && !result_.aovs.empty()) {  // empty where the render was stopped before
-    albedo = rows_of(result_.aovs.at("Albedo"), first_row, n_rows);
-    normal = rows_of(result_.aovs.at("N"), first_row, n_rows);
-    guides = {&albedo, &normal};
+    const char* const names[] = {"Albedo", "N", "DenoisingAlbedo", "DenoisingNormal"};
+    for (size_t i = 0; i < layers.size(); ++i) layers[i] = rows_of(result_.aovs.at(names[i]), first_row, n_rows);
+    guides = {&layers[0], &layers[1], &layers[2], &layers[3]};
   }
   EstimatorResult image = plan_.estimate(camera_passes(state_.passes), first_row, n_rows, guides);
   const Pass* light = light_pass(state_.passes);

@@ -98,6 +98,13 @@ class Denoise(RenderTest):
                           "guide must be finite"
                 self.bad(1, message, *inputs, "--denoise", "error", *PLAIN, "--guides", "guides.exr")
                 self.bad(1, message, "denoise", "guides.exr", "-o", "d.exr")
+            seen = {f"{layer}.{c}": [0.5] * (width * height) for layer, names in (("DenoisingAlbedo", "RGB"),
+                                                                                 ("DenoisingNormal", "XYZ"))
+                    for c in names} | {"DenoisingNormal.Y": [value] * (width * height)}
+            self.write("guides.exr", exr({**layers, **seen, **{c: [0.5] * (width * height) for c in "RGB"}},
+                                         (width, height)))
+            self.bad(1, f"guides.exr: the layer DenoisingNormal holds the value {value} at pixel (0, 0)", *inputs,
+                     "--denoise", "error", *PLAIN, "--guides", "guides.exr")
         self.bad(2, "--explain: with --denoise", *inputs, "--denoise", "error", *PLAIN, "--explain", "1,1")
 
     def test_single_pass(self):
