@@ -82,7 +82,11 @@ def limit_time():
 
 def outcome(program, scene, out):
     command = [program, "render", str(scene), "--resolution", "12x12", "--spp", "2", "--estimator", "none", "--groups",
-               "1", "--no-preview", "--overwrite", "-D", "integrator=path", "-D", "spp=2", "-o", str(out)]
+               "1", "--no-preview", "--overwrite", "-o", str(out)]
+    text = scene.read_text()
+    for name, value in (("integrator", "path"), ("spp", "2")):
+        if f"${name}" in text or f'<default name="{name}"' in text:  # others would be refused
+            command += ["-D", f"{name}={value}"]
     result = subprocess.run(command, capture_output=True, preexec_fn=limit_time, check=False,
                             env={**os.environ, "COVARY_MEMORY": "2"})
     if result.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
