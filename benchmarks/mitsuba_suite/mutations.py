@@ -4,9 +4,9 @@
     mutations.py FOLDER [--count N] [--seed S]      exit code 1 where a process was killed by a signal
 
 FOLDER is a copy of github.com/mitsuba-renderer/mitsuba-data; the files are those of tests/scenes and docs/scenes. A
-mutation is one to three of: a number becomes another or an extreme one, a line is left out, doubled or exchanged, the
-name of a plugin or property becomes one of another file, a byte changes, the end is cut off. It is rendered at 12 x 12
-pixels and two samples, within 2 GB (COVARY_MEMORY) and 60 s of processor time.
+mutation is one to three of: a number becomes another or an extreme one, the name of a plugin or property becomes one of
+another file, an element is left out, doubled or exchanged, a byte changes, the end is cut off. It is rendered at
+12 x 12 pixels and two samples, within 2 GB (COVARY_MEMORY) and 60 s of processor time.
 """
 import argparse
 import collections
@@ -20,8 +20,9 @@ import subprocess
 import sys
 import tempfile
 
-NUMBER = re.compile(r"-?\d+\.?\d*(?:e-?\d+)?")
-NAME = re.compile(r'(?<=type=")[a-z_]+|(?<=name=")[a-z_0-9]+')
+NUMBER = re.compile(r'(?<=")-?\d+\.?\d*(?:e-?\d+)?(?="| |,)')
+TYPE = re.compile(r'(?<=type=")[a-z_]+')
+NAME = re.compile(r'(?<= name=")[a-z_0-9]+')
 EXTREMES = ["0", "-1", "1e30", "-1e30", "nan", "inf", "1e-30", "4294967296", "2", "0.5", ""]
 SECONDS = 60
 
@@ -36,7 +37,8 @@ def replace_one(text, pattern, replacement):
 
 def change_lines(text):
     lines = text.splitlines(keepends=True)
-    i, j = RANDOM.randrange(len(lines)), RANDOM.randrange(len(lines))
+    whole = [i for i, line in enumerate(lines) if line.rstrip().endswith("/>")] or [0]  # mostly elements
+    i, j = RANDOM.choice(whole), RANDOM.choice(whole)
     kind = RANDOM.randrange(3)
     if kind == 0:
         del lines[i]
@@ -47,16 +49,18 @@ def change_lines(text):
     return "".join(lines)
 
 
-def mutate(text, names):
+def mutate(text, types, names):
     for _ in range(RANDOM.randint(1, 3)):
-        kind = RANDOM.randrange(10)
-        if kind < 4:
-            text = replace_one(text, NUMBER, lambda: RANDOM.choice(EXTREMES + [str(RANDOM.uniform(-10, 10))]))
-        elif kind < 6:
+        kind = RANDOM.randrange(20)
+        if kind < 10:
+            text = replace_one(text, NUMBER, lambda: RANDOM.choice(EXTREMES + [str(RANDOM.uniform(-10, 10))] * 8))
+        elif kind < 13:
+            text = replace_one(text, TYPE, lambda: RANDOM.choice(types))
+        elif kind < 14:
             text = replace_one(text, NAME, lambda: RANDOM.choice(names))
-        elif kind < 8 and text:
-            text = change_lines(text)
-        elif kind == 8 and text:
+        elif kind < 19 or not text:
+            text = change_lines(text) if text else text
+        elif RANDOM.randrange(2):
             i = RANDOM.randrange(len(text))
             text = text[:i] + chr(RANDOM.randrange(32, 127)) + text[i + 1:]
         else:
@@ -108,7 +112,8 @@ def main(arguments):
     parser.add_argument("--keep", type=pathlib.Path, metavar="DIR", help="folder of the files that are no success")
     options = parser.parse_args(arguments)
     scenes = sorted(options.folder.glob("docs/scenes/*.xml")) + sorted(options.folder.glob("tests/scenes/*/*.xml"))
-    names = sorted({name for scene in scenes for name in NAME.findall(scene.read_text())})
+    types, names = (sorted({word for scene in scenes for word in pattern.findall(scene.read_text())})
+                    for pattern in (TYPE, NAME))
     counts = collections.Counter()
     with tempfile.TemporaryDirectory() as folder:
         copy = pathlib.Path(folder)
@@ -117,7 +122,7 @@ def main(arguments):
             RANDOM.seed(options.seed * 1000003 + i)
             scene = scenes[i % len(scenes)]
             mutation = copy / scene.relative_to(options.folder).parent / "mutation.xml"
-            mutation.write_text(mutate(scene.read_text(), names))
+            mutation.write_text(mutate(scene.read_text(), types, names))
             what = outcome(options.covary, mutation, copy / "out.exr")
             counts[what] += 1
             if sys.stderr.isatty() or options.progress:
