@@ -15,7 +15,7 @@
 #include "estimators/iicv.h"
 #include "estimators/pilot.h"
 #include "estimators/polynomials.h"
-#include "filters/feedback.h"
+#include "filters/residual_correction.h"
 #include "filters/neighbours.h"
 
 namespace covary {
@@ -104,7 +104,7 @@ void one_regression(benchmark::State& state) {
   count(state);
 }
 
-void one_feedback(benchmark::State& state) {
+void one_residual_correction(benchmark::State& state) {
   const Input& in = input();
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
   IicvOptions options;
@@ -113,7 +113,7 @@ void one_feedback(benchmark::State& state) {
   const EstimatorResult before = iicv(in.crn, in.independent, options);
   for (auto _ : state) {
     Image estimate = before.estimate;
-    add_feedback(in.h, FeedbackOptions(), in.valid, before.std_error, estimate);
+    add_residual_correction(in.h, ResidualCorrectionOptions(), in.valid, before.std_error, estimate);
     benchmark::DoNotOptimize(estimate.data.data());
   }
   count(state);
@@ -182,7 +182,7 @@ BENCHMARK(one_moments)->Unit(benchmark::kMillisecond);
 BENCHMARK(one_pilot)->Unit(benchmark::kMillisecond);
 BENCHMARK(one_neighbours)->Unit(benchmark::kMillisecond);
 BENCHMARK(one_regression)->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
-BENCHMARK(one_feedback)->Unit(benchmark::kMillisecond);
+BENCHMARK(one_residual_correction)->Unit(benchmark::kMillisecond);
 BENCHMARK(one_polynomials)->ArgsProduct({{2, 4, 6}, {48, 192}});
 BENCHMARK_CAPTURE(whole_iicv, default, IicvOptions())->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK_CAPTURE(whole_iicv, paper, IicvOptions::paper())->Unit(benchmark::kMillisecond)->UseRealTime();
