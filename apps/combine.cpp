@@ -251,14 +251,13 @@ nlohmann::ordered_json statistics(const CombineOptions& o, const CombineRequest&
                                    {"estimate", combined.estimate_seconds},
                                    {"write", write_seconds}}}};
   if (combined.predicted_relmse) {
-    json["predicted_relmse"] = *combined.predicted_relmse;
-    json["predicted_relmse_reliable"] = combined.prediction_doubt.empty();
-    if (!combined.prediction_doubt.empty()) json["predicted_relmse_doubt"] = combined.prediction_doubt;
+    add_prediction(*combined.predicted_relmse, combined.predicted_bounds, combined.prediction_doubt, json);
     json["independent_predicted_relmse"] =
         predicted_relmse_of_mean(request.independent, std::max(1, rows_in_memory(request)));
   }
   if (request.light) json["light_groups"] = request.light->groups;
   add_risks(combined.image.risks, json);
+  add_error_sums(combined.image.risk_sums, json);
   add_network(request.estimator.network, denoising_of(o), json);
   if (!combined.image.note.empty()) json["note"] = combined.image.note;
   return json;
@@ -316,7 +315,7 @@ void combine_files(CombineOptions o, const CLI::App& command) {
                o.output, request.independent.width, request.independent.height, request.estimator.text,
                request.crn ? fmt::format("{} + ", request.crn->groups) : "", request.independent.groups,
                combined.estimate_seconds, combined.check_seconds, write_seconds);
-  if (!o.quiet) print_risks(combined.image, combined.predicted_relmse, denoising_of(o));
+  if (!o.quiet) print_risks(combined, denoising_of(o));
   if (!o.json.empty()) write_text_output(o.json, json_text(json));
 }
 

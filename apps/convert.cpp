@@ -10,6 +10,7 @@
 
 #include "commands.h"
 #include "core/error.h"
+#include "false_colours.h"
 #include "film/image_writer.h"
 #include "film/output_file.h"
 #include "film/outputs.h"
@@ -24,7 +25,7 @@ struct ConvertOptions {
   std::vector<std::string> files;  // the last is the output
   std::string layer;
   double exposure = 0;
-  bool accept_changed = false, overwrite = false;
+  bool accept_changed = false, overwrite = false, colours = false;
 
   ChecksumPolicy checksums() const { return accept_changed ? ChecksumPolicy::kIgnore : ChecksumPolicy::kCheck; }
 };
@@ -117,6 +118,10 @@ void convert(const ConvertOptions& options) {
   if (inputs.size() > 1) place = {image.width, image.height, {0, 0, image.width, image.height}};
   const float factor = static_cast<float>(std::exp2(options.exposure));
   for (float& value : image.data) value *= factor;
+  if (options.colours) {
+    image = in_false_colours(image);
+    place = {image.width, image.height, {0, 0, image.width, image.height}};
+  }
   write_image(output, image, place, attributes_of(options));
 }
 
@@ -138,6 +143,8 @@ void add_convert(CLI::App& app) {
       ->capture_default_str();
   command->add_option("--layer", o->layer, "Layer (N, group03, …) or single channel (samples) in place of R G B")
       ->type_name("LAYER");
+  command->add_flag("--false-colours", o->colours,
+                    "Brightness as colours over three powers of ten, with a scale below: for --layer StdError");
   command->add_flag("--accept-changed", o->accept_changed,
                     "Take an image of covary that another program changed: the new one says nothing of its origin");
   command->add_flag("--overwrite", o->overwrite, "Replace OUT, whatever it is; else only pictures made by convert");

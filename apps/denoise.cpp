@@ -172,7 +172,7 @@ void denoise_by_mixture(const Options& o, const GroupedFile& file, const GuideLa
   if (o.quiet) return;
   fmt::print(stderr, "{}: {} x {}, {} of {} groups, {}, in {:.2f} s\n", o.output, file.width(), file.height(),
              request.estimator.text, file.groups(), guides.text(), combined.check_seconds + combined.estimate_seconds);
-  print_risks(combined.image, combined.predicted_relmse, choice);
+  print_risks(combined, choice);
 }
 
 /// Whatever the image is.

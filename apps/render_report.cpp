@@ -34,9 +34,10 @@ std::string replay_command(const RenderOptions& o, const Pass& pass, const BadSa
   return shell_text(words);
 }
 
-/// " (unreliable: 71 % of it lies in …)", or nothing where nothing speaks against the predicted error.
-std::string doubt_in_brackets(const RenderResult& result) {
-  return result.prediction_doubt.empty() ? "" : fmt::format(" (unreliable: {})", result.prediction_doubt);
+/// What is said of the error, with its bounds, what the image gains, and why it may be doubted.
+std::string prediction_of(const RenderResult& result) {
+  return predicted_text(*result.predicted_relmse, result.predicted_bounds) +
+         (result.image.risks ? risks_text(*result.image.risks) : "") + doubt_in_brackets(result.prediction_doubt);
 }
 
 nlohmann::ordered_json json_of(const IntegratorReport& report) {
@@ -139,12 +140,11 @@ nlohmann::ordered_json statistics(const RenderReport& report) {
   if (const IntegratorReport of = result.integrator->report(); !of.name.empty()) json[of.name] = json_of(of);
   if (const Pass* light = light_pass(result.passes)) json["light_paths"] = light_paths(light->film);
   if (result.predicted_relmse) {
-    json["predicted_relmse"] = *result.predicted_relmse;
+    add_prediction(*result.predicted_relmse, result.predicted_bounds, result.prediction_doubt, json);
     json["predicted_relmse_p95"] = *result.predicted_blocks;
-    json["predicted_relmse_reliable"] = result.prediction_doubt.empty();
-    if (!result.prediction_doubt.empty()) json["predicted_relmse_doubt"] = result.prediction_doubt;
   }
   add_risks(result.image.risks, json);
+  add_error_sums(result.image.risk_sums, json);
   add_network(estimator.network, options.settings.denoising, json);
   if (!result.image.note.empty()) json["note"] = result.image.note;
   if (result.until_reached) json["until_reached"] = *result.until_reached;
@@ -172,11 +172,10 @@ void print_summary(const RenderReport& report) {
   if (estimator.passes != EstimatorPasses::kAny) {
     fmt::print(stderr, "{}{} in {:.2f} s", estimator.text,
                estimator.network.empty() ? "" : " with " + estimator.network, result.estimate_seconds());
-    if (result.predicted_relmse && !result.image.risks)
-      fmt::print(stderr, ", predicted relMSE {:.3g}", *result.predicted_relmse);
-    fmt::print(stderr, "{}\n", result.image.risks ? "" : doubt_in_brackets(result));
+    if (result.predicted_relmse && !result.image.risks) fmt::print(stderr, ", {}", prediction_of(result));
+    fmt::print(stderr, "\n");
   } else if (result.predicted_relmse) {
-    fmt::print(stderr, "predicted relMSE {:.3g}{}\n", *result.predicted_relmse, doubt_in_brackets(result));
+    fmt::print(stderr, "{}\n", prediction_of(result));
   }
   for (const std::string& note : {missing_network(options.settings.denoising), result.image.note})
     if (!note.empty()) fmt::print(stderr, "note: {}\n", as_flags(note));
@@ -185,8 +184,7 @@ void print_summary(const RenderReport& report) {
     fmt::print(stderr, "warning: --time {:g} was exceeded: {:.2f} s for at least {} samples per pixel in each pass{}\n",
                limit, result.seconds.limited, result.passes[0].film.groups(),
                estimator.passes == EstimatorPasses::kPair ? " and the estimate" : "");
-  if (result.predicted_relmse && result.image.risks)
-    fmt::print(stderr, "{}{}\n", risks_text(*result.predicted_relmse, *result.image.risks), doubt_in_brackets(result));
+  if (result.predicted_relmse && result.image.risks) fmt::print(stderr, "{}\n", prediction_of(result));
 }
 
 }  // namespace covary

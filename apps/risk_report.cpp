@@ -3,13 +3,31 @@
 
 #include <fmt/format.h>
 
+#include "risk/error_interval.h"
 #include "settings/option_names.h"
 
 namespace covary {
 
-std::string risks_text(double predicted, const MeasuredRisks& risks) {
-  std::string text =
-      fmt::format("predicted relMSE {:.3g}, {:.0f} % of it squared bias", predicted, 100 * risks.bias_share);
+std::string predicted_text(double predicted, const std::optional<PredictedBounds>& bounds) {
+  std::string text = fmt::format("predicted relMSE {:.3g}", predicted);
+  if (bounds) text += fmt::format(", between {:.2g} and {:.2g} ({} %)", bounds->low, bounds->high, kIntervalPercent);
+  return text;
+}
+
+std::string doubt_in_brackets(const std::string& doubt) {
+  return doubt.empty() ? "" : fmt::format(" (unreliable: {})", doubt);
+}
+
+void add_prediction(double predicted, const std::optional<PredictedBounds>& bounds, const std::string& doubt,
+                    nlohmann::ordered_json& json) {
+  json["predicted_relmse"] = predicted;
+  if (bounds) json["predicted_relmse_low"] = bounds->low, json["predicted_relmse_high"] = bounds->high;
+  json["predicted_relmse_reliable"] = doubt.empty();
+  if (!doubt.empty()) json["predicted_relmse_doubt"] = doubt;
+}
+
+std::string risks_text(const MeasuredRisks& risks) {
+  std::string text = fmt::format(", {:.0f} % of it squared bias", 100 * risks.bias_share);
   const char* before = "; ";
   for (size_t i = 0; i < risks.images.size(); ++i) {
     const auto& [name, relmse] = risks.images[i];
@@ -24,16 +42,23 @@ std::string risks_text(double predicted, const MeasuredRisks& risks) {
   return text;
 }
 
-void print_risks(const EstimatorResult& image, std::optional<double> predicted, const DenoisingChoice& choice) {
-  for (const std::string& note : {missing_network(choice), image.note})
+void print_risks(const CombinedImage& combined, const DenoisingChoice& choice) {
+  for (const std::string& note : {missing_network(choice), combined.image.note})
     if (!note.empty()) fmt::print(stderr, "note: {}\n", as_flags(note));
-  if (predicted && image.risks) fmt::print(stderr, "{}\n", risks_text(*predicted, *image.risks));
+  if (combined.predicted_relmse && combined.image.risks)
+    fmt::print(stderr, "{}{}{}\n", predicted_text(*combined.predicted_relmse, combined.predicted_bounds),
+               risks_text(*combined.image.risks), doubt_in_brackets(combined.prediction_doubt));
 }
 
 void add_risks(const std::optional<MeasuredRisks>& risks, nlohmann::ordered_json& json) {
   if (!risks) return;
   json["predicted_bias_share"] = risks->bias_share;
   for (const auto& [name, relmse] : risks->images) json["risks"][name] = relmse;
+}
+
+void add_error_sums(const std::optional<RiskRow>& sums, nlohmann::ordered_json& json) {
+  if (!sums) return;
+  for (const auto& [name, sum] : kRiskSums) json["error_sums"][name] = (*sums).*sum;
 }
 
 void add_network(const std::string& network, const DenoisingChoice& choice, nlohmann::ordered_json& json) {

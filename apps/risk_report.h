@@ -6,19 +6,32 @@
 #include <optional>
 #include <string>
 
+#include "combine/combine.h"
 #include "denoising/mixed_denoising.h"
 #include "estimators/estimator_result.h"
+#include "risk/predicted_error.h"
 
 namespace covary {
 
-/// "predicted relMSE 0.0021, 18 % of it squared bias; the mean of the samples has 0.012, Open Image Denoise 0.0025"
-std::string risks_text(double predicted, const MeasuredRisks& risks);
+/// "predicted relMSE 0.0021, between 0.0016 and 0.0029 (80 %)", without bounds where none can be given.
+std::string predicted_text(double predicted, const std::optional<PredictedBounds>& bounds);
+/// ", 18 % of it squared bias; the mean of the samples has 0.012, Open Image Denoise 0.0025": what follows it.
+std::string risks_text(const MeasuredRisks& risks);
+/// " (unreliable: known to a factor of 1.8)", or nothing where nothing speaks against the predicted error.
+std::string doubt_in_brackets(const std::string& doubt);
 
 /// Lines on stderr: what is missing or to be known, and last the risks.
-void print_risks(const EstimatorResult& image, std::optional<double> predicted, const DenoisingChoice& choice);
+void print_risks(const CombinedImage& combined, const DenoisingChoice& choice);
+
+/// "predicted_relmse", its bounds "predicted_relmse_low" and "_high", "predicted_relmse_reliable" and why not.
+void add_prediction(double predicted, const std::optional<PredictedBounds>& bounds, const std::string& doubt,
+                    nlohmann::ordered_json& json);
 
 /// "predicted_bias_share" and "risks"; nothing where they are not known.
 void add_risks(const std::optional<MeasuredRisks>& risks, nlohmann::ordered_json& json);
+
+/// "error_sums": what the interval is made of; nothing where it is not known.
+void add_error_sums(const std::optional<RiskRow>& sums, nlohmann::ordered_json& json);
 
 /// "denoiser", the network that took part, and "denoiser_missing": that it could not, and how to get it.
 void add_network(const std::string& network, const DenoisingChoice& choice, nlohmann::ordered_json& json);

@@ -29,8 +29,10 @@ class Result:
     bias: FloatArray | None = field(repr=False)
     #: relMSE that the standard errors predict, with the image in place of a reference.
     predicted_relmse: float | None
-    #: Why that may be off by more than a factor of two, such as few samples, or few pixels that hold most of it; ""
-    #: where nothing speaks against it.
+    #: Between which it is in 80 of 100 renders; None where that is not known, or cannot be given.
+    predicted_bounds: tuple[float, float] | None
+    #: Why it is not reliable, such as bounds that are further than a factor of 1.5 from it, few samples, or few pixels
+    #: that hold most of it; "" where nothing speaks against it.
     prediction_doubt: str
     #: What the checks of the inputs, or the render, warned of.
     warnings: list[str]

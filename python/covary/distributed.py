@@ -293,7 +293,7 @@ def _result(canvas: _Canvas, plan: _Plan, n_kept: int, seconds: float) -> Cluste
     films = canvas.films()
     samples = sum(film.samples_per_pixel for film in films.values())
     if plan.estimator == "none":
-        made = Result(next(iter(films.values())).mean, None, None, None, "", [], 0, "none", samples)
+        made = Result(next(iter(films.values())).mean, None, None, None, None, "", [], 0, "none", samples)
     else:
         made = combine(films["crn"], films["independent"], plan.estimator,  # type: ignore[arg-type]
                        albedo=canvas.aovs.get("Albedo"), normal=canvas.aovs.get("N"), **{"force": True, **plan.options})

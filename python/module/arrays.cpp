@@ -142,6 +142,11 @@ nb::object array_of(Image&& image) {
   return array_of(std::move(image.data), shape, {});
 }
 
+nb::object bounds_of(const std::optional<PredictedBounds>& bounds) {
+  if (!bounds) return nb::none();
+  return nb::make_tuple(bounds->low, bounds->high);
+}
+
 nb::object groups_array(std::vector<float>&& values, int width, int height, int groups) {
   const int64_t W = width, T = groups;
   return array_of(std::move(values),

@@ -10,11 +10,13 @@
 #include <cstdint>
 #include <cstdlib>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "film/film.h"
 #include "film/grouped_image.h"
+#include "risk/predicted_error.h"
 
 namespace covary::python {
 
@@ -56,6 +58,8 @@ Image image_of(nb::handle array, const std::string& name, const std::string& sha
 
 /// [H, W, channels], or [H, W] with one channel, of the image's memory; None where it is empty.
 nb::object array_of(Image&& image);
+/// (low, high), or None.
+nb::object bounds_of(const std::optional<PredictedBounds>& bounds);
 /// [T, H, W, 3] of values in the order [H, W, T, 3].
 nb::object groups_array(std::vector<float>&& values, int width, int height, int groups);
 

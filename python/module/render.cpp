@@ -106,6 +106,7 @@ nb::dict dict_of(RenderResult&& result, const std::string& estimator, const std:
   d["std_error"] = array_of(std::move(result.image.std_error));
   d["bias"] = array_of(std::move(result.image.bias));
   d["predicted_relmse"] = result.predicted_relmse;
+  d["predicted_bounds"] = bounds_of(result.predicted_bounds);
   d["prediction_doubt"] = result.prediction_doubt;
   d["predicted_relmse_p95"] = result.predicted_blocks;
   d["nonfinite_pixels"] = result.image.nonfinite_pixels;

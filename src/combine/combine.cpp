@@ -14,6 +14,7 @@
 #include "estimators/mean.h"
 #include "filters/planes.h"
 #include "filters/residual_correction.h"
+#include "risk/error_interval.h"
 #include "risk/held_out_error.h"
 #include "risk/predicted_error.h"
 
@@ -46,6 +47,9 @@ void append(const EstimatorResult& part, int skipped, int y, int n, int height, 
   copy(part.bias, whole.bias);
   if (!part.held_out.empty())
     whole.held_out.insert(whole.held_out.end(), part.held_out.begin() + skipped, part.held_out.begin() + skipped + n);
+  if (!part.risk_rows.empty())
+    whole.risk_rows.insert(whole.risk_rows.end(), part.risk_rows.begin() + skipped,
+                           part.risk_rows.begin() + skipped + n);
 }
 
 void check_memory(const CombineRequest& request, double planned) {
@@ -157,6 +161,7 @@ double predicted_relmse_of_mean(const GroupedSource& image, int rows) {
 
 void finish(EstimatorResult& result, const GroupedImage* light) {
   calibrate(result);
+  apply_interval(result);
   if (!light) return;
   const double before = result.risks ? predicted_relmse(result) : 0;
   add_light(*light, result);
@@ -184,6 +189,7 @@ CombinedImage combine(const CombineRequest& request) {
     const double crn = request.crn ? request.crn->samples : 0, samples = crn + request.independent.samples;
     const bool counted = (crn > 0 || !request.crn) && request.independent.samples > 0;
     combined.predicted_relmse = predicted_relmse(combined.image);
+    combined.predicted_bounds = predicted_bounds(combined.image);
     combined.prediction_doubt =
         doubt_of_prediction(combined.image, counted ? samples : std::numeric_limits<double>::infinity(),
                             request.estimator.reliable_samples);

@@ -12,6 +12,7 @@
 #include "combine/grouped_source.h"
 #include "combine/input_checks.h"
 #include "estimators/estimator.h"
+#include "risk/predicted_error.h"
 
 namespace covary {
 
@@ -39,8 +40,9 @@ struct CombineRequest {
 
 struct CombinedImage {
   EstimatorResult image;
-  std::optional<double> predicted_relmse;  ///< predicted_error.h; where there is a standard error
-  std::string prediction_doubt;            ///< of predicted_error.h; empty where nothing speaks against it
+  std::optional<double> predicted_relmse;           ///< predicted_error.h; where there is a standard error
+  std::optional<PredictedBounds> predicted_bounds;  ///< of predicted_error.h; empty where none can be given
+  std::string prediction_doubt;                     ///< of predicted_error.h; empty where nothing speaks against it
   InputFindings inputs;
   double planned_memory = 0;  ///< planned_memory() of the request
   double check_seconds = 0, estimate_seconds = 0;

@@ -124,6 +124,7 @@ CandidateMaker neural_candidates(const Guides& guides, const DenoiseOptions& opt
   };
   CandidateMaker maker;
   maker.error_over_variance = 1.1;
+  maker.network = true;
   if (base == CandidateBase::kPair) {
     maker.names = {"oidn", "oidn-independent"};
     maker.make = one_by_one([denoised](const CandidateInput& in) {

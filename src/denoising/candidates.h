@@ -40,6 +40,7 @@ struct CandidateMaker {
   /// What the squared error of a mixture that has these usually is, over the variance of mixtures of half of the
   /// samples: the more of it they take away, the more of the error is bias. Measured (docs/methods/error-estimates.md).
   double error_over_variance = 0.65;
+  bool network = false;  ///< a neural network makes them
   /// Number of the one to show where samples are too few to judge.
   int best_of_few = 0;
 };

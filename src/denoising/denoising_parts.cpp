@@ -92,6 +92,7 @@ DenoisingParts parts_of_pair(const Estimator& base, const GroupedImage& crn, con
                              const PairSettings& settings) {
   DenoisingParts parts;
   parts.name = base.name;
+  parts.groups = independent;
   long ignored = 0;  // the base counts them
   parts.valid = finite_pixels(crn, independent, ignored);
   parts.whole = part_of_pair(base, crn, independent, settings, parts.valid);
@@ -107,6 +108,7 @@ DenoisingParts parts_of_pair(const Estimator& base, const GroupedImage& crn, con
 DenoisingParts whole_of_mean(const GroupedImage& independent) {
   DenoisingParts parts;
   parts.is_mean = true;
+  parts.groups = independent;
   long n_nonfinite = 0;
   parts.valid = finite_pixels(independent, independent, n_nonfinite);
   parts.whole = part_of_mean(independent, parts.valid);

@@ -17,6 +17,7 @@
 #include "filters/residual_correction.h"
 #include "risk/held_out_bias.h"
 #include "risk/held_out_error.h"
+#include "risk/image_risk.h"
 #include "risk/predicted_error.h"
 #include "risk/relative_weight.h"
 
@@ -116,6 +117,11 @@ MeasuredRisks risks_of(const DenoisingParts& parts, const std::array<CandidateSe
   return risks;
 }
 
+ErrorKind kind_of(const std::vector<CandidateMaker>& makers) {
+  const bool network = std::any_of(makers.begin(), makers.end(), [](const CandidateMaker& m) { return m.network; });
+  return network ? ErrorKind::kNetwork : ErrorKind::kFilters;
+}
+
 void check_guides(const Guides& guides) {
   if (guides.albedo) check_guide("the guide albedo", *guides.albedo);
   if (guides.normal) check_guide("the guide normal", *guides.normal);
@@ -181,6 +187,11 @@ MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<Candid
     const HeldOutInput held_out{images, input.independent, input.guide, &valid, usual};
     result.std_error = held_out_error(held_out);
     result.bias = held_out_bias({images, {&guide_of(halves[0]), &guide_of(halves[1])}, input.independent, &valid});
+    if (parts.is_mean && parts.groups.groups > 1) {
+      result.risk_rows = image_risk(
+          {&result.estimate, images, &parts.whole.independent, input.independent, &parts.groups, input.guide, &valid});
+      result.risk_kind = kind_of(makers);
+    }
     result.risks = risks_of(parts, halves, out.names, held_out, predicted_relmse(result));
   }
   out.weights = std::move(mixture.weights);

@@ -14,6 +14,7 @@
 #include "estimators/mean.h"
 #include "estimators/test_images.h"
 #include "filters/residual_correction.h"
+#include "risk/image_risk.h"
 #include "risk/relative_weight.h"
 #include "support/files.h"
 
@@ -105,6 +106,19 @@ double mean_square(const Image& image) {
   double sum = 0;
   for (float value : image.data) sum += static_cast<double>(value) * value;
   return sum / static_cast<double>(image.data.size());
+}
+
+// The weights were chosen by both halves, so that these follow each other's samples, and the error told is too small
+// where noise is strong; the fit of error_interval.h knows that.
+TEST(MixedDenoising, OfASinglePassTellsItsErrorByItsSamples) {
+  const EstimatorResult result = denoised_mean(Inputs(1).independent, DenoiseMode::kAuto);
+  EXPECT_EQ(result.risk_kind, ErrorKind::kFilters);
+  const RiskRow sums = sum_of(result.risk_rows);
+  EXPECT_EQ(sums.values, 3.0 * kWidth * kHeight);
+  EXPECT_EQ(sums.groups, 12);
+  EXPECT_LT(sums.variance, 0.2 * sums.noise) << "it has less noise than the mean";
+  EXPECT_LT(std::abs(sums.error), 0.5 * sums.noise);
+  EXPECT_TRUE(denoised(Inputs(1), DenoiseMode::kError).risk_rows.empty()) << "nothing was fitted to pairs";
 }
 
 TEST(MixedDenoising, OfASinglePassHasLessErrorThanItsMean) {

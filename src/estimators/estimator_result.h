@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "film/film.h"
@@ -18,6 +19,55 @@ struct HeldOutRow {
   double predicted = 0;  ///< squared standard error of the image made of all
   double squares = 0;    ///< of `error` of the parts of the row, of which there are `parts`
   int parts = 0;
+};
+
+/// What the samples tell of the error of a row of the image (risk/image_risk.h), relative as in relMSE: sums over its
+/// values, each over G'^2 + 0.01. `scaled` are sums of the same over the noise of the pixels around.
+struct RiskRow {
+  double error = 0;          ///< (M - h)^2 - v + 2 cov(M, h)
+  double squares = 0;        ///< of `error` of the parts of the row, of which there are `parts`
+  double variance = 0;       ///< of the image: that between halves
+  double noise = 0;          ///< v
+  double noise_squares = 0;  ///< of v of each pixel
+  double bias = 0;           ///< (M_A - h_A) (M_B - h_B): squared bias of the halves
+  double held_out = 0;       ///< (M_A - h_B)^2 - var h_B, and the reverse
+  double scaled_error = 0, scaled_squares = 0, scaled_variance = 0;
+  double light = 0;                                  ///< what the groups hold, over G' + 0.1
+  double light_of_largest = 0;                       ///< what the largest group of each pixel holds
+  double squared_deviations = 0, fourth_powers = 0;  ///< of groups: squared variance, and fourth moment
+  double values = 0, parts = 0;
+  double predicted = 0;  ///< by the standard error, before apply_interval(), which sets it
+  double groups = 0;     ///< of each pixel; not a sum
+};
+
+/// Its sums by name.
+inline constexpr std::pair<const char*, double RiskRow::*> kRiskSums[] = {
+    {"error", &RiskRow::error},
+    {"squares", &RiskRow::squares},
+    {"variance", &RiskRow::variance},
+    {"noise", &RiskRow::noise},
+    {"noise_squares", &RiskRow::noise_squares},
+    {"bias", &RiskRow::bias},
+    {"held_out", &RiskRow::held_out},
+    {"scaled_error", &RiskRow::scaled_error},
+    {"scaled_squares", &RiskRow::scaled_squares},
+    {"scaled_variance", &RiskRow::scaled_variance},
+    {"light", &RiskRow::light},
+    {"light_of_largest", &RiskRow::light_of_largest},
+    {"squared_deviations", &RiskRow::squared_deviations},
+    {"fourth_powers", &RiskRow::fourth_powers},
+    {"predicted", &RiskRow::predicted},
+    {"values", &RiskRow::values},
+    {"parts", &RiskRow::parts},
+    {"groups", &RiskRow::groups}};
+
+/// What an image was made by, as far as it changes what its sums mean.
+enum class ErrorKind { kMean, kFilters, kNetwork, kPair };
+
+/// Between which bounds the relMSE is, in 80 of 100 renders (risk/error_interval.h).
+struct ErrorInterval {
+  double below = 1, above = 1;  ///< factors of the predicted relMSE: at most 1, and at least 1
+  std::string unknown;          ///< why no bounds can be given; empty where they are
 };
 
 /// What calibrate() of risk/held_out_error.h found of the predicted error.
@@ -48,6 +98,10 @@ struct EstimatorResult {
   long nonfinite_pixels = 0;
   /// Of each row, for calibrate() of risk/held_out_error.h; empty where nothing was held out.
   std::vector<HeldOutRow> held_out;
+  std::vector<RiskRow> risk_rows;  ///< of each row, for apply_interval(); empty where nothing tells of the error
+  ErrorKind risk_kind = ErrorKind::kMean;
+  std::optional<RiskRow> risk_sums;       ///< of all rows, by apply_interval()
+  std::optional<ErrorInterval> interval;  ///< of the predicted relMSE, by apply_interval()
   std::string note;  ///< what whoever asked for the image should know of how it was made; mostly empty
   std::optional<MeasuredRisks> risks;     ///< of mixtures with a predicted error
   std::optional<HeldOutVerdict> verdict;  ///< by calibrate(); empty where nothing was held out

@@ -55,10 +55,12 @@ bool PlanRun::estimate() {
   const auto ends = [&] { return result_.interrupted ? watch.seconds() > kEstimateOfInterrupted : stopped(); };
   EstimatorResult image;
   result_.image = {};
-  result_.predicted_relmse.reset(), result_.predicted_blocks.reset(), result_.prediction_doubt.clear();
+  result_.predicted_relmse.reset(), result_.predicted_bounds.reset(), result_.predicted_blocks.reset(),
+      result_.prediction_doubt.clear();
   if (!run_stoppable(ends, [&] { image = estimate_rows(0, window_.height); })) return false;
   if (!image.std_error.data.empty()) {
     result_.predicted_relmse = predicted_relmse(image);
+    result_.predicted_bounds = predicted_bounds(image);
     result_.predicted_blocks = predicted_blocks(image);
     double samples = 0;
     for (const Pass& pass : camera_passes(films())) samples += pass.film.mean_count();
@@ -66,10 +68,8 @@ bool PlanRun::estimate() {
   }
   if (request_.until > 0 && !result_.predicted_relmse)
     throw Error(ErrorCode::kUsage, "an error can only be predicted from 2 or more groups");
-  if (plan_.film_is_image)
-    result_.image.std_error = std::move(image.std_error);
-  else
-    result_.image = std::move(image);
+  if (plan_.film_is_image) image.estimate = {};
+  result_.image = std::move(image);
   estimate_seconds_ = watch.seconds();
   result_.seconds.estimate += *estimate_seconds_;
   return true;

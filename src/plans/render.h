@@ -14,6 +14,7 @@
 #include "integrators/light_pass.h"
 #include "integrators/training_image.h"
 #include "plans/plan.h"
+#include "risk/predicted_error.h"
 
 namespace covary {
 
@@ -86,8 +87,9 @@ struct RenderResult {
   /// pixel of every film had samples.
   EstimatorResult image;
   std::optional<double> predicted_relmse;
-  std::optional<double> predicted_blocks;  ///< of predicted_error.h
-  std::string prediction_doubt;            ///< of predicted_error.h; empty where nothing speaks against it
+  std::optional<PredictedBounds> predicted_bounds;  ///< of predicted_error.h; empty where none can be given
+  std::optional<double> predicted_blocks;           ///< of predicted_error.h
+  std::string prediction_doubt;                     ///< of predicted_error.h; empty where nothing speaks against it
   /// Image of the samples of the integrator's training, where they are a part of the image (Plan::takes_training).
   TrainingImage training;
   std::map<std::string, Image> aovs;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "risk/error_interval.h"
 
 namespace covary {
 namespace {
@@ -84,7 +85,19 @@ double predicted_blocks(const EstimatorResult& result) {
   return blocks[static_cast<size_t>(rank)];
 }
 
+std::optional<PredictedBounds> predicted_bounds(const EstimatorResult& result) {
+  if (result.std_error.data.empty() || !result.interval || !result.interval->unknown.empty()) return std::nullopt;
+  const double middle = predicted_relmse(result);
+  return PredictedBounds{middle * result.interval->below, middle * result.interval->above};
+}
+
 std::string doubt_of_prediction(const EstimatorResult& result, double samples, uint32_t reliable_samples) {
+  if (result.interval) {
+    const auto& [below, above, unknown] = *result.interval;
+    if (!unknown.empty()) return "no interval can be given: " + unknown;
+    const double factor = std::max(above, 1 / below);
+    return factor > kReliableFactor ? fmt::format("known to a factor of {:.2g}", factor) : "";
+  }
   if (samples < reliable_samples) return fmt::format("fewer than {} samples per pixel", reliable_samples);
   if (const double share = share_of_few(result); share > kMostInFewPixels)
     return fmt::format("{:.0f} % of it lies in {:.0f} % of the pixels", 100 * share, 100 * kFewPixels);

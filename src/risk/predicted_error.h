@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "estimators/estimator_result.h"
@@ -19,12 +20,20 @@ double predicted_relmse(const EstimatorResult& result);
 /// how bad the worst regions are.
 double predicted_blocks(const EstimatorResult& result);
 
-/// Why the prediction may be off by more than a factor of about two; empty where nothing says so. That is with fewer
-/// than `reliable_samples` (Estimator::reliable_samples) per pixel, where a hundredth of the pixels hold more than two
-/// fifths of it, where held-out samples know it only to more than half of itself, and where they tell more than four
-/// times as much as the estimator, or less than a quarter (of results that calibrate() scaled). Light that no sample
-/// has found is not seen here either. `samples`: per pixel, of all passes together; infinite where nobody knows.
-/// Measured in docs/methods/error-estimates.md.
+/// Between which the relMSE is in 80 of 100 renders (error_interval.h).
+struct PredictedBounds {
+  double low = 0, high = 0;
+};
+/// Those of the predicted relMSE; empty where none can be given (EstimatorResult::interval).
+std::optional<PredictedBounds> predicted_bounds(const EstimatorResult& result);
+
+/// Why the prediction is not reliable; empty where it is. Where there is an interval: because it is wider than
+/// kReliableFactor of error_interval.h, or cannot be given. Elsewhere: with fewer than `reliable_samples`
+/// (Estimator::reliable_samples) per pixel, where a hundredth of the pixels hold more than two fifths of it, where
+/// held-out samples know it only to more than half of itself, and where they tell more than four times as much as the
+/// estimator, or less than a quarter (of results that calibrate() scaled). Light that no sample has found is not seen
+/// here either. `samples`: per pixel, of all passes together; infinite where nobody knows. Measured in
+/// docs/methods/error-estimates.md.
 std::string doubt_of_prediction(const EstimatorResult& result, double samples, uint32_t reliable_samples);
 
 }  // namespace covary

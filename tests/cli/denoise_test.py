@@ -139,6 +139,29 @@ class Denoise(RenderTest):
         self.bad(1, "all groups are identical: the same seed was rendered twice", "denoise", "plain.exr", "copy.exr",
                  "-o", "e.exr", *PLAIN)
 
+    def test_interval(self):
+        render = ("render", ROOM, *SMALL[:2], "-o", "a.exr", "--spp", "48", *PLAIN, "--passes", "films", "--json",
+                  "a.json")
+        last = self.good(*render).stderr.splitlines()[-1]
+        facts = json.loads((self.path / "a.json").read_text())
+        low, middle, high = (facts[f"predicted_relmse{end}"] for end in ("_low", "", "_high"))
+        self.assertTrue(0 < low < middle < high, facts)
+        self.assertRegex(last, r"^predicted relMSE 0\.0\d+, between 0\.0\d+ and 0\.0\d+ \(80 %\), \d+ % of it")
+        factor = max(high / middle, middle / low)
+        self.assertIs(facts["predicted_relmse_reliable"], factor <= 1.5)
+        self.assertEqual("(unreliable: known to a factor of" in last, factor > 1.5)
+        attributes = json.loads(self.good("info", "a.exr", "--json").stdout)["attributes"]
+        self.assertAlmostEqual(float(attributes["covary:predicted_relmse"]) / middle, 1, 3)
+        for told, bound in zip(attributes["covary:predicted_relmse_80"].split(), (low, high), strict=True):
+            self.assertAlmostEqual(float(told) / bound, 1, 3)
+        self.good("combine", "--independent", "films/independent.exr", "-o", "b.exr", "--denoise", "auto", *PLAIN,
+                  "--json", "b.json")
+        self.assertIn("predicted_relmse_high", json.loads((self.path / "b.json").read_text()))
+        # The standard error in colours, with a scale below it.
+        width, height = map(int, SMALL[1].split("x"))
+        self.good("convert", "a.exr", "errors.png", "--layer", "StdError", "--false-colours")
+        self.assertEqual((self.path / "errors.png").read_bytes()[16:24], bytes([0, 0, 0, width, 0, 0, 0, height + 17]))
+
     def test_layers_of_other_renderers(self):
         """Picture, albedo and normal by each renderer's names (docs/other-renderers.md)."""
         noise, n, size = exponential_noise(5), 48 * 32, (48, 32)
