@@ -31,7 +31,7 @@ RIDGE, NOISE_FLOOR = 0.1, 0.1
 #: difference of logarithms from which on a render counts little
 OUTLIER = 0.5
 TRUSTED, LEAST, MOST = 0.5, 0.25, 4
-MOST_OF_LARGEST, MOST_FACTOR, FEWEST_PIXELS = 0.6, 5, 20
+MOST_OF_LARGEST, MOST_FACTOR, FEWEST_PIXELS, FEWEST_OF_PIXELS = 0.6, 5, 20, 0.02
 
 
 def run(arguments, program, *words):
@@ -198,7 +198,8 @@ def usable(row):
     share = float(row["light_of_largest"]) / max(float(row["light"]), 1e-30)
     return (float(row["variance"]) > 0 and float(row["relmse"]) > 2 * float(row["reference_noise"])
             and share <= MOST_OF_LARGEST
-            and float(row["noise"])**2 >= FEWEST_PIXELS * float(row["noise_squares"]))
+            and float(row["noise"])**2 >= max(FEWEST_PIXELS, FEWEST_OF_PIXELS * float(row["values"]) / 3)
+            * float(row["noise_squares"]))
 
 
 TABLE_TEXT = """// SPDX-License-Identifier: Apache-2.0
@@ -222,8 +223,8 @@ inline constexpr FittedErrors kFittedErrors[] = {{
 // clang-format on
 
 /// Where the largest group of each pixel has a larger share of the light, the bounds are further off than this factor,
-/// or fewer pixels hold the noise, there is no interval.
-inline constexpr double kMostOfLargest = {share}, kMostFactor = {factor}, kFewestPixels = {fewest};
+/// or fewer pixels hold the noise, as a number or as a fraction of all, there is no interval.
+inline constexpr double kMostOfLargest = {share}, kMostFactor = {factor}, kFewestPixels = {fewest}, kFewestOfPixels = {fraction};
 
 }}  // namespace covary
 """
@@ -237,7 +238,8 @@ def fit_all(arguments):
         fits.append(Fit(rows, kind))
         fits[-1].report()
     TABLE.write_text(TABLE_TEXT.format(rows="\n".join(fit.text() for fit in fits), share=MOST_OF_LARGEST,
-                                       factor=MOST_FACTOR, fewest=FEWEST_PIXELS))
+                                       factor=MOST_FACTOR, fewest=FEWEST_PIXELS,
+                                       fraction=FEWEST_OF_PIXELS))
 
 
 def main():

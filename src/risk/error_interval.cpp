@@ -72,8 +72,9 @@ LogError fitted_error(const RiskRow& sums, ErrorKind kind) {
 }
 
 std::string unknown_error(const RiskRow& sums, const LogError& error) {
-  if (const double n = sums.noise * sums.noise / sums.noise_squares; n < kFewestPixels)
-    return fmt::format("{:.0f} pixels hold most of the noise", std::max(1.0, n));
+  const double n = sums.noise * sums.noise / sums.noise_squares, pixels = sums.values / 3;
+  if (n < std::max(kFewestPixels, kFewestOfPixels * pixels))
+    return fmt::format("{:.0f} of {:.0f} pixels hold most of the noise", std::max(1.0, n), pixels);
   const double share = sums.light > 0 ? sums.light_of_largest / sums.light : 1;
   if (share > kMostOfLargest)
     return fmt::format("{:.0f} % of the light are in one of {:.0f} groups of each pixel", 100 * share, sums.groups);

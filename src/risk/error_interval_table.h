@@ -14,17 +14,17 @@ struct FittedErrors {
 
 // clang-format off
 inline constexpr FittedErrors kFittedErrors[] = {
-    {{0.6233, 0.001431, 0.08913, 0.0006518, 0.0356, 0.02632, 0.06433, -0.006767, 0.006442, 0.137},
-     {-0.4914, 0, -0.3596, 0, 0, 0, -0.3182, -0.08623, 0.1609, 0},
-     -1.863, -1.18, -0.7704, 1.377},
-    {{0.5183, -0.08252, -0.0106, -0.008119, 0.03825, 0.001952, 0.03545, 0.01812, -0.0337, 0.1079},
-     {-1.817, 0, 0.3538, 0, 0, 0, 0.1684, -0.06648, 0.07457, 0},
-     -2.022, -1.234, -1.2, 1.467},
+    {{0.365, 0.09308, 0.06775, -0.06235, 0.06971, 0.03119, 0.1211, 0.004849, 0.01772, 0.2273},
+     {-0.2297, 0, -0.09452, 0, 0, 0, -0.1744, -0.1656, -0.2919, 0},
+     -2.384, -1.527, -0.867, 1.681},
+    {{0.4987, 0.07706, -0.08913, -0.06182, 0.07972, 0.01712, 0.04478, 0.02886, 0.02496, 0.0357},
+     {-1.942, 0, 0.2966, 0, 0, 0, -0.073, -0.03086, 0.3404, 0},
+     -2.113, -1.477, -1.352, 1.656},
 };
 // clang-format on
 
 /// Where the largest group of each pixel has a larger share of the light, the bounds are further off than this factor,
-/// or fewer pixels hold the noise, there is no interval.
-inline constexpr double kMostOfLargest = 0.6, kMostFactor = 5, kFewestPixels = 20;
+/// or fewer pixels hold the noise, as a number or as a fraction of all, there is no interval.
+inline constexpr double kMostOfLargest = 0.6, kMostFactor = 5, kFewestPixels = 20, kFewestOfPixels = 0.02;
 
 }  // namespace covary

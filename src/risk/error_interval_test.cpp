@@ -80,7 +80,7 @@ TEST(ErrorInterval, IsNotGivenWhereFewPixelsHoldTheNoise) {
   sums.noise_squares = sums.noise * sums.noise / 4;
   EstimatorResult result = result_of(sums, ErrorKind::kNetwork);
   apply_interval(result);
-  EXPECT_EQ(result.interval->unknown, "4 pixels hold most of the noise");
+  EXPECT_EQ(result.interval->unknown, "4 of 10000 pixels hold most of the noise");
 }
 
 TEST(ErrorInterval, IsNotGivenWhereLightIsMissing) {
