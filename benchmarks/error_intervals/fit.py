@@ -224,7 +224,8 @@ inline constexpr FittedErrors kFittedErrors[] = {{
 
 /// Where the largest group of each pixel has a larger share of the light, the bounds are further off than this factor,
 /// or fewer pixels hold the noise, as a number or as a fraction of all, there is no interval.
-inline constexpr double kMostOfLargest = {share}, kMostFactor = {factor}, kFewestPixels = {fewest}, kFewestOfPixels = {fraction};
+inline constexpr double kMostOfLargest = {share}, kMostFactor = {factor};
+inline constexpr double kFewestPixels = {fewest}, kFewestOfPixels = {fraction};
 
 }}  // namespace covary
 """

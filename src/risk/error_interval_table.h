@@ -25,6 +25,7 @@ inline constexpr FittedErrors kFittedErrors[] = {
 
 /// Where the largest group of each pixel has a larger share of the light, the bounds are further off than this factor,
 /// or fewer pixels hold the noise, as a number or as a fraction of all, there is no interval.
-inline constexpr double kMostOfLargest = 0.6, kMostFactor = 5, kFewestPixels = 20, kFewestOfPixels = 0.02;
+inline constexpr double kMostOfLargest = 0.6, kMostFactor = 5;
+inline constexpr double kFewestPixels = 20, kFewestOfPixels = 0.02;
 
 }  // namespace covary
