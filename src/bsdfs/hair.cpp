@@ -48,7 +48,7 @@ FibreShape make_fibre(float eta, float beta_m, float beta_n, float alpha_degrees
   f.eta = eta;
   constexpr float kLeast = 0.02f;
   const double m = std::max(beta_m, kLeast), n = std::max(beta_n, kLeast);
-  // [Chiang2016] §4.1: variance and scale of the distributions, so that roughness looks even.
+  // [Chiang2016]: variance and scale of the distributions, so that roughness looks even.
   f.v[0] = static_cast<float>(sqr(0.726 * m + 0.812 * m * m + 3.7 * std::pow(m, 20)));
   f.v[1] = 0.25f * f.v[0];
   f.v[2] = f.v[3] = 4 * f.v[0];
@@ -58,7 +58,7 @@ FibreShape make_fibre(float eta, float beta_m, float beta_n, float alpha_degrees
     f.tilt[k] = {std::sin(angle), std::cos(angle)};
   }
   f.azimuthal_mass = logistic_distribution(kPi, f.s) - logistic_distribution(-kPi, f.s);
-  // [Chiang2016] §4.2: absorption = (ln colour / D(beta_n))².
+  // [Chiang2016]: absorption = (ln colour / D(beta_n))².
   f.colour_d = static_cast<float>(5.969 - 0.215 * n + 2.532 * n * n - 10.73 * std::pow(n, 3) + 5.574 * std::pow(n, 4) +
                                   0.245 * std::pow(n, 5));
   return f;
@@ -237,7 +237,7 @@ class Hair final : public Bsdf {
   }
   bool needs_derivatives() const override { return true; }
   const Texture* main_texture() const override { return absorption_.texture(); }
-  /// The colour of much hair: [Chiang2016] §4.2, inverted.
+  /// The colour of much hair: [Chiang2016], inverted.
   Spectrum albedo(const SurfaceHit& hit) const override {
     return each(absorption(hit), [this](float a) { return std::exp(-std::sqrt(a) * fibre_.colour_d); });
   }
