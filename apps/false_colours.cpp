@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "core/srgb.h"
+
 namespace covary {
 namespace {
 
@@ -23,15 +25,12 @@ constexpr std::array<std::array<double, 3>, 6> kColours = {{{0.03, 0.03, 0.12},
                                                             {0.99, 0.60, 0.32},
                                                             {0.99, 0.97, 0.75}}};
 
-float linear(double srgb) {
-  return static_cast<float>(srgb <= 0.04045 ? srgb / 12.92 : std::pow((srgb + 0.055) / 1.055, 2.4));
-}
-
 /// `t`: 0 to 1.
 void set_colour(double t, float* rgb) {
   const double at = std::clamp(t, 0.0, 1.0) * (kColours.size() - 1);
   const auto i = std::min(static_cast<size_t>(at), kColours.size() - 2);
-  for (size_t c = 0; c < 3; ++c) rgb[c] = linear(kColours[i][c] + (at - i) * (kColours[i + 1][c] - kColours[i][c]));
+  for (size_t c = 0; c < 3; ++c)
+    rgb[c] = srgb_to_linear(static_cast<float>(kColours[i][c] + (at - i) * (kColours[i + 1][c] - kColours[i][c])));
 }
 
 float mean_at(const Image& image, size_t pixel) {
