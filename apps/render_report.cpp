@@ -36,8 +36,8 @@ std::string replay_command(const RenderOptions& o, const Pass& pass, const BadSa
 
 /// What is said of the error, with its bounds, what the image gains, and why it may be doubted.
 std::string prediction_of(const RenderResult& result) {
-  return predicted_text(*result.predicted_relmse, result.predicted_bounds) +
-         (result.image.risks ? risks_text(*result.image.risks) : "") + doubt_in_brackets(result.prediction_doubt);
+  return prediction_text(*result.predicted_relmse, result.predicted_bounds, result.image.risks,
+                         result.prediction_doubt);
 }
 
 nlohmann::ordered_json json_of(const IntegratorReport& report) {
@@ -177,8 +177,7 @@ void print_summary(const RenderReport& report) {
   } else if (result.predicted_relmse) {
     fmt::print(stderr, "{}\n", prediction_of(result));
   }
-  for (const std::string& note : {missing_network(options.settings.denoising), result.image.note})
-    if (!note.empty()) fmt::print(stderr, "note: {}\n", as_flags(note));
+  print_notes(options.settings.denoising, result.image.note);
   const double limit = options.request().seconds;
   if (limit > 0 && result.seconds.limited > 1.05 * limit)
     fmt::print(stderr, "warning: --time {:g} was exceeded: {:.2f} s for at least {} samples per pixel in each pass{}\n",

@@ -7,25 +7,9 @@
 #include "settings/option_names.h"
 
 namespace covary {
+namespace {
 
-std::string predicted_text(double predicted, const std::optional<PredictedBounds>& bounds) {
-  std::string text = fmt::format("predicted relMSE {:.3g}", predicted);
-  if (bounds) text += fmt::format(", between {:.2g} and {:.2g} ({} %)", bounds->low, bounds->high, kIntervalPercent);
-  return text;
-}
-
-std::string doubt_in_brackets(const std::string& doubt) {
-  return doubt.empty() ? "" : fmt::format(" (unreliable: {})", doubt);
-}
-
-void add_prediction(double predicted, const std::optional<PredictedBounds>& bounds, const std::string& doubt,
-                    nlohmann::ordered_json& json) {
-  json["predicted_relmse"] = predicted;
-  if (bounds) json["predicted_relmse_low"] = bounds->low, json["predicted_relmse_high"] = bounds->high;
-  json["predicted_relmse_reliable"] = doubt.empty();
-  if (!doubt.empty()) json["predicted_relmse_doubt"] = doubt;
-}
-
+/// ", 18 % of it squared bias; the mean of the samples has 0.012, Open Image Denoise alone 0.0025"
 std::string risks_text(const MeasuredRisks& risks) {
   std::string text = fmt::format(", {:.0f} % of it squared bias", 100 * risks.bias_share);
   const char* before = "; ";
@@ -42,12 +26,36 @@ std::string risks_text(const MeasuredRisks& risks) {
   return text;
 }
 
+}  // namespace
+
+std::string prediction_text(double predicted, const std::optional<PredictedBounds>& bounds,
+                            const std::optional<MeasuredRisks>& risks, const std::string& doubt) {
+  std::string text = fmt::format("predicted relMSE {:.3g}", predicted);
+  if (bounds) text += fmt::format(", between {:.2g} and {:.2g} ({} %)", bounds->low, bounds->high, kIntervalPercent);
+  if (risks) text += risks_text(*risks);
+  if (!doubt.empty()) text += fmt::format(" (unreliable: {})", doubt);
+  return text;
+}
+
+void add_prediction(double predicted, const std::optional<PredictedBounds>& bounds, const std::string& doubt,
+                    nlohmann::ordered_json& json) {
+  json["predicted_relmse"] = predicted;
+  if (bounds) json["predicted_relmse_low"] = bounds->low, json["predicted_relmse_high"] = bounds->high;
+  json["predicted_relmse_reliable"] = doubt.empty();
+  if (!doubt.empty()) json["predicted_relmse_doubt"] = doubt;
+}
+
+void print_notes(const DenoisingChoice& choice, const std::string& note) {
+  for (const std::string& text : {missing_network(choice), note})
+    if (!text.empty()) fmt::print(stderr, "note: {}\n", as_flags(text));
+}
+
 void print_risks(const CombinedImage& combined, const DenoisingChoice& choice) {
-  for (const std::string& note : {missing_network(choice), combined.image.note})
-    if (!note.empty()) fmt::print(stderr, "note: {}\n", as_flags(note));
+  print_notes(choice, combined.image.note);
   if (combined.predicted_relmse && combined.image.risks)
-    fmt::print(stderr, "{}{}{}\n", predicted_text(*combined.predicted_relmse, combined.predicted_bounds),
-               risks_text(*combined.image.risks), doubt_in_brackets(combined.prediction_doubt));
+    fmt::print(stderr, "{}\n",
+               prediction_text(*combined.predicted_relmse, combined.predicted_bounds, combined.image.risks,
+                               combined.prediction_doubt));
 }
 
 void add_risks(const std::optional<MeasuredRisks>& risks, nlohmann::ordered_json& json) {

@@ -13,14 +13,14 @@
 
 namespace covary {
 
-/// "predicted relMSE 0.0021, between 0.0016 and 0.0029 (80 %)", without bounds where none can be given.
-std::string predicted_text(double predicted, const std::optional<PredictedBounds>& bounds);
-/// ", 18 % of it squared bias; the mean of the samples has 0.012, Open Image Denoise 0.0025": what follows it.
-std::string risks_text(const MeasuredRisks& risks);
-/// " (unreliable: known to a factor of 1.8)", or nothing where nothing speaks against the predicted error.
-std::string doubt_in_brackets(const std::string& doubt);
+/// "predicted relMSE 0.0021, between 0.0016 and 0.0029 (80 %), 18 % of it squared bias; the mean of the samples has
+/// 0.012, Open Image Denoise alone 0.0025 (unreliable: known to a factor of 1.8)", as far as it is known.
+std::string prediction_text(double predicted, const std::optional<PredictedBounds>& bounds,
+                            const std::optional<MeasuredRisks>& risks, const std::string& doubt);
 
-/// Lines on stderr: what is missing or to be known, and last the risks.
+/// Lines on stderr: the network that is missing, and `note`, where there are such.
+void print_notes(const DenoisingChoice& choice, const std::string& note);
+/// These notes of an image, and last its risks.
 void print_risks(const CombinedImage& combined, const DenoisingChoice& choice);
 
 /// "predicted_relmse", its bounds "predicted_relmse_low" and "_high", "predicted_relmse_reliable" and why not.
