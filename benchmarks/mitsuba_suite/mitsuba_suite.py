@@ -14,7 +14,6 @@ import argparse
 import math
 import pathlib
 import re
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -22,6 +21,7 @@ import time
 
 import mitsuba
 import numpy
+from linked_tree import link_tree
 
 SIGNIFICANCE = 0.01  # of an image
 ACCEPTED_SHARE = 0.9975  # of its values
@@ -76,17 +76,10 @@ def exchanged(text):
 
 
 def copy_with_colours_exchanged(folder, scene, copy):
-    """Copies the scene into `copy`, a folder as `folder`, whose other files are linked."""
-    for part in folder.iterdir():
-        if part.name != "tests":
-            (copy / part.name).symlink_to(part.resolve())
-    scenes = copy / "tests" / "scenes"
-    scenes.mkdir(parents=True)
-    for part in scene.parent.parent.iterdir():
-        if part != scene.parent:
-            (scenes / part.name).symlink_to(part.resolve())
-    shutil.copytree(scene.parent, scenes / scene.parent.name)
-    result = scenes / scene.parent.name / scene.name
+    """The scene in `copy`, a folder as `folder`."""
+    link_tree(folder, copy)
+    result = copy / scene.relative_to(folder)
+    result.unlink()
     result.write_text(exchanged(scene.read_text()))
     return result
 

@@ -20,6 +20,8 @@ import subprocess
 import sys
 import tempfile
 
+from linked_tree import link_tree
+
 NUMBER = re.compile(r'(?<=")-?\d+\.?\d*(?:e-?\d+)?(?="| |,)')
 TYPE = re.compile(r'(?<=type=")[a-z_]+')
 NAME = re.compile(r'(?<= name=")[a-z_0-9]+')
@@ -68,18 +70,6 @@ def mutate(text, types, names):
     return text
 
 
-def links_of(folder, copy):
-    """`copy` becomes a tree as `folder` whose scene folders are real, so that mutations lie beside what they name."""
-    for part in folder.iterdir():
-        if part.name not in ("tests", "docs"):
-            (copy / part.name).symlink_to(part.resolve())
-    for scenes in [folder / "docs" / "scenes", *sorted((folder / "tests" / "scenes").iterdir())]:
-        target = copy / scenes.relative_to(folder)
-        target.mkdir(parents=True)
-        for part in scenes.iterdir():
-            (target / part.name).symlink_to(part.resolve())
-
-
 def limit_time():
     resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS + 5))
 
@@ -117,7 +107,7 @@ def main(arguments):
     counts = collections.Counter()
     with tempfile.TemporaryDirectory() as folder:
         copy = pathlib.Path(folder)
-        links_of(options.folder, copy)
+        link_tree(options.folder, copy)
         for i in range(options.count):
             RANDOM.seed(options.seed * 1000003 + i)
             scene = scenes[i % len(scenes)]
