@@ -189,7 +189,7 @@ CombinedImage combine(const CombineRequest& request) {
     const double crn = request.crn ? request.crn->samples : 0, samples = crn + request.independent.samples;
     const bool counted = (crn > 0 || !request.crn) && request.independent.samples > 0;
     combined.predicted_relmse = predicted_relmse(combined.image);
-    combined.predicted_bounds = predicted_bounds(combined.image);
+    combined.predicted_bounds = predicted_bounds(combined.image, *combined.predicted_relmse);
     combined.prediction_doubt =
         doubt_of_prediction(combined.image, counted ? samples : std::numeric_limits<double>::infinity(),
                             request.estimator.reliable_samples);

@@ -19,8 +19,9 @@ void write_result(const std::string& path, const ImagePlace& place,
   for (auto& [name, image] : aovs) add_image_planes(name, image, planes);
   std::map<std::string, std::string> all = attributes;
   if (!result.std_error.data.empty()) {
-    all["covary:predicted_relmse"] = fmt::format("{:.4g}", predicted_relmse(result));
-    if (const std::optional<PredictedBounds> bounds = predicted_bounds(result))
+    const double predicted = predicted_relmse(result);
+    all["covary:predicted_relmse"] = fmt::format("{:.4g}", predicted);
+    if (const std::optional<PredictedBounds> bounds = predicted_bounds(result, predicted))
       all["covary:predicted_relmse_80"] = fmt::format("{:.4g} {:.4g}", bounds->low, bounds->high);
   }
   write_exr(path, place, all, planes);

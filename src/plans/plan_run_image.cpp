@@ -60,7 +60,7 @@ bool PlanRun::estimate() {
   if (!run_stoppable(ends, [&] { image = estimate_rows(0, window_.height); })) return false;
   if (!image.std_error.data.empty()) {
     result_.predicted_relmse = predicted_relmse(image);
-    result_.predicted_bounds = predicted_bounds(image);
+    result_.predicted_bounds = predicted_bounds(image, *result_.predicted_relmse);
     result_.predicted_blocks = predicted_blocks(image);
     double samples = 0;
     for (const Pass& pass : camera_passes(films())) samples += pass.film.mean_count();

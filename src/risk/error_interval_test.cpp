@@ -44,8 +44,8 @@ TEST(ErrorInterval, IsAroundThePredictedError) {
     ASSERT_TRUE(result.interval);
     EXPECT_EQ(result.interval->unknown, "");
     EXPECT_TRUE(result.risk_rows.empty());
-    const PredictedBounds bounds = predicted_bounds(result).value();
     const double middle = predicted_relmse(result);
+    const PredictedBounds bounds = predicted_bounds(result, middle).value();
     EXPECT_LT(bounds.low, middle);
     EXPECT_GT(bounds.high, middle);
     RiskRow sums = known_sums();
@@ -89,7 +89,7 @@ TEST(ErrorInterval, IsNotGivenWhereLightIsMissing) {
   EstimatorResult result = result_of(sums, ErrorKind::kNetwork);
   apply_interval(result);
   EXPECT_EQ(result.interval->unknown, "90 % of the light are in one of 12 groups of each pixel");
-  EXPECT_FALSE(predicted_bounds(result));
+  EXPECT_FALSE(predicted_bounds(result, predicted_relmse(result)));
   EXPECT_EQ(doubt_of_prediction(result, 64, 0),
             "no interval can be given: 90 % of the light are in one of 12 groups of each pixel");
 }

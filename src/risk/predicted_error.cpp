@@ -85,10 +85,9 @@ double predicted_blocks(const EstimatorResult& result) {
   return blocks[static_cast<size_t>(rank)];
 }
 
-std::optional<PredictedBounds> predicted_bounds(const EstimatorResult& result) {
-  if (result.std_error.data.empty() || !result.interval || !result.interval->unknown.empty()) return std::nullopt;
-  const double middle = predicted_relmse(result);
-  return PredictedBounds{middle * result.interval->below, middle * result.interval->above};
+std::optional<PredictedBounds> predicted_bounds(const EstimatorResult& result, double predicted) {
+  if (!result.interval || !result.interval->unknown.empty()) return std::nullopt;
+  return PredictedBounds{predicted * result.interval->below, predicted * result.interval->above};
 }
 
 std::string doubt_of_prediction(const EstimatorResult& result, double samples, uint32_t reliable_samples) {

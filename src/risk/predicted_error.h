@@ -24,8 +24,8 @@ double predicted_blocks(const EstimatorResult& result);
 struct PredictedBounds {
   double low = 0, high = 0;
 };
-/// Those of the predicted relMSE; empty where none can be given (EstimatorResult::interval).
-std::optional<PredictedBounds> predicted_bounds(const EstimatorResult& result);
+/// Those around `predicted`, which is predicted_relmse(); empty where none can be given (EstimatorResult::interval).
+std::optional<PredictedBounds> predicted_bounds(const EstimatorResult& result, double predicted);
 
 /// Why the prediction is not reliable; empty where it is. Where there is an interval: because it is wider than
 /// kReliableFactor of error_interval.h, or cannot be given. Elsewhere: with fewer than `reliable_samples`
