@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/parallel.h"
 #include "denoising/limited_groups.h"
@@ -58,21 +59,21 @@ Image std_error_of(const Planes& variance, const std::vector<unsigned char>& val
   return result;
 }
 
-LimitedMean limited_mean(const GroupedImage& image, const std::vector<unsigned char>& valid) {
-  const LimitedGroups limited(image, valid);
-  LimitedMean mean;
-  mean.independent = moments(limited.view(), valid, 0, 0.0f);
+MeanImage mean_with_error(const GroupedImage& image, const std::vector<unsigned char>& valid) {
+  MeanImage mean;
+  mean.independent = moments(image, valid, 0, 0.0f);
   mean.estimate = mean_image(mean.independent);
   mean.std_error = std_error_of(mean.independent.variance_of_mean, valid, image.groups - 1, 1);
   return mean;
 }
 
 DenoisingPart part_of_mean(const GroupedImage& image, const std::vector<unsigned char>& valid) {
+  MeanImage mean = mean_with_error(image, valid);
   DenoisingPart part;
-  part.independent = moments(image, valid, 0, 0.0f);
-  part.image.estimate = mean_image(part.independent);
-  part.image.std_error = std_error_of(part.independent.variance_of_mean, valid, image.groups - 1, 1);
-  if (image.groups > 1) part.limited = limited_mean(image, valid);
+  part.independent = std::move(mean.independent);
+  part.image.estimate = std::move(mean.estimate);
+  part.image.std_error = std::move(mean.std_error);
+  if (image.groups > 1) part.limited = mean_with_error(LimitedGroups(image, valid).view(), valid);
   return part;
 }
 
@@ -92,7 +93,6 @@ DenoisingParts parts_of_pair(const Estimator& base, const GroupedImage& crn, con
                              const PairSettings& settings) {
   DenoisingParts parts;
   parts.name = base.name;
-  parts.groups = independent;
   long ignored = 0;  // the base counts them
   parts.valid = finite_pixels(crn, independent, ignored);
   parts.whole = part_of_pair(base, crn, independent, settings, parts.valid);

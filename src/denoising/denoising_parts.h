@@ -13,8 +13,8 @@
 
 namespace covary {
 
-/// What candidates are made of where that is not the image itself.
-struct LimitedMean {
+/// The mean of independent samples.
+struct MeanImage {
   Image estimate, std_error;
   Moments independent;
 };
@@ -24,7 +24,7 @@ struct DenoisingPart {
   EstimatorResult image;  ///< with its standard error; all values are finite
   Moments independent;    ///< of those samples that are independent from pixel to pixel
   /// The mean without fireflies (limited_groups.h); none of a pair.
-  std::optional<LimitedMean> limited;
+  std::optional<MeanImage> limited;
 };
 
 struct DenoisingParts {
@@ -34,7 +34,7 @@ struct DenoisingParts {
   /// The image is the mean of independent samples: noisy, but without a bias that residual correction could take away.
   bool is_mean = false;
   std::string name = "mean";  ///< of the image
-  GroupedImage groups;        ///< the independent samples, whose memory is the caller's; empty where not known
+  GroupedImage groups;        ///< the samples of a mean, whose memory is the caller's; empty of a pair
 };
 
 /// Means of all pixels.

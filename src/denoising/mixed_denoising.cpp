@@ -187,7 +187,7 @@ MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<Candid
     const HeldOutInput held_out{images, input.independent, input.guide, &valid, usual};
     result.std_error = held_out_error(held_out);
     result.bias = held_out_bias({images, {&guide_of(halves[0]), &guide_of(halves[1])}, input.independent, &valid});
-    if (parts.is_mean && parts.groups.groups > 1) {
+    if (parts.is_mean) {
       result.risk_rows = image_risk(
           {&result.estimate, images, &parts.whole.independent, input.independent, &parts.groups, input.guide, &valid});
       result.risk_kind = kind_of(makers);
