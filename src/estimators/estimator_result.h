@@ -29,8 +29,6 @@ struct RiskRow {
   double variance = 0;       ///< of the image: that between halves
   double noise = 0;          ///< v
   double noise_squares = 0;  ///< of v of each pixel
-  double bias = 0;           ///< (M_A - h_A) (M_B - h_B): squared bias of the halves
-  double held_out = 0;       ///< (M_A - h_B)^2 - var h_B, and the reverse
   double scaled_error = 0, scaled_squares = 0, scaled_variance = 0;
   double light = 0;                                  ///< what the groups hold, over G' + 0.1
   double light_of_largest = 0;                       ///< what the largest group of each pixel holds
@@ -47,8 +45,6 @@ inline constexpr std::pair<const char*, double RiskRow::*> kRiskSums[] = {
     {"variance", &RiskRow::variance},
     {"noise", &RiskRow::noise},
     {"noise_squares", &RiskRow::noise_squares},
-    {"bias", &RiskRow::bias},
-    {"held_out", &RiskRow::held_out},
     {"scaled_error", &RiskRow::scaled_error},
     {"scaled_squares", &RiskRow::scaled_squares},
     {"scaled_variance", &RiskRow::scaled_variance},
@@ -61,8 +57,8 @@ inline constexpr std::pair<const char*, double RiskRow::*> kRiskSums[] = {
     {"parts", &RiskRow::parts},
     {"groups", &RiskRow::groups}};
 
-/// What an image was made by, as far as it changes what its sums mean.
-enum class ErrorKind { kMean, kFilters, kNetwork, kPair };
+/// What made the candidates of an image, as far as it changes what its sums mean.
+enum class ErrorKind { kFilters, kNetwork };
 
 /// Between which bounds the relMSE is, in 80 of 100 renders (risk/error_interval.h).
 struct ErrorInterval {
@@ -99,7 +95,7 @@ struct EstimatorResult {
   /// Of each row, for calibrate() of risk/held_out_error.h; empty where nothing was held out.
   std::vector<HeldOutRow> held_out;
   std::vector<RiskRow> risk_rows;  ///< of each row, for apply_interval(); empty where nothing tells of the error
-  ErrorKind risk_kind = ErrorKind::kMean;
+  ErrorKind risk_kind = ErrorKind::kFilters;
   std::optional<RiskRow> risk_sums;       ///< of all rows, by apply_interval()
   std::optional<ErrorInterval> interval;  ///< of the predicted relMSE, by apply_interval()
   std::string note;  ///< what whoever asked for the image should know of how it was made; mostly empty

@@ -5,8 +5,8 @@
 //
 //     log(relMSE / V) = a . x + s r,   log s = b . x,
 //
-// r: what the fit leaves open, whose quantiles are those of scenes that it did not see. Where features are far from
-// all that was fitted, or the bounds far from each other, no interval is given.
+// r: what the fit leaves open, whose quantiles are those of scenes that it did not see. Where few pixels or single
+// groups hold the noise or the light, or the bounds are far from each other, no interval is given.
 #pragma once
 
 #include <array>
@@ -40,7 +40,7 @@ LogError fitted_error(const RiskRow& sums, ErrorKind kind);
 std::string unknown_error(const RiskRow& sums, const LogError& error);
 
 /// Scales the standard error of `result` so that its relMSE is the middle of the interval, and sets `result.interval`
-/// and `result.risk`. Empties `result.risk_rows`; does nothing where there are none.
+/// and `result.risk_sums`. Empties `result.risk_rows`; does nothing where there are none.
 void apply_interval(EstimatorResult& result);
 
 }  // namespace covary

@@ -16,8 +16,6 @@ namespace {
 
 using namespace lanes;
 
-double square(double value) { return value * value; }
-
 /// Pixels of a part of a row, whose errors are taken together.
 constexpr int kPart = 16;
 /// Relative standard error of the held-out error at which it counts as much as the estimator's own prediction.

@@ -10,8 +10,6 @@
 namespace covary {
 namespace {
 
-double square(double value) { return value * value; }
-
 /// Pixels of a part of a row, whose errors are taken together.
 constexpr int kPart = 16;
 /// Pixels around one, in each direction, whose noise is taken together; and the least noise.
@@ -20,7 +18,7 @@ constexpr double kLeastNoise = 1e-6;
 
 /// A pixel's sums over its channels.
 struct PixelRisk {
-  double error = 0, variance = 0, noise = 0, bias = 0, held_out = 0;
+  double error = 0, variance = 0, noise = 0;
 };
 
 PixelRisk risk_at(const ImageRiskInput& in, int x, int y) {
@@ -32,16 +30,13 @@ PixelRisk risk_at(const ImageRiskInput& in, int x, int y) {
       pixel.error += v, pixel.variance += v;
       continue;
     }
-    double m[2], g[2], var[2];
+    double m[2], g[2];
     for (int half : {0, 1}) {
       m[half] = in.halves[half]->pixel(x, y)[c];
       g[half] = in.independents[half]->mean.row(c, y)[x];
-      var[half] = in.independents[half]->variance_of_mean.row(c, y)[x];
     }
     pixel.error += square(in.image->pixel(x, y)[c] - h) - v + 0.5 * (m[0] - m[1]) * (g[0] - g[1]);
     pixel.variance += 0.25 * square(m[0] - m[1]);
-    pixel.bias += (m[0] - g[0]) * (m[1] - g[1]);
-    pixel.held_out += 0.5 * (square(m[0] - g[1]) - var[1] + square(m[1] - g[0]) - var[0]);
   }
   return pixel;
 }
@@ -102,7 +97,6 @@ RiskRow risk_of_row(const ImageRiskInput& in, int y) {
       part += w * pixel.error, scaled += w * pixel.error / around[x];
       row.variance += w * pixel.variance, row.scaled_variance += w * pixel.variance / around[x];
       row.noise += w * pixel.noise, row.noise_squares += square(w * pixel.noise);
-      row.bias += w * pixel.bias, row.held_out += w * pixel.held_out;
       row.values += 3;
       add_groups(in, x, y, w, row);
     }
