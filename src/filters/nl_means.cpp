@@ -40,7 +40,7 @@ Planes continued(const Image& image, bool is_error) {
   return planes;
 }
 
-/// The channels of an image, and as the fourth 1; 0 outside and at pixels that are not valid.
+/// The channels of an image; 0 outside and at pixels that are not valid.
 Planes masked(const Image& image, const std::vector<unsigned char>& valid) {
   Planes planes(image.width, image.height, 3, kBorder, 0);
   parallel_for(image.height, 8, [&](int y) {
