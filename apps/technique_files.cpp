@@ -8,8 +8,8 @@
 
 #include "core/error.h"
 #include "film/image_writer.h"
-#include "integrators/light_pass.h"
 #include "integrators/technique_images.h"
+#include "passes/light_pass.h"
 #include "plans/integrator_choice.h"
 
 namespace covary {

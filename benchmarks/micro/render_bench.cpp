@@ -14,10 +14,11 @@
 #include <vector>
 
 #include "integrators/controlled_path.h"
-#include "integrators/integrator.h"
-#include "integrators/light_selection.h"
-#include "integrators/render_pass.h"
+#include "integrators/registry.h"
 #include "io/load_scene.h"
+#include "passes/integrator.h"
+#include "passes/render_pass.h"
+#include "sampling/light_selection.h"
 #include "scene/property_source.h"
 
 namespace covary {

@@ -6,6 +6,7 @@
 
 #include "denoising/mixed_denoising.h"
 #include "estimators/sample_counts.h"
+#include "integrators/registry.h"
 #include "metrics/metrics.h"
 #include "plans/render_settings.h"
 #include "python/module/bindings.h"

@@ -5,7 +5,7 @@
 #include <atomic>
 
 #include "film/film.h"
-#include "integrators/render_pass.h"
+#include "passes/render_pass.h"
 
 namespace covary {
 

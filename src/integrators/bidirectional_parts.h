@@ -3,9 +3,10 @@
 #pragma once
 
 #include "integrators/bdpt_weights.h"
-#include "integrators/light_pass.h"
 #include "integrators/light_subpaths.h"
+#include "integrators/path_lengths.h"
 #include "integrators/roulette.h"
+#include "passes/light_pass.h"
 
 namespace covary {
 

@@ -20,9 +20,10 @@
 
 #include "integrators/bdpt_weights.h"
 #include "integrators/bidirectional_parts.h"
-#include "integrators/light_pass.h"
 #include "integrators/light_subpaths.h"
+#include "integrators/path_lengths.h"
 #include "integrators/path_steps.h"
+#include "passes/light_pass.h"
 
 namespace covary {
 

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "integrators/render_pass.h"
+#include "passes/render_pass.h"
 
 namespace covary {
 

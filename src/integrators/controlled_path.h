@@ -11,8 +11,8 @@
 #include "integrators/control_settings.h"
 #include "integrators/controlled_batch.h"
 #include "integrators/controlled_tracer.h"
-#include "integrators/light_groups.h"
-#include "integrators/training.h"
+#include "passes/training.h"
+#include "sampling/light_groups.h"
 
 namespace covary {
 

@@ -32,11 +32,12 @@
 
 #include "integrators/controlled_batch.h"
 #include "integrators/controlled_parts.h"
-#include "integrators/light_selection.h"
 #include "integrators/mis.h"
+#include "integrators/path_lengths.h"
 #include "integrators/path_steps.h"
 #include "integrators/primary_sample.h"
 #include "sampling/coefficient_table.h"
+#include "sampling/light_selection.h"
 #include "sampling/light_set.h"
 
 namespace covary {

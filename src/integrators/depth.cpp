@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // `depth`: the distance from the near plane to the first surface along each camera ray, 0 where there is none.
-#include "integrators/integrator.h"
+#include "integrators/path_lengths.h"
 #include "integrators/path_steps.h"
+#include "passes/integrator.h"
 
 namespace covary {
 namespace {

@@ -7,7 +7,7 @@
 #include <algorithm>
 
 #include "core/content_hash.h"
-#include "integrators/guide_probe.h"
+#include "integrators/probe_guide.h"
 #include "sampling/training_bytes.h"
 
 namespace covary {

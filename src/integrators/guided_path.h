@@ -10,8 +10,8 @@
 #include "integrators/guide_settings.h"
 #include "integrators/guided_batch.h"
 #include "integrators/guided_tracer.h"
-#include "integrators/light_groups.h"
-#include "integrators/training.h"
+#include "passes/training.h"
+#include "sampling/light_groups.h"
 
 namespace covary {
 

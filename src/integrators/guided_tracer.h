@@ -19,6 +19,7 @@
 #include "core/in_place.h"
 #include "integrators/guided_vertex_control.h"
 #include "integrators/mis.h"
+#include "integrators/path_lengths.h"
 #include "integrators/path_steps.h"
 
 namespace covary {

@@ -5,7 +5,7 @@
 
 #include "integrators/guided_batch.h"
 #include "integrators/guided_surface.h"
-#include "integrators/light_selection.h"
+#include "sampling/light_selection.h"
 
 namespace covary {
 

@@ -14,7 +14,7 @@
 #include <span>
 #include <vector>
 
-#include "integrators/integrator.h"
+#include "passes/integrator.h"
 #include "sampling/coefficient_table.h"
 
 namespace covary {

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "core/in_place.h"
-#include "integrators/integrator.h"
 #include "integrators/primary_sample.h"
+#include "passes/integrator.h"
 #include "sampling/light_set.h"
 
 namespace covary {

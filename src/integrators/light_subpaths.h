@@ -10,10 +10,10 @@
 #include "core/error.h"
 #include "core/in_place.h"
 #include "integrators/bdpt_weights.h"
-#include "integrators/integrator.h"
-#include "integrators/light_selection.h"
 #include "integrators/primary_sample.h"
 #include "integrators/subpath_store.h"
+#include "passes/integrator.h"
+#include "sampling/light_selection.h"
 
 namespace covary {
 

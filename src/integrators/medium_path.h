@@ -7,9 +7,10 @@
 // passages are no edges of a path, as in Mitsuba's `volpath`.
 #pragma once
 
-#include "integrators/integrator.h"
-#include "integrators/light_selection.h"
 #include "integrators/medium_flight.h"
+#include "integrators/path_lengths.h"
+#include "passes/integrator.h"
+#include "sampling/light_selection.h"
 
 namespace covary {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/in_place.h"
-#include "integrators/integrator.h"
+#include "passes/integrator.h"
 
 namespace covary {
 

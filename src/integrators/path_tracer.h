@@ -13,12 +13,13 @@
 #include <utility>
 
 #include "core/in_place.h"
-#include "integrators/integrator.h"
-#include "integrators/light_selection.h"
 #include "integrators/mis.h"
+#include "integrators/path_lengths.h"
 #include "integrators/path_steps.h"
 #include "integrators/primary_sample.h"
 #include "integrators/roulette.h"
+#include "passes/integrator.h"
+#include "sampling/light_selection.h"
 
 namespace covary {
 

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "integrators/integrator.h"
+#include "passes/integrator.h"
 
 namespace covary {
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // One line per integrator.
-#include "integrators/integrator.h"
-
-#include "core/error.h"
+#include "integrators/registry.h"
 
 namespace covary {
 
@@ -57,31 +55,6 @@ std::shared_ptr<Integrator> make_integrator(const IntegratorPlugin& plugin, Sett
   PathLengthSettings lengths;
   declare(settings, lengths);
   return plugin.make(settings, lengths);
-}
-
-void require_sees_media(const Integrator& integrator, const Scene& scene) {
-  if (!scene.has_media() || integrator.sees_media()) return;
-  const std::string text = integrator.description();
-  throw Error(ErrorCode::kInput, scene.first_medium() + ": the integrator '" + text.substr(0, text.find(' ')) +
-                                     "' does not see participating media; 'path' does");
-}
-
-void declare(Settings& s, PathLengthSettings& v) {
-  constexpr int kMost = 1 << 30;
-  int max_depth = v.max_depth == PathLengthSettings::kUnlimited ? -1 : v.max_depth;
-  s.group("Paths", OptionEffect::kSamples);
-  s.whole("max-depth", max_depth, {.low = -1, .high = kMost},
-          "Most path edges: 1 is emission seen directly, 2 direct light; -1: no limit", {.level = OptionLevel::kBasic});
-  s.whole("min-depth", v.min_depth, {.low = 0, .high = kMost}, "Leave out paths with fewer edges than this");
-  s.whole("rr-depth", v.rr_depth, {.low = 1, .high = kMost}, "Edges after which Russian roulette may end a path");
-  s.on_off("hide-emitters", v.hide_emitters, "Whether lights that the camera sees directly are black");
-  v.max_depth = max_depth < 0 ? PathLengthSettings::kUnlimited : max_depth;
-}
-
-std::string PathLengthSettings::text() const {
-  const auto number = [](int depth) { return depth == kUnlimited ? std::string("unlimited") : std::to_string(depth); };
-  return "min_depth=" + number(min_depth) + " max_depth=" + number(max_depth) + " rr_depth=" + number(rr_depth) +
-         " hide_emitters=" + (hide_emitters ? "true" : "false");
 }
 
 }  // namespace covary

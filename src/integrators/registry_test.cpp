@@ -8,7 +8,7 @@
 #include <limits>
 #include <map>
 
-#include "integrators/integrator.h"
+#include "integrators/registry.h"
 #include "settings/option_names.h"
 
 namespace covary {

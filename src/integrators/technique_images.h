@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "film/film.h"
-#include "integrators/render_pass.h"
+#include "passes/render_pass.h"
 
 namespace covary {
 

@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "integrators/integrator.h"
+#include "integrators/registry.h"
 #include "io/load_scene.h"
 
 namespace covary {

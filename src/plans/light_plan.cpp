@@ -9,7 +9,7 @@
 
 #include "core/error.h"
 #include "film/splat_layer.h"
-#include "integrators/light_pass.h"
+#include "passes/light_pass.h"
 #include "plans/budget.h"
 #include "plans/integrator_choice.h"
 

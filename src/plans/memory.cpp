@@ -9,8 +9,8 @@
 
 #include "core/error.h"
 #include "integrators/aov.h"
-#include "integrators/path_length_images.h"
-#include "integrators/training.h"
+#include "passes/path_length_images.h"
+#include "passes/training.h"
 #include "plans/budget.h"
 #include "plans/integrator_choice.h"
 #include "plans/light_plan.h"

@@ -6,7 +6,7 @@
 
 #include "filters/joint_bilateral.h"
 #include "integrators/aov.h"
-#include "integrators/training.h"
+#include "passes/training.h"
 
 namespace covary {
 

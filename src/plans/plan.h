@@ -15,9 +15,9 @@
 
 #include "estimators/estimator.h"
 #include "film/film.h"
-#include "integrators/integrator.h"
-#include "integrators/render_pass.h"
 #include "io/load_scene.h"
+#include "passes/integrator.h"
+#include "passes/render_pass.h"
 
 namespace covary {
 
@@ -35,7 +35,7 @@ struct PassPlan {
   int fewest_groups = 0;
   bool sample_variance = false;  ///< the film keeps the variance of samples
   PixelEstimate estimate;        ///< PassSettings::estimate
-  /// A light pass (integrators/light_pass.h): the film's samples are bundles of light paths, and the number in its
+  /// A light pass (passes/light_pass.h): the film's samples are bundles of light paths, and the number in its
   /// random numbers is kLightPass + number.
   bool light = false;
   std::string

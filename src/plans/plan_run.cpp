@@ -7,8 +7,8 @@
 
 #include "core/error.h"
 #include "film/splat_layer.h"
-#include "integrators/light_pass.h"
-#include "integrators/training.h"
+#include "passes/light_pass.h"
+#include "passes/training.h"
 #include "plans/budget.h"
 #include "plans/folder_lock.h"
 #include "plans/integrator_choice.h"

@@ -12,7 +12,7 @@
 #include "core/error.h"
 #include "core/stop.h"
 #include "integrators/aov.h"
-#include "integrators/path_length_images.h"
+#include "passes/path_length_images.h"
 #include "plans/light_plan.h"
 #include "plans/pass_files.h"
 #include "plans/result_files.h"

@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "integrators/light_pass.h"
-#include "integrators/training_image.h"
+#include "passes/light_pass.h"
+#include "passes/training_image.h"
 #include "plans/plan.h"
 #include "risk/predicted_error.h"
 
@@ -31,7 +31,7 @@ struct RenderRequest {
   double until = 0;              ///< > 0: add samples until the predicted relMSE is this
   bool until_in_blocks = false;  ///< `until` means predicted_blocks() of predicted_error.h, not the whole image
   bool aovs = false;             ///< also the images Albedo, N and P
-  /// Also the images Edges01, Edges02, … of the last pass of camera samples (integrators/path_length_images.h), which
+  /// Also the images Edges01, Edges02, … of the last pass of camera samples (passes/path_length_images.h), which
   /// needs the integrator controlled-path.
   bool path_lengths = false;
   /// Of passes with common random numbers; other parts than both need an integrator with light subpaths.

@@ -6,8 +6,9 @@
 #include <algorithm>
 
 #include "core/error.h"
-#include "integrators/light_pass.h"
-#include "integrators/training.h"
+#include "integrators/registry.h"
+#include "passes/light_pass.h"
+#include "passes/training.h"
 #include "plans/integrator_choice.h"
 #include "settings/number_text.h"
 

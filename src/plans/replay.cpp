@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "core/error.h"
-#include "integrators/light_pass.h"
+#include "passes/light_pass.h"
 #include "plans/budget.h"
 #include "plans/light_plan.h"
 #include "plans/render.h"

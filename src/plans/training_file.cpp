@@ -8,7 +8,7 @@
 
 #include "core/error.h"
 #include "film/output_file.h"
-#include "integrators/training.h"
+#include "passes/training.h"
 #include "sampling/training_bytes.h"
 
 namespace covary {

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "integrators/integrator.h"
+#include "passes/integrator.h"
 
 namespace covary {
 

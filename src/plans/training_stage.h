@@ -3,7 +3,7 @@
 #pragma once
 
 #include "film/grouped_image.h"
-#include "integrators/training.h"
+#include "passes/training.h"
 #include "plans/render.h"
 
 namespace covary {

@@ -16,9 +16,9 @@
 #include <string>
 #include <vector>
 
-#include "integrators/integrator.h"
-#include "integrators/render_pass.h"
+#include "integrators/registry.h"
 #include "io/load_scene.h"
+#include "passes/render_pass.h"
 #include "scene/property_source.h"
 #include "statistics/p_values.h"
 

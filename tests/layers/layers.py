@@ -32,7 +32,8 @@ ARROWS = {
     "media": ["scene"],
     "io": ["bsdfs", "emitters", "media"],
     "sampling": ["scene"],
-    "integrators": ["sampling", "film"],
+    "passes": ["scene", "film"],
+    "integrators": ["passes", "sampling"],
     "plans": ["combine", "integrators", "io"],
 }
 SOURCE_FOLDERS = ["src", "include", "apps", "python", "tests", "benchmarks"]

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Light passes: the image of light tracing, its bits, and what cannot be used. With the light tracer of tests/support.
-#include "integrators/light_pass.h"
+#include "passes/light_pass.h"
 
 #include <tbb/global_control.h>
 

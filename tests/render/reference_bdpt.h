@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "core/arena.h"
-#include "integrators/light_pass.h"
-#include "integrators/light_selection.h"
 #include "integrators/primary_sample.h"
+#include "passes/light_pass.h"
+#include "sampling/light_selection.h"
 #include "scene/scene.h"
 
 namespace covary::reference_bdpt {

@@ -10,9 +10,9 @@
 #include <memory>
 #include <string>
 
-#include "integrators/integrator.h"
-#include "integrators/render_pass.h"
+#include "integrators/registry.h"
 #include "io/load_scene.h"
+#include "passes/render_pass.h"
 #include "scene/property_source.h"
 #include "support/files.h"
 

@@ -2,7 +2,7 @@
 // Integrators that learn: the same bits for any number of threads, a description that tells one training from another,
 // and passes that refuse what would mix them. By a small integrator whose sums depend on the order in which they are
 // added.
-#include "integrators/training.h"
+#include "passes/training.h"
 
 #include <tbb/global_control.h>
 

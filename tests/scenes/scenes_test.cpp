@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "integrators/light_pass.h"
+#include "passes/light_pass.h"
 #include "plans/estimator_plans.h"
 #include "plans/integrator_choice.h"
 #include "plans/render.h"

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "integrators/light_pass.h"
 #include "integrators/path_tracer.h"
+#include "passes/light_pass.h"
 
 namespace covary::test_support {
 

@@ -14,9 +14,10 @@
 #include <vector>
 
 #include "film/film.h"
-#include "integrators/integrator.h"
-#include "integrators/render_pass.h"
-#include "integrators/splat_filter.h"
+#include "passes/integrator.h"
+#include "passes/render_pass.h"
+#include "passes/splat_filter.h"
+#include "settings/settings.h"
 
 namespace covary {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "integrators/light_selection.h"
+#include "sampling/light_selection.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "integrators/path_length_images.h"
+#include "passes/path_length_images.h"
 
 #include <algorithm>
 

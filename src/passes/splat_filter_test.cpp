@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A splat goes to one pixel, and on average to each as much as the filter says.
-#include "integrators/splat_filter.h"
+#include "passes/splat_filter.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <limits>
 #include <vector>
 
-#include "integrators/render_pass.h"
+#include "passes/render_pass.h"
 
 namespace covary {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "integrators/training_image.h"
+#include "passes/training_image.h"
 
 #include <algorithm>
 #include <cmath>

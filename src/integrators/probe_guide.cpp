@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "integrators/guide_probe.h"
+#include "integrators/probe_guide.h"
 
 #include "core/parallel.h"
-#include "core/trigonometry.h"
 
 namespace covary {
 namespace {
@@ -56,11 +55,6 @@ void set(Image& image, int x, int y, const Spectrum& value) {
 }
 
 }  // namespace
-
-Vec3 probe_direction(float x, float y) {
-  const SinCos polar = sincos_turns(0.5f * y), turn = sincos_turns(x);
-  return {polar.sin * turn.cos, polar.cos, polar.sin * turn.sin};
-}
 
 std::optional<GuideProbe> probe_guide(const Scene& scene, const GuidedPath& integrator, Ray ray, int height,
                                       uint32_t spp, uint64_t seed) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "integrators/render_pass.h"
+#include "passes/render_pass.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,9 +10,9 @@
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "core/warp.h"
-#include "integrators/first_bad_samples.h"
-#include "integrators/pass_limits.h"
-#include "integrators/training.h"
+#include "passes/first_bad_samples.h"
+#include "passes/pass_limits.h"
+#include "passes/training.h"
 
 namespace covary {
 namespace {

@@ -21,9 +21,9 @@
 #include <string_view>
 
 #include "film/film.h"
-#include "integrators/integrator.h"
-#include "integrators/render_pass.h"
-#include "integrators/training_image.h"
+#include "passes/integrator.h"
+#include "passes/render_pass.h"
+#include "passes/training_image.h"
 
 namespace covary {
 

@@ -4,7 +4,6 @@
 
 #include <atomic>
 #include <cstdint>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -17,7 +16,6 @@
 #include "core/arena.h"
 #include "core/random.h"
 #include "scene/scene.h"
-#include "settings/settings.h"
 
 namespace covary {
 
@@ -78,7 +76,7 @@ struct IntegratorReport {
 };
 
 /// How an integrator lives: it is made from parameters, gets the scene by prepare(), is trained if it learns
-/// (integrators/training.h), and then traces. From prepare() or training on, nothing that all threads see changes.
+/// (passes/training.h), and then traces. From prepare() or training on, nothing that all threads see changes.
 /// A loaded scene holds one that is never prepared; each render works with a clone.
 class Integrator : public SceneObject {
  public:
@@ -118,35 +116,5 @@ class Integrator : public SceneObject {
 void require_sees_media(const Integrator& integrator, const Scene& scene);
 
 inline PathContext::PathContext(const Integrator& integrator) : state(integrator.make_thread_state()) {}
-
-/// Settings every integrator has; Mitsuba's meaning. The command line overrides those of the scene.
-struct PathLengthSettings {
-  static constexpr int kUnlimited = std::numeric_limits<int>::max();
-  int min_depth = 0;           ///< contributions of paths with fewer edges are left out
-  int max_depth = kUnlimited;  ///< largest number of path edges; 1: directly visible light only; 0: black
-  int rr_depth = 5;            ///< number of edges after which Russian roulette begins
-  bool hide_emitters = false;  ///< lights are invisible to the camera
-  std::string text() const;
-};
-void declare(Settings& settings, PathLengthSettings& lengths);
-
-/// One integrator. `make` declares its own settings.
-struct IntegratorPlugin {
-  const char* name;
-  std::shared_ptr<Integrator> (*make)(Settings& settings, const PathLengthSettings& lengths);
-};
-/// All integrators, sorted by name.
-std::span<const IntegratorPlugin> integrator_plugins();
-/// The one of that name, or null.
-const IntegratorPlugin* find_integrator(std::string_view name);
-/// What their settings are: those of paths and those of their own. `name` is registered.
-std::vector<Option> options_of_integrator(const std::string& name);
-/// Those of all; equal names are one option.
-std::vector<Option> options_of_integrators();
-std::vector<std::string> integrator_names();
-/// Names of those that have the option, without dashes; empty where none has.
-std::vector<std::string> integrators_with_option(const std::string& option);
-/// Declares settings of paths and of the integrator, and makes it.
-std::shared_ptr<Integrator> make_integrator(const IntegratorPlugin& plugin, Settings& settings);
 
 }  // namespace covary

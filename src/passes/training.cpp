@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "integrators/training.h"
+#include "passes/training.h"
 
 #include "core/content_hash.h"
 #include "core/stopwatch.h"
-#include "integrators/guide_probe.h"
+#include "passes/guide_probe.h"
 
 namespace covary {
 

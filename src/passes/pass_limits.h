@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "core/stopwatch.h"
-#include "integrators/render_pass.h"
+#include "passes/render_pass.h"
 
 namespace covary {
 

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// What `guided-path` knows at a surface, as functions of the direction: latitude-longitude images around the y axis.
+// What an integrator that guides paths knows at a surface, as functions of the direction: latitude-longitude images
+// around the y axis.
 #pragma once
 
-#include <optional>
-
 #include "film/film.h"
-#include "integrators/guided_path.h"
 
 namespace covary {
 
@@ -19,10 +17,5 @@ struct GuideProbe {
 
 /// Direction of the point (x, y) of a probe's image, in [0, 1]².
 Vec3 probe_direction(float x, float y);
-
-/// Probes the first surface along `ray`; nothing where there is none. The images are 2 `height` wide. Each pixel of the
-/// radiance is the mean of `spp` samples of the trained integrator. The number of threads changes no bit.
-std::optional<GuideProbe> probe_guide(const Scene& scene, const GuidedPath& integrator, Ray ray, int height,
-                                      uint32_t spp, uint64_t seed);
 
 }  // namespace covary

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "integrators/render_pass.h"
+#include "passes/render_pass.h"
 
 namespace covary {
 

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "film/film.h"
-#include "integrators/integrator.h"
-#include "integrators/sample_target.h"
+#include "passes/integrator.h"
+#include "passes/sample_target.h"
 
 namespace covary {
 
@@ -49,7 +49,7 @@ struct PassSettings {
   /// When set, takes the place of the mean. The samples of a pixel are then taken in one go, and a thread holds all
   /// spp of them; the film has one group, its pixels are finished or have no samples, and `limit` is not used.
   PixelEstimate estimate;
-  /// The integrator of this pass where it is to learn from all of these samples (integrators/training.h), otherwise
+  /// The integrator of this pass where it is to learn from all of these samples (passes/training.h), otherwise
   /// null. The film has as many samples in each pixel as were learnt from so far.
   LearningIntegrator* learner = nullptr;
   /// How much an error counts in each channel of each pixel of the film, row by row, for a learner; empty: 1. May be

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "integrators/light_pass.h"
+#include "passes/light_pass.h"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "film/splat_layer.h"
-#include "integrators/pass_limits.h"
+#include "passes/pass_limits.h"
 
 namespace covary {
 namespace {

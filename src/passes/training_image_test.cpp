@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Waves of a training as an image. Samples are normal numbers around the pixel's value, with a standard deviation that
 // falls from wave to wave; 64 x 64 pixels, fixed seeds.
-#include "integrators/training_image.h"
+#include "passes/training_image.h"
 
 #include <gtest/gtest.h>
 

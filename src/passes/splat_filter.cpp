@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "integrators/splat_filter.h"
+#include "passes/splat_filter.h"
 
 #include <cmath>
 

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "film/film.h"
-#include "integrators/integrator.h"
-#include "integrators/render_pass.h"
+#include "passes/integrator.h"
+#include "passes/render_pass.h"
 
 namespace covary {
 

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "integrators/path_lengths.h"
+
+namespace covary {
+
+void declare(Settings& s, PathLengthSettings& v) {
+  constexpr int kMost = 1 << 30;
+  int max_depth = v.max_depth == PathLengthSettings::kUnlimited ? -1 : v.max_depth;
+  s.group("Paths", OptionEffect::kSamples);
+  s.whole("max-depth", max_depth, {.low = -1, .high = kMost},
+          "Most path edges: 1 is emission seen directly, 2 direct light; -1: no limit", {.level = OptionLevel::kBasic});
+  s.whole("min-depth", v.min_depth, {.low = 0, .high = kMost}, "Leave out paths with fewer edges than this");
+  s.whole("rr-depth", v.rr_depth, {.low = 1, .high = kMost}, "Edges after which Russian roulette may end a path");
+  s.on_off("hide-emitters", v.hide_emitters, "Whether lights that the camera sees directly are black");
+  v.max_depth = max_depth < 0 ? PathLengthSettings::kUnlimited : max_depth;
+}
+
+std::string PathLengthSettings::text() const {
+  const auto number = [](int depth) { return depth == kUnlimited ? std::string("unlimited") : std::to_string(depth); };
+  return "min_depth=" + number(min_depth) + " max_depth=" + number(max_depth) + " rr_depth=" + number(rr_depth) +
+         " hide_emitters=" + (hide_emitters ? "true" : "false");
+}
+
+}  // namespace covary
