@@ -42,7 +42,7 @@ class Planted(unittest.TestCase):
         self.write("docs/references.bib", "@article{Veach1995,\n}\n")
         self.write("README.md", "# Small\n")
         self.write("docs/architecture.md", "      src/\n        core/\n        scene/        ──► settings\n"
-                   "        integrators/  ──► sampling, film\n")
+                   "        integrators/  ──► passes, sampling\n")
         self.write("docs/scene-format.md", "# Scenes\n## Reflectance (`bsdfs`)\n")
 
     def write(self, path, text):
