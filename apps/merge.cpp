@@ -89,19 +89,20 @@ void advise_on_images(const MergeOptions& options) {
     }
     if (const std::optional<fs::path> folder = folder_of_films(path, info)) folders.push_back(*folder);
     const std::string folder = fs::path(path).replace_extension(".films").string();
-    if (const std::string command = attribute(info, "command"); !command.empty())
+    if (const std::string command = attribute(info, "command"); command.starts_with("covary render "))
       commands.push_back(command + " --passes " + shell_text({folder}));
   }
   if (first.empty()) return;
   const bool all_kept = folders.size() == options.inputs.size();
   if (all_kept) commands = commands_of_films(folders, options.output, estimator);
+  std::string advice = all_kept ? "; its films are there, so merge these and combine them:"
+                       : commands.empty() ? "; merge the films that it was made of"
+                                          : "; render with --passes, which keeps the films, and merge these:";
+  for (const std::string& command : commands) advice += "\n  " + command;
   throw Error(ErrorCode::kInput,
               fmt::format("{} is no film but an image that '{}' made of films, and holds no samples that could be "
-                          "merged; {}:\n  {}",
-                          first, estimator,
-                          all_kept ? "its films are there, so merge these and combine them"
-                                   : "render with --passes, which keeps the films, and merge these",
-                          fmt::join(commands, "\n  ")));
+                          "merged{}",
+                          first, estimator, advice));
 }
 
 Film merged_films(const MergeOptions& options) {

@@ -124,7 +124,7 @@ def _make_runs(client: Any, pieces: Sequence[_Piece], cache: Path, program_hash:
     done = len(pieces) - len(left)
     futures = {client.submit(_run, piece, pure=False, retries=_RETRIES): piece for piece in left}
     try:
-        for future in dask().as_completed(futures):
+        for future in dask().as_completed(futures, loop=client.loop):
             runs = future.result()
             _keep(runs, cache)
             (records / futures[future].name(program_hash)).write_text(json.dumps(sorted(runs)))

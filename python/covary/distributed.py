@@ -27,7 +27,7 @@ from ._parts import Part, PartFolder, Rendered
 from ._render import SCENE, SEED, SPP, Scene, report_bad_samples
 from ._render import render as render_here
 from ._result import BadSample, Result, fields_of
-from .errors import Error, InputError, UsageError
+from .errors import Error, InputError, IoError, UsageError
 from .film import Film, merge_films
 
 if TYPE_CHECKING:
@@ -229,8 +229,10 @@ def render(client: Any, scene: Scene | str | os.PathLike[str], spp: int, estimat
     options: of the estimator, and denoise and oidn of combine(), whose guides are rendered, too.
 
     Raises UsageError for estimators and integrators whose passes look beyond a tile, and for all that is wrong with
-    options, before anything is rendered.
+    options, before anything is rendered; IoError when the scheduler dies.
     """
+    from distributed.comm import CommClosedError  # type: ignore[import-not-found,import-untyped,unused-ignore]
+
     chosen = scene if isinstance(scene, Scene) else Scene.load(scene)
     plan = _plan(chosen, spp, estimator, seed, sample_ranges, tile, settings or {}, options)
     check_versions(client)
@@ -254,11 +256,19 @@ def render(client: Any, scene: Scene | str | os.PathLike[str], spp: int, estimat
     n_kept = len(canvas.parts)
     if n_kept:
         show()
-    for part, rendered in _rendered(client, job, left):
-        if kept is not None:
-            kept.keep(part, rendered)
-        canvas.add(part, rendered)
-        show()
+    try:
+        for part, rendered in _rendered(client, job, left):
+            if kept is not None:
+                kept.keep(part, rendered)
+            canvas.add(part, rendered)
+            show()
+    except (dask().CancelledError, CommClosedError) as error:
+        if isinstance(error, dask().CancelledError) and client.status == "running":
+            raise  # by the caller
+        rest = ("without folder= they are lost" if folder is None else
+                f"they are kept in {fspath(folder)!r}: with a new client the same call asks for the others only")
+        raise IoError(f"Dask's scheduler {client.scheduler.address} is gone after {len(canvas.parts)} of "
+                      f"{len(plan.parts)} parts; {rest}") from error
     return _result(canvas, plan, n_kept, time.monotonic() - started)
 
 
@@ -278,7 +288,7 @@ def _rendered(client: Any, job: _Job, parts: list[Part]) -> Iterator[tuple[Part,
     """Parts as they come from the workers."""
     futures = {client.submit(_render_part, job, part, pure=False, retries=_RETRIES): part for part in parts}
     try:
-        for future in dask().as_completed(futures):
+        for future in dask().as_completed(futures, loop=client.loop):
             rendered = future.result()
             if isinstance(rendered, Error):
                 raise rendered

@@ -177,6 +177,13 @@ class Plans(RenderTest):
                                         "--estimator", estimator)
             self.same("a.exr", "b.exr")
 
+    def test_merging_what_denoise_made(self):
+        for seed in ("1", "2"):
+            self.good("render", ROOM, *SMALL, "-o", f"{seed}.exr", "--estimator", "none", "--spp", "4", "--seed", seed)
+        self.good("denoise", "1.exr", "2.exr", "-o", "out.exr", "--oidn", "off")
+        refused = self.bad(1, "merge the films that it was made of", "merge", "1.exr", "out.exr", "-o", "m.exr").stderr
+        self.assertNotIn("--passes", refused)  # covary denoise has no such option
+
     def test_merging_images_names_what_to_merge_instead(self):
         for seed in ("1", "2"):
             self.statistics("-o", f"{seed}.exr", *IICV, "--spp", "8", "--seed", seed)

@@ -363,6 +363,42 @@ class Kept(PackageTest):
             self.assert_same_bits(here.std_error, made.std_error)
 
 
+    def test_scheduler_that_dies(self):
+        """A sentence says what is kept; workers wait for nothing, and a new scheduler gets the rest."""
+        from distributed import Client, LocalCluster
+        scene = covary.Scene.load(ROOM, resolution=SIZE)
+        for folder, told in ((None, "without folder= they are lost"), (self.path / "parts", "they are kept in ")):
+            address = str(self.path / f"{folder is None}.json")
+            common = ("--scheduler-file", address, "--no-dashboard")
+            scheduler = self.start("scheduler", "--port", 0, *common)
+            self.start("worker", "--nthreads", 1, "--no-nanny", "--local-directory", self.path, *common)
+
+            def kill(done, total, scheduler=scheduler):
+                if done == 2:
+                    scheduler.kill()
+            with Client(scheduler_file=address, set_as_default=False) as client:
+                client.wait_for_workers(1, timeout=60)
+                message = self.message_of(covary.IoError, covary.distributed.render, client, scene, 24, tile=20,
+                                          folder=folder, progress=kill)
+            self.assertRegex(message, "^Dask's scheduler tcp://.* is gone after [0-9]+ of 12 parts; ")
+            self.assertIn(told, message)
+        with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster, \
+                Client(cluster) as client:
+            there = covary.distributed.render(client, scene, 24, tile=20, folder=self.path / "parts")
+        self.assertGreaterEqual(there.parts_kept, 2)
+        self.assert_same_bits(covary.render(scene, 24, "iicv").image, there.image)
+
+    def start(self, kind, *words):
+        """A scheduler or worker of Dask."""
+        log = (self.path / f"{kind}.log").open("a")
+        self.addCleanup(log.close)
+        process = subprocess.Popen([sys.executable, "-m", f"distributed.cli.dask_{kind}", *map(str, words)],
+                                   stdout=log, stderr=log)
+        self.addCleanup(process.wait)
+        self.addCleanup(process.kill)
+        return process
+
+
 if __name__ == "__main__":
     assert (SOURCE / "scenes").exists()
     unittest.main()
