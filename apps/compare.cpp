@@ -8,6 +8,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "commands.h"
@@ -51,18 +52,19 @@ double mean_of(const Image& image, const Image& map) {
   return sum / static_cast<double>(n);
 }
 
-/// Bytes per pixel that compare_one() takes beside the images that were read.
-double bytes_to_compare(const std::vector<std::string>& metrics, size_t n_references) {
+/// Bytes per pixel that compare_one() takes beside the images that were read, of which it copies `n_copies`.
+double bytes_to_compare(const std::vector<std::string>& metrics, int64_t n_copies) {
   constexpr double kImage = 3 * sizeof(float), kMap = sizeof(float), kFlip = 120, kTrimmed = 56;  // film/metrics.cpp
   double most = 0;
   for (const std::string& name : metrics)
     most = std::max(most, name == "flip" ? kFlip : name == "relmse-trimmed" ? kTrimmed : 1);
-  return kImage * static_cast<double>(1 + n_references) + kMap * static_cast<double>(metrics.size()) + most;
+  return kImage * static_cast<double>(n_copies) + kMap * static_cast<double>(metrics.size()) + most;
 }
 
-Comparison compare_one(const CompareOptions& options, const std::vector<PlacedImage>& references,
-                       const std::string& path) {
-  const PlacedImage image = read_image(path, options.layer);
+/// Takes the references' pixels where the image is the last one: no copies of whole images then.
+Comparison compare_one(const CompareOptions& options, std::vector<PlacedImage>& references, const std::string& path,
+                       bool is_last) {
+  PlacedImage image = read_image(path, options.layer);
   Comparison comparison;
   comparison.window = common_window(path, image.place, image.place.window, options.reference, references[0].place);
   bool low_dynamic_range = image.low_dynamic_range && references[0].low_dynamic_range;
@@ -70,11 +72,15 @@ Comparison compare_one(const CompareOptions& options, const std::vector<PlacedIm
     comparison.window = common_window(path, image.place, comparison.window, options.reference2, references[1].place);
     low_dynamic_range = low_dynamic_range && references[1].low_dynamic_range;
   }
+  const auto is_copied = [&](const PlacedImage& r) { return !is_last || !(r.place.window == comparison.window); };
+  const int64_t n_copies = std::count_if(references.begin(), references.end(), is_copied) +
+                           static_cast<int64_t>(!(image.place.window == comparison.window));
   require_image_memory(path, comparison.window.width, comparison.window.height,
-                       bytes_to_compare(options.metrics, references.size()));
-  const Image pixels = cut(image, comparison.window);
+                       bytes_to_compare(options.metrics, n_copies));
+  const Image pixels = cut(std::move(image), comparison.window);
   std::vector<Image> aligned;
-  for (const PlacedImage& reference : references) aligned.push_back(cut(reference, comparison.window));
+  for (PlacedImage& reference : references)
+    aligned.push_back(is_last ? cut(std::move(reference), comparison.window) : cut(reference, comparison.window));
   for (const std::string& name : options.metrics) {
     try {
       comparison.results.push_back(compute_metric(find_metric(name).metric, pixels, aligned, low_dynamic_range));
@@ -198,7 +204,7 @@ void compare(const CompareOptions& options) {
 
   std::vector<Comparison> comparisons;
   for (const std::string& path : options.images) {
-    comparisons.push_back(compare_one(options, references, path));
+    comparisons.push_back(compare_one(options, references, path, &path == &options.images.back()));
     const Comparison& c = comparisons.back();
     if (c.results[0].n_non_finite)
       fmt::print(stderr, "covary: {}: {} of {} pixels are not finite here or in the reference and are left out\n", path,

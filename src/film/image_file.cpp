@@ -186,6 +186,25 @@ std::vector<Image> read_layers(const std::string& path, std::span<const std::str
   return images;
 }
 
+namespace {
+
+/// Channels `sources` of pixels with `n_channels` values, each decoded.
+template <typename T, typename Decode>
+void fill(const std::vector<T>& values, size_t n_channels, const std::array<size_t, 3>& sources, const Decode& decode,
+          Image& image) {
+  for (size_t p = 0; p < image.data.size() / 3; ++p)
+    for (size_t c = 0; c < 3; ++c) image.data[p * 3 + c] = decode(values[p * n_channels + sources[c]]);
+}
+
+/// Linear values of bytes, as OpenImageIO and srgb_to_linear() make them of each.
+std::array<float, 256> linear_bytes() {
+  std::array<float, 256> linear{};
+  for (size_t i = 0; i < linear.size(); ++i) linear[i] = srgb_to_linear(static_cast<float>(i) * (1.0f / 255));
+  return linear;
+}
+
+}  // namespace
+
 PlacedImage read_image(const std::string& path, const std::string& layer, ChecksumPolicy checksums) {
   PlacedImage result;
   if (is_film_or_exr(path)) {
@@ -201,16 +220,22 @@ PlacedImage read_image(const std::string& path, const std::string& layer, Checks
   result.place = place_of(header);
   result.low_dynamic_range = !header.floating_point;
   const size_t n_channels = header.channels.size();
+  std::array<size_t, 3> sources{};
+  for (size_t c = 0; c < 3; ++c)
+    sources[c] = std::find(header.channels.begin(), header.channels.end(), names[c]) - header.channels.begin();
+  const bool is_bytes = header.type == "uint8";
   require_image_memory(path, header.width, header.height,
-                       kImageBytes + static_cast<double>(n_channels * sizeof(float)));
-  const std::vector<float> values = file->read_floats(0, static_cast<int>(n_channels));
-  result.image = Image(header.width, header.height, 3);
-  for (size_t c = 0; c < 3; ++c) {
-    const size_t source = std::find(header.channels.begin(), header.channels.end(), names[c]) - header.channels.begin();
-    for (size_t p = 0; p < result.image.data.size() / 3; ++p) {
-      const float value = values[p * n_channels + source];
-      result.image.data[p * 3 + c] = result.low_dynamic_range ? srgb_to_linear(value) : value;
-    }
+                       kImageBytes + static_cast<double>(n_channels * (is_bytes ? 1 : sizeof(float))));
+  const auto last = static_cast<int>(n_channels);
+  if (is_bytes) {
+    const std::vector<uint8_t> values = file->read_bytes(0, last);
+    result.image = Image(header.width, header.height, 3);
+    fill(values, n_channels, sources, [linear = linear_bytes()](uint8_t value) { return linear[value]; }, result.image);
+  } else {
+    const std::vector<float> values = file->read_floats(0, last);
+    result.image = Image(header.width, header.height, 3);
+    const auto decode = [&](float value) { return result.low_dynamic_range ? srgb_to_linear(value) : value; };
+    fill(values, n_channels, sources, decode, result.image);
   }
   return result;
 }

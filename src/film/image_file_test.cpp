@@ -23,6 +23,8 @@
 #include "core/random.h"
 #include "film/film_file.h"
 #include "film/image_writer.h"
+#include "imageio/image_io.h"
+#include "imageio/png.h"
 #include "support/files.h"
 
 namespace covary {
@@ -147,6 +149,17 @@ TEST(ImageFile, SrgbRoundTrip) {
     EXPECT_NEAR(linear_to_srgb(srgb_to_linear(encoded)), encoded, 1e-6);
   }
   EXPECT_NEAR(linear_to_srgb(0.5f), 0.735357f, 1e-6);  // 1.055 * 0.5^(1/2.4) - 0.055
+}
+
+/// Bytes are decoded by a table, to the bits that OpenImageIO and srgb_to_linear() make of each value.
+TEST(ImageFile, BytesAreDecodedAsFloatsAre) {
+  std::vector<uint8_t> rgb(3 * 256);
+  for (size_t i = 0; i < rgb.size(); ++i) rgb[i] = static_cast<uint8_t>(i);
+  const std::vector<unsigned char> png = encode_png(256, 1, rgb, {});
+  write(test_file("a.png"), std::string(png.begin(), png.end()));
+  const std::vector<float> floats = open_image(test_file("a.png"))->read_floats(0, 3);
+  const Image image = read_image(test_file("a.png")).image;
+  for (size_t i = 0; i < floats.size(); ++i) EXPECT_EQ(image.data[i], srgb_to_linear(floats[i])) << i;
 }
 
 /// OpenEXR's threads are as many as the rest of the program may use, one meaning none beside the caller.

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "core/error.h"
 
@@ -38,6 +39,10 @@ Image cut(const PlacedImage& source, const CropWindow& window) {
     std::copy_n(source.image.pixel(window.x - source.place.window.x, window.y - source.place.window.y + y),
                 static_cast<size_t>(window.width) * 3, result.pixel(0, y));
   return result;
+}
+
+Image cut(PlacedImage&& source, const CropWindow& window) {
+  return source.place.window == window ? std::move(source.image) : cut(source, window);
 }
 
 }  // namespace covary

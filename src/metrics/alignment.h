@@ -15,6 +15,8 @@ CropWindow common_window(const std::string& path, const ImagePlace& place, const
 
 /// The pixels of `window`, which lies inside the image's own; 3 channels.
 Image cut(const PlacedImage& source, const CropWindow& window);
+/// The same of an image that is not needed any more: of a whole one, without a copy.
+Image cut(PlacedImage&& source, const CropWindow& window);
 
 /// "640 x 360 at (10, 20)"
 std::string text_of(const CropWindow& window);
