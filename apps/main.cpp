@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // The `covary` program. Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but not as well as wanted (--until), and
 // after a signal 128 + its number: 130 for Ctrl-C.
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <exception>
+#include <iostream>
 #include <new>
 #include <string>
 #include <vector>
@@ -26,6 +29,19 @@ namespace {
 
 std::string g_command_line;
 
+/// Opens standard streams that are closed: the next file would get their number, and messages would be written into it.
+/// Standard output fails then, as it should; messages that nobody is to see are lost.
+void open_closed_streams() {
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+    if (fcntl(stream, F_GETFD) == -1)
+      [[maybe_unused]] const int opened = open(stream == STDOUT_FILENO ? "/dev/full" : "/dev/null", O_RDWR);
+}
+
+void check_standard_output() {
+  if (!std::cout.flush() || std::fflush(stdout) != 0 || std::ferror(stdout))
+    throw Error(ErrorCode::kIo, "cannot write to standard output");
+}
+
 int report(const char* program, const Error& error) {
   std::fprintf(stderr, "%s: %s%s\n", program, error.code() == ErrorCode::kInternal ? "internal error: " : "",
                as_flags(error.what()).c_str());
@@ -40,8 +56,9 @@ std::vector<std::string> near_options(const CLI::App& command, const std::string
   for (const CLI::Option* option : command.get_options())
     names.insert(names.end(), option->get_lnames().begin(), option->get_lnames().end());
   const std::string bare = given.substr(std::min(given.find_first_not_of('-'), given.size()));
+  if (bare.size() < 2) return {};  // all short names are like a letter
   std::vector<std::string> near = nearest_names(bare, names);
-  if (near.empty() && bare.size() > 1)
+  if (near.empty())
     std::copy_if(names.begin(), names.end(), std::back_inserter(near), [&](auto& n) { return n.starts_with(bare); });
   for (std::string& name : near) name.insert(0, "--");
   return near;
@@ -70,6 +87,7 @@ int run(int argc, char** argv) {
 
   if (argc < 2) {
     std::fputs(app.help().c_str(), stdout);
+    check_standard_output();
     return 0;
   }
   // CLI11 would call an unknown subcommand a stray argument; name it and the nearest one.
@@ -84,7 +102,9 @@ int run(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& success) {  // --help, --version
-    return app.exit(success);
+    const int code = app.exit(success);
+    check_standard_output();
+    return code;
   } catch (const CLI::ParseError& error) {
     // A misspelt option comes before what CLI11 finds first: that the option meant is missing.
     const std::string extra = describe_extra(app);
@@ -93,7 +113,7 @@ int run(int argc, char** argv) {
     throw Error(ErrorCode::kUsage, std::string(error.what()) + "; see 'covary" + command + " --help'");
   }
   if (app.get_subcommands().empty()) throw Error(ErrorCode::kUsage, "no command given; 'covary --help' lists all");
-  if (std::fflush(stdout) != 0 || std::ferror(stdout)) throw Error(ErrorCode::kIo, "cannot write to standard output");
+  check_standard_output();
   return 0;
 }
 
@@ -120,7 +140,9 @@ void add_commands(CLI::App& app) {
 }  // namespace covary
 
 int main(int argc, char** argv) {
+  covary::open_closed_streams();
   std::vector<std::string> words(argv, argv + argc);
+  if (words.empty()) words.emplace_back();
   words[0] = "covary";
   covary::g_command_line = covary::shell_text(words);
   // A file that outgrows its limit is an error like a full disk, which leaves no half-written file behind.

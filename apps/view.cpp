@@ -7,8 +7,10 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cerrno>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -232,9 +234,12 @@ void write_page(const ViewOptions& options, const std::string& path) {
 }
 
 std::string temporary_page() {
-  std::string path = (fs::temp_directory_path() / "covary-view-XXXXXX.html").string();
+  const char* folder = std::getenv("TMPDIR");
+  std::string path = (fs::path(folder && *folder ? folder : "/tmp") / "covary-view-XXXXXX.html").string();
   const int descriptor = mkstemps(path.data(), 5);
-  if (descriptor < 0) throw Error(ErrorCode::kIo, "cannot create a file in " + fs::temp_directory_path().string());
+  if (descriptor < 0)
+    throw Error(ErrorCode::kIo, fmt::format("cannot make a page in {} ({}); name one by -o, or a folder by TMPDIR",
+                                            fs::path(path).parent_path().string(), std::strerror(errno)));
   close(descriptor);
   return path;
 }

@@ -72,6 +72,8 @@ OutputTarget output_target(const std::string& path) {
     // A rename would replace it nevertheless; the superuser may write anything, whatever its mode says.
     if ((status.st_mode & (S_IWUSR | S_IWGRP | S_IWOTH)) == 0 || access(path.c_str(), W_OK) != 0)
       fail_to_write(path, "the file there is write-protected; give another name, or permit writing it");
+  } else if (errno == ENAMETOOLONG) {
+    fail_to_write(path, std::strerror(errno));
   }
   OutputTarget target{follow_links(path)};
   const fs::path name = fs::path(target.path).filename(), folder = fs::path(target.path).parent_path();
@@ -81,6 +83,14 @@ OutputTarget output_target(const std::string& path) {
     fail_to_write(path, "there is no folder " + folder.string());
   if (access(folder.empty() ? "." : folder.c_str(), W_OK | X_OK) != 0) fail_to_write(path, std::strerror(errno));
   return target;
+}
+
+void try_output(const OutputTarget& target) {
+  if (target.is_special) return;
+  UnfinishedFile trial;
+  const int descriptor = trial.create(target.path);
+  if (descriptor < 0) fail_to_write(target.path, std::strerror(errno));
+  close(descriptor);
 }
 
 OutputFile::OutputFile(const std::string& path) : path_(path), target_(output_target(path)) {

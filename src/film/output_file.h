@@ -22,6 +22,10 @@ struct OutputTarget {
 /// write-protected, or nothing at all.
 OutputTarget output_target(const std::string& path);
 
+/// Makes the temporary file and removes it, so that a long render finds out at its beginning what permissions do not
+/// tell: limits, quotas, odd file systems. Throws Error(kIo).
+void try_output(const OutputTarget& target);
+
 class OutputFile {
  public:
   /// Creates the temporary file; special files are kept in memory until commit(). Throws like output_target().

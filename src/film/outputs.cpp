@@ -77,6 +77,7 @@ void Outputs::writes(const std::string& option, const std::string& path, OutputK
   if (kind == OutputKind::kText && (path.empty() || path == "-")) return;
   const OutputTarget target = output_target(path);
   if (!target.is_special) check_extension(option, path, kind);
+  try_output(target);
   Entry entry{option, path, {}};
   if (!identify(path, entry.identity)) return;
   for (const Entry& input : inputs_)

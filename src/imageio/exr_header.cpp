@@ -31,7 +31,9 @@ class HeaderCheck {
                   fmt::format("cannot read {}: {}", path, folder ? "it is a folder" : "not a regular file"));
     }
     file_.reset(std::fopen(path.c_str(), "rb"));
-    if (!file_) throw Error(ErrorCode::kIo, fmt::format("cannot read {}: {}", path, std::strerror(errno)));
+    if (!file_)
+      throw Error(ErrorCode::kIo,
+                  fmt::format("cannot read {}: {}", path.empty() ? "''" : path, std::strerror(errno)));
     left_ = std::filesystem::file_size(path, ignored);
   }
 

@@ -7,6 +7,19 @@
 #include <cctype>
 
 namespace covary {
+namespace {
+
+/// What a file is that was taken for a scene; "" when that does not show.
+std::string kind_of_file(std::string_view text) {
+  if (text.starts_with("v/1\1")) return "an EXR image";
+  if (text.starts_with("\x89PNG")) return "a PNG image";
+  if (text.starts_with("ply")) return "a mesh";
+  const size_t first = text.find_first_not_of(" \t\r\n");
+  if (first != std::string_view::npos && text[first] == '{') return "JSON";
+  return "";
+}
+
+}  // namespace
 
 // ---- XmlDocument ----------------------------------------------------------------------------------------------------
 
@@ -17,6 +30,10 @@ XmlDocument::XmlDocument(std::string_view text, const std::string& name, Diagnos
     if (buffer_[i] == '\n') line_starts_.push_back(i + 1);
   if (text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff")) {
     diagnostics.error({name_, 1, 1}, "the file is UTF-16 encoded; expected UTF-8");
+    return;
+  }
+  if (const std::string kind = kind_of_file(text); !kind.empty()) {
+    diagnostics.error({name_, 1, 1}, "the file is " + kind + "; expected a scene in XML");
     return;
   }
   // In place and without conversion: offsets into the buffer are offsets into the file.

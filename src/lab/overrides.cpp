@@ -52,9 +52,19 @@ void make_quick(Suite& suite) {
   }
 }
 
+/// What can be told before the sizes of the scenes are known.
+void check_sizes(const Overrides& o) {
+  if (!o.resolution.empty() && whole_numbers(o.resolution, 'x').size() != 2)
+    throw Error(ErrorCode::kUsage, fmt::format("`resolution` '{}': expected WIDTHxHEIGHT", o.resolution));
+  if (!o.crop.empty() && whole_numbers(o.crop, 'x').size() != 2 && whole_numbers(o.crop, ',').size() != 4)
+    throw Error(ErrorCode::kUsage,
+                fmt::format("`crop` '{}': expected X,Y,WIDTH,HEIGHT or WIDTHxHEIGHT, which lies in the middle", o.crop));
+}
+
 }  // namespace
 
 void apply(const Overrides& o, Suite& suite) {
+  check_sizes(o);
   if (o.quick) make_quick(suite);
   if (!o.baseline.empty()) suite.baseline = o.baseline;
   if (!o.scenes.empty()) keep("scene", o.scenes, suite.scenes);

@@ -27,7 +27,7 @@ struct Overrides {
 /// many.
 inline constexpr int64_t kQuickPixels = 32400, kQuickCropPixels = 12000;
 
-/// Throws Error(kUsage) where a scene or method named is not in the suite.
+/// Throws Error(kUsage) where a scene or method named is not in the suite, or sizes are none.
 void apply(const Overrides& overrides, Suite& suite);
 
 }  // namespace covary::lab

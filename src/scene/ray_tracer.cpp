@@ -187,7 +187,11 @@ RayTracer::Group RayTracer::make_group(std::span<const ShapePtr> shapes) const {
 
 RayTracer::RayTracer(std::span<const ShapePtr> shapes, std::span<const Instance> instances)
     : device_(rtcNewDevice(nullptr)) {
-  if (!device_) throw Error(ErrorCode::kInternal, "Embree cannot create a device on this machine");
+  if (!device_)
+    throw Error(ErrorCode::kIo,
+                rtcGetDeviceError(nullptr) == RTC_ERROR_OUT_OF_MEMORY
+                    ? "out of memory: Embree's device"
+                    : "Embree cannot make a device: too little memory, too few threads allowed, or another processor");
   rtcSetDeviceErrorFunction(device_, on_embree_error, nullptr);
   top_ = make_group(shapes);
 
