@@ -47,7 +47,7 @@ class Bits(DestructionTest):
     def test_flipped_in_films_and_images(self):
         self.good(*RENDER, "--spp", "24", "--estimator", "iicv", "--passes", "films", "-o", "image.exr")
         self.good(*RENDER, "--spp", "12", "--estimator", "none", "--aovs", "-o", "film.exr")
-        self.good(*RENDER, "--spp", "12", "--estimator", "none", "--seed", "2", "-o", "other.exr")
+        self.good(*RENDER, "--spp", "12", "--estimator", "none", "--aovs", "--seed", "2", "-o", "other.exr")
         commands = (("films/crn.exr", "combine", "--crn", "bad.exr", "--independent", "films/independent.exr"),
                     ("films/independent.exr", "combine", "--crn", "films/crn.exr", "--independent", "bad.exr"),
                     ("film.exr", "denoise", "bad.exr", "other.exr", "--oidn", "off"),
@@ -55,7 +55,7 @@ class Bits(DestructionTest):
         chance, codes = random.Random(600), []
         for source, *command in commands:
             whole = (self.path / source).read_bytes()
-            command += ["o.exr"] if command[0] == "convert" else ["-o", "o.exr"]
+            command += ["o.exr", "--overwrite"] if command[0] == "convert" else ["-o", "o.exr"]
             (self.path / "bad.exr").write_bytes(whole)
             self.good(*command)
             expected = read_exr((self.path / "o.exr").read_bytes())
