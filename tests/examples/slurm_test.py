@@ -92,7 +92,7 @@ class Script(Cluster):
 
     def test_wrong_options_are_found_before_there_are_jobs(self):
         self.assertIn("did you mean '--integrator'", self.render(8, "--integrater", "path", code=2))
-        self.assertIn("two\nor more TASKS", self.render(8, tasks=1, code=2))
+        self.assertIn("two or more TASKS", self.render(8, tasks=1, code=2))
         self.assertFalse((self.path / "out.parts" / "1.log").exists())
 
 
