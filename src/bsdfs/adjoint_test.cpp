@@ -68,6 +68,7 @@ const Case kCases[] = {
     {"polarizer", {{"type", "polarizer"}, {"transmittance", 0.6}}},
     {"pplastic", {{"type", "pplastic"}, {"alpha", 0.3}}},
     {"hair", {{"type", "hair"}, {"scale_tilt", 3.0}}},
+    {"measured", {{"type", "measured"}, {"filename", COVARY_SOURCE_DIR "/tests/references/measured_half.bsdf"}}},
     {"mask", mask(kPlastic)},
     {"mask_of_glass", mask(kGlass)},
     {"blend", blend(kPlastic, kRoughGlass)},

@@ -15,9 +15,11 @@ namespace {
 
 using testing::Json;
 
+const std::string kFolder = COVARY_SOURCE_DIR "/tests/references/";
+
 const Json& references() {
   static const Json json = [] {
-    std::ifstream file(COVARY_SOURCE_DIR "/tests/references/bsdfs.json");
+    std::ifstream file(kFolder + "bsdfs.json");
     return Json::parse(file);
   }();
   return json;
@@ -29,6 +31,7 @@ Vec3 vec3(const Json& a) { return {a.at(0).get<float>(), a.at(1).get<float>(), a
 std::string disagreement(const Json& entry, float scale = 1) {
   std::map<std::string, TexturePtr> textures;
   Json dictionary = entry.at("bsdf");
+  if (dictionary.contains("filename")) dictionary["filename"] = kFolder + dictionary["filename"].get<std::string>();
   if (entry.contains("gradient")) {
     const Json& g = entry.at("gradient");
     textures["bump"] = std::make_shared<testing::TestTexture>(Spectrum(0), Vec2{g.at(0), g.at(1)});

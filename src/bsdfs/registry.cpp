@@ -13,6 +13,7 @@ std::span<const Plugin<Bsdf>> bsdf_plugins() {
       {"diffuse", make_diffuse},
       {"hair", make_hair},
       {"mask", make_mask},
+      {"measured", make_measured},
       {"normalmap", make_normalmap},
       {"null", make_null},
       {"plastic", make_plastic},

@@ -21,6 +21,7 @@ std::shared_ptr<Bsdf> make_dielectric(Parameters& parameters);
 std::shared_ptr<Bsdf> make_diffuse(Parameters& parameters);
 std::shared_ptr<Bsdf> make_hair(Parameters& parameters);
 std::shared_ptr<Bsdf> make_mask(Parameters& parameters);
+std::shared_ptr<Bsdf> make_measured(Parameters& parameters);
 std::shared_ptr<Bsdf> make_normalmap(Parameters& parameters);
 std::shared_ptr<Bsdf> make_null(Parameters& parameters);
 std::shared_ptr<Bsdf> make_plastic(Parameters& parameters);

@@ -22,6 +22,7 @@ lobes come from. Its logarithm of the Bessel function I0 of hair is off by up to
 
 import json
 import math
+import os
 import random
 import sys
 
@@ -133,6 +134,10 @@ def cases():
                  {"longitudinal_roughness": 0.8, "azimuthal_roughness": 0.15, "int_ior": 1.4}]:
         yield case(f"hair {list(more)}", {"type": "hair", **more}, HAIR)
 
+    # Measured materials, of make_measured_files.py.
+    for name in ["isotropic", "half", "quarter"]:
+        yield case(f"measured, {name}", {"type": "measured", "filename": f"measured_{name}.bsdf"})
+
     # Wrappers.
     metal = {"type": "roughconductor", "distribution": "ggx", "alpha": 0.25, "material": "Au"}
     yield case("mask", {"type": "mask", "opacity": 0.3, "nested": diffuse}, samples=True)
@@ -221,8 +226,6 @@ def evaluate(case, pairs):
 
 def conductors():
     """Reflectance of every named conductor at 45 degrees."""
-    import os
-
     folder = os.path.join(os.path.dirname(mi.__file__), "data", "ior")
     wo = spherical(45, 0.3)
     result = {}
@@ -236,6 +239,7 @@ def conductors():
 
 
 def main():
+    mi.file_resolver().append(os.path.dirname(os.path.abspath(__file__)))
     pairs = make_pairs()
     reference = {"mitsuba": mi.__version__, "pairs": pairs, "conductors_at_45_degrees": conductors(),
                  "cases": [evaluate(c, pairs) for c in cases()]}

@@ -4,6 +4,7 @@
 // A dictionary with a type that no reflectance model has is a texture; textures are given by the name of their type.
 #pragma once
 
+#include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -61,7 +62,9 @@ class TestFactory final : public ObjectFactory {
     parameters.report_unknown();
     return object;
   }
-  std::optional<std::string> resolve_file(const std::string&, const SourceLocation&) override { return std::nullopt; }
+  std::optional<std::string> resolve_file(const std::string& name, const SourceLocation&) override {
+    return std::filesystem::exists(name) ? std::optional(name) : std::nullopt;
+  }
 
  private:
   std::map<std::string, TexturePtr> textures_;
