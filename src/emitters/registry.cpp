@@ -7,7 +7,7 @@ std::span<const Plugin<Emitter>> emitter_plugins() {
   static constexpr Plugin<Emitter> kPlugins[] = {
       {"area", make_area},     {"constant", make_constant}, {"directional", make_directional},
       {"envmap", make_envmap}, {"point", make_point},       {"projector", make_projector},
-      {"spot", make_spot},
+      {"spot", make_spot},     {"sunsky", make_sunsky},
   };
   return kPlugins;
 }

@@ -22,5 +22,6 @@ std::shared_ptr<Emitter> make_envmap(Parameters& parameters);
 std::shared_ptr<Emitter> make_point(Parameters& parameters);
 std::shared_ptr<Emitter> make_projector(Parameters& parameters);
 std::shared_ptr<Emitter> make_spot(Parameters& parameters);
+std::shared_ptr<Emitter> make_sunsky(Parameters& parameters);
 
 }  // namespace covary

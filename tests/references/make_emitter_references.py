@@ -45,6 +45,44 @@ def radiance(emitter, directions):
     return result
 
 
+def suns():
+    """Directions of the sun at places and times."""
+    tokyo, santiago = {"latitude": 35.6894, "longitude": 139.6917, "timezone": 9}, {"latitude": -33.45,
+                                                                                    "longitude": -70.67, "timezone": -4}
+    result = []
+    for parameters in ({}, {"hour": 6.5}, {**tokyo, "year": 2024, "month": 2, "day": 29, "hour": 12, "minute": 10},
+                       {**santiago, "month": 12, "day": 21, "hour": 8, "minute": 30, "second": 20},
+                       {**santiago, "year": 1999, "month": 6, "hour": 16}):
+        sky = mi.load_dict({"type": "sunsky", **parameters})
+        result.append({"parameters": parameters, "direction": digits(mi.traverse(sky)["sun_direction"])})
+    return result
+
+
+def skies(rotation):
+    """Radiance of skies along directions all over the sky, and close to the sun."""
+    result = []
+    for sun, parameters in (([0.3, -0.2, 0.6], {}), ([-0.8, 0.5, 0.2], {"turbidity": 7.3, "sun_aperture": 3.0}),
+                            ([0.1, 0.9, 0.03], {"turbidity": 1.0, "sky_scale": 2.0, "sun_scale": 0.5}),
+                            ([0, 0, 1], {"turbidity": 10.0, "complex_sun": True}),
+                            ([0.5, 0.1, 0.02], {"complex_sun": True, "sun_aperture": 5.0}),
+                            ([0.4, 0.3, 0.5], {"sun_scale": 0.0, "albedo": {"type": "rgb", "value": [0.9, 0.4, 0.1]}})):
+        settings = {"type": "sunsky", "sun_direction": sun, **parameters}
+        if "sky_scale" in parameters:
+            settings["to_world"] = rotation
+            sun = digits(rotation @ mi.ScalarVector3f(sun))
+            settings["sun_direction"] = sun
+        frame = mi.Frame3f(mi.ScalarVector3f(sun) / np.linalg.norm(sun))
+        half = np.radians(parameters.get("sun_aperture", 0.5358) / 2)
+        near = [np.array(frame.to_world([x * np.sin(half), y * np.sin(half), 1.0]))
+                for x, y in ((0.01, 0.02), (0.5, 0), (-0.3, 0.6), (0, -0.9), (0.97, 0), (0.8, 0.8), (-1.5, 0.3))]
+        directions = np.concatenate([rng.normal(size=(24, 3)) * [1, 1, 0.5], near])
+        directions = directions / np.linalg.norm(directions, axis=1)[:, None]
+        result.append({"sun": sun, "parameters": parameters, "rotated": "sky_scale" in parameters,
+                       "directions": [digits(d) for d in directions],
+                       "radiance": radiance(mi.load_dict(settings), directions)})
+    return result
+
+
 def main():
     target = sys.argv[1] if len(sys.argv) > 1 else os.path.join(os.path.dirname(os.path.abspath(__file__)),
                                                                  "emitters.json")
@@ -91,6 +129,8 @@ def main():
                 settings["texture"] = {"type": "bitmap", "filename": path, "raw": True}
             output["spot"].append({"cutoff_angle": cutoff, "beam_width": beam, "textured": textured,
                                    "towards": towards(mi.load_dict(settings), points)})
+    output["suns"] = suns()
+    output["skies"] = skies(rotation)
     with open(target, "w") as file:
         json.dump(output, file, indent=None, separators=(",", ":"))
         file.write("\n")

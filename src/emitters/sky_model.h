@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// Radiance of a clear sky [HosekWilkie2012] and of the sun's disk behind it [HosekWilkie2013], in RGB as Mitsuba has
+// them. z is up; the ground's side is black. The coefficients are the authors' (data/pack.py).
+#pragma once
+
+#include <array>
+
+#include "core/spectrum.h"
+#include "core/vec.h"
+
+namespace covary {
+
+/// Half of the angle under which the sun is seen, which the model was fitted with: radians.
+inline constexpr double kSunHalfAngle = 0.5 * 0.5358 * 3.14159265358979323846 / 180;
+
+/// W / (m² sr nm) times what makes the luminance of 1 at all wavelengths 1.
+class SkyModel {
+ public:
+  /// `turbidity` in [1, 10]; `albedo` of the ground, each channel in [0, 1]; `sun` unit, z > 0.
+  SkyModel(float turbidity, const Spectrum& albedo, const Vec3& sun);
+  /// In unit direction `w`; not negative.
+  Spectrum radiance(const Vec3& w) const;
+
+ private:
+  Vec3 sun_;
+  /// [HosekWilkie2012] A to I, and the mean radiance.
+  std::array<std::array<float, 10>, 3> channels_;
+};
+
+class SunModel {
+ public:
+  /// `half_angle` (radians, in (0, pi/2)) spreads the same light over another disk; `limb_darkening`: the disk is
+  /// brighter in its middle.
+  SunModel(float turbidity, const Vec3& sun, float half_angle, bool limb_darkening);
+  /// Of the disk in unit direction `w`, where it is not below the horizon; not negative.
+  Spectrum radiance(const Vec3& w) const;
+  bool on_disk(const Vec3& w) const { return dot(w - sun_, w - sun_) <= largest_chord2_; }
+  /// 1 − cos of the disk's half angle.
+  float one_minus_cos() const { return one_minus_cos_; }
+
+ private:
+  Vec3 sun_;
+  float turbidity_;
+  float one_minus_cos_, largest_chord2_;
+  double sin2_, spread_;  // of the half angle; the factor on radiance
+  bool limb_darkening_;
+  Spectrum mean_;  // without limb darkening
+};
+
+}  // namespace covary
