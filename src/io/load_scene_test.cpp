@@ -132,7 +132,8 @@ TEST_F(LoadScene, ReportsWrongSensors) {
       "scene.xml:4:1: film 'hdrfilm': the crop window of 1000 x 576 pixels at (0, 0) leaves the film of 768 x 576\n"
       "scene.xml:4:22: parameter 'width' of film 'hdrfilm' is 0; it must lie in [1, 65536]\n"
       "scene.xml:5:1: parameter 'file_format' of film 'hdrfilm' is 'png'; accepted: 'openexr', 'exr'\n"
-      "scene.xml:5:41: unknown rfilter 'lanczos'. Supported: 'box', 'gaussian', 'tent'\n"
+      "scene.xml:5:41: rfilter 'lanczos' is not supported: it has negative parts, from which no position can be drawn; "
+      "use 'gaussian'. Supported: 'box', 'gaussian', 'tent'\n"
       "scene.xml:6:23: unknown sampler 'sobl'; did you mean 'sobol'? Supported: 'halton', 'hammersley', 'independent', "
       "'ldsampler', 'multijitter', 'orthogonal', 'sobol', 'stratified'");
   EXPECT_EQ(errors("<shape type=\"cube\"/>"), "scene.xml:1:1: the scene has no sensor");
@@ -142,6 +143,17 @@ TEST_F(LoadScene, ReportsWrongSensors) {
   EXPECT_EQ(errors("<sensor type=\"perspective\"><string name=\"focal_length\" value=\"long\"/></sensor>"),
             "scene.xml:2:28: parameter 'focal_length' of sensor 'perspective' 'long' is not a number; expected a "
             "length like '50mm'");
+}
+
+TEST_F(LoadScene, SaysWhatToUseInstead) {
+  const std::string found = errors(R"(<sensor type="batch"><sensor type="perspective"/></sensor>
+<shape type="merge"><shape type="cube"/></shape><emitter type="timed_sunsky"/>)");
+  for (const char* message :
+       {"scene.xml:2:1: sensor 'batch' is not supported: denoising would look across the edges of "
+        "its pictures; render each of its sensors by itself. Supported: 'orthographic'",
+        "shape 'merge' is not supported: put the shapes that it holds in its place",
+        "emitter 'timed_sunsky' is not supported: nothing moves; use 'sunsky'"})
+    EXPECT_TRUE(contains(found, message));
 }
 
 TEST_F(LoadScene, UsesTheFirstOfSeveralSensors) {

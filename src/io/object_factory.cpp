@@ -35,6 +35,36 @@ std::span<const Plugin<SceneObject>> setting_plugins(const std::string& kind) {
   return {};
 }
 
+/// What to do instead of Mitsuba's plugins that are not supported.
+std::string advice(const ObjectDescription& description) {
+  struct Advice {
+    const char *kind, *type, *text;
+  };
+  static constexpr const char* kNegative = "it has negative parts, from which no position can be drawn; use 'gaussian'";
+  static constexpr const char* kNoPicture = "it makes no picture; use 'perspective'";
+  static constexpr const char* kSplats = "its integrator is not supported either";
+  static constexpr Advice kAll[] = {
+      {"sensor", "batch",
+       "denoising would look across the edges of its pictures; render each of its sensors by itself"},
+      {"sensor", "distant", kNoPicture},
+      {"sensor", "irradiancemeter", kNoPicture},
+      {"sensor", "radiancemeter", kNoPicture},
+      {"film", "specfilm", "rendering is in RGB; use 'hdrfilm'"},
+      {"rfilter", "catmullrom", kNegative},
+      {"rfilter", "lanczos", kNegative},
+      {"rfilter", "mitchell", kNegative},
+      {"bsdf", "measured_polarized", "light is not polarised here; use 'measured' with the material's _rgb.bsdf"},
+      {"emitter", "timed_sunsky", "nothing moves; use 'sunsky' with one of its times"},
+      {"emitter", "directionalarea", "use 'directional'"},
+      {"shape", "merge", "put the shapes that it holds in its place"},
+      {"shape", "ellipsoids", kSplats},
+      {"shape", "ellipsoidsmesh", kSplats},
+  };
+  for (const Advice& a : kAll)
+    if (description.kind == a.kind && description.type == a.type) return a.text;
+  return "";
+}
+
 }  // namespace
 
 bool MadeObjects::find(const ObjectDescription* description, Object& object) const {
@@ -55,6 +85,11 @@ void report_unknown_type(const ObjectDescription& description, std::vector<std::
   std::sort(supported.begin(), supported.end());
   std::string list;
   for (const std::string& name : supported) list += (list.empty() ? "'" : ", '") + name + "'";
+  if (const std::string instead = advice(description); !instead.empty()) {
+    diagnostics.error(description.where, fmt::format("{} '{}' is not supported: {}. Supported: {}", description.kind,
+                                                     description.type, instead, list));
+    return;
+  }
   const std::string hint = did_you_mean(description.type, supported);
   diagnostics.error(description.where, fmt::format("unknown {} '{}'{} Supported: {}", description.kind,
                                                    description.type, hint.empty() ? "." : hint, list));

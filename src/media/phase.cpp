@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // isotropic: all directions are equally likely. It has no parameters.
 //
+// rayleigh: particles much smaller than the wavelength, after Rayleigh (Strutt 1871). It has no parameters.
+//
 // hg: more light goes forwards or backwards [HenyeyGreenstein1941].
 //
 // | name | type  | default | meaning                                                                      |
@@ -21,6 +23,19 @@ class Isotropic final : public PhaseFunction {
  public:
   float pdf(const Vec3&, const Vec3&) const override { return warp::sphere_pdf_solid_angle(); }
   Vec3 sample(const Vec3&, Vec2 u) const override { return warp::square_to_sphere(u); }
+};
+
+class Rayleigh final : public PhaseFunction {
+ public:
+  float pdf(const Vec3& d, const Vec3& w) const override { return 3 / (16 * kPi) * (1 + sqr(dot(d, w))); }
+  Vec3 sample(const Vec3& d, Vec2 u) const override {
+    // The distribution function is a cubic polynomial in the cosine, inverted by Cardano's formula.
+    const double z = 4.0 * u.x - 2, root = std::sqrt(z * z + 1);
+    const float cosine = std::clamp(static_cast<float>(std::cbrt(z + root) + std::cbrt(z - root)), -1.0f, 1.0f);
+    const float r = safe_sqrt(1 - cosine * cosine);
+    const SinCos phi = sincos_turns(u.y);
+    return Frame(d).to_world({r * phi.cos, r * phi.sin, cosine});
+  }
 };
 
 class HenyeyGreenstein final : public PhaseFunction {
@@ -56,6 +71,7 @@ class HenyeyGreenstein final : public PhaseFunction {
 
 PhasePtr isotropic_phase() { return std::make_shared<Isotropic>(); }
 std::shared_ptr<PhaseFunction> make_isotropic(Parameters&) { return std::make_shared<Isotropic>(); }
+std::shared_ptr<PhaseFunction> make_rayleigh(Parameters&) { return std::make_shared<Rayleigh>(); }
 
 std::shared_ptr<PhaseFunction> make_hg(Parameters& p) {
   constexpr float kLargest = 0.9999f;  // beyond it floats cannot tell the forward directions apart

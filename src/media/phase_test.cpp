@@ -23,8 +23,11 @@ statistics::Chi2Result compare(const PhaseFunction& sampled, const PhaseFunction
 const Vec3 kDirection = normalize(Vec3{0.3f, -0.5f, 0.8f});
 
 TEST(PhaseFunctions, DrawTheirDensities) {
-  const auto isotropic = make_plugin<PhaseFunction>(phase_plugins(), "phase", "isotropic", {}).object;
-  EXPECT_TRUE(compare(*isotropic, *isotropic, kDirection).accepted);
+  for (const char* name : {"isotropic", "rayleigh"}) {
+    const auto phase = make_plugin<PhaseFunction>(phase_plugins(), "phase", name, {}).object;
+    const auto result = compare(*phase, *phase, kDirection);
+    EXPECT_TRUE(result.accepted) << name << result.message;
+  }
   for (const double g : {-0.7, -0.2, 0.0, 0.0005, 0.5, 0.85}) {
     SCOPED_TRACE(g);
     const auto result = compare(*hg(g), *hg(g), kDirection);
@@ -35,6 +38,15 @@ TEST(PhaseFunctions, DrawTheirDensities) {
 TEST(PhaseFunctions, AnotherAsymmetryIsFound) {
   EXPECT_FALSE(compare(*hg(0.5), *hg(0.53), kDirection).accepted);
   EXPECT_FALSE(compare(*hg(0.3), *hg(-0.3), kDirection).accepted);
+}
+
+/// Twice as much goes forwards and backwards as to the sides.
+TEST(PhaseFunctions, RayleighHasItsShape) {
+  const auto rayleigh = make_plugin<PhaseFunction>(phase_plugins(), "phase", "rayleigh", {}).object;
+  const auto isotropic = make_plugin<PhaseFunction>(phase_plugins(), "phase", "isotropic", {}).object;
+  EXPECT_FLOAT_EQ(rayleigh->pdf({0, 0, 1}, {0, 0, -1}), 3 / (8 * kPi));
+  EXPECT_FLOAT_EQ(rayleigh->pdf({0, 0, 1}, {0, 1, 0}), 3 / (16 * kPi));
+  EXPECT_FALSE(compare(*rayleigh, *isotropic, kDirection).accepted);
 }
 
 TEST(PhaseFunctions, TheMeanCosineIsG) {

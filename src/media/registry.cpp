@@ -15,6 +15,7 @@ std::span<const Plugin<PhaseFunction>> phase_plugins() {
   static constexpr Plugin<PhaseFunction> kPlugins[] = {
       {"hg", make_hg},
       {"isotropic", make_isotropic},
+      {"rayleigh", make_rayleigh},
   };
   return kPlugins;
 }

@@ -22,6 +22,7 @@ std::shared_ptr<Medium> make_heterogeneous(Parameters& parameters);
 std::shared_ptr<Medium> make_homogeneous(Parameters& parameters);
 std::shared_ptr<PhaseFunction> make_hg(Parameters& parameters);
 std::shared_ptr<PhaseFunction> make_isotropic(Parameters& parameters);
+std::shared_ptr<PhaseFunction> make_rayleigh(Parameters& parameters);
 std::shared_ptr<Volume> make_constvolume(Parameters& parameters);
 std::shared_ptr<Volume> make_gridvolume(Parameters& parameters);
 
