@@ -16,6 +16,7 @@
 #include "film/output_file.h"
 #include "film/outputs.h"
 #include "interruption.h"
+#include "io/scene_file.h"
 #include "json_output.h"
 #include "lab/builtin_suites.h"
 #include "lab/experiment.h"
@@ -84,7 +85,7 @@ lab::Suite load_suite(const ExperimentCommand& command) {
   lab::Suite suite;
   if (given.extension() == ".json") {
     suite = lab::parse_suite(read_file(command.suite), command.suite, check_suite_command);
-  } else if (given.extension() == ".xml") {
+  } else if (is_scene_file(command.suite)) {
     if (!fs::exists(given)) throw Error(ErrorCode::kIo, "cannot open '" + command.suite + "'");
     suite = builtin("compare");
     // A scene called scene.xml is known by its folder.

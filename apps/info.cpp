@@ -2,7 +2,6 @@
 // covary info: what an image or film holds, and whether it is as covary wrote it, or what a scene file describes.
 #include <fmt/format.h>
 
-#include <filesystem>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -13,6 +12,7 @@
 #include "defines.h"
 #include "film/image_file.h"
 #include "io/load_scene.h"
+#include "io/scene_file.h"
 #include "json_output.h"
 #include "plans/estimator_plans.h"
 #include "plans/memory.h"
@@ -101,7 +101,7 @@ void print_text(const ImageInfo& info, const std::string& path) {
 }
 
 void info(const InfoOptions& options) {
-  if (std::filesystem::path(options.path).extension() == ".xml") return scene_info(options);
+  if (is_scene_file(options.path)) return scene_info(options);
   if (!options.defines.empty()) throw Error(ErrorCode::kUsage, "-D is for scene files (.xml)");
   const ImageInfo info = inspect_image(options.path, ChecksumPolicy::kIgnore);
   if (options.json)

@@ -152,7 +152,7 @@ void add_output_options(CLI::App& command, RenderOptions& o) {
 }  // namespace
 
 void add_render_options(CLI::App& command, RenderOptions& o) {
-  command.add_option("SCENE", o.scene, "Scene file, Mitsuba XML")->required();
+  command.add_option("SCENE", o.scene, "Scene file: Mitsuba XML, or pbrt")->required();
   add_options(command, options_of<RenderSettings>(), o.values);
   add_define_option(command, o.defines);
   add_threads_option(command, o.threads);

@@ -19,6 +19,8 @@
 #include "io/mesh_attributes.h"
 #include "io/nested_integrator.h"
 #include "io/object_factory.h"
+#include "io/pbrt_reader.h"
+#include "io/scene_file.h"
 #include "io/scene_jobs.h"
 #include "io/scene_memory.h"
 #include "io/sensor.h"
@@ -35,7 +37,12 @@ class Loader {
 
   void load(std::string_view text, const std::string& name) {
     const Stopwatch watch;
-    xml_ = read_scene_xml(text, name, options_.defines, files_, diagnostics_);
+    if (!is_pbrt_file(name))
+      xml_ = read_scene_xml(text, name, options_.defines, files_, diagnostics_);
+    else if (options_.defines.empty())
+      xml_ = read_scene_pbrt(text, name, files_, diagnostics_);
+    else
+      throw Error(ErrorCode::kUsage, name + ": scenes of pbrt have no parameters to define");
     if (!xml_.scene) {
       diagnostics_.throw_if_errors();
       throw Error(ErrorCode::kInput, name + ": the file holds no scene");

@@ -232,14 +232,17 @@ PARAMETER = re.compile(r'\b(?:p|parameters)(?:\.(?:(?:get|require)_\w+|find_text
 
 
 def documented_parameters(root):
-    """Every parameter name that a plugin reads stands in backquotes in docs/scene-format.md."""
-    page = read(root, os.path.join("docs", "scene-format.md"))
+    """Every parameter name that a plugin reads stands in backquotes in docs/scene-format.md; those of scenes of pbrt,
+    which files pbrt_* read, in docs/pbrt.md."""
     problems = []
     for path in files(root, ["src"], (".cpp", ".h")):
-        if not is_test(path):
-            problems += [f"docs/scene-format.md:1: lacks the parameter '{name}' of {path}:{number}"
-                         for number, text in lines(root, path)
-                         for name in PARAMETER.findall(text) if f"`{name}`" not in page]
+        if is_test(path):
+            continue
+        page = "docs/pbrt.md" if os.path.basename(path).startswith("pbrt_") else "docs/scene-format.md"
+        found = [(number, name) for number, text in lines(root, path) for name in PARAMETER.findall(text)]
+        documented = read(root, page) if found else ""
+        problems += [f"{page}:1: lacks the parameter '{name}' of {path}:{number}" for number, name in found
+                     if f"`{name}`" not in documented]
     return problems
 
 

@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: Apache-2.0
+// Materials of pbrt-v4 as reflectance models of the same reflection, but for 'coateddiffuse' (see there).
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "io/pbrt_objects.h"
+
+namespace covary {
+namespace {
+
+/// pbrt's surfaces look the same from both sides.
+ObjectPtr two_sided(const ObjectBuilder& model) {
+  auto sides = make_object("bsdf", "twosided", model->where);
+  set_property(*sides, "", ObjectPtr(model));
+  return sides;
+}
+
+/// Width of the distribution of normals along u and v.
+struct Roughness {
+  Value u = 0.0, v = 0.0;
+  bool smooth() const { return is_smooth(u) && is_smooth(v); }
+  void set(ObjectDescription& model) const {
+    set_property(model, "distribution", std::string("ggx"));
+    set_property(model, "alpha_u", u);
+    set_property(model, "alpha_v", v);
+  }
+  /// pbrt takes widths below this for a mirror.
+  static bool is_smooth(const Value& alpha) {
+    return std::holds_alternative<double>(alpha) && std::get<double>(alpha) < 1e-3;
+  }
+};
+
+std::optional<Roughness> roughness(PbrtParameters& p, const PbrtNames& names) {
+  const auto both = float_value(p, "roughness", 0, names);
+  const auto one = [&](const char* name) { return p.has(name) ? float_value(p, name, 0, names) : both; };
+  auto u = one("uroughness"), v = one("vroughness");
+  const bool remap = p.get_bool("remaproughness", true);
+  if (!u || !v) return std::nullopt;
+  for (Value* width : {&*u, &*v}) {
+    if (!remap) continue;
+    if (double* number = std::get_if<double>(width)) {
+      *number = std::sqrt(std::max(*number, 0.0));
+    } else {
+      p.error("has a texture for its roughness; supported with 'remaproughness' false");
+      return std::nullopt;
+    }
+  }
+  return Roughness{*u, *v};
+}
+
+/// Index of refraction: a number, or one of pbrt's glasses at 589 nm.
+double index_of_refraction(PbrtParameters& p) {
+  const PbrtParameter* eta = p.find("eta");
+  if (!eta) return 1.5;
+  if (eta->type == "float") return p.get_float("eta", 1.5);
+  static const std::map<std::string, double> kGlasses = {
+      {"glass-BK7", 1.5168}, {"glass-BAF10", 1.67003}, {"glass-FK51A", 1.48656}, {"glass-LASF9", 1.85025},
+      {"glass-F5", 1.60342}, {"glass-SF5", 1.67271},   {"glass-SF10", 1.72828},  {"glass-SF11", 1.78472}};
+  const auto glass = eta->strings.size() == 1 ? kGlasses.find(eta->strings[0]) : kGlasses.end();
+  if (glass != kGlasses.end()) return glass->second;
+  p.error_at(*eta, "is no index of refraction that is supported: expected a float, or a glass such as 'glass-BK7'");
+  return 1.5;
+}
+
+ObjectPtr conductor(PbrtParameters& p, const PbrtNames& names) {
+  const auto rough = roughness(p, names);
+  if (!rough) return nullptr;
+  auto model = make_object("bsdf", rough->smooth() ? "conductor" : "roughconductor", p.where());
+  if (!rough->smooth()) rough->set(*model);
+  if (p.has("reflectance")) {
+    const auto value = spectrum_value(p, "reflectance", names);
+    if (!value) return nullptr;
+    const auto* colour = std::get_if<ColourValue>(&*value);
+    if (!colour) {
+      p.error("has a 'reflectance' that is no 'rgb'; others are not supported");
+      return nullptr;
+    }
+    // pbrt: the k that reflects this much at eta = 1.
+    Spectrum k;
+    for (int c = 0; c < 3; ++c) {
+      const float r = std::clamp(colour->rgb[c], 0.0f, 0.9999f);
+      k[c] = 2 * std::sqrt(r) / std::sqrt(1 - r);
+    }
+    set_property(*model, "eta", 1.0);
+    set_property(*model, "k", ColourValue{k});
+    return two_sided(model);
+  }
+  const auto metal = [&](const char* name, const std::string& end) -> std::string {
+    const PbrtParameter* spectrum = p.find(name);
+    if (!spectrum) return "Cu";
+    if (spectrum->strings.size() != 1) return "";
+    const std::string& text = spectrum->strings[0];
+    if (!text.starts_with("metal-") || !text.ends_with(end)) return "";
+    return text.substr(6, text.size() - 6 - end.size());
+  };
+  const std::string of_eta = metal("eta", "-eta"), of_k = metal("k", "-k");
+  if (!of_eta.empty() && of_eta == of_k) {
+    set_property(*model, "material", of_eta);
+    return two_sided(model);
+  }
+  const auto eta = spectrum_value(p, "eta", names), k = spectrum_value(p, "k", names);
+  if (!eta || !k) {
+    p.error("needs 'eta' and 'k' of one metal, or two colours or spectra");
+    return nullptr;
+  }
+  set_property(*model, "eta", *eta);
+  set_property(*model, "k", *k);
+  return two_sided(model);
+}
+
+ObjectPtr dielectric(PbrtParameters& p, const PbrtNames& names, bool thin) {
+  std::optional<Roughness> rough = Roughness();
+  if (!thin) rough = roughness(p, names);
+  if (!rough) return nullptr;
+  auto model = make_object("bsdf",
+                           thin              ? "thindielectric"
+                           : rough->smooth() ? "dielectric"
+                                             : "roughdielectric",
+                           p.where());
+  if (!thin && !rough->smooth()) rough->set(*model);
+  set_property(*model, "int_ior", index_of_refraction(p));
+  set_property(*model, "ext_ior", 1.0);
+  return model;
+}
+
+/// pbrt follows light between the layers; `plastic` has that in closed form, without what the clear layer's thickness
+/// takes away.
+ObjectPtr coated_diffuse(PbrtParameters& p, const PbrtNames& names) {
+  const auto rough = roughness(p, names);
+  const auto reflectance = p.has("reflectance") ? spectrum_value(p, "reflectance", names) : Value(0.5);
+  if (!rough || !reflectance) return nullptr;
+  if (const auto albedo = p.has("albedo") ? spectrum_value(p, "albedo", names) : std::nullopt; albedo)
+    if (const auto* colour = std::get_if<ColourValue>(&*albedo); !colour || max_component(colour->rgb) > 0)
+      p.error("has an 'albedo': scattering between the layers is not supported");
+  p.ignore({"thickness", "g", "maxdepth", "nsamples"});
+  auto model = make_object("bsdf", rough->smooth() ? "plastic" : "roughplastic", p.where());
+  if (!rough->smooth()) {
+    const auto *u = std::get_if<double>(&rough->u), *v = std::get_if<double>(&rough->v);
+    if (!u || !v || *u != *v) {
+      p.error("has a roughness that is a texture, or differs along u and v; supported is one number");
+      return nullptr;
+    }
+    set_property(*model, "distribution", std::string("ggx"));
+    set_property(*model, "alpha", *u);
+  }
+  set_property(*model, "diffuse_reflectance", *reflectance);
+  set_property(*model, "nonlinear", true);
+  set_property(*model, "int_ior", index_of_refraction(p));
+  set_property(*model, "ext_ior", 1.0);
+  p.warn(fmt::format("is read as '{}', whose clear layer takes no light away", model->type));
+  return two_sided(model);
+}
+
+ObjectPtr diffuse(PbrtParameters& p, const PbrtNames& names) {
+  auto model = make_object("bsdf", "diffuse", p.where());
+  if (p.has("reflectance")) {
+    const auto reflectance = spectrum_value(p, "reflectance", names);
+    if (!reflectance) return nullptr;
+    set_property(*model, "reflectance", *reflectance);
+  }
+  return two_sided(model);
+}
+
+ObjectPtr mix(PbrtParameters& p, const PbrtNames& names) {
+  const PbrtParameter* materials = p.find("materials");
+  const auto amount = float_value(p, "amount", 0.5, names);
+  if (!materials || materials->strings.size() != 2) {
+    p.error("needs the names of two 'materials'");
+    return nullptr;
+  }
+  auto model = make_object("bsdf", "blendbsdf", p.where());
+  if (!amount) return nullptr;
+  set_property(*model, "weight", *amount);
+  for (const std::string& name : materials->strings) {
+    const auto found = names.materials.find(name);
+    if (found == names.materials.end()) {
+      p.error_at(*materials, fmt::format("names the material '{}', which no MakeNamedMaterial before it has", name));
+      return nullptr;
+    }
+    if (!found->second) return nullptr;
+    set_property(*model, "", found->second);
+  }
+  return model;
+}
+
+ObjectPtr base_material(const std::string& type, PbrtParameters& p, const PbrtNames& names) {
+  if (type == "diffuse") return diffuse(p, names);
+  if (type == "coateddiffuse") return coated_diffuse(p, names);
+  if (type == "conductor") return conductor(p, names);
+  if (type == "dielectric" || type == "thindielectric") return dielectric(p, names, type == "thindielectric");
+  if (type == "interface" || type.empty() || type == "none") return make_object("bsdf", "null", p.where());
+  if (type == "mix") return mix(p, names);
+  if (type == "measured") {
+    auto model = make_object("bsdf", "measured", p.where());
+    set_property(*model, "filename", p.get_string("filename", ""));
+    return two_sided(model);
+  }
+  p.error(
+      "is not supported; supported are materials 'coateddiffuse', 'conductor', 'dielectric', 'diffuse', "
+      "'interface', 'measured', 'mix' and 'thindielectric'");
+  return nullptr;
+}
+
+}  // namespace
+
+ObjectPtr make_pbrt_material(const std::string& type, PbrtParameters& p, const PbrtNames& names) {
+  ObjectPtr model = base_material(type, p, names);
+  if (const std::string file = p.get_string("normalmap", ""); !file.empty() && model) {
+    auto map = make_object("texture", "bitmap", p.where());
+    set_property(*map, "filename", file);
+    set_property(*map, "raw", true);
+    set_property(*map, "to_uv", Transform::translate({0, 1, 0}) * Transform::scale({1, -1, 1}));
+    auto mapped = make_object("bsdf", "normalmap", p.where());
+    set_property(*mapped, "normalmap", ObjectPtr(map));
+    set_property(*mapped, "", model);
+    model = mapped;
+  }
+  if (!p.has("displacement") || !model) return model;
+  const auto displacement = float_value(p, "displacement", 0, names);
+  if (!displacement || !std::holds_alternative<ObjectPtr>(*displacement)) return model;
+  auto bumps = make_object("bsdf", "bumpmap", p.where());
+  set_property(*bumps, "", *displacement);
+  set_property(*bumps, "", model);
+  return bumps;
+}
+
+}  // namespace covary

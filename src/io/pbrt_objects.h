@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+// Objects of pbrt-v4's scene files as descriptions of the objects that scenes are made of here. What has no counterpart
+// is an error at its place in the file; what looks a little different is a warning.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "io/pbrt_parameters.h"
+#include "scene/parameters.h"
+
+namespace covary {
+
+using ObjectBuilder = std::shared_ptr<ObjectDescription>;
+ObjectBuilder make_object(const std::string& kind, const std::string& type, const SourceLocation& where);
+void set_property(ObjectDescription& object, const std::string& name, Value value);
+
+/// What later objects refer to by name. Null where an object could not be read.
+struct PbrtNames {
+  std::map<std::string, ObjectPtr> float_textures, spectrum_textures, materials;
+};
+
+/// A number or a texture of numbers; `fallback` when absent, nullopt after an error.
+std::optional<Value> float_value(PbrtParameters& p, const std::string& name, double fallback, const PbrtNames& names);
+/// A colour, a spectrum or a texture of colours; nullopt when absent or after an error.
+std::optional<Value> spectrum_value(PbrtParameters& p, const std::string& name, const PbrtNames& names);
+/// What a light sends: spectra are scaled to a luminance of 1, as pbrt has them; white when absent.
+Spectrum light_colour(PbrtParameters& p, const std::string& name);
+
+/// A texture of class `type`; null after an error.
+ObjectPtr make_pbrt_texture(const std::string& type, PbrtParameters& p, const PbrtNames& names);
+/// A material; null after an error.
+ObjectPtr make_pbrt_material(const std::string& type, PbrtParameters& p, const PbrtNames& names);
+
+/// What a shape is placed with.
+struct PbrtPlacement {
+  Transform to_world;
+  bool reverse_orientation = false;
+};
+/// A shape without material and light; null after an error.
+ObjectBuilder make_pbrt_shape(const std::string& type, PbrtParameters& p, const PbrtPlacement& placement);
+
+/// A light with a place of its own; null after an error, or where it is black.
+ObjectPtr make_pbrt_light(const std::string& type, PbrtParameters& p, const Transform& to_world);
+/// An area light for shapes; null after an error.
+ObjectPtr make_pbrt_area_light(const std::string& type, PbrtParameters& p);
+
+/// The directives before WorldBegin; they may come in any order.
+struct PbrtView {
+  ObjectBuilder sensor, film, filter, sampler, integrator;
+  bool orthographic = false;
+  Transform camera_to_world;
+};
+void read_pbrt_camera(const std::string& type, PbrtParameters& p, const Transform& world_to_camera, PbrtView& view);
+void read_pbrt_film(const std::string& type, PbrtParameters& p, PbrtView& view);
+void read_pbrt_filter(const std::string& type, PbrtParameters& p, PbrtView& view);
+void read_pbrt_sampler(const std::string& type, PbrtParameters& p, PbrtView& view);
+void read_pbrt_integrator(const std::string& type, PbrtParameters& p, PbrtView& view);
+/// Sensor and integrator, with pbrt's defaults for what the file leaves out.
+std::vector<ObjectPtr> finish_pbrt_view(PbrtView view, const SourceLocation& where);
+
+}  // namespace covary

@@ -1,0 +1,397 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/pbrt_reader.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <functional>
+#include <optional>
+
+#include "core/content_hash.h"
+#include "io/file_view.h"
+#include "io/pbrt_objects.h"
+#include "io/pbrt_parameters.h"
+#include "io/xml_values.h"
+
+namespace covary {
+namespace {
+
+// Limits far above what scenes need, and low enough that no small file takes long or much memory.
+constexpr int kMostIncludes = 1000, kDeepest = 15;
+constexpr size_t kMostTextBytes = size_t{1} << 30;  // of all files together
+constexpr size_t kMostObjects = 1000000, kMostStates = 1000;
+
+constexpr std::string_view kDirectives =
+    "Accelerator AreaLightSource AttributeBegin AttributeEnd Camera ColorSpace ConcatTransform CoordinateSystem "
+    "CoordSysTransform Film Identity Import Include Integrator LightSource LookAt MakeNamedMaterial Material "
+    "NamedMaterial ObjectBegin ObjectEnd ObjectInstance Option PixelFilter ReverseOrientation Rotate Sampler Scale "
+    "Shape Texture Transform TransformBegin TransformEnd Translate WorldBegin";
+
+class Reader {
+ public:
+  Reader(FileResolver& files, Diagnostics& diagnostics) : files_(files), diagnostics_(diagnostics) {}
+
+  SceneXml read(std::string_view text, const std::string& name) {
+    const std::string folder = std::filesystem::path(name).parent_path().string();
+    files_.add_folder(folder.empty() ? "." : folder);
+    scene_ = make_object("scene", "scene", {name, 1, 1});
+    SceneXml result;
+    try {
+      read_file(text, name, 0);
+    } catch (const PbrtStop&) {
+      return result;  // the reason was told
+    }
+    if (!in_world_) diagnostics_.error(scene_->where, "the scene has no WorldBegin");
+    if (!states_.empty()) diagnostics_.error(states_.back().where, "this block has no end");
+    if (group_) diagnostics_.error(group_->where, "this object has no ObjectEnd");
+    for (const ObjectPtr& object : finish_pbrt_view(std::move(view_), scene_->where)) add(object);
+    result.scene = scene_;
+    result.hash = hash_bytes(digest_);
+    return result;
+  }
+
+ private:
+  struct State {
+    Transform to_world;
+    bool reverse_orientation = false;
+    ObjectPtr material, area_light;
+    bool material_failed = false;  // it was told, so what uses it says nothing
+  };
+  struct SavedState {
+    State state;
+    bool whole;  // AttributeBegin; else of a transformation alone
+    SourceLocation where;
+  };
+
+  void read_file(std::string_view text, const std::string& name, int depth) {
+    n_text_bytes_ += text.size();
+    if (n_text_bytes_ > kMostTextBytes) {
+      diagnostics_.error({name, 1, 1}, fmt::format("the scene has more than {} bytes of text", kMostTextBytes));
+      throw PbrtStop();
+    }
+    digest_ += hash_text(hash_bytes(text)) + "\n";
+    PbrtTokens tokens(text, name, diagnostics_);
+    while (!tokens.at_end()) {
+      const PbrtToken token = tokens.next();
+      if (token.kind != PbrtToken::kWord)
+        tokens.stop(token, fmt::format("found '{}'; expected a directive", token.text));
+      where_ = tokens.where(token);
+      directive(token, tokens, depth);
+    }
+  }
+
+  void directive(const PbrtToken& token, PbrtTokens& tokens, int depth) {
+    const std::string& word = token.text;
+    if (transformation(word, tokens) || block(word, tokens) || view(word, tokens) || world(word, tokens)) return;
+    if (word == "Include" || word == "Import") {
+      const State before = state_;
+      include(tokens.string("a file"), depth);
+      if (word == "Import") state_ = before;
+    } else if (word == "ColorSpace") {
+      if (const std::string name = tokens.string("a colour space"); name != "srgb")
+        diagnostics_.error(where_, fmt::format("colour space '{}' is not supported; supported is 'srgb'", name));
+    } else if (word == "Option") {
+      parameters(tokens, "Option").ignore({});
+    } else if (word == "Accelerator") {
+      tokens.string("a name");
+      parameters(tokens, "Accelerator");
+    } else {
+      const auto known = split_list(kDirectives);
+      tokens.stop(token, fmt::format("'{}' is no directive that is supported{}", word,
+                                     did_you_mean(word, {known.begin(), known.end()})));
+    }
+  }
+
+  bool transformation(const std::string& word, PbrtTokens& tokens) {
+    const auto vec3 = [](const std::vector<double>& n, size_t i) {
+      return Vec3{static_cast<float>(n[i]), static_cast<float>(n[i + 1]), static_cast<float>(n[i + 2])};
+    };
+    const SourceLocation where = where_;
+    const auto apply = [&](const std::function<Transform()>& make, bool replace = false) {
+      try {
+        state_.to_world = replace ? make() : state_.to_world * make();
+      } catch (const Error& error) {
+        diagnostics_.error(where, fmt::format("{}: {}", word, error.what()));
+      }
+    };
+    if (word == "Identity") {
+      state_.to_world = Transform();
+    } else if (word == "Translate") {
+      apply([n = tokens.numbers(3), &vec3] { return Transform::translate(vec3(n, 0)); });
+    } else if (word == "Scale") {
+      apply([n = tokens.numbers(3)] {
+        return Transform(Matrix4{{{n[0], 0, 0, 0}, {0, n[1], 0, 0}, {0, 0, n[2], 0}, {0, 0, 0, 1}}});
+      });
+    } else if (word == "Rotate") {
+      apply([n = tokens.numbers(4), &vec3] {
+        if (vec3(n, 1) == Vec3{}) throw Error(ErrorCode::kInput, "the axis has length zero");
+        return Transform::rotate(vec3(n, 1), n[0]);
+      });
+    } else if (word == "LookAt") {
+      apply(
+          [n = tokens.numbers(9), &vec3] { return Transform::look_at(vec3(n, 0), vec3(n, 3), vec3(n, 6)).inverse(); });
+    } else if (word == "Transform" || word == "ConcatTransform") {
+      apply(
+          [n = tokens.numbers(16)] {
+            Matrix4 m;
+            for (size_t i = 0; i < 16; ++i) m[i % 4][i / 4] = n[i];  // column by column
+            return Transform(m);
+          },
+          word == "Transform");
+    } else if (word == "CoordinateSystem") {
+      systems_[tokens.string("a name")] = state_.to_world;
+    } else if (word == "CoordSysTransform") {
+      const auto found = systems_.find(tokens.string("the name of a coordinate system"));
+      if (found == systems_.end())
+        diagnostics_.error(where_, "no coordinate system has this name");
+      else
+        state_.to_world = found->second;
+    } else if (word == "ActiveTransform" || word == "TransformTimes") {
+      diagnostics_.error(where_, fmt::format("'{}' is not supported: nothing moves", word));
+      while (tokens.peek().kind == PbrtToken::kWord &&
+             (word == "TransformTimes" || tokens.peek().text == "All" || tokens.peek().text.ends_with("Time")))
+        if (tokens.next(), word != "TransformTimes") break;
+    } else if (word == "ReverseOrientation") {
+      state_.reverse_orientation = !state_.reverse_orientation;
+    } else {
+      return false;
+    }
+    return true;
+  }
+
+  bool block(const std::string& word, PbrtTokens& tokens) {
+    if (word == "AttributeBegin" || word == "TransformBegin") {
+      push(word == "AttributeBegin");
+    } else if (word == "AttributeEnd" || word == "TransformEnd") {
+      pop(word == "AttributeEnd");
+    } else if (word == "WorldBegin") {
+      if (in_world_) diagnostics_.error(where_, "a second WorldBegin");
+      in_world_ = true;
+      state_.to_world = Transform();
+      systems_["world"] = Transform();
+    } else if (word == "ObjectBegin") {
+      const std::string name = tokens.string("a name");
+      push(true);
+      if (group_) diagnostics_.error(where_, "an object inside of an object");
+      group_ = make_object("shape", "shapegroup", where_);
+      group_->id = name;
+      if (!groups_.emplace(name, group_).second)
+        diagnostics_.error(where_, fmt::format("a second object has the name '{}'", name));
+    } else if (word == "ObjectEnd") {
+      if (!group_) {
+        diagnostics_.error(where_, "ObjectEnd without ObjectBegin");
+        return true;
+      }
+      pop(true);
+      if (group_->properties.empty()) {
+        groups_[group_->id] = nullptr;  // its instances place nothing
+      } else {
+        add(group_);
+      }
+      group_ = nullptr;
+    } else if (word == "ObjectInstance") {
+      place_instance(tokens.string("the name of an object"));
+    } else {
+      return false;
+    }
+    return true;
+  }
+
+  bool view(const std::string& word, PbrtTokens& tokens) {
+    using Read = void (*)(const std::string&, PbrtParameters&, PbrtView&);
+    static const std::map<std::string, Read> kReaders = {{"Film", read_pbrt_film},
+                                                         {"PixelFilter", read_pbrt_filter},
+                                                         {"Sampler", read_pbrt_sampler},
+                                                         {"Integrator", read_pbrt_integrator}};
+    const auto reader = kReaders.find(word);
+    if (reader == kReaders.end() && word != "Camera") return false;
+    const std::string type = tokens.string("a type");
+    PbrtParameters p = parameters(tokens, fmt::format("{} \"{}\"", word, type));
+    if (in_world_) {
+      p.error("stands behind WorldBegin");
+    } else if (word == "Camera") {
+      read_pbrt_camera(type, p, state_.to_world, view_);
+      systems_["camera"] = state_.to_world.inverse();
+    } else {
+      reader->second(type, p, view_);
+    }
+    p.report_unknown();
+    return true;
+  }
+
+  bool world(const std::string& word, PbrtTokens& tokens) {
+    if (word == "Texture") {
+      read_texture(tokens);
+      return true;
+    }
+    if (word == "NamedMaterial") {
+      const std::string name = tokens.string("the name of a material");
+      const auto found = names_.materials.find(name);
+      if (found == names_.materials.end())
+        diagnostics_.error(where_, fmt::format("no material has the name '{}'", name));
+      state_.material = found == names_.materials.end() ? nullptr : found->second;
+      state_.material_failed = !state_.material;
+      return true;
+    }
+    if (word != "Material" && word != "MakeNamedMaterial" && word != "Shape" && word != "LightSource" &&
+        word != "AreaLightSource")
+      return false;
+    const std::string type = tokens.string(word == "MakeNamedMaterial" ? "a name" : "a type");
+    PbrtParameters p = parameters(tokens, fmt::format("{} \"{}\"", word, type));
+    if (!in_world_) p.error("stands before WorldBegin");
+    if (word == "Material") {
+      state_.material = make_pbrt_material(type, p, names_);
+      state_.material_failed = !state_.material;
+    } else if (word == "MakeNamedMaterial") {
+      names_.materials[type] = make_pbrt_material(p.get_string("type", ""), p, names_);
+    } else if (word == "AreaLightSource") {
+      state_.area_light = make_pbrt_area_light(type, p);
+    } else if (word == "LightSource") {
+      if (const ObjectPtr light = make_pbrt_light(type, p, state_.to_world)) add(light);
+    } else {
+      read_shape(type, p);
+    }
+    p.report_unknown();
+    return true;
+  }
+
+  void read_texture(PbrtTokens& tokens) {
+    const std::string name = tokens.string("a name"), kind = tokens.string("'float' or 'spectrum'");
+    const std::string type = tokens.string("a type");
+    PbrtParameters p = parameters(tokens, fmt::format("Texture \"{}\" \"{}\"", kind, type));
+    if (kind != "float" && kind != "spectrum") {
+      p.error("has an unknown kind; expected \"float\" or \"spectrum\"");
+      return;
+    }
+    if (const ObjectPtr texture = make_pbrt_texture(type, p, names_))
+      (kind == "float" ? names_.float_textures : names_.spectrum_textures)[name] = texture;
+    p.report_unknown();
+  }
+
+  void read_shape(const std::string& type, PbrtParameters& p) {
+    const auto alpha = float_value(p, "alpha", 1, names_);
+    const ObjectBuilder shape = make_pbrt_shape(type, p, {state_.to_world, state_.reverse_orientation});
+    if (!shape || !alpha) return;
+    ObjectPtr material = state_.material;
+    if (!material && !state_.material_failed) material = default_material();
+    if (const auto* number = std::get_if<double>(&*alpha); material && (!number || *number < 1)) {
+      auto mask = make_object("bsdf", "mask", p.where());
+      set_property(*mask, "opacity", *alpha);
+      set_property(*mask, "", material);
+      material = mask;
+    }
+    if (material) set_property(*shape, "", material);
+    if (state_.area_light && group_)
+      p.warn("emits no light, because it is part of an object that has instances");
+    else if (state_.area_light)
+      set_property(*shape, "", state_.area_light);
+    if (group_) {
+      count();
+      set_property(*group_, "", ObjectPtr(shape));
+    } else {
+      add(shape);
+    }
+  }
+
+  /// pbrt's: diffuse, of reflectance 0.5.
+  ObjectPtr default_material() {
+    if (default_material_) return default_material_;
+    auto sides = make_object("bsdf", "twosided", scene_->where);
+    set_property(*sides, "", ObjectPtr(make_object("bsdf", "diffuse", scene_->where)));
+    return default_material_ = sides;
+  }
+
+  void place_instance(const std::string& name) {
+    const auto found = groups_.find(name);
+    if (found == groups_.end() || found->second == group_) {
+      diagnostics_.error(where_, fmt::format("no object before this one has the name '{}'", name));
+      return;
+    }
+    if (group_) {
+      diagnostics_.error(where_, "an instance inside of an object is not supported");
+      return;
+    }
+    if (!found->second) return;
+    auto instance = make_object("shape", "instance", where_);
+    set_property(*instance, "to_world", state_.to_world);
+    set_property(*instance, "", ObjectPtr(found->second));
+    add(instance);
+  }
+
+  void include(const std::string& name, int depth) {
+    const SourceLocation where = where_;
+    if (name.ends_with(".gz")) {
+      diagnostics_.error(where, "compressed files are not supported; use 'gunzip'");
+      return;
+    }
+    if (depth + 1 >= kDeepest || ++n_includes_ > kMostIncludes) {
+      diagnostics_.error(where,
+                         fmt::format("more than {} files inside of each other, or {} in all", kDeepest, kMostIncludes));
+      throw PbrtStop();
+    }
+    const std::string path = files_.resolve(name, where, diagnostics_);
+    if (path.empty()) return;
+    try {
+      const FileView file(path);
+      read_file(file.text(), path, depth + 1);
+    } catch (const Error& error) {
+      diagnostics_.error(where, error.what());
+    }
+  }
+
+  PbrtParameters parameters(PbrtTokens& tokens, std::string what) {
+    return {tokens, std::move(what), where_, diagnostics_};
+  }
+  void push(bool whole) {
+    if (states_.size() >= kMostStates) {
+      diagnostics_.error(where_, fmt::format("more than {} blocks inside of each other", kMostStates));
+      throw PbrtStop();
+    }
+    states_.push_back({state_, whole, where_});
+  }
+  void pop(bool whole) {
+    if (states_.empty() || states_.back().whole != whole) {
+      diagnostics_.error(where_, "the end of a block that was not begun");
+      throw PbrtStop();
+    }
+    if (whole)
+      state_ = std::move(states_.back().state);
+    else
+      state_.to_world = states_.back().state.to_world;
+    states_.pop_back();
+  }
+  void count() {
+    if (++n_objects_ <= kMostObjects) return;
+    diagnostics_.error(where_, fmt::format("more than {} objects", kMostObjects));
+    throw PbrtStop();
+  }
+  void add(const ObjectPtr& object) {
+    count();
+    set_property(*scene_, "", object);
+  }
+
+  FileResolver& files_;
+  Diagnostics& diagnostics_;
+  std::string digest_;
+  ObjectBuilder scene_, group_;
+  PbrtView view_;
+  PbrtNames names_;
+  State state_;
+  std::vector<SavedState> states_;
+  std::map<std::string, Transform> systems_;
+  std::map<std::string, ObjectBuilder> groups_;
+  ObjectPtr default_material_;
+  SourceLocation where_;  // of the directive
+  bool in_world_ = false;
+  size_t n_text_bytes_ = 0, n_objects_ = 0;
+  int n_includes_ = 0;
+};
+
+}  // namespace
+
+SceneXml read_scene_pbrt(std::string_view text, const std::string& name, FileResolver& files,
+                         Diagnostics& diagnostics) {
+  return Reader(files, diagnostics).read(text, name);
+}
+
+}  // namespace covary

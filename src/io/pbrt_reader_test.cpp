@@ -1,0 +1,378 @@
+// SPDX-License-Identifier: Apache-2.0
+// Scenes of pbrt against the same scenes in Mitsuba's XML by hand: rays of the camera, what they meet, its reflection
+// and light. Nothing is statistical; numbers are equal but for the rounding of the transformations.
+#include "io/pbrt_reader.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "core/arena.h"
+#include "core/random.h"
+#include "io/load_scene.h"
+#include "io/xml_values.h"
+#include "support/files.h"
+
+namespace covary {
+namespace {
+
+using test_support::contains;
+using test_support::message_of;
+
+class Pbrt : public ::testing::Test {
+ protected:
+  void write(const std::string& name, const std::string& text) {
+    std::ofstream(folder_.file(name), std::ios::binary) << text;
+  }
+  LoadedScene load(const std::string& name, const std::string& text) {
+    write(name, text);
+    return load_scene(folder_.file(name));
+  }
+  LoadedScene pbrt(const std::string& text) { return load("scene.pbrt", text); }
+  LoadedScene xml(const std::string& body) {
+    return load("scene.xml", "<scene version=\"3.0.0\">\n" + body + "\n</scene>\n");
+  }
+  std::string errors(const std::string& text) {
+    std::string found = message_of([&] { pbrt(text); });
+    for (size_t i; (i = found.find(folder_.file(""))) != std::string::npos;) found.erase(i, folder_.file("").size());
+    return found;
+  }
+  /// Both scenes look the same along all rays of a grid on the film, and have lights of the same power.
+  void expect_equal(const LoadedScene& a, const LoadedScene& b, int least_hits);
+
+  test_support::TemporaryFolder folder_;
+};
+
+const char* const kTriangle = R"(ply
+format ascii 1.0
+element vertex 3
+property float x
+property float y
+property float z
+property float nx
+property float ny
+property float nz
+property float u
+property float v
+element face 1
+property list uchar int vertex_indices
+end_header
+-.5 -.75 0 0 0 1 0 0
+1.5 -.75 0 .2 0 1 1 0
+.5 1.25 .5 0 .1 1 0 1
+3 0 1 2
+)";
+const char* const kFloor = R"(ply
+format ascii 1.0
+element vertex 4
+property float x
+property float y
+property float z
+property float u
+property float v
+element face 2
+property list uchar int vertex_indices
+end_header
+-20 -20 -1 0 0
+20 -20 -1 1 0
+-20 20 -1 0 1
+20 20 -1 1 1
+3 1 2 0
+3 1 3 2
+)";
+
+double difference(const Vec3& a, const Vec3& b) { return length(a - b); }
+
+void Pbrt::expect_equal(const LoadedScene& a, const LoadedScene& b, int least_hits) {
+  ASSERT_EQ(a.width, b.width);
+  ASSERT_EQ(a.height, b.height);
+  EXPECT_EQ(a.crop_width, b.crop_width);
+  EXPECT_EQ(a.spp, b.spp);
+  EXPECT_EQ(a.integrator_type, b.integrator_type);
+  EXPECT_EQ(a.filter.kind, b.filter.kind);
+  constexpr int kSide = 24;
+  int hits = 0;
+  Arena arena;
+  for (int i = 0; i < kSide * kSide; ++i) {
+    const Vec2 film{(static_cast<float>(i % kSide) + 0.4f) / kSide * static_cast<float>(a.width),
+                    (static_cast<float>(i / kSide) + 0.6f) / kSide * static_cast<float>(a.height)};
+    const Ray ra = a.scene->camera().ray(film, {0.3f, 0.4f}), rb = b.scene->camera().ray(film, {0.3f, 0.4f});
+    ASSERT_LT(difference(ra.d, rb.d), 1e-5) << i;
+    SurfaceHit ha, hb;
+    const bool hit = a.scene->intersect(ra, ha);
+    ASSERT_EQ(hit, b.scene->intersect(rb, hb)) << i;
+    if (!hit) continue;
+    ++hits;
+    ASSERT_LT(difference(ha.p, hb.p), 1e-4) << i;
+    EXPECT_LT(difference(ha.ng, hb.ng), 1e-4) << i;
+    EXPECT_LT(difference(ha.frame.n, hb.frame.n), 1e-4) << i;
+    EXPECT_EQ(ha.shape->emitter() != nullptr, hb.shape->emitter() != nullptr) << i;
+    const Vec3 wo = ha.frame.to_local(-ra.d), wi = normalize(Vec3{0.3f, -0.5f, wo.z > 0 ? 1.0f : -1.0f});
+    arena.reset();
+    const auto value = [&](const SurfaceHit& h) {
+      return h.shape->bsdf()->bind(h, wo.z > 0, TransportMode::kRadiance, arena)->eval(wo, wi).value;
+    };
+    const Spectrum va = value(ha), vb = value(hb);
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(va[c], vb[c], 1e-3f * std::abs(vb[c]) + 1e-5f) << i;
+  }
+  EXPECT_GE(hits, least_hits);
+  ASSERT_EQ(a.scene->emitters().size(), b.scene->emitters().size());
+  for (size_t i = 0; i < a.scene->emitters().size(); ++i)
+    for (int c = 0; c < 3; ++c)
+      EXPECT_NEAR(a.scene->emitters()[i]->power()[c], b.scene->emitters()[i]->power()[c],
+                  1e-4f * b.scene->emitters()[i]->power()[c]);
+}
+
+const std::string kPbrtHead = R"(LookAt 3 4 1.5  .5 .5 0  0 0 1
+Camera "perspective" "float fov" 45
+Film "rgb" "integer xresolution" 60 "integer yresolution" [ 40 ] "string filename" "a.exr"
+Sampler "zsobol" "integer pixelsamples" 32
+PixelFilter "box"
+Integrator "volpath" "integer maxdepth" [ 4 ]
+WorldBegin
+)";
+const std::string kXmlHead = R"(<integrator type="path"><integer name="max_depth" value="5"/></integrator>
+<sensor type="perspective"><float name="fov" value="45"/><string name="fov_axis" value="smaller"/>
+<float name="far_clip" value="1e7"/>
+<transform name="to_world"><scale x="-1"/><lookat origin="3, 4, 1.5" target=".5, .5, 0" up="0, 0, 1"/></transform>
+<sampler type="independent"><integer name="sample_count" value="32"/></sampler>
+<film type="hdrfilm"><integer name="width" value="60"/><integer name="height" value="40"/><rfilter type="box"/></film>
+</sensor>
+)";
+
+const std::string kGlassAndFloor = R"(
+LightSource "infinite" "rgb L" [ .4 .45 .5 ]
+LightSource "distant" "point3 from" [ -30 40 100 ] "rgb L" [ 1.5 1.4 1.3 ] "float scale" 2
+AttributeBegin
+  Material "dielectric"
+  Shape "sphere" "float radius" 1   # a glass ball
+AttributeEnd
+AttributeBegin
+  Texture "checks" "spectrum" "checkerboard" "float uscale" [ 16 ] "float vscale" 16
+          "rgb tex1" [ .1 .1 .1 ] "rgb tex2" [ .8 .8 .8 ]
+  Material "diffuse" "texture reflectance" "checks"
+  Translate 0 0 -1
+  Shape "bilinearmesh" "point3 P" [ -20 -20 0   20 -20 0   -20 20 0   20 20 0 ]
+        "point2 uv" [ 0 0  1 0  0 1  1 1 ]
+AttributeEnd
+AttributeBegin
+  AreaLightSource "diffuse" "blackbody L" [ 3000 ] "float scale" 5
+  Translate 0 2 2 Rotate 90 1 0 0
+  Shape "disk" "float radius" .5
+AttributeEnd
+)";
+const std::string kObjects =
+    R"(MakeNamedMaterial "copper" "string type" "conductor" "spectrum eta" "metal-Cu-eta" "spectrum k" "metal-Cu-k"
+  "float roughness" .25
+MakeNamedMaterial "paint" "string type" "diffuse" "rgb reflectance" [ .6 .3 .1 ]
+MakeNamedMaterial "both" "string type" "mix" "string materials" [ "paint" "copper" ] "float amount" .3
+AttributeBegin
+  CoordinateSystem "here"
+  TransformBegin
+    Translate 9 9 9
+  TransformEnd
+  ConcatTransform [ 1 0 0 0  0 1 0 0  0 0 1 0  .5 .25 0 1 ]
+  NamedMaterial "both"
+  Shape "trianglemesh" "integer indices" [ 0 1 2 ] "point3 P" [ -1 -1 0  1 -1 0  0 1 .5 ]
+    "normal3 N" [ 0 0 1  .2 0 1  0 .1 1 ] "point2 uv" [ 0 0  1 0  0 1 ]
+AttributeEnd
+ReverseOrientation
+ObjectBegin "ball"
+  NamedMaterial "copper"
+  Shape "sphere" "float radius" .5
+ObjectEnd
+Translate -1.5 0 0
+ObjectInstance "ball"
+CoordSysTransform "here"
+Translate 1.5 1 0
+ObjectInstance "ball"
+LightSource "point" "point3 from" [ 0 0 4 ] "rgb I" [ 1 2 3 ]
+)";
+
+// The example of pbrt's documentation of its files, in short.
+TEST_F(Pbrt, IsTheSceneByHand) {
+  const LoadedScene a = pbrt(kPbrtHead + kGlassAndFloor);
+  write("floor.ply", kFloor);
+  const Spectrum glow = spectrum_to_rgb(blackbody_spectrum(3000, 1), SpectrumRole::kEmission);
+  const Spectrum l = glow * (5 / luminance(glow));
+  const LoadedScene b =
+      xml(kXmlHead + R"(
+<emitter type="constant"><rgb name="radiance" value=".4, .45, .5"/></emitter>
+<emitter type="directional"><vector name="direction" value="30, -40, -99"/>
+<rgb name="irradiance" value="3, 2.8, 2.6"/></emitter>
+<shape type="sphere"><bsdf type="dielectric"><float name="int_ior" value="1.5"/><float name="ext_ior" value="1"/></bsdf>
+</shape>
+<shape type="ply"><string name="filename" value="floor.ply"/><boolean name="face_normals" value="true"/>
+<bsdf type="twosided"><bsdf type="diffuse"><texture name="reflectance" type="checkerboard">
+<transform name="to_uv"><scale x="8" y="8"/></transform>
+<rgb name="color0" value=".1"/><rgb name="color1" value=".8"/></texture></bsdf></bsdf></shape>
+<shape type="disk"><transform name="to_world"><scale x=".5" y=".5"/><rotate x="1" angle="90"/>
+<translate y="2" z="2"/></transform><bsdf type="twosided"><bsdf type="diffuse"/></bsdf>
+<emitter type="area"><rgb name="radiance" value=")" +
+          std::to_string(l.r) + ", " + std::to_string(l.g) + ", " + std::to_string(l.b) + R"("/></emitter></shape>)");
+  expect_equal(a, b, 300);
+}
+
+TEST_F(Pbrt, BlocksTransformationsAndMeshesAreTheSceneByHand) {
+  const LoadedScene a = pbrt(R"(Scale -1 1 1
+LookAt 0 0 5  0 0 0  0 1 0
+Camera "perspective" "float fov" [ 40 ] "float lensradius" .1 "float focaldistance" 4.5
+Film "rgb" "integer xresolution" 40 "integer yresolution" 50
+PixelFilter "triangle" "float xradius" 1 "float yradius" 1
+WorldBegin
+)" + kObjects);
+  write("t.ply", kTriangle);
+  const LoadedScene b = xml(R"(<integrator type="path"><integer name="max_depth" value="6"/></integrator>
+<sensor type="thinlens"><float name="fov" value="40"/><string name="fov_axis" value="smaller"/>
+<float name="aperture_radius" value=".1"/><float name="focus_distance" value="4.5"/><float name="far_clip" value="1e7"/>
+<transform name="to_world"><lookat origin="0, 0, 5" target="0, 0, 0" up="0, 1, 0"/></transform>
+<sampler type="independent"><integer name="sample_count" value="16"/></sampler>
+<film type="hdrfilm"><integer name="width" value="40"/><integer name="height" value="50"/>
+<rfilter type="tent"/></film></sensor>
+<bsdf type="twosided" id="copper"><bsdf type="roughconductor"><string name="material" value="Cu"/>
+<string name="distribution" value="ggx"/><float name="alpha" value=".5"/></bsdf></bsdf>
+<shape type="ply"><string name="filename" value="t.ply"/><bsdf type="blendbsdf"><float name="weight" value=".3"/>
+<bsdf type="twosided"><bsdf type="diffuse"><rgb name="reflectance" value=".6, .3, .1"/></bsdf></bsdf>
+<ref id="copper"/></bsdf></shape>
+<shape type="shapegroup" id="g"><shape type="sphere"><float name="radius" value=".5"/>
+<boolean name="flip_normals" value="true"/><ref id="copper"/></shape></shape>
+<shape type="instance"><ref id="g"/><transform name="to_world"><translate x="-1.5"/></transform></shape>
+<shape type="instance"><ref id="g"/><transform name="to_world"><translate x="1.5" y="1"/></transform></shape>
+<emitter type="point"><point name="position" x="0" y="0" z="4"/><rgb name="intensity" value="1, 2, 3"/></emitter>)");
+  expect_equal(a, b, 80);
+}
+
+TEST_F(Pbrt, IncludesAreReadInPlace) {
+  write("ball.pbrt", "Translate 0 0 1\nShape \"sphere\"\n");
+  // Heights of the uppermost spheres, one column each: the ball, after it moved all later ones; after that of Import.
+  const LoadedScene a = pbrt(kPbrtHead + R"(
+Include "ball.pbrt"
+Translate 3 0 0 Shape "sphere"
+Import "ball.pbrt"
+Translate 3 0 0 Shape "sphere")");
+  ASSERT_EQ(a.scene->n_shapes(), 4u);
+  const float heights[] = {2, 3, 2};
+  for (int i = 0; i < 3; ++i) {
+    SurfaceHit hit;
+    ASSERT_TRUE(a.scene->intersect({{3.0f * static_cast<float>(i), 0, 100}, {0, 0, -1}}, hit));
+    EXPECT_NEAR(hit.p.z, heights[i], 1e-3f);
+  }
+  write("ball.pbrt", "Include \"ball.pbrt\"\n");
+  EXPECT_TRUE(contains(errors(kPbrtHead + "Include \"ball.pbrt\"\n"), "more than 15 files inside of each other"));
+}
+
+TEST_F(Pbrt, OrthographicCamerasSeeTheShorterSide) {
+  const LoadedScene a =
+      pbrt("Camera \"orthographic\"\nFilm \"rgb\" \"integer xresolution\" 40 \"integer yresolution\" 20\nWorldBegin\n");
+  const Camera& camera = a.scene->camera();
+  EXPECT_LT(difference(camera.ray({40, 0}, {}).at(0), Vec3{2, 1, camera.ray({40, 0}, {}).at(0).z}), 1e-5);
+  EXPECT_LT(difference(camera.ray({0, 20}, {}).d, Vec3{0, 0, 1}), 1e-6);
+}
+
+TEST_F(Pbrt, WhatIsNotSupportedIsNamed) {
+  const std::string found = errors(R"(Camera "perspective" "float screenwindow" [ -1 1 -1 1 ]
+WorldBegin
+Material "hair"
+Shape "sphere" "float radios" 2 "float zmin" 0
+Shape "curve"
+Material "diffuse" "texture reflectance" "wood"
+Shape "trianglemesh" "point3 P" [ 0 0 0  1 0 0  0 1 0 ] "integer indices" [ 0 1 3 ]
+LightSource "infinite" "string filename" "sky.exr"
+AreaLightSource "diffuse" "bool twosided" true
+NamedMaterial "gold"
+Shape "sphere" "rgb radius" [ 1 1 1 ]
+ObjectInstance "tree"
+Texture "t" "spectrum" "marble"
+Shape "plymesh" "string filename" "no.ply"
+Material "coateddiffuse" "rgb albedo" [ 1 1 1 ]
+Translate 0 0 0 Scale 0 1 1
+)");
+  for (const char* message : {
+           "scene.pbrt:1:22: parameter 'screenwindow' of Camera \"perspective\" is not supported",
+           "scene.pbrt:3:1: Material \"hair\" is not supported; supported are materials 'coateddiffuse', ",
+           "scene.pbrt:4:16: parameter 'radios' of Shape \"sphere\" is not supported; did you mean 'radius'?",
+           "scene.pbrt:4:1: Shape \"sphere\" has zmin 0; supported are whole ones, -1",
+           "scene.pbrt:5:1: Shape \"curve\" is not supported; supported are shapes 'bilinearmesh', ",
+           "scene.pbrt:6:20: parameter 'reflectance' of Material \"diffuse\" names the texture 'wood', which is no "
+           "texture of spectra",
+           "scene.pbrt:7:1: Shape \"trianglemesh\" has the index 3; there are 3 vertices",
+           "scene.pbrt:8:24: parameter 'filename' of LightSource \"infinite\" is an image of equal areas",
+           "scene.pbrt:9:1: AreaLightSource \"diffuse\" shines on both sides",
+           "scene.pbrt:10:1: no material has the name 'gold'",
+           "scene.pbrt:11:16: parameter 'radius' of Shape \"sphere\" has the type 'rgb'; expected 'float'",
+           "scene.pbrt:12:1: no object before this one has the name 'tree'",
+           "scene.pbrt:13:1: Texture \"spectrum\" \"marble\" is not supported; supported are textures 'checkerboard'",
+           "no.ply",
+           "scene.pbrt:15:1: Material \"coateddiffuse\" has an 'albedo'",
+           "scene.pbrt:16:17: Scale: ",
+       })
+    EXPECT_TRUE(contains(found, message));
+}
+
+TEST_F(Pbrt, MistakesOfTheTextEndTheReading) {
+  const auto starts = [&](const std::string& text, const std::string& message) {
+    EXPECT_TRUE(errors(text).starts_with(message)) << errors(text);
+  };
+  starts("WorldBegin\nShap \"sphere\"\n",
+         "scene.pbrt:2:1: 'Shap' is no directive that is supported; did you mean 'Shape");
+  starts("Shape \"sphere\n", "scene.pbrt:1:7: a string has no end");
+  starts("Translate 1 2\n", "scene.pbrt:2:1: found the end of the file; expected a number");
+  starts("Scale 1 2 x\n", "scene.pbrt:1:11: found 'x'; expected a number");
+  starts("WorldBegin AttributeEnd", "scene.pbrt:1:12: the end of a block that was not begun");
+  starts("WorldBegin\nShape \"sphere\" \"color c\" [ 1 1 1 ]",
+         "scene.pbrt:2:16: unknown type 'color' of parameter 'c'; files of pbrt-v3 are brought to version 4");
+  starts("WorldBegin\nAttributeBegin\n", "scene.pbrt:2:1: this block has no end");
+  starts("", "scene.pbrt:1:1: the scene has no WorldBegin");
+  starts("]", "scene.pbrt:1:1: found ']'; expected a directive");
+}
+
+TEST_F(Pbrt, WhatLooksDifferentIsAWarning) {
+  const LoadedScene a = pbrt(R"(Integrator "sppm" PixelFilter "mitchell"
+WorldBegin
+LightSource "spot"
+Material "coateddiffuse" "float roughness" 0
+ObjectBegin "lamp" AreaLightSource "diffuse" Shape "sphere" ObjectEnd
+ObjectInstance "lamp"
+)");
+  std::string all;
+  for (const std::string& warning : a.warnings) all += warning + "\n";
+  for (const char* message :
+       {"Integrator \"sppm\" is read as 'path'", "PixelFilter \"mitchell\" is read as 'gaussian'",
+        "LightSource \"spot\" has a smooth edge", "Material \"coateddiffuse\" is read as 'plastic'",
+        "Shape \"sphere\" emits no light, because it is part of an object"})
+    EXPECT_TRUE(contains(all, message));
+  LoadOptions options;
+  options.defines["a"] = "1";
+  EXPECT_TRUE(contains(message_of([&] { load_scene(folder_.file("scene.pbrt"), options); }),
+                       "scenes of pbrt have no parameters to define"));
+}
+
+/// 3,000 texts with a few bytes changed, cut off, or words exchanged: each loads, or is refused with a message.
+TEST_F(Pbrt, DamagedTextsDoNoHarm) {
+  const std::string whole = kPbrtHead + kObjects + kGlassAndFloor;
+  int loaded = 0;
+  for (int i = 0; i < 3000; ++i) {
+    const PathRandom random(Sampling::kIndependent, 2, 0, 0, i);
+    std::string text = whole;
+    for (uint32_t k = 0; k < 1 + static_cast<uint32_t>(i % 3); ++k) {
+      const Vec2 u = random.get_2d(k, Event::kDirection);
+      const auto place = static_cast<size_t>(u.x * static_cast<float>(text.size()));
+      if (i % 5 == 0)
+        text.erase(place, static_cast<size_t>(u.y * 20));
+      else if (i % 5 == 1)
+        text.insert(place, whole, static_cast<size_t>(u.y * static_cast<float>(whole.size())), 30);
+      else
+        text[place] = " \"[]-0123456789exABSTC#\n"[static_cast<size_t>(u.y * 24)];
+    }
+    try {
+      load_scene_text(text, folder_.file("scene.pbrt"));
+      ++loaded;
+    } catch (const Error& error) {
+      EXPECT_NE(error.code(), ErrorCode::kInternal) << error.what() << "\n" << text;
+    }
+  }
+  EXPECT_GT(loaded, 50);
+}
+
+}  // namespace
+}  // namespace covary

@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: Apache-2.0
+// Numbers, colours and textures of pbrt's scene files.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "io/pbrt_objects.h"
+#include "io/xml_values.h"
+
+namespace covary {
+namespace {
+
+ObjectPtr find_texture(PbrtParameters& p, const PbrtParameter& parameter, const std::map<std::string, ObjectPtr>& all,
+                       const char* of) {
+  const std::string& name = parameter.strings.empty() ? "" : parameter.strings[0];
+  const auto found = all.find(name);
+  if (found != all.end()) return found->second;
+  std::vector<std::string> known;
+  for (const auto& [other, texture] : all) known.push_back(other);
+  p.error_at(parameter,
+             fmt::format("names the texture '{}', which is no texture of {}{}", name, of, did_you_mean(name, known)));
+  return nullptr;
+}
+
+/// Wavelengths and values in turn.
+std::optional<SampledSpectrum> sampled(PbrtParameters& p, const PbrtParameter& parameter) {
+  std::vector<double> wavelengths, values;
+  for (size_t i = 0; i < parameter.numbers.size(); ++i) (i % 2 ? values : wavelengths).push_back(parameter.numbers[i]);
+  try {
+    return make_spectrum(wavelengths, values);
+  } catch (const Error& error) {
+    p.error_at(parameter, std::string("is no list of wavelengths and values: ") + error.what());
+    return std::nullopt;
+  }
+}
+
+std::optional<ColourValue> rgb(PbrtParameters& p, const PbrtParameter& parameter) {
+  const std::vector<double>& n = parameter.numbers;
+  if (n.size() == 3 && std::ranges::all_of(n, [](double x) { return x >= 0; }))
+    return ColourValue{{static_cast<float>(n[0]), static_cast<float>(n[1]), static_cast<float>(n[2])}};
+  p.error_at(parameter, "is no colour; expected three numbers, not negative");
+  return std::nullopt;
+}
+
+/// pbrt's mapping of (u, v), then `more`.
+Transform texture_mapping(PbrtParameters& p, const Transform& more) {
+  if (const std::string mapping = p.get_string("mapping", "uv"); mapping != "uv")
+    p.error(fmt::format("has the mapping '{}'; supported is 'uv'", mapping));
+  const auto number = [&](const char* name, double fallback) {
+    return static_cast<float>(p.get_float(name, fallback));
+  };
+  const Vec3 scale{number("uscale", 1), number("vscale", 1), 1}, shift{number("udelta", 0), number("vdelta", 0), 0};
+  if (scale.x == 0 || scale.y == 0) {
+    p.error("has a scale of 0");
+    return more;
+  }
+  return more * Transform::translate(shift) * Transform::scale(scale);
+}
+
+ObjectPtr image_texture(PbrtParameters& p) {
+  auto bitmap = make_object("texture", "bitmap", p.where());
+  set_property(*bitmap, "filename", p.get_string("filename", ""));
+  // pbrt's v = 0 is the lower edge of the picture.
+  const Transform flip = Transform::translate({0, 1, 0}) * Transform::scale({1, -1, 1});
+  set_property(*bitmap, "to_uv", texture_mapping(p, flip));
+  const std::string wrap = p.get_string("wrap", "repeat"), filter = p.get_string("filter", "bilinear");
+  if (wrap == "repeat" || wrap == "clamp")
+    set_property(*bitmap, "wrap_mode", wrap);
+  else
+    p.error(fmt::format("has wrap '{}'; supported are 'repeat' and 'clamp'", wrap));
+  set_property(*bitmap, "filter_type", std::string(filter == "point" ? "nearest" : "bilinear"));
+  p.ignore({"maxanisotropy"});
+  const std::string encoding = p.get_string("encoding", "sRGB");
+  if (encoding != "sRGB" && encoding != "linear")
+    p.error(fmt::format("has encoding '{}'; supported are 'sRGB' and 'linear'", encoding));
+  set_property(*bitmap, "raw", encoding == "linear");
+  if (p.get_bool("invert", false)) p.error("is inverted, which is not supported");
+  const double scale = p.get_float("scale", 1);
+  if (scale == 1) return bitmap;
+  auto scaled = make_object("texture", "scale", p.where());
+  set_property(*scaled, "scale", scale);
+  set_property(*scaled, "", ObjectPtr(bitmap));
+  return scaled;
+}
+
+/// A texture parameter of a texture: a number, a colour or another texture.
+std::optional<Value> either(PbrtParameters& p, const std::string& name, double fallback, bool of_numbers,
+                            const PbrtNames& names) {
+  if (of_numbers) return float_value(p, name, fallback, names);
+  if (!p.has(name)) return fallback;
+  return spectrum_value(p, name, names);
+}
+
+ObjectPtr checkerboard(PbrtParameters& p, bool of_numbers, const PbrtNames& names) {
+  if (p.get_integer("dimension", 2) != 2) p.error("has three dimensions; supported are two");
+  auto board = make_object("texture", "checkerboard", p.where());
+  // Squares of pbrt have the length 1, those here 1/2.
+  set_property(*board, "to_uv", texture_mapping(p, Transform::scale({0.5f, 0.5f, 1})));
+  const auto first = either(p, "tex1", 1, of_numbers, names), second = either(p, "tex2", 0, of_numbers, names);
+  if (!first || !second) return nullptr;
+  set_property(*board, "color0", *first);
+  set_property(*board, "color1", *second);
+  return board;
+}
+
+ObjectPtr scaled_texture(PbrtParameters& p, bool of_numbers, const PbrtNames& names) {
+  const auto texture = either(p, "tex", 1, of_numbers, names);
+  const auto factor = float_value(p, "scale", 1, names);
+  if (!texture || !factor) return nullptr;
+  if (!std::holds_alternative<double>(*factor)) {
+    p.error("scales by a texture; supported is a number");
+    return nullptr;
+  }
+  auto scaled = make_object("texture", "scale", p.where());
+  set_property(*scaled, "scale", *factor);
+  if (std::holds_alternative<ObjectPtr>(*texture)) {
+    set_property(*scaled, "", *texture);
+  } else {
+    auto constant = make_object("texture", "uniform", p.where());
+    set_property(*constant, "value", *texture);
+    set_property(*scaled, "", ObjectPtr(constant));
+  }
+  return scaled;
+}
+
+}  // namespace
+
+ObjectBuilder make_object(const std::string& kind, const std::string& type, const SourceLocation& where) {
+  auto object = std::make_shared<ObjectDescription>();
+  object->kind = kind, object->type = type, object->where = where;
+  return object;
+}
+
+void set_property(ObjectDescription& object, const std::string& name, Value value) {
+  object.properties.push_back({name, std::move(value), object.where});
+}
+
+std::optional<Value> float_value(PbrtParameters& p, const std::string& name, double fallback, const PbrtNames& names) {
+  const PbrtParameter* parameter = p.find(name);
+  if (!parameter) return fallback;
+  if (parameter->type != "texture") return p.get_float(name, fallback);
+  const ObjectPtr texture = find_texture(p, *parameter, names.float_textures, "floats");
+  return texture ? std::optional<Value>(texture) : std::nullopt;
+}
+
+std::optional<Value> spectrum_value(PbrtParameters& p, const std::string& name, const PbrtNames& names) {
+  const PbrtParameter* parameter = p.find(name);
+  if (!parameter) return std::nullopt;
+  if (parameter->type == "texture") {
+    const ObjectPtr texture = find_texture(p, *parameter, names.spectrum_textures, "spectra");
+    return texture ? std::optional<Value>(texture) : std::nullopt;
+  }
+  if (parameter->type == "rgb") {
+    const auto colour = rgb(p, *parameter);
+    return colour ? std::optional<Value>(*colour) : std::nullopt;
+  }
+  if (parameter->type == "spectrum" && parameter->strings.empty()) {
+    const auto spectrum = sampled(p, *parameter);
+    return spectrum ? std::optional<Value>(*spectrum) : std::nullopt;
+  }
+  p.error_at(*parameter,
+             parameter->type == "spectrum"
+                 ? fmt::format("names the spectrum '{}', which is not supported here", parameter->strings[0])
+                 : fmt::format("has the type '{}'; expected 'rgb', 'spectrum' or 'texture'", parameter->type));
+  return std::nullopt;
+}
+
+Spectrum light_colour(PbrtParameters& p, const std::string& name) {
+  const PbrtParameter* parameter = p.find(name);
+  if (!parameter) return Spectrum(1);
+  if (parameter->type == "rgb") {
+    const auto colour = rgb(p, *parameter);
+    return colour ? colour->rgb : Spectrum(1);
+  }
+  std::optional<SampledSpectrum> spectrum;
+  if (parameter->type == "blackbody" && parameter->numbers.size() == 1 && parameter->numbers[0] > 0)
+    spectrum = blackbody_spectrum(parameter->numbers[0], 1);
+  else if (parameter->type == "spectrum" && parameter->strings == std::vector<std::string>{"stdillum-D65"})
+    return Spectrum(1);
+  else if (parameter->type == "spectrum" && parameter->strings.empty())
+    spectrum = sampled(p, *parameter);
+  else
+    p.error_at(*parameter, "is no colour of a light: expected 'rgb', 'blackbody' with a temperature, or 'spectrum'");
+  if (!spectrum) return Spectrum(1);
+  const Spectrum colour = spectrum_to_rgb(*spectrum, SpectrumRole::kEmission);
+  const float y = luminance(colour);
+  if (y > 0) return colour / y;
+  p.error_at(*parameter, "is black");
+  return Spectrum(1);
+}
+
+ObjectPtr make_pbrt_texture(const std::string& type, PbrtParameters& p, const PbrtNames& names) {
+  const bool of_numbers = p.what().starts_with("Texture \"float\"");
+  if (type == "imagemap") return image_texture(p);
+  if (type == "checkerboard") return checkerboard(p, of_numbers, names);
+  if (type == "scale") return scaled_texture(p, of_numbers, names);
+  if (type == "constant") {
+    auto constant = make_object("texture", "uniform", p.where());
+    const auto value = either(p, "value", 1, of_numbers, names);
+    if (!value) return nullptr;
+    set_property(*constant, "value", *value);
+    return constant;
+  }
+  p.error("is not supported; supported are textures 'checkerboard', 'constant', 'imagemap' and 'scale'");
+  return nullptr;
+}
+
+}  // namespace covary
