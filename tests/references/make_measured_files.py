@@ -108,7 +108,8 @@ def tabulate(alpha, phi_i, theta_i, n_normals=12, n_spectra=8):
     rgb = np.moveaxis(slices(spectra), -1, 2)
     luminance = np.tensordot(rgb, np.array([0.2126, 0.7152, 0.0722]), axes=([2], [0])) + 1e-3
     f = np.float32
-    return {"description": np.frombuffer(b"synthetic", np.uint8), "theta_i": theta_i.astype(f), "phi_i": phi_i.astype(f),
+    return {"description": np.frombuffer(b"synthetic", np.uint8),
+            "theta_i": theta_i.astype(f), "phi_i": phi_i.astype(f),
             "ndf": ndf.astype(f), "sigma": sigma.astype(f), "vndf": vndf, "luminance": luminance.astype(f),
             "rgb": rgb.astype(f), "jacobian": np.array([1], np.uint8)}
 
