@@ -561,5 +561,25 @@ class Interruption(RenderTest):
         self.bad(1, "was rendered with groups 12, this command asks for 6", *again, "--groups", "6")
 
 
+class Pbrt(RenderTest):
+    SCENE = str(SCENES / "spheres.pbrt")
+
+    def test_scenes_of_pbrt_are_scenes(self):
+        self.assertIn("480 x 320 pixels, 48 samples per pixel, integrator path", self.good("info", self.SCENE).stdout)
+        small = ("render", self.SCENE, "--resolution", "48x32", "--quiet", "--no-preview", "--spp", "24")
+        self.good(*small, "-o", "a.exr")
+        self.good(*small, "-o", "b.exr", "--estimator", "none", "--threads", "1")
+        self.good(*small, "-o", "c.exr", "--estimator", "none", "--threads", "3")
+        self.same("b.exr", "c.exr")
+        # Within the noise the default shows what path tracing does.
+        self.assertLess(self.relmse("a.exr", "b.exr"), 0.1)
+        self.bad(2, "scenes of pbrt have no parameters to define", *small, "-o", "d.exr", "-D", "a=1")
+
+    def test_mistakes_have_a_place(self):
+        (self.path / "wrong.pbrt").write_text('WorldBegin\nShape "cube"\n')
+        self.bad(1, 'wrong.pbrt:2:1: Shape "cube" is not supported; supported are shapes', "render", "wrong.pbrt", "-o",
+                 "a.exr")
+
+
 if __name__ == "__main__":
     unittest.main()

@@ -223,6 +223,16 @@ const std::vector<std::string> kExrPieces = {std::string(4, '\0'),       "\xff\x
 TEST(FuzzReplay, Film) { replay_corpus("film", kExrPieces, 400); }
 TEST(FuzzReplay, Grouped) { replay_corpus("grouped", kExrPieces, 400); }
 TEST(FuzzReplay, Image) { replay_corpus("image", kExrPieces, 50); }
+TEST(FuzzReplay, Pbrt) {
+  replay_corpus("pbrt",
+                {"[", "]", "\"", "#", "AttributeBegin", "ObjectEnd", "ObjectInstance \"ball\"", "Scale 0 0 0",
+                 "\"float radius\"", "Include \"a.pbrt\"", "NamedMaterial \"gold\"", "Shape \"disk\"", "true"},
+                2000);
+}
+TEST(FuzzReplay, Tensor) {
+  replay_corpus("tensor", {std::string(8, '\0'), std::string(8, '\xff'), std::string("\1\0\0\0\0\0\0\0", 8), "rgb"},
+                2000);
+}
 TEST(FuzzReplay, Suite) {
   replay_corpus("suite", {"[", "{", "}", "null", "true", "\"seeds\": 4000000000,", "\"name\": \"a\",", "\\u0000", "{}"},
                 2000);

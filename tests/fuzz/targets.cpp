@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 
+#include "bsdfs/tensor_file.h"
 #include "combine/grouped_file.h"
 #include "core/error.h"
 #include "film/film_file.h"
@@ -63,6 +64,17 @@ void place(MeshFile file) {
 
 bool scene(Bytes input) {
   return accepts([&] { load_scene_text(text_of(input), "/no/such/folder/scene.xml"); });
+}
+bool pbrt(Bytes input) {
+  return accepts([&] { load_scene_text(text_of(input), "/no/such/folder/scene.pbrt"); });
+}
+bool tensor(Bytes input) {
+  const InputFile input_file(input);
+  return accepts([&] {
+    const TensorFile file(input_file.path());
+    for (const char* field : {"phi_i", "theta_i", "ndf", "vndf", "luminance", "rgb"}) file.floats(field);
+    file.bytes("jacobian");
+  });
 }
 bool ply(Bytes input) {
   return accepts([&] { place(read_ply(input)); });
@@ -122,8 +134,9 @@ bool training(Bytes input) {
 
 std::span<const Target> targets() {
   static constexpr Target kTargets[] = {
-      {"scene", scene},           {"ply", ply},     {"obj", obj},     {"film", film},       {"image", image},
-      {"serialized", serialized}, {"suite", suite}, {"costs", costs}, {"grouped", grouped}, {"training", training}};
+      {"scene", scene}, {"pbrt", pbrt},   {"tensor", tensor},   {"ply", ply},
+      {"obj", obj},     {"film", film},   {"image", image},     {"serialized", serialized},
+      {"suite", suite}, {"costs", costs}, {"grouped", grouped}, {"training", training}};
   return kTargets;
 }
 

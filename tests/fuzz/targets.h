@@ -12,6 +12,10 @@ using Bytes = std::span<const std::byte>;
 
 /// A scene file: XML, then the objects it describes. Names of files lead nowhere.
 bool scene(Bytes input);
+/// The same of pbrt.
+bool pbrt(Bytes input);
+/// A tensor file, as of a measured material.
+bool tensor(Bytes input);
 bool ply(Bytes input);
 bool obj(Bytes input);
 bool serialized(Bytes input);
