@@ -101,6 +101,18 @@ class Render(PackageTest):
                 with ThreadPoolExecutor(4) as threads:
                     self.assertEqual(list(threads.map(bits, range(4))), alone, integrator)
 
+    def test_threads_load_render_denoise_and_save(self):
+        """What is made when each thread begins from the file: meshes, the ray tracer's tree, films, images on disk."""
+        def bits(seed):
+            result = covary.render(self.scene(), 12, seed=seed, oidn="off")
+            result.save(self.path / f"{seed}.exr")
+            return result.image.tobytes(), rgb(self.path / f"{seed}.exr").tobytes()
+
+        alone = [bits(seed) for seed in range(3)]
+        for _ in range(3):
+            with ThreadPoolExecutor(3) as threads:
+                self.assertEqual(list(threads.map(bits, range(3))), alone)
+
     def test_progress(self):
         seen = []
         covary.render(self.scene(), spp=24, progress=lambda done, total: seen.append((done, total)))
