@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Less Monte Carlo noise by control variates and correlated sampling.
 
-    result = covary.combine(crn, independent)          # arrays [T, H, W, 3] of any renderer
-    result = covary.render(covary.scenes.path("room"), spp=96)      # or a file of yours, Mitsuba XML
+    import covary
+    result = covary.render(covary.scenes.path("room"), spp=48)      # or a file of yours, Mitsuba XML
+    result.save("room.png")
 
-docs/python.md is the manual.
+result.image is a float32 array [H, W, 3] of linear Rec. 709 radiance. combine() takes the images of any renderer, as
+arrays [T, H, W, 3]. docs/python.md is the manual.
 """
 from . import errors, metrics, progress, scenes
 from ._combine import InputReport, check_inputs, combine

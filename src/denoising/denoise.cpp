@@ -84,12 +84,24 @@ std::string environment(const char* name) {
   return value ? value : "";
 }
 
+/// The folder of Python's packages that this code lies in where pip installed it, else "".
+fs::path own_packages() {
+  Dl_info info{};
+  if (!dladdr(reinterpret_cast<const void*>(&own_packages), &info) || !info.dli_fname) return {};
+  fs::path folder = fs::path(info.dli_fname).parent_path();
+  while (folder.has_relative_path() && !matches(folder.filename().string(), kWheelFolders[2]))
+    folder = folder.parent_path();
+  return folder.has_relative_path() ? folder : fs::path();
+}
+
 /// Where the library may be, in order. A name without a folder is left to the loader.
 std::vector<std::string> candidates(const DenoiseOptions& options) {
   if (!options.library.empty()) return libraries_at(options.library);
   if (const std::string path = environment("COVARY_OIDN"); !path.empty()) return libraries_at(path);
   std::vector<std::string> all = {kLibrary};
-  if (const std::string path = environment("VIRTUAL_ENV"); !path.empty()) find_along_wheel(path, 0, all);
+  if (const fs::path packages = own_packages(); !packages.empty()) find_along_wheel(packages, 3, all);
+  for (const char* name : {"VIRTUAL_ENV", "CONDA_PREFIX"})
+    if (const std::string path = environment(name); !path.empty()) find_along_wheel(path, 0, all);
   if (const std::string home = environment("HOME"); !home.empty()) find_along_wheel(fs::path(home) / ".local", 0, all);
   find_along_wheel("/usr/local", 0, all);
   find_along_wheel("/usr", 0, all);

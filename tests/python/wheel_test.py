@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A wheel for this machine, in a fresh virtual environment and without the environment of the build. Needs PyPI."""
+import json
 import subprocess
 import tarfile
 import unittest
@@ -45,6 +46,22 @@ class Wheel(PackageTest):
         self.assertGreater(len([line for line in facts if line.startswith("Classifier: ")]), 5)
         self.assertIn("License-Expression: Apache-2.0", facts)
 
+    def check_licences(self, wheel):
+        """Each package that the lists of parts name has its licence in the wheel, and the metadata name it."""
+        with zipfile.ZipFile(wheel) as archive:
+            names = archive.namelist()
+            info = next(name for name in names if name.endswith(".dist-info/METADATA")).removesuffix("METADATA")
+            facts = archive.read(info + "METADATA").decode()
+            lists = [json.loads(archive.read(name)) for name in names if name.startswith(info + "sboms/")]
+        packages = {part["name"] for parts in lists for part in parts["components"]} - {"covary"}
+        libraries = {name.partition("-")[0] for name in names if name.startswith("covary.libs/")}
+        self.assertEqual(len(lists), 2)
+        self.assertGreaterEqual(len(packages), 12)
+        self.assertIn("covary.libs/libembree3", libraries)
+        for package in packages:
+            self.assertIn(f"{info}licenses/{package}/copyright", names)
+            self.assertIn(f"License-File: {package}/copyright\n", facts)
+
     def test_wheel(self):
         subprocess.run([SOURCE / "scripts" / "wheel", "native", self.path / "dist"], check=True, capture_output=True)
         wheel, = (self.path / "dist").glob("covary-*-cp310-abi3-manylinux_*_x86_64.whl")
@@ -52,13 +69,15 @@ class Wheel(PackageTest):
         sources, = (self.path / "dist").glob("covary-*.tar.gz")
         self.check_sources(sources)
         self.bare("/usr/bin/python3", "-m", "venv", "fresh")
-        self.bare("fresh/bin/pip", "install", "-q", wheel)
+        self.bare("fresh/bin/pip", "install", "-q", f"{wheel}[oidn]")
         self.bare("fresh/bin/python", "-c", LINES)
         self.bare("fresh/bin/python", "-c", "\n".join(examples_of_page()))
         self.assertTrue((self.path / "room.png").exists())
         self.assertIn("covary ", self.bare("fresh/bin/covary", "--version"))
         self.assertIn("room.xml", self.bare("fresh/bin/covary", "experiment", "quick", "--print"))
+        self.assertIn("Open Image Denoise 2.5.1\n", self.bare("fresh/bin/covary", "denoise", "--check"))
         self.check_metadata(wheel)
+        self.check_licences(wheel)
         linked = self.bare("ldd", *(self.path / "fresh").glob("lib/python*/site-packages/covary/_covary*.so"))
         self.assertNotIn("not found", linked)
         self.assertNotIn("/usr/lib/x86_64-linux-gnu/libembree", linked)
