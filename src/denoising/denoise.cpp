@@ -98,8 +98,9 @@ fs::path own_packages() {
 std::vector<std::string> candidates(const DenoiseOptions& options) {
   if (!options.library.empty()) return libraries_at(options.library);
   if (const std::string path = environment("COVARY_OIDN"); !path.empty()) return libraries_at(path);
-  std::vector<std::string> all = {kLibrary};
+  std::vector<std::string> all;
   if (const fs::path packages = own_packages(); !packages.empty()) find_along_wheel(packages, 3, all);
+  all.push_back(kLibrary);
   for (const char* name : {"VIRTUAL_ENV", "CONDA_PREFIX"})
     if (const std::string path = environment(name); !path.empty()) find_along_wheel(path, 0, all);
   if (const std::string home = environment("HOME"); !home.empty()) find_along_wheel(fs::path(home) / ".local", 0, all);

@@ -14,8 +14,8 @@ namespace covary {
 
 struct DenoiseOptions {
   /// The library's file, its folder, or a folder above it in Python's wheel `pyoidn`, up to the root of the environment
-  /// that holds the wheel; "": the environment variable COVARY_OIDN (likewise), the loader's path, and the places where
-  /// the wheel puts it (beside covary's own, of $VIRTUAL_ENV or $CONDA_PREFIX, the user, the system).
+  /// that holds the wheel; "": the environment variable COVARY_OIDN (likewise), beside covary where pip installed both,
+  /// the loader's path, and the places where the wheel puts it (of $VIRTUAL_ENV, $CONDA_PREFIX, the user, the system).
   std::string library;
 };
 

@@ -2,10 +2,12 @@
 """`covary render --integrator controlled-path`: its options, what it reports, and films that belong together."""
 import json
 import os
+import shutil
+import subprocess
 import unittest
 from pathlib import Path
 
-from cli_test import CliTest
+from cli_test import COVARY, CliTest
 from exr_reader import read_exr
 from training_tests import LearningFiles, LearningFilms, LearningTest
 
@@ -125,6 +127,16 @@ class Surrogate(LearningTest, CliTest):
         self.assertEqual(result.returncode, 2, result.stderr)
         self.assertIn("Open Image Denoise is not there (/nowhere", result.stderr)
         self.assertFalse((self.path / "a.exr").exists())
+
+    def test_library_that_pip_installed_beside_the_program(self):
+        packages = self.path / "lib" / "python3.11" / "site-packages"
+        program, library = packages / "covary" / "bin" / "covary", packages / "pyoidn" / "oidn" / "lib"
+        for place, file in ((program, COVARY), (library / "libOpenImageDenoise.so.2", os.environ["STAND_IN_DENOISER"])):
+            place.parent.mkdir(parents=True)
+            shutil.copy(file, place)
+        bare = {name: value for name, value in os.environ.items() if name != "COVARY_OIDN"}
+        told = subprocess.run([program, "denoise", "--check"], env=bare, capture_output=True, text=True, check=True)
+        self.assertIn(f"\n{library}/libOpenImageDenoise.so.2\n", told.stdout)
 
     def test_by_the_denoiser_that_is_named(self):
         """Another one that the machine has is not taken."""
