@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""controlled_published.py COVARY SCENES FOLDER [SCENE...]: the gains of Table 1, Fig. 9 and the columns of Vévoda in Hua
+"""controlled_published.py COVARY SCENES FOLDER [SCENE...]: gains of Table 1, Fig. 9 and the columns of Vévoda in Hua
 et al. 2023, 640 x 480 pixels, from one render of each method, which FOLDER keeps. Needs numpy; five scenes take some
 ten minutes of processor time.
 
