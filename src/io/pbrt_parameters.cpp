@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "io/xml_values.h"
 
@@ -236,7 +237,7 @@ void PbrtParameters::ignore(std::initializer_list<const char*> names) {
 
 void PbrtParameters::report_unknown() {
   std::ranges::sort(asked_);
-  asked_.erase(std::ranges::unique(asked_).begin(), asked_.end());
+  asked_.erase(std::unique(asked_.begin(), asked_.end()), asked_.end());
   for (const PbrtParameter& parameter : parameters_)
     if (!parameter.used) error_at(parameter, "is not supported" + did_you_mean(parameter.name, asked_));
 }
