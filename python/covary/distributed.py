@@ -231,7 +231,7 @@ def render(client: Any, scene: Scene | str | os.PathLike[str], spp: int, estimat
     Raises UsageError for estimators and integrators whose passes look beyond a tile, and for all that is wrong with
     options, before anything is rendered; IoError when the scheduler dies.
     """
-    from distributed.comm import CommClosedError  # type: ignore[import-not-found,import-untyped,unused-ignore]
+    from distributed.comm.core import CommClosedError  # type: ignore[import-not-found,import-untyped,unused-ignore]
 
     chosen = scene if isinstance(scene, Scene) else Scene.load(scene)
     plan = _plan(chosen, spp, estimator, seed, sample_ranges, tile, settings or {}, options)
