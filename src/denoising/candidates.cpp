@@ -85,6 +85,31 @@ std::vector<std::vector<Image>> filtered(const FilterGuides& guides, CandidateBa
   return all;
 }
 
+/// The means of layers with the weights of each of the candidates.
+std::vector<std::vector<Image>> filtered_layers(const FilterGuides& guides, const CandidateInput& in,
+                                                std::span<const Image> layers) {
+  const auto n = static_cast<ptrdiff_t>(layers.size());
+  std::vector<const Image*> sources;
+  for (const Image& layer : layers) sources.push_back(&layer);
+  std::vector<NlMeansSteering> steerings = {{in.estimate, in.std_error, {{kSharp, sources}, {kSmooth, sources}}}};
+  std::vector<Image> images = nl_means(steerings, or_null(guides.all), *in.valid);
+  std::vector<std::vector<Image>> all;
+  all.emplace_back(images.begin(), images.begin() + n);
+  all.emplace_back(images.begin() + n, images.end());
+  if (guides.albedo.data.empty()) return all;
+  std::deque<Image> demodulated;
+  for (const Image* source : {in.estimate, in.std_error})
+    demodulated.push_back(combined(*source, guides.albedo, std::divides<>()));
+  sources.clear();
+  for (const Image& layer : layers)
+    sources.push_back(&demodulated.emplace_back(combined(layer, guides.albedo, std::divides<>())));
+  steerings = {{&demodulated[0], &demodulated[1], {{kSharp, sources}}}};
+  images = nl_means(steerings, or_null(guides.normal), *in.valid);
+  for (Image& image : images) image = combined(image, guides.albedo, std::multiplies<>());
+  all.push_back(std::move(images));
+  return all;
+}
+
 }  // namespace
 
 CandidateMaker::Make one_by_one(std::function<std::vector<Image>(const CandidateInput&)> make) {
@@ -103,6 +128,9 @@ CandidateMaker filtered_candidates(const Guides& guides, CandidateBase base) {
   maker.names.emplace_back("smooth");
   if (!kept->albedo.data.empty()) maker.names.emplace_back("demodulated");
   maker.make = [kept, base](std::span<const CandidateInput> inputs) { return filtered(*kept, base, inputs); };
+  maker.make_layers = [kept](const CandidateInput& input, std::span<const Image> layers) {
+    return filtered_layers(*kept, input, layers);
+  };
   return maker;
 }
 
@@ -139,6 +167,11 @@ CandidateMaker neural_candidates(const Guides& guides, const DenoiseOptions& opt
     add_residual(*in.moments, kNarrowResidual, *in.valid, images[2]);
     return images;
   });
+  maker.make_layers = [denoised, n = maker.names.size()](const CandidateInput&, std::span<const Image> layers) {
+    std::vector<Image> images;
+    for (const Image& layer : layers) images.push_back(denoised(layer));
+    return std::vector(n, images);
+  };
   return maker;
 }
 

@@ -37,6 +37,10 @@ struct CandidateMaker {
 
   std::vector<std::string> names;  ///< of its images, in their order
   Make make;
+  /// The same of the layers of one set of samples (PairSettings::layers, means without fireflies): for each candidate
+  /// the images of all layers. Those of filters add up to the candidate's, those of a network about. For
+  /// CandidateBase::kMean.
+  std::function<std::vector<std::vector<Image>>(const CandidateInput&, std::span<const Image> layers)> make_layers;
   /// What the squared error of a mixture that has these usually is, over the variance of mixtures of half of the
   /// samples: the more of it they take away, the more of the error is bias. Measured (docs/methods/error-estimates.md).
   double error_over_variance = 0.65;

@@ -13,6 +13,7 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "denoising/denoise.h"
+#include "denoising/layers.h"
 #include "denoising/mixture.h"
 #include "filters/residual_correction.h"
 #include "risk/held_out_bias.h"
@@ -48,6 +49,13 @@ constexpr double kBytesPerPixel = 480, kBytesOfMean = 220, kBytesWithOidn = 1400
 /// measured (docs/methods/denoising.md).
 constexpr float kCountOfVariance = 2, kPriorOfMean = 5;
 
+/// `h`: the mean of its independent image.
+CandidateInput input_of(const DenoisingPart& part, const Image& h, const std::vector<unsigned char>& valid) {
+  if (const auto& limited = part.limited)
+    return {&limited->estimate, &limited->std_error, &h, &limited->independent, &valid};
+  return {&part.image.estimate, &part.image.std_error, &h, &part.independent, &valid};
+}
+
 /// Of each of the parts.
 std::vector<CandidateSet> candidates_of(const std::vector<const DenoisingPart*>& parts,
                                         const std::vector<unsigned char>& valid,
@@ -57,11 +65,7 @@ std::vector<CandidateSet> candidates_of(const std::vector<const DenoisingPart*>&
   std::vector<CandidateSet> sets;
   for (const DenoisingPart* part : parts) {
     h.push_back(mean_image(part->independent));
-    const Image *estimate = &part->image.estimate, *std_error = &part->image.std_error;
-    const Moments* independent = &part->independent;
-    if (const auto& limited = part->limited)
-      estimate = &limited->estimate, std_error = &limited->std_error, independent = &limited->independent;
-    inputs.push_back({estimate, std_error, &h.back(), independent, &valid});
+    inputs.push_back(input_of(*part, h.back(), valid));
     sets.push_back({part->image.estimate, {}});
   }
   for (const CandidateMaker& maker : makers) {
@@ -117,6 +121,15 @@ MeasuredRisks risks_of(const DenoisingParts& parts, const std::array<CandidateSe
   return risks;
 }
 
+/// Of a mean.
+std::vector<Image> layers_of(const DenoisingParts& parts, const std::vector<CandidateMaker>& makers,
+                             const MixedDenoising& mixture, std::span<const Layer> layers) {
+  if (layers.empty()) return {};
+  const Image h = mean_image(parts.whole.independent);
+  return denoise_layers({&mixture.result.estimate, &parts.groups, layers, input_of(parts.whole, h, parts.valid), makers,
+                         mixture.weights});
+}
+
 ErrorKind kind_of(const std::vector<CandidateMaker>& makers) {
   const bool network = std::any_of(makers.begin(), makers.end(), [](const CandidateMaker& m) { return m.network; });
   return network ? ErrorKind::kNetwork : ErrorKind::kFilters;
@@ -148,7 +161,7 @@ DenoiseMode denoise_mode(const std::string& name) {
 }
 
 MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<CandidateMaker>& makers, DenoiseMode mode,
-                                  bool std_error) {
+                                  bool std_error, std::span<const Layer> layers) {
   const ModeSettings chosen = settings_of(mode);
   const std::vector<unsigned char>& valid = parts.valid;
   std::vector<CandidateSet> sets = candidates_of({&parts.whole, &parts.halves[0], &parts.halves[1]}, valid, makers);
@@ -196,6 +209,7 @@ MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<Candid
   }
   out.weights = std::move(mixture.weights);
   out.candidates = std::move(whole.candidates);
+  result.layers = layers_of(parts, makers, out, layers);
   return out;
 }
 
@@ -212,13 +226,14 @@ bool can_be_mixed(const GroupedImage& image) {
 }
 
 /// The candidate that was measured to be best where samples are few; without any the mean itself.
-MixedDenoising single_candidate(const GroupedImage& independent, const std::vector<CandidateMaker>& makers) {
+MixedDenoising single_candidate(const GroupedImage& independent, const std::vector<CandidateMaker>& makers,
+                                std::span<const Layer> layers) {
   DenoisingParts parts = whole_of_mean(independent);
   CandidateSet set = std::move(candidates_of({&parts.whole}, parts.valid, makers)[0]);
   MixedDenoising out;
   for (const CandidateMaker& maker : makers) out.names.insert(out.names.end(), maker.names.begin(), maker.names.end());
   const size_t best = static_cast<size_t>(makers[0].best_of_few);
-  out.result = std::move(parts.whole.image);
+  out.result = parts.whole.image;
   out.result.std_error = Image();
   for (size_t i = 0; i < parts.valid.size(); ++i)
     if (parts.valid[i]) std::copy_n(&set.candidates[best].data[3 * i], 3, &out.result.estimate.data[3 * i]);
@@ -229,6 +244,7 @@ MixedDenoising single_candidate(const GroupedImage& independent, const std::vect
   out.weights.assign(set.candidates.size(), Image(independent.width, independent.height, 1));
   std::fill(out.weights[best].data.begin(), out.weights[best].data.end(), 1.0f);
   out.candidates = std::move(set.candidates);
+  out.result.layers = layers_of(parts, makers, out, layers);
   return out;
 }
 
@@ -252,8 +268,8 @@ Run run_of_mean(const MixedDenoisingOptions& options, bool with_oidn) {
     std::vector<CandidateMaker> makers;
     if (with_oidn) makers.push_back(neural_candidates(settings.guides, options.oidn, CandidateBase::kMean));
     makers.push_back(filtered_candidates(settings.guides, CandidateBase::kMean));
-    if (!can_be_mixed(independent)) return single_candidate(independent, makers);
-    return denoise_by_mixture(parts_of_mean(independent), makers, options.mode, settings.std_error);
+    if (!can_be_mixed(independent)) return single_candidate(independent, makers, settings.layers);
+    return denoise_by_mixture(parts_of_mean(independent), makers, options.mode, settings.std_error, settings.layers);
   };
 }
 
@@ -278,6 +294,7 @@ Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& opt
   estimator.memory.always += with_oidn ? kBytesWithOidn : kBytesPerPixel + (is_mean(base) ? kBytesOfMean : 0);
   estimator.memory.of_halves = estimator.memory.of_halves_per_group = 0;  // part of that
   if (is_mean(base)) estimator.passes = EstimatorPasses::kIndependent, estimator.fewest_groups = 1;
+  estimator.splits_layers = is_mean(base);
   const Run run = is_mean(base) ? run_of_mean(options, with_oidn) : run_of_pair(base, options, with_oidn);
   estimator.apply = [run](const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings) {
     return run(crn, independent, settings).result;

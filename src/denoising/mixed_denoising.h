@@ -9,6 +9,7 @@
 
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -65,9 +66,9 @@ struct MixedDenoising {
   std::vector<Image> candidates;   ///< made of all samples
   std::vector<Image> weights;      ///< one channel each
 };
-/// `std_error`: with the error of the result.
+/// `std_error`: with the error of the result. `layers`: of a mean; its result has them, too.
 MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<CandidateMaker>& makers, DenoiseMode mode,
-                                  bool std_error);
+                                  bool std_error, std::span<const Layer> layers = {});
 
 /// Samples per pixel, in two groups or more, whose halves can judge candidates.
 inline constexpr int kFewestMixedSamples = 4;

@@ -40,12 +40,20 @@ struct Guides {
   const Image* denoising_normal = nullptr;
 };
 
+/// A part of the samples' light, such as that which comes straight from lights.
+struct Layer {
+  std::string name;
+  GroupedImage image;  ///< that part of each group of the independent image
+};
+
 /// What an estimator of a pair is told beside the images.
 struct PairSettings {
   int64_t crn_samples = 1;  ///< samples per pixel of the CRN image, > 0; read where needs_sample_count says so
   bool std_error = false;   ///< estimate the standard error, too; where predicts_error says that it can
   bool held_out = true;     ///< with the standard error, also EstimatorResult::held_out
   Guides guides;            ///< read where reads_guides says so
+  /// Layers that together are the independent image; read where splits_layers says so.
+  std::span<const Layer> layers;
 };
 
 /// Samples of a pixel, and of each the first random numbers that it was made of: [sample][dimension].
@@ -84,7 +92,8 @@ struct Estimator {
   bool needs_sample_count = false;  ///< PairSettings::crn_samples
   /// Groups of samples that it needs in each pass. All estimators take groups that differ in size by a sample.
   int fewest_groups = 1;
-  bool reads_guides = false;  ///< PairSettings::guides
+  bool reads_guides = false;   ///< PairSettings::guides
+  bool splits_layers = false;  ///< PairSettings::layers
   /// Parts of the samples for the CRN and the independent pass where nothing else is asked for; they add up to 1.
   std::array<double, 2> split = {0.5, 0.5};
 

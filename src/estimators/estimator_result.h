@@ -89,6 +89,8 @@ struct EstimatorResult {
   Image std_error;
   /// That of each value where it is significant, positive where too bright, zero elsewhere (risk/held_out_bias.h).
   Image bias;
+  /// Parts of the estimate that add up to it, for PairSettings::layers in their order; empty where there were none.
+  std::vector<Image> layers;
   /// Pixels with a non-finite value in either input. They are left out everywhere else and show the mean of their
   /// finite groups, or zero where there are none.
   long nonfinite_pixels = 0;

@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // `path`: path tracing (path_tracer.h) with uniform light selection, the power heuristic and BSDF sampling; where a
 // scene has participating media, by medium_path.h.
+#include <algorithm>
+
 #include "integrators/medium_path.h"
 #include "integrators/path_tracer.h"
 
 namespace covary {
 namespace {
+
+constexpr int kDirectEdges = 2;  // of paths from the camera by one surface to a light
 
 class PathIntegrator final : public Integrator {
  public:
@@ -20,6 +24,11 @@ class PathIntegrator final : public Integrator {
     } else if (lengths_.max_depth > 0) {
       for (CameraSample& sample : samples) MediumPath(scene, lengths_, sample, context).trace();
     }
+  }
+  std::shared_ptr<Integrator> of_direct_light() const override {
+    PathLengthSettings direct = lengths_;
+    direct.max_depth = std::min(direct.max_depth, kDirectEdges);
+    return std::make_shared<PathIntegrator>(direct);
   }
   bool sees_media() const override { return true; }
   std::string description() const override { return surfaces_.description(); }

@@ -104,6 +104,9 @@ class Integrator : public SceneObject {
   const LightTracingIntegrator* light_tracing() const { return const_cast<Integrator*>(this)->light_tracing(); }
   /// Most edges of its paths where trace() fills PathContext::by_length.
   virtual std::optional<int> longest_path() const { return {}; }
+  /// Another, whose samples hold the part of this one's with the same random numbers that came by at most two edges:
+  /// emission seen directly and direct light. Null where it has no such part.
+  virtual std::shared_ptr<Integrator> of_direct_light() const { return nullptr; }
   /// What it cannot see of the scene, as warnings.
   virtual std::vector<std::string> blind_spots(const Scene& /*scene*/) const { return {}; }
   /// Whether it follows light through participating media.

@@ -110,7 +110,7 @@ PassPlan pass_of(const std::string& name, Sampling sampling, uint32_t number, ui
   return pass;
 }
 
-EstimatorResult mean_of_last(std::span<const Pass> passes, int first_row, int n_rows, const Guides&) {
+EstimatorResult mean_of_last(std::span<const Pass> passes, int first_row, int n_rows, const Beside&) {
   return mean_of_groups(rows_of(passes.back().film, first_row, n_rows));
 }
 
@@ -131,7 +131,7 @@ Plan adaptive_plan(const Estimator& estimator, std::optional<int> groups) {
     plan.estimate_memory = estimator.memory;
     const bool std_error = estimator.predicts_error;
     plan.estimate = [apply = estimator.apply, std_error](std::span<const Pass> passes, int first_row, int n_rows,
-                                                         const Guides&) {
+                                                         const Beside&) {
       const Film &crn = passes[0].film, &independent = passes[1].film;
       return apply(rows_of(crn, first_row, n_rows), rows_of(independent, first_row, n_rows),
                    {std::llround(crn.mean_count()), std_error, {}});

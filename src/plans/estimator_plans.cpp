@@ -28,8 +28,10 @@ PixelEstimate pixel_estimate(const PixelFunction& estimate, int dimensions) {
   };
 }
 
-EstimatorResult mean_of_first(std::span<const Pass> passes, int first_row, int n_rows, const Guides&) {
-  return mean_of_groups(rows_of(passes[0].film, first_row, n_rows));
+EstimatorResult mean_of_first(std::span<const Pass> passes, int first_row, int n_rows, const Beside& beside) {
+  EstimatorResult result = mean_of_groups(rows_of(passes[0].film, first_row, n_rows));
+  for (const Layer& layer : beside.layers) result.layers.push_back(mean_of_groups(layer.image).estimate);
+  return result;
 }
 
 /// A single pass of `groups` groups takes the whole budget.
@@ -51,7 +53,7 @@ Shares shares_of(const PairMethod& method) {
 Plan plain_plan(Sampling sampling, std::optional<int> groups) {
   Plan plan;
   plan.name = plan.estimator = "none";
-  plan.film_is_image = plan.predicts_error = true;
+  plan.film_is_image = plan.predicts_error = plan.splits_layers = true;
   plan.has_crn_pass = sampling == Sampling::kCrn;
   plan.takes_training = !plan.has_crn_pass;
   plan.estimate = mean_of_first;
@@ -80,11 +82,13 @@ Plan independent_plan(const Estimator& estimator, std::optional<int> groups) {
   plan.groups_follow_speed = !groups;
   plan.estimate_memory = estimator.memory;
   plan.reads_guides = estimator.reads_guides;
+  plan.splits_layers = estimator.splits_layers;
   plan.estimate = [apply = estimator.apply](std::span<const Pass> passes, int first_row, int n_rows,
-                                            const Guides& guides) {
+                                            const Beside& beside) {
     PairSettings settings;
     settings.std_error = true;
-    settings.guides = guides;
+    settings.guides = beside.guides;
+    settings.layers = beside.layers;
     return apply({}, rows_of(passes[0].film, first_row, n_rows), settings);
   };
   plan.phases[0].passes = [groups](const PlanState& state) {
@@ -131,10 +135,10 @@ Plan pair_plan(const PairMethod& method) {
   plan.estimate_memory = method.memory;
   plan.reads_guides = method.reads_guides;
   plan.estimate = [estimate = method.estimate](std::span<const Pass> passes, int first_row, int n_rows,
-                                               const Guides& guides) {
+                                               const Beside& beside) {
     PairSettings settings;
     settings.crn_samples = static_cast<int64_t>(std::llround(passes[0].film.mean_count()));
-    settings.guides = guides;
+    settings.guides = beside.guides;
     return estimate(rows_of(passes[0].film, first_row, n_rows), rows_of(passes[1].film, first_row, n_rows), settings);
   };
   Phase phase;

@@ -198,7 +198,7 @@ TEST(Passes, AFileInPlaceOfTheFolderIsNamed) {
 /// A plan of two passes whose estimator fails.
 Plan failing_plan() {
   Plan plan = average_plan();
-  plan.estimate = [](std::span<const Pass>, int, int, const Guides&) -> EstimatorResult {
+  plan.estimate = [](std::span<const Pass>, int, int, const Beside&) -> EstimatorResult {
     throw Error(ErrorCode::kInput, "no image today");
   };
   return plan;
@@ -260,12 +260,12 @@ TEST(Failure, FilmsOfAFolderAreThereBeforeTheEstimate) {
   RenderRequest request = request_of(24);
   request.output = folder.file("a.exr"), request.passes = folder.file("films");
   Plan plan = average_plan();
-  plan.estimate = [&, make = plan.estimate](std::span<const Pass> passes, int row, int n_rows, const Guides& guides) {
+  plan.estimate = [&, make = plan.estimate](std::span<const Pass> passes, int row, int n_rows, const Beside& beside) {
     for (const char* name : {"films/crn.exr", "films/independent.exr"}) {
       EXPECT_EQ(read_film(folder.file(name)).mean_count(), 12) << name;
       EXPECT_EQ(attribute(folder.file(name), "complete"), "true") << name;
     }
-    return make(passes, row, n_rows, guides);
+    return make(passes, row, n_rows, beside);
   };
   render(scene, plan, request);
 }
@@ -278,12 +278,12 @@ TEST(Estimate, GetsGuidesOfTheFirstSurfaceAndOfThatBehindGlass) {
   Plan plan = average_plan();
   plan.reads_guides = true;
   std::map<std::string, std::vector<float>> guided;
-  plan.estimate = [&, make = plan.estimate](std::span<const Pass> passes, int row, int n_rows, const Guides& guides) {
-    guided = {{"Albedo", guides.albedo->data},
-              {"N", guides.normal->data},
-              {"DenoisingAlbedo", guides.denoising_albedo->data},
-              {"DenoisingNormal", guides.denoising_normal->data}};
-    return make(passes, row, n_rows, guides);
+  plan.estimate = [&, make = plan.estimate](std::span<const Pass> passes, int row, int n_rows, const Beside& beside) {
+    guided = {{"Albedo", beside.guides.albedo->data},
+              {"N", beside.guides.normal->data},
+              {"DenoisingAlbedo", beside.guides.denoising_albedo->data},
+              {"DenoisingNormal", beside.guides.denoising_normal->data}};
+    return make(passes, row, n_rows, beside);
   };
   const RenderResult result = render(scene, plan, request);
   for (const auto& [name, data] : guided) EXPECT_EQ(data, result.aovs.at(name).data) << name;
@@ -317,9 +317,9 @@ TEST(Failure, FilmsOfAnImageThatCannotBeWrittenAreKept) {
   RenderRequest request = request_of(24);
   request.output = folder.file("images/a.exr"), request.passes = folder.file("films");
   Plan plan = average_plan();
-  plan.estimate = [&, make = plan.estimate](std::span<const Pass> passes, int row, int n_rows, const Guides& guides) {
+  plan.estimate = [&, make = plan.estimate](std::span<const Pass> passes, int row, int n_rows, const Beside& beside) {
     fs::remove(folder.file("images"));
-    return make(passes, row, n_rows, guides);
+    return make(passes, row, n_rows, beside);
   };
   warnings_of_failure("there is no folder", scene, plan, request);
   EXPECT_EQ(read_film(folder.file("films/crn.exr")).mean_count(), 12);

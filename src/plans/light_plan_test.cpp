@@ -278,7 +278,7 @@ TEST(LightPlan, TheLightPassComesWithTheLastPhase) {
   };
   plan.phases.insert(plan.phases.begin(), first);
   plan.film_is_image = false;
-  plan.estimate = [](std::span<const Pass> passes, int first_row, int n_rows, const Guides&) {
+  plan.estimate = [](std::span<const Pass> passes, int first_row, int n_rows, const Beside&) {
     EXPECT_EQ(passes.size(), 2u);
     return mean_of_groups(rows_of(passes[1].film, first_row, n_rows));
   };

@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "integrators/aov.h"
+#include "passes/direct_light.h"
 #include "passes/path_length_images.h"
 #include "passes/training.h"
 #include "plans/budget.h"
@@ -20,6 +21,7 @@ namespace covary {
 namespace {
 
 constexpr double kImageBytes = 3 * sizeof(float);  // per pixel
+constexpr double kImagesOfLayer = 12;              // while it is denoised
 constexpr double kSplatBytes = 16e6;               // of a round of light paths, about
 
 }  // namespace
@@ -50,6 +52,11 @@ RenderMemory render_memory(const LoadedScene& scene, const Plan& plan, const Ren
   if (has_light_pass(scene, plan)) passes.push_back(light_pass_plan(plan, passes));
   RenderMemory memory = render_memory(plan, passes, window.width, window.height, request.aovs || plan.reads_guides);
   memory.training = training_memory(scene);
+  if (request.layers) {
+    // Films of both layers, which the denoiser copies, and images of each for each candidate.
+    const double images = std::size(kLayerNames) * (2.0 * passes.back().groups + kImagesOfLayer);
+    memory.films += window.width * window.height * images * kImageBytes;
+  }
   if (request.path_lengths) memory.films += window.width * window.height * kMostEdges * kImageBytes;
   return memory;
 }

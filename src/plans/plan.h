@@ -93,6 +93,12 @@ struct Phase {
   std::function<void(const PlanState&, std::span<Pass>)> set_targets;
 };
 
+/// What an estimate may read beside the films, of its rows.
+struct Beside {
+  Guides guides;              ///< where Plan::reads_guides
+  std::vector<Layer> layers;  ///< where Plan::splits_layers; empty where none were asked for
+};
+
 /// What render() makes of a plan whose integrator traces light: a pass "light" beside those of the last phase, which
 /// advances with them, and whose film is added to the image (light_plan.h). Phases and estimate() see the passes of
 /// camera samples alone.
@@ -101,12 +107,13 @@ struct Plan {
   std::string estimator;  ///< the same with its options, for the image's attribute
   std::string network;    ///< Estimator::network
   std::vector<Phase> phases;
-  /// The image of rows first_row … first_row + n_rows - 1 of the films so far, with the guides of these rows where the
-  /// plan reads them. Its cost depends on the size, not on counts.
-  std::function<EstimatorResult(std::span<const Pass>, int first_row, int n_rows, const Guides& guides)> estimate;
+  /// The image of rows first_row … first_row + n_rows - 1 of the films so far. Its cost depends on the size, not on
+  /// counts.
+  std::function<EstimatorResult(std::span<const Pass>, int first_row, int n_rows, const Beside& beside)> estimate;
   EstimatorMemory estimate_memory;  ///< that estimate() takes beside the films
   bool takes_unfinished = false;    ///< estimate() works where pixels of a film still have no samples
   bool reads_guides = false;        ///< estimate() reads albedo and normal, which are rendered for it
+  bool splits_layers = false;       ///< estimate() makes EstimatorResult::layers of Beside::layers
   bool film_is_image = false;       ///< the film of the one pass is the result; estimate() only serves its error
   bool takes_training = false;      ///< samples of the integrator's training join the image
   bool has_crn_pass = false;        ///< some pass takes common random numbers

@@ -116,7 +116,7 @@ bool PlanRun::render_to_limits() {
       state_.budget = rounds_.budget();
       continue;
     }
-    if (!plan_.film_is_image || film_has_errors() || request_.until > 0) {
+    if (needs_estimate()) {
       keep_films_before_more();
       if (!estimate()) return false;
     }

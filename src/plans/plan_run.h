@@ -30,7 +30,8 @@ class PlanRun {
   double seconds_left(size_t phase, double share);
   void begin_phase(const Phase& phase);
   Pass begin_pass(const PassPlan& plan);
-  EstimatorResult estimate_rows(int first_row, int n_rows) const;
+  /// `layers`: films of parts of the last pass's samples.
+  EstimatorResult estimate_rows(int first_row, int n_rows, std::span<const Film> layers = {}) const;
   void between_waves();
   void keep_films_before_more();
   bool try_to_keep_films(bool complete, const char* then);  // false: a warning says why
@@ -42,6 +43,7 @@ class PlanRun {
   bool estimate();
   double time_estimate();
   void render_auxiliary_images();
+  void trace_layers();
   void add_path_lengths();
   void write_files();
 
@@ -57,6 +59,10 @@ class PlanRun {
   /// The film is the image, and its groups tell its error.
   bool film_has_errors() const {
     return plan_.film_is_image && plan_.predicts_error && state_.passes[0].film.groups() > 1;
+  }
+  /// The film needs no estimate, but for its error or layers.
+  bool needs_estimate() const {
+    return !plan_.film_is_image || film_has_errors() || request_.until > 0 || request_.layers;
   }
   bool needs_aovs() const { return request_.aovs || plan_.reads_guides; }
   bool stopped() const { return callbacks_.stop && callbacks_.stop->load(); }
@@ -93,7 +99,9 @@ class PlanRun {
   ErrorRounds rounds_;                  // where an error is wanted
   std::vector<size_t> first_of_phase_;  // index of the first pass of each phase that has begun
   RenderResult result_;
-  uint64_t done_ = 0;  // samples of this call, of earlier phases and rounds
+  std::shared_ptr<Integrator> direct_light_;  // with RenderRequest::layers, as the two below
+  std::vector<Film> layers_;                  // of kLayerNames; empty until they have been traced
+  uint64_t done_ = 0;                         // samples of this call, of earlier phases and rounds
   Stopwatch watch_, since_checkpoint_;
   bool consistent_ = true;                  // the films are as they were between two waves
   bool unsaved_ = false;                    // they have samples that are on no disk

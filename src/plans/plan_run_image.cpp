@@ -12,6 +12,7 @@
 #include "core/error.h"
 #include "core/stop.h"
 #include "integrators/aov.h"
+#include "passes/direct_light.h"
 #include "passes/path_length_images.h"
 #include "plans/light_plan.h"
 #include "plans/pass_files.h"
@@ -32,15 +33,17 @@ constexpr double kEstimateOfInterrupted = 0.5;  // seconds that it may take; aft
 
 }  // namespace
 
-EstimatorResult PlanRun::estimate_rows(int first_row, int n_rows) const {
-  std::array<Image, 4> layers;
-  Guides guides;
+EstimatorResult PlanRun::estimate_rows(int first_row, int n_rows, std::span<const Film> layers) const {
+  std::array<Image, 4> images;
+  Beside beside;
   if (plan_.reads_guides && !result_.aovs.empty()) {  // empty where the render was stopped before
     const char* const names[] = {"Albedo", "N", "DenoisingAlbedo", "DenoisingNormal"};
-    for (size_t i = 0; i < layers.size(); ++i) layers[i] = rows_of(result_.aovs.at(names[i]), first_row, n_rows);
-    guides = {&layers[0], &layers[1], &layers[2], &layers[3]};
+    for (size_t i = 0; i < images.size(); ++i) images[i] = rows_of(result_.aovs.at(names[i]), first_row, n_rows);
+    beside.guides = {&images[0], &images[1], &images[2], &images[3]};
   }
-  EstimatorResult image = plan_.estimate(camera_passes(state_.passes), first_row, n_rows, guides);
+  for (size_t i = 0; i < layers.size(); ++i)
+    beside.layers.push_back({kLayerNames[i], rows_of(layers[i], first_row, n_rows)});
+  EstimatorResult image = plan_.estimate(camera_passes(state_.passes), first_row, n_rows, beside);
   const Pass* light = light_pass(state_.passes);
   const GroupedImage light_rows = light ? rows_of(light->film, first_row, n_rows) : GroupedImage{};
   finish(image, light ? &light_rows : nullptr);
@@ -57,7 +60,12 @@ bool PlanRun::estimate() {
   result_.image = {};
   result_.predicted_relmse.reset(), result_.predicted_bounds.reset(), result_.predicted_blocks.reset(),
       result_.prediction_doubt.clear();
-  if (!run_stoppable(ends, [&] { image = estimate_rows(0, window_.height); })) return false;
+  const bool with_layers = request_.layers && !result_.interrupted;
+  if (with_layers) trace_layers();
+  if (with_layers && stopped()) return false;
+  const std::span<const Film> layers = with_layers ? std::span<const Film>(layers_) : std::span<const Film>();
+  if (!run_stoppable(ends, [&] { image = estimate_rows(0, window_.height, layers); })) return false;
+  for (size_t i = 0; i < image.layers.size(); ++i) result_.aovs[kLayerNames[i]] = std::move(image.layers[i]);
   if (!image.std_error.data.empty()) {
     result_.predicted_relmse = predicted_relmse(image);
     result_.predicted_bounds = predicted_bounds(image, *result_.predicted_relmse);
@@ -92,6 +100,21 @@ void PlanRun::render_auxiliary_images() {
   render_aovs(*scene_.scene, last.settings, kAovSamples, last.film, callbacks_.stop);
   result_.aovs = std::exchange(last.film.aovs, {});
   result_.seconds.auxiliary = watch.seconds();
+}
+
+/// As many samples as the last pass has, those that earlier calls have traced among them.
+void PlanRun::trace_layers() {
+  const Pass& pass = camera_passes(films()).back();
+  if (!direct_light_) {
+    direct_light_ = pass.integrator->of_direct_light();
+    direct_light_->prepare(*scene_.scene);
+    layers_.resize(std::size(kLayerNames));
+  }
+  PassSettings settings = pass.settings;
+  settings.stop = callbacks_.stop;
+  settings.progress = nullptr;
+  trace_direct_light(*scene_.scene, *direct_light_, settings, pass.film, layers_[0]);
+  if (!stopped()) layers_[1] = indirect_light(pass.film, layers_[0]);
 }
 
 bool PlanRun::try_to_keep_films(bool complete, const char* then) {

@@ -22,6 +22,10 @@ void check(const LoadedScene& scene, const Plan& plan, const RenderRequest& requ
     usage(plan.name + " needs the number of samples to be known before, so there can be no limit of time or error");
   if (request.path_lengths && !integrator_of(scene).longest_path())
     usage("images by the number of edges need an integrator that knows them, such as controlled-path");
+  if (request.layers && !plan.splits_layers)
+    usage(plan.name + " makes no `layers`; `estimator` none does, denoised or not");
+  if (request.layers && !integrator_of(scene).of_direct_light())
+    usage("`layers` need an integrator that tells direct light from indirect: path");
   if (request.until > 0 && !plan.predicts_error) usage(plan.name + " does not estimate its error");
 }
 

@@ -34,6 +34,9 @@ struct RenderRequest {
   /// Also the images Edges01, Edges02, … of the last pass of camera samples (passes/path_length_images.h), which
   /// needs the integrator controlled-path.
   bool path_lengths = false;
+  /// Also the images Direct and Indirect, which add up to the image (passes/direct_light.h). Needs an integrator
+  /// that tells direct light, and a plan that splits layers.
+  bool layers = false;
   /// Of passes with common random numbers; other parts than both need an integrator with light subpaths.
   CrnPart crn_part = CrnPart::kBoth;
 

@@ -132,6 +132,8 @@ void declare_output(Settings& s, RenderRequest& r) {
   s.real("checkpoint", r.checkpoint_seconds, {.low = 0}, "Seconds between writing unfinished films; 0: never");
   r.preview = !s.flag("no-preview", "Do not write the PNG");
   s.flag("aovs", r.aovs, "Add the images Albedo, N (normal) and P (position) to the output");
+  s.flag("layers", r.layers,
+         "Add the layers Direct and Indirect to the output: denoised as the image is, they add up to it");
   s.flag("path-lengths", r.path_lengths, "Add an image for each number of edges of paths (Edges01, …) to the output",
          {.effect = OptionEffect::kPasses});
   s.group("Training of controlled-path and guided-path");

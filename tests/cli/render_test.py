@@ -251,6 +251,26 @@ class Plans(RenderTest):
         channels = json.loads(self.good("info", "a.exr", "--json").stdout)["channels"]
         self.assertTrue({"Albedo.R", "N.X", "P.Z", "StdError.B", "G"} <= set(channels))
 
+    def test_layers_add_up(self):
+        films = ("--spp", "16", "--groups", "8", "--seed", "5")
+        for options, error in ((("--oidn", "off"), 1e-5), (("--estimator", "none"), 1e-5),
+                               (("--estimator", "none", "--groups", "1"), 1e-5)):
+            self.good("render", ROOM, *SMALL, *films[:2], "-o", "a.exr", "--layers", "--seed", "5", *options)
+            channels = read_exr((self.path / "a.exr").read_bytes())
+            for c in "RGB":
+                for whole, *parts in zip(*(channels[layer + c] for layer in ("", "Direct.", "Indirect."))):
+                    self.assertAlmostEqual(whole, sum(parts), delta=error * (1 + abs(whole)))
+        self.good("render", ROOM, *SMALL, *films, "-o", "b.exr", "--max-depth", "2", "--estimator", "none")
+        self.good("render", ROOM, *SMALL, *films, "-o", "a.exr", "--layers", "--estimator", "none")
+        direct = [read_exr((self.path / name).read_bytes())[channel]
+                  for name, channel in (("a.exr", "Direct.G"), ("b.exr", "G"))]
+        self.assertEqual(*direct, "the same paths, but shorter")
+        self.good("render", ROOM, *SMALL, *films, "-o", "c.exr", "--estimator", "none")
+        self.assertEqual(*(read_exr((self.path / name).read_bytes())["G"] for name in ("a.exr", "c.exr")))
+        self.bad(2, "iicv makes no --layers", "render", ROOM, "-o", "d.exr", *IICV, "--layers")
+        self.bad(2, "--layers need an integrator that tells direct light from indirect: path", "render", ROOM, "-o",
+                 "d.exr", "--layers", "--integrator", "bdpt")
+
     def test_wrong_options(self):
         render = ("render", ROOM, "-o", "a.exr")
         for options, noted in ((("--sampling", "crn"), True), (("--sampling", "crn", "--estimator", "none"), False)):

@@ -46,7 +46,7 @@ RENDER = {"scene": (*NO_SCENE, ""), "spp": without_none(NO_SPP), "estimator": ("
           "integrator": ("pth", *NO_TEXT), "until": NO_LIMIT, "until_p95": NO_LIMIT, "time": NO_LIMIT, "seed": NO_SEED,
           "denoise": ("yes", *NO_TEXT), "oidn": NO_TEXT, "output": NO_PATH, "passes": NO_PATH,
           "resume": (True, *NO_FLAG), "overwrite": (True, *NO_FLAG), "checkpoint": (-1, 5, "1", True),
-          "preview": (True, *NO_FLAG), "aovs": NO_FLAG, "path_lengths": NO_FLAG,
+          "preview": (True, *NO_FLAG), "aovs": NO_FLAG, "layers": NO_FLAG, "path_lengths": NO_FLAG,
           "crop": (3, "0,0,4,4", (0, 0, 4), (0, 0, 0, 0), (-1, 0, 4, 4), (0, 0, 4.5, 4), (0, 0, 400, 4)),
           "filter": ("bx", *NO_TEXT), "sampling": ("common", *NO_TEXT), "sampler": ("halton", *NO_TEXT),
           "crn_part": ("all", None, *NO_TEXT), "groups": (0, -1, 1025, 2.5, "12"),

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "denoising/layers.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "core/parallel.h"
+#include "denoising/limited_groups.h"
+
+namespace covary {
+namespace {
+
+/// Mean of the layer's groups; each scaled as those of the picture were, where these are given.
+Image mean_of(const GroupedImage& layer, const GroupedImage& picture, const GroupedImage* limited,
+              const std::vector<unsigned char>& valid) {
+  std::vector<float> scaled;
+  GroupedImage view = layer;
+  if (limited) {
+    scaled.assign(layer.data, layer.data + valid.size() * layer.groups * 3);
+    view.data = scaled.data();
+    parallel_for(scaled.size() / 3, 4096, [&](size_t group) {
+      const float *before = picture.data + 3 * group, *after = limited->data + 3 * group;
+      if (std::equal(before, before + 3, after)) return;
+      const float scale = (after[0] + after[1] + after[2]) / (before[0] + before[1] + before[2]);
+      for (size_t c = 0; c < 3; ++c) scaled[3 * group + c] *= scale;
+    });
+  }
+  return mean_image(moments(view, valid, 0, 0.0f));
+}
+
+}  // namespace
+
+void add_up(const Image& image, std::span<Image> layers) {
+  parallel_for(image.data.size(), 4096, [&](size_t i) {
+    double sum = 0, size = 0;
+    for (const Image& layer : layers) sum += layer.data[i], size += std::abs(layer.data[i]);
+    const double missing = image.data[i] - sum, n = static_cast<double>(layers.size());
+    for (Image& layer : layers) {
+      const double part = size > 0 ? std::abs(layer.data[i]) / size : 1 / n;
+      layer.data[i] = static_cast<float>(layer.data[i] + missing * part);
+    }
+  });
+}
+
+std::vector<Image> denoise_layers(const LayersInput& in) {
+  const std::vector<unsigned char>& valid = *in.candidates.valid;
+  const LimitedGroups limited(*in.independent, valid);
+  std::vector<Image> result, without_fireflies;
+  for (const Layer& layer : in.layers) {
+    COVARY_CHECK(layer.image.groups == in.independent->groups, "layers have the groups of the picture");
+    result.push_back(mean_of(layer.image, *in.independent, nullptr, valid));
+    without_fireflies.push_back(mean_of(layer.image, *in.independent, &limited.view(), valid));
+  }
+  const std::vector<Image> means = result;
+  size_t p = 0;
+  for (const CandidateMaker& maker : in.makers)
+    for (const std::vector<Image>& candidate : maker.make_layers(in.candidates, without_fireflies)) {
+      const std::vector<float>& weights = in.weights[p++].data;
+      for (size_t k = 0; k < result.size(); ++k)
+        for (size_t i = 0; i < result[k].data.size(); ++i)
+          if (valid[i / 3]) result[k].data[i] += weights[i / 3] * (candidate[k].data[i] - means[k].data[i]);
+    }
+  add_up(*in.image, result);
+  return result;
+}
+
+}  // namespace covary

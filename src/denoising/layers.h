@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// Layers of a denoised image (ours): parts of the light, such as direct and indirect light, denoised so that they add
+// up to the picture. Each layer is made as the picture is, by the picture's own weights:
+//
+//     L_k = d_k + sum_p x_p (C_p,k - d_k),
+//
+// d_k: mean of the layer's samples, C_p,k: the layer as candidate p has it. Filters are linear, so that theirs add up;
+// a network's do not. What is missing to the picture M is given to each in proportion to what it has,
+//
+//     L'_k = L_k + (M - sum_j L_j) |L_k| / sum_j |L_j|,
+//
+// which scales layers that are positive. Claim: sum_k L'_k = M up to rounding, at every pixel.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "denoising/candidates.h"
+#include "denoising/denoising_parts.h"
+#include "estimators/estimator.h"
+
+namespace covary {
+
+struct LayersInput {
+  const Image* image = nullptr;  ///< the picture
+  const GroupedImage* independent = nullptr;
+  std::span<const Layer> layers;
+  CandidateInput candidates;  ///< what those of the picture were made of
+  std::span<const CandidateMaker> makers;
+  std::span<const Image> weights;  ///< of the picture, for the candidates of all makers
+};
+
+/// The layers, in their order.
+std::vector<Image> denoise_layers(const LayersInput& input);
+
+/// Makes images add up to `image`, as above. They have its size.
+void add_up(const Image& image, std::span<Image> layers);
+
+}  // namespace covary

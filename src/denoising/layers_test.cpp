@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+// Layers add up to the picture, and are denoised by its weights.
+#include "denoising/layers.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "denoising/mixed_denoising.h"
+#include "estimators/test_images.h"
+
+namespace covary {
+namespace {
+
+constexpr int kWidth = 48, kHeight = 40, kGroups = 8;
+
+/// Groups of noisy samples around a level for each column, a part of which is direct.
+struct Scene {
+  std::vector<float> all, direct, indirect;
+  Scene() {
+    uint32_t state = 1;
+    const auto uniform = [&] {
+      state = state * 1664525u + 1013904223u;
+      return static_cast<float>(state >> 8) / 16777216.0f;
+    };
+    for (int i = 0; i < kWidth * kHeight * kGroups * 3; ++i) {
+      const int x = i / (3 * kGroups) % kWidth;
+      direct.push_back(x < kWidth / 2 ? 0.5f + uniform() : 0.0f);
+      indirect.push_back(uniform() < 2e-4f ? 90.0f : 0.2f * uniform());
+      all.push_back(direct.back() + indirect.back());
+    }
+  }
+  GroupedImage view(const std::vector<float>& data) const { return {kWidth, kHeight, kGroups, data.data()}; }
+  std::vector<Layer> layers() const { return {{"Direct", view(direct)}, {"Indirect", view(indirect)}}; }
+};
+
+void expect_sum(const Image& image, const std::vector<Image>& layers) {
+  ASSERT_EQ(layers.size(), 2u);
+  for (size_t i = 0; i < image.data.size(); ++i)
+    ASSERT_NEAR(layers[0].data[i] + layers[1].data[i], image.data[i], 1e-5f * std::max(1.0f, std::abs(image.data[i])));
+}
+
+double deviation(const Image& image, int first_x, int last_x) {
+  double sum = 0, squares = 0, n = 0;
+  for (int y = 0; y < image.height; ++y)
+    for (int x = first_x; x < last_x; ++x) {
+      const double v = image.pixel(x, y)[1];
+      sum += v, squares += v * v, n += 1;
+    }
+  return std::sqrt(squares / n - sum / n * (sum / n));
+}
+
+/// A network that takes light away, from dim layers more than from bright ones.
+CandidateMaker planted_network() {
+  CandidateMaker maker;
+  maker.names = {"planted"};
+  const auto dimmed = [](const Image& image) {
+    Image result = image;
+    for (float& v : result.data) v = 0.7f * v / (0.1f + v) * v;
+    return result;
+  };
+  maker.make = one_by_one([dimmed](const CandidateInput& in) { return std::vector{dimmed(*in.estimate)}; });
+  maker.make_layers = [dimmed](const CandidateInput&, std::span<const Image> layers) {
+    std::vector<Image> images;
+    for (const Image& layer : layers) images.push_back(dimmed(layer));
+    return std::vector<std::vector<Image>>{images};
+  };
+  return maker;
+}
+
+TEST(Layers, OfFiltersAddUpWithoutHelp) {
+  const Scene scene;
+  const DenoisingParts parts = parts_of_mean(scene.view(scene.all));
+  const MixedDenoising mixed = denoise_by_mixture(parts, {filtered_candidates({}, CandidateBase::kMean)},
+                                                  DenoiseMode::kAuto, false, scene.layers());
+  expect_sum(mixed.result.estimate, mixed.result.layers);
+  for (int half : {0, 1}) {
+    const double before = deviation(
+        mean_image(moments(scene.view(half ? scene.indirect : scene.direct), parts.valid, 0, 0.0f)), 2, kWidth / 2 - 2);
+    EXPECT_LT(deviation(mixed.result.layers[half], 2, kWidth / 2 - 2), 0.7 * before) << half;
+  }
+  for (int y = 0; y < kHeight; ++y) EXPECT_EQ(mixed.result.layers[0].pixel(kWidth - 1, y)[0], 0) << "no direct light";
+}
+
+TEST(Layers, OfANetworkAddUp) {
+  const Scene scene;
+  const MixedDenoising mixed = denoise_by_mixture(parts_of_mean(scene.view(scene.all)), {planted_network()},
+                                                  DenoiseMode::kAuto, false, scene.layers());
+  expect_sum(mixed.result.estimate, mixed.result.layers);
+  for (const Image& layer : mixed.result.layers)
+    for (const float v : layer.data) ASSERT_GE(v, 0);
+}
+
+TEST(Layers, OfAPictureWithoutOthersThanBlackOnesShareIt) {
+  Image picture(1, 1, 3);
+  picture.data = {1, -2, 0};
+  std::vector<Image> layers(2, Image(1, 1, 3));
+  layers[0].data[1] = -1, layers[1].data[1] = -3;
+  add_up(picture, layers);
+  EXPECT_EQ(layers[0].data, (std::vector<float>{0.5f, -0.5f, 0}));
+  EXPECT_EQ(layers[1].data, (std::vector<float>{0.5f, -1.5f, 0}));
+}
+
+TEST(Layers, KeepToPixelsThatAreNotFinite) {
+  Scene scene;
+  scene.all[0] = scene.indirect[0] = NAN;
+  const MixedDenoising mixed =
+      denoise_by_mixture(parts_of_mean(scene.view(scene.all)), {filtered_candidates({}, CandidateBase::kMean)},
+                         DenoiseMode::kAuto, false, scene.layers());
+  expect_sum(mixed.result.estimate, mixed.result.layers);
+}
+
+}  // namespace
+}  // namespace covary
