@@ -65,7 +65,7 @@ struct Choice {
 Plan plan_of(const RenderSettings& settings, const Choice& choice) {
   Plan plan = estimator_plan(estimator_of(settings, choice.of_estimator), settings.passes);
   if (choice.films_only) {
-    plan.estimate = [](std::span<const Pass>, int, int, const Guides&) { return EstimatorResult(); };
+    plan.estimate = [](std::span<const Pass>, int, int, const Beside&) { return EstimatorResult(); };
     plan.estimate_memory = {};
     plan.network.clear();
     plan.estimator = kNoEstimator;
