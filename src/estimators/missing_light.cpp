@@ -48,36 +48,45 @@ Planes tolerance(const Moments& g, const Moments& h, const std::vector<unsigned 
 
 /// D of missing_light.h, and summed over RGB its variance v and the variance V of a pixel of h.
 struct Difference {
-  vfloat mean[3] = {}, variance = {}, of_pixel = {};
+  vfloat mean[3], variance, of_pixel;
 };
 
-Difference guided_difference(const Moments& g, const Moments& h, int x, int y, vfloat squared_bandwidth) {
+/// `variance_of_h`: one plane, summed over RGB.
+Difference guided_difference(const Moments& g, const Moments& h, const Planes& variance_of_h, int x, int y,
+                             vfloat squared_bandwidth) {
   const vfloat factor = -1.0f / max(squared_bandwidth, splat(1e-30f));
-  const vfloat centre[3] = {load(g.mean.row(0, y) + x), load(g.mean.row(1, y) + x), load(g.mean.row(2, y) + x)};
+  const vfloat g0 = load(g.mean.row(0, y) + x), g1 = load(g.mean.row(1, y) + x), g2 = load(g.mean.row(2, y) + x);
   constexpr int kRadius = kMissingWindow / 2;
-  Difference sum;
-  vfloat weights = {};
+  vfloat m0 = {}, m1 = {}, m2 = {}, variance = {}, of_pixel = {}, weights = {};
   for (int dy = -kRadius; dy <= kRadius; ++dy)
     for (int dx = -kRadius; dx <= kRadius; ++dx) {
-      vfloat q[3], distance = {};
-      for (int c = 0; c < 3; ++c) {
-        q[c] = load(g.mean.row(c, y + dy) + x + dx);
-        distance += (q[c] - centre[c]) * (q[c] - centre[c]);
-      }
+      const auto at = [=](const Planes& planes, int c) { return load(planes.row(c, y + dy) + x + dx); };
+      const vfloat q0 = at(g.mean, 0), q1 = at(g.mean, 1), q2 = at(g.mean, 2);
+      vfloat distance = {};
+      distance += (q0 - g0) * (q0 - g0);
+      distance += (q1 - g1) * (q1 - g1);
+      distance += (q2 - g2) * (q2 - g2);
       vfloat w = exp_of_nonpositive(distance * factor);
-      if (h.relative_count) w *= load(h.relative_count->row(0, y + dy) + x + dx);
+      if (h.relative_count) w *= at(*h.relative_count, 0);
       weights += w;
-      vfloat variance = {};
-      for (int c = 0; c < 3; ++c) {
-        sum.mean[c] += w * (load(h.mean.row(c, y + dy) + x + dx) - q[c]);
-        variance += load(h.variance_of_mean.row(c, y + dy) + x + dx);
-      }
-      sum.variance += w * w * variance;
-      sum.of_pixel += w * variance;
+      m0 += w * (at(h.mean, 0) - q0);
+      m1 += w * (at(h.mean, 1) - q1);
+      m2 += w * (at(h.mean, 2) - q2);
+      const vfloat v = at(variance_of_h, 0);
+      variance += w * w * v;
+      of_pixel += w * v;
     }
-  for (vfloat& m : sum.mean) m /= weights;
-  sum.variance /= weights * weights;
-  sum.of_pixel /= weights;
+  return {{m0 / weights, m1 / weights, m2 / weights}, variance / (weights * weights), of_pixel / weights};
+}
+
+/// The planes added up, border included.
+Planes sum_of_planes(const Planes& p) {
+  Planes sum(p.width(), p.height(), 1, p.border(), 0);
+  parallel_for(p.height() + 2 * p.border(), 8, [&](int row) {
+    const int y = row - p.border();
+    for (int x = -p.border(); x < p.width() + p.border() + kLanes; ++x)
+      sum.row(0, y)[x] = p.row(0, y)[x] + p.row(1, y)[x] + p.row(2, y)[x];
+  });
   return sum;
 }
 
@@ -86,11 +95,11 @@ Difference guided_difference(const Moments& g, const Moments& h, int x, int y, v
 Planes missing_light(const Moments& g, const Moments& h, const std::vector<unsigned char>& valid, int border) {
   const int width = h.mean.width(), height = h.mean.height();
   Planes result(width, height, 3, border, 0);
-  const Planes alike = tolerance(g, h, valid);
+  const Planes alike = tolerance(g, h, valid), variance_of_h = sum_of_planes(h.variance_of_mean);
   for_each_batch(width, height, [&](int x, int y, int n) {
     vfloat own = {};
     for (int c = 0; c < 3; ++c) own += load(g.variance_of_mean.row(c, y) + x);
-    const Difference d = guided_difference(g, h, x, y, own + load(alike.row(0, y) + x));
+    const Difference d = guided_difference(g, h, variance_of_h, x, y, own + load(alike.row(0, y) + x));
     const vfloat squares = d.mean[0] * d.mean[0] + d.mean[1] * d.mean[1] + d.mean[2] * d.mean[2];
     const vfloat known = min(own / max(kCredible * d.of_pixel, splat(1e-30f)), splat(1));
     const vfloat noise = max(kSignificant * known, splat(kLeastSignificant)) * (own + d.variance);

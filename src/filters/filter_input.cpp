@@ -50,28 +50,31 @@ Planes mean_planes(const GroupedImage& image, const std::vector<unsigned char>& 
 
 Planes box_mean(const Planes& image, const std::vector<unsigned char>& valid, int window, int border, float outside) {
   const int width = image.width(), height = image.height(), radius = window / 2;
+  // Of each row the sums of its windows and how many valid pixels these have.
+  const auto pixels = static_cast<size_t>(width);
   std::vector<double> sums(valid.size());
   std::vector<int> numbers(valid.size());
+  const auto add = [pixels](const auto* from, auto* to) {
+    for (size_t x = 0; x < pixels; ++x) to[x] += from[x];
+  };
   parallel_for(height, 8, [&](int y) {
-    for (int x = 0; x < width; ++x)
-      for (int q = std::max(0, x - radius); q <= std::min(width - 1, x + radius); ++q) {
-        const size_t pixel = static_cast<size_t>(y) * width + q;
-        if (!valid[pixel]) continue;
-        sums[static_cast<size_t>(y) * width + x] += image.row(0, y)[q];
-        ++numbers[static_cast<size_t>(y) * width + x];
-      }
+    const size_t row = static_cast<size_t>(y) * pixels;
+    std::vector<double> values(pixels + 2 * radius);
+    std::vector<int> ones(pixels + 2 * radius);
+    for (size_t x = 0; x < pixels; ++x)
+      if (valid[row + x]) values[x + radius] = image.row(0, y)[x], ones[x + radius] = 1;
+    for (int q = 0; q <= 2 * radius; ++q) add(values.data() + q, &sums[row]), add(ones.data() + q, &numbers[row]);
   });
   Planes result(width, height, 1, border, outside);
   parallel_for(height, 8, [&](int y) {
-    for (int x = 0; x < width; ++x) {
-      double sum = 0;
-      int number = 0;
-      for (int q = std::max(0, y - radius); q <= std::min(height - 1, y + radius); ++q) {
-        sum += sums[static_cast<size_t>(q) * width + x];
-        number += numbers[static_cast<size_t>(q) * width + x];
-      }
-      result.row(0, y)[x] = number ? static_cast<float>(sum / number) : 0.0f;
+    std::vector<double> sum(pixels);
+    std::vector<int> number(pixels);
+    for (int q = std::max(0, y - radius); q <= std::min(height - 1, y + radius); ++q) {
+      const size_t row = static_cast<size_t>(q) * pixels;
+      add(&sums[row], sum.data()), add(&numbers[row], number.data());
     }
+    for (size_t x = 0; x < pixels; ++x)
+      result.row(0, y)[x] = number[x] ? static_cast<float>(sum[x] / number[x]) : 0.0f;
   });
   return result;
 }

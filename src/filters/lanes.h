@@ -9,6 +9,10 @@
 #include <cstdint>
 #include <cstring>
 
+#ifdef __SSE__
+#include <xmmintrin.h>
+#endif
+
 namespace covary::lanes {
 
 #if defined(__AVX512F__)
@@ -43,11 +47,27 @@ inline vfloat sqrt(vfloat v) {
   return r;
 }
 
+/// While one lives, results of its thread that are too small for a normal float (below 1.2e-38) are zero. Products of
+/// Gaussian weights are often so small, and some processors take a hundred times longer for them.
+class FlushTiny {
+ public:
+#ifdef __SSE__
+  FlushTiny() { _mm_setcsr(before_ | kFlushToZero); }
+  ~FlushTiny() { _mm_setcsr(before_); }
+  FlushTiny(const FlushTiny&) = delete;
+  FlushTiny& operator=(const FlushTiny&) = delete;
+
+ private:
+  static constexpr unsigned kFlushToZero = 0x8000;
+  const unsigned before_ = _mm_getcsr();
+#endif
+};
+
 /// e^x for x <= 0, relative error below 3e-7 + 1e-7 |x|; 0 below -87.
 inline vfloat exp_of_nonpositive(vfloat x) {
-  const vfloat t = max(x, splat(-87.0f)) * 1.44269504f;
-  const vfloat whole = (t + 12582912.0f) - 12582912.0f;  // rounds to the nearest integer
-  const vfloat f = t - whole;                            // in [-1/2, 1/2]
+  const vfloat t = x * 1.44269504f;
+  const vfloat shifted = t + 12582912.0f;        // its last bits are the nearest integer
+  const vfloat f = t - (shifted - 12582912.0f);  // in [-1/2, 1/2] where x >= -87
   // Taylor coefficients of 2^f.
   vfloat p = splat(1.53533619e-4f);
   p = p * f + 1.33335581e-3f;
@@ -56,8 +76,7 @@ inline vfloat exp_of_nonpositive(vfloat x) {
   p = p * f + 2.40226507e-1f;
   p = p * f + 6.93147181e-1f;
   p = p * f + 1.0f;
-  const vint exponent = (__builtin_convertvector(whole, vint) + 127) << 23;
-  return x > splat(-87.0f) ? p * from_bits(exponent) : vfloat{};
+  return x > splat(-87.0f) ? from_bits(bits(p) + (bits(shifted) << 23)) : vfloat{};  // p 2^integer
 }
 
 /// Lane l of the result is lane order[l] of a followed by b.

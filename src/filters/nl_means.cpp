@@ -180,6 +180,7 @@ class Filter {
   }
 
   void filter_tile(const Tile& tile) {
+    const FlushTiny flush;
     thread_local Buffers b;
     b.totals.resize(n_sums_);
     for (Rows& total : b.totals) std::fill(total.data.begin(), total.data.end(), 0.0f);

@@ -42,6 +42,7 @@ class Planes {
 template <typename Batch>
 void for_each_batch(int width, int height, const Batch& batch) {
   parallel_for(height, 4, [&](int y) {
+    const lanes::FlushTiny flush;
     for (int x = 0; x < width; x += lanes::kLanes) batch(x, y, std::min(lanes::kLanes, width - x));
   });
 }

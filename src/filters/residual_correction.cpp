@@ -83,7 +83,7 @@ GuidedMean guided_mean(const Planes& cells, int side, int radius, int x, int y, 
                        vfloat squared_bandwidth) {
   const vfloat factor = -1.0f / max(squared_bandwidth, splat(1e-30f));
   const int row = y / side, reach = radius * side;
-  GuidedMean mean;
+  vfloat weights = {}, squares = {}, r0 = {}, r1 = {}, r2 = {};
   for (int dy = -radius; dy <= radius; ++dy) {
     const float* p[kPlanes];
     for (int i = 0; i < kPlanes; ++i) p[i] = cells.row(i, row + dy) + x;
@@ -91,12 +91,14 @@ GuidedMean guided_mean(const Planes& cells, int side, int radius, int x, int y, 
       const vfloat d0 = load(p[kGuide] + dx) - f[0], d1 = load(p[kGuide + 1] + dx) - f[1],
                    d2 = load(p[kGuide + 2] + dx) - f[2];
       const vfloat w = exp_of_nonpositive((d0 * d0 + d1 * d1 + d2 * d2) * factor);
-      mean.weights += w * load(p[kWeight] + dx);
-      mean.squares += w * w * load(p[kVariance] + dx);
-      for (int c = 0; c < 3; ++c) mean.residuals[c] += w * load(p[kResidual + c] + dx);
+      weights += w * load(p[kWeight] + dx);
+      squares += w * w * load(p[kVariance] + dx);
+      r0 += w * load(p[kResidual] + dx);
+      r1 += w * load(p[kResidual + 1] + dx);
+      r2 += w * load(p[kResidual + 2] + dx);
     }
   }
-  return mean;
+  return {weights, {r0, r1, r2}, squares};
 }
 
 /// Adds to each valid pixel what `correction(x, y, f, variance)` gives, three vfloats for the pixels (x + lane, y)
