@@ -9,7 +9,9 @@
 #   make check            all there is: lint of every file, the tests under sanitizers and of a build by Clang with the
 #                         checks of the standard library, a minute of each fuzz target; takes hours
 #                         FUZZ=seconds for each target
-#   make bench            build and run the micro benchmarks                BENCH=regex selects some
+#   make bench            build and run the micro benchmarks: the time of each stage, and what part of its limit it
+#                         reaches; build/release/bench.json            BENCH=regex selects some; BASELINE=an earlier
+#                         bench.json to compare with
 #   make lint             formatting, static analysis, rules of the tree    ALL=1 analyses all files, not changed ones
 #   make install          build for every x86-64 processor (docs/library.md) and install under PREFIX (default
 #                         /usr/local); ARCH=native builds for this machine alone, in a third of the time; with Open
@@ -73,7 +75,7 @@ nightly: configure
 
 bench: configure
 	@cmake --build build/release -j $(JOBS)
-	@scripts/bench build/release '$(BENCH)'
+	@scripts/bench build/release '$(BENCH)' $(BASELINE)
 
 lint:
 	@scripts/setup lint

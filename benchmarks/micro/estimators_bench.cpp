@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 // The image-space estimators on a synthetic frame of 1280 x 720 pixels with 12 + 12 groups: the stages of iicv one by
-// one, and whole estimators. Stages run on one thread, estimators on all. items_per_second are pixels per second.
+// one, and whole estimators. Stages run on one thread, estimators on all. items_per_second are pixels per second; flops
+// are counted from the formulas, with 20 for an exponential function, and bytes are what is read at least.
 #include <benchmark/benchmark.h>
 #include <tbb/global_control.h>
 
 #include <cmath>
 #include <vector>
 
+#include "combine/registry.h"
 #include "core/random.h"
 #include "dependent_tests/dependent_tests.h"
 #include "estimators/control_variates.h"
 #include "estimators/cv_baseline.h"
+#include "estimators/estimator.h"
 #include "estimators/iduw.h"
 #include "estimators/iicv.h"
 #include "estimators/pilot.h"
@@ -59,11 +62,18 @@ const Input& input() {
 
 void count(benchmark::State& state) { state.SetItemsProcessed(state.iterations() * kWidth * kHeight); }
 
+/// What a stage does for each pixel, per second: "flops" or "bytes".
+void count_work(benchmark::State& state, const char* name, double per_pixel) {
+  state.counters[name] =
+      benchmark::Counter(per_pixel * kWidth * kHeight, benchmark::Counter::kIsIterationInvariantRate);
+}
+
 void one_moments(benchmark::State& state) {
   const Input& in = input();
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
   for (auto _ : state) benchmark::DoNotOptimize(moments(in.crn, in.valid, kBorder, kFar));
   count(state);
+  count_work(state, "bytes", 3 * kGroups * sizeof(float));
 }
 
 void one_pilot(benchmark::State& state) {
@@ -71,6 +81,7 @@ void one_pilot(benchmark::State& state) {
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
   for (auto _ : state) benchmark::DoNotOptimize(pilot_error(in.g, in.h, 11, false, kBorder));
   count(state);
+  count_work(state, "flops", 121 * 36);
 }
 
 void one_neighbours(benchmark::State& state) {
@@ -102,6 +113,7 @@ void one_regression(benchmark::State& state) {
     benchmark::DoNotOptimize(result.estimate.data.data());
   }
   count(state);
+  if (state.range(0)) count_work(state, "flops", 41e3);  // of them 23e3 for the Gram matrix
 }
 
 void one_residual_correction(benchmark::State& state) {
@@ -117,6 +129,7 @@ void one_residual_correction(benchmark::State& state) {
     benchmark::DoNotOptimize(estimate.data.data());
   }
   count(state);
+  count_work(state, "flops", (441 + 441 + 121) * 40);
 }
 
 /// One pixel of range(1) samples in range(0) dimensions.
@@ -135,6 +148,17 @@ void one_polynomials(benchmark::State& state) {
 void whole_iicv(benchmark::State& state, const IicvOptions& options) {
   const Input& in = input();
   for (auto _ : state) benchmark::DoNotOptimize(iicv(in.crn, in.independent, options).estimate.data.data());
+  count(state);
+}
+
+/// With its standard error calibrated by both halves of the samples: three runs of the estimator.
+void whole_calibrated(benchmark::State& state) {
+  const Input& in = input();
+  const Estimator estimator = make_estimator("iicv");
+  PairSettings settings;
+  settings.std_error = true;
+  for (auto _ : state)
+    benchmark::DoNotOptimize(estimator.apply(in.crn, in.independent, settings).estimate.data.data());
   count(state);
 }
 
@@ -186,6 +210,7 @@ BENCHMARK(one_residual_correction)->Unit(benchmark::kMillisecond);
 BENCHMARK(one_polynomials)->ArgsProduct({{2, 4, 6}, {48, 192}});
 BENCHMARK_CAPTURE(whole_iicv, default, IicvOptions())->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK_CAPTURE(whole_iicv, paper, IicvOptions::paper())->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(whole_calibrated)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(filter_paper)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK(filter_exact)->Arg(7)->Arg(15)->Arg(31)->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK_CAPTURE(whole_dependent_tests, default, DependentTestsOptions())

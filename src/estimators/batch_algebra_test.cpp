@@ -26,6 +26,19 @@ TEST(Lanes, ExpOfNonpositiveIsAccurate) {
   EXPECT_EQ(lanes::exp_of_nonpositive(lanes::splat(-INFINITY))[0], 0.0f);
 }
 
+TEST(Lanes, TinyProductsAreZeroWhileTheyAreFlushed) {
+  volatile float tiny = 1e-30f, product = 1;
+  {
+    const lanes::FlushTiny flush;
+    product = tiny * 1e-10f;
+    EXPECT_EQ(product, 0.0f);
+    product = tiny * 1e-7f;
+    EXPECT_GT(product, 0.9e-37f);
+  }
+  product = tiny * 1e-10f;
+  EXPECT_GT(product, 0.9e-40f);
+}
+
 TEST(Lanes, TransposeSwapsRowsAndLanes) {
   vfloat rows[kLanes];
   for (int i = 0; i < kLanes; ++i)
