@@ -63,6 +63,14 @@ class Render(PackageTest):
         self.assertLessEqual(result.predicted_relmse, 0.05)
         self.assertLess(result.samples_per_pixel, 400)
 
+    def test_layers(self):
+        result = covary.render(self.scene(), 16, layers=True, oidn="off")
+        layers = result.aovs["Direct"], result.aovs["Indirect"]
+        numpy.testing.assert_allclose(sum(layers), result.image, rtol=1e-5, atol=1e-5)
+        self.assertTrue(all(layer.max() > 1e-3 for layer in layers))
+        with self.assertRaisesRegex(covary.UsageError, "layers: films_only=True makes no image"):
+            covary.render(self.scene(), 16, layers=True, films_only=True)
+
     def test_films_only(self):
         whole, films = (covary.render(self.scene(), 24, "iicv", films_only=only) for only in (False, True))
         for name in ("crn", "independent"):
