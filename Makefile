@@ -27,17 +27,18 @@
 #   make clean            remove build/ and out/
 #
 # ARCH=x86-64-v3 builds for every AVX2 machine instead of this one; WERROR=ON makes warnings errors (dev and clang
-# always do); JOBS=n limits parallelism (default: processors, fewer when memory is short).
+# always do) until WERROR=OFF, so that what is built once is built for all targets above; JOBS=n limits parallelism
+# (default: processors, fewer when memory is short).
 
 ARCH   ?= native
-WERROR ?= OFF
 PREFIX ?= /usr/local
 JOBS   ?= $(shell scripts/jobs)
 TESTS  ?= .
 BENCH  ?= .
 FUZZ   ?= 60
 CTEST   = ctest --output-on-failure --no-tests=error -LE nightly -R '$(TESTS)' -j $(JOBS)
-CONFIGURE = -DCOVARY_ARCH=$(ARCH) -DCOVARY_WERROR=$(WERROR)
+WARNINGS = $(if $(WERROR),-DCOVARY_WERROR=$(WERROR))
+CONFIGURE = -DCOVARY_ARCH=$(ARCH) $(WARNINGS)
 
 # Install for every processor unless ARCH was given.
 INSTALL = $(if $(filter file,$(origin ARCH)),portable,release)
@@ -83,15 +84,13 @@ lint:
 	@scripts/lint build/release $(if $(ALL),--all)
 
 install: setup
-	@cmake --preset $(INSTALL) $(if $(filter release,$(INSTALL)),-DCOVARY_ARCH=$(ARCH)) \
-	  -DCOVARY_WERROR=$(WERROR) > /dev/null
+	@cmake --preset $(INSTALL) $(if $(filter release,$(INSTALL)),-DCOVARY_ARCH=$(ARCH)) $(WARNINGS) > /dev/null
 	@cmake --build build/$(INSTALL) -j $(JOBS) --target covary
 	@cmake --install build/$(INSTALL) --prefix $(PREFIX)
 	@[ "$(OIDN)" = OFF ] || scripts/oidn $(PREFIX) || echo "install: without Open Image Denoise; scripts/oidn $(PREFIX)"
 
 deb: setup
-	@cmake --preset $(INSTALL) $(if $(filter release,$(INSTALL)),-DCOVARY_ARCH=$(ARCH)) \
-	  -DCOVARY_WERROR=$(WERROR) > /dev/null
+	@cmake --preset $(INSTALL) $(if $(filter release,$(INSTALL)),-DCOVARY_ARCH=$(ARCH)) $(WARNINGS) > /dev/null
 	@cmake --build build/$(INSTALL) -j $(JOBS) --target covary
 	@cd build/$(INSTALL) && cpack -G DEB -B $(CURDIR)/dist
 
