@@ -13,20 +13,20 @@
 // | alpha, alpha_u, alpha_v, sample_visible |  |           | see roughness.h                                     |
 //
 // f = F D G / (4 cos cos) + rho / pi (1 - F(wo)) (1 - F(wi)), as Mitsuba's variants without polarisation.
+#include "bsdfs/coated.h"
 #include "bsdfs/fresnel.h"
 #include "bsdfs/registry.h"
-#include "bsdfs/roughness.h"
 
 namespace covary {
 namespace {
 
-class PPlasticClosure final : public BsdfClosure {
+class PPlasticClosure final : public CoatedClosure<PPlasticClosure> {
  public:
   PPlasticClosure(const RoughSurface& surface, float eta, float specular_weight, const Spectrum& base,
                   const Spectrum& specular)
-      : surface_(surface), eta_(eta), specular_weight_(specular_weight), base_(base), specular_(specular) {}
+      : CoatedClosure(surface), eta_(eta), specular_weight_(specular_weight), base_(base), specular_(specular) {}
 
-  uint32_t flags() const override { return kGlossyReflection | kDiffuseReflection; }
+  float specular_pmf(float) const { return specular_weight_; }
   BsdfValue eval(const Vec3& wo, const Vec3& wi) const override {
     if (!(wo.z > 0 && wi.z > 0)) return {};
     const Vec3 m = normalize(wo + wi);
@@ -40,38 +40,8 @@ class PPlasticClosure final : public BsdfClosure {
             specular_weight_ * surface_.pdf(wo, m) / (4 * om) +
                 (1 - specular_weight_) * warp::cosine_hemisphere_pdf_solid_angle(wi.z)};
   }
-  BsdfSample sample(const Vec3& wo, float u_lobe, Vec2 u) const override {
-    BsdfSample s;
-    if (!(wo.z > 0)) return s;
-    if (u_lobe < specular_weight_) {
-      s.wi = reflect(wo, surface_.sample(wo, u).m);
-      s.flags = kGlossyReflection;
-    } else {
-      s.wi = warp::square_to_cosine_hemisphere(u);
-      s.flags = kDiffuseReflection;
-      s.lobe = 1;
-    }
-    const BsdfValue v = eval(wo, s.wi);
-    if (!(v.pdf_solid_angle > 0)) return s;
-    s.pdf = v.pdf_solid_angle;
-    s.weight = v.value / s.pdf;
-    return s;
-  }
-  int n_lobes() const override { return 2; }
-  void lobe_pmfs(const Vec3& wo, float* pmfs) const override {
-    pmfs[0] = wo.z > 0 ? specular_weight_ : 0;
-    pmfs[1] = wo.z > 0 ? 1 - specular_weight_ : 0;
-  }
-  void lobe_pdfs(const Vec3& wo, const Vec3& wi, float* pdfs) const override {
-    pdfs[0] = pdfs[1] = 0;
-    if (!(wo.z > 0 && wi.z > 0)) return;
-    const Vec3 m = normalize(wo + wi);
-    pdfs[0] = surface_.pdf(wo, m) / (4 * dot(wo, m));
-    pdfs[1] = warp::cosine_hemisphere_pdf_solid_angle(wi.z);
-  }
 
  private:
-  RoughSurface surface_;
   float eta_, specular_weight_;
   Spectrum base_, specular_;
 };

@@ -19,9 +19,9 @@
 #include <array>
 #include <vector>
 
+#include "bsdfs/coated.h"
 #include "bsdfs/fresnel.h"
 #include "bsdfs/registry.h"
-#include "bsdfs/roughness.h"
 
 namespace covary {
 namespace {
@@ -92,68 +92,38 @@ class RoughTransmittance {
   float internal_reflectance_;
 };
 
-class RoughPlasticClosure final : public BsdfClosure {
+class RoughPlasticClosure final : public CoatedClosure<RoughPlasticClosure> {
  public:
   /// `base`: rho / (pi eta^2 (1 - rho Ri)).
   RoughPlasticClosure(const RoughSurface& surface, const RoughTransmittance& transmittance, float eta,
                       float specular_weight, const Spectrum& base, const Spectrum& specular)
-      : surface_(surface),
+      : CoatedClosure(surface),
         transmittance_(transmittance),
         eta_(eta),
         specular_weight_(specular_weight),
         base_(base),
         specular_(specular) {}
 
-  uint32_t flags() const override { return kGlossyReflection | kDiffuseReflection; }
+  /// By the coating's directional reflectance and the mean colours.
+  float specular_pmf(float cos_o) const { return specular_pmf_of(transmittance_(cos_o)); }
   BsdfValue eval(const Vec3& wo, const Vec3& wi) const override {
     if (!(wo.z > 0 && wi.z > 0)) return {};
     const Vec3 m = normalize(wo + wi);
     const Microfacet& normals = surface_.normals;
-    const float om = dot(wo, m), t_o = transmittance_(wo.z), pmf = specular_pmf(t_o);
+    const float om = dot(wo, m), t_o = transmittance_(wo.z), pmf = specular_pmf_of(t_o);
     const float d_g1 = normals.eval(m) * normals.smith_g1(wo, m) / (4 * wo.z);
     const float coating = fresnel_dielectric(om, eta_).reflectance * d_g1 * normals.smith_g1(wi, m);
     const float pdf = surface_.sample_visible ? d_g1 : surface_.pdf(wo, m) / (4 * om);
     return {specular_ * coating + base_ * (wi.z * t_o * transmittance_(wi.z)),
             pmf * pdf + (1 - pmf) * warp::cosine_hemisphere_pdf_solid_angle(wi.z)};
   }
-  BsdfSample sample(const Vec3& wo, float u_lobe, Vec2 u) const override {
-    BsdfSample s;  // the one object returned, so that it is built where the caller wants it
-    if (!(wo.z > 0)) return s;
-    if (u_lobe < specular_pmf(transmittance_(wo.z))) {
-      s.wi = reflect(wo, surface_.sample(wo, u).m);
-      s.flags = kGlossyReflection;
-    } else {
-      s.wi = warp::square_to_cosine_hemisphere(u);
-      s.flags = kDiffuseReflection;
-      s.lobe = 1;
-    }
-    const BsdfValue v = eval(wo, s.wi);
-    if (!(v.pdf_solid_angle > 0)) return s;
-    s.pdf = v.pdf_solid_angle;
-    s.weight = v.value / s.pdf;
-    return s;
-  }
-  int n_lobes() const override { return 2; }
-  void lobe_pmfs(const Vec3& wo, float* pmfs) const override {
-    pmfs[0] = wo.z > 0 ? specular_pmf(transmittance_(wo.z)) : 0;
-    pmfs[1] = wo.z > 0 ? 1 - pmfs[0] : 0;
-  }
-  void lobe_pdfs(const Vec3& wo, const Vec3& wi, float* pdfs) const override {
-    pdfs[0] = pdfs[1] = 0;
-    if (!(wo.z > 0 && wi.z > 0)) return;
-    const Vec3 m = normalize(wo + wi);
-    pdfs[0] = surface_.pdf(wo, m) / (4 * dot(wo, m));
-    pdfs[1] = warp::cosine_hemisphere_pdf_solid_angle(wi.z);
-  }
 
  private:
-  /// Probability of the coating's lobe, by its directional reflectance and the mean colours.
-  float specular_pmf(float t_o) const {
+  float specular_pmf_of(float t_o) const {
     const float specular = (1 - t_o) * specular_weight_, diffuse = t_o * (1 - specular_weight_);
     return specular + diffuse > 0 ? specular / (specular + diffuse) : 1;
   }
 
-  RoughSurface surface_;
   const RoughTransmittance& transmittance_;
   float eta_, specular_weight_;
   Spectrum base_, specular_;

@@ -7,6 +7,7 @@
 // | position  | point     | (0,0,0)  | where it stands; not together with to_world  |
 // | to_world  | transform | identity | the point is the image of the origin         |
 #include "core/warp.h"
+#include "emitters/point_source.h"
 #include "emitters/registry.h"
 
 namespace covary {
@@ -19,28 +20,11 @@ class PointLight final : public Emitter {
   bool is_delta_position() const override { return true; }
 
   EmitterSample sample_towards(const Vec3& reference, Vec2, float) const override {
-    EmitterSample sample;
-    const Vec3 d = position_ - reference;
-    const float distance_squared = length_squared(d);
-    if (!(distance_squared > 0)) return sample;
-    sample.distance = std::sqrt(distance_squared);
-    sample.wi = d * (1 / sample.distance);
-    sample.p = position_, sample.n = -sample.wi;
-    sample.radiance = intensity_ * (1 / distance_squared);
-    sample.pdf_solid_angle = 1;
-    sample.is_delta = true;
-    return sample;
+    return sample_point(position_, reference, [&](const Vec3&) { return intensity_; });
   }
 
   EmissionSample sample_emission(Vec2, Vec2 u_direction, float) const override {
-    EmissionSample sample;
-    sample.ray = {position_, warp::square_to_sphere(u_direction)};
-    sample.n = sample.ray.d;
-    sample.radiance = intensity_;
-    sample.pdf_position = 1;
-    sample.pdf_direction = warp::sphere_pdf_solid_angle();
-    sample.delta_position = true;
-    return sample;
+    return emit_from_point(position_, warp::square_to_sphere(u_direction), intensity_, warp::sphere_pdf_solid_angle());
   }
 
   EmissionPdf pdf_emission(const SurfaceHit&, const Vec3&) const override {

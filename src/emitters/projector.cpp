@@ -9,18 +9,15 @@
 // | scale        | float     | 1        | factor                                                                   |
 // | fov, fov_axis, focal_length |  | 50mm | as of the sensor `perspective`; the picture's pixels give the aspect      |
 // | to_world     | transform | identity | shines along the image of +z, the picture's y axis up, x to the left      |
-#include "core/warp.h"
-#include "emitters/lattice.h"
+#include "emitters/point_source.h"
 #include "emitters/registry.h"
-#include "emitters/rotation.h"
 #include "scene/field_of_view.h"
 
 namespace covary {
 namespace {
 
 struct ProjectorSettings {
-  Vec3 position;
-  Rotation rotation;
+  PointFrame frame;
   TexturePtr irradiance;
   float scale = 1;
   float tan_x = 1, tan_y = 1;  // half extents of the picture at distance 1
@@ -33,36 +30,21 @@ class Projector final : public Emitter {
   bool is_delta_position() const override { return true; }
 
   EmitterSample sample_towards(const Vec3& reference, Vec2, float) const override {
-    EmitterSample sample;
-    const Vec3 d = s_.position - reference;
-    const float distance_squared = length_squared(d);
-    if (!(distance_squared > 0)) return sample;
-    sample.distance = std::sqrt(distance_squared);
-    sample.wi = d * (1 / sample.distance);
-    sample.p = s_.position, sample.n = -sample.wi;
-    sample.radiance = intensity(s_.rotation.to_local(-sample.wi)) * (1 / distance_squared);
-    sample.pdf_solid_angle = 1;
-    sample.is_delta = true;
-    return sample;
+    return sample_point(s_.frame.position, reference,
+                        [&](const Vec3& d) { return intensity(s_.frame.rotation.to_local(d)); });
   }
 
   /// Positions in the picture by its luminance.
   EmissionSample sample_emission(Vec2, Vec2 u_direction, float) const override {
-    EmissionSample sample;
     const Texture::PositionSample at = s_.irradiance->sample_position(u_direction);
-    if (!(at.pdf > 0)) return sample;
+    if (!(at.pdf > 0)) return {};
     const Vec3 local = direction(at.uv);
-    sample.ray = {s_.position, s_.rotation.to_world(local)};
-    sample.n = sample.ray.d;
-    sample.radiance = intensity_at(at.uv, local.z);
-    sample.pdf_position = 1;
-    sample.pdf_direction = at.pdf * per_solid_angle(local.z);
-    sample.delta_position = true;
-    return sample;
+    return emit_from_point(s_.frame.position, s_.frame.rotation.to_world(local), intensity_at(at.uv, local.z),
+                           at.pdf * per_solid_angle(local.z));
   }
 
   EmissionPdf pdf_emission(const SurfaceHit&, const Vec3& w) const override {
-    const Vec3 local = s_.rotation.to_local(w);
+    const Vec3 local = s_.frame.rotation.to_local(w);
     Vec2 uv;
     return {1, find(local, uv) ? s_.irradiance->pdf_position(uv) * per_solid_angle(local.z) : 0};
   }
@@ -72,18 +54,11 @@ class Projector final : public Emitter {
     const float area = kPi * s_.scale * 4 * s_.tan_x * s_.tan_y;
     SurfaceHit hit;
     if (s_.irradiance->is_constant()) return s_.irradiance->eval(hit) * area;
-    constexpr int kPoints = 1 << 14;
-    double sum[3] = {0, 0, 0};
-    for (int i = 0; i < kPoints; ++i) {
-      const Vec3 u = lattice_point(i);
-      const Texture::PositionSample at = s_.irradiance->sample_position({u.x, u.y});
-      if (!(at.pdf > 0)) continue;
-      hit.uv = at.uv;
-      const Spectrum value = s_.irradiance->eval(hit);
-      for (int channel = 0; channel < 3; ++channel) sum[channel] += value[channel] / at.pdf;
-    }
-    return Spectrum(static_cast<float>(sum[0] / kPoints), static_cast<float>(sum[1] / kPoints),
-                    static_cast<float>(sum[2] / kPoints)) *
+    return mean_over_texture(*s_.irradiance,
+                             [&](const Vec2& uv, float pdf) {
+                               hit.uv = uv;
+                               return s_.irradiance->eval(hit) / Spectrum(pdf);
+                             }) *
            area;
   }
   bool knows_power() const override { return s_.irradiance->is_constant(); }
@@ -122,13 +97,7 @@ std::shared_ptr<Emitter> make_projector(Parameters& parameters) {
   const float aspect = settings.irradiance->aspect();
   settings.tan_x = half_extent_x(view.degrees, view.axis, aspect);
   settings.tan_y = settings.tan_x / aspect;
-  const Transform to_world = parameters.get_transform("to_world");
-  settings.position = to_world.point({0, 0, 0});
-  try {
-    settings.rotation = Rotation(to_world);
-  } catch (const Error& error) {
-    parameters.error_at("to_world", error.what());
-  }
+  settings.frame = get_point_frame(parameters);
   return std::make_shared<Projector>(std::move(settings));
 }
 

@@ -10,16 +10,14 @@
 // | texture      | texture   | none             | projected factor; its unit square spans the cone (cutoff < 90) |
 // | to_world     | transform | identity         | the light stands at the image of the origin                   |
 #include "core/warp.h"
-#include "emitters/lattice.h"
+#include "emitters/point_source.h"
 #include "emitters/registry.h"
-#include "emitters/rotation.h"
 
 namespace covary {
 namespace {
 
 struct SpotSettings {
-  Vec3 position;
-  Rotation rotation;
+  PointFrame frame;
   Spectrum intensity;
   float cutoff = 0, beam_width = 0;  // radians, 0 <= beam_width <= cutoff
   TexturePtr texture;                // or null
@@ -36,34 +34,19 @@ class SpotLight final : public Emitter {
   bool is_delta_position() const override { return true; }
 
   EmitterSample sample_towards(const Vec3& reference, Vec2, float) const override {
-    EmitterSample sample;
-    const Vec3 d = s_.position - reference;
-    const float distance_squared = length_squared(d);
-    if (!(distance_squared > 0)) return sample;
-    sample.distance = std::sqrt(distance_squared);
-    sample.wi = d * (1 / sample.distance);
-    sample.p = s_.position, sample.n = -sample.wi;
-    sample.radiance = intensity(s_.rotation.to_local(-sample.wi)) * (1 / distance_squared);
-    sample.pdf_solid_angle = 1;
-    sample.is_delta = true;
-    return sample;
+    return sample_point(s_.frame.position, reference,
+                        [&](const Vec3& d) { return intensity(s_.frame.rotation.to_local(d)); });
   }
 
   /// Uniform in the cone.
   EmissionSample sample_emission(Vec2, Vec2 u_direction, float) const override {
-    EmissionSample sample;
     const Vec3 local = warp::square_to_cone(u_direction, one_minus_cos_cutoff_);
-    sample.ray = {s_.position, s_.rotation.to_world(local)};
-    sample.n = sample.ray.d;
-    sample.radiance = intensity(local);
-    sample.pdf_position = 1;
-    sample.pdf_direction = warp::cone_pdf_solid_angle(one_minus_cos_cutoff_);
-    sample.delta_position = true;
-    return sample;
+    return emit_from_point(s_.frame.position, s_.frame.rotation.to_world(local), intensity(local),
+                           warp::cone_pdf_solid_angle(one_minus_cos_cutoff_));
   }
 
   EmissionPdf pdf_emission(const SurfaceHit&, const Vec3& w) const override {
-    const bool inside = s_.rotation.to_local(w).z > cos_cutoff_;
+    const bool inside = s_.frame.rotation.to_local(w).z > cos_cutoff_;
     return {1, inside ? warp::cone_pdf_solid_angle(one_minus_cos_cutoff_) : 0};
   }
 
@@ -74,21 +57,12 @@ class SpotLight final : public Emitter {
       const float mean_cosine = c - b > 1e-4f ? (std::sin(c) - std::sin(b)) / (c - b) : std::cos(c);
       return s_.intensity * (kTwoPi * (1 - mean_cosine));
     }
-    // Over the texture's square, at positions that it chooses by its luminance, so that a few bright texels are found.
-    constexpr int kPoints = 1 << 14;
-    double sum[3] = {0, 0, 0};
-    for (int i = 0; i < kPoints; ++i) {
-      const Vec3 u = lattice_point(i);
-      const Texture::PositionSample at = s_.texture->sample_position({u.x, u.y});
-      if (!(at.pdf > 0)) continue;
-      const float side = 2 * std::tan(c);  // of the square at distance 1
-      const Vec3 local = normalize(Vec3{(at.uv.x - 0.5f) * side, (at.uv.y - 0.5f) * side, 1});
-      const float solid_angle = sqr(side) * local.z * sqr(local.z) / at.pdf;
-      const Spectrum value = intensity(local);
-      for (int channel = 0; channel < 3; ++channel) sum[channel] += value[channel] * solid_angle;
-    }
-    return {static_cast<float>(sum[0] / kPoints), static_cast<float>(sum[1] / kPoints),
-            static_cast<float>(sum[2] / kPoints)};
+    const float side = 2 * std::tan(c);  // of the texture's square at distance 1
+    return mean_over_texture(*s_.texture, [&](const Vec2& uv, float pdf) {
+      const Vec3 local = normalize(Vec3{(uv.x - 0.5f) * side, (uv.y - 0.5f) * side, 1});
+      const float solid_angle = sqr(side) * local.z * sqr(local.z) / pdf;
+      return intensity(local) * solid_angle;
+    });
   }
   bool knows_power() const override { return !s_.texture || s_.texture->is_constant(); }
 
@@ -118,7 +92,6 @@ std::shared_ptr<Emitter> make_spot(Parameters& parameters) {
   float cutoff = parameters.get_float("cutoff_angle", 20, 0, 180);
   const float beam_width = parameters.get_float("beam_width", 0.75f * cutoff, 0, 180);
   settings.texture = parameters.find_texture("texture");
-  const Transform to_world = parameters.get_transform("to_world");
   if (!(cutoff > 0 && cutoff < 180) || (settings.texture && cutoff >= 90)) {
     parameters.error_at("cutoff_angle", settings.texture
                                             ? "must lie between 0 and 90 degrees for a light with a texture"
@@ -128,12 +101,7 @@ std::shared_ptr<Emitter> make_spot(Parameters& parameters) {
   if (beam_width > cutoff) parameters.error_at("beam_width", "must not exceed cutoff_angle");
   settings.cutoff = cutoff * (kPi / 180);
   settings.beam_width = std::min(beam_width, cutoff) * (kPi / 180);
-  settings.position = to_world.point({0, 0, 0});
-  try {
-    settings.rotation = Rotation(to_world);
-  } catch (const Error& error) {
-    parameters.error_at("to_world", error.what());
-  }
+  settings.frame = get_point_frame(parameters);
   return std::make_shared<SpotLight>(std::move(settings));
 }
 
