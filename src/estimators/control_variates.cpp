@@ -4,6 +4,8 @@
 // transposition.
 #include "estimators/control_variates.h"
 
+#include <fmt/format.h>
+
 #include <array>
 #include <cmath>
 
@@ -352,6 +354,13 @@ void apply_control_variates(const ControlVariateInput& input, const ControlVaria
     regression.run_tile({x0, y0, std::min(x0 + kTileWidth, width), std::min(y0 + kTileHeight, height)},
                         workspaces.local());
   });
+}
+
+void check_k(int k, int window, bool include_target, std::vector<std::string>& problems) {
+  const int64_t candidates = int64_t{window} * window - (include_target ? 0 : 1);
+  if (k < 1 || k > candidates)
+    problems.push_back(fmt::format("k is {}, expected 1 to {}, the number of {}pixels in a window of {} x {}", k,
+                                   candidates, include_target ? "" : "neighbouring ", window, window));
 }
 
 }  // namespace covary

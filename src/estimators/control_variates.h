@@ -13,6 +13,9 @@
 // of a group. Unequal counts of the independent image enter through V_h and Eq. (8).
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "estimators/estimator_result.h"
 #include "estimators/pixel_probe.h"
 #include "film/grouped_image.h"
@@ -49,6 +52,21 @@ struct ControlVariateSettings {
   bool std_error = false;
   PixelProbe* probe = nullptr;  ///< optional
 };
+
+/// The settings that the options of several estimators have under one name.
+template <typename Options>
+ControlVariateSettings common_settings(const Options& options) {
+  ControlVariateSettings settings;
+  settings.k = options.k;
+  settings.window = options.window;
+  settings.include_target = options.include_target;
+  settings.shared = options.shared_coefficients;
+  settings.std_error = options.std_error;
+  settings.probe = options.probe;
+  return settings;
+}
+/// Adds what is wrong with the number k of control variates.
+void check_k(int k, int window, bool include_target, std::vector<std::string>& problems);
 
 struct ControlVariateInput {
   GroupedImage crn;

@@ -17,10 +17,7 @@ std::vector<std::string> CvBaselineOptions::validate() const {
   std::vector<std::string> problems;
   if (window < 3 || window > 63 || window % 2 == 0)
     problems.push_back(fmt::format("window is {}, expected an odd number from 3 to 63", window));
-  const int64_t candidates = int64_t{window} * window - (include_target ? 0 : 1);
-  if (k < 1 || k > candidates)
-    problems.push_back(fmt::format("k is {}, expected 1 to {}, the number of {}pixels in a window of {} x {}", k,
-                                   candidates, include_target ? "" : "neighbouring ", window, window));
+  check_k(k, window, include_target, problems);
   if (!(ridge >= 0)) problems.push_back(fmt::format("ridge is {}, expected zero or a positive number", ridge));
   return problems;
 }
@@ -35,16 +32,10 @@ EstimatorResult cv_baseline(const GroupedImage& crn, const GroupedImage& indepen
   const std::vector<unsigned char> valid = finite_pixels(crn, independent, result.nonfinite_pixels);
   const int border = std::max(options.window, kMissingWindow) / 2;
   const Moments g = moments(crn, valid, border, kFar), h = moments(independent, valid, border, 0.0f);
-  ControlVariateSettings settings;
-  settings.k = options.k;
-  settings.window = options.window;
-  settings.include_target = options.include_target;
-  settings.shared = options.shared_coefficients;
+  ControlVariateSettings settings = common_settings(options);
   // [YM2025] Eq. (6) is Eq. (10) with V_h = 0; a ridge on X^T X is one of 1 / (T - 1) times its size on X^T X / (T -
   // 1), and both are relative to the mean diagonal.
   settings.ridge = options.ridge;
-  settings.std_error = options.std_error;
-  settings.probe = options.probe;
   ControlVariateInput input{crn, &g, &h.mean, nullptr, &h.variance_of_mean};
   std::optional<Planes> missing;
   if (options.std_error) input.missing = &missing.emplace(missing_light(g, h, valid, border));

@@ -30,10 +30,7 @@ std::vector<std::string> IicvOptions::validate() const {
   };
   check_window("window", window);
   check_window("pilot_window", pilot_window);
-  const int64_t candidates = int64_t{window} * window - (include_target ? 0 : 1);
-  if (k < 1 || k > candidates)
-    problems.push_back(fmt::format("k is {}, expected 1 to {}, the number of {}pixels in a window of {} x {}", k,
-                                   candidates, include_target ? "" : "neighbouring ", window, window));
+  check_k(k, window, include_target, problems);
   if (probe && penalty == Penalty::kCrossFit)
     problems.push_back("the penalty cross-fit has two sets of coefficients, so that no pixel can be explained by one");
   if (!(ridge > 0)) problems.push_back(fmt::format("ridge is {}, expected a positive number", ridge));
@@ -62,16 +59,11 @@ struct Prepared {
   Moments g, h;  ///< of the CRN image and of the independent one
 
   ControlVariateSettings settings() const {
-    ControlVariateSettings settings;
-    settings.k = options.k;
-    settings.window = options.window;
-    settings.include_target = options.include_target;
-    settings.shared = options.shared_coefficients;
+    ControlVariateSettings settings = common_settings(options);
     settings.symmetric = options.symmetric;
     settings.mean_constraint = options.mean_constraint;
     settings.sample_fraction = options.sample_fraction;
     settings.std_error = options.std_error || options.residual_correction;
-    settings.probe = options.probe;
     return settings;
   }
   /// `judge`: the independent image by which light that the CRN image lacks is found.
