@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "settings/number_text.h"
+#include "core/number_text.h"
 
 namespace covary {
 

@@ -6,11 +6,11 @@
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <cmath>
 #include <numeric>
 
 #include "core/error.h"
+#include "core/number_text.h"
 #include "film/image_file.h"
 #include "film/splat_layer.h"
 
@@ -47,9 +47,8 @@ std::string samples_key(const ExrFile& file) {
 double samples_per_pixel(const ExrFile& file, const std::string& path) {
   const std::string key = samples_key(file), text = key.empty() ? "" : attribute(file, key);
   if (text.empty()) return 0;
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || !(value >= 0 && value < 1e15))
+  const double value = parse_real(text).value_or(-1);
+  if (!(value >= 0 && value < 1e15))
     fail(path, fmt::format("attribute {} is '{}'; expected is a number of samples per pixel", key, text));
   return value;
 }

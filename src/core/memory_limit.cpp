@@ -5,12 +5,12 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cstdlib>
 #include <fstream>
 #include <string_view>
 
 #include "core/error.h"
+#include "core/number_text.h"
 
 namespace covary {
 namespace {
@@ -48,10 +48,8 @@ double memory_limit() {
   const char* given = std::getenv(kVariable);
   if (!given || !*given) return kShare * machine_memory();
   const std::string_view text = given;
-  double gigabytes = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), gigabytes);
-  const bool is_number = error == std::errc() && end == text.data() + text.size();
-  if (!is_number || !(gigabytes * 1e9 >= kLeastMemoryLimit && gigabytes < 1e9))
+  const double gigabytes = parse_real(text).value_or(0);
+  if (!(gigabytes * 1e9 >= kLeastMemoryLimit && gigabytes < 1e9))
     throw Error(ErrorCode::kUsage, fmt::format("the environment variable {} is '{}'; expected is a number of GB, at "
                                                "least {:g}",
                                                kVariable, text, kLeastMemoryLimit / 1e9));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "settings/number_text.h"
+#include "core/number_text.h"
 
 #include <algorithm>
 #include <cmath>

@@ -20,6 +20,7 @@
 #include <thread>
 
 #include "core/error.h"
+#include "core/number_text.h"
 
 namespace covary {
 
@@ -100,8 +101,8 @@ Address parse_address(const std::string& text) {
   const std::string port = colon == std::string::npos ? "" : text.substr(colon + 1);
   std::string host = text.substr(0, std::min(colon, text.size()));
   if (host.size() > 2 && host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);
-  const bool number = !port.empty() && port.size() <= 5 && port.find_first_not_of("0123456789") == std::string::npos;
-  if (host.empty() || !number || std::stoi(port) < 1 || std::stoi(port) > 65535)
+  const int number = parse_number<int>(port).value_or(0);
+  if (host.empty() || number < 1 || number > 65535)
     throw Error(ErrorCode::kUsage, "display server '" + text + "': expected HOST:PORT, e.g. localhost:14158");
   return {host, port};
 }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 
+#include "core/number_text.h"
 #include "film/exr.h"
 #include "film/image_file.h"
 
@@ -130,10 +131,9 @@ void write_film(const std::string& path, const Film& film, const Image& std_erro
 Film read_film(const std::string& path) {
   const ExrFile file(path);
   std::map<std::string, std::string> attributes = film_attributes(file, path);
-  int groups = 0;
   const std::string text = attributes[kGroups];
-  if (text.empty() || text.size() > 6 || text.find_first_not_of("0123456789") != std::string::npos ||
-      (groups = std::stoi(text)) < 1 || groups > Film::kMaxGroups)
+  const int groups = parse_number<int>(text).value_or(0);
+  if (groups < 1 || groups > Film::kMaxGroups)
     fail(path, fmt::format("attribute covary:groups is '{}'; expected is 1 to {}", text, Film::kMaxGroups));
   // Before memory is taken: all channels must be there, with the right type.
   if (!file.find(group_name(groups - 1) + ".R") && groups > 1)

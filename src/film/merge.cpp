@@ -9,6 +9,7 @@
 #include <optional>
 #include <set>
 
+#include "core/number_text.h"
 #include "film/film_file.h"
 #include "film/groups.h"
 #include "film/image_file.h"
@@ -35,13 +36,9 @@ std::set<uint64_t> seeds_of(const Attributes& attributes, const std::string& nam
   std::set<uint64_t> seeds;
   for (size_t begin = 0; begin <= text.size();) {
     const size_t end = std::min(text.find(',', begin), text.size());
-    const std::string item = text.substr(begin, end - begin);
-    if (item.empty() || item.find_first_not_of("0123456789") != std::string::npos) fail();
-    try {
-      seeds.insert(std::stoull(item));
-    } catch (const std::out_of_range&) {
-      fail();
-    }
+    const std::optional<uint64_t> seed = parse_number<uint64_t>(text.substr(begin, end - begin));
+    if (!seed) fail();
+    seeds.insert(*seed);
     begin = end + 1;
   }
   return seeds;

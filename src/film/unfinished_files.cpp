@@ -9,14 +9,14 @@
 #include <array>
 #include <atomic>
 #include <cerrno>
-#include <charconv>
-#include <climits>
 #include <csignal>
 #include <cstring>
 #include <filesystem>
 #include <map>
 #include <mutex>
 #include <optional>
+
+#include "core/number_text.h"
 
 namespace covary {
 namespace {
@@ -58,14 +58,10 @@ std::optional<PartName> parse_part_name(const std::string& name) {
   const std::string body = name.substr(1, name.size() - 1 - std::strlen(kEnding));
   const size_t dot = body.rfind('.'), dash = body.rfind('-');
   if (dot == std::string::npos || dash == std::string::npos || dot == 0 || dash < dot) return {};
-  const auto number = [&](size_t begin, size_t end) -> std::optional<long> {
-    long value = -1;
-    const auto [rest, error] = std::from_chars(body.data() + begin, body.data() + end, value);
-    return error == std::errc() && rest == body.data() + end && value >= 0 ? std::optional(value) : std::nullopt;
-  };
-  const std::optional<long> process = number(dot + 1, dash), count = number(dash + 1, body.size());
-  if (!process || !count || *process < 1 || *process > INT_MAX) return {};
-  return PartName{body.substr(0, dot), static_cast<pid_t>(*process)};
+  const auto process = parse_number<pid_t>(body.substr(dot + 1, dash - dot - 1));
+  const auto count = parse_number<uint64_t>(body.substr(dash + 1));
+  if (!process || !count || *process < 1) return {};
+  return PartName{body.substr(0, dot), *process};
 }
 
 /// Whoever made the file is dead: no process has its number, and on other machines, which may share the file system,

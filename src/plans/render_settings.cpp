@@ -6,11 +6,11 @@
 #include <algorithm>
 
 #include "core/error.h"
+#include "core/number_text.h"
 #include "integrators/registry.h"
 #include "passes/light_pass.h"
 #include "passes/training.h"
 #include "plans/integrator_choice.h"
-#include "settings/number_text.h"
 
 namespace covary {
 namespace {
@@ -178,7 +178,7 @@ void take_training(const LoadedScene& scene, RenderRequest& request) {
   if (all <= training)
     throw Error(ErrorCode::kUsage, fmt::format("{} samples per pixel, of which the training takes {}, leave none for "
                                                "the image; use a larger `spp` or a shorter training "
-                                               "(`cv-train`, `guide-train`)",
+                                               "(`cv-train`, `guiding-train`)",
                                                all, training));
   request.spp = all - training;
 }

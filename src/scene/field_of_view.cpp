@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scene/field_of_view.h"
+#include "core/number_text.h"
 
 #include <fmt/format.h>
 
-#include <charconv>
 #include <cmath>
 #include <numbers>
 
@@ -31,12 +31,9 @@ FieldOfView get_field_of_view(Parameters& p) {
   // Focal length of a lens before a 36 x 24 mm film, as photographers say it.
   std::string text = p.get_string("focal_length", "50mm");
   if (text.ends_with("mm")) text.resize(text.size() - 2);
-  double length = 50;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), length);
-  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(length)) {
-    p.error_at("focal_length", fmt::format("'{}' is not a number; expected a length like '50mm'", text));
-    length = 50;
-  }
+  const std::optional<double> given = parse_real(text);
+  if (!given) p.error_at("focal_length", fmt::format("'{}' is not a number; expected a length like '50mm'", text));
+  double length = given.value_or(50);
   if (!(length > 0)) {
     p.error_at("focal_length", fmt::format("is {} mm; it must be positive", length));
     length = 50;

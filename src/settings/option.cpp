@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "settings/number_text.h"
+#include "core/number_text.h"
 
 namespace covary {
 namespace {

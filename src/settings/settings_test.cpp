@@ -7,7 +7,7 @@
 
 #include <limits>
 
-#include "settings/number_text.h"
+#include "core/number_text.h"
 #include "settings/option_names.h"
 #include "support/files.h"
 
