@@ -16,15 +16,14 @@
 #include <vector>
 
 #include "combine/combine.h"
+#include "combine/combine_settings.h"
 #include "combine/pair_input.h"
-#include "combine/registry.h"
 #include "combine/result_file.h"
 #include "combine_counts.h"
 #include "commands.h"
 #include "core/memory_limit.h"
 #include "core/stopwatch.h"
 #include "declared_options.h"
-#include "denoising/mixed_denoising.h"
 #include "estimators/mean.h"
 #include "estimators/sample_counts.h"
 #include "film/outputs.h"
@@ -40,22 +39,15 @@
 namespace covary {
 namespace {
 
-struct CombineOptions {
-  std::vector<std::string> crn, independent;
-  std::string output, crn_layer, independent_layer, counts, light, guides, stages, json;
-  std::string estimator = kDefaultEstimator;
-  OptionValues of_estimator, denoising;
-  bool error = false, force = false, quiet = false;
-  std::optional<int> samples;
-  std::optional<double> memory_mib;
-  std::vector<int> explain;  ///< x, y in the full frame
+struct CombineOptions : CombineSettings {
+  OptionValues values, of_estimator;
+  std::string stages, json;
+  bool quiet = false;
   int threads = 0;
 };
 
-DenoisingChoice denoising_of(const CombineOptions& o) { return settings_from<DenoisingChoice>(o.denoising); }
-
 Estimator estimator_of(const CombineOptions& o) {
-  return with_denoising(make_estimator(o.estimator, o.of_estimator), denoising_of(o));
+  return with_denoising(make_estimator(o.estimator, o.of_estimator), o.denoising);
 }
 
 void write(const CombineOptions& o, const CombineRequest& request, EstimatorResult& result) {
@@ -70,23 +62,23 @@ void write(const CombineOptions& o, const CombineRequest& request, EstimatorResu
 }
 
 void check_explain(const CombineOptions& o, const Estimator& estimator, const GroupedFile& file) {
-  if (o.explain.empty()) return;
+  if (!o.explain) return;
   const CropWindow& window = file.place().window;
-  const int x = o.explain[0] - window.x, y = o.explain[1] - window.y;
+  const int x = o.explain->x - window.x, y = o.explain->y - window.y;
   if (estimator.reads_guides)
     throw Error(ErrorCode::kUsage, "--explain: with --denoise, a pixel is no sum of control variates");
   if (!estimator.explain)
     throw Error(ErrorCode::kUsage, "--explain: " + o.estimator + " has no control variates with coefficients");
   if (x < 0 || y < 0 || x >= window.width || y >= window.height)
     throw Error(ErrorCode::kUsage,
-                fmt::format("--explain {},{} is outside the image: {} x {} pixels at ({}, {})", o.explain[0],
-                            o.explain[1], window.width, window.height, window.x, window.y));
+                fmt::format("--explain {},{} is outside the image: {} x {} pixels at ({}, {})", o.explain->x,
+                            o.explain->y, window.width, window.height, window.x, window.y));
 }
 
 /// What one pixel is made of: f, and for each control variate its place, coefficients, CRN mean and independent mean.
 nlohmann::ordered_json explain(const CombineOptions& o, const CombineRequest& request) {
   const CropWindow& window = request.independent.origin.place.window;
-  const int x = o.explain[0] - window.x, y = o.explain[1] - window.y;
+  const int x = o.explain->x - window.x, y = o.explain->y - window.y;
   const auto [g, h, first] = band_around(request, y, y + 1);
   const auto mean = [&](const GroupedImage& image, int px, int py) {
     const uint32_t count = image.count(px, py);
@@ -99,8 +91,8 @@ nlohmann::ordered_json explain(const CombineOptions& o, const CombineRequest& re
                         {"beta", v.beta},
                         {"crn", mean(g, x + v.dx, y - first + v.dy)},
                         {"independent", mean(h, x + v.dx, y - first + v.dy)}});
-  return {{"x", o.explain[0]},
-          {"y", o.explain[1]},
+  return {{"x", o.explain->x},
+          {"y", o.explain->y},
           {"crn", mean(g, x, y - first)},
           {"independent", mean(h, x, y - first)},
           {"control_variates", variates}};
@@ -258,7 +250,7 @@ nlohmann::ordered_json statistics(const CombineOptions& o, const CombineRequest&
   if (request.light) json["light_groups"] = request.light->groups;
   add_risks(combined.image.risks, json);
   add_error_sums(combined.image.risk_sums, json);
-  add_network(request.estimator.network, denoising_of(o), json);
+  add_network(request.estimator.network, o.denoising, json);
   if (!combined.image.note.empty()) json["note"] = combined.image.note;
   return json;
 }
@@ -270,21 +262,21 @@ void write_stages(const CombineOptions& o, const CombineRequest& request) {
 }
 
 /// Without a CRN image, the mean of the other is denoised.
-void check_passes(CombineOptions& o, const CLI::App& command) {
+void check_passes(CombineOptions& o) {
   if (!o.crn.empty()) return;
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
-  if (!denoising_of(o).denoises())
+  if (!o.denoising.denoises())
     usage(
         "without --crn, independent images can only be denoised: --denoise auto, bias, balanced or error (their mean "
-        "is "
-        "made by covary merge)");
-  for (const char* option : {"--estimator", "--crn-layer", "--samples", "--explain"})
-    if (command.count(option) > 0) usage(fmt::format("{} needs the image with common random numbers, --crn", option));
+        "is made by covary merge)");
+  for (const char* option : {"estimator", "crn-layer", "samples", "explain"})
+    if (o.values.contains(option)) usage(fmt::format("--{} needs the image with common random numbers, --crn", option));
   o.estimator = kNoEstimator;
 }
 
-void combine_files(CombineOptions o, const CLI::App& command) {
-  check_passes(o, command);
+void combine_files(CombineOptions o) {
+  static_cast<CombineSettings&>(o) = settings_from<CombineSettings>(o.values);
+  check_passes(o);
   check_files_of_command(o);
   std::optional<tbb::global_control> control;
   if (o.threads > 0) control.emplace(tbb::global_control::max_allowed_parallelism, o.threads);
@@ -295,7 +287,7 @@ void combine_files(CombineOptions o, const CLI::App& command) {
   request.checked = [&](const InputFindings& found) {
     progress.clear();
     print_findings(o, found.findings);
-    progress.begin(denoising_of(o).denoises() ? "estimating and denoising" : "estimating");
+    progress.begin(o.denoising.denoises() ? "estimating and denoising" : "estimating");
   };
   CombinedImage combined = combine(request);
   Stopwatch watch;
@@ -306,7 +298,7 @@ void combine_files(CombineOptions o, const CLI::App& command) {
   progress.finish();
 
   nlohmann::ordered_json json = statistics(o, request, combined, write_seconds);
-  if (!o.explain.empty()) {
+  if (o.explain) {
     json["pixel"] = explain(o, request);
     if (o.json != "-") print_explanation(json["pixel"]);
   }
@@ -315,7 +307,7 @@ void combine_files(CombineOptions o, const CLI::App& command) {
                o.output, request.independent.width, request.independent.height, request.estimator.text,
                request.crn ? fmt::format("{} + ", request.crn->groups) : "", request.independent.groups,
                combined.estimate_seconds, combined.check_seconds, write_seconds);
-  if (!o.quiet) print_risks(combined, denoising_of(o));
+  if (!o.quiet) print_risks(combined, o.denoising);
   if (!o.json.empty()) write_text_output(o.json, json_text(json));
 }
 
@@ -325,67 +317,22 @@ void add_combine(CLI::App& app) {
   const auto o = std::make_shared<CombineOptions>();
   CLI::App* command =
       app.add_subcommand("combine", "Combine a CRN and an independent image of any renderer into one with less noise");
-  command
-      ->add_option("--crn", o->crn,
-                   "Image with common random numbers: one EXR with all groups, or one per group; without it, --denoise "
-                   "works on the mean of the independent image")
-      ->type_name(kFileValue)
-      ->expected(1, 1000);
-  command->add_option("--independent,--pt", o->independent, "Image with independent random numbers, likewise")
-      ->type_name(kFileValue)
-      ->required()
-      ->expected(1, 1000);
-  command->add_option("-o,--output", o->output, "The result (EXR)")->type_name(kFileValue)->required();
-  command->add_option("--crn-layer", o->crn_layer, "Layer of the CRN image where its files hold several")
-      ->type_name("LAYER");
-  command
-      ->add_option("--independent-layer,--pt-layer", o->independent_layer,
-                   "Layer of the independent image where its files hold several")
-      ->type_name("LAYER");
-  command
-      ->add_option("--counts", o->counts,
-                   "EXR with the samples of each pixel of the independent image, all groups together, where its "
-                   "files do not tell and pixels differ")
-      ->type_name(kFileValue);
-  command->add_option("--light", o->light, "Light film (light.exr of covary render --passes) to add to the result")
-      ->type_name(kFileValue);
-  command->add_option("--estimator", o->estimator, "iicv, or a comparator")
-      ->check(CLI::Validator([](std::string& name) { return needs_samples_text(name); }, ""))
-      ->check(one_of(pair_estimator_names()))
-      ->capture_default_str();
+  add_options(*command, options_of<CombineSettings>(), o->values);
+  command->get_option("--independent")->required();
+  command->get_option("--output")->required();
+  command->get_option("--estimator")
+      ->transform(CLI::Validator([](std::string& name) { return needs_samples_text(name); }, ""));
   std::vector<Option> of_estimator = options_of_estimators(pair_estimator_names());
   std::erase_if(of_estimator, [](const Option& option) {
     return std::find(std::begin(kAdaptiveOptions), std::end(kAdaptiveOptions), option.name) !=
            std::end(kAdaptiveOptions);
   });
   add_options(*command, of_estimator, o->of_estimator);
-  add_options(*command, options_of<DenoisingChoice>(), o->denoising);
-  command
-      ->add_option("--guides", o->guides,
-                   "For --denoise: image (EXR) of the same pixels whose layers Albedo and N show the surfaces")
-      ->type_name(kFileValue);
   add_stages_option(*command, o->stages);
-  command
-      ->add_option("--samples", o->samples,
-                   fmt::format("With --counts, or {}: samples per pixel of the CRN image; default: what its file tells",
-                               fmt::join(estimators_with_samples(), ", ")))
-      ->transform(whole_number(1, std::numeric_limits<int>::max()));
-  command->add_flag("--error", o->error, "Add the standard error as channels StdError.R, .G, .B");
-  command->add_option("--explain", o->explain, "X,Y: print the control variates of this pixel and their coefficients")
-      ->delimiter(',')
-      ->expected(2)
-      ->transform(whole_number(0, std::numeric_limits<int>::max()))
-      ->type_name("X,Y");
-  command->add_flag("--force", o->force, "Combine even where the check of the inputs finds errors");
-  command
-      ->add_option("--memory", o->memory_mib,
-                   "MiB to work in: larger images are worked on in bands, with the same bits, or refused by estimators "
-                   "that need whole images; default: 4096 for bands, most of the machine's for whole images")
-      ->check(positive_number());
   add_threads_option(*command, o->threads);
   command->add_option("--json", o->json, "File for statistics; '-': standard output")->type_name(kFileValue);
   command->add_flag("--quiet", o->quiet, "Warnings and errors only");
-  command->callback([o, command] { combine_files(*o, *command); });
+  command->callback([o] { combine_files(*o); });
 }
 
 }  // namespace covary

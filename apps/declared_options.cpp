@@ -11,6 +11,8 @@
 namespace covary {
 namespace {
 
+constexpr int kMostTexts = 1000;  ///< that may follow an option which repeats
+
 /// "--cv-grid", "-o,--output".
 std::string names_of(const Option& option) {
   std::string names;
@@ -62,7 +64,7 @@ void add_option(CLI::App& command, const Option& what, OptionValues& values) {
     option->transform(checked(what));
   }
   if (what.type != Option::Type::kFlag) option->type_name(value_name(what));
-  if (what.repeats) option->expected(1)->take_all();
+  if (what.repeats) option->expected(1, kMostTexts)->take_all();
   const bool is_basic = what.level == OptionLevel::kBasic || what.group.empty();
   option->group(is_basic ? kBasicOptions : what.group);
 }

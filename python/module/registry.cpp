@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "combine/registry.h"
+#include "combine/combine_settings.h"
 
 #include <algorithm>
 #include <iterator>
 
-#include "denoising/mixed_denoising.h"
 #include "estimators/sample_counts.h"
 #include "integrators/registry.h"
 #include "metrics/metrics.h"
@@ -104,6 +103,9 @@ void bind_registry(nb::module_& module) {
   module.def(
       "render_options", [] { return list_of(options_of<RenderSettings>()); },
       nb::sig("def render_options() -> list[dict[str, typing.Any]]"));
+  module.def(
+      "combine_options", [] { return list_of(options_of<CombineSettings>()); },
+      nb::sig("def combine_options() -> list[dict[str, typing.Any]]"));
   module.def(
       "integrator_options",
       [] {

@@ -52,7 +52,7 @@ struct Option {
   OptionLevel level = OptionLevel::kExpert;
   OptionNames names = OptionNames::kValue;
   OptionEffect effect = OptionEffect::kImage;
-  bool repeats = false;    ///< may be given more than once; its value is a line for each
+  bool repeats = false;    ///< may have several values, which is a line for each of them
   std::string film;        ///< see Settings::film_text()
   bool has_effect = true;  ///< false where values of other options leave it without one
 

@@ -146,7 +146,7 @@ class Settings {
     if (!problem.empty()) source_->refuse(options_.back(), "'" + *given + "': expected " + problem);
     set_value(*given);
   }
-  /// Texts, one each time the option is given.
+  /// Texts, one or more each time the option is given.
   void texts(const std::string& name, std::vector<std::string>& values, const std::string& form,
              const std::string& help, const OptionTraits& traits = {});
 

@@ -242,6 +242,22 @@ class Arguments(PackageTest):
         self.assertEqual({other.get(name, name) for name in declared} - {"resolution"}, taken)
         self.assertIn("resolution", inspect.signature(covary.Scene.load).parameters)
 
+    def test_options_of_combining_are_arguments(self):
+        """All that the library declares, under their names but for these; guides are two images, and some are of files
+        and of the program alone."""
+        declared = {option["name"].replace("-", "_"): option for option in covary._covary.combine_options()}
+        other = {"error": ["std_error"], "guides": ["albedo", "normal"]}
+        files = {"output", "crn_layer", "independent_layer", "explain", "memory"}
+        arguments = inspect.signature(covary.combine).parameters
+        self.assertEqual({name for option in declared if option not in files for name in other.get(option, [option])},
+                         set(arguments) - {"options", "progress"})
+        for name in ("estimator", "denoise", "oidn"):
+            self.assertEqual(declared[name]["default"], arguments[name].default)
+        words = subprocess.run([os.environ["COVARY_PROGRAM"], "combine", "--help-all"], capture_output=True, text=True,
+                               check=True).stdout
+        for name in declared:
+            self.assertRegex(words, rf"\n +(-o, )?--{name.replace('_', '-')}[ ,\n]")
+
     def test_options_of_integrators_are_those_of_scene_files_and_of_the_program(self):
         """Each with its default, in all three."""
         room = Path(ROOM).read_text()

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// The settings of `covary combine`. Python's combine() takes images in place of files, and the same settings of what is
+// made of them.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "combine/registry.h"
+#include "denoising/mixed_denoising.h"
+#include "settings/settings.h"
+
+namespace covary {
+
+/// In the full frame.
+struct PixelPosition {
+  int x, y;
+};
+
+struct CombineSettings {
+  std::vector<std::string> crn;          ///< files of one image, see GroupedFile; empty: `independent` is denoised
+  std::vector<std::string> independent;  ///< likewise
+  std::string output;
+  std::string crn_layer, independent_layer;  ///< of files that hold several
+  std::string counts;                        ///< file with the samples of each pixel of the independent image
+  std::string light;                         ///< film of light paths
+  std::string guides;                        ///< file with the guides of the denoising
+  std::string estimator = kDefaultEstimator;
+  std::optional<int> samples;  ///< samples per pixel of the CRN image
+  DenoisingChoice denoising;
+  bool error = false;  ///< estimate the standard error, too
+  bool force = false;  ///< combine in spite of errors of the inputs
+  std::optional<PixelPosition> explain;
+  std::optional<double> memory_mib;  ///< to work in
+};
+void declare(Settings& settings, CombineSettings& v);
+
+}  // namespace covary
