@@ -80,6 +80,31 @@ nlohmann::ordered_json statistics_of(const Pass& pass) {
   return json;
 }
 
+nlohmann::ordered_json seconds_of(const RenderReport& report) {
+  const RenderResult& result = report.result;
+  return {{"load", report.load_seconds},       {"build", report.scene.scene->build_seconds()},
+          {"train", result.seconds.train},     {"surrogate", result.seconds.surrogate},
+          {"solve", result.seconds.solve},     {"trial", result.seconds.trial},
+          {"render", result.render_seconds()}, {"estimate", result.estimate_seconds()},
+          {"write", result.seconds.write}};
+}
+
+/// What holds only for some renders.
+void add_results(const RenderReport& report, const Estimator& estimator, nlohmann::ordered_json& json) {
+  const RenderResult& result = report.result;
+  if (const IntegratorReport of = result.integrator->report(); !of.name.empty()) json[of.name] = json_of(of);
+  if (const Pass* light = light_pass(result.passes)) json["light_paths"] = light_paths(light->film);
+  if (result.predicted_relmse) {
+    add_prediction(*result.predicted_relmse, result.predicted_bounds, result.prediction_doubt, json);
+    json["predicted_relmse_p95"] = *result.predicted_blocks;
+  }
+  add_risks(result.image.risks, json);
+  add_error_sums(result.image.risk_sums, json);
+  add_network(estimator.network, report.options.settings.denoising, json);
+  if (!result.image.note.empty()) json["note"] = result.image.note;
+  if (result.until_reached) json["until_reached"] = *result.until_reached;
+}
+
 }  // namespace
 
 nlohmann::ordered_json statistics(const RenderReport& report) {
@@ -116,16 +141,7 @@ nlohmann::ordered_json statistics(const RenderReport& report) {
       {"complete", result.complete},
       {"interrupted", result.interrupted},
       {"passes", passes},
-      {"seconds",
-       {{"load", load_seconds},
-        {"build", scene.scene->build_seconds()},
-        {"train", result.seconds.train},
-        {"surrogate", result.seconds.surrogate},
-        {"solve", result.seconds.solve},
-        {"trial", result.seconds.trial},
-        {"render", result.render_seconds()},
-        {"estimate", result.estimate_seconds()},
-        {"write", result.seconds.write}}},
+      {"seconds", seconds_of(report)},
       {"samples", samples},
       {"rays", rays},
       {"samples_per_second", samples * rate},
@@ -137,17 +153,7 @@ nlohmann::ordered_json statistics(const RenderReport& report) {
       {"not_finite_samples", result.sum([](const Pass& p) { return p.result.n_not_finite; })},
       {"negative_samples", result.sum([](const Pass& p) { return p.result.n_negative; })},
       {"bad_samples", bad}};
-  if (const IntegratorReport of = result.integrator->report(); !of.name.empty()) json[of.name] = json_of(of);
-  if (const Pass* light = light_pass(result.passes)) json["light_paths"] = light_paths(light->film);
-  if (result.predicted_relmse) {
-    add_prediction(*result.predicted_relmse, result.predicted_bounds, result.prediction_doubt, json);
-    json["predicted_relmse_p95"] = *result.predicted_blocks;
-  }
-  add_risks(result.image.risks, json);
-  add_error_sums(result.image.risk_sums, json);
-  add_network(estimator.network, options.settings.denoising, json);
-  if (!result.image.note.empty()) json["note"] = result.image.note;
-  if (result.until_reached) json["until_reached"] = *result.until_reached;
+  add_results(report, estimator, json);
   return json;
 }
 

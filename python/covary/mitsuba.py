@@ -57,12 +57,8 @@ def _module() -> Any:
     return mitsuba
 
 
-def _define_plugins(mi: Any) -> None:
-    """Registers the CRN sampler and the sensor around another, once for each variant."""
-    if mi.variant() in _defined:
-        return
-    import drjit  # type: ignore[import-not-found,import-untyped,unused-ignore]
-
+def _common_numbers(mi: Any, drjit: Any) -> Any:
+    """The class of the CRN sampler."""
     class CommonNumbers(mi.Sampler):  # type: ignore[misc,unused-ignore]
         """Numbers that depend on the seed and the index of the sample, and not on the pixel. Mitsuba traces the samples
         of a pixel side by side: lane i is sample i mod n, for n samples a pixel in a pass. `pixels`: of the film, in
@@ -105,7 +101,7 @@ def _define_plugins(mi: Any) -> None:
         def next_2d(self, active: Any = True) -> Any:
             return mi.Point2f(self.next_1d(active), self.next_1d(active))
 
-        def _copy(self) -> Any:
+        def fork(self) -> Any:
             properties = mi.Properties()
             properties["pixels"], properties["first"] = self.pixels, self.first
             properties["group_pixels"] = self.group_pixels
@@ -113,16 +109,18 @@ def _define_plugins(mi: Any) -> None:
             other.set_sample_count(self.sample_count())
             return other
 
-        def fork(self) -> Any:
-            return self._copy()
-
         def clone(self) -> Any:
-            other = self._copy()
+            other = self.fork()
             if hasattr(self, "random"):
                 other.seed_value, other.size, other.passes = self.seed_value, self.size, self.passes
                 other.random = mi.PCG32(self.random)
             return other
 
+    return CommonNumbers
+
+
+def _around(mi: Any, drjit: Any) -> Any:
+    """The class of the sensor around another."""
     class Around(mi.Sensor):  # type: ignore[misc,unused-ignore]
         """Another sensor with a film and a sampler of its own. With `groups`, the film holds the frame so many times,
         one below the other and each followed by a row that is thrown away."""
@@ -152,8 +150,16 @@ def _define_plugins(mi: Any) -> None:
         def bbox(self) -> Any:
             return self.inner.bbox()
 
-    mi.register_sampler("covary_common_numbers", CommonNumbers)
-    mi.register_sensor("covary_around", Around)
+    return Around
+
+
+def _define_plugins(mi: Any) -> None:
+    """Registers both, once for each variant."""
+    if mi.variant() in _defined:
+        return
+    import drjit  # type: ignore[import-not-found,import-untyped,unused-ignore]
+    mi.register_sampler("covary_common_numbers", _common_numbers(mi, drjit))
+    mi.register_sensor("covary_around", _around(mi, drjit))
     _defined[mi.variant()] = None
 
 

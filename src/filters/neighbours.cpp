@@ -2,6 +2,7 @@
 #include "filters/neighbours.h"
 
 #include <bit>
+#include <span>
 
 #include "core/error.h"
 
@@ -15,34 +16,41 @@ NeighbourSearch::NeighbourSearch(int k, int window, bool include_target) : k_(k)
   index_mask_ = static_cast<int>(std::bit_ceil(offsets_.size())) - 1;
 }
 
-void NeighbourSearch::find(const Planes& guide, int x, int y, vint* keys, uint16_t* chosen) const {
-  const int n = static_cast<int>(offsets_.size());
+namespace {
 
-  // A key is the squared distance with the candidate's index in its lowest bits. Non-negative floats compare like their
-  // bits, so keys are distinct integers in the order wanted.
+/// Smallest and largest of keys. Key 0 is left out of the smallest: mostly it is the target's own, of distance zero.
+struct KeyRange {
+  vint smallest, largest;
+};
+
+/// A key is the squared distance with the candidate's index in its lowest bits. Non-negative floats compare like their
+/// bits, so keys are distinct integers in the order wanted.
+KeyRange make_keys(const Planes& guide, int x, int y, std::span<const Offset> offsets, int index_mask, vint* keys) {
   const vfloat f0 = load(guide.row(0, y) + x), f1 = load(guide.row(1, y) + x), f2 = load(guide.row(2, y) + x);
-  vint smallest = splat_int(INT32_MAX), largest = splat_int(0);
-  for (int j = 0; j < n; ++j) {
-    const int gx = x + offsets_[j].dx, gy = y + offsets_[j].dy;
+  KeyRange range{splat_int(INT32_MAX), splat_int(0)};
+  for (int j = 0; j < static_cast<int>(offsets.size()); ++j) {
+    const int gx = x + offsets[j].dx, gy = y + offsets[j].dy;
     const vfloat d0 = load(guide.row(0, gy) + gx) - f0;
     const vfloat d1 = load(guide.row(1, gy) + gx) - f1;
     const vfloat d2 = load(guide.row(2, gy) + gx) - f2;
-    const vint key = (bits(d0 * d0 + d1 * d1 + d2 * d2) & ~index_mask_) | j;
+    const vint key = (bits(d0 * d0 + d1 * d1 + d2 * d2) & ~index_mask) | j;
     keys[j] = key;
-    // Key 0 is apart: mostly it is the target's own, of distance zero.
-    if (j > 0) smallest = key < smallest ? key : smallest;
-    largest = key > largest ? key : largest;
+    if (j > 0) range.smallest = key < range.smallest ? key : range.smallest;
+    range.largest = key > range.largest ? key : range.largest;
   }
+  return range;
+}
 
-  // Search for a threshold with exactly k keys at or below it: count(low) < k <= count(high). Guesses alternate between
-  // interpolation and bisection.
-  if (k_ == 1) smallest = keys[0] < smallest ? keys[0] : smallest;
-  vint low = smallest - 1, high = largest, below = -(keys[0] < smallest), above = splat_int(n);
+/// A threshold with exactly k of the n keys at or below it: count(low) < k <= count(high). Guesses alternate between
+/// interpolation and bisection.
+vint find_threshold(const vint* keys, int n, int k, KeyRange range) {
+  if (k == 1) range.smallest = keys[0] < range.smallest ? keys[0] : range.smallest;
+  vint low = range.smallest - 1, high = range.largest, below = -(keys[0] < range.smallest), above = splat_int(n);
   for (bool interpolate = true;; interpolate = !interpolate) {
     const vint interval = high - low;
     vint middle = low + (interval >> 1);
     if (interpolate) {
-      const vfloat part = __builtin_convertvector(k_ - below, vfloat) / __builtin_convertvector(above - below, vfloat);
+      const vfloat part = __builtin_convertvector(k - below, vfloat) / __builtin_convertvector(above - below, vfloat);
       const vint guess = low + __builtin_convertvector(__builtin_convertvector(interval, vfloat) * part, vint);
       middle = guess > low ? guess : low + 1;
       middle = middle < high ? middle : high - 1;
@@ -50,23 +58,31 @@ void NeighbourSearch::find(const Planes& guide, int x, int y, vint* keys, uint16
     }
     vint count = {};
     for (int j = 0; j < n; ++j) count -= keys[j] <= middle;
-    const vint enough = count >= k_;
+    const vint enough = count >= k;
     high = enough ? middle : high;
     above = enough ? count : above;
     low = enough ? low : middle;
     below = enough ? below : count;
     // A lane with exactly k keys is done; closing its interval keeps it so.
-    low = count == k_ ? high : low;
+    low = count == k ? high : low;
     int open = 0;
     for (int l = 0; l < kLanes; ++l) open |= high[l] - low[l] > 1;
-    if (!open) break;
+    if (!open) return high;
   }
+}
+
+}  // namespace
+
+void NeighbourSearch::find(const Planes& guide, int x, int y, vint* keys, uint16_t* chosen) const {
+  const int n = static_cast<int>(offsets_.size());
+  const KeyRange range = make_keys(guide, x, y, offsets_, index_mask_, keys);
+  const vint threshold = find_threshold(keys, n, k_, range);
 
   constexpr int kWord = 32;
   for (int first = 0, word = 0; first < n; first += kWord, ++word) {
     vint taken = {};
     for (int j = first; j < std::min(n, first + kWord); ++j)
-      taken |= (keys[j] <= high) & static_cast<int32_t>(1u << (j - first));
+      taken |= (keys[j] <= threshold) & static_cast<int32_t>(1u << (j - first));
     keys[word] = taken;  // keys up to this word are not needed any more
   }
   for (int l = 0; l < kLanes; ++l) {

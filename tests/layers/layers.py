@@ -5,6 +5,7 @@
 Each check is a function from the tree's root to a list of problems "file:line: what is wrong". layers_test.py runs them
 over this project and over trees with planted violations. On the command line: layers.py [--lengths] ROOT.
 """
+import ast
 import os
 import re
 import subprocess
@@ -43,6 +44,8 @@ CITATION = re.compile(r"\[([A-Z][A-Za-z]+\d{4}[a-z]?)\]")
 LONG_FILE = 450
 COLUMNS = 120  # of code and prose
 LINES = 400  # of a file of code, tests apart
+FUNCTION_LINES = 60
+MODULE_LINES = 5000
 WRAPPED = (".h", ".cpp", ".cu", ".cuh", ".py", ".md", ".js", ".cmake", "CMakeLists.txt", "Makefile")
 
 
@@ -273,8 +276,65 @@ def files_fit(root):
     return [f"{path}:{n}: {n} lines; at most {LINES}" for path, n in counts.items() if n > LINES]
 
 
-CHECKS = [lines_fit, files_fit, includes_follow_arrows, links_follow_arrows, architecture_draws_the_arrows,
-          licence_lines, no_leftovers, citations_have_entries,
+# What may hold braces and semicolons that are no code: comments, strings, characters, lines of the preprocessor.
+NO_CODE = re.compile(r'//[^\n]*|/\*.*?\*/|R"(\w*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"'
+                     r"|(?<![0-9a-fA-F])'(?:\\.|[^'\\\n])+'|^[ \t]*#(?:\\\n|[^\n])*", re.S | re.M)
+
+
+def cpp_functions(text):
+    """First line, last line and head of each function that is defined in a namespace or class."""
+    text = NO_CODE.sub(lambda match: "\n" * match[0].count("\n") or " ", text)
+    line_of = lambda position: text.count("\n", 0, position) + 1
+    scopes, head_start = [], 0
+    for match in re.finditer(r"[{};]|\b(?:public|private|protected):", text):
+        head = text[head_start:match.start()]
+        if match[0] == "{":
+            if any(kind != "scope" for kind, _, _ in scopes):
+                kind = "block"
+            elif re.search(r"\b(?:namespace|class|struct|union|enum|extern)\b[^()]*$", head):
+                kind = "scope"
+            else:
+                kind = "function" if "(" in head and not head.rstrip().endswith("=") else "block"
+            scopes.append((kind, line_of(match.start() - len(head.lstrip())), " ".join(head.split())))
+        elif match[0] == "}":
+            kind, first, head = scopes.pop()
+            if kind == "function":
+                yield first, line_of(match.start()), head
+        head_start = match.end()
+
+
+def python_functions(text):
+    """The same of Python, without docstrings: what is left of them."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
+            first = node.body[0]
+            docstring = ast.get_docstring(node) is not None and first.end_lineno - first.lineno + 1
+            yield node.lineno, node.end_lineno - docstring, node.name
+
+
+def functions_fit(root):
+    """No function has more than FUNCTION_LINES lines, but for tests."""
+    problems = []
+    for path in files(root, ["src", "apps", "python"], (".cpp", ".h", ".py")):
+        functions = python_functions if path.endswith(".py") else cpp_functions
+        problems += [f"{path}:{first}: {last - first + 1} lines of '{name[:60]}'; at most {FUNCTION_LINES}"
+                     for first, last, name in functions(read(root, path)) if not is_test(path)
+                     and last - first >= FUNCTION_LINES]
+    return problems
+
+
+def modules_fit(root):
+    """No module has more than MODULE_LINES lines, but for tests: what is larger holds more than one thing."""
+    counts = {}
+    for path in files(root, ["src"], CPP):
+        if not is_test(path):
+            module = path.split(os.sep)[1]
+            counts[module] = counts.get(module, 0) + len(lines(root, path))
+    return [f"src/{module}:1: {n} lines; at most {MODULE_LINES}" for module, n in counts.items() if n > MODULE_LINES]
+
+
+CHECKS = [lines_fit, files_fit, functions_fit, modules_fit, includes_follow_arrows, links_follow_arrows,
+          architecture_draws_the_arrows, licence_lines, no_leftovers, citations_have_entries,
           documented_names_match_registries, documented_parameters, documented_commands]
 
 

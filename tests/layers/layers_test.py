@@ -77,6 +77,23 @@ class Planted(unittest.TestCase):
         self.write("src/film/film.h", "\n" * 400)
         self.expect(layers.files_fit, "src/film/film.cpp:401: 401 lines; at most 400")
 
+    def test_long_function(self):
+        body = "  if (a) { f('}', \"}\"); }  // }\n" * 58
+        self.write("src/film/film.cpp", f"{SPDX}namespace covary {{\nclass Film {{\n public:\n  void fits() {{\n{body}"
+                   f"  }}\n  int does_not(int a,\n    int b) const {{\n{body}  }}\n}};\nint k[] = {{\n{body}}};\n}}\n")
+        self.write("src/film/film_test.cpp", f"{SPDX}void test() {{\n{body}\n\n}}\n")
+        line = "    pass\n"
+        self.write("python/covary/film.py", f"# {SPDX}def f():\n{40 * line}    def g():\n{19 * ('    ' + line)}"
+                   f"def h():\n    '''\n{60 * line}    '''\n    pass\n")
+        self.expect(layers.functions_fit,
+                    "src/film/film.cpp:65: 61 lines of 'int does_not(int a, int b) const'; at most 60",
+                    "python/covary/film.py:2: 61 lines of 'f'; at most 60")
+
+    def test_long_module(self):
+        for name in ("a", "b", "c_test"):
+            self.write(f"src/film/{name}.cpp", "\n" * 2501)
+        self.expect(layers.modules_fit, "src/film:1: 5002 lines; at most 5000")
+
     def test_include_against_an_arrow(self):
         self.write("src/film/film.cpp", SPDX + '#include "core/vec.h"\n#include "scene/scene.h"\n')
         self.expect(layers.includes_follow_arrows, "src/film/film.cpp:3: film may not include 'scene/scene.h'")
