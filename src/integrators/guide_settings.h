@@ -38,17 +38,19 @@ inline void declare(Settings& s, GuideSettings& v) {
   static constexpr std::pair<const char*, ControlKind> kControls[] = {
       {"rgb", ControlKind::kRgb}, {"mono", ControlKind::kMono}, {"off", ControlKind::kOff}};
   s.group("Integrator guided-path", OptionEffect::kSamples);
-  s.whole("guide-lobes", v.lobes, {.low = 1, .high = VmfLobes::kMax},
-          "Lobes of a leaf at first; splitting makes up to twice as many", {.film = "lobes={}"});
-  s.whole("guide-leaf", v.leaf_samples, {.low = GuideSettings::kMinLeafSamples, .high = GuideSettings::kMaxLeafSamples},
-          "Samples of a leaf; one with more is split", {.film = "leaf={}"});
-  s.whole("guide-train", v.train_spp, {.low = 1, .high = GuideSettings::kMaxTrainingSpp},
-          "Samples per pixel to learn from, a part of `spp`", {.film = "train={}"});
-  s.real<float>("guide-fraction", v.fraction, {.low = 0, .high = 1, .above_low = true, .below_high = true},
+  s.whole("guiding-lobes", v.lobes, {.low = 1, .high = VmfLobes::kMax},
+          "Lobes of a leaf at first; splitting makes up to twice as many",
+          {.aliases = {"guide-lobes"}, .film = "lobes={}"});
+  s.whole("guiding-leaf", v.leaf_samples,
+          {.low = GuideSettings::kMinLeafSamples, .high = GuideSettings::kMaxLeafSamples},
+          "Samples of a leaf; one with more is split", {.aliases = {"guide-leaf"}, .film = "leaf={}"});
+  s.whole("guiding-train", v.train_spp, {.low = 1, .high = GuideSettings::kMaxTrainingSpp},
+          "Samples per pixel to learn from, a part of `spp`", {.aliases = {"guide-train"}, .film = "train={}"});
+  s.real<float>("guiding-fraction", v.fraction, {.low = 0, .high = 1, .above_low = true, .below_high = true},
                 {"learned", GuideSettings::kLearnedFraction}, "Fraction of guided directions, or learned by leaf",
-                {.film = "fraction={}"});
-  s.real("guide-roughness", v.roughness, {.low = 0, .high = 1}, "Lobes of BSDFs that are less rough are not guided",
-         {.film = "roughness={:f}"});
+                {.aliases = {"guide-fraction"}, .film = "fraction={}"});
+  s.real("guiding-roughness", v.roughness, {.low = 0, .high = 1}, "Lobes of BSDFs that are less rough are not guided",
+         {.aliases = {"guide-roughness"}, .film = "roughness={:f}"});
   s.on_off("nee", v.nee, "Light samples at each vertex (next-event estimation)", {.film = "nee={}"});
   s.choice("cv", v.control, kControls, "Control variates on the lobes", {.film = "cv={}"});
   s.whole("cv-train", v.control_train_spp, {.low = 1, .high = GuideSettings::kMaxTrainingSpp},

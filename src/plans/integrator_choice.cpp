@@ -12,10 +12,16 @@
 namespace covary {
 namespace {
 
-void check_belong(const std::string& integrator, const OptionValues& options) {
+/// By the options' own names in place of aliases. Throws Error(kUsage) for one that the integrator does not have.
+OptionValues own_options(const std::string& integrator, const OptionValues& options) {
   const std::vector<Option> own = options_of_integrator(integrator);
-  for (const auto& [name, value] : options)
-    if (!find_option(own, name)) refuse_option("integrator", integrator, own, name, integrators_with_option(name));
+  OptionValues values;
+  for (const auto& [name, value] : options) {
+    const Option* option = find_option(own, name);
+    if (!option) refuse_option("integrator", integrator, own, name, integrators_with_option(name));
+    values[option->name] = value;
+  }
+  return values;
 }
 
 /// Mitsuba, too, takes depths for which there are no paths. Their images are black, which is seldom what is meant.
@@ -44,9 +50,9 @@ std::function<std::shared_ptr<SceneObject>(Parameters&)> integrator_maker(const 
       parameters.error(unknown_integrator(name));
       return nullptr;
     }
-    check_belong(name, choice.options);
+    const OptionValues options = own_options(name, choice.options);
     if (name != of_scene && find_integrator(of_scene)) ignore_properties(parameters, options_of_integrator(of_scene));
-    PropertySource source(parameters, choice.options);
+    PropertySource source(parameters, options);
     Settings settings(source);
     auto integrator = make_integrator(*plugin, settings);
     warn_of_black(parameters, settings);

@@ -45,14 +45,14 @@ std::optional<std::string> text_of(Parameters& parameters, const Property& prope
 }  // namespace
 
 std::optional<std::string> PropertySource::find(const Option& option) {
-  const std::string name = underscored(option.name);
-  const std::vector<Property>& properties = parameters_.object().properties;
-  const auto property =
-      std::find_if(properties.begin(), properties.end(), [&](const Property& p) { return p.name == name; });
+  std::vector<std::string> names = {underscored(option.name)};
+  for (const std::string& alias : option.aliases) names.push_back(underscored(alias));
   std::optional<std::string> text;
-  if (parameters_.has(name) && property != properties.end()) {
-    text = text_of(parameters_, *property, option);
-    if (!text) parameters_.error_at(name, "must be " + wanted(option));
+  for (const Property& property : parameters_.object().properties) {
+    if (std::find(names.begin(), names.end(), property.name) == names.end() || !parameters_.has(property.name))
+      continue;
+    text = text_of(parameters_, property, option);
+    if (!text) parameters_.error_at(property.name, "must be " + wanted(option));
   }
   if (const auto value = of_caller_.find(option.name); value != of_caller_.end()) return value->second;
   return only_caller_ ? std::nullopt : text;

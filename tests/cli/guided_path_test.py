@@ -13,7 +13,8 @@ from exr_reader import read_exr
 from training_tests import LearningFiles, LearningFilms
 
 ROOM = str(Path(os.environ["SCENES"]) / "room.xml")
-RENDER = ("render", ROOM, "--resolution", "48x32", "--no-preview", "--integrator", "guided-path", "--guide-train", "4")
+RENDER = ("render", ROOM, "--resolution", "48x32", "--no-preview", "--integrator", "guided-path", "--guiding-train",
+          "4")
 PLAIN = (*RENDER, "--estimator", "none")
 
 
@@ -40,12 +41,12 @@ class Options(CliTest):
 
     def test_refuses_impossible_fractions(self):
         for fraction in ("0", "1", "-0.5", "much", "nan", "0.5x"):
-            self.bad(2, f"--guide-fraction: '{fraction}': expected learned or a number above 0 and below 1", *PLAIN,
-                     "-o", "a.exr", "--guide-fraction=" + fraction)
+            self.bad(2, f"--guiding-fraction: '{fraction}': expected learned or a number above 0 and below 1", *PLAIN,
+                     "-o", "a.exr", "--guiding-fraction=" + fraction)
 
     def test_refuses_impossible_numbers(self):
-        for option, value in (("--guide-lobes", "33"), ("--guide-lobes", "0"), ("--guide-leaf", "199"),
-                              ("--guide-train", "0"), ("--nee", "1")):
+        for option, value in (("--guiding-lobes", "33"), ("--guiding-lobes", "0"), ("--guiding-leaf", "199"),
+                              ("--guiding-train", "0"), ("--nee", "1")):
             self.bad(2, option, *PLAIN, "-o", "a.exr", option, value)
 
     def test_refuses_more_training_than_samples(self):
@@ -67,25 +68,25 @@ class Options(CliTest):
 
     def test_settings_of_a_scene(self):
         scene = Path(ROOM).read_text()
-        scene = re.sub(r'<integrator type="path">', '<integrator type="guided-path"><string name="guide_fraction" '
+        scene = re.sub(r'<integrator type="path">', '<integrator type="guided-path"><string name="guiding_fraction" '
                        'value="learned"/><boolean name="nee" value="false"/><integer name="guide_lobes" value="4"/>',
-                       scene, count=1)
+                       scene, count=1)  # the last by its old name, as is the option below
         (self.path / "guided.xml").write_text(scene)
         self.good("render", "guided.xml", "--resolution", "24x16", "--no-preview", "--estimator", "none", "--spp", "20",
-                  "-o", "a.exr")
+                  "--guide-train", "16", "-o", "a.exr")
         settings = json.loads(self.good("info", "a.exr", "--json").stdout)["attributes"]["covary:settings"]
         self.assertIn("lobes=4 leaf=8000 train=16 fraction=learned", settings)
         self.assertIn("nee=off", settings)
 
 
 class Guided:
-    RENDER, PLAIN, OTHER_SETTING = RENDER, PLAIN, ("--guide-lobes", "9")
+    RENDER, PLAIN, OTHER_SETTING = RENDER, PLAIN, ("--guiding-lobes", "9")
 
 
 class Films(Guided, LearningFilms, CliTest):
     def test_other_fractions_are_other_films(self):
         self.good(*PLAIN, "--spp", "8", "-o", "a.exr")
-        self.bad(1, "a.exr", *PLAIN, "--guide-fraction", "0.3", "--spp", "12", "-o", "a.exr", "--resume")
+        self.bad(1, "a.exr", *PLAIN, "--guiding-fraction", "0.3", "--spp", "12", "-o", "a.exr", "--resume")
 
     def test_crops_and_times(self):
         self.good(*PLAIN, "--crop", "8,8,16,16", "--spp", "6", "-o", "crop.exr")
@@ -96,7 +97,7 @@ class Films(Guided, LearningFilms, CliTest):
 
 
 class Probe(CliTest):
-    PROBE = ("probe", *RENDER[1:4], "--guide-train", "4", "-o", "a.exr")
+    PROBE = ("probe", *RENDER[1:4], "--guiding-train", "4", "-o", "a.exr")
 
     def test_density_integrates_to_one(self):
         self.good(*self.PROBE, "--pixel", "4,4", "--samples", "2", "--cv", "rgb", "--cv-train", "12")
@@ -128,7 +129,7 @@ class Probe(CliTest):
             self.assertNotIn(option[0] + " ", listed)
             self.assertNotIn(f"'probe {option[0]}'", completed)
         self.assertIn("'probe --seed'", completed)
-        for option in ("--seed", "--crop", "--guide-lobes", "--load-training", "--pixel"):
+        for option in ("--seed", "--crop", "--guiding-lobes", "--load-training", "--pixel"):
             self.assertIn(option + " ", listed)
 
     def test_refuses_what_it_cannot_show(self):

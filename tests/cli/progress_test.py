@@ -53,7 +53,7 @@ class Progress(CliTest):
         self.assertNotIn("training", text)
         self.assertNotIn("room: ", text[text.index("a.exr: "):])
         text = self.shown(*RENDER, "--spp", "8", "--denoise", "balanced", "--integrator", "guided-path",
-                          "--guide-train", "4", "-o", "b.exr")
+                          "--guiding-train", "4", "-o", "b.exr")
         self.in_order(text, "loading", "training", "rendering", "estimating and denoising", "writing")
         self.good(*RENDER, "--estimator", "iicv", "--spp", "8", "-o", "c.exr", "--passes", "films")
         text = self.shown("combine", "--crn", "films/crn.exr", "--independent", "films/independent.exr", "-o", "d.exr")

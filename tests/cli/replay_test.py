@@ -128,10 +128,10 @@ class ControlledPath(ReplayTest):
 
 class GuidedPath(ReplayTest):
     def test_samples_of_films(self):
-        self.check_all("--integrator", "guided-path", "--guide-train", "8", training=8)
+        self.check_all("--integrator", "guided-path", "--guiding-train", "8", training=8)
 
     def test_with_control_variates(self):
-        self.check("--integrator", "guided-path", "--guide-train", "8", "--crop", ",".join(map(str, CROP)),
+        self.check("--integrator", "guided-path", "--guiding-train", "8", "--crop", ",".join(map(str, CROP)),
                    "--estimator", "iicv", training=8)
 
 
