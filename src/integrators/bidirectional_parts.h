@@ -17,7 +17,7 @@ struct BidirectionalSettings {
 };
 
 /// The parts of `bdpt`; tests exchange them as those of `path` (path_tracer.h).
-struct BidirectionalParts {
+struct BidirectionalParts : roulette::Parts {
   /// Largest number of vertices of a light subpath, at least 1. Techniques with more have weight 0.
   int max_light_vertices() const { return PathLengthSettings::kUnlimited; }
   /// What light subpaths carry.
@@ -29,10 +29,6 @@ struct BidirectionalParts {
   }
   /// Probability that a light subpath starts at this light, as its throughput counts it.
   float emission_pmf(const PowerLights& lights, const Emitter& emitter) const { return lights.pmf(emitter); }
-  float survival_probability(const Spectrum& throughput, float eta, Sampling sampling) const {
-    return roulette::survival_probability(throughput, eta, sampling);
-  }
-  float survivor_weight(float survival) const { return roulette::survivor_weight(survival); }
   /// Factor on what joins a light subpath to the lens.
   float splat_factor() const { return 1; }
 

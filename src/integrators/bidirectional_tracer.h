@@ -207,8 +207,7 @@ class BidirectionalTracer final : public LightTracingIntegrator {
       const Vec3 wo = hit.frame.to_local(-batch.rays[i].d);
       SubpathSums& sums = state.sums[path.sample];
       sums = mis_.arrive(sums, mis_cosine(hit.ng, batch.rays[i].d), length_squared(hit.p - path.previous_p));
-      // Addresses as those of `path`.
-      const uint32_t vertex = hit.bsdf_flags & kSmooth ? kFirstSurfaceVertex + path.n_smooth++ : kDeltaVertices + depth;
+      const uint32_t vertex = next_vertex(path, hit, depth);
       context.arena.reset();
       const BsdfClosure* bsdf = hit.bsdf->bind(hit, wo.z > 0, TransportMode::kRadiance, context.arena);
       const CameraVertex end{hit, wo, *bsdf, path, sums, depth + 2};
@@ -230,16 +229,11 @@ class BidirectionalTracer final : public LightTracingIntegrator {
     const BsdfSample next =
         bsdf.sample(wo, random.get_1d(vertex, Event::kLobe), random.get_2d(vertex, Event::kDirection));
     if (!next.valid() || is_black(next.weight)) return false;
-    path.throughput *= next.weight;
-    path.eta *= next.eta;
-    if (!(next.flags & kNullTransmission)) path.only_null = false;
+    scatter_path(path, next);
     if (depth + 1 >= lengths_.rr_depth) {
-      const float survival = parts_.survival_probability(path.throughput, path.eta, random.sampling());
-      if (!(random.get_1d(vertex, Event::kRoulette) < survival)) {
-        if (std::isnan(survival)) sample.radiance = path.throughput;  // a bad sample, not a black one
-        return false;
-      }
-      path.throughput *= parts_.survivor_weight(survival);
+      const float weight = play_roulette(parts_, path, path.throughput, vertex, sample);
+      if (!(weight > 0)) return false;
+      path.throughput *= weight;
     }
     const Vec3 wi = hit.frame.to_world(next.wi);
     sums = mis_.leave(sums, mis_cosine(hit.ng, wi), scatter_pdfs(bsdf, wo, next));

@@ -18,15 +18,15 @@ struct ControlledVertex {
   Spectrum throughput;                      ///< of the path before the vertex
   Spectrum direction_weight;                ///< f cos / pdf of the direction sample
   uint32_t cell = CoefficientTable::kNone;  ///< where its coefficients lie; kNone: no control
-  Spectrum unit{1};                         ///< what coefficients are multiplied by
-  Spectrum control;                         ///< what the control adds to the plain estimate, so far, in units
+  Spectrum albedo_scale{1};                 ///< what coefficients are multiplied by
+  Spectrum control;  ///< what the control adds to the plain estimate, so far, over the albedo scale
 
   // While coefficients are learnt:
   bool recorded = false;
   uint32_t sums_cell = 0;  ///< of ControlledBatch::sums
   float weight = 0;        ///< of its samples in the sums
   Spectrum weights;        ///< that of each channel, where the sums are by channel
-  Spectrum plain;          ///< the plain estimate without the throughput, so far, in units
+  Spectrum plain;          ///< the plain estimate without the throughput, so far, over the albedo scale
 };
 
 struct ControlledPathState : CameraPath {

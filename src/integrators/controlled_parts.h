@@ -45,7 +45,7 @@ struct ControlledParts {
     return mis::balance(pdf, pdf_light);
   }
   /// What multiplies the coefficients of a vertex, whether its path ends there or goes on.
-  static Spectrum unit(const Spectrum& unit, bool /*ended*/) { return unit; }
+  static Spectrum albedo_scale(const Spectrum& scale, bool /*ended*/) { return scale; }
 };
 
 }  // namespace covary

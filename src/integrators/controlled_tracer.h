@@ -58,9 +58,8 @@ class ControlledTracer {
   // All paths of the batch advance together, in short loops, as in PathTracer.
   void trace() {
     if (lengths_.max_depth <= 0) return;
-    batch_.start(samples_.size());
+    start_paths(samples_, batch_);
     context_.by_length.radiance.assign(samples_.size() * context_.by_length.n_lengths, Spectrum());
-    for (uint32_t i = 0; i < samples_.size(); ++i) batch_.rays[i] = samples_[i].ray, batch_.paths[i].sample = i;
     const bool any_light = !control_.lights->empty() || control_.environment;
     for (int depth = 0; !batch_.paths.empty(); ++depth) {
       find_surfaces(scene_, depth, lengths_.hide_emitters, batch_, context_);
@@ -111,7 +110,8 @@ class ControlledTracer {
   }
 
   bool survives(Path& path) {
-    const float weight = play_roulette(path, path.throughput, samples_[path.sample]);
+    const float weight =
+        play_roulette(roulette::Parts(), path, path.throughput, path.last_vertex, samples_[path.sample]);
     path.throughput *= weight;
     return weight > 0;
   }
@@ -170,7 +170,7 @@ class ControlledTracer {
       const SurfaceHit& hit = batch_.hits[i];
       const PathRandom& random = samples_[path.sample].random;
       const Vec3 wo = hit.frame.to_local(-batch_.rays[i].d);
-      path.last_vertex = hit.bsdf_flags & kSmooth ? kFirstSurfaceVertex + path.n_smooth++ : kDeltaVertices + depth;
+      path.last_vertex = next_vertex(path, hit, depth);
       context_.arena.reset();
       const BsdfClosure* bsdf = hit.bsdf->bind(hit, wo.z > 0, TransportMode::kRadiance, context_.arena);
       ControlledVertex& vertex = batch_.vertices[path.sample];
@@ -195,14 +195,8 @@ class ControlledTracer {
         continue;
       }
       vertex.direction_weight = next.weight;
-      path.throughput *= next.weight;
-      path.eta *= next.eta;
-      if (!(next.flags & kNullTransmission)) path.only_null = false;
-      const Vec3 wi = hit.frame.to_world(next.wi);
-      path.previous_p = hit.p;
-      path.previous_pdf = next.pdf;
-      path.previous_delta = next.is_delta();
-      make_in_place(batch_.rays[i], [&] { return Ray{offset_origin(hit, wi), wi, kInfinity}; });
+      scatter_path(path, next);
+      lead_on(path, batch_.rays[i], hit, next, hit.frame.to_world(next.wi));
       batch_.alive.push_back(i);
     }
     keep_alive(batch_);
@@ -221,20 +215,20 @@ class ControlledTracer {
         begin_control(vertex);
     }
     const bool controlled = vertex.recorded || vertex.cell != CoefficientTable::kNone;
-    vertex.unit = control_.by_albedo && (controlled || control_.indirect) ? unit_of(hit) : Spectrum(1);
+    vertex.albedo_scale = control_.by_albedo && (controlled || control_.indirect) ? albedo_scale_of(hit) : Spectrum(1);
     if (!vertex.recorded) return;
-    vertex.weight = weight_of(path, vertex.unit);
-    if (batch_.sums.layout().by_channel) vertex.weights = weights_of(path, vertex.unit);
+    vertex.weight = weight_of(path, vertex.albedo_scale);
+    if (batch_.sums.layout().by_channel) vertex.weights = weights_of(path, vertex.albedo_scale);
     vertex.sums_cell = batch_.sums.cell(choice.key);
     vertex.plain = Spectrum();
   }
 
   /// Weights of the samples of a vertex in the sums, by channel, and their mean.
-  Spectrum weights_of(const Path& path, const Spectrum& unit) const {
+  Spectrum weights_of(const Path& path, const Spectrum& albedo_scale) const {
     const Spectrum importance = context_.importance.empty() ? Spectrum(1) : context_.importance[path.sample];
-    return variance_weights((control_.prefix ? path.throughput : Spectrum(1)) * unit, importance);
+    return variance_weights((control_.prefix ? path.throughput : Spectrum(1)) * albedo_scale, importance);
   }
-  float weight_of(const Path& path, const Spectrum& unit) const { return mean(weights_of(path, unit)); }
+  float weight_of(const Path& path, const Spectrum& albedo_scale) const { return mean(weights_of(path, albedo_scale)); }
 
   /// Control of the light that comes by way of the next surface, indirect_control.h; before the path's throughput holds
   /// the direction that `u` chose.
@@ -244,25 +238,25 @@ class ControlledTracer {
     const CoefficientTable& table = *control_.indirect;
     const CellKey key = cell_of(table.grid(), ray, hit);
     const uint32_t cell = table.find(key), bin = DirectionBins::of(u);
-    const Spectrum& unit = batch_.vertices[path.sample].unit;
-    Spectrum control(0), share(0);
+    const Spectrum& albedo_scale = batch_.vertices[path.sample].albedo_scale;
+    Spectrum control(0), fraction(0);
     if (cell != CoefficientTable::kNone && (batch_.indirect.recording || !is_black(table.scale(cell)))) {
-      control = table.light_sum(cell) - table.light(cell, bin), share = table.scale(cell);
-      add(path.sample, edges, path.throughput * unit * share * control);
+      control = table.light_sum(cell) - table.light(cell, bin), fraction = table.scale(cell);
+      add(path.sample, edges, path.throughput * albedo_scale * fraction * control);
     }
     if (!batch_.indirect.recording) return;
     batch_.indirect.vertex(path.sample, depth) = {true,
                                                   cell != CoefficientTable::kNone,
                                                   batch_.indirect.sums.cell(key),
                                                   bin,
-                                                  weight_of(path, unit),
-                                                  path.throughput * unit,
+                                                  weight_of(path, albedo_scale),
+                                                  path.throughput * albedo_scale,
                                                   control,
-                                                  share};
+                                                  fraction};
   }
 
   /// The albedo of a surface; not zero, since a black surface can have highlights.
-  Spectrum unit_of(const SurfaceHit& hit) const {
+  Spectrum albedo_scale_of(const SurfaceHit& hit) const {
     constexpr float kLeast = 0.02f;
     Spectrum albedo = hit.bsdf->albedo(hit);
     if (control_.monochrome) albedo = Spectrum(mean(albedo));
@@ -292,10 +286,10 @@ class ControlledTracer {
       control = sum * table_.scale(vertex.cell);
     }
     if (!vertex.recorded) return;
-    const Spectrum in_units = value / vertex.unit;
-    record(vertex, in_units, cluster, r_light);
+    const Spectrum scaled = value / vertex.albedo_scale;
+    record(vertex, scaled, cluster, r_light);
     if (control_.residuals && cluster != kNoLight && r_light > 0)
-      batch_.sums.add_residual(cluster, vertex.weight, in_units - control);
+      batch_.sums.add_residual(cluster, vertex.weight, scaled - control);
   }
 
   void record(ControlledVertex& vertex, const Spectrum& value, uint32_t cluster, float r_light) {
@@ -331,20 +325,12 @@ class ControlledTracer {
 
   /// Finishes the light samples, now that it is known which are hidden.
   void trace_connections(int edges) {
-    const size_t n = batch_.n_connections;
-    scene_.occluded(std::span(batch_.shadow_rays).first(n), batch_.blocked);
-    context_.n_rays += n;
-    for (size_t i = 0; i < n; ++i) {
-      const ControlledBatch::Connection& connection = batch_.connections[i];
+    visit_connections(scene_, batch_, context_, [&](const ControlledBatch::Connection& connection, bool hidden) {
       ControlledVertex& vertex = batch_.vertices[connection.sample];
-      if (batch_.blocked[i]) {
-        take(vertex, Spectrum(), connection.cluster, 1);
-      } else {
-        add(connection.sample, edges, vertex.throughput * connection.value);
-        take(vertex, connection.value, connection.cluster, control_.light_samples_only ? 1 : connection.r_technique);
-      }
-    }
-    batch_.n_connections = 0;
+      if (hidden) return take(vertex, Spectrum(), connection.cluster, 1);
+      add(connection.sample, edges, vertex.throughput * connection.value);
+      take(vertex, connection.value, connection.cluster, control_.light_samples_only ? 1 : connection.r_technique);
+    });
   }
 
   /// Adds to the radiance of a sample what came by paths of so many edges.
@@ -363,8 +349,8 @@ class ControlledTracer {
     ControlledVertex& vertex = batch_.vertices[sample];
     vertex.open = false;
     if (vertex.cell == CoefficientTable::kNone) return;
-    const Spectrum unit = Parts::unit(vertex.unit, ended);
-    add(sample, edges, vertex.throughput * table_.scale(vertex.cell) * vertex.control * unit);
+    const Spectrum scale = Parts::albedo_scale(vertex.albedo_scale, ended);
+    add(sample, edges, vertex.throughput * table_.scale(vertex.cell) * vertex.control * scale);
     if (vertex.recorded) batch_.sums.add_held_out(vertex.sums_cell, vertex.weight, vertex.plain, vertex.control);
   }
 

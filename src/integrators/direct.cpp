@@ -85,10 +85,7 @@ class DirectIntegrator final : public Integrator {
       batch.connections[n] = {f.value * light.radiance * (weight * each / pdf), batch.paths[i].sample};
       batch.shadow_rays[n] = shadow_ray(hit, light);
     }
-    scene.occluded(std::span(batch.shadow_rays).first(batch.n_connections), batch.blocked);
-    context.n_rays += batch.n_connections;
-    for (size_t i = 0; i < batch.n_connections; ++i)
-      if (!batch.blocked[i]) samples[batch.connections[i].sample].radiance += batch.connections[i].radiance;
+    add_connections(scene, samples, batch, context);
   }
 
   /// Direction sample k of every path.

@@ -29,7 +29,7 @@ struct GuidedScene {
 
 /// The correct ones.
 struct GuidedParts {
-  /// Density of the mixture of BSDF and guide, with the share `g` of guided directions.
+  /// Density of the mixture of BSDF and guide, with the fraction `g` of guided directions.
   static float mixture_pdf(float g, float pdf_bsdf, float pdf_guide) { return (1 - g) * pdf_bsdf + g * pdf_guide; }
   /// Whether a direction that failed counts as a sample of the control.
   static constexpr bool kCountFailed = true;
@@ -44,16 +44,16 @@ struct GuidedParts {
 /// Probability of the BSDF lobes that guiding can replace: those with a density in the mirror direction that is at most
 /// that of a microfacet lobe of the given roughness α, D / (4 cos θ) <= 1 / (4 π α² cos θ) [Walter2007] Eq. (14). Delta
 /// lobes have none. 0 for surfaces that transmit light other than by delta lobes.
-inline float guidable_share(const BsdfClosure& bsdf, const Vec3& wo, float min_roughness) {
+inline float guidable_fraction(const BsdfClosure& bsdf, const Vec3& wo, float min_roughness) {
   if (bsdf.flags() & (kGlossyTransmission | kDiffuseTransmission)) return 0;
   float pmfs[kMaxLobes], pdfs[kMaxLobes];
   bsdf.lobe_pmfs(wo, pmfs);
   bsdf.lobe_pdfs(wo, reflect(wo), pdfs);
   const float inverse_limit = 4 * kPi * sqr(min_roughness) * std::abs(wo.z);
-  float share = 0;
+  float fraction = 0;
   for (int l = 0; l < bsdf.n_lobes(); ++l)
-    if (pdfs[l] > 0 && pdfs[l] * inverse_limit <= 1) share += pmfs[l];
-  return std::min(share, 1.0f);
+    if (pdfs[l] > 0 && pdfs[l] * inverse_limit <= 1) fraction += pmfs[l];
+  return std::min(fraction, 1.0f);
 }
 
 /// A direction with its densities per unit solid angle.
@@ -65,18 +65,18 @@ struct GuidedDirection {
 /// How directions are drawn at a vertex.
 template <typename Parts>
 struct Guide {
-  float share = 0;     ///< probability of the BSDF lobes that guiding can replace
+  float guidable = 0;  ///< probability of the BSDF lobes that guiding can replace
   float fraction = 0;  ///< g; 0: the BSDF alone
   uint32_t leaf = 0;
   VmfLobes lobes;
   alignas(32) float parts[VmfLobes::kMax];  ///< of pdf(), by lobe, where the guide draws directions
 
-  /// Sets fraction and lobes to those of the leaf at a surface that is seen from `wo`, where share > 0 and the leaf
+  /// Sets fraction and lobes to those of the leaf at a surface that is seen from `wo`, where guidable > 0 and the leaf
   /// guides.
   void see(const GuidedScene& guided, const SurfaceHit& hit, const Vec3& wo) {
     const GuidingLeaf& own = guided.field->leaf(leaf);
-    if (share == 0 || own.mixture.lobes.n == 0) return;
-    fraction = share * (guided.learned_fraction ? own.fraction : guided.fraction);
+    if (guidable == 0 || own.mixture.lobes.n == 0) return;
+    fraction = guidable * (guided.learned_fraction ? own.fraction : guided.fraction);
     own.mixture.see_from(hit.p, lobes);
     lobes.multiply_by_cosine(wo.z > 0 ? hit.frame.n : -hit.frame.n);
   }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Path tracing that draws directions from a mixture of the BSDF and of what a guiding field has learnt [Ruppert2020].
-// At a vertex a share g of directions comes from the lobes of the field's leaf, seen from the vertex and multiplied by
-// the cosine; the density of every direction, whichever drew it, is that of the mixture,
+// At a vertex a fraction g of directions comes from the lobes of the field's leaf, seen from the vertex and multiplied
+// by the cosine; the density of every direction, whichever drew it, is that of the mixture,
 //
 //     p(w) = (1 − g) p_bsdf(w) + g p_guide(w),
 //
@@ -41,8 +41,7 @@ class GuidedTracer {
   // All paths of the batch advance together, in short loops, as in PathTracer.
   void trace() {
     if (lengths_.max_depth <= 0) return;
-    batch_.start(samples_.size());
-    for (uint32_t i = 0; i < samples_.size(); ++i) batch_.rays[i] = samples_[i].ray, batch_.paths[i].sample = i;
+    start_paths(samples_, batch_);
     const bool any_light = guided_.lights && (!guided_.lights->empty() || guided_.environment);
     for (int depth = 0; !batch_.paths.empty(); ++depth) {
       find_surfaces(scene_, depth, lengths_.hide_emitters, batch_, context_);
@@ -108,7 +107,8 @@ class GuidedTracer {
 
   /// Roulette is judged by what BSDF sampling alone would carry; see above.
   bool survives(Path& path) {
-    const float weight = play_roulette(path, path.bsdf_throughput, samples_[path.sample]);
+    const float weight =
+        play_roulette(roulette::Parts(), path, path.bsdf_throughput, path.last_vertex, samples_[path.sample]);
     path.throughput *= weight;
     path.bsdf_throughput *= weight;
     return weight > 0;
@@ -135,11 +135,10 @@ class GuidedTracer {
       const SurfaceHit& hit = batch_.hits[i];
       const PathRandom& random = samples_[path.sample].random;
       const Vec3 wo = hit.frame.to_local(-batch_.rays[i].d);
-      const bool smooth = hit.bsdf_flags & kSmooth;
-      path.last_vertex = smooth ? kFirstSurfaceVertex + path.n_smooth++ : kDeltaVertices + depth;
+      path.last_vertex = next_vertex(path, hit, depth);
       context_.arena.reset();
       const BsdfClosure* bsdf = hit.bsdf->bind(hit, wo.z > 0, TransportMode::kRadiance, context_.arena);
-      make_guide(hit, wo, *bsdf, smooth, i);
+      make_guide(hit, wo, *bsdf, i);
       control_.open(path, connecting_);
       if (connecting_ && batch_.choices[i].open) {
         if (!guided_.lights->empty())
@@ -159,26 +158,21 @@ class GuidedTracer {
         batch_.ended.push_back(path.sample);
         continue;
       }
-      path.throughput *= next.weight;
+      scatter_path(path, next);
       path.bsdf_throughput *= next.weight * (direction.pdf_bsdf > 0 ? next.pdf / direction.pdf_bsdf : 1);
-      path.eta *= next.eta;
-      if (!(next.flags & kNullTransmission)) path.only_null = false;
       const Vec3 wi = hit.frame.to_world(next.wi);
-      path.previous_p = hit.p;
-      path.previous_pdf = next.pdf;
-      path.previous_delta = next.is_delta();
-      make_in_place(batch_.rays[i], [&] { return Ray{offset_origin(hit, wi), wi, kInfinity}; });
-      if (batch_.recording && !next.is_delta() && guide_.share > 0) record(path, hit.p, wi, direction);
+      lead_on(path, batch_.rays[i], hit, next, wi);
+      if (batch_.recording && !next.is_delta() && guide_.guidable > 0) record(path, hit.p, wi, direction);
       batch_.alive.push_back(i);
     }
     keep_alive(batch_);
   }
 
   /// Sets guide_ for the vertex of path i.
-  void make_guide(const SurfaceHit& hit, const Vec3& wo, const BsdfClosure& bsdf, bool smooth, uint32_t i) {
-    guide_.fraction = guide_.share = 0;
-    if (!smooth || (field_.n_leaves() == 0 && !batch_.recording)) return;
-    guide_.share = guidable_share(bsdf, wo, guided_.min_roughness);
+  void make_guide(const SurfaceHit& hit, const Vec3& wo, const BsdfClosure& bsdf, uint32_t i) {
+    guide_.fraction = guide_.guidable = 0;
+    if (!(hit.bsdf_flags & kSmooth) || (field_.n_leaves() == 0 && !batch_.recording)) return;
+    guide_.guidable = guidable_fraction(bsdf, wo, guided_.min_roughness);
     if (field_.n_leaves() == 0) return;
     guide_.leaf = batch_.leaves[i];
     guide_.see(guided_, hit, wo);
@@ -225,22 +219,16 @@ class GuidedTracer {
 
   /// Adds the light samples that nothing hides.
   void trace_connections() {
-    const size_t n = batch_.n_connections;
-    scene_.occluded(std::span(batch_.shadow_rays).first(n), batch_.blocked);
-    context_.n_rays += n;
-    for (size_t i = 0; i < n; ++i) {
-      const GuidedBatch::Connection& connection = batch_.connections[i];
-      if (!batch_.blocked[i]) samples_[connection.sample].radiance += connection.radiance;
-      if (!batch_.vertices[connection.sample].active) continue;
+    visit_connections(scene_, batch_, context_, [&](const GuidedBatch::Connection& connection, bool hidden) {
+      if (!hidden) samples_[connection.sample].radiance += connection.radiance;
+      if (!batch_.vertices[connection.sample].active) return;
       const GuidedBatch::ConnectionParts& parts = batch_.connection_parts[connection.place];
-      if (batch_.blocked[i] || !batch_.recording_control)
-        control_.take_light(connection.sample,
-                            batch_.blocked[i] ? GuidedBatch::ConnectionParts{{}, parts.light, 1, {}} : parts,
+      if (hidden || !batch_.recording_control)
+        control_.take_light(connection.sample, hidden ? GuidedBatch::ConnectionParts{{}, parts.light, 1, {}} : parts,
                             kNoWeights);
       else
         control_.take_light(connection.sample, parts, batch_.connection_weights[connection.place]);
-    }
-    batch_.n_connections = 0;
+    });
   }
 
   /// Appends a direction sample to the path's trail.
@@ -256,7 +244,7 @@ class GuidedTracer {
                    .pdf = direction.sample.pdf,
                    .pdf_bsdf = direction.pdf_bsdf,
                    .pdf_guide = direction.pdf_guide,
-                   .share = guide_.share};
+                   .guidable = guide_.guidable};
   }
 
   /// The light samples of their own vertices are taken: what is added from now on came along the directions recorded.

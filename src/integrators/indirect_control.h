@@ -47,7 +47,7 @@ class IndirectRecorder {
     float weight = 0;  ///< of its samples in the sums
     Spectrum scale;    ///< what contributions to the image are divided by
     Spectrum control;  ///< not scaled
-    Spectrum share;    ///< of the control that is in the image
+    Spectrum fraction;  ///< of the control that is in the image
   };
 
   /// Begins n paths.
@@ -77,7 +77,7 @@ class IndirectRecorder {
 
   void record(const Vertex& v, const Spectrum& contribution) {
     Spectrum value = contribution;
-    for (int c = 0; c < 3; ++c) value[c] = v.scale[c] > 0 ? value[c] / v.scale[c] - v.control[c] * v.share[c] : 0;
+    for (int c = 0; c < 3; ++c) value[c] = v.scale[c] > 0 ? value[c] / v.scale[c] - v.control[c] * v.fraction[c] : 0;
     sums.add(v.cell, v.weight, {value, v.bin, 1, {}});
     if (v.held_out) sums.add_held_out(v.cell, v.weight, value, v.control);
   }

@@ -13,6 +13,13 @@
 
 namespace covary {
 
+/// Begins a path with the ray of each sample.
+template <typename Batch>
+void start_paths(std::span<const CameraSample> samples, Batch& batch) {
+  batch.start(samples.size());
+  for (uint32_t i = 0; i < samples.size(); ++i) batch.rays[i] = samples[i].ray, batch.paths[i].sample = i;
+}
+
 /// Follows the camera ray past area lights until something else is hit.
 template <typename Path>
 void skip_area_lights(const Scene& scene, Path& path, Ray& ray, SurfaceHit& hit, PathContext& context) {
@@ -53,14 +60,55 @@ void keep_paths(Batch& batch, const Keep& keep) {
   batch.resize(n_kept);
 }
 
-/// Plays Russian roulette with a path that carries `throughput`, and returns what is to be multiplied to what it
-/// carries; 0: it ends.
-template <typename Path>
-float play_roulette(const Path& path, const Spectrum& throughput, CameraSample& sample) {
-  const float survival = roulette::survival_probability(throughput, path.eta, sample.random.sampling());
-  if (sample.random.get_1d(path.last_vertex, Event::kRoulette) < survival) return roulette::survivor_weight(survival);
+/// The vertex at which a path reads the random numbers of the surface that it has met. Mirrors and glass have addresses
+/// of their own: a path that met one reads, at the surfaces behind it, the same numbers as its neighbour that did not.
+inline uint32_t next_vertex(CameraPath& path, const SurfaceHit& hit, int depth) {
+  return hit.bsdf_flags & kSmooth ? kFirstSurfaceVertex + path.n_smooth++
+                                  : kDeltaVertices + static_cast<uint32_t>(depth);
+}
+
+/// What a direction sample does to all that a path carries.
+inline void scatter_path(CameraPath& path, const BsdfSample& next) {
+  path.throughput *= next.weight;
+  path.eta *= next.eta;
+  if (!(next.flags & kNullTransmission)) path.only_null = false;
+}
+
+/// Leads a path on from a surface, in the world's direction `wi` of the sample.
+inline void lead_on(CameraPath& path, Ray& ray, const SurfaceHit& hit, const BsdfSample& next, const Vec3& wi) {
+  path.previous_p = hit.p;
+  path.previous_pdf = next.pdf;
+  path.previous_delta = next.is_delta();
+  make_in_place(ray, [&] { return Ray{offset_origin(hit, wi), wi, kInfinity}; });
+}
+
+/// Calls visit(connection, whether something hides it) for each connection of the batch, of which none is left.
+template <typename Batch, typename Visit>
+void visit_connections(const Scene& scene, Batch& batch, PathContext& context, const Visit& visit) {
+  const size_t n = batch.n_connections;
+  scene.occluded(std::span(batch.shadow_rays).first(n), batch.blocked);
+  context.n_rays += n;
+  for (size_t i = 0; i < n; ++i) visit(batch.connections[i], batch.blocked[i] != 0);
+  batch.n_connections = 0;
+}
+
+/// Russian roulette by `parts` (roulette.h) with the number of `vertex`, for a path that carries `throughput`: the
+/// factor of survivors, or 0 where the path ends.
+template <typename Parts>
+float play_roulette(const Parts& parts, const CameraPath& path, const Spectrum& throughput, uint32_t vertex,
+                    CameraSample& sample) {
+  const float survival = parts.survival_probability(throughput, path.eta, sample.random.sampling());
+  if (sample.random.get_1d(vertex, Event::kRoulette) < survival) return parts.survivor_weight(survival);
   if (std::isnan(survival)) sample.radiance = path.throughput;  // a bad sample, not a black one
   return 0;
+}
+
+/// Adds the light samples that nothing hides.
+inline void add_connections(const Scene& scene, std::span<CameraSample> samples, PathBatch& batch,
+                            PathContext& context) {
+  visit_connections(scene, batch, context, [&](const LightConnection& connection, bool hidden) {
+    if (!hidden) samples[connection.sample].radiance += connection.radiance;
+  });
 }
 
 /// Removes the paths that left the scene.

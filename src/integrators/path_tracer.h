@@ -26,7 +26,7 @@ namespace covary {
 /// The parts of `path`. Others derive from it and hide what they do otherwise; calls are resolved when the template
 /// below is compiled, so exchanging one costs nothing. Many threads use one object; its functions are const but for
 /// prepare().
-struct PathParts {
+struct PathParts : roulette::Parts {
   /// Called before the first path.
   void prepare(const Scene&) {}
 
@@ -50,11 +50,6 @@ struct PathParts {
   float light_weight_over_pdf(bool is_delta, float pdf_light, float pdf) const {
     return is_delta ? 1 / pdf_light : mis::power_over_pdf(pdf_light, pdf);
   }
-
-  float survival_probability(const Spectrum& throughput, float eta, Sampling sampling) const {
-    return roulette::survival_probability(throughput, eta, sampling);
-  }
-  float survivor_weight(float survival) const { return roulette::survivor_weight(survival); }
 };
 
 /// The integrator made of `Parts`, which has the functions of PathParts.
@@ -75,8 +70,7 @@ class PathTracer final : public Integrator {
     if (lengths_.max_depth <= 0) return;
     PathBatch& batch = context.state_as<PathBatch>();
     const auto& lights = parts_.lights(scene);
-    batch.start(samples.size());
-    for (uint32_t i = 0; i < samples.size(); ++i) batch.rays[i] = samples[i].ray, batch.paths[i].sample = i;
+    start_paths(samples, batch);
 
     for (int depth = 0; !batch.paths.empty(); ++depth) {
       find_surfaces(scene, depth, lengths_.hide_emitters, batch, context);
@@ -90,7 +84,7 @@ class PathTracer final : public Integrator {
       const bool connect = depth + 2 >= lengths_.min_depth && !lights.empty();
       if (connect) sample_lights(scene, lights, samples, batch);
       scatter(lights, depth, connect, samples, batch, context);
-      trace_connections(scene, samples, batch, context);
+      add_connections(scene, samples, batch, context);
     }
   }
 
@@ -109,9 +103,7 @@ class PathTracer final : public Integrator {
       const SurfaceHit& hit = batch.hits[i];
       const PathRandom& random = samples[path.sample].random;
       const Vec3 wo = hit.frame.to_local(-batch.rays[i].d);
-      // Mirrors and glass have addresses of their own: a path that met one reads, at the surfaces behind it, the same
-      // numbers as its neighbour that did not.
-      const uint32_t vertex = hit.bsdf_flags & kSmooth ? kFirstSurfaceVertex + path.n_smooth++ : kDeltaVertices + depth;
+      const uint32_t vertex = next_vertex(path, hit, depth);
       context.arena.reset();
       const BsdfClosure* bsdf = hit.bsdf->bind(hit, wo.z > 0, TransportMode::kRadiance, context.arena);
       if (connect && batch.lights[i].pdf_solid_angle > 0)
@@ -119,35 +111,16 @@ class PathTracer final : public Integrator {
 
       const BsdfSample next = parts_.sample_direction(*bsdf, hit, wo, random, vertex);
       if (!next.valid() || is_black(next.weight)) continue;
-      path.throughput *= next.weight;
-      path.eta *= next.eta;
-      if (!(next.flags & kNullTransmission)) path.only_null = false;
+      scatter_path(path, next);
       if (depth + 1 >= lengths_.rr_depth) {
-        const float survival = parts_.survival_probability(path.throughput, path.eta, random.sampling());
-        if (!(random.get_1d(vertex, Event::kRoulette) < survival)) {
-          if (std::isnan(survival)) samples[path.sample].radiance = path.throughput;  // a bad sample, not a black one
-          continue;
-        }
-        path.throughput *= parts_.survivor_weight(survival);
+        const float weight = play_roulette(parts_, path, path.throughput, vertex, samples[path.sample]);
+        if (!(weight > 0)) continue;
+        path.throughput *= weight;
       }
-      const Vec3 wi = hit.frame.to_world(next.wi);
-      path.previous_p = hit.p;
-      path.previous_pdf = next.pdf;
-      path.previous_delta = next.is_delta();
-      make_in_place(batch.rays[i], [&] { return Ray{offset_origin(hit, wi), wi, kInfinity}; });
+      lead_on(path, batch.rays[i], hit, next, hit.frame.to_world(next.wi));
       batch.alive.push_back(i);
     }
     keep_alive(batch);
-  }
-
-  /// Adds the light samples that nothing hides.
-  static void trace_connections(const Scene& scene, std::span<CameraSample> samples, PathBatch& batch,
-                                PathContext& context) {
-    scene.occluded(std::span(batch.shadow_rays).first(batch.n_connections), batch.blocked);
-    context.n_rays += batch.n_connections;
-    for (size_t i = 0; i < batch.n_connections; ++i)
-      if (!batch.blocked[i]) samples[batch.connections[i].sample].radiance += batch.connections[i].radiance;
-    batch.n_connections = 0;
   }
 
   /// Contribution of what the path's ray met, weighted against light sampling.

@@ -17,7 +17,7 @@ class Surface {
     bsdf_ = hit.bsdf->bind(hit, wo_.z > 0, TransportMode::kRadiance, arena_);
     guide_.leaf = guided_.field->find(hit.p);
     if (guide_.leaf == GuidingField::kNone) return;
-    guide_.share = guidable_share(*bsdf_, wo_, guided_.min_roughness);
+    guide_.guidable = guidable_fraction(*bsdf_, wo_, guided_.min_roughness);
     guide_.see(guided_, hit, wo_);
     if (guide_.lobes.n > 0 && guided_.table->n_cells() > 0) cell_ = guided_.table->find(control_key(guide_.leaf));
   }

@@ -22,4 +22,12 @@ inline float survival_probability(const Spectrum& throughput, float eta, Samplin
 /// What the throughput of a survivor is multiplied with.
 inline float survivor_weight(float survival) { return 1 / survival; }
 
+/// Both as parts of a tracer, which tests exchange (path_tracer.h).
+struct Parts {
+  float survival_probability(const Spectrum& throughput, float eta, Sampling sampling) const {
+    return roulette::survival_probability(throughput, eta, sampling);
+  }
+  float survivor_weight(float survival) const { return roulette::survivor_weight(survival); }
+};
+
 }  // namespace covary::roulette

@@ -189,7 +189,7 @@ void solve_cell(Level& level, uint32_t i, const Level* above, const std::vector<
   for (size_t k = 0; k < lights.size(); ++k) add_to_sum(own.lights[k], light_counts[lights[k]]);
   for (int c = 0; c < 3; ++c) level.light_sums[i][c] = static_cast<float>(sum[c]);
   if (settings.held_out)
-    level.scales[i] = best_share(level.system(i), level.scales[i], settings.prior_vertices, settings.monochrome);
+    level.scales[i] = best_fraction(level.system(i), level.scales[i], settings.prior_vertices, settings.monochrome);
 }
 
 /// Finest first; `resolution` of that, or 0 for no others.

@@ -9,9 +9,9 @@
 namespace covary {
 namespace {
 
-// Least pull towards the prior, relative to the diagonal: it decides what samples leave open and costs 1e-8 of a
+// Least weight of the prior, relative to the diagonal: it decides what samples leave open and costs 1e-8 of a
 // coefficient elsewhere.
-constexpr double kLeastPull = 1e-8;
+constexpr double kLeastPrior = 1e-8;
 
 using Layout = SystemLayout;
 using Rgb = Eigen::Array3d;
@@ -28,22 +28,22 @@ Spectrum spectrum(const Rgb& v) {
   return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
 }
 
-/// What the pull adds to the diagonal of A. The weight of one sample is that of a typical one, Σw² / Σw: where a few
-/// samples have nearly all of the weight, these few are what the pull is compared with.
-class Pull {
+/// What the prior adds to the diagonal of A. The weight of one sample is that of a typical one, Σw² / Σw: where a few
+/// samples have nearly all of the weight, these few are what the prior is compared with.
+class Prior {
  public:
-  Pull(const SystemView& system, const SolveSettings& settings) {
+  Prior(const SystemView& system, const SolveSettings& settings) {
     const double weight = system.head[Layout::kWeight];
-    if (weight > 0) pull_ = settings.prior_samples * system.head[Layout::kWeightSquared] / weight;
+    if (weight > 0) weight_ = settings.prior_samples * system.head[Layout::kWeightSquared] / weight;
   }
-  double diagonal(double a) const { return a * (1 + kLeastPull) + pull_; }
+  double diagonal(double a) const { return a * (1 + kLeastPrior) + weight_; }
 
  private:
-  double pull_ = 0;
+  double weight_ = 0;
 };
 
-/// Right-hand sides of (A + pull) difference = b − A (prior + constant), whose solution is the difference between
-/// solution and prior.
+/// Right-hand sides of (A + weight of the prior) x = b − A (prior + constant); x is the solution's difference from the
+/// prior.
 struct Residuals {
   std::vector<Rgb> lights;
   DenseRgb dense;  // a column for each technique
@@ -161,19 +161,19 @@ void solve_block_arrow(const SystemView& system, const SolveSettings& settings, 
   const uint32_t m = layout.n_dense;
   Residuals right = residuals(system, coefficients, settings.monochrome);
 
-  const Pull pull(system, settings);
+  const Prior prior(system, settings);
   DenseMatrix matrix(m, m);
   double diagonal[Layout::kMaxDense];
   for (uint32_t j = 0; j < m; ++j) {
     for (uint32_t i = 0; i < m; ++i) matrix(i, j) = system.head[layout.matrix(i, j)];
-    matrix(j, j) = pull.diagonal(matrix(j, j));
+    matrix(j, j) = prior.diagonal(matrix(j, j));
     diagonal[j] = matrix(j, j);
   }
   // The lights' rows, put into the others: [Hua2023] Eq. (32).
   std::vector<double> inverse(system.lights.size());
   for (size_t k = 0; k < system.lights.size(); ++k) {
     const float* row = &system.rows[k * layout.row_size()];
-    const double own = pull.diagonal(row[Layout::kDiagonal]);
+    const double own = prior.diagonal(row[Layout::kDiagonal]);
     inverse[k] = own > 0 ? 1 / own : 0;
     for (uint32_t j = 0; j < m; ++j) {
       const double factor = row[Layout::kRowDense + j] * inverse[k];
@@ -197,19 +197,19 @@ void solve_dense(const SystemView& system, const SolveSettings& settings, Coeffi
   const Layout& layout = system.layout;
   const auto n = static_cast<Eigen::Index>(system.lights.size()), m = static_cast<Eigen::Index>(layout.n_dense);
   Residuals parts = residuals(system, coefficients, settings.monochrome);
-  const Pull pull(system, settings);
+  const Prior prior(system, settings);
   Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(n + m, n + m);
   Eigen::Matrix<double, 3, Eigen::Dynamic> right(3, n + m);
   for (Eigen::Index k = 0; k < n; ++k) {
     const float* row = &system.rows[static_cast<size_t>(k) * layout.row_size()];
-    matrix(k, k) = pull.diagonal(row[Layout::kDiagonal]);
+    matrix(k, k) = prior.diagonal(row[Layout::kDiagonal]);
     for (Eigen::Index j = 0; j < m; ++j) matrix(k, n + j) = matrix(n + j, k) = row[Layout::kRowDense + j];
     right.col(k) = parts.lights[static_cast<size_t>(k)];
   }
   for (Eigen::Index j = 0; j < m; ++j) {
     const auto own = static_cast<uint32_t>(j);
     for (uint32_t i = 0; i < layout.n_dense; ++i) matrix(n + i, n + j) = system.head[layout.matrix(i, own)];
-    matrix(n + j, n + j) = pull.diagonal(matrix(n + j, n + j));
+    matrix(n + j, n + j) = prior.diagonal(matrix(n + j, n + j));
     right.col(n + j) = parts.dense.col(j);
   }
   const Eigen::VectorXd diagonal = matrix.diagonal();
@@ -218,12 +218,12 @@ void solve_dense(const SystemView& system, const SolveSettings& settings, Coeffi
   add_differences(parts.lights, right.rightCols(m), coefficients);
 }
 
-Spectrum best_share(const SystemView& system, const Spectrum& parent, double prior_vertices, bool monochrome) {
+Spectrum best_fraction(const SystemView& system, const Spectrum& parent, double prior_vertices, bool monochrome) {
   const double* head = system.head.data();
   const double n = head[Layout::kHeldOut], weight = head[Layout::kHeldOutWeight];
   if (!(n > 0 && weight > 0)) return parent;
   // Both have the means taken off: that of the plain estimate, times what noise is left of the control's mean of 0,
-  // would hide the share.
+  // would hide the fraction.
   const Rgb control = rgb(head + Layout::kControl) / weight;
   Rgb cross = rgb(head + Layout::kPlainControl) - rgb(head + Layout::kPlain) * control;
   Rgb second = rgb(head + Layout::kControlSquared);
@@ -234,8 +234,8 @@ Spectrum best_share(const SystemView& system, const Spectrum& parent, double pri
   for (int c = 0; c < 3; ++c) {
     if (!(squared[c] > 1e-9 * second[c])) continue;  // one vertex, or equal ones, say nothing
     // The least variance of plain + s · control lies at s = −Cov(plain, control) / Var(control).
-    const double share = (-cross[c] / squared[c] + prior * parent[c]) / (1 + prior);
-    result[c] = static_cast<float>(std::clamp(share, 0.0, 1.0));
+    const double fraction = (-cross[c] / squared[c] + prior * parent[c]) / (1 + prior);
+    result[c] = static_cast<float>(std::clamp(fraction, 0.0, 1.0));
   }
   return result;
 }

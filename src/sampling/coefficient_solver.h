@@ -13,7 +13,7 @@
 // The first techniques are lights (or clusters of them), of which a sample knows one at most, so their part of A is a
 // diagonal; the others (directions by the BSDF or its lobes, the environment) form a small dense block.
 //
-// What is ours: a system's solution is drawn towards that of its surroundings (the *prior*), by a pull worth some
+// What is ours: a system's solution is drawn towards that of its surroundings (the *prior*), by a weight worth some
 // samples of each technique. So a technique without samples keeps the prior's value and leaves the others alone, a
 // singular system has a solution, and with little data the plain estimate remains.
 #pragma once
@@ -78,7 +78,7 @@ struct CoefficientsView {
 };
 
 struct SolveSettings {
-  /// Strength of the pull towards the prior, as if each technique had been seen in so many more samples that no other
+  /// Strength of the prior, as if each technique had been seen in so many more samples that no other
   /// technique could have taken (r = 1) and that had the prior as value. At least 0; with 0 the prior decides only what
   /// the samples leave open, and techniques whose weights r are always small have coefficients of any size.
   double prior_samples = 0;
@@ -99,11 +99,11 @@ void solve_block_arrow(const SystemView& system, const SolveSettings& settings, 
 /// lights.
 void solve_dense(const SystemView& system, const SolveSettings& settings, CoefficientsView coefficients);
 
-/// How much of a system's control to use, per channel in [0, 1]: the share s for which the mixture of plain and
+/// How much of a system's control to use, per channel in [0, 1]: the fraction s for which the mixture of plain and
 /// controlled estimate, plain + s · control, varied least over vertices that the coefficients had not been made of: a
 /// regression with an intercept, which is exact where the control leaves a constant. `parent` counts as as many
 /// vertices as `prior_vertices`; with no data it is the result. The channels share one s when `monochrome`.
-Spectrum best_share(const SystemView& system, const Spectrum& parent, double prior_vertices, bool monochrome);
+Spectrum best_fraction(const SystemView& system, const Spectrum& parent, double prior_vertices, bool monochrome);
 
 /// Weights of a vertex's samples in the sums of each channel: (throughput · importance)². `throughput` is that of
 /// the path before the vertex ([Hua2023] Eq. 29), `importance` is 1 / √(value² + 0.01) with the value of the pixel,

@@ -86,17 +86,17 @@ TEST(CoefficientSolver, BlockArrowEqualsDenseOnRandomSystems) {
   Numbers numbers;
   for (const uint32_t m : {0u, 1u, 2u, 3u, 7u, 20u})
     for (const uint32_t n_lights : {1u, 2u, 30u})
-      for (const double pull : {0.0, 4.0}) {
+      for (const double weight : {0.0, 4.0}) {
         OneCell cell(m);
         fill_randomly(cell, numbers, n_lights, 12);
         Coefficients prior = cell.zeros();
         for (Spectrum& value : prior.lights) value = Spectrum(numbers.next());
         for (Spectrum& value : prior.dense) value = Spectrum(numbers.next());
         for (const bool monochrome : {false, true}) {
-          const SolveSettings settings{pull, monochrome};
+          const SolveSettings settings{weight, monochrome};
           const Coefficients arrow = fast(cell.view(), prior, settings);
           EXPECT_LT(largest_difference(arrow, slow(cell.view(), prior, settings)), 2e-6f)
-              << m << " dense, " << n_lights << " lights, pull " << pull;
+              << m << " dense, " << n_lights << " lights, weight of the prior " << weight;
         }
       }
 }
@@ -213,14 +213,14 @@ TEST(CoefficientSolver, LittleDataStaysNearThePrior) {
   OneCell cell(0);
   for (int s = 0; s < 4; ++s) cell.add(1, Spectrum(4), 0, 1, {});
   for (int s = 0; s < 4; ++s) cell.add(1, Spectrum(0), 1, 1, {});
-  // The mean is 2, so coefficients lie 2 above and below it; with a pull of 4 samples, half of that.
+  // The mean is 2, so coefficients lie 2 above and below it; with a prior of 4 samples, half of that.
   const Coefficients free = fast(cell.view(), cell.zeros());
   EXPECT_NEAR(4, free.lights[0].r - free.lights[1].r, 1e-5);
   const Coefficients drawn = fast(cell.view(), cell.zeros(), {4});
   EXPECT_NEAR(2, drawn.lights[0].r - drawn.lights[1].r, 1e-5);
 }
 
-/// A light that directions find now and then, and light samples never: its weights r are tiny, and without a pull its
+/// A light that directions find now and then, and light samples never: its weights r are tiny, and without a prior its
 /// coefficient would be as large as they are small.
 TEST(CoefficientSolver, TinyWeightsGiveNoLargeCoefficients) {
   OneCell cell(1);
@@ -242,7 +242,7 @@ TEST(CoefficientSolver, OneHeavySampleIsNotMuchData) {
 
 TEST(CoefficientSolver, ShareOfTheControlIsWhatHeldOutVerticesSay) {
   OneCell cell(0);
-  const auto share = [&](double prior) { return best_share(cell.view(), {1, 0.5f, 0}, prior, false); };
+  const auto share = [&](double prior) { return best_fraction(cell.view(), {1, 0.5f, 0}, prior, false); };
   EXPECT_EQ(Spectrum(1, 0.5f, 0), share(10)) << "no data";
   for (int i = 0; i < 10; ++i) {
     // Red: the control takes away all noise. Green: half of it would be best. Blue: it adds noise.
@@ -251,7 +251,7 @@ TEST(CoefficientSolver, ShareOfTheControlIsWhatHeldOutVerticesSay) {
   }
   EXPECT_EQ(Spectrum(1, 0.5f, 0), share(0));
   EXPECT_EQ(Spectrum(1, 0.5f, 0), share(10));
-  const Spectrum one = best_share(cell.view(), Spectrum(1), 0, true);
+  const Spectrum one = best_fraction(cell.view(), Spectrum(1), 0, true);
   EXPECT_NEAR((1 + 2 - 1) / (1.0 + 4 + 1), one.r, 1e-6);
   EXPECT_EQ(one.r, one.b);
 }
@@ -261,14 +261,14 @@ TEST(CoefficientSolver, ShareIsOneWhereTheControlLeavesAConstant) {
   OneCell cell(0);
   const float controls[] = {-1, 0.5f, 3, 2, 0.25f};
   for (const float c : controls) cell.sums.add_held_out(cell.cell, 2 + c, Spectrum(100 - c), Spectrum(c));
-  const Spectrum share = best_share(cell.view(), Spectrum(), 0, false);
-  for (int c = 0; c < 3; ++c) EXPECT_NEAR(1, share[c], 1e-6);
+  const Spectrum fraction = best_fraction(cell.view(), Spectrum(), 0, false);
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(1, fraction[c], 1e-6);
 }
 
 TEST(CoefficientSolver, EqualVerticesSayNothingOfTheShare) {
   OneCell cell(0);
   for (int i = 0; i < 3; ++i) cell.sums.add_held_out(cell.cell, 1, Spectrum(0.1f), Spectrum(0.3f));
-  EXPECT_EQ(Spectrum(0.5f), best_share(cell.view(), Spectrum(0.5f), 0, false));
+  EXPECT_EQ(Spectrum(0.5f), best_fraction(cell.view(), Spectrum(0.5f), 0, false));
 }
 
 TEST(CoefficientSolver, WeightIsTheMeanOfSquaredFactors) {

@@ -186,10 +186,10 @@ float best_guiding_fraction(std::span<const GuidingSample> samples) {
   std::array<double, kCandidates> cost = {};
   bool any = false;
   for (const GuidingSample& s : samples) {
-    if (!(s.weight > 0 && s.share > 0 && s.pdf_guide > 0)) continue;
+    if (!(s.weight > 0 && s.guidable > 0 && s.pdf_guide > 0)) continue;
     any = true;
     for (int i = 0; i < kCandidates; ++i) {
-      const float c = 0.1f * static_cast<float>(i + 1) * s.share;
+      const float c = 0.1f * static_cast<float>(i + 1) * s.guidable;
       cost[i] -= s.weight * std::log(std::max((1 - c) * s.pdf_bsdf + c * s.pdf_guide, 1e-30f));
     }
   }

@@ -146,7 +146,7 @@ TEST(GuidingField, BytesComeBackAndDamageIsFound) {
 
 TEST(GuidingField, LearnsTheBetterTechnique) {
   std::vector<GuidingSample> samples = two_rooms(1000);
-  for (GuidingSample& s : samples) s.share = 1, s.pdf_guide = s.pdf, s.pdf_bsdf = 0.1f;
+  for (GuidingSample& s : samples) s.guidable = 1, s.pdf_guide = s.pdf, s.pdf_bsdf = 0.1f;
   EXPECT_FLOAT_EQ(best_guiding_fraction(samples), 0.9f);
   for (GuidingSample& s : samples) std::swap(s.pdf_guide, s.pdf_bsdf);
   EXPECT_FLOAT_EQ(best_guiding_fraction(samples), 0.1f);

@@ -22,9 +22,9 @@ struct GuidingSample {
   float inverse_distance = 0;  ///< 1 / distance to the next surface there; 0: infinitely far
   float weight = 0;            ///< radiance / pdf, at least 0
   float pdf = 1;               ///< density with which the direction was drawn, per unit solid angle, positive
-  /// Densities of the BSDF and of the guide alone, and the share of the BSDF that guiding may replace, for the learned
-  /// fraction (guiding_field.h); a guide of 0: there was none.
-  float pdf_bsdf = 0, pdf_guide = 0, share = 0;
+  /// For the learned fraction (guiding_field.h): densities of the BSDF and of the guide alone (0: there was none), and
+  /// the fraction of the BSDF that guiding may replace.
+  float pdf_bsdf = 0, pdf_guide = 0, guidable = 0;
 };
 
 struct VmfFitSettings {

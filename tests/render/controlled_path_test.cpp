@@ -64,7 +64,7 @@ struct EnvironmentTwice : ControlledParts {
 };
 struct NegativeClipped : ControlledParts {};
 struct AlbedoForgottenAtEnds : ControlledParts {
-  static Spectrum unit(const Spectrum& unit, bool ended) { return ended ? Spectrum(1) : unit; }
+  static Spectrum albedo_scale(const Spectrum& scale, bool ended) { return ended ? Spectrum(1) : scale; }
 };
 
 /// With a planted bug.

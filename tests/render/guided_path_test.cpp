@@ -207,7 +207,7 @@ float share(const testing::Json& json, const Vec3& wo = normalize(Vec3{0.3f, 0.2
   const std::shared_ptr<const Bsdf> bsdf = testing::make_bsdf(json);
   Arena arena;
   SurfaceHit hit;
-  return guidable_share(*bsdf->bind(hit, wo.z > 0, TransportMode::kRadiance, arena), wo, 0.1f);
+  return guidable_fraction(*bsdf->bind(hit, wo.z > 0, TransportMode::kRadiance, arena), wo, 0.1f);
 }
 
 TEST(GuidableShare, LeavesOutDeltaAndNarrowLobes) {
