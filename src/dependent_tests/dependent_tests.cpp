@@ -239,13 +239,13 @@ void declare(Settings& p, DependentTestsOptions& o) {
                             "Weights that minimise the error bound, or the published ones", kPasses);
   p.choice<Norm>("norm", o.norm, kNorms, kNormHelp, kPasses);
   p.whole("window", o.bound.window, kWindowRange, kWindowHelp);
-  p.choice<VarianceSource>("sigma", o.variance, kSources, "Passes that tell the noise of a sample");
+  p.choice<VarianceSource>("sigma", o.variance, kSources, "Passes from which the noise of a sample is estimated");
   p.whole("sigma-window", o.smoothing, {.low = 1, .high = 63, .odd = true},
           "Side of the window that averages the noise");
   p.choice<int>("guard", o.guard, kGuards, "Trust the CRN image less where it is too dark");
   p.whole("max-region", o.regions.max_region, {.low = 1, .high = 63}, "Largest side of a region of `filter` paper");
   p.real("min-centre-drop", o.regions.min_centre_drop, {.low = 0},
-         "Regions grow while the weight of their centre falls by so much");
+         "Regions grow while the weight of their centre drops by at least this much");
   p.choice<Pyramid>("pyramid", o.regions.pyramid, kPyramids,
                     "Height of the pyramid: side of the region, or its pixels");
   p.choice<bool>("region-sides", o.regions.odd_sides, kSides, "Sides of regions: all, or the odd, which do not shift");

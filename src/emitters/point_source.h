@@ -28,7 +28,7 @@ inline PointFrame get_point_frame(Parameters& parameters) {
   return frame;
 }
 
-/// Emitter::sample_towards() of a light at `position`; intensity(d): power per unit solid angle in the unit direction d.
+/// Emitter::sample_towards() of a light at `position`; intensity(d): its power per unit solid angle in direction d.
 template <typename Intensity>
 EmitterSample sample_point(const Vec3& position, const Vec3& reference, const Intensity& intensity) {
   EmitterSample sample;

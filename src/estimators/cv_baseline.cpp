@@ -49,7 +49,7 @@ Estimator make_cv_baseline(Settings& parameters) {
   CvBaselineOptions o;
   p.whole("k", o.k, kVariatesRange, kVariatesHelp);
   p.whole("window", o.window, kWindowRange, kWindowHelp);
-  p.real("ridge", o.ridge, {.low = 0}, "ridge relative to the mean diagonal");
+  p.real("ridge", o.ridge, {.low = 0}, "Ridge relative to the mean diagonal");
   if (p.flag("exclude-target", kExcludeTargetHelp)) o.include_target = false;
   p.choice<bool>("coefficients", o.shared_coefficients, kCoefficients, kCoefficientsHelp);
   throw_if_any("cv-baseline", o.validate());

@@ -201,8 +201,8 @@ Estimator make_iicv(Settings& parameters) {
          {.aliases = {"sample-share"}});
   p.real("mean-constraint", o.mean_constraint, {.low = 0}, "Weight of the condition sum beta g = f",
          {.aliases = {"conservation"}});
-  p.choice<bool>("residual-correction", o.residual_correction, kOnOff, "Give back what the penalty takes away",
-                 {.aliases = {"feedback"}});
+  p.choice<bool>("residual-correction", o.residual_correction, kOnOff,
+                 "Add back the smoothed residual, which the penalty suppresses", {.aliases = {"feedback"}});
   check_effects(p, o);
   std::vector<std::string> problems = o.validate();
   AdaptiveSampling standard;
@@ -211,7 +211,7 @@ Estimator make_iicv(Settings& parameters) {
   standard.reads_groups = true;
   Estimator estimator;
   estimator.adaptive =
-      ask_for_adaptive(p, standard, "As many independent samples in each pixel as the CRN pass says", problems);
+      ask_for_adaptive(p, standard, "Distribute the independent samples over the pixels by the CRN pass", problems);
   throw_if_any("iicv", problems);
 
   estimator.summary = "imperfect image-space control variates";

@@ -96,7 +96,7 @@ Spectrum polynomials(std::span<const Spectrum> values, std::span<const float> co
 Estimator make_polynomials(Settings& parameters) {
   PolynomialsOptions o;
   parameters.whole("dimensions", o.dimensions, {.low = 1, .high = PolynomialsOptions::kMaxDimensions},
-                   "polynomials: how many of a path's first random numbers they are functions of",
+                   "How many of a path's first random numbers the polynomials depend on",
                    {.effect = OptionEffect::kPasses});
   o.samples = std::numeric_limits<uint32_t>::max();  // until they are known
   throw_if_any("polynomials", o.validate());

@@ -231,15 +231,16 @@ void ask_for(Settings& parameters, AdaptiveSampling& sampling) {
   static constexpr OptionTraits kPasses{.effect = OptionEffect::kPasses};
   Settings& p = parameters;
   CountOptions& o = sampling.counts;
-  p.whole("dependent-spp", sampling.first_spp, {.low = 1}, "Samples of the first pass; else half, up to 50 (not iicv)",
+  p.whole("dependent-spp", sampling.first_spp, {.low = 1},
+          "Samples of the first pass; else half, at most 50 (not iicv)",
           {.aliases = {"pilot-spp"}, .effect = OptionEffect::kPasses});
   p.choice<Allocation>("allocation", o.allocation, kAllocations, "How pixels share the samples of the last pass",
                        kPasses);
   p.real("relative-error", o.relative_error, {.low = 0, .above_low = true},
-         "Error that pixels shall have, as three standard deviations; `spp` then is a limit", kPasses);
+         "Target relative error per pixel (3 sigma); `spp` becomes the cap", kPasses);
   p.whole("min-spp", o.min_spp, {.low = static_cast<double>(sampling.least_min_spp)},
-          "Samples that each pixel of the last pass has at least", kPasses);
-  p.whole("max-spp", o.max_spp, {.low = 1}, "Samples that each pixel of the last pass has at most", kPasses);
+          "Fewest samples of a pixel in the last pass", kPasses);
+  p.whole("max-spp", o.max_spp, {.low = 1}, "Most samples of a pixel in the last pass", kPasses);
 }
 
 std::optional<AdaptiveSampling> ask_for_adaptive(Settings& parameters, AdaptiveSampling standard,

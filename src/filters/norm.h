@@ -15,7 +15,7 @@ enum class Norm {
 };
 
 inline constexpr std::pair<const char*, Norm> kNorms[] = {{"l1", Norm::kL1}, {"l2", Norm::kL2}};
-inline constexpr const char* kNormHelp = "Length of colours: sum of absolute values, or Euclidean";
+inline constexpr const char* kNormHelp = "Norm of colours: sum of absolute values, or Euclidean";
 
 float length(Norm norm, const Spectrum& colour);
 /// Variance of one sample as a scalar. Euclidean: the sum of the channels' variances, exact. Sum of absolute values:
