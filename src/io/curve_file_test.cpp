@@ -7,7 +7,7 @@
 #include <fstream>
 
 #include "io/load_scene.h"
-#include "io/mesh_file.h"
+#include "meshes/mesh_file.h"
 #include "support/files.h"
 
 namespace covary {

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "core/error.h"
-#include "io/mesh_file.h"
+#include "meshes/mesh_file.h"
 
 namespace covary {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Names of attributes in PLY files are Mitsuba's: properties that share a prefix are channels of one attribute.
-#include "io/ply_attributes.h"
+#include "meshes/ply_attributes.h"
 
 #include <algorithm>
 #include <vector>

@@ -6,7 +6,7 @@
 #include <bit>
 #include <cstring>
 
-#include "io/mesh_file.h"
+#include "meshes/mesh_file.h"
 #include "support/files.h"
 
 namespace covary {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/ply_header.h"
+#include "meshes/ply_header.h"
 
 #include <fmt/format.h>
 

@@ -11,7 +11,7 @@
 
 #include "core/error.h"
 #include "core/memory_limit.h"
-#include "io/mesh_file.h"
+#include "meshes/mesh_file.h"
 
 namespace covary {
 namespace {

@@ -4,7 +4,7 @@
 #include <span>
 #include <string>
 
-#include "io/ply_header.h"
+#include "meshes/ply_header.h"
 #include "scene/mesh.h"
 
 namespace covary {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/mesh_file.h"
+#include "meshes/mesh_file.h"
 
 #include <fmt/format.h>
 

@@ -12,9 +12,9 @@
 #include <string>
 
 #include "core/error.h"
-#include "io/mesh_file.h"
-#include "io/ply_attributes.h"
-#include "io/ply_header.h"
+#include "meshes/mesh_file.h"
+#include "meshes/ply_attributes.h"
+#include "meshes/ply_header.h"
 
 namespace covary {
 namespace {
