@@ -48,6 +48,13 @@ class CompareBuilds(unittest.TestCase):
         self.assertEqual(result.returncode, 1, result.stdout + result.stderr)
         self.assertIn("the second program failed, exit code 1", result.stdout)
 
+    def test_what_both_refuse_is_equal(self):
+        """Scenes with media, by an integrator that does not see them."""
+        result = self.compare(COVARY, "bdpt")
+        self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
+        result = self.compare("/bin/false", "bdpt")
+        self.assertIn("fog.xml, bdpt:\n    the first program failed, exit code 1: covary: ", result.stdout)
+
     def test_wrong_usage(self):
         self.assertEqual(self.compare("/no/such/program", "none, 1 group").returncode, 2)
         for size in ("42x32", "43x31", "64", "wide"):
