@@ -242,8 +242,8 @@ nlohmann::ordered_json statistics(const CombineOptions& o, const CombineRequest&
                                   {{"read_and_check", combined.check_seconds},
                                    {"estimate", combined.estimate_seconds},
                                    {"write", write_seconds}}}};
-  if (combined.predicted_relmse) {
-    add_prediction(*combined.predicted_relmse, combined.predicted_bounds, combined.prediction_doubt, json);
+  if (combined.predicted) {
+    add_prediction(*combined.predicted, json);
     json["independent_predicted_relmse"] =
         predicted_relmse_of_mean(request.independent, std::max(1, rows_in_memory(request)));
   }

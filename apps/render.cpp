@@ -130,7 +130,7 @@ void report(const RenderReport& report, const StopFlag& stop) {
   if (!options.json.empty()) write_text_output(options.json, json_text(statistics(report)));
   if (result.interrupted) throw Unfinished(stop.exit_code(), interruption(options, result));
   if (!options.quiet) print_summary(report);
-  const std::string& doubt = result.prediction_doubt;
+  const std::string doubt = result.predicted ? result.predicted->doubt : "";
   if (!doubt.empty() && result.until_reached.value_or(false))
     fmt::print(stderr, "warning: --until {} was reached, but the predicted error is unreliable: {}\n",
                options.values.at("until"), doubt);
@@ -140,8 +140,8 @@ void report(const RenderReport& report, const StopFlag& stop) {
         fmt::format(
             "--until {} was not reached: '{}' has a predicted relMSE of {:.3g}{} after {:.4g} samples per "
             "pixel{}",
-            options.values.at("until"), options.request().output, *result.predicted_relmse,
-            options.request().until_in_blocks ? fmt::format(", {:.3g} in blocks,", *result.predicted_blocks) : "",
+            options.values.at("until"), options.request().output, result.predicted->relmse,
+            options.request().until_in_blocks ? fmt::format(", {:.3g} in blocks,", result.predicted_blocks) : "",
             result.samples_per_pixel(), doubt.empty() ? "" : "; that is unreliable: " + doubt));
   if (std::any_of(result.passes.begin(), result.passes.end(), [](const Pass& p) { return p.misses_error; }))
     throw Unfinished(kTargetMissed,

@@ -34,12 +34,6 @@ std::string replay_command(const RenderOptions& o, const Pass& pass, const BadSa
   return shell_text(words);
 }
 
-/// What is said of the error, with its bounds, what the image gains, and why it may be doubted.
-std::string prediction_of(const RenderResult& result) {
-  return prediction_text(*result.predicted_relmse, result.predicted_bounds, result.image.risks,
-                         result.prediction_doubt);
-}
-
 nlohmann::ordered_json json_of(const IntegratorReport& report) {
   nlohmann::ordered_json json = nlohmann::ordered_json::object();
   for (const auto& [name, number] : report.numbers) std::visit([&](const auto& value) { json[name] = value; }, number);
@@ -94,9 +88,9 @@ void add_results(const RenderReport& report, const Estimator& estimator, nlohman
   const RenderResult& result = report.result;
   if (const IntegratorReport of = result.integrator->report(); !of.name.empty()) json[of.name] = json_of(of);
   if (const Pass* light = light_pass(result.passes)) json["light_paths"] = light_paths(light->film);
-  if (result.predicted_relmse) {
-    add_prediction(*result.predicted_relmse, result.predicted_bounds, result.prediction_doubt, json);
-    json["predicted_relmse_p95"] = *result.predicted_blocks;
+  if (result.predicted) {
+    add_prediction(*result.predicted, json);
+    json["predicted_relmse_p95"] = result.predicted_blocks;
   }
   add_risks(result.image.risks, json);
   add_error_sums(result.image.risk_sums, json);
@@ -178,10 +172,10 @@ void print_summary(const RenderReport& report) {
   if (estimator.passes != EstimatorPasses::kAny) {
     fmt::print(stderr, "{}{} in {:.2f} s", estimator.text,
                estimator.network.empty() ? "" : " with " + estimator.network, result.estimate_seconds());
-    if (result.predicted_relmse && !result.image.risks) fmt::print(stderr, ", {}", prediction_of(result));
+    if (result.predicted && !result.image.risks) fmt::print(stderr, ", {}", prediction_text(*result.predicted, {}));
     fmt::print(stderr, "\n");
-  } else if (result.predicted_relmse) {
-    fmt::print(stderr, "{}\n", prediction_of(result));
+  } else if (result.predicted) {
+    fmt::print(stderr, "{}\n", prediction_text(*result.predicted, {}));
   }
   print_notes(options.settings.denoising, result.image.note);
   const double limit = options.request().seconds;
@@ -189,7 +183,8 @@ void print_summary(const RenderReport& report) {
     fmt::print(stderr, "warning: --time {:g} was exceeded: {:.2f} s for at least {} samples per pixel in each pass{}\n",
                limit, result.seconds.limited, result.passes[0].film.groups(),
                estimator.passes == EstimatorPasses::kPair ? " and the estimate" : "");
-  if (result.predicted_relmse && result.image.risks) fmt::print(stderr, "{}\n", prediction_of(result));
+  if (result.predicted && result.image.risks)
+    fmt::print(stderr, "{}\n", prediction_text(*result.predicted, result.image.risks));
 }
 
 }  // namespace covary

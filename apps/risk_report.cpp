@@ -28,18 +28,18 @@ std::string risks_text(const MeasuredRisks& risks) {
 
 }  // namespace
 
-std::string prediction_text(double predicted, const std::optional<PredictedBounds>& bounds,
-                            const std::optional<MeasuredRisks>& risks, const std::string& doubt) {
-  std::string text = fmt::format("predicted relMSE {:.3g}", predicted);
+std::string prediction_text(const PredictedError& predicted, const std::optional<MeasuredRisks>& risks) {
+  const auto& [relmse, bounds, doubt] = predicted;
+  std::string text = fmt::format("predicted relMSE {:.3g}", relmse);
   if (bounds) text += fmt::format(", between {:.2g} and {:.2g} ({} %)", bounds->low, bounds->high, kIntervalPercent);
   if (risks) text += risks_text(*risks);
   if (!doubt.empty()) text += fmt::format(" (unreliable: {})", doubt);
   return text;
 }
 
-void add_prediction(double predicted, const std::optional<PredictedBounds>& bounds, const std::string& doubt,
-                    nlohmann::ordered_json& json) {
-  json["predicted_relmse"] = predicted;
+void add_prediction(const PredictedError& predicted, nlohmann::ordered_json& json) {
+  const auto& [relmse, bounds, doubt] = predicted;
+  json["predicted_relmse"] = relmse;
   if (bounds) json["predicted_relmse_low"] = bounds->low, json["predicted_relmse_high"] = bounds->high;
   json["predicted_relmse_reliable"] = doubt.empty();
   if (!doubt.empty()) json["predicted_relmse_doubt"] = doubt;
@@ -52,10 +52,8 @@ void print_notes(const DenoisingChoice& choice, const std::string& note) {
 
 void print_risks(const CombinedImage& combined, const DenoisingChoice& choice) {
   print_notes(choice, combined.image.note);
-  if (combined.predicted_relmse && combined.image.risks)
-    fmt::print(stderr, "{}\n",
-               prediction_text(*combined.predicted_relmse, combined.predicted_bounds, combined.image.risks,
-                               combined.prediction_doubt));
+  if (combined.predicted && combined.image.risks)
+    fmt::print(stderr, "{}\n", prediction_text(*combined.predicted, combined.image.risks));
 }
 
 void add_risks(const std::optional<MeasuredRisks>& risks, nlohmann::ordered_json& json) {

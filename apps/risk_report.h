@@ -15,8 +15,7 @@ namespace covary {
 
 /// "predicted relMSE 0.0021, between 0.0016 and 0.0029 (80 %), 18 % of it squared bias; the mean of the samples has
 /// 0.012, Open Image Denoise alone 0.0025 (unreliable: known to a factor of 1.8)", as far as it is known.
-std::string prediction_text(double predicted, const std::optional<PredictedBounds>& bounds,
-                            const std::optional<MeasuredRisks>& risks, const std::string& doubt);
+std::string prediction_text(const PredictedError& predicted, const std::optional<MeasuredRisks>& risks);
 
 /// Lines on stderr: the network that is missing, and `note`, where there are such.
 void print_notes(const DenoisingChoice& choice, const std::string& note);
@@ -24,8 +23,7 @@ void print_notes(const DenoisingChoice& choice, const std::string& note);
 void print_risks(const CombinedImage& combined, const DenoisingChoice& choice);
 
 /// "predicted_relmse", its bounds "predicted_relmse_low" and "_high", "predicted_relmse_reliable" and why not.
-void add_prediction(double predicted, const std::optional<PredictedBounds>& bounds, const std::string& doubt,
-                    nlohmann::ordered_json& json);
+void add_prediction(const PredictedError& predicted, nlohmann::ordered_json& json);
 
 /// "predicted_bias_share" and "risks"; nothing where they are not known.
 void add_risks(const std::optional<MeasuredRisks>& risks, nlohmann::ordered_json& json);

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The scenes that error intervals are fitted on: those of scenes/ and changes of them, easy and hard to render. Cameras
-are turned, lights made small, dim or bright, windows narrow, glass put before lights, rooms lit through a gap."""
-import re
+are turned, lights made small, dim or bright, windows narrow, glass put before lights, rooms lit through a gap. And
+rooms that nobody chose (random_rooms.py)."""
 from pathlib import Path
+
+from random_rooms import random_room
 
 PARTITION = """<shape type="cube">
     <transform name="to_world"><scale x="0.03" y="1.3" z="{depth}"/><translate x="-1.2" y="1.3" z="{z}"/></transform>
@@ -70,19 +72,31 @@ VARIANTS = {
     "materials": ("materials", changed(), {}),
     "materials-near": ("materials", changed(view("-3, 1.6, 4.2", "-0.8, 0.4, 0",
                                                  'origin="0, 4.2, 10" target="0, 0.35, 0"')), {}),
-    "caustic-wide": ("caustic", changed(), {"integrator": "path", "lamp": 0.3}),
-    "caustic": ("caustic", changed(), {"integrator": "path", "lamp": 0.12}),
-    "caustic-small": ("caustic", changed(), {"integrator": "path"}),
-    "fog": ("fog", changed(), {}),
-    "smoke": ("smoke", changed(), {"max_depth": 16}),
 }
+#: Names of rooms by their numbers.
+RANDOM_ROOMS = {f"random-{number:02d}": number for number in range(1, 21)}
+SCENES = [*VARIANTS, *RANDOM_ROOMS]
+
+#: Film sizes, one scene after the other
+SIZES = ["160x90", "128x96", "160x90", "96x54", "160x90", "240x136", "120x120"]
+
+
+def family_of(name):
+    """The scene of which others are changes: a family is left out together, and counts as one. A random room is one."""
+    return name if name in RANDOM_ROOMS else VARIANTS[name][0]
+
+
+def size_of(name):
+    place = RANDOM_ROOMS[name] + 3 if name in RANDOM_ROOMS else list(VARIANTS).index(name)
+    return SIZES[place % len(SIZES)]
 
 
 def write_variant(name, scenes, folder):
-    """The scene file of a variant and its options, in a folder that refers to the files of `scenes`."""
-    base, change, parameters = VARIANTS[name]
-    text = change((Path(scenes) / f"{base}.xml").read_text())
-    text = re.sub(r'value="(skies/|smoke\.vol)', lambda m: f'value="{Path(scenes).resolve()}/{m.group(1)}', text)
+    """The scene file of a variant and its options, in `folder`."""
     path = Path(folder) / f"{name}.xml"
-    path.write_text(text)
+    if name in RANDOM_ROOMS:
+        path.write_text(random_room(RANDOM_ROOMS[name]))
+        return [str(path)]
+    base, change, parameters = VARIANTS[name]
+    path.write_text(change((Path(scenes) / f"{base}.xml").read_text()))
     return [str(path), *(word for key, value in parameters.items() for word in ("-D", f"{key}={value}"))]

@@ -142,9 +142,14 @@ nb::object array_of(Image&& image) {
   return array_of(std::move(image.data), shape, {});
 }
 
-nb::object bounds_of(const std::optional<PredictedBounds>& bounds) {
-  if (!bounds) return nb::none();
-  return nb::make_tuple(bounds->low, bounds->high);
+void add_prediction(const std::optional<PredictedError>& predicted, nb::dict& to) {
+  nb::object relmse = nb::none(), bounds = nb::none();
+  if (predicted) relmse = nb::float_(predicted->relmse);
+  if (predicted && predicted->bounds) bounds = nb::make_tuple(predicted->bounds->low, predicted->bounds->high);
+  const std::string doubt = predicted ? predicted->doubt : "";
+  to["predicted_relmse"] = relmse;
+  to["predicted_bounds"] = bounds;
+  to["prediction_doubt"] = nb::str(doubt.c_str());
 }
 
 nb::object groups_array(std::vector<float>&& values, int width, int height, int groups) {

@@ -58,8 +58,8 @@ Image image_of(nb::handle array, const std::string& name, const std::string& sha
 
 /// [H, W, channels], or [H, W] with one channel, of the image's memory; None where it is empty.
 nb::object array_of(Image&& image);
-/// (low, high), or None.
-nb::object bounds_of(const std::optional<PredictedBounds>& bounds);
+/// "predicted_relmse", "predicted_bounds" (low, high), both None where not known, and "prediction_doubt".
+void add_prediction(const std::optional<PredictedError>& predicted, nb::dict& to);
 /// [T, H, W, 3] of values in the order [H, W, T, 3].
 nb::object groups_array(std::vector<float>&& values, int width, int height, int groups);
 

@@ -211,9 +211,7 @@ nb::dict combine(nb::object crn, nb::object independent, const Beside& beside, c
   d["image"] = array_of(std::move(combined.image.estimate));
   d["std_error"] = array_of(std::move(combined.image.std_error));
   d["bias"] = array_of(std::move(combined.image.bias));
-  d["predicted_relmse"] = combined.predicted_relmse;
-  d["predicted_bounds"] = bounds_of(combined.predicted_bounds);
-  d["prediction_doubt"] = combined.prediction_doubt;
+  add_prediction(combined.predicted, d);
   d["warnings"] = texts_of(combined.inputs.findings);
   d["nonfinite_pixels"] = combined.image.nonfinite_pixels;
   d["estimator"] = estimator.text;

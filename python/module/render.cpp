@@ -107,10 +107,8 @@ nb::dict dict_of(RenderResult&& result, const std::string& estimator, const std:
   d["image"] = array_of(std::move(picture));
   d["std_error"] = array_of(std::move(result.image.std_error));
   d["bias"] = array_of(std::move(result.image.bias));
-  d["predicted_relmse"] = result.predicted_relmse;
-  d["predicted_bounds"] = bounds_of(result.predicted_bounds);
-  d["prediction_doubt"] = result.prediction_doubt;
-  d["predicted_relmse_p95"] = result.predicted_blocks;
+  add_prediction(result.predicted, d);
+  d["predicted_relmse_p95"] = result.predicted ? nb::cast(result.predicted_blocks) : nb::none();
   d["nonfinite_pixels"] = result.image.nonfinite_pixels;
   d["warnings"] = warnings;
   d["films"] = films;

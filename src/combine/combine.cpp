@@ -185,15 +185,10 @@ CombinedImage combine(const CombineRequest& request) {
     for (int y = 0; y < request.light->height; y += kLightRows)
       add_light(request.light->rows(y, std::min(kLightRows, request.light->height - y)), combined.image, y);
   if (request.light) add_risk_of_light(before, combined.image);
-  if (!combined.image.std_error.data.empty()) {
-    const double crn = request.crn ? request.crn->samples : 0, samples = crn + request.independent.samples;
-    const bool counted = (crn > 0 || !request.crn) && request.independent.samples > 0;
-    combined.predicted_relmse = predicted_relmse(combined.image);
-    combined.predicted_bounds = predicted_bounds(combined.image, *combined.predicted_relmse);
-    combined.prediction_doubt =
-        doubt_of_prediction(combined.image, counted ? samples : std::numeric_limits<double>::infinity(),
-                            request.estimator.reliable_samples);
-  }
+  const double crn = request.crn ? request.crn->samples : 0, samples = crn + request.independent.samples;
+  const bool counted = (crn > 0 || !request.crn) && request.independent.samples > 0;
+  combined.predicted = predicted_error(combined.image, counted ? samples : std::numeric_limits<double>::infinity(),
+                                       request.estimator.reliable_samples);
   combined.estimate_seconds = watch.lap();
   return combined;
 }

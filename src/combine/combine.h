@@ -40,9 +40,7 @@ struct CombineRequest {
 
 struct CombinedImage {
   EstimatorResult image;
-  std::optional<double> predicted_relmse;           ///< predicted_error.h; where there is a standard error
-  std::optional<PredictedBounds> predicted_bounds;  ///< of predicted_error.h; empty where none can be given
-  std::string prediction_doubt;                     ///< of predicted_error.h; empty where nothing speaks against it
+  std::optional<PredictedError> predicted;  ///< where there is a standard error
   InputFindings inputs;
   double planned_memory = 0;  ///< planned_memory() of the request
   double check_seconds = 0, estimate_seconds = 0;

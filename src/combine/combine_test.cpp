@@ -12,6 +12,7 @@
 #include "denoising/mixed_denoising.h"
 #include "estimators/mean.h"
 #include "estimators/test_images.h"
+#include "risk/error_interval.h"
 #include "risk/held_out_error.h"
 #include "risk/predicted_error.h"
 #include "support/files.h"
@@ -54,10 +55,12 @@ TEST(Combine, IsEstimateCalibrationAndPrediction) {
   EstimatorResult expected = request.estimator.apply(images.crn.view(), images.independent.view(), request.settings);
   const std::vector<float> uncalibrated = expected.std_error.data;
   calibrate(expected);
+  EXPECT_NE(expected.std_error.data, uncalibrated);
+  apply_interval(expected);
   EXPECT_EQ(combined.image.estimate.data, expected.estimate.data);
   EXPECT_EQ(combined.image.std_error.data, expected.std_error.data);
-  EXPECT_NE(combined.image.std_error.data, uncalibrated);
-  EXPECT_EQ(*combined.predicted_relmse, predicted_relmse(expected));
+  EXPECT_EQ(combined.predicted->relmse, predicted_relmse(expected));
+  EXPECT_TRUE(combined.image.interval);
 }
 
 TEST(Combine, BandsHaveTheBitsOfTheWhole) {
@@ -109,7 +112,7 @@ TEST(Combine, AnIndependentImageAloneIsDenoised) {
   EXPECT_FALSE(expected.interval);
   finish(expected, nullptr);
   EXPECT_EQ(combined.image.estimate.data, expected.estimate.data);
-  EXPECT_EQ(*combined.predicted_relmse, predicted_relmse(expected));
+  EXPECT_EQ(combined.predicted->relmse, predicted_relmse(expected));
   EXPECT_TRUE(combined.image.interval) << "the error of a mean that was denoised has bounds";
   EXPECT_GT(combined.inputs.report.independent_mean, 0);
   // Groups that are one render are found.

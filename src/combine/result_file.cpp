@@ -3,11 +3,21 @@
 
 #include <fmt/format.h>
 
+#include <limits>
 #include <optional>
 
-#include "risk/predicted_error.h"
+#include "film/film_file.h"
 
 namespace covary {
+
+std::map<std::string, std::string> prediction_attributes(const std::optional<PredictedError>& predicted) {
+  std::map<std::string, std::string> attributes;
+  if (!predicted) return attributes;
+  attributes[film_key::kPredicted] = fmt::format("{:.4g}", predicted->relmse);
+  if (const std::optional<PredictedBounds>& bounds = predicted->bounds)
+    attributes[film_key::kPredictedBounds] = fmt::format("{:.4g} {:.4g}", bounds->low, bounds->high);
+  return attributes;
+}
 
 void write_result(const std::string& path, const ImagePlace& place,
                   const std::map<std::string, std::string>& attributes, EstimatorResult& result,
@@ -18,12 +28,8 @@ void write_result(const std::string& path, const ImagePlace& place,
   if (!result.bias.data.empty()) add_image_planes("Bias", result.bias, planes);
   for (auto& [name, image] : aovs) add_image_planes(name, image, planes);
   std::map<std::string, std::string> all = attributes;
-  if (!result.std_error.data.empty()) {
-    const double predicted = predicted_relmse(result);
-    all["covary:predicted_relmse"] = fmt::format("{:.4g}", predicted);
-    if (const std::optional<PredictedBounds> bounds = predicted_bounds(result, predicted))
-      all["covary:predicted_relmse_80"] = fmt::format("{:.4g} {:.4g}", bounds->low, bounds->high);
-  }
+  const auto predicted = predicted_error(result, std::numeric_limits<double>::infinity(), 0);
+  for (const auto& [key, value] : prediction_attributes(predicted)) all["covary:" + key] = value;
   write_exr(path, place, all, planes);
 }
 

@@ -3,13 +3,18 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 
 #include "estimators/estimator_result.h"
 #include "film/exr.h"
 #include "film/grouped_image.h"
+#include "risk/predicted_error.h"
 
 namespace covary {
+
+/// What attributes of files say of the error of an image, by film_key::kPredicted and kPredictedBounds.
+std::map<std::string, std::string> prediction_attributes(const std::optional<PredictedError>& predicted);
 
 /// Writes R, G, B, where there are an error estimate StdError.R, .G, .B and Bias.R, .G, .B, and the auxiliary images by
 /// name, with string attributes. The file appears under its name only when complete. Throws Error(kIo). The arguments

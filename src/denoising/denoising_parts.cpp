@@ -93,6 +93,7 @@ DenoisingParts parts_of_pair(const Estimator& base, const GroupedImage& crn, con
                              const PairSettings& settings) {
   DenoisingParts parts;
   parts.name = base.name;
+  parts.groups = independent;
   long ignored = 0;  // the base counts them
   parts.valid = finite_pixels(crn, independent, ignored);
   parts.whole = part_of_pair(base, crn, independent, settings, parts.valid);

@@ -34,7 +34,7 @@ struct DenoisingParts {
   /// The image is the mean of independent samples: noisy, but without a bias that residual correction could take away.
   bool is_mean = false;
   std::string name = "mean";  ///< of the image
-  GroupedImage groups;        ///< the samples of a mean, whose memory is the caller's; empty of a pair
+  GroupedImage groups;        ///< the independent samples, whose memory is the caller's
 };
 
 /// Means of all pixels.

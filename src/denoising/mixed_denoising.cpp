@@ -130,9 +130,10 @@ std::vector<Image> layers_of(const DenoisingParts& parts, const std::vector<Cand
                          mixture.weights});
 }
 
-ErrorKind kind_of(const std::vector<CandidateMaker>& makers) {
+ErrorKind kind_of(const std::vector<CandidateMaker>& makers, bool is_mean) {
   const bool network = std::any_of(makers.begin(), makers.end(), [](const CandidateMaker& m) { return m.network; });
-  return network ? ErrorKind::kNetwork : ErrorKind::kFilters;
+  if (is_mean) return network ? ErrorKind::kNetwork : ErrorKind::kFilters;
+  return network ? ErrorKind::kPairNetwork : ErrorKind::kPairFilters;
 }
 
 void check_guides(const Guides& guides) {
@@ -200,11 +201,9 @@ MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<Candid
     const HeldOutInput held_out{images, input.independent, input.guide, &valid, usual};
     result.std_error = held_out_error(held_out);
     result.bias = held_out_bias({images, {&guide_of(halves[0]), &guide_of(halves[1])}, input.independent, &valid});
-    if (parts.is_mean) {
-      result.risk_rows = image_risk(
-          {&result.estimate, images, &parts.whole.independent, input.independent, &parts.groups, input.guide, &valid});
-      result.risk_kind = kind_of(makers);
-    }
+    result.risk_rows = image_risk(
+        {&result.estimate, images, &parts.whole.independent, input.independent, &parts.groups, input.guide, &valid});
+    result.risk_kind = kind_of(makers, parts.is_mean);
     result.risks = risks_of(parts, halves, out.names, held_out, predicted_relmse(result));
   }
   out.weights = std::move(mixture.weights);

@@ -118,7 +118,9 @@ TEST(MixedDenoising, OfASinglePassTellsItsErrorByItsSamples) {
   EXPECT_EQ(sums.groups, 12);
   EXPECT_LT(sums.variance, 0.2 * sums.noise) << "it has less noise than the mean";
   EXPECT_LT(std::abs(sums.error), 0.5 * sums.noise);
-  EXPECT_TRUE(denoised(Inputs(1), DenoiseMode::kError).risk_rows.empty()) << "nothing was fitted to pairs";
+  const EstimatorResult of_pair = denoised(Inputs(1), DenoiseMode::kError);
+  EXPECT_EQ(of_pair.risk_kind, ErrorKind::kPairFilters);
+  EXPECT_EQ(of_pair.risk_rows.size(), static_cast<size_t>(kHeight));
 }
 
 TEST(MixedDenoising, OfASinglePassHasLessErrorThanItsMean) {

@@ -22,14 +22,14 @@ struct HeldOutRow {
 };
 
 /// What the samples tell of the error of a row of the image (risk/image_risk.h), relative as in relMSE: sums over its
-/// values, each over G'^2 + 0.01. `scaled` are sums of the same over the noise of the pixels around.
+/// values, each over G'^2 + 0.01.
 struct RiskRow {
-  double error = 0;          ///< (M - h)^2 - v + 2 cov(M, h)
-  double squares = 0;        ///< of `error` of the parts of the row, of which there are `parts`
-  double variance = 0;       ///< of the image: that between halves
-  double noise = 0;          ///< v
-  double noise_squares = 0;  ///< of v of each pixel
-  double scaled_error = 0, scaled_squares = 0, scaled_variance = 0;
+  double error = 0;                                  ///< (M - h)^2 - v + 2 cov(M, h)
+  double covariance = 0;                             ///< 2 cov(M, h)
+  double squares = 0;                                ///< of `error` of the parts of the row, of which there are `parts`
+  double variance = 0;                               ///< of the image: that between halves
+  double noise = 0;                                  ///< v
+  double noise_squares = 0;                          ///< of v of each pixel
   double light = 0;                                  ///< what the groups hold, over G' + 0.1
   double light_of_largest = 0;                       ///< what the largest group of each pixel holds
   double squared_deviations = 0, fourth_powers = 0;  ///< of groups: squared variance, and fourth moment
@@ -41,13 +41,11 @@ struct RiskRow {
 /// Its sums by name.
 inline constexpr std::pair<const char*, double RiskRow::*> kRiskSums[] = {
     {"error", &RiskRow::error},
+    {"covariance", &RiskRow::covariance},
     {"squares", &RiskRow::squares},
     {"variance", &RiskRow::variance},
     {"noise", &RiskRow::noise},
     {"noise_squares", &RiskRow::noise_squares},
-    {"scaled_error", &RiskRow::scaled_error},
-    {"scaled_squares", &RiskRow::scaled_squares},
-    {"scaled_variance", &RiskRow::scaled_variance},
     {"light", &RiskRow::light},
     {"light_of_largest", &RiskRow::light_of_largest},
     {"squared_deviations", &RiskRow::squared_deviations},
@@ -57,12 +55,14 @@ inline constexpr std::pair<const char*, double RiskRow::*> kRiskSums[] = {
     {"parts", &RiskRow::parts},
     {"groups", &RiskRow::groups}};
 
-/// What made the candidates of an image, as far as it changes what its sums mean.
-enum class ErrorKind { kFilters, kNetwork };
+/// What made an image, as far as it changes what its sums mean: the mean of independent samples; an estimator of two
+/// passes; candidates of filters, or of a network, mixed with either.
+enum class ErrorKind { kMean, kPair, kFilters, kNetwork, kPairFilters, kPairNetwork };
 
 /// Between which bounds the relMSE is, in 80 of 100 renders (risk/error_interval.h).
 struct ErrorInterval {
-  double below = 1, above = 1;  ///< factors of the predicted relMSE: at most 1, and at least 1
+  double middle = 1;  ///< of the relMSE, over that which the standard errors predict: 1 where these were scaled to it
+  double below = 1, above = 1;  ///< factors of the middle: at most 1, and at least 1
   std::string unknown;          ///< why no bounds can be given; empty where they are
 };
 

@@ -9,6 +9,13 @@
 
 namespace covary {
 
+/// Attributes of files alone, which follow from the image: its predicted relMSE, and the two bounds between which that
+/// is in 80 of 100 renders, with a space between them.
+namespace film_key {
+inline constexpr const char* kPredicted = "predicted_relmse";
+inline constexpr const char* kPredictedBounds = "predicted_relmse_80";
+}  // namespace film_key
+
 /// Writes `film`; the file appears under its name only when complete. `std_error`, where not empty, is the standard
 /// error of what the file shows, for the layer StdError, which is not read. Throws Error(kIo).
 void write_film(const std::string& path, const Film& film, const Image& std_error = {});

@@ -12,6 +12,7 @@
 #include "estimators/mean.h"
 #include "plans/budget.h"
 #include "plans/render.h"
+#include "risk/image_risk.h"
 
 namespace covary {
 namespace {
@@ -111,7 +112,10 @@ PassPlan pass_of(const std::string& name, Sampling sampling, uint32_t number, ui
 }
 
 EstimatorResult mean_of_last(std::span<const Pass> passes, int first_row, int n_rows, const Beside&) {
-  return mean_of_groups(rows_of(passes.back().film, first_row, n_rows));
+  const GroupedImage groups = rows_of(passes.back().film, first_row, n_rows);
+  EstimatorResult mean = mean_of_groups(groups);
+  add_risk_of_mean(groups, mean);
+  return mean;
 }
 
 }  // namespace

@@ -78,8 +78,8 @@ TEST(AdaptivePlan, ControlVariatesOfUnequalNumbers) {
   for (const uint32_t n : independent.counts()) EXPECT_TRUE(n >= 12 && n % 12 == 0);
   EXPECT_EQ(result.image.estimate.data,
             make_estimator("iicv").apply(rows_of(crn, 0, 30), rows_of(independent, 0, 30), {96, true}).estimate.data);
-  ASSERT_TRUE(result.predicted_relmse);
-  EXPECT_GT(*result.predicted_relmse, 0);
+  ASSERT_TRUE(result.predicted);
+  EXPECT_GT(result.predicted->relmse, 0);
 }
 
 TEST(AdaptivePlan, ARelativeErrorTakesThePlaceOfTheBudget) {
@@ -257,14 +257,14 @@ TEST(UnbiasedPlan, IsTheMeanOfItsLastPass) {
   EXPECT_EQ(result.image.estimate.data, result.passes[1].film.mean_image().data);
   EXPECT_NEAR(result.samples_per_pixel(), 40, 0.4);
   for (const uint32_t n : result.passes[1].film.counts()) EXPECT_GE(n, 1u);
-  ASSERT_TRUE(result.predicted_relmse);
-  EXPECT_GT(*result.predicted_relmse, 0);
+  ASSERT_TRUE(result.predicted);
+  EXPECT_GT(result.predicted->relmse, 0);
 }
 
 TEST(UnbiasedPlan, AddsSamplesUntilAnErrorIsReached) {
   const LoadedScene scene = load_sized(kRoom);
   RenderRequest request = request_of(1000);
-  const double first = *render(scene, plain_adaptive({{"min-spp", "4"}}), request_of(96)).predicted_relmse;
+  const double first = render(scene, plain_adaptive({{"min-spp", "4"}}), request_of(96)).predicted->relmse;
   request.until = first / 2;
   const RenderResult result = render(scene, plain_adaptive({{"min-spp", "4"}}), request);
   EXPECT_TRUE(result.until_reached.value());

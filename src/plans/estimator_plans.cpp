@@ -12,6 +12,7 @@
 #include "plans/adaptive_plan.h"
 #include "plans/budget.h"
 #include "plans/render.h"
+#include "risk/image_risk.h"
 
 namespace covary {
 namespace {
@@ -28,10 +29,16 @@ PixelEstimate pixel_estimate(const PixelFunction& estimate, int dimensions) {
   };
 }
 
+/// Memory beside a film of groups: moments and a mask.
+constexpr double kBytesOfMean = 7 * sizeof(float);
+
 EstimatorResult mean_of_first(std::span<const Pass> passes, int first_row, int n_rows, const Beside& beside) {
-  EstimatorResult result = mean_of_groups(rows_of(passes[0].film, first_row, n_rows));
-  for (const Layer& layer : beside.layers) result.layers.push_back(mean_of_groups(layer.image).estimate);
-  return result;
+  const GroupedImage groups = rows_of(passes[0].film, first_row, n_rows);
+  EstimatorResult mean = mean_of_groups(groups);
+  // Pixels with common random numbers err together, which their variances do not tell.
+  if (passes[0].plan.sampling == Sampling::kIndependent) add_risk_of_mean(groups, mean);
+  for (const Layer& layer : beside.layers) mean.layers.push_back(mean_of_groups(layer.image).estimate);
+  return mean;
 }
 
 /// A single pass of `groups` groups takes the whole budget.
@@ -57,6 +64,7 @@ Plan plain_plan(Sampling sampling, std::optional<int> groups) {
   plan.has_crn_pass = sampling == Sampling::kCrn;
   plan.takes_training = !plan.has_crn_pass;
   plan.estimate = mean_of_first;
+  plan.estimate_memory.of_halves = kBytesOfMean, plan.estimate_memory.groups_for_halves = 2;
   Phase phase;
   phase.passes = [=](const PlanState& state) {
     PassPlan pass;

@@ -8,13 +8,13 @@
 #include <filesystem>
 #include <random>
 
-#include "combine/light_film.h"
+#include "combine/combine.h"
 #include "combine/registry.h"
 #include "estimators/mean.h"
 #include "film/film_file.h"
 #include "film/splat_layer.h"
 #include "plans/memory.h"
-#include "risk/held_out_error.h"
+#include "risk/image_risk.h"
 #include "risk/predicted_error.h"
 #include "scene/property_source.h"
 #include "support/files.h"
@@ -85,13 +85,13 @@ TEST(LightPlan, BesideCrnThereIsOneWhereItIsAskedFor) {
   const Film &crn = on.passes[0].film, &independent = on.passes[1].film;
   EstimatorResult expected =
       make_estimator("iicv").apply(rows_of(crn, 0, kHeight), rows_of(independent, 0, kHeight), {12, true});
-  calibrate(expected);
+  finish(expected, nullptr);
   const EstimatorResult light = mean_of_groups(rows_of(on.passes[2].film, 0, kHeight));
   for (size_t i = 0; i < expected.estimate.data.size(); ++i) {
     ASSERT_EQ(on.image.estimate.data[i], expected.estimate.data[i] + light.estimate.data[i]);
     ASSERT_FLOAT_EQ(on.image.std_error.data[i], std::hypot(expected.std_error.data[i], light.std_error.data[i]));
   }
-  EXPECT_EQ(*on.predicted_relmse, predicted_relmse(on.image));
+  EXPECT_EQ(on.predicted->relmse, predicted_relmse(on.image));
   EXPECT_EQ(render(light_scene(), plain_plan(Sampling::kCrn), request_of(24)).passes.size(), 1u);
 }
 
@@ -220,8 +220,10 @@ TEST(LightPlan, UntilAWantedErrorLightPathsKeepStep) {
   EXPECT_NEAR(static_cast<double>(light_paths_of(result)), result.samples_per_pixel() * kWidth * kHeight,
               4 * kBundlePaths);
   EstimatorResult expected = mean_of_groups(rows_of(result.passes[0].film, 0, kHeight));
-  add_light(rows_of(result.passes[1].film, 0, kHeight), expected);
-  EXPECT_EQ(*result.predicted_relmse, predicted_relmse(expected));
+  add_risk_of_mean(rows_of(result.passes[0].film, 0, kHeight), expected);
+  const GroupedImage light = rows_of(result.passes[1].film, 0, kHeight);
+  finish(expected, &light);
+  EXPECT_EQ(result.predicted->relmse, predicted_error(expected, 0, 0)->relmse);
 }
 
 TEST(LightPlan, ATimeLimitLeavesBothFilmsWithSamples) {

@@ -128,7 +128,7 @@ bool PlanRun::render_to_limits() {
     const bool out_of_time = timed() && seconds_left(plan_.phases.size() - 1, 1) <= 0;
     if (result_.until_reached.value_or(true) || state_.budget >= limit || out_of_time) return true;
     rounds_.add(next_budget(state_.budget, error_to_limit(), request_.until, limit,
-                            result_.prediction_doubt.empty() ? kMostGrowth : kDoubtfulGrowth));
+                            result_.predicted->doubt.empty() ? kMostGrowth : kDoubtfulGrowth));
     state_.budget = rounds_.budget();
   }
 }

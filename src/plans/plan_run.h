@@ -54,7 +54,7 @@ class PlanRun {
   bool timed() const { return request_.seconds > 0; }
   /// What RenderRequest::until is about.
   double error_to_limit() const {
-    return request_.until_in_blocks ? *result_.predicted_blocks : *result_.predicted_relmse;
+    return request_.until_in_blocks ? result_.predicted_blocks : result_.predicted->relmse;
   }
   /// The film is the image, and its groups tell its error.
   bool film_has_errors() const {

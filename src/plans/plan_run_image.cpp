@@ -58,23 +58,18 @@ bool PlanRun::estimate() {
   const auto ends = [&] { return result_.interrupted ? watch.seconds() > kEstimateOfInterrupted : stopped(); };
   EstimatorResult image;
   result_.image = {};
-  result_.predicted_relmse.reset(), result_.predicted_bounds.reset(), result_.predicted_blocks.reset(),
-      result_.prediction_doubt.clear();
+  result_.predicted.reset();
   const bool with_layers = request_.layers && !result_.interrupted;
   if (with_layers) trace_layers();
   if (with_layers && stopped()) return false;
   const std::span<const Film> layers = with_layers ? std::span<const Film>(layers_) : std::span<const Film>();
   if (!run_stoppable(ends, [&] { image = estimate_rows(0, window_.height, layers); })) return false;
   for (size_t i = 0; i < image.layers.size(); ++i) result_.aovs[kLayerNames[i]] = std::move(image.layers[i]);
-  if (!image.std_error.data.empty()) {
-    result_.predicted_relmse = predicted_relmse(image);
-    result_.predicted_bounds = predicted_bounds(image, *result_.predicted_relmse);
-    result_.predicted_blocks = predicted_blocks(image);
-    double samples = 0;
-    for (const Pass& pass : camera_passes(films())) samples += pass.film.mean_count();
-    result_.prediction_doubt = doubt_of_prediction(image, samples, plan_.reliable_samples);
-  }
-  if (request_.until > 0 && !result_.predicted_relmse)
+  double samples = 0;
+  for (const Pass& pass : camera_passes(films())) samples += pass.film.mean_count();
+  result_.predicted = predicted_error(image, samples, plan_.reliable_samples);
+  if (result_.predicted) result_.predicted_blocks = predicted_blocks(image);
+  if (request_.until > 0 && !result_.predicted)
     throw Error(ErrorCode::kUsage, "an error can only be predicted from 2 or more groups");
   if (plan_.film_is_image) image.estimate = {};
   result_.image = std::move(image);

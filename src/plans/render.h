@@ -89,10 +89,8 @@ struct RenderResult {
   /// Where the film alone is the image, at most its standard error. Empty of a render that was interrupted before every
   /// pixel of every film had samples.
   EstimatorResult image;
-  std::optional<double> predicted_relmse;
-  std::optional<PredictedBounds> predicted_bounds;  ///< of predicted_error.h; empty where none can be given
-  std::optional<double> predicted_blocks;           ///< of predicted_error.h
-  std::string prediction_doubt;                     ///< of predicted_error.h; empty where nothing speaks against it
+  std::optional<PredictedError> predicted;  ///< where there is a standard error
+  double predicted_blocks = 0;              ///< of predicted_error.h, there
   /// Image of the samples of the integrator's training, where they are a part of the image (Plan::takes_training).
   TrainingImage training;
   std::map<std::string, Image> aovs;

@@ -32,6 +32,7 @@ void write_result_files(const Plan& plan, const RenderRequest& request, RenderRe
     film.attributes[film_key::kComplete] = result.interrupted ? "false" : "true";
     film.aovs = aovs;
     film.shown = result.image.estimate;
+    for (const auto& [key, value] : prediction_attributes(result.predicted)) film.attributes[key] = value;
     write_film(request.output, film, result.image.std_error);
   } else {
     const Film& film = last;

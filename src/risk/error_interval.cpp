@@ -17,19 +17,21 @@ namespace {
 /// Relative scatter at which what the samples tell counts as much as what is usual.
 constexpr double kTrusted = 0.5;
 /// No error is taken to be less than this part of the variance, or more than so many times as much.
-constexpr double kLeastOverVariance = 0.25, kMostOverVariance = 4;
+constexpr double kLeastOverVariance = 0.5, kMostOverVariance = 30;
+/// What halves miss of the covariance (docs/notes/error-estimates.md).
+constexpr double kMissingCovariance = 0.27;
 
 /// How large a ratio is, and how much that is hidden by its noise.
 struct Ratio {
   double log = 0, hidden = 1;
 };
 
-/// Of sums over parts: sum / whole, both of the same weight; `squares`: of the sums of the parts.
-Ratio ratio_of(double sum, double squares, double parts, double whole) {
-  const double least = std::max(sum, kLeastOverVariance * whole);
-  const double scatter = std::sqrt(std::max(0.0, squares - sum * sum / std::max(parts, 1.0))) / least;
+/// R / V.
+Ratio ratio_of(const RiskRow& s) {
+  const double least = std::max(s.error + kMissingCovariance * s.covariance, kLeastOverVariance * s.variance);
+  const double scatter = std::sqrt(std::max(0.0, s.squares - s.error * s.error / std::max(s.parts, 1.0))) / least;
   const double trust = 1 / (1 + scatter * scatter / (kTrusted * kTrusted));
-  return {trust * std::log(std::min(least / whole, kMostOverVariance)), 1 - trust};
+  return {trust * std::log(std::min(least / s.variance, kMostOverVariance)), 1 - trust};
 }
 
 double dot(const ErrorFeatures& a, const ErrorFeatures& b) {
@@ -41,18 +43,16 @@ void scale(Image& std_error, double factor) {
   for (float& value : std_error.data) value *= static_cast<float>(std::sqrt(factor));
 }
 
-const FittedErrors& fit_of(ErrorKind kind) { return kFittedErrors[kind == ErrorKind::kNetwork]; }
+const FittedErrors& fit_of(ErrorKind kind) { return kFittedErrors[static_cast<size_t>(kind)]; }
 
 }  // namespace
 
 ErrorFeatures error_features(const RiskRow& s) {
-  const Ratio plain = ratio_of(s.error, s.squares, s.parts, s.variance);
-  const Ratio scaled = ratio_of(s.scaled_error, s.scaled_squares, s.parts, s.scaled_variance);
+  const Ratio ratio = ratio_of(s);
   const double kurtosis = s.squared_deviations > 0 ? s.fourth_powers / s.squared_deviations : 1;
   return {1,
-          plain.log,
-          plain.hidden,
-          scaled.log,
+          ratio.log,
+          ratio.hidden,
           std::log(s.noise / s.variance),
           std::log(s.noise / s.values),
           std::log(kurtosis),
@@ -72,6 +72,8 @@ LogError fitted_error(const RiskRow& sums, ErrorKind kind) {
 }
 
 std::string unknown_error(const RiskRow& sums, const LogError& error) {
+  if (sums.groups < kFewestGroups)
+    return fmt::format("{:.0f} groups of samples are too few, it takes {}", sums.groups, kFewestGroups);
   const double n = sums.noise * sums.noise / sums.noise_squares, pixels = sums.values / 3;
   if (n < std::max(kFewestPixels, kFewestOfPixels * pixels))
     return fmt::format("{:.0f} of {:.0f} pixels hold most of the noise", std::max(1.0, n), pixels);
@@ -91,13 +93,15 @@ void apply_interval(EstimatorResult& result) {
   sums.predicted = predicted * sums.values;
   result.risk_sums = sums;
   if (!(predicted > 0 && sums.variance > 0 && sums.noise > 0 && std::isfinite(sums.error + sums.noise_squares))) {
-    result.interval = ErrorInterval{1, 1, "its samples do not differ"};
+    result.interval = ErrorInterval{1, 1, 1, "its samples do not differ"};
     return;
   }
   const LogError error = fitted_error(sums, result.risk_kind);
-  scale(result.std_error, std::exp(error.middle) / predicted);
-  result.interval = ErrorInterval{std::exp(error.low - error.middle), std::exp(error.high - error.middle),
-                                  unknown_error(sums, error)};
+  const double middle = std::exp(error.middle) / predicted;
+  const bool scaled = result.risk_kind != ErrorKind::kMean;
+  if (scaled) scale(result.std_error, middle);
+  result.interval = ErrorInterval{scaled ? 1 : middle, std::exp(error.low - error.middle),
+                                  std::exp(error.high - error.middle), unknown_error(sums, error)};
 }
 
 }  // namespace covary

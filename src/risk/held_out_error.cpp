@@ -9,6 +9,7 @@
 #include "filters/guided_cells.h"
 #include "risk/halves.h"
 #include "risk/held_out_bias.h"
+#include "risk/image_risk.h"
 #include "risk/relative_weight.h"
 
 namespace covary {
@@ -125,6 +126,10 @@ EstimatorResult apply_with_rows(const Estimator& base, const GroupedImage& crn, 
     h[half] = moments(half_independent.view(), valid, 0, 0.0f);
   }
   const HeldOutInput input{{&images[0], &images[1]}, {&h[0], &h[1]}, nullptr, &valid};
+  const Moments all = moments(independent, valid, 0, 0.0f);
+  whole.risk_rows =
+      image_risk({&whole.estimate, input.halves, &all, input.independent, &independent, &whole.estimate, &valid});
+  whole.risk_kind = ErrorKind::kPair;
   whole.bias = held_out_bias({input.halves, input.halves, input.independent, &valid});
   whole.held_out.resize(static_cast<size_t>(crn.height));
   parallel_for(crn.height, 8, [&](int y) { whole.held_out[static_cast<size_t>(y)] = held_out_row(input, whole, y); });
@@ -136,8 +141,8 @@ EstimatorResult apply_with_rows(const Estimator& base, const GroupedImage& crn, 
 Estimator with_held_out_rows(const Estimator& base) {
   if (!base.holds_out || base.adaptive) return base;
   Estimator estimator = base;
-  // The images and moments of both halves, and half of the groups of both images.
-  estimator.memory.of_halves = 2 * (3 + 6) * sizeof(float);
+  // The images and moments of both halves, the moments of all, and half of the groups of both images.
+  estimator.memory.of_halves = (2 * (3 + 6) + 6) * sizeof(float);
   estimator.memory.of_halves_per_group = 3 * sizeof(float);
   estimator.memory.groups_for_halves = 2 * base.fewest_groups;
   if (base.reach >= 0) estimator.reach += kBiasReach;

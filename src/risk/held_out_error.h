@@ -41,8 +41,8 @@ struct HalvesRisk {
 /// held-out samples are the same.
 HalvesRisk risk_of_halves(const HeldOutInput& input);
 
-/// An estimator that fills EstimatorResult::held_out beside its standard error where both halves of the groups are
-/// enough for it; only of those with Estimator::holds_out, others are returned as they are.
+/// An estimator that fills EstimatorResult::held_out and risk_rows beside its standard error where both halves of the
+/// groups are enough for it; only of those with Estimator::holds_out, others are returned as they are.
 Estimator with_held_out_rows(const Estimator& base);
 
 /// Scales the standard error so that its relMSE is between what the estimator predicts and what held-out samples tell:

@@ -12,13 +12,10 @@ namespace {
 
 /// Pixels of a part of a row, whose errors are taken together.
 constexpr int kPart = 16;
-/// Pixels around one, in each direction, whose noise is taken together; and the least noise.
-constexpr int kAround = 3;
-constexpr double kLeastNoise = 1e-6;
 
 /// A pixel's sums over its channels.
 struct PixelRisk {
-  double error = 0, variance = 0, noise = 0;
+  double error = 0, covariance = 0, variance = 0, noise = 0;
 };
 
 PixelRisk risk_at(const ImageRiskInput& in, int x, int y) {
@@ -26,7 +23,7 @@ PixelRisk risk_at(const ImageRiskInput& in, int x, int y) {
   for (int c = 0; c < 3; ++c) {
     const double h = in.independent->mean.row(c, y)[x], v = in.independent->variance_of_mean.row(c, y)[x];
     pixel.noise += v;
-    if (!in.halves[0]) {  // M is h: its error is its variance
+    if (!in.halves[0]) {  // M is h: its error is its variance, and nothing is to be added to it
       pixel.error += v, pixel.variance += v;
       continue;
     }
@@ -35,7 +32,9 @@ PixelRisk risk_at(const ImageRiskInput& in, int x, int y) {
       m[half] = in.halves[half]->pixel(x, y)[c];
       g[half] = in.independents[half]->mean.row(c, y)[x];
     }
-    pixel.error += square(in.image->pixel(x, y)[c] - h) - v + 0.5 * (m[0] - m[1]) * (g[0] - g[1]);
+    const double twice_covariance = 0.5 * (m[0] - m[1]) * (g[0] - g[1]);
+    pixel.error += square(in.image->pixel(x, y)[c] - h) - v + twice_covariance;
+    pixel.covariance += twice_covariance;
     pixel.variance += 0.25 * square(m[0] - m[1]);
   }
   return pixel;
@@ -64,48 +63,45 @@ void add_groups(const ImageRiskInput& in, int x, int y, double weight, RiskRow& 
   row.light += brightness * light, row.light_of_largest += brightness * largest;
 }
 
-/// Relative noise of the pixels around each one of a row.
-std::vector<double> noise_around(const ImageRiskInput& in, int y) {
-  const int width = in.image->width, height = in.image->height;
-  std::vector<double> sums(static_cast<size_t>(width)), counts(sums);
-  for (int j = std::max(0, y - kAround); j <= std::min(height - 1, y + kAround); ++j)
-    for (int x = 0; x < width; ++x) {
-      if (!(*in.valid)[static_cast<size_t>(j) * width + x]) continue;
-      const double weight = relative_weight(in.guide->pixel(x, j));
-      for (int c = 0; c < 3; ++c) sums[x] += weight * in.independent->variance_of_mean.row(c, j)[x];
-      counts[x] += 3;
-    }
-  std::vector<double> around(sums.size());
-  for (int x = 0; x < width; ++x) {
-    double sum = 0, n = 0;
-    for (int i = std::max(0, x - kAround); i <= std::min(width - 1, x + kAround); ++i) sum += sums[i], n += counts[i];
-    around[x] = (n > 0 ? sum / n : 0) + kLeastNoise;
-  }
-  return around;
-}
-
 RiskRow risk_of_row(const ImageRiskInput& in, int y) {
   const int width = in.image->width;
-  const std::vector<double> around = noise_around(in, y);
   RiskRow row;
   row.groups = in.groups->groups;
-  double part = 0, scaled = 0;
+  double part = 0;
   for (int x = 0; x < width; ++x) {
     if ((*in.valid)[static_cast<size_t>(y) * width + x]) {
       const double w = relative_weight(in.guide->pixel(x, y));
       const PixelRisk pixel = risk_at(in, x, y);
-      part += w * pixel.error, scaled += w * pixel.error / around[x];
-      row.variance += w * pixel.variance, row.scaled_variance += w * pixel.variance / around[x];
+      part += w * pixel.error;
+      row.covariance += w * pixel.covariance, row.variance += w * pixel.variance;
       row.noise += w * pixel.noise, row.noise_squares += square(w * pixel.noise);
       row.values += 3;
       add_groups(in, x, y, w, row);
     }
     if (x % kPart != kPart - 1 && x != width - 1) continue;
     row.error += part, row.squares += square(part), row.parts += 1;
-    row.scaled_error += scaled, row.scaled_squares += square(scaled);
-    part = scaled = 0;
+    part = 0;
   }
   return row;
+}
+
+/// The median brightness of the 3 x 3 pixels around each: a pixel that is bright by chance would hide its own error.
+Image median_brightness(const Image& image) {
+  Image guide(image.width, image.height, 3);
+  parallel_for(image.height, 8, [&](int y) {
+    for (int x = 0; x < image.width; ++x) {
+      std::array<float, 9> around;
+      size_t n = 0;
+      for (int j = std::max(0, y - 1); j <= std::min(image.height - 1, y + 1); ++j)
+        for (int i = std::max(0, x - 1); i <= std::min(image.width - 1, x + 1); ++i) {
+          const float* p = image.pixel(i, j);
+          around[n++] = (p[0] + p[1] + p[2]) / 3;
+        }
+      std::nth_element(around.begin(), around.begin() + n / 2, around.begin() + n);
+      std::fill_n(guide.pixel(x, y), 3, around[n / 2]);
+    }
+  });
+  return guide;
 }
 
 }  // namespace
@@ -114,6 +110,18 @@ std::vector<RiskRow> image_risk(const ImageRiskInput& input) {
   std::vector<RiskRow> rows(static_cast<size_t>(input.image->height));
   parallel_for(input.image->height, 4, [&](int y) { rows[static_cast<size_t>(y)] = risk_of_row(input, y); });
   return rows;
+}
+
+void add_risk_of_mean(const GroupedImage& groups, EstimatorResult& mean) {
+  if (groups.groups < 2) return;
+  long ignored = 0;  // whoever shows the image counts them
+  const std::vector<unsigned char> valid = finite_pixels(groups, groups, ignored);
+  const Moments independent = moments(groups, valid, 0, 0.0f);
+  Image finite = mean.estimate;
+  fill_invalid(groups, groups, valid, finite);
+  const Image guide = median_brightness(finite);
+  mean.risk_rows = image_risk({&mean.estimate, {}, &independent, {}, &groups, &guide, &valid});
+  mean.risk_kind = ErrorKind::kMean;
 }
 
 RiskRow sum_of(const std::vector<RiskRow>& rows) {

@@ -36,6 +36,10 @@ struct ImageRiskInput {
 /// bit-identical for any number of threads.
 std::vector<RiskRow> image_risk(const ImageRiskInput& input);
 
+/// Sets the rows and kind of `mean`, which is that of these groups and has their standard error; nothing where pixels
+/// have one group.
+void add_risk_of_mean(const GroupedImage& groups, EstimatorResult& mean);
+
 /// All rows together.
 RiskRow sum_of(const std::vector<RiskRow>& rows);
 

@@ -19,7 +19,7 @@ namespace {
 constexpr int kBlock = 16;
 constexpr double kShareOfBlocks = 0.95;
 
-/// Of doubt_of_prediction(). Fewer pixels than kFewestPixels have no hundredth to speak of.
+/// Of doubt_of(). Fewer pixels than kFewestPixels have no hundredth to speak of.
 constexpr double kFewPixels = 0.01, kMostInFewPixels = 0.4, kMostUncertainty = 0.5, kMostDisagreement = 4;
 constexpr size_t kFewestPixels = 400;
 
@@ -67,6 +67,31 @@ double share_of_few(const EstimatorResult& result) {
   return all > 0 ? std::accumulate(errors.begin(), few, 0.0) / all : 0;
 }
 
+std::optional<PredictedBounds> bounds_around(const EstimatorResult& result, double predicted) {
+  if (!result.interval || !result.interval->unknown.empty()) return std::nullopt;
+  return PredictedBounds{predicted * result.interval->below, predicted * result.interval->above};
+}
+
+std::string doubt_of(const EstimatorResult& result, double samples, uint32_t reliable_samples) {
+  if (result.interval) {
+    const auto& [middle, below, above, unknown] = *result.interval;
+    if (!unknown.empty()) return "no interval can be given: " + unknown;
+    const double factor = std::max(above, 1 / below);
+    return factor > kReliableFactor ? fmt::format("known to a factor of {:.2g}", factor) : "";
+  }
+  if (samples < reliable_samples) return fmt::format("fewer than {} samples per pixel", reliable_samples);
+  if (const double share = share_of_few(result); share > kMostInFewPixels)
+    return fmt::format("{:.0f} % of it lies in {:.0f} % of the pixels", 100 * share, 100 * kFewPixels);
+  if (!result.verdict) return "";
+  const auto& [uncertainty, ratio] = *result.verdict;
+  if (!std::isfinite(uncertainty)) return "held-out samples do not confirm it";
+  if (uncertainty > kMostUncertainty)
+    return fmt::format("held-out samples know it only to ±{:.0f} %", 100 * uncertainty);
+  if (ratio > kMostDisagreement || ratio < 1 / kMostDisagreement)
+    return fmt::format("held-out samples tell {:.2g} times as much as the estimator itself", ratio);
+  return "";
+}
+
 }  // namespace
 
 double predicted_relmse(const EstimatorResult& result) {
@@ -85,29 +110,11 @@ double predicted_blocks(const EstimatorResult& result) {
   return blocks[static_cast<size_t>(rank)];
 }
 
-std::optional<PredictedBounds> predicted_bounds(const EstimatorResult& result, double predicted) {
-  if (!result.interval || !result.interval->unknown.empty()) return std::nullopt;
-  return PredictedBounds{predicted * result.interval->below, predicted * result.interval->above};
-}
-
-std::string doubt_of_prediction(const EstimatorResult& result, double samples, uint32_t reliable_samples) {
-  if (result.interval) {
-    const auto& [below, above, unknown] = *result.interval;
-    if (!unknown.empty()) return "no interval can be given: " + unknown;
-    const double factor = std::max(above, 1 / below);
-    return factor > kReliableFactor ? fmt::format("known to a factor of {:.2g}", factor) : "";
-  }
-  if (samples < reliable_samples) return fmt::format("fewer than {} samples per pixel", reliable_samples);
-  if (const double share = share_of_few(result); share > kMostInFewPixels)
-    return fmt::format("{:.0f} % of it lies in {:.0f} % of the pixels", 100 * share, 100 * kFewPixels);
-  if (!result.verdict) return "";
-  const auto& [uncertainty, ratio] = *result.verdict;
-  if (!std::isfinite(uncertainty)) return "held-out samples do not confirm it";
-  if (uncertainty > kMostUncertainty)
-    return fmt::format("held-out samples know it only to ±{:.0f} %", 100 * uncertainty);
-  if (ratio > kMostDisagreement || ratio < 1 / kMostDisagreement)
-    return fmt::format("held-out samples tell {:.2g} times as much as the estimator itself", ratio);
-  return "";
+std::optional<PredictedError> predicted_error(const EstimatorResult& result, double samples,
+                                              uint32_t reliable_samples) {
+  if (result.std_error.data.empty()) return std::nullopt;
+  const double relmse = predicted_relmse(result) * (result.interval ? result.interval->middle : 1);
+  return PredictedError{relmse, bounds_around(result, relmse), doubt_of(result, samples, reliable_samples)};
 }
 
 }  // namespace covary

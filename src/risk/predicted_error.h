@@ -24,16 +24,21 @@ double predicted_blocks(const EstimatorResult& result);
 struct PredictedBounds {
   double low = 0, high = 0;
 };
-/// Those around `predicted`, which is predicted_relmse(); empty where none can be given (EstimatorResult::interval).
-std::optional<PredictedBounds> predicted_bounds(const EstimatorResult& result, double predicted);
 
-/// Why the prediction is not reliable; empty where it is. Where there is an interval: because it is wider than
-/// kReliableFactor of error_interval.h, or cannot be given. Elsewhere: with fewer than `reliable_samples`
-/// (Estimator::reliable_samples) per pixel, where a hundredth of the pixels hold more than two fifths of it, where
-/// held-out samples know it only to more than half of itself, and where they tell more than four times as much as the
-/// estimator, or less than a quarter (of results that calibrate() scaled). Light that no sample has found is not seen
-/// here either. `samples`: per pixel, of all passes together; infinite where nobody knows. Measured in
-/// docs/methods/error-estimates.md.
-std::string doubt_of_prediction(const EstimatorResult& result, double samples, uint32_t reliable_samples);
+/// What is known of the relMSE of an image.
+struct PredictedError {
+  double relmse = 0;                      ///< predicted_relmse(), or the middle of the interval
+  std::optional<PredictedBounds> bounds;  ///< around it; empty where none can be given (EstimatorResult::interval)
+  /// Why it is not reliable; empty where it is. Where there is an interval: because it is wider than kReliableFactor of
+  /// error_interval.h, or cannot be given. Elsewhere: with few samples per pixel, where a hundredth of the pixels hold
+  /// more than two fifths of it, where held-out samples know it only to more than half of itself, and where they tell
+  /// more than four times as much as the estimator, or less than a quarter (of results that calibrate() scaled). Light
+  /// that no sample has found is not seen here either. Measured in docs/methods/error-estimates.md.
+  std::string doubt;
+};
+
+/// Of a result with standard errors; empty where it has none. `samples`: per pixel, of all passes together, infinite
+/// where nobody knows; fewer than `reliable_samples` (Estimator::reliable_samples) are few.
+std::optional<PredictedError> predicted_error(const EstimatorResult& result, double samples, uint32_t reliable_samples);
 
 }  // namespace covary

@@ -34,8 +34,8 @@ TEST(PredictedError, OfBlocksIsTheirPercentile) {
       for (int c = 0; c < 3; ++c)
         result.std_error.pixel(x, y)[c] = std::sqrt(0.01f * static_cast<float>(y / 16 * 4 + x / 16));
   EXPECT_NEAR(predicted_blocks(result), 18, 1e-4);  // 19 of 20 have no more
-  EXPECT_EQ(doubt_of_prediction(result, 47, 48), "fewer than 48 samples per pixel");
-  EXPECT_EQ(doubt_of_prediction(result, 1, 0), "");
+  EXPECT_EQ(predicted_error(result, 47, 48)->doubt, "fewer than 48 samples per pixel");
+  EXPECT_EQ(predicted_error(result, 1, 0)->doubt, "");
   result.estimate = result.std_error = Image(3, 2, 3);
   EXPECT_EQ(predicted_blocks(result), 0);
 }
@@ -44,21 +44,21 @@ TEST(PredictedError, IsDoubtedWhereFewPixelsHoldIt) {
   EstimatorResult result;
   result.estimate = result.std_error = Image(40, 25, 3);
   std::fill(result.std_error.data.begin(), result.std_error.data.end(), 0.1f);
-  EXPECT_EQ(doubt_of_prediction(result, 48, 48), "");
+  EXPECT_EQ(predicted_error(result, 48, 48)->doubt, "");
   // 990 pixels with 1 each and 10 with 70 each: 0.41 of 1690.
   for (int x = 0; x < 10; ++x)
     for (int c = 0; c < 3; ++c) result.std_error.pixel(3 * x, 7)[c] = 0.1f * std::sqrt(70.0f);
-  EXPECT_EQ(doubt_of_prediction(result, 48, 48), "41 % of it lies in 1 % of the pixels");
+  EXPECT_EQ(predicted_error(result, 48, 48)->doubt, "41 % of it lies in 1 % of the pixels");
   for (int x = 0; x < 10; ++x)
     for (int c = 0; c < 3; ++c) result.std_error.pixel(3 * x, 7)[c] = 0.1f * std::sqrt(60.0f);  // 0.38
-  EXPECT_EQ(doubt_of_prediction(result, 48, 48), "");
+  EXPECT_EQ(predicted_error(result, 48, 48)->doubt, "");
   std::fill(result.std_error.data.begin(), result.std_error.data.end(), 0.0f);
-  EXPECT_EQ(doubt_of_prediction(result, 48, 48), "");
-  EXPECT_EQ(doubt_of_prediction(result, 47, 48), "fewer than 48 samples per pixel");
-  EXPECT_EQ(doubt_of_prediction(result, 1, 0), "");
+  EXPECT_EQ(predicted_error(result, 48, 48)->doubt, "");
+  EXPECT_EQ(predicted_error(result, 47, 48)->doubt, "fewer than 48 samples per pixel");
+  EXPECT_EQ(predicted_error(result, 1, 0)->doubt, "");
   result.estimate = result.std_error = Image(3, 2, 3);
   result.std_error.pixel(1, 1)[0] = 1;
-  EXPECT_EQ(doubt_of_prediction(result, 48, 48), "") << "six pixels have no hundredth";
+  EXPECT_EQ(predicted_error(result, 48, 48)->doubt, "") << "six pixels have no hundredth";
 }
 
 TEST(PredictedError, IsDoubtedWhereHeldOutSamplesDoNotConfirmIt) {
@@ -66,7 +66,7 @@ TEST(PredictedError, IsDoubtedWhereHeldOutSamplesDoNotConfirmIt) {
   result.estimate = result.std_error = Image(2, 2, 3);
   const auto doubt = [&](double uncertainty, double ratio) {
     result.verdict = {uncertainty, ratio};
-    return doubt_of_prediction(result, 48, 48);
+    return predicted_error(result, 48, 48)->doubt;
   };
   EXPECT_EQ(doubt(0.2, 1), "");
   EXPECT_EQ(doubt(0.49, 3.9), "");

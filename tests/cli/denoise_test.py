@@ -13,6 +13,8 @@ from render_test import IICV, ROOM, SMALL, RenderTest
 
 # Without Open Image Denoise, so that results do not depend on what is installed.
 PLAIN = ("--oidn", "off")
+# Whose noise lies in many pixels, so that there are intervals.
+MATERIALS = ROOM.replace("room", "materials")
 
 
 def exponential_noise(seed):
@@ -140,7 +142,7 @@ class Denoise(RenderTest):
                  "-o", "e.exr", *PLAIN)
 
     def test_interval(self):
-        render = ("render", ROOM, *SMALL[:2], "-o", "a.exr", "--spp", "48", *PLAIN, "--passes", "films", "--json",
+        render = ("render", MATERIALS, *SMALL[:2], "-o", "a.exr", "--spp", "48", *PLAIN, "--passes", "films", "--json",
                   "a.json")
         last = self.good(*render).stderr.splitlines()[-1]
         facts = json.loads((self.path / "a.json").read_text())
@@ -161,6 +163,28 @@ class Denoise(RenderTest):
         width, height = map(int, SMALL[1].split("x"))
         self.good("convert", "a.exr", "errors.png", "--layer", "StdError", "--false-colours")
         self.assertEqual((self.path / "errors.png").read_bytes()[16:24], bytes([0, 0, 0, width, 0, 0, 0, height + 17]))
+
+    def test_intervals_of_all_kinds(self):
+        for name, options in (("mean", ("--estimator", "none", "--groups", "12")), ("pair", ("--estimator", "iicv")),
+                              ("denoised pair", ("--estimator", "iicv", "--denoise", "auto", *PLAIN))):
+            with self.subTest(name):
+                last = self.good("render", MATERIALS, *SMALL[:2], "-o", "k.exr", "--spp", "96", *options, "--json",
+                                 "k.json", "--overwrite").stderr.splitlines()[-1]
+                facts = json.loads((self.path / "k.json").read_text())
+                low, middle, high = (facts[f"predicted_relmse{end}"] for end in ("_low", "", "_high"))
+                self.assertTrue(0 < low < middle < high, facts)
+                self.assertRegex(last, r"predicted relMSE 0\.\d+, between 0\.\d+ and 0\.\d+ \(80 %\)")
+                attributes = json.loads(self.good("info", "k.exr", "--json").stdout)["attributes"]
+                for told, bound in zip(attributes["covary:predicted_relmse_80"].split(), (low, high), strict=True):
+                    self.assertAlmostEqual(float(told) / bound, 1, 3)
+        # What a film says of its image is no part of the film.
+        film = ("render", MATERIALS, *SMALL[:2], "-o", "f.exr", "--estimator", "none", "--groups", "12", "--quiet")
+        self.good(*film, "--spp", "24", "--json", "f.json")
+        self.assertIn("predicted_relmse_high", json.loads((self.path / "f.json").read_text()))
+        self.good(*film, "--spp", "24", "--seed", "1", "-o", "g.exr")
+        self.good("merge", "f.exr", "g.exr", "-o", "h.exr")
+        self.assertNotIn("covary:predicted_relmse",
+                         json.loads(self.good("info", "h.exr", "--json").stdout)["attributes"])
 
     def test_layers_of_other_renderers(self):
         """Picture, albedo and normal by each renderer's names (docs/other-renderers.md)."""

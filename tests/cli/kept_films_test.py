@@ -218,19 +218,27 @@ class LeftOver(FilmsTest):
 
 class WantedError(FilmsTest):
     """--until decides on samples in rounds, and takes the same ones after an interruption."""
-    UNTIL = (*IICV, "--until", "relmse=0.003", "--quiet", "--no-preview")
+    UNTIL = ("--until", "relmse=0.003", "--quiet", "--no-preview")
 
     def test_interrupted_and_resumed(self):
-        self.good("render", ROOM, *SMALL, *self.UNTIL, "-o", "whole.exr")
+        # Of each film: of 24 in the first round, and of 120 in the last.
+        self.check((*IICV, *self.UNTIL), "crn", (12, 84), ((signal.SIGKILL, -9), (signal.SIGTERM, 143)))
+
+    def test_denoised(self):
+        self.check(("--oidn", "off", "--until", "relmse=0.0015", *self.UNTIL[2:]), "independent", (12, 108),
+                   ((signal.SIGTERM, 143),))
+
+    def check(self, options, film, all_samples, ends):
+        self.good("render", ROOM, *SMALL, *options, "-o", "whole.exr")
         whole = read_exr((self.path / "whole.exr").read_bytes())
-        for sent, code in ((signal.SIGKILL, -9), (signal.SIGTERM, 143)):
-            for samples in (12, 84):  # of each film: of 24 in the first round, and of 120 in the last
+        for sent, code in ends:
+            for samples in all_samples:
                 with self.subTest(code=code, samples=samples):
-                    process = self.start("-o", "out.exr", *self.UNTIL, "--checkpoint", "0.01", "--overwrite",
+                    process = self.start("-o", "out.exr", *options, "--checkpoint", "0.01", "--overwrite",
                                          "--threads", "1")
-                    self.wait_for(lambda: self.samples("out.passes/crn.exr") >= samples, process)
+                    self.wait_for(lambda: self.samples(f"out.passes/{film}.exr") >= samples, process)
                     self.assertEqual(self.stop(process, sent)[0], code)
-                    self.good("render", ROOM, *SMALL, *self.UNTIL, "-o", "out.exr", "--resume")
+                    self.good("render", ROOM, *SMALL, *options, "-o", "out.exr", "--resume")
                     self.assertEqual(read_exr((self.path / "out.exr").read_bytes()), whole)
 
     def samples(self, film):

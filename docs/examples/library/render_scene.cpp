@@ -27,7 +27,7 @@ int main(int argc, char** argv) try {
   const covary::RenderResult result = covary::render(scene, plan, request, callbacks);
 
   std::printf("%g samples per pixel in %.2f s, predicted relMSE %.3g\n", result.samples_per_pixel(),
-              result.render_seconds(), result.predicted_relmse.value_or(0));
+              result.render_seconds(), result.predicted ? result.predicted->relmse : 0.0);
   return 0;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "render_scene: %s\n", error.what());

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Renders of scenes with few samples and with many, the images that covary makes of them, and their true errors."""
+import csv
+import json
+import math
+import subprocess
+from pathlib import Path
+
+import numpy
+from variants import size_of, write_variant
+
+HERE = Path(__file__).resolve().parent
+SCENES = HERE.parent.parent / "scenes"
+#: Samples, seed, and groups as a render has them
+RENDERS = [(16, 1, 8), (48, 2, 12), (144, 3, 12)]
+#: Of these there is an image with common random numbers, of as many samples
+MOST_OF_PAIRS = 48
+REFERENCE_SPP, REFERENCE_SEEDS = 128, (1001, 1002)
+#: What images are made by, in the order of ErrorKind in src/estimators/estimator_result.h, and the options of it.
+KINDS = {"mean": [],
+         "pair": ["--estimator", "iicv", "--error"],
+         "filters": ["--denoise", "auto", "--oidn", "off"],
+         "network": ["--denoise", "auto"],
+         "pair-filters": ["--estimator", "iicv", "--error", "--denoise", "auto", "--oidn", "off"],
+         "pair-network": ["--estimator", "iicv", "--error", "--denoise", "auto"]}
+
+
+def run(arguments, *words):
+    command = ["nice", "-n", str(arguments.nice), arguments.program, *map(str, words)]
+    result = subprocess.run(command, capture_output=True, text=True)
+    if result.returncode:
+        raise SystemExit(f"{' '.join(command)}\n{result.stderr}")
+
+
+def render(arguments, scene, size, spp, seed, film, *more):
+    run(arguments, "render", *scene, "--resolution", size, "--rfilter", "box", "--estimator", "none", "--denoise",
+        "none", "--spp", spp, "--seed", seed, *more, "--quiet", "-o", film)
+
+
+def render_all(arguments):
+    """Films of every variant, where they are missing."""
+    folder = arguments.work
+    for name in arguments.variants:
+        scene = write_variant(name, SCENES, folder)
+        films = [(f"{name}-{spp}-{seed}", spp, seed, ["--groups", groups, "--aovs"]) for spp, seed, groups in RENDERS]
+        films += [(f"{name}-{spp}-{seed}-crn", spp, seed, ["--groups", groups, "--sampling", "crn"])
+                  for spp, seed, groups in RENDERS if spp <= MOST_OF_PAIRS]
+        films += [(f"{name}-ref-{seed}", REFERENCE_SPP, seed, []) for seed in REFERENCE_SEEDS]
+        for stem, spp, seed, more in films:
+            if not (folder / f"{stem}.done").exists():
+                render(arguments, scene, size_of(name), spp, seed, folder / f"{stem}.exr", "--overwrite", *more)
+                (folder / f"{stem}.done").touch()
+
+
+def pixels(arguments, path):
+    """The image of a file, in double precision."""
+    raw = arguments.work / "pixels.pfm"
+    run(arguments, "convert", path, raw, "--overwrite")
+    with open(raw, "rb") as file:
+        assert file.readline().strip() == b"PF"
+        width, height = map(int, file.readline().split())
+        kind = "<f4" if float(file.readline()) < 0 else ">f4"
+        return numpy.frombuffer(file.read(), kind).reshape(height, width, 3)[::-1].astype(float)
+
+
+def relmse(image, first, second):
+    """In product form, and the standard error that the noise of the references gives it."""
+    mean = (first + second) / 2
+    weight = 1 / (mean.mean(2, keepdims=True)**2 + 0.01)
+    product = (weight * (image - first) * (image - second)).mean(2)
+    cross = (weight * (image - mean) * (first - second)).mean(2)
+    square = (weight * (first - second)**2 / 4).mean(2)
+    return product.mean(), math.sqrt((cross.var() + square.var()) / cross.size)
+
+
+def image_of(arguments, name, spp, seed, kind):
+    """The image of films, and what the program tells of it."""
+    image, facts = arguments.work / "image.exr", arguments.work / "facts.json"
+    film = arguments.work / f"{name}-{spp}-{seed}.exr"
+    if kind == "mean":  # the film is complete, so that nothing is rendered
+        groups = next(groups for n, s, groups in RENDERS if (n, s) == (spp, seed))
+        render(arguments, write_variant(name, SCENES, arguments.work), size_of(name), spp, seed, film, "--groups",
+               groups, "--aovs", "--resume", "--json", facts)
+        return pixels(arguments, film), json.loads(facts.read_text())
+    films = ["--independent", film, "--guides", film]
+    if kind.startswith("pair"):
+        films += ["--crn", arguments.work / f"{name}-{spp}-{seed}-crn.exr"]
+        if kind == "pair":
+            films = films[:2] + films[4:]
+    image.unlink(missing_ok=True)
+    # Of dark rooms many pixels are 0 in all groups, which looks like one render twice.
+    run(arguments, "combine", *films, *KINDS[kind], "-o", image, "--json", facts, "--quiet", "--force")
+    return pixels(arguments, image), json.loads(facts.read_text())
+
+
+def measure_all(arguments):
+    """A row for each image: kind, truth and the sums that the program tells; written after each scene."""
+    rows = []
+    for name in arguments.variants:
+        references = [pixels(arguments, arguments.work / f"{name}-ref-{seed}.exr") for seed in REFERENCE_SEEDS]
+        for spp, seed, _ in RENDERS:
+            for kind in KINDS:
+                if kind.startswith("pair") and spp > MOST_OF_PAIRS:
+                    continue
+                image, facts = image_of(arguments, name, spp, seed, kind)
+                if not facts.get("error_sums"):
+                    continue
+                truth, noise = relmse(image, *references)
+                rows.append({"scene": name, "kind": kind, "spp": spp, "seed": seed, "relmse": truth,
+                             "reference_noise": noise, **facts["error_sums"]})
+        write(rows, arguments.data)
+        print(name, flush=True)
+
+
+def write(rows, path):
+    with open(path, "w", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows({key: f"{value:.6g}" if isinstance(value, float) else value for key, value in row.items()}
+                         for row in rows)
