@@ -333,7 +333,7 @@ class Numbers(OutputsTest):
             self.bad(2, f"--k: '{text}': expected a whole number", *combine, f"--k={text}")
         for text in ("0", "4097", "-1", "0x2", "18446744073709551617"):
             self.bad(2, f"--threads: '{text}': expected a whole number from 1 to 4096", *combine, f"--threads={text}")
-        self.bad(2, "--explain: '-1': expected a whole number from 0", *combine, "--explain=-1,2")
+        self.bad(2, "--explain '-1,2': expected X,Y", *combine, "--explain=-1,2")
         self.bad(2, "--spp: '0': expected a whole number from 1 to 1073741824", "experiment", "quick", "-o", "o",
                  "--spp", "24,0")
         self.bad(2, "--reference-spp: '4294967296': expected", "experiment", "quick", "-o", "o", "--reference-spp",
@@ -354,7 +354,7 @@ class Numbers(OutputsTest):
         combine = ("combine", "--crn", "a.exr", "--independent", "b.exr", "-o", "o.exr")
         for text in ("nan", "inf", "-inf", "0x1p3", "1e999", "1.5x"):
             self.bad(2, f"--ridge: '{text}': expected a number", *combine, f"--ridge={text}")
-            self.bad(2, f"--memory: '{text}': expected a positive number", *combine, f"--memory={text}")
+            self.bad(2, f"--memory: '{text}': expected a number above 0", *combine, f"--memory={text}")
             self.bad(2, f"--time: '{text}': expected a positive number", "experiment", "quick", "-o", "o",
                      f"--time={text}")
             self.bad(2, f"--exposure: '{text}': expected a number from -100 to 100", "convert", "a.exr", "a.png",
