@@ -89,8 +89,8 @@ class OneScreen(HelpTest):
 class Pages(HelpTest):
     """The pages name options that there are."""
 
-    #: Of Dask, `covary experiment --cluster`, and scripts that the pages name.
-    OTHERS = {"--cluster", "--scheduler-file", "--local-directory", "--variants", "--each-trained"}
+    #: Of Dask, Slurm, `covary experiment --cluster`, and scripts that the pages name.
+    OTHERS = {"--cluster", "--scheduler-file", "--local-directory", "--requeue", "--variants", "--each-trained"}
 
     def test_options(self):
         known = {option for options in self.options.values() for option in options} | self.OTHERS
