@@ -130,7 +130,7 @@ class Probe(CliTest):
             self.assertNotIn(f"'probe {option[0]}'", completed)
         self.assertIn("'probe --seed'", completed)
         for option in ("--seed", "--crop", "--guiding-lobes", "--load-training", "--pixel"):
-            self.assertIn(option + " ", listed)
+            self.assertRegex(listed, option + "[ ,]")
 
     def test_refuses_what_it_cannot_show(self):
         self.bad(2, "--pixel '48,0' is outside the 48 x 32 frame", *self.PROBE, "--pixel", "48,0")
