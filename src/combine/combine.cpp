@@ -45,6 +45,7 @@ void append(const EstimatorResult& part, int skipped, int y, int n, int height, 
   copy(part.estimate, whole.estimate);
   copy(part.std_error, whole.std_error);
   copy(part.bias, whole.bias);
+  whole.risk_kind = part.risk_kind;
   if (!part.held_out.empty())
     whole.held_out.insert(whole.held_out.end(), part.held_out.begin() + skipped, part.held_out.begin() + skipped + n);
   if (!part.risk_rows.empty())

@@ -27,8 +27,8 @@ using ErrorFeatures = std::array<double, kErrorFeatures>;
 /// Of the sums of a whole image that has a variance: 1; log(R / V), where noise hides it towards 0, and how much it is
 /// hidden, 0 to 1; logs of the noise of h over V, of the noise, of the kurtosis between groups, of how many pixels hold
 /// the noise, of the share of light that the largest group of each pixel has, and of the prediction by the standard
-/// error over V. R is the error of image_risk.h with 1.27 times its covariance: halves are smoothed more than the whole,
-/// and groups that are left out tell so much more.
+/// error over V. R is the error of image_risk.h with 1.27 times its covariance: halves are smoothed more than the
+/// whole, and groups that are left out tell so much more.
 ErrorFeatures error_features(const RiskRow& sums);
 
 /// What is known of log(relMSE).
@@ -40,8 +40,9 @@ LogError fitted_error(const RiskRow& sums, ErrorKind kind);
 /// Why no interval can be given; empty where one can.
 std::string unknown_error(const RiskRow& sums, const LogError& error);
 
-/// Scales the standard error of `result` so that its relMSE is the middle of the interval (that of a mean stays as it is,
-/// unbiased in every pixel), and sets `result.interval` and `result.risk_sums`. Empties `result.risk_rows`; does nothing where there are none.
+/// Scales the standard error of `result` so that its relMSE is the middle of the interval (that of a mean stays as it
+/// is, unbiased in every pixel), and sets `result.interval` and `result.risk_sums`. Empties `result.risk_rows`; does
+/// nothing where there are none.
 void apply_interval(EstimatorResult& result);
 
 }  // namespace covary
