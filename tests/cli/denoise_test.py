@@ -178,10 +178,10 @@ class Denoise(RenderTest):
                 for told, bound in zip(attributes["covary:predicted_relmse_80"].split(), (low, high), strict=True):
                     self.assertAlmostEqual(float(told) / bound, 1, 3)
         # What a film says of its image is no part of the film.
-        film = ("render", MATERIALS, *SMALL[:2], "-o", "f.exr", "--estimator", "none", "--groups", "12", "--quiet")
-        self.good(*film, "--spp", "24", "--json", "f.json")
+        film = ("render", MATERIALS, *SMALL[:2], "--estimator", "none", "--groups", "12", "--quiet", "--spp", "24")
+        self.good(*film, "-o", "f.exr", "--json", "f.json")
         self.assertIn("predicted_relmse_high", json.loads((self.path / "f.json").read_text()))
-        self.good(*film, "--spp", "24", "--seed", "1", "-o", "g.exr")
+        self.good(*film, "-o", "g.exr", "--seed", "1")
         self.good("merge", "f.exr", "g.exr", "-o", "h.exr")
         self.assertNotIn("covary:predicted_relmse",
                          json.loads(self.good("info", "h.exr", "--json").stdout)["attributes"])

@@ -131,7 +131,7 @@ class Until(RenderTest):
 
     def test_an_unreliable_prediction_at_most_doubles_the_samples(self):
         for scene, resolution, doubt, budgets in (("caustic", "48x36", True, "96 192 384 500"),
-                                                  ("room", "96x64", False, "96 384 500")):
+                                                  ("wall", "96x64", False, "96 384 500")):
             result = self.run_covary("render", str(SCENES / f"{scene}.xml"), "--resolution", resolution, "-o", "a.exr",
                                      "--quiet", "--no-preview", *IICV, "--until", "relmse=1e-9", "--spp", "500",
                                      "--passes", scene)
