@@ -119,7 +119,7 @@ def _common_numbers(mi: Any, drjit: Any) -> Any:
     return CommonNumbers
 
 
-def _around(mi: Any, drjit: Any) -> Any:
+def _sensor_around(mi: Any, drjit: Any) -> Any:
     """The class of the sensor around another."""
     class Around(mi.Sensor):  # type: ignore[misc,unused-ignore]
         """Another sensor with a film and a sampler of its own. With `groups`, the film holds the frame so many times,
@@ -159,7 +159,7 @@ def _define_plugins(mi: Any) -> None:
         return
     import drjit  # type: ignore[import-not-found,import-untyped,unused-ignore]
     mi.register_sampler("covary_common_numbers", _common_numbers(mi, drjit))
-    mi.register_sensor("covary_around", _around(mi, drjit))
+    mi.register_sensor("covary_around", _sensor_around(mi, drjit))
     _defined[mi.variant()] = None
 
 
