@@ -17,6 +17,7 @@
 
 #include "command_description.h"
 #include "commands.h"
+#include "core/detached_work.h"
 #include "core/error.h"
 #include "core/shell_text.h"
 #include "core/unfinished.h"
@@ -117,6 +118,20 @@ int run(int argc, char** argv) {
   return 0;
 }
 
+/// The exit code; errors are told on standard error.
+int run_and_report(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const Error& error) {
+    return report("covary", error);
+  } catch (const std::bad_alloc&) {
+    std::fputs("covary: out of memory\n", stderr);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "covary: internal error: %s\n", error.what());
+  }
+  return 1;
+}
+
 }  // namespace
 
 const std::string& command_line() { return g_command_line; }
@@ -148,14 +163,12 @@ int main(int argc, char** argv) {
   // A file that outgrows its limit is an error like a full disk, which leaves no half-written file behind.
   std::signal(SIGXFSZ, SIG_IGN);
   covary::catch_signals();
-  try {
-    return covary::run(argc, argv);
-  } catch (const covary::Error& error) {
-    return covary::report("covary", error);
-  } catch (const std::bad_alloc&) {
-    std::fputs("covary: out of memory\n", stderr);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "covary: internal error: %s\n", error.what());
+  const int code = covary::run_and_report(argc, argv);
+  if (covary::has_detached_work()) {
+    // Ctrl-C ends the program now, not when a library has come to the end of its step.
+    std::cout.flush();
+    std::fflush(nullptr);
+    _exit(code);
   }
-  return 1;
+  return code;
 }

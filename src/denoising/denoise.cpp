@@ -7,17 +7,18 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstdlib>
 #include <deque>
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <string_view>
+#include <utility>
 #include <vector>
 
+#include "core/detached_work.h"
 #include "core/error.h"
-#include "core/stop.h"
 
 namespace covary {
 namespace {
@@ -212,31 +213,50 @@ struct Denoiser::Library {
     if (api.device_error(device.get(), &message) != 0 || !device)
       throw Error(ErrorCode::kIo, fmt::format("Open Image Denoise: {}", message ? message : "no processor device"));
   }
+};
 
-  /// Runs the filter "RT" with these inputs, some of which may be null.
-  Image run(std::initializer_list<std::pair<const char*, const Image*>> inputs, bool hdr, bool clean_guides) const {
-    const std::unique_ptr<void, void (*)(void*)> filter(api.new_filter(device.get(), "RT"), api.release_filter);
-    check();
-    std::deque<Image> kept;
+namespace {
+
+/// One run of the filter "RT". It owns all that the library touches: the library cannot be stopped inside of a layer
+/// of the network (half a second and more on large images), so that its thread may outlive whoever asked for the image.
+struct Run {
+  std::shared_ptr<const Denoiser::Library> library;
+  std::deque<std::pair<const char*, Image>> inputs;  ///< by the filter's names; at least one
+  bool hdr = false, clean_guides = false;
+  Image result;
+  std::atomic<bool> cancelled{false};
+
+  /// Throws Error(kIo) when the library refuses to work, or was cancelled.
+  void execute() {
+    const Api& api = library->api;
+    // Errors of the library belong to the thread that asks for them.
+    const std::unique_ptr<void, void (*)(void*)> filter(api.new_filter(library->device.get(), "RT"),
+                                                        api.release_filter);
+    library->check();
     const auto set = [&](const char* name, Image& image) {
       api.set_image(filter.get(), name, image.data.data(), Api::kFormatFloat3, image.width, image.height, 0, 0, 0);
     };
-    for (const auto& [name, image] : inputs)
-      if (image) set(name, kept.emplace_back(finite(*image)));
-    Image result(kept.front().width, kept.front().height, 3);
+    for (auto& [name, image] : inputs) set(name, image);
+    result = Image(inputs.front().second.width, inputs.front().second.height, 3);
     set("output", result);
     if (hdr) api.set_bool(filter.get(), "hdr", true);
     if (clean_guides) api.set_bool(filter.get(), "cleanAux", true);
-    std::function<bool()> stopped = stop_question();
     api.set_progress(
-        filter.get(), [](void* data, double) { return !(*static_cast<std::function<bool()>*>(data))(); }, &stopped);
+        filter.get(), [](void* data, double) { return !static_cast<std::atomic<bool>*>(data)->load(); }, &cancelled);
     api.commit_filter(filter.get());
-    check();
+    library->check();
     api.execute_filter(filter.get());
-    check();
-    return result;
+    library->check();
   }
 };
+
+/// The result; throws Stopped as soon as the work around it is to end.
+Image image_of(const std::shared_ptr<Run>& run) {
+  run_detached([run] { run->execute(); }, [run] { run->cancelled = true; });
+  return std::move(run->result);
+}
+
+}  // namespace
 
 void check_guide(const std::string& name, const Image& guide) {
   const auto it = std::find_if(guide.data.begin(), guide.data.end(), [](float v) { return !std::isfinite(v); });
@@ -247,18 +267,26 @@ void check_guide(const std::string& name, const Image& guide) {
                                              name, *it, pixel % guide.width, pixel / guide.width));
 }
 
-Denoiser::Denoiser(const DenoiseOptions& options) : library_(std::make_unique<Library>(options)) {}
+Denoiser::Denoiser(const DenoiseOptions& options) : library_(std::make_shared<Library>(options)) {}
 Denoiser::~Denoiser() = default;
 
 Image Denoiser::denoise(const Image& rgb, const Image* albedo, const Image* normal, bool clean_guides) {
   check_images(rgb, albedo, normal);
-  return library_->run({{"color", &rgb}, {"albedo", albedo}, {"normal", normal}}, true, clean_guides && albedo);
+  const auto run = std::make_shared<Run>();
+  run->library = library_, run->hdr = true, run->clean_guides = clean_guides && albedo;
+  run->inputs.emplace_back("color", finite(rgb));
+  if (albedo) run->inputs.emplace_back("albedo", finite(*albedo));
+  if (normal) run->inputs.emplace_back("normal", finite(*normal));
+  return image_of(run);
 }
 
 Image Denoiser::denoise_guide(const std::string& name, const Image& guide) {
   COVARY_CHECK(name == "albedo" || name == "normal", "a guide is an albedo or a normal");
   check_images(guide, nullptr, nullptr);
-  return library_->run({{name.c_str(), &guide}}, false, false);
+  const auto run = std::make_shared<Run>();
+  run->library = library_;
+  run->inputs.emplace_back(name == "albedo" ? "albedo" : "normal", finite(guide));
+  return image_of(run);
 }
 
 Image denoise(const Image& rgb, const Image* albedo, const Image* normal, const DenoiseOptions& options) {

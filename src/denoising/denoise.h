@@ -23,6 +23,7 @@ struct DenoiseOptions {
 /// machine, with other numbers of threads, too, where this was measured (docs/methods/denoising.md).
 class Denoiser {
  public:
+  struct Library;
   /// Throws Error(kUsage) when the library is missing, with how to get it, and Error(kIo) when it refuses to work.
   explicit Denoiser(const DenoiseOptions& options = {});
   ~Denoiser();
@@ -32,14 +33,14 @@ class Denoiser {
   /// Denoises `rgb` (linear, 3 channels, high dynamic range) on the processor. `albedo` in [0, 1] and `normal` in
   /// [-1, 1] (3 channels, the same size; the normal only together with the albedo) or null: guides that keep texture
   /// and edges; they may be noisy unless `clean_guides` says that they are not. Values that are not finite become zero
-  /// before. Throws Error(kInput) when sizes differ, and Error(kIo) when the library refuses to work.
+  /// before. Throws Error(kInput) when sizes differ, and Error(kIo) when the library refuses to work. Inside of
+  /// run_stoppable() it ends at once; the library's own work is left behind until its next step (core/detached_work.h).
   Image denoise(const Image& rgb, const Image* albedo, const Image* normal, bool clean_guides = false);
   /// The same of a guide alone, which makes it clean. `name`: "albedo" or "normal".
   Image denoise_guide(const std::string& name, const Image& guide);
 
  private:
-  struct Library;
-  std::unique_ptr<Library> library_;
+  std::shared_ptr<Library> library_;
 };
 
 /// Throws Error(kInput) where a guide has a value that is not finite, which would spread over the image. `name` stands

@@ -45,5 +45,31 @@ class EveryCommand(CliTest):
                 pipe.unlink()
 
 
+class WhileDenoising(CliTest):
+    """The denoiser's library cannot be stopped inside of a step: it is left behind."""
+
+    def test_ends_at_once(self):
+        room = str(Path(os.environ["SCENES"]) / "room.xml")
+        small = ("--resolution", "24x16", "--spp", "24", "--quiet", "--no-preview")
+        library = os.environ["STAND_IN_DENOISER"]
+        surrogate = ("--integrator", "controlled-path", "--cv-surrogate", "oidn", "--oidn", library)
+        cases = (("render", room, *small, "-o", "a.exr", "--denoise", "error", "--oidn", library),
+                 ("render", room, *small, "-o", "b.exr", *surrogate))
+        for command in cases:
+            with self.subTest(" ".join(command[-4:])):
+                begins = self.path / "begins"
+                process = subprocess.Popen([COVARY, *command], cwd=self.path, stdout=subprocess.DEVNULL,
+                                           stderr=subprocess.PIPE, text=True,
+                                           env={**os.environ, "STAND_IN_BEGINS": str(begins)})
+                self.addCleanup(process.kill)
+                while process.poll() is None and not begins.exists():
+                    time.sleep(0.01)
+                process.send_signal(signal.SIGINT)
+                errors = process.communicate(timeout=60 * SLOWDOWN)[1]
+                self.assertEqual(process.returncode, 130, errors)
+                self.assertIn("interrupted", errors)
+                begins.unlink()
+
+
 if __name__ == "__main__":
     unittest.main()

@@ -1,9 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // Stands in for Open Image Denoise where tests need one that is at a place of its own: the functions of its interface
 // that covary calls (denoising/denoise.cpp). Its image is the input turned upside down, which no filter makes.
+// Where STAND_IN_BEGINS names a file, it is made when a filter begins, which then works for ten minutes and cannot be
+// cancelled.
+#include <chrono>
 #include <cstddef>
+#include <cstdlib>
+#include <fstream>
 #include <map>
 #include <string>
+#include <thread>
 
 namespace {
 
@@ -35,7 +41,12 @@ void oidnSetFilterBool(void*, const char*, bool) {}
 void oidnSetFilterProgressMonitorFunction(void*, bool (*)(void*, double), void*) {}
 void oidnCommitFilter(void*) {}
 void oidnExecuteFilter(void* filter) {
-  const Plane from = static_cast<Filter*>(filter)->at("color"), to = static_cast<Filter*>(filter)->at("output");
+  if (const char* begins = std::getenv("STAND_IN_BEGINS")) {
+    std::ofstream(begins).close();
+    std::this_thread::sleep_for(std::chrono::minutes(10));
+  }
+  Filter& planes = *static_cast<Filter*>(filter);
+  const Plane from = planes.contains("color") ? planes.at("color") : planes.begin()->second, to = planes.at("output");
   const size_t n = 3 * from.width * from.height;
   for (size_t i = 0; i < n; ++i) to.data[i] = from.data[n - 1 - i];
 }
