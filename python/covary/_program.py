@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import sys
 from pathlib import Path
 
 from . import _covary
@@ -25,14 +24,3 @@ def program() -> Path:
 def run_program(*words: str | os.PathLike[str]) -> tuple[int, str, str]:
     """Exit code, standard output and error of the program, which ends with this process, however that ends."""
     return _covary.run_program([str(program()), *(os.fspath(word) for word in words)])
-
-
-def main() -> None:
-    """Becomes the program, with the arguments of this process: the command `covary` of an installed package. Only
-    `covary experiment … --cluster ADDRESS` is Python's."""
-    if sys.argv[1:2] == ["experiment"] and any(word.partition("=")[0] == "--cluster" for word in sys.argv):
-        from .distributed import main as on_cluster
-
-        sys.exit(on_cluster(sys.argv[1:]))
-    path = str(program())
-    os.execv(path, [path, *sys.argv[1:]])

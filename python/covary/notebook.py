@@ -13,7 +13,6 @@ from typing import Any
 from . import _covary
 from ._arguments import Rule, checked, flag, path, text, whole
 from ._program import program
-from ._result import Result
 from .errors import Error
 
 
@@ -52,7 +51,7 @@ def _file_of(argument: str, image: Any, folder: Path, name: str) -> str:
         raise ValueError(f"images: found the name {name!r}; accepted are names without '/' that begin with no dot")
     path = str(folder / f"{name}.exr")
     try:
-        _covary.write_image(path, image.image if isinstance(image, Result) else image, {})
+        _covary.write_image(path, getattr(image, "image", image), {})  # of a result
     except (TypeError, ValueError) as error:
         raise type(error)(f"{argument}: {str(error).removeprefix('image: ')}") from None
     return path

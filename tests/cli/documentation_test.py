@@ -11,7 +11,7 @@ from cli_test import CliTest
 
 SOURCE = Path(os.environ["SOURCE"])
 PAGES = [SOURCE / "README.md", SOURCE / "CONTRIBUTING.md", *sorted((SOURCE / "docs").rglob("*.md"))]
-OF_PYTHON = "--cluster"  # of the program `covary` that pip installs (python/covary/_program.py)
+OF_PYTHON = "--cluster"  # of the program `covary` that pip installs (python/covary/_main.py)
 
 
 def code_blocks(text):

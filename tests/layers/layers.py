@@ -118,6 +118,33 @@ def includes_follow_arrows(root):
     return problems
 
 
+def python_imports(root, path):
+    """Names of the files beside this one that it imports: at its top, inside of functions, for types alone."""
+    names = set()
+    for node in ast.walk(ast.parse(read(root, path))):
+        if isinstance(node, ast.ImportFrom) and node.level == 1:
+            names |= {node.module} if node.module else {name.name for name in node.names}
+    return names
+
+
+def python_has_no_circle(root):
+    """No file of the Python package imports itself through others."""
+    imports = {os.path.basename(path)[:-3]: python_imports(root, path)
+               for path in files(root, ["python/covary"], ".py")}
+    problems = []
+    for start in sorted(imports):
+        ways = [[name] for name in sorted(imports[start] & imports.keys())]
+        seen = set()
+        for way in ways:  # grows
+            if way[-1] == start:
+                problems.append(f"python/covary/{start}.py:1: imports itself: {' -> '.join([start, *way])}")
+                break
+            new = (imports[way[-1]] & imports.keys()) - seen
+            seen |= new
+            ways += [[*way, name] for name in sorted(new)]
+    return problems
+
+
 def links_follow_arrows(root):
     """The DEPENDS of a module's CMakeLists.txt obey the same arrows."""
     problems = []
@@ -335,7 +362,7 @@ def modules_fit(root):
 
 
 CHECKS = [lines_fit, files_fit, functions_fit, modules_fit, includes_follow_arrows, links_follow_arrows,
-          architecture_draws_the_arrows, licence_lines, no_leftovers, citations_have_entries,
+          python_has_no_circle, architecture_draws_the_arrows, licence_lines, no_leftovers, citations_have_entries,
           documented_names_match_registries, documented_parameters, documented_commands]
 
 

@@ -124,6 +124,15 @@ class Planted(unittest.TestCase):
                     "architecture.md:1: core has arrows to nothing",
                     "architecture.md:3: draws src/utils, which there is not")
 
+    def test_circle_of_python_files(self):
+        self.write("python/covary/a.py", "# SPDX-License-Identifier: Apache-2.0\nfrom . import b, other\n")
+        self.write("python/covary/b.py", "# SPDX-License-Identifier: Apache-2.0\ndef f():\n    from .c import g\n")
+        self.write("python/covary/c.py", "# SPDX-License-Identifier: Apache-2.0\n")
+        self.expect(layers.python_has_no_circle)
+        self.write("python/covary/c.py", "# SPDX-License-Identifier: Apache-2.0\nif T:\n    from .a import h\n")
+        self.expect(layers.python_has_no_circle, "a.py:1: imports itself: a -> b -> c -> a",
+                    "b.py:1: imports itself: b -> c -> a -> b", "c.py:1: imports itself: c -> a -> b -> c")
+
     def test_include_by_climbing(self):
         self.write("src/core/a.h", SPDX + '#include "../scene/scene.h"\n')
         self.expect(layers.includes_follow_arrows, "src/core/a.h:2: '../scene/scene.h' climbs out")

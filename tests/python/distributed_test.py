@@ -224,7 +224,7 @@ class Cluster(PackageTest):
 
     def test_experiment_by_its_address(self):
         (self.path / "suite.json").write_text(json.dumps({**SUITE, "seeds": 1}))
-        for start in (["-m", "covary.distributed"], ["-c", "import covary._program; covary._program.main()"]):
+        for start in (["-m", "covary.distributed"], ["-c", "import covary._main; covary._main.main()"]):
             command = [sys.executable, *start, "experiment", self.path / "suite.json", "-o", self.path / "out",
                        "--cluster", self.cluster.scheduler_address, "--scenes", SOURCE / "scenes"]
             run = subprocess.run(command, capture_output=True, text=True, check=False)
