@@ -23,24 +23,6 @@ namespace {
   throw Error(ErrorCode::kInput, path + ": " + what);
 }
 
-/// Whether OpenEXR reads the file, whatever it is called.
-bool is_film_or_exr(const std::string& path) {
-  if (is_exr(path)) return true;
-  std::error_code ignored;
-  if (std::filesystem::file_size(path, ignored) == 0) fail(path, "the file is empty");
-  return false;
-}
-
-ImagePlace place_of(const ImageHeader& header) {
-  return {header.frame_width, header.frame_height, {header.x, header.y, header.width, header.height}};
-}
-
-std::vector<ExrFile::Channel> channels_of(const ImageHeader& header) {
-  std::vector<ExrFile::Channel> result;
-  for (const std::string& name : header.channels) result.push_back({name, header.type});
-  return result;
-}
-
 std::string lower(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
   return text;
@@ -107,6 +89,13 @@ constexpr double kImageBytes = 3 * sizeof(float);  // per pixel
 
 }  // namespace
 
+bool is_exr_image(const std::string& path) {
+  if (is_exr(path)) return true;
+  std::error_code ignored;
+  if (std::filesystem::file_size(path, ignored) == 0) fail(path, "the file is empty");
+  return false;
+}
+
 void require_image_memory(const std::string& path, int width, int height, double bytes_per_pixel) {
   require_memory(path, fmt::format("an image of {} x {} pixels", width, height),
                  bytes_per_pixel * static_cast<double>(width) * height);
@@ -138,38 +127,46 @@ std::vector<std::string> layer_channels(const std::string& path, const std::vect
   fail(path, fmt::format("no layer '{}'{} ({})", layer, did_you_mean(layer, candidates), have));
 }
 
+ImageInfo info_of(const ImageHeader& header) {
+  ImageInfo info{header.format, header.compression, {}, {}, header.attributes};
+  info.place = {header.frame_width, header.frame_height, {header.x, header.y, header.width, header.height}};
+  for (const std::string& name : header.channels) info.channels.push_back({name, header.type});
+  return info;
+}
+
 ImageInfo inspect_image(const std::string& path, ChecksumPolicy checksums) {
-  if (is_film_or_exr(path)) {
+  if (is_exr_image(path)) {
     const ExrFile file(path, checksums);
     return {"openexr", file.compression(), file.place(), file.channels(), file.attributes()};
   }
-  const ImageHeader header = open_image(path)->header();
-  return {header.format, header.compression, place_of(header), channels_of(header), header.attributes};
+  return info_of(open_image(path)->header());
 }
 
 void check_image(const std::string& path) {
-  if (!is_film_or_exr(path)) return;
+  if (!is_exr_image(path)) return;
   const ExrFile file(path);
   for (const ExrFile::Channel& channel : file.channels()) file.check({&channel.name, 1});
 }
 
-namespace {
-
-std::vector<Image> read_exr_layers(const ExrFile& file, const std::string& path, std::span<const std::string> layers) {
+std::vector<Image> read_layers(const ExrFile& file, const std::string& path, std::span<const std::string> layers,
+                               int first_row, int n_rows) {
   const CropWindow window = file.place().window;
-  require_image_memory(path, window.width, window.height, kImageBytes * static_cast<double>(layers.size()));
+  require_image_memory(path, window.width, n_rows, kImageBytes * static_cast<double>(layers.size()));
   std::vector<Image> images;
   std::vector<ExrPlane> planes;
   std::vector<size_t> grey;
   images.reserve(layers.size());  // planes point into them
   for (const std::string& layer : layers) {
     const std::vector<std::string> names = layer_channels(path, file.channels(), layer);
-    Image& image = images.emplace_back(window.width, window.height, 3);
+    Image& image = images.emplace_back(window.width, n_rows, 3);
     if (names[0] == names[2]) grey.push_back(images.size() - 1);
     for (size_t c = 0; c < (names[0] == names[2] ? 1 : 3); ++c)
       planes.push_back({names[c], ExrPlane::Type::kFloat, image.data.data() + c, 3 * sizeof(float)});
   }
-  file.read(planes);
+  if (n_rows == window.height)
+    file.read(planes);
+  else
+    file.read_rows(planes, first_row, n_rows);
   for (const size_t i : grey) {
     std::vector<float>& data = images[i].data;
     for (size_t k = 0; k < data.size(); k += 3) data[k + 1] = data[k + 2] = data[k];
@@ -177,67 +174,14 @@ std::vector<Image> read_exr_layers(const ExrFile& file, const std::string& path,
   return images;
 }
 
-}  // namespace
-
 std::vector<Image> read_layers(const std::string& path, std::span<const std::string> layers) {
-  if (is_film_or_exr(path)) return read_exr_layers(ExrFile(path), path, layers);
+  if (is_exr_image(path)) {
+    const ExrFile file(path);
+    return read_layers(file, path, layers, 0, file.place().window.height);
+  }
   std::vector<Image> images;
   for (const std::string& layer : layers) images.push_back(read_image(path, layer).image);
   return images;
-}
-
-namespace {
-
-/// Channels `sources` of pixels with `n_channels` values, each decoded.
-template <typename T, typename Decode>
-void fill(const std::vector<T>& values, size_t n_channels, const std::array<size_t, 3>& sources, const Decode& decode,
-          Image& image) {
-  for (size_t p = 0; p < image.data.size() / 3; ++p)
-    for (size_t c = 0; c < 3; ++c) image.data[p * 3 + c] = decode(values[p * n_channels + sources[c]]);
-}
-
-/// Linear values of bytes, as OpenImageIO and srgb_to_linear() make them of each.
-std::array<float, 256> linear_bytes() {
-  std::array<float, 256> linear{};
-  for (size_t i = 0; i < linear.size(); ++i) linear[i] = srgb_to_linear(static_cast<float>(i) * (1.0f / 255));
-  return linear;
-}
-
-}  // namespace
-
-PlacedImage read_image(const std::string& path, const std::string& layer, ChecksumPolicy checksums) {
-  PlacedImage result;
-  if (is_film_or_exr(path)) {
-    const ExrFile file(path, checksums);
-    result.place = file.place();
-    result.image = std::move(read_exr_layers(file, path, {&layer, 1})[0]);
-    return result;
-  }
-
-  const std::unique_ptr<ImageReader> file = open_image(path);
-  const ImageHeader& header = file->header();
-  const std::vector<std::string> names = layer_channels(path, channels_of(header), layer);
-  result.place = place_of(header);
-  result.low_dynamic_range = !header.floating_point;
-  const size_t n_channels = header.channels.size();
-  std::array<size_t, 3> sources{};
-  for (size_t c = 0; c < 3; ++c)
-    sources[c] = std::find(header.channels.begin(), header.channels.end(), names[c]) - header.channels.begin();
-  const bool is_bytes = header.type == "uint8";
-  require_image_memory(path, header.width, header.height,
-                       kImageBytes + static_cast<double>(n_channels * (is_bytes ? 1 : sizeof(float))));
-  const auto last = static_cast<int>(n_channels);
-  if (is_bytes) {
-    const std::vector<uint8_t> values = file->read_bytes(0, last);
-    result.image = Image(header.width, header.height, 3);
-    fill(values, n_channels, sources, [linear = linear_bytes()](uint8_t value) { return linear[value]; }, result.image);
-  } else {
-    const std::vector<float> values = file->read_floats(0, last);
-    result.image = Image(header.width, header.height, 3);
-    const auto decode = [&](float value) { return result.low_dynamic_range ? srgb_to_linear(value) : value; };
-    fill(values, n_channels, sources, decode, result.image);
-  }
-  return result;
 }
 
 std::vector<ColourLayer> colour_layers(const std::vector<ExrFile::Channel>& channels) {

@@ -31,6 +31,14 @@ struct PlacedImage {
 /// Throws Error(kIo) when the file cannot be opened and Error(kInput) when it is damaged or of an unknown format.
 ImageInfo inspect_image(const std::string& path, ChecksumPolicy checksums = ChecksumPolicy::kCheck);
 
+struct ImageHeader;
+/// The same of a file that OpenImageIO has opened.
+ImageInfo info_of(const ImageHeader& header);
+
+/// Whether OpenEXR reads the file, whatever it is called; OpenImageIO reads all others. Throws Error(kInput) where the
+/// file is empty.
+bool is_exr_image(const std::string& path);
+
 /// Reads all of a file that covary wrote, for nothing but its checksums; throws Error(kInput) where it is not as it was
 /// written. Files without checksums pass unread.
 void check_image(const std::string& path);
@@ -46,6 +54,9 @@ PlacedImage read_image(const std::string& path, const std::string& layer = "",
                        ChecksumPolicy checksums = ChecksumPolicy::kCheck);
 /// Several layers, which share no channel, of one reading of the file, in the file's window; throws like read_image.
 std::vector<Image> read_layers(const std::string& path, std::span<const std::string> layers);
+/// `n_rows` of their rows from `first_row` of the window on; checksums are looked at where these are all rows.
+std::vector<Image> read_layers(const ExrFile& file, const std::string& path, std::span<const std::string> layers,
+                               int first_row, int n_rows);
 
 /// The three channels (one for grey, given three times) that `layer` means among `channels`; throws like read_image.
 std::vector<std::string> layer_channels(const std::string& path, const std::vector<ExrFile::Channel>& channels,

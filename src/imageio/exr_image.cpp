@@ -48,6 +48,7 @@ class PlainExr final : public ImageReader {
     const Imf::Header& header = file_->header();
     const Imath::Box2i &data = header.dataWindow(), &frame = header.displayWindow();
     path_ = path;
+    has_rows_ = true;
     header_.format = "openexr";
     header_.width = data.max.x - data.min.x + 1, header_.height = data.max.y - data.min.y + 1;
     header_.x = data.min.x - frame.min.x, header_.y = data.min.y - frame.min.y;
@@ -62,14 +63,16 @@ class PlainExr final : public ImageReader {
   }
 
  private:
-  bool read(int first, int last, float* values, std::string& problem) override {
+  bool read(const Part& part, float* values, std::string& problem) override {
     try {
-      const Imath::Box2i& window = file_->header().dataWindow();
-      const auto stride = sizeof(float) * static_cast<size_t>(last - first);
+      Imath::Box2i window = file_->header().dataWindow();
+      window.min.y += part.first_row;
+      window.max.y = window.min.y + part.n_rows - 1;
+      const auto stride = sizeof(float) * static_cast<size_t>(part.last - part.first);
       Imf::FrameBuffer buffer;
-      for (int c = first; c < last; ++c)
+      for (int c = part.first; c < part.last; ++c)
         buffer.insert(header_.channels[static_cast<size_t>(c)],
-                      Imf::Slice::Make(Imf::FLOAT, values + (c - first), window, stride,
+                      Imf::Slice::Make(Imf::FLOAT, values + (c - part.first), window, stride,
                                        stride * static_cast<size_t>(header_.width)));
       file_->setFrameBuffer(buffer);
       file_->readPixels(window.min.y, window.max.y);
@@ -80,7 +83,7 @@ class PlainExr final : public ImageReader {
       return false;
     }
   }
-  bool read(int, int, uint8_t*, std::string& problem) override {
+  bool read(const Part&, uint8_t*, std::string& problem) override {
     problem = "its values are no bytes";
     return false;
   }

@@ -86,20 +86,30 @@ std::vector<unsigned char> encode_pfm(const ImageToEncode& image) {
 }  // namespace
 
 template <typename T>
-std::vector<T> ImageReader::read_all(int first, int last) {
-  COVARY_CHECK(first >= 0 && first < last && last <= static_cast<int>(header_.channels.size()), "channels exist");
-  const size_t n_values = n_pixels() * static_cast<size_t>(last - first);
+std::vector<T> ImageReader::read_part(const Part& part) {
+  COVARY_CHECK(part.first >= 0 && part.first < part.last && part.last <= static_cast<int>(header_.channels.size()),
+               "channels exist");
+  const bool is_whole = part.first_row == 0 && part.n_rows == header_.height;
+  COVARY_CHECK(is_whole || (has_rows_ && part.first_row >= 0 && part.n_rows > 0 &&
+                            part.first_row + part.n_rows <= header_.height),
+               "rows are there");
+  const size_t n_values = static_cast<size_t>(header_.width) * static_cast<size_t>(part.n_rows) *
+                          static_cast<size_t>(part.last - part.first);
   require_memory(path_, fmt::format("an image of {} x {} pixels", header_.width, header_.height),
                  static_cast<double>(n_values) * sizeof(T));
   std::vector<T> values(n_values);
   std::string problem;
-  if (!read(first, last, values.data(), problem))
+  if (!read(part, values.data(), problem))
     throw Error(ErrorCode::kInput, fmt::format("{}: damaged or incomplete image: {}", path_, problem));
   return values;
 }
 
-std::vector<float> ImageReader::read_floats(int first, int last) { return read_all<float>(first, last); }
-std::vector<uint8_t> ImageReader::read_bytes(int first, int last) { return read_all<uint8_t>(first, last); }
+std::vector<float> ImageReader::read_floats(int first, int last, int first_row, int n_rows) {
+  return read_part<float>({first, last, first_row, n_rows});
+}
+std::vector<uint8_t> ImageReader::read_bytes(int first, int last, int first_row, int n_rows) {
+  return read_part<uint8_t>({first, last, first_row, n_rows});
+}
 
 std::unique_ptr<ImageReader> open_image(const std::string& path, OtherColours colours) {
   const size_t file_bytes = size_of_readable(path);

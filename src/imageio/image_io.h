@@ -36,20 +36,32 @@ class ImageReader {
 
   /// Channels [first, last) of all pixels, interleaved, row by row from the top; integers scaled to [0, 1]. Colours are
   /// as stored: not multiplied by alpha. Throws Error(kInput) when the file is damaged.
-  std::vector<float> read_floats(int first, int last);
+  std::vector<float> read_floats(int first, int last) { return read_floats(first, last, 0, header_.height); }
   /// The same as bytes; for files of the type "uint8".
-  std::vector<uint8_t> read_bytes(int first, int last);
+  std::vector<uint8_t> read_bytes(int first, int last) { return read_bytes(first, last, 0, header_.height); }
+
+  /// Whether some rows take less memory than all.
+  bool has_rows() const { return has_rows_; }
+  /// The same of `n_rows` rows from `first_row` on; all of them where has_rows() is false. Rows are best read from the
+  /// top down: many formats begin anew to go back.
+  std::vector<float> read_floats(int first, int last, int first_row, int n_rows);
+  std::vector<uint8_t> read_bytes(int first, int last, int first_row, int n_rows);
 
  protected:
+  struct Part {
+    int first, last;        ///< channels
+    int first_row, n_rows;  ///< from 0 on
+  };
   /// Fills `values`; false after setting `problem`. Never throws: a module may not throw into the program.
-  virtual bool read(int first, int last, float* values, std::string& problem) = 0;
-  virtual bool read(int first, int last, uint8_t* values, std::string& problem) = 0;
+  virtual bool read(const Part& part, float* values, std::string& problem) = 0;
+  virtual bool read(const Part& part, uint8_t* values, std::string& problem) = 0;
   ImageHeader header_;
   std::string path_;
+  bool has_rows_ = false;
 
  private:
   template <typename T>
-  std::vector<T> read_all(int first, int last);
+  std::vector<T> read_part(const Part& part);
 };
 
 /// Colours that a file does not store as RGB, such as CMYK.

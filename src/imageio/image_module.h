@@ -22,7 +22,7 @@ class ImageModule {
 
 /// Name of the module's only function, which returns a `const ImageModule*` that lives as long as the program. The
 /// number changes with the classes of these headers, so that a program never uses a module of another build.
-inline constexpr const char* kImageModuleEntry = "covary_image_module_1";
+inline constexpr const char* kImageModuleEntry = "covary_image_module_2";
 inline constexpr const char* kImageModuleFile = "libcovary_imageio.so";
 
 }  // namespace covary

@@ -45,6 +45,7 @@ class OiioReader final : public ImageReader {
     header_.floating_point = spec.format.is_floating_point();
     header_.channels.assign(spec.channelnames.begin(), spec.channelnames.end());
     header_.alpha_channel = spec.alpha_channel;
+    has_rows_ = spec.tile_width == 0;
     for (const OIIO::ParamValue& value : spec.extra_attribs) {
       if (value.name() == "compression") header_.compression = value.get_string();
       if (value.type() == OIIO::TypeDesc::STRING) header_.attributes[value.name().string()] = value.get_string();
@@ -56,17 +57,22 @@ class OiioReader final : public ImageReader {
   }
 
  private:
-  bool read(int first, int last, float* values, std::string& problem) override {
-    return read_as(first, last, OIIO::TypeDesc::FLOAT, values, problem);
+  bool read(const Part& part, float* values, std::string& problem) override {
+    return read_as(part, OIIO::TypeDesc::FLOAT, values, problem);
   }
-  bool read(int first, int last, uint8_t* values, std::string& problem) override {
-    return read_as(first, last, OIIO::TypeDesc::UINT8, values, problem);
+  bool read(const Part& part, uint8_t* values, std::string& problem) override {
+    return read_as(part, OIIO::TypeDesc::UINT8, values, problem);
   }
-  bool read_as(int first, int last, OIIO::TypeDesc type, void* values, std::string& problem) {
+  bool read_as(const Part& part, OIIO::TypeDesc type, void* values, std::string& problem) {
     std::unique_lock lock(metadata_mutex(), std::defer_lock);
-    if (std::exchange(was_read_, true)) lock.lock();  // some formats open the file again to go back
+    if (part.first_row < next_row_) lock.lock();  // some formats open the file again to go back
+    next_row_ = part.first_row + part.n_rows;
+    const int y = input_->spec().y + part.first_row;
     try {
-      if (input_->read_image(0, 0, first, last, type, values)) return true;
+      if (part.n_rows == header_.height
+              ? input_->read_image(0, 0, part.first, part.last, type, values)
+              : input_->read_scanlines(0, 0, y, y + part.n_rows, 0, part.first, part.last, type, values))
+        return true;
       problem = one_line(input_->geterror());
     } catch (const std::exception& error) {
       problem = error.what();
@@ -75,7 +81,7 @@ class OiioReader final : public ImageReader {
   }
 
   std::unique_ptr<OIIO::ImageInput> input_;
-  bool was_read_ = false;
+  int next_row_ = 0;
 };
 
 /// A file without a place on a device. (OpenImageIO's own files in memory do not work for TIFF.)
@@ -150,7 +156,7 @@ class OiioModule final : public ImageModule {
 }  // namespace
 }  // namespace covary
 
-extern "C" __attribute__((visibility("default"))) const covary::ImageModule* covary_image_module_1() {
+extern "C" __attribute__((visibility("default"))) const covary::ImageModule* covary_image_module_2() {
   static const covary::OiioModule module;
   return &module;
 }
