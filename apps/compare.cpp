@@ -8,17 +8,18 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include "commands.h"
 #include "comparison_warnings.h"
-#include "film/image_file.h"
+#include "film/image_rows.h"
 #include "film/image_writer.h"
 #include "film/outputs.h"
 #include "json_output.h"
 #include "metrics/alignment.h"
+#include "metrics/compared_rows.h"
 #include "metrics/error_map.h"
+#include "metrics/flip.h"
 #include "metrics/metrics.h"
 #include "numbers.h"
 #include "value_names.h"
@@ -38,60 +39,47 @@ struct CompareOptions {
 struct Comparison {
   CropWindow window;
   std::vector<MetricResult> results;
-  double mean = 0, reference_mean = 0;
+  double mean() const { return results[0].mean; }
+  double reference_mean() const { return results[0].reference_mean; }
 };
 
-double mean_of(const Image& image, const Image& map) {
-  double sum = 0;
-  uint64_t n = 0;
-  for (size_t p = 0; p < map.data.size(); ++p)
-    if (std::isfinite(map.data[p])) {
-      for (size_t c = 0; c < 3; ++c) sum += image.data[p * 3 + c];
-      n += 3;
-    }
-  return sum / static_cast<double>(n);
+/// Bands of rows are held at a time, and the map where one is wanted.
+void require_memory_to_compare(const CompareOptions& options, const std::string& path, const ComparedRows& rows,
+                               size_t n_images) {
+  constexpr double kImage = 3 * sizeof(float), kFlip = 120;  // metrics/flip.cpp
+  const auto is_flip = [](const std::string& name) { return name == "flip"; };
+  const bool flip = std::any_of(options.metrics.begin(), options.metrics.end(), is_flip);
+  const int band = std::min(rows.band_rows() + (flip ? 2 * kFlipReach : 0), rows.height());
+  require_image_memory(path, rows.width(), band, 2 * kImage * static_cast<double>(n_images) + (flip ? kFlip : 1));
+  if (!options.error_map.empty()) require_image_memory(path, rows.width(), rows.height(), sizeof(float) + kImage);
 }
 
-/// Bytes per pixel that compare_one() takes beside the images that were read, of which it copies `n_copies`.
-double bytes_to_compare(const std::vector<std::string>& metrics, int64_t n_copies) {
-  constexpr double kImage = 3 * sizeof(float), kMap = sizeof(float), kFlip = 120, kTrimmed = 56;  // film/metrics.cpp
-  double most = 0;
-  for (const std::string& name : metrics)
-    most = std::max(most, name == "flip" ? kFlip : name == "relmse-trimmed" ? kTrimmed : 1);
-  return kImage * static_cast<double>(n_copies) + kMap * static_cast<double>(metrics.size()) + most;
-}
-
-/// Takes the references' pixels where the image is the last one: no copies of whole images then.
-Comparison compare_one(const CompareOptions& options, std::vector<PlacedImage>& references, const std::string& path,
-                       bool is_last) {
-  PlacedImage image = read_image(path, options.layer);
+Comparison compare_one(const CompareOptions& options, std::vector<ImageRows>& references, const std::string& path) {
+  ImageRows image(path, options.layer);
   Comparison comparison;
-  comparison.window = common_window(path, image.place, image.place.window, options.reference, references[0].place);
-  bool low_dynamic_range = image.low_dynamic_range && references[0].low_dynamic_range;
+  comparison.window =
+      common_window(path, image.place(), image.place().window, options.reference, references[0].place());
+  bool low_dynamic_range = image.low_dynamic_range() && references[0].low_dynamic_range();
   if (references.size() == 2) {
-    comparison.window = common_window(path, image.place, comparison.window, options.reference2, references[1].place);
-    low_dynamic_range = low_dynamic_range && references[1].low_dynamic_range;
+    comparison.window =
+        common_window(path, image.place(), comparison.window, options.reference2, references[1].place());
+    low_dynamic_range = low_dynamic_range && references[1].low_dynamic_range();
   }
-  const auto is_copied = [&](const PlacedImage& r) { return !is_last || !(r.place.window == comparison.window); };
-  const int64_t n_copies = std::count_if(references.begin(), references.end(), is_copied) +
-                           static_cast<int64_t>(!(image.place.window == comparison.window));
-  require_image_memory(path, comparison.window.width, comparison.window.height,
-                       bytes_to_compare(options.metrics, n_copies));
-  const Image pixels = cut(std::move(image), comparison.window);
-  std::vector<Image> aligned;
-  for (PlacedImage& reference : references)
-    aligned.push_back(is_last ? cut(std::move(reference), comparison.window) : cut(reference, comparison.window));
+  std::vector<ImageRows*> files{&image};
+  for (ImageRows& reference : references) files.push_back(&reference);
+  ComparedFiles rows(files, comparison.window);
+  require_memory_to_compare(options, path, rows, files.size());
   for (const std::string& name : options.metrics) {
+    const bool with_map = comparison.results.empty() && !options.error_map.empty();
     try {
-      comparison.results.push_back(compute_metric(find_metric(name).metric, pixels, aligned, low_dynamic_range));
+      comparison.results.push_back(compute_metric(find_metric(name).metric, rows, low_dynamic_range, with_map));
     } catch (const Error& error) {
-      throw Error(error.code(), path + ": " + error.what());
+      const std::string text = error.what();
+      const bool names_file = text.starts_with(path) || text.starts_with(options.reference) ||
+                              (!options.reference2.empty() && text.starts_with(options.reference2));
+      throw Error(error.code(), names_file ? text : path + ": " + text);
     }
   }
-  const Image& map = comparison.results[0].map;
-  comparison.mean = mean_of(pixels, map);
-  for (const Image& reference : aligned)
-    comparison.reference_mean += mean_of(reference, map) / static_cast<double>(aligned.size());
   return comparison;
 }
 
@@ -102,8 +90,8 @@ nlohmann::ordered_json json_of(const CompareOptions& options, const std::string&
   object["window"] = {c.window.x, c.window.y, c.window.width, c.window.height};
   object["pixels"] = c.results[0].n_pixels;
   object["non_finite_pixels"] = c.results[0].n_non_finite;
-  object["mean"] = c.mean;
-  object["reference_mean"] = c.reference_mean;
+  object["mean"] = c.mean();
+  object["reference_mean"] = c.reference_mean();
   for (size_t m = 0; m < options.metrics.size(); ++m) object[options.metrics[m]] = c.results[m].value;
   object["warnings"] = warnings;
   return object;
@@ -128,7 +116,7 @@ void print_table(const CompareOptions& options, const std::vector<Comparison>& c
   for (size_t i = 0; i < comparisons.size(); ++i) {
     fmt::print("{:{}}", options.images[i], width);
     for (const MetricResult& result : comparisons[i].results) fmt::print("  {:12.6g}", result.value);
-    fmt::print("  {:>10}\n", ratio_text(comparisons[i].mean, comparisons[i].reference_mean));
+    fmt::print("  {:>10}\n", ratio_text(comparisons[i].mean(), comparisons[i].reference_mean()));
   }
 }
 
@@ -199,20 +187,19 @@ void check_files(const CompareOptions& options) {
 void compare(const CompareOptions& options) {
   check_options(options);
   check_files(options);
-  std::vector<PlacedImage> references{read_image(options.reference, options.layer)};
-  if (!options.reference2.empty()) references.push_back(read_image(options.reference2, options.layer));
+  std::vector<ImageRows> references;
+  references.emplace_back(options.reference, options.layer);
+  if (!options.reference2.empty()) references.emplace_back(options.reference2, options.layer);
 
   std::vector<Comparison> comparisons;
   for (const std::string& path : options.images) {
-    comparisons.push_back(compare_one(options, references, path, &path == &options.images.back()));
+    comparisons.push_back(compare_one(options, references, path));
     const Comparison& c = comparisons.back();
     if (c.results[0].n_non_finite)
       fmt::print(stderr, "covary: {}: {} of {} pixels are not finite here or in the reference and are left out\n", path,
                  c.results[0].n_non_finite, c.results[0].n_non_finite + c.results[0].n_pixels);
-    if (!(c.window == references[0].place.window))
+    if (!(c.window == references[0].place().window))
       fmt::print(stderr, "covary: {}: compared over the pixels in common, {}\n", path, text_of(c.window));
-    if (options.error_map.empty())
-      for (MetricResult& result : comparisons.back().results) result.map = Image();
   }
 
   const std::vector<std::vector<std::string>> warnings = warn_of_comparison(

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -224,18 +225,67 @@ Image flip_ldr(const Image& image, const Image& reference, float pixels_per_degr
   return result;
 }
 
+namespace {
+
+float luminance(const Image& image, size_t p) {
+  const float* rgb = image.data.data() + 3 * p;
+  return 0.2126f * rgb[0] + 0.7152f * rgb[1] + 0.0722f * rgb[2];
+}
+
+/// Numbers that rise with the floats.
+constexpr uint32_t kSign = 1u << 31;
+uint32_t rising(float value) {
+  const auto bits = std::bit_cast<uint32_t>(value);
+  return bits & kSign ? ~bits : bits | kSign;
+}
+float float_of(uint32_t rising) { return std::bit_cast<float>(rising & kSign ? rising & ~kSign : ~rising); }
+
+/// How often values were seen.
+class Histogram {
+ public:
+  void add(uint16_t value) { ++counts_[value]; }
+  /// The value that `rank` of them come before; `rank` becomes its own among those that are equal.
+  uint32_t value_at(uint64_t& rank) const {
+    uint32_t value = 0;
+    while (rank >= counts_[value]) rank -= counts_[value++];
+    return value;
+  }
+
+ private:
+  std::vector<uint64_t> counts_ = std::vector<uint64_t>(size_t{1} << 16);
+};
+
+}  // namespace
+
 FlipExposures flip_exposures(const Image& reference) {
-  std::vector<float> luminances;
-  for (size_t i = 0; i < reference.data.size(); i += 3)
-    luminances.push_back(0.2126f * reference.data[i] + 0.7152f * reference.data[i + 1] +
-                         0.0722f * reference.data[i + 2]);
-  const auto middle = luminances.begin() + static_cast<std::ptrdiff_t>(luminances.size() / 2);
-  std::nth_element(luminances.begin(), middle, luminances.end());
+  return flip_exposures([&](const std::function<void(const Image&)>& give) { give(reference); });
+}
+
+FlipExposures flip_exposures(const VisitImages& visit) {
+  // The median: first the upper half of its bits, then the lower one.
+  Histogram upper, lower;
+  uint64_t rank = 0;
+  float brightest = -std::numeric_limits<float>::infinity();
+  visit([&](const Image& image) {
+    for (size_t p = 0; p < image.data.size() / 3; ++p) {
+      upper.add(static_cast<uint16_t>(rising(luminance(image, p)) >> 16));
+      brightest = std::max(brightest, luminance(image, p));
+    }
+    rank += image.data.size() / 3;
+  });
+  rank /= 2;
+  const uint32_t high = upper.value_at(rank);
+  visit([&](const Image& image) {
+    for (size_t p = 0; p < image.data.size() / 3; ++p)
+      if (const uint32_t bits = rising(luminance(image, p)); bits >> 16 == high)
+        lower.add(static_cast<uint16_t>(bits & 0xffff));
+  });
+  const float middle = float_of(high << 16 | lower.value_at(rank));
   // A reference that is mostly or all black has no such exposures; the smallest positive value stands in.
   constexpr float kSmallest = 1e-7f;
-  const float median = std::clamp(*middle, kSmallest, std::numeric_limits<float>::max());
-  const float largest = std::clamp(*std::max_element(luminances.begin(), luminances.end()), median,
-                                   std::numeric_limits<float>::max());  // a sum of three may be infinite
+  const float median = std::clamp(middle, kSmallest, std::numeric_limits<float>::max());
+  const float largest =
+      std::clamp(brightest, median, std::numeric_limits<float>::max());  // a sum of three may be infinite
   // The luminance that the tone curve maps to 0.85, [Andersson2021] Sec. 3: the positive root of k(x) = t.
   constexpr double kTarget = 0.85;
   const double a = kAcesA - kTarget * kAcesC, b = kAcesB - kTarget * kAcesD, c = -kTarget * kAcesE;
@@ -247,8 +297,11 @@ FlipExposures flip_exposures(const Image& reference) {
   return result;
 }
 
-Image flip_hdr(const Image& image, const Image& reference, float pixels_per_degree) {
-  const FlipExposures exposures = flip_exposures(reference);
+Image flip_hdr(const Image& image, const Image& reference) {
+  return flip_hdr(image, reference, flip_exposures(reference));
+}
+
+Image flip_hdr(const Image& image, const Image& reference, const FlipExposures& exposures, float pixels_per_degree) {
   Image result(image.width, image.height, 1);
   for (int i = 0; i < exposures.count; ++i) {
     const float stops =

@@ -3,6 +3,8 @@
 // range [Andersson2021]. Written from the papers.
 #pragma once
 
+#include <functional>
+
 #include "film/film.h"
 
 namespace covary {
@@ -19,8 +21,17 @@ struct FlipExposures {
   int count = 2;
 };
 FlipExposures flip_exposures(const Image& reference);
+/// The same of a reference in pieces: `visit` calls its argument with each of them, in any order. It is called twice.
+using VisitImages = std::function<void(const std::function<void(const Image&)>&)>;
+FlipExposures flip_exposures(const VisitImages& visit);
+
+/// How many rows around a pixel its FLIP depends on, at kFlipPixelsPerDegree.
+inline constexpr int kFlipReach = 10;
 
 /// HDR-FLIP per pixel: the largest LDR-FLIP over the exposures, tone mapped by the ACES curve. Finite linear RGB.
-Image flip_hdr(const Image& image, const Image& reference, float pixels_per_degree = kFlipPixelsPerDegree);
+Image flip_hdr(const Image& image, const Image& reference, const FlipExposures& exposures,
+               float pixels_per_degree = kFlipPixelsPerDegree);
+/// With the exposures of this reference.
+Image flip_hdr(const Image& image, const Image& reference);
 
 }  // namespace covary

@@ -6,32 +6,25 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
-#include <numeric>
+#include <optional>
+#include <utility>
 
 #include "metrics/flip.h"
 
 namespace covary {
 namespace {
 
-void check_sizes(const Image& image, std::span<const Image> references) {
-  COVARY_CHECK(references.size() == 1 || references.size() == 2, "one or two references");
-  for (const Image& r : references)
-    if (r.width != image.width || r.height != image.height)
-      throw Error(ErrorCode::kInput, fmt::format("the image has {} x {} pixels, the reference {} x {}", image.width,
-                                                 image.height, r.width, r.height));
-  for (const Image& r : references) COVARY_CHECK(r.channels == 3 && image.channels == 3, "3 channels");
-}
-
 /// One pixel of a render and of its references, in double.
 struct Pixel {
   std::array<double, 3> f, r1, r2, r;  // r: mean of the references
   double grey = 0;                     // mean of r over the channels
-  Pixel(const Image& image, std::span<const Image> references, size_t p) {
+  Pixel(const ComparedRows::Band& band, size_t p) {
     for (size_t c = 0; c < 3; ++c) {
-      f[c] = image.data[p * 3 + c];
-      r1[c] = references.front().data[p * 3 + c];
-      r2[c] = references.back().data[p * 3 + c];
+      f[c] = band.image->data[p * 3 + c];
+      r1[c] = band.references.front()->data[p * 3 + c];
+      r2[c] = band.references.back()->data[p * 3 + c];
       r[c] = 0.5 * (r1[c] + r2[c]);
       grey += r[c] / 3;
     }
@@ -75,50 +68,129 @@ float map_value(double error) {
   return static_cast<float>(std::clamp(error, -kLargest, kLargest));
 }
 
-/// Relative squared errors of single values, by the value's own reference; 0 where pixels are left out.
-std::vector<double> channel_errors(const Image& image, std::span<const Image> references,
-                                   const std::vector<char>& finite) {
-  std::vector<double> errors(3 * finite.size());
-  for (size_t p = 0; p < finite.size(); ++p) {
-    if (!finite[p]) continue;
-    const Pixel pixel(image, references, p);
-    for (size_t c = 0; c < 3; ++c)
-      errors[3 * p + c] =
-          (pixel.f[c] - pixel.r1[c]) * (pixel.f[c] - pixel.r2[c]) / (pixel.r[c] * pixel.r[c] + kRelativeOffset);
-  }
+/// Whether all values of a pixel are finite.
+bool is_finite(const ComparedRows::Band& band, size_t p) {
+  return pixel_is_finite(*band.image, p) && pixel_is_finite(*band.references.front(), p) &&
+         pixel_is_finite(*band.references.back(), p);
+}
+
+/// Relative squared errors of the values of a pixel, each by its own reference; 0 where the pixel is left out.
+std::array<double, 3> channel_errors(const ComparedRows::Band& band, size_t p) {
+  std::array<double, 3> errors{};
+  if (!is_finite(band, p)) return errors;
+  const Pixel pixel(band, p);
+  for (size_t c = 0; c < 3; ++c)
+    errors[c] = (pixel.f[c] - pixel.r1[c]) * (pixel.f[c] - pixel.r2[c]) / (pixel.r[c] * pixel.r[c] + kRelativeOffset);
   return errors;
 }
 
-/// kRelMseTrimmed of each pixel: the largest values do not count.
-std::vector<double> trimmed_errors(const Image& image, std::span<const Image> references,
-                                   const std::vector<char>& finite, uint64_t n_pixels) {
-  std::vector<double> errors = channel_errors(image, references, finite);
-  const auto n_dropped = static_cast<size_t>(kTrimmedPart * 3 * static_cast<double>(n_pixels));
-  std::vector<size_t> order(errors.size());
-  std::iota(order.begin(), order.end(), size_t{0});
-  // Equal values: those of later pixels are dropped first.
-  std::nth_element(order.begin(), order.end() - static_cast<ptrdiff_t>(n_dropped), order.end(),
-                   [&](size_t a, size_t b) { return errors[a] != errors[b] ? errors[a] < errors[b] : a < b; });
-  for (size_t i = order.size() - n_dropped; i < order.size(); ++i) errors[order[i]] = 0;
-  std::vector<double> result(finite.size());
-  const double scale =
-      static_cast<double>(n_pixels) / (3 * static_cast<double>(n_pixels) - static_cast<double>(n_dropped));
-  for (size_t p = 0; p < finite.size(); ++p)
-    result[p] = (errors[3 * p] + errors[3 * p + 1] + errors[3 * p + 2]) * scale;
+/// Calls f(band, first row) for all rows, in order.
+template <typename F>
+void for_each_band(ComparedRows& rows, const F& f) {
+  for (int y = 0; y < rows.height(); y += rows.band_rows())
+    f(rows.rows(y, std::min(rows.band_rows(), rows.height() - y)), y);
+}
+
+/// An error of kRelMseTrimmed and which it is, 3 for each pixel.
+using RankedError = std::pair<double, uint64_t>;
+
+/// What kRelMseTrimmed leaves out, and by what the rest is to be multiplied for each pixel.
+struct TrimmedErrors {
+  std::optional<RankedError> smallest_dropped;  ///< of equal errors, those of later pixels are left out first
+  double scale = 1;
+};
+
+TrimmedErrors trimmed_errors(ComparedRows& rows) {
+  const auto n_values = [](uint64_t n_pixels) {
+    return static_cast<size_t>(kTrimmedPart * 3 * static_cast<double>(n_pixels));
+  };
+  const size_t most = n_values(static_cast<uint64_t>(rows.width()) * rows.height());
+  std::vector<RankedError> largest;
+  const auto keep = [&](size_t n) {
+    if (largest.size() <= n) return;
+    std::nth_element(largest.begin(), largest.begin() + static_cast<ptrdiff_t>(n), largest.end(), std::greater<>());
+    largest.resize(n);
+  };
+  uint64_t n_finite = 0, i = 0;
+  for_each_band(rows, [&](const ComparedRows::Band& band, int) {
+    for (size_t p = 0; p < band.image->data.size() / 3; ++p) {
+      n_finite += is_finite(band, p) ? 1 : 0;
+      for (const double error : channel_errors(band, p)) largest.emplace_back(error, i++);
+      if (largest.size() > 2 * most + 1024) keep(most);
+    }
+  });
+  const size_t n_dropped = n_values(n_finite);
+  TrimmedErrors result;
+  result.scale = static_cast<double>(n_finite) / (3 * static_cast<double>(n_finite) - static_cast<double>(n_dropped));
+  keep(n_dropped);
+  if (n_dropped > 0) result.smallest_dropped = *std::min_element(largest.begin(), largest.end());
   return result;
 }
 
-/// FLIP looks at neighbourhoods: pixels that are left out become equal in both images.
-Image flip_map(const Image& image, std::span<const Image> references, const std::vector<char>& finite,
-               bool low_dynamic_range) {
-  Image f = image, r = references.front();
-  for (size_t p = 0; p < finite.size(); ++p)
+/// FLIP looks at neighbourhoods: pixels that are left out become equal in both images. The reference is the mean of
+/// all references.
+std::pair<Image, Image> flip_inputs(const ComparedRows::Band& band) {
+  std::pair<Image, Image> images(*band.image, *band.references.front());
+  auto& [f, r] = images;
+  for (size_t p = 0; p < f.data.size() / 3; ++p) {
+    const bool finite = is_finite(band, p);
     for (size_t i = p * 3; i < p * 3 + 3; ++i) {
-      r.data[i] = 0.5f * r.data[i] + 0.5f * references.back().data[i];  // their sum may be infinite
-      if (!finite[p]) f.data[i] = r.data[i] = 0;
+      r.data[i] = 0.5f * r.data[i] + 0.5f * band.references.back()->data[i];  // their sum may be infinite
+      if (!finite) f.data[i] = r.data[i] = 0;
     }
-  return low_dynamic_range ? flip_ldr(f, r) : flip_hdr(f, r);
+  }
+  return images;
 }
+
+/// What the errors of single pixels of one metric need to know of the whole image.
+class ErrorOfPixels {
+ public:
+  ErrorOfPixels(Metric metric, ComparedRows& rows, bool low_dynamic_range) : metric_(metric), rows_(rows) {
+    if (metric == Metric::kFlip && !low_dynamic_range)
+      exposures_ = flip_exposures([&](const std::function<void(const Image&)>& give) {
+        for_each_band(rows, [&](const ComparedRows::Band& band, int) { give(flip_inputs(band).second); });
+      });
+    if (metric == Metric::kRelMseTrimmed) trimmed_ = trimmed_errors(rows);
+  }
+
+  /// Reads a band. FLIP looks at rows around it.
+  const ComparedRows::Band& move_to(int first_row, int n_rows) {
+    const int reach = metric_ == Metric::kFlip ? kFlipReach : 0;
+    const int first = std::max(first_row - reach, 0), end = std::min(first_row + n_rows + reach, rows_.height());
+    band_ = rows_.rows(first, end - first);
+    offset_ = static_cast<size_t>(first_row - first) * rows_.width();
+    first_value_ = 3 * static_cast<uint64_t>(first) * rows_.width();
+    if (metric_ == Metric::kFlip) {
+      const auto [f, r] = flip_inputs(band_);
+      flip_ = exposures_ ? flip_hdr(f, r, *exposures_) : flip_ldr(f, r);
+    }
+    return band_;
+  }
+  /// Where pixel p of the rows asked for is in the band.
+  size_t in_band(size_t p) const { return offset_ + p; }
+
+  /// Of a pixel of the band that is finite.
+  double error(size_t p) const {
+    if (metric_ == Metric::kFlip) return flip_.data[p];
+    if (metric_ != Metric::kRelMseTrimmed) return pixel_error(metric_, Pixel(band_, p));
+    double sum = 0;
+    const std::array<double, 3> errors = channel_errors(band_, p);
+    for (size_t c = 0; c < 3; ++c)
+      if (!trimmed_.smallest_dropped || RankedError(errors[c], first_value_ + 3 * p + c) < *trimmed_.smallest_dropped)
+        sum += errors[c];
+    return sum * trimmed_.scale;
+  }
+
+ private:
+  Metric metric_;
+  ComparedRows& rows_;
+  std::optional<FlipExposures> exposures_;
+  TrimmedErrors trimmed_;
+  ComparedRows::Band band_;
+  size_t offset_ = 0;
+  uint64_t first_value_ = 0;
+  Image flip_;
+};
 
 }  // namespace
 
@@ -156,41 +228,48 @@ const MetricInfo& find_metric(const std::string& name) {
                                              fmt::join(names, ", ")));
 }
 
-MetricResult compute_metric(Metric metric, const Image& image, std::span<const Image> references,
-                            bool low_dynamic_range) {
-  check_sizes(image, references);
-  const size_t n_pixels = static_cast<size_t>(image.width) * image.height;
+MetricResult compute_metric(Metric metric, ComparedRows& rows, bool low_dynamic_range, bool with_map) {
   MetricResult result;
-  std::vector<char> finite(n_pixels);
-  for (size_t p = 0; p < n_pixels; ++p) {
-    finite[p] =
-        pixel_is_finite(image, p) && pixel_is_finite(references.front(), p) && pixel_is_finite(references.back(), p);
-    ++(finite[p] ? result.n_pixels : result.n_non_finite);
+  if (with_map) result.map = Image(rows.width(), rows.height(), 1);
+  ErrorOfPixels errors(metric, rows, low_dynamic_range);
+  double sum = 0, image_sum = 0;
+  size_t n_references = 1;
+  std::array<double, 2> reference_sums{};
+  float* map = result.map.data.data();
+  for (int y = 0; y < rows.height(); y += rows.band_rows()) {
+    const int n_rows = std::min(rows.band_rows(), rows.height() - y);
+    const ComparedRows::Band& band = errors.move_to(y, n_rows);
+    const size_t n_pixels = static_cast<size_t>(n_rows) * static_cast<size_t>(rows.width());
+    for (size_t i = 0; i < n_pixels; ++i) {
+      const size_t p = errors.in_band(i);
+      const bool finite = is_finite(band, p);
+      ++(finite ? result.n_pixels : result.n_non_finite);
+      const double error = finite ? errors.error(p) : std::numeric_limits<double>::quiet_NaN();
+      if (with_map) *map++ = finite ? map_value(error) : std::numeric_limits<float>::quiet_NaN();
+      if (!finite) continue;
+      sum += error;
+      for (size_t k = 3 * p; k < 3 * p + 3; ++k) {
+        image_sum += band.image->data[k];
+        for (size_t r = 0; r < band.references.size(); ++r) reference_sums[r] += band.references[r]->data[k];
+      }
+      n_references = band.references.size();
+    }
   }
   if (result.n_pixels == 0)
     throw Error(ErrorCode::kInput,
-                fmt::format("none of the {} pixels is finite in the image and the reference", n_pixels));
-
-  if (metric == Metric::kFlip)
-    result.map = flip_map(image, references, finite, low_dynamic_range);
-  else
-    result.map = Image(image.width, image.height, 1);
-  std::vector<double> trimmed;
-  if (metric == Metric::kRelMseTrimmed) trimmed = trimmed_errors(image, references, finite, result.n_pixels);
-  double sum = 0;
-  for (size_t p = 0; p < n_pixels; ++p) {
-    if (!finite[p]) {
-      result.map.data[p] = std::numeric_limits<float>::quiet_NaN();
-      continue;
-    }
-    const double error = metric == Metric::kFlip ? result.map.data[p]
-                         : !trimmed.empty()      ? trimmed[p]
-                                                 : pixel_error(metric, Pixel(image, references, p));
-    result.map.data[p] = map_value(error);
-    sum += error;
-  }
-  result.value = sum / static_cast<double>(result.n_pixels);
+                fmt::format("none of the {} pixels is finite in the image and the reference", result.n_non_finite));
+  const auto n = static_cast<double>(result.n_pixels);
+  result.value = sum / n;
+  result.mean = image_sum / (3 * n);
+  for (size_t r = 0; r < n_references; ++r)
+    result.reference_mean += reference_sums[r] / (3 * n) / static_cast<double>(n_references);
   return result;
+}
+
+MetricResult compute_metric(Metric metric, const Image& image, std::span<const Image> references,
+                            bool low_dynamic_range) {
+  WholeImages rows(image, references);
+  return compute_metric(metric, rows, low_dynamic_range, true);
 }
 
 }  // namespace covary

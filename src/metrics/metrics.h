@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "film/film.h"
+#include "metrics/compared_rows.h"
 
 namespace covary {
 
@@ -45,6 +46,7 @@ struct MetricResult {
   /// 1 channel: the error of each pixel, whose mean is `value`; not-a-number where left out. What kRelMseTrimmed leaves
   /// out is 0 here.
   Image map;
+  double mean = 0, reference_mean = 0;  ///< of all values of the finite pixels
 };
 
 /// Images of equal size with 3 channels, linear RGB. `references`: one or two. For FLIP, `low_dynamic_range` chooses
@@ -52,5 +54,8 @@ struct MetricResult {
 /// left.
 MetricResult compute_metric(Metric metric, const Image& image, std::span<const Image> references,
                             bool low_dynamic_range = false);
+/// The same of images that need not fit in memory: bit by bit what whole images give. Some metrics read them more than
+/// once. Without `with_map`, there is no map.
+MetricResult compute_metric(Metric metric, ComparedRows& rows, bool low_dynamic_range, bool with_map);
 
 }  // namespace covary
