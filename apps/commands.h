@@ -16,6 +16,7 @@ void add_merge(CLI::App& app);
 void add_info(CLI::App& app);
 void add_probe(CLI::App& app);
 void add_convert(CLI::App& app);
+void add_convert_scene(CLI::App& app);
 void add_combine(CLI::App& app);
 void add_denoise(CLI::App& app);
 void add_experiment(CLI::App& app);

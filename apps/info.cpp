@@ -12,7 +12,7 @@
 #include "defines.h"
 #include "film/image_file.h"
 #include "io/load_scene.h"
-#include "io/scene_file.h"
+#include "formats/scene_file.h"
 #include "json_output.h"
 #include "plans/estimator_plans.h"
 #include "plans/memory.h"

@@ -34,8 +34,8 @@ std::string g_command_line;
 /// Standard output fails then, as it should; messages that nobody is to see are lost.
 void open_closed_streams() {
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
-    if (fcntl(stream, F_GETFD) == -1)
-      [[maybe_unused]] const int opened = open(stream == STDOUT_FILENO ? "/dev/full" : "/dev/null", O_RDWR);
+    if (fcntl(stream, F_GETFD) == -1) [[maybe_unused]]
+      const int opened = open(stream == STDOUT_FILENO ? "/dev/full" : "/dev/null", O_RDWR);
 }
 
 void check_standard_output() {
@@ -142,7 +142,8 @@ void add_commands(CLI::App& app) {
   app.formatter_fn([](const CLI::App* command, const std::string& name, CLI::AppFormatMode mode) {
     return help_text(*command, name, mode == CLI::AppFormatMode::All);
   });
-  for (const auto add : {add_render, add_combine, add_denoise, add_compare, add_view, add_info, add_convert, add_help})
+  for (const auto add : {add_render, add_combine, add_denoise, add_compare, add_view, add_info, add_convert,
+                         add_convert_scene, add_help})
     add(app);
   const std::vector<CLI::App*> everybodys = app.get_subcommands([](CLI::App*) { return true; });
   for (const auto add : {add_experiment, add_merge, add_probe}) add(app);

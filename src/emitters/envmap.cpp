@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// `envmap`: light from infinitely far away, given by an image in latitude-longitude format; see environment_image.h for
-// the mapping and the sampling.
+// `envmap`: light from infinitely far away, given by an image, mostly in latitude-longitude format; see
+// environment_image.h for the mapping and the sampling.
 //
 // | parameter        | type      | default  | meaning                                                              |
 // |------------------|-----------|----------|----------------------------------------------------------------------|
 // | filename         | string    | required | image, as for the texture `bitmap`; the top row lies around +y       |
 // | scale            | float     | 1        | factor, not negative                                                 |
 // | to_world         | transform | identity | rotation of the map                                                  |
+// | mapping          | string    | see      | latitude_longitude, or equal_area: pbrt-v4's (equal_area_image.h)    |
 // | mis_compensation | boolean   | false    | sample only what is brighter than the mean; right only for           |
 // |                  |           |          | integrators that combine it with the sampling of the surface         |
 #include "emitters/environment_image.h"
+#include "emitters/equal_area_image.h"
 #include "emitters/registry.h"
 #include "emitters/rotation.h"
 #include "emitters/scene_sphere.h"
@@ -17,10 +19,12 @@
 namespace covary {
 namespace {
 
+/// `Image`: EnvironmentImage, or what has its interface.
+template <typename Image>
 class EnvironmentMap final : public Emitter {
  public:
-  EnvironmentMap(EnvironmentImage image, const Rotation& rotation)
-      : image_(std::make_shared<const EnvironmentImage>(std::move(image))), rotation_(rotation) {}
+  EnvironmentMap(Image image, const Rotation& rotation)
+      : image_(std::make_shared<const Image>(std::move(image))), rotation_(rotation) {}
 
   std::shared_ptr<const Emitter> in_scene(const Bounds3& bounds) const override {
     auto placed = std::make_shared<EnvironmentMap>(*this);
@@ -31,12 +35,12 @@ class EnvironmentMap final : public Emitter {
   std::shared_ptr<const Emitter> mis_compensated() const override {
     if (image_->is_compensated()) return nullptr;
     auto result = std::make_shared<EnvironmentMap>(*this);
-    result->image_ = std::make_shared<const EnvironmentImage>(image_->compensated());
+    result->image_ = std::make_shared<const Image>(image_->compensated());
     return result;
   }
 
   EnvironmentLight environment(const Vec3& d) const override {
-    const EnvironmentImage::Lookup found = image_->lookup(rotation_.to_local(d));
+    const typename Image::Lookup found = image_->lookup(rotation_.to_local(d));
     return {found.value, found.pdf_solid_angle};
   }
   void prefetch(Vec2 u, PrefetchStep step) const override {
@@ -47,7 +51,7 @@ class EnvironmentMap final : public Emitter {
   }
 
   EmitterSample sample_towards(const Vec3&, Vec2 u, float) const override {
-    const EnvironmentImage::Sample from = image_->sample(u);
+    const typename Image::Sample from = image_->sample(u);
     EmitterSample sample;
     sample.wi = rotation_.to_world(from.d);
     sample.radiance = from.value;
@@ -56,7 +60,7 @@ class EnvironmentMap final : public Emitter {
   }
 
   EmissionSample sample_emission(Vec2 u_position, Vec2 u_direction, float) const override {
-    const EnvironmentImage::Sample from = image_->sample(u_direction);
+    const typename Image::Sample from = image_->sample(u_direction);
     EmissionSample sample;
     const Vec3 d = -rotation_.to_world(from.d);
     sample.ray = {scene_.disk_point(d, u_position), d};
@@ -74,7 +78,7 @@ class EnvironmentMap final : public Emitter {
   Spectrum power() const override { return image_->integral() * scene_.disk_area(); }
 
  private:
-  std::shared_ptr<const EnvironmentImage> image_;  // large, and shared by copies
+  std::shared_ptr<const Image> image_;  // large, and shared by copies
   Rotation rotation_;
   SceneSphere scene_;
 };
@@ -84,6 +88,8 @@ class EnvironmentMap final : public Emitter {
 std::shared_ptr<Emitter> make_envmap(Parameters& parameters) {
   const std::string path = parameters.require_file("filename");
   const float scale = parameters.get_float("scale", 1, 0);
+  const bool equal_area =
+      parameters.get_choice("mapping", "latitude_longitude", {"latitude_longitude", "equal_area"}) == "equal_area";
   const bool mis_compensation = parameters.get_bool("mis_compensation", false);
   Rotation rotation;
   const Transform to_world = parameters.get_transform("to_world");
@@ -94,7 +100,11 @@ std::shared_ptr<Emitter> make_envmap(Parameters& parameters) {
   }
   if (path.empty()) return nullptr;  // already reported
   try {
-    return std::make_shared<EnvironmentMap>(EnvironmentImage(read_linear_rgb(path), scale, mis_compensation), rotation);
+    if (equal_area)
+      return std::make_shared<EnvironmentMap<EqualAreaImage>>(
+          EqualAreaImage(read_linear_rgb(path), scale, mis_compensation), rotation);
+    return std::make_shared<EnvironmentMap<EnvironmentImage>>(
+        EnvironmentImage(read_linear_rgb(path), scale, mis_compensation), rotation);
   } catch (const Error& error) {
     parameters.error_at("filename", std::string("cannot be used: ") + error.what());
     return nullptr;

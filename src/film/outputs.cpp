@@ -33,6 +33,8 @@ void check_extension(const std::string& option, const std::string& path, OutputK
       return require(image_extensions(), "");
     case OutputKind::kPng:
       return require({".png"}, "");
+    case OutputKind::kScene:
+      return require({".xml"}, "");
     case OutputKind::kPage:
       return require({".html", ".htm"}, "");
     case OutputKind::kText:

@@ -16,6 +16,7 @@ enum class OutputKind {
   kFilm,   ///< a film or a result: .exr
   kImage,  ///< what write_image() writes: .exr, .png, .hdr, .pfm, .jpg, .jpeg, .tif, .tiff
   kPng,    ///< .png
+  kScene,  ///< .xml
   kPage,   ///< .html, .htm
   kText,   ///< JSON, CSV: any name that is not that of an image, a scene or a page; "" and "-" mean standard output
 };

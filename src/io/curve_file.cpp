@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include "core/error.h"
-#include "io/xml_values.h"
+#include "formats/xml_values.h"
 
 namespace covary {
 namespace {

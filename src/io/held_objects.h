@@ -3,7 +3,7 @@
 
 #include <unordered_set>
 
-#include "io/object_graph.h"
+#include "formats/object_graph.h"
 
 namespace covary {
 

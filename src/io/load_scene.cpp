@@ -13,18 +13,16 @@
 #include "core/memory_limit.h"
 #include "core/stopwatch.h"
 #include "emitters/area.h"
-#include "io/file_view.h"
+#include "formats/file_view.h"
+#include "formats/scene_file.h"
 #include "io/held_objects.h"
 #include "io/media.h"
 #include "io/mesh_attributes.h"
 #include "io/nested_integrator.h"
 #include "io/object_factory.h"
-#include "io/pbrt_reader.h"
-#include "io/scene_file.h"
 #include "io/scene_jobs.h"
 #include "io/scene_memory.h"
 #include "io/sensor.h"
-#include "io/xml_reader.h"
 #include "scene/mesh.h"
 
 namespace covary {
@@ -37,16 +35,7 @@ class Loader {
 
   void load(std::string_view text, const std::string& name) {
     const Stopwatch watch;
-    if (!is_pbrt_file(name))
-      xml_ = read_scene_xml(text, name, options_.defines, files_, diagnostics_);
-    else if (options_.defines.empty())
-      xml_ = read_scene_pbrt(text, name, files_, diagnostics_);
-    else
-      throw Error(ErrorCode::kUsage, name + ": scenes of pbrt have no parameters to define");
-    if (!xml_.scene) {
-      diagnostics_.throw_if_errors();
-      throw Error(ErrorCode::kInput, name + ": the file holds no scene");
-    }
+    xml_ = read_scene_file(text, name, options_.defines, files_, diagnostics_);
     jobs_.collect(*xml_.scene);
     jobs_.run(diagnostics_);
     assemble();

@@ -7,7 +7,7 @@
 #include <string>
 #include <unordered_map>
 
-#include "io/file_resolver.h"
+#include "formats/file_resolver.h"
 #include "scene/parameters.h"
 
 namespace covary {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Scenes of pbrt against the same scenes in Mitsuba's XML by hand: rays of the camera, what they meet, its reflection
 // and light. Nothing is statistical; numbers are equal but for the rounding of the transformations.
-#include "io/pbrt_reader.h"
+#include "formats/pbrt_reader.h"
 
 #include <gtest/gtest.h>
 
@@ -9,8 +9,9 @@
 
 #include "core/arena.h"
 #include "core/random.h"
+#include "core/srgb.h"
+#include "formats/xml_values.h"
 #include "io/load_scene.h"
-#include "io/xml_values.h"
 #include "support/files.h"
 
 namespace covary {
@@ -242,6 +243,73 @@ WorldBegin
   expect_equal(a, b, 80);
 }
 
+/// The images of infinite lights: pbrt's axes of the square, turned by the light's transformation.
+TEST_F(Pbrt, ImagesOfInfiniteLightsShineFromTheirDirections) {
+  // Texels of 1, 2, 3 around +z, x < 0 and y < 0 first; the corners are those around -z.
+  std::string texels;
+  for (int i = 0; i < 16; ++i) texels += std::string(3, static_cast<char>(i * 16));
+  write("sky.ppm", "P6\n4 4\n255\n" + texels);
+  const LoadedScene a = pbrt(R"(Camera "perspective"
+WorldBegin
+Scale -1 1 1
+Rotate 90 0 0 1
+LightSource "infinite" "string filename" "sky.ppm" "float scale" 2
+Shape "sphere"
+)");
+  ASSERT_TRUE(a.scene->environment());
+  const auto expect = [&](const Vec3& local, int texel) {
+    const Vec3 d = normalize(Vec3{local.y, local.x, local.z});  // turned by 90 degrees, then mirrored
+    EXPECT_NEAR(a.scene->environment()->environment(d).radiance.g,
+                2 * srgb_to_linear(static_cast<float>(texel * 16) / 255), 1e-4f)
+        << texel;
+  };
+  expect({-0.2f, -0.2f, 1}, 5);
+  expect({0.2f, -0.2f, 1}, 6);
+  expect({-0.2f, 0.2f, 1}, 9);
+  expect({0.2f, 0.2f, 1}, 10);
+  expect({0.2f, 0.2f, -1}, 15);
+  expect({-0.2f, 0.2f, -1}, 12);
+  expect({1, 0.1f, 0.1f}, 11);
+}
+
+TEST_F(Pbrt, MediaAreTheSceneByHand) {
+  const LoadedScene a = pbrt(R"(MakeNamedMedium "fog" "string type" "homogeneous" "rgb sigma_a" [ .1 .2 0 ]
+  "rgb sigma_s" [ .3 .2 0 ] "float scale" 2 "float g" .5
+MediumInterface "" "fog"
+Camera "perspective"
+WorldBegin
+MakeNamedMedium "milk" "string type" "homogeneous"
+AttributeBegin
+  MediumInterface "milk" "fog"
+  Material "interface"
+  Translate 0 0 3
+  Shape "sphere"
+AttributeEnd
+MediumInterface "fog"
+Translate 0 0 6
+Shape "sphere"
+)");
+  const Medium* camera = a.scene->camera_medium();
+  ASSERT_TRUE(camera);
+  // The media before and behind what a ray along +z meets first.
+  const auto media = [&](float z) {
+    SurfaceHit hit;
+    EXPECT_TRUE(a.scene->intersect({{0, 0, z}, {0, 0, 1}}, hit));
+    return std::pair(hit.shape->medium_towards(hit.ng, {0, 0, -1}), hit.shape->medium_towards(hit.ng, {0, 0, 1}));
+  };
+  const auto [fog, milk] = media(0);
+  ASSERT_TRUE(milk);
+  EXPECT_EQ(fog, camera);
+  const Medium::Coefficients in_fog = fog->at({0, 0, 0}), in_milk = milk->at({0, 0, 0});
+  for (int c = 0; c < 3; ++c) {
+    EXPECT_NEAR(in_fog.extinction[c], c < 2 ? 0.8f : 0, 1e-6f);
+    EXPECT_NEAR(in_fog.scattering[c], c == 0 ? 0.6f : c == 1 ? 0.4f : 0, 1e-6f);
+    EXPECT_EQ(in_milk.extinction[c], 2);
+    EXPECT_EQ(in_milk.scattering[c], 1);
+  }
+  EXPECT_EQ(media(4.5f), std::pair(camera, camera));
+}
+
 TEST_F(Pbrt, IncludesAreReadInPlace) {
   write("ball.pbrt", "Translate 0 0 1\nShape \"sphere\"\n");
   // Heights of the uppermost spheres, one column each: the ball, after it moved all later ones; after that of Import.
@@ -277,7 +345,7 @@ Shape "sphere" "float radios" 2 "float zmin" 0
 Shape "curve"
 Material "diffuse" "texture reflectance" "wood"
 Shape "trianglemesh" "point3 P" [ 0 0 0  1 0 0  0 1 0 ] "integer indices" [ 0 1 3 ]
-LightSource "infinite" "string filename" "sky.exr"
+LightSource "infinite" "string filename" "sky.exr" "rgb L" [ 1 1 1 ]
 AreaLightSource "diffuse" "bool twosided" true
 NamedMaterial "gold"
 Shape "sphere" "rgb radius" [ 1 1 1 ]
@@ -286,6 +354,10 @@ Texture "t" "spectrum" "marble"
 Shape "plymesh" "string filename" "no.ply"
 Material "coateddiffuse" "rgb albedo" [ 1 1 1 ]
 Translate 0 0 0 Scale 0 1 1
+MakeNamedMedium "smoke" "string type" "uniformgrid"
+MakeNamedMedium "milk" "string type" "homogeneous" "string preset" "Wholemilk" "rgb Le" [ 1 1 1 ]
+MediumInterface "mist" ""
+LightSource "projection" "string filename" "a.png"
 )");
   for (const char* message : {
            "scene.pbrt:1:22: parameter 'screenwindow' of Camera \"perspective\" is not supported",
@@ -296,7 +368,7 @@ Translate 0 0 0 Scale 0 1 1
            "scene.pbrt:6:20: parameter 'reflectance' of Material \"diffuse\" names the texture 'wood', which is no "
            "texture of spectra",
            "scene.pbrt:7:1: Shape \"trianglemesh\" has the index 3; there are 3 vertices",
-           "scene.pbrt:8:24: parameter 'filename' of LightSource \"infinite\" is an image of equal areas",
+           "scene.pbrt:8:24: parameter 'filename' of LightSource \"infinite\" stands beside 'L'",
            "scene.pbrt:9:1: AreaLightSource \"diffuse\" shines on both sides",
            "scene.pbrt:10:1: no material has the name 'gold'",
            "scene.pbrt:11:16: parameter 'radius' of Shape \"sphere\" has the type 'rgb'; expected 'float'",
@@ -305,6 +377,12 @@ Translate 0 0 0 Scale 0 1 1
            "no.ply",
            "scene.pbrt:15:1: Material \"coateddiffuse\" has an 'albedo'",
            "scene.pbrt:16:17: Scale: ",
+           "scene.pbrt:17:1: MakeNamedMedium \"smoke\" is of the type 'uniformgrid'; supported is 'homogeneous'",
+           "scene.pbrt:18:52: parameter 'preset' of MakeNamedMedium \"milk\" is not supported; give 'sigma_a'",
+           "scene.pbrt:18:80: parameter 'Le' of MakeNamedMedium \"milk\" is not supported: media emit no light",
+           "scene.pbrt:19:1: no medium before this one has the name 'mist'",
+           "scene.pbrt:20:1: LightSource \"projection\" is not supported; supported are lights 'distant', 'infinite', "
+           "'point' and 'spot'. Its like in XML is 'projector'",
        })
     EXPECT_TRUE(contains(found, message));
 }

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "emitters/area.h"
-#include "io/file_resolver.h"
+#include "formats/file_resolver.h"
 #include "io/object_factory.h"
 #include "scene/parameters.h"
 #include "scene/shape.h"

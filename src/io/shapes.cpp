@@ -16,20 +16,19 @@
 #include <fmt/format.h>
 
 #include "core/memory_limit.h"
+#include "formats/file_view.h"
 #include "io/curve_file.h"
-#include "io/file_view.h"
 #include "io/mesh_attributes.h"
 #include "media/volume_file.h"
 #include "meshes/mesh_file.h"
 #include "scene/analytic_shape.h"
+#include "scene/embedded_data.h"
 #include "scene/mesh.h"
 #include "scene/sdf_grid.h"
 
 namespace covary {
 namespace {
 
-/// A mesh in the text of a scene of pbrt: the content of a PLY file in place of its name.
-const std::string kInlineMesh = "data";
 constexpr float kHuge = std::numeric_limits<float>::max();
 
 MeshPlacement placement_of(Parameters& p) {
@@ -72,11 +71,8 @@ std::shared_ptr<Shape> make_ply(Parameters& p) {
   MeshPlacement placement = placement_of(p);
   placement.flip_tex_coords = p.get_bool("flip_tex_coords", false);
   const std::vector<std::string> wanted = wanted_attributes(p.object());
-  for (const Property& property : p.object().properties)
-    if (const auto* text = std::get_if<std::string>(&property.value); text && property.name == kInlineMesh) {
-      p.get_string(kInlineMesh, "");
-      return finish(p, read_ply(std::as_bytes(std::span(*text)), wanted), placement);
-    }
+  if (const std::string* data = find_embedded(p))
+    return finish(p, read_ply(std::as_bytes(std::span(*data)), wanted), placement);
   return make_from_file(p, placement, [&](const FileView& view) { return read_ply(view.bytes(), wanted); });
 }
 

@@ -15,7 +15,7 @@ class HelpTest(CliTest):
     def setUp(self):
         super().setUp()
         names = self.good("help").stdout.split("\nCommands:")[1]
-        self.commands = re.findall(r"^  (\w+) ", names, re.M)
+        self.commands = re.findall(r"^  ([\w-]+) ", names, re.M)
         self.options = {name: self.options_in(self.good(name, "--help-all").stdout) for name in self.commands}
         self.assertIn("render", self.commands)
         self.assertIn("--estimator", self.options["render"])
@@ -76,7 +76,7 @@ class OneScreen(HelpTest):
     def test_commands(self):
         text = self.good("--help").stdout
         main, laboratory = text.split("\nCommands:\n")[1].split("\nLaboratory:\n")
-        names = [re.findall(r"^  (\w+)", part, re.M) for part in (main, laboratory)]
+        names = [re.findall(r"^  ([\w-]+)", part, re.M) for part in (main, laboratory)]
         self.assertEqual(names[0][:5], ["render", "combine", "denoise", "compare", "view"])
         self.assertLessEqual({"experiment", "probe"}, set(names[1]))
 

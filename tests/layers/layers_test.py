@@ -182,10 +182,10 @@ class Planted(unittest.TestCase):
         self.write("src/bsdfs/diffuse.cpp", SPDX +
                    'f(parameters.get_texture("reflectance", 1), parameters.get_bool("new", 1));\n')
         self.write("docs/scene-format.md", "| `reflectance` |\n")
-        self.write("src/io/pbrt_view.cpp", SPDX + 'p.get_float("fov", 1);\n')
+        self.write("src/formats/pbrt_view.cpp", SPDX + 'p.get_float("fov", 1);\n')
         self.write("docs/pbrt.md", "| nothing |\n")
         self.expect(layers.documented_parameters, "lacks the parameter 'new' of src/bsdfs/diffuse.cpp:2",
-                    "docs/pbrt.md:1: lacks the parameter 'fov' of src/io/pbrt_view.cpp:2")
+                    "docs/pbrt.md:1: lacks the parameter 'fov' of src/formats/pbrt_view.cpp:2")
 
     def test_command_without_documentation(self):
         self.write("apps/render.cpp", SPDX + 'auto* a = app.add_subcommand("render", "Render a scene");\n')

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/file_view.h"
+#include "formats/file_view.h"
 
 #include <fcntl.h>
 #include <sys/mman.h>

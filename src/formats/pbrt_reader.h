@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "io/xml_reader.h"
+#include "formats/xml_reader.h"
 
 namespace covary {
 

@@ -3,44 +3,13 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <cstring>
-#include <limits>
 
-#include "io/pbrt_objects.h"
+#include "formats/embedded_mesh.h"
+#include "formats/pbrt_objects.h"
+#include "scene/embedded_data.h"
 
 namespace covary {
 namespace {
-
-struct InlineMesh {
-  std::vector<double> positions, normals, uvs;
-  std::vector<double> corners;  // three indices a triangle
-};
-
-template <typename T>
-void append(std::string& bytes, T value) {
-  char raw[sizeof(T)];
-  std::memcpy(raw, &value, sizeof(T));
-  bytes.append(raw, sizeof(T));
-}
-
-/// The mesh as a binary PLY file. Indices are whole and in range.
-std::string ply_text(const InlineMesh& mesh) {
-  const size_t n = mesh.positions.size() / 3;
-  std::string text = fmt::format("ply\nformat binary_little_endian 1.0\nelement vertex {}\n", n);
-  for (const char* name : {"x", "y", "z"}) text += fmt::format("property float {}\n", name);
-  if (!mesh.normals.empty()) text += "property float nx\nproperty float ny\nproperty float nz\n";
-  if (!mesh.uvs.empty()) text += "property float u\nproperty float v\n";
-  text += fmt::format("element face {}\nproperty list uchar int vertex_indices\nend_header\n", mesh.corners.size() / 3);
-  const auto add = [&](const std::vector<double>& values, size_t i, size_t width) {
-    for (size_t k = 0; k < width && !values.empty(); ++k) append(text, static_cast<float>(values[i * width + k]));
-  };
-  for (size_t i = 0; i < n; ++i) add(mesh.positions, i, 3), add(mesh.normals, i, 3), add(mesh.uvs, i, 2);
-  for (size_t i = 0; i < mesh.corners.size(); ++i) {
-    if (i % 3 == 0) append(text, uint8_t{3});
-    append(text, static_cast<int32_t>(mesh.corners[i]));
-  }
-  return text;
-}
 
 ObjectBuilder shape(const std::string& type, PbrtParameters& p, const PbrtPlacement& placement,
                     const Transform& own = Transform()) {
@@ -64,16 +33,16 @@ std::vector<double> read_indices(PbrtParameters& p, size_t n_vertices, size_t wi
   return indices;
 }
 
-ObjectBuilder mesh_shape(PbrtParameters& p, const PbrtPlacement& placement, InlineMesh mesh, bool smooth) {
+ObjectBuilder mesh_shape(PbrtParameters& p, const PbrtPlacement& placement, EmbeddedMesh mesh, bool smooth) {
   ObjectBuilder result = shape("ply", p, placement);
-  set_property(*result, "data", ply_text(mesh));
+  set_property(*result, std::string(kEmbeddedData), ply_text(mesh));
   if (!smooth) set_property(*result, "face_normals", true);
   return result;
 }
 
 /// Positions and what stands at each of them.
-std::optional<InlineMesh> read_vertices(PbrtParameters& p) {
-  InlineMesh mesh;
+std::optional<EmbeddedMesh> read_vertices(PbrtParameters& p) {
+  EmbeddedMesh mesh;
   mesh.positions = p.get_array("P", "point3", 3);
   mesh.normals = p.get_array("N", "normal3", 3);
   mesh.uvs = p.get_array("uv", "point2", 2);
@@ -91,7 +60,7 @@ std::optional<InlineMesh> read_vertices(PbrtParameters& p) {
 }
 
 ObjectBuilder triangle_mesh(PbrtParameters& p, const PbrtPlacement& placement) {
-  std::optional<InlineMesh> mesh = read_vertices(p);
+  std::optional<EmbeddedMesh> mesh = read_vertices(p);
   p.ignore({"S", "faceIndices"});
   if (!mesh) return nullptr;
   mesh->corners = read_indices(p, mesh->positions.size() / 3, 3);
@@ -102,13 +71,13 @@ ObjectBuilder triangle_mesh(PbrtParameters& p, const PbrtPlacement& placement) {
 
 /// Patches that are parallelograms: two triangles of each, with a quarter of the unit square at each corner.
 ObjectBuilder bilinear_mesh(PbrtParameters& p, const PbrtPlacement& placement) {
-  const std::optional<InlineMesh> given = read_vertices(p);
+  const std::optional<EmbeddedMesh> given = read_vertices(p);
   p.ignore({"faceIndices"});
   if (!given) return nullptr;
   if (p.has("emissionfilename")) p.error("has an 'emissionfilename', which is not supported");
   const std::vector<double> indices = read_indices(p, given->positions.size() / 3, 4);
   if (indices.empty()) return nullptr;
-  InlineMesh mesh;
+  EmbeddedMesh mesh;
   for (size_t patch = 0; patch < indices.size(); patch += 4) {
     const auto first = static_cast<double>(mesh.positions.size() / 3);
     double off = 0, size = 0;
@@ -189,9 +158,11 @@ ObjectBuilder make_pbrt_shape(const std::string& type, PbrtParameters& p, const 
     set_property(*result, "filename", p.get_string("filename", ""));
     return result;
   }
+  const char* instead = type == "curve" ? ". Hair can be a file of a shape 'bsplinecurve' in XML" : "";
   p.error(
-      "is not supported; supported are shapes 'bilinearmesh', 'cylinder', 'disk', 'plymesh', 'sphere' and "
-      "'trianglemesh'");
+      fmt::format("is not supported; supported are shapes 'bilinearmesh', 'cylinder', 'disk', 'plymesh', 'sphere' and "
+                  "'trianglemesh'{}",
+                  instead));
   return nullptr;
 }
 

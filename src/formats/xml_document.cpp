@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/xml_document.h"
+#include "formats/xml_document.h"
 
 #include <fmt/format.h>
 

@@ -4,13 +4,13 @@
 
 #include <cmath>
 
-#include "io/pbrt_objects.h"
+#include "formats/pbrt_objects.h"
 
 namespace covary {
 namespace {
 
 /// pbrt's surfaces look the same from both sides.
-ObjectPtr two_sided(const ObjectBuilder& model) {
+ObjectBuilder two_sided(const ObjectBuilder& model) {
   auto sides = make_object("bsdf", "twosided", model->where);
   set_property(*sides, "", ObjectPtr(model));
   return sides;
@@ -63,7 +63,7 @@ double index_of_refraction(PbrtParameters& p) {
   return 1.5;
 }
 
-ObjectPtr conductor(PbrtParameters& p, const PbrtNames& names) {
+ObjectBuilder conductor(PbrtParameters& p, const PbrtNames& names) {
   const auto rough = roughness(p, names);
   if (!rough) return nullptr;
   auto model = make_object("bsdf", rough->smooth() ? "conductor" : "roughconductor", p.where());
@@ -109,7 +109,7 @@ ObjectPtr conductor(PbrtParameters& p, const PbrtNames& names) {
   return two_sided(model);
 }
 
-ObjectPtr dielectric(PbrtParameters& p, const PbrtNames& names, bool thin) {
+ObjectBuilder dielectric(PbrtParameters& p, const PbrtNames& names, bool thin) {
   std::optional<Roughness> rough = Roughness();
   if (!thin) rough = roughness(p, names);
   if (!rough) return nullptr;
@@ -126,7 +126,7 @@ ObjectPtr dielectric(PbrtParameters& p, const PbrtNames& names, bool thin) {
 
 /// pbrt follows light between the layers; `plastic` has that in closed form, without what the clear layer's thickness
 /// takes away.
-ObjectPtr coated_diffuse(PbrtParameters& p, const PbrtNames& names) {
+ObjectBuilder coated_diffuse(PbrtParameters& p, const PbrtNames& names) {
   const auto rough = roughness(p, names);
   const auto reflectance = p.has("reflectance") ? spectrum_value(p, "reflectance", names) : Value(0.5);
   if (!rough || !reflectance) return nullptr;
@@ -152,7 +152,7 @@ ObjectPtr coated_diffuse(PbrtParameters& p, const PbrtNames& names) {
   return two_sided(model);
 }
 
-ObjectPtr diffuse(PbrtParameters& p, const PbrtNames& names) {
+ObjectBuilder diffuse(PbrtParameters& p, const PbrtNames& names) {
   auto model = make_object("bsdf", "diffuse", p.where());
   if (p.has("reflectance")) {
     const auto reflectance = spectrum_value(p, "reflectance", names);
@@ -162,7 +162,7 @@ ObjectPtr diffuse(PbrtParameters& p, const PbrtNames& names) {
   return two_sided(model);
 }
 
-ObjectPtr mix(PbrtParameters& p, const PbrtNames& names) {
+ObjectBuilder mix(PbrtParameters& p, const PbrtNames& names) {
   const PbrtParameter* materials = p.find("materials");
   const auto amount = float_value(p, "amount", 0.5, names);
   if (!materials || materials->strings.size() != 2) {
@@ -184,7 +184,7 @@ ObjectPtr mix(PbrtParameters& p, const PbrtNames& names) {
   return model;
 }
 
-ObjectPtr base_material(const std::string& type, PbrtParameters& p, const PbrtNames& names) {
+ObjectBuilder base_material(const std::string& type, PbrtParameters& p, const PbrtNames& names) {
   if (type == "diffuse") return diffuse(p, names);
   if (type == "coateddiffuse") return coated_diffuse(p, names);
   if (type == "conductor") return conductor(p, names);
@@ -204,8 +204,8 @@ ObjectPtr base_material(const std::string& type, PbrtParameters& p, const PbrtNa
 
 }  // namespace
 
-ObjectPtr make_pbrt_material(const std::string& type, PbrtParameters& p, const PbrtNames& names) {
-  ObjectPtr model = base_material(type, p, names);
+ObjectBuilder make_pbrt_material(const std::string& type, PbrtParameters& p, const PbrtNames& names) {
+  ObjectBuilder model = base_material(type, p, names);
   if (const std::string file = p.get_string("normalmap", ""); !file.empty() && model) {
     auto map = make_object("texture", "bitmap", p.where());
     set_property(*map, "filename", file);
@@ -213,7 +213,7 @@ ObjectPtr make_pbrt_material(const std::string& type, PbrtParameters& p, const P
     set_property(*map, "to_uv", Transform::translate({0, 1, 0}) * Transform::scale({1, -1, 1}));
     auto mapped = make_object("bsdf", "normalmap", p.where());
     set_property(*mapped, "normalmap", ObjectPtr(map));
-    set_property(*mapped, "", model);
+    set_property(*mapped, "", ObjectPtr(model));
     model = mapped;
   }
   if (!p.has("displacement") || !model) return model;
@@ -221,7 +221,7 @@ ObjectPtr make_pbrt_material(const std::string& type, PbrtParameters& p, const P
   if (!displacement || !std::holds_alternative<ObjectPtr>(*displacement)) return model;
   auto bumps = make_object("bsdf", "bumpmap", p.where());
   set_property(*bumps, "", *displacement);
-  set_property(*bumps, "", model);
+  set_property(*bumps, "", ObjectPtr(model));
   return bumps;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/file_resolver.h"
+#include "formats/file_resolver.h"
 
 #include <fmt/format.h>
 
@@ -11,7 +11,7 @@
 #include "core/content_hash.h"
 #include "core/error.h"
 #include "core/parallel.h"
-#include "io/file_view.h"
+#include "formats/file_view.h"
 
 namespace covary {
 namespace fs = std::filesystem;

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "io/pbrt_objects.h"
+#include "formats/pbrt_objects.h"
 
 namespace covary {
 namespace {
@@ -47,11 +47,16 @@ ObjectPtr spot(PbrtParameters& p, const Transform& to_world) {
   return light;
 }
 
-ObjectPtr infinite(PbrtParameters& p, const Transform&) {
+ObjectPtr infinite(PbrtParameters& p, const Transform& to_world) {
   refuse(p, {"portal", "illuminance"});
   if (const PbrtParameter* file = p.find("filename")) {
-    p.error_at(*file, "is an image of equal areas, which is not supported; supported is 'L'");
-    return nullptr;
+    if (p.has("L")) p.error_at(*file, "stands beside 'L'; only one of them can be given");
+    auto map = make_object("emitter", "envmap", p.where());
+    set_property(*map, "filename", p.get_string("filename", ""));
+    set_property(*map, "mapping", std::string("equal_area"));
+    set_property(*map, "scale", p.get_float("scale", 1));
+    set_property(*map, "to_world", to_world);
+    return map;
   }
   auto light = make_object("emitter", "constant", p.where());
   set_property(*light, "radiance", scaled_colour(p, "L"));
@@ -78,7 +83,10 @@ ObjectPtr make_pbrt_light(const std::string& type, PbrtParameters& p, const Tran
   }
   if (type == "spot") return spot(p, to_world);
   if (type == "infinite") return infinite(p, to_world);
-  p.error("is not supported; supported are lights 'distant', 'infinite', 'point' and 'spot'");
+  const char* instead = type == "projection"    ? " Its like in XML is 'projector'."
+                        : type == "goniometric" ? " A 'point' without its pattern shines alike in all directions."
+                                                : "";
+  p.error(fmt::format("is not supported; supported are lights 'distant', 'infinite', 'point' and 'spot'.{}", instead));
   return nullptr;
 }
 

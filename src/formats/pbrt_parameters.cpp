@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/pbrt_parameters.h"
+#include "formats/pbrt_parameters.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "io/xml_values.h"
+#include "formats/xml_values.h"
 
 namespace covary {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/xml_values.h"
+#include "formats/xml_values.h"
 
 #include <gtest/gtest.h>
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/spectrum_objects.h"
+#include "formats/spectrum_objects.h"
 
 #include <fmt/format.h>
 
-#include "io/xml_values.h"
+#include "formats/xml_values.h"
 
 namespace covary {
 namespace {

@@ -7,7 +7,7 @@
 #include <memory>
 #include <string>
 
-#include "io/file_resolver.h"
+#include "formats/file_resolver.h"
 #include "scene/parameters.h"
 
 namespace covary {

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "io/pbrt_objects.h"
-#include "io/xml_values.h"
+#include "formats/pbrt_objects.h"
+#include "formats/xml_values.h"
 
 namespace covary {
 namespace {
@@ -57,7 +57,7 @@ Transform texture_mapping(PbrtParameters& p, const Transform& more) {
   return more * Transform::translate(shift) * Transform::scale(scale);
 }
 
-ObjectPtr image_texture(PbrtParameters& p) {
+ObjectBuilder image_texture(PbrtParameters& p) {
   auto bitmap = make_object("texture", "bitmap", p.where());
   set_property(*bitmap, "filename", p.get_string("filename", ""));
   // pbrt's v = 0 is the lower edge of the picture.
@@ -91,7 +91,7 @@ std::optional<Value> either(PbrtParameters& p, const std::string& name, double f
   return spectrum_value(p, name, names);
 }
 
-ObjectPtr checkerboard(PbrtParameters& p, bool of_numbers, const PbrtNames& names) {
+ObjectBuilder checkerboard(PbrtParameters& p, bool of_numbers, const PbrtNames& names) {
   if (p.get_integer("dimension", 2) != 2) p.error("has three dimensions; supported are two");
   auto board = make_object("texture", "checkerboard", p.where());
   // Squares of pbrt have the length 1, those here 1/2.
@@ -103,7 +103,7 @@ ObjectPtr checkerboard(PbrtParameters& p, bool of_numbers, const PbrtNames& name
   return board;
 }
 
-ObjectPtr scaled_texture(PbrtParameters& p, bool of_numbers, const PbrtNames& names) {
+ObjectBuilder scaled_texture(PbrtParameters& p, bool of_numbers, const PbrtNames& names) {
   const auto texture = either(p, "tex", 1, of_numbers, names);
   const auto factor = float_value(p, "scale", 1, names);
   if (!texture || !factor) return nullptr;
@@ -124,16 +124,6 @@ ObjectPtr scaled_texture(PbrtParameters& p, bool of_numbers, const PbrtNames& na
 }
 
 }  // namespace
-
-ObjectBuilder make_object(const std::string& kind, const std::string& type, const SourceLocation& where) {
-  auto object = std::make_shared<ObjectDescription>();
-  object->kind = kind, object->type = type, object->where = where;
-  return object;
-}
-
-void set_property(ObjectDescription& object, const std::string& name, Value value) {
-  object.properties.push_back({name, std::move(value), object.where});
-}
 
 std::optional<Value> float_value(PbrtParameters& p, const std::string& name, double fallback, const PbrtNames& names) {
   const PbrtParameter* parameter = p.find(name);
@@ -189,7 +179,7 @@ Spectrum light_colour(PbrtParameters& p, const std::string& name) {
   return Spectrum(1);
 }
 
-ObjectPtr make_pbrt_texture(const std::string& type, PbrtParameters& p, const PbrtNames& names) {
+ObjectBuilder make_pbrt_texture(const std::string& type, PbrtParameters& p, const PbrtNames& names) {
   const bool of_numbers = p.what().starts_with("Texture \"float\"");
   if (type == "imagemap") return image_texture(p);
   if (type == "checkerboard") return checkerboard(p, of_numbers, names);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/scene_references.h"
+#include "formats/scene_references.h"
 
 #include <fmt/format.h>
 

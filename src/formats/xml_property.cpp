@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/xml_property.h"
+#include "formats/xml_property.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "io/file_view.h"
-#include "io/xml_values.h"
+#include "formats/file_view.h"
+#include "formats/xml_values.h"
 
 namespace covary {
 namespace {

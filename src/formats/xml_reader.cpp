@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/xml_reader.h"
+#include "formats/xml_reader.h"
 
 #include <fmt/format.h>
 
@@ -9,12 +9,12 @@
 #include <unordered_map>
 
 #include "core/content_hash.h"
-#include "io/file_view.h"
-#include "io/scene_references.h"
-#include "io/spectrum_objects.h"
-#include "io/upgrade.h"
-#include "io/xml_document.h"
-#include "io/xml_property.h"
+#include "formats/file_view.h"
+#include "formats/scene_references.h"
+#include "formats/spectrum_objects.h"
+#include "formats/upgrade.h"
+#include "formats/xml_document.h"
+#include "formats/xml_property.h"
 
 namespace covary {
 namespace fs = std::filesystem;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Names and parameters of Mitsuba 0.x files in today's terms (docs/scene-format.md lists them).
-#include "io/upgrade.h"
+#include "formats/upgrade.h"
 
 #include <fmt/format.h>
 

@@ -1,17 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/pbrt_reader.h"
+#include "formats/pbrt_reader.h"
 
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <functional>
 #include <optional>
 
 #include "core/content_hash.h"
-#include "io/file_view.h"
-#include "io/pbrt_objects.h"
-#include "io/pbrt_parameters.h"
-#include "io/xml_values.h"
+#include "formats/file_view.h"
+#include "formats/pbrt_objects.h"
+#include "formats/pbrt_parameters.h"
+#include "formats/xml_values.h"
 
 namespace covary {
 namespace {
@@ -23,7 +22,8 @@ constexpr size_t kMostObjects = 1000000, kMostStates = 1000;
 
 constexpr std::string_view kDirectives =
     "Accelerator AreaLightSource AttributeBegin AttributeEnd Camera ColorSpace ConcatTransform CoordinateSystem "
-    "CoordSysTransform Film Identity Import Include Integrator LightSource LookAt MakeNamedMaterial Material "
+    "CoordSysTransform Film Identity Import Include Integrator LightSource LookAt MakeNamedMaterial MakeNamedMedium "
+    "Material MediumInterface "
     "NamedMaterial ObjectBegin ObjectEnd ObjectInstance Option PixelFilter ReverseOrientation Rotate Sampler Scale "
     "Shape Texture Transform TransformBegin TransformEnd Translate WorldBegin";
 
@@ -52,9 +52,8 @@ class Reader {
 
  private:
   struct State {
-    Transform to_world;
-    bool reverse_orientation = false;
-    ObjectPtr material, area_light;
+    PbrtPlacement placement;
+    ObjectPtr material, area_light, inside, outside;
     bool material_failed = false;  // it was told, so what uses it says nothing
   };
   struct SavedState {
@@ -82,7 +81,8 @@ class Reader {
 
   void directive(const PbrtToken& token, PbrtTokens& tokens, int depth) {
     const std::string& word = token.text;
-    if (transformation(word, tokens) || block(word, tokens) || view(word, tokens) || world(word, tokens)) return;
+    if (change_placement(word, tokens, where_, state_.placement, systems_, diagnostics_)) return;
+    if (block(word, tokens) || view(word, tokens) || medium(word, tokens) || world(word, tokens)) return;
     if (word == "Include" || word == "Import") {
       const State before = state_;
       include(tokens.string("a file"), depth);
@@ -102,63 +102,6 @@ class Reader {
     }
   }
 
-  bool transformation(const std::string& word, PbrtTokens& tokens) {
-    const auto vec3 = [](const std::vector<double>& n, size_t i) {
-      return Vec3{static_cast<float>(n[i]), static_cast<float>(n[i + 1]), static_cast<float>(n[i + 2])};
-    };
-    const SourceLocation where = where_;
-    const auto apply = [&](const std::function<Transform()>& make, bool replace = false) {
-      try {
-        state_.to_world = replace ? make() : state_.to_world * make();
-      } catch (const Error& error) {
-        diagnostics_.error(where, fmt::format("{}: {}", word, error.what()));
-      }
-    };
-    if (word == "Identity") {
-      state_.to_world = Transform();
-    } else if (word == "Translate") {
-      apply([n = tokens.numbers(3), &vec3] { return Transform::translate(vec3(n, 0)); });
-    } else if (word == "Scale") {
-      apply([n = tokens.numbers(3)] {
-        return Transform(Matrix4{{{n[0], 0, 0, 0}, {0, n[1], 0, 0}, {0, 0, n[2], 0}, {0, 0, 0, 1}}});
-      });
-    } else if (word == "Rotate") {
-      apply([n = tokens.numbers(4), &vec3] {
-        if (vec3(n, 1) == Vec3{}) throw Error(ErrorCode::kInput, "the axis has length zero");
-        return Transform::rotate(vec3(n, 1), n[0]);
-      });
-    } else if (word == "LookAt") {
-      apply(
-          [n = tokens.numbers(9), &vec3] { return Transform::look_at(vec3(n, 0), vec3(n, 3), vec3(n, 6)).inverse(); });
-    } else if (word == "Transform" || word == "ConcatTransform") {
-      apply(
-          [n = tokens.numbers(16)] {
-            Matrix4 m;
-            for (size_t i = 0; i < 16; ++i) m[i % 4][i / 4] = n[i];  // column by column
-            return Transform(m);
-          },
-          word == "Transform");
-    } else if (word == "CoordinateSystem") {
-      systems_[tokens.string("a name")] = state_.to_world;
-    } else if (word == "CoordSysTransform") {
-      const auto found = systems_.find(tokens.string("the name of a coordinate system"));
-      if (found == systems_.end())
-        diagnostics_.error(where_, "no coordinate system has this name");
-      else
-        state_.to_world = found->second;
-    } else if (word == "ActiveTransform" || word == "TransformTimes") {
-      diagnostics_.error(where_, fmt::format("'{}' is not supported: nothing moves", word));
-      while (tokens.peek().kind == PbrtToken::kWord &&
-             (word == "TransformTimes" || tokens.peek().text == "All" || tokens.peek().text.ends_with("Time")))
-        if (tokens.next(), word != "TransformTimes") break;
-    } else if (word == "ReverseOrientation") {
-      state_.reverse_orientation = !state_.reverse_orientation;
-    } else {
-      return false;
-    }
-    return true;
-  }
-
   bool block(const std::string& word, PbrtTokens& tokens) {
     if (word == "AttributeBegin" || word == "TransformBegin") {
       push(word == "AttributeBegin");
@@ -167,7 +110,7 @@ class Reader {
     } else if (word == "WorldBegin") {
       if (in_world_) diagnostics_.error(where_, "a second WorldBegin");
       in_world_ = true;
-      state_.to_world = Transform();
+      state_.placement.to_world = Transform();
       systems_["world"] = Transform();
     } else if (word == "ObjectBegin") {
       const std::string name = tokens.string("a name");
@@ -210,13 +153,41 @@ class Reader {
     if (in_world_) {
       p.error("stands behind WorldBegin");
     } else if (word == "Camera") {
-      read_pbrt_camera(type, p, state_.to_world, view_);
-      systems_["camera"] = state_.to_world.inverse();
+      read_pbrt_camera(type, p, state_.placement.to_world, view_);
+      if (state_.outside && view_.sensor) set_property(*view_.sensor, "", state_.outside);
+      systems_["camera"] = state_.placement.to_world.inverse();
     } else {
       reader->second(type, p, view_);
     }
     p.report_unknown();
     return true;
+  }
+
+  bool medium(const std::string& word, PbrtTokens& tokens) {
+    if (word == "MakeNamedMedium") {
+      const std::string name = tokens.string("a name");
+      PbrtParameters p = parameters(tokens, fmt::format("{} \"{}\"", word, name));
+      const ObjectBuilder made = make_pbrt_medium(p.get_string("type", ""), p);
+      if (made) made->id = name;
+      names_.media[name] = made;
+      p.report_unknown();
+    } else if (word == "MediumInterface") {
+      const std::string inside = tokens.string("the name of a medium");
+      const std::string outside =
+          tokens.peek().kind == PbrtToken::kString ? tokens.string("the name of a medium") : inside;
+      state_.inside = named_medium(inside);
+      state_.outside = named_medium(outside);
+    } else {
+      return false;
+    }
+    return true;
+  }
+
+  ObjectPtr named_medium(const std::string& name) {
+    const auto found = names_.media.find(name);
+    if (found == names_.media.end() && !name.empty())
+      diagnostics_.error(where_, fmt::format("no medium before this one has the name '{}'", name));
+    return found == names_.media.end() ? nullptr : found->second;
   }
 
   bool world(const std::string& word, PbrtTokens& tokens) {
@@ -243,11 +214,13 @@ class Reader {
       state_.material = make_pbrt_material(type, p, names_);
       state_.material_failed = !state_.material;
     } else if (word == "MakeNamedMaterial") {
-      names_.materials[type] = make_pbrt_material(p.get_string("type", ""), p, names_);
+      const ObjectBuilder material = make_pbrt_material(p.get_string("type", ""), p, names_);
+      if (material) material->id = type;
+      names_.materials[type] = material;
     } else if (word == "AreaLightSource") {
       state_.area_light = make_pbrt_area_light(type, p);
     } else if (word == "LightSource") {
-      if (const ObjectPtr light = make_pbrt_light(type, p, state_.to_world)) add(light);
+      if (const ObjectPtr light = make_pbrt_light(type, p, state_.placement.to_world)) add(light);
     } else {
       read_shape(type, p);
     }
@@ -263,14 +236,16 @@ class Reader {
       p.error("has an unknown kind; expected \"float\" or \"spectrum\"");
       return;
     }
-    if (const ObjectPtr texture = make_pbrt_texture(type, p, names_))
+    if (const ObjectBuilder texture = make_pbrt_texture(type, p, names_)) {
+      texture->id = name;
       (kind == "float" ? names_.float_textures : names_.spectrum_textures)[name] = texture;
+    }
     p.report_unknown();
   }
 
   void read_shape(const std::string& type, PbrtParameters& p) {
     const auto alpha = float_value(p, "alpha", 1, names_);
-    const ObjectBuilder shape = make_pbrt_shape(type, p, {state_.to_world, state_.reverse_orientation});
+    const ObjectBuilder shape = make_pbrt_shape(type, p, state_.placement);
     if (!shape || !alpha) return;
     ObjectPtr material = state_.material;
     if (!material && !state_.material_failed) material = default_material();
@@ -281,6 +256,8 @@ class Reader {
       material = mask;
     }
     if (material) set_property(*shape, "", material);
+    if (state_.inside) set_property(*shape, "interior", state_.inside);
+    if (state_.outside) set_property(*shape, "exterior", state_.outside);
     if (state_.area_light && group_)
       p.warn("emits no light, because it is part of an object that has instances");
     else if (state_.area_light)
@@ -313,7 +290,7 @@ class Reader {
     }
     if (!found->second) return;
     auto instance = make_object("shape", "instance", where_);
-    set_property(*instance, "to_world", state_.to_world);
+    set_property(*instance, "to_world", state_.placement.to_world);
     set_property(*instance, "", ObjectPtr(found->second));
     add(instance);
   }
@@ -357,7 +334,7 @@ class Reader {
     if (whole)
       state_ = std::move(states_.back().state);
     else
-      state_.to_world = states_.back().state.to_world;
+      state_.placement.to_world = states_.back().state.placement.to_world;
     states_.pop_back();
   }
   void count() {
@@ -378,7 +355,7 @@ class Reader {
   PbrtNames names_;
   State state_;
   std::vector<SavedState> states_;
-  std::map<std::string, Transform> systems_;
+  PbrtSystems systems_;
   std::map<std::string, ObjectBuilder> groups_;
   ObjectPtr default_material_;
   SourceLocation where_;  // of the directive

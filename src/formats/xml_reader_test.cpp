@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/xml_reader.h"
+#include "formats/xml_reader.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>

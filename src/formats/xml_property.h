@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "io/file_resolver.h"
-#include "io/xml_document.h"
+#include "formats/file_resolver.h"
+#include "formats/xml_document.h"
 #include "scene/parameters.h"
 
 namespace covary {

@@ -9,18 +9,16 @@
 #include <string>
 #include <vector>
 
-#include "io/pbrt_parameters.h"
+#include "formats/object_builder.h"
+#include "formats/pbrt_parameters.h"
+#include "formats/pbrt_placement.h"
 #include "scene/parameters.h"
 
 namespace covary {
 
-using ObjectBuilder = std::shared_ptr<ObjectDescription>;
-ObjectBuilder make_object(const std::string& kind, const std::string& type, const SourceLocation& where);
-void set_property(ObjectDescription& object, const std::string& name, Value value);
-
 /// What later objects refer to by name. Null where an object could not be read.
 struct PbrtNames {
-  std::map<std::string, ObjectPtr> float_textures, spectrum_textures, materials;
+  std::map<std::string, ObjectPtr> float_textures, spectrum_textures, materials, media;
 };
 
 /// A number or a texture of numbers; `fallback` when absent, nullopt after an error.
@@ -31,17 +29,15 @@ std::optional<Value> spectrum_value(PbrtParameters& p, const std::string& name, 
 Spectrum light_colour(PbrtParameters& p, const std::string& name);
 
 /// A texture of class `type`; null after an error.
-ObjectPtr make_pbrt_texture(const std::string& type, PbrtParameters& p, const PbrtNames& names);
+ObjectBuilder make_pbrt_texture(const std::string& type, PbrtParameters& p, const PbrtNames& names);
 /// A material; null after an error.
-ObjectPtr make_pbrt_material(const std::string& type, PbrtParameters& p, const PbrtNames& names);
+ObjectBuilder make_pbrt_material(const std::string& type, PbrtParameters& p, const PbrtNames& names);
 
-/// What a shape is placed with.
-struct PbrtPlacement {
-  Transform to_world;
-  bool reverse_orientation = false;
-};
 /// A shape without material and light; null after an error.
 ObjectBuilder make_pbrt_shape(const std::string& type, PbrtParameters& p, const PbrtPlacement& placement);
+
+/// A medium; null after an error.
+ObjectBuilder make_pbrt_medium(const std::string& type, PbrtParameters& p);
 
 /// A light with a place of its own; null after an error, or where it is black.
 ObjectPtr make_pbrt_light(const std::string& type, PbrtParameters& p, const Transform& to_world);

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+// covary convert-scene: a scene of any format that is read, in Mitsuba's XML.
+#include "io/convert_scene.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+
+#include "commands.h"
+#include "core/error.h"
+#include "defines.h"
+#include "film/output_file.h"
+#include "film/outputs.h"
+#include "formats/file_view.h"
+#include "plans/integrator_choice.h"
+#include "value_names.h"
+
+namespace covary {
+namespace fs = std::filesystem;
+namespace {
+
+struct ConvertSceneOptions {
+  std::string input, output;
+  std::vector<std::string> defines;
+  bool overwrite = false;
+};
+
+[[noreturn]] void refuse(const std::string& path) {
+  throw Error(ErrorCode::kUsage,
+              fmt::format("the output '{}' is there already; give another name, or --overwrite to replace it", path));
+}
+
+bool holds(const std::string& path, std::string_view bytes) {
+  const FileView file(path);
+  return file.text() == bytes;
+}
+
+/// Meshes first, the scene last: once its name is there, all that it names is. Files of meshes are called by their
+/// content, so that a scene that is replaced is whole until the last moment.
+void write_files(const ConvertSceneOptions& options, const ConvertedScene& scene) {
+  const fs::path folder = fs::path(options.output).parent_path();
+  for (const SceneDocumentFile& file : scene.document.files) {
+    const fs::path path = folder / file.path;
+    std::error_code failed;
+    fs::create_directory(path.parent_path(), failed);
+    if (failed)
+      throw Error(ErrorCode::kIo,
+                  fmt::format("cannot make the folder '{}': {}", path.parent_path().string(), failed.message()));
+    if (fs::exists(path, failed)) {
+      if (holds(path.string(), file.bytes)) continue;
+      if (!options.overwrite) refuse(path.string());
+    }
+    OutputFile out(path.string());
+    out.write(file.bytes.data(), file.bytes.size());
+    out.commit();
+  }
+  write_text_file(options.output, scene.document.xml);
+}
+
+void convert_scene(const ConvertSceneOptions& options) {
+  Outputs outputs;
+  outputs.reads(options.input);
+  outputs.writes("the output", options.output, OutputKind::kScene);
+  const bool special = output_target(options.output).is_special;
+  std::error_code ignored;
+  if (!options.overwrite && !special && fs::exists(options.output, ignored)) refuse(options.output);
+  LoadOptions load_options;
+  load_options.defines = parse_defines(options.defines);
+  load_options.make_integrator = integrator_maker({});
+  const ConvertedScene scene = convert_scene(options.input, options.output, load_options);
+  for (const std::string& file : scene.files)
+    if (is_same_file(file, options.output))
+      throw Error(ErrorCode::kUsage,
+                  fmt::format("the output '{}' is a file that the scene reads; give another name", options.output));
+  if (special && !scene.document.files.empty())
+    throw Error(ErrorCode::kUsage,
+                fmt::format("the scene has meshes or images in its own file, which become files beside the new one: "
+                            "the output '{}' must be the name of a file",
+                            options.output));
+  for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", warning);
+  write_files(options, scene);
+}
+
+}  // namespace
+
+void add_convert_scene(CLI::App& app) {
+  const auto o = std::make_shared<ConvertSceneOptions>();
+  CLI::App* command = app.add_subcommand("convert-scene", "Convert scenes of pbrt-v4 to Mitsuba's XML");
+  command->add_option("SCENE", o->input, "Scene of pbrt-v4 (.pbrt), or Mitsuba's of any version (.xml), brought to 3.0")
+      ->type_name(kFileValue)
+      ->option_text("SCENE")
+      ->required();
+  command
+      ->add_option("OUT", o->output,
+                   "The new scene (.xml). Meshes that stand in SCENE become files in the folder OUT-files beside it; "
+                   "other files stay where they are")
+      ->type_name(kFileValue)
+      ->option_text("OUT.xml")
+      ->required();
+  add_define_option(*command, o->defines);
+  command->add_flag("--overwrite", o->overwrite, "Replace OUT.xml and its files");
+  command->callback([o] { convert_scene(*o); });
+}
+
+}  // namespace covary

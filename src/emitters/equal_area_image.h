@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// A square image on the sphere of directions whose texels cover equal solid angles, as pbrt-v4 has for infinite lights:
+// Clarberg's octahedral mapping (2008). Texels are constant, not interpolated, as pbrt looks them up.
+//
+// With (x, y) in [-1, 1]^2 from the image's upper left corner, s = |x| + |y|, r = min(s, 2 - s) and
+// phi = (pi / 4) (1 + (|y| - |x|) / r) in the first quadrant: |z| = 1 - r^2, z >= 0 inside of the diamond s <= 1, and the
+// signs of the direction's x and y are those of (x, y).
+#pragma once
+
+#include "core/distribution.h"
+#include "core/spectrum.h"
+#include "core/vec.h"
+#include "textures/image.h"
+
+namespace covary {
+
+/// Direction of a point of the unit square, and the reverse.
+Vec3 equal_area_direction(Vec2 uv);
+Vec2 equal_area_square(const Vec3& d);
+
+/// The same interface as EnvironmentImage; a density follows the luminance of texels.
+class EqualAreaImage {
+ public:
+  /// `image`: linear RGB floats as from read_linear_rgb. Throws Error(kInput) where it is not square.
+  EqualAreaImage(TexelImage image, float scale, bool mis_compensation);
+  EqualAreaImage compensated() const { return {image_, 1, true}; }
+  bool is_compensated() const { return compensated_; }
+
+  struct Lookup {
+    Spectrum value;
+    float pdf_solid_angle;  ///< density of sample() at the direction
+  };
+  Lookup lookup(const Vec3& d) const;
+
+  struct Sample {
+    Vec3 d;
+    Spectrum value;
+    float pdf_solid_angle;  ///< 0 when the image is black
+  };
+  Sample sample(Vec2 u) const;
+  void prefetch_table(Vec2) const {}
+  void prefetch_texels(Vec2) const {}
+
+  /// Integral of the value over the sphere of directions.
+  const Spectrum& integral() const { return integral_; }
+
+ private:
+  Spectrum at(Vec2 uv) const;
+  TexelImage image_;  // scaled
+  PiecewiseConstant2D texels_;
+  Spectrum integral_;
+  bool compensated_;
+};
+
+/// The image in the mapping of EnvironmentImage, twice as wide as it was, half as high as that: texels are means of what
+/// lies around them. For programs that have this mapping only; what is as small as a texel becomes wider.
+TexelImage latitude_longitude_of(const TexelImage& equal_area);
+
+}  // namespace covary

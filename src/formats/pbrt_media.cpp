@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// Media of pbrt-v4: what absorbs and scatters by length, as an extinction and the fraction of it that scatters.
+#include <fmt/format.h>
+
+#include "formats/pbrt_objects.h"
+
+namespace covary {
+namespace {
+
+/// A cross section per unit of length; pbrt's default is 1.
+std::optional<Spectrum> cross_section(PbrtParameters& p, const char* name) {
+  if (!p.has(name)) return Spectrum(1);
+  const auto value = spectrum_value(p, name, {});
+  if (!value) return std::nullopt;
+  if (const auto* colour = std::get_if<ColourValue>(&*value)) return colour->rgb;
+  return spectrum_to_rgb(std::get<SampledSpectrum>(*value), SpectrumRole::kIndex);
+}
+
+}  // namespace
+
+ObjectBuilder make_pbrt_medium(const std::string& type, PbrtParameters& p) {
+  if (type != "homogeneous") {
+    p.error(fmt::format("is of the type '{}'; supported is 'homogeneous'. Grids can be given in XML, by 'gridvolume'",
+                        type));
+    return nullptr;
+  }
+  for (const char* name : {"Le", "preset"})
+    if (const PbrtParameter* parameter = p.find(name))
+      p.error_at(*parameter, std::string(name) == "Le" ? "is not supported: media emit no light here"
+                                                       : "is not supported; give 'sigma_a' and 'sigma_s'");
+  p.ignore({"Lescale"});
+  const auto absorbed = cross_section(p, "sigma_a"), scattered = cross_section(p, "sigma_s");
+  if (!absorbed || !scattered) return nullptr;
+  Spectrum albedo;
+  const Spectrum extinction = *absorbed + *scattered;
+  for (int c = 0; c < 3; ++c) albedo[c] = extinction[c] > 0 ? (*scattered)[c] / extinction[c] : 0;
+  auto medium = make_object("medium", "homogeneous", p.where());
+  set_property(*medium, "sigma_t", ColourValue{extinction});
+  set_property(*medium, "albedo", ColourValue{albedo});
+  set_property(*medium, "scale", p.get_float("scale", 1));
+  const double g = p.get_float("g", 0);
+  auto phase = make_object("phase", g == 0 ? "isotropic" : "hg", p.where());
+  if (g != 0) set_property(*phase, "g", g);
+  set_property(*medium, "", ObjectPtr(phase));
+  return medium;
+}
+
+}  // namespace covary

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "formats/pbrt_placement.h"
+
+#include <fmt/format.h>
+
+#include <functional>
+
+namespace covary {
+
+bool change_placement(const std::string& word, PbrtTokens& tokens, const SourceLocation& where,
+                      PbrtPlacement& placement, PbrtSystems& systems, Diagnostics& diagnostics) {
+  const auto vec3 = [](const std::vector<double>& n, size_t i) {
+    return Vec3{static_cast<float>(n[i]), static_cast<float>(n[i + 1]), static_cast<float>(n[i + 2])};
+  };
+  const auto apply = [&](const std::function<Transform()>& make, bool replace = false) {
+    try {
+      placement.to_world = replace ? make() : placement.to_world * make();
+    } catch (const Error& error) {
+      diagnostics.error(where, fmt::format("{}: {}", word, error.what()));
+    }
+  };
+  if (word == "Identity") {
+    placement.to_world = Transform();
+  } else if (word == "Translate") {
+    apply([n = tokens.numbers(3), &vec3] { return Transform::translate(vec3(n, 0)); });
+  } else if (word == "Scale") {
+    apply([n = tokens.numbers(3)] {
+      return Transform(Matrix4{{{n[0], 0, 0, 0}, {0, n[1], 0, 0}, {0, 0, n[2], 0}, {0, 0, 0, 1}}});
+    });
+  } else if (word == "Rotate") {
+    apply([n = tokens.numbers(4), &vec3] {
+      if (vec3(n, 1) == Vec3{}) throw Error(ErrorCode::kInput, "the axis has length zero");
+      return Transform::rotate(vec3(n, 1), n[0]);
+    });
+  } else if (word == "LookAt") {
+    apply([n = tokens.numbers(9), &vec3] { return Transform::look_at(vec3(n, 0), vec3(n, 3), vec3(n, 6)).inverse(); });
+  } else if (word == "Transform" || word == "ConcatTransform") {
+    apply(
+        [n = tokens.numbers(16)] {
+          Matrix4 m;
+          for (size_t i = 0; i < 16; ++i) m[i % 4][i / 4] = n[i];  // column by column
+          return Transform(m);
+        },
+        word == "Transform");
+  } else if (word == "CoordinateSystem") {
+    systems[tokens.string("a name")] = placement.to_world;
+  } else if (word == "CoordSysTransform") {
+    const auto found = systems.find(tokens.string("the name of a coordinate system"));
+    if (found == systems.end())
+      diagnostics.error(where, "no coordinate system has this name");
+    else
+      placement.to_world = found->second;
+  } else if (word == "ActiveTransform" || word == "TransformTimes") {
+    diagnostics.error(where, fmt::format("'{}' is not supported: nothing moves", word));
+    while (tokens.peek().kind == PbrtToken::kWord &&
+           (word == "TransformTimes" || tokens.peek().text == "All" || tokens.peek().text.ends_with("Time")))
+      if (tokens.next(), word != "TransformTimes") break;
+  } else if (word == "ReverseOrientation") {
+    placement.reverse_orientation = !placement.reverse_orientation;
+  } else {
+    return false;
+  }
+  return true;
+}
+
+}  // namespace covary

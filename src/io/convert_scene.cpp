@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/convert_scene.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "emitters/equal_area_image.h"
+#include "formats/file_view.h"
+#include "formats/object_graph.h"
+#include "formats/scene_file.h"
+#include "scene/embedded_data.h"
+#include "textures/image.h"
+
+namespace covary {
+namespace fs = std::filesystem;
+namespace {
+
+/// Comments of XML hold no "--".
+std::string comment_on(const std::string& path) {
+  std::string name = fs::path(path).filename().string();
+  for (size_t i; (i = name.find("--")) != std::string::npos;) name.replace(i, 2, "- -");
+  return fmt::format(" Made by covary of '{}' ", name);
+}
+
+/// `file` as seen from `folder`.
+std::string relative_name(const fs::path& file, const fs::path& folder) {
+  std::error_code failed;
+  const fs::path relative = fs::relative(file, folder.empty() ? "." : folder, failed);
+  return failed || relative.empty() ? fs::absolute(file).string() : relative.string();
+}
+
+/// What Mitsuba 3 has no plugin for.
+void warn_of_own_plugins(const ObjectDescription& scene, std::vector<std::string>& warnings) {
+  size_t n = 0;
+  SourceLocation first;
+  visit_properties(scene, [&](const ObjectDescription&, const Property& property) {
+    const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value);
+    if (child && *child && (*child)->kind == "texture" && (*child)->type == "scale" && n++ == 0)
+      first = (*child)->where;
+  });
+  if (n > 0)
+    warnings.push_back(fmt::format(
+        "{} textures become 'scale', which covary and Mitsuba 0.6 have, but Mitsuba 3 has not; the first is that of {}",
+        n, first.text()));
+}
+
+using FindFile = std::function<std::string(const std::string& name, const SourceLocation& where)>;
+
+std::string pfm_text(const TexelImage& image) {
+  std::string text = fmt::format("PF\n{} {}\n-1.0\n", image.width, image.height);
+  const size_t row = static_cast<size_t>(image.width) * 3;
+  for (int y = image.height - 1; y >= 0; --y)
+    text.append(reinterpret_cast<const char*>(image.floats.data() + y * row), row * sizeof(float));
+  return text;
+}
+
+/// An environment of pbrt in the mapping that Mitsuba has.
+ObjectPtr in_latitude_longitude(const ObjectDescription& emitter, const FindFile& find_file) {
+  auto changed = std::make_shared<ObjectDescription>(emitter);
+  std::erase_if(changed->properties, [](const Property& p) { return p.name == "mapping"; });
+  for (Property& p : changed->properties)
+    if (p.name == "filename") {
+      const std::string path = find_file(std::get<std::string>(p.value), p.where);
+      p.name = kEmbeddedData;
+      p.value = pfm_text(latitude_longitude_of(read_linear_rgb(path)));
+    }
+  return changed;
+}
+
+/// The scene, with environments in Mitsuba's mapping.
+std::shared_ptr<const ObjectDescription> for_mitsuba(const ObjectDescription& scene, const FindFile& find_file,
+                                                     std::vector<std::string>& warnings) {
+  auto changed = std::make_shared<ObjectDescription>(scene);
+  for (Property& property : changed->properties) {
+    ObjectPtr* object = std::get_if<ObjectPtr>(&property.value);
+    if (!object || !*object || (*object)->kind != "emitter" || (*object)->type != "envmap") continue;
+    const auto has = [&](const std::string& name, const std::string& value) {
+      return std::any_of((*object)->properties.begin(), (*object)->properties.end(), [&](const Property& p) {
+        const std::string* text = std::get_if<std::string>(&p.value);
+        return p.name == name && text && *text == value;
+      });
+    };
+    if (!has("mapping", "equal_area")) continue;
+    warnings.push_back((*object)->where.text() +
+                       ": the image of equal areas becomes one by latitude and longitude: a little less sharp");
+    *object = in_latitude_longitude(**object, find_file);
+  }
+  return changed;
+}
+
+}  // namespace
+
+ConvertedScene convert_scene(const std::string& path, const std::string& output, const LoadOptions& options) {
+  ConvertedScene result;
+  {
+    const LoadedScene loaded = load_scene(path, options);
+    result.files = loaded.files;
+    result.warnings = loaded.warnings;
+  }
+  result.files.push_back(path);
+  const FileView file(path);
+  Diagnostics diagnostics;
+  FileResolver files;
+  const SceneXml xml = read_scene_file(file.text(), path, options.defines, files, diagnostics);
+  const auto find_file = [&](const std::string& name, const SourceLocation& where) {
+    return files.resolve(name, where, diagnostics);
+  };
+  result.description = for_mitsuba(*xml.scene, find_file, result.warnings);
+  const fs::path folder = fs::path(output).parent_path();
+  SceneWriting writing{comment_on(path), fs::path(output).stem().string() + "-files", {}};
+  writing.file_name = [&](const std::string& name, const SourceLocation& where) {
+    const std::string found = find_file(name, where);
+    return found.empty() ? name : relative_name(found, folder);
+  };
+  result.document = scene_document(*result.description, writing);
+  diagnostics.throw_if_errors();
+  warn_of_own_plugins(*result.description, result.warnings);
+  return result;
+}
+
+}  // namespace covary
