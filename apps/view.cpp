@@ -52,6 +52,8 @@ struct Shown {
 };
 
 /// The shortest ends of the paths that differ from each other: "a/pt.exr" and "b/pt.exr", but "pt" where it is alone.
+constexpr double kPixels = 3 * sizeof(float);  // bytes per pixel
+
 void name_images(std::vector<Shown>& images) {
   for (Shown& image : images) image.name = fs::path(image.path).stem().string();
   for (Shown& image : images) {
@@ -67,6 +69,9 @@ std::vector<Shown> read_images(const ViewOptions& options) {
   const auto add = [&](const std::string& path, bool is_reference) {
     const auto same = [&](const Shown& image) { return image.path == path; };
     if (std::find_if(images.begin(), images.end(), same) != images.end()) return;
+    // Before any of it is read: the page holds the image twice more, cut and encoded.
+    const CropWindow window = inspect_image(path).place.window;
+    require_image_memory(path, window.width, window.height, 3 * kPixels);
     images.push_back({path, "", read_image(path, options.layer), is_reference});
   };
   if (!options.reference.empty()) add(options.reference, true);
@@ -173,7 +178,7 @@ void Page::add_layers(const Shown& image, const std::string& shown, nlohmann::or
 
 nlohmann::ordered_json Page::add(const Shown& image, const std::string& layer) {
   nlohmann::ordered_json entry{{"name", image.name}, {"image", image.path}};
-  constexpr double kPixels = 3 * sizeof(float), kFlip = 150;  // per pixel
+  constexpr double kFlip = 150;  // bytes per pixel
   require_image_memory(image.path, window.width, window.height, 2 * kPixels + (reference && !small ? kFlip : 0));
   Image pixels = cut(image.source, window);
   if (!small) add_layers(image, layer, entry);

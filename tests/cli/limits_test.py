@@ -195,6 +195,10 @@ class Limits(unittest.TestCase):
         self.write("big.exr", self.black_exr(4000, 2200))
         self.write("wide.exr", self.black_exr(64000, 64))
         self.assertEqual(self.run_limited("compare", "big.exr", "-r", "big.exr", environment=limited)[0], 0)
+        self.most_memory = 60e6  # not even one copy is read
+        self.refused("an image of 4000 x 2200 pixels needs 316.8 MB ", "view", "big.exr", "-o", "a.html",
+                     environment=limited)
+        self.most_memory = MEMORY
         self.refused("an image of 64000 x 36 pixels needs ", "compare", "wide.exr", "-r", "wide.exr", "--metric",
                      "flip", environment=limited)
         self.refused("an image of 4000 x 2000 pixels needs 192.0 MB ", "convert", "a.exr", "a.exr", "out.exr",
