@@ -88,7 +88,7 @@ void one_neighbours(benchmark::State& state) {
   const Input& in = input();
   const NeighbourSearch search(25, 11, true);
   std::vector<lanes::vint> keys(search.offsets().size());
-  std::vector<uint16_t> chosen(25 * lanes::kLanes);
+  std::vector<uint16_t> chosen(search.chosen_size());
   for (auto _ : state)
     for (int y = 0; y < kHeight; ++y)
       for (int x = 0; x < kWidth; x += lanes::kLanes) {

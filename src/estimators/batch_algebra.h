@@ -16,41 +16,48 @@ constexpr size_t packed_size(size_t n) { return packed(n, 0); }
 
 namespace detail {
 
-// Register tile: NA x NB accumulators. 16 with 32 vector registers, 8 otherwise.
-inline constexpr int kTileRows = 4;
-inline constexpr int kTileColumns = lanes::kLanes == 16 ? 4 : 2;
+// Register tile: kTile x kTile accumulators and kTile operands. Its loops are unrolled, so that it stays in registers.
+inline constexpr int kTile = lanes::kLanes == 16 ? 5 : 3;
 
-/// c(a, b) = sum over s < n of A[a * row + s * sum] * B[b * row + s * sum].
-template <int NA, int NB>
-inline void product_tile(const vfloat* A, const vfloat* B, ptrdiff_t row, ptrdiff_t sum, int n, vfloat (&c)[NA][NB]) {
+/// Calls tile.template operator()<N>(i), N = kTile, for the rows i, i + N, … from `begin` on, and with what is left of
+/// the rows before `end`, if any.
+template <int N = kTile, typename Tile>
+inline void for_each_tile(int begin, int end, const Tile& tile) {
+  int i = begin;
+  for (; i + N <= end; i += N) tile.template operator()<N>(i);
+  if constexpr (N > 1)
+    if (i < end) for_each_tile<N - 1>(i, end, tile);
+}
+
+/// Rows [i0, i0 + NA), columns [j0, j0 + NB) of the matrix of products, where i0 >= j0 + NB or i0 = j0, NA = NB.
+template <int NA, int NB, bool diagonal>
+inline void gram_tile(const vfloat* X, ptrdiff_t row, ptrdiff_t sum, int n, int i0, int j0, vfloat* G) {
+  const vfloat *A = X + i0 * row, *B = X + j0 * row;
+  vfloat c[NA][NB];
+#pragma GCC unroll 8
   for (int a = 0; a < NA; ++a)
+#pragma GCC unroll 8
     for (int b = 0; b < NB; ++b) c[a][b] = vfloat{};
   for (int s = 0; s < n; ++s) {
     vfloat va[NA], vb[NB];
+#pragma GCC unroll 8
     for (int a = 0; a < NA; ++a) va[a] = A[a * row + s * sum];
-    for (int b = 0; b < NB; ++b) vb[b] = B[b * row + s * sum];
+#pragma GCC unroll 8
+    for (int b = 0; b < NB; ++b) {
+      vb[b] = B[b * row + s * sum];
+      lanes::keep_in_register(vb[b]);
+    }
+#pragma GCC unroll 8
     for (int a = 0; a < NA; ++a)
-      for (int b = 0; b < NB; ++b) c[a][b] += va[a] * vb[b];
+#pragma GCC unroll 8
+      for (int b = 0; b < NB; ++b)
+        if (!diagonal || b <= a) c[a][b] += va[a] * vb[b];
   }
-}
-
-template <int NA, int NB>
-inline void gram_tile(const vfloat* X, ptrdiff_t row, ptrdiff_t sum, int n, int i0, int j0, vfloat* G) {
-  vfloat c[NA][NB];
-  product_tile<NA, NB>(X + i0 * row, X + j0 * row, row, sum, n, c);
+#pragma GCC unroll 8
   for (int a = 0; a < NA; ++a)
+#pragma GCC unroll 8
     for (int b = 0; b < NB; ++b)
-      if (j0 + b <= i0 + a) G[packed(i0 + a, j0 + b)] = c[a][b];
-}
-
-template <int NA>
-inline void gram_tile(int nb, const vfloat* X, ptrdiff_t row, ptrdiff_t sum, int n, int i0, int j0, vfloat* G) {
-  if (nb == 1) return gram_tile<NA, 1>(X, row, sum, n, i0, j0, G);
-  if (nb == 2) return gram_tile<NA, 2>(X, row, sum, n, i0, j0, G);
-  if constexpr (kTileColumns > 2) {
-    if (nb == 3) return gram_tile<NA, 3>(X, row, sum, n, i0, j0, G);
-    if (nb == 4) return gram_tile<NA, 4>(X, row, sum, n, i0, j0, G);
-  }
+      if (!diagonal || b <= a) G[packed(i0 + a, j0 + b)] = c[a][b];
 }
 
 }  // namespace detail
@@ -59,99 +66,100 @@ inline void gram_tile(int nb, const vfloat* X, ptrdiff_t row, ptrdiff_t sum, int
 /// X[i * row + s * sum].
 inline void gram(const vfloat* X, ptrdiff_t row, ptrdiff_t sum, int m, int n, vfloat* G) {
   using namespace detail;
-  for (int i = 0; i < m; i += kTileRows) {
-    const int na = std::min(kTileRows, m - i), last = i + na - 1;
-    for (int j = 0; j <= last; j += kTileColumns) {
-      const int nb = std::min(kTileColumns, m - j);
-      switch (na) {
-        case 1:
-          gram_tile<1>(nb, X, row, sum, n, i, j, G);
-          break;
-        case 2:
-          gram_tile<2>(nb, X, row, sum, n, i, j, G);
-          break;
-        case 3:
-          gram_tile<3>(nb, X, row, sum, n, i, j, G);
-          break;
-        default:
-          gram_tile<4>(nb, X, row, sum, n, i, j, G);
-          break;
-      }
-    }
-  }
+  for_each_tile(0, m, [&]<int NA>(int i) {
+    for_each_tile(0, i, [&]<int NB>(int j) { gram_tile<NA, NB, false>(X, row, sum, n, i, j, G); });
+    gram_tile<NA, NA, true>(X, row, sum, n, i, i, G);
+  });
 }
 
 namespace detail {
 
 /// What columns before j0 of the Cholesky factor leave of rows [i0, i0 + NA), columns [j0, j0 + NB).
-template <int NA, int NB>
+template <int NA, int NB, bool diagonal>
 inline void subtract_columns(const vfloat* G, int i0, int j0, vfloat (&c)[NA][NB]) {
   const vfloat *A[NA], *B[NB];
+#pragma GCC unroll 8
   for (int a = 0; a < NA; ++a) A[a] = G + packed(i0 + a, 0);
+#pragma GCC unroll 8
   for (int b = 0; b < NB; ++b) B[b] = G + packed(j0 + b, 0);
+#pragma GCC unroll 8
   for (int a = 0; a < NA; ++a)
-    for (int b = 0; b < NB; ++b) c[a][b] = j0 + b <= i0 + a ? A[a][j0 + b] : vfloat{};
+#pragma GCC unroll 8
+    for (int b = 0; b < NB; ++b)
+      if (!diagonal || b <= a) c[a][b] = A[a][j0 + b];
   for (int q = 0; q < j0; ++q) {
     vfloat va[NA], vb[NB];
+#pragma GCC unroll 8
     for (int a = 0; a < NA; ++a) va[a] = A[a][q];
-    for (int b = 0; b < NB; ++b) vb[b] = B[b][q];
+#pragma GCC unroll 8
+    for (int b = 0; b < NB; ++b) {
+      vb[b] = B[b][q];
+      lanes::keep_in_register(vb[b]);
+    }
+#pragma GCC unroll 8
     for (int a = 0; a < NA; ++a)
-      for (int b = 0; b < NB; ++b) c[a][b] -= va[a] * vb[b];
+#pragma GCC unroll 8
+      for (int b = 0; b < NB; ++b)
+        if (!diagonal || b <= a) c[a][b] -= va[a] * vb[b];
   }
 }
 
-/// Columns [j0, j0 + NB) of the factor, those before being known: first the block on the diagonal, whose pivots are
-/// inverted into `inverse`, then the rows below it, to row m.
+/// Columns [j0, j0 + NB) of the factor, those before being known: the block on the diagonal, whose pivots are inverted
+/// into `inverse`.
 template <int NB>
 inline void factor_diagonal(vfloat* G, const vfloat* shift, int j0, vfloat* inverse) {
   vfloat c[NB][NB];
-  subtract_columns<NB, NB>(G, j0, j0, c);
+  subtract_columns<NB, NB, true>(G, j0, j0, c);
+#pragma GCC unroll 8
   for (int b = 0; b < NB; ++b) {
     vfloat pivot = c[b][b] + shift[j0 + b];
+#pragma GCC unroll 8
     for (int p = 0; p < b; ++p) pivot -= c[b][p] * c[b][p];
-    inverse[j0 + b] = 1.0f / lanes::sqrt(lanes::max(pivot, shift[j0 + b]));
+    const vfloat inverted = 1.0f / lanes::sqrt(lanes::max(pivot, shift[j0 + b]));
+    inverse[j0 + b] = inverted;
+#pragma GCC unroll 8
     for (int a = b + 1; a < NB; ++a) {
+#pragma GCC unroll 8
       for (int p = 0; p < b; ++p) c[a][b] -= c[a][p] * c[b][p];
-      c[a][b] *= inverse[j0 + b];
+      c[a][b] *= inverted;
       G[packed(j0 + a, j0 + b)] = c[a][b];
     }
   }
 }
 
+/// The rows [i0, i0 + NA) of these columns, below that block.
 template <int NA, int NB>
 inline void factor_rows(vfloat* G, int i0, int j0, const vfloat* inverse) {
   vfloat c[NA][NB];
-  subtract_columns<NA, NB>(G, i0, j0, c);
+  subtract_columns<NA, NB, false>(G, i0, j0, c);
+#pragma GCC unroll 8
   for (int b = 0; b < NB; ++b)
+#pragma GCC unroll 8
     for (int a = 0; a < NA; ++a) {
+#pragma GCC unroll 8
       for (int p = 0; p < b; ++p) c[a][b] -= c[a][p] * G[packed(j0 + b, j0 + p)];
       c[a][b] *= inverse[j0 + b];
       G[packed(i0 + a, j0 + b)] = c[a][b];
     }
 }
 
-template <int NB>
-inline void factor_columns(vfloat* G, const vfloat* shift, int m, int j0, vfloat* inverse) {
-  factor_diagonal<NB>(G, shift, j0, inverse);
-  int i = j0 + NB;
-  for (; i + kTileRows <= m + 1; i += kTileRows) factor_rows<kTileRows, NB>(G, i, j0, inverse);
-  for (; i <= m; ++i) factor_rows<1, NB>(G, i, j0, inverse);
-}
-
 }  // namespace detail
 
 /// Solves (G + diag(shift)) x = b for positive semidefinite G and m positive shifts. `G`: packed, m rows, with room for
-/// one more row; on return it holds, below the diagonal, the Cholesky factor L. `bx`: b on entry, x on return.
+/// 1 + n_more rows; on return it holds, below the diagonal, the Cholesky factor L. `bx`: b on entry, x on return.
 /// `inverse`: receives the inverses of the m diagonal elements of L. In exact arithmetic no pivot is below its shift;
-/// rounding is kept from going there.
-inline void solve_shifted(vfloat* G, const vfloat* shift, int m, vfloat* bx, vfloat* inverse) {
+/// rounding is kept from going there. `n_more` right-hand sides b' in the first m elements of rows m + 1, … are
+/// replaced by L^-1 b'.
+inline void solve_shifted(vfloat* G, const vfloat* shift, int m, vfloat* bx, vfloat* inverse, int n_more = 0) {
   using namespace detail;
   // b is carried along as row m, which then holds L^-1 b.
   vfloat* const last = G + packed(m, 0);
   for (int j = 0; j < m; ++j) last[j] = bx[j];
-  int j0 = 0;
-  for (; j0 + kTileColumns <= m; j0 += kTileColumns) factor_columns<kTileColumns>(G, shift, m, j0, inverse);
-  for (; j0 < m; ++j0) factor_columns<1>(G, shift, m, j0, inverse);
+  const int n_rows = m + 1 + n_more;
+  for_each_tile(0, m, [&]<int NB>(int j0) {
+    factor_diagonal<NB>(G, shift, j0, inverse);
+    for_each_tile(j0 + NB, n_rows, [&]<int NA>(int i0) { factor_rows<NA, NB>(G, i0, j0, inverse); });
+  });
   // Back substitution by columns of L^T, that is by rows of L.
   for (int j = 0; j < m; ++j) bx[j] = last[j];
   for (int j = m - 1; j >= 0; --j) {
@@ -161,41 +169,68 @@ inline void solve_shifted(vfloat* G, const vfloat* shift, int m, vfloat* bx, vfl
   }
 }
 
-/// Sum of weight_i (A^-1)_ii for A = G + diag(shift), from what solve_shifted leaves. `column`: scratch for m vectors.
-inline vfloat inverse_trace(const vfloat* L, const vfloat* inverse, const vfloat* weight, int m, vfloat* column) {
-  // A^-1 = L^-T L^-1; column j of L^-1 by forward substitution.
-  vfloat trace = {};
-  for (int j = 0; j < m; ++j) {
-    column[j] = inverse[j];
-    vfloat squares = inverse[j] * inverse[j];
-    for (int i = j + 1; i < m; ++i) {
-      const vfloat* const Li = L + packed(i, 0);
-      vfloat even = {}, odd = {};
-      int q = j;
-      for (; q + 1 < i; q += 2) {
-        even += Li[q] * column[q];
-        odd += Li[q + 1] * column[q + 1];
+namespace detail {
+
+/// Sums of squares of the columns [j0, j0 + N) of L^-1, by forward substitution of all at once. `columns`: scratch for
+/// N m vectors.
+template <int N>
+inline void inverse_squares(const vfloat* L, const vfloat* inverse, int m, int j0, vfloat* columns,
+                            vfloat (&squares)[N]) {
+  vfloat total[N] = {};
+  for (int i = j0; i < m; ++i) {
+    const vfloat* const Li = L + packed(i, 0);
+    vfloat* const row = columns + static_cast<ptrdiff_t>(i) * N;
+    // Terms q - j of one parity together; columns are zero above the diagonal.
+    vfloat sums[2][N] = {};
+    int q = j0;
+    for (; q + 1 < i; q += 2) {
+      vfloat first = Li[q], second = Li[q + 1];
+      lanes::keep_in_register(first);
+      lanes::keep_in_register(second);
+#pragma GCC unroll 8
+      for (int c = 0; c < N; ++c) {
+        sums[c % 2][c] += first * columns[q * N + c];
+        sums[1 - c % 2][c] += second * columns[(q + 1) * N + c];
       }
-      if (q < i) even += Li[q] * column[q];
-      column[i] = -(even + odd) * inverse[i];
-      squares += column[i] * column[i];
     }
-    trace += weight[j] * squares;
+    if (q < i)
+#pragma GCC unroll 8
+      for (int c = 0; c < N; ++c) sums[c % 2][c] += Li[q] * columns[q * N + c];
+#pragma GCC unroll 8
+    for (int c = 0; c < N; ++c) {
+      vfloat element = -(sums[0][c] + sums[1][c]) * inverse[i];
+      if (i == j0 + c) element = inverse[i];
+      if (i < j0 + c) element = vfloat{};
+      row[c] = element;
+      total[c] += element * element;
+    }
   }
-  return trace;
+#pragma GCC unroll 8
+  for (int c = 0; c < N; ++c) squares[c] = total[c];
 }
 
-/// b^T A^-1 b likewise; b is destroyed.
-inline vfloat inverse_norm(const vfloat* L, const vfloat* inverse, int m, vfloat* b) {
-  vfloat norm = {};
-  for (int i = 0; i < m; ++i) {
-    const vfloat* const Li = L + packed(i, 0);
-    vfloat rest = b[i];
-    for (int q = 0; q < i; ++q) rest -= Li[q] * b[q];
-    b[i] = rest * inverse[i];
-    norm += b[i] * b[i];
+}  // namespace detail
+
+/// Columns of an inverse factor at once.
+inline constexpr int kColumnsAtOnce = 4;
+
+/// Sum of weight_i (A^-1)_ii for A = G + diag(shift), from what solve_shifted leaves. `columns`: scratch for
+/// kColumnsAtOnce m vectors.
+inline vfloat inverse_trace(const vfloat* L, const vfloat* inverse, const vfloat* weight, int m, vfloat* columns) {
+  // A^-1 = L^-T L^-1
+  vfloat trace = {};
+  int j = 0;
+  for (; j + kColumnsAtOnce <= m; j += kColumnsAtOnce) {
+    vfloat squares[kColumnsAtOnce];
+    detail::inverse_squares<kColumnsAtOnce>(L, inverse, m, j, columns, squares);
+    for (int c = 0; c < kColumnsAtOnce; ++c) trace += weight[j + c] * squares[c];
   }
-  return norm;
+  for (; j < m; ++j) {
+    vfloat squares[1];
+    detail::inverse_squares<1>(L, inverse, m, j, columns, squares);
+    trace += weight[j] * squares[0];
+  }
+  return trace;
 }
 
 }  // namespace covary::batch

@@ -53,7 +53,7 @@ TEST(BatchAlgebra, GramAndSolveAgreeWithEigen) {
   for (int m : {1, 2, 3, 4, 5, 6, 7, 8, 9, 11, 13, 25, 33, 40}) {
     for (int n : {1, 5, 33}) {
       for (bool by_rows : {true, false}) {
-        std::vector<vfloat> X(static_cast<size_t>(m) * n), G(batch::packed_size(m + 1)), b(m), inverse(m);
+        std::vector<vfloat> X(static_cast<size_t>(m) * n), G(batch::packed_size(m + 3)), b(m), inverse(m);
         const ptrdiff_t row = by_rows ? n : 1, sum = by_rows ? 1 : m;
         for (int i = 0; i < m; ++i)
           for (int s = 0; s < n; ++s)
@@ -65,10 +65,14 @@ TEST(BatchAlgebra, GramAndSolveAgreeWithEigen) {
         std::vector<vfloat> shift(m);
         for (int i = 0; i < m; ++i)
           for (int l = 0; l < kLanes; ++l) shift[i][l] = 0.8f + test::noise(m + 60, i, l);
-        batch::solve_shifted(solved.data(), shift.data(), m, x.data(), inverse.data());
-        std::vector<vfloat> scratch(m), rhs_copy = b;
+        // Two more right-hand sides: the same, and twice that.
+        vfloat* const more[] = {&solved[batch::packed(m + 1, 0)], &solved[batch::packed(m + 2, 0)]};
+        for (int i = 0; i < m; ++i) more[0][i] = b[i], more[1][i] = 2 * b[i];
+        batch::solve_shifted(solved.data(), shift.data(), m, x.data(), inverse.data(), 2);
+        std::vector<vfloat> scratch(static_cast<size_t>(m) * batch::kColumnsAtOnce);
         const vfloat trace = batch::inverse_trace(solved.data(), inverse.data(), shift.data(), m, scratch.data());
-        const vfloat norm = batch::inverse_norm(solved.data(), inverse.data(), m, rhs_copy.data());
+        vfloat norm = {}, twice = {};  // b^T A^-1 b from L^-1 b
+        for (int i = 0; i < m; ++i) norm += more[0][i] * more[0][i], twice += more[0][i] * more[1][i];
         for (int l : {0, 3, kLanes - 1}) {
           Eigen::MatrixXd A(m, n);
           Eigen::VectorXd rhs(m);
@@ -85,6 +89,7 @@ TEST(BatchAlgebra, GramAndSolveAgreeWithEigen) {
           for (int i = 0; i < m; ++i) expected_trace += shift[i][l] * inverted(i, i);
           ASSERT_NEAR(trace[l], expected_trace, 1e-5 * m) << "m " << m << " n " << n;
           ASSERT_NEAR(norm[l], rhs.dot(inverted * rhs), 1e-5 * m) << "m " << m << " n " << n;
+          ASSERT_NEAR(twice[l], 2 * rhs.dot(inverted * rhs), 2e-5 * m) << "m " << m << " n " << n;
           for (int i = 0; i < m; ++i) {
             for (int j = 0; j <= i; ++j) ASSERT_NEAR(G[batch::packed(i, j)][l], expected(i, j), 1e-5) << m << " " << n;
             ASSERT_NEAR(x[i][l], solution(i), 2e-5) << "m " << m << " n " << n << " lane " << l;

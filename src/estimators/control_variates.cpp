@@ -26,7 +26,7 @@ constexpr float kFewestFreedom = 0.1f;
 
 /// Scratch memory of one thread.
 struct Workspace {
-  std::vector<float> records;  ///< of the tile and its border
+  std::vector<vfloat> records;  ///< of the tile and its border
   std::vector<vint> keys;
   std::vector<uint16_t> chosen;
   std::vector<vfloat> x;     ///< [neighbour][contrast]
@@ -52,7 +52,7 @@ class Regression {
         valid_(valid),
         result_(result),
         T_(input.crn.groups),
-        records_(input, settings.mean_constraint > 0, valid),
+        records_(input, settings, valid),
         layout_(records_.layout()),
         search_(settings.k, settings.window, settings.include_target),
         radius_(settings.window / 2) {}
@@ -60,25 +60,26 @@ class Regression {
   void run_tile(const Tile& tile, Workspace& w) const {
     prepare(w);
     for (int y = tile.y0 - radius_; y < tile.y1 + radius_; ++y)
-      for (int x = tile.x0 - radius_; x < tile.x1 + radius_; ++x)
-        records_.fill(x, y, w.records.data() + record_index(tile, x, y));
+      for (int x = tile.x0 - radius_; x < tile.x1 + radius_; ++x) records_.fill(x, y, record(tile, x, y, w));
     for (int y = tile.y0; y < tile.y1; ++y)
       for (int x = tile.x0; x < tile.x1; x += kLanes) run_batch(tile, x, y, w);
   }
 
  private:
   int record_stride(const Tile& tile) const { return tile.x1 - tile.x0 + 2 * radius_; }
-  size_t record_index(const Tile& tile, int x, int y) const {
-    return (static_cast<size_t>(y - tile.y0 + radius_) * record_stride(tile) + (x - tile.x0 + radius_)) * layout_.size;
+  float* record(const Tile& tile, int x, int y, Workspace& w) const {
+    const ptrdiff_t index =
+        static_cast<ptrdiff_t>(y - tile.y0 + radius_) * record_stride(tile) + (x - tile.x0 + radius_);
+    return reinterpret_cast<float*>(w.records.data()) + index * layout_.stride;
   }
 
   void prepare(Workspace& w) const {
     if (!w.x.empty()) return;
     const size_t k = s_.k, rows = layout_.contrasts, m = std::min(k, s_.shared ? rows : rows / 3);
-    w.records.resize(static_cast<size_t>(kTileWidth + 2 * radius_) * (kTileHeight + 2 * radius_) * layout_.size +
-                     kLanes);
+    w.records.resize(static_cast<size_t>(kTileWidth + 2 * radius_) * (kTileHeight + 2 * radius_) *
+                     (layout_.stride / kLanes));
     w.keys.resize(search_.offsets().size());
-    w.chosen.resize(k * kLanes);
+    w.chosen.resize(search_.chosen_size());
     w.x.resize(k * rows);
     w.tail.resize(k * (layout_.size - rows));
     w.y.resize(rows);
@@ -86,9 +87,9 @@ class Regression {
     w.penalty.resize(k);
     w.beta.resize(k);
     w.shift.resize(m);
-    w.gram.resize(batch::packed_size(m + 1));
+    w.gram.resize(batch::packed_size(m + 1 + 3));
     w.inverse.resize(m);
-    w.b.resize(std::max<size_t>(m, rows));
+    w.b.resize(std::max<size_t>(batch::kColumnsAtOnce * m, rows));
     w.gamma.resize(k);
   }
 
@@ -113,14 +114,14 @@ class Regression {
 
     // Lanes beyond the tile repeat its last pixel's record; what they compute is not used.
     const float* target[kLanes];
-    for (int l = 0; l < kLanes; ++l) target[l] = w.records.data() + record_index(tile, std::min(x + l, tile.x1 - 1), y);
+    for (int l = 0; l < kLanes; ++l) target[l] = record(tile, std::min(x + l, tile.x1 - 1), y, w);
     gather(target, w.y.data(), w.y_tail.data());
-    const ptrdiff_t row = static_cast<ptrdiff_t>(record_stride(tile)) * layout_.size;
+    const ptrdiff_t row = static_cast<ptrdiff_t>(record_stride(tile)) * layout_.stride;
     for (int i = 0; i < k; ++i) {
       const float* source[kLanes];
       for (int l = 0; l < kLanes; ++l) {
         const Offset o = search_.offsets()[w.chosen[l * k + i]];
-        source[l] = target[l] + o.dy * row + o.dx * layout_.size;
+        source[l] = target[l] + o.dy * row + o.dx * layout_.stride;
       }
       gather(source, w.x.data() + static_cast<size_t>(i) * layout_.contrasts,
              w.tail.data() + static_cast<size_t>(i) * n_tail);
@@ -155,6 +156,11 @@ class Regression {
     return total;
   }
 
+  /// That sum of a penalty, of which records hold the sum of all channels where these share their coefficients.
+  vfloat penalty_sum(const vfloat* tail, int offset, int first) const {
+    return tail_value(tail, offset + (layout_.penalties == 1 ? 0 : first));
+  }
+
   /// The condition on the coefficients as a row of X and y (one for each channel, like a contrast of the groups),
   /// scaled by sqrt(mean_constraint (T - 1) S / N). The CRN mean has an error of the size of the light that it lacks;
   /// the variance of a group is T times that of the mean.
@@ -162,7 +168,7 @@ class Regression {
     const int k = s_.k, n_tail = layout_.size - layout_.contrasts;
     vfloat S = {}, N = {};
     for (int i = 0; i < k; ++i) {
-      S += channel_sum(w.tail.data() + i * n_tail, layout_.group_variance, first, count);
+      S += penalty_sum(w.tail.data() + i * n_tail, layout_.group_variance, first);
       for (int c = first; c < first + count; ++c) {
         const vfloat missing = tail_value(w.tail.data() + i * n_tail, layout_.missing + c);
         S += static_cast<float>(T_) * missing * missing;
@@ -183,22 +189,21 @@ class Regression {
     const int k = s_.k, n_tail = layout_.size - layout_.contrasts;
     vfloat homogeneous = {};
     if (!in_.error_of_h) {
-      for (int i = 0; i < k; ++i)
-        homogeneous += channel_sum(w.tail.data() + i * n_tail, layout_.group_variance, first, count);
+      for (int i = 0; i < k; ++i) homogeneous += penalty_sum(w.tail.data() + i * n_tail, layout_.group_variance, first);
       homogeneous *= (s_.ridge > 0 ? s_.ridge : kNegligibleRidge) / static_cast<float>(k);
     }
-    const vfloat own = channel_sum(w.y_tail.data(), layout_.error, first, count);
+    const vfloat own = penalty_sum(w.y_tail.data(), layout_.error, first);
     const float variance_share = s_.sample_fraction * static_cast<float>(T_);
     for (int i = 0; i < k; ++i) {
       const vfloat* tail = w.tail.data() + i * n_tail;
       vfloat penalty = homogeneous, smallest = {};
       if (in_.error_of_h) {
-        const vfloat error = channel_sum(tail, layout_.error, first, count);
+        const vfloat error = penalty_sum(tail, layout_.error, first);
         penalty = s_.symmetric ? 0.5f * (own + error) : error;  // [YM2025] Sec. 4, after Eq. (11)
         if (s_.sample_fraction > 0)
           penalty =
               (1 - s_.sample_fraction) * penalty + variance_share * channel_sum(tail, layout_.h_variance, first, count);
-        smallest = kSmallestPenalty * channel_sum(tail, layout_.group_variance, first, count);
+        smallest = kSmallestPenalty * penalty_sum(tail, layout_.group_variance, first);
       }
       if (s_.mean_constraint > 0) {
         vfloat squares = {};
@@ -232,14 +237,22 @@ class Regression {
         w.gamma[i] = dot(X + static_cast<size_t>(i) * all, Y, step, rows);
         w.shift[i] = T1 * w.penalty[i];
       }
-      batch::solve_shifted(w.gram.data(), w.shift.data(), k, w.gamma.data(), w.inverse.data());
+      const int n_more = s_.std_error ? rows - group_rows : 0;
+      for (int r = 0; r < n_more; ++r)
+        for (int i = 0; i < k; ++i)
+          w.gram[batch::packed(k + 1 + r, i)] = X[static_cast<size_t>(i) * all + (group_rows + r) * step];
+      batch::solve_shifted(w.gram.data(), w.shift.data(), k, w.gamma.data(), w.inverse.data(), n_more);
       for (int i = 0; i < k; ++i) w.beta[i] = w.gamma[i];
       if (s_.std_error) {
         w.freedom = splat(static_cast<float>(k)) -
                     batch::inverse_trace(w.gram.data(), w.inverse.data(), w.shift.data(), k, w.b.data());
-        for (int r = group_rows; r < rows; ++r) {
-          for (int i = 0; i < k; ++i) w.b[i] = X[static_cast<size_t>(i) * all + r * step];
-          w.freedom -= batch::inverse_norm(w.gram.data(), w.inverse.data(), k, w.b.data());
+        for (int r = 0; r < n_more; ++r) {
+          vfloat norm = {};
+          for (int i = 0; i < k; ++i) {
+            const vfloat element = w.gram[batch::packed(k + 1 + r, i)];
+            norm += element * element;
+          }
+          w.freedom -= norm;
         }
       }
     } else {

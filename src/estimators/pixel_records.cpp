@@ -3,33 +3,42 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "film/groups.h"
 #include "filters/neighbours.h"
 
 namespace covary {
 
-PixelRecords::PixelRecords(const ControlVariateInput& input, bool condition, const std::vector<unsigned char>& valid)
+PixelRecords::PixelRecords(const ControlVariateInput& input, const ControlVariateSettings& settings,
+                           const std::vector<unsigned char>& valid)
     : in_(input),
       valid_(valid),
       T_(input.crn.groups),
       weights_differ_(input.crn_moments->relative_count.has_value()),
-      layout_(weights_differ_ ? T_ : T_ - 1, condition),
+      layout_(weights_differ_ ? T_ : T_ - 1, settings.mean_constraint > 0, settings.shared),
       weights_(T_) {
   for (int j = 1; j < T_; ++j) weights_[j] = 1.0f / std::sqrt(static_cast<float>(j) * static_cast<float>(j + 1));
 }
 
 /// Contrast j: (x_0 + … + x_{j-1} - j x_j) / sqrt(j (j + 1)). `squares`: sums of their squares per channel.
 void PixelRecords::make_contrasts(const float* p, float* record, float* squares) const {
-  float sum[3] = {p[0], p[1], p[2]};
-  for (int j = 1; j < T_; ++j)
-    for (int c = 0; c < 3; ++c) {
-      const float value = p[3 * j + c];
-      const float contrast = (sum[c] - static_cast<float>(j) * value) * weights_[j];
-      sum[c] += value;
-      squares[c] += contrast * contrast;
-      record[3 * (j - 1) + c] = contrast;
-    }
+  typedef float Rgb __attribute__((vector_size(4 * sizeof(float))));  // and one more, which is not used
+  Rgb sum = {p[0], p[1], p[2], 0}, total = {};
+  const auto add = [&](int j, Rgb value) {
+    const Rgb contrast = (sum - static_cast<float>(j) * value) * weights_[j];
+    sum += value;
+    total += contrast * contrast;
+    std::memcpy(record + 3 * (j - 1), &contrast, sizeof contrast);  // what follows is written later
+  };
+  for (int j = 1; j < T_ - 1; ++j) {
+    Rgb value;
+    std::memcpy(&value, p + 3 * j, sizeof value);
+    add(j, value);
+  }
+  const float* last = p + 3 * (T_ - 1);  // beyond it there may be nothing to read
+  if (T_ > 1) add(T_ - 1, Rgb{last[0], last[1], last[2], 0});
+  for (int c = 0; c < 3; ++c) squares[c] = total[c];
 }
 
 /// The same for groups of unequal sizes, with weights w_t = size T / count of mean 1: with W = w_0 + … + w_{j-1},
@@ -65,11 +74,19 @@ void PixelRecords::make_centred_means(const float* p, uint32_t count, const floa
   }
 }
 
+void PixelRecords::put_penalties(const float* values, float* to) const {
+  if (layout_.penalties == 1)
+    to[0] = values[0] + values[1] + values[2];
+  else
+    std::copy_n(values, 3, to);
+}
+
 void PixelRecords::fill(int x, int y, float* record) const {
   const bool inside = x >= 0 && y >= 0 && x < in_.crn.width && y < in_.crn.height;
   if (!inside || !valid_[static_cast<size_t>(y) * in_.crn.width + x]) {
     std::fill(record, record + layout_.size, 0.0f);
-    for (int c = 0; c < 3; ++c) record[layout_.error + c] = kUseless;
+    const float useless[3] = {kUseless, kUseless, kUseless};
+    put_penalties(useless, record + layout_.error);
     return;
   }
   float squares[3] = {}, mean[3];
@@ -82,13 +99,16 @@ void PixelRecords::fill(int x, int y, float* record) const {
     make_weighted_contrasts(in_.crn.pixel(x, y), in_.crn.count(x, y), record, squares);
   if (layout_.contrasts > layout_.group_contrasts)
     for (int c = 0; c < 3; ++c) record[layout_.group_contrasts + c] = mean[c] + missing(c, x, y);
+  float error[3], group_variance[3];
   for (int c = 0; c < 3; ++c) {
     record[layout_.difference + c] = mean[c] - in_.h->row(c, y)[x];
-    record[layout_.error + c] = in_.error_of_h ? static_cast<float>(T_) * in_.error_of_h->row(c, y)[x] : 0.0f;
-    record[layout_.group_variance + c] = squares[c] / static_cast<float>(T_ - 1);
     record[layout_.h_variance + c] = in_.variance_of_h ? in_.variance_of_h->row(c, y)[x] : 0.0f;
     record[layout_.missing + c] = missing(c, x, y);
+    error[c] = in_.error_of_h ? static_cast<float>(T_) * in_.error_of_h->row(c, y)[x] : 0.0f;
+    group_variance[c] = squares[c] / static_cast<float>(T_ - 1);
   }
+  put_penalties(error, record + layout_.error);
+  put_penalties(group_variance, record + layout_.group_variance);
 }
 
 }  // namespace covary

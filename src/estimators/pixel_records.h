@@ -15,29 +15,35 @@ namespace covary {
 
 /// Offsets in the record of a pixel.
 struct RecordLayout {
-  RecordLayout(int rows, bool condition)
-      : group_contrasts(3 * rows),
+  /// `shared`: whether channels share their coefficients, and so their penalties.
+  RecordLayout(int rows, bool condition, bool shared)
+      : penalties(shared ? 1 : 3),
+        group_contrasts(3 * rows),
         contrasts(group_contrasts + (condition ? 3 : 0)),
         difference(contrasts),
-        error(contrasts + 3),
-        group_variance(contrasts + 6),
-        h_variance(contrasts + 9),
-        missing(contrasts + 12),
-        size(contrasts + 15) {}
+        h_variance(contrasts + 3),
+        missing(contrasts + 6),
+        error(contrasts + 9),
+        group_variance(error + penalties),
+        size(group_variance + penalties),
+        stride((size + lanes::kLanes - 1) / lanes::kLanes * lanes::kLanes) {}
+  int penalties;        ///< 1: sums over the channels; 3: one for each
   int group_contrasts;  ///< number of contrasts (or centred means) of the groups, all channels: [contrast][rgb], at 0
   int contrasts;        ///< the same with the row of the condition, which acts like one more contrast
   int difference;       ///< g - h
-  int error;            ///< error variance of h for the penalty, times T
-  int group_variance;   ///< sample variance of the CRN groups
   int h_variance;       ///< variance of h
   int missing;          ///< light that g lacks
+  int error;            ///< `penalties` of them: error variance of h for the penalty, times T
+  int group_variance;   ///< `penalties` of them: sample variance of the CRN groups
   int size;
+  int stride;  ///< floats from a record to the next: whole vectors
 };
 
 class PixelRecords {
  public:
-  /// `condition`: with a row for the condition on the coefficients; `valid`: 0 marks pixels that contribute nothing.
-  PixelRecords(const ControlVariateInput& input, bool condition, const std::vector<unsigned char>& valid);
+  /// `valid`: 0 marks pixels that contribute nothing.
+  PixelRecords(const ControlVariateInput& input, const ControlVariateSettings& settings,
+               const std::vector<unsigned char>& valid);
 
   const RecordLayout& layout() const { return layout_; }
 
@@ -48,6 +54,8 @@ class PixelRecords {
   void make_contrasts(const float* p, float* record, float* squares) const;
   void make_weighted_contrasts(const float* p, uint32_t count, float* record, float* squares) const;
   void make_centred_means(const float* p, uint32_t count, const float* mean, float* record, float* squares) const;
+  /// Three channels, or their sum.
+  void put_penalties(const float* values, float* to) const;
   float missing(int c, int x, int y) const { return in_.missing ? in_.missing->row(c, y)[x] : 0.0f; }
 
   const ControlVariateInput& in_;

@@ -35,11 +35,27 @@ inline vfloat load(const float* p) {
 }
 inline void store(float* p, vfloat v) { std::memcpy(p, &v, sizeof v); }
 
+/// Keeps v in a register. Compilers rather read it from memory again for each of its uses, which then wait for loads.
+inline void keep_in_register([[maybe_unused]] vfloat& v) {
+#if defined(__AVX512F__) || defined(__AVX__)
+  asm("" : "+v"(v));
+#endif
+}
+
 inline vint bits(vfloat v) { return reinterpret_cast<vint>(v); }
 inline vfloat from_bits(vint v) { return reinterpret_cast<vfloat>(v); }
 
 inline vfloat max(vfloat a, vfloat b) { return a > b ? a : b; }
 inline vfloat min(vfloat a, vfloat b) { return a < b ? a : b; }
+
+/// Whether any bit is set.
+inline bool any(vint v) {
+  typedef int64_t Words __attribute__((vector_size(sizeof v)));
+  const Words words = reinterpret_cast<Words>(v);
+  int64_t all = 0;
+  for (int i = 0; i < kLanes / 2; ++i) all |= words[i];
+  return all != 0;
+}
 
 inline vfloat sqrt(vfloat v) {
   vfloat r;
@@ -90,27 +106,58 @@ inline vfloat shuffle(vfloat a, vfloat b, vint order) {
 #endif
 }
 
+namespace detail {
+
+/// In each block of four lanes: a0 b0 a1 b1, or a2 b2 a3 b3.
+template <bool high>
+inline vfloat interleave(vfloat a, vfloat b) {
+  vint order;
+  for (int l = 0; l < kLanes; ++l) order[l] = (l & ~3) + (high ? 2 : 0) + (l & 3) / 2 + (l % 2) * kLanes;
+  return shuffle(a, b, order);
+}
+
+/// In each block of four lanes: a0 a1 b0 b1, or a2 a3 b2 b3.
+template <bool high>
+inline vfloat interleave_pairs(vfloat a, vfloat b) {
+  vint order;
+  for (int l = 0; l < kLanes; ++l) order[l] = (l & ~3) + (high ? 2 : 0) + l % 2 + (l & 2) / 2 * kLanes;
+  return shuffle(a, b, order);
+}
+
+/// Blocks of four lanes: `first` and `second` of a, then of b.
+template <int first, int second>
+inline vfloat select_blocks(vfloat a, vfloat b) {
+  vint order;
+  constexpr int kHalf = kLanes / 2;
+  for (int l = 0; l < kLanes; ++l) order[l] = 4 * (l % kHalf < 4 ? first : second) + l % 4 + (l < kHalf ? 0 : kLanes);
+  return shuffle(a, b, order);
+}
+
+}  // namespace detail
+
 /// Transposes a kLanes x kLanes block in place: rows[i][j] <-> rows[j][i].
-inline void transpose(vfloat (&rows)[kLanes]) {
-  // Swaps the off-diagonal halves of blocks of size 2, 4, 8, …: after the step for `half`, blocks of twice that size
-  // are transposed.
-  constexpr auto step = []<int half>(vfloat(&r)[kLanes]) {
-    vint low, high;
-    for (int l = 0; l < kLanes; ++l) {
-      low[l] = (l & half) ? kLanes + (l ^ half) : l;
-      high[l] = (l & half) ? kLanes + l : (l ^ half);
+[[gnu::always_inline]] inline void transpose(vfloat (&rows)[kLanes]) {
+  using namespace detail;
+  // Blocks of 4 x 4, each in its place.
+  for (int i = 0; i < kLanes; i += 4) {
+    const vfloat a = interleave<false>(rows[i], rows[i + 1]), b = interleave<true>(rows[i], rows[i + 1]);
+    const vfloat c = interleave<false>(rows[i + 2], rows[i + 3]), d = interleave<true>(rows[i + 2], rows[i + 3]);
+    rows[i] = interleave_pairs<false>(a, c), rows[i + 1] = interleave_pairs<true>(a, c);
+    rows[i + 2] = interleave_pairs<false>(b, d), rows[i + 3] = interleave_pairs<true>(b, d);
+  }
+  // Then the blocks.
+  for (int i = 0; i < 4; ++i) {
+    if constexpr (kLanes == 16) {
+      const vfloat a = select_blocks<0, 1>(rows[i], rows[i + 4]), b = select_blocks<2, 3>(rows[i], rows[i + 4]);
+      const vfloat c = select_blocks<0, 1>(rows[i + 8], rows[i + 12]),
+                   d = select_blocks<2, 3>(rows[i + 8], rows[i + 12]);
+      rows[i] = select_blocks<0, 2>(a, c), rows[i + 4] = select_blocks<1, 3>(a, c);
+      rows[i + 8] = select_blocks<0, 2>(b, d), rows[i + 12] = select_blocks<1, 3>(b, d);
+    } else {
+      const vfloat a = rows[i], b = rows[i + 4];
+      rows[i] = select_blocks<0, 0>(a, b), rows[i + 4] = select_blocks<1, 1>(a, b);
     }
-    for (int i = 0; i < kLanes; ++i) {
-      if (i & half) continue;
-      const vfloat a = r[i], b = r[i + half];
-      r[i] = shuffle(a, b, low);
-      r[i + half] = shuffle(a, b, high);
-    }
-  };
-  step.template operator()<1>(rows);
-  step.template operator()<2>(rows);
-  step.template operator()<4>(rows);
-  if constexpr (kLanes == 16) step.template operator()<8>(rows);
+  }
 }
 
 }  // namespace covary::lanes

@@ -28,17 +28,31 @@ struct KeyRange {
 KeyRange make_keys(const Planes& guide, int x, int y, std::span<const Offset> offsets, int index_mask, vint* keys) {
   const vfloat f0 = load(guide.row(0, y) + x), f1 = load(guide.row(1, y) + x), f2 = load(guide.row(2, y) + x);
   KeyRange range{splat_int(INT32_MAX), splat_int(0)};
+  const float* const here = guide.row(0, y) + x;
+  const ptrdiff_t stride = guide.stride(), plane = guide.row(1, 0) - guide.row(0, 0);
   for (int j = 0; j < static_cast<int>(offsets.size()); ++j) {
-    const int gx = x + offsets[j].dx, gy = y + offsets[j].dy;
-    const vfloat d0 = load(guide.row(0, gy) + gx) - f0;
-    const vfloat d1 = load(guide.row(1, gy) + gx) - f1;
-    const vfloat d2 = load(guide.row(2, gy) + gx) - f2;
+    const float* const there = here + (offsets[j].dy * stride + offsets[j].dx);
+    const vfloat d0 = load(there) - f0, d1 = load(there + plane) - f1, d2 = load(there + 2 * plane) - f2;
     const vint key = (bits(d0 * d0 + d1 * d1 + d2 * d2) & ~index_mask) | j;
     keys[j] = key;
     if (j > 0) range.smallest = key < range.smallest ? key : range.smallest;
     range.largest = key > range.largest ? key : range.largest;
   }
   return range;
+}
+
+/// How many of n keys are at or below `threshold`.
+vint count_below(const vint* keys, int n, vint threshold) {
+  vint even = {}, odd = {};
+  int j = 0;
+  for (; j + 3 < n; j += 4) {
+    even = keys[j] <= threshold ? even + 1 : even;
+    odd = keys[j + 1] <= threshold ? odd + 1 : odd;
+    even = keys[j + 2] <= threshold ? even + 1 : even;
+    odd = keys[j + 3] <= threshold ? odd + 1 : odd;
+  }
+  for (; j < n; ++j) even = keys[j] <= threshold ? even + 1 : even;
+  return even + odd;
 }
 
 /// A threshold with exactly k of the n keys at or below it: count(low) < k <= count(high). Guesses alternate between
@@ -56,8 +70,7 @@ vint find_threshold(const vint* keys, int n, int k, KeyRange range) {
       middle = middle < high ? middle : high - 1;
       middle = interval > 1 ? middle : low;
     }
-    vint count = {};
-    for (int j = 0; j < n; ++j) count -= keys[j] <= middle;
+    const vint count = count_below(keys, n, middle);
     const vint enough = count >= k;
     high = enough ? middle : high;
     above = enough ? count : above;
@@ -65,9 +78,7 @@ vint find_threshold(const vint* keys, int n, int k, KeyRange range) {
     below = enough ? below : count;
     // A lane with exactly k keys is done; closing its interval keeps it so.
     low = count == k ? high : low;
-    int open = 0;
-    for (int l = 0; l < kLanes; ++l) open |= high[l] - low[l] > 1;
-    if (!open) return high;
+    if (!any(high - low > 1)) return high;
   }
 }
 
@@ -85,11 +96,19 @@ void NeighbourSearch::find(const Planes& guide, int x, int y, vint* keys, uint16
       taken |= (keys[j] <= threshold) & static_cast<int32_t>(1u << (j - first));
     keys[word] = taken;  // keys up to this word are not needed any more
   }
+  const int n_words = (n + kWord - 1) / kWord;
   for (int l = 0; l < kLanes; ++l) {
-    int i = 0;
-    for (int word = 0; word * kWord < n; ++word)
-      for (uint32_t taken = static_cast<uint32_t>(keys[word][l]); taken; taken &= taken - 1)
-        chosen[l * k_ + i++] = static_cast<uint16_t>(word * kWord + std::countr_zero(taken));
+    uint16_t* to = chosen + static_cast<ptrdiff_t>(l) * k_;
+    for (int word = 0; word < n_words; word += 2) {
+      uint64_t taken = static_cast<uint32_t>(keys[word][l]);
+      if (word + 1 < n_words) taken |= uint64_t{static_cast<uint32_t>(keys[word + 1][l])} << kWord;
+      // A few at a time without looking whether there are so many: what is too much is overwritten by what follows.
+      uint16_t* next = to + std::popcount(taken);
+      for (; to < next; to += kNeighboursAtOnce)
+        for (int i = 0; i < kNeighboursAtOnce; ++i, taken &= taken - 1)
+          to[i] = static_cast<uint16_t>(word * kWord + std::countr_zero(taken));
+      to = next;
+    }
   }
 }
 

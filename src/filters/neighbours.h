@@ -11,6 +11,8 @@
 namespace covary {
 
 class NeighbourSearch {
+  static constexpr int kNeighboursAtOnce = 8;
+
  public:
   /// `k` at most the number of candidates: window^2, one less where the target itself is left out.
   NeighbourSearch(int k, int window, bool include_target);
@@ -18,11 +20,12 @@ class NeighbourSearch {
   int k() const { return k_; }
   /// Candidates, from the centre outwards.
   const std::vector<Offset>& offsets() const { return offsets_; }
+  size_t chosen_size() const { return static_cast<size_t>(k_) * lanes::kLanes + kNeighboursAtOnce; }
 
   /// Chooses for the pixels (x + lane, y). chosen[lane * k + i] is an index into offsets(), ascending in i. `guide`:
   /// three planes with a border of at least window / 2, kFar where there is no pixel; such candidates are taken only
   /// when nothing else is left. Distances that agree to 14 bits count as equal; of equals the one nearer to the target
-  /// wins. `keys`: scratch for offsets().size() vectors.
+  /// wins. `keys`: scratch for offsets().size() vectors; `chosen` has chosen_size() elements.
   void find(const Planes& guide, int x, int y, lanes::vint* keys, uint16_t* chosen) const;
 
  private:

@@ -14,8 +14,7 @@ namespace {
 struct Found {
   std::vector<lanes::vint> keys;
   std::vector<uint16_t> chosen;
-  explicit Found(const NeighbourSearch& s)
-      : keys(s.offsets().size()), chosen(static_cast<size_t>(s.k()) * lanes::kLanes) {}
+  explicit Found(const NeighbourSearch& s) : keys(s.offsets().size()), chosen(s.chosen_size()) {}
 };
 
 Planes means(const test::Grouped& image, int border) {

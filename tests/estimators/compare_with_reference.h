@@ -18,7 +18,7 @@ inline std::vector<std::vector<Pixel>> neighbours(const GroupedImage& crn, int k
   const Planes guide = moments(crn, valid, window / 2, kFar).mean;
   const NeighbourSearch search(k, window, include_target);
   std::vector<lanes::vint> keys(search.offsets().size());
-  std::vector<uint16_t> chosen(static_cast<size_t>(k) * lanes::kLanes);
+  std::vector<uint16_t> chosen(search.chosen_size());
   std::vector<std::vector<Pixel>> result(valid.size());
   for (int y = 0; y < crn.height; ++y)
     for (int x = 0; x < crn.width; ++x) {
