@@ -3,8 +3,8 @@
 // Clarberg's octahedral mapping (2008). Texels are constant, not interpolated, as pbrt looks them up.
 //
 // With (x, y) in [-1, 1]^2 from the image's upper left corner, s = |x| + |y|, r = min(s, 2 - s) and
-// phi = (pi / 4) (1 + (|y| - |x|) / r) in the first quadrant: |z| = 1 - r^2, z >= 0 inside of the diamond s <= 1, and the
-// signs of the direction's x and y are those of (x, y).
+// phi = (pi / 4) (1 + (|y| - |x|) / r) in the first quadrant: |z| = 1 - r^2, z >= 0 inside of the diamond s <= 1, and
+// the signs of the direction's x and y are those of (x, y).
 #pragma once
 
 #include "core/distribution.h"
@@ -52,8 +52,8 @@ class EqualAreaImage {
   bool compensated_;
 };
 
-/// The image in the mapping of EnvironmentImage, twice as wide as it was, half as high as that: texels are means of what
-/// lies around them. For programs that have this mapping only; what is as small as a texel becomes wider.
+/// The image in the mapping of EnvironmentImage, twice as wide as it was, half as high as that: texels are means of
+/// what lies around them. For programs that have this mapping only; what is as small as a texel becomes wider.
 TexelImage latitude_longitude_of(const TexelImage& equal_area);
 
 }  // namespace covary
