@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <set>
 
 #include "emitters/equal_area_image.h"
 #include "formats/file_view.h"
@@ -33,17 +34,26 @@ std::string relative_name(const fs::path& file, const fs::path& folder) {
 
 /// What Mitsuba 3 has no plugin for.
 void warn_of_own_plugins(const ObjectDescription& scene, std::vector<std::string>& warnings) {
-  size_t n = 0;
-  SourceLocation first;
+  std::set<std::string> told;
   visit_properties(scene, [&](const ObjectDescription&, const Property& property) {
     const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value);
-    if (child && *child && (*child)->kind == "texture" && (*child)->type == "scale" && n++ == 0)
-      first = (*child)->where;
+    if (!child || !*child) return;
+    const ObjectDescription& object = **child;
+    const bool own =
+        (object.kind == "texture" && object.type == "scale") || (object.kind == "integrator" && object.type == "bdpt");
+    if (own && told.insert(object.type).second)
+      warnings.push_back(fmt::format("{}: becomes the {} '{}', which Mitsuba 3 does not have", object.where.text(),
+                                     object.kind, object.type));
   });
-  if (n > 0)
-    warnings.push_back(fmt::format(
-        "{} textures become 'scale', which covary and Mitsuba 0.6 have, but Mitsuba 3 has not; the first is that of {}",
-        n, first.text()));
+}
+
+bool has_media(const ObjectDescription& scene) {
+  bool found = false;
+  visit_properties(scene, [&](const ObjectDescription&, const Property& property) {
+    const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value);
+    found |= child && *child && (*child)->kind == "medium";
+  });
+  return found;
 }
 
 using FindFile = std::function<std::string(const std::string& name, const SourceLocation& where)>;
@@ -69,13 +79,20 @@ ObjectPtr in_latitude_longitude(const ObjectDescription& emitter, const FindFile
   return changed;
 }
 
-/// The scene, with environments in Mitsuba's mapping.
+/// The scene, with environments in Mitsuba's mapping, and with its path tracer that sees media where there are some.
 std::shared_ptr<const ObjectDescription> for_mitsuba(const ObjectDescription& scene, const FindFile& find_file,
                                                      std::vector<std::string>& warnings) {
   auto changed = std::make_shared<ObjectDescription>(scene);
+  const bool media = has_media(scene);
   for (Property& property : changed->properties) {
     ObjectPtr* object = std::get_if<ObjectPtr>(&property.value);
-    if (!object || !*object || (*object)->kind != "emitter" || (*object)->type != "envmap") continue;
+    if (!object || !*object) continue;
+    if (media && (*object)->kind == "integrator" && (*object)->type == "path") {
+      auto integrator = std::make_shared<ObjectDescription>(**object);
+      integrator->type = "volpath";
+      *object = integrator;
+    }
+    if ((*object)->kind != "emitter" || (*object)->type != "envmap") continue;
     const auto has = [&](const std::string& name, const std::string& value) {
       return std::any_of((*object)->properties.begin(), (*object)->properties.end(), [&](const Property& p) {
         const std::string* text = std::get_if<std::string>(&p.value);

@@ -168,9 +168,10 @@ TEST_F(SceneWriter, ScenesOfPbrtStayTheSameToTheLastBit) {
   const auto body = [](const std::string& xml) { return xml.substr(xml.find("<scene")); };
   EXPECT_EQ(body(converted.document.xml), body(again.document.xml));
   EXPECT_TRUE(contains(converted.document.xml, "<ref id=\"gold, of a kind\" />"));
-  ASSERT_EQ(std::count_if(converted.warnings.begin(), converted.warnings.end(),
-                          [](const std::string& w) { return contains(w, "1 textures become 'scale'"); }),
-            1);
+  ASSERT_EQ(
+      std::count_if(converted.warnings.begin(), converted.warnings.end(),
+                    [](const std::string& w) { return contains(w, "becomes the texture 'scale', which Mitsuba 3"); }),
+      1);
 }
 
 TEST_F(SceneWriter, ScenesOfMitsubaAreBroughtToTheNewestVersion) {
@@ -208,6 +209,32 @@ TEST_F(SceneWriter, NumbersKeepTheirBits) {
   const std::string from = write("numbers.pbrt", text);
   convert(from, "numbers.xml");
   expect_same(from, folder_.file("numbers.xml"), 1000);
+}
+
+/// Mitsuba's `path` sees no media, and its environments lie by latitude and longitude.
+TEST_F(SceneWriter, MitsubaGetsWhatItHas) {
+  std::string texels(48, 'a');
+  write("sky.ppm", "P6\n4 4\n255\n" + texels);
+  const std::string from = write("fog.pbrt", R"(Camera "perspective"
+WorldBegin
+LightSource "infinite" "string filename" "sky.ppm" "float scale" 2
+MakeNamedMedium "milk" "string type" "homogeneous"
+MediumInterface "milk" ""
+Shape "sphere"
+)");
+  const ConvertedScene converted = convert(from, "fog.xml");
+  const std::string& xml = converted.document.xml;
+  EXPECT_TRUE(contains(xml, "<integrator type=\"volpath\">"));
+  EXPECT_FALSE(contains(xml, "mapping"));
+  ASSERT_EQ(converted.document.files.size(), 1u);
+  EXPECT_TRUE(converted.document.files[0].bytes.starts_with("PF\n8 5\n"));
+  const LoadedScene a = load_scene(from), b = load_scene(folder_.file("fog.xml"));
+  EXPECT_EQ(b.integrator_type, "path");
+  const Vec3 up{0, 0, 1};
+  EXPECT_NEAR(a.scene->environment()->environment(up).radiance.g, b.scene->environment()->environment(up).radiance.g,
+              1e-4f);
+  write("plain.pbrt", "Camera \"perspective\"\nWorldBegin\nShape \"sphere\"\n");
+  EXPECT_TRUE(contains(convert(folder_.file("plain.pbrt"), "plain.xml").document.xml, "<integrator type=\"path\">"));
 }
 
 TEST_F(SceneWriter, WhatCannotBeRenderedIsNotConverted) {
