@@ -86,15 +86,19 @@ void convert_scene(const ConvertSceneOptions& options) {
 
 void add_convert_scene(CLI::App& app) {
   const auto o = std::make_shared<ConvertSceneOptions>();
-  CLI::App* command = app.add_subcommand("convert-scene", "Convert scenes of pbrt-v4 to Mitsuba's XML");
-  command->add_option("SCENE", o->input, "Scene of pbrt-v4 (.pbrt), or Mitsuba's of any version (.xml), brought to 3.0")
+  CLI::App* command = app.add_subcommand("convert-scene", "Convert scenes of pbrt-v4 or glTF 2.0 to Mitsuba's XML");
+  command
+      ->add_option(
+          "SCENE", o->input,
+          "Scene of pbrt-v4 (.pbrt) or glTF 2.0 (.glb, .gltf), or Mitsuba's of any version (.xml), brought to 3.0")
       ->type_name(kFileValue)
       ->option_text("SCENE")
       ->required();
   command
-      ->add_option("OUT", o->output,
-                   "The new scene (.xml). Meshes that stand in SCENE become files in the folder OUT-files beside it; "
-                   "other files stay where they are")
+      ->add_option(
+          "OUT", o->output,
+          "The new scene (.xml). Meshes and images that stand in SCENE become files in the folder OUT-files beside "
+          "it; other files stay where they are")
       ->type_name(kFileValue)
       ->option_text("OUT.xml")
       ->required();

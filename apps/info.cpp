@@ -11,8 +11,8 @@
 #include "core/error.h"
 #include "defines.h"
 #include "film/image_file.h"
-#include "io/load_scene.h"
 #include "formats/scene_file.h"
+#include "io/load_scene.h"
 #include "json_output.h"
 #include "plans/estimator_plans.h"
 #include "plans/memory.h"
@@ -117,7 +117,7 @@ void info(const InfoOptions& options) {
 void add_info(CLI::App& app) {
   const auto options = std::make_shared<InfoOptions>();
   CLI::App* command = app.add_subcommand("info", "What a film, image or scene holds: size, channels, attributes");
-  command->add_option("FILE", options->path, "A film or image, or a scene file (.xml, .pbrt)")
+  command->add_option("FILE", options->path, "A film or image, or a scene file (.xml, .pbrt, .glb, .gltf)")
       ->type_name(kFileValue)
       ->required();
   add_define_option(*command, options->defines);

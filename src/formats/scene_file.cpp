@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "formats/scene_file.h"
 
+#include <fmt/format.h>
+
+#include "formats/gltf_reader.h"
 #include "formats/pbrt_reader.h"
 
 namespace covary {
@@ -9,12 +12,16 @@ SceneXml read_scene_file(std::string_view text, const std::string& name,
                          const std::map<std::string, std::string>& defines, FileResolver& files,
                          Diagnostics& diagnostics) {
   SceneXml result;
-  if (!is_pbrt_file(name))
-    result = read_scene_xml(text, name, defines, files, diagnostics);
-  else if (defines.empty())
+  const bool pbrt = is_pbrt_file(name), gltf = is_gltf_file(name);
+  if ((pbrt || gltf) && !defines.empty())
+    throw Error(ErrorCode::kUsage,
+                fmt::format("{}: scenes of {} have no parameters to define", name, pbrt ? "pbrt" : "glTF"));
+  if (pbrt)
     result = read_scene_pbrt(text, name, files, diagnostics);
+  else if (gltf)
+    result = read_scene_gltf(text, name, files, diagnostics);
   else
-    throw Error(ErrorCode::kUsage, name + ": scenes of pbrt have no parameters to define");
+    result = read_scene_xml(text, name, defines, files, diagnostics);
   if (result.scene) return result;
   diagnostics.throw_if_errors();
   throw Error(ErrorCode::kInput, name + ": the file holds no scene");

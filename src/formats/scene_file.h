@@ -11,8 +11,12 @@ namespace covary {
 
 /// Whether a file of this name is read as a scene of pbrt-v4.
 inline bool is_pbrt_file(std::string_view name) { return name.ends_with(".pbrt"); }
+/// Whether a file of this name is read as a scene of glTF 2.0.
+inline bool is_gltf_file(std::string_view name) { return name.ends_with(".gltf") || name.ends_with(".glb"); }
 /// Whether a file of this name is a scene, rather than an image or else.
-inline bool is_scene_file(std::string_view name) { return name.ends_with(".xml") || is_pbrt_file(name); }
+inline bool is_scene_file(std::string_view name) {
+  return name.ends_with(".xml") || is_pbrt_file(name) || is_gltf_file(name);
+}
 
 /// Reads the text of a scene file in the format that its name tells, as read_scene_xml(). Throws Error(kInput) with all
 /// problems where there is no scene to go on with, and Error(kUsage) for defines that the format has no use for.

@@ -41,7 +41,8 @@ struct LoadedScene {
   std::string content_hash;        ///< hex; over the scene's XML, defines and all files it reads
 };
 
-/// Reads a scene, Mitsuba's XML or "*.pbrt". Throws Error(kInput) with every problem of the file, or Error(kIo).
+/// Reads a scene: Mitsuba's XML, "*.pbrt", "*.gltf" or "*.glb". Throws Error(kInput) with every problem of the file, or
+/// Error(kIo).
 LoadedScene load_scene(const std::string& path, const LoadOptions& options = {});
 /// The same for text in memory. `name` stands for the file in messages; files the scene names are looked up in its
 /// folder.

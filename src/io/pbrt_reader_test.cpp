@@ -7,12 +7,12 @@
 
 #include <fstream>
 
-#include "core/arena.h"
 #include "core/random.h"
 #include "core/srgb.h"
 #include "formats/xml_values.h"
 #include "io/load_scene.h"
 #include "support/files.h"
+#include "support/same_scene.h"
 
 namespace covary {
 namespace {
@@ -38,9 +38,6 @@ class Pbrt : public ::testing::Test {
     for (size_t i; (i = found.find(folder_.file(""))) != std::string::npos;) found.erase(i, folder_.file("").size());
     return found;
   }
-  /// Both scenes look the same along all rays of a grid on the film, and have lights of the same power.
-  void expect_equal(const LoadedScene& a, const LoadedScene& b, int least_hits);
-
   test_support::TemporaryFolder folder_;
 };
 
@@ -81,48 +78,6 @@ end_header
 3 1 2 0
 3 1 3 2
 )";
-
-double difference(const Vec3& a, const Vec3& b) { return length(a - b); }
-
-void Pbrt::expect_equal(const LoadedScene& a, const LoadedScene& b, int least_hits) {
-  ASSERT_EQ(a.width, b.width);
-  ASSERT_EQ(a.height, b.height);
-  EXPECT_EQ(a.crop_width, b.crop_width);
-  EXPECT_EQ(a.spp, b.spp);
-  EXPECT_EQ(a.integrator_type, b.integrator_type);
-  EXPECT_EQ(a.filter.kind, b.filter.kind);
-  constexpr int kSide = 24;
-  int hits = 0;
-  Arena arena;
-  for (int i = 0; i < kSide * kSide; ++i) {
-    const Vec2 film{(static_cast<float>(i % kSide) + 0.4f) / kSide * static_cast<float>(a.width),
-                    (static_cast<float>(i / kSide) + 0.6f) / kSide * static_cast<float>(a.height)};
-    const Ray ra = a.scene->camera().ray(film, {0.3f, 0.4f}), rb = b.scene->camera().ray(film, {0.3f, 0.4f});
-    ASSERT_LT(difference(ra.d, rb.d), 1e-5) << i;
-    SurfaceHit ha, hb;
-    const bool hit = a.scene->intersect(ra, ha);
-    ASSERT_EQ(hit, b.scene->intersect(rb, hb)) << i;
-    if (!hit) continue;
-    ++hits;
-    ASSERT_LT(difference(ha.p, hb.p), 1e-4) << i;
-    EXPECT_LT(difference(ha.ng, hb.ng), 1e-4) << i;
-    EXPECT_LT(difference(ha.frame.n, hb.frame.n), 1e-4) << i;
-    EXPECT_EQ(ha.shape->emitter() != nullptr, hb.shape->emitter() != nullptr) << i;
-    const Vec3 wo = ha.frame.to_local(-ra.d), wi = normalize(Vec3{0.3f, -0.5f, wo.z > 0 ? 1.0f : -1.0f});
-    arena.reset();
-    const auto value = [&](const SurfaceHit& h) {
-      return h.shape->bsdf()->bind(h, wo.z > 0, TransportMode::kRadiance, arena)->eval(wo, wi).value;
-    };
-    const Spectrum va = value(ha), vb = value(hb);
-    for (int c = 0; c < 3; ++c) EXPECT_NEAR(va[c], vb[c], 1e-3f * std::abs(vb[c]) + 1e-5f) << i;
-  }
-  EXPECT_GE(hits, least_hits);
-  ASSERT_EQ(a.scene->emitters().size(), b.scene->emitters().size());
-  for (size_t i = 0; i < a.scene->emitters().size(); ++i)
-    for (int c = 0; c < 3; ++c)
-      EXPECT_NEAR(a.scene->emitters()[i]->power()[c], b.scene->emitters()[i]->power()[c],
-                  1e-4f * b.scene->emitters()[i]->power()[c]);
-}
 
 const std::string kPbrtHead = R"(LookAt 3 4 1.5  .5 .5 0  0 0 1
 Camera "perspective" "float fov" 45
@@ -211,7 +166,7 @@ TEST_F(Pbrt, IsTheSceneByHand) {
 <translate y="2" z="2"/></transform><bsdf type="twosided"><bsdf type="diffuse"/></bsdf>
 <emitter type="area"><rgb name="radiance" value=")" +
           std::to_string(l.r) + ", " + std::to_string(l.g) + ", " + std::to_string(l.b) + R"("/></emitter></shape>)");
-  expect_equal(a, b, 300);
+  test_support::expect_same_scene(a, b, 300);
 }
 
 TEST_F(Pbrt, BlocksTransformationsAndMeshesAreTheSceneByHand) {
@@ -240,7 +195,7 @@ WorldBegin
 <shape type="instance"><ref id="g"/><transform name="to_world"><translate x="-1.5"/></transform></shape>
 <shape type="instance"><ref id="g"/><transform name="to_world"><translate x="1.5" y="1"/></transform></shape>
 <emitter type="point"><point name="position" x="0" y="0" z="4"/><rgb name="intensity" value="1, 2, 3"/></emitter>)");
-  expect_equal(a, b, 80);
+  test_support::expect_same_scene(a, b, 80);
 }
 
 /// The images of infinite lights: pbrt's axes of the square, turned by the light's transformation.
@@ -333,8 +288,8 @@ TEST_F(Pbrt, OrthographicCamerasSeeTheShorterSide) {
   const LoadedScene a =
       pbrt("Camera \"orthographic\"\nFilm \"rgb\" \"integer xresolution\" 40 \"integer yresolution\" 20\nWorldBegin\n");
   const Camera& camera = a.scene->camera();
-  EXPECT_LT(difference(camera.ray({40, 0}, {}).at(0), Vec3{2, 1, camera.ray({40, 0}, {}).at(0).z}), 1e-5);
-  EXPECT_LT(difference(camera.ray({0, 20}, {}).d, Vec3{0, 0, 1}), 1e-6);
+  EXPECT_LT(test_support::difference(camera.ray({40, 0}, {}).at(0), Vec3{2, 1, camera.ray({40, 0}, {}).at(0).z}), 1e-5);
+  EXPECT_LT(test_support::difference(camera.ray({0, 20}, {}).d, Vec3{0, 0, 1}), 1e-6);
 }
 
 TEST_F(Pbrt, WhatIsNotSupportedIsNamed) {

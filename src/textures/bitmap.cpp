@@ -25,7 +25,9 @@
 #include "core/large_vector.h"
 #include "core/srgb.h"
 #include "core/warp.h"
+#include "scene/embedded_data.h"
 #include "textures/block_layout.h"
+#include "textures/embedded_image.h"
 #include "textures/registry.h"
 
 namespace covary {
@@ -289,7 +291,8 @@ std::shared_ptr<Texture> make_bitmap_texture(TexelImage image, const BitmapSetti
 }
 
 std::shared_ptr<Texture> make_bitmap(Parameters& parameters) {
-  const std::string path = parameters.require_file("filename");
+  const std::string* data = find_embedded(parameters);
+  const std::string path = data ? "" : parameters.require_file("filename");
   BitmapSettings settings;
   settings.raw = parameters.get_bool("raw", false);
   settings.filter = parameters.get_choice("filter_type", "bilinear", {"bilinear", "nearest"}) == "nearest"
@@ -300,9 +303,9 @@ std::shared_ptr<Texture> make_bitmap(Parameters& parameters) {
   settings.to_uv = UvTransform(parameters.get_transform("to_uv"));
   parameters.get_choice("format", "auto", {"auto", "variant", "float16", "fp16", "uint8"});
   parameters.get_bool("accel", true);
-  if (path.empty()) return nullptr;  // already reported
+  if (path.empty() && !data) return nullptr;  // already reported
   try {
-    return make_bitmap_texture(read_texels(path), settings);
+    return make_bitmap_texture(data ? read_embedded_image(*data) : read_texels(path), settings);
   } catch (const Error& error) {
     parameters.error_at("filename", std::string("cannot be used: ") + error.what());
     return nullptr;

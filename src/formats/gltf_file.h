@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// A file of glTF 2.0 as tinygltf reads it, and what is found wrong with it.
+#pragma once
+
+#include <tiny_gltf.h>
+
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "formats/file_resolver.h"
+#include "scene/parameters.h"
+
+namespace covary {
+
+class GltfFile {
+ public:
+  /// Reads JSON (.gltf) or binary files (.glb) with their buffers; images stay encoded. Throws Error(kInput).
+  GltfFile(std::string_view bytes, const std::string& name, FileResolver& files, Diagnostics& diagnostics);
+
+  const tinygltf::Model& model() const { return model_; }
+  const SourceLocation& where() const { return where_; }
+  void error(const std::string& message);
+  /// A file that is read besides, for the hash of the scene; an error where it is missing.
+  void reads(const std::string& uri);
+  /// Each message is given once.
+  void warn(const std::string& message);
+
+  /// The numbers of an accessor of `width` numbers an element; integers are scaled to [-1, 1] where it says so. Empty
+  /// after an error, which names `what` it is.
+  std::vector<double> numbers(int accessor, int width, const std::string& what);
+  /// The bytes of a part of a buffer; empty after an error.
+  std::string_view bytes_of_view(int view, const std::string& what);
+
+ private:
+  void check_extensions();
+
+  tinygltf::Model model_;
+  SourceLocation where_;
+  FileResolver& files_;
+  Diagnostics& diagnostics_;
+  std::set<std::string> warned_;
+};
+
+/// The name of the file that a URI names: "%20" and its like are characters.
+std::string file_of_uri(const std::string& uri);
+/// An object of an extension; null where it is absent.
+const tinygltf::Value* find_extension(const tinygltf::ExtensionMap& extensions, const std::string& name);
+double extension_number(const tinygltf::Value& extension, const std::string& name, double fallback);
+
+}  // namespace covary

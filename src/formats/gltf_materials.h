@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// Materials of glTF: metallic-roughness as `principled`, with textures, opacity, normals and emission.
+#pragma once
+
+#include <map>
+#include <memory>
+
+#include "formats/gltf_file.h"
+#include "formats/object_builder.h"
+
+namespace covary {
+
+class GltfTextures;
+
+class GltfMaterials {
+ public:
+  explicit GltfMaterials(GltfFile& file);
+  ~GltfMaterials();
+
+  /// The reflectance model of a material; that of glTF's default one for -1.
+  ObjectPtr model(int material);
+  /// The light that surfaces of the material send out; null where it has none.
+  ObjectPtr light(int material);
+  /// The set of texture coordinates that all its textures use.
+  int texture_set(int material);
+
+ private:
+  const tinygltf::Material& of(int material) const;
+  ObjectPtr make(const tinygltf::Material& material);
+  ObjectBuilder surface(const tinygltf::Material& material);
+  ObjectPtr with_normals(const tinygltf::Material& material, ObjectPtr model);
+  ObjectPtr with_opacity(const tinygltf::Material& material, ObjectPtr model);
+
+  GltfFile& file_;
+  std::unique_ptr<GltfTextures> textures_;
+  tinygltf::Material default_;
+  std::map<int, ObjectPtr> models_, lights_;
+};
+
+}  // namespace covary

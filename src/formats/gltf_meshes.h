@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+// Meshes of glTF: triangles, strips and fans as shapes `ply`.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "formats/embedded_mesh.h"
+#include "formats/gltf_file.h"
+
+namespace covary {
+
+struct GltfMesh {
+  EmbeddedMesh mesh;
+  bool smooth = false;  ///< has normals
+};
+
+/// The triangles of a primitive with the texture coordinates of `texture_set`; nothing after an error, or where it has
+/// no triangles, which is a warning. Messages name it `what`.
+std::optional<GltfMesh> read_gltf_mesh(GltfFile& file, const tinygltf::Primitive& primitive, int texture_set,
+                                       const std::string& what);
+
+}  // namespace covary

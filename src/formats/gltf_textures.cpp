@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "formats/gltf_textures.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/memory_limit.h"
+#include "core/srgb.h"
+#include "scene/embedded_data.h"
+
+namespace covary {
+namespace {
+
+/// Width and height of a PNG or JPEG picture, from its header; zeros where it is neither.
+std::pair<int, int> size_of(const std::vector<unsigned char>& bytes) {
+  const auto two = [&](size_t at) { return bytes[at] * 256 + bytes[at + 1]; };
+  if (bytes.size() > 24 && bytes[0] == 0x89 && bytes[1] == 'P') {
+    if (two(16) > 0 || two(20) > 0) return {1 << 16, 1 << 16};  // more than is accepted
+    return {two(18), two(22)};
+  }
+  if (bytes.size() < 4 || bytes[0] != 0xff || bytes[1] != 0xd8) return {0, 0};
+  for (size_t at = 2; at + 9 < bytes.size() && bytes[at] == 0xff; at += 2 + static_cast<size_t>(two(at + 2))) {
+    const int marker = bytes[at + 1];
+    if (marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc)
+      return {two(at + 7), two(at + 5)};
+  }
+  return {0, 0};
+}
+
+std::string wrap_mode(int wrap) {
+  return wrap == TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE     ? "clamp"
+         : wrap == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT ? "mirror"
+                                                         : "repeat";
+}
+
+/// Vertices have v upwards here, downwards in the file. KHR_texture_transform: rotation is counter-clockwise as seen in
+/// the picture.
+Transform uv_transform(const tinygltf::ExtensionMap& extensions) {
+  const Transform flip = Transform::translate({0, 1, 0}) * Transform::scale({1, -1, 1});
+  const tinygltf::Value* khr = find_extension(extensions, "KHR_texture_transform");
+  if (!khr) return flip;
+  const auto pair = [&](const char* name, float fallback) {
+    const tinygltf::Value& value = khr->Get(name);
+    Vec2 result{fallback, fallback};
+    if (value.IsArray() && value.ArrayLen() == 2) {
+      result.x = static_cast<float>(value.Get(0).GetNumberAsDouble());
+      result.y = static_cast<float>(value.Get(1).GetNumberAsDouble());
+    }
+    return result;
+  };
+  const Vec2 offset = pair("offset", 0), scale = pair("scale", 1);
+  const double turn = extension_number(*khr, "rotation", 0) * 180 / M_PI;
+  return Transform::translate({offset.x, offset.y, 0}) * Transform::rotate({0, 0, 1}, -turn) *
+         Transform::scale({scale.x, scale.y, 1}) * flip;
+}
+
+}  // namespace
+
+ObjectPtr GltfTextures::make(int texture, const tinygltf::ExtensionMap& extensions, const GltfUse& use) {
+  const tinygltf::Model& model = file_.model();
+  if (texture < 0 || static_cast<size_t>(texture) >= model.textures.size()) {
+    file_.error(fmt::format("there is no texture {}", texture));
+    return nullptr;
+  }
+  const tinygltf::Texture& given = model.textures[texture];
+  if (given.source < 0 || static_cast<size_t>(given.source) >= model.images.size()) {
+    file_.error(fmt::format("texture {} has no image in PNG or JPEG, which are supported", texture));
+    return nullptr;
+  }
+  auto bitmap = make_object("texture", "bitmap", file_.where());
+  try {
+    set_property(*bitmap, "to_uv", uv_transform(extensions));
+  } catch (const Error& error) {
+    file_.error(fmt::format("the transformation of texture {}: {}", texture, error.what()));
+  }
+  if (given.sampler >= 0 && static_cast<size_t>(given.sampler) < model.samplers.size()) {
+    const tinygltf::Sampler& sampler = model.samplers[given.sampler];
+    if (sampler.wrapS != sampler.wrapT)
+      file_.warn("a texture is wrapped in different ways along u and v: that along u is taken for both");
+    set_property(*bitmap, "wrap_mode", wrap_mode(sampler.wrapS));
+    if (sampler.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST)
+      set_property(*bitmap, "filter_type", std::string("nearest"));
+  }
+  const bool as_it_is = use.kind != GltfUse::kChannel && use.factor == Spectrum(1);
+  set_property(*bitmap, "raw", use.kind != GltfUse::kColour);
+  const tinygltf::Image& image = model.images[given.source];
+  if (as_it_is && !image.uri.empty() && !image.uri.starts_with("data:") && image.bufferView < 0) {
+    set_property(*bitmap, "filename", file_of_uri(image.uri));
+    return bitmap;
+  }
+  const Pixels* pixels = decoded(given.source);
+  if (!pixels) return nullptr;
+  set_property(*bitmap, std::string(kEmbeddedData), embedded(*pixels, use));
+  return bitmap;
+}
+
+const GltfTextures::Pixels* GltfTextures::decoded(int index) {
+  if (const auto found = images_.find(index); found != images_.end())
+    return found->second.width > 0 ? &found->second : nullptr;
+  Pixels& pixels = images_[index];
+  tinygltf::Image image = file_.model().images[index];
+  if (image.bufferView < 0 && !image.uri.empty()) file_.reads(image.uri);
+  const std::string name = image.uri.empty() ? image.name : image.uri.substr(0, 40);
+  const auto [width, height] = size_of(image.image);
+  const auto fail = [&](const std::string& why) {
+    file_.error(fmt::format("image {} '{}' {}", index, name, why));
+    return nullptr;
+  };
+  if (width <= 0 || height <= 0 || width > 32768 || height > 32768)
+    return fail("is no picture in PNG or JPEG that can be read");
+  require_memory(file_.where().text(), fmt::format("image {} of {} x {} pixels", index, width, height),
+                 20.0 * width * height);
+  const std::vector<unsigned char> bytes = std::move(image.image);
+  std::string problem, warning;
+  image.image.clear(), image.as_is = false;
+  if (!tinygltf::LoadImageData(&image, index, &problem, &warning, 0, 0, bytes.data(), static_cast<int>(bytes.size()),
+                               nullptr) ||
+      image.width != width || image.height != height || image.component < 1 || (image.bits != 8 && image.bits != 16))
+    return fail("cannot be decoded: it is damaged");
+  const size_t n = static_cast<size_t>(width) * height * image.component, step = image.bits / 8;
+  if (image.image.size() < n * step) return fail("cannot be decoded: it is damaged");
+  pixels.channels = image.component;
+  pixels.values.resize(n);
+  for (size_t i = 0; i < n; ++i) pixels.values[i] = image.image[i * step + step - 1];  // of 16 bits the upper ones
+  pixels.width = width, pixels.height = height;
+  return &pixels;
+}
+
+std::string GltfTextures::embedded(const Pixels& pixels, const GltfUse& use) const {
+  const size_t n = static_cast<size_t>(pixels.width) * pixels.height;
+  const bool one = use.kind == GltfUse::kChannel, plain = use.factor == Spectrum(1) || use.cutoff >= 0;
+  const auto value = [&](size_t i, int c) {  // grey pictures are the same in all channels, and opaque
+    const int n_colours = pixels.channels < 3 ? 1 : 3;
+    if (c == 3)
+      return pixels.channels % 2 == 0 ? pixels.values[i * pixels.channels + pixels.channels - 1] : uint8_t{255};
+    return pixels.values[i * pixels.channels + std::min(c, n_colours - 1)];
+  };
+  const int channels = one ? 1 : 3;
+  if (plain) {
+    std::string text = fmt::format("P{}\n{} {}\n255\n", one ? 5 : 6, pixels.width, pixels.height);
+    for (size_t i = 0; i < n; ++i)
+      for (int c = 0; c < channels; ++c) {
+        uint8_t x = value(i, one ? use.channel : c);
+        if (use.cutoff >= 0) x = x / 255.0 * use.factor.r >= use.cutoff ? 255 : 0;
+        text += static_cast<char>(x);
+      }
+    return text;
+  }
+  // PFM: linear floats from the lowest row up.
+  std::string text = fmt::format("P{}\n{} {}\n-1.0\n", one ? 'f' : 'F', pixels.width, pixels.height);
+  for (int y = pixels.height - 1; y >= 0; --y)
+    for (int x = 0; x < pixels.width; ++x)
+      for (int c = 0; c < channels; ++c) {
+        const float raw =
+            static_cast<float>(value(static_cast<size_t>(y) * pixels.width + x, one ? use.channel : c)) / 255;
+        const float linear = (use.kind == GltfUse::kColour ? srgb_to_linear(raw) : raw) * use.factor[c];
+        text.append(reinterpret_cast<const char*>(&linear), sizeof(linear));
+      }
+  return text;
+}
+
+}  // namespace covary

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// Textures of glTF as bitmaps. Images in files of their own stay there where they are used as they are; others become
+// part of the description: one channel of several, colours with a factor, images inside of the file.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include "core/spectrum.h"
+#include "formats/gltf_file.h"
+#include "formats/object_builder.h"
+
+namespace covary {
+
+/// What of an image is meant.
+struct GltfUse {
+  enum Kind {
+    kColour,   ///< sRGB, times `factor`
+    kVector,   ///< three linear channels as they are
+    kChannel,  ///< one linear channel, times factor.r
+  } kind = kColour;
+  int channel = 0;  ///< of kChannel; 3: alpha
+  Spectrum factor{1};
+  double cutoff = -1;  ///< of kChannel: 1 from here on, otherwise 0; negative: none
+};
+
+class GltfTextures {
+ public:
+  explicit GltfTextures(GltfFile& file) : file_(file) {}
+  /// The texture of this index, with the extensions of what names it; null after an error.
+  ObjectPtr make(int texture, const tinygltf::ExtensionMap& extensions, const GltfUse& use);
+
+ private:
+  struct Pixels {
+    int width = 0, height = 0, channels = 0;
+    std::vector<uint8_t> values;
+  };
+  /// Null after an error.
+  const Pixels* decoded(int image);
+  std::string embedded(const Pixels& pixels, const GltfUse& use) const;
+
+  GltfFile& file_;
+  std::map<int, Pixels> images_;
+};
+
+}  // namespace covary
