@@ -123,8 +123,13 @@ Checksums checksums_of(const ImagePlace& place, const std::map<std::string, std:
 }  // namespace
 
 void add_image_planes(const std::string& name, Image& image, std::vector<ExrPlane>& planes) {
-  COVARY_CHECK(image.channels == 3, "an image of three channels");
-  const std::string components = name == "N" || name == "P" || name == "DenoisingNormal" ? "XYZ" : "RGB";
+  if (image.channels == 1) {
+    planes.push_back({name, ExrPlane::Type::kFloat, image.data.data(), sizeof(float)});
+    return;
+  }
+  COVARY_CHECK(image.channels == 3, "an image of one or three channels");
+  const bool is_vector = name == "N" || name == "P" || name == "DenoisingNormal" || name == "Motion";
+  const std::string components = is_vector ? "XYZ" : "RGB";
   for (size_t c = 0; c < 3; ++c)
     planes.push_back({(name.empty() ? "" : name + ".") + components[c], ExrPlane::Type::kFloat, image.data.data() + c,
                       3 * sizeof(float)});

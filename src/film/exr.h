@@ -24,8 +24,8 @@ struct ExrPlane {
   size_t pixel_stride = 0;
 };
 
-/// Appends the three channels of `image`: `name`.R, .G, .B; .X, .Y, .Z for N (normal) and P (position); R, G, B where
-/// `name` is empty. The planes point into the image, which has 3 channels.
+/// Appends the channels of `image`: `name` where it has one; of three, `name`.R, .G, .B; .X, .Y, .Z for N (normal), P
+/// (position) and Motion; R, G, B where `name` is empty. The planes point into the image.
 void add_image_planes(const std::string& name, Image& image, std::vector<ExrPlane>& planes);
 
 /// Where an image lies: the full frame, and the window of pixels that a file holds, relative to the frame's corner.

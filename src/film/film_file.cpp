@@ -74,11 +74,13 @@ std::string layer_of(const std::string& channel) {
   return channel.substr(0, dot == std::string::npos ? 0 : dot);
 }
 
-/// The names of the auxiliary images: every triple of channels that is no group, mean, error or variance.
+constexpr const char* kDepth = "Depth";  // the one auxiliary image of a single channel
+
+/// The names of the auxiliary images: Depth, and every triple of channels that is no group, mean, error or variance.
 std::vector<std::string> find_aovs(const ExrFile& file, bool has_groups) {
   std::vector<std::string> names;
   for (const ExrFile::Channel& channel : file.channels()) {
-    const std::string name = layer_of(channel.name);
+    const std::string name = channel.name == kDepth ? kDepth : layer_of(channel.name);
     if (name.empty() || name == kVariance || name == kStdError || (name.starts_with("group") && has_groups)) continue;
     if (names.empty() || names.back() != name) names.push_back(name);
   }
@@ -151,7 +153,8 @@ Film read_film(const std::string& path) {
     if (!is_derived(key)) film.attributes[key] = value;
   if (file.find(std::string(kVariance) + ".R")) film.keep_sample_variance();
   const bool has_groups = groups > 1 || attributes.count(kShown);
-  for (const std::string& name : find_aovs(file, has_groups)) film.aovs[name] = Image(film.width(), film.height(), 3);
+  for (const std::string& name : find_aovs(file, has_groups))
+    film.aovs[name] = Image(film.width(), film.height(), name == kDepth ? 1 : 3);
 
   Image means = has_groups ? Image(film.width(), film.height(), 3) : Image();
   const std::vector<ExrPlane> planes = film_planes(film, means);

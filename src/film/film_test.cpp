@@ -135,8 +135,8 @@ TEST(Film, FileRoundTripIsBitExact) {
     Film film = test_film(groups, 3, 5);
     film.data()[7] = -0.0f;
     film.data()[8] = 1e-42f;  // denormal
-    for (const char* name : {"Albedo", "N", "P"}) {
-      film.aovs[name] = Image(17, 19, 3);
+    for (const char* name : {"Albedo", "Depth", "Motion", "N", "P"}) {
+      film.aovs[name] = Image(17, 19, name == std::string("Depth") ? 1 : 3);
       for (size_t i = 0; i < film.aovs[name].data.size(); ++i) film.aovs[name].data[i] = 0.1f * i + name[0];
     }
     const std::string path = test_file("film.exr");
@@ -148,8 +148,9 @@ TEST(Film, FileRoundTripIsBitExact) {
     EXPECT_EQ(read.frame_width(), 40);
     EXPECT_EQ(read.frame_height(), 30);
     EXPECT_EQ(read.attributes, film.attributes);
-    ASSERT_EQ(read.aovs.size(), 3u);
-    for (const char* name : {"Albedo", "N", "P"}) EXPECT_EQ(read.aovs.at(name).data, film.aovs.at(name).data);
+    ASSERT_EQ(read.aovs.size(), 5u);
+    for (const char* name : {"Albedo", "Depth", "Motion", "N", "P"})
+      EXPECT_EQ(read.aovs.at(name).data, film.aovs.at(name).data);
   }
 }
 
@@ -264,7 +265,9 @@ TEST(Film, MergeDoesNotDependOnTheOrder) {
   for (int i = 0; i < 4; ++i) {
     films.push_back(test_film(2, 10 + i, 3 + i * i));
     films.back().aovs["N"] = Image(17, 19, 3);
-    for (float& v : films.back().aovs["N"].data) v = 0.1f * (i + 1);
+    films.back().aovs["Depth"] = Image(17, 19, 1);
+    for (const char* name : {"Depth", "N"})
+      for (float& v : films.back().aovs[name].data) v = 0.1f * (i + 1);
   }
   films[2].attributes[film_key::kComplete] = "false";
   const std::vector<std::string> names{"a", "b", "c", "d"};
@@ -276,7 +279,7 @@ TEST(Film, MergeDoesNotDependOnTheOrder) {
     for (int i : order) permuted.push_back(films[i]);
     const Film other = merge_films(permuted, names);
     ASSERT_TRUE(same_bits(merged, other));
-    ASSERT_EQ(merged.aovs.at("N").data, other.aovs.at("N").data);
+    for (const char* name : {"Depth", "N"}) ASSERT_EQ(merged.aovs.at(name).data, other.aovs.at(name).data);
     ASSERT_EQ(merged.attributes, other.attributes);
   }
 }

@@ -221,7 +221,7 @@ Film merge(std::span<const Attributes> attributes, std::span<const std::string> 
   const auto add = [&](const Film& film, const std::string& name) {
     if (merged.counts().empty()) {
       merged = Film(film.frame_width(), film.frame_height(), film.crop(), film.groups());
-      for (const auto& [aov, image] : film.aovs) merged.aovs[aov] = Image(film.width(), film.height(), 3);
+      for (const auto& [aov, image] : film.aovs) merged.aovs[aov] = Image(film.width(), film.height(), image.channels);
       if (film.keeps_sample_variance()) merged.keep_sample_variance();
     }
     check_same("the size", size_text(merged), size_text(film), first, name);
