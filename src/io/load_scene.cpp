@@ -40,7 +40,7 @@ class Loader {
     jobs_.run(diagnostics_);
     assemble();
     for (const auto& file : files_.files()) result_.files.push_back(file.first);
-    result_.content_hash = files_.content_hash(hash_text(xml_.hash));
+    result_.files_hash = result_.content_hash = files_.content_hash(hash_text(xml_.hash));
     result_.warnings = diagnostics_.warnings();
     diagnostics_.throw_if_errors();
     require_table_memory(name, parts_);
@@ -331,7 +331,8 @@ class Loader {
     result_.spp = sensor.sampler.sample_count;
     result_.sampler_type = sensor.sampler.type;
     try {
-      parts_.camera = std::make_shared<Camera>(sensor.camera, film.width, film.height);
+      result_.camera = std::make_shared<Camera>(sensor.camera, film.width, film.height);
+      parts_.camera = result_.camera;
     } catch (const Error& error) {
       diagnostics_.error(sensor_->where, fmt::format("sensor '{}': {}", sensor_->type, error.what()));
     }

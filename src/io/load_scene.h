@@ -25,6 +25,7 @@ struct LoadOptions {
 
 struct LoadedScene {
   std::unique_ptr<Scene> scene;
+  std::shared_ptr<Camera> camera;  ///< the scene's, which may be moved between renders (plans/camera_path.h)
   int width = 0, height = 0;  ///< full frame
   int crop_x = 0, crop_y = 0, crop_width = 0, crop_height = 0;
   FilterSettings filter;
@@ -38,7 +39,8 @@ struct LoadedScene {
   std::vector<std::string> warnings;
   std::vector<std::string> files;  ///< paths of all files that the scene's file names and that were read
   double read_seconds = 0;         ///< parsing and reading files; Scene::build_seconds() comes on top
-  std::string content_hash;        ///< hex; over the scene's XML, defines and all files it reads
+  std::string content_hash;        ///< hex; over the scene's XML, defines, all files it reads, and the moved camera
+  std::string files_hash;          ///< the same without the last
 };
 
 /// Reads a scene: Mitsuba's XML, "*.pbrt", "*.gltf" or "*.glb". Throws Error(kInput) with every problem of the file, or

@@ -50,6 +50,8 @@ struct RenderRequest {
   bool resume = false;     ///< continue films that are there
   bool overwrite = false;  ///< films that are in `passes` may be replaced; without it and `resume` they are an error
   double checkpoint_seconds = 0;  ///< > 0: seconds between writing unfinished films
+  /// Images of the window that only the caller knows, written as layers of the output: 1 or 3 channels.
+  std::map<std::string, Image> beside;
   /// Attributes of films and image that only the caller knows, such as film_key::kVersion and kCommand.
   std::map<std::string, std::string> attributes;
 };

@@ -11,6 +11,7 @@
 #include "film/image_writer.h"
 #include "integrators/aov.h"
 #include "plans/light_plan.h"
+#include "plans/pass_files.h"
 
 namespace covary {
 
@@ -23,6 +24,7 @@ void write_result_files(const Plan& plan, const RenderRequest& request, RenderRe
   std::map<std::string, Image> aovs = result.aovs;
   if (!request.aovs)  // only the estimator asked for these
     for (const char* name : kAuxiliaryImages) aovs.erase(name);
+  aovs.insert(request.beside.begin(), request.beside.end());
   Film& last = result.passes[camera_passes(result.passes).size() - 1].film;
   if (plan.film_is_image) {
     const Pass* light = light_pass(result.passes);
@@ -38,7 +40,8 @@ void write_result_files(const Plan& plan, const RenderRequest& request, RenderRe
     const Film& film = last;
     std::map<std::string, std::string> attributes;
     for (const char* key :
-         {film_key::kSeed, film_key::kSceneHash, film_key::kSettings, film_key::kVersion, film_key::kCommand})
+         {film_key::kSeed, film_key::kSceneHash, film_key::kSettings, film_key::kVersion, film_key::kCommand,
+          film_key::kFrame})
       if (film.attributes.count(key)) attributes[std::string("covary:") + key] = film.attributes.at(key);
     const bool estimated = !result.image.estimate.data.empty();
     attributes["covary:estimator"] = estimated ? plan.estimator : "none";
