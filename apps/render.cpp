@@ -26,6 +26,8 @@
 #include "progress.h"
 #include "render_options.h"
 #include "render_report.h"
+#include "render_sequence.h"
+#include "render_steps.h"
 #include "settings/option_names.h"
 #include "stages.h"
 #include "technique_files.h"
@@ -72,9 +74,10 @@ const char* name_of(RenderStage stage, const RenderOptions& options) {
   throw Error(ErrorCode::kInternal, "unknown stage of a render");
 }
 
-/// Renders with a line of progress and, where there is one, a viewer.
-RenderResult render_watched(const RenderOptions& options, const LoadedScene& scene, Display* display,
-                            ProgressLine& progress, const StopFlag& stop) {
+}  // namespace
+
+RenderResult render_watched(const RenderOptions& options, const LoadedScene& scene, const RenderRequest& request,
+                            Display* display, ProgressLine& progress, const StopFlag& stop) {
   Stopwatch since_preview;
   RenderCallbacks callbacks;
   callbacks.stop = stop.token();
@@ -94,11 +97,13 @@ RenderResult render_watched(const RenderOptions& options, const LoadedScene& sce
     fmt::print(stderr, "warning: {}\n", as_flags(text));
   };
   progress.limit(options.request().seconds);
-  RenderResult result = covary::render(scene, make_plan(options), make_request(options, scene), callbacks);
+  RenderResult result = covary::render(scene, make_plan(options), request, callbacks);
   progress.finish();
   if (display && !result.passes.empty()) display->update(result.picture());
   return result;
 }
+
+namespace {
 
 /// --save-stages, of films of two passes or of one.
 void write_stages(const RenderOptions& options, const RenderResult& result) {
@@ -123,6 +128,8 @@ std::string interruption(const RenderOptions& options, const RenderResult& resul
       options.request().output,
       result.kept == options.request().output ? "" : ", '" + result.kept + "' holds its films");
 }
+
+}  // namespace
 
 void report(const RenderReport& report, const StopFlag& stop) {
   const auto& [options, scene, result, load_seconds, threads] = report;
@@ -150,7 +157,6 @@ void report(const RenderReport& report, const StopFlag& stop) {
                                  options.request().output, result.samples_per_pixel()));
 }
 
-/// What the command reads and writes, as far as it is known before the scene is loaded.
 Outputs files_of(const RenderOptions& options) {
   Outputs outputs;
   outputs.reads(options.scene);
@@ -175,37 +181,48 @@ Outputs files_of(const RenderOptions& options) {
   return outputs;
 }
 
-void render(RenderOptions options) {
-  check_options(options);
-  Outputs outputs = files_of(options);
-  const int threads = options.threads > 0 ? options.threads : static_cast<int>(std::thread::hardware_concurrency());
-  const tbb::global_control control(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(threads));
+std::unique_ptr<Display> display_of(const RenderOptions& options) {
+  if (options.display_server.empty()) return nullptr;
+  return std::make_unique<Display>(options.display_server, options.request().output, [](const std::string& text) {
+    // On a terminal over the line of progress.
+    fmt::print(stderr, "{}warning: {}\n", isatty(2) == 1 ? "\r\033[K" : "", text);
+  });
+}
 
-  std::optional<Display> display;
-  if (!options.display_server.empty())
-    display.emplace(options.display_server, options.request().output, [](const std::string& text) {
-      // On a terminal over the line of progress.
-      fmt::print(stderr, "{}warning: {}\n", isatty(2) == 1 ? "\r\033[K" : "", text);
-    });
-
-  ProgressLine progress(std::filesystem::path(options.scene).stem().string(), options.quiet);
-  progress.begin("loading");
-  const Stopwatch load_watch;
-  const LoadedScene scene = load(options);
-  const double load_seconds = load_watch.seconds() - scene.scene->build_seconds();
-  outputs.reads(scene.files);
-  progress.clear();
+void warn_of_scene(const RenderOptions& options, const LoadedScene& scene) {
   for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", as_flags(warning));
   const auto given = [&](const char* option) { return options.values.contains(option); };
   if (given("sampling") && !given("estimator") && !given("denoise") && !options.is_replay() && !options.quiet)
     fmt::print(stderr, "note: --sampling takes one film, as --estimator none does, and leaves out --denoise\n");
+}
+
+namespace {
+
+void render(RenderOptions options) {
+  check_options(options);
+  const int threads = options.threads > 0 ? options.threads : static_cast<int>(std::thread::hardware_concurrency());
+  const tbb::global_control control(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(threads));
+  if (options.sequence.is_sequence() && !options.is_replay()) return render_sequence(options, threads);
+
+  Outputs outputs = files_of(options);
+  const std::unique_ptr<Display> display = display_of(options);
+  ProgressLine progress(std::filesystem::path(options.scene).stem().string(), options.quiet);
+  progress.begin("loading");
+  const Stopwatch load_watch;
+  LoadedScene scene = load(options);
+  const double load_seconds = load_watch.seconds() - scene.scene->build_seconds();
+  outputs.reads(scene.files);
+  progress.clear();
+  warn_of_scene(options, scene);
   if (options.is_replay()) {
     progress.finish();
+    if (options.sequence.is_sequence()) place_frame(options, scene);
     return print_replay(options, scene);
   }
   if (!options.debug_strategies.empty()) check_technique_folder(options.debug_strategies, scene);
   std::optional<StopFlag> stop(std::in_place);
-  const RenderResult result = render_watched(options, scene, display ? &*display : nullptr, progress, *stop);
+  const RenderResult result =
+      render_watched(options, scene, make_request(options, scene), display.get(), progress, *stop);
   report({options, scene, result, load_seconds, threads}, *stop);
   if (stop->is_set())
     throw Unfinished(stop->exit_code(), fmt::format("interrupted when '{}' was written", options.request().output));

@@ -22,6 +22,7 @@ namespace covary {
 void check_options(RenderOptions& options) {
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
   options.settings = settings_from<RenderSettings>(options.values);
+  options.sequence = settings_from<SequenceSettings>(options.of_sequence);
   RenderSettings& settings = options.settings;
   if (!options.is_replay() && settings.request.output.empty())
     usage("no output given; use -o OUT.exr (or --replay X,Y,SAMPLE)");
@@ -159,6 +160,7 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
   command.add_option("--json", o.json, "Statistics; '-': to standard output")->type_name(kFileValue);
   command.add_flag("--quiet", o.quiet, "No progress and no summary");
   add_output_options(command, o);
+  add_options(command, options_of<SequenceSettings>(), o.of_sequence);
   add_options(command, options_of_integrators(), o.of_integrator);
   add_options(command, options_of_estimators(estimator_names()), o.of_estimator);
 }

@@ -9,13 +9,15 @@
 #include <vector>
 
 #include "plans/render_settings.h"
+#include "sequences/sequence_settings.h"
 
 namespace covary {
 
 struct RenderOptions {
   std::string scene, json, stages, replay, display_server, debug_strategies;
-  OptionValues values, of_integrator, of_estimator;  ///< as given
-  RenderSettings settings;                           ///< what `values` say, by check_options()
+  OptionValues values, of_integrator, of_estimator, of_sequence;  ///< as given
+  RenderSettings settings;                                        ///< what `values` say, by check_options()
+  SequenceSettings sequence;                                      ///< the same of `of_sequence`
   std::vector<std::string> defines;
   std::optional<uint64_t> replay_light;  ///< number of a light path
   int threads = 0;

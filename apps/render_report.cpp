@@ -31,6 +31,10 @@ std::string replay_command(const RenderOptions& o, const Pass& pass, const BadSa
   OptionValues given = o.values;
   given.insert(o.of_integrator.begin(), o.of_integrator.end());
   for (const std::string& word : replay_words(std::move(given), pass, bad)) words.push_back(word);
+  if (o.sequence.is_sequence()) {
+    words.insert(words.end(), {"--frames", std::to_string(o.sequence.frames->first), "--frame-seeds", "same"});
+    if (!o.sequence.camera_path.empty()) words.insert(words.end(), {"--camera-path", o.sequence.camera_path});
+  }
   return shell_text(words);
 }
 

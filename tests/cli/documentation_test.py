@@ -36,7 +36,7 @@ def commands_in(lines):
     """The words of each call of the program; lines that end in a backslash are joined."""
     for line in re.sub(r"\\\n\s*", " ", "\n".join(lines)).splitlines():
         if match := re.match(r"(?:build/release/)?covary ([a-z-]+\b.*)", line):
-            yield shlex.split(re.split(r"\s[|>&]|;", match[1])[0], comments=True)
+            yield shlex.split(re.split(r"\s[|>&#]|;", match[1])[0])
 
 
 class Documentation(CliTest):

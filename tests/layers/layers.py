@@ -23,6 +23,7 @@ ARROWS = {
     "dependent_tests": ["estimators"],
     "risk": ["estimators"],
     "denoising": ["risk"],
+    "sequences": ["denoising"],
     "combine": ["dependent_tests", "denoising"],
     "lab": ["report"],
     "report": ["metrics"],

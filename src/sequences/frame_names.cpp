@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sequences/frame_names.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <optional>
+#include <string_view>
+#include <system_error>
+
+#include "core/error.h"
+#include "core/number_text.h"
+
+namespace covary {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kLastFrame = 999'999;
+
+std::optional<int> frame_number(const std::string& text) {
+  if (text.empty() || text.size() > 6 || text.find_first_not_of("0123456789") != std::string::npos) return {};
+  return std::stoi(text);
+}
+
+/// A pattern around its run of '#'.
+struct Parts {
+  std::string before, after;
+  size_t digits = 0;
+};
+
+Parts parts_of(const std::string& pattern) {
+  if (!is_frame_pattern(pattern))
+    throw Error(ErrorCode::kUsage, fmt::format("'{}': expected is a name with '#' in place of the frame's number, e.g. "
+                                               "out_####.exr",
+                                               pattern));
+  const size_t last = pattern.rfind('#');
+  size_t first = last;
+  while (first > 0 && pattern[first - 1] == '#') --first;
+  return {pattern.substr(0, first), pattern.substr(last + 1), last + 1 - first};
+}
+
+}  // namespace
+
+std::vector<int> FrameRange::numbers() const {
+  std::vector<int> all;
+  for (int frame = first; frame <= last; frame += step) all.push_back(frame);
+  return all;
+}
+
+bool read_frame_range(const std::string& text, FrameRange& range) {
+  const size_t colon = text.find(':'), dash = text.find('-');
+  const std::string frames = text.substr(0, colon);
+  const std::optional<int> step = colon == std::string::npos ? 1 : frame_number(text.substr(colon + 1));
+  const std::optional<int> first = frame_number(frames.substr(0, dash));
+  const std::optional<int> last = dash == std::string::npos ? first : frame_number(frames.substr(dash + 1));
+  if (!first || !last || !step || *step < 1 || *last < *first) return false;
+  range = {*first, *last, *step};
+  return true;
+}
+
+bool is_frame_pattern(const std::string& pattern) {
+  return fs::path(pattern).filename().string().find('#') != std::string::npos;
+}
+
+std::string frame_name(const std::string& pattern, int frame) {
+  const Parts parts = parts_of(pattern);
+  return fmt::format("{}{:0{}}{}", parts.before, frame, parts.digits, parts.after);
+}
+
+std::vector<int> frames_on_disk(const std::string& pattern) {
+  const Parts parts = parts_of(fs::path(pattern).filename().string());
+  const fs::path folder = fs::path(pattern).parent_path();
+  std::error_code error;
+  std::vector<int> frames;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder.empty() ? "." : folder, error)) {
+    const std::string name = entry.path().filename().string();
+    if (name.size() <= parts.before.size() + parts.after.size() || !name.starts_with(parts.before) ||
+        !name.ends_with(parts.after))
+      continue;
+    const std::string digits = name.substr(parts.before.size(), name.size() - parts.before.size() - parts.after.size());
+    const std::optional<int> frame = frame_number(digits);
+    // Only the name that frame_name() gives: "out_7.exr" is no frame of "out_####.exr".
+    if (frame && *frame <= kLastFrame && digits == fmt::format("{:0{}}", *frame, parts.digits))
+      frames.push_back(*frame);
+  }
+  if (error) throw Error(ErrorCode::kIo, fmt::format("cannot read the folder of '{}': {}", pattern, error.message()));
+  std::sort(frames.begin(), frames.end());
+  return frames;
+}
+
+}  // namespace covary

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sequences/sequence_settings.h"
+
+#include "core/error.h"
+
+namespace covary {
+namespace {
+
+std::string read_frames(const std::string& text, std::optional<FrameRange>& frames) {
+  FrameRange range;
+  if (!read_frame_range(text, range)) return "FIRST-LAST[:STEP] or one number, e.g. 1-48";
+  frames = range;
+  return "";
+}
+
+}  // namespace
+
+void declare(Settings& s, SequenceSettings& v) {
+  static constexpr std::pair<const char*, FrameSeeds> kSeeds[] = {{"own", FrameSeeds::kOwn},
+                                                                  {"same", FrameSeeds::kSame}};
+  s.group("Sequences");
+  s.text_as("frames", v.frames, "FIRST-LAST", read_frames,
+            "Render these frames, each into a file of its own: -o OUT_####.exr", {.effect = OptionEffect::kSamples});
+  s.text("camera-path", v.camera_path, "FILE", "Where the camera is in each frame (JSON)",
+         {.names = OptionNames::kFile, .effect = OptionEffect::kSamples});
+  s.choice("frame-seeds", v.seeds, kSeeds,
+           "own: the seed of frame n is `seed` + 1,000,000 n, so that errors of frames are independent; same: `seed` "
+           "for all",
+           {.effect = OptionEffect::kSamples});
+  s.only_if(v.is_sequence(), {"camera-path", "frame-seeds"}, "without `frames`");
+}
+
+}  // namespace covary

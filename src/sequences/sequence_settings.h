@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is asked for of a rendered sequence, declared once (settings/settings.h).
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "sequences/frame_names.h"
+#include "settings/settings.h"
+
+namespace covary {
+
+enum class FrameSeeds { kOwn, kSame };
+
+struct SequenceSettings {
+  std::string camera_path;  ///< JSON file (plans/camera_path.h); empty: the camera rests
+  std::optional<FrameRange> frames;
+  FrameSeeds seeds = FrameSeeds::kOwn;
+
+  bool is_sequence() const { return frames.has_value(); }
+  /// Of a frame, where that of the command is `seed`: no two frames have one in common, nor have those of commands
+  /// whose seeds are below 1,000,000.
+  uint64_t seed_of(uint64_t seed, int frame) const {
+    return seeds == FrameSeeds::kSame ? seed : seed + static_cast<uint64_t>(frame) * 1'000'000;
+  }
+};
+
+/// Throws Error(kUsage) for a camera path without frames.
+void declare(Settings& settings, SequenceSettings& sequence);
+
+}  // namespace covary

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`covary render --frames`: numbered images along a camera path, each as it would be alone."""
+import json
+import os
+import re
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+from cli_test import COVARY, SLOWDOWN, CliTest
+from exr_reader import read_exr
+
+ROOM = (Path(os.environ["SCENES"]) / "room.xml").read_text()
+QUIET = ("--quiet", "--no-preview")
+SMALL = {"--resolution": "32x24", "--spp": "8", "--denoise": "none"}
+TO_WORLD = re.compile(r'(<sensor type="perspective">.*?)<lookat[^>]*/>', re.DOTALL)
+# The camera walks to the left and turns; rows of matrices.
+START = [[-1, 0, 0, 0.5], [0, 1, 0, 1.3], [0, 0, -1, 3.5], [0, 0, 0, 1]]
+END = [[-0.8, 0, -0.6, 0.1], [0, 1, 0, 1.3], [0.6, 0, -0.8, 3.5], [0, 0, 0, 1]]
+
+
+class Frames(CliTest):
+    def setUp(self):
+        super().setUp()
+        self.write_text("room.xml", ROOM)
+        self.write_path((1, START), (4, END))
+
+    def write_text(self, name, text):
+        self.write(name, text.encode())
+
+    def render(self, *arguments, frames="1-4"):
+        along = ("--camera-path", "path.json", "--frames", frames)
+        small = [word for option in SMALL.items() if option[0] not in arguments for word in option]
+        return self.run_covary("render", "room.xml", *QUIET, *small, *along, *arguments)
+
+    def write_path(self, *keys):
+        frames = [{"time": time, "to_world": matrix} for time, matrix in keys]
+        self.write_text("path.json", json.dumps({"keyframes": frames}))
+
+    def good_render(self, *arguments, **frames):
+        result = self.render(*arguments, **frames)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return result
+
+    def channels(self, name):
+        return read_exr((self.path / name).read_bytes())
+
+    def picture(self, name):
+        channels = self.channels(name)
+        return [channels[c] for c in "RGB"]
+
+    def test_each_is_the_image_of_that_camera_and_seed(self):
+        small = ("--resolution", "32x24", "--spp", "8", "--denoise", "auto")
+        self.good_render("-o", "f_##.exr", "--seed", "3", *small)
+        self.assertEqual(sorted(p.name for p in self.path.glob("f_*")), [f"f_0{n}.exr" for n in range(1, 5)])
+        for frame, matrix in ((1, START), (4, END)):
+            numbers = " ".join(str(value) for row in matrix for value in row)
+            self.write_text("alone.xml", TO_WORLD.sub(rf'\1<matrix value="{numbers}"/>', ROOM))
+            self.good("render", "alone.xml", *QUIET, *small, "-o", "alone.exr", "--seed", str(3 + 1000000 * frame))
+            self.assertEqual(self.picture(f"f_0{frame}.exr"), self.picture("alone.exr"))
+
+    def test_a_part_of_a_sequence_has_the_same_frames(self):
+        self.good_render("-o", "a_#.exr")
+        self.good_render("-o", "b_#.exr", frames="3-4")
+        for frame in (3, 4):
+            self.assertEqual(self.channels(f"a_{frame}.exr"), self.channels(f"b_{frame}.exr"))
+
+    def test_motion_leads_to_the_same_point_of_the_frame_before(self):
+        self.good_render("-o", "f_#.exr", "--aovs", "--resolution", "64x48", frames="2-3")
+        before, after = self.channels("f_2.exr"), self.channels("f_3.exr")
+        right = tested = 0
+        for y in range(48):
+            for x in range(64):
+                at = y * 64 + x
+                old_x, old_y = x + 0.5 + after["Motion.X"][at], y + 0.5 + after["Motion.Y"][at]
+                if not (1 < old_x < 63 and 1 < old_y < 47):
+                    continue
+                old_depth = after["Depth"][at] + after["Motion.Z"][at]
+                depth = before["Depth"][int(old_y) * 64 + int(old_x)]
+                tested += 1
+                right += abs(depth / old_depth - 1) < 0.03
+        self.assertGreater(tested, 2000)
+        self.assertGreater(right, 0.9 * tested, "but for edges, the surface there is as far away as the motion says")
+        self.assertGreater(max(abs(m) for m in after["Motion.X"]), 2)
+
+    def test_seeds_of_frames(self):
+        self.write_path((0, START))
+        self.good_render("-o", "own_#.exr", frames="1-2")
+        self.assertNotEqual(self.picture("own_1.exr"), self.picture("own_2.exr"))
+        self.good_render("-o", "same_#.exr", "--frame-seeds", "same", frames="1-2")
+        self.assertEqual(self.picture("same_1.exr"), self.picture("same_2.exr"))
+        self.assertLess(max(abs(m) for m in self.channels("own_2.exr")["Motion.X"]), 1e-3)
+
+    def test_resume_renders_what_is_missing(self):
+        self.good_render("-o", "f_#.exr")
+        whole = {n: (self.path / f"f_{n}.exr").read_bytes() for n in range(1, 5)}
+        (self.path / "f_2.exr").unlink()
+        times = {n: (self.path / f"f_{n}.exr").stat().st_mtime_ns for n in (1, 3, 4)}
+        self.good_render("-o", "f_#.exr", "--resume")
+        for n in (1, 3, 4):
+            self.assertEqual((self.path / f"f_{n}.exr").stat().st_mtime_ns, times[n])
+        self.assertEqual(self.picture("f_2.exr"), [read_exr(whole[2])[c] for c in "RGB"])
+        errors = self.render("-o", "f_#.exr", "--resume", "--seed", "9").stderr
+        self.assertIn("'f_1.exr' is no frame of this command: its scene, camera, seed or options are others", errors)
+
+    def test_interrupted(self):
+        command = [COVARY, "render", "room.xml", *QUIET, "--resolution", "160x120", "--spp", "256", "--camera-path",
+                   "path.json", "--frames", "1-400", "-o", "f_###.exr", "--denoise", "none"]
+        process = subprocess.Popen(command, cwd=self.path, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(process.kill)
+        end = time.monotonic() + 60 * SLOWDOWN
+        while not (self.path / "f_002.exr").exists() and time.monotonic() < end:
+            time.sleep(0.02)
+        process.send_signal(signal.SIGINT)
+        errors = process.communicate(timeout=60 * SLOWDOWN)[1]
+        self.assertEqual(process.returncode, 130, errors)
+        self.assertRegex(errors, r"interrupted in frame \d+: \d+ of 400 frames are complete; the same command")
+        for n in (1, 2):
+            attributes = json.loads(self.good("info", f"f_00{n}.exr", "--json").stdout)["attributes"]
+            self.assertEqual(attributes["covary:complete"], "true")
+
+    def test_a_sample_of_a_frame_is_repeated(self):
+        self.good_render("-o", "f_#.exr", "--spp", "1", frames="3")
+        channels = self.channels("f_3.exr")
+        printed = self.good_render("--spp", "1", "--replay", "5,7,0", frames="3").stdout
+        values = [float(v) for v in re.search(r"radiance \((.*)\)", printed)[1].split(", ")]
+        for value, channel in zip(values, "RGB"):
+            self.assertAlmostEqual(value, channels[channel][7 * 32 + 5], 6)
+        self.assertIn("--replay is about one frame", self.render("--replay", "5,7,0").stderr)
+
+    def test_wrong_input(self):
+        for arguments, message in (
+                (("-o", "f.exr"), "-o 'f.exr': with --frames, expected is a name with '#'"),
+                (("-o", "f_#.exr", "--json", "f.json"), "--json 'f.json': with --frames, expected is a name with '#'"),
+                (("-o", "f_#.exr", "--debug-strategies", "parts"), "--debug-strategies is an option of single images"),
+                (("-o", "f_#.exr", "--save-training", "t"), "--save-training is an option of single images")):
+            result = self.render(*arguments)
+            self.assertEqual(result.returncode, 2)
+            self.assertIn(message, result.stderr)
+        self.assertIn("--frames '4-1': expected FIRST-LAST", self.render("-o", "f_#.exr", frames="4-1").stderr)
+        alone = self.run_covary("render", "room.xml", "-o", "f.exr", "--camera-path", "path.json")
+        self.assertIn("--camera-path has no effect without --frames", alone.stderr)
+        self.write_text("path.json", '{"keyframes": [{"time": 0, "to_world": [2]}]}')
+        self.assertIn("camera path 'path.json': keyframe 0: 'to_world' is no", self.render("-o", "f_#.exr").stderr)
+        scaled = [[2 * v for v in row[:3]] + row[3:] for row in START]
+        scaled[3] = [0, 0, 0, 1]
+        self.write_path((0, scaled))
+        self.assertIn("the to_world transformation of a sensor must not scale", self.render("-o", "f_#.exr").stderr)
+        self.assertEqual(list(self.path.glob("f_*")), [])
+
+
+if __name__ == "__main__":
+    import unittest
+    unittest.main()
