@@ -9,8 +9,8 @@
 
 namespace covary {
 
-/// What lies behind the centres of the pixels: no sample is drawn, so that edges are sharp and no value is a mean of two
-/// surfaces.
+/// What lies behind the centres of the pixels: no sample is drawn, so that edges are sharp and no value is a mean of
+/// two surfaces.
 struct MotionImages {
   /// 1 channel: distance of the first surface from the camera (orthographic: from its plane along the ray), in units of
   /// the scene; 0 where there is none. A thin lens counts as the pinhole in its middle.

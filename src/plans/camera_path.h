@@ -33,9 +33,9 @@ CameraPath parse_camera_path(const std::string& text, const std::string& name);
 /// The same of a file; also throws Error(kIo).
 CameraPath read_camera_path(const std::string& path);
 
-/// Puts the scene's camera elsewhere, between renders; all else stays as it was built. Films and images of the scene are
-/// then told from those of other places by its content_hash. Throws Error(kInput) for a transformation that the camera
-/// cannot have.
+/// Puts the scene's camera elsewhere, between renders; all else stays as it was built. Films and images of the scene
+/// are then told from those of other places by its content_hash. Throws Error(kInput) for a transformation that the
+/// camera cannot have.
 void place_camera(LoadedScene& scene, const Transform& to_world);
 
 }  // namespace covary

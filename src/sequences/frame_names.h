@@ -23,8 +23,8 @@ bool is_frame_pattern(const std::string& pattern);
 /// The file of a frame: the last run of '#' is replaced. Throws Error(kUsage) where there is none.
 std::string frame_name(const std::string& pattern, int frame);
 
-/// The numbers of the frames whose files are there, ascending. Throws like frame_name(), and Error(kIo) where the folder
-/// cannot be read.
+/// The numbers of the frames whose files are there, ascending. Throws like frame_name(), and Error(kIo) where the
+/// folder cannot be read.
 std::vector<int> frames_on_disk(const std::string& pattern);
 
 }  // namespace covary
