@@ -29,10 +29,6 @@ void check_options(RenderOptions& options) {
   if (!options.replay.empty() && options.replay_light) usage("--replay and --replay-light exclude each other");
   const std::string name = settings.estimator;
   const auto given = [&](const char* option) { return options.values.contains(option); };
-  if (options.of_estimator.contains("adaptive") && !given("estimator"))
-    usage(
-        "--adaptive: name the estimator, e.g. --estimator iicv or none; the default does not choose numbers of "
-        "samples");
   const Estimator estimator = estimator_of(options);
   const EstimatorPasses passes = estimator.passes;
   const bool is_denoised_mean = passes == EstimatorPasses::kIndependent;

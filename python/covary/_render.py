@@ -195,8 +195,6 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
                                 "output": output, "passes": passes, "until": until, "until_p95": until_p95,
                                 "sampling": sampling, "split": split})
     texts = text_options(options, estimator or "none")
-    if "adaptive" in texts and estimator is None:
-        raise UsageError("adaptive: name the estimator, such as estimator='iicv' or 'none'")
     chosen = scene if isinstance(scene, Scene) else Scene.load(scene, integrator=integrator)
     chosen = chosen.with_integrator(integrator)
     if checkpoint is None:

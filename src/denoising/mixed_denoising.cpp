@@ -275,7 +275,7 @@ Run run_of_mean(const MixedDenoisingOptions& options, bool with_oidn) {
 }  // namespace
 
 bool can_be_denoised(const Estimator& estimator) {
-  return (estimator.apply || is_mean(estimator)) && estimator.predicts_error && !estimator.adaptive;
+  return ((estimator.apply && !estimator.adaptive) || is_mean(estimator)) && estimator.predicts_error;
 }
 
 Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& options) {
@@ -293,7 +293,11 @@ Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& opt
   estimator.memory.always += with_oidn ? kBytesWithOidn : kBytesPerPixel + (is_mean(base) ? kBytesOfMean : 0);
   estimator.memory.of_halves = estimator.memory.of_halves_per_group = 0;  // part of that
   if (is_mean(base)) estimator.passes = EstimatorPasses::kIndependent, estimator.fewest_groups = 1;
-  estimator.splits_layers = is_mean(base);
+  estimator.splits_layers = is_mean(base) && !base.adaptive;
+  if (AdaptiveSampling* adaptive = estimator.adaptive ? &*estimator.adaptive : nullptr) {
+    adaptive->counts.tops_up = true;
+    if (!adaptive->names_allocation) adaptive->counts.allocation = Allocation::kDenoised;
+  }
   const Run run = is_mean(base) ? run_of_mean(options, with_oidn) : run_of_pair(base, options, with_oidn);
   estimator.apply = [run](const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings) {
     return run(crn, independent, settings).result;

@@ -73,7 +73,7 @@ Estimator make_none(Settings& parameters) {
   standard.counts.first_pass_counts = false;
   std::vector<std::string> problems;
   estimator.adaptive = ask_for_adaptive(
-      p, standard, "Distribute the samples over the pixels by a first pass, which is not averaged in", problems);
+      p, standard, "A first pass distributes the samples over the pixels; denoised, it is averaged in", problems);
   Norm norm = standard.counts.norm;
   p.choice<Norm>("norm", norm, kNorms, kNormHelp, {.effect = OptionEffect::kPasses});
   if (estimator.adaptive) estimator.adaptive->counts.norm = norm;

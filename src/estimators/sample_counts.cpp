@@ -18,6 +18,9 @@ constexpr uint32_t kMost = 1u << 30;  // samples of any pixel
 constexpr double kOffset = 0.01;      // of squared brightness
 constexpr double kLeastShare = 0.7, kLargestShare = 2;
 constexpr double kDamping = 0.5;  // power of the relative deviation that least-error is proportional to
+// Limits and window of kDenoised.
+constexpr double kLeastOfFiltered = 0.5, kLargestOfFiltered = 4;
+constexpr int kFilteredWindow = 15;
 constexpr int kBisections = 60;
 
 /// Rounding up must not follow from the last bits of a power or a logarithm.
@@ -71,7 +74,21 @@ double mean_count(const GroupedImage& image) {
   return std::accumulate(image.counts, image.counts + n_pixels, 0.0) / static_cast<double>(n_pixels);
 }
 
-Demand demand_of(const GroupedImage& image, const CountOptions& options) {
+/// Means over neighbours.
+std::vector<double> smoothed(std::span<const double> errors, const GroupedImage& image) {
+  Planes plane(image.width, image.height, 1, 0, 0);
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x)
+      plane.row(0, y)[x] = static_cast<float>(errors[static_cast<size_t>(y) * image.width + x]);
+  const std::vector<unsigned char> all(errors.size(), 1);
+  plane = box_mean(plane, all, kFilteredWindow, 0, 0);
+  std::vector<double> means(errors.size());
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x) means[static_cast<size_t>(y) * image.width + x] = plane.row(0, y)[x];
+  return means;
+}
+
+Demand demand_of(const GroupedImage& image, const CountOptions& options, std::span<const double> filtered) {
   const double error = options.relative_error.value_or(1), per_error = 1 / (error * error);
   Demand demand;
   if (options.allocation == Allocation::kEqualError) {
@@ -80,14 +97,18 @@ Demand demand_of(const GroupedImage& image, const CountOptions& options) {
     demand.for_error = per_error;                                       // 1 / eps^2
     return demand;
   }
-  std::vector<double> errors = squared_errors(image, options);
+  const bool is_filtered = options.allocation == Allocation::kDenoised;
+  std::vector<double> errors = is_filtered ? smoothed(filtered, image) : squared_errors(image, options);
   const double mean_square = mean_of(errors);
-  for (double& e : errors) e = options.allocation == Allocation::kUniform ? 1 : std::pow(e, kDamping / 2);
+  const double damping = is_filtered ? 1 : kDamping, least = is_filtered ? kLeastOfFiltered : kLeastShare;
+  const double largest = is_filtered ? kLargestOfFiltered : kLargestShare;
+  for (double& e : errors) e = options.allocation == Allocation::kUniform ? 1 : std::pow(e, damping / 2);
   if (const double mean = mean_of(errors); mean > 0)
-    for (double& e : errors) e = std::clamp(e / mean, kLeastShare, kLargestShare);
+    for (double& e : errors) e = std::clamp(e / mean, least, largest);
   else
     std::fill(errors.begin(), errors.end(), 1.0);
   demand.of_pixel = std::move(errors);
+  if (options.tops_up) demand.already = mean_count(image);
   // Mean of squared error / (s share), the share being one on average; exact for uniform counts.
   demand.for_error = mean_square * per_error;
   return demand;
@@ -191,11 +212,11 @@ std::vector<std::string> CountOptions::validate(uint32_t multiple) const {
 }
 
 std::vector<uint32_t> sample_counts(const GroupedImage& first_pass, double budget, const CountOptions& options,
-                                    uint32_t multiple) {
+                                    uint32_t multiple, std::span<const double> filtered) {
   throw_if_any("numbers of samples", options.validate(multiple));
   COVARY_CHECK(multiple >= 1 && budget >= 0 && (std::isfinite(budget) || options.relative_error),
                "counts follow from a budget or a relative error");
-  const Demand demand = demand_of(first_pass, options);
+  const Demand demand = demand_of(first_pass, options, filtered);
   const Rounding rounding(options, multiple);
   const double total = budget * static_cast<double>(demand.of_pixel.size());
   if (options.relative_error) {
@@ -210,7 +231,7 @@ bool have_relative_error(const GroupedImage& first_pass, const std::vector<uint3
   if (!options.relative_error) return true;
   CountOptions without_limit = options;
   without_limit.max_spp.reset();
-  const Demand demand = demand_of(first_pass, without_limit);
+  const Demand demand = demand_of(first_pass, without_limit, {});
   const std::vector<uint32_t> wanted = counts_for(demand, demand.for_error, Rounding(without_limit, multiple));
   return std::equal(counts.begin(), counts.end(), wanted.begin(), wanted.end(), std::greater_equal<>());
 }
@@ -227,15 +248,17 @@ std::vector<std::string> AdaptiveSampling::validate() const {
 void ask_for(Settings& parameters, AdaptiveSampling& sampling) {
   static constexpr std::pair<const char*, Allocation> kAllocations[] = {{"equal-error", Allocation::kEqualError},
                                                                         {"least-error", Allocation::kLeastError},
-                                                                        {"uniform", Allocation::kUniform}};
+                                                                        {"uniform", Allocation::kUniform},
+                                                                        {"denoised", Allocation::kDenoised}};
   static constexpr OptionTraits kPasses{.effect = OptionEffect::kPasses};
   Settings& p = parameters;
   CountOptions& o = sampling.counts;
   p.whole("dependent-spp", sampling.first_spp, {.low = 1},
           "Samples of the first pass; else half, at most 50 (not iicv)",
           {.aliases = {"pilot-spp"}, .effect = OptionEffect::kPasses});
-  p.choice<Allocation>("allocation", o.allocation, kAllocations, "How pixels share the samples of the last pass",
+  p.choice<Allocation>("allocation", o.allocation, kAllocations, "How the last pass's samples are shared",
                        kPasses);
+  sampling.names_allocation = p.is_given("allocation");
   p.real("relative-error", o.relative_error, {.low = 0, .above_low = true},
          "Target relative error per pixel (3 sigma); `spp` becomes the cap", kPasses);
   p.whole("min-spp", o.min_spp, {.low = static_cast<double>(sampling.least_min_spp)},

@@ -7,6 +7,11 @@
 //                 proportion to e = sigma / sqrt(|C|^2 + 0.01). As e is known from few samples, whose errors are
 //                 common to neighbours, and C is dark where sigma is missed: N in proportion to sqrt(e), with |C| and
 //                 sigma^2 averaged over neighbours, at least 0.7 and at most twice its mean.
+//   denoised      where the first pass becomes a denoised image: towards its least relMSE per ray (ours). A filter that
+//                 averages alike around p and q has var M_p = d var h_p, and d is q's part in all errors, too, so that
+//                 N in proportion to sqrt(N_1 var M / ((M^2 + 0.01) c)) is best, with N_1 of the first pass and the
+//                 cost c of a sample. The image's squared error, its bias included, takes the variance's place,
+//                 averaged over 15 x 15 pixels; at least a half and at most four times the mean of N.
 //   uniform       all pixels the same; what is left of the budget is spread, but not where numbers are rounded to
 //                 classes: there all are equal, and no class is needed.
 //
@@ -20,6 +25,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -29,7 +35,7 @@
 
 namespace covary {
 
-enum class Allocation { kEqualError, kLeastError, kUniform };
+enum class Allocation { kEqualError, kLeastError, kUniform, kDenoised };
 
 struct CountOptions {
   Allocation allocation = Allocation::kLeastError;
@@ -39,6 +45,8 @@ struct CountOptions {
   std::optional<int> max_spp;           ///< and at most, >= min_spp and 1; default: no limit
   bool classes = false;                 ///< round up to classes
   bool first_pass_counts = true;        ///< its samples are part of the image
+  /// Numbers are shared out together with the first pass's samples, so that pixels get what they lack.
+  bool tops_up = false;
   /// Side of the window over which sigma^2, and |C| of kLeastError, are averaged, odd, 1 … 63.
   int smoothing = 7;
 
@@ -50,8 +58,10 @@ struct CountOptions {
 /// needs a relative error. Numbers are multiples of `multiple` >= 1. They add up to the budget to 1 %, unless min_spp,
 /// max_spp or `multiple` do not allow it, for `uniform` with classes, and where no pixel has noise: `least-error` then
 /// gives all the same, and `equal-error` min_spp. Throws Error(kUsage) for options that are wrong.
+/// `filtered`: for kDenoised, the squared relative error of the denoised image at each pixel, over the cost of a
+/// sample there.
 std::vector<uint32_t> sample_counts(const GroupedImage& first_pass, double budget, const CountOptions& options,
-                                    uint32_t multiple = 1);
+                                    uint32_t multiple = 1, std::span<const double> filtered = {});
 
 /// Whether every pixel has as many samples as the relative error asks for, whatever budget and max_spp are. True
 /// without a relative error.
@@ -65,7 +75,8 @@ uint32_t class_of(double samples);
 /// otherwise a pilot, an independent pass that is not part of the image, so that the mean stays unbiased.
 struct AdaptiveSampling {
   CountOptions counts;
-  std::optional<int> first_spp;  ///< of the first pass, >= 1; default: half of the budget, at most most_first_spp
+  bool names_allocation = false;  ///< counts.allocation was asked for
+  std::optional<int> first_spp;   ///< of the first pass, >= 1; default: half of the budget, at most most_first_spp
   int most_first_spp = 50;
   int least_min_spp = 0;      ///< smallest value of counts.min_spp that the estimator takes
   bool reads_groups = false;  ///< the estimator needs means of groups, not only the variance of samples

@@ -231,5 +231,30 @@ TEST(SampleCounts, SayWhatIsWrong) {
   EXPECT_TRUE(contains(message(options), "min-spp is -1"));
 }
 
+/// Four times the squared error, twice the samples, those of the first pass among them; limits on both sides.
+TEST(SampleCounts, OfAFilteredImageFollowTheRootOfItsErrorAndTopUp) {
+  constexpr int kSide = 96, kFirst = 8;
+  const test::Grouped first = test::constant_image(kSide, kSide, kFirst, 1);
+  CountOptions options = options_of(Allocation::kDenoised);
+  const auto counts_of = [&](double left, double right) {
+    std::vector<double> errors(kSide * kSide, left);
+    for (int i = 0; i < kSide * kSide; ++i)
+      if (i % kSide >= kSide / 2) errors[static_cast<size_t>(i)] = right;
+    return sample_counts(first.view(), 40, options, 1, errors);
+  };
+  const auto at = [](const std::vector<uint32_t>& counts, int x) { return counts[48 * kSide + x]; };
+  options.tops_up = true;
+  std::vector<uint32_t> counts = counts_of(0.01, 0.04);
+  EXPECT_NEAR(mean(counts), 40, 0.01);
+  EXPECT_NEAR(at(counts, 5), 24, 1) << "32 with those of the first pass";
+  EXPECT_NEAR(at(counts, 90), 56, 1) << "64 with those of the first pass";
+  counts = counts_of(0.01, 1);
+  EXPECT_NEAR((at(counts, 90) + 8.0) / (at(counts, 5) + 8.0), 1.82 / 0.5, 0.2) << "no pixel less than half of the mean";
+  options.tops_up = false;
+  counts = counts_of(0.01, 0.04);
+  EXPECT_NEAR(at(counts, 5), 26.7, 1);
+  EXPECT_NEAR(at(counts, 90), 53.3, 1);
+}
+
 }  // namespace
 }  // namespace covary

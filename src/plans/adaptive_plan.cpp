@@ -9,16 +9,19 @@
 #include <utility>
 
 #include "core/error.h"
+#include "denoising/mixed_denoising.h"
 #include "estimators/mean.h"
 #include "plans/budget.h"
+#include "plans/denoised_passes.h"
 #include "plans/render.h"
 #include "risk/image_risk.h"
 
 namespace covary {
 namespace {
 
-constexpr double kFirstShare = 0.5;    // of the budget or the time, at most
-constexpr double kOverestimate = 1.1;  // of the samples that a limit of time allows
+constexpr double kFirstShare = 0.5;        // of the budget or the time, at most
+constexpr double kShareOfFirst = 1.0 / 3;  // of the budget, where it is a part of the image
+constexpr double kOverestimate = 1.1;      // of the samples that a limit of time allows
 
 constexpr uint32_t kFirstOfError = 50;  // samples of the first pass where a relative error says how many there are
 
@@ -27,10 +30,12 @@ struct Method {
   std::string name;
   std::optional<int> groups;  ///< that were asked for
   int fewest_groups = 1;
+  DenoisedMean denoise;  ///< of a denoised mean, whose first pass is a part of it
 
   /// Of both films.
   uint32_t groups_of(const PlanState& state) const {
     if (groups) return static_cast<uint32_t>(*groups);
+    if (denoise) return static_cast<uint32_t>(number_of_groups({{1.0}, 1}, state));
     if (!sampling.reads_groups) return 1;
     constexpr uint32_t kEnough = 4;  // as of other estimators of two passes
     return static_cast<uint32_t>(number_of_groups({{kFirstShare, 1 - kFirstShare}, kEnough}, state));
@@ -40,10 +45,14 @@ struct Method {
 /// Samples per pixel of the first pass.
 uint32_t first_samples(const Method& method, const PlanState& state) {
   if (method.sampling.first_spp) return static_cast<uint32_t>(*method.sampling.first_spp);
+  const uint32_t groups = method.groups_of(state);
+  if (method.denoise) {
+    const double part = std::max<double>(kShareOfFirst * state.budget, kFewestMixedSamples);
+    return std::max(static_cast<uint32_t>(std::lround(part / groups)), 1u) * groups;
+  }
   const auto part = static_cast<uint32_t>(kFirstShare * state.group_budget);
   const bool is_open = method.sampling.counts.relative_error && !state.request.spp;
   const uint32_t samples = is_open ? kFirstOfError : std::min<uint32_t>(part, method.sampling.most_first_spp);
-  const uint32_t groups = method.groups_of(state);
   return std::max(samples / groups, 1u) * groups;
 }
 
@@ -95,9 +104,11 @@ void set_last_target(const Method& method, const PlanState& state, Pass& last) {
   if (state.seconds_left) budget = std::min(budget, samples_in_time(state));
   const GroupedImage image = rows_of(first, 0, first.height());
   const CountOptions& options = method.sampling.counts;
-  const uint32_t groups = method.groups_of(state);
-  std::vector<uint32_t> counts = sample_counts(image, std::max(0.0, budget), options, groups);
-  last.misses_error = !have_relative_error(image, counts, options, groups);
+  const uint32_t multiple = method.denoise ? 1 : method.groups_of(state);
+  std::vector<double> filtered;
+  if (options.allocation == Allocation::kDenoised) filtered = filtered_errors(method.denoise, first, state);
+  std::vector<uint32_t> counts = sample_counts(image, std::max(0.0, budget), options, multiple, filtered);
+  last.misses_error = !have_relative_error(image, counts, options, multiple);
   last.settings.spp = SampleTarget(std::move(counts));
 }
 
@@ -118,35 +129,69 @@ EstimatorResult mean_of_last(std::span<const Pass> passes, int first_row, int n_
   return mean;
 }
 
+void check_allocation(const CountOptions& options, bool is_denoised) {
+  if (options.allocation == Allocation::kDenoised && !is_denoised)
+    throw Error(ErrorCode::kUsage,
+                "`allocation` denoised is for the mean of independent samples that is denoised (`denoise`)");
+  if (options.relative_error && is_denoised)
+    throw Error(ErrorCode::kUsage,
+                "`relative-error` is that of an image that is not denoised; `until` adds samples until a denoised one "
+                "has a wanted error");
+}
+
+void set_estimate(const Estimator& estimator, Plan& plan) {
+  const auto apply = estimator.apply;
+  if (estimator.passes == EstimatorPasses::kAny) {
+    plan.estimate = mean_of_last;
+    return;
+  }
+  plan.estimate_memory = estimator.memory;
+  if (estimator.passes == EstimatorPasses::kPair) {
+    plan.estimate = [apply, std_error = estimator.predicts_error](std::span<const Pass> passes, int first_row,
+                                                                  int n_rows, const Beside&) {
+      const Film &crn = passes[0].film, &independent = passes[1].film;
+      return apply(rows_of(crn, first_row, n_rows), rows_of(independent, first_row, n_rows),
+                   {std::llround(crn.mean_count()), std_error, {}});
+    };
+    return;
+  }
+  plan.network = estimator.network;
+  plan.reads_guides = true;
+  plan.estimate_memory.of_halves_per_group = 3 * sizeof(float);  // the film of both
+  plan.estimate = [apply](std::span<const Pass> passes, int first_row, int n_rows, const Beside& beside) {
+    const Film film = joined(passes[0].film, passes[1].film);
+    PairSettings settings;
+    settings.std_error = true;
+    settings.guides = beside.guides;
+    return apply({}, rows_of(film, first_row, n_rows), settings);
+  };
+}
+
 }  // namespace
 
 Plan adaptive_plan(const Estimator& estimator, std::optional<int> groups) {
   const bool is_pair = estimator.passes == EstimatorPasses::kPair;
-  const Method method{*estimator.adaptive, estimator.name, groups, estimator.fewest_groups};
+  const bool is_denoised = estimator.passes == EstimatorPasses::kIndependent;
+  check_allocation(estimator.adaptive->counts, is_denoised);
+  const Method method{*estimator.adaptive, estimator.name, groups, estimator.fewest_groups,
+                      is_denoised ? DenoisedMean(estimator.apply) : DenoisedMean()};
   Plan plan;
   plan.name = estimator.name;
   plan.estimator = estimator.text;
   plan.predicts_error = estimator.predicts_error;
   plan.reliable_samples = estimator.reliable_samples;
-  plan.takes_unfinished = is_pair && !method.sampling.reads_groups;
+  plan.takes_unfinished = is_denoised || (is_pair && !method.sampling.reads_groups);
+  plan.groups_follow_speed = is_denoised && !groups;
   plan.has_crn_pass = is_pair;
-  plan.estimate = mean_of_last;
-  if (is_pair) {
-    plan.estimate_memory = estimator.memory;
-    const bool std_error = estimator.predicts_error;
-    plan.estimate = [apply = estimator.apply, std_error](std::span<const Pass> passes, int first_row, int n_rows,
-                                                         const Beside&) {
-      const Film &crn = passes[0].film, &independent = passes[1].film;
-      return apply(rows_of(crn, first_row, n_rows), rows_of(independent, first_row, n_rows),
-                   {std::llround(crn.mean_count()), std_error, {}});
-    };
-  }
+  set_estimate(estimator, plan);
   Phase first, last;
   first.share = last.share = kFirstShare;
   first.passes = [=](const PlanState& state) {
     const uint32_t n_groups = method.groups_of(state);
-    return std::vector{is_pair ? pass_of("crn", Sampling::kCrn, 0, n_groups)
-                               : pass_of("pilot", Sampling::kIndependent, 1, n_groups)};
+    std::vector passes = {is_pair ? pass_of("crn", Sampling::kCrn, 0, n_groups)
+                                  : pass_of(is_denoised ? "first" : "pilot", Sampling::kIndependent, 1, n_groups)};
+    passes[0].sample_variance = !is_denoised;
+    return passes;
   };
   first.set_targets = [=](const PlanState& state, std::span<Pass> passes) {
     const uint32_t samples = first_samples(method, state);
@@ -156,7 +201,9 @@ Plan adaptive_plan(const Estimator& estimator, std::optional<int> groups) {
     passes[0].settings.spp = samples;
   };
   last.passes = [=](const PlanState& state) {
-    return std::vector{pass_of("independent", Sampling::kIndependent, 0, method.groups_of(state))};
+    std::vector passes = {pass_of("independent", Sampling::kIndependent, 0, method.groups_of(state))};
+    passes[0].sample_variance = !is_denoised;
+    return passes;
   };
   last.set_targets = [=](const PlanState& state, std::span<Pass> passes) { set_last_target(method, state, passes[0]); };
   plan.phases = {first, last};

@@ -10,9 +10,12 @@
 
 namespace covary {
 
-/// For an estimator with `adaptive`. Of a pair, the first pass is the CRN pass, "crn"; otherwise a pilot, "pilot-1", of
-/// random numbers of its own that is not part of the image, so that numbers of samples do not depend on their values.
-/// The last pass is "independent". Films keep the variance of samples.
+/// For an estimator with `adaptive`. Of a pair, the first pass is the CRN pass, "crn"; of a mean, a pilot, "pilot-1",
+/// of random numbers of its own that is not part of the image, so that numbers of samples do not depend on their
+/// values. The last pass is "independent". Films keep the variance of samples.
+///
+/// Of a mean that is denoised, the first pass, "first-1", takes a third of the budget and is a part of the image. The
+/// last one brings pixels to the numbers that Allocation::kDenoised has from the denoised image of the first.
 ///
 /// The budget is that of both passes; a relative error takes its place where the request names no number of samples,
 /// and is otherwise limited by it. With a limit of time, the first pass gets at most half of it, and the last as many

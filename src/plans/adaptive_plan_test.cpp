@@ -10,8 +10,10 @@
 
 #include "combine/registry.h"
 #include "core/random.h"
+#include "denoising/mixed_denoising.h"
 #include "film/film_file.h"
 #include "film/merge.h"
+#include "plans/denoised_passes.h"
 #include "plans/memory.h"
 #include "statistics/p_values.h"
 #include "support/files.h"
@@ -32,6 +34,12 @@ Plan plan_of(const std::string& estimator, const OptionValues& options = {}) {
 Plan plain_adaptive(OptionValues options = {}) {
   options["adaptive"] = "";
   return plan_of("none", options);
+}
+
+/// A denoised mean, by filters alone.
+Estimator denoised(OptionValues options = {}) {
+  options["adaptive"] = "";
+  return with_denoising(make_estimator("none", options), {.mode = DenoiseMode::kAuto, .use_oidn = false, .oidn = {}});
 }
 
 TEST(AdaptivePlan, TheFirstPassAndTheBudget) {
@@ -147,7 +155,8 @@ TEST(AdaptivePlan, SameBitsForAnyNumberOfThreads) {
 
 TEST(AdaptivePlan, StoppedAtManyTilesAndResumedGivesTheSameBits) {
   const LoadedScene scene = load_sized(kRoom);
-  for (const Plan& plan : {plan_of("dependent-tests"), plain_adaptive(), plan_of("iicv", {{"adaptive", ""}})}) {
+  for (const Plan& plan :
+       {plan_of("dependent-tests"), plain_adaptive(), plan_of("iicv", {{"adaptive", ""}}), adaptive_plan(denoised())}) {
     const TemporaryFolder folder;
     RenderRequest request = request_of(48);
     const RenderResult whole = render(scene, plan, request);
@@ -230,7 +239,7 @@ TEST(AdaptivePlan, ALimitOfTimeEndsWithAnImage) {
   request.spp.reset();
   for (const double seconds : {0.001, 0.4}) {
     request.seconds = seconds;
-    for (const Plan& plan : {plan_of("dependent-tests"), plain_adaptive()}) {
+    for (const Plan& plan : {plan_of("dependent-tests"), plain_adaptive(), adaptive_plan(denoised())}) {
       const RenderResult result = render(scene, plan, request);
       EXPECT_FALSE(result.interrupted);
       ASSERT_EQ(result.passes.size(), 2u);
@@ -245,6 +254,51 @@ TEST(AdaptivePlan, PlansMemoryForBothPasses) {
   const LoadedScene scene = load_sized(kRoom);
   const RenderMemory memory = render_memory(scene, plan_of("dependent-tests"), request_of(10));
   EXPECT_EQ(memory.films, 40 * 30 * 2 * (2 * 12 + 4));
+}
+
+/// A third of the samples say where the others go, and the image is made of all.
+TEST(DenoisedPlan, TopsUpWhereTheFilteredImageIsWrong) {
+  const LoadedScene scene = load_sized(kRoom);
+  const RenderResult result = render(scene, adaptive_plan(denoised()), request_of(72));
+  ASSERT_EQ(result.passes.size(), 2u);
+  const Film &first = result.passes[0].film, &last = result.passes[1].film;
+  EXPECT_EQ(result.passes[0].plan.id(), "first-1");
+  EXPECT_NE(result.passes[0].settings.pass, result.passes[1].settings.pass) << "random numbers of its own";
+  EXPECT_EQ(first.groups(), 12);
+  for (const uint32_t n : first.counts()) EXPECT_EQ(n, 24u);
+  EXPECT_NEAR(last.mean_count(), 48, 0.48);
+  const auto [least, most] = std::minmax_element(last.counts().begin(), last.counts().end());
+  EXPECT_GE(*least, 11u) << "half of the mean, those of the first pass among them";
+  EXPECT_GT(*most, *least + 12);
+  const Film both = joined(first, last);
+  EXPECT_EQ(both.count(7, 9), 24 + last.count(7, 9));
+  const Spectrum sum = 24.0f * first.mean(7, 9) + static_cast<float>(last.count(7, 9)) * last.mean(7, 9);
+  EXPECT_NEAR(both.mean(7, 9).r * static_cast<float>(both.count(7, 9)), sum.r, 1e-4 * sum.r);
+  ASSERT_TRUE(result.predicted);
+  EXPECT_GT(result.predicted->relmse, 0);
+  const RenderResult uniform = render(scene, adaptive_plan(denoised({{"allocation", "uniform"}})), request_of(72));
+  for (const uint32_t n : uniform.passes[1].film.counts()) EXPECT_EQ(n, 48u);
+  EXPECT_EQ(uniform.passes[0].film.data(), first.data());
+}
+
+TEST(DenoisedPlan, SameBitsForAnyNumberOfThreads) {
+  const LoadedScene scene = load_sized(kRoom);
+  std::vector<float> first;
+  for (const int threads : {1, 2, 7}) {
+    const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+    const RenderResult result = render(scene, adaptive_plan(denoised()), request_of(24));
+    if (first.empty()) first = result.image.estimate.data;
+    EXPECT_EQ(result.image.estimate.data, first);
+  }
+}
+
+TEST(DenoisedPlan, AddsSamplesUntilAnErrorIsReached) {
+  const LoadedScene scene = load_sized(kRoom);
+  RenderRequest request = request_of(1000);
+  request.until = 0.6 * render(scene, adaptive_plan(denoised()), request_of(96)).predicted->relmse;
+  const RenderResult result = render(scene, adaptive_plan(denoised()), request);
+  EXPECT_TRUE(result.until_reached.value());
+  EXPECT_GT(result.samples_per_pixel(), 110);
 }
 
 TEST(UnbiasedPlan, IsTheMeanOfItsLastPass) {

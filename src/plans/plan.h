@@ -76,6 +76,7 @@ struct PlanState {
   /// With a limit of time, what is left of it when a phase's targets are set, for all that follows.
   std::optional<double> seconds_left;
   std::vector<Pass> passes;  ///< of this phase and all before it, in the order of the plan
+  Guides guides;             ///< of the whole window, for the targets of the last phase, where Plan::reads_guides
 
   /// The pass of this name and number. Throws Error(kInternal) where none has begun.
   const Pass& pass(const std::string& name, uint32_t number = 0) const;

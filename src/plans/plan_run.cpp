@@ -145,6 +145,7 @@ bool PlanRun::render_phase(size_t index, double share) {
   const std::span<Pass> passes = passes_of(index);
   if (passes.empty()) return false;  // interrupted before its films were made
   if (index + 1 == plan_.phases.size() && needs_aovs() && result_.aovs.empty()) render_auxiliary_images();
+  state_.guides = guides();
   if (timed()) state_.seconds_left = request_.seconds - watch_.seconds();
   if (request_.until > 0) {
     state_.budget = rounds_.budget();  // a film may have told of an earlier call's

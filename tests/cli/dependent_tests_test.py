@@ -115,6 +115,19 @@ class Adaptive(RenderTest):
         info = json.loads(self.good("info", "a.exr", "--json").stdout)
         self.assertEqual(info["attributes"]["covary:estimator"], "none --adaptive")
 
+    def test_a_denoised_mean_has_both_passes(self):
+        facts = self.statistics("-o", "a.exr", "--adaptive", "--oidn", "off", "--spp", "48", "--passes", "films")
+        self.assertEqual(facts["estimator"], "none --adaptive --denoise auto --oidn off")
+        self.assertEqual([p["samples_per_pixel"] for p in facts["passes"]], [12, 36])
+        self.assertEqual(sorted(p.name for p in (self.path / "films").glob("*.exr")),
+                         ["first-1.exr", "independent.exr"])
+        self.statistics("-o", "b.exr", "--adaptive", "--oidn", "off", "--spp", "48", "--passes", "films", "--resume")
+        self.same("a.exr", "b.exr")
+        render = ("render", ROOM, *SMALL, "-o", "c.exr", "--adaptive")
+        self.bad(2, "--allocation denoised is for the mean of independent samples that is denoised", *render,
+                 "--estimator", "none", "--allocation", "denoised")
+        self.bad(2, "--relative-error is that of an image that is not denoised", *render, "--relative-error", "0.1")
+
     def test_until(self):
         first = self.statistics("-o", "a.exr", "--estimator", "none", "--adaptive", "--min-spp", "2", "--spp", "96")
         facts = self.statistics("-o", "b.exr", "--estimator", "none", "--adaptive", "--min-spp", "2", "--until",

@@ -95,7 +95,6 @@ class Plans(RenderTest):
         for options in (("--estimator", "none"), ("--denoise", "none"), ("--sampling", "independent")):
             self.assertEqual(self.statistics("-o", "a.exr", "--spp", "4", *options)["estimator"], "none")
         self.assertEqual(self.statistics("-o", "a.exr", "--spp", "8", *IICV)["estimator"], "iicv")
-        self.bad(2, "--adaptive: name the estimator", "render", ROOM, "-o", "a.exr", "--adaptive")
 
     def test_a_missing_network_is_said_once_and_is_no_error(self):
         if self.run_covary("denoise", "--check").returncode == 0:
