@@ -32,14 +32,7 @@ class ConstantLight final : public Emitter {
   }
 
   EmissionSample sample_emission(Vec2 u_position, Vec2 u_direction, float) const override {
-    EmissionSample sample;
-    const Vec3 d = warp::square_to_sphere(u_direction);
-    sample.ray = {scene_.disk_point(d, u_position), d};
-    sample.n = d;
-    sample.radiance = radiance_;
-    sample.pdf_position = 1 / scene_.disk_area();
-    sample.pdf_direction = warp::sphere_pdf_solid_angle();
-    return sample;
+    return scene_.emission(warp::square_to_sphere(u_direction), u_position, radiance_, warp::sphere_pdf_solid_angle());
   }
 
   EmissionPdf pdf_emission(const SurfaceHit&, const Vec3&) const override {

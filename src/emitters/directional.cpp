@@ -34,12 +34,7 @@ class DirectionalLight final : public Emitter {
   }
 
   EmissionSample sample_emission(Vec2 u_position, Vec2, float) const override {
-    EmissionSample sample;
-    sample.ray = {scene_.disk_point(direction_, u_position), direction_};
-    sample.n = direction_;
-    sample.radiance = irradiance_;
-    sample.pdf_position = 1 / scene_.disk_area();
-    sample.pdf_direction = 1;
+    EmissionSample sample = scene_.emission(direction_, u_position, irradiance_, 1);
     sample.delta_direction = true;
     return sample;
   }

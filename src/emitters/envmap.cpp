@@ -61,14 +61,7 @@ class EnvironmentMap final : public Emitter {
 
   EmissionSample sample_emission(Vec2 u_position, Vec2 u_direction, float) const override {
     const typename Image::Sample from = image_->sample(u_direction);
-    EmissionSample sample;
-    const Vec3 d = -rotation_.to_world(from.d);
-    sample.ray = {scene_.disk_point(d, u_position), d};
-    sample.n = d;
-    sample.radiance = from.value;
-    sample.pdf_position = 1 / scene_.disk_area();
-    sample.pdf_direction = from.pdf_solid_angle;
-    return sample;
+    return scene_.emission(-rotation_.to_world(from.d), u_position, from.value, from.pdf_solid_angle);
   }
 
   EmissionPdf pdf_emission(const SurfaceHit&, const Vec3& w) const override {

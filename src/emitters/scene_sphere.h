@@ -4,6 +4,7 @@
 #include "core/frame.h"
 #include "core/ray.h"
 #include "core/warp.h"
+#include "scene/emitter.h"
 
 namespace covary {
 
@@ -24,6 +25,16 @@ struct SceneSphere {
     const Frame frame(d);
     const Vec2 offset = warp::square_to_disk(u);
     return center + (frame.s * offset.x + frame.t * offset.y - d) * radius;
+  }
+  /// Light that enters the scene in direction `d`, which has the density `pdf_direction` per unit solid angle.
+  EmissionSample emission(const Vec3& d, Vec2 u, const Spectrum& radiance, float pdf_direction) const {
+    EmissionSample sample;
+    sample.ray = {disk_point(d, u), d};
+    sample.n = d;
+    sample.radiance = radiance;
+    sample.pdf_position = 1 / disk_area();
+    sample.pdf_direction = pdf_direction;
+    return sample;
   }
 };
 

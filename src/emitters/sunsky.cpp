@@ -154,14 +154,7 @@ class SunSky final : public Emitter {
   EmissionSample sample_emission(Vec2 u_position, Vec2 u_direction, float) const override {
     const Vec3 from = dome_->sample(u_direction);
     const EnvironmentLight light = dome_->at(from);
-    EmissionSample sample;
-    const Vec3 d = -rotation_.to_world(from);
-    sample.ray = {scene_.disk_point(d, u_position), d};
-    sample.n = d;
-    sample.radiance = light.radiance;
-    sample.pdf_position = 1 / scene_.disk_area();
-    sample.pdf_direction = light.pdf_solid_angle;
-    return sample;
+    return scene_.emission(-rotation_.to_world(from), u_position, light.radiance, light.pdf_solid_angle);
   }
   EmissionPdf pdf_emission(const SurfaceHit&, const Vec3& w) const override {
     return {1 / scene_.disk_area(), environment(-w).pdf_solid_angle};
