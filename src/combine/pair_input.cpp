@@ -93,11 +93,6 @@ InputReport unchecked_report() {
   return report;
 }
 
-InputReport examine_pair(const Estimator& estimator, const GroupedImage& crn, const GroupedImage& independent) {
-  if (estimator.adaptive && (lacks_samples(crn) || lacks_samples(independent))) return unchecked_report();
-  return examine_inputs(crn, independent);
-}
-
 std::vector<std::string> estimators_with_samples() {
   return estimators_where([](const Estimator& e) { return e.needs_sample_count; });
 }

@@ -38,12 +38,9 @@ void check_light(const ImageOrigin& crn, const ImageOrigin& independent, const I
 /// The errors among the findings, separated by "; "; empty where there are none.
 std::string errors_text(const std::vector<Finding>& findings);
 
-/// The report on whole images, as examine_inputs(); of images in which groups lack samples, which an estimator with
-/// adaptive sampling may take, that they were not checked.
-InputReport examine_pair(const Estimator& estimator, const GroupedImage& crn, const GroupedImage& independent);
 /// Whether a group of a pixel has no samples.
 bool lacks_samples(const GroupedImage& image);
-/// The report of examine_pair() on such images.
+/// The report on such images, which an estimator with adaptive sampling may take: that they were not checked.
 InputReport unchecked_report();
 
 /// Names of those that need the number of samples of the CRN image.
