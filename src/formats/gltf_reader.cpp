@@ -75,6 +75,7 @@ class Reader {
       add(sky);
     }
     add(sensor_);
+    add(make_object("integrator", "path", file_.where()));
     if (!model_.animations.empty()) file_.warn("animations are not read: all is where it stands before they begin");
     if (!model_.skins.empty()) file_.warn("skins are not read: meshes are as they are before they are deformed");
     return scene_;

@@ -32,12 +32,15 @@ ObjectBuilder make_pbrt_medium(const std::string& type, PbrtParameters& p) {
   const auto absorbed = cross_section(p, "sigma_a"), scattered = cross_section(p, "sigma_s");
   if (!absorbed || !scattered) return nullptr;
   Spectrum albedo;
-  const Spectrum extinction = *absorbed + *scattered;
+  Spectrum extinction = *absorbed + *scattered;
   for (int c = 0; c < 3; ++c) albedo[c] = extinction[c] > 0 ? (*scattered)[c] / extinction[c] : 0;
+  // Mitsuba takes no colour above 1 for an extinction.
+  const float unit = std::max(max_component(extinction), 1.0f);
+  extinction = extinction / unit;
   auto medium = make_object("medium", "homogeneous", p.where());
   set_property(*medium, "sigma_t", ColourValue{extinction});
   set_property(*medium, "albedo", ColourValue{albedo});
-  set_property(*medium, "scale", p.get_float("scale", 1));
+  set_property(*medium, "scale", p.get_float("scale", 1) * unit);
   const double g = p.get_float("g", 0);
   auto phase = make_object("phase", g == 0 ? "isotropic" : "hg", p.where());
   if (g != 0) set_property(*phase, "g", g);

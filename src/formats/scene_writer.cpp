@@ -42,12 +42,6 @@ std::string matrix_text(const Matrix4& m) {
   return text;
 }
 
-/// What files of such content are called.
-const char* extension_of(std::string_view bytes) {
-  if (bytes.starts_with("ply")) return ".ply";
-  return bytes.starts_with("PF") || bytes.starts_with("Pf") ? ".pfm" : ".ppm";
-}
-
 class Writer {
  public:
   explicit Writer(const SceneWriting& writing) : writing_(writing) {}
@@ -177,9 +171,14 @@ class Writer {
 
   /// A file of this content; its name.
   std::string add_file(const std::string& bytes) {
-    const std::string path =
-        fmt::format("{}/{}{}", writing_.folder, key_text(bytes).substr(0, 16), extension_of(bytes));
-    if (files_.insert(path).second) result_.files.push_back({path, bytes});
+    std::string_view content = bytes;
+    const char* extension = bytes.starts_with("ply") ? ".ply" : bytes[1] == 'F' || bytes[1] == 'f' ? ".pfm" : ".ppm";
+    if (std::optional<RecodedFile> other = writing_.recode ? writing_.recode(bytes) : std::nullopt) {
+      content = result_.recoded.emplace_back(std::move(other->bytes));
+      extension = other->extension;
+    }
+    const std::string path = fmt::format("{}/{}{}", writing_.folder, key_text(content).substr(0, 16), extension);
+    if (files_.insert(path).second) result_.files.push_back({path, content});
     return path;
   }
 

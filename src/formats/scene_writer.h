@@ -2,7 +2,9 @@
 // ObjectDescription trees, of whatever scene file, as Mitsuba's XML: what xml_reader.h reads into the same trees.
 #pragma once
 
+#include <deque>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -20,6 +22,13 @@ struct SceneDocumentFile {
 struct SceneDocument {
   std::string xml;
   std::vector<SceneDocumentFile> files;
+  std::deque<std::string> recoded;  ///< bytes of files that are not those of the description
+};
+
+/// A file in another format.
+struct RecodedFile {
+  std::string bytes;
+  const char* extension;  ///< ".png"
 };
 
 struct SceneWriting {
@@ -28,6 +37,8 @@ struct SceneWriting {
   std::string folder;
   /// What the new file calls a file that the scene names; `where` is the object that names it.
   std::function<std::string(const std::string& name, const SourceLocation& where)> file_name;
+  /// The format that an image which stood in the scene's file gets; nullopt: its own.
+  std::function<std::optional<RecodedFile>(std::string_view bytes)> recode;
 };
 
 /// The scene in the format of version 3.0.0. Numbers have as many digits as are needed to read the same numbers again.

@@ -11,7 +11,9 @@
 #include "formats/file_view.h"
 #include "formats/object_graph.h"
 #include "formats/scene_file.h"
+#include "imageio/png.h"
 #include "scene/embedded_data.h"
+#include "textures/embedded_image.h"
 #include "textures/image.h"
 
 namespace covary {
@@ -59,11 +61,24 @@ bool has_media(const ObjectDescription& scene) {
 using FindFile = std::function<std::string(const std::string& name, const SourceLocation& where)>;
 
 std::string pfm_text(const TexelImage& image) {
-  std::string text = fmt::format("PF\n{} {}\n-1.0\n", image.width, image.height);
-  const size_t row = static_cast<size_t>(image.width) * 3;
+  std::string text = fmt::format("P{}\n{} {}\n-1.0\n", image.channels == 3 ? 'F' : 'f', image.width, image.height);
+  const size_t row = static_cast<size_t>(image.width) * image.channels;
   for (int y = image.height - 1; y >= 0; --y)
     text.append(reinterpret_cast<const char*>(image.floats.data() + y * row), row * sizeof(float));
   return text;
+}
+
+/// Images that were part of the scene's file in formats that Mitsuba reads: colours of bytes as PNG, grey ones, which
+/// are linear, as PFM.
+std::optional<RecodedFile> recode(std::string_view bytes) {
+  if (!bytes.starts_with("P5") && !bytes.starts_with("P6")) return std::nullopt;
+  TexelImage image = read_embedded_image(bytes);
+  if (image.channels == 3) {
+    const std::vector<unsigned char> png = encode_png(image.width, image.height, image.bytes);
+    return RecodedFile{{png.begin(), png.end()}, ".png"};
+  }
+  for (const uint8_t value : image.bytes) image.floats.push_back(static_cast<float>(value) / 255);
+  return RecodedFile{pfm_text(image), ".pfm"};
 }
 
 /// An environment of pbrt in the mapping that Mitsuba has.
@@ -126,7 +141,7 @@ ConvertedScene convert_scene(const std::string& path, const std::string& output,
   };
   result.description = for_mitsuba(*xml.scene, find_file, result.warnings);
   const fs::path folder = fs::path(output).parent_path();
-  SceneWriting writing{comment_on(path), fs::path(output).stem().string() + "-files", {}};
+  SceneWriting writing{comment_on(path), fs::path(output).stem().string() + "-files", {}, recode};
   writing.file_name = [&](const std::string& name, const SourceLocation& where) {
     const std::string found = find_file(name, where);
     return found.empty() ? name : relative_name(found, folder);

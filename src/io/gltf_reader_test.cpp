@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scenes of glTF against the same scenes in Mitsuba's XML by hand: rays of the camera, what they meet, its reflection and
-// light. Nothing is statistical.
+// Scenes of glTF against the same scenes in Mitsuba's XML by hand: rays of the camera, what they meet, its reflection
+// and light. Nothing is statistical.
 #include "formats/gltf_reader.h"
 
 #include <fmt/format.h>
@@ -13,6 +13,7 @@
 #include "core/arena.h"
 #include "core/random.h"
 #include "imageio/png.h"
+#include "io/convert_scene.h"
 #include "io/load_scene.h"
 #include "support/files.h"
 #include "support/same_scene.h"
@@ -165,7 +166,8 @@ TEST_F(GltfReader, IsTheSceneByHand) {
 <boolean name="face_normals" value="true"/><transform name="to_world"><rotate y="1" angle="45"/><scale value="1.2"/>
 <translate x=".1" y=".2" z="-.3"/></transform>
 <bsdf type="twosided"><bsdf type="principled"><texture type="bitmap" name="base_color">
-<string name="filename" value="picture.png"/><transform name="to_uv"><scale y="-1"/><translate y="1"/></transform></texture>
+<string name="filename" value="picture.png"/>
+<transform name="to_uv"><scale y="-1"/><translate y="1"/></transform></texture>
 <float name="metallic" value=".25"/><float name="roughness" value=".6"/></bsdf></bsdf></shape>)" +
                             kSquare + R"(
 <boolean name="face_normals" value="true"/><transform name="to_world"><scale value=".3"/>
@@ -235,6 +237,30 @@ TEST_F(GltfReader, MaterialsAreThoseByHand) {
                             R"(<float name="clearcoat" value=".5"/><float name="clearcoat_gloss" value=".75"/>
 </bsdf></bsdf></bsdf></bsdf></shape><emitter type="constant"/>)");
   test_support::expect_same_scene(a, b, 100);
+}
+
+/// A converted file is the same scene; its images are in formats that Mitsuba reads.
+TEST_F(GltfReader, CanBeConverted) {
+  Gltf file;
+  file.add_camera();
+  file.add("images", {{"bufferView", file.add_view(png())}, {"mimeType", "image/png"}});
+  file.add("textures", {{"source", 0}});
+  file.add("materials", {{"normalTexture", {{"index", 0}}},
+                         {"pbrMetallicRoughness",
+                          {{"baseColorTexture", {{"index", 0}}}, {"metallicRoughnessTexture", {{"index", 0}}}}}});
+  file.add_root({{"mesh", file.add_square(0, true)}});
+  const LoadedScene a = load(file);
+  const ConvertedScene converted = convert_scene(folder_.file("scene.glb"), folder_.file("out.xml"));
+  write("out.xml", converted.document.xml);
+  std::filesystem::create_directory(folder_.file("out-files"));
+  std::map<std::string, int> kinds;
+  for (const SceneDocumentFile& part : converted.document.files) {
+    write(part.path, std::string(part.bytes));
+    ++kinds[std::filesystem::path(part.path).extension().string()];
+  }
+  // The picture as it is, which colours and normals share; its green and its blue; the mesh.
+  EXPECT_EQ(kinds, (std::map<std::string, int>{{".pfm", 2}, {".ply", 1}, {".png", 1}}));
+  test_support::expect_same_scene(a, load_scene(folder_.file("out.xml")), 100);
 }
 
 TEST_F(GltfReader, MeshesThatAreUsedAgainAreInstances) {
@@ -320,7 +346,8 @@ TEST_F(GltfReader, WhatIsWrongIsNamed) {
          "needs the extension 'KHR_draco_mesh_compression', which is not supported; export without compression");
   expect([](Gltf& f) { f.scene["accessors"][0]["count"] = 1000000000; }, "with 1000000000 elements reaches beyond");
   expect([](Gltf& f) { f.scene["bufferViews"][0]["byteLength"] = 4000000; }, "reaches beyond its buffer");
-  expect([](Gltf& f) { f.scene["meshes"][0]["primitives"][0]["indices"] = 99; }, "primitive indices accessor out of bounds");
+  expect([](Gltf& f) { f.scene["meshes"][0]["primitives"][0]["indices"] = 99; },
+         "primitive indices accessor out of bounds");
   expect([](Gltf& f) { f.scene["accessors"][2]["bufferView"] = 0; }, "; there are 4 vertices");
   expect([](Gltf& f) { f.scene["nodes"][1]["children"] = {1}; }, "is not there, or has several parents");
   expect([](Gltf& f) { f.scene["materials"][0]["normalTexture"]["index"] = 7; }, "there is no texture 7");
