@@ -18,15 +18,16 @@ from os import fspath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from . import _covary
 from ._arguments import array, check_some, checked, function, mapping_of, optional, path, real, text, whole
 from ._cluster import CLIENT, SceneFiles, check_versions, dask, make_plugin
 from ._combine import Progress, check_options, combine
 from ._experiment import experiment, main
-from ._options import OptionValue, check_no_passes
+from ._options import OptionValue, check_no_passes, option_texts
 from ._parts import Part, PartFolder, Rendered
 from ._render import SCENE, SEED, SPP, Scene, report_bad_samples
 from ._render import render as render_here
-from ._result import BadSample, Result, fields_of
+from ._result import BadSample, RenderResult, Result, fields_of
 from .errors import Error, InputError, IoError, UsageError
 from .film import Film, merge_films
 
@@ -38,6 +39,8 @@ __all__ = ["ClusterResult", "SceneFiles", "experiment", "main", "render"]
 
 #: Estimators that look at films after the passes, and do not change what passes take.
 _ESTIMATORS = ("iicv", "cv-baseline", "iduw", "none")
+#: Options of the image of one pass.
+_OF_ONE_PASS = ("denoise", "oidn")
 #: Keywords of covary.render() that say what passes take.
 _SETTINGS = ("filter", "sampling", "sampler", "groups", "split")
 _RETRIES = 5  # of a part that an error of the machine ended; dead workers are counted by Dask (allowed-failures)
@@ -171,16 +174,16 @@ class _Plan:
     """A render that was checked: what workers do and what becomes of it."""
 
     scene: Scene
-    estimator: str
-    options: dict[str, Any]  #: for combine()
+    estimator: str | None
+    options: dict[str, Any]  #: for combine(), or the image of one pass
     settings: dict[str, Any]  #: for covary.render()
     parts: list[Part]
 
 
-def _plan(scene: Scene, spp: int, estimator: str, seed: int, sample_ranges: int, tile: int, settings: Mapping[str, Any],
-          options: Mapping[str, Any]) -> _Plan:
+def _plan(scene: Scene, spp: int, estimator: str | None, seed: int, sample_ranges: int, tile: int,
+          settings: Mapping[str, Any], options: Mapping[str, Any]) -> _Plan:
     """Raises all that would be wrong with any part, and with the estimate after the last, before one is rendered."""
-    if estimator not in _ESTIMATORS:
+    if estimator is not None and estimator not in _ESTIMATORS:
         raise UsageError(f"estimator '{estimator}' looks at other pixels or samples while it renders; on a cluster "
                          f"accepted are {', '.join(_ESTIMATORS)}")
     check_no_passes([*options, *settings], "it looks at the whole frame, of which a worker has a tile")
@@ -193,7 +196,12 @@ def _plan(scene: Scene, spp: int, estimator: str, seed: int, sample_ranges: int,
     if scene.integrator not in ("path", ""):
         raise UsageError(f"the integrator '{scene.integrator}' trains or traces light over the whole frame; on a "
                          "cluster accepted is path")
-    if estimator != "none":
+    if estimator in (None, "none"):
+        check_some(render_here, options)
+        if unknown := set(options) - set(_OF_ONE_PASS):
+            raise UsageError(f"{min(unknown)}: is no argument of estimator {estimator or 'none'!r}; accepted are "
+                             f"{', '.join(_OF_ONE_PASS)}")
+    else:
         check_options(estimator, options)
     of_combine = {"force", "std_error"}
     passed = {"spp": spp // sample_ranges, "estimator": estimator, **settings,
@@ -206,10 +214,10 @@ def _plan(scene: Scene, spp: int, estimator: str, seed: int, sample_ranges: int,
                  [Part(crop, own_seed, number) for number, (crop, own_seed) in enumerate(places)])
 
 
-@checked(client=CLIENT, scene=SCENE, spp=SPP, estimator=text, seed=SEED, sample_ranges=whole(1, 1 << 20),
+@checked(client=CLIENT, scene=SCENE, spp=SPP, estimator=optional(text), seed=SEED, sample_ranges=whole(1, 1 << 20),
          tile=whole(1, 65536), folder=optional(path), progress=optional(function), on_image=optional(function),
          image_seconds=real(0), settings=optional(mapping_of(array, "a mapping from keywords of covary.render()")))
-def render(client: Any, scene: Scene | str | os.PathLike[str], spp: int, estimator: Estimator = "iicv", *,
+def render(client: Any, scene: Scene | str | os.PathLike[str], spp: int, estimator: Estimator | None = None, *,
            seed: int = 0, sample_ranges: int = 1, tile: int = 128, folder: str | os.PathLike[str] | None = None,
            progress: Progress | None = None, on_image: Callable[[FloatArray], object] | None = None,
            image_seconds: float = 5.0, settings: Mapping[str, Any] | None = None,
@@ -217,6 +225,7 @@ def render(client: Any, scene: Scene | str | os.PathLike[str], spp: int, estimat
     """Renders on the workers of a dask.distributed.Client.
 
     spp: samples per pixel of all passes and ranges together.
+    estimator: as covary.render() has it; by default the mean of independent samples, denoised images mixed into it.
     sample_ranges: into how many seeds, `seed` and those that follow, the samples are divided; their films are merged.
         With 1 the result has the bits of `covary.render(scene, spp, estimator, seed=seed)`, with more those of
         merge_films() of such renders, for any number of workers and whatever becomes of them.
@@ -226,7 +235,7 @@ def render(client: Any, scene: Scene | str | os.PathLike[str], spp: int, estimat
     progress: called with (done, total) parts.
     on_image: called with the mean of all samples so far, at most every `image_seconds`.
     settings: further keywords of covary.render() for the passes: filter, sampling, sampler, groups, split.
-    options: of the estimator, and denoise and oidn of combine(), whose guides are rendered, too.
+    options: of the estimator, and denoise and oidn, whose guides are rendered, too.
 
     Raises UsageError for estimators and integrators whose passes look beyond a tile, and for all that is wrong with
     options, before anything is rendered; IoError when the scheduler dies.
@@ -300,10 +309,12 @@ def _rendered(client: Any, job: _Job, parts: list[Part]) -> Iterator[tuple[Part,
 
 
 def _result(canvas: _Canvas, plan: _Plan, n_kept: int, seconds: float) -> ClusterResult:
+    made: Result
     films = canvas.films()
     samples = sum(film.samples_per_pixel for film in films.values())
-    if plan.estimator == "none":
-        made = Result(next(iter(films.values())).mean, None, None, None, None, "", [], 0, "none", samples)
+    if plan.estimator in (None, "none"):
+        values = option_texts({"estimator": plan.estimator, **plan.options})
+        made = RenderResult(**_covary.image_of_films(values, {}, films, canvas.aovs))
     else:
         made = combine(films["crn"], films["independent"], plan.estimator,  # type: ignore[arg-type]
                        albedo=canvas.aovs.get("Albedo"), normal=canvas.aovs.get("N"), **{"force": True, **plan.options})

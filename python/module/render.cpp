@@ -6,12 +6,15 @@
 #include <span>
 #include <utility>
 
+#include "combine/combine.h"
 #include "combine/registry.h"
+#include "core/stopwatch.h"
 #include "plans/integrator_choice.h"
 #include "plans/render_settings.h"
 #include "python/module/arrays.h"
 #include "python/module/bindings.h"
 #include "python/module/work.h"
+#include "risk/predicted_error.h"
 #include "settings/option_names.h"
 
 namespace covary::python {
@@ -157,6 +160,53 @@ nb::dict render_scene(const LoadedScene& scene, const Choice& choice, const Opti
   return made;
 }
 
+/// Rows of all of them at once, as render() has them.
+Guides guides_of(const std::map<std::string, Image>& aovs) {
+  const auto find = [&](const char* name) -> const Image* {
+    const auto found = aovs.find(name);
+    return found == aovs.end() ? nullptr : &found->second;
+  };
+  return {find("Albedo"), find("N"), find("DenoisingAlbedo"), find("DenoisingNormal")};
+}
+
+/// What render() would make of the films of its passes, in their order, and the auxiliary images: those of a render in
+/// parts. Has render()'s bits.
+nb::dict image_of_films(const Options& values, const Options& of_estimator, nb::dict films, nb::dict aovs) {
+  const RenderSettings settings = settings_from<RenderSettings>(values);
+  const Plan plan = plan_of(settings, {values, of_estimator});
+  RenderResult result;
+  for (const auto& [name, film] : films) {
+    Pass& pass = result.passes.emplace_back();
+    pass.plan.name = nb::cast<std::string>(name);
+    pass.film = nb::cast<const Film&>(film);
+  }
+  if (result.passes.empty()) throw Error(ErrorCode::kUsage, "films: found none; expected those of a render");
+  for (const auto& [name, image] : aovs) {
+    const std::string key = nb::cast<std::string>(name);
+    result.aovs[key] = image_of(image, key);
+  }
+  run_work(
+      [&](WorkState& state) {
+        const Stopwatch watch;
+        Beside beside;
+        if (plan.reads_guides) beside.guides = guides_of(result.aovs);
+        const auto estimate = [&] {
+          result.image = plan.estimate(result.passes, 0, result.passes[0].film.height(), beside);
+          finish(result.image, nullptr);
+        };
+        if (!run_stoppable(state, estimate)) return;
+        result.predicted = predicted_error(result.image, result.samples_per_pixel(), plan.reliable_samples);
+        if (result.predicted) result.predicted_blocks = predicted_blocks(result.image);
+        if (plan.film_is_image) result.image.estimate = {};
+        result.seconds.estimate = watch.seconds();
+      },
+      nb::none());
+  result.complete = true;
+  nb::dict made = dict_of(std::move(result), plan.estimator, {}, values);
+  made["network"] = plan.network;
+  return made;
+}
+
 }  // namespace
 
 void bind_render(nb::module_& module) {
@@ -191,6 +241,9 @@ void bind_render(nb::module_& module) {
       nb::sig("def render(scene: LoadedScene, values: dict[str, str], of_integrator: dict[str, str], "
               "of_estimator: dict[str, str], films_only: bool, progress: typing.Any) "
               "-> dict[str, typing.Any]"));
+  module.def("image_of_films", &image_of_films, "values"_a, "of_estimator"_a, "films"_a, "aovs"_a,
+             nb::sig("def image_of_films(values: dict[str, str], of_estimator: dict[str, str], films: dict[str, Film], "
+                     "aovs: dict[str, typing.Any]) -> dict[str, typing.Any]"));
 }
 
 }  // namespace covary::python

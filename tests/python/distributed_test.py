@@ -155,7 +155,7 @@ class Cluster(PackageTest):
     def test_bits_of_one_machine(self):
         here = covary.render(self.scene(), 24, "iicv", seed=3)
         seen = []
-        there = covary.distributed.render(self.client, self.scene(), 24, seed=3, tile=20,
+        there = covary.distributed.render(self.client, self.scene(), 24, "iicv", seed=3, tile=20,
                                           progress=lambda done, total: seen.append((done, total)))
         self.assert_same_bits(here.image, there.image)
         self.assert_same_bits(here.std_error, there.std_error)
@@ -171,10 +171,26 @@ class Cluster(PackageTest):
     def test_denoised(self):
         """With guides that the workers render, and the denoiser of the frame, not of tiles."""
         here = covary.render(self.scene(), 48, "iicv", denoise="error", oidn="off")
-        there = covary.distributed.render(self.client, self.scene(), 48, tile=30, denoise="error", oidn="off")
+        there = covary.distributed.render(self.client, self.scene(), 48, "iicv", tile=30, denoise="error", oidn="off")
         self.assert_same_bits(here.image, there.image)
         self.assert_same_bits(here.std_error, there.std_error)
         self.assertEqual(here.estimator, there.estimator)
+
+    def test_the_default_is_that_of_one_machine(self):
+        for keywords in ({}, {"estimator": "none"}, {"estimator": "none", "denoise": "bias"}):
+            with self.subTest(keywords):
+                if keywords.get("estimator") is None or "denoise" in keywords:
+                    keywords = {**keywords, "oidn": "off"}
+                here = covary.render(self.scene(), 16, seed=3, **keywords)
+                there = covary.distributed.render(self.client, self.scene(), 16, seed=3, tile=30, **keywords)
+                self.assert_same_bits(here.image, there.image)
+                self.assertEqual(list(here.films), list(there.films))
+                self.assertEqual((here.estimator, here.predicted_relmse, here.predicted_bounds, here.samples_per_pixel),
+                                 (there.estimator, there.predicted_relmse, there.predicted_bounds,
+                                  there.samples_per_pixel))
+        self.assertIn("window: is no argument of estimator 'none'",
+                      self.message_of(covary.UsageError, covary.distributed.render, self.client, self.scene(), 16,
+                                      window=3))
 
     def test_ranges_of_samples(self):
         films = [covary.render(self.scene(), 8, "none", seed=seed).films["independent"] for seed in (5, 6, 7)]
@@ -194,7 +210,7 @@ class Cluster(PackageTest):
                 pid = next(iter(self.client.run(os.getpid).values()))
                 killed.append(pid)
                 os.kill(pid, signal.SIGKILL)
-        there = covary.distributed.render(self.client, self.scene(), 48, seed=4, tile=12, progress=kill)
+        there = covary.distributed.render(self.client, self.scene(), 48, "iicv", seed=4, tile=12, progress=kill)
         self.assertEqual(len(killed), 2)
         self.assert_same_bits(here.image, there.image)
 
@@ -278,7 +294,7 @@ class Cluster(PackageTest):
                                    ({"settings": {"sampling": "crn"}}, "sampling: found 'crn' with estimator 'iicv'"),
                                    ({"window": 4}, "window is 4")):
                 self.assertIn(text, self.message_of(covary.UsageError, covary.distributed.render, self.client,
-                                                    self.scene(), 24, **keywords))
+                                                    self.scene(), 24, "iicv", **keywords))
         finally:
             self.client.register_plugin, self.client.submit = given
 
@@ -332,7 +348,7 @@ def die(done, total):
 
 if __name__ == "__main__":
     scene = covary.Scene.load(sys.argv[2], resolution=(72, 48))
-    covary.distributed.render(Client(sys.argv[1]), scene, 24, seed=6, tile=20, folder=sys.argv[3], progress=die,
+    covary.distributed.render(Client(sys.argv[1]), scene, 24, "iicv", seed=6, tile=20, folder=sys.argv[3], progress=die,
                               denoise="error", oidn="off")
 """
 
@@ -351,7 +367,7 @@ class Kept(PackageTest):
                 seen = []
 
                 def call(seed, **more):
-                    return covary.distributed.render(client, scene, 24, seed=seed, tile=20, folder=folder,
+                    return covary.distributed.render(client, scene, 24, "iicv", seed=seed, tile=20, folder=folder,
                                                      denoise="error", oidn="off", **more)
                 there = call(6, progress=lambda done, total: seen.append(done))
                 again, other = call(6), call(7)
@@ -386,7 +402,7 @@ class Kept(PackageTest):
                 Client(cluster) as client:
             there = covary.distributed.render(client, scene, 24, tile=20, folder=self.path / "parts")
         self.assertGreaterEqual(there.parts_kept, 2)
-        self.assert_same_bits(covary.render(scene, 24, "iicv").image, there.image)
+        self.assert_same_bits(covary.render(scene, 24).image, there.image)
 
     def start(self, kind, *words):
         """A scheduler or worker of Dask."""

@@ -47,7 +47,7 @@ class Slurm(PackageTest):
             def cancel(done, total):
                 if done == 3:
                     subprocess.run(["scancel", "--signal=KILL", "--full", jobs[0]], check=True)
-            there = covary.distributed.render(client, scene, 48, seed=4, tile=12, progress=cancel)
+            there = covary.distributed.render(client, scene, 48, "iicv", seed=4, tile=12, progress=cancel)
             self.assertNotIn(jobs[0], self.jobs())
             report = covary.distributed.experiment(client, self.suite(), self.path / "out",
                                                    ["--scenes", str(SOURCE / "scenes")])
