@@ -6,7 +6,7 @@
 #include <functional>
 #include <memory>
 
-#include "core/parallel.h"
+#include "denoising/mirrored_halves.h"
 #include "filters/nl_means.h"
 #include "filters/residual_correction.h"
 
@@ -110,6 +110,44 @@ std::vector<std::vector<Image>> filtered_layers(const FilterGuides& guides, cons
   return all;
 }
 
+/// Open Image Denoise with guides that it has denoised.
+class GuidedNetwork {
+ public:
+  GuidedNetwork(const Guides& guides, const DenoiseOptions& options) : denoiser_(options) {
+    if (!guides.albedo) return;
+    albedo_ = denoiser_.denoise_guide("albedo", *guides.albedo);
+    if (guides.normal) normal_ = denoiser_.denoise_guide("normal", *guides.normal);
+  }
+
+  /// The image is mirrored already.
+  Image denoise(const Image& image, Mirror mirror = Mirror::kNone) {
+    if (mirror == Mirror::kNone) return denoiser_.denoise(image, or_null(albedo_), or_null(normal_), true);
+    const Image albedo = mirrored(albedo_, mirror), normal = mirrored(normal_, mirror);
+    return denoiser_.denoise(image, or_null(albedo), or_null(normal), true);
+  }
+
+ private:
+  static const Image* or_null(const Image& image) { return image.data.empty() ? nullptr : &image; }
+
+  Denoiser denoiser_;
+  Image albedo_, normal_;
+};
+
+/// Of means.
+std::vector<std::vector<Image>> of_means(GuidedNetwork& network, std::span<const CandidateInput> inputs) {
+  std::vector<const Image*> means;
+  for (const CandidateInput& in : inputs) means.push_back(in.estimate);
+  const std::vector<Image> denoised =
+      denoise_with_halves(means, [&](const Image& image, Mirror mirror) { return network.denoise(image, mirror); });
+  std::vector<std::vector<Image>> all;
+  for (size_t i = 0; i < inputs.size(); ++i) {
+    std::vector<Image>& images = all.emplace_back(3, denoised[i]);
+    add_residual(*inputs[i].moments, kWideResidual, *inputs[i].valid, images[1]);
+    add_residual(*inputs[i].moments, kNarrowResidual, *inputs[i].valid, images[2]);
+  }
+  return all;
+}
+
 }  // namespace
 
 CandidateMaker::Make one_by_one(std::function<std::vector<Image>(const CandidateInput&)> make) {
@@ -127,6 +165,7 @@ CandidateMaker filtered_candidates(const Guides& guides, CandidateBase base) {
   if (base == CandidateBase::kPair) maker.names.emplace_back("sharp-independent");
   maker.names.emplace_back("smooth");
   if (!kept->albedo.data.empty()) maker.names.emplace_back("demodulated");
+  if (base == CandidateBase::kMean && maker.names.size() == 3) maker.usual = {0.4f, 0, 0.6f};
   maker.make = [kept, base](std::span<const CandidateInput> inputs) { return filtered(*kept, base, inputs); };
   maker.make_layers = [kept](const CandidateInput& input, std::span<const Image> layers) {
     return filtered_layers(*kept, input, layers);
@@ -141,35 +180,23 @@ Guides network_guides(const Guides& guides) {
 }
 
 CandidateMaker neural_candidates(const Guides& guides, const DenoiseOptions& options, CandidateBase base) {
-  const auto denoiser = std::make_shared<Denoiser>(options);
-  const auto albedo = std::make_shared<Image>(), normal = std::make_shared<Image>();
-  const Guides seen = network_guides(guides);
-  if (seen.albedo) *albedo = denoiser->denoise_guide("albedo", *seen.albedo);
-  if (seen.albedo && seen.normal) *normal = denoiser->denoise_guide("normal", *seen.normal);
-  const auto denoised = [=](const Image& image) {
-    return denoiser->denoise(image, albedo->data.empty() ? nullptr : albedo.get(),
-                             normal->data.empty() ? nullptr : normal.get(), true);
-  };
+  const auto network = std::make_shared<GuidedNetwork>(network_guides(guides), options);
   CandidateMaker maker;
   maker.error_over_variance = 1.1;
   maker.network = true;
   if (base == CandidateBase::kPair) {
     maker.names = {"oidn", "oidn-independent"};
-    maker.make = one_by_one([denoised](const CandidateInput& in) {
-      return std::vector<Image>{denoised(*in.estimate), denoised(*in.independent)};
+    maker.make = one_by_one([network](const CandidateInput& in) {
+      return std::vector<Image>{network->denoise(*in.estimate), network->denoise(*in.independent)};
     });
     return maker;
   }
   maker.names = {"oidn", "oidn-wide", "oidn-narrow"};
-  maker.make = one_by_one([denoised](const CandidateInput& in) {
-    std::vector<Image> images(3, denoised(*in.estimate));
-    add_residual(*in.moments, kWideResidual, *in.valid, images[1]);
-    add_residual(*in.moments, kNarrowResidual, *in.valid, images[2]);
-    return images;
-  });
-  maker.make_layers = [denoised, n = maker.names.size()](const CandidateInput&, std::span<const Image> layers) {
+  maker.usual = {0.6f, 0.2f, 0.2f};
+  maker.make = [network](std::span<const CandidateInput> inputs) { return of_means(*network, inputs); };
+  maker.make_layers = [network, n = maker.names.size()](const CandidateInput&, std::span<const Image> layers) {
     std::vector<Image> images;
-    for (const Image& layer : layers) images.push_back(denoised(layer));
+    for (const Image& layer : layers) images.push_back(network->denoise(layer));
     return std::vector(n, images);
   };
   return maker;

@@ -8,6 +8,7 @@
 //
 // Where the image is the mean of the independent samples itself, the images of the one are left out, and those of Open
 // Image Denoise come with what they took away from pixels alike given back (ResidualOptions of residual_correction.h).
+// The network's image of all samples is a mean with those of the halves there (mirrored_halves.h).
 #pragma once
 
 #include <functional>
@@ -32,7 +33,8 @@ struct CandidateInput {
 
 /// Makes candidates, the same of any samples.
 struct CandidateMaker {
-  /// The images of each of several sets of samples, all with the same valid pixels.
+  /// The images of each of several sets of samples, all with the same valid pixels: all samples, or these and both
+  /// halves of them.
   using Make = std::function<std::vector<std::vector<Image>>(std::span<const CandidateInput>)>;
 
   std::vector<std::string> names;  ///< of its images, in their order
@@ -45,6 +47,9 @@ struct CandidateMaker {
   /// samples: the more of it they take away, the more of the error is bias. Measured (docs/methods/error-estimates.md).
   double error_over_variance = 0.65;
   bool network = false;  ///< a neural network makes them
+  /// Weights of its images around a mean that are best among scenes with few samples, where no other maker with such
+  /// weights is beside it, or this is a network (measured, docs/notes/denoising.md); empty: not known.
+  std::vector<float> usual;
   /// Number of the one to show where samples are too few to judge.
   int best_of_few = 0;
 };

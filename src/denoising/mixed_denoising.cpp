@@ -47,7 +47,10 @@ constexpr double kBytesPerPixel = 480, kBytesOfMean = 220, kBytesWithOidn = 1400
 
 /// Of the mean: what its variance counts beside its square, and how much the weights of the whole image count; both
 /// measured (docs/methods/denoising.md).
-constexpr float kCountOfVariance = 2, kPriorOfMean = 5;
+constexpr float kCountOfVariance = 2, kPriorOfMean = 10;
+
+/// How much usual weights count for those of the whole image, with so many samples per pixel or fewer; less with more.
+constexpr float kCountOfUsual = 0.2f, kSamplesOfUsual = 16;
 
 /// `h`: the mean of its independent image.
 CandidateInput input_of(const DenoisingPart& part, const Image& h, const std::vector<unsigned char>& valid) {
@@ -130,8 +133,33 @@ std::vector<Image> layers_of(const DenoisingParts& parts, const std::vector<Cand
                          mixture.weights});
 }
 
+float count_of_usual(const GroupedImage& image) {
+  double samples = 0;
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x) samples += image.count(x, y);
+  samples /= static_cast<double>(image.width) * image.height;
+  return kCountOfUsual * static_cast<float>(std::min(1.0, kSamplesOfUsual / std::max(samples, 1.0)));
+}
+
+bool has_network(const std::vector<CandidateMaker>& makers) {
+  return std::any_of(makers.begin(), makers.end(), [](const CandidateMaker& m) { return m.network; });
+}
+
+/// Of all candidates; empty where not known.
+std::vector<float> usual_weights(const std::vector<CandidateMaker>& makers) {
+  std::vector<float> weights;
+  const bool network = has_network(makers);
+  bool known = false;
+  for (const CandidateMaker& maker : makers) {
+    const bool counts = !maker.usual.empty() && maker.network == network;
+    known |= counts;
+    for (size_t p = 0; p < maker.names.size(); ++p) weights.push_back(counts ? maker.usual[p] : 0);
+  }
+  return known ? weights : std::vector<float>{};
+}
+
 ErrorKind kind_of(const std::vector<CandidateMaker>& makers, bool is_mean) {
-  const bool network = std::any_of(makers.begin(), makers.end(), [](const CandidateMaker& m) { return m.network; });
+  const bool network = has_network(makers);
   if (is_mean) return network ? ErrorKind::kNetwork : ErrorKind::kFilters;
   return network ? ErrorKind::kPairNetwork : ErrorKind::kPairFilters;
 }
@@ -176,6 +204,8 @@ MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<Candid
   input.valid = &valid;
   input.bias_share = chosen.bias_share;
   input.prior = parts.is_mean ? kPriorOfMean : chosen.prior;
+  if (parts.is_mean) input.usual = usual_weights(makers);
+  if (!input.usual.empty()) input.usual_count = count_of_usual(parts.groups);
   std::array<Image, 2> counts;
   for (int half = 0; parts.is_mean && half < 2; ++half) {
     counts[half] = counts_of(parts.halves[half], guide_of(halves[half]));

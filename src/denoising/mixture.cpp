@@ -113,7 +113,9 @@ Weights weights_everywhere(const MixtureInput& in, int m) {
     sums[i] = splat(static_cast<float>(sum));
   }
   std::array<vfloat, kMostCandidates + 1> x;
-  solve(m, sums, {}, 0, x);
+  Weights usual{};
+  std::copy(in.usual.begin(), in.usual.end(), usual.begin());
+  solve(m, sums, usual, in.usual_count, x);
   Weights weights{};
   for (int p = 0; p < m; ++p) weights[p] = x[p][0];
   return weights;
@@ -143,6 +145,7 @@ Mixture mix(const MixtureInput& input) {
   const int m = static_cast<int>(input.whole->candidates.size());
   const int width = input.guide->width, height = input.guide->height;
   COVARY_CHECK(m >= 1 && m <= kMostCandidates, "between one and kMostCandidates candidates");
+  COVARY_CHECK(input.usual_count == 0 || std::ssize(input.usual) == m, "a usual weight for each candidate");
   const GuidedCells cells(*input.guide, *input.valid, n_planes(m),
                           [&](int x, int y, float* sums) { add_pixel(input, m, x, y, sums); });
   Mixture mixture;

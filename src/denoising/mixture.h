@@ -17,7 +17,9 @@
 //     bias_share * squared bias + variance,   x >= 0, sum x <= 1.
 //
 // Where that is told by noise more than by anything else, weights are near those of the whole image, x0: to the sum is
-// added prior * v ||x - x0||^2, v: mean variance of the U_p. It vanishes with more samples.
+// added prior * v ||x - x0||^2, v: mean variance of the U_p. It vanishes with more samples. x0 in turn is drawn to
+// weights x1 that are usual among scenes, by usual_count * v ||x0 - x1||^2 of the whole image: with few samples, halves
+// of them think too well of smooth images.
 //
 // The whole image has half of that variance. Its bias is smaller than that of a half, too, so that bias_share = 1
 // leaves less error than 2 (docs/notes/denoising.md).
@@ -44,6 +46,9 @@ struct MixtureInput {
   const std::vector<unsigned char>* valid = nullptr;  ///< pixels with 0 are left out, and keep the base image
   float bias_share = 1;                               ///< weight of the squared bias, > 0
   float prior = 0;                                    ///< how much the weights of the whole image count, >= 0
+  /// Weights of the candidates that are usual, >= 0, with a sum of at most 1; empty: none are known.
+  std::vector<float> usual;
+  float usual_count = 0;  ///< how much these count for those of the whole image, >= 0
   /// What squared errors of each half's pixels count, one channel, made of the same half; null: 1 / (F'_A^2 + 0.01).
   std::array<const Image*, 2> counts = {};
 };

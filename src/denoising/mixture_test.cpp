@@ -50,13 +50,21 @@ struct Experiment {
                     moments_of(flat(0, kVariance, 100 * seed + 2), kVariance)} {}
 
   /// `make(half)`: base and candidates of a half; the whole is the mean of both.
-  Mixture run(const std::function<CandidateSet(int)>& make, float bias_share, float prior = 0) const {
+  Mixture run(const std::function<CandidateSet(int)>& make, float bias_share, float prior = 0,
+              const std::vector<float>& usual = {}) const {
     const CandidateSet halves[2] = {make(0), make(1)};
     CandidateSet whole{average(halves[0].base, halves[1].base), {}};
     for (size_t p = 0; p < halves[0].candidates.size(); ++p)
       whole.candidates.push_back(average(halves[0].candidates[p], halves[1].candidates[p]));
-    return mix(
-        {&whole, {&halves[0], &halves[1]}, {&independent[0], &independent[1]}, &guide, &valid, bias_share, prior});
+    return mix({&whole,
+                {&halves[0], &halves[1]},
+                {&independent[0], &independent[1]},
+                &guide,
+                &valid,
+                bias_share,
+                prior,
+                usual,
+                usual.empty() ? 0.0f : 0.2f});
   }
 };
 
@@ -124,6 +132,20 @@ TEST(Mixture, TheWholeImagesWeightsCountOnlyWhereThereIsNoise) {
   EXPECT_NEAR(weight_where_wrong(0.03, 0), 0.25, 0.1);
   EXPECT_NEAR(weight_where_wrong(0.03, 10), 0.43, 0.08);
   EXPECT_LT(weight_where_wrong(1e-4, 10), 0.02);
+}
+
+TEST(Mixture, UsualWeightsCountOnlyWhereThereIsNoise) {
+  const auto weight = [](double variance, const std::vector<float>& usual) {
+    const Experiment experiment(5);
+    const auto make = [&](int half) { return CandidateSet{flat(0, variance, 7 + half), {flat(0.3f, 0, 0)}}; };
+    return mean_weight(experiment.run(make, 1, 1000, usual), 0);
+  };
+  // With b^2 = v = 0.09: v / (b^2 + v) = 0.5, and (v + 0.2 v x1) / (b^2 + v + 0.2 v) = 0.545 and 0.455.
+  const double none = weight(0.09, {});
+  EXPECT_NEAR(none, 0.5, 0.05);
+  EXPECT_NEAR(weight(0.09, {1}) - none, 0.045, 0.02);
+  EXPECT_NEAR(none - weight(0.09, {0}), 0.045, 0.02);
+  EXPECT_LT(weight(1e-4, {1}), 0.02);
 }
 
 TEST(Mixture, WeightsAreSharesOfOne) {
