@@ -10,6 +10,7 @@
 #include "formats/file_view.h"
 #include "formats/pbrt_objects.h"
 #include "formats/pbrt_parameters.h"
+#include "formats/scene_references.h"
 #include "formats/xml_values.h"
 
 namespace covary {
@@ -18,7 +19,7 @@ namespace {
 // Limits far above what scenes need, and low enough that no small file takes long or much memory.
 constexpr int kMostIncludes = 1000, kDeepest = 15;
 constexpr size_t kMostTextBytes = size_t{1} << 30;  // of all files together
-constexpr size_t kMostObjects = 1000000, kMostStates = 1000;
+constexpr size_t kMostObjects = 1000000, kMostStates = 1000, kMostNesting = 64;
 
 constexpr std::string_view kDirectives =
     "Accelerator AreaLightSource AttributeBegin AttributeEnd Camera ColorSpace ConcatTransform CoordinateSystem "
@@ -211,10 +212,10 @@ class Reader {
     PbrtParameters p = parameters(tokens, fmt::format("{} \"{}\"", word, type));
     if (!in_world_) p.error("stands before WorldBegin");
     if (word == "Material") {
-      state_.material = make_pbrt_material(type, p, names_);
+      state_.material = limited(make_pbrt_material(type, p, names_));
       state_.material_failed = !state_.material;
     } else if (word == "MakeNamedMaterial") {
-      const ObjectBuilder material = make_pbrt_material(p.get_string("type", ""), p, names_);
+      const ObjectBuilder material = limited(make_pbrt_material(p.get_string("type", ""), p, names_));
       if (material) material->id = type;
       names_.materials[type] = material;
     } else if (word == "AreaLightSource") {
@@ -236,7 +237,7 @@ class Reader {
       p.error("has an unknown kind; expected \"float\" or \"spectrum\"");
       return;
     }
-    if (const ObjectBuilder texture = make_pbrt_texture(type, p, names_)) {
+    if (const ObjectBuilder texture = limited(make_pbrt_texture(type, p, names_))) {
       texture->id = name;
       (kind == "float" ? names_.float_textures : names_.spectrum_textures)[name] = texture;
     }
@@ -316,6 +317,8 @@ class Reader {
     }
   }
 
+  /// Null where it holds too much, which is an error.
+  ObjectBuilder limited(ObjectBuilder object) { return object && limit_.add(*object) ? object : nullptr; }
   PbrtParameters parameters(PbrtTokens& tokens, std::string what) {
     return {tokens, std::move(what), where_, diagnostics_};
   }
@@ -349,6 +352,7 @@ class Reader {
 
   FileResolver& files_;
   Diagnostics& diagnostics_;
+  ExpansionLimit limit_{kMostNesting, diagnostics_};
   std::string digest_;
   ObjectBuilder scene_, group_;
   PbrtView view_;

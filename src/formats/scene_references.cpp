@@ -95,35 +95,40 @@ std::vector<ObjectDescription*> break_cycles(const SceneObjects& objects, Diagno
   return done;
 }
 
-void limit_expansion(const std::vector<ObjectDescription*>& objects, size_t max_nesting, Diagnostics& diagnostics) {
-  struct Expanded {
-    size_t count = 1, depth = 1;
-  };
-  std::unordered_map<const ObjectDescription*, Expanded> expanded;
-  for (ObjectDescription* object : objects) {
-    Expanded& whole = expanded[object];
-    if (object->kind == "scene") continue;
-    for (const Property& property : object->properties)
-      if (const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value); child && *child) {
-        const Expanded part = expanded.at(child->get());
-        whole.count += part.count;
-        whole.depth = std::max(whole.depth, part.depth + 1);
-      }
-    if (object->kind == "shape") whole.count = 1;  // a group may be large: shapes are looked at once
-    if (object->kind == "bsdf" && object->type == "twosided") whole.count = 2 * whole.count - 1;  // both sides look
-    const bool too_deep = whole.depth > max_nesting;
-    if (!too_deep && whole.count <= kMaxExpanded) continue;
-    diagnostics.error(object->where,
-                      too_deep ? fmt::format("{} '{}' holds {} objects inside each other when every reference is "
-                                             "followed; at most {} are accepted",
-                                             object->kind, object->type, whole.depth, max_nesting)
-                               : fmt::format("{} '{}' holds {} objects when every reference is followed; at most {} "
-                                             "are accepted",
-                                             object->kind, object->type, whole.count, kMaxExpanded));
-    for (Property& property : object->properties)
-      if (ObjectPtr* child = std::get_if<ObjectPtr>(&property.value)) child->reset();
-    whole = {};
+bool ExpansionLimit::add(const ObjectDescription& object) {
+  Expanded whole;
+  for (const Property& property : object.properties) {
+    const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value);
+    if (!child || !*child) continue;
+    auto found = expanded_.find(child->get());
+    if (found == expanded_.end()) {
+      if (!add(**child)) return false;
+      found = expanded_.find(child->get());
+    }
+    whole.count += found->second.count;
+    whole.depth = std::max(whole.depth, found->second.depth + 1);
   }
+  if (object.kind == "shape") whole.count = 1;  // a group may be large: shapes are looked at once
+  if (object.kind == "bsdf" && object.type == "twosided") whole.count = 2 * whole.count - 1;  // both sides look
+  const bool too_deep = whole.depth > max_nesting_, accepted = !too_deep && whole.count <= kMaxExpanded;
+  expanded_[&object] = accepted ? whole : Expanded{};
+  if (accepted) return true;
+  diagnostics_.error(object.where,
+                     too_deep ? fmt::format("{} '{}' holds {} objects inside each other when every reference is "
+                                            "followed; at most {} are accepted",
+                                            object.kind, object.type, whole.depth, max_nesting_)
+                              : fmt::format("{} '{}' holds {} objects when every reference is followed; at most {} "
+                                            "are accepted",
+                                            object.kind, object.type, whole.count, kMaxExpanded));
+  return false;
+}
+
+void limit_expansion(const std::vector<ObjectDescription*>& objects, size_t max_nesting, Diagnostics& diagnostics) {
+  ExpansionLimit limit(max_nesting, diagnostics);
+  for (ObjectDescription* object : objects)
+    if (object->kind != "scene" && !limit.add(*object))
+      for (Property& property : object->properties)
+        if (ObjectPtr* child = std::get_if<ObjectPtr>(&property.value)) child->reset();
 }
 
 }  // namespace covary

@@ -31,6 +31,24 @@ void resolve_references(const SceneObjects& objects, ObjectIds ids, const std::v
 /// each after everything it holds.
 std::vector<ObjectDescription*> break_cycles(const SceneObjects& objects, Diagnostics& diagnostics);
 
+/// Finds objects that hold too many others, or more than `max_nesting` inside each other, when every reference is
+/// followed, one after the other.
+class ExpansionLimit {
+ public:
+  ExpansionLimit(size_t max_nesting, Diagnostics& diagnostics) : max_nesting_(max_nesting), diagnostics_(diagnostics) {}
+  /// False after recording an error; the object then counts as one that holds nothing, as its user leaves it out. What
+  /// it holds was added before, or holds few itself.
+  bool add(const ObjectDescription& object);
+
+ private:
+  struct Expanded {
+    size_t count = 1, depth = 1;
+  };
+  size_t max_nesting_;
+  Diagnostics& diagnostics_;
+  std::unordered_map<const ObjectDescription*, Expanded> expanded_;
+};
+
 /// Records an error for objects that hold too many others, or more than `max_nesting` inside each other, when every
 /// reference is followed, and takes these out. `objects`: each after everything it holds.
 void limit_expansion(const std::vector<ObjectDescription*>& objects, size_t max_nesting, Diagnostics& diagnostics);

@@ -3,6 +3,7 @@
 // and light. Nothing is statistical; numbers are equal but for the rounding of the transformations.
 #include "formats/pbrt_reader.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -340,6 +341,23 @@ LightSource "projection" "string filename" "a.png"
            "'point' and 'spot'. Its like in XML is 'projector'",
        })
     EXPECT_TRUE(contains(found, message));
+}
+
+/// Chains that would overflow the stack, and mixtures of mixtures that would take for ever.
+TEST_F(Pbrt, ReferencesToReferencesEnd) {
+  const std::string head = "Camera \"perspective\"\nWorldBegin\n";
+  std::string deep = head + "Texture \"0\" \"spectrum\" \"constant\" \"rgb value\" [ .5 .5 .5 ]\n", wide = head;
+  for (int i = 1; i < 30000; ++i)
+    deep += fmt::format("Texture \"{}\" \"spectrum\" \"scale\" \"texture tex\" \"{}\"\n", i, i - 1);
+  wide += "MakeNamedMaterial \"0\" \"string type\" \"diffuse\"\n";
+  for (int i = 1; i < 60; ++i)
+    wide += fmt::format("MakeNamedMaterial \"{0}\" \"string type\" \"mix\" \"string materials\" [ \"{1}\" \"{1}\" ]\n",
+                        i, i - 1);
+  EXPECT_TRUE(contains(errors(deep),
+                       "scene.pbrt:67:1: texture 'scale' holds 65 objects inside each other when every "
+                       "reference is followed; at most 64 are accepted"));
+  EXPECT_TRUE(contains(errors(wide), "bsdf 'blendbsdf' holds "));
+  EXPECT_TRUE(contains(errors(wide), " objects when every reference is followed; at most "));
 }
 
 TEST_F(Pbrt, MistakesOfTheTextEndTheReading) {
