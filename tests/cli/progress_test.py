@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The line of progress, as a terminal shows it: what is done, how far it is, and nothing that stays."""
-import fcntl
 import os
-import pty
 import re
-import struct
-import termios
+import sys
 import unittest
 from pathlib import Path
 
 from cli_test import COVARY, CliTest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
+import terminal  # noqa: E402
 
 ROOM = str(Path(os.environ["SCENES"]) / "room.xml")
 RENDER = ("render", ROOM, "--resolution", "64x48", "--no-preview")
@@ -18,27 +18,9 @@ RENDER = ("render", ROOM, "--resolution", "64x48", "--no-preview")
 class Progress(CliTest):
     def shown(self, *arguments, columns=80):
         """What the command writes to a terminal so wide; it must succeed."""
-        try:
-            pid, terminal = pty.fork()
-        except OSError as error:
-            self.skipTest(f"no pseudo-terminals here: {error}")
-        if pid == 0:
-            fcntl.ioctl(2, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
-            os.chdir(self.path)
-            os.execv(COVARY, (COVARY, *arguments))
-        text = b""
-        while True:
-            try:
-                part = os.read(terminal, 4096)
-            except OSError:  # how Linux tells that nobody has the terminal open any more
-                break
-            if not part:
-                break
-            text += part
-        os.close(terminal)
-        _, status = os.waitpid(pid, 0)
-        self.assertEqual(os.waitstatus_to_exitcode(status), 0, text)
-        return text.decode()
+        text, exit_code = terminal.finish(*terminal.start(self, (COVARY, *arguments), self.path, columns))
+        self.assertEqual(exit_code, 0, text)
+        return text
 
     def in_order(self, text, *parts):
         at = 0

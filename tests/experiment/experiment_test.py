@@ -5,14 +5,17 @@ import copy
 import csv
 import json
 import os
-import pty
 import random
 import signal
 import subprocess
+import sys
 import tempfile
 import time
 import unittest
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "support"))
+import terminal  # noqa: E402
 
 COVARY = os.environ["COVARY"]
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
@@ -313,37 +316,18 @@ class Resume(ExperimentTest):
 
     def test_interrupted_at_a_terminal(self):
         """Ctrl-C reaches every process of the terminal's foreground group. The render then saves its films."""
-        try:
-            for end in pty.openpty():
-                os.close(end)
-        except OSError as error:
-            self.skipTest(f"no pseudo-terminals here: {error}")
         self.suite["budgets"], self.suite["seeds"] = [{"spp": 24}], 1
         long = ("--reference-spp", "8000")
         expected = without_times(self.results(*long, out="whole"))
         command = self.command(*long)
-        pid, terminal = pty.fork()
-        if pid == 0:
-            os.chdir(self.path)
-            os.execv(command[0], command)
+        pid, keyboard = terminal.start(self, command, self.path)
         # Long enough for the first samples, and a small part of the reference.
         wait_for(lambda: any(is_render(child) and catches(child, signal.SIGINT) and processor_seconds(child) > 1
                              for child in children(pid)))
-        os.write(terminal, b"\x03")
-        shown = b""
-        while True:
-            try:
-                part = os.read(terminal, 4096)
-            except OSError:  # how Linux tells that nobody has the terminal open any more
-                break
-            if not part:
-                break
-            shown += part
-        os.close(terminal)
-        _, status = os.waitpid(pid, 0)
-        self.assertTrue(os.WIFEXITED(status), shown)
-        self.assertEqual(os.WEXITSTATUS(status), 130, shown)
-        self.assertIn(b"interrupted after 0 of", shown)
+        os.write(keyboard, b"\x03")
+        shown, exit_code = terminal.finish(pid, keyboard)
+        self.assertEqual(exit_code, 130, shown)
+        self.assertIn("interrupted after 0 of", shown)
         films = list((self.path / "out" / "cache" / "passes").glob("*/*.exr"))
         self.assertEqual([film.name for film in films], ["independent.exr"])
         info = self.run_covary([COVARY, "info", str(films[0]), "--json"])
