@@ -229,6 +229,12 @@ TEST(FuzzReplay, Pbrt) {
                  "\"float radius\"", "Include \"a.pbrt\"", "NamedMaterial \"gold\"", "Shape \"disk\"", "true"},
                 2000);
 }
+TEST(FuzzReplay, Gltf) {
+  replay_corpus("gltf",
+                {"[", "{", "}", "null", "\"byteStride\":1,", "\"indices\":0,", "\"mode\":6,", "\"mesh\":0,",
+                 "\"sparse\":{},", "\"uri\":\"a.bin\",", "\"children\":[0],", std::string(4, '\0'), "\xff\xff\xff\xff"},
+                2000);
+}
 TEST(FuzzReplay, Tensor) {
   replay_corpus("tensor", {std::string(8, '\0'), std::string(8, '\xff'), std::string("\1\0\0\0\0\0\0\0", 8), "rgb"},
                 2000);

@@ -68,6 +68,9 @@ bool scene(Bytes input) {
 bool pbrt(Bytes input) {
   return accepts([&] { load_scene_text(text_of(input), "/no/such/folder/scene.pbrt"); });
 }
+bool gltf(Bytes input) {
+  return accepts([&] { load_scene_text(text_of(input), "/no/such/folder/scene.gltf"); });
+}
 bool tensor(Bytes input) {
   const InputFile input_file(input);
   return accepts([&] {
@@ -134,9 +137,9 @@ bool training(Bytes input) {
 
 std::span<const Target> targets() {
   static constexpr Target kTargets[] = {
-      {"scene", scene}, {"pbrt", pbrt},   {"tensor", tensor},   {"ply", ply},
-      {"obj", obj},     {"film", film},   {"image", image},     {"serialized", serialized},
-      {"suite", suite}, {"costs", costs}, {"grouped", grouped}, {"training", training}};
+      {"scene", scene}, {"pbrt", pbrt},       {"gltf", gltf},        {"tensor", tensor},         {"ply", ply},
+      {"obj", obj},     {"film", film},       {"image", image},      {"serialized", serialized}, {"suite", suite},
+      {"costs", costs}, {"grouped", grouped}, {"training", training}};
   return kTargets;
 }
 

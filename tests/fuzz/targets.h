@@ -14,6 +14,8 @@ using Bytes = std::span<const std::byte>;
 bool scene(Bytes input);
 /// The same of pbrt.
 bool pbrt(Bytes input);
+/// The same of glTF, JSON or binary, with images in the file.
+bool gltf(Bytes input);
 /// A tensor file, as of a measured material.
 bool tensor(Bytes input);
 bool ply(Bytes input);
