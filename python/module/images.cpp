@@ -57,7 +57,8 @@ nb::tuple metric(const std::string& name, nb::object image, nb::object reference
   std::vector<Image> references{image_of(reference, "reference")};
   if (!reference2.is_none()) references.push_back(image_of(reference2, "reference2"));
   MetricResult result;
-  run_work([&](WorkState&) { result = compute_metric(metric, pixels, references, low_dynamic_range); }, nb::none());
+  const auto compute = [&] { result = compute_metric(metric, pixels, references, low_dynamic_range); };
+  run_work([&](WorkState& state) { run_stoppable(state, compute); }, nb::none());
   return nb::make_tuple(result.value, result.n_pixels, result.n_non_finite, array_of(std::move(result.map)));
 }
 
@@ -71,13 +72,10 @@ nb::object denoised(nb::object image, nb::object albedo, nb::object normal, cons
   check_guide("albedo", a);
   check_guide("normal", n);
   Image result;
-  run_work(
-      [&](WorkState&) {
-        DenoiseOptions options;
-        options.library = library;
-        result = denoise(rgb, a.data.empty() ? nullptr : &a, n.data.empty() ? nullptr : &n, options);
-      },
-      nb::none());
+  const auto compute = [&] {
+    result = denoise(rgb, a.data.empty() ? nullptr : &a, n.data.empty() ? nullptr : &n, {library});
+  };
+  run_work([&](WorkState& state) { run_stoppable(state, compute); }, nb::none());
   return array_of(std::move(result));
 }
 

@@ -231,14 +231,37 @@ except KeyboardInterrupt:
     print("interrupted")
 """
 
+DENOISING = """
+import covary, numpy, signal, sys, threading, os, pathlib, time
+begins = pathlib.Path(os.environ["STAND_IN_BEGINS"])
+def interrupt():
+    while not begins.exists():
+        time.sleep(0.01)
+    os.kill(os.getpid(), signal.SIGINT)
+threading.Thread(target=interrupt, daemon=True).start()
+try:
+    covary.denoise(numpy.ones((8, 8, 3), "float32"), library=sys.argv[1])
+except KeyboardInterrupt:
+    print("interrupted", flush=True)
+    os._exit(0)  # not waiting for the library
+"""
+
 
 class Interruption(PackageTest):
+    def run_interrupted(self, code, *arguments, **environment):
+        run = subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True, timeout=100,
+                             check=False, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+                             env={**os.environ, **environment})
+        self.assertEqual((run.stdout, run.stderr), ("interrupted\n", ""))
+
+    def test_ctrl_c_while_a_library_works(self):
+        """It works for ten minutes, and cannot be stopped."""
+        self.run_interrupted(DENOISING, os.environ["STAND_IN_DENOISER"], STAND_IN_BEGINS=str(self.path / "begins"))
+
     def test_ctrl_c(self):
         """Ends a render that would take hours, and what there is was kept."""
         out = self.path / "out.exr"
-        run = subprocess.run([sys.executable, "-c", LONG, ROOM, out], capture_output=True, text=True, timeout=100,
-                             check=False, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler))
-        self.assertEqual((run.stdout, run.stderr), ("interrupted\n", ""))
+        self.run_interrupted(LONG, ROOM, out)
         self.assertEqual(covary.read_image(out).shape, (24, 36, 3))
 
     def test_progress_that_raises(self):
