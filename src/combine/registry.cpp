@@ -89,6 +89,7 @@ Estimator with_denoising(const Estimator& base, const DenoisingChoice& choice) {
                                                base.adaptive ? " with adaptive numbers of samples" : ""));
   options.use_oidn = choice.oidn != "off";
   if (options.use_oidn) options.oidn.library = choice.oidn;
+  options.history = choice.history;
   return with_denoising(base, options);
 }
 

@@ -158,6 +158,13 @@ std::vector<float> usual_weights(const std::vector<CandidateMaker>& makers) {
   return known ? weights : std::vector<float>{};
 }
 
+/// HeldOutInput::error_over_variance
+double usual_error(const std::vector<CandidateMaker>& makers) {
+  double usual = 0.5;
+  for (const CandidateMaker& maker : makers) usual = std::max(usual, maker.error_over_variance);
+  return usual;
+}
+
 ErrorKind kind_of(const std::vector<CandidateMaker>& makers, bool is_mean) {
   const bool network = has_network(makers);
   if (is_mean) return network ? ErrorKind::kNetwork : ErrorKind::kFilters;
@@ -190,7 +197,7 @@ DenoiseMode denoise_mode(const std::string& name) {
 }
 
 MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<CandidateMaker>& makers, DenoiseMode mode,
-                                  bool std_error, std::span<const Layer> layers) {
+                                  bool std_error, std::span<const Layer> layers, const History* history) {
   const ModeSettings chosen = settings_of(mode);
   const std::vector<unsigned char>& valid = parts.valid;
   std::vector<CandidateSet> sets = candidates_of({&parts.whole, &parts.halves[0], &parts.halves[1]}, valid, makers);
@@ -219,16 +226,19 @@ MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<Candid
                               mixture.halves[half]);
   }
 
+  const std::array<const Image*, 2> images = {&mixture.halves[0], &mixture.halves[1]};
+  const HeldOutInput held_out{images, input.independent, input.guide, &valid, usual_error(makers)};
+  if (history) {
+    const Image frame_error = held_out_error(held_out);
+    add_history(*history, {input.independent, &frame_error, input.guide, &valid, input.counts}, mixture);
+  }
+
   MixedDenoising out;
   for (const CandidateMaker& maker : makers) out.names.insert(out.names.end(), maker.names.begin(), maker.names.end());
   EstimatorResult& result = out.result;
   result.nonfinite_pixels = parts.whole.image.nonfinite_pixels;
   result.estimate = std::move(mixture.image);
   if (std_error) {
-    const std::array<const Image*, 2> images = {&mixture.halves[0], &mixture.halves[1]};
-    double usual = 0.5;
-    for (const CandidateMaker& maker : makers) usual = std::max(usual, maker.error_over_variance);
-    const HeldOutInput held_out{images, input.independent, input.guide, &valid, usual};
     result.std_error = held_out_error(held_out);
     result.bias = held_out_bias({images, {&guide_of(halves[0]), &guide_of(halves[1])}, input.independent, &valid});
     result.risk_rows = image_risk(
@@ -286,8 +296,8 @@ Run run_of_pair(const Estimator& base, const MixedDenoisingOptions& options, boo
     check_guides(settings.guides);
     std::vector<CandidateMaker> makers = {filtered_candidates(settings.guides)};
     if (with_oidn) makers.push_back(neural_candidates(settings.guides, options.oidn));
-    return denoise_by_mixture(parts_of_pair(base, crn, independent, settings), makers, options.mode,
-                              settings.std_error);
+    return denoise_by_mixture(parts_of_pair(base, crn, independent, settings), makers, options.mode, settings.std_error,
+                              {}, options.history.get());
   };
 }
 
@@ -298,7 +308,8 @@ Run run_of_mean(const MixedDenoisingOptions& options, bool with_oidn) {
     if (with_oidn) makers.push_back(neural_candidates(settings.guides, options.oidn, CandidateBase::kMean));
     makers.push_back(filtered_candidates(settings.guides, CandidateBase::kMean));
     if (!can_be_mixed(independent)) return single_candidate(independent, makers, settings.layers);
-    return denoise_by_mixture(parts_of_mean(independent), makers, options.mode, settings.std_error, settings.layers);
+    return denoise_by_mixture(parts_of_mean(independent), makers, options.mode, settings.std_error, settings.layers,
+                              options.history.get());
   };
 }
 

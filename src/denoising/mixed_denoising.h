@@ -8,6 +8,7 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -15,6 +16,7 @@
 
 #include "denoising/candidates.h"
 #include "denoising/denoising_parts.h"
+#include "denoising/history.h"
 #include "estimators/estimator.h"
 #include "settings/settings.h"
 
@@ -33,6 +35,8 @@ struct MixedDenoisingOptions {
   DenoiseMode mode = DenoiseMode::kBalanced;
   bool use_oidn = true;  ///< candidates of Open Image Denoise, where it is installed
   DenoiseOptions oidn;   ///< where it is; a library that is named and is not there is an error
+  /// Of a frame of moving pictures, mixed in where there are samples enough for a mixture; layers have no part in it.
+  std::shared_ptr<const History> history;
 };
 
 /// The estimator's image denoised. `base` is an estimator of a pair that predicts its error, and the result needs twice
@@ -46,8 +50,9 @@ bool can_be_denoised(const Estimator& estimator);
 
 /// MixedDenoisingOptions by words, as options have them.
 struct DenoisingChoice {
-  std::string mode = "none";  ///< of denoise_mode_names()
-  std::string oidn;           ///< a library or a folder of it; "": where it is found, "off": without it
+  std::string mode = "none";               ///< of denoise_mode_names()
+  std::string oidn;                        ///< a library or a folder of it; "": where it is found, "off": without it
+  std::shared_ptr<const History> history;  ///< MixedDenoisingOptions::history, which no word says
   bool denoises() const { return mode != "none"; }
   bool uses_oidn() const { return denoises() && oidn != "off"; }
 };
@@ -66,9 +71,9 @@ struct MixedDenoising {
   std::vector<Image> candidates;   ///< made of all samples
   std::vector<Image> weights;      ///< one channel each
 };
-/// `std_error`: with the error of the result. `layers`: of a mean; its result has them, too.
+/// `std_error`: with the error of the result. `layers`: of a mean; its result has them, too. `history`: or null.
 MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<CandidateMaker>& makers, DenoiseMode mode,
-                                  bool std_error, std::span<const Layer> layers = {});
+                                  bool std_error, std::span<const Layer> layers = {}, const History* history = nullptr);
 
 /// Samples per pixel, in two groups or more, whose halves can judge candidates.
 inline constexpr int kFewestMixedSamples = 4;

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+// Histories of known error: which are used, and how far a wrong one can lead.
+#include "denoising/history.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "estimators/test_images.h"
+
+namespace covary {
+namespace {
+
+constexpr int kSize = 64;
+constexpr float kTruth = 0.5f;
+constexpr double kFrameVariance = 0.0025;  // of a half's mixture; the whole has half of it
+constexpr double kNoise = 0.04;            // variance of a half's independent image
+
+Image flat(float offset, double variance, uint64_t seed) {
+  Image image(kSize, kSize, 3);
+  const auto width = static_cast<float>(std::sqrt(12 * variance));
+  for (size_t i = 0; i < image.data.size(); ++i) image.data[i] = kTruth + offset + width * test::noise(seed, i, 0);
+  return image;
+}
+
+Moments moments_of(const Image& image) {
+  Moments m{Planes(kSize, kSize, 3, 0, 0), Planes(kSize, kSize, 3, 0, static_cast<float>(kNoise)), {}};
+  for (int y = 0; y < kSize; ++y)
+    for (int x = 0; x < kSize; ++x)
+      for (int c = 0; c < 3; ++c) m.mean.row(c, y)[x] = image.pixel(x, y)[c];
+  return m;
+}
+
+struct Frame {
+  std::array<Moments, 2> independent;
+  Mixture mixture;
+  Image std_error, guide = flat(0, 0, 0);
+  std::vector<unsigned char> valid = std::vector<unsigned char>(size_t{kSize} * kSize, 1);
+
+  explicit Frame(uint64_t seed)
+      : independent{moments_of(flat(0, kNoise, 10 * seed + 1)), moments_of(flat(0, kNoise, 10 * seed + 2))},
+        std_error(kSize, kSize, 3) {
+    mixture.halves = {flat(0, kFrameVariance, 10 * seed + 3), flat(0, kFrameVariance, 10 * seed + 4)};
+    mixture.image = mixture.halves[0];
+    for (size_t i = 0; i < mixture.image.data.size(); ++i)
+      mixture.image.data[i] = 0.5f * (mixture.halves[0].data[i] + mixture.halves[1].data[i]);
+    mixture.weights = {Image(kSize, kSize, 1)};
+    std::fill(mixture.weights[0].data.begin(), mixture.weights[0].data.end(), 0.6f);
+    std::fill(std_error.data.begin(), std_error.data.end(), std_deviation());
+  }
+  static float std_deviation() { return static_cast<float>(std::sqrt(kFrameVariance / 2)); }
+  Image add(const History& history) {
+    return add_history(history, {{&independent[0], &independent[1]}, &std_error, &guide, &valid, {}}, mixture);
+  }
+};
+
+History history(Image image) {
+  return {std::move(image), Image(kSize, kSize, 1), std::vector<unsigned char>(size_t{kSize} * kSize, 1)};
+}
+
+double mean_squared_error(const Image& image) {
+  double sum = 0;
+  for (const float v : image.data) sum += (v - kTruth) * (v - kTruth);
+  return sum / static_cast<double>(image.data.size());
+}
+
+TEST(History, TakesNoiseAwayWhereItIsRight) {
+  Frame frame(1);
+  const double alone = mean_squared_error(frame.mixture.image);
+  const Image weights = frame.add(history(flat(0, 0, 0)));
+  EXPECT_LT(mean_squared_error(frame.mixture.image), 0.25 * alone);
+  for (const float w : weights.data) EXPECT_GT(w, 0.6f);
+  EXPECT_NEAR(frame.mixture.weights[0].data[7], 0.6f * (1 - weights.data[7]), 1e-6f);
+}
+
+TEST(History, LeadsNowhereWhereItIsWrong) {
+  for (const float offset : {0.05f, 0.2f, -0.4f}) {
+    Frame frame(2);
+    const double alone = mean_squared_error(frame.mixture.image);
+    frame.add(history(flat(offset, 0, 0)));
+    EXPECT_LT(mean_squared_error(frame.mixture.image), 1.05 * alone) << offset;
+  }
+}
+
+TEST(History, StaysWithinTheIntervalOfTheFrame) {
+  Frame frame(3);
+  Image wrong_in_one_place = flat(0, 0, 0);
+  std::fill_n(wrong_in_one_place.pixel(30, 30), 3, 100.0f);
+  const Image before = frame.mixture.image;
+  frame.add(history(std::move(wrong_in_one_place)));
+  EXPECT_LE(frame.mixture.image.pixel(30, 30)[1] - before.pixel(30, 30)[1], 1.51f * Frame::std_deviation());
+}
+
+TEST(History, HasNoPartWhereItIsUnknownOrUncertain) {
+  Frame frame(4);
+  History some = history(flat(0, 0, 0));
+  for (int x = 0; x < kSize; ++x) {
+    some.known[size_t{10} * kSize + x] = 0;
+    *some.squared_error.pixel(x, 12) = 1e9f;
+  }
+  const Image before = frame.mixture.image;
+  frame.add(some);
+  for (int x = 0; x < kSize; ++x)
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_EQ(frame.mixture.image.pixel(x, 10)[c], before.pixel(x, 10)[c]);
+      EXPECT_NEAR(frame.mixture.image.pixel(x, 12)[c], before.pixel(x, 12)[c], 1e-6f);
+    }
+  EXPECT_NE(frame.mixture.image.data, before.data);
+}
+
+TEST(History, OfAnotherSizeIsAnError) {
+  Frame frame(5);
+  EXPECT_THROW(frame.add({Image(3, 2, 3), Image(3, 2, 1), std::vector<unsigned char>(6)}), Error);
+}
+
+}  // namespace
+}  // namespace covary

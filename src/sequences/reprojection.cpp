@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sequences/reprojection.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/error.h"
+#include "core/parallel.h"
+#include "core/vec.h"
+
+namespace covary {
+namespace {
+
+constexpr float kAtRest = 1e-3f;    // pixels
+constexpr float kEdge = 0.25f;      // pixels of motion from a pixel to the next
+constexpr float kRelative = 0.01f;  // of the depth that a pixel may differ by
+constexpr float kOfSlope = 1.5f;    // and of the depth's change from pixel to pixel
+
+struct Tap {
+  int first;                     // of four pixels
+  std::array<float, 4> weights;  // Catmull-Rom
+  float part;                    // of the third pixel, of the two in the middle
+};
+
+/// Around the position `at`, in pixels with centres at + 0.5.
+Tap tap(float at) {
+  const float shifted = at - 0.5f, base = std::floor(shifted), t = shifted - base;
+  return {static_cast<int>(base) - 1,
+          {0.5f * t * (-1 + t * (2 - t)), 1 + 0.5f * t * t * (3 * t - 5), 0.5f * t * (1 + t * (4 - 3 * t)),
+           0.5f * t * t * (t - 1)},
+          t};
+}
+
+/// Depth's smallest change to a neighbour along each axis: that of the surface, not of an edge.
+float slope(const Image& depth, int x, int y) {
+  const float here = *depth.pixel(x, y);
+  const auto change = [&](int dx, int dy) {
+    const int nx = x + dx, ny = y + dy;
+    const bool inside = nx >= 0 && ny >= 0 && nx < depth.width && ny < depth.height;
+    return inside ? std::abs(*depth.pixel(nx, ny) - here) : kInfinity;
+  };
+  const float along_x = std::min(change(-1, 0), change(1, 0)), along_y = std::min(change(0, -1), change(0, 1));
+  return (std::isfinite(along_x) ? along_x : 0) + (std::isfinite(along_y) ? along_y : 0);
+}
+
+/// Something near moves otherwise.
+bool is_edge(const Image& motion, int x, int y) {
+  const float* here = motion.pixel(x, y);
+  for (int ny = std::max(y - 1, 0); ny <= std::min(y + 1, motion.height - 1); ++ny)
+    for (int nx = std::max(x - 1, 0); nx <= std::min(x + 1, motion.width - 1); ++nx)
+      for (int c : {0, 1})
+        if (!(std::abs(motion.pixel(nx, ny)[c] - here[c]) <= kEdge)) return true;
+  return false;
+}
+
+class Reprojection {
+ public:
+  Reprojection(const Image& before, const Image& depth_before, const MotionLayers& now)
+      : before_(before), depth_before_(depth_before), now_(now) {}
+
+  /// False: not known.
+  bool move(int x, int y, float* value, float& squared_error) const {
+    const float* motion = now_.motion.pixel(x, y);
+    if (std::abs(motion[0]) < kAtRest && std::abs(motion[1]) < kAtRest) {
+      if (!is_same_depth(x, y, x, y)) return false;
+      std::copy_n(before_.pixel(x, y), 3, value);
+      return true;
+    }
+    const float old_x = static_cast<float>(x) + 0.5f + motion[0], old_y = static_cast<float>(y) + 0.5f + motion[1];
+    if (!(old_x >= 0.5f && old_y >= 0.5f && old_x < static_cast<float>(before_.width) - 0.5f &&
+          old_y < static_cast<float>(before_.height) - 0.5f) ||
+        is_edge(now_.motion, x, y))
+      return false;
+    const Tap h = tap(old_x), v = tap(old_y);
+    for (const int j : {1, 2})
+      for (const int i : {1, 2})
+        if (!is_same_depth(x, y, column(h.first + i), row(v.first + j))) return false;
+    for (int c = 0; c < 3; ++c) squared_error += sqr(interpolate(h, v, c, value[c])) / 3;
+    return true;
+  }
+
+ private:
+  int column(int x) const { return std::clamp(x, 0, before_.width - 1); }
+  int row(int y) const { return std::clamp(y, 0, before_.height - 1); }
+
+  bool is_same_depth(int x, int y, int old_x, int old_y) const {
+    const float depth = *now_.depth.pixel(x, y), old = *depth_before_.pixel(old_x, old_y);
+    if (depth == 0 || old == 0) return depth == old;
+    const float expected = depth + now_.motion.pixel(x, y)[2];
+    return std::abs(old - expected) <= kRelative * expected + kOfSlope * slope(now_.depth, x, y);
+  }
+
+  /// The difference to linear interpolation.
+  float interpolate(const Tap& h, const Tap& v, int c, float& value) const {
+    float sum = 0, low = kInfinity, high = -kInfinity, linear = 0;
+    for (int j = 0; j < 4; ++j)
+      for (int i = 0; i < 4; ++i) {
+        const float pixel = before_.pixel(column(h.first + i), row(v.first + j))[c];
+        sum += h.weights[i] * v.weights[j] * pixel;
+        if (i == 0 || i == 3 || j == 0 || j == 3) continue;
+        low = std::min(low, pixel), high = std::max(high, pixel);
+        linear += (i == 2 ? h.part : 1 - h.part) * (j == 2 ? v.part : 1 - v.part) * pixel;
+      }
+    value = std::clamp(sum, low, high);
+    return sum - linear;
+  }
+
+  const Image& before_;
+  const Image& depth_before_;
+  const MotionLayers& now_;
+};
+
+}  // namespace
+
+namespace {
+
+/// Means over 3 x 3 pixels, as far as they are in the image.
+Image smoothed(const Image& image) {
+  Image result(image.width, image.height, 1);
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x) {
+      float sum = 0, n = 0;
+      for (int ny = std::max(y - 1, 0); ny <= std::min(y + 1, image.height - 1); ++ny)
+        for (int nx = std::max(x - 1, 0); nx <= std::min(x + 1, image.width - 1); ++nx)
+          sum += *image.pixel(nx, ny), n += 1;
+      *result.pixel(x, y) = sum / n;
+    }
+  return result;
+}
+
+}  // namespace
+
+History reproject(const Image& before, const Image& depth_before, const MotionLayers& now) {
+  const int width = now.depth.width, height = now.depth.height;
+  for (const Image* image : {&before, &depth_before, &now.motion})
+    if (image->width != width || image->height != height)
+      throw Error(ErrorCode::kInput, "frames of a sequence differ in size");
+  History history{Image(width, height, 3), Image(width, height, 1),
+                  std::vector<unsigned char>(static_cast<size_t>(width) * height)};
+  const Reprojection reprojection(before, depth_before, now);
+  parallel_for(height, 4, [&](int y) {
+    for (int x = 0; x < width; ++x) {
+      float* value = history.image.pixel(x, y);
+      const bool known = reprojection.move(x, y, value, *history.squared_error.pixel(x, y)) &&
+                         std::all_of(value, value + 3, [](float v) { return std::isfinite(v); });
+      history.known[static_cast<size_t>(y) * width + x] = known;
+    }
+  });
+  history.squared_error = smoothed(history.squared_error);
+  return history;
+}
+
+}  // namespace covary

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// The image of the frame before, moved to where its points are now.
+#pragma once
+
+#include "denoising/history.h"
+
+namespace covary {
+
+/// Layers of a frame, of one size: Depth and Motion as in passes/motion.h.
+struct MotionLayers {
+  Image depth;   ///< 1 channel; 0 where there is nothing
+  Image motion;  ///< 3 channels: pixels to the right and down, and depth: before minus now
+};
+
+/// `before`: the picture of the frame before, 3 channels, and `depth_before` its depth, in the same window of the frame
+/// as `now`. Where motion is less than a thousandth of a pixel, values are taken as they are. Otherwise they are
+/// interpolated by Catmull-Rom splines [Catmull1974], clamped to the four pixels around. `squared_error` is the squared
+/// difference to linear interpolation, its mean over the channels and 3 x 3 pixels.
+///
+/// Not known is what lies out of the window; what was hidden, by depth: one of the four pixels around is not as far away
+/// as the point was; and, where things move against each other or the background (by more than a quarter of a pixel from
+/// a pixel to the next), the pixels at edges, which show both.
+History reproject(const Image& before, const Image& depth_before, const MotionLayers& now);
+
+}  // namespace covary
