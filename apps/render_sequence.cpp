@@ -22,6 +22,7 @@
 #include "plans/camera_path.h"
 #include "plans/pass_files.h"
 #include "render_steps.h"
+#include "sequences/reprojection.h"
 
 namespace covary {
 namespace {
@@ -48,6 +49,9 @@ void check(const RenderOptions& options) {
                                     {"--debug-strategies", !options.debug_strategies.empty()},
                                     {"--save-training", !request.save_training.empty()}})
     if (given) usage(fmt::format("{} is an option of single images, not of --frames", name));
+  const DenoisingChoice& denoising = options.settings.denoising;
+  if (options.sequence.history && (!denoising.denoises() || request.layers))
+    usage("--history is for frames with --denoise, and without --layers");
   for (const auto& [name, path] :
        {std::pair{"-o", request.output}, {"--passes", request.passes}, {"--json", options.json}})
     if (!path.empty() && !is_frame_pattern(path))
@@ -70,12 +74,15 @@ RenderOptions frame_options(const RenderOptions& options, int frame) {
   return one;
 }
 
-/// A hash of what the image of the frame depends on: scene and camera, the camera before, seed and settings.
-std::string frame_hash(const RenderOptions& one, const LoadedScene& scene, const Transform& before) {
+/// A hash of what the image of the frame depends on: scene and camera, the camera before, seed and settings; with a
+/// history, `earlier`, the hash of the frame that it is made of.
+std::string frame_hash(const RenderOptions& one, const LoadedScene& scene, const Transform& before,
+                       const std::string& earlier) {
   OptionValues values = one.values;
   for (const char* option : {"output", "passes", "resume", "overwrite", "checkpoint", "no-preview"})
     values.erase(option);
   std::string text = scene.content_hash;
+  if (one.sequence.history) text += " history " + earlier;
   for (const auto& row : before.matrix()) text += fmt::format(" {}", fmt::join(row, " "));
   for (const OptionValues& all : std::array{std::as_const(values), one.of_integrator, one.of_estimator})
     for (const auto& [name, value] : all) text += fmt::format("\n{}={}", name, value);
@@ -105,6 +112,16 @@ void prepare(const FrameCameras& cameras, int frame, LoadedScene& scene, RenderR
   MotionImages images = motion_images(*scene.scene, previous, window_of(scene, request));
   request.beside["Depth"] = std::move(images.depth);
   request.beside["Motion"] = std::move(images.motion);
+}
+
+/// The history that the frame in the file is for one with these layers.
+std::shared_ptr<const History> history_of(const std::string& path, const RenderRequest& request) {
+  const PlacedImage before = read_image(path);
+  Image depth(before.image.width, before.image.height, 1);
+  const std::vector<ExrPlane> planes = {{"Depth", ExrPlane::Type::kFloat, depth.data.data(), sizeof(float)}};
+  ExrFile(path).read(planes);
+  return std::make_shared<History>(
+      reproject(before.image, depth, {request.beside.at("Depth"), request.beside.at("Motion")}));
 }
 
 class SequenceRender {
@@ -144,16 +161,20 @@ class SequenceRender {
   }
 
   void render_frame(const FrameCameras& cameras, int frame, const StopFlag& stop) {
-    const RenderOptions one = frame_options(options_, frame);
+    RenderOptions one = frame_options(options_, frame);
     if (stop.is_set()) throw Unfinished(stop.exit_code(), interruption(frame));
     RenderRequest request = make_request(one, *scene_);
     prepare(cameras, frame, *scene_, request);
-    const std::string hash = frame_hash(one, *scene_, cameras.at(frame - 1));
+    const bool follows = frame - 1 == last_frame_;  // of frames that are farther apart nothing is known
+    const std::string hash = frame_hash(one, *scene_, cameras.at(frame - 1), follows ? last_hash_ : "");
+    last_frame_ = frame, last_hash_ = hash;
     if (request.resume && is_complete(request.output, hash)) {
       if (!options_.quiet) fmt::print(stderr, "{}: complete\n", request.output);
       return;
     }
     request.attributes[film_key::kFrame] = hash;
+    if (options_.sequence.history && follows)
+      one.settings.denoising.history = history_of(frame_name(options_.request().output, frame - 1), request);
     ProgressLine progress(fmt::format("{} frame {}", stem(), frame), options_.quiet);
     const RenderResult result = render_watched(one, *scene_, request, display_.get(), progress, stop);
     try {
@@ -179,6 +200,8 @@ class SequenceRender {
   std::optional<LoadedScene> scene_;
   double load_seconds_ = 0;
   std::vector<int> missed_;
+  int last_frame_ = -2;
+  std::string last_hash_;
 };
 
 }  // namespace

@@ -27,7 +27,11 @@ void declare(Settings& s, SequenceSettings& v) {
            "own: the seed of frame n is `seed` + 1,000,000 n, so that errors of frames are independent; same: `seed` "
            "for all",
            {.effect = OptionEffect::kSamples});
-  s.only_if(v.is_sequence(), {"camera-path", "frame-seeds"}, "without `frames`");
+  s.on_off("history", v.history,
+           "Mix in what the frame before shows, moved to where it is now, where held-out samples find that better");
+  s.only_if(v.is_sequence(), {"camera-path", "frame-seeds", "history"}, "without `frames`");
+  if (v.history && v.seeds == FrameSeeds::kSame)
+    throw Error(ErrorCode::kUsage, "`history` needs `frame-seeds` own: errors of frames must be independent");
 }
 
 }  // namespace covary

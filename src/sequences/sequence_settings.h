@@ -16,6 +16,7 @@ struct SequenceSettings {
   std::string camera_path;  ///< JSON file (plans/camera_path.h); empty: the camera rests
   std::optional<FrameRange> frames;
   FrameSeeds seeds = FrameSeeds::kOwn;
+  bool history = false;  ///< frames before are mixed in
 
   bool is_sequence() const { return frames.has_value(); }
   /// Of a frame, where that of the command is `seed`: no two frames have one in common, nor have those of commands

@@ -104,6 +104,37 @@ class Frames(CliTest):
         errors = self.render("-o", "f_#.exr", "--resume", "--seed", "9").stderr
         self.assertIn("'f_1.exr' is no frame of this command: its scene, camera, seed or options are others", errors)
 
+    def difference(self, one, other):
+        a, b = self.picture(one), self.picture(other)
+        return sum((p - q)**2 / (q**2 + 0.01) for x, y in zip(a, b) for p, q in zip(x, y)) / len(a[0]) / 3
+
+    def test_history_takes_noise_away(self):
+        """The camera rests: frames alone differ by their noise, which history takes away."""
+        self.write_path((0, START))
+        quick = ("--denoise", "auto", "--oidn", "off", "--resolution", "64x48")
+        self.good_render("-o", "reference_#.exr", "--resolution", "64x48", "--spp", "1024", frames="9")
+        self.good_render("-o", "alone_#.exr", *quick, frames="1-6")
+        self.good_render("-o", "on_#.exr", *quick, "--history", "on", frames="1-6")
+        self.assertEqual(self.picture("on_1.exr"), self.picture("alone_1.exr"))
+        alone = sum(self.difference(f"alone_{n}.exr", "reference_9.exr") for n in (4, 5, 6))
+        with_history = sum(self.difference(f"on_{n}.exr", "reference_9.exr") for n in (4, 5, 6))
+        self.assertLess(with_history, 0.8 * alone)
+        flicker = [sum(self.difference(f"{name}_{n}.exr", f"{name}_{n + 1}.exr") for n in (3, 4, 5))
+                   for name in ("alone", "on")]
+        self.assertLess(flicker[1], 0.75 * flicker[0])
+
+    def test_history_is_the_same_after_an_interruption(self):
+        small = ("--denoise", "auto", "--oidn", "off", "--history", "on")
+        self.good_render("-o", "whole_#.exr", *small)
+        self.good_render("-o", "parts_#.exr", *small, frames="1-2")
+        self.good_render("-o", "parts_#.exr", *small, "--resume")
+        for n in range(1, 5):
+            self.assertEqual(self.picture(f"whole_{n}.exr"), self.picture(f"parts_{n}.exr"))
+        self.good_render("-o", "alone_#.exr", "--denoise", "auto", "--oidn", "off")
+        self.assertNotEqual(self.picture("whole_3.exr"), self.picture("alone_3.exr"))
+        self.assertIn("'parts_1.exr' is no frame of this command",
+                      self.render("-o", "parts_#.exr", "--resume", "--denoise", "auto", "--oidn", "off").stderr)
+
     def test_interrupted(self):
         command = [COVARY, "render", "room.xml", *QUIET, "--resolution", "160x120", "--spp", "256", "--camera-path",
                    "path.json", "--frames", "1-400", "-o", "f_###.exr", "--denoise", "none"]
@@ -138,6 +169,9 @@ class Frames(CliTest):
             result = self.render(*arguments)
             self.assertEqual(result.returncode, 2)
             self.assertIn(message, result.stderr)
+        for more, message in ((("--denoise", "none"), "--history is for frames with --denoise"),
+                              (("--denoise", "auto", "--frame-seeds", "same"), "--history needs --frame-seeds own")):
+            self.assertIn(message, self.render("-o", "f_#.exr", "--history", "on", *more).stderr)
         self.assertIn("--frames '4-1': expected FIRST-LAST", self.render("-o", "f_#.exr", frames="4-1").stderr)
         alone = self.run_covary("render", "room.xml", "-o", "f.exr", "--camera-path", "path.json")
         self.assertIn("--camera-path has no effect without --frames", alone.stderr)
