@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Five sequences made of scenes/room.xml, with what moves known exactly: a moving camera, a turning box whose shadow
+moves along, a turning mirror, a lamp that is dimmed, and one in which nothing moves.
+
+NAME_0001.xml, NAME_0002.xml, … are scenes in which nothing moves, one for each frame; the references are renders of
+these, so that a fault of what interpolates motion shows as an error. A renderer of sequences takes them, too, but for
+`camera` and `still`, which have one scene NAME.xml, with a camera path camera.json beside it."""
+import copy
+import json
+import math
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy
+
+ROOM = Path(__file__).resolve().parents[2] / "scenes/room.xml"
+#: horizontal field of view of the room's camera in degrees
+FOV = 54
+NAMES = ["camera", "still", "box", "mirror", "lamp"]
+#: origin and target at the first frame and at the last one, whatever their number
+CAMERA_FROM, CAMERA_TO = ((0.5, 1.45, 3.8), (-0.1, 0.95, -1)), ((-0.2, 1.35, 3.0), (0.3, 1.0, -1))
+
+
+def part_of(frame, frames):
+    """How much of the sequence has passed, 0 to 1. Frames count from 1."""
+    return (frame - 1) / max(1, frames - 1)
+
+
+def translate(x, y, z):
+    matrix = numpy.eye(4)
+    matrix[:3, 3] = x, y, z
+    return matrix
+
+
+def scale(x, y, z):
+    return numpy.diag([x, y, z, 1.0])
+
+
+def rotate_y(degrees):
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    matrix = numpy.eye(4)
+    matrix[0, 0], matrix[0, 2], matrix[2, 0], matrix[2, 2] = c, s, -s, c
+    return matrix
+
+
+def look_at(origin, target, up=(0, 1, 0)):
+    """From the camera to the world as Mitsuba has it: x to the left of the image, y up, z along the view."""
+    view = numpy.subtract(target, origin) / numpy.linalg.norm(numpy.subtract(target, origin))
+    left = numpy.cross(up, view) / numpy.linalg.norm(numpy.cross(up, view))
+    matrix = numpy.eye(4)
+    matrix[:3] = numpy.stack([left, numpy.cross(view, left), view, origin], axis=1)
+    return matrix
+
+
+def camera(name, frame, frames):
+    """The camera's matrix to the world; all sequences but `camera` have the room's own."""
+    t = part_of(frame, frames) if name == "camera" else 0
+    ends = [[numpy.array(point) for point in end] for end in (CAMERA_FROM, CAMERA_TO)]
+    return look_at(*((1 - t) * first + t * last for first, last in zip(*ends)))
+
+
+def box(frame, frames):
+    """A quarter of a turn on the floor, 1.2 m to the right, through the light of the window."""
+    t = part_of(frame, frames)
+    return translate(-0.55 + 1.2 * t, 0.2, 0.5) @ rotate_y(90 * t) @ scale(0.2, 0.2, 0.2)
+
+
+def mirror(frame, frames):
+    """A standing mirror, which turns by 30 degrees."""
+    return translate(1.2, 1.0, 0.6) @ rotate_y(-60 + 30 * part_of(frame, frames)) @ scale(0.4, 0.8, 1)
+
+
+def dimming(frame, frames):
+    """What is left of the lamp's radiance: falls to a tenth."""
+    return 10 ** -part_of(frame, frames)
+
+
+def text_of(matrix):
+    return ", ".join(f"{value:.9g}" for value in matrix.ravel())
+
+
+def add_shape(root, kind, bsdf, matrix):
+    shape = ElementTree.SubElement(root, "shape", type=kind)
+    transform = ElementTree.SubElement(shape, "transform", name="to_world")
+    ElementTree.SubElement(transform, "matrix", value=text_of(matrix))
+    ElementTree.SubElement(shape, "ref", id=bsdf)
+
+
+def set_camera(root, matrix):
+    transform = root.find("sensor/transform")
+    transform.clear()
+    transform.set("name", "to_world")
+    ElementTree.SubElement(transform, "matrix", value=text_of(matrix))
+
+
+def dim_lamp(root, factor):
+    radiance = root.find("shape[@type='sphere']/emitter/rgb")
+    values = [float(value) * factor for value in radiance.get("value").split(",")]
+    radiance.set("value", ", ".join(f"{value:.9g}" for value in values))
+
+
+def scene_of(room, name, frame, frames):
+    """The room at this frame."""
+    root = copy.deepcopy(room)
+    set_camera(root, camera(name, frame, frames))
+    if name == "box":
+        add_shape(root, "cube", "wood", box(frame, frames))
+    if name == "mirror":
+        add_shape(root, "rectangle", "silver", mirror(frame, frames))
+    if name == "lamp":
+        dim_lamp(root, dimming(frame, frames))
+    return root
+
+
+def camera_path(frames):
+    """What --camera-path reads."""
+    return {"keyframes": [{"time": frame, "to_world": camera("camera", frame, frames).tolist()}
+                          for frame in range(1, frames + 1)]}
+
+
+def still_name(name, frame):
+    return f"{name}_{frame:04d}.xml"
+
+
+def write_sequence(name, frames, folder):
+    """Writes a sequence's files; the name of the scene, or the pattern of names, that a renderer of sequences takes."""
+    room = ElementTree.parse(ROOM).getroot()
+    for frame in range(1, frames + 1):
+        ElementTree.ElementTree(scene_of(room, name, frame, frames)).write(folder / still_name(name, frame))
+    if name not in ("camera", "still"):
+        return f"{name}_####.xml", []
+    ElementTree.ElementTree(scene_of(room, name, 1, frames)).write(folder / f"{name}.xml")
+    if name == "still":
+        return "still.xml", []
+    (folder / "camera.json").write_text(json.dumps(camera_path(frames), indent=1) + "\n")
+    return "camera.xml", ["--camera-path", folder / "camera.json"]

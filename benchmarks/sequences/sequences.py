@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: Apache-2.0
+"""sequences.py references|measure --work FOLDER [NAME...]
+
+Five sequences (scenes.py): references of every frame, and a table of what methods make of few samples. `references`
+renders what FOLDER does not hold yet, two images of each frame; `measure` renders the methods and compares. Each frame
+alone is rendered from a scene of its own, in which nothing moves; `sequence` is one command for all frames. A frame's
+seed is that of --seeds plus 1,000,000 times its number, as the command for all frames has it. Needs numpy.
+Errors are given as multiples of those of `auto`, the mixture of each frame alone."""
+import argparse
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import accumulation
+import measures
+import numpy
+import scenes
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tests/cli"))
+
+from exr_reader import header, read_exr  # noqa: E402
+
+REFERENCE_SEEDS = (1001, 1002)
+#: SequenceSettings::seed_of() of src/sequences: seeds of two frames of one command are that far apart
+SEEDS_OF_FRAME = 1_000_000
+COLUMNS = ["relmse_ratio", "temporal_ratio", "still_relmse_ratio", "worst_relmse", "worst_temporal",
+           "worst_relmse_of_frame", "worst_temporal_of_frame"]
+
+
+def run(options, *words):
+    command = ["nice", "-n", str(options.nice), options.covary, *map(str, words)]
+    result = subprocess.run(command, capture_output=True, text=True)
+    if result.returncode:
+        raise SystemExit(f"{' '.join(command)}\n{result.stderr}")
+
+
+def layers(path, *names):
+    """Layers of an EXR file of covary, each (height, width, 3); "" is the image itself."""
+    data = path.read_bytes()
+    x0, y0, x1, y1 = numpy.frombuffer(header(data)[0]["dataWindow"], "<i4")
+    channels = read_exr(data)
+    result = []
+    for name in names:
+        parts = [f"{name}.{end}" if name else end for end in ("XYZ" if f"{name}.X" in channels else "RGB")]
+        if any(part not in channels for part in parts):
+            raise SystemExit(f"{path}: found no layer {name or 'RGB'}; it has {', '.join(channels)}")
+        result.append(numpy.stack([numpy.array(channels[part], float).reshape(y1 - y0 + 1, x1 - x0 + 1)
+                                   for part in parts], -1))
+    return result
+
+
+def render(options, scene, spp, seed, out, *more):
+    """A render, unless the file is there: what is interrupted begins again with the first missing one."""
+    if not out.exists():
+        run(options, "render", scene, "--resolution", options.resolution, "--rfilter", "box", "--spp", spp, "--seed",
+            seed, "--no-preview", "--quiet", *more, "-o", out)
+    return out
+
+
+def seed_of(seed, frame):
+    return seed + SEEDS_OF_FRAME * frame
+
+
+def frame_numbers(options):
+    return range(1, options.frames + 1)
+
+
+def render_references(options):
+    for name in options.names:
+        scenes.write_sequence(name, options.frames, options.work)
+        for frame in frame_numbers(options):
+            for seed in REFERENCE_SEEDS:
+                render(options, options.work / scenes.still_name(name, frame), options.reference_spp, seed,
+                       reference(options, name, frame, seed), "--estimator", "none", "--denoise", "none")
+        print(name, flush=True)
+
+
+def reference(options, name, frame, seed):
+    frame = 1 if name == "still" else frame  # all frames are this one
+    return options.work / f"{name}_{frame:04d}-reference-{seed}.exr"
+
+
+def references(options, name):
+    files = [[reference(options, name, frame, seed) for frame in frame_numbers(options)] for seed in REFERENCE_SEEDS]
+    missing = [str(file) for side in files for file in side if not file.exists()]
+    if missing:
+        raise SystemExit(f"{missing[0]} is missing; `sequences.py references` renders it")
+    return [numpy.stack([layers(file, "")[0] for file in side]) for side in files]
+
+
+def frames_alone(options, name, spp, seed, folder):
+    """Images by the network and by the mixture, and positions, (frames, height, width, 3) each."""
+    network, mixture, positions = [], [], []
+    for frame in frame_numbers(options):
+        scene = options.work / scenes.still_name(name, frame)
+        raw = render(options, scene, spp, seed_of(seed, frame), folder / f"raw_{frame:04d}.exr", "--estimator", "none",
+                     "--denoise", "none", "--aovs")
+        denoised = folder / f"oidn_{frame:04d}.exr"
+        if not denoised.exists():
+            run(options, "denoise", raw, "--mode", "oidn", "-o", denoised, "--quiet")
+        mixed = render(options, scene, spp, seed_of(seed, frame), folder / f"auto_{frame:04d}.exr", "--denoise", "auto")
+        network += layers(denoised, "")
+        mixture += layers(mixed, "")
+        positions += layers(raw, "P")
+    return numpy.stack(network), numpy.stack(mixture), numpy.stack(positions)
+
+
+def sequence(options, name, spp, seed, folder):
+    """All frames by one command: images and motion vectors."""
+    scene, more = scenes.write_sequence(name, options.frames, options.work)
+    last = folder / f"sequence_{options.frames:04d}.exr"
+    render_sequence = [options.work / scene, *more, "--frames", f"1-{options.frames}"]
+    if not last.exists():
+        run(options, "render", *render_sequence, "--resolution", options.resolution, "--rfilter", "box", "--spp", spp,
+            "--seed", seed, "--no-preview", "--quiet", *options.options.split(), "-o", folder / "sequence_####.exr")
+    files = [layers(folder / f"sequence_{frame:04d}.exr", "", "Motion") for frame in frame_numbers(options)]
+    return tuple(numpy.stack(images) for images in zip(*files))
+
+
+def methods(options, name, spp):
+    """Images (seeds, frames, height, width, 3) by method."""
+    result = {}
+    for seed in options.seeds:
+        folder = options.work / f"{name}-{spp}-{seed}"
+        folder.mkdir(exist_ok=True)
+        network, mixture, positions = frames_alone(options, name, spp, seed, folder)
+        images = {"oidn": network, "auto": mixture,
+                  "accumulation": accumulation.accumulated(name, mixture, positions)}
+        if not options.frames_alone:
+            images["sequence"], vectors = sequence(options, name, spp, seed, folder)
+            agreement = accumulation.motion_agreement(name, positions, vectors)
+            print(f"{name}: motion as known in {agreement:.1%} of the pixels", file=sys.stderr)
+        for method, frames in images.items():
+            result.setdefault(method, []).append(frames)
+    return {method: numpy.stack(frames) for method, frames in result.items()}
+
+
+def measure(options):
+    table = []
+    print(f"| sequence | spp | method | {' | '.join(column.replace('_', ' ') for column in COLUMNS)} |\n"
+          f"|{'---|' * (3 + len(COLUMNS))}", flush=True)
+    for name in options.names:
+        first, second = references(options, name)
+        for spp in options.spp:
+            images = methods(options, name, spp)
+            for method, frames in images.items():
+                row = measures.summary(frames, first, second, images["auto"])
+                table.append({"sequence": name, "spp": spp, "method": method, **row})
+                values = " | ".join(f"{row[column]:.2f}" if column in row else "" for column in COLUMNS)
+                print(f"| {name} | {spp} | {method} | {values} |", flush=True)
+    (options.work / "sequences.json").write_text(json.dumps(table, indent=1) + "\n")
+
+
+def main(arguments):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("task", choices=["references", "measure"])
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(scenes.NAMES)}; all when absent")
+    parser.add_argument("--work", required=True, type=Path, metavar="FOLDER", help="scenes, renders and sequences.json")
+    parser.add_argument("--covary", default=str(ROOT / "build/release/covary"), metavar="PROGRAM")
+    parser.add_argument("--frames", type=int, default=16)
+    parser.add_argument("--resolution", default="320x180", metavar="WxH")
+    parser.add_argument("--spp", type=int, nargs="+", default=[16, 64])
+    parser.add_argument("--seeds", type=int, nargs="+", default=[1])
+    parser.add_argument("--reference-spp", type=int, default=512, help="of each of the two")
+    parser.add_argument("--frames-alone", action="store_true", help="only the methods that know no other frames")
+    parser.add_argument("--options", default="--history on", help="of the command for all frames")
+    parser.add_argument("--nice", type=int, default=0)
+    options = parser.parse_args(arguments)
+    options.names = options.names or scenes.NAMES
+    unknown = [name for name in options.names if name not in scenes.NAMES]
+    if unknown:
+        parser.error(f"no sequence is called {unknown[0]}; there are {', '.join(scenes.NAMES)}")
+    if options.frames < 2:
+        parser.error(f"--frames must be 2 or more; found {options.frames}")
+    if len(set(options.seeds)) < len(options.seeds) or not all(0 <= seed < SEEDS_OF_FRAME for seed in options.seeds):
+        parser.error(f"--seeds must differ and be below {SEEDS_OF_FRAME}, so that no two frames share random numbers")
+    options.work.mkdir(parents=True, exist_ok=True)
+    (render_references if options.task == "references" else measure)(options)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
