@@ -203,6 +203,7 @@ void render(RenderOptions options) {
   const int threads = options.threads > 0 ? options.threads : static_cast<int>(std::thread::hardware_concurrency());
   const tbb::global_control control(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(threads));
   if (options.sequence.is_sequence() && !options.is_replay()) return render_sequence(options, threads);
+  if (options.sequence.is_sequence()) take_frame(options);
 
   Outputs outputs = files_of(options);
   const std::unique_ptr<Display> display = display_of(options);

@@ -8,6 +8,7 @@
 #include <array>
 #include <filesystem>
 #include <map>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -28,19 +29,6 @@ namespace covary {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Where the camera is in every frame.
-class FrameCameras {
- public:
-  FrameCameras(const RenderOptions& options, const LoadedScene& scene) : resting_(scene.camera->settings().to_world) {
-    if (!options.sequence.camera_path.empty()) path_ = read_camera_path(options.sequence.camera_path);
-  }
-  Transform at(int frame) const { return path_ ? path_->at_frame(frame) : resting_; }
-
- private:
-  Transform resting_;
-  std::optional<CameraPath> path_;
-};
 
 void check(const RenderOptions& options) {
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
@@ -65,6 +53,7 @@ void check(const RenderOptions& options) {
 RenderOptions frame_options(const RenderOptions& options, int frame) {
   RenderOptions one = options;
   RenderRequest& request = one.settings.request;
+  if (is_frame_pattern(one.scene)) one.scene = frame_name(one.scene, frame);
   for (std::string* path : {&request.output, &request.passes, &one.json})
     if (!path->empty()) *path = frame_name(*path, frame);
   request.seed = options.sequence.seed_of(request.seed, frame);
@@ -104,11 +93,11 @@ bool is_complete(const std::string& path, const std::string& hash) {
                                              path));
 }
 
-/// Puts the camera where it is in the frame, and gives its layers.
-void prepare(const FrameCameras& cameras, int frame, LoadedScene& scene, RenderRequest& request) {
-  place_camera(scene, cameras.at(frame - 1));
+/// Puts the camera where it is now, and gives the frame's layers.
+void prepare(const Transform& before, const Transform& now, LoadedScene& scene, RenderRequest& request) {
+  place_camera(scene, before);
   const Camera previous = *scene.camera;
-  place_camera(scene, cameras.at(frame));
+  place_camera(scene, now);
   MotionImages images = motion_images(*scene.scene, previous, window_of(scene, request));
   request.beside["Depth"] = std::move(images.depth);
   request.beside["Motion"] = std::move(images.motion);
@@ -131,16 +120,15 @@ class SequenceRender {
 
   void run() {
     check(options_);
-    std::vector<Outputs> outputs;
     for (const int frame : frames_) {
-      outputs.push_back(files_of(frame_options(options_, frame)));
-      if (!options_.sequence.camera_path.empty()) outputs.back().reads(options_.sequence.camera_path);
+      outputs_.push_back(files_of(frame_options(options_, frame)));
+      if (!options_.sequence.camera_path.empty()) outputs_.back().reads(options_.sequence.camera_path);
     }
     display_ = display_of(options_);
-    load_scene(outputs);
-    const FrameCameras cameras(options_, *scene_);
+    if (!options_.sequence.camera_path.empty()) path_ = read_camera_path(options_.sequence.camera_path);
+    if (!has_many_scenes()) load_scene(options_, outputs_);
     const StopFlag stop;
-    for (const int frame : frames_) render_frame(cameras, frame, stop);
+    for (size_t i = 0; i < frames_.size(); ++i) render_frame(i, stop);
     if (stop.is_set()) throw Unfinished(stop.exit_code(), "interrupted when the last frame was written");
     if (!missed_.empty())
       throw Unfinished(kTargetMissed, fmt::format("frames {} did not reach their target", fmt::join(missed_, ", ")));
@@ -148,26 +136,33 @@ class SequenceRender {
 
  private:
   std::string stem() const { return fs::path(options_.scene).stem().string(); }
+  bool has_many_scenes() const { return is_frame_pattern(options_.scene); }
 
-  void load_scene(std::vector<Outputs>& outputs) {
-    ProgressLine progress(stem(), options_.quiet);
+  void load_scene(const RenderOptions& options, std::span<Outputs> outputs) {
+    ProgressLine progress(stem(), options.quiet);
     progress.begin("loading");
     const Stopwatch watch;
-    scene_ = load(options_);
+    scene_.reset();  // two might not fit into memory
+    scene_ = load(options);
     load_seconds_ = watch.seconds() - scene_->scene->build_seconds();
+    own_camera_ = scene_->camera->settings().to_world;
     progress.finish();
     for (Outputs& of_frame : outputs) of_frame.reads(scene_->files);
-    warn_of_scene(options_, *scene_);
+    warn_of_scene(options, *scene_);
   }
 
-  void render_frame(const FrameCameras& cameras, int frame, const StopFlag& stop) {
+  void render_frame(size_t index, const StopFlag& stop) {
+    const int frame = frames_[index];
     RenderOptions one = frame_options(options_, frame);
-    if (stop.is_set()) throw Unfinished(stop.exit_code(), interruption(frame));
+    if (stop.is_set()) throw Unfinished(stop.exit_code(), interruption(index));
+    if (has_many_scenes()) load_scene(one, std::span(outputs_).subspan(index, 1));
     RenderRequest request = make_request(one, *scene_);
-    prepare(cameras, frame, *scene_, request);
     const bool follows = frame - 1 == last_frame_;  // of frames that are farther apart nothing is known
-    const std::string hash = frame_hash(one, *scene_, cameras.at(frame - 1), follows ? last_hash_ : "");
-    last_frame_ = frame, last_hash_ = hash;
+    const Transform now = path_ ? path_->at_frame(frame) : own_camera_;
+    const Transform before = path_ ? path_->at_frame(frame - 1) : follows ? last_camera_ : now;
+    prepare(before, now, *scene_, request);
+    const std::string hash = frame_hash(one, *scene_, before, follows ? last_hash_ : "");
+    last_frame_ = frame, last_hash_ = hash, last_camera_ = now;
     if (request.resume && is_complete(request.output, hash)) {
       if (!options_.quiet) fmt::print(stderr, "{}: complete\n", request.output);
       return;
@@ -180,27 +175,30 @@ class SequenceRender {
     try {
       report({one, *scene_, result, load_seconds_, threads_}, stop);
     } catch (const Unfinished& unfinished) {
-      if (unfinished.exit_code() != kTargetMissed) throw Unfinished(unfinished.exit_code(), interruption(frame));
+      if (unfinished.exit_code() != kTargetMissed) throw Unfinished(unfinished.exit_code(), interruption(index));
       fmt::print(stderr, "warning: {}\n", unfinished.what());
       missed_.push_back(frame);
     }
   }
 
-  std::string interruption(int frame) const {
+  std::string interruption(size_t index) const {
     return fmt::format(
-        "interrupted in frame {}: {} of {} frames are complete; the same command with --resume "
-        "continues",
-        frame, std::find(frames_.begin(), frames_.end(), frame) - frames_.begin(), frames_.size());
+        "interrupted in frame {}: {} of {} frames are complete; the same command with --resume continues",
+        frames_[index], index, frames_.size());
   }
 
   const RenderOptions& options_;
   const int threads_;
   const std::vector<int> frames_;
+  std::vector<Outputs> outputs_;  // of each frame
   std::unique_ptr<Display> display_;
+  std::optional<CameraPath> path_;
   std::optional<LoadedScene> scene_;
+  Transform own_camera_;  // of the scene, without the path
   double load_seconds_ = 0;
   std::vector<int> missed_;
   int last_frame_ = -2;
+  Transform last_camera_;
   std::string last_hash_;
 };
 
@@ -208,11 +206,15 @@ class SequenceRender {
 
 void render_sequence(const RenderOptions& options, int threads) { SequenceRender(options, threads).run(); }
 
-void place_frame(RenderOptions& options, LoadedScene& scene) {
+void take_frame(RenderOptions& options) {
   const std::vector<int> frames = options.sequence.frames->numbers();
   if (frames.size() != 1) throw Error(ErrorCode::kUsage, "--replay is about one frame, such as --frames 7");
-  place_camera(scene, FrameCameras(options, scene).at(frames[0]));
-  options.settings.request.seed = options.sequence.seed_of(options.request().seed, frames[0]);
+  options = frame_options(options, frames[0]);
+}
+
+void place_frame(const RenderOptions& options, LoadedScene& scene) {
+  if (options.sequence.camera_path.empty()) return;
+  place_camera(scene, read_camera_path(options.sequence.camera_path).at_frame(options.sequence.frames->first));
 }
 
 }  // namespace covary

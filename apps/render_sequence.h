@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// covary render --frames: a scene to numbered images. The scene is loaded and built once; each frame is the image that
+// covary render --frames: a scene to numbered images. The scene is loaded and built once, or where it
+// is a pattern of names, for each frame; each frame is the image that
 // `render` makes of it alone with the same camera and seed, whichever other frames the command has.
 #pragma once
 
@@ -12,7 +13,9 @@ namespace covary {
 /// Unfinished after a signal and where frames missed --until.
 void render_sequence(const RenderOptions& options, int threads);
 
-/// For --replay: puts the camera where it is in the only frame of options.sequence, and the seed into the request.
-void place_frame(RenderOptions& options, LoadedScene& scene);
+/// For --replay: the options of the only frame of options.sequence; throws Error(kUsage) where there are more.
+void take_frame(RenderOptions& options);
+/// Then puts the camera where it is in that frame.
+void place_frame(const RenderOptions& options, LoadedScene& scene);
 
 }  // namespace covary

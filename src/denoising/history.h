@@ -37,9 +37,9 @@ struct HistoryInput {
   std::array<const Image*, 2> counts = {};            ///< as there
 };
 
-/// Adds the history to the frame's mixture and to its halves. The weights of `frame` become what is left to it; returned
-/// are those of the history, one channel. Bit-identical for any number of threads. Throws Error(kInput) where sizes
-/// differ.
+/// Adds the history to the frame's mixture and to its halves. The weights of `frame` become what is left to it;
+/// returned are those of the history, one channel. Bit-identical for any number of threads. Throws Error(kInput) where
+/// sizes differ.
 Image add_history(const History& history, const HistoryInput& input, Mixture& frame);
 
 }  // namespace covary

@@ -17,9 +17,9 @@ struct MotionLayers {
 /// interpolated by Catmull-Rom splines [Catmull1974], clamped to the four pixels around. `squared_error` is the squared
 /// difference to linear interpolation, its mean over the channels and 3 x 3 pixels.
 ///
-/// Not known is what lies out of the window; what was hidden, by depth: one of the four pixels around is not as far away
-/// as the point was; and, where things move against each other or the background (by more than a quarter of a pixel from
-/// a pixel to the next), the pixels at edges, which show both.
+/// Not known is what lies out of the window; what was hidden, by depth: one of the four pixels around is not as far
+/// away as the point was; and, where things move against each other or the background (by more than a quarter of a
+/// pixel from a pixel to the next), the pixels at edges, which show both.
 History reproject(const Image& before, const Image& depth_before, const MotionLayers& now);
 
 }  // namespace covary

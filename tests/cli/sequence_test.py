@@ -15,6 +15,7 @@ ROOM = (Path(os.environ["SCENES"]) / "room.xml").read_text()
 QUIET = ("--quiet", "--no-preview")
 SMALL = {"--resolution": "32x24", "--spp": "8", "--denoise": "none"}
 TO_WORLD = re.compile(r'(<sensor type="perspective">.*?)<lookat[^>]*/>', re.DOTALL)
+SMALL_WORDS = [word for option in SMALL.items() for word in option]
 # The camera walks to the left and turns; rows of matrices.
 START = [[-1, 0, 0, 0.5], [0, 1, 0, 1.3], [0, 0, -1, 3.5], [0, 0, 0, 1]]
 END = [[-0.8, 0, -0.6, 0.1], [0, 1, 0, 1.3], [0.6, 0, -0.8, 3.5], [0, 0, 0, 1]]
@@ -83,6 +84,21 @@ class Frames(CliTest):
         self.assertGreater(tested, 2000)
         self.assertGreater(right, 0.9 * tested, "but for edges, the surface there is as far away as the motion says")
         self.assertGreater(max(abs(m) for m in after["Motion.X"]), 2)
+
+    def test_a_scene_for_each_frame(self):
+        for frame, shift in ((1, 0), (2, 0.3)):
+            matrix = " ".join(str(v) for row in START for v in row).replace("0.5", str(0.5 + shift), 1)
+            self.write_text(f"room_{frame}.xml", TO_WORLD.sub(rf'\1<matrix value="{matrix}"/>', ROOM))
+        self.good("render", "room_#.xml", *QUIET, *SMALL_WORDS, "--frames", "1-2", "-o", "f_#.exr")
+        for frame in (1, 2):
+            self.good("render", f"room_{frame}.xml", *QUIET, *SMALL_WORDS, "-o", "alone.exr", "--seed",
+                      str(1000000 * frame))
+            self.assertEqual(self.picture(f"f_{frame}.exr"), self.picture("alone.exr"))
+        self.assertLess(max(abs(m) for m in self.channels("f_1.exr")["Motion.X"]), 1e-3)
+        self.assertGreater(max(abs(m) for m in self.channels("f_2.exr")["Motion.X"]), 1)
+        result = self.run_covary("render", "room_#.xml", *QUIET, *SMALL_WORDS, "--frames", "2-3", "-o", "g_#.exr")
+        self.assertIn("room_3.xml", result.stderr)
+        self.assertTrue((self.path / "g_2.exr").exists())
 
     def test_seeds_of_frames(self):
         self.write_path((0, START))
