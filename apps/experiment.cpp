@@ -16,7 +16,7 @@
 #include "film/output_file.h"
 #include "film/outputs.h"
 #include "interruption.h"
-#include "formats/scene_file.h"
+#include "io/scene_file.h"
 #include "json_output.h"
 #include "lab/builtin_suites.h"
 #include "lab/experiment.h"

@@ -11,7 +11,7 @@
 #include "core/error.h"
 #include "defines.h"
 #include "film/image_file.h"
-#include "formats/scene_file.h"
+#include "io/scene_file.h"
 #include "io/load_scene.h"
 #include "json_output.h"
 #include "plans/estimator_plans.h"

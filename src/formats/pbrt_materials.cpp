@@ -2,6 +2,7 @@
 // Materials of pbrt-v4 as reflectance models of the same reflection, but for 'coateddiffuse' (see there).
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "formats/pbrt_objects.h"
@@ -184,12 +185,45 @@ ObjectBuilder mix(PbrtParameters& p, const PbrtNames& names) {
   return model;
 }
 
+/// The same model as here. Without a colour it is pbrt's brown hair.
+ObjectBuilder hair(PbrtParameters& p, const PbrtNames& names) {
+  auto model = make_object("bsdf", "hair", p.where());
+  const double n = p.get_float("beta_n", 0.3);
+  set_property(*model, "longitudinal_roughness", p.get_float("beta_m", 0.3));
+  set_property(*model, "azimuthal_roughness", n);
+  set_property(*model, "scale_tilt", p.get_float("alpha", 2));
+  set_property(*model, "int_ior", p.get_float("eta", 1.55));
+  set_property(*model, "ext_ior", 1.0);
+  if (p.has("sigma_a")) {
+    const auto absorption = spectrum_value(p, "sigma_a", names);
+    if (!absorption) return nullptr;
+    set_property(*model, "sigma_a", *absorption);
+  } else if (p.has("reflectance")) {
+    const auto value = spectrum_value(p, "reflectance", names);
+    const auto* colour = value ? std::get_if<ColourValue>(&*value) : nullptr;
+    if (value && !colour) p.error("has a 'reflectance' that is no 'rgb'; others are not supported");
+    if (!colour) return nullptr;
+    // [Chiang2016]: absorption = (ln colour / D(beta_n))^2, as in bsdfs/hair.cpp.
+    const double d =
+        5.969 - 0.215 * n + 2.532 * n * n - 10.73 * std::pow(n, 3) + 5.574 * std::pow(n, 4) + 0.245 * std::pow(n, 5);
+    Spectrum absorption;
+    for (int c = 0; c < 3; ++c)
+      absorption[c] = static_cast<float>(std::pow(std::log(std::clamp(colour->rgb[c], 1e-4f, 1.0f)) / d, 2));
+    set_property(*model, "sigma_a", ColourValue{absorption});
+  } else {
+    set_property(*model, "eumelanin", p.get_float("eumelanin", p.has("pheomelanin") ? 0 : 1.3));
+    set_property(*model, "pheomelanin", p.get_float("pheomelanin", 0));
+  }
+  return model;
+}
+
 ObjectBuilder base_material(const std::string& type, PbrtParameters& p, const PbrtNames& names) {
   if (type == "diffuse") return diffuse(p, names);
   if (type == "coateddiffuse") return coated_diffuse(p, names);
   if (type == "conductor") return conductor(p, names);
   if (type == "dielectric" || type == "thindielectric") return dielectric(p, names, type == "thindielectric");
   if (type == "interface" || type.empty() || type == "none") return make_object("bsdf", "null", p.where());
+  if (type == "hair") return hair(p, names);
   if (type == "mix") return mix(p, names);
   if (type == "measured") {
     auto model = make_object("bsdf", "measured", p.where());
@@ -197,7 +231,7 @@ ObjectBuilder base_material(const std::string& type, PbrtParameters& p, const Pb
     return two_sided(model);
   }
   p.error(
-      "is not supported; supported are materials 'coateddiffuse', 'conductor', 'dielectric', 'diffuse', "
+      "is not supported; supported are materials 'coateddiffuse', 'conductor', 'dielectric', 'diffuse', 'hair', "
       "'interface', 'measured', 'mix' and 'thindielectric'");
   return nullptr;
 }

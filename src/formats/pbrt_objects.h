@@ -36,6 +36,11 @@ ObjectBuilder make_pbrt_material(const std::string& type, PbrtParameters& p, con
 /// A shape without material and light; null after an error.
 ObjectBuilder make_pbrt_shape(const std::string& type, PbrtParameters& p, const PbrtPlacement& placement);
 
+/// The shape `curve`, a part of make_pbrt_shape().
+ObjectBuilder make_pbrt_curve(PbrtParameters& p, const PbrtPlacement& placement);
+/// Adds the curves of `more` to those of `first`, of scenes that have one of each hair; false where they are no curves.
+bool join_pbrt_curves(ObjectDescription& first, const ObjectDescription& more);
+
 /// A medium; null after an error.
 ObjectBuilder make_pbrt_medium(const std::string& type, PbrtParameters& p);
 

@@ -57,6 +57,15 @@ class Reader {
     ObjectPtr material, area_light, inside, outside;
     bool material_failed = false;  // it was told, so what uses it says nothing
   };
+  /// The last curves, to which others that follow with the same material belong.
+  struct Curves {
+    ObjectBuilder shape;
+    ObjectPtr material, inside, outside;
+    ObjectBuilder group;
+    bool is_of(const State& state, const ObjectBuilder& in) const {
+      return shape && material == state.material && inside == state.inside && outside == state.outside && group == in;
+    }
+  };
   struct SavedState {
     State state;
     bool whole;  // AttributeBegin; else of a transformation alone
@@ -248,6 +257,11 @@ class Reader {
     const auto alpha = float_value(p, "alpha", 1, names_);
     const ObjectBuilder shape = make_pbrt_shape(type, p, state_.placement);
     if (!shape || !alpha) return;
+    const bool opaque = std::holds_alternative<double>(*alpha) && std::get<double>(*alpha) >= 1;
+    if (type == "curve" && opaque && !state_.area_light && curves_.is_of(state_, group_) &&
+        join_pbrt_curves(*curves_.shape, *shape))
+      return;
+    curves_ = {type == "curve" && opaque ? shape : nullptr, state_.material, state_.inside, state_.outside, group_};
     ObjectPtr material = state_.material;
     if (!material && !state_.material_failed) material = default_material();
     if (const auto* number = std::get_if<double>(&*alpha); material && (!number || *number < 1)) {
@@ -358,6 +372,7 @@ class Reader {
   PbrtView view_;
   PbrtNames names_;
   State state_;
+  Curves curves_;
   std::vector<SavedState> states_;
   PbrtSystems systems_;
   std::map<std::string, ObjectBuilder> groups_;

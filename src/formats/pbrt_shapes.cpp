@@ -151,6 +151,7 @@ ObjectBuilder make_pbrt_shape(const std::string& type, PbrtParameters& p, const 
   if (type == "cylinder") return cylinder(p, placement);
   if (type == "trianglemesh") return triangle_mesh(p, placement);
   if (type == "bilinearmesh") return bilinear_mesh(p, placement);
+  if (type == "curve") return make_pbrt_curve(p, placement);
   if (type == "plymesh") {
     if (p.has("displacement")) p.error("has a 'displacement', which is not supported");
     p.ignore({"displacement", "edgelength"});
@@ -158,11 +159,9 @@ ObjectBuilder make_pbrt_shape(const std::string& type, PbrtParameters& p, const 
     set_property(*result, "filename", p.get_string("filename", ""));
     return result;
   }
-  const char* instead = type == "curve" ? ". Hair can be a file of a shape 'bsplinecurve' in XML" : "";
   p.error(
-      fmt::format("is not supported; supported are shapes 'bilinearmesh', 'cylinder', 'disk', 'plymesh', 'sphere' and "
-                  "'trianglemesh'{}",
-                  instead));
+      "is not supported; supported are shapes 'bilinearmesh', 'curve', 'cylinder', 'disk', 'plymesh', 'sphere' and "
+      "'trianglemesh'");
   return nullptr;
 }
 

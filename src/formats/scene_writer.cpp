@@ -172,7 +172,10 @@ class Writer {
   /// A file of this content; its name.
   std::string add_file(const std::string& bytes) {
     std::string_view content = bytes;
-    const char* extension = bytes.starts_with("ply") ? ".ply" : bytes[1] == 'F' || bytes[1] == 'f' ? ".pfm" : ".ppm";
+    const char* extension = bytes.starts_with("ply")                             ? ".ply"
+                            : bytes.starts_with("PF") || bytes.starts_with("Pf") ? ".pfm"
+                            : bytes.starts_with("P5") || bytes.starts_with("P6") ? ".ppm"
+                                                                                 : ".txt";
     if (std::optional<RecodedFile> other = writing_.recode ? writing_.recode(bytes) : std::nullopt) {
       content = result_.recoded.emplace_back(std::move(other->bytes));
       extension = other->extension;

@@ -10,7 +10,7 @@
 #include "emitters/equal_area_image.h"
 #include "formats/file_view.h"
 #include "formats/object_graph.h"
-#include "formats/scene_file.h"
+#include "io/scene_file.h"
 #include "imageio/png.h"
 #include "scene/embedded_data.h"
 #include "textures/embedded_image.h"

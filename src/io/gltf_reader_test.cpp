@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Scenes of glTF against the same scenes in Mitsuba's XML by hand: rays of the camera, what they meet, its reflection
 // and light. Nothing is statistical.
-#include "formats/gltf_reader.h"
+#include "gltf/gltf_reader.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>

@@ -14,7 +14,7 @@
 #include "core/stopwatch.h"
 #include "emitters/area.h"
 #include "formats/file_view.h"
-#include "formats/scene_file.h"
+#include "io/scene_file.h"
 #include "io/held_objects.h"
 #include "io/media.h"
 #include "io/mesh_attributes.h"

@@ -228,6 +228,38 @@ Shape "sphere"
   expect({1, 0.1f, 0.1f}, 11);
 }
 
+/// Round tubes along the curves: their height above the axis is the radius that pbrt's widths give.
+TEST_F(Pbrt, CurvesAreTubes) {
+  const LoadedScene a = pbrt(R"(Camera "perspective"
+WorldBegin
+Material "hair" "rgb sigma_a" [ .1 .2 .3 ]
+Scale 2 2 2
+# Straight, evenly parametrised: x = -1 … 1, its radius 0.1 … 0.05; then to a tip; then of degree 2.
+Shape "curve" "point3 P" [ -1 0 0  -.33333333 0 0  .33333333 0 0  1 0 0 ] "float width0" .2 "float width1" .1
+Shape "curve" "point3 P" [ -1 2 0  -.33333333 2 0  .33333333 2 0  1 2 0 ] "float width0" .2 "float width1" 0
+Translate 0 4 0
+Shape "curve" "integer degree" 2 "point3 P" [ -1 0 0  0 0 0  1 0 0 ] "float width" .2
+# A B-spline of two segments, x = 0 … 2.
+Shape "curve" "string basis" "bspline" "point3 P" [ -1 2 0  0 2 0  1 2 0  2 2 0  3 2 0 ] "float width" .2
+Material "hair" "rgb reflectance" [ .1 .2 .3 ]
+Shape "curve" "string type" "cylinder" "point3 P" [ -1 4 0  0 5 0  0 5 0  1 4 0 ] "float width" .2
+)");
+  EXPECT_EQ(a.scene->n_shapes(), 2u);  // those of one material are one
+  const auto height = [&](float x, float y) {
+    SurfaceHit hit;
+    return a.scene->intersect({{x, y, 10}, {0, 0, -1}}, hit) ? hit.p.z : 0;
+  };
+  for (const float x : {-0.9f, -0.3f, 0.2f, 0.8f}) {
+    EXPECT_NEAR(height(2 * x, 0), 2 * (0.1f - 0.05f * (x + 1) / 2), 1e-3f) << x;
+    EXPECT_NEAR(height(2 * x, 4), 2 * (0.1f - 0.1f * (x + 1) / 2), 1e-3f) << x;
+    EXPECT_NEAR(height(2 * x, 8), 0.2f, 1e-3f) << x;
+    EXPECT_NEAR(height(2 * (x + 1), 12), 0.2f, 1e-3f) << x;
+  }
+  EXPECT_LT(height(1.998f, 4), 0.01f);  // near the tip
+  EXPECT_EQ(height(2 * 2.1f, 12), 0);
+  EXPECT_NEAR(height(0, 2 * (4 + 4 + 0.75f)), 0.2f, 1e-3f);  // the top of the arc
+}
+
 TEST_F(Pbrt, MediaAreTheSceneByHand) {
   const LoadedScene a = pbrt(R"(MakeNamedMedium "fog" "string type" "homogeneous" "rgb sigma_a" [ .1 .2 0 ]
   "rgb sigma_s" [ .3 .2 0 ] "float scale" 2 "float g" .5
@@ -296,9 +328,9 @@ TEST_F(Pbrt, OrthographicCamerasSeeTheShorterSide) {
 TEST_F(Pbrt, WhatIsNotSupportedIsNamed) {
   const std::string found = errors(R"(Camera "perspective" "float screenwindow" [ -1 1 -1 1 ]
 WorldBegin
-Material "hair"
+Material "velvet"
 Shape "sphere" "float radios" 2 "float zmin" 0
-Shape "curve"
+Shape "curve" "string basis" "linear" "point3 P" [ 0 0 0 1 0 0 ]
 Material "diffuse" "texture reflectance" "wood"
 Shape "trianglemesh" "point3 P" [ 0 0 0  1 0 0  0 1 0 ] "integer indices" [ 0 1 3 ]
 LightSource "infinite" "string filename" "sky.exr" "rgb L" [ 1 1 1 ]
@@ -317,10 +349,10 @@ LightSource "projection" "string filename" "a.png"
 )");
   for (const char* message : {
            "scene.pbrt:1:22: parameter 'screenwindow' of Camera \"perspective\" is not supported",
-           "scene.pbrt:3:1: Material \"hair\" is not supported; supported are materials 'coateddiffuse', ",
+           "scene.pbrt:3:1: Material \"velvet\" is not supported; supported are materials 'coateddiffuse', ",
            "scene.pbrt:4:16: parameter 'radios' of Shape \"sphere\" is not supported; did you mean 'radius'?",
            "scene.pbrt:4:1: Shape \"sphere\" has zmin 0; supported are whole ones, -1",
-           "scene.pbrt:5:1: Shape \"curve\" is not supported; supported are shapes 'bilinearmesh', ",
+           "scene.pbrt:5:1: Shape \"curve\" has basis 'linear' and degree 3; supported are 'bezier'",
            "scene.pbrt:6:20: parameter 'reflectance' of Material \"diffuse\" names the texture 'wood', which is no "
            "texture of spectra",
            "scene.pbrt:7:1: Shape \"trianglemesh\" has the index 3; there are 3 vertices",

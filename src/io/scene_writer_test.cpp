@@ -11,7 +11,7 @@
 
 #include "core/random.h"
 #include "formats/file_view.h"
-#include "formats/scene_file.h"
+#include "io/scene_file.h"
 #include "io/convert_scene.h"
 #include "scene/embedded_data.h"
 #include "support/files.h"

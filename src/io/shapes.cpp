@@ -143,6 +143,7 @@ std::shared_ptr<Shape> make_cylinder(Parameters& p) {
 std::shared_ptr<Shape> make_curves(Parameters& p, CurveKind kind) {
   const Transform to_world = p.get_transform("to_world");
   p.get_float("silhouette_sampling_weight", 1);  // of Mitsuba's derivatives
+  if (const std::string* data = find_embedded(p)) return read_curves(*data, kind, to_world);
   const std::string path = p.require_file("filename");
   if (path.empty()) return nullptr;
   try {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "formats/gltf_meshes.h"
+#include "gltf/gltf_meshes.h"
 
 #include <fmt/format.h>
 

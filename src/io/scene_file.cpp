@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "formats/scene_file.h"
+#include "io/scene_file.h"
 
 #include <fmt/format.h>
 
-#include "formats/gltf_reader.h"
 #include "formats/pbrt_reader.h"
+#include "gltf/gltf_reader.h"
 
 namespace covary {
 

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "formats/embedded_mesh.h"
-#include "formats/gltf_file.h"
+#include "gltf/gltf_file.h"
 
 namespace covary {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "formats/gltf_reader.h"
+#include "gltf/gltf_reader.h"
 
 #include <fmt/format.h>
 
@@ -8,8 +8,8 @@
 #include <filesystem>
 
 #include "core/content_hash.h"
-#include "formats/gltf_materials.h"
-#include "formats/gltf_meshes.h"
+#include "gltf/gltf_materials.h"
+#include "gltf/gltf_meshes.h"
 #include "scene/embedded_data.h"
 
 namespace covary {

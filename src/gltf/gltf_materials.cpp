@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "formats/gltf_materials.h"
+#include "gltf/gltf_materials.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "formats/gltf_textures.h"
+#include "gltf/gltf_textures.h"
 
 namespace covary {
 namespace {

@@ -5,8 +5,8 @@
 #include <map>
 #include <memory>
 
-#include "formats/gltf_file.h"
 #include "formats/object_builder.h"
+#include "gltf/gltf_file.h"
 
 namespace covary {
 

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "core/spectrum.h"
-#include "formats/gltf_file.h"
 #include "formats/object_builder.h"
+#include "gltf/gltf_file.h"
 
 namespace covary {
 

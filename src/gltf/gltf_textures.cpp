@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "formats/gltf_textures.h"
+#include "gltf/gltf_textures.h"
 
 #include <fmt/format.h>
 
