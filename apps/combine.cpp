@@ -209,15 +209,6 @@ struct Inputs {
   Inputs& operator=(const Inputs&) = delete;
 };
 
-void print_findings(const CombineOptions& o, const std::vector<Finding>& findings) {
-  if (const std::string errors = errors_text(findings); !errors.empty() && !o.force)
-    throw Error(ErrorCode::kInput, "the inputs do not fit: " + errors + " (--force combines them nevertheless)");
-  for (const Finding& f : findings) {
-    const bool note = f.severity == Finding::Severity::kNote;
-    if (!note || !o.quiet) fmt::print(stderr, "{}: {}\n", note ? "note" : "warning", as_flags(f.text));
-  }
-}
-
 nlohmann::ordered_json statistics(const CombineOptions& o, const CombineRequest& request, const CombinedImage& combined,
                                   double write_seconds) {
   const InputReport& report = combined.inputs.report;
@@ -286,7 +277,7 @@ void combine_files(CombineOptions o) {
   CombineRequest& request = inputs.request;
   request.checked = [&](const InputFindings& found) {
     progress.clear();
-    print_findings(o, found.findings);
+    print_findings(found.findings, o.force, o.quiet);
     progress.begin(o.denoising.denoises() ? "estimating and denoising" : "estimating");
   };
   CombinedImage combined = combine(request);

@@ -137,14 +137,6 @@ void denoise_by_network(const Options& o, const GuideLayers& guides, ProgressLin
                watch.seconds());
 }
 
-void print_findings(const std::vector<Finding>& findings, bool quiet) {
-  for (const Finding& f : findings) {
-    const bool note = f.severity == Finding::Severity::kNote;
-    if (f.severity != Finding::Severity::kError && !(note && quiet))
-      fmt::print(stderr, "{}: {}\n", note ? "note" : "warning", f.text);
-  }
-}
-
 void denoise_by_mixture(const Options& o, const GroupedFile& file, const GuideLayers& guides, ProgressLine& progress) {
   CombineRequest request;
   request.independent = source_of(file);
@@ -155,7 +147,7 @@ void denoise_by_mixture(const Options& o, const GroupedFile& file, const GuideLa
   request.force = o.force;
   request.checked = [&](const InputFindings& found) {
     progress.clear();
-    print_findings(found.findings, o.quiet);
+    print_findings(found.findings, o.force, o.quiet);
     progress.begin("denoising");
   };
   CombinedImage combined = combine(request);

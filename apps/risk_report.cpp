@@ -45,6 +45,15 @@ void add_prediction(const PredictedError& predicted, nlohmann::ordered_json& jso
   if (!doubt.empty()) json["predicted_relmse_doubt"] = doubt;
 }
 
+void print_findings(const std::vector<Finding>& findings, bool force, bool quiet) {
+  if (const std::string errors = errors_text(findings); !errors.empty() && !force)
+    throw Error(ErrorCode::kInput, "the inputs do not fit: " + errors + " (--force combines them nevertheless)");
+  for (const Finding& f : findings) {
+    const bool note = f.severity == Finding::Severity::kNote;
+    if (!note || !quiet) fmt::print(stderr, "{}: {}\n", note ? "note" : "warning", as_flags(f.text));
+  }
+}
+
 void print_notes(const DenoisingChoice& choice, const std::string& note) {
   for (const std::string& text : {missing_network(choice), note})
     if (!text.empty()) fmt::print(stderr, "note: {}\n", as_flags(text));

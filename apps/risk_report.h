@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is said of the error of a denoised image: its size, its bias, and what others would have had.
+// What is said of images to combine, and of the error of a denoised image: its size, its bias, and what others would
+// have had.
 #pragma once
 
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "combine/combine.h"
+#include "combine/pair_input.h"
 #include "denoising/mixed_denoising.h"
 #include "estimators/estimator_result.h"
 #include "risk/predicted_error.h"
@@ -17,6 +20,9 @@ namespace covary {
 /// 0.012, Open Image Denoise alone 0.0025 (unreliable: known to a factor of 1.8)", as far as it is known.
 std::string prediction_text(const PredictedError& predicted, const std::optional<MeasuredRisks>& risks);
 
+/// Lines on stderr: what is wrong with the inputs, and, unless `quiet`, notes. Throws Error(kInput) instead where there
+/// are errors, unless `force` makes warnings of them.
+void print_findings(const std::vector<Finding>& findings, bool force, bool quiet);
 /// Lines on stderr: the network that is missing, and `note`, where there are such.
 void print_notes(const DenoisingChoice& choice, const std::string& note);
 /// These notes of an image, and last its risks.

@@ -243,7 +243,8 @@ class Denoise(RenderTest):
         self.good("denoise", "a.exr", "b.exr", *out)
         self.bad(1, "exposure", "denoise", "a.exr", "bright.exr", *out)
         self.bad(1, "they were denoised before", "denoise", "smooth0.exr", "smooth1.exr", *out)
-        self.good("denoise", "smooth0.exr", "smooth1.exr", *out, "--force")
+        forced = self.good("denoise", "smooth0.exr", "smooth1.exr", *out, "--force").stderr
+        self.assertRegex(forced, "warning: .*they were denoised before")
         for name, samples in (("few", "16"), ("many", "64")):
             self.write(f"{name}.exr", grey(first, attributes={"cycles.ViewLayer.samples": samples}))
         self.bad(1, "has 64 samples per pixel, the group before it 16", "denoise", "few.exr", "many.exr", *out)
