@@ -165,7 +165,6 @@ CandidateMaker filtered_candidates(const Guides& guides, CandidateBase base) {
   if (base == CandidateBase::kPair) maker.names.emplace_back("sharp-independent");
   maker.names.emplace_back("smooth");
   if (!kept->albedo.data.empty()) maker.names.emplace_back("demodulated");
-  if (base == CandidateBase::kMean && maker.names.size() == 3) maker.usual = {0.4f, 0, 0.6f};
   maker.make = [kept, base](std::span<const CandidateInput> inputs) { return filtered(*kept, base, inputs); };
   maker.make_layers = [kept](const CandidateInput& input, std::span<const Image> layers) {
     return filtered_layers(*kept, input, layers);
@@ -192,7 +191,6 @@ CandidateMaker neural_candidates(const Guides& guides, const DenoiseOptions& opt
     return maker;
   }
   maker.names = {"oidn", "oidn-wide", "oidn-narrow"};
-  maker.usual = {0.6f, 0.2f, 0.2f};
   maker.make = [network](std::span<const CandidateInput> inputs) { return of_means(*network, inputs); };
   maker.make_layers = [network, n = maker.names.size()](const CandidateInput&, std::span<const Image> layers) {
     std::vector<Image> images;

@@ -47,9 +47,6 @@ struct CandidateMaker {
   /// samples: the more of it they take away, the more of the error is bias. Measured (docs/methods/error-estimates.md).
   double error_over_variance = 0.65;
   bool network = false;  ///< a neural network makes them
-  /// Weights of its images around a mean that are best among scenes with few samples, where no other maker with such
-  /// weights is beside it, or this is a network (measured, docs/notes/denoising.md); empty: not known.
-  std::vector<float> usual;
   /// Number of the one to show where samples are too few to judge.
   int best_of_few = 0;
 };
