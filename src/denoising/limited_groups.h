@@ -15,7 +15,7 @@ namespace covary {
 /// Side of the window around a pixel whose groups say how bright its own may be, and how many times as bright as these
 /// (measured: docs/notes/denoising.md).
 inline constexpr int kLimitWindow = 7;
-inline constexpr float kBrighter = 4;
+inline constexpr float kBrighter = 6;
 
 /// A copy of an image in which each group is at most kBrighter times as bright (mean of its channels) as the brightest
 /// one around it of the other half of the groups: groups 0, 2, 4, … are limited by 1, 3, 5, …, and these by those.
