@@ -72,6 +72,46 @@ inline void gram(const vfloat* X, ptrdiff_t row, ptrdiff_t sum, int m, int n, vf
   });
 }
 
+/// products[i] = sum over s < n of X[i * row + s * sum] * y[s * sum], for m vectors.
+inline void multiply(const vfloat* X, ptrdiff_t row, ptrdiff_t sum, const vfloat* y, int m, int n, vfloat* products) {
+  detail::for_each_tile<4>(0, m, [&]<int N>(int i) {
+    vfloat sums[2][N];
+#pragma GCC unroll 8
+    for (int a = 0; a < N; ++a) sums[0][a] = sums[1][a] = vfloat{};
+    const auto add = [&](int s, int parity) {
+      vfloat factor = y[s * sum];
+      lanes::keep_in_register(factor);
+#pragma GCC unroll 8
+      for (int a = 0; a < N; ++a) sums[parity][a] += X[(i + a) * row + s * sum] * factor;
+    };
+    int s = 0;
+    for (; s + 1 < n; s += 2) add(s, 0), add(s + 1, 1);
+    if (s < n) add(s, 0);
+#pragma GCC unroll 8
+    for (int a = 0; a < N; ++a) products[i + a] = sums[0][a] + sums[1][a];
+  });
+}
+
+/// Sum over s < n of (y[s * sum] - sum over i < m of gamma[i] X[i * row + s * sum])^2.
+inline vfloat residual_squares(const vfloat* X, ptrdiff_t row, ptrdiff_t sum, const vfloat* y, const vfloat* gamma,
+                               int m, int n) {
+  vfloat squares = {};
+  detail::for_each_tile<6>(0, n, [&]<int N>(int s) {
+    vfloat rest[N];
+#pragma GCC unroll 8
+    for (int a = 0; a < N; ++a) rest[a] = y[(s + a) * sum];
+    for (int i = 0; i < m; ++i) {
+      vfloat factor = gamma[i];
+      lanes::keep_in_register(factor);
+#pragma GCC unroll 8
+      for (int a = 0; a < N; ++a) rest[a] -= factor * X[i * row + (s + a) * sum];
+    }
+#pragma GCC unroll 8
+    for (int a = 0; a < N; ++a) squares += rest[a] * rest[a];
+  });
+  return squares;
+}
+
 namespace detail {
 
 /// What columns before j0 of the Cholesky factor leave of rows [i0, i0 + NA), columns [j0, j0 + NB).

@@ -100,6 +100,33 @@ TEST(BatchAlgebra, GramAndSolveAgreeWithEigen) {
   }
 }
 
+/// Products and residuals of vectors stored by rows and by columns, for every rest of a register tile.
+TEST(BatchAlgebra, ProductsAndResidualsAgreeWithEigen) {
+  for (int m : {1, 2, 3, 4, 5, 7, 25})
+    for (int n : {1, 2, 6, 11, 13, 36})
+      for (bool by_rows : {true, false}) {
+        const ptrdiff_t row = by_rows ? n : 1, sum = by_rows ? 1 : m;
+        std::vector<vfloat> X(static_cast<size_t>(m) * n), y(X.size()), gamma(m), products(m);
+        for (int l = 0; l < kLanes; ++l) {
+          for (size_t i = 0; i < X.size(); ++i) X[i][l] = test::noise(m, i, l), y[i][l] = test::noise(m + 1, i, l);
+          for (int i = 0; i < m; ++i) gamma[i][l] = test::noise(m + 2, i, l);
+        }
+        batch::multiply(X.data(), row, sum, y.data(), m, n, products.data());
+        const vfloat squares = batch::residual_squares(X.data(), row, sum, y.data(), gamma.data(), m, n);
+        for (int l : {0, kLanes - 1}) {
+          Eigen::MatrixXd A(m, n);
+          Eigen::VectorXd target(n), factors(m);
+          for (int s = 0; s < n; ++s) {
+            target(s) = y[s * sum][l];
+            for (int i = 0; i < m; ++i) A(i, s) = X[i * row + s * sum][l], factors(i) = gamma[i][l];
+          }
+          const Eigen::VectorXd expected = A * target;
+          for (int i = 0; i < m; ++i) ASSERT_NEAR(products[i][l], expected(i), 1e-5) << m << " x " << n;
+          ASSERT_NEAR(squares[l], (target - A.transpose() * factors).squaredNorm(), 1e-5 * n) << m << " x " << n;
+        }
+      }
+}
+
 /// Rank 1 with 1e7 times the shift: rounding would make pivots negative; the solution must stay near the exact one.
 TEST(BatchAlgebra, SolveSurvivesNearlySingularSystems) {
   const int m = 12;

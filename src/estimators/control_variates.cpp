@@ -233,10 +233,8 @@ class Regression {
     const vfloat* Y = w.y.data() + first;
     if (k <= rows) {
       batch::gram(X, all, step, k, rows, w.gram.data());
-      for (int i = 0; i < k; ++i) {
-        w.gamma[i] = dot(X + static_cast<size_t>(i) * all, Y, step, rows);
-        w.shift[i] = T1 * w.penalty[i];
-      }
+      batch::multiply(X, all, step, Y, k, rows, w.gamma.data());
+      for (int i = 0; i < k; ++i) w.shift[i] = T1 * w.penalty[i];
       const int n_more = s_.std_error ? rows - group_rows : 0;
       for (int r = 0; r < n_more; ++r)
         for (int i = 0; i < k; ++i)
@@ -282,17 +280,6 @@ class Regression {
     w.freedom /= static_cast<float>((T_ - 1) * count);
   }
 
-  static vfloat dot(const vfloat* a, const vfloat* b, int step, int n) {
-    vfloat even = {}, odd = {};
-    int r = 0;
-    for (; r + 1 < n; r += 2) {
-      even += a[r * step] * b[r * step];
-      odd += a[(r + 1) * step] * b[(r + 1) * step];
-    }
-    if (r < n) even += a[r * step] * b[r * step];
-    return even + odd;
-  }
-
   /// Eq. (7) for one channel, and Eq. (8) where asked for.
   void finish_channel(int c, int x, int y, int n_lanes, Workspace& w) const {
     const int k = s_.k, n_tail = layout_.size - layout_.contrasts;
@@ -312,12 +299,8 @@ class Regression {
   /// same groups, so that their residuals are too small; generalised cross-validation [GHW1979] corrects
   /// that by the degrees of freedom. Light that the CRN image lacks is an error of f and all g_i at once.
   vfloat crn_variance(int c, const Workspace& w) const {
-    vfloat squares = {};
-    for (int r = c; r < layout_.group_contrasts; r += 3) {
-      vfloat residual = w.y[r];
-      for (int i = 0; i < s_.k; ++i) residual -= w.gamma[i] * w.x[static_cast<size_t>(i) * layout_.contrasts + r];
-      squares += residual * residual;
-    }
+    const vfloat squares = batch::residual_squares(w.x.data() + c, layout_.contrasts, 3, w.y.data() + c, w.gamma.data(),
+                                                   s_.k, layout_.group_contrasts / 3);
     const vfloat left = max(1.0f - w.freedom, splat(kFewestFreedom));
     vfloat missing = tail_value(w.y_tail.data(), layout_.missing + c);
     for (int i = 0; i < s_.k; ++i)

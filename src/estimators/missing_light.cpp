@@ -54,7 +54,7 @@ struct Difference {
 /// `variance_of_h`: one plane, summed over RGB.
 Difference guided_difference(const Moments& g, const Moments& h, const Planes& variance_of_h, int x, int y,
                              vfloat squared_bandwidth) {
-  const vfloat factor = -1.0f / max(squared_bandwidth, splat(1e-30f));
+  const vfloat factor = -kLog2E / max(squared_bandwidth, splat(1e-30f));
   const vfloat g0 = load(g.mean.row(0, y) + x), g1 = load(g.mean.row(1, y) + x), g2 = load(g.mean.row(2, y) + x);
   constexpr int kRadius = kMissingWindow / 2;
   vfloat m0 = {}, m1 = {}, m2 = {}, variance = {}, of_pixel = {}, weights = {};
@@ -66,7 +66,7 @@ Difference guided_difference(const Moments& g, const Moments& h, const Planes& v
       distance += (q0 - g0) * (q0 - g0);
       distance += (q1 - g1) * (q1 - g1);
       distance += (q2 - g2) * (q2 - g2);
-      vfloat w = exp_of_nonpositive(distance * factor);
+      vfloat w = exp2_of_nonpositive(distance * factor);
       if (h.relative_count) w *= at(*h.relative_count, 0);
       weights += w;
       m0 += w * (at(h.mean, 0) - q0);

@@ -18,14 +18,14 @@ Rgb load_rgb(const Planes& p, int x, int y) {
 template <bool kCounted>
 Rgb guided_mean(const Moments& g, const Planes& image, const Planes* counts, int radius, int x, int y) {
   const Rgb centre = load_rgb(g.mean, x, y), variance = load_rgb(g.variance_of_mean, x, y);
-  const vfloat inverse_bandwidth = -1.0f / max(variance.r + variance.g + variance.b, splat(1e-30f));
+  const vfloat inverse_bandwidth = -kLog2E / max(variance.r + variance.g + variance.b, splat(1e-30f));
   vfloat weights = {};
   Rgb sum = {};
   for (int dy = -radius; dy <= radius; ++dy)
     for (int dx = -radius; dx <= radius; ++dx) {
       const Rgb q = load_rgb(g.mean, x + dx, y + dy), v = load_rgb(image, x + dx, y + dy);
       const vfloat dr = q.r - centre.r, dg = q.g - centre.g, db = q.b - centre.b;
-      vfloat w = exp_of_nonpositive((dr * dr + dg * dg + db * db) * inverse_bandwidth);  // w_j of [YM2025] Eq. (11)
+      vfloat w = exp2_of_nonpositive((dr * dr + dg * dg + db * db) * inverse_bandwidth);  // w_j of [YM2025] Eq. (11)
       if constexpr (kCounted) w *= load(counts->row(0, y + dy) + x + dx);
       weights += w;
       sum.r += w * v.r;

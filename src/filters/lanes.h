@@ -9,7 +9,9 @@
 #include <cstdint>
 #include <cstring>
 
-#ifdef __SSE__
+#if defined(__AVX512F__)
+#include <immintrin.h>
+#elif defined(__SSE__)
 #include <xmmintrin.h>
 #endif
 
@@ -79,21 +81,33 @@ class FlushTiny {
 #endif
 };
 
-/// e^x for x <= 0, relative error below 3e-7 + 1e-7 |x|; 0 below -87.
-inline vfloat exp_of_nonpositive(vfloat x) {
-  const vfloat t = x * 1.44269504f;
-  const vfloat shifted = t + 12582912.0f;        // its last bits are the nearest integer
-  const vfloat f = t - (shifted - 12582912.0f);  // in [-1/2, 1/2] where x >= -87
-  // Taylor coefficients of 2^f.
-  vfloat p = splat(1.53533619e-4f);
-  p = p * f + 1.33335581e-3f;
-  p = p * f + 9.61812911e-3f;
-  p = p * f + 5.55041087e-2f;
-  p = p * f + 2.40226507e-1f;
-  p = p * f + 6.93147181e-1f;
-  p = p * f + 1.0f;
-  return x > splat(-87.0f) ? from_bits(bits(p) + (bits(shifted) << 23)) : vfloat{};  // p 2^integer
+inline constexpr float kLog2E = 1.44269504f;
+
+/// 2^x for x <= 0, relative error below 2e-7; 0 below -126, and for NaN.
+inline vfloat exp2_of_nonpositive(vfloat x) {
+  // 2^x = 2^f 2^n with f in [-1/2, 1/2]. The polynomial has the least relative error of its degree, and p(0) = 1.
+  const auto of_fraction = [](vfloat f) {
+    vfloat p = splat(1.32647273e-3f);
+    p = p * f + 9.67151299e-3f;
+    p = p * f + 5.55073358e-2f;
+    p = p * f + 2.40222424e-1f;
+    p = p * f + 6.93147004e-1f;
+    return p * f + 1.0f;
+  };
+#ifdef __AVX512F__
+  x = x > splat(-200.0f) ? x : splat(-200.0f);
+  constexpr __mmask16 kAll = 0xffff;  // with masks, which are not used, because of GCC bug 105593
+  const vfloat n = _mm512_maskz_roundscale_ps(kAll, x, _MM_FROUND_TO_NEAREST_INT);
+  return _mm512_maskz_scalef_ps(kAll, of_fraction(x - n), n);
+#else
+  const vfloat shifted = x + 12582912.0f;  // its last bits are the nearest integer
+  const vfloat p = of_fraction(x - (shifted - 12582912.0f));
+  return x > splat(-126.0f) ? from_bits(bits(p) + (bits(shifted) << 23)) : vfloat{};
+#endif
 }
+
+/// e^x for x <= 0, relative error below 3e-7 + 1e-7 |x|; 0 below -88.
+inline vfloat exp_of_nonpositive(vfloat x) { return exp2_of_nonpositive(x * kLog2E); }
 
 /// Lane l of the result is lane order[l] of a followed by b.
 inline vfloat shuffle(vfloat a, vfloat b, vint order) {

@@ -174,7 +174,7 @@ class Filter {
               load(guides_->row(i, tile.y + y) + x0 + x) - load(guides_->row(i, tile.y + y + dy) + x0 + dx + x);
           sum += difference * difference;
         }
-        store(row + x, exp_of_nonpositive(-sum));
+        store(row + x, exp2_of_nonpositive(sum * -kLog2E));
       }
     }
   }
@@ -223,7 +223,7 @@ class Filter {
   /// and at the opposite ones.
   template <int n>
   void find_likenesses(float bandwidth, const Tile& tile, int y, int dx, int dy, Buffers& b, int first) const {
-    const float scale = -1 / (9 * 3 * bandwidth * bandwidth);
+    const float scale = -kLog2E / (9 * 3 * bandwidth * bandwidth);
     for (int k = 0; k < n; ++k)
       for (int direction : {0, 1}) {
         const Rows& sums = (direction == 0 ? b.forward : b.backward)[first + k];
@@ -231,7 +231,7 @@ class Filter {
         float* row = b.likenesses[2 * k + direction].data();
         for (int x = 0; x < tile.width; x += kLanes) {
           const vfloat sum = load(here + x - Rows::kStride) + load(here + x) + load(here + x + Rows::kStride);
-          store(row + x, exp_of_nonpositive(min(sum * scale, vfloat{})));
+          store(row + x, exp2_of_nonpositive(min(sum * scale, vfloat{})));
         }
       }
   }

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <atomic>
+#include <bit>
 #include <cmath>
+#include <cstring>
 #include <numeric>
 
 #include "core/parallel.h"
@@ -16,19 +18,27 @@ Planes::Planes(int width, int height, int count, int border, float value)
   data_.assign(static_cast<size_t>(count) * (height + 2 * border) * stride_ + lanes::kLanes, value);
 }
 
+namespace {
+
+/// Whether no exponent is the one of infinities and NaN. Integers, whose sum has no order.
+bool all_finite(const float* values, int n) {
+  constexpr uint32_t kExponent = 0x7f800000;
+  uint32_t bad = 0;
+  for (int i = 0; i < n; ++i) bad |= (std::bit_cast<uint32_t>(values[i]) & kExponent) == kExponent;
+  return bad == 0;
+}
+
+}  // namespace
+
 std::vector<unsigned char> finite_pixels(const GroupedImage& a, const GroupedImage& b, long& n_nonfinite) {
   std::vector<unsigned char> valid(static_cast<size_t>(a.width) * a.height, 1);
   std::atomic<long> bad{0};
   parallel_for(a.height, 8, [&](int y) {
     long bad_in_row = 0;
     for (int x = 0; x < a.width; ++x) {
-      // 0 * v is NaN for infinite and NaN values and zero otherwise.
-      float test = 0;
-      for (const GroupedImage* image : {&a, &b}) {
-        const float* p = image->pixel(x, y);
-        for (int i = 0; i < 3 * image->groups; ++i) test += 0.0f * p[i];
-      }
-      if (test != 0.0f) {
+      bool finite = true;
+      for (const GroupedImage* image : {&a, &b}) finite &= all_finite(image->pixel(x, y), 3 * image->groups);
+      if (!finite) {
         valid[static_cast<size_t>(y) * a.width + x] = 0;
         ++bad_in_row;
       }
@@ -46,18 +56,31 @@ struct PixelMoments {
   float mean[3] = {}, variance[3] = {};
 };
 
+/// Three channels and one more that is not used.
+typedef float Rgb __attribute__((vector_size(4 * sizeof(float))));
+
 /// Groups of equal sizes.
 PixelMoments equal_moments(const float* p, int groups, int first, int step) {
   const int n = (groups - first + step - 1) / step;
+  const float* const end = p + 3 * (groups - 1);  // beyond the last group there may be nothing to read
+  const Rgb last = {end[0], end[1], end[2], 0};
+  const auto at = [&](int t) {
+    Rgb value;
+    std::memcpy(&value, p + 3 * t, sizeof value);
+    return value;
+  };
+  const bool has_last = (groups - 1 - first) % step == 0;
+  Rgb mean = {}, squares = {};
+  for (int t = first; t < groups - 1; t += step) mean += at(t);
+  if (has_last) mean += last;
+  mean /= static_cast<float>(n);
+  for (int t = first; t < groups - 1; t += step) squares += (at(t) - mean) * (at(t) - mean);
+  if (has_last) squares += (last - mean) * (last - mean);
   PixelMoments m;
-  float squares[3] = {};
-  for (int t = first; t < groups; t += step)
-    for (int c = 0; c < 3; ++c) m.mean[c] += p[3 * t + c];
-  for (float& s : m.mean) s /= static_cast<float>(n);
-  for (int t = first; t < groups; t += step)
-    for (int c = 0; c < 3; ++c) squares[c] += (p[3 * t + c] - m.mean[c]) * (p[3 * t + c] - m.mean[c]);
-  for (int c = 0; c < 3; ++c)
+  for (int c = 0; c < 3; ++c) {
+    m.mean[c] = mean[c];
     m.variance[c] = n > 1 ? squares[c] / (static_cast<float>(n) * static_cast<float>(n - 1)) : 0.0f;
+  }
   return m;
 }
 

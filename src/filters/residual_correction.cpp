@@ -34,31 +34,38 @@ Planes make_cells(int side, const Moments& h, const std::vector<unsigned char>& 
   for (int c = 0; c < 3; ++c)
     for (int row = -border; row < cell_rows + border; ++row)
       std::fill_n(cells.row(kGuide + c, row) - border, cells.stride(), kFar);
+  const ptrdiff_t plane = cells.row(1, 0) - cells.row(0, 0), of_mean = h.mean.row(1, 0) - h.mean.row(0, 0),
+                  of_noise = h.variance_of_mean.row(1, 0) - h.variance_of_mean.row(0, 0);
   parallel_for(cell_rows, [&](int row) {
+    float* const to = cells.row(0, row);
     const int y0 = side * row, y1 = std::min(height, y0 + side);
     for (int x0 = 0; x0 < width; x0 += side) {
       float guide[3] = {}, residual[3] = {}, variance = 0, weight = 0, count = 0;
-      for (int y = y0; y < y1; ++y)
+      for (int y = y0; y < y1; ++y) {
+        const float* const mean = h.mean.row(0, y);
+        const float* const noise = h.variance_of_mean.row(0, y);
         for (int x = x0; x < std::min(width, x0 + side); ++x) {
           if (!valid[static_cast<size_t>(y) * width + x]) continue;
           const float n = h.relative_count ? h.relative_count->row(0, y)[x] : 1.0f;
+          const float* const p = f.pixel(x, y);
           count += 1;
           weight += n;
           for (int c = 0; c < 3; ++c) {
-            guide[c] += f.pixel(x, y)[c];
-            residual[c] += n * (h.mean.row(c, y)[x] - f.pixel(x, y)[c]);
-            variance += n * n * h.variance_of_mean.row(c, y)[x];
+            guide[c] += p[c];
+            residual[c] += n * (mean[c * of_mean + x] - p[c]);
+            variance += n * n * noise[c * of_noise + x];
           }
         }
+      }
       if (count == 0) continue;
       // Beyond the last column, too: neighbouring cells are read a multiple of `side` from any column of a cell.
       for (int x = x0; x < x0 + side; ++x) {
         for (int c = 0; c < 3; ++c) {
-          cells.row(kGuide + c, row)[x] = guide[c] / count;
-          cells.row(kResidual + c, row)[x] = residual[c];
+          to[(kGuide + c) * plane + x] = guide[c] / count;
+          to[(kResidual + c) * plane + x] = residual[c];
         }
-        cells.row(kWeight, row)[x] = weight;
-        cells.row(kVariance, row)[x] = variance;
+        to[kWeight * plane + x] = weight;
+        to[kVariance * plane + x] = variance;
       }
     }
   });
@@ -78,27 +85,49 @@ struct GuidedMean {
   }
 };
 
-/// r of residual_correction.h at the pixels (x + lane, y) with values f, over (2 radius + 1)^2 cells.
-GuidedMean guided_mean(const Planes& cells, int side, int radius, int x, int y, const vfloat* f,
-                       vfloat squared_bandwidth) {
-  const vfloat factor = -1.0f / max(squared_bandwidth, splat(1e-30f));
-  const int row = y / side, reach = radius * side;
+/// What guided_mean() sums up, and what of the target it reads.
+struct GuidedSums {
+  vfloat f[3], factor;
   vfloat weights = {}, squares = {}, r0 = {}, r1 = {}, r2 = {};
+
+  /// Adds n cells, `side` columns apart; p: their planes.
+  template <int n>
+  void add(const float* const* p, ptrdiff_t dx, int side) {
+    vfloat w[n];
+#pragma GCC unroll 8
+    for (int i = 0; i < n; ++i) {
+      const vfloat d0 = load(p[kGuide] + dx + i * side) - f[0], d1 = load(p[kGuide + 1] + dx + i * side) - f[1],
+                   d2 = load(p[kGuide + 2] + dx + i * side) - f[2];
+      w[i] = (d0 * d0 + d1 * d1 + d2 * d2) * factor;
+    }
+#pragma GCC unroll 8
+    for (int i = 0; i < n; ++i) w[i] = exp2_of_nonpositive(w[i]);
+#pragma GCC unroll 8
+    for (int i = 0; i < n; ++i) {
+      const ptrdiff_t at = dx + i * side;
+      weights += w[i] * load(p[kWeight] + at);
+      squares += w[i] * w[i] * load(p[kVariance] + at);
+      r0 += w[i] * load(p[kResidual] + at);
+      r1 += w[i] * load(p[kResidual + 1] + at);
+      r2 += w[i] * load(p[kResidual + 2] + at);
+    }
+  }
+};
+
+/// r of residual_correction.h at the pixels (x + lane, y) with values f, over (2 radius + 1)^2 cells.
+template <int side>
+GuidedMean guided_mean(const Planes& cells, int radius, int x, int y, const vfloat* f, vfloat squared_bandwidth) {
+  constexpr int kAtOnce = 3;
+  GuidedSums sums{{f[0], f[1], f[2]}, -kLog2E / max(squared_bandwidth, splat(1e-30f))};
+  const int row = y / side, reach = radius * side;
   for (int dy = -radius; dy <= radius; ++dy) {
     const float* p[kPlanes];
     for (int i = 0; i < kPlanes; ++i) p[i] = cells.row(i, row + dy) + x;
-    for (int dx = -reach; dx <= reach; dx += side) {
-      const vfloat d0 = load(p[kGuide] + dx) - f[0], d1 = load(p[kGuide + 1] + dx) - f[1],
-                   d2 = load(p[kGuide + 2] + dx) - f[2];
-      const vfloat w = exp_of_nonpositive((d0 * d0 + d1 * d1 + d2 * d2) * factor);
-      weights += w * load(p[kWeight] + dx);
-      squares += w * w * load(p[kVariance] + dx);
-      r0 += w * load(p[kResidual] + dx);
-      r1 += w * load(p[kResidual + 1] + dx);
-      r2 += w * load(p[kResidual + 2] + dx);
-    }
+    int dx = -reach;
+    for (; dx + (kAtOnce - 1) * side <= reach; dx += kAtOnce * side) sums.add<kAtOnce>(p, dx, side);
+    for (; dx <= reach; dx += side) sums.add<1>(p, dx, side);
   }
-  return {weights, {r0, r1, r2}, squares};
+  return {sums.weights, {sums.r0, sums.r1, sums.r2}, sums.squares};
 }
 
 /// Adds to each valid pixel what `correction(x, y, f, variance)` gives, three vfloats for the pixels (x + lane, y)
@@ -134,9 +163,9 @@ void add_residual_correction(const Moments& h, const ResidualCorrectionOptions& 
     const Planes cells = make_cells(kCell, h, valid, estimate, wide_radius * kCell);
     const Planes pixels = make_cells(1, h, valid, estimate, narrow_radius);
     const auto mixed = [&](int x, int y, const vfloat* f, vfloat variance) {
-      const GuidedMean narrow = guided_mean(pixels, 1, narrow_radius, x, y, f, variance * bandwidth);
+      const GuidedMean narrow = guided_mean<1>(pixels, narrow_radius, x, y, f, variance * bandwidth);
       const GuidedMean wide =
-          guided_mean(cells, kCell, wide_radius, x, y, f, variance * (bandwidth * kWidening * kWidening));
+          guided_mean<kCell>(cells, wide_radius, x, y, f, variance * (bandwidth * kWidening * kWidening));
       const vfloat a = narrow.share(kNoise * variance), b = (1 - a) * wide.share(kWideNoise * variance);
       std::array<vfloat, 3> result;
       for (int c = 0; c < 3; ++c) result[c] = a * narrow.value(c) + b * wide.value(c);
@@ -148,7 +177,7 @@ void add_residual_correction(const Moments& h, const ResidualCorrectionOptions& 
   const Planes cells = make_cells(kResidualCell, h, valid, estimate, radius * kResidualCell);
   const auto second = [&](int x, int y, const vfloat* f, vfloat variance) {
     const GuidedMean mean =
-        guided_mean(cells, kResidualCell, radius, x, y, f, variance * (bandwidth * kSecondWidening * kSecondWidening));
+        guided_mean<kResidualCell>(cells, radius, x, y, f, variance * (bandwidth * kSecondWidening * kSecondWidening));
     const vfloat b = mean.share(kWideNoise * variance);
     return std::array<vfloat, 3>{b * mean.value(0), b * mean.value(1), b * mean.value(2)};
   };
@@ -165,7 +194,7 @@ void add_residual(const Moments& h, const ResidualOptions& options, const std::v
       for (int l = 0; l < kLanes; ++l) f[c][l] = estimate.pixel(std::min(x + l, estimate.width - 1), y)[c];
       brightness += f[c] * (options.bandwidth / 3);
     }
-    const GuidedMean mean = guided_mean(cells, options.cell, radius, x, y, f, brightness * brightness + kLeastSquare);
+    const GuidedMean mean = guided_mean<4>(cells, radius, x, y, f, brightness * brightness + kLeastSquare);
     for (int l = 0; l < n; ++l)
       if (valid[static_cast<size_t>(y) * estimate.width + x + l])
         for (int c = 0; c < 3; ++c) estimate.pixel(x + l, y)[c] += mean.value(c)[l];

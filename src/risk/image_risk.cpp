@@ -45,17 +45,18 @@ void add_groups(const ImageRiskInput& in, int x, int y, double weight, RiskRow& 
   const GroupedImage& image = *in.groups;
   const int T = image.groups;
   const float* g = image.pixel(x, y);
+  const double part = 1.0 / T;
   double light = 0, largest = 0;
   std::array<double, 3> mean{}, second{}, fourth{};
   for (int t = 0; t < T; ++t) {
     double sum = 0;
-    for (int c = 0; c < 3; ++c) sum += std::max(0.0f, g[3 * t + c]), mean[c] += g[3 * t + c] / static_cast<double>(T);
+    for (int c = 0; c < 3; ++c) sum += std::max(0.0f, g[3 * t + c]), mean[c] += part * g[3 * t + c];
     light += sum, largest = std::max(largest, sum);
   }
   for (int c = 0; c < 3; ++c) {
     for (int t = 0; t < T; ++t) {
       const double d = square(g[3 * t + c] - mean[c]);
-      second[c] += d / T, fourth[c] += d * d / T;
+      second[c] += part * d, fourth[c] += part * d * d;
     }
     row.squared_deviations += square(weight * second[c]), row.fourth_powers += square(weight) * fourth[c];
   }
