@@ -497,7 +497,7 @@ class Time(RenderTest):
     def test_a_plain_render_uses_all_of_it(self):
         seconds = self.timed(1, "none")["seconds"]
         self.assertEqual(seconds["estimate"], 0)
-        self.assertLess(seconds["trial"], 0.01)
+        self.assertLess(seconds["trial"], 0.1 * SLOWDOWN)
         self.assertTrue(0.9 < seconds["render"] < 3 * SLOWDOWN, seconds)
 
     def test_every_pixel_has_samples_however_short_the_time(self):
@@ -563,7 +563,8 @@ class Interruption(RenderTest):
                 break
             self.assertIn(process.returncode, (130, -signal.SIGINT),
                           message)  # the signal itself before the render begins
-            if process.returncode == 130 and "before the first sample" not in message:
+            begun = message != "covary: interrupted\n" and "before the first sample" not in message
+            if process.returncode == 130 and begun:
                 interrupted += 1
                 self.assertIn("interrupted after", message)
                 self.assertIn(film.split("/")[0], message)
