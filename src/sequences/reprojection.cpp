@@ -12,10 +12,11 @@
 namespace covary {
 namespace {
 
-constexpr float kAtRest = 1e-3f;    // pixels
-constexpr float kEdge = 0.25f;      // pixels of motion from a pixel to the next
-constexpr float kRelative = 0.01f;  // of the depth that a pixel may differ by
-constexpr float kOfSlope = 1.5f;    // and of the depth's change from pixel to pixel
+constexpr float kAtRest = 1e-3f;          // pixels
+constexpr float kEdge = 0.25f;            // pixels of motion from a pixel to the next
+constexpr float kRelative = 0.01f;        // of the depth that a pixel may differ by
+constexpr float kRelativeUnknown = 0.1f;  // where its change is not known
+constexpr float kOfSlope = 1.5f;          // and of the depth's change from pixel to pixel
 
 struct Tap {
   int first;                     // of four pixels
@@ -88,7 +89,8 @@ class Reprojection {
     const float depth = *now_.depth.pixel(x, y), old = *depth_before_.pixel(old_x, old_y);
     if (depth == 0 || old == 0) return depth == old;
     const float expected = depth + now_.motion.pixel(x, y)[2];
-    return std::abs(old - expected) <= kRelative * expected + kOfSlope * slope(now_.depth, x, y);
+    const float relative = now_.knows_depth ? kRelative : kRelativeUnknown;
+    return std::abs(old - expected) <= relative * expected + kOfSlope * slope(now_.depth, x, y);
   }
 
   /// The difference to linear interpolation.

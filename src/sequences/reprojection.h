@@ -10,6 +10,8 @@ namespace covary {
 struct MotionLayers {
   Image depth;   ///< 1 channel; 0 where there is nothing
   Image motion;  ///< 3 channels: pixels to the right and down, and depth: before minus now
+  /// The third channel of motion is known, and depth. Otherwise a point may have come nearer or farther by a tenth.
+  bool knows_depth = true;
 };
 
 /// `before`: the picture of the frame before, 3 channels, and `depth_before` its depth, in the same window of the frame

@@ -21,7 +21,7 @@ START = [[-1, 0, 0, 0.5], [0, 1, 0, 1.3], [0, 0, -1, 3.5], [0, 0, 0, 1]]
 END = [[-0.8, 0, -0.6, 0.1], [0, 1, 0, 1.3], [0.6, 0, -0.8, 3.5], [0, 0, 0, 1]]
 
 
-class Frames(CliTest):
+class SequenceTest(CliTest):
     def setUp(self):
         super().setUp()
         self.write_text("room.xml", ROOM)
@@ -51,6 +51,8 @@ class Frames(CliTest):
         channels = self.channels(name)
         return [channels[c] for c in "RGB"]
 
+
+class Frames(SequenceTest):
     def test_each_is_the_image_of_that_camera_and_seed(self):
         small = ("--resolution", "32x24", "--spp", "8", "--denoise", "auto")
         self.good_render("-o", "f_##.exr", "--seed", "3", *small)
@@ -199,6 +201,52 @@ class Frames(CliTest):
         self.write_path((0, scaled))
         self.assertIn("the to_world transformation of a sensor must not scale", self.render("-o", "f_#.exr").stderr)
         self.assertEqual(list(self.path.glob("f_*")), [])
+
+
+class Denoise(SequenceTest):
+    """`covary denoise` of frames of any renderer, whose motion is a layer of them."""
+
+    def setUp(self):
+        super().setUp()
+        for name in ("a", "b"):
+            self.good_render("-o", f"{name}_#.exr", "--spp", "4", "--seed", str(ord(name)), frames="1-3")
+
+    def denoise(self, *arguments):
+        return self.run_covary("denoise", *arguments, "--oidn", "off", "--mode", "auto")
+
+    def test_frames_of_two_seeds(self):
+        result = self.denoise("a_#.exr", "b_#.exr", "-o", "d_#.exr")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(self.denoise("a_#.exr", "b_#.exr", "-o", "alone_#.exr", "--no-history").returncode, 0)
+        self.assertEqual(self.denoise("a_2.exr", "b_2.exr", "-o", "single.exr").returncode, 0)
+        self.assertEqual(self.picture("d_1.exr"), self.picture("alone_1.exr"))
+        self.assertNotEqual(self.picture("d_2.exr"), self.picture("alone_2.exr"))
+        self.assertEqual(self.picture("alone_2.exr"), self.picture("single.exr"))
+        self.assertEqual(len(list(self.path.glob("d_*.exr"))), 3)
+        self.assertEqual(self.denoise("a_#.exr", "b_#.exr", "-o", "e_#.exr", "--frames", "2-3").returncode, 0)
+        self.assertEqual(self.picture("e_2.exr"), self.picture("alone_2.exr"))
+
+    def test_wrong_motion_and_seeds_are_found(self):
+        wrong = self.denoise("a_#.exr", "b_#.exr", "-o", "d_#.exr", "--motion-scale=-1,-1")
+        self.assertEqual(wrong.returncode, 1)
+        self.assertIn("'a_2.exr': its motion does not lead to where things are in 'a_1.exr'", wrong.stderr)
+        self.good_render("-o", "c_#.exr", "--frame-seeds", "same", frames="1-2")
+        self.good_render("-o", "d_#.exr", "--frame-seeds", "same", "--seed", "5", frames="1-2")
+        self.assertIn("'c_1.exr' and 'c_2.exr' have the same seed, 0",
+                      self.denoise("c_#.exr", "d_#.exr", "-o", "o_#.exr").stderr)
+
+    def test_wrong_input(self):
+        for arguments, message in (
+                (("a_#.exr", "b_1.exr", "-o", "d_#.exr"), "'b_1.exr' has no '#'"),
+                (("a_#.exr", "b_#.exr", "-o", "d.exr"), "-o 'd.exr': of frames, expected is a name such as"),
+                (("a_#.exr", "b_#.exr", "-o", "d_#.exr", "--frames", "3-1"), "--frames '3-1': expected FIRST-LAST"),
+                (("a_#.exr", "b_#.exr", "-o", "d_#.exr", "--motion-scale", "1"), "--motion-scale '1': expected X,Y"),
+                (("a_1.exr", "b_1.exr", "-o", "d.exr", "--frames", "1"), "--frames: the input has no '#'"),
+                (("none_#.exr", "b_#.exr", "-o", "d_#.exr"), "there are no frames 'none_#.exr'"),
+                (("a_#.exr", "b_#.exr", "-o", "d_#.exr", "--motion", "Vector"), "no layer 'Vector' of motion")):
+            result = self.denoise(*arguments)
+            self.assertNotEqual(result.returncode, 0)
+            self.assertIn(message, result.stderr)
 
 
 if __name__ == "__main__":
