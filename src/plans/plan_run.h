@@ -111,6 +111,7 @@ class PlanRun {
   Stopwatch watch_, since_checkpoint_;
   bool consistent_ = true;                  // the films are as they were between two waves
   bool unsaved_ = false;                    // they have samples that are on no disk
+  double estimate_stopped_after_ = 0;  // seconds
   std::optional<double> estimate_seconds_;  // what the next estimate takes
 };
 

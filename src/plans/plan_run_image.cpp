@@ -53,6 +53,8 @@ EstimatorResult PlanRun::estimate_rows(int first_row, int n_rows, std::span<cons
 
 /// False when interrupted; of a render that was interrupted before, when it takes too long.
 bool PlanRun::estimate() {
+  // One that took so long until it was stopped takes too long from its start, too.
+  if (result_.interrupted && estimate_stopped_after_ > kEstimateOfInterrupted) return false;
   begin(RenderStage::kEstimating);
   const Stopwatch watch;
   const auto ends = [&] { return result_.interrupted ? watch.seconds() > kEstimateOfInterrupted : stopped(); };
@@ -63,7 +65,10 @@ bool PlanRun::estimate() {
   if (with_layers) trace_layers();
   if (with_layers && stopped()) return false;
   const std::span<const Film> layers = with_layers ? std::span<const Film>(layers_) : std::span<const Film>();
-  if (!run_stoppable(ends, [&] { image = estimate_rows(0, window_.height, layers); })) return false;
+  if (!run_stoppable(ends, [&] { image = estimate_rows(0, window_.height, layers); })) {
+    estimate_stopped_after_ = watch.seconds();
+    return false;
+  }
   for (size_t i = 0; i < image.layers.size(); ++i) result_.aovs[kLayerNames[i]] = std::move(image.layers[i]);
   double samples = 0;
   for (const Pass& pass : camera_passes(films())) samples += pass.film.mean_count();

@@ -5,10 +5,12 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
 #include <filesystem>
 #include <thread>
 
 #include "combine/registry.h"
+#include "core/stop.h"
 #include "film/film_file.h"
 #include "film/image_file.h"
 #include "plans/budget.h"
@@ -50,6 +52,30 @@ TEST(Render, ACropOutsideTheFrameAndImpossibleLimitsAreUsageErrors) {
   request.until = 0;
   request.seconds = 1;
   EXPECT_THROW(render(scene, samples_plan(make_estimator("polynomials", {{"dimensions", "2"}})), request), Error);
+}
+
+/// An estimate that is stopped begins once more, for an image of what there is, but not where it had taken long already.
+TEST(Render, AnEstimateThatTookLongUntilItWasStoppedIsNotMadeAgain) {
+  const LoadedScene scene = load_sized(kRoom);
+  for (const auto& [milliseconds, expected] : {std::pair(0, 2), std::pair(700, 1)}) {
+    std::atomic<bool> stop{false};
+    RenderCallbacks callbacks;
+    callbacks.stop = &stop;
+    Plan plan = average_plan();
+    int n_estimates = 0;
+    plan.estimate = [&, wait = milliseconds, average = plan.estimate](std::span<const Pass> passes, int first, int n,
+                                                                      const Beside& beside) {
+      if (++n_estimates == 1) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(wait));
+        for (stop = true;; std::this_thread::yield()) throw_if_stopped();
+      }
+      return average(passes, first, n, beside);
+    };
+    const RenderResult result = render(scene, plan, request_of(24), callbacks);
+    EXPECT_TRUE(result.interrupted);
+    EXPECT_EQ(n_estimates, expected) << milliseconds;
+    EXPECT_EQ(result.passes[0].film.mean_count(), 12);
+  }
 }
 
 TEST(Render, StoppedAtManyTilesAndResumedGivesTheSameBits) {
