@@ -24,7 +24,7 @@ RIDGE, NOISE_FLOOR = 0.1, 0.1
 #: difference of logarithms from which on a render counts little
 OUTLIER = 0.5
 TRUSTED, LEAST, MOST, MISSING_COVARIANCE = 0.5, 0.5, 30, 0.27
-MOST_OF_LARGEST, MOST_FACTOR, FEWEST_PIXELS, FEWEST_OF_PIXELS = 0.6, 5, 20, 0.04
+MOST_OF_LARGEST, MOST_FACTOR, FEWEST_PIXELS = 0.6, 5, 20
 FEWEST_GROUPS = 8
 #: What bounds are off at least, of a median render: scenes of others differ more from ours than ours do
 LEAST_FACTOR = 1.15
@@ -122,12 +122,11 @@ class Fit:
 
 
 def usable(row):
-    """Whether an interval would nearly be given, and the references know the error to half of it."""
+    """Whether an interval can be given, and the references know the error to half of it."""
     share = float(row["light_of_largest"]) / max(float(row["light"]), 1e-30)
     return (float(row["variance"]) > 0 and float(row["relmse"]) > 2 * float(row["reference_noise"])
             and share <= MOST_OF_LARGEST
-            and float(row["noise"])**2 >= max(FEWEST_PIXELS, FEWEST_OF_PIXELS / 2 * float(row["values"]) / 3)
-            * float(row["noise_squares"]))
+            and float(row["noise"])**2 >= FEWEST_PIXELS * float(row["noise_squares"]))
 
 
 TABLE_TEXT = """// SPDX-License-Identifier: Apache-2.0
@@ -151,10 +150,9 @@ inline constexpr FittedErrors kFittedErrors[] = {{
 // clang-format on
 
 /// There is no interval where the largest group of each pixel has a larger share of the light, the bounds are further
-/// off than this factor, fewer pixels hold the noise, as a number or as a fraction of all, or there are fewer groups.
+/// off than this factor, fewer pixels hold the noise, or there are fewer groups.
 inline constexpr double kMostOfLargest = {share}, kMostFactor = {factor};
-inline constexpr double kFewestPixels = {fewest}, kFewestOfPixels = {fraction};
-inline constexpr int kFewestGroups = {groups};
+inline constexpr int kFewestPixels = {fewest}, kFewestGroups = {groups};
 
 }}  // namespace covary
 """
@@ -168,8 +166,7 @@ def fit_all(arguments):
         fits.append(Fit(rows, kind))
         fits[-1].report()
     TABLE.write_text(TABLE_TEXT.format(rows="\n".join(fit.text() for fit in fits), share=MOST_OF_LARGEST,
-                                       factor=MOST_FACTOR, fewest=FEWEST_PIXELS,
-                                       fraction=FEWEST_OF_PIXELS, groups=FEWEST_GROUPS))
+                                       factor=MOST_FACTOR, fewest=FEWEST_PIXELS, groups=FEWEST_GROUPS))
 
 
 def main():

@@ -75,8 +75,7 @@ std::string unknown_error(const RiskRow& sums, const LogError& error) {
   if (sums.groups < kFewestGroups)
     return fmt::format("{:.0f} groups of samples are too few, it takes {}", sums.groups, kFewestGroups);
   const double n = sums.noise * sums.noise / sums.noise_squares, pixels = sums.values / 3;
-  if (n < std::max(kFewestPixels, kFewestOfPixels * pixels))
-    return fmt::format("{:.0f} of {:.0f} pixels hold most of the noise", std::max(1.0, n), pixels);
+  if (n < kFewestPixels) return fmt::format("{:.0f} of {:.0f} pixels hold most of the noise", std::max(1.0, n), pixels);
   const double share = sums.light > 0 ? sums.light_of_largest / sums.light : 1;
   if (share > kMostOfLargest)
     return fmt::format("{:.0f} % of the light are in one of {:.0f} groups of each pixel", 100 * share, sums.groups);

@@ -103,6 +103,17 @@ TEST(ErrorInterval, IsNotGivenWhereFewPixelsHoldTheNoise) {
   EXPECT_EQ(result.interval->unknown, "4 of 10000 pixels hold most of the noise");
 }
 
+TEST(ErrorInterval, IsWiderWhereFewerPixelsHoldTheNoise) {
+  for (const ErrorKind kind : {ErrorKind::kMean, ErrorKind::kPair, ErrorKind::kFilters, ErrorKind::kNetwork,
+                               ErrorKind::kPairFilters, ErrorKind::kPairNetwork}) {
+    RiskRow few = known_sums();
+    few.noise_squares = few.noise * few.noise / 100;  // one hundredth of the pixels
+    const LogError error = fitted_error(few, kind), usual = fitted_error(known_sums(), kind);
+    EXPECT_GT(error.high - error.low, 1.02 * (usual.high - usual.low)) << static_cast<int>(kind);
+    EXPECT_EQ(unknown_error(few, {0, -0.5, 0.5}), "") << "wide, but not refused";
+  }
+}
+
 TEST(ErrorInterval, IsNotGivenWhereLightIsMissing) {
   RiskRow sums = known_sums();
   sums.light_of_largest = 0.9 * sums.light;
