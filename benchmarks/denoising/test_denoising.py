@@ -8,7 +8,8 @@ from pathlib import Path
 from denoising import resolution_of, tables, turned_cameras, turned_scene
 
 SCENE = """<scene version="3.0.0"><default name="w" value="720"/>
-<sensor type="perspective"><transform name="to_world"><lookat origin="0, 0, 5" target="0, 0, 0" up="0, 1, 0"/></transform>
+<sensor type="perspective">
+<transform name="to_world"><lookat origin="0, 0, 5" target="0, 0, 0" up="0, 1, 0"/></transform>
 <film type="hdrfilm"><integer name="width" value="$w"/><integer name="height" value="1280"/></film></sensor></scene>"""
 
 
