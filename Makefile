@@ -11,7 +11,7 @@
 #                         FUZZ=seconds for each target
 #   make bench            build and run the micro benchmarks: the time of each stage, and what part of its limit it
 #                         reaches; build/release/bench.json            BENCH=regex selects some; BASELINE=an earlier
-#                         bench.json to compare with
+#                         bench.json to compare with; HISTORY=benchmarks/results.md adds a row to that table
 #   make lint             formatting, static analysis, rules of the tree    ALL=1 analyses all files, not changed ones
 #   make install          build for every x86-64 processor (docs/library.md) and install under PREFIX (default
 #                         /usr/local); ARCH=native builds for this machine alone, in a third of the time; with Open
@@ -76,7 +76,7 @@ nightly: configure
 
 bench: configure
 	@cmake --build build/release -j $(JOBS)
-	@scripts/bench build/release '$(BENCH)' $(BASELINE)
+	@scripts/bench build/release '$(BENCH)' '$(BASELINE)' '$(HISTORY)'
 
 lint:
 	@scripts/setup lint

@@ -8,7 +8,11 @@ whole paths (`rays` per second) the nearest hits of camera rays of the same scen
 time of a stage is the least processor time of its repetitions; of one that uses all threads (`real_time`), time by the
 clock.
 
-    stages.py --out FILE [--baseline FILE] [--program TEXT] JSON...
+    stages.py --out FILE [--baseline FILE] [--history FILE] [--program TEXT] JSON...
+
+`--history` adds a row to a table of Markdown, benchmarks/results.md: the milliseconds of the stages that its head
+names, with the processor and the part of a multiply-add's peak as a measure of how busy the machine was. A stage that
+was not run leaves its place empty. Runs of different processors do not compare.
 
 JSON: files that Google Benchmark wrote (`--benchmark_out`), those of machine_bench among them.
 """
@@ -68,15 +72,52 @@ def table(stages, baseline):
     return lines
 
 
+FIXED = ["program", "date", "processor", "G multiply-adds/s"]
+
+
+def history_row(head, stages, best, program, date, processor):
+    """The row of a run for a table whose head is `head`;
+    ValueError where that does not begin with the fixed columns."""
+    columns = [column.strip() for column in head.strip().strip("|").split("|")]
+    if columns[:len(FIXED)] != FIXED:
+        raise ValueError(f"expected a table with the columns {', '.join(FIXED)} and names of stages, found: {head}")
+    peak = f"{best[ARITHMETIC]['items_per_second'] / 2e9:.0f}" if ARITHMETIC in best else ""
+    times = [f"{1e3 * stages[name]['seconds']:.4g}" if name in stages else "" for name in columns[len(FIXED):]]
+    return "| " + " | ".join([program, date, processor, peak] + times) + " |"
+
+
+def with_row(text, make_row):
+    """`text` with a row at the end of its only table; make_row(head) gives it."""
+    lines = text.rstrip("\n").split("\n")
+    table_lines = [i for i, line in enumerate(lines) if line.startswith("|")]
+    if len(table_lines) < 2:
+        raise ValueError("expected a table")
+    lines.insert(table_lines[-1] + 1, make_row(lines[table_lines[0]]))
+    return "\n".join(lines) + "\n"
+
+
+def processor_name():
+    """As the system calls it; empty where it does not tell."""
+    try:
+        lines = pathlib.Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return ""
+    values = {line.split(":")[0].strip(): line.split(":", 1)[1].strip() for line in lines if ":" in line}
+    return ", ".join(part for part in [values.get("model name", ""),
+                                       f"family {values['cpu family']}" if "cpu family" in values else ""] if part)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("files", nargs="+", type=pathlib.Path, metavar="JSON")
     parser.add_argument("--out", required=True, type=pathlib.Path, help="JSON file of this run")
     parser.add_argument("--baseline", type=pathlib.Path, help="the same of an earlier run")
+    parser.add_argument("--history", type=pathlib.Path, help="table of Markdown that gets a row of this run")
     parser.add_argument("--program", default="", help="what was measured, for the JSON file")
     arguments = parser.parse_args()
     results = [json.loads(file.read_text()) for file in arguments.files]
-    stages = summarize([run for result in results for run in result["benchmarks"]])
+    runs = [run for result in results for run in result["benchmarks"]]
+    stages = summarize(runs)
     baseline = {}
     if arguments.baseline:
         baseline = json.loads(arguments.baseline.read_text()).get("stages")
@@ -85,6 +126,14 @@ def main():
     context = results[0]["context"]
     arguments.out.write_text(json.dumps({"program": arguments.program, "date": context["date"],
                                          "processors": context["num_cpus"], "stages": stages}, indent=1) + "\n")
+    if arguments.history:
+        try:
+            text = with_row(arguments.history.read_text(),
+                            lambda head: history_row(head, stages, best_runs(runs), arguments.program,
+                                                     context["date"][:10], processor_name()))
+        except (OSError, ValueError) as error:
+            sys.exit(f"stages.py: {arguments.history}: {error}")
+        arguments.history.write_text(text)
     print("\n".join(table(stages, baseline)))
 
 

@@ -2,7 +2,7 @@
 """Tests of the table of stages: python -m unittest test_stages."""
 import unittest
 
-from stages import summarize, table
+from stages import best_runs, history_row, summarize, table, with_row
 
 
 def run(name, cpu, **values):
@@ -33,6 +33,21 @@ class StagesTest(unittest.TestCase):
     def test_the_earlier_run_is_compared_by_name(self):
         lines = table({"a": {"seconds": 0.001}, "b": {"seconds": 0.002}}, {"a": {"seconds": 0.002}})
         self.assertEqual(lines[2:], ["| a | 1 |  | 0.50 |", "| b | 2 |  |  |"])
+
+    def test_a_run_is_a_row_of_the_history(self):
+        head = "| program | date | processor | G multiply-adds/s | pilot | find |"
+        runs = [run("multiply_add", 1, items_per_second=2e11), run("pilot", 28, flops=70.0), run("other", 3)]
+        text = with_row(f"# Results\n\n{head}\n|---|---|---|---|---|---|\n| old | | | | 1 | 2 |\n\nMore.\n",
+                        lambda found: history_row(found, summarize(runs), best_runs(runs), "covary 1", "2026-01-02",
+                                                  "A"))
+        self.assertEqual(text.split("\n")[4:], ["| old | | | | 1 | 2 |",
+                                                "| covary 1 | 2026-01-02 | A | 100 | 28 |  |", "", "More.", ""])
+
+    def test_a_history_without_its_table_is_refused(self):
+        with self.assertRaisesRegex(ValueError, "expected a table"):
+            with_row("# Results\n", lambda head: "")
+        with self.assertRaisesRegex(ValueError, "expected a table with the columns program"):
+            history_row("| a | b |", {}, {}, "", "", "")
 
 
 if __name__ == "__main__":
