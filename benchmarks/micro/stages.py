@@ -72,7 +72,7 @@ def table(stages, baseline):
     return lines
 
 
-FIXED = ["program", "date", "processor", "G multiply-adds/s"]
+FIXED = ["program", "date", "processor", "peak"]
 
 
 def history_row(head, stages, best, program, date, processor):

@@ -35,7 +35,7 @@ class StagesTest(unittest.TestCase):
         self.assertEqual(lines[2:], ["| a | 1 |  | 0.50 |", "| b | 2 |  |  |"])
 
     def test_a_run_is_a_row_of_the_history(self):
-        head = "| program | date | processor | G multiply-adds/s | pilot | find |"
+        head = "| program | date | processor | peak | pilot | find |"
         runs = [run("multiply_add", 1, items_per_second=2e11), run("pilot", 28, flops=70.0), run("other", 3)]
         text = with_row(f"# Results\n\n{head}\n|---|---|---|---|---|---|\n| old | | | | 1 | 2 |\n\nMore.\n",
                         lambda found: history_row(found, summarize(runs), best_runs(runs), "covary 1", "2026-01-02",
