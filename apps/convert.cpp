@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "commands.h"
@@ -16,7 +17,9 @@
 #include "film/outputs.h"
 #include "metrics/provenance.h"
 #include "numbers.h"
+#include "sequences/frame_names.h"
 #include "value_names.h"
+#include "video.h"
 
 namespace covary {
 namespace {
@@ -25,6 +28,7 @@ struct ConvertOptions {
   std::vector<std::string> files;  // the last is the output
   std::string layer;
   double exposure = 0;
+  std::optional<double> rate;  // of a video, frames per second
   bool accept_changed = false, overwrite = false, colours = false;
 
   ChecksumPolicy checksums() const { return accept_changed ? ChecksumPolicy::kIgnore : ChecksumPolicy::kCheck; }
@@ -98,8 +102,46 @@ void check_memory(const std::vector<Image>& images, const std::string& output) {
   require_image_memory(output, width, height, (images.size() > 1 ? 2 : 1) * kPixel);
 }
 
+void expose(const ConvertOptions& options, Image& image) {
+  const float factor = static_cast<float>(std::exp2(options.exposure));
+  for (float& value : image.data) value *= factor;
+  if (options.colours) image = in_false_colours(image);
+}
+
+/// Numbered images, or several sequences side by side, to a video.
+void convert_frames(const ConvertOptions& options) {
+  constexpr double kUsualRate = 24;
+  const std::vector<std::string> inputs(options.files.begin(), options.files.end() - 1);
+  const std::string& output = options.files.back();
+  for (const std::string& input : inputs)
+    if (!is_frame_pattern(input))
+      throw Error(ErrorCode::kUsage,
+                  fmt::format("'{}': of a video, expected are names with '#' in place of the frame's number, e.g. "
+                              "out_####.exr",
+                              input));
+  const std::vector<int> frames = frames_on_disk(inputs[0]);
+  if (frames.empty()) throw Error(ErrorCode::kInput, fmt::format("there are no frames '{}'", inputs[0]));
+  Outputs outputs;
+  for (const int frame : frames)
+    for (const std::string& input : inputs) outputs.reads(frame_name(input, frame));
+  outputs.writes("the output", output, OutputKind::kText);
+  check_not_lost(options);
+  VideoWriter video(output, options.rate.value_or(kUsualRate));
+  for (const int frame : frames) {
+    std::vector<Image> images;
+    for (const std::string& input : inputs)
+      images.push_back(read_image(frame_name(input, frame), options.layer, options.checksums()).image);
+    Image image = images.size() == 1 ? std::move(images[0]) : side_by_side(images);
+    expose(options, image);
+    video.add(image);
+  }
+  video.finish();
+}
+
 void convert(const ConvertOptions& options) {
   if (options.files.size() < 2) throw Error(ErrorCode::kUsage, "convert needs an image to read and one to write");
+  if (is_video_name(options.files.back())) return convert_frames(options);
+  if (options.rate) throw Error(ErrorCode::kUsage, "--fps is an option of videos (.mp4, .mkv, .mov, .webm)");
   const std::vector<std::string> inputs(options.files.begin(), options.files.end() - 1);
   const std::string& output = options.files.back();
   Outputs outputs;
@@ -116,12 +158,8 @@ void convert(const ConvertOptions& options) {
   check_memory(images, output);
   Image image = images.size() == 1 ? std::move(images[0]) : side_by_side(images);
   if (inputs.size() > 1) place = {image.width, image.height, {0, 0, image.width, image.height}};
-  const float factor = static_cast<float>(std::exp2(options.exposure));
-  for (float& value : image.data) value *= factor;
-  if (options.colours) {
-    image = in_false_colours(image);
-    place = {image.width, image.height, {0, 0, image.width, image.height}};
-  }
+  expose(options, image);
+  if (options.colours) place = {image.width, image.height, {0, 0, image.width, image.height}};
   write_image(output, image, place, attributes_of(options));
 }
 
@@ -132,15 +170,18 @@ void add_convert(CLI::App& app) {
   CLI::App* command =
       app.add_subcommand("convert", "Convert images, or layers of films, to EXR, PNG, HDR, PFM, JPEG or TIFF");
   command
-      ->add_option("FILES", o->files,
-                   "Images of any renderer (EXR, HDR, PFM, …), put side by side, and last the new one: its name "
-                   "tells the format (.exr .pfm .tif: 32-bit linear, .hdr: linear, .png .jpg: 8-bit sRGB)")
+      ->add_option(
+          "FILES", o->files,
+          "Images of any renderer (EXR, HDR, PFM, …), put side by side, and last the new one: its name "
+          "tells the format (.exr .pfm .tif: 32-bit linear, .hdr: linear, .png .jpg: 8-bit sRGB; .mp4 .mkv .mov "
+          ".webm: a video of in_####.exr, by ffmpeg)")
       ->type_name(kFileValue)
       ->option_text("IN... OUT")
       ->required();
   command->add_option("-e,--exposure", o->exposure, "Stops: the image is multiplied by 2^E")
       ->check(real_number(-100, 100))
       ->capture_default_str();
+  command->add_option("--fps", o->rate, "Of a video: frames per second; default: 24")->check(real_number(0.01, 1000));
   command->add_option("--layer", o->layer, "Layer (N, group03, …) or single channel (samples) in place of R G B")
       ->type_name("LAYER");
   command->add_flag("--false-colours", o->colours,

@@ -143,6 +143,7 @@ def measure(options):
           f"|{'---|' * (3 + len(COLUMNS))}", flush=True)
     for name in options.names:
         first, second = references(options, name)
+        scenes.write_sequence(name, options.frames, options.work)
         for spp in options.spp:
             images = methods(options, name, spp)
             for method, frames in images.items():

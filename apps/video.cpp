@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "video.h"
+
+#include <fmt/format.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <csignal>
+#include <filesystem>
+#include <string_view>
+#include <utility>
+
+#include "core/error.h"
+#include "core/shell_text.h"
+#include "core/srgb.h"
+#include "film/image_writer.h"
+
+namespace covary {
+namespace {
+
+constexpr int kNotFound = 127;  // of a shell whose program is missing
+
+}  // namespace
+
+bool is_video_name(const std::string& path) {
+  constexpr std::array<std::string_view, 4> kEndings = {".mp4", ".mkv", ".mov", ".webm"};
+  return std::find(kEndings.begin(), kEndings.end(), lower_extension(path)) != kEndings.end();
+}
+
+VideoWriter::VideoWriter(const std::string& path, double rate) : path_(path), rate_(rate) {
+  const std::filesystem::path whole(path);
+  temporary_ = (whole.parent_path() / (".unfinished-" + whole.filename().string())).string();
+}
+
+VideoWriter::~VideoWriter() {
+  if (pipe_) pclose(pipe_);
+  std::error_code ignored;
+  std::filesystem::remove(temporary_, ignored);
+}
+
+void VideoWriter::start(int width, int height) {
+  width_ = width, height_ = height;
+  // Codecs want even sizes: a black column or row is added. Yellow-blue at half of the resolution is what all players
+  // show.
+  const std::string command =
+      shell_text({"ffmpeg", "-loglevel", "error", "-f", "rawvideo", "-pixel_format", "rgb24", "-video_size",
+                  fmt::format("{}x{}", width, height), "-framerate", fmt::format("{}", rate_), "-i", "-", "-vf",
+                  "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p", "-y", temporary_});
+  std::signal(SIGPIPE, SIG_IGN);  // an ffmpeg that ends early is an error of writing
+  pipe_ = popen(command.c_str(), "w");
+  if (!pipe_) throw Error(ErrorCode::kIo, "cannot start ffmpeg");
+}
+
+void VideoWriter::add(const Image& frame) {
+  if (!pipe_) start(frame.width, frame.height);
+  if (frame.width != width_ || frame.height != height_)
+    throw Error(ErrorCode::kInput, fmt::format("a frame of {} x {} pixels; those before have {} x {}", frame.width,
+                                               frame.height, width_, height_));
+  bytes_.resize(frame.data.size());
+  std::transform(frame.data.begin(), frame.data.end(), bytes_.begin(), [](float linear) {
+    const float value = linear > 0 ? std::min(linear, 1.0f) : 0;  // and what is no number
+    return static_cast<unsigned char>(std::lround(255 * linear_to_srgb(value)));
+  });
+  if (std::fwrite(bytes_.data(), 1, bytes_.size(), pipe_) != bytes_.size()) finish();
+}
+
+void VideoWriter::finish() {
+  if (!pipe_) throw Error(ErrorCode::kIo, fmt::format("there are no frames for '{}'", path_));
+  const int status = pclose(std::exchange(pipe_, nullptr));
+  if (WIFEXITED(status) && WEXITSTATUS(status) == kNotFound)
+    throw Error(ErrorCode::kIo, "videos need the program ffmpeg, which is not installed (Debian: apt install ffmpeg)");
+  if (status != 0) throw Error(ErrorCode::kIo, fmt::format("ffmpeg could not write '{}'", path_));
+  std::error_code error;
+  std::filesystem::rename(temporary_, path_, error);
+  if (error) throw Error(ErrorCode::kIo, fmt::format("cannot write '{}': {}", path_, error.message()));
+}
+
+}  // namespace covary
