@@ -54,7 +54,7 @@ TEST(Render, ACropOutsideTheFrameAndImpossibleLimitsAreUsageErrors) {
   EXPECT_THROW(render(scene, samples_plan(make_estimator("polynomials", {{"dimensions", "2"}})), request), Error);
 }
 
-/// An estimate that is stopped begins once more, for an image of what there is, but not where it had taken long already.
+/// An estimate that is stopped begins once more, for an image of what there is, but not where it had taken long.
 TEST(Render, AnEstimateThatTookLongUntilItWasStoppedIsNotMadeAgain) {
   const LoadedScene scene = load_sized(kRoom);
   for (const auto& [milliseconds, expected] : {std::pair(0, 2), std::pair(700, 1)}) {
