@@ -55,7 +55,7 @@ std::shared_ptr<LoadedScene> load(const std::string& path, const SceneChoice& ch
   if (choice.max_depth) integrator.options["max-depth"] = std::to_string(*choice.max_depth);
   options.make_integrator = integrator_maker(integrator);
   auto scene = std::make_shared<LoadedScene>();
-  run_work([&](WorkState&) { *scene = load_scene(path, options); }, nb::none());
+  run_work([&](WorkState& state) { run_stoppable(state, [&] { *scene = load_scene(path, options); }); }, nb::none());
   return scene;
 }
 

@@ -168,6 +168,12 @@ void place(SurfaceHit& hit, const Transform& to_world, bool with_derivatives) {
   hit.frame = Frame::from_tangent(n, hit.dp_du);
 }
 
+void release(RTCDevice device, RTCScene top, const auto& groups) {
+  if (top) rtcReleaseScene(top);
+  for (const auto& group : groups) rtcReleaseScene(group.scene);
+  rtcReleaseDevice(device);
+}
+
 }  // namespace
 
 RayTracer::Group RayTracer::make_group(std::span<const ShapePtr> shapes) const {
@@ -193,35 +199,36 @@ RayTracer::RayTracer(std::span<const ShapePtr> shapes, std::span<const Instance>
                     ? "out of memory: Embree's device"
                     : "Embree cannot make a device: too little memory, too few threads allowed, or another processor");
   rtcSetDeviceErrorFunction(device_, on_embree_error, nullptr);
-  top_ = make_group(shapes);
+  try {
+    top_ = make_group(shapes);
 
-  std::map<const ShapeGroup*, size_t> index;
-  for (const Instance& instance : instances)
-    if (index.emplace(instance.group.get(), groups_.size()).second) {
-      groups_.push_back(make_group(instance.group->shapes));
-      rtcCommitScene(groups_.back().scene);
+    std::map<const ShapeGroup*, size_t> index;
+    for (const Instance& instance : instances)
+      if (index.emplace(instance.group.get(), groups_.size()).second) {
+        groups_.push_back(make_group(instance.group->shapes));
+        rtcCommitScene(groups_.back().scene);
+      }
+    for (const Instance& instance : instances) {
+      const Group& group = groups_[index.at(instance.group.get())];
+      const RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_INSTANCE);
+      rtcSetGeometryInstancedScene(geometry, group.scene);
+      float columns[12];
+      for (int c = 0; c < 4; ++c)
+        for (int r = 0; r < 3; ++r) columns[c * 3 + r] = static_cast<float>(instance.to_world.matrix()[r][c]);
+      rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns);
+      rtcCommitGeometry(geometry);
+      rtcAttachGeometryByID(top_.scene, geometry, static_cast<unsigned>(top_.shapes.size() + placed_.size()));
+      rtcReleaseGeometry(geometry);
+      placed_.push_back({&group, instance.to_world});
     }
-  for (const Instance& instance : instances) {
-    const Group& group = groups_[index.at(instance.group.get())];
-    const RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_INSTANCE);
-    rtcSetGeometryInstancedScene(geometry, group.scene);
-    float columns[12];
-    for (int c = 0; c < 4; ++c)
-      for (int r = 0; r < 3; ++r) columns[c * 3 + r] = static_cast<float>(instance.to_world.matrix()[r][c]);
-    rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns);
-    rtcCommitGeometry(geometry);
-    rtcAttachGeometryByID(top_.scene, geometry, static_cast<unsigned>(top_.shapes.size() + placed_.size()));
-    rtcReleaseGeometry(geometry);
-    placed_.push_back({&group, instance.to_world});
+    rtcCommitScene(top_.scene);
+  } catch (...) {  // too little memory, or a stop (core/stop.h), of which Embree makes an error
+    release(device_, top_.scene, groups_);
+    throw;
   }
-  rtcCommitScene(top_.scene);
 }
 
-RayTracer::~RayTracer() {
-  rtcReleaseScene(top_.scene);
-  for (const Group& group : groups_) rtcReleaseScene(group.scene);
-  rtcReleaseDevice(device_);
-}
+RayTracer::~RayTracer() { release(device_, top_.scene, groups_); }
 
 void RayTracer::nearest(std::span<const Ray> rays, std::span<RayHit> hits, bool coherent) const {
   Query query(coherent);

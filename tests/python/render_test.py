@@ -246,6 +246,22 @@ except KeyboardInterrupt:
     os._exit(0)  # not waiting for the library
 """
 
+LOADING = """
+import covary, os, signal, sys, threading, time
+def seconds():
+    begin = time.process_time()
+    covary.Scene.load(sys.argv[1])
+    return time.process_time() - begin
+whole = seconds()
+threading.Timer(0.05, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+begin = time.process_time()
+try:
+    covary.Scene.load(sys.argv[1])
+except KeyboardInterrupt:
+    part = time.process_time() - begin
+    print("interrupted" if part < 0.5 * whole else f"{part} of {whole} s")
+"""
+
 
 class Interruption(PackageTest):
     def run_interrupted(self, code, *arguments, **environment):
@@ -263,6 +279,24 @@ class Interruption(PackageTest):
         out = self.path / "out.exr"
         self.run_interrupted(LONG, ROOM, out)
         self.assertEqual(covary.read_image(out).shape, (24, 36, 3))
+
+    def test_ctrl_c_while_a_scene_is_loaded(self):
+        """Meshes not yet read are left, and so is the hierarchy of those that were."""
+        n = 700  # a height field of 2 n^2 triangles, in each of three shapes
+        rows, columns = numpy.divmod(numpy.arange(n * n), n)
+        points = numpy.stack([columns, rows, numpy.sin(rows * columns)], axis=1).astype("<f4")
+        corners = (numpy.arange(n - 1)[:, None] * n + numpy.arange(n - 1)).ravel()
+        faces = numpy.empty(2 * corners.size, dtype=[("n", "u1"), ("v", "<i4", 3)])
+        faces["n"] = 3
+        faces["v"][::2] = numpy.stack([corners, corners + 1, corners + n], axis=1)
+        faces["v"][1::2] = numpy.stack([corners + 1, corners + n + 1, corners + n], axis=1)
+        header = (f"ply\nformat binary_little_endian 1.0\nelement vertex {n * n}\nproperty float x\nproperty float y\n"
+                  f"property float z\nelement face {faces.size}\nproperty list uchar int vertex_indices\nend_header\n")
+        (self.path / "field.ply").write_bytes(header.encode() + points.tobytes() + faces.tobytes())
+        shapes = '<shape type="ply"><string name="filename" value="field.ply"/></shape>' * 3
+        (self.path / "field.xml").write_text(f'<scene version="3.0.0"><integrator type="path"/>'
+                                             f'<sensor type="perspective"/>{shapes}</scene>')
+        self.run_interrupted(LOADING, self.path / "field.xml")
 
     def test_progress_that_raises(self):
         def fail(done, total):
