@@ -241,16 +241,12 @@ MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<Candid
 
   const std::array<const Image*, 2> images = {&mixture.halves[0], &mixture.halves[1]};
   const HeldOutInput held_out{images, input.independent, input.guide, &valid, usual_error(makers)};
-  if (history) {
-    const Image frame_error = held_out_error(held_out);
-    add_history(*history, {input.independent, &frame_error, input.guide, &valid, input.counts}, mixture);
-  }
 
   MixedDenoising out;
   for (const CandidateMaker& maker : makers) out.names.insert(out.names.end(), maker.names.begin(), maker.names.end());
   EstimatorResult& result = out.result;
   result.nonfinite_pixels = parts.whole.image.nonfinite_pixels;
-  result.estimate = std::move(mixture.image);
+  result.estimate = mixture.image;
   if (std_error) {
     result.std_error = held_out_error(held_out);
     result.bias = held_out_bias({images, {&guide_of(halves[0]), &guide_of(halves[1])}, input.independent, &valid});
@@ -258,6 +254,11 @@ MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<Candid
         {&result.estimate, images, &parts.whole.independent, input.independent, &parts.groups, input.guide, &valid});
     result.risk_kind = kind_of(makers, parts.is_mean);
     result.risks = risks_of(parts, halves, out.names, held_out, predicted_relmse(result));
+  }
+  if (history) {  // after the error, which is that of the frame alone
+    const Image frame_error = std_error ? result.std_error : held_out_error(held_out);
+    add_history(*history, {input.independent, &frame_error, input.guide, &valid, input.counts}, mixture);
+    result.estimate = std::move(mixture.image);
   }
   out.weights = std::move(mixture.weights);
   out.candidates = std::move(whole.candidates);
