@@ -229,6 +229,10 @@ class Reader {
   void read_property(const Document& document, pugi::xml_node node, ObjectDescription& owner) {
     const std::string tag = node.name();
     const SourceLocation where = document.xml.where(node);
+    if (tag == "animation")
+      return diagnostics_.error(where,
+                                "<animation> is not supported: `camera-path` moves the camera of a scene, and a "
+                                "scene for each frame (scene_####.xml with `frames`) moves anything");
     if (tag != "transform") {
       for (const pugi::xml_node child : node.children())
         if (child.type() == pugi::node_element)

@@ -223,6 +223,15 @@ TEST(XmlReader, AcceptsAByteOrderMarkAndWindowsLines) {
   EXPECT_EQ(r.errors, "scene.xml:3:1: unknown element <flim>; did you mean 'film'?");
 }
 
+TEST(XmlReader, SaysHowScenesMove) {
+  const Read r = read(
+      "<scene version=\"3.0.0\"><shape type=\"cube\">\n<animation name=\"to_world\"><transform time=\"0\"/></animation>"
+      "</shape></scene>");
+  EXPECT_EQ(r.errors,
+            "scene.xml:2:1: <animation> is not supported: `camera-path` moves the camera of a scene, and a scene for "
+            "each frame (scene_####.xml with `frames`) moves anything");
+}
+
 TEST(XmlReader, ReportsWrongRoots) {
   EXPECT_EQ(read("<bsdf type=\"diffuse\" version=\"3.0.0\"/>").errors,
             "scene.xml:1:1: the root element is <bsdf>; a scene file starts with <scene>");
