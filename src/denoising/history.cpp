@@ -13,8 +13,8 @@ namespace {
 
 constexpr float kInterval = 1.5f;  // k, in standard errors
 /// c: both interpolations have errors in common, which their difference does not tell. With 1, regions of moving edges
-/// of light had 1.28 times the error of frames alone, with 10 and more at most 1.01, in a prototype on one sequence with
-/// one seed (docs/methods/sequences.md).
+/// of light had 1.28 times the error of frames alone, with 10 and more at most 1.01, in a prototype on one sequence
+/// with one seed (docs/methods/sequences.md).
 constexpr float kOfMoving = 20;
 /// How much the weights of the whole image count (MixtureInput::prior).
 constexpr float kPrior = 1;
