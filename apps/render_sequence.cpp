@@ -160,13 +160,14 @@ class SequenceRender {
     const bool follows = frame - 1 == last_frame_;  // of frames that are farther apart nothing is known
     const Transform now = path_ ? path_->at_frame(frame) : own_camera_;
     const Transform before = path_ ? path_->at_frame(frame - 1) : follows ? last_camera_ : now;
-    prepare(before, now, *scene_, request);
+    place_camera(*scene_, now);
     const std::string hash = frame_hash(one, *scene_, before, follows ? last_hash_ : "");
     last_frame_ = frame, last_hash_ = hash, last_camera_ = now;
     if (request.resume && is_complete(request.output, hash)) {
       if (!options_.quiet) fmt::print(stderr, "{}: complete\n", request.output);
       return;
     }
+    prepare(before, now, *scene_, request);
     request.attributes[film_key::kFrame] = hash;
     if (options_.sequence.history && follows)
       one.settings.denoising.history = history_of(frame_name(options_.request().output, frame - 1), request);
