@@ -18,6 +18,17 @@ COMMANDS = (("info", "pipe.xml"), ("render", "pipe.xml", "-o", "a.exr"), ("exper
             ("combine", "--crn", "1.exr", "--independent", "2.exr", "-o", "pipe.exr", "--force"))
 
 
+def interrupted_when(test, process, is_ready):
+    """What a process says that gets SIGINT as soon as `is_ready()`; it has to end by it."""
+    test.addCleanup(process.kill)
+    while process.poll() is None and not is_ready():
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    errors = process.communicate(timeout=60 * SLOWDOWN)[1]
+    test.assertEqual(process.returncode, 130, errors)
+    return errors
+
+
 class EveryCommand(CliTest):
     def setUp(self):
         super().setUp()
@@ -35,12 +46,7 @@ class EveryCommand(CliTest):
                 os.mkfifo(pipe)
                 process = subprocess.Popen([COVARY, *command], cwd=self.path, stdout=subprocess.DEVNULL,
                                            stderr=subprocess.PIPE, text=True)
-                self.addCleanup(process.kill)
-                while process.poll() is None and not self.catches_signals(process):
-                    time.sleep(0.01)
-                process.send_signal(signal.SIGINT)
-                errors = process.communicate(timeout=60 * SLOWDOWN)[1]
-                self.assertEqual(process.returncode, 130, errors)
+                errors = interrupted_when(self, process, lambda process=process: self.catches_signals(process))
                 self.assertIn("covary: interrupted", errors)
                 pipe.unlink()
 
@@ -61,13 +67,7 @@ class WhileDenoising(CliTest):
                 process = subprocess.Popen([COVARY, *command], cwd=self.path, stdout=subprocess.DEVNULL,
                                            stderr=subprocess.PIPE, text=True,
                                            env={**os.environ, "STAND_IN_BEGINS": str(begins)})
-                self.addCleanup(process.kill)
-                while process.poll() is None and not begins.exists():
-                    time.sleep(0.01)
-                process.send_signal(signal.SIGINT)
-                errors = process.communicate(timeout=60 * SLOWDOWN)[1]
-                self.assertEqual(process.returncode, 130, errors)
-                self.assertIn("interrupted", errors)
+                self.assertIn("interrupted", interrupted_when(self, process, begins.exists))
                 begins.unlink()
 
 
