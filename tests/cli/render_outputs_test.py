@@ -98,7 +98,9 @@ class Signals(RenderTest):
     def test_an_ignored_signal_stays_ignored(self):
         command = f"trap '' INT; exec {shlex.join([COVARY, 'render', ROOM, *SMALL, '-o', 'a.exr', '--spp', '240'])}"
         process = subprocess.Popen(["sh", "-c", command], cwd=self.path, stderr=subprocess.PIPE, text=True)
-        time.sleep(0.3 * SLOWDOWN)
+        name = Path(f"/proc/{process.pid}/comm")
+        while process.poll() is None and name.read_text().strip() != "covary":  # the shell has set the trap by then
+            time.sleep(0.01)
         process.send_signal(signal.SIGINT)
         errors = process.communicate(timeout=120 * SLOWDOWN)[1]
         self.assertEqual(process.returncode, 0, errors)
