@@ -27,11 +27,13 @@
 #include "estimators/mean.h"
 #include "estimators/sample_counts.h"
 #include "film/outputs.h"
+#include "frame_files.h"
 #include "guide_layer.h"
 #include "json_output.h"
 #include "numbers.h"
 #include "progress.h"
 #include "risk_report.h"
+#include "sequences/frame_names.h"
 #include "settings/option_names.h"
 #include "stages.h"
 #include "value_names.h"
@@ -41,6 +43,7 @@ namespace {
 
 struct CombineOptions : CombineSettings {
   OptionValues values, of_estimator;
+  FrameOptions of_frames;
   std::string stages, json;
   bool quiet = false;
   int threads = 0;
@@ -265,9 +268,7 @@ void check_passes(CombineOptions& o) {
   o.estimator = kNoEstimator;
 }
 
-void combine_files(CombineOptions o) {
-  static_cast<CombineSettings&>(o) = settings_from<CombineSettings>(o.values);
-  check_passes(o);
+void combine_files(const CombineOptions& o) {
   check_files_of_command(o);
   std::optional<tbb::global_control> control;
   if (o.threads > 0) control.emplace(tbb::global_control::max_allowed_parallelism, o.threads);
@@ -302,6 +303,37 @@ void combine_files(CombineOptions o) {
   if (!o.json.empty()) write_text_output(o.json, json_text(json));
 }
 
+/// The options of one frame alone.
+CombineOptions frame_options(const CombineOptions& o, int frame) {
+  CombineOptions one = o;
+  for (std::vector<std::string>* files : {&one.crn, &one.independent})
+    for (std::string& path : *files) path = frame_name(path, frame);
+  for (std::string* path : {&one.light, &one.counts, &one.guides})
+    if (is_frame_pattern_of_input(*path)) *path = frame_name(*path, frame);
+  one.output = frame_name(one.output, frame);
+  if (is_frame_pattern(one.json)) one.json = frame_name(one.json, frame);
+  return one;
+}
+
+void combine_frames(const CombineOptions& o, const FramePatterns& patterns) {
+  if (!o.stages.empty()) throw Error(ErrorCode::kUsage, "--save-stages is an option of single images, not of frames");
+  if (!o.json.empty() && o.json != "-" && !is_frame_pattern(o.json))
+    throw Error(ErrorCode::kUsage, fmt::format("--json '{}': of frames, expected is a name with '#', or -", o.json));
+  for_each_frame(o.of_frames, patterns, o.denoising.denoises(), [&](int frame, std::shared_ptr<const History> history) {
+    CombineOptions one = frame_options(o, frame);
+    one.denoising.history = std::move(history);
+    combine_files(one);
+  });
+}
+
+void run(CombineOptions o) {
+  static_cast<CombineSettings&>(o) = settings_from<CombineSettings>(o.values);
+  check_passes(o);
+  FramePatterns patterns{o.independent, {o.guides, o.light}, o.output, o.independent_layer};
+  patterns.images.insert(patterns.images.end(), o.crn.begin(), o.crn.end());
+  are_frames(o.of_frames, patterns) ? combine_frames(o, patterns) : combine_files(o);
+}
+
 }  // namespace
 
 void add_combine(CLI::App& app) {
@@ -323,7 +355,8 @@ void add_combine(CLI::App& app) {
   add_threads_option(*command, o->threads);
   command->add_option("--json", o->json, "File for statistics; '-': standard output")->type_name(kFileValue);
   command->add_flag("--quiet", o->quiet, "Warnings and errors only");
-  command->callback([o] { combine_files(*o); });
+  add_frame_options(*command, o->of_frames, "With --denoise, combine");
+  command->callback([o] { run(*o); });
 }
 
 }  // namespace covary

@@ -17,18 +17,17 @@
 #include "combine/result_file.h"
 #include "commands.h"
 #include "core/error.h"
-#include "core/number_text.h"
 #include "core/stopwatch.h"
 #include "denoising/mixed_denoising.h"
 #include "film/image_file.h"
 #include "film/outputs.h"
+#include "frame_files.h"
 #include "guide_layer.h"
 #include "metrics/provenance.h"
 #include "numbers.h"
 #include "progress.h"
 #include "risk_report.h"
 #include "sequences/frame_names.h"
-#include "sequences/motion_file.h"
 #include "value_names.h"
 
 namespace covary {
@@ -41,13 +40,9 @@ struct Options {
   std::vector<std::string> inputs;
   std::string output, mode, oidn, albedo, normal;
   bool no_guides = false, clean_guides = false, check = false, quiet = false, force = false;
-  // Of frames.
-  std::string frames, motion_scale;
-  MotionSource motion;
-  bool no_history = false;
+  FrameOptions of_frames;
   std::shared_ptr<const History> history;  ///< of one frame
 
-  bool is_sequence() const { return !inputs.empty() && is_frame_pattern(inputs[0]); }
   DenoiseOptions denoiser() const { return {oidn}; }
 };
 
@@ -213,87 +208,20 @@ void run_one(const Options& o) {
   denoise_by_mixture(o, *file, guides, progress);
 }
 
-std::vector<int> frames_of(const Options& o) {
-  if (o.frames.empty()) {
-    const std::vector<int> frames = frames_on_disk(o.inputs[0]);
-    if (frames.empty()) throw Error(ErrorCode::kInput, fmt::format("there are no frames '{}'", o.inputs[0]));
-    return frames;
-  }
-  FrameRange range;
-  if (!read_frame_range(o.frames, range))
-    throw Error(ErrorCode::kUsage,
-                fmt::format("--frames '{}': expected FIRST-LAST[:STEP] or one number, e.g. 1-48", o.frames));
-  return range.numbers();
-}
-
-/// Motion that explains less of what changes than none does is not what it seems to be.
-void check_motion(const std::string& before, const std::string& now, const MotionLayers& motion) {
-  const double fit = misfit(read_image(before).image, read_image(now).image, motion);
-  if (fit <= 1) return;
-  throw Error(ErrorCode::kInput,
-              fmt::format("'{}': its motion does not lead to where things are in '{}': the difference is {:.2f} times "
-                          "that without motion. Expected are pixels to the right and down, from a pixel to where its "
-                          "point was in the frame before; see --motion-scale, or --no-history",
-                          now, before, fit));
-}
-
-/// Frames of one seed have errors in common, which no samples of theirs could tell.
-void check_seeds(const std::string& before, const std::string& now) {
-  const auto seed = [](const std::string& path) {
-    const auto attributes = inspect_image(path).attributes;
-    const auto found = attributes.find("covary:seed");
-    return found == attributes.end() ? std::string() : found->second;
-  };
-  const std::string own = seed(now);
-  if (!own.empty() && own == seed(before))
-    throw Error(ErrorCode::kInput, fmt::format("'{}' and '{}' have the same seed, {}; frames need seeds of their own, "
-                                               "or --no-history",
-                                               before, now, own));
-}
-
-MotionSource motion_source(const Options& o) {
-  MotionSource source = o.motion;
-  if (o.motion_scale.empty()) return source;
-  const std::string_view text = o.motion_scale;
-  const size_t comma = std::min(text.find(','), text.size());
-  const auto x = parse_real(text.substr(0, comma)), y = parse_real(text.substr(std::min(comma + 1, text.size())));
-  if (!x || !y)
-    throw Error(ErrorCode::kUsage, fmt::format("--motion-scale '{}': expected X,Y, e.g. 1,-1", o.motion_scale));
-  source.scale_x = static_cast<float>(*x), source.scale_y = static_cast<float>(*y);
-  return source;
-}
-
-void run_sequence(const Options& o) {
-  const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
-  for (const std::string& path : o.inputs)
-    if (!is_frame_pattern(path)) usage(fmt::format("'{}' has no '#' in place of the frame's number, others do", path));
-  if (o.output.empty() || !is_frame_pattern(o.output))
-    usage(fmt::format("-o '{}': of frames, expected is a name such as out_####.exr", o.output));
-  const bool has_history = !o.no_history && !is_by_network(o);
-  const MotionSource motion = motion_source(o);
-  std::optional<int> last;
-  for (const int frame : frames_of(o)) {
+void run_sequence(const Options& o, const FramePatterns& patterns) {
+  for_each_frame(o.of_frames, patterns, !is_by_network(o), [&](int frame, std::shared_ptr<const History> history) {
     Options one = o;
     one.output = frame_name(o.output, frame);
     for (std::string& path : one.inputs) path = frame_name(path, frame);
-    if (has_history && last == frame - 1) {
-      const std::string before = frame_name(o.inputs[0], *last);
-      const MotionLayers layers = read_motion(one.inputs[0], motion), old = read_motion(before, motion);
-      check_seeds(before, one.inputs[0]);
-      check_motion(before, one.inputs[0], layers);
-      one.history =
-          std::make_shared<History>(reproject(read_image(frame_name(o.output, *last)).image, old.depth, layers));
-    }
+    one.history = std::move(history);
     run_one(one);
-    last = frame;
-  }
+  });
 }
 
 void run(const Options& o) {
   if (o.check) return check(o);
-  if (o.is_sequence()) return run_sequence(o);
-  if (!o.frames.empty()) throw Error(ErrorCode::kUsage, "--frames: the input has no '#' for the frame's number");
-  run_one(o);
+  const FramePatterns patterns{o.inputs, {}, o.output, ""};
+  are_frames(o.of_frames, patterns) ? run_sequence(o, patterns) : run_one(o);
 }
 
 }  // namespace
@@ -332,19 +260,7 @@ void add_denoise(CLI::App& app) {
   command->add_flag("--clean-guides", o->clean_guides,
                     "With --mode oidn, denoise these layers first, each alone: less error where they are noisy, for "
                     "three times the time");
-  command->add_option("--frames", o->frames, "Of in_####.exr: these frames; default: those there are")
-      ->type_name("FIRST-LAST");
-  command->add_option("--motion", o->motion.motion, "Of frames: the layer of motion to the frame before")
-      ->type_name("LAYER")
-      ->capture_default_str();
-  command->add_option("--depth", o->motion.depth, "Of frames: the layer of depth, if there is one")
-      ->type_name("LAYER")
-      ->capture_default_str();
-  command
-      ->add_option("--motion-scale", o->motion_scale,
-                   "What motion is multiplied by to be pixels to the right and down; 1,-1 where Y points up")
-      ->type_name("X,Y");
-  command->add_flag("--no-history", o->no_history, "Denoise each frame alone");
+  add_frame_options(*command, o->of_frames, "Denoise");
   command->add_flag("--force", o->force, "Denoise even where the renders do not fit each other");
   command->add_flag("--quiet", o->quiet, "No summary");
   command->callback([o] { run(*o); });

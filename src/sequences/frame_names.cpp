@@ -31,7 +31,7 @@ struct Parts {
 };
 
 Parts parts_of(const std::string& pattern) {
-  if (!is_frame_pattern(pattern))
+  if (pattern.find('#') == std::string::npos)
     throw Error(ErrorCode::kUsage, fmt::format("'{}': expected is a name with '#' in place of the frame's number, e.g. "
                                                "out_####.exr",
                                                pattern));
@@ -64,14 +64,22 @@ bool is_frame_pattern(const std::string& pattern) {
   return fs::path(pattern).filename().string().find('#') != std::string::npos;
 }
 
+bool is_frame_pattern_of_input(const std::string& pattern) {
+  return is_frame_pattern(pattern) || (pattern.find('#') != std::string::npos && !fs::exists(pattern));
+}
+
 std::string frame_name(const std::string& pattern, int frame) {
   const Parts parts = parts_of(pattern);
   return fmt::format("{}{:0{}}{}", parts.before, frame, parts.digits, parts.after);
 }
 
 std::vector<int> frames_on_disk(const std::string& pattern) {
-  const Parts parts = parts_of(fs::path(pattern).filename().string());
-  const fs::path folder = fs::path(pattern).parent_path();
+  parts_of(pattern);                   // throws where there is no '#'
+  fs::path head = pattern, in_folder;  // as far as the part with the number, and what follows
+  for (; !is_frame_pattern(head.string()); head = head.parent_path())
+    in_folder = in_folder.empty() ? head.filename() : head.filename() / in_folder;
+  const Parts parts = parts_of(head.filename().string());
+  const fs::path folder = head.parent_path();
   std::error_code error;
   std::vector<int> frames;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder.empty() ? "." : folder, error)) {
@@ -82,7 +90,8 @@ std::vector<int> frames_on_disk(const std::string& pattern) {
     const std::string digits = name.substr(parts.before.size(), name.size() - parts.before.size() - parts.after.size());
     const std::optional<int> frame = frame_number(digits);
     // Only the name that frame_name() gives: "out_7.exr" is no frame of "out_####.exr".
-    if (frame && *frame <= kLastFrame && digits == fmt::format("{:0{}}", *frame, parts.digits))
+    if (frame && *frame <= kLastFrame && digits == fmt::format("{:0{}}", *frame, parts.digits) &&
+        (in_folder.empty() || fs::exists(entry.path() / in_folder)))
       frames.push_back(*frame);
   }
   if (error) throw Error(ErrorCode::kIo, fmt::format("cannot read the folder of '{}': {}", pattern, error.message()));

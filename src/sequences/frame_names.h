@@ -20,6 +20,10 @@ bool read_frame_range(const std::string& text, FrameRange& range);
 /// Whether there is a run of '#' in the last part of the path.
 bool is_frame_pattern(const std::string& pattern);
 
+/// The same of a file to read, which may also lie in folders of frames: "passes_####/crn.exr". A file of just that name
+/// is none.
+bool is_frame_pattern_of_input(const std::string& pattern);
+
 /// The file of a frame: the last run of '#' is replaced. Throws Error(kUsage) where there is none.
 std::string frame_name(const std::string& pattern, int frame);
 

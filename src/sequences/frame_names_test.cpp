@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <fstream>
 
 #include "core/error.h"
@@ -40,6 +41,14 @@ TEST(FramesOnDisk, AreThoseOfThePatternInTheirOrder) {
     std::ofstream(folder.file(name)) << 'x';
   EXPECT_EQ(frames_on_disk(folder.file("f_####.exr")), (std::vector<int>{2, 10, 10000}));
   EXPECT_THROW(frames_on_disk(folder.file("f.exr")), Error);
+  for (const char* name : {"p_1", "p_2", "p_3"}) std::filesystem::create_directory(folder.file(name));
+  for (const char* name : {"p_1/crn.exr", "p_3/crn.exr", "p_2/other.exr"}) std::ofstream(folder.file(name)) << 'x';
+  EXPECT_EQ(frames_on_disk(folder.file("p_#/crn.exr")), (std::vector<int>{1, 3}));
+  EXPECT_TRUE(is_frame_pattern_of_input(folder.file("p_#/crn.exr")));
+  EXPECT_FALSE(is_frame_pattern_of_input(folder.file("p_1/crn.exr")));
+  std::filesystem::create_directory(folder.file("p_#"));
+  std::ofstream(folder.file("p_#/crn.exr")) << 'x';
+  EXPECT_FALSE(is_frame_pattern_of_input(folder.file("p_#/crn.exr"))) << "a file of that name";
   EXPECT_THROW(frames_on_disk(folder.file("none/f_#.exr")), Error);
 }
 

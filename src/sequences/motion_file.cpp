@@ -30,6 +30,10 @@ std::optional<std::string> depth_channel(const ExrFile& file, const std::string&
 
 }  // namespace
 
+bool has_motion(const std::string& path, const MotionSource& source) {
+  return motion_channels(ExrFile(path), source.motion).has_value();
+}
+
 MotionLayers read_motion(const std::string& path, const MotionSource& source) {
   const ExrFile file(path);
   const int width = file.place().window.width, height = file.place().window.height;

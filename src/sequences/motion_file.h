@@ -17,6 +17,9 @@ struct MotionSource {
   float scale_x = 1, scale_y = 1;
 };
 
+/// Whether the file has the layer of motion. Throws Error(kIo).
+bool has_motion(const std::string& path, const MotionSource& source);
+
 /// The layers in the file's window. A third channel .Z of motion that is covary's is the change of depth; without one,
 /// or without depth, MotionLayers::knows_depth is false. Throws Error(kIo), and Error(kInput) with the layers there are
 /// where the motion is missing.

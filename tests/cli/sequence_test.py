@@ -249,6 +249,56 @@ class Denoise(SequenceTest):
             self.assertIn(message, result.stderr)
 
 
+class Combine(SequenceTest):
+    """`covary combine` of frames, here of the passes that renders keep in a folder for each frame."""
+
+    def setUp(self):
+        super().setUp()
+        self.good_render("-o", "o_#.exr", "--passes", "p_#", "--spp", "16", "--estimator", "iicv", "--aovs",
+                         frames="1-3")
+
+    def combine(self, *arguments):
+        return self.run_covary("combine", "--crn", "p_#/crn.exr", "--independent", "p_#/independent.exr", "--quiet",
+                               *arguments)
+
+    def good_combine(self, *arguments):
+        result = self.combine(*arguments)
+        self.assertEqual(result.returncode, 0, result.stderr)
+
+    def test_frames(self):
+        self.good_combine("-o", "c_#.exr", "--json", "c_#.json")
+        for frame in range(1, 4):
+            self.good("combine", "--crn", f"p_{frame}/crn.exr", "--independent", f"p_{frame}/independent.exr", "-o",
+                      "alone.exr", "--quiet")
+            self.assertEqual(self.picture(f"c_{frame}.exr"), self.picture("alone.exr"))
+            self.assertEqual(json.loads((self.path / f"c_{frame}.json").read_text())["output"], f"c_{frame}.exr")
+
+    def test_history(self):
+        denoised = ("--denoise", "auto", "--oidn", "off", "--guides", "o_#.exr")
+        self.good_combine("-o", "on_#.exr", *denoised)
+        self.good_combine("-o", "alone_#.exr", *denoised, "--no-history")
+        self.good_combine("-o", "part_#.exr", *denoised, "--frames", "2-3")
+        self.assertEqual(self.picture("on_1.exr"), self.picture("alone_1.exr"))
+        self.assertEqual(self.picture("part_2.exr"), self.picture("alone_2.exr"))
+        for frame in (2, 3):
+            self.assertNotEqual(self.picture(f"on_{frame}.exr"), self.picture(f"alone_{frame}.exr"))
+        wrong = self.combine("-o", "d_#.exr", *denoised, "--motion-scale=-1,-1").stderr
+        self.assertIn("its motion does not lead to where things are", wrong)
+        self.assertIn("multiplied by -1,-1 (--motion-scale) it fits better", wrong)
+
+    def test_wrong_input(self):
+        (self.path / "a#").mkdir()
+        (self.path / "a#" / "crn.exr").write_bytes((self.path / "p_1/crn.exr").read_bytes())
+        for arguments, message in ((("-o", "c.exr"), "-o 'c.exr': of frames, expected is a name such as"),
+                                   (("-o", "c_#.exr", "--json", "c.json"), "--json 'c.json': of frames, expected"),
+                                   (("-o", "c_#.exr", "--save-stages", "s"), "--save-stages is an option of single"),
+                                   (("-o", "c_#.exr", "--crn", "a#/crn.exr"), "'a#/crn.exr' has no '#' in place"),
+                                   (("-o", "c_#.exr", "--denoise", "auto"), "no layer 'Motion' of motion")):
+            result = self.combine(*arguments)
+            self.assertNotEqual(result.returncode, 0)
+            self.assertIn(message, result.stderr)
+
+
 # In the place of ffmpeg: its last argument gets the arguments and what came by standard input.
 STAND_IN = """#!/bin/sh
 for last; do :; done
