@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "compare_frames.h"
 #include "comparison_warnings.h"
 #include "film/image_rows.h"
 #include "film/image_writer.h"
@@ -26,14 +27,6 @@
 
 namespace covary {
 namespace {
-
-struct CompareOptions {
-  std::vector<std::string> images;
-  std::string reference, reference2, layer, error_map;
-  std::vector<std::string> metrics{"relmse"};
-  std::vector<double> error_range;
-  std::optional<std::string> json;  // "" and "-": standard output
-};
 
 /// One image's errors; values in the order of the metrics asked for.
 struct Comparison {
@@ -186,6 +179,7 @@ void check_files(const CompareOptions& options) {
 
 void compare(const CompareOptions& options) {
   check_options(options);
+  if (compares_frames(options)) return compare_frames(options);
   check_files(options);
   std::vector<ImageRows> references;
   references.emplace_back(options.reference, options.layer);
@@ -220,10 +214,15 @@ void compare(const CompareOptions& options) {
 void add_compare(CLI::App& app) {
   const auto o = std::make_shared<CompareOptions>();
   CLI::App* command = app.add_subcommand("compare", "Errors of images against a reference");
-  command->add_option("IMAGES", o->images, "Images of any renderer (EXR, PNG, HDR, PFM, …)")
+  command
+      ->add_option(
+          "IMAGES", o->images,
+          "Images of any renderer (EXR, PNG, HDR, PFM, …), or frames, out_####.exr, whose changes are compared, too")
       ->type_name(kFileValue)
       ->required();
-  command->add_option("-r,--reference", o->reference, "The reference image")->type_name(kFileValue)->required();
+  command->add_option("-r,--reference", o->reference, "The reference image, or ref_####.exr")
+      ->type_name(kFileValue)
+      ->required();
   command
       ->add_option("--reference2", o->reference2,
                    "A second reference with samples of its own: products (F - R1)(F - R2) cancel the references' noise")
@@ -246,6 +245,13 @@ void add_compare(CLI::App& app) {
       ->delimiter(',')
       ->expected(2)
       ->check(finite_number());
+  command->add_option("--frames", o->frames, "Of out_####.exr: these frames; default: those there are")
+      ->type_name("FIRST-LAST");
+  command
+      ->add_option("--baseline", o->baseline,
+                   "Of frames: a sequence (…_####.exr) whose errors are the units of a second table, with the worst "
+                   "region of 32 x 32 pixels")
+      ->type_name(kFileValue);
   command->callback([o] { compare(*o); });
 }
 

@@ -110,15 +110,15 @@ void add_frame_options(CLI::App& command, FrameOptions& o, const std::string& wh
   command.add_flag("--no-history", o.no_history, what + " each frame alone");
 }
 
-std::vector<int> frames_of(const FrameOptions& o, const std::string& pattern) {
-  if (o.frames.empty()) {
+std::vector<int> frames_of(const std::string& text, const std::string& pattern) {
+  if (text.empty()) {
     const std::vector<int> frames = frames_on_disk(pattern);
     if (frames.empty()) throw Error(ErrorCode::kInput, fmt::format("there are no frames '{}'", pattern));
     return frames;
   }
   FrameRange range;
-  if (!read_frame_range(o.frames, range))
-    usage(fmt::format("--frames '{}': expected FIRST-LAST[:STEP] or one number, e.g. 1-48", o.frames));
+  if (!read_frame_range(text, range))
+    usage(fmt::format("--frames '{}': expected FIRST-LAST[:STEP] or one number, e.g. 1-48", text));
   return range.numbers();
 }
 
@@ -140,7 +140,7 @@ void for_each_frame(const FrameOptions& o, const FramePatterns& patterns, bool h
   const MotionSource source = motion_source(o);
   const std::string& images = patterns.images[0];
   std::optional<int> last;
-  for (const int frame : frames_of(o, images)) {
+  for (const int frame : frames_of(o.frames, images)) {
     std::shared_ptr<const History> history;
     if (has_history && !o.no_history && last == frame - 1) {
       const std::string motion = motion_pattern(source, patterns, frame);

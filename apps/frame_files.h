@@ -23,9 +23,9 @@ struct FrameOptions {
 /// --frames, --motion, --depth, --motion-scale, --no-history. `what`: "Denoise".
 void add_frame_options(CLI::App& command, FrameOptions& options, const std::string& what);
 
-/// The numbers that --frames tells or, without it, those of the files there are of the pattern. Throws Error(kUsage),
-/// and Error(kInput) where there are none.
-std::vector<int> frames_of(const FrameOptions& options, const std::string& pattern);
+/// The numbers that --frames tells or, where that is empty, those of the files there are of the pattern. Throws
+/// Error(kUsage), and Error(kInput) where there are none.
+std::vector<int> frames_of(const std::string& frames, const std::string& pattern);
 
 /// Files of frames, by patterns.
 struct FramePatterns {

@@ -13,7 +13,6 @@ import sys
 from pathlib import Path
 
 import accumulation
-import measures
 import numpy
 import scenes
 
@@ -21,12 +20,14 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tests/cli"))
 
 from exr_reader import header, read_exr  # noqa: E402
+from exr_writer import exr  # noqa: E402
 
 REFERENCE_SEEDS = (1001, 1002)
 #: SequenceSettings::seed_of() of src/sequences: seeds of two frames of one command are that far apart
 SEEDS_OF_FRAME = 1_000_000
-COLUMNS = ["relmse_ratio", "temporal_ratio", "still_relmse_ratio", "worst_relmse", "worst_temporal",
-           "worst_relmse_of_frame", "worst_temporal_of_frame"]
+#: of the row of a method: values of the sequence as multiples of the baseline's, and worst regions
+RATIOS = ["relmse", "temporal", "temporal_flip", "still_relmse"]
+WORST = ["relmse", "temporal", "relmse_of_frame", "temporal_of_frame"]
 
 
 def run(options, *words):
@@ -34,6 +35,7 @@ def run(options, *words):
     result = subprocess.run(command, capture_output=True, text=True)
     if result.returncode:
         raise SystemExit(f"{' '.join(command)}\n{result.stderr}")
+    return result.stdout
 
 
 def layers(path, *names):
@@ -82,75 +84,83 @@ def reference(options, name, frame, seed):
     return options.work / f"{name}_{frame:04d}-reference-{seed}.exr"
 
 
-def references(options, name):
-    files = [[reference(options, name, frame, seed) for frame in frame_numbers(options)] for seed in REFERENCE_SEEDS]
-    missing = [str(file) for side in files for file in side if not file.exists()]
-    if missing:
-        raise SystemExit(f"{missing[0]} is missing; `sequences.py references` renders it")
-    return [numpy.stack([layers(file, "")[0] for file in side]) for side in files]
-
-
 def frames_alone(options, name, spp, seed, folder):
-    """Images by the network and by the mixture, and positions, (frames, height, width, 3) each."""
-    network, mixture, positions = [], [], []
+    """Renders images by the network and by the mixture, and accumulates the latter."""
+    mixture, positions = [], []
     for frame in frame_numbers(options):
         scene = options.work / scenes.still_name(name, frame)
         raw = render(options, scene, spp, seed_of(seed, frame), folder / f"raw_{frame:04d}.exr", "--estimator", "none",
                      "--denoise", "none", "--aovs")
         denoised = folder / f"oidn_{frame:04d}.exr"
-        if not denoised.exists():
+        if options.network and not denoised.exists():
             run(options, "denoise", raw, "--mode", "oidn", "-o", denoised, "--quiet")
         mixed = render(options, scene, spp, seed_of(seed, frame), folder / f"auto_{frame:04d}.exr", "--denoise", "auto")
-        network += layers(denoised, "")
         mixture += layers(mixed, "")
         positions += layers(raw, "P")
-    return numpy.stack(network), numpy.stack(mixture), numpy.stack(positions)
+    positions = numpy.stack(positions)
+    for frame, image in enumerate(accumulation.accumulated(name, numpy.stack(mixture), positions), 1):
+        channels = {c: image[..., i].ravel().tolist() for i, c in enumerate("RGB")}
+        (folder / f"accumulation_{frame:04d}.exr").write_bytes(exr(channels, image.shape[1::-1]))
+    return positions
 
 
 def sequence(options, name, spp, seed, folder):
-    """All frames by one command: images and motion vectors."""
+    """Renders all frames by one command; their motion vectors."""
     scene, more = scenes.write_sequence(name, options.frames, options.work)
     last = folder / f"sequence_{options.frames:04d}.exr"
     render_sequence = [options.work / scene, *more, "--frames", f"1-{options.frames}"]
     if not last.exists():
         run(options, "render", *render_sequence, "--resolution", options.resolution, "--rfilter", "box", "--spp", spp,
             "--seed", seed, "--no-preview", "--quiet", *options.options.split(), "-o", folder / "sequence_####.exr")
-    files = [layers(folder / f"sequence_{frame:04d}.exr", "", "Motion") for frame in frame_numbers(options)]
-    return tuple(numpy.stack(images) for images in zip(*files))
+    return numpy.stack([layers(folder / f"sequence_{frame:04d}.exr", "Motion")[0] for frame in frame_numbers(options)])
 
 
-def methods(options, name, spp):
-    """Images (seeds, frames, height, width, 3) by method."""
-    result = {}
-    for seed in options.seeds:
-        folder = options.work / f"{name}-{spp}-{seed}"
-        folder.mkdir(exist_ok=True)
-        network, mixture, positions = frames_alone(options, name, spp, seed, folder)
-        images = {"oidn": network, "auto": mixture,
-                  "accumulation": accumulation.accumulated(name, mixture, positions)}
-        if not options.frames_alone:
-            images["sequence"], vectors = sequence(options, name, spp, seed, folder)
-            agreement = accumulation.motion_agreement(name, positions, vectors)
-            print(f"{name}: motion as known in {agreement:.1%} of the pixels", file=sys.stderr)
-        for method, frames in images.items():
-            result.setdefault(method, []).append(frames)
-    return {method: numpy.stack(frames) for method, frames in result.items()}
+def render_methods(options, name, spp, seed, folder):
+    """The names of what is rendered then."""
+    folder.mkdir(exist_ok=True)
+    positions = frames_alone(options, name, spp, seed, folder)
+    methods = ["oidn"] * options.network + ["auto", "accumulation"]
+    if options.frames_alone:
+        return methods
+    agreement = accumulation.motion_agreement(name, positions, sequence(options, name, spp, seed, folder))
+    print(f"{name}: motion as known in {agreement:.1%} of the pixels", file=sys.stderr)
+    return [*methods, "sequence"]
+
+
+def compare(options, name, methods, folder):
+    """What `covary compare` says of each method."""
+    number = "0001" if name == "still" else "####"
+    pairs = zip(("--reference", "--reference2"), REFERENCE_SEEDS)
+    references = [word for option, seed in pairs
+                  for word in (option, options.work / f"{name}_{number}-reference-{seed}.exr")]
+    lines = run(options, "compare", *(folder / f"{method}_####.exr" for method in methods), *references, "--baseline",
+                folder / "auto_####.exr", "--frames", f"1-{options.frames}", "--json").splitlines()
+    return {method: json.loads(line) for method, line in zip(methods, lines)}
 
 
 def measure(options):
+    """Prints a table of means over seeds, and keeps what it is made of."""
     table = []
-    print(f"| sequence | spp | method | {' | '.join(column.replace('_', ' ') for column in COLUMNS)} |\n"
-          f"|{'---|' * (3 + len(COLUMNS))}", flush=True)
+    titles = RATIOS + [f"worst {column}" for column in WORST]
+    print(f"| sequence | spp | method | {' | '.join(titles).replace('_', ' ')} |\n|{'---|' * (3 + len(titles))}",
+          flush=True)
     for name in options.names:
-        first, second = references(options, name)
         scenes.write_sequence(name, options.frames, options.work)
         for spp in options.spp:
-            images = methods(options, name, spp)
-            for method, frames in images.items():
-                row = measures.summary(frames, first, second, images["auto"])
-                table.append({"sequence": name, "spp": spp, "method": method, **row})
-                values = " | ".join(f"{row[column]:.2f}" if column in row else "" for column in COLUMNS)
-                print(f"| {name} | {spp} | {method} | {values} |", flush=True)
+            results = []
+            for seed in options.seeds:
+                folder = options.work / f"{name}-{spp}-{seed}"
+                results.append(compare(options, name, render_methods(options, name, spp, seed, folder), folder))
+            for method in results[0]:
+                def mean(value, of=method):
+                    return float(numpy.mean([numpy.nan if value(result[of]) is None else value(result[of])
+                                             for result in results]))
+
+                row = [mean(lambda r, c=column: r[c]) / mean(lambda r, c=column: r[c], "auto") for column in RATIOS]
+                row += [mean(lambda r, c=column: r["worst_region"][c]["ratio"]) for column in WORST]
+                print(f"| {name} | {spp} | {method} | {' | '.join(f'{value:.2f}' for value in row)} |", flush=True)
+                table += [{"sequence": name, "spp": spp, "method": method, "seed": seed, **result[method]}
+                          for seed, result in zip(options.seeds, results)]
     (options.work / "sequences.json").write_text(json.dumps(table, indent=1) + "\n")
 
 
@@ -165,6 +175,7 @@ def main(arguments):
     parser.add_argument("--spp", type=int, nargs="+", default=[16, 64])
     parser.add_argument("--seeds", type=int, nargs="+", default=[1])
     parser.add_argument("--reference-spp", type=int, default=512, help="of each of the two")
+    parser.add_argument("--no-network", dest="network", action="store_false", help="without Open Image Denoise alone")
     parser.add_argument("--frames-alone", action="store_true", help="only the methods that know no other frames")
     parser.add_argument("--options", default="--history on", help="of the command for all frames")
     parser.add_argument("--nice", type=int, default=0)

@@ -299,63 +299,6 @@ class Combine(SequenceTest):
             self.assertIn(message, result.stderr)
 
 
-# In the place of ffmpeg: its last argument gets the arguments and what came by standard input.
-STAND_IN = """#!/bin/sh
-for last; do :; done
-echo "$@" > "$last"
-cat >> "$last"
-test ! -e fail
-"""
-
-
-class Video(CliTest):
-    def setUp(self):
-        super().setUp()
-        (self.path / "bin").mkdir()
-        self.write("bin/ffmpeg", STAND_IN.encode())
-        (self.path / "bin/ffmpeg").chmod(0o755)
-        for frame, value in ((1, 0), (2, 1), (10, 9)):
-            self.image(f"f_{frame:02}.exr", [value] * 3)
-        self.environment = {**os.environ, "PATH": f"{self.path}/bin:{os.environ['PATH']}"}
-
-    def convert(self, *arguments):
-        return subprocess.run([COVARY, "convert", *arguments], cwd=self.path, env=self.environment, capture_output=True,
-                              text=True)
-
-    def test_frames_go_to_ffmpeg_in_their_order(self):
-        result = self.convert("f_##.exr", "v.mp4", "--fps", "12")
-        self.assertEqual(result.returncode, 0, result.stderr)
-        arguments, frames = (self.path / "v.mp4").read_bytes().split(b"\n", 1)
-        self.assertIn(b"-video_size 4x3 -framerate 12", arguments)
-        self.assertEqual(frames, bytes(36) + b"\xff" * 72)
-        result = self.convert("f_##.exr", "f_##.exr", "v.mp4", "--overwrite")
-        self.assertEqual(result.returncode, 0, result.stderr)
-        self.assertIn(b"-video_size 8x3 -framerate 24", (self.path / "v.mp4").read_bytes())
-
-    def test_failures_leave_no_file(self):
-        (self.path / "fail").touch()
-        self.assertIn("ffmpeg could not write 'v.mp4'", self.convert("f_##.exr", "v.mp4").stderr)
-        (self.path / "fail").unlink()
-        self.image("f_03.exr", [1, 1, 1], size=(2, 2))
-        self.assertIn("a frame of 2 x 2 pixels; those before have 4 x 3", self.convert("f_##.exr", "v.mp4").stderr)
-        for path in (self.path / "f_03.exr", self.path / "bin/ffmpeg"):
-            path.unlink()
-        self.environment["PATH"] = f"{self.path}/bin:/nowhere"
-        self.assertIn("videos need the program ffmpeg", self.convert("f_##.exr", "v.mp4").stderr)
-        self.assertEqual([p.name for p in self.path.glob("*v.mp4")], [])
-
-    def test_wrong_input(self):
-        self.write("v.mp4", b"precious")
-        for arguments, message in ((("f_01.exr", "w.mp4"), "'f_01.exr': of a video, expected are names with '#'"),
-                                   (("g_##.exr", "w.mp4"), "there are no frames 'g_##.exr'"),
-                                   (("f_##.exr", "v.mp4"), "--overwrite to replace it"),
-                                   (("f_01.exr", "a.png", "--fps", "3"), "--fps is an option of videos")):
-            result = self.convert(*arguments)
-            self.assertNotEqual(result.returncode, 0)
-            self.assertIn(message, result.stderr)
-        self.assertEqual((self.path / "v.mp4").read_bytes(), b"precious")
-
-
 if __name__ == "__main__":
     import unittest
     unittest.main()

@@ -1,0 +1,224 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "compare_frames.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "comparison_warnings.h"
+#include "core/error.h"
+#include "film/image_file.h"
+#include "film/outputs.h"
+#include "frame_files.h"
+#include "json_output.h"
+#include "metrics/alignment.h"
+#include "metrics/metrics.h"
+#include "metrics/sequence_errors.h"
+#include "sequences/frame_names.h"
+
+namespace covary {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// One sequence: its errors frame by frame.
+struct ComparedSequence {
+  std::string pattern;
+  std::vector<std::vector<double>> metrics;  ///< of each frame, in the order asked for
+  SequenceErrors errors;
+  SequenceSummary summary() const { return summary_of(errors.frames()); }
+  std::vector<double> mean_metrics() const {
+    std::vector<double> means(metrics[0].size());
+    for (const std::vector<double>& of_frame : metrics)
+      for (size_t m = 0; m < means.size(); ++m) means[m] += of_frame[m] / static_cast<double>(metrics.size());
+    return means;
+  }
+};
+
+std::string of_frame(const std::string& pattern, int frame) {
+  return is_frame_pattern_of_input(pattern) ? frame_name(pattern, frame) : pattern;
+}
+
+std::vector<std::string> references_of(const CompareOptions& o, int frame) {
+  std::vector<std::string> paths{of_frame(o.reference, frame)};
+  if (!o.reference2.empty()) paths.push_back(of_frame(o.reference2, frame));
+  return paths;
+}
+
+ComparedSequence compare_sequence(const CompareOptions& o, const std::string& pattern, const std::vector<int>& frames) {
+  ComparedSequence sequence{pattern, {}, {}};
+  for (const int frame : frames) {
+    const std::string path = frame_name(pattern, frame);
+    const std::vector<std::string> reference_paths = references_of(o, frame);
+    const ImagePlace place = inspect_image(path).place;
+    constexpr double kImages = 8 * 3 * sizeof(float),
+                     kFlip = 2 * 120;  // two frames, their references; metrics/flip.cpp
+    require_image_memory(path, place.window.width, place.window.height, kImages + kFlip);
+    PlacedImage image = read_image(path, o.layer);
+    std::vector<PlacedImage> sources;
+    CropWindow window = image.place.window;
+    for (const std::string& reference : reference_paths) {
+      sources.push_back(read_image(reference, o.layer));
+      window = common_window(path, image.place, window, reference, sources.back().place);
+    }
+    const bool low = image.low_dynamic_range && sources[0].low_dynamic_range && sources.back().low_dynamic_range;
+    std::vector<Image> references;
+    for (PlacedImage& source : sources) references.push_back(cut(std::move(source), window));
+    Image pixels = cut(std::move(image), window);
+    sequence.metrics.emplace_back();
+    for (const std::string& name : o.metrics)
+      sequence.metrics.back().push_back(compute_metric(find_metric(name).metric, pixels, references, low).value);
+    sequence.errors.add(std::move(pixels), std::move(references), low);
+    if (const uint64_t n = sequence.errors.frames().back().n_non_finite)
+      fmt::print(stderr, "covary: {}: {} pixels are not finite here or in the reference and are left out\n", path, n);
+  }
+  return sequence;
+}
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+Json json_of(const WorstRegion& worst, const std::vector<int>& frames) {
+  Json json{{"ratio", number(worst.ratio)}, {"column", worst.column}, {"row", worst.row}};
+  if (worst.frame >= 0) json["frame"] = frames[static_cast<size_t>(worst.frame)];
+  json["left_out"] = worst.left_out;
+  return json;
+}
+
+Json json_of(const CompareOptions& o, const ComparedSequence& s, const ComparedSequence* baseline,
+             const std::vector<int>& frames, const std::vector<std::string>& warnings) {
+  Json json{{"image", s.pattern}, {"reference", o.reference}};
+  if (!o.reference2.empty()) json["reference2"] = o.reference2;
+  const auto add = [&](Json& object, const std::vector<double>& metrics, const auto& errors) {
+    for (size_t m = 0; m < metrics.size(); ++m) object[o.metrics[m]] = metrics[m];
+    object["temporal"] = number(errors.temporal);
+    object["temporal_flip"] = number(errors.temporal_flip);
+    object["still_relmse"] = number(errors.still_relmse);
+    object["still_part"] = errors.still_part;
+  };
+  add(json, s.mean_metrics(), s.summary());
+  json["frames"] = Json::array();
+  for (size_t f = 0; f < frames.size(); ++f) {
+    Json object{{"frame", frames[f]}};
+    add(object, s.metrics[f], s.errors.frames()[f]);
+    object["non_finite_pixels"] = s.errors.frames()[f].n_non_finite;
+    json["frames"].push_back(object);
+  }
+  if (baseline) {
+    const WorstRegions worst = worst_regions(s.errors.frames(), baseline->errors.frames());
+    json["baseline"] = baseline->pattern;
+    json["worst_region"] = {{"relmse", json_of(worst.relmse, frames)},
+                            {"relmse_of_frame", json_of(worst.relmse_of_frame, frames)},
+                            {"temporal", json_of(worst.temporal, frames)},
+                            {"temporal_of_frame", json_of(worst.temporal_of_frame, frames)}};
+  }
+  json["warnings"] = warnings;
+  return json;
+}
+
+/// A row of a table; what is not known is left empty.
+void print_row(const std::string& name, size_t width, const std::vector<double>& values) {
+  fmt::print("{:{}}", name, width);
+  for (const double value : values) fmt::print("  {:>13}", std::isfinite(value) ? fmt::format("{:.6g}", value) : "-");
+  fmt::print("\n");
+}
+
+void print_header(const std::string& name, size_t width, const std::vector<std::string>& columns) {
+  fmt::print("{:{}}", name, width);
+  for (const std::string& column : columns) fmt::print("  {:>13}", column);
+  fmt::print("\n");
+}
+
+void print_errors(const CompareOptions& o, const std::vector<ComparedSequence>& sequences,
+                  const std::vector<int>& frames, size_t width) {
+  for (const std::string& name : o.metrics) {
+    const MetricInfo& info = find_metric(name);
+    fmt::print("{} = {}\n", name, o.reference2.empty() ? info.formula : info.formula_two);
+  }
+  fmt::print(
+      "temporal = relmse of changes since the frame before\n"
+      "temporal-flip = 1/N sum |FLIP of both frames - FLIP of both references|\n"
+      "still = relmse where the references do not change\n");
+  std::vector<std::string> columns = o.metrics;
+  columns.insert(columns.end(), {"temporal", "temporal-flip", "still"});
+  print_header("image", width, columns);
+  const auto row = [&](const std::string& name, std::vector<double> values, const auto& errors) {
+    values.insert(values.end(), {errors.temporal, errors.temporal_flip, errors.still_relmse});
+    print_row(name, width, values);
+  };
+  for (const ComparedSequence& s : sequences) {
+    for (size_t f = 0; f < frames.size(); ++f)
+      row(frame_name(s.pattern, frames[f]), s.metrics[f], s.errors.frames()[f]);
+    row(s.pattern, s.mean_metrics(), s.summary());
+  }
+}
+
+void print_multiples(const std::vector<ComparedSequence>& sequences, const ComparedSequence& baseline, size_t width) {
+  fmt::print(
+      "\nmultiples of the errors of {}; worst: the largest of any region of {} x {} pixels, of means over frames and "
+      "of "
+      "single frames\n",
+      baseline.pattern, kRegionSide, kRegionSide);
+  print_header("image", width,
+               {"relmse", "temporal", "temporal-flip", "still", "worst relmse", "temporal", "of a frame", "temporal"});
+  const SequenceSummary base = baseline.summary();
+  for (const ComparedSequence& s : sequences) {
+    const SequenceSummary own = s.summary();
+    const WorstRegions worst = worst_regions(s.errors.frames(), baseline.errors.frames());
+    print_row(s.pattern, width,
+              {own.relmse / base.relmse, own.temporal / base.temporal, own.temporal_flip / base.temporal_flip,
+               own.still_relmse / base.still_relmse, worst.relmse.ratio, worst.temporal.ratio,
+               worst.relmse_of_frame.ratio, worst.temporal_of_frame.ratio});
+  }
+}
+
+std::vector<std::string> warnings_of(const CompareOptions& o, const std::string& pattern, int frame) {
+  return warn_of_comparison({frame_name(pattern, frame)}, references_of(o, frame))[0];
+}
+
+}  // namespace
+
+bool compares_frames(const CompareOptions& o) {
+  const auto usage = [](const std::string& text) { throw Error(ErrorCode::kUsage, text); };
+  const bool of_frames = is_frame_pattern_of_input(o.images[0]);
+  for (const std::string& path : o.images)
+    if (is_frame_pattern_of_input(path) != of_frames)
+      usage(fmt::format("'{}' and '{}': either all images are names with '#', or none", o.images[0], path));
+  if (!of_frames && !(o.frames + o.baseline).empty())
+    usage("--frames and --baseline are about frames, whose names have a '#' for the number");
+  if (of_frames && !o.error_map.empty()) usage("--error-map is an option of single images, not of frames");
+  if (!o.baseline.empty() && !is_frame_pattern_of_input(o.baseline))
+    usage(fmt::format("--baseline '{}' has no '#' in place of the frame's number", o.baseline));
+  return of_frames;
+}
+
+void compare_frames(const CompareOptions& o) {
+  const std::vector<int> frames = frames_of(o.frames, o.images[0]);
+  Outputs outputs;
+  if (o.json) outputs.writes("--json", *o.json, OutputKind::kText);
+  for (const int frame : frames) {
+    for (const std::string& pattern : o.images) outputs.reads(frame_name(pattern, frame));
+    if (!o.baseline.empty()) outputs.reads(frame_name(o.baseline, frame));
+    for (const std::string& path : references_of(o, frame)) outputs.reads(path);
+  }
+  std::vector<ComparedSequence> sequences;
+  for (const std::string& pattern : o.images) sequences.push_back(compare_sequence(o, pattern, frames));
+  std::optional<ComparedSequence> baseline;
+  if (!o.baseline.empty()) baseline = compare_sequence(o, o.baseline, frames);
+
+  std::string json;
+  size_t width = 5;
+  for (const ComparedSequence& s : sequences) {
+    const std::vector<std::string> warnings = warnings_of(o, s.pattern, frames[0]);
+    if (o.json) json += json_text(json_of(o, s, baseline ? &*baseline : nullptr, frames, warnings), -1);
+    width = std::max({width, s.pattern.size(), frame_name(s.pattern, frames.back()).size()});
+  }
+  if (!o.json || !(o.json->empty() || *o.json == "-")) {
+    print_errors(o, sequences, frames, width);
+    if (baseline) print_multiples(sequences, *baseline, width);
+  }
+  if (o.json) write_text_output(*o.json, json);
+}
+
+}  // namespace covary

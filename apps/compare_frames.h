@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// covary compare of numbered frames: errors of frames, of their changes, and of the worst region.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace covary {
+
+/// Of `covary compare`.
+struct CompareOptions {
+  std::vector<std::string> images;
+  std::string reference, reference2, layer, error_map, frames, baseline;
+  std::vector<std::string> metrics{"relmse"};
+  std::vector<double> error_range;
+  std::optional<std::string> json;  // "" and "-": standard output
+};
+
+/// Whether the images are names with '#'. Throws Error(kUsage) where only some are, or options do not fit.
+bool compares_frames(const CompareOptions& options);
+
+/// Prints a table of the frames' errors, and writes the JSON that is asked for. References without a '#' are those of
+/// all frames.
+void compare_frames(const CompareOptions& options);
+
+}  // namespace covary
