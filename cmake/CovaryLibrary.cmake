@@ -17,7 +17,7 @@ target_include_directories(covary_library INTERFACE
   $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
 # What has code; static, the programs of others link it, too.
 target_link_libraries(covary_library PRIVATE
-  TBB::tbb embree OpenEXR::OpenEXR PNG::PNG ZLIB::ZLIB pugixml::pugixml TinyGLTF::TinyGLTF fmt::fmt
+  TBB::tbb embree OpenEXR::OpenEXR PNG::PNG JPEG::JPEG ZLIB::ZLIB pugixml::pugixml TinyGLTF::TinyGLTF fmt::fmt
   ${CMAKE_DL_LIBS}
   "$<BUILD_INTERFACE:${XXHASH_LIBRARY}>$<INSTALL_INTERFACE:xxhash>")
 if(NOT BUILD_SHARED_LIBS)  # else the library knows by its own RPATH where libcovary_imageio.so lies
@@ -90,7 +90,7 @@ install(FILES ${PROJECT_BINARY_DIR}/covaryConfig.cmake ${PROJECT_BINARY_DIR}/cov
 set(requires)
 set(libraries)
 if(NOT BUILD_SHARED_LIBS)
-  set(requires "tbb OpenEXR libpng zlib pugixml tinygltf fmt libxxhash")
+  set(requires "tbb OpenEXR libpng libjpeg zlib pugixml tinygltf fmt libxxhash")
   get_target_property(configurations embree IMPORTED_CONFIGURATIONS)
   list(GET configurations 0 configuration)
   get_target_property(embree_file embree IMPORTED_LOCATION_${configuration})

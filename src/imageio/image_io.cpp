@@ -16,6 +16,8 @@
 #include "imageio/exr_header.h"
 #include "imageio/exr_image.h"
 #include "imageio/image_module.h"
+#include "imageio/jpeg.h"
+#include "imageio/png.h"
 
 namespace covary {
 namespace {
@@ -24,21 +26,38 @@ constexpr size_t kMaxPixels = size_t{1} << 30;
 /// No format packs images tighter than this many values into one byte of file (deflate: about 1032).
 constexpr size_t kMaxCompression = 10000;
 
+/// The module, or why there is none.
+struct LoadedModule {
+  const ImageModule* module = nullptr;
+  std::string problem;
+};
+
 /// Loads the module: from the folders in the program's DT_RPATH, which are the build folder or, installed,
 /// ../lib/covary; the loader's usual places follow.
-const ImageModule& image_module() {
-  static const ImageModule& loaded = []() -> const ImageModule& {
+const LoadedModule& find_image_module() {
+  static const LoadedModule loaded = []() -> LoadedModule {
     void* library = dlopen(kImageModuleFile, RTLD_NOW | RTLD_LOCAL);
     if (!library)
-      throw Error(ErrorCode::kIo,
-                  fmt::format("images of this format need the module {}: {}", kImageModuleFile, dlerror()));
+      return {nullptr, fmt::format("only EXR, PNG and JPEG are read without OpenImageIO and the module {}: {}",
+                                   kImageModuleFile, dlerror())};
     using Entry = const ImageModule* (*)();
     const auto entry = reinterpret_cast<Entry>(dlsym(library, kImageModuleEntry));
-    if (!entry)
-      throw Error(ErrorCode::kIo, fmt::format("the module {} belongs to another version of covary", kImageModuleFile));
-    return *entry();
+    if (!entry) return {nullptr, fmt::format("the module {} belongs to another version of covary", kImageModuleFile)};
+    return {entry(), ""};
   }();
   return loaded;
+}
+
+const ImageModule& image_module() {
+  const LoadedModule& loaded = find_image_module();
+  if (!loaded.module) throw Error(ErrorCode::kIo, loaded.problem);
+  return *loaded.module;
+}
+
+/// A file of the formats of textures; nullptr where it is another, or of a kind that OpenImageIO alone reads.
+std::unique_ptr<ImageReader> open_plain_image(const std::string& path) {
+  auto reader = open_plain_png(path);
+  return reader ? std::move(reader) : open_plain_jpeg(path);
 }
 
 /// Bytes of the file; throws where it is not a regular file that can be opened.
@@ -117,6 +136,8 @@ std::unique_ptr<ImageReader> open_image(const std::string& path, OtherColours co
   if (is_exr(path)) {
     check_exr_header(path);
     reader = open_plain_exr(path);
+  } else if (colours == OtherColours::kKeep || !find_image_module().module) {
+    reader = open_plain_image(path);
   }
   std::string problem;
   if (!reader) reader = image_module().open(path, colours, problem);

@@ -8,6 +8,7 @@
 #include <new>
 
 #include "core/error.h"
+#include "imageio/plain_rows.h"
 
 namespace covary {
 namespace {
@@ -49,7 +50,34 @@ struct Reader {
   png_infop info = nullptr;
 };
 
+/// A file whose rows are read from the top down as grey or RGB of 8 or 16 bits, with alpha where it has some.
+class PngRows final : public PlainRows {
+ public:
+  explicit PngRows(std::FILE* file) {
+    png_structp png = reader_.png;
+    png_init_io(png, file);
+    png_read_info(png, reader_.info);
+    if (png_get_interlace_type(png, reader_.info) != PNG_INTERLACE_NONE)
+      throw Error(ErrorCode::kInput, "it is interlaced");
+    png_set_expand(png);  // palettes, fewer than 8 bits, one colour that is transparent
+    png_set_swap(png);    // 16 bits have the upper ones first
+    png_read_update_info(png, reader_.info);
+    width = static_cast<int>(png_get_image_width(png, reader_.info));
+    height = static_cast<int>(png_get_image_height(png, reader_.info));
+    channels = png_get_channels(png, reader_.info);
+    bytes_per_value = png_get_bit_depth(png, reader_.info) == 16 ? 2 : 1;
+  }
+  void read_row(uint8_t* row) override { png_read_row(reader_.png, row, nullptr); }
+
+ private:
+  const Reader reader_;
+};
+
 }  // namespace
+
+std::unique_ptr<ImageReader> open_plain_png(const std::string& path) {
+  return open_plain_rows(path, "png", [](std::FILE* file) { return std::make_unique<PngRows>(file); });
+}
 
 std::vector<unsigned char> encode_png(int width, int height, const std::vector<uint8_t>& rgb,
                                       const std::map<std::string, std::string>& texts) {

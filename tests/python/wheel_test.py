@@ -76,6 +76,12 @@ class Wheel(PackageTest):
         self.assertIn("covary ", self.bare("fresh/bin/covary", "--version"))
         self.assertIn("room.xml", self.bare("fresh/bin/covary", "experiment", "quick", "--print"))
         self.assertIn("Open Image Denoise 2.5.1\n", self.bare("fresh/bin/covary", "denoise", "--check"))
+        for module in (self.path / "fresh").glob("lib/python*/site-packages/covary/lib/covary/libcovary_imageio.so"):
+            module.unlink()  # as where OpenImageIO is not installed, which it needs
+        self.bare("fresh/bin/covary", "convert", "room.png", "again.exr")
+        with self.assertRaises(subprocess.CalledProcessError) as refused:
+            self.bare("fresh/bin/covary", "convert", "room.png", "again.tif")
+        self.assertIn("only EXR, PNG and JPEG are read without OpenImageIO", refused.exception.stderr)
         self.check_metadata(wheel)
         self.check_licences(wheel)
         linked = self.bare("ldd", *(self.path / "fresh").glob("lib/python*/site-packages/covary/_covary*.so"))

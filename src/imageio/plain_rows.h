@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// Image files whose rows a small library reads from the top down: what png.h and jpeg.h share.
+#pragma once
+
+#include <cstdint>
+#include <cstdio>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "imageio/image_io.h"
+
+namespace covary {
+
+/// An open file behind its header. Functions throw Error where it is damaged.
+struct PlainRows {
+  virtual ~PlainRows() = default;
+  /// The next row: width * channels values of 8 bits, or 16 in this machine's order.
+  virtual void read_row(uint8_t* row) = 0;
+  int width = 0, height = 0, channels = 0;  ///< 1: grey, 2: grey and alpha, 3: RGB, 4: RGB and alpha
+  int bytes_per_value = 1;
+};
+
+using OpenRows = std::function<std::unique_ptr<PlainRows>(std::FILE*)>;
+
+/// A reader of the file `path`, whose header has the name of the format and no attributes; nullptr where `open` throws
+/// Error.
+std::unique_ptr<ImageReader> open_plain_rows(const std::string& path, const char* format, OpenRows open);
+
+}  // namespace covary
