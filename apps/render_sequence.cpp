@@ -93,12 +93,39 @@ bool is_complete(const std::string& path, const std::string& hash) {
                                              path));
 }
 
-/// Puts the camera where it is now, and gives the frame's layers.
-void prepare(const Transform& before, const Transform& now, LoadedScene& scene, RenderRequest& request) {
-  place_camera(scene, before);
-  const Camera previous = *scene.camera;
-  place_camera(scene, now);
-  MotionImages images = motion_images(*scene.scene, previous, window_of(scene, request));
+/// When frames are, and where the camera is then.
+class FrameTimes {
+ public:
+  FrameTimes() = default;
+  explicit FrameTimes(const SequenceSettings& sequence) {
+    if (!sequence.camera_path.empty()) path_ = read_camera_path(sequence.camera_path);
+    rate_ = sequence.frames_per_second > 0 ? sequence.frames_per_second : path_ ? path_->frames_per_second() : 1;
+  }
+
+  double time(int frame) const { return frame / rate_; }
+  /// The camera's place by the path, or else by the scene's animation; nothing where neither moves it.
+  std::optional<Transform> camera(const LoadedScene& scene, int frame) const {
+    if (path_) return path_->at(time(frame));
+    if (scene.camera_to_world) return scene.camera_to_world->at(time(frame));
+    return std::nullopt;
+  }
+  /// Puts all that moves where it is in the frame.
+  void place(int frame, const Transform& camera, LoadedScene& scene) const {
+    scene.scene->move_to(time(frame));
+    place_camera(scene, camera);
+  }
+
+ private:
+  std::optional<CameraPath> path_;
+  double rate_ = 1;
+};
+
+/// The frame's layers; `before` is where its camera was at the time `then`.
+void trace_motion(const Transform& before, double then, const LoadedScene& scene, RenderRequest& request) {
+  CameraSettings settings = scene.camera->settings();
+  settings.to_world = before;
+  MotionImages images =
+      motion_images(*scene.scene, Camera(settings, scene.width, scene.height), then, window_of(scene, request));
   request.beside["Depth"] = std::move(images.depth);
   request.beside["Motion"] = std::move(images.motion);
 }
@@ -125,7 +152,7 @@ class SequenceRender {
       if (!options_.sequence.camera_path.empty()) outputs_.back().reads(options_.sequence.camera_path);
     }
     display_ = display_of(options_);
-    if (!options_.sequence.camera_path.empty()) path_ = read_camera_path(options_.sequence.camera_path);
+    times_ = FrameTimes(options_.sequence);
     if (!has_many_scenes()) load_scene(options_, outputs_);
     const StopFlag stop;
     for (size_t i = 0; i < frames_.size(); ++i) render_frame(i, stop);
@@ -158,16 +185,16 @@ class SequenceRender {
     if (has_many_scenes()) load_scene(one, std::span(outputs_).subspan(index, 1));
     RenderRequest request = make_request(one, *scene_);
     const bool follows = frame - 1 == last_frame_;  // of frames that are farther apart nothing is known
-    const Transform now = path_ ? path_->at_frame(frame) : own_camera_;
-    const Transform before = path_ ? path_->at_frame(frame - 1) : follows ? last_camera_ : now;
-    place_camera(*scene_, now);
+    const Transform now = times_.camera(*scene_, frame).value_or(own_camera_);
+    const Transform before = times_.camera(*scene_, frame - 1).value_or(follows ? last_camera_ : now);
+    times_.place(frame, now, *scene_);
     const std::string hash = frame_hash(one, *scene_, before, follows ? last_hash_ : "");
     last_frame_ = frame, last_hash_ = hash, last_camera_ = now;
     if (request.resume && is_complete(request.output, hash)) {
       if (!options_.quiet) fmt::print(stderr, "{}: complete\n", request.output);
       return;
     }
-    prepare(before, now, *scene_, request);
+    trace_motion(before, times_.time(frame - 1), *scene_, request);
     request.attributes[film_key::kFrame] = hash;
     if (options_.sequence.history && follows)
       one.settings.denoising.history = history_of(frame_name(options_.request().output, frame - 1), request);
@@ -193,7 +220,7 @@ class SequenceRender {
   const std::vector<int> frames_;
   std::vector<Outputs> outputs_;  // of each frame
   std::unique_ptr<Display> display_;
-  std::optional<CameraPath> path_;
+  FrameTimes times_;
   std::optional<LoadedScene> scene_;
   Transform own_camera_;  // of the scene, without the path
   double load_seconds_ = 0;
@@ -214,8 +241,9 @@ void take_frame(RenderOptions& options) {
 }
 
 void place_frame(const RenderOptions& options, LoadedScene& scene) {
-  if (options.sequence.camera_path.empty()) return;
-  place_camera(scene, read_camera_path(options.sequence.camera_path).at_frame(options.sequence.frames->first));
+  const FrameTimes times(options.sequence);
+  const int frame = options.sequence.frames->first;
+  times.place(frame, times.camera(scene, frame).value_or(scene.camera->settings().to_world), scene);
 }
 
 }  // namespace covary

@@ -2,6 +2,7 @@
 // Transformations over time, given at some times and interpolated between them.
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "core/transform.h"
@@ -24,11 +25,14 @@ class KeyedTransform {
 
   /// At the time of a key exactly its matrix, and between keys of the same matrix that one.
   Transform at(double time) const;
+  const std::vector<TransformKey>& keys() const { return keys_; }
   double first_time() const { return keys_.front().time; }
   double last_time() const { return keys_.back().time; }
 
  private:
   std::vector<TransformKey> keys_;
 };
+
+using KeyedTransformPtr = std::shared_ptr<const KeyedTransform>;
 
 }  // namespace covary

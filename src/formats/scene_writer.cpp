@@ -125,6 +125,13 @@ class Writer {
     if (!name.empty() && !name.starts_with("_arg_")) node.append_attribute("name") = name.c_str();
   }
 
+  static void add_transform(pugi::xml_node parent, const char* attribute, const std::string& text,
+                            const Matrix4& matrix) {
+    pugi::xml_node node = parent.append_child("transform");
+    node.append_attribute(attribute) = text.c_str();
+    node.append_child("matrix").append_attribute("value") = matrix_text(matrix).c_str();
+  }
+
   void write_property(pugi::xml_node parent, const Property& property) {
     if (const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value)) {
       if (!*child) return;
@@ -158,9 +165,12 @@ class Writer {
       add("spectrum", name, spectrum_text(*spectrum));
     } else if (const Transform* transform = std::get_if<Transform>(&property.value)) {
       if (transform->is_identity()) return;
-      pugi::xml_node node = parent.append_child("transform");
+      add_transform(parent, "name", name, transform->matrix());
+    } else if (const KeyedTransformPtr* animation = std::get_if<KeyedTransformPtr>(&property.value)) {
+      pugi::xml_node node = parent.append_child("animation");
       node.append_attribute("name") = name.c_str();
-      node.append_child("matrix").append_attribute("value") = matrix_text(transform->matrix()).c_str();
+      for (const TransformKey& key : (*animation)->keys())
+        add_transform(node, "time", fmt::format("{}", key.time), key.matrix);
     } else if (const std::string* text = std::get_if<std::string>(&property.value)) {
       if (name == kEmbeddedData)
         add("string", "filename", add_file(*text));

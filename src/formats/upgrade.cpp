@@ -128,8 +128,6 @@ void upgrade_object(ObjectDescription& object, Diagnostics& diagnostics) {
     drop(object, {"attach_log"}, diagnostics);
   } else if (object.kind == "integrator") {
     drop(object, {"strict_normals"}, diagnostics);
-  } else if (object.kind == "sensor") {
-    drop(object, {"shutter_open", "shutter_close"}, diagnostics);
   } else if (object.kind == "shape") {
     drop(object, {"collapse"}, diagnostics);
   }

@@ -54,6 +54,9 @@ Property PropertyReader::read(const XmlDocument& document, pugi::xml_node node) 
     if (tag == "transform") {
       read({"!name"});
       value = read_transform(document, node);
+    } else if (tag == "animation") {
+      read({"!name"});
+      value = read_animation(document, node);
     } else if (tag == "point" || tag == "vector") {
       const XmlAttributes attributes = read({"!name", "value", "x", "y", "z"});
       for (const char* axis : {"x", "y", "z"})
@@ -117,6 +120,21 @@ Transform PropertyReader::read_transform(const XmlDocument& document, pugi::xml_
     }
   }
   return transform;
+}
+
+Value PropertyReader::read_animation(const XmlDocument& document, pugi::xml_node node) {
+  std::vector<TransformKey> keys;
+  for (const pugi::xml_node child : node.children()) {
+    if (child.type() != pugi::node_element) continue;
+    const SourceLocation where = document.where(child);
+    if (std::string_view(child.name()) != "transform")
+      throw Error(ErrorCode::kInput,
+                  fmt::format("<{}> cannot stand inside <animation>, only <transform time=\"…\">", child.name()));
+    const XmlAttributes attributes(child, where, defines_, {"!time"}, diagnostics_);
+    if (!attributes.complete()) throw Error(ErrorCode::kInput, "");
+    keys.push_back({parse_number(attributes.get("time")), read_transform(document, child).matrix()});
+  }
+  return std::make_shared<const KeyedTransform>(std::move(keys));
 }
 
 Transform PropertyReader::read_operation(pugi::xml_node node, const std::string& tag, const SourceLocation& where) {

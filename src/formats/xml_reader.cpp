@@ -31,9 +31,9 @@ constexpr int kNewestVersion = 3;
 const std::vector<std::string> kObjectTags = {"scene",  "bsdf",  "texture", "emitter",    "shape",
                                               "sensor", "film",  "rfilter", "integrator", "sampler",
                                               "medium", "phase", "volume",  "subsurface"};
-const std::vector<std::string> kOtherTags = {"boolean", "integer", "float",    "string",    "point",   "vector",
-                                             "rgb",     "srgb",    "spectrum", "blackbody", "include", "alias",
-                                             "default", "path",    "ref",      "transform"};
+const std::vector<std::string> kOtherTags = {"boolean", "integer", "float",    "string",    "point",    "vector",
+                                             "rgb",     "srgb",    "spectrum", "blackbody", "include",  "alias",
+                                             "default", "path",    "ref",      "transform", "animation"};
 
 bool contains(const std::vector<std::string>& names, std::string_view name) {
   return std::find(names.begin(), names.end(), name) != names.end();
@@ -229,11 +229,7 @@ class Reader {
   void read_property(const Document& document, pugi::xml_node node, ObjectDescription& owner) {
     const std::string tag = node.name();
     const SourceLocation where = document.xml.where(node);
-    if (tag == "animation")
-      return diagnostics_.error(where,
-                                "<animation> is not supported: `camera-path` moves the camera of a scene, and a "
-                                "scene for each frame (scene_####.xml with `frames`) moves anything");
-    if (tag != "transform") {
+    if (tag != "transform" && tag != "animation") {
       for (const pugi::xml_node child : node.children())
         if (child.type() == pugi::node_element)
           diagnostics_.error(document.xml.where(child),

@@ -223,13 +223,30 @@ TEST(XmlReader, AcceptsAByteOrderMarkAndWindowsLines) {
   EXPECT_EQ(r.errors, "scene.xml:3:1: unknown element <flim>; did you mean 'film'?");
 }
 
-TEST(XmlReader, SaysHowScenesMove) {
-  const Read r = read(
-      "<scene version=\"3.0.0\"><shape type=\"cube\">\n<animation name=\"to_world\"><transform time=\"0\"/></animation>"
-      "</shape></scene>");
+TEST(XmlReader, ReadsAnimations) {
+  const Read r = read_scene(R"(<shape type="cube"><animation name="to_world">
+  <transform time="-1"><scale value="2"/><translate x="3"/></transform><transform time="0.5"/></animation></shape>)");
+  EXPECT_EQ(r.errors, "no error");
+  const std::vector<TransformKey>& keys = value<KeyedTransformPtr>(r, "to_world")->keys();
+  ASSERT_EQ(keys.size(), 2u);
+  EXPECT_EQ(keys[0].time, -1);
+  EXPECT_EQ(keys[0].matrix, (Transform::translate({3, 0, 0}) * Transform::scale({2, 2, 2})).matrix());
+  EXPECT_EQ(keys[1].time, 0.5);
+  EXPECT_EQ(keys[1].matrix, Transform().matrix());
+}
+
+TEST(XmlReader, ReportsWrongAnimations) {
+  const Read r = read_scene(R"(<shape type="cube"><animation name="a"><translate x="3"/></animation>
+<animation name="b"><transform/></animation>
+<animation name="c"><transform time="1"/><transform time="1"/></animation>
+<animation name="d"/>
+<animation name="e"><transform time="0"><scale value="0"/></transform></animation></shape>)");
   EXPECT_EQ(r.errors,
-            "scene.xml:2:1: <animation> is not supported: `camera-path` moves the camera of a scene, and a scene for "
-            "each frame (scene_####.xml with `frames`) moves anything");
+            "scene.xml:2:20: 'a': <translate> cannot stand inside <animation>, only <transform time=\"…\">\n"
+            "scene.xml:3:21: <transform> needs the attribute 'time'\n"
+            "scene.xml:4:1: 'c': keyframe 1: the time 1 is not after 1, that of the one before\n"
+            "scene.xml:5:1: 'd': there are no keyframes\n"
+            "scene.xml:6:41: <scale>: the transformation matrix is singular");
 }
 
 TEST(XmlReader, ReportsWrongRoots) {

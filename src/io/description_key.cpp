@@ -25,10 +25,16 @@ struct ValueText {
     for (const auto& [wavelength, value] : v.samples) text += fmt::format("{:a}:{:a},", wavelength, value);
     return text;
   }
-  std::string operator()(const Transform& v) const {
+  static std::string matrix(const Matrix4& m) {
     std::string text = "t";
-    for (const auto& row : v.matrix())
+    for (const auto& row : m)
       for (double entry : row) text += fmt::format("{:a},", entry);
+    return text;
+  }
+  std::string operator()(const Transform& v) const { return matrix(v.matrix()); }
+  std::string operator()(const KeyedTransformPtr& v) const {
+    std::string text = "a";
+    for (const TransformKey& key : v->keys()) text += fmt::format("{:a}{}", key.time, matrix(key.matrix));
     return text;
   }
   std::string operator()(const ObjectPtr& v) const { return fmt::format("o{}", fmt::ptr(v.get())); }

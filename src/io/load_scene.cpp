@@ -12,17 +12,17 @@
 #include "core/content_hash.h"
 #include "core/memory_limit.h"
 #include "core/stopwatch.h"
-#include "emitters/area.h"
 #include "formats/file_view.h"
-#include "io/scene_file.h"
 #include "io/held_objects.h"
 #include "io/media.h"
 #include "io/mesh_attributes.h"
 #include "io/nested_integrator.h"
 #include "io/object_factory.h"
+#include "io/scene_file.h"
 #include "io/scene_jobs.h"
 #include "io/scene_memory.h"
 #include "io/sensor.h"
+#include "io/shape_copies.h"
 #include "scene/mesh.h"
 
 namespace covary {
@@ -47,6 +47,7 @@ class Loader {
     result_.read_seconds = watch.seconds();
     result_.has_delta_lights_and_surfaces = has_delta_lights() && has_delta_surfaces();
     result_.scene = std::make_unique<Scene>(std::move(parts_));
+    result_.scene->move_to(sensor_made_->shutter_open);
   }
 
  private:
@@ -101,7 +102,10 @@ class Loader {
       } else {
         ShapeJob& job = *jobs_.shape(object.get());
         finish_shape(job);
-        if (job.shape) parts_.shapes.push_back(job.shape);
+        if (job.shape && job.to_world)
+          place_copy(copies_of(job.shape, job.light, object->where), Transform(), job.to_world);
+        else if (job.shape)
+          parts_.shapes.push_back(job.shape);
       }
     } else if (kind == "emitter") {
       place_emitter(object);
@@ -145,10 +149,13 @@ class Loader {
       const auto* area = dynamic_cast<const AreaLight*>(emitters[0].get());
       if (!area) {
         p.error("only an emitter 'area' can be part of a shape");
-      } else if (job.in_group) {
-        job.light = area;  // each instance becomes a light of its own, see place_instance
+      } else if (job.in_group || job.to_world) {
+        job.light = area;
       } else {
-        add_light(*area, job.shape);
+        const std::shared_ptr<AreaLight> light = area->clone();
+        light->attach(job.shape.get());
+        job.shape->set_emitter(light);
+        parts_.emitters.push_back(light);
       }
     }
     if (const auto* mesh = dynamic_cast<const TriangleMesh*>(job.shape.get()); mesh && mesh->n_degenerate() > 0) {
@@ -158,11 +165,17 @@ class Loader {
     }
   }
 
-  void add_light(const AreaLight& prototype, const ShapePtr& shape) {
-    const std::shared_ptr<AreaLight> light = prototype.clone();
-    light->attach(shape.get());
-    shape->set_emitter(light);
-    parts_.emitters.push_back(light);
+  /// Adds the copy of a shape at `to_world`, or one that `animation` moves.
+  void place_copy(std::function<ShapePtr(const Transform&)> copy_to, const Transform& to_world,
+                  const KeyedTransformPtr& animation) {
+    try {
+      const ShapePtr shape = copy_to(animation ? animation->at(0) : to_world);
+      if (animation) parts_.movements.push_back({animation, parts_.shapes.size(), std::move(copy_to)});
+      if (shape->emitter()) parts_.emitters.push_back(shape->shared_emitter());
+      parts_.shapes.push_back(shape);
+    } catch (const Error& error) {
+      diagnostics_.error({}, error.what());
+    }
   }
 
   /// What a shape without a BSDF gets, as in Mitsuba: diffuse of reflectance 0.5, or black if it emits light.
@@ -240,7 +253,8 @@ class Loader {
       if (const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value))
         if (*child && (*child)->kind == "shape" && (*child)->type == "shapegroup") group(*child);
     Instance instance;
-    instance.to_world = p.get_transform("to_world");
+    const KeyedTransformPtr animation = p.find_animation("to_world");
+    instance.to_world = animation ? animation->at(0) : p.get_transform("to_world");
     const bool only_groups =
         std::all_of(object->properties.begin(), object->properties.end(), [](const Property& property) {
           const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value);
@@ -258,14 +272,12 @@ class Loader {
     }
     check_copies(*object, *groups[0]);
     // Shapes that emit are copied to their place, so that each copy is a light with its own area and position.
-    for (const GroupLight& member : group_lights_[groups[0].get()]) {
-      const ShapePtr placed = member.shape->transformed(instance.to_world);
-      placed->set_bsdf(member.shape->shared_bsdf());
-      add_light(*member.light, placed);
-      parts_.shapes.push_back(placed);
-    }
+    for (const GroupLight& member : group_lights_[groups[0].get()])
+      place_copy(copies_of(member.shape, member.light, object->where), instance.to_world, animation);
     instance.group = groups[0];
-    if (!instance.group->shapes.empty()) parts_.instances.push_back(std::move(instance));
+    if (instance.group->shapes.empty()) return;
+    if (animation) parts_.movements.push_back({animation, parts_.instances.size(), {}});
+    parts_.instances.push_back(std::move(instance));
   }
 
   void place_emitter(const ObjectPtr& object) {
@@ -330,6 +342,12 @@ class Loader {
     result_.filter = film.filter;
     result_.spp = sensor.sampler.sample_count;
     result_.sampler_type = sensor.sampler.type;
+    result_.camera_to_world = sensor.to_world;
+    if (sensor.shutter_close > sensor.shutter_open && (sensor.to_world || !parts_.movements.empty()))
+      diagnostics_.error(sensor_->where,
+                         fmt::format("the shutter is open from {} to {}, and there is an <animation>: motion is not "
+                                     "blurred; shutter_close must be shutter_open, the time of the image",
+                                     sensor.shutter_open, sensor.shutter_close));
     try {
       result_.camera = std::make_shared<Camera>(sensor.camera, film.width, film.height);
       parts_.camera = result_.camera;

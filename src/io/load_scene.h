@@ -25,8 +25,9 @@ struct LoadOptions {
 
 struct LoadedScene {
   std::unique_ptr<Scene> scene;
-  std::shared_ptr<Camera> camera;  ///< the scene's, which may be moved between renders (plans/camera_path.h)
-  int width = 0, height = 0;  ///< full frame
+  std::shared_ptr<Camera> camera;     ///< the scene's, which may be moved between renders (plans/camera_path.h)
+  KeyedTransformPtr camera_to_world;  ///< of a camera that moves by an <animation>, or null
+  int width = 0, height = 0;          ///< full frame
   int crop_x = 0, crop_y = 0, crop_width = 0, crop_height = 0;
   FilterSettings filter;
   int spp = 4;                  ///< of the scene's sampler
@@ -39,8 +40,8 @@ struct LoadedScene {
   std::vector<std::string> warnings;
   std::vector<std::string> files;  ///< paths of all files that the scene's file names and that were read
   double read_seconds = 0;         ///< parsing and reading files; Scene::build_seconds() comes on top
-  std::string content_hash;        ///< hex; over the scene's XML, defines, all files it reads, and the moved camera
-  std::string files_hash;          ///< the same without the last
+  std::string content_hash;  ///< hex; over the scene's XML, defines, all files it reads; where moved, camera and time
+  std::string files_hash;    ///< the same without camera and time
 };
 
 /// Reads a scene: Mitsuba's XML, "*.pbrt", "*.gltf" or "*.glb". Throws Error(kInput) with every problem of the file, or

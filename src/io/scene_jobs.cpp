@@ -5,6 +5,7 @@
 
 #include "core/parallel.h"
 #include "io/description_key.h"
+#include "io/shape_copies.h"
 #include "io/shapes.h"
 
 namespace covary {
@@ -67,8 +68,10 @@ void SceneJobs::collect_leaves(const ObjectPtr& object, std::unordered_set<const
 
 void SceneJobs::add_shape(const ObjectPtr& object, bool in_group) {
   if (object->kind != "shape" || shapes_by_description_.contains(object.get())) return;
-  shapes_.push_back(std::make_unique<ShapeJob>(object, made_, files_));
+  KeyedTransformPtr to_world;
+  shapes_.push_back(std::make_unique<ShapeJob>(in_group ? object : in_own_space(object, to_world), made_, files_));
   shapes_.back()->in_group = in_group;
+  shapes_.back()->to_world = to_world;
   shapes_by_description_[object.get()] = shapes_.back().get();
 }
 

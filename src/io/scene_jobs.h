@@ -32,7 +32,8 @@ struct ShapeJob {
   Parameters parameters;
   ShapePtr shape;  ///< null where it could not be made
   bool in_group = false;
-  const AreaLight* light = nullptr;  ///< of a shape in a group
+  KeyedTransformPtr to_world;        ///< of a shape that moves; `shape` is in its own space
+  const AreaLight* light = nullptr;  ///< of a shape in a group, or that moves: each copy becomes a light of its own
   bool asked_everything = false;     ///< else what is left over says nothing about unknown parameters
 };
 

@@ -11,8 +11,8 @@
 
 #include "core/random.h"
 #include "formats/file_view.h"
-#include "io/scene_file.h"
 #include "io/convert_scene.h"
+#include "io/scene_file.h"
 #include "scene/embedded_data.h"
 #include "support/files.h"
 
@@ -65,6 +65,9 @@ class SceneWriter : public ::testing::Test {
         parts.push_back(name + "=" + (file ? std::string(FileView(path).text()) : *text));
       } else if (const auto* transform = std::get_if<Transform>(&v)) {
         if (!transform->is_identity()) parts.push_back(name + "=" + matrix(*transform) + matrix(transform->inverse()));
+      } else if (const auto* animation = std::get_if<KeyedTransformPtr>(&v)) {
+        for (const TransformKey& key : (*animation)->keys())
+          parts.push_back(name + "=" + number(key.time) + matrix(Transform(key.matrix)));
       } else {
         parts.push_back(name + "=" + number(v));
       }
@@ -182,7 +185,9 @@ TEST_F(SceneWriter, ScenesOfMitsubaAreBroughtToTheNewestVersion) {
 <bsdf type="roughplastic" id="not used"><rgb name="diffuseReflectance" value="#ff8000"/></bsdf>
 <emitter type="area" id="lamp"><spectrum name="radiance" value="1.5"/></emitter>
 <shape type="sphere"><point name="center" x="0" y=".1" z="5"/><ref id="a"/><ref id="lamp"/></shape>
-<shape type="sphere"><point name="center" x="2" y=".1" z="5"/><ref id="a"/><ref id="lamp"/></shape></scene>)");
+<shape type="sphere"><animation name="toWorld"><transform time="-0.1"><scale value="0.3"/></transform>
+<transform time="2"><rotate x="1" y="2" angle="33"/></transform></animation>
+<point name="center" x="2" y=".1" z="5"/><ref id="a"/><ref id="lamp"/></shape></scene>)");
   const ConvertedScene converted = convert(from, "new.xml");
   EXPECT_TRUE(contains(converted.document.xml, "<scene version=\"3.0.0\">"));
   EXPECT_TRUE(contains(converted.document.xml, "name=\"diffuse_reflectance\""));

@@ -76,7 +76,9 @@ std::shared_ptr<SamplerSettings> make_sampler(Parameters& p) {
 std::shared_ptr<SensorSettings> make_sensor(Parameters& p) {
   auto sensor = std::make_shared<SensorSettings>();
   CameraSettings& camera = sensor->camera;
-  camera.to_world = p.get_transform("to_world");
+  sensor->shutter_open = p.get_float("shutter_open", 0), sensor->shutter_close = p.get_float("shutter_close", 0);
+  sensor->to_world = p.find_animation("to_world");
+  camera.to_world = sensor->to_world ? sensor->to_world->at(sensor->shutter_open) : p.get_transform("to_world");
   camera.orthographic = p.type() == "orthographic";
   if (!camera.orthographic) {
     const FieldOfView view = get_field_of_view(p);
@@ -96,7 +98,6 @@ std::shared_ptr<SensorSettings> make_sensor(Parameters& p) {
     camera.principal_point_offset = {p.get_float("principal_point_offset_x", 0),
                                      p.get_float("principal_point_offset_y", 0)};
   }
-  for (const char* time : {"shutter_open", "shutter_close"}) p.get_float(time, 0);  // nothing moves
   sensor->medium = only_child<Medium>(p, "medium");
   if (const auto film = only_child<FilmSettings>(p, "film")) sensor->film = *film;
   if (const auto sampler = only_child<SamplerSettings>(p, "sampler")) sensor->sampler = *sampler;

@@ -25,7 +25,9 @@ struct SamplerSettings : SceneObject {
 
 /// <sensor>: the camera still without its film size, which the command line may change.
 struct SensorSettings : SceneObject {
-  CameraSettings camera;
+  CameraSettings camera;       ///< where it is when the shutter opens
+  KeyedTransformPtr to_world;  ///< of a camera that moves, or null
+  double shutter_open = 0, shutter_close = 0;
   MediumPtr medium;  ///< in which the camera stands; null: none
   FilmSettings film;
   SamplerSettings sampler;

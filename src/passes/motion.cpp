@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "passes/motion.h"
 
+#include <vector>
+
 #include "core/parallel.h"
 
 namespace covary {
@@ -45,7 +47,8 @@ struct PixelMotion {
   Vec3 motion{0, 0, 0};
 };
 
-PixelMotion pixel_motion(const Scene& scene, const Projection& now, const Projection& before, Vec2 centre) {
+PixelMotion pixel_motion(const Scene& scene, std::span<const Transform> displacements, const Projection& now,
+                         const Projection& before, Vec2 centre) {
   const Camera& camera = scene.camera();
   const Ray ray = camera.ray(centre, {0.5f, 0.5f});
   RayHit hit;
@@ -56,8 +59,10 @@ PixelMotion pixel_motion(const Scene& scene, const Projection& now, const Projec
   if (hit.found()) {
     const Vec3 p = ray.at(hit.t);
     result.depth = now.depth(p);
-    seen = before.position(p, old);
-    if (seen) result.motion.z = before.depth(p) - result.depth;
+    const int movement = scene.movement_of(hit);
+    const Vec3 q = movement < 0 ? p : displacements[static_cast<size_t>(movement)].point(p);
+    seen = before.position(q, old);
+    if (seen) result.motion.z = before.depth(q) - result.depth;
   } else {
     if (camera.is_orthographic()) return result;  // all pixels show the same point at infinity
     seen = before.position_of_direction(ray.d, old);
@@ -69,15 +74,16 @@ PixelMotion pixel_motion(const Scene& scene, const Projection& now, const Projec
 
 }  // namespace
 
-MotionImages motion_images(const Scene& scene, const Camera& previous, const CropWindow& window,
+MotionImages motion_images(const Scene& scene, const Camera& previous, double then, const CropWindow& window,
                            const std::atomic<bool>* stop) {
   MotionImages images{Image(window.width, window.height, 1), Image(window.width, window.height, 3)};
   const Projection now(scene.camera()), before(previous);
+  const std::vector<Transform> displacements = scene.displacements(then);
   parallel_for(window.height, [&](int y) {
     if (stop && stop->load(std::memory_order_relaxed)) return;
     for (int x = 0; x < window.width; ++x) {
       const Vec2 centre{static_cast<float>(window.x + x) + 0.5f, static_cast<float>(window.y + y) + 0.5f};
-      const PixelMotion at = pixel_motion(scene, now, before, centre);
+      const PixelMotion at = pixel_motion(scene, displacements, now, before, centre);
       *images.depth.pixel(x, y) = at.depth;
       for (int c = 0; c < 3; ++c) images.motion.pixel(x, y)[c] = at.motion[c];
     }

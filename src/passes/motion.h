@@ -23,9 +23,9 @@ struct MotionImages {
 };
 
 /// Of the pixels of `window`, which lies in the frame of the scene's camera; `previous` has a frame of the same size.
-/// What the camera sees has not moved. Mirrors and glass count as surfaces. Where `stop` becomes true, the rest of the
-/// pixels are 0.
-MotionImages motion_images(const Scene& scene, const Camera& previous, const CropWindow& window,
+/// Shapes were where their animations say for the time `then`. Mirrors and glass count as surfaces. Where `stop`
+/// becomes true, the rest of the pixels are 0.
+MotionImages motion_images(const Scene& scene, const Camera& previous, double then, const CropWindow& window,
                            const std::atomic<bool>* stop = nullptr);
 
 }  // namespace covary

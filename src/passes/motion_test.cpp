@@ -38,7 +38,7 @@ constexpr CropWindow kFrame{0, 0, kWidth, kHeight};
 
 TEST(MotionImages, AreZeroForACameraAtRest) {
   const LoadedScene scene = wall();
-  const MotionImages images = motion_images(*scene.scene, *scene.camera, kFrame);
+  const MotionImages images = motion_images(*scene.scene, *scene.camera, 0, kFrame);
   for (const float value : images.motion.data) EXPECT_NEAR(value, 0, 1e-4f);
   EXPECT_EQ(*images.depth.pixel(15, 3), 0) << "nothing there";
   EXPECT_NEAR(*images.depth.pixel(9, 5), 5, 0.02f);
@@ -48,7 +48,8 @@ TEST(MotionImages, AreZeroForACameraAtRest) {
 TEST(MotionImages, LeadToThePointInTheFrameBefore) {
   const LoadedScene scene = wall();
   // 0.3 to the left, 0.2 up and 1 farther away: the camera has moved to the origin since.
-  const MotionImages images = motion_images(*scene.scene, moved(scene, Transform::translate({0.3f, 0.2f, -1})), kFrame);
+  const MotionImages images =
+      motion_images(*scene.scene, moved(scene, Transform::translate({0.3f, 0.2f, -1})), 0, kFrame);
   const double half = std::tan(25 * M_PI / 180), pixel = kWidth / (2 * half);  // pixels for a unit at distance 1
   for (const int x : {0, 4, 9})
     for (const int y : {0, 7}) {
@@ -64,7 +65,7 @@ TEST(MotionImages, LeadToThePointInTheFrameBefore) {
 
 TEST(MotionImages, FollowATurnAtAnyDistance) {
   const LoadedScene scene = wall();
-  const MotionImages images = motion_images(*scene.scene, moved(scene, Transform::rotate({0, 1, 0}, 5)), kFrame);
+  const MotionImages images = motion_images(*scene.scene, moved(scene, Transform::rotate({0, 1, 0}, 5)), 0, kFrame);
   // The camera looked 5 degrees towards x, which is left: the middle of the image was to the right.
   const double pixel = kWidth / (2 * std::tan(25 * M_PI / 180));
   const double angle = std::atan((9.5 - kWidth / 2.0) / pixel) + 5 * M_PI / 180;
@@ -76,7 +77,7 @@ TEST(MotionImages, FollowATurnAtAnyDistance) {
 
 TEST(MotionImages, LeadOutOfTheFrameWhereThePointWasBehindTheCamera) {
   const LoadedScene scene = wall();
-  const MotionImages images = motion_images(*scene.scene, moved(scene, Transform::rotate({0, 1, 0}, 180)), kFrame);
+  const MotionImages images = motion_images(*scene.scene, moved(scene, Transform::rotate({0, 1, 0}, 180)), 0, kFrame);
   for (const int x : {3, 15}) {
     EXPECT_EQ(images.motion.pixel(x, 5)[0], kWidth);
     EXPECT_EQ(images.motion.pixel(x, 5)[1], 0);
@@ -86,7 +87,7 @@ TEST(MotionImages, LeadOutOfTheFrameWhereThePointWasBehindTheCamera) {
 TEST(MotionImages, OfParallelRaysFollowTheScaleOfTheFrame) {
   const LoadedScene scene = wall("orthographic");
   const MotionImages images =
-      motion_images(*scene.scene, moved(scene, Transform::translate({0.5f, 0.25f, -2})), kFrame);
+      motion_images(*scene.scene, moved(scene, Transform::translate({0.5f, 0.25f, -2})), 0, kFrame);
   const float* motion = images.motion.pixel(3, 5);
   EXPECT_NEAR(*images.depth.pixel(3, 5), 5, 1e-4f);
   EXPECT_NEAR(motion[0], 0.5f * kWidth / 2, 1e-4f);
@@ -94,11 +95,37 @@ TEST(MotionImages, OfParallelRaysFollowTheScaleOfTheFrame) {
   EXPECT_NEAR(motion[2], 2, 1e-4f);
 }
 
+/// A square in front of the camera turns about the axis of view, 30 degrees a frame, while it comes nearer.
+TEST(MotionImages, FollowShapesThatMove) {
+  const LoadedScene scene = load_scene_text(fmt::format(R"(<scene version="3.0.0">
+    <sensor type="perspective"><float name="fov" value="50"/><film type="hdrfilm">
+      <integer name="width" value="{}"/><integer name="height" value="{}"/></film></sensor>
+    <shape type="rectangle"><animation name="to_world">
+      <transform time="0"><rotate y="1" angle="180"/><translate z="7"/></transform>
+      <transform time="2"><rotate y="1" angle="180"/><rotate z="1" angle="60"/><translate z="3"/></transform>
+    </animation></shape></scene>)",
+                                                        kWidth, kHeight),
+                                            "turning.xml");
+  scene.scene->move_to(1);
+  const MotionImages images = motion_images(*scene.scene, *scene.camera, 0, kFrame);
+  const double pixel = kWidth / (2 * std::tan(25 * M_PI / 180)), c = std::cos(M_PI / 6), s = std::sin(M_PI / 6);
+  for (const int x : {9, 10, 11}) {
+    const double wx = (kWidth / 2.0 - (x + 0.5)) / pixel * 5, wy = (kHeight / 2.0 - 3.5) / pixel * 5;
+    const double old_x = c * wx + s * wy, old_y = c * wy - s * wx;
+    const float* motion = images.motion.pixel(x, 3);
+    EXPECT_NEAR(motion[0], kWidth / 2.0 - pixel * old_x / 7 - (x + 0.5), 1e-3) << x;
+    EXPECT_NEAR(motion[1], kHeight / 2.0 - pixel * old_y / 7 - 3.5, 1e-3) << x;
+    EXPECT_NEAR(motion[2], std::hypot(wx, wy, 7) - std::hypot(wx, wy, 5), 1e-3) << x;
+  }
+  EXPECT_EQ(*images.depth.pixel(0, 5), 0) << "beside it";
+  EXPECT_NEAR(images.motion.pixel(0, 5)[0], 0, 1e-4f);
+}
+
 TEST(MotionImages, OfAWindowAreThoseOfTheFrame) {
   const LoadedScene scene = wall();
   const Camera previous = moved(scene, Transform::translate({0.3f, 0.2f, -1}));
-  const MotionImages all = motion_images(*scene.scene, previous, kFrame);
-  const MotionImages part = motion_images(*scene.scene, previous, {4, 2, 9, 3});
+  const MotionImages all = motion_images(*scene.scene, previous, 0, kFrame);
+  const MotionImages part = motion_images(*scene.scene, previous, 0, {4, 2, 9, 3});
   for (int c = 0; c < 3; ++c) EXPECT_EQ(part.motion.pixel(2, 1)[c], all.motion.pixel(6, 3)[c]);
   EXPECT_EQ(*part.depth.pixel(2, 1), *all.depth.pixel(6, 3));
 }

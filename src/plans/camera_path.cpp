@@ -100,6 +100,7 @@ void place_camera(LoadedScene& scene, const Transform& to_world) {
   settings.to_world = to_world;
   *scene.camera = Camera(settings, scene.width, scene.height);
   std::string text = scene.files_hash;
+  if (scene.scene->moves()) text += fmt::format(" time {}", scene.scene->time());
   for (const auto& row : to_world.matrix())
     for (const double entry : row) text += fmt::format(" {}", entry);
   scene.content_hash = hash_text(hash_bytes(text));

@@ -20,7 +20,8 @@ class CameraPath {
  public:
   CameraPath(KeyedTransform to_world, double frames_per_second)
       : to_world_(std::move(to_world)), frames_per_second_(frames_per_second) {}
-  Transform at_frame(int frame) const { return to_world_.at(frame / frames_per_second_); }
+  Transform at(double time) const { return to_world_.at(time); }
+  double frames_per_second() const { return frames_per_second_; }
 
  private:
   KeyedTransform to_world_;
@@ -34,8 +35,8 @@ CameraPath parse_camera_path(const std::string& text, const std::string& name);
 CameraPath read_camera_path(const std::string& path);
 
 /// Puts the scene's camera elsewhere, between renders; all else stays as it was built. Films and images of the scene
-/// are then told from those of other places by its content_hash. Throws Error(kInput) for a transformation that the
-/// camera cannot have.
+/// are then told from those of other places, and where shapes move, of other times, by its content_hash. Throws
+/// Error(kInput) for a transformation that the camera cannot have.
 void place_camera(LoadedScene& scene, const Transform& to_world);
 
 }  // namespace covary

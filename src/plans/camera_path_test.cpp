@@ -29,9 +29,9 @@ std::string problem_of(const std::string& text) {
 
 TEST(CameraPath, CountsFramesByTheirRate) {
   const CameraPath path = parse_camera_path(kTwoKeys, "p.json");
-  EXPECT_EQ(path.at_frame(0).matrix()[0][3], 0);
-  EXPECT_DOUBLE_EQ(path.at_frame(1).matrix()[0][3], 2);
-  EXPECT_EQ(path.at_frame(4).matrix()[0][3], 8);
+  EXPECT_EQ(path.at(0).matrix()[0][3], 0);
+  EXPECT_DOUBLE_EQ(path.at(1 / path.frames_per_second()).matrix()[0][3], 2);
+  EXPECT_EQ(path.at(4 / path.frames_per_second()).matrix()[0][3], 8);
 }
 
 TEST(CameraPath, SaysWhatIsWrongAndWhere) {
@@ -77,14 +77,14 @@ TEST(PlacedCamera, RendersAsASceneWithThatCamera) {
   LoadedScene moved = load_scene_text(box_scene(Transform().matrix()), "box.xml", options);
   const Image at_first = picture_of(moved);
   const std::string first_hash = moved.content_hash;
-  const Transform there = path.at_frame(1);
+  const Transform there = path.at(1 / path.frames_per_second());
   place_camera(moved, there);
   EXPECT_NE(moved.content_hash, first_hash);
   const LoadedScene alone = load_scene_text(box_scene(there.matrix()), "box.xml", options);
   const Image picture = picture_of(moved);
   EXPECT_EQ(picture.data, picture_of(alone).data);
   EXPECT_NE(picture.data, at_first.data);
-  place_camera(moved, path.at_frame(0));
+  place_camera(moved, path.at(0));
   EXPECT_EQ(picture_of(moved).data, at_first.data);
 }
 

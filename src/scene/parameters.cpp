@@ -67,6 +67,7 @@ std::string type_name(const Value& value) {
     std::string operator()(const ColourValue&) const { return "an rgb colour"; }
     std::string operator()(const SampledSpectrum&) const { return "a spectrum"; }
     std::string operator()(const Transform&) const { return "a transform"; }
+    std::string operator()(const KeyedTransformPtr&) const { return "an animation"; }
     std::string operator()(const ObjectPtr& object) const {
       if (!object) return "a reference to nothing";
       return (object->kind == "emitter" || object->kind == "integrator" ? "an " : "a ") + object->kind;
@@ -210,6 +211,12 @@ Transform Parameters::get_transform(const std::string& name) {
   if (const Transform* value = std::get_if<Transform>(&property->value)) return *value;
   error_at(name, "must be a transform, not " + type_name(property->value));
   return {};
+}
+
+KeyedTransformPtr Parameters::find_animation(const std::string& name) {
+  const Property* property = find(name);
+  const KeyedTransformPtr* value = property ? std::get_if<KeyedTransformPtr>(&property->value) : nullptr;
+  return value ? *value : nullptr;
 }
 
 Spectrum Parameters::get_spectrum(const std::string& name, const Spectrum& fallback, SpectrumRole role) {

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/keyed_transform.h"
 #include "core/spectrum.h"
 #include "core/transform.h"
 #include "scene/object.h"
@@ -65,8 +66,8 @@ using ObjectPtr = std::shared_ptr<const ObjectDescription>;
 
 /// A null ObjectPtr stands for a value that could not be read; the reason is in the diagnostics, and getters then
 /// behave as if the parameter were absent.
-using Value =
-    std::variant<bool, int64_t, double, std::string, Vec3, ColourValue, SampledSpectrum, Transform, ObjectPtr>;
+using Value = std::variant<bool, int64_t, double, std::string, Vec3, ColourValue, SampledSpectrum, Transform,
+                           KeyedTransformPtr, ObjectPtr>;
 
 struct Property {
   std::string name;  ///< "" or "_arg_N" for nested objects without a name
@@ -107,6 +108,8 @@ class Parameters {
   std::string require_string(const std::string& name);
   Vec3 get_vec3(const std::string& name, const Vec3& fallback);
   Transform get_transform(const std::string& name);  ///< identity when absent
+  /// An <animation>; null when absent, and where it is a <transform>, which get_transform() then gives.
+  KeyedTransformPtr find_animation(const std::string& name);
   /// A colour that may not be textured: number, rgb or spectrum.
   Spectrum get_spectrum(const std::string& name, const Spectrum& fallback, SpectrumRole role);
   /// A texture; numbers and colours become ConstantTexture.

@@ -57,24 +57,20 @@ void analytic_occluded(const RTCOccludedFunctionNArguments* args) {
       RTCRayN_tfar(args->ray, args->N, i) = -kInfinity;
 }
 
-RTCGeometry mesh_geometry(RTCDevice device, const TriangleMesh& mesh) {
-  const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+void set_mesh(RTCGeometry geometry, const TriangleMesh& mesh) {
   // Embree reads 16 bytes of each vertex; the record is longer than that, so the last one is safe too.
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, mesh.vertices().data(), 0,
                              sizeof(TriangleMesh::Vertex), mesh.vertices().size());
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.triangles().data(), 0,
                              sizeof(mesh.triangles()[0]), mesh.triangles().size());
-  return geometry;
 }
 
-RTCGeometry analytic_geometry(RTCDevice device, const AnalyticShape& shape) {
-  const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
+void set_analytic(RTCGeometry geometry, const AnalyticShape& shape) {
   rtcSetGeometryUserPrimitiveCount(geometry, 1);
   rtcSetGeometryUserData(geometry, const_cast<AnalyticShape*>(&shape));
   rtcSetGeometryBoundsFunction(geometry, analytic_bounds, nullptr);
   rtcSetGeometryIntersectFunction(geometry, analytic_intersect);
   rtcSetGeometryOccludedFunction(geometry, analytic_occluded);
-  return geometry;
 }
 
 /// Curves are seen from outside alone, as in Mitsuba; Embree has that as an option of its own compilation.
@@ -88,23 +84,40 @@ void pass_from_inside(const RTCFilterFunctionNArguments* args) {
   }
 }
 
-RTCGeometry curve_geometry(RTCDevice device, const CurveShape& curve) {
-  const bool linear = curve.kind() == CurveKind::kLinear;
-  const RTCGeometry geometry =
-      rtcNewGeometry(device, linear ? RTC_GEOMETRY_TYPE_ROUND_LINEAR_CURVE : RTC_GEOMETRY_TYPE_ROUND_BSPLINE_CURVE);
+void set_curve(RTCGeometry geometry, const CurveShape& curve) {
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, curve.points().data(), 0,
                              sizeof(CurvePoint), curve.points().size());
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT, curve.segments().data(), 0,
                              sizeof(uint32_t), curve.segments().size());
   rtcSetGeometryIntersectFilterFunction(geometry, pass_from_inside);
   rtcSetGeometryOccludedFilterFunction(geometry, pass_from_inside);
-  return geometry;
 }
 
-RTCGeometry geometry_of(RTCDevice device, const Shape& shape) {
-  if (const auto* mesh = dynamic_cast<const TriangleMesh*>(&shape)) return mesh_geometry(device, *mesh);
-  if (const auto* curve = dynamic_cast<const CurveShape*>(&shape)) return curve_geometry(device, *curve);
-  return analytic_geometry(device, dynamic_cast<const AnalyticShape&>(shape));
+RTCGeometryType type_of(const Shape& shape) {
+  if (dynamic_cast<const TriangleMesh*>(&shape)) return RTC_GEOMETRY_TYPE_TRIANGLE;
+  const auto* curve = dynamic_cast<const CurveShape*>(&shape);
+  if (!curve) return RTC_GEOMETRY_TYPE_USER;
+  return curve->kind() == CurveKind::kLinear ? RTC_GEOMETRY_TYPE_ROUND_LINEAR_CURVE
+                                             : RTC_GEOMETRY_TYPE_ROUND_BSPLINE_CURVE;
+}
+
+/// Makes the geometry, of the shape's type, that of the shape.
+void set_shape(RTCGeometry geometry, const Shape& shape) {
+  if (const auto* mesh = dynamic_cast<const TriangleMesh*>(&shape))
+    set_mesh(geometry, *mesh);
+  else if (const auto* curve = dynamic_cast<const CurveShape*>(&shape))
+    set_curve(geometry, *curve);
+  else
+    set_analytic(geometry, dynamic_cast<const AnalyticShape&>(shape));
+  rtcCommitGeometry(geometry);
+}
+
+void set_placement(RTCGeometry geometry, const Transform& to_world) {
+  float columns[12];
+  for (int c = 0; c < 4; ++c)
+    for (int r = 0; r < 3; ++r) columns[c * 3 + r] = static_cast<float>(to_world.matrix()[r][c]);
+  rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns);
+  rtcCommitGeometry(geometry);
 }
 
 /// Rays are handed to Embree in packets: camera rays gain most, scattered ones a little, single ones lose little.
@@ -176,13 +189,15 @@ void release(RTCDevice device, RTCScene top, const auto& groups) {
 
 }  // namespace
 
-RayTracer::Group RayTracer::make_group(std::span<const ShapePtr> shapes) const {
+RayTracer::Group RayTracer::make_group(std::span<const ShapePtr> shapes, bool moves) const {
   Group group;
   group.scene = rtcNewScene(device_);
-  rtcSetSceneBuildQuality(group.scene, RTC_BUILD_QUALITY_MEDIUM);
+  // By Embree's manual, "low" is the quality that gives each geometry a hierarchy of its own (of medium quality).
+  rtcSetSceneBuildQuality(group.scene, moves ? RTC_BUILD_QUALITY_LOW : RTC_BUILD_QUALITY_MEDIUM);
+  if (moves) rtcSetSceneFlags(group.scene, RTC_SCENE_FLAG_DYNAMIC);
   for (const ShapePtr& shape : shapes) {
-    const RTCGeometry geometry = geometry_of(device_, *shape);
-    rtcCommitGeometry(geometry);
+    const RTCGeometry geometry = rtcNewGeometry(device_, type_of(*shape));
+    set_shape(geometry, *shape);
     rtcAttachGeometryByID(group.scene, geometry, static_cast<unsigned>(group.shapes.size()));
     rtcReleaseGeometry(geometry);
     group.shapes.push_back(shape.get());
@@ -191,7 +206,7 @@ RayTracer::Group RayTracer::make_group(std::span<const ShapePtr> shapes) const {
   return group;
 }
 
-RayTracer::RayTracer(std::span<const ShapePtr> shapes, std::span<const Instance> instances)
+RayTracer::RayTracer(std::span<const ShapePtr> shapes, std::span<const Instance> instances, bool moves)
     : device_(rtcNewDevice(nullptr)) {
   if (!device_)
     throw Error(ErrorCode::kIo,
@@ -200,7 +215,7 @@ RayTracer::RayTracer(std::span<const ShapePtr> shapes, std::span<const Instance>
                     : "Embree cannot make a device: too little memory, too few threads allowed, or another processor");
   rtcSetDeviceErrorFunction(device_, on_embree_error, nullptr);
   try {
-    top_ = make_group(shapes);
+    top_ = make_group(shapes, moves);
 
     std::map<const ShapeGroup*, size_t> index;
     for (const Instance& instance : instances)
@@ -212,11 +227,7 @@ RayTracer::RayTracer(std::span<const ShapePtr> shapes, std::span<const Instance>
       const Group& group = groups_[index.at(instance.group.get())];
       const RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_INSTANCE);
       rtcSetGeometryInstancedScene(geometry, group.scene);
-      float columns[12];
-      for (int c = 0; c < 4; ++c)
-        for (int r = 0; r < 3; ++r) columns[c * 3 + r] = static_cast<float>(instance.to_world.matrix()[r][c]);
-      rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns);
-      rtcCommitGeometry(geometry);
+      set_placement(geometry, instance.to_world);
       rtcAttachGeometryByID(top_.scene, geometry, static_cast<unsigned>(top_.shapes.size() + placed_.size()));
       rtcReleaseGeometry(geometry);
       placed_.push_back({&group, instance.to_world});
@@ -229,6 +240,19 @@ RayTracer::RayTracer(std::span<const ShapePtr> shapes, std::span<const Instance>
 }
 
 RayTracer::~RayTracer() { release(device_, top_.scene, groups_); }
+
+void RayTracer::move_shape(size_t index, const Shape& shape) {
+  set_shape(rtcGetGeometry(top_.scene, static_cast<unsigned>(index)), shape);
+  top_.shapes[index] = &shape;
+  top_.meshes[index] = dynamic_cast<const TriangleMesh*>(&shape);
+}
+
+void RayTracer::move_instance(size_t index, const Transform& to_world) {
+  set_placement(rtcGetGeometry(top_.scene, static_cast<unsigned>(top_.shapes.size() + index)), to_world);
+  placed_[index].to_world = to_world;
+}
+
+void RayTracer::commit() { rtcCommitScene(top_.scene); }
 
 void RayTracer::nearest(std::span<const Ray> rays, std::span<RayHit> hits, bool coherent) const {
   Query query(coherent);

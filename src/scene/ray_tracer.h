@@ -16,10 +16,18 @@ namespace covary {
 
 class RayTracer {
  public:
-  RayTracer(std::span<const ShapePtr> shapes, std::span<const Instance> instances);
+  /// `moves`: some of them will be moved. Their hierarchy then has two levels, so that only what moved and the upper
+  /// level are built again.
+  RayTracer(std::span<const ShapePtr> shapes, std::span<const Instance> instances, bool moves);
   ~RayTracer();
   RayTracer(const RayTracer&) = delete;
   RayTracer& operator=(const RayTracer&) = delete;
+
+  /// Puts another shape in place of the one of that index: one of the same class, with as many primitives.
+  void move_shape(size_t index, const Shape& shape);
+  void move_instance(size_t index, const Transform& to_world);
+  /// After moving, before the next ray.
+  void commit();
 
   void nearest(std::span<const Ray> rays, std::span<RayHit> hits, bool coherent) const;
   void resolve(const Ray& ray, const RayHit& found, SurfaceHit& hit) const;
@@ -35,7 +43,7 @@ class RayTracer {
   const TriangleMesh* mesh_of(const RayHit& hit) const {
     return hit.found() && hit.instance == RayHit::kNone ? top_.meshes[hit.geometry] : nullptr;
   }
-  Group make_group(std::span<const ShapePtr> shapes) const;
+  Group make_group(std::span<const ShapePtr> shapes, bool moves = false) const;
 
   RTCDeviceTy* device_ = nullptr;
   Group top_;  // shapes, then instances

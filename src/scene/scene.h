@@ -3,11 +3,13 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "core/keyed_transform.h"
 #include "core/transform.h"
 #include "scene/camera.h"
 #include "scene/emitter.h"
@@ -26,10 +28,20 @@ struct Instance {
   Transform to_world;
 };
 
-/// What a loader hands over.
+/// A shape or an instance that moves.
+struct Movement {
+  KeyedTransformPtr to_world;  ///< from its own space into the scene
+  size_t index = 0;            ///< in SceneParts::shapes; of an instance, in SceneParts::instances
+  /// The shape where a transformation takes it, with its BSDF, media and light; empty: an instance moves. May throw
+  /// Error(kInput).
+  std::function<ShapePtr(const Transform&)> shape_at;
+};
+
+/// What a loader hands over. What moves stands where it is at the time 0.
 struct SceneParts {
   std::vector<ShapePtr> shapes;  ///< each with a BSDF and perhaps an area light set
   std::vector<Instance> instances;
+  std::vector<Movement> movements;
   std::vector<std::shared_ptr<const Emitter>> emitters;  ///< in file order, area lights of `shapes` included
   std::shared_ptr<const Camera> camera;
   MediumPtr camera_medium;   ///< in which the camera stands; null: none
@@ -78,6 +90,21 @@ class Scene {
   /// The same for many rays; 1 where blocked.
   void occluded(std::span<const Ray> rays, std::span<uint8_t> blocked) const;
 
+  /// Whether anything but the camera moves.
+  bool moves() const { return !parts_.movements.empty(); }
+  /// 0 until move_to().
+  double time() const { return time_; }
+  /// Places what moves where it is at that time; what rests is not built again. Not while the scene is in use. Throws
+  /// Error(kInput) where a shape cannot have its transformation, such as a sphere a scale by axes.
+  void move_to(double time);
+  /// What moved since another time: for each movement, the map from where its points are now to where they were then.
+  std::vector<Transform> displacements(double then) const;
+  /// The index in displacements() of the surface that was hit, or -1 where it rests.
+  int movement_of(const RayHit& found) const {
+    if (movements_.empty()) return -1;
+    return movements_[found.instance == RayHit::kNone ? found.geometry : found.instance];
+  }
+
   const Camera& camera() const { return *parts_.camera; }
   std::span<const std::shared_ptr<const Emitter>> emitters() const { return parts_.emitters; }
   /// The light at infinity that rays leaving the scene meet, or null.
@@ -94,8 +121,13 @@ class Scene {
   double build_seconds() const { return build_seconds_; }
 
  private:
+  void measure();       // bounds, sampling of lights
+  void place_lights();  // into the bounds
+
   SceneParts parts_;
   std::unique_ptr<RayTracer> tracer_;
+  double time_ = 0;
+  std::vector<int> movements_;  // of shapes, then of instances: an index into parts_.movements, or -1
   const Emitter* environment_ = nullptr;
   Bounds3 bounds_;
   float offset_unit_ = 1;  // largest coordinate of the scene, at most 1

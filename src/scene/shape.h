@@ -82,9 +82,14 @@ class Shape : public SceneObject {
   /// A copy moved by `to_world`, without BSDF and emitter. Throws Error(kInput) when the shape cannot be moved so.
   virtual std::shared_ptr<Shape> transformed(const Transform& to_world) const = 0;
 
-  const BsdfPtr& shared_bsdf() const { return bsdf_; }
+  /// Takes over the BSDF and the media of another shape.
+  void share_surface(const Shape& other) {
+    set_bsdf(other.bsdf_);
+    set_media(other.interior_, other.exterior_);
+  }
   const Bsdf* bsdf() const { return bsdf_.get(); }
   const Emitter* emitter() const { return emitter_.get(); }
+  const std::shared_ptr<const Emitter>& shared_emitter() const { return emitter_; }
   void set_bsdf(BsdfPtr bsdf) {
     bsdf_ = std::move(bsdf);
     needs_derivatives_ = bsdf_ && bsdf_->needs_derivatives();

@@ -15,6 +15,7 @@ enum class FrameSeeds { kOwn, kSame };
 struct SequenceSettings {
   std::string camera_path;  ///< JSON file (plans/camera_path.h); empty: the camera rests
   std::optional<FrameRange> frames;
+  double frames_per_second = 0;  ///< frame n is at the time n / this; 0: as the camera path says, or 1
   FrameSeeds seeds = FrameSeeds::kOwn;
   bool history = false;  ///< frames before are mixed in
 

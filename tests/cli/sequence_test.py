@@ -31,9 +31,11 @@ class SequenceTest(CliTest):
         self.write(name, text.encode())
 
     def render(self, *arguments, frames="1-4"):
-        along = ("--camera-path", "path.json", "--frames", frames)
+        return self.render_small("room.xml", "--camera-path", "path.json", "--frames", frames, *arguments)
+
+    def render_small(self, scene, *arguments):
         small = [word for option in SMALL.items() if option[0] not in arguments for word in option]
-        return self.run_covary("render", "room.xml", *QUIET, *small, *along, *arguments)
+        return self.run_covary("render", scene, *QUIET, *small, *arguments)
 
     def write_path(self, *keys):
         frames = [{"time": time, "to_world": matrix} for time, matrix in keys]
@@ -201,6 +203,80 @@ class Frames(SequenceTest):
         self.write_path((0, scaled))
         self.assertIn("the to_world transformation of a sensor must not scale", self.render("-o", "f_#.exr").stderr)
         self.assertEqual(list(self.path.glob("f_*")), [])
+
+
+ANIMATED = """<shape type="cube"><animation name="to_world">
+<transform time="0.5"><scale value="0.3"/><translate x="-0.5" y="0.3" z="0.8"/></transform>
+<transform time="2"><scale value="0.3"/><rotate y="1" angle="50"/><translate x="0.4" y="0.3" z="0.8"/></transform>
+</animation></shape>"""
+RESTING = re.sub(r'<animation name="to_world">.*time="2">(.*)</animation>',
+                 r'<transform name="to_world">\1', ANIMATED, flags=re.DOTALL)
+
+
+class Animation(SequenceTest):
+    """Shapes and a camera that move by the scene's <animation>."""
+
+    def setUp(self):
+        super().setUp()
+        self.write_text("moving.xml", ROOM.replace("</scene>", ANIMATED + "</scene>"))
+
+    def frames(self, *arguments, good=True):
+        result = self.render_small("moving.xml", *arguments)
+        self.assertEqual(result.returncode == 0, good, result.stderr)
+        return result
+
+    def test_frames_are_images_of_scenes_at_rest(self):
+        self.write_text("resting.xml", ROOM.replace("</scene>", RESTING + "</scene>"))
+        self.frames("--frames", "1-4", "--fps", "2", "-o", "f_#.exr")
+        self.good("render", "resting.xml", *QUIET, *SMALL_WORDS, "--seed", "4000000", "-o", "alone.exr")
+        self.assertEqual(self.picture("f_4.exr"), self.picture("alone.exr"), "frame 4 is at the time 2")
+        self.assertNotEqual(self.picture("f_3.exr"), self.picture("f_4.exr"))
+        self.frames("--frames", "4", "--fps", "2", "-o", "g_#.exr")
+        self.assertEqual(self.channels("f_4.exr"), self.channels("g_4.exr"))
+        printed = self.frames("--frames", "4", "--fps", "2", "--spp", "1", "--replay", "15,15,0").stdout
+        self.frames("--frames", "4", "--fps", "2", "--spp", "1", "-o", "one_#.exr")
+        values = [float(v) for v in re.search(r"radiance \((.*)\)", printed)[1].split(", ")]
+        for value, channel in zip(values, "RGB"):
+            self.assertAlmostEqual(value, self.channels("one_4.exr")[channel][15 * 32 + 15], 6)
+        for fps in (("--fps", "3"), ()):
+            self.assertIn("'f_4.exr' is no frame of this command",
+                          self.frames("--frames", "4", *fps, "-o", "f_#.exr", "--resume", good=False).stderr)
+        self.frames("--frames", "1-4", "--fps", "2", "-o", "f_#.exr", "--resume")
+
+    def test_motion_leads_to_the_same_point_of_a_shape(self):
+        """Warping: where Motion leads to in the frame before, the box was as far away as Motion says."""
+        size = ("--resolution", "128x96", "--spp", "1")
+        self.frames("--frames", "1-2", "--fps", "2", *size, "--aovs", "-o", "f_#.exr")
+        before, after = self.channels("f_1.exr"), self.channels("f_2.exr")
+        moved = right = 0
+        for y in range(96):
+            for x in range(128):
+                at = y * 128 + x
+                motion = [after[f"Motion.{c}"][at] for c in "XYZ"]
+                old_x, old_y = int(x + 0.5 + motion[0]), int(y + 0.5 + motion[1])
+                if abs(motion[0]) < 0.5 or not (0 <= old_x < 128 and 0 <= old_y < 96):
+                    continue
+                moved += 1
+                depth = before["Depth"][old_y * 128 + old_x]
+                right += abs(depth / (after["Depth"][at] + motion[2]) - 1) < 0.03
+        self.assertGreater(moved, 300, "the box")
+        self.assertLess(moved, 0.3 * 128 * 96, "not what rests")
+        self.assertGreater(right, 0.9 * moved)
+
+    def test_the_camera_of_the_scene_moves(self):
+        keys = "".join(f'<transform time="{time}"><matrix value="{" ".join(str(v) for row in matrix for v in row)}"/>'
+                       "</transform>" for time, matrix in ((1, START), (4, END)))
+        sensor = re.compile(r'<transform name="to_world">\s*<lookat[^>]*/>\s*</transform>')
+        self.write_text("moving.xml", sensor.sub(f'<animation name="to_world">{keys}</animation>', ROOM, count=1))
+        self.frames("--frames", "2-3", "-o", "f_#.exr")
+        self.good_render("-o", "path_#.exr", frames="2-3")
+        self.assertEqual(self.channels("f_3.exr"), self.channels("path_3.exr"))
+
+    def test_an_open_shutter_is_an_error(self):
+        text = (self.path / "moving.xml").read_text()
+        self.write_text("moving.xml", text.replace('<sensor type="perspective">', '<sensor type="perspective">'
+                                                   '<float name="shutter_close" value="1"/>'))
+        self.assertIn("motion is not blurred", self.frames("--frames", "1-2", "-o", "f_#.exr", good=False).stderr)
 
 
 class Denoise(SequenceTest):
