@@ -3,8 +3,8 @@
 moves along, a turning mirror, a lamp that is dimmed, and one in which nothing moves.
 
 NAME_0001.xml, NAME_0002.xml, … are scenes in which nothing moves, one for each frame; the references are renders of
-these, so that a fault of what interpolates motion shows as an error. A renderer of sequences takes them, too, but for
-`camera` and `still`, which have one scene NAME.xml, with a camera path camera.json beside it."""
+these, so that a fault of what interpolates motion shows as an error. A renderer of sequences takes one scene NAME.xml,
+with <animation>s of box and mirror and a camera path camera.json beside it; but those of each frame for `lamp`."""
 import copy
 import json
 import math
@@ -79,11 +79,27 @@ def text_of(matrix):
     return ", ".join(f"{value:.9g}" for value in matrix.ravel())
 
 
-def add_shape(root, kind, bsdf, matrix):
+#: shapes that move: what they are, and their matrices to the world
+MOVING = {"box": ("cube", "wood", box), "mirror": ("rectangle", "silver", mirror)}
+
+
+def add_shape(root, name):
+    """Adds what moves in the sequence; the shape, which has yet to be placed."""
+    kind, bsdf, _ = MOVING[name]
     shape = ElementTree.SubElement(root, "shape", type=kind)
-    transform = ElementTree.SubElement(shape, "transform", name="to_world")
-    ElementTree.SubElement(transform, "matrix", value=text_of(matrix))
     ElementTree.SubElement(shape, "ref", id=bsdf)
+    return shape
+
+
+def place(parent, matrix, **attributes):
+    transform = ElementTree.SubElement(parent, "transform", attributes)
+    ElementTree.SubElement(transform, "matrix", value=text_of(matrix))
+
+
+def animate(shape, move, frames):
+    animation = ElementTree.SubElement(shape, "animation", name="to_world")
+    for frame in range(1, frames + 1):
+        place(animation, move(frame, frames), time=str(frame))
 
 
 def set_camera(root, matrix):
@@ -103,10 +119,8 @@ def scene_of(room, name, frame, frames):
     """The room at this frame."""
     root = copy.deepcopy(room)
     set_camera(root, camera(name, frame, frames))
-    if name == "box":
-        add_shape(root, "cube", "wood", box(frame, frames))
-    if name == "mirror":
-        add_shape(root, "rectangle", "silver", mirror(frame, frames))
+    if name in MOVING:
+        place(add_shape(root, name), MOVING[name][2](frame, frames), name="to_world")
     if name == "lamp":
         dim_lamp(root, dimming(frame, frames))
     return root
@@ -127,10 +141,13 @@ def write_sequence(name, frames, folder):
     room = ElementTree.parse(ROOM).getroot()
     for frame in range(1, frames + 1):
         ElementTree.ElementTree(scene_of(room, name, frame, frames)).write(folder / still_name(name, frame))
-    if name not in ("camera", "still"):
-        return f"{name}_####.xml", []
-    ElementTree.ElementTree(scene_of(room, name, 1, frames)).write(folder / f"{name}.xml")
-    if name == "still":
-        return "still.xml", []
+    if name == "lamp":
+        return "lamp_####.xml", []
+    root = scene_of(room, "still" if name in MOVING else name, 1, frames)
+    if name in MOVING:
+        animate(add_shape(root, name), MOVING[name][2], frames)
+    ElementTree.ElementTree(root).write(folder / f"{name}.xml")
+    if name != "camera":
+        return f"{name}.xml", []
     (folder / "camera.json").write_text(json.dumps(camera_path(frames), indent=1) + "\n")
     return "camera.xml", ["--camera-path", folder / "camera.json"]
