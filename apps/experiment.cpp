@@ -147,12 +147,13 @@ void show_progress(const lab::Progress& p, ProgressLine& line) {
 // ---- the command
 // -----------------------------------------------------------------------------------------------------
 
-/// Options of a method as `covary render` reads them.
-RenderOptions parsed(std::vector<std::string> words) {
+/// Options of a method as `covary render` reads them, of frames or not.
+RenderOptions parsed(std::vector<std::string> words, bool of_frames) {
   CLI::App command;
   RenderOptions options;
   add_render_options(command, options);
-  words.insert(words.end(), {"scene.xml", "-o", "out.exr"});
+  words.insert(words.end(), {"scene.xml", "-o", "out_#.exr"});
+  if (of_frames) words.insert(words.end(), {"--frames", "1"});
   std::reverse(words.begin(), words.end());
   command.parse(words);
   return options;
@@ -160,7 +161,7 @@ RenderOptions parsed(std::vector<std::string> words) {
 
 lab::PlanContext plan_context() {
   return {program_version(), [](const std::vector<std::string>& words) {
-            const RenderOptions options = parsed(words);
+            const RenderOptions options = parsed(words, true);
             return pass_words(options.values, options.of_integrator, options.of_estimator);
           }};
 }
@@ -180,8 +181,11 @@ void check_files(const ExperimentCommand& command, const lab::Suite& suite, cons
   Outputs outputs;
   outputs.reads(command.suite);
   for (const lab::SceneEntry& scene : suite.scenes) {
-    outputs.reads((fs::path(scenes) / scene.file).string());
-    for (const std::string& file : suite.reference_of(scene).files) outputs.reads((fs::path(scenes) / file).string());
+    const lab::SceneInstance located = lab::located(scene, scenes);
+    outputs.reads(located.scene_files());
+    if (!located.camera_path.empty()) outputs.reads(located.camera_path);
+    for (const std::string& file : suite.reference_of(scene).files)
+      outputs.reads(lab::files_of(located.frames, (fs::path(scenes) / file).string()));
   }
   outputs.writes("-o", command.output + kResults, OutputKind::kText);
   outputs.writes("-o", command.output + kTable, OutputKind::kText);
@@ -199,12 +203,14 @@ void check_files(const ExperimentCommand& command, const lab::Suite& suite, cons
 /// mistakes of the suite are left to run_experiment().
 void check_methods(const lab::Suite& suite) {
   if (!lab::validate(suite).empty()) return;
+  const bool of_frames = std::any_of(suite.scenes.begin(), suite.scenes.end(),
+                                     [](const lab::SceneEntry& scene) { return !scene.frames.empty(); });
   std::vector<std::string> problems;
   for (const lab::MethodEntry& method : suite.methods) {
     std::vector<std::string> words = suite.common_options;
     words.insert(words.end(), method.options.begin(), method.options.end());
     try {
-      RenderOptions options = parsed(words);
+      RenderOptions options = parsed(words, of_frames);
       check_options(options);
     } catch (const std::runtime_error& error) {
       problems.push_back(fmt::format("method '{}': {}", method.name, error.what()));

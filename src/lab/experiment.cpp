@@ -19,6 +19,7 @@
 #include "lab/measure.h"
 #include "lab/process.h"
 #include "lab/runner.h"
+#include "lab/scene_images.h"
 #include "metrics/provenance.h"
 
 namespace covary::lab {
@@ -107,29 +108,31 @@ class Experiment {
 
   /// Size and hash of a scene, from the program itself: a scene that crashes the reader must not end the experiment.
   void look_at(size_t index) {
-    SceneInstance scene{results_.suite.scenes[index]};
-    scene.file = (fs::path(options_.scenes_folder) / scene.entry.file).string();
-    std::vector<std::string> command{options_.program, "info", scene.file, "--json"};
-    for (const std::string& define : scene.entry.defines) command.insert(command.end(), {"-D", define});
+    SceneInstance scene = located(results_.suite.scenes[index], options_.scenes_folder);
     report(Progress::Kind::kStarted, scene.entry.name + ", reading");
+    std::optional<Failure> failure;
+    for (const std::string& file : scene.scene_files())
+      if (!failure) failure = look_at_file(file, scene);
+    usable_.push_back(!failure);
+    results_.scenes.push_back({scene, {}});
+    if (failure && !stopped()) fail(std::move(*failure));
+  }
+
+  std::optional<Failure> look_at_file(const std::string& file, SceneInstance& scene) const {
+    std::vector<std::string> command{options_.program, "info", file, "--json"};
+    for (const std::string& define : scene.entry.defines) command.insert(command.end(), {"-D", define});
     const ProcessResult process = run_process(command, options_.stop);
     std::string message = process.errors;
     if (process.ok()) try {
         const nlohmann::json info = nlohmann::json::parse(process.output);
-        scene.hash = info.at("scene_hash");
+        scene.hash += info.at("scene_hash");
         place(scene, info.at("frame").at(0), info.at("frame").at(1), options_.max_pixels);
-        usable_.push_back(true);
-        results_.scenes.push_back({scene, {}});
-        return;
+        return std::nullopt;
       } catch (const std::exception& error) {
         message = error.what();
       }
-    usable_.push_back(false);
-    results_.scenes.push_back({scene, {}});
-    if (!stopped()) {
-      command[0] = "covary";
-      fail({scene.entry.name, "", "", shell_text(command), message, process.exit_code, 0});
-    }
+    command[0] = "covary";
+    return Failure{scene.entry.name, "", "", shell_text(command), message, process.exit_code, 0};
   }
 
   void plan() {
@@ -282,7 +285,7 @@ class Experiment {
     std::string text = options_.context.program_version;
     for (const Run& run : references_[s]) text += "\n" + run.key;
     if (references_[s].empty())
-      for (const std::string& file : scene.reference.files)
+      for (const std::string& file : scene.reference_files())
         text += fmt::format("\n{} {} {}", fs::absolute(file).string(), fs::file_size(file),
                             fs::last_write_time(file).time_since_epoch().count());
     return text;
@@ -292,7 +295,9 @@ class Experiment {
   void warn_of_given_references(size_t s) {
     const SceneResult& scene = results_.scenes[s];
     std::vector<ImageFacts> references;
-    for (const std::string& file : scene.reference.files) references.push_back(read_facts(file));
+    const std::vector<int>& frames = scene.scene.frames;
+    for (const std::string& file : scene.reference.files)
+      references.push_back(read_facts(files_of(frames, file).front()));
     std::vector<std::string> found;
     const auto add = [&](const ImageFacts& image, const ImageFacts& reference) {
       for (const std::string& text : comparison_warnings(image, reference))
@@ -303,7 +308,9 @@ class Experiment {
     for (const Run& run : runs_[s])
       if (const auto record = records_.find(run.key); record != records_.end() && seen.insert(run.method).second)
         for (const ImageFacts& reference : references)
-          add(read_facts(record->second.image, "renders of " + results_.suite.methods[run.method].name), reference);
+          add(read_facts(files_of(frames, record->second.image).front(),
+                         "renders of " + results_.suite.methods[run.method].name),
+              reference);
     results_.warnings.insert(results_.warnings.end(), found.begin(), found.end());
   }
 
@@ -315,7 +322,7 @@ class Experiment {
                               scene.reference.files[0]));
     std::set<std::string> used;
     for (uint64_t seed : results_.suite.seeds) used.insert(fmt::format("{}", seed));
-    for (const std::string& file : scene.reference.files) {
+    for (const std::string& file : scene.reference_files()) {
       const auto attributes = inspect_image(file).attributes;
       const auto seeds = attributes.find("covary:seed");
       if (seeds == attributes.end()) continue;

@@ -13,7 +13,7 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "film/image_file.h"
-#include "metrics/alignment.h"
+#include "lab/scene_images.h"
 #include "metrics/metrics.h"
 
 namespace covary::lab {
@@ -26,7 +26,7 @@ struct ImageErrors {
 
 /// The standard errors in the file; empty where it has none, or where another layer is looked at.
 Image standard_errors(const std::string& path, const SceneInstance& scene) {
-  const ImageInfo info = inspect_image(path);
+  const ImageInfo info = inspect_image(files_of(scene.frames, path).front());
   const bool has_errors = std::any_of(info.channels.begin(), info.channels.end(),
                                       [](const ExrFile::Channel& c) { return c.name == "StdError.R"; });
   return has_errors && scene.entry.layer.empty() ? read_window(path, scene, "StdError") : Image();
@@ -80,7 +80,7 @@ ImageErrors image_errors(const Image& image, const std::string& path, const Scen
             number_or_none(*kept, "predicted_relmse"),
             number_or_none(*kept, "coverage")};
   const Image std_error = standard_errors(path, scene);
-  const auto error = [&](Metric metric) { return compute_metric(metric, image, references).value; };
+  const auto error = [&](Metric metric) { return mean_metric(metric, image, references, scene); };
   const ImageErrors errors{error(Metric::kRelMseTrimmed),
                            error(Metric::kMae),
                            error(Metric::kFlip),
@@ -115,6 +115,7 @@ std::vector<double> values_of(const Cell& cell, Value&& value) {
 }
 
 double relmse(const RunResult& run) { return run.relmse; }
+double temporal(const RunResult& run) { return run.temporal; }
 double seconds(const RunResult& run) { return run.record.method_seconds(); }
 double mean(const std::vector<double>& values) { return mean_estimate(values).value; }
 
@@ -257,19 +258,6 @@ void warn_of_left_out(Results& results, const std::vector<size_t>& common, size_
 
 }  // namespace
 
-Image read_window(const std::string& path, const SceneInstance& scene, const std::string& layer) {
-  const PlacedImage source = read_image(path, layer.empty() ? scene.entry.layer : layer);
-  const CropWindow &have = source.place.window, &want = scene.window;
-  if (source.place.frame_width != scene.frame_width || source.place.frame_height != scene.frame_height)
-    throw Error(ErrorCode::kInput, fmt::format("{} has a frame of {} x {} pixels, the scene one of {} x {}", path,
-                                               source.place.frame_width, source.place.frame_height, scene.frame_width,
-                                               scene.frame_height));
-  if (want.x < have.x || want.y < have.y || want.x + want.width > have.x + have.width ||
-      want.y + want.height > have.y + have.height)
-    throw Error(ErrorCode::kInput, fmt::format("{} ({}) does not cover {}", path, text_of(have), text_of(want)));
-  return cut(source, want);
-}
-
 void measure(Cell& cell, const SceneInstance& scene, const std::vector<Image>& references, bool unbiased,
              const Budget& budget, const Cache& cache, const std::vector<std::string>& run_keys,
              const std::string& reference_key) {
@@ -283,6 +271,9 @@ void measure(Cell& cell, const SceneInstance& scene, const std::vector<Image>& r
     run.relmse_trimmed = errors.relmse_trimmed, run.mae = errors.mae, run.flip = errors.flip,
     run.above5 = errors.above5;
     run.predicted_relmse = errors.predicted_relmse, run.coverage = errors.coverage;
+    run.frames = frame_errors(images[s], references, scene);
+    const SequenceSummary of_frames = summary_of(run.frames);
+    run.temporal = of_frames.temporal, run.temporal_flip = of_frames.temporal_flip;
   });
   cell.split = split_error(images, references);
   for (size_t s = 0; s < n; ++s) {
@@ -296,8 +287,8 @@ void measure(Cell& cell, const SceneInstance& scene, const std::vector<Image>& r
   cell.above5 = mean_estimate(values_of(cell, [](const RunResult& r) { return r.above5; }));
   if (n > 1) {
     const Image average = mean_of(images);
-    cell.mae_of_mean = compute_metric(Metric::kMae, average, references).value;
-    cell.flip_of_mean = compute_metric(Metric::kFlip, average, references).value;
+    cell.mae_of_mean = mean_metric(Metric::kMae, average, references, scene);
+    cell.flip_of_mean = mean_metric(Metric::kFlip, average, references, scene);
   }
   cell.load_seconds = mean_estimate(values_of(cell, [](const RunResult& r) { return r.record.load_seconds; }));
   cell.render_seconds = mean_estimate(values_of(cell, [](const RunResult& r) { return r.record.render_seconds; }));
@@ -312,6 +303,11 @@ void measure(Cell& cell, const SceneInstance& scene, const std::vector<Image>& r
   cell.predicted_over_true =
       ratio_of_means(values_of(cell, [](const RunResult& r) { return r.predicted_relmse; }), values_of(cell, relmse));
   cell.coverage = mean_estimate(values_of(cell, [](const RunResult& r) { return r.coverage; }));
+  cell.temporal = mean_estimate(values_of(cell, temporal));
+  cell.temporal_flip = mean_estimate(values_of(cell, [](const RunResult& r) { return r.temporal_flip; }));
+  std::vector<std::vector<FrameErrors>> frames;
+  for (const RunResult& run : cell.runs) frames.push_back(run.frames);
+  cell.frames = mean_over_renders(frames);
   cell.suspicions = suspicions(cell.split, unbiased);
 }
 
@@ -327,6 +323,10 @@ void compare_cells(Results& results) {
     cell.published_ratio = published(suite.published_ratio, scene, method, budget.key());
     const Cell* base = results.find(cell.scene, baseline, cell.budget);
     if (!base) continue;
+    if (!cell.frames.empty() && cell.frames.size() == base->frames.size()) {
+      cell.temporal_gain = ratio(*base, cell, temporal);
+      cell.worst = worst_regions(cell.frames, base->frames);
+    }
     // With a budget in seconds the errors themselves are those of equal times.
     const Estimate errors = ratio(*base, cell, relmse);
     if (budget.seconds > 0) {

@@ -8,10 +8,6 @@
 
 namespace covary::lab {
 
-/// Pixels of a scene's window from an image of any size that covers it; of `layer`, or the scene's where that is empty.
-/// Throws Error(kInput) where it does not cover it.
-Image read_window(const std::string& path, const SceneInstance& scene, const std::string& layer = "");
-
 /// Fills in everything of a cell that follows from its own runs; their records and seeds are given. MAE and FLIP are
 /// against the mean of the references. `unbiased`: see suspicions(). Errors of single images are kept in the cache
 /// under keys made of `run_keys`, one for each run, and `reference_key`.

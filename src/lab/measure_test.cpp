@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "film/exr.h"
+#include "lab/scene_images.h"
 #include "support/files.h"
 
 namespace covary::lab {

@@ -6,14 +6,19 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <iterator>
+#include <sstream>
 
 #include "core/content_hash.h"
 #include "core/error.h"
+#include "sequences/frame_names.h"
 
 namespace covary::lab {
 namespace {
 
+namespace fs = std::filesystem;
 using Words = std::vector<std::string>;
 
 CropWindow crop_window(const SceneInstance& scene) {
@@ -64,6 +69,13 @@ Words flattened(const std::vector<Words>& steps) {
 
 }  // namespace
 
+std::vector<std::string> files_of(std::span<const int> frames, const std::string& path) {
+  if (frames.empty() || !is_frame_pattern(path)) return Words(std::max<size_t>(1, frames.size()), path);
+  Words files;
+  for (const int frame : frames) files.push_back(frame_name(path, frame));
+  return files;
+}
+
 std::vector<int> whole_numbers(const std::string& text, char separator) {
   std::vector<int> result;
   const char *at = text.data(), *end = at + text.size();
@@ -84,9 +96,26 @@ Words SceneInstance::options() const {
   if (!entry.resolution.empty()) words.insert(words.end(), {"--resolution", entry.resolution});
   // Always given, so that a crop in the scene file itself plays no part.
   words.insert(words.end(), {"--crop", fmt::format("{},{},{},{}", window.x, window.y, window.width, window.height)});
+  if (!frames.empty()) words.insert(words.end(), {"--frames", entry.frames});
+  if (!camera_path.empty()) words.insert(words.end(), {"--camera-path", camera_path});
   if (entry.max_depth) words.insert(words.end(), {"--max-depth", fmt::format("{}", *entry.max_depth)});
   return words;
 }
+
+SceneInstance located(const SceneEntry& entry, const std::string& folder) {
+  SceneInstance scene{entry};
+  scene.file = (fs::path(folder) / entry.file).string();
+  if (FrameRange range; read_frame_range(entry.frames, range)) scene.frames = range.numbers();
+  if (entry.camera_path.empty()) return scene;
+  scene.camera_path = (fs::path(folder) / entry.camera_path).string();
+  std::ifstream file(scene.camera_path);  // where it cannot be read, the render says so
+  std::stringstream text;
+  text << file.rdbuf();
+  scene.hash = hash_text(hash_bytes(text.str()));
+  return scene;
+}
+
+Words SceneInstance::scene_files() const { return is_frame_pattern(file) ? files_of(frames, file) : Words{file}; }
 
 void place(SceneInstance& scene, int width, int height, int64_t max_pixels) {
   const double pixels = static_cast<double>(width) * height;
@@ -112,7 +141,7 @@ std::vector<Run> reference_runs(const Suite& suite, const SceneInstance& scene, 
   const uint32_t spp = suite.reference_of(scene.entry).spp;
   for (uint64_t seed : kReferenceSeeds) {
     Run run;
-    run.seed = seed;
+    run.seed = seed, run.frames = scene.frames;
     run.options = joined({scene.options(),
                           suite.common_options,
                           {"--estimator", "none", "--spp", fmt::format("{}", spp), "--seed", fmt::format("{}", seed)}});
@@ -139,7 +168,7 @@ std::vector<Run> runs_of_scene(const Suite& suite, size_t index, const SceneInst
         Run run;
         run.scene = index, run.method = m, run.budget = b, run.seed = seed;
         run.options = joined({scene.options(), suite.common_options, method.options, amount, seed_words});
-        run.then = method.then;
+        run.then = method.then, run.frames = scene.frames;
         run.work = budget.spp * static_cast<double>(scene.n_pixels());
         run.key = key_of("run", context, scene, {run.options, flattened(run.then)});
         run.timed = budget.seconds > 0;

@@ -2,7 +2,9 @@
 // From a suite to command lines: what to run, in which order, and under which keys results are kept.
 #pragma once
 
+#include <algorithm>
 #include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -14,13 +16,24 @@ namespace covary::lab {
 struct SceneInstance {
   SceneEntry entry;
   std::string file;  ///< path
-  std::string hash;  ///< of the scene's content
+  std::string hash;  ///< of the content of scene and camera path
   int frame_width = 0, frame_height = 0;
+  std::vector<int> frames;  ///< of a sequence; empty: one image
+  std::string camera_path;  ///< path, or empty
   CropWindow window;
   /// Options of `covary render` that choose frame, crop, depth and definitions.
   std::vector<std::string> options() const;
-  uint64_t n_pixels() const { return static_cast<uint64_t>(window.width) * window.height; }
+  /// The scene's file, or those of all frames.
+  std::vector<std::string> scene_files() const;
+  size_t n_images() const { return std::max<size_t>(1, frames.size()); }
+  uint64_t n_pixels() const { return static_cast<uint64_t>(window.width) * window.height * n_images(); }
 };
+
+/// The files that an image of a scene is: its path or, of frames, that of each, where the path has a '#'.
+std::vector<std::string> files_of(std::span<const int> frames, const std::string& path);
+
+/// A scene of a suite whose files lie in `folder`. Nothing of it is looked at but the camera path, which `hash` is of.
+SceneInstance located(const SceneEntry& entry, const std::string& folder);
 
 /// Numbers >= 0 between separators ("10,20,30", "240x135"); empty where the text is anything else.
 std::vector<int> whole_numbers(const std::string& text, char separator);
@@ -36,10 +49,11 @@ struct Run {
   uint64_t seed = 0;
   std::vector<std::string> options;  ///< of `covary render SCENE`, without outputs
   std::vector<std::vector<std::string>> then;
-  double work = 0;         ///< samples, for the time left
-  bool timed = false;      ///< with a budget in seconds: an interrupted run begins again
-  std::string key;         ///< names the result: hash of program, scene, options, seed
-  std::string passes_key;  ///< the same for all runs that can share the films of their passes
+  std::vector<int> frames;  ///< as in SceneInstance
+  double work = 0;          ///< samples, for the time left
+  bool timed = false;       ///< with a budget in seconds: an interrupted run begins again
+  std::string key;          ///< names the result: hash of program, scene, options, seed
+  std::string passes_key;   ///< the same for all runs that can share the films of their passes
 };
 
 /// What does not change from run to run.

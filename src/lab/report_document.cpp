@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "lab/measure.h"
 #include "lab/report_tables.h"
+#include "lab/scene_images.h"
 #include "metrics/metrics.h"
 
 namespace covary::lab {
@@ -86,7 +86,8 @@ Json scenes_table(const Results& results) {
   for (const SceneResult& result : results.scenes) {
     const SceneInstance& scene = result.scene;
     rows.push_back({{"name", scene.entry.name},
-                    {"frame", fmt::format("{} × {}", scene.frame_width, scene.frame_height)},
+                    {"frame", fmt::format("{} × {}{}", scene.frame_width, scene.frame_height,
+                                          scene.frames.empty() ? "" : fmt::format(", {} frames", scene.frames.size()))},
                     {"window", fmt::format("{} × {} at {}, {}", scene.window.width, scene.window.height, scene.window.x,
                                            scene.window.y)},
                     {"reference",
@@ -117,13 +118,20 @@ const std::vector<std::string> kHowMeasured = {
     "time: the same with each "
     "error multiplied by the method's time (render, estimate and later steps, without loading), as if errors fell like "
     "1 / time; where "
-    "a budget is in seconds, the errors are those of that time."};
+    "a budget is in seconds, the errors are those of that time.",
+    "Of scenes with frames, errors are means over all frames. Temporal error: relMSE of the differences of successive "
+    "frames, which are flicker and trails; temporal FLIP: |FLIP of successive frames − FLIP of those of the "
+    "reference|; "
+    "worst region: largest ratio of mean errors, with the baseline's, of any region."};
+
+/// Of a sequence, the last frame is shown.
+Image shown_image(const Image& pixels, const SceneInstance& scene) { return images_of(pixels, scene).back(); }
 
 Image mean_of_references(const SceneResult& result) {
   Image mean = read_window(result.reference.files.front(), result.scene);
   const Image other = read_window(result.reference.files.back(), result.scene);
   for (size_t i = 0; i < mean.data.size(); ++i) mean.data[i] = 0.5f * (mean.data[i] + other.data[i]);
-  return mean;
+  return shown_image(mean, result.scene);
 }
 
 }  // namespace
@@ -162,6 +170,12 @@ Json report_document(const Results& results) {
     (published["blocks"].empty() ? gains : published)["text"].push_back("Published: " + suite.published_source + ".");
   add_section(document, std::move(published));
   add_section(document, std::move(gains));
+
+  Json frames = new_section("frames", "Frames");
+  for (const bool of_changes : {false, true})
+    for (size_t s = 0; s < suite.scenes.size(); ++s) add_block(frames, frames_plot(results, s, shown, of_changes));
+  for (size_t b = 0; b < suite.budgets.size(); ++b) add_block(frames, frames_table(results, b));
+  add_section(document, std::move(frames));
 
   Json quality = new_section("bias", "Bias, variance and other measures");
   add_block(quality, front_plot(results, shown));
@@ -276,19 +290,23 @@ void add_pictures(const Results& results, Json& document, std::vector<ReportImag
   for (size_t s = 0; s < results.scenes.size(); ++s) {
     const SceneResult& result = results.scenes[s];
     if (result.reference.files.empty()) continue;
-    Json scene{{"name", result.scene.entry.name}, {"credit", result.scene.entry.credit}, {"images", Json::array()}};
+    const std::vector<int>& frames = result.scene.frames;
+    const std::string frame = frames.empty() ? "" : fmt::format(", frame {}", frames.back());
+    Json scene{
+        {"name", result.scene.entry.name + frame}, {"credit", result.scene.entry.credit}, {"images", Json::array()}};
     const Image reference = mean_of_references(result);
     for (size_t m = 0; m < suite.methods.size(); ++m) {
       const Cell* cell = results.find(s, m, budget);
       if (!cell) continue;
       const std::string id = fmt::format("s{}m{}", s, m);
-      Image pixels = read_window(cell->runs[0].record.image, result.scene);
+      Image pixels = shown_image(read_window(cell->runs[0].record.image, result.scene), result.scene);
+      const RunResult& run = cell->runs[0];
       images.push_back({id + "flip", compute_metric(Metric::kFlip, pixels, {&reference, 1}).map});
       images.push_back({id, std::move(pixels)});
       Json image{{"name", suite.methods[m].name},
                  {"image", id},
                  {"flip", id + "flip"},
-                 {"label", fmt::format("relMSE {:.3g}", cell->runs[0].relmse)}};
+                 {"label", fmt::format("relMSE {:.3g}", run.frames.empty() ? run.relmse : run.frames.back().relmse)}};
       if (suite.methods[m].name == suite.baseline) image["role"] = "baseline";
       if (suite.methods[m].name == best) image["role"] = "best";
       scene["images"].push_back(std::move(image));

@@ -71,11 +71,11 @@ Json cell_rows(const Results& results, size_t budget, Fill&& fill, bool (*use)(c
 }
 
 Json plot(const std::string& title, const std::string& x_label, Json series, const std::string& alt,
-          const Json& y_axis = {{"label", "relMSE"}, {"scale", "log"}}) {
+          const Json& y_axis = {{"label", "relMSE"}, {"scale", "log"}}, const char* x_scale = "log") {
   if (series.empty()) return nullptr;
   return {{"type", "plot"},
           {"title", title},
-          {"x", {{"label", x_label}, {"scale", "log"}}},
+          {"x", {{"label", x_label}, {"scale", x_scale}}},
           {"y", y_axis},
           {"series", std::move(series)},
           {"alt", alt}};
@@ -300,6 +300,56 @@ Json time_plot(const Results& results, size_t scene) {
       results, scene, [](const Cell& cell) { return cell.method_seconds.value; }, [](const Budget&) { return true; });
   const std::string alt = alternative("relMSE of " + name + " from the shortest to the longest time", series);
   return plot(name, "seconds, render and estimate", std::move(series), alt);
+}
+
+Json frames_table(const Results& results, size_t budget) {
+  const Json columns{column("scene", "Scene", "text"),
+                     column("method", "Method", "text"),
+                     column("temporal", "Temporal error", "number"),
+                     column("gain", "Gain", "ratio"),
+                     column("flip", "Temporal FLIP", "number"),
+                     column("worst_relmse", "Worst region, relMSE", "ratio"),
+                     column("worst_temporal", "temporal", "ratio"),
+                     column("frame_relmse", "Of a frame, relMSE", "ratio"),
+                     column("frame_temporal", "temporal", "ratio")};
+  Json rows = cell_rows(
+      results, budget,
+      [](const Cell& cell, Json& row) {
+        row["temporal"] = value_of(cell.temporal);
+        row["gain"] = value_of(cell.temporal_gain);
+        row["flip"] = value_of(cell.temporal_flip);
+        if (!cell.worst) return;
+        row["worst_relmse"] = number(cell.worst->relmse.ratio);
+        row["worst_temporal"] = number(cell.worst->temporal.ratio);
+        row["frame_relmse"] = number(cell.worst->relmse_of_frame.ratio);
+        row["frame_temporal"] = number(cell.worst->temporal_of_frame.ratio);
+      },
+      [](const Cell& cell) { return !cell.frames.empty(); });
+  return table(fmt::format("Changes from frame to frame, {}; gain: error of {} / error of the method; worst region: "
+                           "the largest error of the method / error of {} in a region of {} × {} pixels",
+                           results.suite.budgets[budget].label(), results.suite.baseline, results.suite.baseline,
+                           kRegionSide, kRegionSide),
+               columns, rows);
+}
+
+Json frames_plot(const Results& results, size_t scene, size_t budget, bool of_changes) {
+  const std::string title =
+      fmt::format("{}, {}", results.suite.scenes[scene].name, results.suite.budgets[budget].label());
+  Json series = Json::array();
+  for (size_t m = 0; m < results.suite.methods.size(); ++m) {
+    const Cell* cell = results.find(scene, m, budget);
+    if (!cell) continue;
+    Json x = Json::array(), y = Json::array();
+    for (size_t f = 0; f < cell->frames.size(); ++f)
+      if (const double error = of_changes ? cell->frames[f].temporal : cell->frames[f].relmse; error > 0) {
+        x.push_back(results.scenes[scene].scene.frames[f]);
+        y.push_back(error);
+      }
+    if (!x.empty()) series.push_back({{"name", results.suite.methods[m].name}, {"x", x}, {"y", y}, {"style", "line"}});
+  }
+  const char* what = of_changes ? "temporal error" : "relMSE";
+  const std::string alt = alternative(fmt::format("{} of {} from the first to the last frame", what, title), series);
+  return plot(title, "frame", std::move(series), alt, {{"label", what}, {"scale", "log"}}, "linear");
 }
 
 Json front_plot(const Results& results, size_t budget) {

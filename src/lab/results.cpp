@@ -5,6 +5,7 @@
 #include <sys/utsname.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <thread>
@@ -38,6 +39,33 @@ Json json_of(const Budget& budget) {
   return {{"seconds", budget.seconds}};
 }
 
+Json json_of(const FrameErrors& frame) {
+  return {{"relmse", number(frame.relmse)},
+          {"temporal", number(frame.temporal)},
+          {"temporal_flip", number(frame.temporal_flip)},
+          {"still_relmse", number(frame.still_relmse)}};
+}
+
+/// What a cell has of its frames.
+Json frames_of(const Cell& cell, const std::vector<int>& numbers) {
+  Json frames = Json::array();
+  for (size_t f = 0; f < cell.frames.size(); ++f) {
+    frames.push_back({{"frame", numbers[f]}});
+    frames.back().update(json_of(cell.frames[f]));
+  }
+  Json json{{"temporal", json_of(cell.temporal)},
+            {"temporal_flip", json_of(cell.temporal_flip)},
+            {"temporal_gain", json_of(cell.temporal_gain)},
+            {"frames", frames}};
+  if (!cell.worst) return json;
+  for (const auto& [name, region] : {std::pair{"relmse", &cell.worst->relmse},
+                                     {"relmse_of_frame", &cell.worst->relmse_of_frame},
+                                     {"temporal", &cell.worst->temporal},
+                                     {"temporal_of_frame", &cell.worst->temporal_of_frame}})
+    json["worst_region"][name] = number(region->ratio);
+  return json;
+}
+
 Json json_of(const RunResult& run) {
   const RunRecord& r = run.record;
   return {{"seed", run.seed},
@@ -66,37 +94,39 @@ Json json_of(const Cell& cell, const Results& results) {
     seeds.push_back(run.seed);
     runs.push_back(json_of(run));
   }
-  return {{"scene", suite.scenes[cell.scene].name},
-          {"method", suite.methods[cell.method].name},
-          {"budget", json_of(suite.budgets[cell.budget])},
-          {"seeds", seeds},
-          {"samples_per_pixel", cell.samples_per_pixel},
-          {"pixels", cell.split.n_pixels},
-          {"non_finite_pixels", cell.split.n_non_finite},
-          {"relmse", json_of(cell.split.relative)},
-          {"relmse_trimmed", json_of(cell.relmse_trimmed)},
-          {"mse", json_of(cell.split.absolute)},
-          {"mae", mae},
-          {"flip", flip},
-          {"above5", json_of(cell.above5)},
-          {"mean_ratio", json_of(cell.split.mean_ratio)},
-          {"equal_sample", json_of(cell.equal_sample)},
-          {"equal_sample_normalised", cell.equal_sample_normalised},
-          {"equal_time", json_of(cell.equal_time)},
-          {"seconds",
-           {{"load", json_of(cell.load_seconds)},
-            {"render", json_of(cell.render_seconds)},
-            {"estimate", json_of(cell.estimate_seconds)},
-            {"then", json_of(cell.then_seconds)},
-            {"method", json_of(cell.method_seconds)},
-            {"over_budget", number(cell.time_ratio)}}},
-          {"efficiency", json_of(cell.efficiency)},
-          {"predicted_over_true", json_of(cell.predicted_over_true)},
-          {"coverage", json_of(cell.coverage)},
-          {"published", {{"relmse", number(cell.published_relmse)}, {"ratio", number(cell.published_ratio)}}},
-          {"peak_memory_bytes", cell.peak_memory_bytes},
-          {"warnings", cell.suspicions},
-          {"runs", runs}};
+  Json json{{"scene", suite.scenes[cell.scene].name},
+            {"method", suite.methods[cell.method].name},
+            {"budget", json_of(suite.budgets[cell.budget])},
+            {"seeds", seeds},
+            {"samples_per_pixel", cell.samples_per_pixel},
+            {"pixels", cell.split.n_pixels},
+            {"non_finite_pixels", cell.split.n_non_finite},
+            {"relmse", json_of(cell.split.relative)},
+            {"relmse_trimmed", json_of(cell.relmse_trimmed)},
+            {"mse", json_of(cell.split.absolute)},
+            {"mae", mae},
+            {"flip", flip},
+            {"above5", json_of(cell.above5)},
+            {"mean_ratio", json_of(cell.split.mean_ratio)},
+            {"equal_sample", json_of(cell.equal_sample)},
+            {"equal_sample_normalised", cell.equal_sample_normalised},
+            {"equal_time", json_of(cell.equal_time)},
+            {"seconds",
+             {{"load", json_of(cell.load_seconds)},
+              {"render", json_of(cell.render_seconds)},
+              {"estimate", json_of(cell.estimate_seconds)},
+              {"then", json_of(cell.then_seconds)},
+              {"method", json_of(cell.method_seconds)},
+              {"over_budget", number(cell.time_ratio)}}},
+            {"efficiency", json_of(cell.efficiency)},
+            {"predicted_over_true", json_of(cell.predicted_over_true)},
+            {"coverage", json_of(cell.coverage)},
+            {"published", {{"relmse", number(cell.published_relmse)}, {"ratio", number(cell.published_ratio)}}},
+            {"peak_memory_bytes", cell.peak_memory_bytes},
+            {"warnings", cell.suspicions},
+            {"runs", runs}};
+  if (!cell.frames.empty()) json.update(frames_of(cell, results.scenes[cell.scene].scene.frames));
+  return json;
 }
 
 Json json_of(const SceneResult& result) {
@@ -130,6 +160,14 @@ std::string fact(const char* path, const std::string& key) {
 }
 
 }  // namespace
+
+std::vector<std::string> SceneResult::reference_files() const {
+  std::vector<std::string> all;
+  for (const std::string& file : reference.files)
+    for (const std::string& of_frame : files_of(scene.frames, file))
+      if (std::find(all.begin(), all.end(), of_frame) == all.end()) all.push_back(of_frame);
+  return all;
+}
 
 const Cell* Results::find(size_t scene, size_t method, size_t budget) const {
   for (const Cell& cell : cells)

@@ -11,6 +11,7 @@
 #include "lab/plan.h"
 #include "lab/runner.h"
 #include "lab/suite.h"
+#include "metrics/sequence_errors.h"
 
 namespace covary::lab {
 
@@ -22,6 +23,8 @@ struct RunResult {
   double predicted_relmse = kNone;  ///< from the run's own standard errors, where it has them
   /// Part of the values that differ from the reference by 1.96 standard errors at most, the reference's included.
   double coverage = kNone;
+  double temporal = kNone, temporal_flip = kNone;  ///< of frames: metrics/sequence_errors.h
+  std::vector<FrameErrors> frames;                 ///< empty for a single image
 };
 
 /// Numbers of samples that differ by this part at most count as the same.
@@ -46,6 +49,11 @@ struct Cell {
   double time_ratio = kNone;
   Estimate predicted_over_true;  ///< predicted relMSE / relMSE
   Estimate coverage;             ///< of RunResult
+  // Of frames: of their changes, and beside the baseline's frames of the same budget.
+  Estimate temporal, temporal_flip;
+  Estimate temporal_gain;           ///< temporal error of the baseline over that of this method
+  std::vector<FrameErrors> frames;  ///< means over seeds
+  std::optional<WorstRegions> worst;
   double published_relmse = kNone, published_ratio = kNone;
   std::vector<std::string> suspicions;
 };
@@ -61,6 +69,8 @@ struct Reference {
 struct SceneResult {
   SceneInstance scene;
   Reference reference;
+  /// The files of both halves, of all frames.
+  std::vector<std::string> reference_files() const;
 };
 
 struct Failure {

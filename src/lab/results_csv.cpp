@@ -59,6 +59,13 @@ void add_cell(Table& table, const Cell& cell) {
   table.add("efficiency", cell.efficiency);
   table.add("predicted_over_true", cell.predicted_over_true);
   table.add("coverage", cell.coverage);
+  table.add("temporal", cell.temporal);
+  table.add("temporal_flip", cell.temporal_flip);
+  table.add("temporal_gain", cell.temporal_gain);
+  if (cell.worst) {
+    table.add("worst_region_relmse", cell.worst->relmse.ratio);
+    table.add("worst_region_temporal", cell.worst->temporal.ratio);
+  }
   table.add("published_relmse", cell.published_relmse);
   table.add("published_ratio", cell.published_ratio);
   table.add("seconds_load", cell.load_seconds);
@@ -81,6 +88,8 @@ void add_run(Table& table, const RunResult& run) {
   table.add("mean_ratio", run.mean_ratio);
   table.add("predicted_relmse", run.predicted_relmse);
   table.add("coverage", run.coverage);
+  table.add("temporal", run.temporal);
+  table.add("temporal_flip", run.temporal_flip);
   table.add("seconds_load", run.record.load_seconds);
   table.add("seconds_render", run.record.render_seconds);
   table.add("seconds_estimate", run.record.estimate_seconds);

@@ -6,6 +6,7 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -36,16 +37,19 @@ std::string typed(Words command) {
   return shell_text(command);
 }
 
-RunRecord record_of(const nlohmann::json& stats) {
-  RunRecord record;
+/// Adds the statistics of an image, of which there are `n`.
+void add_statistics(const nlohmann::json& stats, size_t n, RunRecord& record) {
   const nlohmann::json seconds = stats.value("seconds", nlohmann::json::object());
-  record.load_seconds = seconds.value("load", 0.0) + seconds.value("build", 0.0);
-  record.render_seconds = seconds.value("render", 0.0) + seconds.value("trial", 0.0) + seconds.value("train", 0.0);
-  record.estimate_seconds = seconds.value("estimate", 0.0);
-  record.samples_per_pixel = stats.value("samples_per_pixel", 0.0) + stats.value("training_samples_per_pixel", 0.0);
-  record.peak_memory_bytes = stats.value("peak_memory_bytes", 0.0);
-  return record;
+  record.load_seconds += seconds.value("load", 0.0) + seconds.value("build", 0.0);
+  record.render_seconds += seconds.value("render", 0.0) + seconds.value("trial", 0.0) + seconds.value("train", 0.0);
+  record.estimate_seconds += seconds.value("estimate", 0.0);
+  record.samples_per_pixel +=
+      (stats.value("samples_per_pixel", 0.0) + stats.value("training_samples_per_pixel", 0.0)) / static_cast<double>(n);
+  record.peak_memory_bytes = std::max(record.peak_memory_bytes, stats.value("peak_memory_bytes", 0.0));
 }
+
+/// Part of the names of a run's files: the number of the frame.
+std::string number_of(const Run& run) { return run.frames.empty() ? "" : "_####"; }
 
 nlohmann::json json_of(const RunRecord& r) {
   return {{"command", r.command},
@@ -101,10 +105,13 @@ void Cache::write_json(const std::string& kind, const std::string& key, const nl
 }
 
 std::optional<RunRecord> Runner::find(const Run& run) const {
-  const std::string image = cache_.path("runs", run.key) + "/image.exr";
+  const std::string image = cache_.path("runs", run.key) + "/image" + number_of(run) + ".exr";
   const std::optional<nlohmann::json> json = cache_.read_json("runs", run.key + "/run.json");
-  if (!json || !fs::exists(image)) return std::nullopt;
-  RunRecord record = record_of(*json);
+  const Words files = files_of(run.frames, image);
+  if (!json || !std::all_of(files.begin(), files.end(), [](const std::string& file) { return fs::exists(file); }))
+    return std::nullopt;
+  RunRecord record;
+  add_statistics(*json, 1, record);
   record.image = image;
   record.command = json->value("command", "");
   record.messages = json->value("messages", "");
@@ -113,16 +120,17 @@ std::optional<RunRecord> Runner::find(const Run& run) const {
 }
 
 Runner::Result Runner::execute(const Run& run, const SceneInstance& scene) const {
-  const std::string folder = cache_.path("runs", run.key), image = folder + "/image.exr",
-                    stats = folder + "/stats.json";
+  const std::string folder = cache_.path("runs", run.key), number = number_of(run),
+                    image = folder + "/image" + number + ".exr", stats = folder + "/stats" + number + ".json";
   fs::create_directories(folder);
   Words render{program_, "render", scene.file};
   render.insert(render.end(), run.options.begin(), run.options.end());
   const std::string typed_command = typed(render);
   if (threads_ > 0) render.insert(render.end(), {"--threads", fmt::format("{}", threads_)});
-  std::string output = run.then.empty() ? image : folder + "/step0.exr";
-  render.insert(render.end(), {"--passes", cache_.path("passes", run.passes_key), "--quiet", "--no-preview", "--json",
-                               stats, "-o", output});
+  std::string output = run.then.empty() ? image : folder + "/step0" + number + ".exr";
+  render.insert(render.end(), {"--quiet", "--no-preview", "--json", stats, "-o", output});
+  // Frames that are done are their own memory of an interruption.
+  if (run.frames.empty()) render.insert(render.end(), {"--passes", cache_.path("passes", run.passes_key)});
   render.emplace_back(run.timed ? "--overwrite" : "--resume");
   const auto failed = [&](const std::string& command, const ProcessResult& process) -> Result {
     if (stop_ && stop_->load()) return {};
@@ -133,14 +141,17 @@ Runner::Result Runner::execute(const Run& run, const SceneInstance& scene) const
   // An image that is not as good as wanted is an image.
   constexpr int kTargetMissed = 3;
   if (!process.ok() && process.exit_code != kTargetMissed) return failed(typed_command, process);
-  const std::optional<nlohmann::json> json = read_json_file(stats);
-  if (!json) return {std::nullopt, RunFailure{typed_command, 0, "the render wrote no statistics"}};
-  RunRecord record = record_of(*json);
+  RunRecord record;
+  for (const std::string& file : files_of(run.frames, stats)) {
+    const std::optional<nlohmann::json> json = read_json_file(file);
+    if (!json) return {std::nullopt, RunFailure{typed_command, 0, "the render wrote no statistics"}};
+    add_statistics(*json, std::max<size_t>(1, run.frames.size()), record);
+  }
   record.image = image;
   record.command = typed_command;
   record.messages = process.errors;
   for (size_t i = 0; i < run.then.size(); ++i) {
-    const std::string next = i + 1 == run.then.size() ? image : fmt::format("{}/step{}.exr", folder, i + 1);
+    const std::string next = i + 1 == run.then.size() ? image : fmt::format("{}/step{}{}.exr", folder, i + 1, number);
     Words step{program_, run.then[i][0], output};
     step.insert(step.end(), run.then[i].begin() + 1, run.then[i].end());
     const std::string typed_step = typed(step);
@@ -151,7 +162,7 @@ Runner::Result Runner::execute(const Run& run, const SceneInstance& scene) const
     record.peak_memory_bytes = std::max(record.peak_memory_bytes, static_cast<double>(after.peak_memory_bytes));
     record.command += " && " + typed_step;
     record.messages += after.errors;
-    fs::remove(output);
+    for (const std::string& file : files_of(run.frames, output)) fs::remove(file);
     output = next;
   }
   cache_.write_json("runs", run.key + "/run.json", json_of(record));

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "core/error.h"
+#include "sequences/frame_names.h"
 
 namespace covary::lab {
 namespace {
@@ -16,9 +17,9 @@ using Json = nlohmann::ordered_json;
 namespace fs = std::filesystem;
 
 /// Options of `covary render` that the laboratory itself gives.
-const std::vector<std::string> kReserved = {"--spp",  "--time",       "--seed",   "-o",      "--output",
-                                            "--json", "--passes",     "--resume", "--quiet", "--no-preview",
-                                            "--crop", "--resolution", "--replay"};
+const std::vector<std::string> kReserved = {"--spp",  "--time",       "--seed",   "-o",       "--output",
+                                            "--json", "--passes",     "--resume", "--quiet",  "--no-preview",
+                                            "--crop", "--resolution", "--replay", "--frames", "--camera-path"};
 
 void check_options(const std::string& where, const std::vector<std::string>& options,
                    std::vector<std::string>& problems) {
@@ -67,6 +68,8 @@ Json json_of(const SceneEntry& scene) {
   if (scene.max_depth) json["max_depth"] = *scene.max_depth;
   if (!scene.defines.empty()) json["defines"] = scene.defines;
   if (!scene.credit.empty()) json["credit"] = scene.credit;
+  if (!scene.frames.empty()) json["frames"] = scene.frames;
+  if (!scene.camera_path.empty()) json["camera_path"] = scene.camera_path;
   if (!scene.layer.empty()) json["layer"] = scene.layer;
   for (const CropWindow& w : scene.insets)
     json["insets"].push_back({{"x", w.x}, {"y", w.y}, {"w", w.width}, {"h", w.height}});
@@ -119,6 +122,12 @@ std::vector<std::string> validate(const Suite& suite) {
     problems.push_back(
         fmt::format("baseline: no method is named '{}'{}", suite.baseline, did_you_mean(suite.baseline, methods)));
   for (const SceneEntry& scene : suite.scenes) {
+    FrameRange frames;
+    if (!scene.frames.empty() && !read_frame_range(scene.frames, frames))
+      problems.push_back(fmt::format("scene '{}': frames '{}': expected FIRST-LAST[:STEP] or one number, e.g. 1-16",
+                                     scene.name, scene.frames));
+    if (scene.frames.empty() && !scene.camera_path.empty())
+      problems.push_back(fmt::format("scene '{}': 'camera_path' has no effect without 'frames'", scene.name));
     const ReferencePlan& plan = suite.reference_of(scene);
     if (plan.spp == 0 && plan.files.empty())
       problems.push_back(fmt::format(

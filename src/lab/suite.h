@@ -37,6 +37,8 @@ struct SceneEntry {
   std::optional<int64_t> max_depth;
   std::vector<std::string> defines;  ///< name=value
   std::string credit;                ///< author, title, licence
+  std::string frames;                ///< "1-16": frames of a sequence; empty: one image
+  std::string camera_path;           ///< of them: file beside the scene's; empty: the camera is the scene's
   std::string layer;                 ///< of images and references that is looked at; empty: R G B
   std::vector<CropWindow> insets;    ///< in the frame
   std::optional<ReferencePlan> reference;

@@ -59,6 +59,8 @@ class SuiteReader {
     scene.max_depth = reader.whole("max_depth", -1, kLargestInt);
     scene.defines = reader.texts("defines");
     scene.credit = reader.text("credit").value_or("");
+    scene.frames = reader.text("frames").value_or("");
+    scene.camera_path = reader.text("camera_path").value_or("");
     scene.layer = reader.text("layer").value_or("");
     for (const std::string& inset : reader.objects("insets")) scene.insets.push_back(window(inset));
     if (const auto own = reader.object("reference")) scene.reference = reference(*own);

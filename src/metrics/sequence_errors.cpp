@@ -235,6 +235,22 @@ void SequenceErrors::add_still(const Image& frame, const std::vector<Image>& ref
   if (n > 0) errors.still_relmse = sum / n;
 }
 
+std::vector<FrameErrors> mean_over_renders(std::span<const std::vector<FrameErrors>> renders) {
+  std::vector<FrameErrors> result(renders.empty() ? 0 : renders[0].size());
+  for (size_t f = 0; f < result.size(); ++f) {
+    std::vector<FrameErrors> of_frame;
+    std::vector<const RegionErrors*> regions, temporal_regions;
+    for (const std::vector<FrameErrors>& frames : renders) of_frame.push_back(frames[f]);
+    for (const FrameErrors& frame : of_frame)
+      regions.push_back(&frame.regions), temporal_regions.push_back(&frame.temporal_regions);
+    const SequenceSummary mean = summary_of(of_frame);
+    result[f] = {mean.relmse, mean.temporal,    mean.temporal_flip,       mean.still_relmse, of_frame[0].still_part,
+                 0,           mean_of(regions), mean_of(temporal_regions)};
+    for (const FrameErrors& frame : of_frame) result[f].n_non_finite += frame.n_non_finite;
+  }
+  return result;
+}
+
 SequenceSummary summary_of(std::span<const FrameErrors> frames) {
   const auto part = [](const FrameErrors& f) { return f.still_part; };
   return {mean_of_frames(frames, [](const FrameErrors& f) { return f.relmse; }),

@@ -7,8 +7,8 @@
 //                      smaller weight of both frames, that of the brighter one: a light that appears has not the weight
 //                      of the darkness before it.
 //     temporal FLIP    |FLIP(F_{t-1}, F_t) - FLIP(R_{t-1}, R_t)|: change that is seen and should not be, or the other
-//                      way round. This is tLP of [Chu2020] (metrics.py of its code) with FLIP for LPIPS, at every pixel; the
-//                      references' noise is in it.
+//                      way round. This is tLP of [Chu2020] (metrics.py of its code) with FLIP for LPIPS, at every
+//                      pixel; the references' noise is in it.
 #pragma once
 
 #include <cstdint>
@@ -58,6 +58,9 @@ class SequenceErrors {
   Image before_;
   std::vector<Image> references_before_;
 };
+
+/// Frame by frame the means over renders of different seeds, of regions as well. Empty for none.
+std::vector<FrameErrors> mean_over_renders(std::span<const std::vector<FrameErrors>> renders);
 
 /// Means over frames, those of changes over all but the first, and of what is unchanged over its pixels.
 struct SequenceSummary {

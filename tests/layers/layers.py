@@ -25,7 +25,7 @@ ARROWS = {
     "denoising": ["risk"],
     "sequences": ["denoising"],
     "combine": ["dependent_tests", "denoising"],
-    "lab": ["report"],
+    "lab": ["report", "sequences"],
     "report": ["metrics"],
     "scene": ["settings"],
     "textures": ["scene", "imageio"],

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// The pixels of a scene: an image, or the frames of a sequence, one below the other, so that errors of all pixels are
+// those of the sequence.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "lab/plan.h"
+#include "metrics/metrics.h"
+#include "metrics/sequence_errors.h"
+
+namespace covary::lab {
+
+/// Pixels of a scene's window from an image of any size that covers it, or from all frames; of `layer`, or the scene's
+/// where that is empty. Throws Error(kInput) where an image does not cover the window.
+Image read_window(const std::string& path, const SceneInstance& scene, const std::string& layer = "");
+
+/// The images that such pixels are made of.
+std::vector<Image> images_of(const Image& pixels, const SceneInstance& scene);
+
+/// The mean of a metric over the scene's images.
+double mean_metric(Metric metric, const Image& pixels, const std::vector<Image>& references,
+                   const SceneInstance& scene);
+
+/// Errors of frames; empty for a single image.
+std::vector<FrameErrors> frame_errors(const Image& pixels, const std::vector<Image>& references,
+                                      const SceneInstance& scene);
+
+}  // namespace covary::lab
