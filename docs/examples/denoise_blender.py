@@ -22,6 +22,8 @@ scene.cycles.use_denoising = False  # covary denoises
 scene.cycles.use_adaptive_sampling = False
 for layer in scene.view_layers:
     layer.cycles.denoising_store_passes = True  # albedo and normal
+if hasattr(scene.render.image_settings, "media_type"):  # from Blender 5.0 on
+    scene.render.image_settings.media_type = "MULTI_LAYER_IMAGE"
 scene.render.image_settings.file_format = "OPEN_EXR_MULTILAYER"
 scene.render.image_settings.color_depth = "32"
 for seed, name in enumerate(("a.exr", "b.exr")):

@@ -63,6 +63,7 @@ def needed(scene: Any) -> list[tuple[Any, str, Any, str]]:
         (scene.render, "use_border", False, "the image would be a part of the frame"),
         (scene.render, "use_multiview", False, "groups are of one view"),
         (scene.render, "use_motion_blur", scene.render.use_motion_blur, ""),
+        (image, "media_type", "IMAGE", ""),  # from Blender 5.0 on; it decides which formats there are
         (image, "file_format", "OPEN_EXR", ""),
         (image, "color_mode", "RGB", ""),
         (image, "color_depth", "32", ""),

@@ -51,6 +51,8 @@ def message_of(scene, **arguments):
 def picture():
     """A picture, in the image "covary" and in a file, with the settings as before; another seed, another one."""
     scene = small_room()
+    if hasattr(scene.render.image_settings, "media_type"):
+        scene.render.image_settings.media_type = "VIDEO"
     scene.covary.samples = 73
     assert scene.covary.samples == 96, "rounded up to whole groups"
     before = settings_of(scene)

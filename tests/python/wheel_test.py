@@ -44,7 +44,8 @@ class Wheel(PackageTest):
         author = next(line.removeprefix("Author: ") for line in facts if line.startswith("Author: "))
         self.assertIn(f"name: {author}", cited)
         self.assertGreater(len([line for line in facts if line.startswith("Classifier: ")]), 5)
-        self.assertIn("License-Expression: Apache-2.0", facts)
+        self.assertIn("License-Expression: Apache-2.0 AND BSD-3-Clause", facts)
+        self.assertIn("License-File: src/emitters/data/LICENSE.hosek_wilkie", facts)
 
     def check_licences(self, wheel):
         """Each package that the lists of parts name has its licence in the wheel, and the metadata name it."""
