@@ -18,8 +18,9 @@
 #include "estimators/iicv.h"
 #include "estimators/pilot.h"
 #include "estimators/polynomials.h"
-#include "filters/residual_correction.h"
 #include "filters/neighbours.h"
+#include "filters/nl_means.h"
+#include "filters/residual_correction.h"
 
 namespace covary {
 namespace {
@@ -132,6 +133,40 @@ void one_residual_correction(benchmark::State& state) {
   count_work(state, "flops", (441 + 441 + 121) * 40);
 }
 
+/// NL-means with two bandwidths and six planes of guides, for the image alone (1) or with both halves (3), as the
+/// candidates of a mixture are made.
+void one_nl_means(benchmark::State& state) {
+  const Input& in = input();
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  const auto image_of = [](const Planes& planes, bool root) {
+    Image image(kWidth, kHeight, 3);
+    for (int y = 0; y < kHeight; ++y)
+      for (int x = 0; x < kWidth; ++x)
+        for (int c = 0; c < 3; ++c) {
+          const float value = planes.row(c, y)[x];
+          image.pixel(x, y)[c] = root ? std::sqrt(value) : value;
+        }
+    return image;
+  };
+  std::vector<Image> images, errors;
+  for (const int first : {0, 0, 1}) {
+    const Moments m = moments(in.independent, in.valid, 0, 0.0f, first, images.empty() ? 1 : 2);
+    images.push_back(image_of(m.mean, false));
+    errors.push_back(image_of(m.variance_of_mean, true));
+  }
+  std::vector<NlMeansSteering> steerings;
+  for (size_t i = 0; i < static_cast<size_t>(state.range(0)); ++i)
+    steerings.push_back({&images[i], &errors[i], {{0.5f, {&images[i]}}, {1.0f, {&images[i]}}}});
+  Planes guides(kWidth, kHeight, 6, kNlMeansRadius, 0.0f);
+  for (int i = 0; i < 6; ++i)
+    for (int y = 0; y < kHeight; ++y)
+      for (int x = 0; x < kWidth; ++x) guides.row(i, y)[x] = ((x / 90 + y / 70 + i) % 2 ? 0.3f : 1.0f) / 0.2f;
+  for (auto _ : state) benchmark::DoNotOptimize(nl_means(steerings, &guides, in.valid));
+  count(state);
+  // By pair of pixels and image: distances 33 and their sums 8, two weights of 22 each, two sums of 16 each.
+  count_work(state, "flops", 220.0 * (20 + static_cast<double>(state.range(0)) * (33 + 8 + 2 * (22 + 16))));
+}
+
 /// One pixel of range(1) samples in range(0) dimensions.
 void one_polynomials(benchmark::State& state) {
   const auto dimensions = static_cast<int>(state.range(0));
@@ -157,8 +192,7 @@ void whole_calibrated(benchmark::State& state) {
   const Estimator estimator = make_estimator("iicv");
   PairSettings settings;
   settings.std_error = true;
-  for (auto _ : state)
-    benchmark::DoNotOptimize(estimator.apply(in.crn, in.independent, settings).estimate.data.data());
+  for (auto _ : state) benchmark::DoNotOptimize(estimator.apply(in.crn, in.independent, settings).estimate.data.data());
   count(state);
 }
 
@@ -207,6 +241,7 @@ BENCHMARK(one_pilot)->Unit(benchmark::kMillisecond);
 BENCHMARK(one_neighbours)->Unit(benchmark::kMillisecond);
 BENCHMARK(one_regression)->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
 BENCHMARK(one_residual_correction)->Unit(benchmark::kMillisecond);
+BENCHMARK(one_nl_means)->Arg(1)->Arg(3)->Unit(benchmark::kMillisecond);
 BENCHMARK(one_polynomials)->ArgsProduct({{2, 4, 6}, {48, 192}});
 BENCHMARK_CAPTURE(whole_iicv, default, IicvOptions())->Unit(benchmark::kMillisecond)->UseRealTime();
 BENCHMARK_CAPTURE(whole_iicv, paper, IicvOptions::paper())->Unit(benchmark::kMillisecond)->UseRealTime();

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tiles of the image in parallel; in a tile a few offsets o = j - i after the other, for which the distances of all
-// patches are a box filter of the distances of pixels. All loops run along rows. The pair of pixels (p, p + o) tells
-// the weight of p + o for p, `forward`, and of p for p + o, `backward`: both have the same distance of guides and the
-// same quotient. So half of all offsets are enough, if pairs are looked at that reach into the tile from outside.
+// Tiles of the image in parallel; in a tile bands of rows from top to bottom, and in a band a few offsets o = j - i
+// after the other. All loops run along rows. The pair of pixels (p, p + o) tells the weight of p + o for p, `forward`,
+// and of p for p + o, `backward`: both have the same distance of guides and the same quotient. So half of all offsets
+// are enough, if pairs are looked at that reach into the tile from outside. Distances of patches are sums over rows of
+// three pixels, then over three rows, of which the last two are kept. Weights live no longer than a row.
 #include "filters/nl_means.h"
 
 #include <algorithm>
@@ -19,308 +20,353 @@ namespace {
 using namespace lanes;
 
 constexpr int kPatch = 1;  // radius
-constexpr int kTileWidth = 128 - 2 * kPatch, kTileHeight = 32;
 constexpr int kBorder = kNlMeansRadius + kPatch;
-/// Offsets whose pixels are added together, each in both directions.
-constexpr int kAtOnce = 3;
+/// Pairs in a row that are looked at; pixels of a tile, so that the pairs touching them are no more. `kTileHeight`: not
+/// many more pairs than pixels. `kBand`: what its rows read and write stays in the second-level cache.
+constexpr int kRow = 256, kTileWidth = kRow - kNlMeansRadius - 2 * kPatch, kTileHeight = 64, kBand = 16;
+/// From row to row and from plane to plane of a tile with its border.
+constexpr ptrdiff_t kStride = kTileWidth + 2 * kBorder + kLanes, kPlane = kStride * (kTileHeight + 2 * kBorder);
+/// Rows of a total: three channels and the weights.
+constexpr int kSums = 4;
+/// Offsets whose pixels are added together.
+constexpr int kAtOnce = 7;
 /// Errors below this are taken for none; squared errors above that for it.
 constexpr float kSmallestVariance = 1e-10f, kLargestVariance = 1e30f;
 
-/// The channels of an image, continued beyond its frame by its outermost pixels.
-Planes continued(const Image& image, bool is_error) {
-  Planes planes(image.width, image.height, 3, kBorder, 0);
-  parallel_for(image.height + 2 * kBorder, 8, [&](int row) {
-    const int y = std::clamp(row - kBorder, 0, image.height - 1);
-    for (int x = -kBorder; x < image.width + kBorder; ++x) {
-      const float* value = image.pixel(std::clamp(x, 0, image.width - 1), y);
-      for (int c = 0; c < 3; ++c)
-        planes.row(c, row - kBorder)[x] = is_error ? std::min(value[c] * value[c], kLargestVariance) : value[c];
-    }
-  });
-  return planes;
-}
-
-/// The channels of an image; 0 outside and at pixels that are not valid.
-Planes masked(const Image& image, const std::vector<unsigned char>& valid) {
-  Planes planes(image.width, image.height, 3, kBorder, 0);
-  parallel_for(image.height, 8, [&](int y) {
-    for (int x = 0; x < image.width; ++x)
-      if (valid[static_cast<size_t>(y) * image.width + x])
-        for (int c = 0; c < 3; ++c) planes.row(c, y)[x] = image.pixel(x, y)[c];
-  });
-  return planes;
-}
-
-/// One plane: 1 at valid pixels, 0 elsewhere and outside.
-Planes mask_of(const std::vector<unsigned char>& valid, int width, int height) {
-  Planes mask(width, height, 1, kBorder, 0);
-  for (int y = 0; y < height; ++y) std::copy_n(valid.data() + static_cast<size_t>(y) * width, width, mask.row(0, y));
-  return mask;
-}
-
-/// Distances of n pixels in a row from those `there` floats on, and theirs from these, summed over three planes.
-void pixel_distances(const float* f, const float* variance, ptrdiff_t plane, ptrdiff_t there, int n,
-                     float* __restrict forward, float* __restrict backward) {
-  for (int x = 0; x < n; x += kLanes) {
-    vfloat of_pixel = {}, of_other = {};
-    for (int c = 0; c < 3; ++c) {
-      const float *here = f + c * plane + x, *own = variance + c * plane + x;
-      const vfloat difference = load(here) - load(here + there), v = load(own), u = load(own + there);
-      const vfloat quotient = 1 / (v + u + kSmallestVariance), rest = difference * difference - min(v, u);
-      of_pixel += (rest - v) * quotient;
-      of_other += (rest - u) * quotient;
-    }
-    store(forward + x, of_pixel);
-    store(backward + x, of_other);
-  }
-}
-
-/// Rows of floats around a tile, with room for whole vectors.
-struct Rows {
-  static constexpr int kStride = kTileWidth + 2 * kBorder + 2 * kLanes;
-  std::vector<float> data = std::vector<float>(static_cast<size_t>(kTileHeight + 2 * kBorder) * kStride, 0.0f);
-  /// Column 0 of row y of the tile.
-  float* row(int y) { return data.data() + static_cast<size_t>(y + kBorder) * kStride + kBorder; }
-  const float* row(int y) const { return data.data() + static_cast<size_t>(y + kBorder) * kStride + kBorder; }
+/// Of one direction of pairs each.
+struct BothWays {
+  vfloat forward = {}, backward = {};
 };
 
-/// A tile, and the pixels p of pairs (p, p + (dx, dy)) that touch it, counted from its corner.
+/// Distances of pixels in a row from those `there` floats on, and theirs from these, summed over three planes.
+BothWays pixel_distances(const float* f, const float* variance, ptrdiff_t there) {
+  BothWays sum;
+  for (int c = 0; c < 3; ++c, f += kPlane, variance += kPlane) {
+    const vfloat difference = load(f) - load(f + there), v = load(variance), u = load(variance + there);
+    const vfloat quotient = reciprocal(v + u + kSmallestVariance), rest = difference * difference - min(v, u);
+    sum.forward += (rest - v) * quotient;
+    sum.backward += (rest - u) * quotient;
+  }
+  return sum;
+}
+
+/// Sums over three neighbours from each lane of a on, which b follows.
+vfloat sum_of_three(vfloat a, vfloat b) { return a + shift<1>(a, b) + shift<2>(a, b); }
+
+/// Part of the image, and the pixels p of pairs (p, p + (dx, dy)) that touch it, counted from its corner.
 struct Tile {
   int x, y, width, height;
 
   int left(int dx) const { return std::min(0, -dx); }
-  int right(int dx) const { return width + std::max(0, -dx); }
-  int top(int dy) const { return -dy; }
+  int n_pairs(int dx) const { return width + std::abs(dx); }
 };
 
-/// An image that steers, with what is averaged by it.
+/// The channels of the part of an image around a tile as planes from number `first` on, continued beyond its frame by
+/// its outermost pixels.
+void copy_around(const Tile& tile, const Image& image, bool is_error, int first, Planes& planes) {
+  for (int y = -kBorder; y < tile.height + kBorder; ++y) {
+    const float* const pixels = image.pixel(0, std::clamp(tile.y + y, 0, image.height - 1));
+    for (int c = 0; c < 3; ++c) {
+      float* const row = planes.row(first + c, y);
+      for (int x = -kBorder; x < tile.width + kBorder; ++x) {
+        const float value = pixels[3 * std::clamp(tile.x + x, 0, image.width - 1) + c];
+        row[x] = is_error ? std::min(value * value, kLargestVariance) : value;
+      }
+    }
+  }
+}
+
+/// An image that is averaged, and with the weights of which tasks.
+struct Source {
+  struct Use {
+    size_t task, total;  // places among weights and totals
+  };
+  const Image* image;
+  std::vector<Use> uses;
+};
+
+/// An image that steers, with what is averaged by it, first itself. Tasks go from the widest to the narrowest.
 struct Steering {
-  Planes f, variance;
-  std::vector<size_t> order;  // of tasks, from the widest to the narrowest
-  std::vector<Planes> sources;
-  std::vector<size_t> first_source;  // of each task
+  const Image* std_error;
+  std::vector<float> scales;  // of each task, from distances to exponents; 0: four times the exponent before
+  std::vector<Source> sources;
+
+  /// Planes of a tile: the image, its squared errors, and all other sources.
+  int n_planes() const { return 3 + 3 * static_cast<int>(sources.size()); }
+  static int first_plane(size_t source) { return source == 0 ? 0 : 3 + 3 * static_cast<int>(source); }
 };
 
 class Filter {
  public:
   Filter(std::span<const NlMeansSteering> steerings, const Planes* guides, const std::vector<unsigned char>& valid)
-      : width_(steerings[0].image->width),
-        height_(steerings[0].image->height),
-        guides_(guides),
-        mask_(mask_of(valid, width_, height_)),
-        given_(steerings) {
+      : width_(steerings[0].image->width), height_(steerings[0].image->height), guides_(guides), valid_(valid) {
     COVARY_CHECK(!guides_ || guides_->border() >= kNlMeansRadius, "guides have the border that NL-means reads");
-    for (const NlMeansSteering& given : given_) {
-      Steering steering{continued(*given.image, false), continued(*given.std_error, true), {}, {}, {}};
-      for (const NlMeansTask& task : given.tasks) {
-        steering.first_source.push_back(steering.sources.size());
-        for (const Image* source : task.sources) steering.sources.push_back(masked(*source, valid));
-        n_sums_ += 1 + 3 * task.sources.size();
-      }
-      results_.resize(results_.size() + steering.sources.size(), Image(width_, height_, 3));
-      steering.order.resize(given.tasks.size());
-      std::iota(steering.order.begin(), steering.order.end(), 0);
-      std::sort(steering.order.begin(), steering.order.end(),
-                [&](size_t a, size_t b) { return given.tasks[a].bandwidth > given.tasks[b].bandwidth; });
-      steerings_.push_back(std::move(steering));
-    }
+    for (const NlMeansSteering& given : steerings) add_steering(given);
+    images_.resize(results_.size(), Image(width_, height_, 3));
   }
 
   std::vector<Image> run() {
     const int columns = (width_ + kTileWidth - 1) / kTileWidth, rows = (height_ + kTileHeight - 1) / kTileHeight;
+    PerThread<Buffers> buffers;
     parallel_for(columns * rows, [&](int number) {
       const int x = number % columns * kTileWidth, y = number / columns * kTileHeight;
-      filter_tile({x, y, std::min(kTileWidth, width_ - x), std::min(kTileHeight, height_ - y)});
+      filter_tile({x, y, std::min(kTileWidth, width_ - x), std::min(kTileHeight, height_ - y)}, buffers.local());
     });
-    return std::move(results_);
+    return std::move(images_);
   }
 
  private:
-  using Row = std::array<float, Rows::kStride>;
-  /// What is done at once for kAtOnce offsets: sums that are read and written once for all.
+  /// Values of pairs in a row, from the first pair on.
+  struct alignas(sizeof(vfloat)) Row {
+    std::array<float, kRow + sizeof(vfloat) / sizeof(float) + kNlMeansRadius> data;
+    float* begin() { return data.data(); }
+    const float* begin() const { return data.data(); }
+  };
+  using Rows = std::array<Row, kAtOnce>;  // of offsets
+  /// What is done at once for kAtOnce offsets.
   struct Buffers {
-    Row pixels[2];
-    std::array<Rows, kAtOnce> forward, backward;       // distances of pixels, summed over the columns of patches
-    std::array<Rows, kAtOnce> guides;                  // exp(-||q_p - q_(p + o)||^2)
-    std::array<Row, 2 * kAtOnce> likenesses, weights;  // of offset k forward, 2 k, and backward, 2 k + 1
-    std::vector<Rows> totals;                          // per task its weights, per source three channels
+    std::vector<Planes> planes;                     // of each steering
+    Planes mask;                                    // 1 at valid pixels, 0 elsewhere and outside
+    std::array<std::array<Rows, 2>, kBand> guides;  // exp(-||q_p - q_(p + o)||^2), for valid p + o, and for valid p
+    std::array<std::array<Rows, 2>, 2> distances;   // of pixels, summed over three; of even rows and of odd ones
+    std::vector<std::array<Rows, 2>> weights;       // of each task, forward and backward
+    std::vector<float> totals;                      // of each row of the tile
+  };
+  struct Result {
+    size_t total;
+    const Image* source;
+  };
+  /// Offsets (dx, dy) ... (dx + n - 1, dy).
+  struct Offsets {
+    int dx, dy, n;
   };
 
-  /// Distances of the pixels of all pairs that touch the tile, summed over the columns of patches.
-  void column_sums(const Steering& s, const Tile& tile, int dx, int dy, int k, Buffers& b) const {
-    const ptrdiff_t plane = s.f.row(1, 0) - s.f.row(0, 0), there = dy * s.f.stride() + dx;
-    const int left = tile.left(dx), n = tile.right(dx) - left;
-    float *forward = b.pixels[0].data(), *backward = b.pixels[1].data();
-    for (int y = tile.top(dy) - kPatch; y < tile.height + kPatch; ++y) {
-      const ptrdiff_t first = s.f.row(0, tile.y + y) + tile.x + left - kPatch - s.f.row(0, 0);
-      pixel_distances(s.f.row(0, 0) + first, s.variance.row(0, 0) + first, plane, there, n + 2 * kPatch, forward,
-                      backward);
-      float *sums = b.forward[k].row(y) + left, *other_sums = b.backward[k].row(y) + left;
-      for (int x = 0; x < n; x += kLanes) {
-        store(sums + x, load(forward + x) + load(forward + x + 1) + load(forward + x + 2));
-        store(other_sums + x, load(backward + x) + load(backward + x + 1) + load(backward + x + 2));
+  void add_steering(const NlMeansSteering& given) {
+    Steering& s = steerings_.emplace_back(given.std_error);
+    s.sources.push_back({given.image, {}});
+    std::vector<size_t> order(given.tasks.size()), first_result;
+    for (const NlMeansTask& task : given.tasks) {
+      first_result.push_back(results_.size());
+      results_.resize(results_.size() + task.sources.size());
+    }
+    std::iota(order.begin(), order.end(), 0);
+    std::stable_sort(order.begin(), order.end(),
+                     [&](size_t a, size_t b) { return given.tasks[a].bandwidth > given.tasks[b].bandwidth; });
+    for (size_t i = 0; i < order.size(); ++i) {
+      const NlMeansTask& task = given.tasks[order[i]];
+      const bool is_half = i > 0 && given.tasks[order[i - 1]].bandwidth == 2 * task.bandwidth;
+      s.scales.push_back(is_half ? 0 : -kLog2E / (9 * 3 * task.bandwidth * task.bandwidth));
+      for (const Image* image : task.sources) {
+        auto source =
+            std::find_if(s.sources.begin(), s.sources.end(), [&](auto& other) { return other.image == image; });
+        if (source == s.sources.end()) source = s.sources.insert(source, {image, {}});
+        source->uses.push_back({i, kSums * n_totals_});
+        results_[first_result[order[i]]++] = {kSums * n_totals_++, image};
       }
     }
+    n_weights_ = std::max(n_weights_, order.size());
   }
 
-  void guide_likenesses(const Tile& tile, int dx, int dy, Rows& likenesses) const {
-    for (int y = tile.top(dy); y < tile.height; ++y) {
-      float* row = likenesses.row(y);
-      const size_t x0 = static_cast<size_t>(tile.x);
-      for (int x = tile.left(dx); x < tile.right(dx); x += kLanes) {
-        vfloat sum = {};
-        for (int i = 0; guides_ && i < guides_->count(); ++i) {
-          const vfloat difference =
-              load(guides_->row(i, tile.y + y) + x0 + x) - load(guides_->row(i, tile.y + y + dy) + x0 + dx + x);
-          sum += difference * difference;
-        }
-        store(row + x, exp2_of_nonpositive(sum * -kLog2E));
-      }
-    }
-  }
+  float* totals(Buffers& b, int y) const { return b.totals.data() + y * kSums * n_totals_ * kRow; }
 
-  void filter_tile(const Tile& tile) {
+  [[gnu::noinline]] void filter_tile(const Tile& tile, Buffers& b) {
     const FlushTiny flush;
-    thread_local Buffers b;
-    b.totals.resize(n_sums_);
-    for (Rows& total : b.totals) std::fill(total.data.begin(), total.data.end(), 0.0f);
+    b.weights.resize(n_weights_);
+    copy_tile(tile, b);
+    b.totals.resize(tile.height * kSums * n_totals_ * kRow);
     for (int y = 0; y < tile.height; ++y) add_own(tile, y, b);
     const int most_x = std::min(kNlMeansRadius, width_ - 1), most_y = std::min(kNlMeansRadius, height_ - 1);
-    for (int dy = 0; dy <= most_y; ++dy)
-      for (int dx = dy == 0 ? 1 : -most_x; dx <= most_x; dx += kAtOnce) {
-        const int n = std::min(kAtOnce, most_x + 1 - dx);
-        for (int k = 0; k < n; ++k) guide_likenesses(tile, dx + k, dy, b.guides[k]);
-        size_t total = 0;
-        for (const Steering& s : steerings_) {
-          for (int k = 0; k < n; ++k) column_sums(s, tile, dx + k, dy, k, b);
-          for (int y = 0; y < tile.height; ++y) {
-            if (n == kAtOnce)
-              add_row<kAtOnce>(s, tile, y, dx, dy, b, 0, total);
-            else
-              for (int k = 0; k < n; ++k) add_row<1>(s, tile, y, dx + k, dy, b, k, total);
-          }
-          total += s.order.size() + 3 * s.sources.size();
-        }
+    for (int band = std::max(-most_y, -tile.y); band < tile.height; band += kBand)
+      for (int dy = 0; dy <= most_y; ++dy) {
+        const int first = std::max(band, -dy), end = std::min({band + kBand, tile.height, height_ - tile.y - dy});
+        if (first >= end) continue;
+        for (int dx = dy == 0 ? 1 : -most_x; dx <= most_x; dx += kAtOnce)
+          add_pairs(tile, first, end, {dx, dy, std::min(kAtOnce, most_x + 1 - dx)}, b);
       }
-    for (int y = 0; y < tile.height; ++y)
-      for (int x = 0; x < tile.width; ++x) finish(tile, x, y, b);
+    for (int y = 0; y < tile.height; ++y) finish(tile, y, totals(b, y));
+  }
+
+  void copy_tile(const Tile& tile, Buffers& b) const {
+    b.planes.resize(steerings_.size());
+    for (size_t i = 0; i < steerings_.size(); ++i) {
+      const Steering& s = steerings_[i];
+      Planes& planes = b.planes[i];
+      if (planes.count() != s.n_planes()) planes = Planes(kTileWidth, kTileHeight, s.n_planes(), kBorder, 0);
+      COVARY_CHECK(planes.row(1, 0) - planes.row(0, 0) == kPlane && planes.stride() == kStride,
+                   "planes are as assumed");
+      copy_around(tile, *s.std_error, true, 3, planes);
+      for (size_t k = 0; k < s.sources.size(); ++k)
+        copy_around(tile, *s.sources[k].image, false, Steering::first_plane(k), planes);
+    }
+    b.mask = Planes(tile.width, tile.height, 1, kBorder, 0);
+    for (int y = std::max(-kBorder, -tile.y); y < std::min(tile.height + kBorder, height_ - tile.y); ++y)
+      for (int x = std::max(-kBorder, -tile.x); x < std::min(tile.width + kBorder, width_ - tile.x); ++x)
+        b.mask.row(0, y)[x] = valid_[static_cast<size_t>(tile.y + y) * width_ + tile.x + x];
   }
 
   /// The pixels themselves, whose weight is 1.
   void add_own(const Tile& tile, int y, Buffers& b) const {
-    size_t total = 0;
+    const float* const mask = b.mask.row(0, y);
     for (size_t i = 0; i < steerings_.size(); ++i)
-      for (size_t t = 0; t < given_[i].tasks.size(); ++t) {
-        std::copy_n(mask_.row(0, tile.y + y) + tile.x, tile.width, b.totals[total++].row(y));
-        for (size_t source = 0; source < given_[i].tasks[t].sources.size(); ++source)
-          for (int c = 0; c < 3; ++c)
-            std::copy_n(steerings_[i].sources[steerings_[i].first_source[t] + source].row(c, tile.y + y) + tile.x,
-                        tile.width, b.totals[total++].row(y));
-      }
-  }
-
-  /// exp(-max(d, 0) / k^2) for the pixels at n offsets from (dx, dy) on, which are number `first` ... of the buffers,
-  /// and at the opposite ones.
-  template <int n>
-  void find_likenesses(float bandwidth, const Tile& tile, int y, int dx, int dy, Buffers& b, int first) const {
-    const float scale = -kLog2E / (9 * 3 * bandwidth * bandwidth);
-    for (int k = 0; k < n; ++k)
-      for (int direction : {0, 1}) {
-        const Rows& sums = (direction == 0 ? b.forward : b.backward)[first + k];
-        const float* here = direction == 0 ? sums.row(y) : sums.row(y - dy) - (dx + k);
-        float* row = b.likenesses[2 * k + direction].data();
-        for (int x = 0; x < tile.width; x += kLanes) {
-          const vfloat sum = load(here + x - Rows::kStride) + load(here + x) + load(here + x + Rows::kStride);
-          store(row + x, exp2_of_nonpositive(min(sum * scale, vfloat{})));
-        }
-      }
-  }
-
-  /// Adds the pixels at n offsets from (dx, dy) on, and at the opposite ones, to the sums of row y, from number
-  /// `first_total` on.
-  template <int n>
-  void add_row(const Steering& s, const Tile& tile, int y, int dx, int dy, Buffers& b, int first,
-               size_t first_total) const {
-    const std::vector<NlMeansTask>& tasks = given_[static_cast<size_t>(&s - steerings_.data())].tasks;
-    float before = 0;
-    for (const size_t t : s.order) {
-      const float bandwidth = tasks[t].bandwidth;
-      const bool is_half = before == 2 * bandwidth;  // exp(-4 d) = exp(-d)^4
-      if (!is_half && before != bandwidth) find_likenesses<n>(bandwidth, tile, y, dx, dy, b, first);
-      before = bandwidth;
-      size_t total = first_total + t + 3 * s.first_source[t];
-      add_weights<n>(tile, y, dx, dy, is_half, b, first, b.totals[total++].row(y));
-      for (size_t i = 0; i < tasks[t].sources.size(); ++i, total += 3)
-        add_values<n>(s.sources[s.first_source[t] + i], tile, y, dx, dy, b, &b.totals[total]);
-    }
-  }
-
-  template <int n>
-  void add_weights(const Tile& tile, int y, int dx, int dy, bool to_fourth, Buffers& b, int first, float* total) const {
-    const float *guides[2 * n], *there = mask_.row(0, tile.y + y + dy) + tile.x + dx,
-                                *back = mask_.row(0, tile.y + y - dy) + tile.x - dx;
-    for (int k = 0; k < n; ++k)
-      guides[2 * k] = b.guides[first + k].row(y), guides[2 * k + 1] = b.guides[first + k].row(y - dy) - dx - k;
-    for (int x = 0; x < tile.width; x += kLanes) {
-      vfloat sum = load(total + x);
-      for (int m = 0; m < 2 * n; ++m) {
-        vfloat likeness = load(b.likenesses[m].data() + x);
-        if (to_fourth) {
-          likeness *= likeness;
-          likeness *= likeness;
-          store(b.likenesses[m].data() + x, likeness);
-        }
-        const vfloat weight = min(likeness, load(guides[m] + x));
-        store(b.weights[m].data() + x, weight);
-        sum += weight * load(m % 2 == 0 ? there + m / 2 + x : back - m / 2 + x);
-      }
-      store(total + x, sum);
-    }
-  }
-
-  template <int n>
-  void add_values(const Planes& source, const Tile& tile, int y, int dx, int dy, const Buffers& b, Rows* totals) const {
-    const ptrdiff_t plane = source.row(1, 0) - source.row(0, 0);
-    const float *there = source.row(0, tile.y + y + dy) + tile.x + dx,
-                *back = source.row(0, tile.y + y - dy) + tile.x - dx, *weights = b.weights[0].data();
-    float* const sums[] = {totals[0].row(y), totals[1].row(y), totals[2].row(y)};
-    for (int x = 0; x < tile.width; x += kLanes) {
-      vfloat sum[3];
-      for (int c = 0; c < 3; ++c) sum[c] = load(sums[c] + x);
-      for (int k = 0; k < n; ++k) {
-        const vfloat forward = load(weights + 2 * k * Rows::kStride + x);
-        const vfloat backward = load(weights + (2 * k + 1) * Rows::kStride + x);
-        for (int c = 0; c < 3; ++c) {
-          sum[c] += forward * load(there + c * plane + k + x);
-          sum[c] += backward * load(back + c * plane - k + x);
-        }
-      }
-      for (int c = 0; c < 3; ++c) store(sums[c] + x, sum[c]);
-    }
-  }
-
-  void finish(const Tile& tile, int x, int y, Buffers& b) {
-    size_t total = 0, result = 0;
-    for (const NlMeansSteering& given : given_)
-      for (const NlMeansTask& task : given.tasks) {
-        const float weight = b.totals[total++].row(y)[x];
-        for (const Image* source : task.sources) {
-          float* to = results_[result++].pixel(tile.x + x, tile.y + y);
+      for (size_t k = 0; k < steerings_[i].sources.size(); ++k)
+        for (const Source::Use& use : steerings_[i].sources[k].uses) {
+          float* const total = totals(b, y) + use.total * kRow;
           for (int c = 0; c < 3; ++c) {
-            const float sum = b.totals[total++].row(y)[x];
-            to[c] = weight > 0 ? sum / weight : source->pixel(tile.x + x, tile.y + y)[c];
+            const float* const values = b.planes[i].row(Steering::first_plane(k) + c, y);
+            for (int x = 0; x < tile.width; ++x) total[c * kRow + x] = mask[x] * values[x];
           }
+          std::copy_n(mask, tile.width, total + 3 * kRow);
+        }
+  }
+
+  /// What the pairs of rows `first` to `end` - 1 add to both of their pixels.
+  void add_pairs(const Tile& tile, int first, int end, const Offsets& o, Buffers& b) const {
+    for (int y = first; y < end; ++y)
+      for (int k = 0; k < o.n; ++k) find_guide_likenesses(tile, y, o.dx + k, o.dy, k, b.guides[y - first], b);
+    for (size_t i = 0; i < steerings_.size(); ++i)
+      for (int y = first - kPatch; y < end + kPatch; ++y) {
+        const int row = y - kPatch;  // whose patches are complete with this one
+        for (int k = 0; k < o.n; ++k)
+          if (row < first)
+            find_weights<false>(i, tile, y, o.dx + k, o.dy, k, nullptr, b);
+          else
+            find_weights<true>(i, tile, y, o.dx + k, o.dy, k, b.guides[row - first].data(), b);
+        if (row < first) continue;
+        if (row >= 0) add_row(i, tile, row + o.dy, o, 1, totals(b, row), b);
+        if (row + o.dy < tile.height) add_row(i, tile, row, o, -1, totals(b, row + o.dy), b);
+      }
+  }
+
+  void find_guide_likenesses(const Tile& tile, int y, int dx, int dy, int k, std::array<Rows, 2>& likenesses,
+                             const Buffers& b) const {
+    const int left = tile.left(dx), n = tile.n_pairs(dx), count = guides_ ? guides_->count() : 0;
+    const float* const guides = guides_ ? guides_->row(0, tile.y + y) + tile.x + left : nullptr;
+    const ptrdiff_t plane = count > 1 ? guides_->row(1, 0) - guides_->row(0, 0) : 0;
+    const ptrdiff_t there = guides_ ? dy * guides_->stride() + dx : 0;
+    const float *own_mask = b.mask.row(0, y) + left, *other_mask = b.mask.row(0, y + dy) + left + dx;
+    float *forward = likenesses[0][k].begin(), *backward = likenesses[1][k].begin();
+    for (int x = 0; x < n; x += kLanes) {
+      vfloat sum = {};
+      const float* q = guides + x;
+      for (int i = 0; i < count; ++i, q += plane) {
+        const vfloat difference = load(q) - load(q + there);
+        sum += difference * difference;
+      }
+      const vfloat likeness = exp2_of_nonpositive(sum * -kLog2E);
+      store(forward + x, likeness * load(other_mask + x));
+      store(backward + x, likeness * load(own_mask + x));
+    }
+  }
+
+  /// Distances of the pairs of row y, and from them and those of the two rows before the weights of row y - 1: of
+  /// offset number k.
+  template <bool with_weights>
+  [[gnu::noinline]] void find_weights(size_t steering, const Tile& tile, int y, int dx, int dy, int k,
+                                      const Rows* guides, Buffers& b) const {
+    const Planes& planes = b.planes[steering];
+    const int left = tile.left(dx), n = tile.n_pairs(dx);
+    const ptrdiff_t there = dy * kStride + dx;
+    const float *f = planes.row(0, y) + left - kPatch, *variance = planes.row(3, y) + left - kPatch;
+    const float* const guide[] = {with_weights ? guides[0][k].begin() : nullptr,
+                                  with_weights ? guides[1][k].begin() : nullptr};
+    float *before[2], *before_that[2], *weights[2];
+    for (const int direction : {0, 1}) {
+      before[direction] = b.distances[(y + 1) & 1][direction][k].begin();
+      before_that[direction] = b.distances[y & 1][direction][k].begin();
+      weights[direction] = b.weights[0][direction][k].begin();
+    }
+    constexpr size_t kTask = sizeof(b.weights[0]) / sizeof(float);
+    const float* const scales = steerings_[steering].scales.data();
+    const size_t n_tasks = steerings_[steering].scales.size();
+    BothWays pixels = pixel_distances(f, variance, there);
+    for (int x = 0; x < n; x += kLanes) {
+      const int next_x = x + kLanes;
+      BothWays next = pixels;
+      if (next_x < n + 2 * kPatch) next = pixel_distances(f + next_x, variance + next_x, there);
+      const vfloat sums[] = {sum_of_three(pixels.forward, next.forward), sum_of_three(pixels.backward, next.backward)};
+      if constexpr (with_weights) {
+        const vfloat of_guides[] = {load(guide[0] + x), load(guide[1] + x)};
+        const vfloat distances[] = {load(before_that[0] + x) + load(before[0] + x) + sums[0],
+                                    load(before_that[1] + x) + load(before[1] + x) + sums[1]};
+        vfloat likenesses[2];
+        for (size_t i = 0; i < n_tasks; ++i)
+          for (const int direction : {0, 1}) {
+            vfloat& likeness = likenesses[direction];
+            if (i > 0 && scales[i] == 0) {  // exp(-4 d) = exp(-d)^4
+              likeness *= likeness;
+              likeness *= likeness;
+            } else {
+              likeness = exp2_of_nonpositive(min(distances[direction] * scales[i], vfloat{}));
+            }
+            store(weights[direction] + i * kTask + x, min(likeness, of_guides[direction]));
+          }
+      }
+      for (const int direction : {0, 1}) store(before_that[direction] + x, sums[direction]);
+      pixels = next;
+    }
+  }
+
+  /// Adds the pixels of row `from` to the totals of another one: those at the offsets from its pixels, or at the
+  /// opposite ones (sign -1).
+  void add_row(size_t steering, const Tile& tile, int from, const Offsets& o, int sign, float* total,
+               const Buffers& b) const {
+    const Planes& planes = b.planes[steering];
+    const std::vector<Source>& sources = steerings_[steering].sources;
+    for (size_t k = 0; k < sources.size(); ++k) {
+      const float* const values = planes.row(Steering::first_plane(k), from) + sign * o.dx;
+      const std::vector<Source::Use>& uses = sources[k].uses;
+      size_t i = 0;
+      for (; i + 1 < uses.size(); i += 2) add_values<2>(values, tile.width, o, sign, &uses[i], total, b);
+      if (i < uses.size()) add_values<1>(values, tile.width, o, sign, &uses[i], total, b);
+    }
+  }
+
+  /// With the weights of n tasks.
+  template <int n>
+  [[gnu::noinline]] void add_values(const float* values, int width, const Offsets& o, int sign, const Source::Use* uses,
+                                    float* total, const Buffers& b) const {
+    const float* weights[kAtOnce][n];
+    float* sums[n];
+    for (int i = 0; i < n; ++i) {
+      sums[i] = total + uses[i].total * kRow;
+      for (int k = 0; k < o.n; ++k)
+        weights[k][i] =
+            b.weights[uses[i].task][sign > 0 ? 0 : 1][k].begin() + std::max(0, sign * (o.dx + k));  // of column 0
+    }
+    for (int x = 0; x < width; x += kLanes) {
+      vfloat sum[n][kSums];
+      for (int i = 0; i < n; ++i)
+        for (int c = 0; c < kSums; ++c) sum[i][c] = load(sums[i] + c * kRow + x);
+      for (int k = 0; k < o.n; ++k) {
+        vfloat weight[n];
+        for (int i = 0; i < n; ++i) sum[i][3] += weight[i] = load(weights[k][i] + x);
+        for (int c = 0; c < 3; ++c) {
+          const vfloat value = load(values + c * kPlane + sign * k + x);
+          for (int i = 0; i < n; ++i) sum[i][c] += weight[i] * value;
         }
       }
+      for (int i = 0; i < n; ++i)
+        for (int c = 0; c < kSums; ++c) store(sums[i] + c * kRow + x, sum[i][c]);
+    }
+  }
+
+  void finish(const Tile& tile, int y, const float* total) {
+    for (size_t i = 0; i < results_.size(); ++i) {
+      const float *sums = total + results_[i].total * kRow, *weights = sums + 3 * kRow;
+      for (int x = 0; x < tile.width; ++x)
+        for (int c = 0; c < 3; ++c)
+          images_[i].pixel(tile.x + x, tile.y + y)[c] =
+              weights[x] > 0 ? sums[c * kRow + x] / weights[x] : results_[i].source->pixel(tile.x + x, tile.y + y)[c];
+    }
   }
 
   const int width_, height_;
   const Planes* guides_;
-  const Planes mask_;
-  const std::span<const NlMeansSteering> given_;
+  const std::vector<unsigned char>& valid_;
   std::vector<Steering> steerings_;
-  size_t n_sums_ = 0;
-  std::vector<Image> results_;
+  size_t n_totals_ = 0, n_weights_ = 0;
+  std::vector<Result> results_;
+  std::vector<Image> images_;
 };
 
 }  // namespace
