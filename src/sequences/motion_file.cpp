@@ -4,9 +4,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "core/error.h"
@@ -15,14 +17,39 @@
 namespace covary {
 namespace {
 
-/// The names of both channels, or none.
-std::optional<std::array<std::string, 2>> motion_channels(const ExrFile& file, const std::string& layer) {
+/// The layer of this name or, as Blender calls its layers after the view layer, the only one whose last part is.
+std::string layer_of(const ExrFile& file, const std::string& name) {
+  std::set<std::string> found;
+  for (const ExrFile::Channel& channel : file.channels()) {
+    const std::string layer = channel.name.substr(0, std::min(channel.name.rfind('.'), channel.name.size()));
+    if (layer == name || channel.name == name) return name;
+    if (last_part(layer) == name) found.insert(layer);
+  }
+  return found.size() == 1 ? *found.begin() : name;
+}
+
+/// Both channels, and what they are multiplied by.
+struct MotionChannels {
+  std::array<std::string, 2> names;
+  float scale_x, scale_y;
+  bool is_ours = false;
+};
+
+std::optional<MotionChannels> motion_channels(const ExrFile& file, const MotionSource& source) {
+  const std::string layer = layer_of(file, source.motion);
   for (const auto& [x, y] : {std::pair{".X", ".Y"}, {".R", ".G"}, {".U", ".V"}})
-    if (file.find(layer + x) && file.find(layer + y)) return std::array{layer + x, layer + y};
+    if (file.find(layer + x) && file.find(layer + y))
+      return MotionChannels{
+          {layer + x, layer + y}, source.scale_x, source.scale_y, source.motion == MotionSource().motion};
+  // Blender's pass, whose first two channels lead to the frame before, with Y up; the others lead to the next frame.
+  const std::string vector = layer_of(file, "Vector");
+  if (source.motion == MotionSource().motion && file.find(vector + ".X") && file.find(vector + ".W"))
+    return MotionChannels{{vector + ".X", vector + ".Y"}, source.scale_x, -source.scale_y};
   return std::nullopt;
 }
 
-std::optional<std::string> depth_channel(const ExrFile& file, const std::string& layer) {
+std::optional<std::string> depth_channel(const ExrFile& file, const std::string& name) {
+  const std::string layer = layer_of(file, name);
   for (const char* end : {"", ".V", ".Z", ".R", ".Y", ".X"})
     if (file.find(layer + end)) return layer + end;
   return std::nullopt;
@@ -31,15 +58,15 @@ std::optional<std::string> depth_channel(const ExrFile& file, const std::string&
 }  // namespace
 
 bool has_motion(const std::string& path, const MotionSource& source) {
-  return motion_channels(ExrFile(path), source.motion).has_value();
+  return motion_channels(ExrFile(path), source).has_value();
 }
 
 MotionLayers read_motion(const std::string& path, const MotionSource& source) {
   const ExrFile file(path);
   const int width = file.place().window.width, height = file.place().window.height;
   MotionLayers layers{Image(width, height, 1), Image(width, height, 3)};
-  const auto names = motion_channels(file, source.motion);
-  if (!names) {
+  const std::optional<MotionChannels> found = motion_channels(file, source);
+  if (!found) {
     std::vector<std::string> all;
     for (const ExrFile::Channel& channel : file.channels()) all.push_back(channel.name);
     throw Error(ErrorCode::kInput, fmt::format("{}: no layer '{}' of motion; there are the channels {}", path,
@@ -49,17 +76,17 @@ MotionLayers read_motion(const std::string& path, const MotionSource& source) {
   const auto add = [&](const std::string& name, Image& image, int channel) {
     planes.push_back({name, ExrPlane::Type::kFloat, image.data.data() + channel, image.channels * sizeof(float)});
   };
-  for (const int c : {0, 1}) add((*names)[c], layers.motion, c);
+  for (const int c : {0, 1}) add(found->names[c], layers.motion, c);
   const std::optional<std::string> depth = depth_channel(file, source.depth);
   if (depth) add(*depth, layers.depth, 0);
   const std::string change = source.motion + ".Z";
-  const bool has_change = source.motion == MotionSource().motion && file.find(change);
+  const bool has_change = found->is_ours && file.find(change);
   if (has_change) add(change, layers.motion, 2);
   file.read(planes);
   layers.knows_depth = depth && has_change;
   for (size_t i = 0; i < layers.motion.data.size(); i += 3) {
-    layers.motion.data[i] *= source.scale_x;
-    layers.motion.data[i + 1] *= source.scale_y;
+    layers.motion.data[i] *= found->scale_x;
+    layers.motion.data[i + 1] *= found->scale_y;
   }
   return layers;
 }

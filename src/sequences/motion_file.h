@@ -10,8 +10,10 @@ namespace covary {
 
 /// Which layers tell motion, and how they mean it.
 struct MotionSource {
-  std::string motion = "Motion";  ///< layer of two channels or more: .X .Y, or .R .G, or .U .V
-  std::string depth = "Depth";    ///< a channel, or a layer of one: .V, .Z, .R, .Y or .X; left out where there is none
+  /// Layer of two channels or more: .X .Y, or .R .G, or .U .V. Names may lack what stands before the last dot, as
+  /// Blender's view layer. Where there is no Motion, Blender's Vector is taken, as Blender means it.
+  std::string motion = "Motion";
+  std::string depth = "Depth";  ///< a channel, or a layer of one: .V, .Z, .R, .Y or .X; left out where there is none
   /// What the values are multiplied by, so that they are pixels to the right and down from a pixel to where its point
   /// was in the frame before.
   float scale_x = 1, scale_y = 1;

@@ -57,6 +57,23 @@ TEST_F(MotionFile, OfOthersIsScaled) {
   EXPECT_EQ(*flat.depth.pixel(0, 0), 0);
 }
 
+TEST_F(MotionFile, OfBlenderIsFoundAndTurned) {
+  const MotionLayers layers = read_motion(file({{"ViewLayer.Vector.X", 2},
+                                                {"ViewLayer.Vector.Y", 3},
+                                                {"ViewLayer.Vector.Z", 8},
+                                                {"ViewLayer.Vector.W", 9},
+                                                {"ViewLayer.Depth.Z", 4}}),
+                                          {});
+  EXPECT_EQ(layers.motion.pixel(0, 0)[0], 2);
+  EXPECT_EQ(layers.motion.pixel(0, 0)[1], -3) << "Y is up there";
+  EXPECT_EQ(layers.motion.pixel(0, 0)[2], 0);
+  EXPECT_EQ(*layers.depth.pixel(0, 0), 4);
+  EXPECT_FALSE(layers.knows_depth);
+  const std::string two = file({{"A.Vector.X", 2}, {"A.Vector.Y", 3}, {"B.Vector.X", 2}, {"B.Vector.Y", 3}});
+  EXPECT_FALSE(has_motion(two, {"Vector", "Depth", 1, 1})) << "which of both?";
+  EXPECT_TRUE(has_motion(two, {"B.Vector", "Depth", 1, 1}));
+}
+
 TEST_F(MotionFile, WithoutMotionIsAnError) {
   try {
     read_motion(file({{"R", 1}, {"Vector.X", 2}}), {});
