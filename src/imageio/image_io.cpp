@@ -38,8 +38,9 @@ const LoadedModule& find_image_module() {
   static const LoadedModule loaded = []() -> LoadedModule {
     void* library = dlopen(kImageModuleFile, RTLD_NOW | RTLD_LOCAL);
     if (!library)
-      return {nullptr, fmt::format("only EXR, PNG and JPEG are read without OpenImageIO and the module {}: {}",
-                                   kImageModuleFile, dlerror())};
+      return {nullptr,
+              fmt::format("without OpenImageIO only EXR, PNG and JPEG are read, EXR and PNG written (module {}: {})",
+                          kImageModuleFile, dlerror())};
     using Entry = const ImageModule* (*)();
     const auto entry = reinterpret_cast<Entry>(dlsym(library, kImageModuleEntry));
     if (!entry) return {nullptr, fmt::format("the module {} belongs to another version of covary", kImageModuleFile)};
