@@ -308,8 +308,7 @@ CombineOptions frame_options(const CombineOptions& o, int frame) {
   CombineOptions one = o;
   for (std::vector<std::string>* files : {&one.crn, &one.independent})
     for (std::string& path : *files) path = frame_name(path, frame);
-  for (std::string* path : {&one.light, &one.counts, &one.guides})
-    if (is_frame_pattern_of_input(*path)) *path = frame_name(*path, frame);
+  for (std::string* path : {&one.light, &one.counts, &one.guides}) *path = file_of_frame(*path, frame);
   one.output = frame_name(one.output, frame);
   if (is_frame_pattern(one.json)) one.json = frame_name(one.json, frame);
   return one;

@@ -37,13 +37,9 @@ struct ComparedSequence {
   }
 };
 
-std::string of_frame(const std::string& pattern, int frame) {
-  return is_frame_pattern_of_input(pattern) ? frame_name(pattern, frame) : pattern;
-}
-
 std::vector<std::string> references_of(const CompareOptions& o, int frame) {
-  std::vector<std::string> paths{of_frame(o.reference, frame)};
-  if (!o.reference2.empty()) paths.push_back(of_frame(o.reference2, frame));
+  std::vector<std::string> paths{file_of_frame(o.reference, frame)};
+  if (!o.reference2.empty()) paths.push_back(file_of_frame(o.reference2, frame));
   return paths;
 }
 

@@ -122,6 +122,10 @@ std::vector<int> frames_of(const std::string& text, const std::string& pattern) 
   return range.numbers();
 }
 
+std::string file_of_frame(const std::string& path, int frame) {
+  return is_frame_pattern_of_input(path) ? frame_name(path, frame) : path;
+}
+
 bool are_frames(const FrameOptions& o, const FramePatterns& patterns) {
   if (patterns.images.empty() || !is_frame_pattern_of_input(patterns.images[0])) {
     if (!o.frames.empty()) usage("--frames: the input has no '#' for the frame's number");

@@ -27,6 +27,9 @@ void add_frame_options(CLI::App& command, FrameOptions& options, const std::stri
 /// Error(kUsage), and Error(kInput) where there are none.
 std::vector<int> frames_of(const std::string& frames, const std::string& pattern);
 
+/// The file of a frame; where the path has no '#', or is a file's whole name, that of all frames.
+std::string file_of_frame(const std::string& path, int frame);
+
 /// Files of frames, by patterns.
 struct FramePatterns {
   std::vector<std::string> images;  ///< each with samples of its own

@@ -22,11 +22,13 @@
 #include "core/error.h"
 #include "film/image_file.h"
 #include "film/outputs.h"
+#include "frame_files.h"
 #include "metrics/alignment.h"
 #include "metrics/metrics.h"
 #include "numbers.h"
 #include "report/report.h"
 #include "risk/predicted_error.h"
+#include "sequences/frame_names.h"
 #include "value_names.h"
 
 extern char** environ;
@@ -40,8 +42,11 @@ constexpr size_t kMostLayers = 100;  // of a file
 
 struct ViewOptions {
   std::vector<std::string> images, insets;
-  std::string reference, layer, output, title;
+  std::string reference, layer, output, title, frames;
+  double fps = 24;
   bool small = false;
+
+  bool is_sequence() const { return is_frame_pattern_of_input(images[0]); }
 };
 
 /// An image as the page shows it.
@@ -51,9 +56,9 @@ struct Shown {
   bool is_reference = false;
 };
 
-/// The shortest ends of the paths that differ from each other: "a/pt.exr" and "b/pt.exr", but "pt" where it is alone.
 constexpr double kPixels = 3 * sizeof(float);  // bytes per pixel
 
+/// The shortest ends of the paths that differ from each other: "a/pt.exr" and "b/pt.exr", but "pt" where it is alone.
 void name_images(std::vector<Shown>& images) {
   for (Shown& image : images) image.name = fs::path(image.path).stem().string();
   for (Shown& image : images) {
@@ -62,6 +67,21 @@ void name_images(std::vector<Shown>& images) {
     };
     if (std::any_of(images.begin(), images.end(), same)) image.name = image.path;
   }
+}
+
+/// The same of frames, whose names are those of the sequences: "pt" of "pt_####.exr".
+void name_frames(const ViewOptions& options, int frame, std::vector<Shown>& images) {
+  std::vector<std::string> patterns = options.images;
+  if (!options.reference.empty()) patterns.push_back(options.reference);
+  std::vector<Shown> sequences;
+  for (const std::string& pattern : patterns) sequences.push_back({pattern, "", {}});
+  name_images(sequences);
+  for (Shown& image : images)
+    for (const Shown& sequence : sequences)
+      if (file_of_frame(sequence.path, frame) == image.path) {
+        image.name = sequence.name;
+        while (image.name.size() > 1 && std::strchr("#_-.", image.name.back())) image.name.pop_back();
+      }
 }
 
 std::vector<Shown> read_images(const ViewOptions& options) {
@@ -196,7 +216,8 @@ nlohmann::ordered_json Page::add(const Shown& image, const std::string& layer) {
     entry["label"] = "reference";
   else
     add_errors(image, pixels, entry);
-  images.push_back({image.path, std::move(pixels)});
+  const auto is_it = [&](const ReportImage& other) { return other.id == image.path; };  // an image of all frames
+  if (std::none_of(images.begin(), images.end(), is_it)) images.push_back({image.path, std::move(pixels)});
   return entry;
 }
 
@@ -220,19 +241,59 @@ std::vector<std::string> warnings_of(const ViewOptions& options) {
   return all;
 }
 
-void write_page(const ViewOptions& options, const std::string& path) {
-  const std::vector<Shown> shown = read_images(options);
-  Page page{window_of_all(shown), options.small};
+/// Adds images of one frame to the page: a scene of its comparer, with the images' names as its name.
+nlohmann::ordered_json add_scene(const ViewOptions& options, std::optional<int> frame, Page& page) {
+  ViewOptions one = options;
+  if (frame) {
+    for (std::string& path : one.images) path = file_of_frame(path, *frame);
+    if (!one.reference.empty()) one.reference = file_of_frame(one.reference, *frame);
+  }
+  std::vector<Shown> shown = read_images(one);
+  if (frame) name_frames(options, *frame, shown);
+  page.window = window_of_all(shown);
+  page.reference.reset();
   for (const Shown& image : shown)
     if (!(image.source.place.window == page.window))
       fmt::print(stderr, "covary: {}: shown are the pixels in common, {}\n", image.path, text_of(page.window));
-  const std::vector<std::string> warnings = warnings_of(options);
   nlohmann::ordered_json entries = nlohmann::ordered_json::array(), insets = nlohmann::ordered_json::array();
   for (const Shown& image : shown) entries.push_back(page.add(image, options.layer));
   for (const std::string& inset : options.insets) insets.push_back(parse_inset(inset, page.window));
-  const std::string title = options.title.empty() ? names_of(shown) : options.title;
-  const nlohmann::ordered_json scene{{"name", title}, {"images", entries}, {"insets", insets}};
-  const nlohmann::ordered_json block{{"type", "comparer"}, {"id", "view"}, {"scenes", {scene}}};
+  return {{"name", names_of(shown)}, {"images", entries}, {"insets", insets}};
+}
+
+/// Frames as scenes of the comparer, which plays them; all must fit in memory.
+nlohmann::ordered_json add_frames(const ViewOptions& options, Page& page) {
+  const std::vector<int> frames = frames_of(options.frames, options.images[0]);
+  page.small = true;
+  nlohmann::ordered_json scenes = nlohmann::ordered_json::array();
+  for (const int frame : frames) {
+    scenes.push_back(add_scene(options, frame, page));
+    scenes.back()["name"] = fmt::format("frame {}", frame);
+    double bytes = 0;
+    for (const ReportImage& image : page.images) bytes += static_cast<double>(image.pixels.data.size()) * sizeof(float);
+    const double pixels = static_cast<double>(page.window.width) * page.window.height;
+    require_image_memory(file_of_frame(options.images[0], frame), page.window.width, page.window.height,
+                         2 * bytes / pixels);
+  }
+  return scenes;
+}
+
+void write_page(const ViewOptions& options, const std::string& path) {
+  Page page{{}, options.small};
+  nlohmann::ordered_json block{{"type", "comparer"}, {"id", "view"}};
+  std::vector<std::string> warnings;
+  std::string title = options.title;
+  if (options.is_sequence()) {
+    block["fps"] = options.fps;
+    block["scenes"] = add_frames(options, page);
+    if (title.empty()) title = fmt::format("{}", fmt::join(options.images, ", "));
+  } else {
+    nlohmann::ordered_json scene = add_scene(options, std::nullopt, page);
+    warnings = warnings_of(options);
+    if (title.empty()) title = scene["name"];
+    scene["name"] = title;
+    block["scenes"] = {scene};
+  }
   nlohmann::ordered_json section{{"id", "images"}, {"blocks", {block}}};
   if (!warnings.empty()) section["blocks"].push_back({{"type", "notes"}, {"kind", "warning"}, {"items", warnings}});
   write_report(path, {{"title", title}, {"sections", {section}}}, page.images);
@@ -260,10 +321,23 @@ bool open_in_browser(const std::string& path) {
          waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
 
+/// Throws Error(kUsage) where only some of the images are frames.
+void check_frames(const ViewOptions& options) {
+  for (const std::string& path : options.images)
+    if (is_frame_pattern_of_input(path) != options.is_sequence())
+      throw Error(ErrorCode::kUsage,
+                  fmt::format("'{}' and '{}': either all images are names with '#', or none", options.images[0], path));
+  if (!options.is_sequence() && !options.frames.empty())
+    throw Error(ErrorCode::kUsage, "--frames is about frames, whose names have a '#' for the number");
+}
+
 void view(const ViewOptions& options) {
+  check_frames(options);
   Outputs outputs;
-  outputs.reads(options.images);
-  if (!options.reference.empty()) outputs.reads(options.reference);
+  std::vector<std::string> read = options.images;
+  if (!options.reference.empty()) read.push_back(options.reference);
+  for (const int frame : options.is_sequence() ? frames_of(options.frames, options.images[0]) : std::vector{0})
+    for (const std::string& path : read) outputs.reads(file_of_frame(path, frame));
   if (!options.output.empty()) {
     outputs.writes("-o", options.output, OutputKind::kPage);
     return write_page(options, options.output);
@@ -287,7 +361,10 @@ void view(const ViewOptions& options) {
 void add_view(CLI::App& app) {
   const auto o = std::make_shared<ViewOptions>();
   CLI::App* command = app.add_subcommand("view", "Compare images in the browser: one page without a network");
-  command->add_option("IMAGES", o->images, "Images of any renderer (EXR, PNG, HDR, PFM, …), all of one frame")
+  command
+      ->add_option("IMAGES", o->images,
+                   "Images of any renderer (EXR, PNG, HDR, PFM, …), all of one frame; or sequences, out_####.exr, "
+                   "to be played side by side")
       ->type_name(kFileValue)
       ->required();
   command->add_option("-r,--reference", o->reference, "Shows errors relative to this image")->type_name(kFileValue);
@@ -302,6 +379,11 @@ void add_view(CLI::App& app) {
   command->add_flag(
       "--small", o->small,
       "Leave out FLIP and the other layers of the files (StdError, Albedo, N, …): a smaller page, sooner");
+  command->add_option("--frames", o->frames, "Of out_####.exr: these frames; default: those there are")
+      ->type_name("FIRST-LAST");
+  command->add_option("--fps", o->fps, "Frames per second at which a sequence is played")
+      ->check(positive_number())
+      ->capture_default_str();
   command->add_option("--title", o->title, "Title of the page; default: the images' names")->type_name("TITLE");
   command->callback([o] { view(*o); });
 }

@@ -6,7 +6,8 @@
     covary denoise a_####.exr b_####.exr -o out_####.exr
 
 Mitsuba has no layer of motion: the layers Motion and Depth are made here of the positions that it gives, for a scene in
-which the camera alone moves. Needs numpy. Between keys the matrices are interpolated linearly, so keys should be near.
+which the camera alone moves. Needs numpy. Between keys rotations are interpolated nearly evenly, not exactly as covary
+does.
 """
 import json
 import sys
@@ -22,7 +23,11 @@ def camera_at(path, time):
     keys = path["keyframes"]
     matrices = [numpy.array(key["to_world"], float).reshape(4, 4) for key in keys]
     times = [key["time"] for key in keys]
-    return numpy.array([[numpy.interp(time, times, [m[i, j] for m in matrices]) for j in range(4)] for i in range(4)])
+    matrix = numpy.array([[numpy.interp(time, times, [m[i, j] for m in matrices]) for j in range(4)]
+                          for i in range(4)])
+    left, _, right = numpy.linalg.svd(matrix[:3, :3])
+    matrix[:3, :3] = left @ right  # the nearest rotation
+    return matrix
 
 
 def projected(points, to_world, width, height, fov):

@@ -112,9 +112,10 @@ std::string styles() {
 std::string scripts() {
   using namespace report_files;
   std::string text;
-  append(text, {"(() => {", "\"use strict\";", dom_js,      format_js,   images_js, tone_js,   colour_js, ssim_js,
-                views_js,   link_js,           viewport_js, painter_js,  stage_js,  insets_js, figure_js, histogram_js,
-                readout_js, controls_js,       gestures_js, comparer_js, table_js,  plot_js,   page_js,   "})();"});
+  append(text, {"(() => {", "\"use strict\";", dom_js,     format_js,   images_js,   tone_js,     colour_js,
+                ssim_js,    views_js,          link_js,    viewport_js, painter_js,  stage_js,    insets_js,
+                figure_js,  histogram_js,      readout_js, frames_js,   controls_js, gestures_js, comparer_js,
+                table_js,   plot_js,           page_js,    "})();"});
   return text;
 }
 

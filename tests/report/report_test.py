@@ -646,6 +646,33 @@ class View(PageTest):
             "document.querySelector(`[data-value=${m}]`).disabled)"),
                          [True, True, False])
 
+    def test_sequences_play_and_keep_what_is_chosen(self):
+        for frame in (1, 2, 3):
+            self.write(f"a_{frame:02}.exr", frame / 4), self.write(f"b_{frame:02}.exr", 0.1)
+        result = self.covary("a_##.exr", "b_##.exr", "-r", "b_02.exr", "-o", "play.html", "--fps", "5")
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        self.open_page("play.html", "#mode=error&layout=single")
+        shown = "document.querySelector('canvas').ariaLabel"
+        self.assertIn("frame 1: a (relMSE", self.page.evaluate(shown))
+        slider, play = "[aria-label=Frame]", "document.querySelector('[title^=\"Play\"]').innerText"
+        self.page.evaluate(f"(() => {{ const s = document.querySelector('{slider}'); s.value = 2;"
+            "s.dispatchEvent(new Event('input')); })()")
+        self.assertIn("frame 3: a (relMSE", self.page.evaluate(shown))
+        self.assertIn("error", self.page.evaluate(shown), "the view stays")
+        self.page.key("k")
+        self.assertEqual(self.page.evaluate(play), "Stop")
+        for frame in (1, 2, 3, 1):  # begins again after the last one
+            self.page.wait(f"{shown}.startsWith('frame {frame}:')")
+        self.page.key("k")
+        self.assertEqual(self.page.evaluate(play), "Play")
+        self.assertEqual(self.covary("a_##.exr", "-o", "one.html", "--frames", "2-3").returncode, 0)
+        self.open_page("one.html")
+        self.assertEqual(self.page.evaluate("[...document.querySelector('[aria-label=Scene]').options].map(o => "
+            "o.value)"), ["frame 2", "frame 3"])
+        self.assertIn("either all images are names with '#', or none",
+            self.covary("a_##.exr", "a_01.exr", "-o", "two.html").stderr)
+        self.assertIn("--frames is about frames", self.covary("a_01.exr", "-o", "two.html", "--frames", "1").stderr)
+
     def middle(self):
         left, top, width, height = self.page.box(".stage")
         return left + width / 2, top + height / 2

@@ -71,6 +71,13 @@ class Comparer {
     this.update({ scene: index, a, b, layout: images.length > 1 ? "split" : "single" });
   }
 
+  /** Another frame of the same images: what else is chosen stays. */
+  show_frame(index) {
+    this.painter.clear();
+    this.loaded_ahead = new Set();
+    this.update({ scene: index });
+  }
+
   /** Changes the state and everything that shows it. */
   update(changes = {}) {
     const next = { ...this.state, ...changes };

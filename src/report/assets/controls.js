@@ -23,6 +23,7 @@ const KEYS = [
   ["[, ]", "move the split"],
   ["N", "draw an inset; Enter takes the middle of the view, Esc gives up"],
   ["P", "save the figure with all insets as PNG"],
+  ["K", "play or stop the frames of a sequence"],
 ];
 
 const label_with_note = ({ label, note }) => [label, note].filter(Boolean).join(", ");
@@ -32,7 +33,9 @@ class Controls {
   constructor(comparer) {
     this.comparer = comparer;
     const update = (changes) => comparer.update(changes);
-    this.scene = el("select", { "aria-label": "Scene", change: () => comparer.choose_scene(this.scene.selectedIndex) },
+    this.player = comparer.block.fps ? new FramePlayer(comparer) : null;
+    const choose_scene = (index) => (this.player ? comparer.show_frame(index) : comparer.choose_scene(index));
+    this.scene = el("select", { "aria-label": "Scene", change: () => choose_scene(this.scene.selectedIndex) },
       comparer.block.scenes.map((scene) => el("option", {}, scene.name)));
     this.mode = segmented("View", VIEW_BUTTONS.map((mode) => [mode, VIEWS[mode].name, view_hint(VIEWS[mode])]),
       (mode) => update({ mode }));
@@ -68,8 +71,8 @@ class Controls {
       change: () => update({ b: this.other.selectedIndex }) });
     this.other_label = el("label", { class: "other" }, "Right: ", this.other);
     this.head = el("div", { class: "head" },
-      el("div", { class: "bar" }, comparer.block.scenes.length > 1 && this.scene || null, this.layout.group,
-        this.methods, this.other_label),
+      el("div", { class: "bar" }, comparer.block.scenes.length > 1 && this.scene || null, this.player?.element,
+        this.layout.group, this.methods, this.other_label),
       el("div", { class: "bar" }, this.mode.group, this.layer, this.tone,
         el("label", { class: "stops" }, this.stops_name, this.stops, this.stops_value), tools), this.help);
     this.handle = el("div", { class: "handle", role: "slider", tabindex: "0", "aria-label": "Split position",
@@ -82,6 +85,7 @@ class Controls {
   show() {
     const { state, images, scene, painter } = this.comparer;
     if (this.shown_scene !== scene) this.show_scene(scene, images);
+    this.player?.show();
     this.layout.show(state.layout);
     this.mode.show(state.mode);
     this.mode.buttons.forEach((button) => {

@@ -152,7 +152,8 @@ class Gestures {
       arrowleft: () => pan(1, 0), arrowright: () => pan(-1, 0), arrowup: () => pan(0, 1), arrowdown: () => pan(0, -1),
       "[": () => comparer.update({ split: state.split - 0.02 }),
       "]": () => comparer.update({ split: state.split + 0.02 }),
-      n: () => this.toggle_drawing(), p: () => controls.save(), "?": () => controls.help.showModal(),
+      n: () => this.toggle_drawing(), k: () => controls.player?.toggle(),
+      p: () => controls.save(), "?": () => controls.help.showModal(),
     };
     for (const mode of VIEW_BUTTONS) actions[VIEWS[mode].key] = () => comparer.update({ mode });
     if (this.drawing) {
