@@ -15,6 +15,7 @@
 #include "core/memory_limit.h"
 #include "imageio/exr_header.h"
 #include "imageio/exr_image.h"
+#include "imageio/hdr.h"
 #include "imageio/image_module.h"
 #include "imageio/jpeg.h"
 #include "imageio/png.h"
@@ -38,9 +39,10 @@ const LoadedModule& find_image_module() {
   static const LoadedModule loaded = []() -> LoadedModule {
     void* library = dlopen(kImageModuleFile, RTLD_NOW | RTLD_LOCAL);
     if (!library)
-      return {nullptr,
-              fmt::format("without OpenImageIO only EXR, PNG and JPEG are read, EXR and PNG written (module {}: {})",
-                          kImageModuleFile, dlerror())};
+      return {
+          nullptr,
+          fmt::format("without OpenImageIO only EXR, PNG, JPEG and HDR are read, EXR and PNG written (module {}: {})",
+                      kImageModuleFile, dlerror())};
     using Entry = const ImageModule* (*)();
     const auto entry = reinterpret_cast<Entry>(dlsym(library, kImageModuleEntry));
     if (!entry) return {nullptr, fmt::format("the module {} belongs to another version of covary", kImageModuleFile)};
@@ -57,8 +59,9 @@ const ImageModule& image_module() {
 
 /// A file of the formats of textures; nullptr where it is another, or of a kind that OpenImageIO alone reads.
 std::unique_ptr<ImageReader> open_plain_image(const std::string& path) {
-  auto reader = open_plain_png(path);
-  return reader ? std::move(reader) : open_plain_jpeg(path);
+  for (const auto open : {open_plain_png, open_plain_jpeg, open_plain_hdr})
+    if (auto reader = open(path)) return reader;
+  return nullptr;
 }
 
 /// Bytes of the file; throws where it is not a regular file that can be opened.

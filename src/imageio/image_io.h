@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Image files in every format OpenImageIO knows. OpenImageIO brings some 250 shared libraries, which take longer to
 // load than a small scene to render. So it lies behind a shared module, libcovary_imageio.so, which is loaded when a
-// function of this header needs it. EXR files of ordinary channels, films, textures in PNG and JPEG, and PNG files that
-// are written do not: imageio/exr_image.h, film/exr.h, imageio/png.h, imageio/jpeg.h.
+// function of this header needs it. EXR files of ordinary channels, films, textures in PNG, JPEG and HDR, and PNG files
+// that are written do not: imageio/exr_image.h, film/exr.h, imageio/png.h, imageio/jpeg.h, imageio/hdr.h.
 #pragma once
 
 #include <cstdint>
@@ -64,8 +64,8 @@ class ImageReader {
   std::vector<T> read_part(const Part& part);
 };
 
-/// Colours that a file does not store as RGB, such as CMYK. kKeep is for textures: PNG and JPEG files then have no
-/// attributes, as they have none anyway where the module is missing.
+/// Colours that a file does not store as RGB, such as CMYK. kKeep is for textures: PNG, JPEG and HDR files then have
+/// no attributes, as they have none anyway where the module is missing.
 enum class OtherColours { kConvert, kKeep };
 
 /// Opens the first picture of a file. Throws Error with the file's name: kIo when it cannot be opened, kInput when it

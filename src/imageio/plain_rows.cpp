@@ -30,7 +30,8 @@ class PlainReader final : public ImageReader {
     header_.format = format;
     header_.width = header_.frame_width = rows->width;
     header_.height = header_.frame_height = rows->height;
-    header_.type = rows->bytes_per_value == 2 ? "uint16" : "uint8";
+    header_.floating_point = rows->bytes_per_value == sizeof(float);
+    header_.type = header_.floating_point ? "float" : rows->bytes_per_value == 2 ? "uint16" : "uint8";
     header_.channels = rows->channels < 3 ? std::vector<std::string>{"Y"} : std::vector<std::string>{"R", "G", "B"};
     if (rows->channels % 2 == 0) {
       header_.alpha_channel = rows->channels - 1;
@@ -40,6 +41,7 @@ class PlainReader final : public ImageReader {
 
  private:
   bool read(const Part& part, float* values, std::string& problem) override {
+    if (header_.floating_point) return read_as<float>(part, values, problem);
     return header_.type == "uint16" ? read_as<uint16_t>(part, values, problem)
                                     : read_as<uint8_t>(part, values, problem);
   }

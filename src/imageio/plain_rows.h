@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Image files whose rows a small library reads from the top down: what png.h and jpeg.h share.
+// Image files whose rows a small library reads from the top down: what png.h, jpeg.h and hdr.h share.
 #pragma once
 
 #include <cstdint>
@@ -12,10 +12,10 @@
 
 namespace covary {
 
-/// An open file behind its header. Functions throw Error where it is damaged.
+/// An open file behind its header: integers, or linear floats. Functions throw Error where it is damaged.
 struct PlainRows {
   virtual ~PlainRows() = default;
-  /// The next row: width * channels values of 8 bits, or 16 in this machine's order.
+  /// The next row: width * channels values of 8 bits, or of 16 or floats in this machine's order.
   virtual void read_row(uint8_t* row) = 0;
   int width = 0, height = 0, channels = 0;  ///< 1: grey, 2: grey and alpha, 3: RGB, 4: RGB and alpha
   int bytes_per_value = 1;

@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// PNG and JPEG files as textures read them, against OpenImageIO's reading: the same bits.
+// PNG, JPEG and HDR files as textures read them, against OpenImageIO's reading: the same bits.
 #include "imageio/plain_rows.h"
 
 #include <gtest/gtest.h>
 #include <png.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 
 #include "core/error.h"
+#include "imageio/hdr.h"
 #include "imageio/jpeg.h"
 #include "imageio/png.h"
 #include "support/files.h"
@@ -102,6 +104,23 @@ TEST(PlainRows, JpegIsWhatOpenImageIoReads) {
     }
 }
 
+TEST(PlainRows, HdrIsWhatOpenImageIoReads) {
+  const TemporaryFolder folder;
+  const std::string path = folder.file("a.hdr");
+  const std::vector<uint8_t> bits = noise(size_t{2} * kWidth * kHeight * 3);
+  std::vector<float> values(size_t{kWidth} * kHeight * 3);
+  for (size_t i = 0; i < values.size(); ++i)  // runs of equal pixels, black ones, and all exponents
+    values[i] = i < 60 ? 0 : i < 150 ? 0.7f : std::ldexp(static_cast<float>(bits[2 * i]), bits[2 * i + 1] / 2 - 64);
+  ImageToEncode image{kWidth, kHeight};
+  image.floats = values.data();
+  const std::vector<unsigned char> content = encode_image("hdr", image);
+  std::ofstream(path, std::ios::binary).write(reinterpret_cast<const char*>(content.data()), std::ssize(content));
+  expect_same_as_openimageio(open_plain_hdr(path).get(), path);
+  std::filesystem::resize_file(path, content.size() - 5);
+  const auto reader = open_plain_hdr(path);
+  EXPECT_TRUE(contains(message_of([&] { reader->read_floats(0, 3); }), "damaged or incomplete image: it ends early"));
+}
+
 /// Textures are read by these; what they leave is left to OpenImageIO.
 TEST(PlainRows, DamagedFilesAreNamedAndOthersLeft) {
   const TemporaryFolder folder;
@@ -117,6 +136,7 @@ TEST(PlainRows, DamagedFilesAreNamedAndOthersLeft) {
     std::ofstream(path, std::ios::binary | std::ios::trunc) << "P6\n1 1\n255\nabc";
     EXPECT_FALSE(open_plain_png(path));
     EXPECT_FALSE(open_plain_jpeg(path));
+    EXPECT_FALSE(open_plain_hdr(path));
     EXPECT_FALSE(open_plain_png(folder.file("missing")));
   }
 }

@@ -90,16 +90,16 @@ class Environment(OddTest):
         self.good(*RENDER, "-o", "o.exr", "--quiet", env={})
 
     def test_textures_without_openimageio(self):
-        """PNG and JPEG; the loader tells which libraries are opened."""
+        """PNG, JPEG, HDR; the loader tells which libraries are opened."""
         self.good(*RENDER[:-1], "-o", "o.exr", "--quiet")
-        for name in ("t.png", "t.jpg", "t.hdr"):
+        for name in ("t.png", "t.jpg", "t.hdr", "t.tif"):
             self.good("convert", "o.exr", name)
             self.write("scene.xml", SCENE.replace(b'<rgb name="radiance" value="1"/>', b"""
                 <texture type="bitmap" name="radiance"><string name="filename" value="%s"/></texture>"""
                                                   % name.encode()))
             result = self.good(*RENDER, "-o", "t.exr", "--overwrite", env={**os.environ, "LD_DEBUG": "files"})
             self.assertIn("file=libembree", result.stderr)
-            self.assertEqual("file=libOpenImageIO" in result.stderr, name == "t.hdr", name)
+            self.assertEqual("file=libOpenImageIO" in result.stderr, name == "t.tif", name)
 
     def test_too_little_memory_for_the_ray_tracer(self):
         if SLOWDOWN > 1:

@@ -82,7 +82,7 @@ class Wheel(PackageTest):
         self.bare("fresh/bin/covary", "convert", "room.png", "again.exr")
         with self.assertRaises(subprocess.CalledProcessError) as refused:
             self.bare("fresh/bin/covary", "convert", "room.png", "again.tif")
-        self.assertIn("without OpenImageIO only EXR, PNG and JPEG are read", refused.exception.stderr)
+        self.assertIn("without OpenImageIO only EXR, PNG, JPEG and HDR are read", refused.exception.stderr)
         self.check_metadata(wheel)
         self.check_licences(wheel)
         linked = self.bare("ldd", *(self.path / "fresh").glob("lib/python*/site-packages/covary/_covary*.so"))
