@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <deque>
 #include <filesystem>
 #include <functional>
 #include <limits>
@@ -53,15 +54,14 @@ Estimator estimator_of(const CombineOptions& o) {
   return with_denoising(make_estimator(o.estimator, o.of_estimator), o.denoising);
 }
 
-void write(const CombineOptions& o, const CombineRequest& request, EstimatorResult& result) {
+void write(const CombineOptions& o, const CombineRequest& request, CombinedImage& combined) {
   std::map<std::string, std::string> attributes = {{"covary:estimator", estimator_of(o).text},
                                                    {"covary:version", COVARY_VERSION},
                                                    {"covary:command", command_line()}};
   const double crn = request.crn ? request.crn->samples : 0, independent = request.independent.samples;
   if ((crn > 0 || !request.crn) && independent > 0) attributes["covary:samples"] = fmt::to_string(crn + independent);
-  if (!o.error) result.std_error = {}, result.bias = {};  // asked for by --json alone
-  std::map<std::string, Image> no_aovs;
-  write_result(o.output, request.independent.origin.place, attributes, result, no_aovs);
+  if (!o.error) combined.image.std_error = {}, combined.image.bias = {};  // asked for by --json alone
+  write_result(o.output, request.independent.origin.place, attributes, combined.image, combined.layers);
 }
 
 void check_explain(const CombineOptions& o, const Estimator& estimator, const GroupedFile& file) {
@@ -185,6 +185,7 @@ struct Inputs {
   std::optional<GroupedFile> crn;
   GroupedFile independent;
   std::optional<GroupedFile> light;
+  std::deque<GroupedFile> layers;
   GuideImages guides;
   CombineRequest request;
 
@@ -203,6 +204,8 @@ struct Inputs {
     if (crn) request.crn = source_of(*crn);
     request.independent = source_of(independent);
     if (light) request.light = source_of(*light);
+    for (const std::string& name : o.layers)
+      request.layers.push_back({name, source_of(layers.emplace_back(o.independent, name))});
     constexpr double kMebibyte = 1 << 20, kUsual = 4096 * kMebibyte;
     if (o.memory_mib) request.most_memory = *o.memory_mib * kMebibyte;
     request.memory = request.most_memory.value_or(std::min(kUsual, memory_limit()));
@@ -244,7 +247,7 @@ nlohmann::ordered_json statistics(const CombineOptions& o, const CombineRequest&
   if (request.light) json["light_groups"] = request.light->groups;
   add_risks(combined.image.risks, json);
   add_error_sums(combined.image.risk_sums, json);
-  add_network(request.estimator.network, o.denoising, json);
+  add_network(request.estimator.network, combined.image.network_runs, o.denoising, json);
   if (!combined.image.note.empty()) json["note"] = combined.image.note;
   return json;
 }
@@ -284,7 +287,7 @@ void combine_files(const CombineOptions& o) {
   CombinedImage combined = combine(request);
   Stopwatch watch;
   progress.begin("writing");
-  write(o, request, combined.image);
+  write(o, request, combined);
   write_stages(o, request);
   const double write_seconds = watch.lap();
   progress.finish();

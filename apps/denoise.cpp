@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <deque>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -39,6 +40,7 @@ constexpr const char* kNetwork = "oidn";
 struct Options {
   std::vector<std::string> inputs;
   std::string output, mode, oidn, albedo, normal;
+  std::vector<std::string> layers;
   bool no_guides = false, clean_guides = false, check = false, quiet = false, force = false;
   FrameOptions of_frames;
   std::shared_ptr<const History> history;  ///< of one frame
@@ -148,6 +150,9 @@ void denoise_by_mixture(const Options& o, const GroupedFile& file, const GuideLa
   request.estimator = with_denoising(make_estimator(kNoEstimator), choice);
   request.settings.std_error = true;
   request.settings.guides = guides.view();
+  std::deque<GroupedFile> layers;
+  for (const std::string& name : o.layers)
+    request.layers.push_back({name, source_of(layers.emplace_back(o.inputs, name))});
   request.force = o.force;
   request.checked = [&](const InputFindings& found) {
     progress.clear();
@@ -162,8 +167,7 @@ void denoise_by_mixture(const Options& o, const GroupedFile& file, const GuideLa
   attributes["covary:estimator"] = request.estimator.text;
   if (!request.estimator.network.empty()) attributes["covary:denoiser"] = request.estimator.network;
   if (file.samples() > 0) attributes["covary:samples"] = fmt::to_string(file.samples());
-  std::map<std::string, Image> no_aovs;
-  write_result(o.output, file.place(), attributes, combined.image, no_aovs);
+  write_result(o.output, file.place(), attributes, combined.image, combined.layers);
   progress.finish();
   if (o.quiet) return;
   fmt::print(stderr, "{}: {} x {}, {} of {} groups, {}, in {:.2f} s\n", o.output, file.width(), file.height(),
@@ -204,6 +208,8 @@ void run_one(const Options& o) {
     throw Error(ErrorCode::kUsage, fmt::format("--mode {} needs a second render of another seed, or a film with two "
                                                "groups or more (--groups); '{}' has one",
                                                o.mode, o.inputs[0]));
+  if (!o.layers.empty() && (!file || file->groups() < 2))
+    throw Error(ErrorCode::kUsage, "--layers are denoised by a mixture, which needs a second render of another seed");
   if (!file || file->groups() < 2) return denoise_by_network(o, guides, progress);
   denoise_by_mixture(o, *file, guides, progress);
 }
@@ -256,6 +262,12 @@ void add_denoise(CLI::App& app) {
                    "the renderer calls so")
       ->type_name("LAYER|FILE");
   command->add_option("--normal", o->normal, "The same for normals, from -1 to 1")->type_name("LAYER|FILE");
+  command
+      ->add_option("--layers", o->layers,
+                   "Layers of the inputs, denoised with the picture's weights, so that they add up to it; Rest is what "
+                   "they leave of it")
+      ->type_name("LAYER")
+      ->delimiter(',');
   command->add_flag("--no-guides", o->no_guides, "Do not use these layers");
   command->add_flag("--clean-guides", o->clean_guides,
                     "With --mode oidn, denoise these layers first, each alone: less error where they are noisy, for "

@@ -98,7 +98,7 @@ void add_results(const RenderReport& report, const Estimator& estimator, nlohman
   }
   add_risks(result.image.risks, json);
   add_error_sums(result.image.risk_sums, json);
-  add_network(estimator.network, report.options.settings.denoising, json);
+  add_network(estimator.network, result.image.network_runs, report.options.settings.denoising, json);
   if (!result.image.note.empty()) json["note"] = result.image.note;
   if (result.until_reached) json["until_reached"] = *result.until_reached;
 }

@@ -15,9 +15,11 @@ std::string risks_text(const MeasuredRisks& risks) {
   const char* before = "; ";
   for (size_t i = 0; i < risks.images.size(); ++i) {
     const auto& [name, relmse] = risks.images[i];
-    if (i > 0 && name != "oidn") continue;
+    const bool of_independent = name == "oidn-independent";
+    if (i > 0 && name != "oidn" && !of_independent) continue;
     text += fmt::format("{}{} {:.3g}", before,
-                        i > 0            ? "Open Image Denoise alone"
+                        of_independent   ? "Open Image Denoise of the independent samples"
+                        : i > 0          ? "Open Image Denoise alone"
                         : name == "mean" ? "the mean of the samples has"
                                          : name + " has",
                         relmse);
@@ -76,8 +78,8 @@ void add_error_sums(const std::optional<RiskRow>& sums, nlohmann::ordered_json& 
   for (const auto& [name, sum] : kRiskSums) json["error_sums"][name] = (*sums).*sum;
 }
 
-void add_network(const std::string& network, const DenoisingChoice& choice, nlohmann::ordered_json& json) {
-  if (!network.empty()) json["denoiser"] = network;
+void add_network(const std::string& network, int runs, const DenoisingChoice& choice, nlohmann::ordered_json& json) {
+  if (!network.empty()) json["denoiser"] = network, json["denoiser_runs"] = runs;
   if (const std::string text = missing_network(choice); !text.empty()) json["denoiser_missing"] = as_flags(text);
 }
 

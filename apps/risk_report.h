@@ -37,7 +37,8 @@ void add_risks(const std::optional<MeasuredRisks>& risks, nlohmann::ordered_json
 /// "error_sums": what the interval is made of; nothing where it is not known.
 void add_error_sums(const std::optional<RiskRow>& sums, nlohmann::ordered_json& json);
 
-/// "denoiser", the network that took part, and "denoiser_missing": that it could not, and how to get it.
-void add_network(const std::string& network, const DenoisingChoice& choice, nlohmann::ordered_json& json);
+/// "denoiser", the network that took part, "denoiser_runs", how many images and guides it denoised, and
+/// "denoiser_missing": that it could not, and how to get it.
+void add_network(const std::string& network, int runs, const DenoisingChoice& choice, nlohmann::ordered_json& json);
 
 }  // namespace covary

@@ -8,7 +8,8 @@ from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from . import _covary
-from ._arguments import Rule, array, check_some, checked, choice, empty_or, flag, function, optional, path, text, whole
+from ._arguments import (Rule, array, check_some, checked, choice, empty_or, flag, function, mapping_of, optional, path,
+                         text, whole)
 from ._options import OptionValue, check_no_passes, text_options
 from ._result import Result
 from .errors import UsageError
@@ -24,20 +25,24 @@ DENOISE = choice(get_args(DenoiseMode))
 OIDN = empty_or(path)
 #: Checked with the pixels, by the module.
 IMAGE = Rule("a covary.Film or an array", array.convert)
+_LAYERS = optional(mapping_of(IMAGE, "a mapping from names to arrays"))
 
 
 @checked(crn=IMAGE, independent=IMAGE, estimator=text, light=IMAGE, counts=array,
-         samples=optional(whole(1, _covary.most_samples)), denoise=DENOISE, albedo=array, normal=array, oidn=OIDN,
+         samples=optional(whole(1, _covary.most_samples)), denoise=DENOISE, albedo=array, normal=array,
+         denoising_albedo=array, denoising_normal=array, layers=_LAYERS, oidn=OIDN,
          std_error=optional(flag), force=flag, progress=optional(function))
 def combine(crn: Any, independent: Any, estimator: PairEstimator = "iicv", *, light: Film | None = None,
             counts: Any = None, samples: int | None = None, denoise: DenoiseMode = "none", albedo: Any = None,
-            normal: Any = None, oidn: str | PathLike[str] = "", std_error: bool | None = None, force: bool = False,
+            normal: Any = None, denoising_albedo: Any = None, denoising_normal: Any = None,
+            layers: Mapping[str, Any] | None = None, oidn: str | PathLike[str] = "", std_error: bool | None = None, force: bool = False,
             progress: Progress | None = None, **options: OptionValue) -> Result:
     """One image of two: `crn`, whose pixels share their random numbers, and `independent`, whose pixels do not.
 
     Each is an array of float32 [T, H, W, 3], the means of T groups of samples (renders with different seeds), of NumPy,
     PyTorch or anything with DLPack or the buffer protocol and with any strides; or a Film. Values are linear; 12 groups
-    are recommended. Memory that is [H, W, T, 3], as of read_groups() and Film.groups, is read where it lies.
+    are recommended. Memory that is [H, W, T, 3], as of read_groups() and Film.groups, is read where it lies. Without
+    crn (None), `independent` alone is denoised, of two renders or groups on.
 
     estimator: "iicv", or a comparator; its options follow as keywords (covary.estimators has each with its types).
     light: the film of light paths, that of a pass "light", which is added to the result.
@@ -46,8 +51,11 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = "iicv", *, li
     samples: samples per pixel of the CRN image, for counts and for estimators that need them.
     denoise: mix the image with denoised ones where held-out samples find that better: for the least error ("auto",
         "error"), for least bias, or balanced. albedo, normal: guides [H, W, 3] for it, the normal only together with
-        the albedo; oidn: Open Image Denoise's library or a folder of it, by default where it is found; "off": without
-        it.
+        the albedo; denoising_albedo, denoising_normal: the same of what is seen in mirrors and through glass, for the
+        network (of render(), aovs["DenoisingAlbedo"] and so on); oidn: Open Image Denoise's library or a folder of it,
+        by default where it is found; "off": without it.
+    layers: parts of `independent` by name, such as direct light, in its groups: denoised as it is, they are in the
+        result's aovs, and add up to its image, with "Rest" for what they leave of it.
     std_error: estimate the error, too; by default where the estimator can.
     force: combine even where the checks of the inputs find errors.
     progress: called with (done, total) steps.
@@ -57,9 +65,16 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = "iicv", *, li
     """
     check_no_passes(options, "here are images that are rendered: counts= tells the samples that their pixels have")
     return Result(**_covary.combine(crn, independent, None if counts is None else _counts(counts), light, albedo,
-                                    normal, estimator, text_options(options, estimator), denoise, fspath(oidn), force,
-                                    std_error,
-                                    samples, progress))
+                                    normal, denoising_albedo, denoising_normal, dict(layers or {}), estimator,
+                                    text_options(options, estimator), denoise, fspath(oidn), force, std_error, samples,
+                                    progress))
+
+
+def guides_of(aovs: Mapping[str, Any]) -> dict[str, Any]:
+    """Auxiliary images by the names of combine()'s guides; None for those that there are not."""
+    return {name: aovs.get(layer) for name, layer in (("albedo", "Albedo"), ("normal", "N"),
+                                                      ("denoising_albedo", "DenoisingAlbedo"),
+                                                      ("denoising_normal", "DenoisingNormal"))}
 
 
 def _counts(counts: Any) -> Any:

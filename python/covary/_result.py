@@ -42,6 +42,10 @@ class Result:
     estimator: str
     #: Samples per pixel of all images together, on average; None where arrays do not tell.
     samples_per_pixel: float | None
+    #: Images beside it by name, [H, W, 3]: layers, which add up to it, and auxiliary images where they were asked for,
+    #: or guided a denoiser: "Albedo", "N", "P", and of what is seen behind mirrors and glass "DenoisingAlbedo",
+    #: "DenoisingNormal".
+    aovs: dict[str, FloatArray] = field(repr=False)
 
     @checked(path=path)
     def save(self, path: str | PathLike[str]) -> None:
@@ -98,8 +102,6 @@ class RenderResult(Result):
 
     #: Films of the passes by name: "crn", "independent", …
     films: dict[str, _covary.Film] = field(repr=False)
-    #: Auxiliary images by name where they were asked for, or guided a denoiser: "Albedo", "N", "P".
-    aovs: dict[str, FloatArray] = field(repr=False)
     render_seconds: float
     estimate_seconds: float
     #: Whether all passes have the samples that were planned.

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 from . import _covary
 from ._arguments import array, check_some, checked, function, mapping_of, optional, path, real, text, whole
 from ._cluster import CLIENT, SceneFiles, check_versions, dask, make_plugin
-from ._combine import Progress, check_options, combine
+from ._combine import Progress, check_options, combine, guides_of
 from ._experiment import experiment, main
 from ._options import OptionValue, check_no_passes, option_texts
 from ._parts import Part, PartFolder, Rendered
@@ -317,7 +317,7 @@ def _result(canvas: _Canvas, plan: _Plan, n_kept: int, seconds: float) -> Cluste
         made = RenderResult(**_covary.image_of_films(values, {}, films, canvas.aovs))
     else:
         made = combine(films["crn"], films["independent"], plan.estimator,  # type: ignore[arg-type]
-                       albedo=canvas.aovs.get("Albedo"), normal=canvas.aovs.get("N"), **{"force": True, **plan.options})
+                       **{"force": True, **guides_of(canvas.aovs), **plan.options})
     given = fields_of(made) | {"warnings": list(canvas.warnings), "samples_per_pixel": samples,
                                "not_finite_samples": canvas.not_finite_samples,
                                "negative_samples": canvas.negative_samples, "bad_samples": canvas.bad_samples}

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from ._arguments import checked, either, flag, function, instance, optional, path, text, whole
-from ._combine import Progress, check_options, combine
+from ._combine import Progress, check_options, combine, guides_of
 from ._covary import most_groups
 from ._options import OptionValue
 from ._render import SEED, SPP
@@ -25,6 +25,9 @@ _MOST_LANES = 1 << 32
 _LANES_OF_STACK = 1 << 24
 #: Rows of groups that are traced together: positions of samples, 32-bit floats, keep 1/4096 of a pixel.
 _ROWS_OF_STACK = 4096
+#: Mirrors and panes of glass that guides see through.
+_FOLLOWED_BOUNCES = 8
+_GUIDES = ("Albedo", "N", "DenoisingAlbedo", "DenoisingNormal")
 _defined: dict[str, None] = {}
 
 
@@ -34,8 +37,6 @@ class MitsubaResult(Result):
 
     #: "crn" and "independent", for other estimators: `covary.combine(films["crn"], films["independent"], …)`.
     films: dict[str, Film] = field(repr=False)
-    #: "Albedo" and "N" where they were asked for: guides for covary.denoise().
-    aovs: dict[str, FloatArray] = field(repr=False)
     render_seconds: float
     estimate_seconds: float
 
@@ -153,6 +154,49 @@ def _sensor_around(mi: Any, drjit: Any) -> Any:
     return Around
 
 
+def _surface_guides(mi: Any, drjit: Any) -> Any:
+    """The class of the integrator of guides."""
+    class SurfaceGuides(mi.SamplingIntegrator):  # type: ignore[misc,unused-ignore]
+        """Albedo and normal of the first surface, then of the first one that scatters light in more than single
+        directions, in the colour of the mirrors and the glass before it (src/integrators/aov.h)."""
+
+        def aov_names(self) -> list[str]:
+            return [f"{name}.{c}" for name in _GUIDES for c in "RGB"]
+
+        def sample(self, scene: Any, sampler: Any, ray: Any, medium: Any = None, active: Any = True) -> Any:
+            hit = scene.ray_intersect(ray, active)
+            first = self._guides(hit, mi.Color3f(1.0))
+            context = mi.BSDFContext()
+
+            def follow(n: Any, tint: Any, hit: Any, sampler: Any) -> Any:
+                turn, weight = hit.bsdf().sample(context, hit, sampler.next_1d(), sampler.next_2d())
+                ray = hit.spawn_ray(hit.to_world(turn.wo))
+                return n + 1, tint * self._colour(weight), scene.ray_intersect(ray, turn.pdf > 0.0), sampler
+
+            _, tint, behind, _ = drjit.while_loop(
+                (mi.UInt32(0), mi.Color3f(1.0), hit, sampler),
+                lambda n, tint, hit, sampler: self._single(hit) & (n < _FOLLOWED_BOUNCES), follow)
+            return mi.Spectrum(0.0), mi.Bool(True), [*first, *self._guides(behind, tint)]
+
+        def _single(self, hit: Any) -> Any:
+            """Whether the surface scatters light in single directions alone."""
+            flags = hit.bsdf().flags()
+            return hit.is_valid() & ~mi.has_flag(flags, mi.BSDFFlags.Smooth) & mi.has_flag(flags, mi.BSDFFlags.Delta)
+
+        def _colour(self, values: Any) -> Any:
+            """Of spectra the mean."""
+            return mi.Color3f(values if len(values) == 3 else drjit.mean(values))
+
+        def _guides(self, hit: Any, tint: Any) -> list[Any]:
+            """Albedo and normal, zero where there is no surface."""
+            found = hit.is_valid()
+            albedo = tint * self._colour(hit.bsdf().eval_diffuse_reflectance(hit, found))
+            return [*drjit.select(found, drjit.clip(albedo, 0.0, 1.0), 0.0),
+                    *drjit.select(found, mi.Vector3f(hit.sh_frame.n), 0.0)]
+
+    return SurfaceGuides
+
+
 def _define_plugins(mi: Any) -> None:
     """Registers both, once for each variant."""
     if mi.variant() in _defined:
@@ -160,6 +204,7 @@ def _define_plugins(mi: Any) -> None:
     import drjit  # type: ignore[import-not-found,import-untyped,unused-ignore]
     mi.register_sampler("covary_common_numbers", _common_numbers(mi, drjit))
     mi.register_sensor("covary_around", _sensor_around(mi, drjit))
+    mi.register_integrator("covary_guides", _surface_guides(mi, drjit))
     _defined[mi.variant()] = None
 
 
@@ -232,7 +277,8 @@ def render(scene: Any, spp: int, seed: int = 0, integrator: Any = None, sensor: 
     integrator: in place of the scene's: an Integrator, its name, or a dictionary for mitsuba.load_dict().
     sensor: its number in the scene.
     groups: of samples in each image, 3 or more; fewer where there are fewer samples.
-    aovs: also albedo and shading normals, as guides for denoise().
+    aovs: also albedo and shading normals, "Albedo" and "N", and those of what is seen in mirrors and through glass,
+        "DenoisingAlbedo" and "DenoisingNormal". With `denoise` they are there, and guide it.
     progress: called with (done, total) groups.
     options: of the estimator.
 
@@ -267,12 +313,14 @@ def render(scene: Any, spp: int, seed: int = 0, integrator: Any = None, sensor: 
 
     films = {name: _film(mi, loaded, camera, chosen, name, count, groups, seed, finished)
              for name in ("crn", "independent")}
-    guides = _guides(mi, loaded, camera, chosen, seed) if aovs else {}
+    denoises = options.get("denoise", "none") != "none"
+    guides = _guides(mi, loaded, camera, seed) if aovs or denoises else {}
     rendered = time.perf_counter()
-    result = combine(films["crn"], films["independent"], estimator, **options)  # type: ignore[arg-type]
+    known: dict[str, Any] = (guides_of(guides) if denoises else {}) | options
+    result = combine(films["crn"], films["independent"], estimator, **known)  # type: ignore[arg-type]
     estimated = time.perf_counter()
-    given = fields_of(result) | {"warnings": warnings + result.warnings}
-    return MitsubaResult(**given, films=films, aovs=guides, render_seconds=rendered - started,
+    given = fields_of(result) | {"warnings": warnings + result.warnings, "aovs": guides}
+    return MitsubaResult(**given, films=films, render_seconds=rendered - started,
                          estimate_seconds=estimated - rendered)
 
 
@@ -312,10 +360,11 @@ def _film(mi: Any, scene: Any, camera: Any, integrator: Any, sampling: str, coun
     return film_from_groups(numpy.stack(images), count, sampling=sampling)
 
 
-def _guides(mi: Any, scene: Any, camera: Any, integrator: Any, seed: int) -> dict[str, FloatArray]:
+def _guides(mi: Any, scene: Any, camera: Any, seed: int) -> dict[str, FloatArray]:
     import numpy
 
-    both = mi.load_dict({"type": "aov", "aovs": "albedo:albedo,normal:sh_normal", "image": integrator})
     around = _around(mi, camera, {"type": "independent", "sample_count": 16})
-    image = numpy.array(both.render(scene, around, seed=(2 * seed + 1) * 4096 + 4095, spp=16), dtype=numpy.float32)
-    return {"Albedo": image[..., -6:-3], "N": image[..., -3:]}
+    integrator = mi.load_dict({"type": "covary_guides"})
+    image = integrator.render(scene, around, seed=((2 * seed + 1) * 4096 + 4095) % (1 << 32), spp=16)
+    values = numpy.array(image, dtype=numpy.float32)[..., -3 * len(_GUIDES):]
+    return {name: numpy.ascontiguousarray(values[..., 3 * i:3 * i + 3]) for i, name in enumerate(_GUIDES)}

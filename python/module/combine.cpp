@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include <deque>
 #include <numeric>
 #include <optional>
 #include <span>
@@ -77,21 +78,33 @@ class Input {
   double samples_ = 0;
 };
 
-/// The two images and what an estimator of pairs is to make of them.
+/// The two images, or the independent one alone, and what an estimator is to make of them.
 struct Pair {
-  Input crn, independent;
+  std::optional<Input> crn;
+  Input independent;
+  std::deque<Input> layers;
   CombineRequest request;
 
   Pair(nb::handle crn_object, nb::handle independent_object, const Film* light)
-      : crn(crn_object, "crn"), independent(independent_object, "independent") {
+      : independent(independent_object, "independent") {
+    if (!crn_object.is_none()) crn.emplace(crn_object, "crn");
     // An array has the place of a film beside it.
-    const Film* film = light ? light : crn.film() ? crn.film() : independent.film();
+    const Film* film = light ? light : crn && crn->film() ? crn->film() : independent.film();
     const ImagePlace place = film ? Input::origin_of(*film, "").place : ImagePlace{};
-    request.crn = source_of(crn, place), request.independent = source_of(independent, place);
+    if (crn) request.crn = source_of(*crn, place);
+    request.independent = source_of(independent, place);
     if (light)
       request.light = covary::source_of(rows_of(*light, 0, light->height()), Input::origin_of(*light, "light"));
     std::vector<Finding> findings;
-    check_light(request.crn->origin, request.independent.origin, light ? &request.light->origin : nullptr, findings);
+    if (crn)
+      check_light(request.crn->origin, request.independent.origin, light ? &request.light->origin : nullptr, findings);
+  }
+  /// An array for each name.
+  void take_layers(const nb::dict& arrays) {
+    for (const auto& [key, array] : arrays) {
+      const auto name = nb::cast<std::string>(key);
+      request.layers.push_back({name, source_of(layers.emplace_back(array, name), request.independent.origin.place)});
+    }
   }
   Pair(const Pair&) = delete;
   Pair& operator=(const Pair&) = delete;
@@ -104,14 +117,16 @@ struct Pair {
                                         counts.shape(1), independent.height(), independent.width())
                                 .c_str());
     independent.take_counts({counts.data(), counts.size()});
-    if (crn.film()) return;
+    if (!crn || crn->film()) return;
     if (!samples) throw Error(ErrorCode::kUsage, "`counts` needs `samples` N, the samples per pixel of the CRN image");
-    crn.take_counts(std::vector(static_cast<size_t>(crn.width()) * crn.height(), static_cast<uint32_t>(*samples)));
+    crn->take_counts(std::vector(static_cast<size_t>(crn->width()) * crn->height(), static_cast<uint32_t>(*samples)));
   }
+  double crn_samples() const { return crn ? crn->samples() : 0; }
   /// Arrays may have any shape, and any counts. Needs no GIL.
   void check_shapes() {
+    if (!crn) return;
     std::vector<std::string> problems;
-    check_inputs(crn.view(), independent.view(), 1, 1, problems);
+    check_inputs(crn->view(), independent.view(), 1, 1, problems);
     if (!request.estimator.adaptive) throw_if_any("inputs", problems);
   }
 
@@ -138,7 +153,8 @@ struct CombineArguments {
 
 /// What may come beside the two images; None where it does not.
 struct Beside {
-  nb::object counts, light, albedo, normal;
+  nb::object counts, light, albedo, normal, denoising_albedo, denoising_normal;
+  nb::dict layers;
 };
 
 std::vector<std::string> texts_of(const std::vector<Finding>& findings) {
@@ -155,17 +171,33 @@ DenoisingChoice denoising_of(const std::string& mode, const std::string& oidn) {
 
 /// The guides of --denoise.
 struct GuideImages {
-  Image albedo, normal;
+  Image albedo, normal, denoising_albedo, denoising_normal;
   GuideImages(const Beside& beside, const Estimator& estimator, const Input& image) {
-    if (beside.albedo.is_none() && beside.normal.is_none()) return;
-    if (!estimator.reads_guides)
-      throw Error(ErrorCode::kUsage, "albedo, normal: guides are of denoise='auto', 'bias', 'balanced' and 'error'");
-    if (beside.albedo.is_none()) throw Error(ErrorCode::kUsage, "normal: it is a guide only together with the albedo");
     const std::string shape = fmt::format("{}, {}, 3", image.height(), image.width());
-    albedo = image_of(beside.albedo, "albedo", shape);
-    if (!beside.normal.is_none()) normal = image_of(beside.normal, "normal", shape);
+    const auto take = [&](nb::handle array, const char* name, Image& to) {
+      if (array.is_none()) return;
+      if (!estimator.reads_guides)
+        throw Error(ErrorCode::kUsage, std::string(name) +
+                                           ": guides are of denoise='auto', 'bias', 'balanced' and "
+                                           "'error'");
+      to = image_of(array, name, shape);
+    };
+    take(beside.albedo, "albedo", albedo);
+    take(beside.normal, "normal", normal);
+    take(beside.denoising_albedo, "denoising_albedo", denoising_albedo);
+    take(beside.denoising_normal, "denoising_normal", denoising_normal);
+    const auto needs = [](const Image& guide, const Image& other, const char* name, const char* other_name) {
+      if (guide.data.empty() || !other.data.empty()) return;
+      throw Error(ErrorCode::kUsage, fmt::format("{}: it is a guide only together with {}", name, other_name));
+    };
+    needs(normal, albedo, "normal", "the albedo");
+    needs(denoising_normal, denoising_albedo, "denoising_normal", "denoising_albedo");
+    if (!normal.data.empty()) needs(denoising_albedo, denoising_normal, "denoising_albedo", "denoising_normal");
   }
-  Guides view() const { return {albedo.data.empty() ? nullptr : &albedo, normal.data.empty() ? nullptr : &normal}; }
+  Guides view() const {
+    const auto or_null = [](const Image& image) { return image.data.empty() ? nullptr : &image; };
+    return {or_null(albedo), or_null(normal), or_null(denoising_albedo), or_null(denoising_normal)};
+  }
 };
 
 const Film* film_of(nb::handle light) {
@@ -176,20 +208,33 @@ const Film* film_of(nb::handle light) {
   return film;
 }
 
+/// Of two images, or of an independent one that is denoised.
+Estimator estimator_of(bool is_pair, const std::string& name, const OptionValues& options,
+                       const DenoisingChoice& denoising) {
+  if (is_pair) return with_denoising(make_pair_estimator(name, options), denoising);
+  if (name != kDefaultEstimator && name != kNoEstimator)
+    throw Error(ErrorCode::kUsage, fmt::format("crn: '{}' needs the image with common random numbers", name));
+  if (!denoising.denoises())
+    throw Error(ErrorCode::kUsage, std::string("crn: without it, independent images can only be denoised, ") +
+                                       kNotDenoised + " they are not");
+  return with_denoising(make_estimator(kNoEstimator, options), denoising);
+}
+
 nb::dict combine(nb::object crn, nb::object independent, const Beside& beside, const CombineArguments& arguments,
                  nb::object progress) {
   const Film* light = film_of(beside.light);
   Pair pair(crn, independent, light);
   CombineRequest& request = pair.request;
-  request.estimator = with_denoising(make_pair_estimator(arguments.estimator, arguments.options),
-                                     denoising_of(arguments.denoise, arguments.oidn));
+  request.estimator = estimator_of(pair.crn.has_value(), arguments.estimator, arguments.options,
+                                   denoising_of(arguments.denoise, arguments.oidn));
   const Estimator& estimator = request.estimator;
   const bool has_counts = !beside.counts.is_none();
   request.settings =
       pair_settings(estimator, estimator.needs_sample_count || !has_counts ? arguments.samples : std::nullopt,
-                    pair.crn.samples(), arguments.std_error.value_or(estimator.predicts_error));
-  const GuideImages guides(beside, estimator, pair.crn);
+                    pair.crn_samples(), arguments.std_error.value_or(estimator.predicts_error));
+  const GuideImages guides(beside, estimator, pair.independent);
   request.settings.guides = guides.view();
+  pair.take_layers(beside.layers);
   if (has_counts) pair.take_counts(nb::cast<Counts>(beside.counts), arguments.samples);
   request.force = arguments.force;
   CombinedImage combined;
@@ -205,13 +250,16 @@ nb::dict combine(nb::object crn, nb::object independent, const Beside& beside, c
   };
   run_work(work, progress);
   std::optional<double> samples;
-  if (pair.crn.samples() > 0 && pair.independent.samples() > 0)
-    samples = pair.crn.samples() + pair.independent.samples();
+  if ((!pair.crn || pair.crn_samples() > 0) && pair.independent.samples() > 0)
+    samples = pair.crn_samples() + pair.independent.samples();
   nb::dict d;
   d["image"] = array_of(std::move(combined.image.estimate));
   d["std_error"] = array_of(std::move(combined.image.std_error));
   d["bias"] = array_of(std::move(combined.image.bias));
   add_prediction(combined.predicted, d);
+  nb::dict layers;
+  for (auto& [name, layer] : combined.layers) layers[name.c_str()] = array_of(std::move(layer));
+  d["aovs"] = layers;
   d["warnings"] = texts_of(combined.inputs.findings);
   d["nonfinite_pixels"] = combined.image.nonfinite_pixels;
   d["estimator"] = estimator.text;
@@ -249,6 +297,7 @@ nb::object correlation(const Correlation& c) {
 }
 
 nb::dict check(nb::object crn, nb::object independent) {
+  if (crn.is_none()) throw nb::type_error("crn: found None; accepted is a covary.Film or an array");
   Pair pair(crn, independent, nullptr);
   InputFindings inputs;
   run_work(
@@ -285,19 +334,19 @@ void bind_combine(nb::module_& module) {
   module.def(
       "combine",
       [](nb::object crn, nb::object independent, nb::object counts, nb::object light, nb::object albedo,
-         nb::object normal, const std::string& estimator, const OptionValues& options, const std::string& denoise,
-         const std::string& oidn, bool force, std::optional<bool> std_error, std::optional<int> samples,
-         nb::object progress) {
-        return combine(crn, independent, {counts, light, albedo, normal},
+         nb::object normal, nb::object denoising_albedo, nb::object denoising_normal, nb::dict layers,
+         const std::string& estimator, const OptionValues& options, const std::string& denoise, const std::string& oidn,
+         bool force, std::optional<bool> std_error, std::optional<int> samples, nb::object progress) {
+        return combine(crn, independent, {counts, light, albedo, normal, denoising_albedo, denoising_normal, layers},
                        {estimator, options, denoise, oidn, force, std_error, samples}, progress);
       },
       "crn"_a.none(), "independent"_a.none(), "counts"_a.none(), "light"_a.none(), "albedo"_a.none(), "normal"_a.none(),
-      "estimator"_a, "options"_a, "denoise"_a, "oidn"_a, "force"_a, "std_error"_a.none(), "samples"_a.none(),
-      "progress"_a.none(),
+      "denoising_albedo"_a.none(), "denoising_normal"_a.none(), "layers"_a, "estimator"_a, "options"_a, "denoise"_a,
+      "oidn"_a, "force"_a, "std_error"_a.none(), "samples"_a.none(), "progress"_a.none(),
       nb::sig("def combine(crn: object, independent: object, counts: object | None, light: object | None, albedo: "
-              "object | None, normal: object | None, estimator: str, options: dict[str, str], denoise: str, oidn: str, "
-              "force: bool, std_error: bool | None, samples: int | None, progress: typing.Any) -> "
-              "dict[str, typing.Any]"));
+              "object | None, normal: object | None, denoising_albedo: object | None, denoising_normal: object | None, "
+              "layers: dict[str, typing.Any], estimator: str, options: dict[str, str], denoise: str, oidn: str, force: "
+              "bool, std_error: bool | None, samples: int | None, progress: typing.Any) -> dict[str, typing.Any]"));
   module.def(
       "check_pair_estimator", &check_pair_estimator, "estimator"_a, "options"_a, "denoise"_a, "oidn"_a,
       nb::sig("def check_pair_estimator(estimator: str, options: dict[str, str], denoise: str, oidn: str) -> None"));

@@ -23,6 +23,7 @@ namespace {
 
 constexpr int kLightRows = 64;  // of the light film in memory at a time
 constexpr int kFewestRows = 16;
+constexpr double kImagesOfLayer = 12;
 
 int groups_of(const std::optional<GroupedSource>& source) { return source ? source->groups : 0; }
 
@@ -72,6 +73,24 @@ void add_risk_of_light(double before, EstimatorResult& result) {
   for (MeasuredRisks::OfImage& image : result.risks->images) image.relmse += after - before;
 }
 
+/// Bytes per pixel of a layer while it is denoised: its groups, copies of them, and its images.
+double layer_bytes(int groups) { return 3 * sizeof(float) * (2.0 * groups + kImagesOfLayer); }
+
+/// With all layers, of the whole image.
+EstimatorResult estimate_layers(const CombineRequest& request, std::map<std::string, Image>& layers) {
+  if (!request.estimator.splits_layers)
+    throw Error(ErrorCode::kUsage,
+                fmt::format("{} makes no `layers`; denoised independent images have them", request.estimator.text));
+  const GroupedImage independent = request.independent.all();
+  const WholeLayers whole(independent, request.layers);
+  PairSettings settings = request.settings;
+  settings.layers = whole.view();
+  EstimatorResult result = request.estimator.apply(rows_of(request.crn, 0, independent.height), independent, settings);
+  for (size_t i = 0; i < result.layers.size(); ++i) layers[whole.view()[i].name] = std::move(result.layers[i]);
+  result.layers.clear();
+  return result;
+}
+
 EstimatorResult estimate(const CombineRequest& request) {
   const Estimator& estimator = request.estimator;
   const int height = request.independent.height, in_memory = rows_in_memory(request);
@@ -103,7 +122,9 @@ double memory_of_rows(const CombineRequest& request, int rows) {
   const double values = kImage * all_groups + 2 * kCount;
   // Of bands, the estimate of the whole image, its standard error and bias are beside them.
   const double results = rows < request.independent.height ? 3 * kImage * width * request.independent.height : 0;
-  return n_pixels * values + request.estimator.memory.bytes(n_pixels, groups) + results;
+  const double layers = request.layers.empty() ? 0 : static_cast<double>(request.layers.size() + 1);
+  return n_pixels * (values + layers * layer_bytes(request.independent.groups)) +
+         request.estimator.memory.bytes(n_pixels, groups) + results;
 }
 
 int rows_in_memory(const CombineRequest& request) {
@@ -179,7 +200,7 @@ CombinedImage combine(const CombineRequest& request) {
   if (!request.force) throw_errors(combined.inputs);
   combined.check_seconds = watch.lap();
 
-  combined.image = estimate(request);
+  combined.image = request.layers.empty() ? estimate(request) : estimate_layers(request, combined.layers);
   finish(combined.image, nullptr);
   const double before = combined.image.risks && request.light ? predicted_relmse(combined.image) : 0;
   if (request.light)

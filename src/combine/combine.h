@@ -5,12 +5,14 @@
 
 #include <functional>
 #include <limits>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "combine/grouped_source.h"
 #include "combine/input_checks.h"
+#include "combine/layer_sources.h"
 #include "estimators/estimator.h"
 #include "risk/predicted_error.h"
 
@@ -26,6 +28,7 @@ struct CombineRequest {
   std::optional<GroupedSource> crn;  ///< none with an estimator of EstimatorPasses::kIndependent
   GroupedSource independent;
   std::optional<GroupedSource> light;  ///< a light film (film/splat_layer.h), to be added
+  std::vector<LayerSource> layers;     ///< parts of the independent image, for estimators that split them
   Estimator estimator;                 ///< of a pair of images, or of an independent one
   PairSettings settings;
   bool force = false;  ///< combine even where the findings hold errors
@@ -40,6 +43,8 @@ struct CombineRequest {
 
 struct CombinedImage {
   EstimatorResult image;
+  /// Of the request by name, and kRest where they leave some of the image: together they are its estimate.
+  std::map<std::string, Image> layers;
   std::optional<PredictedError> predicted;  ///< where there is a standard error
   InputFindings inputs;
   double planned_memory = 0;  ///< planned_memory() of the request

@@ -49,6 +49,9 @@ void declare(Settings& s, CombineSettings& v) {
   s.group("");
   s.text("guides", v.guides, "FILE",
          "For `denoise`: image (EXR) of the same pixels whose layers Albedo and N show the surfaces", kFile);
+  s.texts("layers", v.layers, "LAYER",
+          "For `denoise`: layers of the independent image's files, denoised so that they add up to the result, with "
+          "Rest for what they leave of it");
   s.whole("samples", v.samples, {.low = 1, .high = std::numeric_limits<int>::max()},
           fmt::format("With `counts`, or {}: samples per pixel of the CRN image; default: what its file tells",
                       fmt::join(estimators_with_samples(), ", ")));

@@ -26,6 +26,7 @@ struct CombineSettings {
   std::string counts;                        ///< file with the samples of each pixel of the independent image
   std::string light;                         ///< film of light paths
   std::string guides;                        ///< file with the guides of the denoising
+  std::vector<std::string> layers;           ///< of the independent image's files, to be denoised as it is
   std::string estimator = kDefaultEstimator;
   std::optional<int> samples;  ///< samples per pixel of the CRN image
   DenoisingChoice denoising;

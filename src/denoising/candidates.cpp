@@ -119,6 +119,7 @@ class GuidedNetwork {
     if (guides.normal) normal_ = denoiser_.denoise_guide("normal", *guides.normal);
   }
 
+  int runs() const { return denoiser_.runs(); }
   /// The image is mirrored already.
   Image denoise(const Image& image, Mirror mirror = Mirror::kNone) {
     if (mirror == Mirror::kNone) return denoiser_.denoise(image, or_null(albedo_), or_null(normal_), true);
@@ -133,15 +134,18 @@ class GuidedNetwork {
   Image albedo_, normal_;
 };
 
-/// Of means.
-std::vector<std::vector<Image>> of_means(GuidedNetwork& network, std::span<const CandidateInput> inputs) {
-  std::vector<const Image*> means;
-  for (const CandidateInput& in : inputs) means.push_back(in.estimate);
-  const std::vector<Image> denoised =
-      denoise_with_halves(means, [&](const Image& image, Mirror mirror) { return network.denoise(image, mirror); });
+/// The network's images of the independent ones: it was trained on noise that differs from pixel to pixel.
+/// `with_residual`: and the same with what was taken away given back to pixels alike.
+std::vector<std::vector<Image>> denoised(GuidedNetwork& network, std::span<const CandidateInput> inputs,
+                                         bool with_residual) {
+  std::vector<const Image*> noisy;
+  for (const CandidateInput& in : inputs) noisy.push_back(with_residual ? in.estimate : in.independent);
+  const std::vector<Image> clean =
+      denoise_with_halves(noisy, [&](const Image& image, Mirror mirror) { return network.denoise(image, mirror); });
   std::vector<std::vector<Image>> all;
   for (size_t i = 0; i < inputs.size(); ++i) {
-    std::vector<Image>& images = all.emplace_back(3, denoised[i]);
+    std::vector<Image>& images = all.emplace_back(with_residual ? 3 : 1, clean[i]);
+    if (!with_residual) continue;
     add_residual(*inputs[i].moments, kWideResidual, *inputs[i].valid, images[1]);
     add_residual(*inputs[i].moments, kNarrowResidual, *inputs[i].valid, images[2]);
   }
@@ -183,15 +187,14 @@ CandidateMaker neural_candidates(const Guides& guides, const DenoiseOptions& opt
   CandidateMaker maker;
   maker.error_over_variance = 1.1;
   maker.network = true;
+  maker.runs = [network] { return network->runs(); };
   if (base == CandidateBase::kPair) {
-    maker.names = {"oidn", "oidn-independent"};
-    maker.make = one_by_one([network](const CandidateInput& in) {
-      return std::vector<Image>{network->denoise(*in.estimate), network->denoise(*in.independent)};
-    });
+    maker.names = {"oidn-independent"};
+    maker.make = [network](std::span<const CandidateInput> in) { return denoised(*network, in, false); };
     return maker;
   }
   maker.names = {"oidn", "oidn-wide", "oidn-narrow"};
-  maker.make = [network](std::span<const CandidateInput> inputs) { return of_means(*network, inputs); };
+  maker.make = [network](std::span<const CandidateInput> in) { return denoised(*network, in, true); };
   maker.make_layers = [network, n = maker.names.size()](const CandidateInput&, std::span<const Image> layers) {
     std::vector<Image> images;
     for (const Image& layer : layers) images.push_back(network->denoise(layer));

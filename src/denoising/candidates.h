@@ -3,8 +3,9 @@
 //
 // Without a neural network (nl_means.h, steered by the estimator's image and its standard error, guided by albedo and
 // normal): that image with two bandwidths; the independent image with the same weights; and the image over the albedo,
-// filtered with the normal as the only guide, times the albedo. With Open Image Denoise: both images denoised, with
-// guides that were denoised before.
+// filtered with the normal as the only guide, times the albedo. With Open Image Denoise: images denoised with
+// guides that were denoised before: of a pair the independent image alone, as the errors of the other, which pixels
+// have in common, are not what the network was trained on.
 //
 // Where the image is the mean of the independent samples itself, the images of the one are left out, and those of Open
 // Image Denoise come with what they took away from pixels alike given back (ResidualOptions of residual_correction.h).
@@ -46,7 +47,8 @@ struct CandidateMaker {
   /// What the squared error of a mixture that has these usually is, over the variance of mixtures of half of the
   /// samples: the more of it they take away, the more of the error is bias. Measured (docs/methods/error-estimates.md).
   double error_over_variance = 0.65;
-  bool network = false;  ///< a neural network makes them
+  bool network = false;       ///< a neural network makes them
+  std::function<int()> runs;  ///< of the network, so far; none without one
   /// Number of the one to show where samples are too few to judge.
   int best_of_few = 0;
 };

@@ -277,6 +277,7 @@ Image Denoiser::denoise(const Image& rgb, const Image* albedo, const Image* norm
   run->inputs.emplace_back("color", finite(rgb));
   if (albedo) run->inputs.emplace_back("albedo", finite(*albedo));
   if (normal) run->inputs.emplace_back("normal", finite(*normal));
+  ++runs_;
   return image_of(run);
 }
 
@@ -286,6 +287,7 @@ Image Denoiser::denoise_guide(const std::string& name, const Image& guide) {
   const auto run = std::make_shared<Run>();
   run->library = library_;
   run->inputs.emplace_back(name == "albedo" ? "albedo" : "normal", finite(guide));
+  ++runs_;
   return image_of(run);
 }
 

@@ -38,9 +38,12 @@ class Denoiser {
   Image denoise(const Image& rgb, const Image* albedo, const Image* normal, bool clean_guides = false);
   /// The same of a guide alone, which makes it clean. `name`: "albedo" or "normal".
   Image denoise_guide(const std::string& name, const Image& guide);
+  /// Images and guides denoised so far.
+  int runs() const { return runs_; }
 
  private:
   std::shared_ptr<Library> library_;
+  int runs_ = 0;
 };
 
 /// Throws Error(kInput) where a guide has a value that is not finite, which would spread over the image. `name` stands

@@ -142,6 +142,12 @@ std::vector<Image> layers_of(const DenoisingParts& parts, const std::vector<Cand
                          mixture.weights});
 }
 
+int runs_of(const std::vector<CandidateMaker>& makers) {
+  int runs = 0;
+  for (const CandidateMaker& maker : makers) runs += maker.runs ? maker.runs() : 0;
+  return runs;
+}
+
 float count_of_usual(const GroupedImage& image) {
   double samples = 0;
   for (int y = 0; y < image.height; ++y)
@@ -263,6 +269,7 @@ MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<Candid
   out.weights = std::move(mixture.weights);
   out.candidates = std::move(whole.candidates);
   result.layers = layers_of(parts, makers, out, layers);
+  result.network_runs = runs_of(makers);
   return out;
 }
 
@@ -298,6 +305,7 @@ MixedDenoising single_candidate(const GroupedImage& independent, const std::vect
   std::fill(out.weights[best].data.begin(), out.weights[best].data.end(), 1.0f);
   out.candidates = std::move(set.candidates);
   out.result.layers = layers_of(parts, makers, out, layers);
+  out.result.network_runs = runs_of(makers);
   return out;
 }
 

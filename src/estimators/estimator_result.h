@@ -98,6 +98,7 @@ struct EstimatorResult {
   std::vector<HeldOutRow> held_out;
   std::vector<RiskRow> risk_rows;  ///< of each row, for apply_interval(); empty where nothing tells of the error
   ErrorKind risk_kind = ErrorKind::kFilters;
+  int network_runs = 0;  ///< of Estimator::network: images and guides that it denoised
   std::optional<RiskRow> risk_sums;       ///< of all rows, by apply_interval()
   std::optional<ErrorInterval> interval;  ///< of the predicted relMSE, by apply_interval()
   std::string note;  ///< what whoever asked for the image should know of how it was made; mostly empty

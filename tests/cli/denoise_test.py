@@ -229,6 +229,46 @@ class Denoise(RenderTest):
         self.bad(1, "'small.exr' has 3 x 2 pixels, 'mitsuba0.exr' 48 x 32", *two, "--albedo", "small.exr")
         self.bad(2, "--albedo and --normal: with --no-guides there are none", *two, "--no-guides", "--albedo", "x")
 
+    def test_layers_add_up(self):
+        """Of two renders, with and without a network, by covary denoise and combine."""
+        for seed in ("1", "2"):
+            self.good("render", ROOM, *SMALL, "-o", f"{seed}.exr", "--estimator", "none", "--spp", "8", "--layers",
+                      "--seed", seed)
+        two = ("denoise", "1.exr", "2.exr", "-o", "a.exr")
+        for oidn in ("off", os.environ["STAND_IN_DENOISER"]):
+            self.good(*two, "--layers", "Direct", "Indirect", "--oidn", oidn)
+            self.assert_add_up("a.exr", "Direct", "Indirect")
+            self.good(*two, "--layers", "Direct", "--oidn", oidn)
+            self.assert_add_up("a.exr", "Direct", "Rest")
+        self.good(*two, "--oidn", oidn)
+        plain = read_exr((self.path / "a.exr").read_bytes())
+        self.good("combine", "--independent", "1.exr", "2.exr", "-o", "b.exr", "--denoise", "auto", "--oidn", oidn,
+                  "--layers", "Direct", "Indirect")
+        self.assert_add_up("b.exr", "Direct", "Indirect")
+        self.assertEqual(set(plain), {"R", "G", "B", "StdError.R", "StdError.G", "StdError.B", "Bias.R", "Bias.G",
+                                      "Bias.B"})
+        self.bad(1, "no image 'Dirct'; did you mean 'Direct'?", *two, "--layers", "Dirct")
+        self.bad(2, "--layers are denoised by a mixture, which needs a second render of another seed", "denoise",
+                 "1.exr", "-o", "c.exr", "--layers", "Direct")
+        self.bad(2, "iicv makes no --layers; denoised independent images have them", "combine", "--crn", "1.exr",
+                 "--independent", "2.exr", "-o", "c.exr", "--layers", "Direct", "--force")
+
+    def assert_add_up(self, name, *layers):
+        channels = read_exr((self.path / name).read_bytes())
+        for c in "RGB":
+            for whole, *parts in zip(channels[c], *(channels[f"{layer}.{c}"] for layer in layers)):
+                self.assertAlmostEqual(whole, sum(parts), delta=1e-5 * (1 + abs(whole)))
+
+    def test_runs_of_the_network(self):
+        """Three images, of all samples and of both halves, and two guides."""
+        for options in ((), (*IICV, "--denoise", "error")):
+            runs = self.path / "runs"
+            self.good("render", ROOM, *SMALL, "-o", "a.exr", "--spp", "24", *options, "--json", "a.json", "--oidn",
+                      os.environ["STAND_IN_DENOISER"], env={**os.environ, "STAND_IN_RUNS": str(runs)})
+            self.assertEqual(json.loads((self.path / "a.json").read_text())["denoiser_runs"], 5)
+            self.assertEqual(len(runs.read_bytes()), 5)
+            runs.unlink()
+
     def test_renders_that_do_not_fit(self):
         noise, n, size = exponential_noise(6), 96 * 64, (96, 64)
         grey = lambda values, **more: exr({c: values for c in "RGB"}, size, **more)  # noqa: E731

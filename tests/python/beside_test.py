@@ -2,6 +2,7 @@
 """What may come beside two images: light films, numbers of samples, denoising with guides. Values and messages of the
 command line."""
 import math
+import os
 import unittest
 
 import covary
@@ -110,8 +111,7 @@ class Denoise(BesideTest):
         self.albedo, self.normal = (rng.random((HEIGHT, WIDTH, 3), numpy.float32) for _ in range(2))
 
     def test_bits_of_the_program(self):
-        self.write("guides", {f"{name}.{c}": image[:, :, i] for i, (rgb_name, xyz) in enumerate(zip("RGB", "XYZ"))
-                              for name, image, c in (("Albedo", self.albedo, rgb_name), ("N", self.normal, xyz))})
+        self.write_guides(("Albedo", "N"), (self.albedo, self.normal))
         for mode in ("bias", "balanced", "error"):
             result = covary.combine(*self.images, denoise=mode, oidn="off")
             self.assertEqual(result.estimator, f"iicv --denoise {mode} --oidn off")
@@ -122,12 +122,51 @@ class Denoise(BesideTest):
         self.assert_same_bits(guided.image, covary.iicv(*self.images, denoise="error", oidn="off", albedo=self.albedo,
                                                         normal=self.normal).image)
 
+    def write_guides(self, names, images):
+        self.write("guides", {f"{name}.{c}": image[:, :, i] for name, image in zip(names, images)
+                              for i, c in enumerate("XYZ" if name.endswith(("N", "Normal")) else "RGB")})
+
+    def test_guides_behind_glass(self):
+        """Go to the network in place of the others."""
+        denoiser = os.environ["STAND_IN_DENOISER"]
+        first = {"albedo": self.albedo, "normal": self.normal}
+        behind = {"denoising_albedo": self.albedo[::-1].copy(), "denoising_normal": self.normal[::-1].copy()}
+        self.write_guides(("Albedo", "N", "DenoisingAlbedo", "DenoisingNormal"), (*first.values(), *behind.values()))
+        result = covary.combine(*self.images, denoise="error", oidn=denoiser, **first, **behind)
+        self.assertFalse((result.image == covary.combine(*self.images, denoise="error", oidn=denoiser,
+                                                         **first).image).all())
+        self.assert_program_has(result, "--denoise", "error", "--oidn", denoiser, "--guides", "guides.exr")
+        said = [self.message_of(covary.UsageError, covary.combine, *self.images, denoise="error", **guides)
+                for guides in ({"denoising_normal": self.normal}, {**first, "denoising_albedo": self.albedo})]
+        self.assertEqual(said, ["denoising_normal: it is a guide only together with denoising_albedo",
+                                "denoising_albedo: it is a guide only together with denoising_normal"])
+
+    def test_independent_image_alone(self):
+        """Denoised, with layers that add up to it."""
+        independent = self.images[1]
+        result = covary.combine(None, independent, denoise="auto", oidn="off", albedo=self.albedo, normal=self.normal,
+                                layers={"half": 0.5 * independent, "third": independent / 3})
+        self.assertEqual(result.estimator, "none --denoise auto --oidn off")
+        self.assertEqual(list(result.aovs), ["Rest", "half", "third"])
+        numpy.testing.assert_allclose(sum(result.aovs.values()), result.image, rtol=1e-5, atol=1e-6)
+        numpy.testing.assert_allclose(result.aovs["half"], 0.5 * result.image, rtol=1e-4, atol=1e-5)
+        self.write_guides(("Albedo", "N"), (self.albedo, self.normal))
+        self.run_program("combine", "--independent", "independent.exr", "-o", "out.exr", "--denoise", "auto", "--oidn", "off", "--guides",
+                         "guides.exr", "--quiet", "--error")
+        self.assert_same_bits(result.image.reshape(-1, 3), rgb(self.path / "out.exr"))
+        self.assertIn("crn: without it, independent images can only be denoised",
+                      self.message_of(covary.UsageError, covary.combine, None, independent))
+        self.assertIn("crn: 'iduw' needs the image with common random numbers",
+                      self.message_of(covary.UsageError, covary.combine, None, independent, "iduw"))
+        self.assertIn("the layer 'x' has 24 x 19 pixels", self.message_of(
+            covary.InputError, covary.combine, None, independent, denoise="auto", layers={"x": independent[:, 1:]}))
+
     def test_messages(self):
         def message(error, estimator="iicv", **keywords):
             return self.message_of(error, covary.combine, *self.images, estimator, **keywords)
         self.write("guides", {f"Albedo.{c}": self.albedo[:, :, i] for i, c in enumerate("RGB")})
         self.assertIn("option of --denoise auto, bias", self.failure_of_program(*FILES, "--guides", "guides.exr"))
-        self.assertIn("albedo, normal: guides are of denoise='auto', 'bias'",
+        self.assertIn("albedo: guides are of denoise='auto', 'bias'",
                       message(covary.UsageError, albedo=self.albedo))
         self.assertEqual(message(covary.UsageError, oidn="off"),
                          self.failure_of_program(*FILES, "--oidn", "off").replace("--", ""))

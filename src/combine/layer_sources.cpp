@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "combine/layer_sources.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+
+namespace covary {
+namespace {
+
+constexpr double kNothing = 1e-3;  // of the picture
+
+[[noreturn]] void fail(const std::string& name, const std::string& text) {
+  throw Error(ErrorCode::kInput, fmt::format("the layer '{}' {}", name, text));
+}
+
+void check(const LayerSource& source, const GroupedImage& picture) {
+  const GroupedSource& g = source.groups;
+  if (g.width != picture.width || g.height != picture.height || g.groups != picture.groups)
+    fail(source.name, fmt::format("has {} x {} pixels in {} groups, the image {} x {} in {}", g.width, g.height,
+                                  g.groups, picture.width, picture.height, picture.groups));
+}
+
+}  // namespace
+
+WholeLayers::WholeLayers(const GroupedImage& picture, std::span<const LayerSource> sources) {
+  const size_t n = static_cast<size_t>(picture.width) * picture.height * picture.groups * 3;
+  rest_.assign(picture.data, picture.data + n);
+  for (const LayerSource& source : sources) {
+    if (source.name == kRest ||
+        std::any_of(layers_.begin(), layers_.end(), [&](const Layer& other) { return other.name == source.name; }))
+      fail(source.name, "is there twice");
+    check(source, picture);
+    Layer& layer = layers_.emplace_back(Layer{source.name, source.groups.all()});
+    layer.image.counts = picture.counts, layer.image.mean_count = picture.mean_count;
+    for (size_t i = 0; i < n; ++i) {
+      if (!std::isfinite(layer.image.data[i]) && std::isfinite(picture.data[i]))
+        fail(source.name, "has values that are not finite");
+      rest_[i] -= layer.image.data[i];
+    }
+  }
+  double left = 0, all = 0;
+  for (size_t i = 0; i < n; ++i)
+    if (std::isfinite(rest_[i])) left += std::abs(rest_[i]), all += std::abs(picture.data[i]);
+  if (left <= kNothing * all) return;
+  GroupedImage rest = picture;
+  rest.data = rest_.data();
+  layers_.push_back({kRest, rest});
+}
+
+}  // namespace covary

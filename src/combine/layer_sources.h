@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// Layers of an independent image, such as direct light or the light of single lamps, of any renderer.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "combine/grouped_source.h"
+#include "estimators/estimator.h"
+
+namespace covary {
+
+struct LayerSource {
+  std::string name;
+  GroupedSource groups;
+};
+
+/// Of what the layers that were given leave of the image.
+inline constexpr const char* kRest = "Rest";
+
+/// Layers that together are the image: those of `sources`, and kRest where these leave more than a thousandth of it
+/// (less is what rounding, such as that of 16-bit files, may leave).
+class WholeLayers {
+ public:
+  /// What `picture` and the sources point to must live as long. Throws Error(kInput) where a layer has other pixels or
+  /// groups, is named twice or kRest, or has a value that is not finite where the picture's is.
+  WholeLayers(const GroupedImage& picture, std::span<const LayerSource> sources);
+  std::span<const Layer> view() const { return layers_; }
+
+ private:
+  std::vector<Layer> layers_;
+  std::vector<float> rest_;
+};
+
+}  // namespace covary
