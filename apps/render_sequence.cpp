@@ -38,8 +38,8 @@ void check(const RenderOptions& options) {
                                     {"--save-training", !request.save_training.empty()}})
     if (given) usage(fmt::format("{} is an option of single images, not of --frames", name));
   const DenoisingChoice& denoising = options.settings.denoising;
-  if (options.sequence.history && (!denoising.denoises() || request.layers))
-    usage("--history is for frames with --denoise, and without --layers");
+  if (options.sequence.history && (!denoising.denoises() || request.splits_layers()))
+    usage("--history is for frames with --denoise, and without --layers and --light-groups");
   for (const auto& [name, path] :
        {std::pair{"-o", request.output}, {"--passes", request.passes}, {"--json", options.json}})
     if (!path.empty() && !is_frame_pattern(path))

@@ -35,8 +35,8 @@ _LAYERS = optional(mapping_of(IMAGE, "a mapping from names to arrays"))
 def combine(crn: Any, independent: Any, estimator: PairEstimator = "iicv", *, light: Film | None = None,
             counts: Any = None, samples: int | None = None, denoise: DenoiseMode = "none", albedo: Any = None,
             normal: Any = None, denoising_albedo: Any = None, denoising_normal: Any = None,
-            layers: Mapping[str, Any] | None = None, oidn: str | PathLike[str] = "", std_error: bool | None = None, force: bool = False,
-            progress: Progress | None = None, **options: OptionValue) -> Result:
+            layers: Mapping[str, Any] | None = None, oidn: str | PathLike[str] = "", std_error: bool | None = None,
+            force: bool = False, progress: Progress | None = None, **options: OptionValue) -> Result:
     """One image of two: `crn`, whose pixels share their random numbers, and `independent`, whose pixels do not.
 
     Each is an array of float32 [T, H, W, 3], the means of T groups of samples (renders with different seeds), of NumPy,

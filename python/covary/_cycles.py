@@ -40,6 +40,12 @@ def compositor(scene: Any) -> tuple[Any, str, Any, str]:
     return scene, "use_nodes", False, reason
 
 
+def blue_noise(cycles: Any) -> str:
+    """Why the scene's pattern is not kept, where that is more than another order of the same points."""
+    lost = "a group's errors would be arranged over its pixels, and its numbers could not be common"
+    return lost if getattr(cycles, "sampling_pattern", "") == "BLUE_NOISE" else ""
+
+
 def needed(scene: Any) -> list[tuple[Any, str, Any, str]]:
     """(owner, name, value, reason) of each setting that both images need; "" for those that leave the picture as it
     is."""
@@ -56,7 +62,7 @@ def needed(scene: Any) -> list[tuple[Any, str, Any, str]]:
         (cycles, "use_guiding", False, "it learns while it renders, so that samples depend on each other"),
         (cycles, "use_animated_seed", False, ""),
         (cycles, "auto_scrambling_distance", False, ""),
-        (cycles, "sampling_pattern", pattern(), ""),
+        (cycles, "sampling_pattern", pattern(), blue_noise(cycles)),
         (cycles, "time_limit", 0.0, ""),
         compositor(scene),
         (scene.render, "use_sequencer", False, ""),

@@ -146,7 +146,7 @@ def _check_scene_arguments(scene: PathOrScene, options: Mapping[str, Any]) -> No
          until_p95=optional(real(0, above=True)), time=optional(real(0, above=True)), seed=SEED,
          denoise=optional(DENOISE), oidn=empty_or(path), output=optional(path), passes=optional(path), resume=flag,
          overwrite=flag,
-         checkpoint=optional(real(0)), preview=flag, aovs=flag, layers=flag, path_lengths=flag,
+         checkpoint=optional(real(0)), preview=flag, aovs=flag, layers=flag, light_groups=flag, path_lengths=flag,
          crop=optional(several("(x, y, width, height) in pixels", whole(0, 65535), whole(0, 65535), whole(1, 65536),
                                whole(1, 65536))),
          filter=optional(choice(get_args(Filter))), sampling=optional(choice(get_args(Sampling))),
@@ -159,7 +159,8 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
            denoise: DenoiseMode | None = None, oidn: str | PathLike[str] = "",
            output: str | PathLike[str] | None = None, passes: str | PathLike[str] | None = None, resume: bool = False,
            overwrite: bool = False, checkpoint: float | None = None, preview: bool = False, aovs: bool = False,
-           layers: bool = False, path_lengths: bool = False, crop: tuple[int, int, int, int] | None = None,
+           layers: bool = False, light_groups: bool = False, path_lengths: bool = False,
+           crop: tuple[int, int, int, int] | None = None,
            filter: Filter | None = None, sampling: Sampling | None = None, sampler: Sampler | None = None,
            crn_part: CrnPart = "both", groups: int | None = None, split: tuple[float, float] | None = None,
            films_only: bool = False, save_training: str | PathLike[str] | None = None,
@@ -180,6 +181,7 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
     passes: folder that keeps the films; resume: continues those that are there; overwrite: replaces them;
         checkpoint: seconds between writing unfinished films, by default 300 where there is a place for them; 0: never.
     aovs: also the images Albedo, N and P; layers: also Direct and Indirect, which add up to the image;
+        light_groups: in place of these Combined_ID of each id of lights, and Rest;
         path_lengths: also images of paths of each length, by controlled-path.
     crop: x, y, width and height in the frame.
     sampling: of the one pass of estimator "none"; by default "independent".
@@ -207,8 +209,9 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
         "integrator": loading["integrator"] or None, "estimator": estimator, "denoise": denoise,
         "oidn": fspath(oidn) or None, "resolution": loading["resolution"], "crop": crop, "passes": passes,
         "resume": resume, "overwrite": overwrite, "checkpoint": checkpoint, "no-preview": not preview, "aovs": aovs,
-        "layers": layers, "path-lengths": path_lengths, "sampling": sampling, "sampler": sampler, "split": split,
-        "groups": groups, "crn-part": None if crn_part == "both" else crn_part, "rfilter": filter,
+        "layers": layers, "light-groups": light_groups, "path-lengths": path_lengths, "sampling": sampling,
+        "sampler": sampler, "split": split, "groups": groups,
+        "crn-part": None if crn_part == "both" else crn_part, "rfilter": filter,
         "save-training": save_training, "load-training": load_training})
     properties = {"min_depth": loading["min_depth"], "max_depth": loading["max_depth"], **loading["integrator_options"]}
     of_integrator = {name.replace("_", "-"): {"True": "on", "False": "off"}.get(str(value), str(value))

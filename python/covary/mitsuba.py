@@ -317,7 +317,7 @@ def render(scene: Any, spp: int, seed: int = 0, integrator: Any = None, sensor: 
     guides = _guides(mi, loaded, camera, seed) if aovs or denoises else {}
     rendered = time.perf_counter()
     known: dict[str, Any] = (guides_of(guides) if denoises else {}) | options
-    result = combine(films["crn"], films["independent"], estimator, **known)  # type: ignore[arg-type]
+    result = combine(films["crn"], films["independent"], estimator, **known)
     estimated = time.perf_counter()
     given = fields_of(result) | {"warnings": warnings + result.warnings, "aovs": guides}
     return MitsubaResult(**given, films=films, render_seconds=rendered - started,

@@ -103,7 +103,8 @@ struct Pair {
   void take_layers(const nb::dict& arrays) {
     for (const auto& [key, array] : arrays) {
       const auto name = nb::cast<std::string>(key);
-      request.layers.push_back({name, source_of(layers.emplace_back(array, name), request.independent.origin.place)});
+      request.layers.push_back(
+          {name, source_of(layers.emplace_back(array, "layers: " + name), request.independent.origin.place)});
     }
   }
   Pair(const Pair&) = delete;
@@ -213,10 +214,12 @@ Estimator estimator_of(bool is_pair, const std::string& name, const OptionValues
                        const DenoisingChoice& denoising) {
   if (is_pair) return with_denoising(make_pair_estimator(name, options), denoising);
   if (name != kDefaultEstimator && name != kNoEstimator)
-    throw Error(ErrorCode::kUsage, fmt::format("crn: '{}' needs the image with common random numbers", name));
+    throw Error(ErrorCode::kUsage,
+                fmt::format("crn: found None; '{}' needs the image with common random numbers", name));
   if (!denoising.denoises())
-    throw Error(ErrorCode::kUsage, std::string("crn: without it, independent images can only be denoised, ") +
-                                       kNotDenoised + " they are not");
+    throw Error(ErrorCode::kUsage,
+                std::string("crn: found None; without it, independent images can only be denoised, ") + kNotDenoised +
+                    " they are not");
   return with_denoising(make_estimator(kNoEstimator, options), denoising);
 }
 

@@ -67,7 +67,7 @@ struct Choice {
 
 Plan plan_of(const RenderSettings& settings, const Choice& choice) {
   Plan plan = estimator_plan(estimator_of(settings, choice.of_estimator), settings.passes);
-  if (choice.films_only && settings.request.layers)
+  if (choice.films_only && settings.request.splits_layers())
     throw Error(ErrorCode::kUsage, "layers: films_only=True makes no image that they would be parts of");
   if (choice.films_only) {
     plan.estimate = [](std::span<const Pass>, int, int, const Beside&) { return EstimatorResult(); };

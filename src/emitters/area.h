@@ -24,7 +24,11 @@ class AreaLight final : public Emitter {
   /// must outlive the light.
   void attach(const Shape* shape);
   /// The same light without a shape.
-  std::shared_ptr<AreaLight> clone() const { return std::make_shared<AreaLight>(radiance_); }
+  std::shared_ptr<AreaLight> clone() const {
+    const auto light = std::make_shared<AreaLight>(radiance_);
+    light->set_group(group());
+    return light;
+  }
   const Shape* shape() const override { return shape_; }
 
   Spectrum surface_radiance(const SurfaceHit& hit, const Vec3& w) const override;

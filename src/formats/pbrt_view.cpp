@@ -170,8 +170,10 @@ void read_pbrt_filter(const std::string& type, PbrtParameters& p, PbrtView& view
   p.ignore({"sigma", "B", "C", "tau"});
 }
 
-void read_pbrt_sampler(const std::string&, PbrtParameters& p, PbrtView& view) {
-  view.sampler = make_object("sampler", "independent", p.where());
+void read_pbrt_sampler(const std::string& type, PbrtParameters& p, PbrtView& view) {
+  const bool independent = type == "independent";
+  if (!independent && type != "sobol") p.warn("is read as 'sobol'");
+  view.sampler = make_object("sampler", independent ? "independent" : "sobol", p.where());
   int64_t samples = p.get_integer("pixelsamples", 16);
   if (p.has("xsamples") || p.has("ysamples")) samples = p.get_integer("xsamples", 4) * p.get_integer("ysamples", 4);
   set_property(*view.sampler, "sample_count", samples);

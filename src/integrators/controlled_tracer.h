@@ -59,7 +59,7 @@ class ControlledTracer {
   void trace() {
     if (lengths_.max_depth <= 0) return;
     start_paths(samples_, batch_);
-    context_.by_length.radiance.assign(samples_.size() * context_.by_length.n_lengths, Spectrum());
+    context_.by_part.radiance.assign(samples_.size() * context_.by_part.n_parts, Spectrum());
     const bool any_light = !control_.lights->empty() || control_.environment;
     for (int depth = 0; !batch_.paths.empty(); ++depth) {
       find_surfaces(scene_, depth, lengths_.hide_emitters, batch_, context_);
@@ -339,9 +339,9 @@ class ControlledTracer {
     if (batch_.indirect.recording) [[unlikely]]
       batch_.indirect.add(sample, edges, value);
     const auto place = static_cast<size_t>(edges - 1);
-    RadianceByLength& by_length = context_.by_length;
-    if (place < by_length.n_lengths) [[unlikely]]
-      by_length.radiance[sample * by_length.n_lengths + place] += value;
+    RadianceByPart& by_part = context_.by_part;
+    if (place < by_part.n_parts) [[unlikely]]
+      by_part.radiance[sample * by_part.n_parts + place] += value;
   }
 
   /// Ends the estimate of a vertex, which is of paths of so many edges.

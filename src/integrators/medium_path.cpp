@@ -19,11 +19,13 @@ NullPassage null_passage(const SurfaceHit& hit, const Vec3& d) {
 }  // namespace
 
 MediumPath::MediumPath(const Scene& scene, const PathLengthSettings& lengths, CameraSample& sample,
-                       PathContext& context)
+                       PathContext& context, const LightParts* parts, uint32_t number)
     : scene_(scene),
       lengths_(lengths),
       sample_(sample),
       context_(context),
+      parts_(parts),
+      number_(number),
       lights_(scene),
       channel_(channel_of(sample.random)),
       numbers_(sample.random, 0),
@@ -64,12 +66,12 @@ bool MediumPath::scatter_in_medium(const Vec3& p) {
   const uint32_t vertex = kFirstSurfaceVertex + n_smooth_;
   const PhaseFunction& phase = medium_->phase();
   if (medium_->sample_lights() && depth_ + 2 >= lengths_.min_depth && !lights_.empty()) {
-    float pmf = 0;
-    const EmitterSample light = sample_light(p, vertex, pmf);
+    const Emitter& emitter = choose_light(vertex);
+    const EmitterSample light = sample_light(emitter, p, vertex);
     if (light.pdf_solid_angle > 0) {
       const float value = phase.pdf(ray_.d, light.wi);
       const float distance = light.distance == kInfinity ? kInfinity : light.distance * (1 - 10 * kRayEpsilon);
-      connect(light, pmf, {p, light.wi, distance}, medium_, Spectrum(value), value);
+      connect(light, emitter, {p, light.wi, distance}, medium_, Spectrum(value), value);
     }
   }
   const Vec3 w = phase.sample(ray_.d, sample_.random.get_2d(vertex, Event::kDirection));
@@ -92,12 +94,12 @@ bool MediumPath::scatter_on_surface(const SurfaceHit& hit) {
   context_.arena.reset();
   const BsdfClosure* bsdf = hit.bsdf->bind(hit, wo.z > 0, TransportMode::kRadiance, context_.arena);
   if (smooth && !last && depth_ + 2 >= lengths_.min_depth && !lights_.empty()) {
-    float pmf = 0;
-    const EmitterSample light = sample_light(hit.p, vertex, pmf);
+    const Emitter& emitter = choose_light(vertex);
+    const EmitterSample light = sample_light(emitter, hit.p, vertex);
     if (light.pdf_solid_angle > 0) {
       const BsdfValue f = bsdf->eval(wo, hit.frame.to_local(light.wi));
       const Medium* medium = hit.shape->bounds_medium() ? hit.shape->medium_towards(hit.ng, light.wi) : medium_;
-      connect(light, pmf, shadow_ray(hit, light), medium, f.value, f.pdf_solid_angle);
+      connect(light, emitter, shadow_ray(hit, light), medium, f.value, f.pdf_solid_angle);
     }
   }
   const BsdfSample next =
@@ -148,28 +150,30 @@ void MediumPath::add_emission(const Emitter& emitter, const SurfaceHit* hit) {
     const float pdf_light = hit ? emitter.pdf_solid_angle(previous_p_, *hit) : light.pdf_solid_angle;
     pdf += weights_.pdf_light * (lights_.pmf(emitter) * pdf_light);
   }
-  sample_.radiance += radiance * (1 / mean(pdf));
+  add(emitter, radiance * (1 / mean(pdf)));
 }
 
-EmitterSample MediumPath::sample_light(const Vec3& p, uint32_t vertex, float& pmf) const {
+const Emitter& MediumPath::choose_light(uint32_t vertex) const {
+  return lights_.select(sample_.random.get_1d(vertex, Event::kLightChoice));
+}
+
+EmitterSample MediumPath::sample_light(const Emitter& emitter, const Vec3& p, uint32_t vertex) const {
   const PathRandom& random = sample_.random;
-  const Emitter& emitter = lights_.select(random.get_1d(vertex, Event::kLightChoice));
-  pmf = lights_.pmf(emitter);
   return emitter.sample_towards(p, random.get_2d(vertex, Event::kLightPosition),
                                 random.get_1d(vertex, Event::kLightPrimitive));
 }
 
-/// Adds a light sample. `value`: of the surface, with its cosine, or of the phase function; `pdf_direction`: density
-/// with which that draws the direction.
-void MediumPath::connect(const EmitterSample& light, float pmf, const Ray& shadow, const Medium* medium,
+/// Adds a sample of the light. `value`: of the surface, with its cosine, or of the phase function; `pdf_direction`:
+/// density with which that draws the direction.
+void MediumPath::connect(const EmitterSample& light, const Emitter& emitter, const Ray& shadow, const Medium* medium,
                          const Spectrum& value, float pdf_direction) {
   const Spectrum unblocked = weights_.throughput * value * light.radiance;
   if (is_black(unblocked)) return;
   SpectralWeights weights;
   if (!light_arrives(shadow, medium, weights)) return;
-  Spectrum pdf = weights.pdf_light * (pmf * light.pdf_solid_angle);
+  Spectrum pdf = weights.pdf_light * (lights_.pmf(emitter) * light.pdf_solid_angle);
   if (!light.is_delta) pdf += weights.pdf_path * pdf_direction;
-  sample_.radiance += unblocked * weights.throughput * (1 / mean(weights_.pdf_path * pdf));
+  add(emitter, unblocked * weights.throughput * (1 / mean(weights_.pdf_path * pdf)));
 }
 
 /// Follows a shadow ray through boundaries and media; false where nothing arrives.

@@ -7,6 +7,7 @@
 // passages are no edges of a path, as in Mitsuba's `volpath`.
 #pragma once
 
+#include "integrators/light_parts.h"
 #include "integrators/medium_flight.h"
 #include "integrators/path_lengths.h"
 #include "passes/integrator.h"
@@ -16,7 +17,9 @@ namespace covary {
 
 class MediumPath {
  public:
-  MediumPath(const Scene& scene, const PathLengthSettings& lengths, CameraSample& sample, PathContext& context);
+  /// `parts`: or null; the sample is the one of this `number` of the batch.
+  MediumPath(const Scene& scene, const PathLengthSettings& lengths, CameraSample& sample, PathContext& context,
+             const LightParts* parts = nullptr, uint32_t number = 0);
   /// Sets the radiance of the sample.
   void trace() {
     while (advance()) {
@@ -32,15 +35,22 @@ class MediumPath {
   void start_flight() { numbers_ = FlightNumbers(sample_.random, n_smooth_); }
   void go_through(const SurfaceHit& hit, const Vec3& w);
 
-  EmitterSample sample_light(const Vec3& p, uint32_t vertex, float& pmf) const;
-  void connect(const EmitterSample& light, float pmf, const Ray& shadow, const Medium* medium, const Spectrum& value,
-               float pdf_direction);
+  const Emitter& choose_light(uint32_t vertex) const;
+  EmitterSample sample_light(const Emitter& emitter, const Vec3& p, uint32_t vertex) const;
+  void connect(const EmitterSample& light, const Emitter& emitter, const Ray& shadow, const Medium* medium,
+               const Spectrum& value, float pdf_direction);
+  void add(const Emitter& light, const Spectrum& radiance) {
+    sample_.radiance += radiance;
+    if (parts_) parts_->add(light, number_, radiance, context_);
+  }
   bool light_arrives(Ray ray, const Medium* medium, SpectralWeights& weights);
 
   const Scene& scene_;
   const PathLengthSettings& lengths_;
   CameraSample& sample_;
   PathContext& context_;
+  const LightParts* parts_;
+  const uint32_t number_;
   UniformLights lights_;
   int channel_;
   FlightNumbers numbers_;

@@ -11,37 +11,63 @@ namespace {
 
 constexpr int kDirectEdges = 2;  // of paths from the camera by one surface to a light
 
+/// Tells apart from which lights radiance comes.
+struct ByLight : PathParts {
+  std::shared_ptr<const LightParts> parts;
+  void begin(size_t n_samples, PathContext& context) const { parts->begin(n_samples, context); }
+  void add_light(const Emitter* light, uint32_t sample, const Spectrum& radiance, PathContext& context) const {
+    if (light && !is_black(radiance)) parts->add(*light, sample, radiance, context);
+  }
+  void connect_with(const Emitter& light, size_t n, PathBatch& batch) const {
+    if (batch.connected.size() <= n) batch.connected.resize(batch.connections.size());
+    batch.connected[n] = &light;
+  }
+  const Emitter* light_of(size_t n, const PathBatch& batch) const { return batch.connected[n]; }
+};
+
+const LightParts* light_parts(const PathParts&) { return nullptr; }
+const LightParts* light_parts(const ByLight& by_light) { return by_light.parts.get(); }
+
+/// Path tracing whose surfaces are traced by PathTracer<Parts>.
+template <typename Parts>
 class PathIntegrator final : public Integrator {
  public:
-  explicit PathIntegrator(const PathLengthSettings& lengths) : lengths_(lengths), surfaces_("path", lengths) {}
+  explicit PathIntegrator(const PathLengthSettings& lengths, Parts parts = {})
+      : lengths_(lengths), parts_(parts), surfaces_("path", lengths, parts) {}
 
-  std::shared_ptr<Integrator> clone() const override { return std::make_shared<PathIntegrator>(lengths_); }
+  std::shared_ptr<Integrator> clone() const override { return std::make_shared<PathIntegrator>(lengths_, parts_); }
   void prepare(const Scene& scene) override { surfaces_.prepare(scene); }
   std::unique_ptr<ThreadState> make_thread_state() const override { return surfaces_.make_thread_state(); }
   void trace(const Scene& scene, std::span<CameraSample> samples, PathContext& context) const override {
     if (!scene.has_media()) {
       surfaces_.trace(scene, samples, context);
     } else if (lengths_.max_depth > 0) {
-      for (CameraSample& sample : samples) MediumPath(scene, lengths_, sample, context).trace();
+      parts_.begin(samples.size(), context);
+      for (uint32_t i = 0; i < samples.size(); ++i)
+        MediumPath(scene, lengths_, samples[i], context, light_parts(parts_), i).trace();
     }
+  }
+  std::shared_ptr<Integrator> by_light(std::span<const std::string> groups) const override {
+    return std::make_shared<PathIntegrator<ByLight>>(lengths_, ByLight{{}, std::make_shared<LightParts>(groups)});
   }
   std::shared_ptr<Integrator> of_direct_light() const override {
     PathLengthSettings direct = lengths_;
     direct.max_depth = std::min(direct.max_depth, kDirectEdges);
-    return std::make_shared<PathIntegrator>(direct);
+    return std::make_shared<PathIntegrator<PathParts>>(direct);
   }
   bool sees_media() const override { return true; }
   std::string description() const override { return surfaces_.description(); }
 
  private:
   PathLengthSettings lengths_;
-  PathTracer<PathParts> surfaces_;
+  Parts parts_;
+  PathTracer<Parts> surfaces_;
 };
 
 }  // namespace
 
 std::shared_ptr<Integrator> make_path(Settings&, const PathLengthSettings& lengths) {
-  return std::make_shared<PathIntegrator>(lengths);
+  return std::make_shared<PathIntegrator<PathParts>>(lengths);
 }
 
 }  // namespace covary

@@ -71,6 +71,8 @@ struct LightConnection {
 };
 
 /// The batch of PathTracer.
-struct PathBatch final : CameraBatch<CameraPath, EmitterChoice, LightConnection> {};
+struct PathBatch final : CameraBatch<CameraPath, EmitterChoice, LightConnection> {
+  std::vector<const Emitter*> connected;  ///< the lights of the connections, where lights are told apart
+};
 
 }  // namespace covary

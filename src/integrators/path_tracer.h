@@ -30,6 +30,13 @@ struct PathParts : roulette::Parts {
   /// Called before the first path.
   void prepare(const Scene&) {}
 
+  /// For those who tell apart from which lights radiance comes: that a batch of samples begins, what a light adds to
+  /// the radiance of a sample, and which light connection number n of the batch is with.
+  void begin(size_t /*n_samples*/, PathContext&) const {}
+  void add_light(const Emitter* /*light*/, uint32_t /*sample*/, const Spectrum& /*radiance*/, PathContext&) const {}
+  void connect_with(const Emitter& /*light*/, size_t /*n*/, PathBatch&) const {}
+  const Emitter* light_of(size_t /*n*/, const PathBatch&) const { return nullptr; }
+
   /// How to choose a light; see UniformLights for what the result must be able to do.
   UniformLights lights(const Scene& scene) const { return UniformLights(scene); }
 
@@ -71,20 +78,29 @@ class PathTracer final : public Integrator {
     PathBatch& batch = context.state_as<PathBatch>();
     const auto& lights = parts_.lights(scene);
     start_paths(samples, batch);
+    parts_.begin(samples.size(), context);
 
     for (int depth = 0; !batch.paths.empty(); ++depth) {
       find_surfaces(scene, depth, lengths_.hide_emitters, batch, context);
       if (depth + 1 >= lengths_.min_depth)
-        for (size_t i = 0; i < batch.paths.size(); ++i)
-          samples[batch.paths[i].sample].radiance +=
-              emission(scene, lights, batch.paths[i], batch.rays[i], batch.hits[i]);
+        for (size_t i = 0; i < batch.paths.size(); ++i) {
+          const Path& path = batch.paths[i];
+          const Spectrum radiance = emission(scene, lights, path, batch.rays[i], batch.hits[i]);
+          samples[path.sample].radiance += radiance;
+          parts_.add_light(path.found ? batch.hits[i].emitter : scene.environment(), path.sample, radiance, context);
+        }
       if (depth + 1 >= lengths_.max_depth || context.stopped()) break;
       end_paths_without_surface(batch);
 
       const bool connect = depth + 2 >= lengths_.min_depth && !lights.empty();
       if (connect) sample_lights(scene, lights, samples, batch);
       scatter(lights, depth, connect, samples, batch, context);
-      add_connections(scene, samples, batch, context);
+      visit_connections(scene, batch, context, [&](const PathBatch::Connection& connection, bool hidden) {
+        if (hidden) return;
+        samples[connection.sample].radiance += connection.radiance;
+        const auto n = static_cast<size_t>(&connection - batch.connections.data());
+        parts_.add_light(parts_.light_of(n, batch), connection.sample, connection.radiance, context);
+      });
     }
   }
 
@@ -107,7 +123,7 @@ class PathTracer final : public Integrator {
       context.arena.reset();
       const BsdfClosure* bsdf = hit.bsdf->bind(hit, wo.z > 0, TransportMode::kRadiance, context.arena);
       if (connect && batch.lights[i].pdf_solid_angle > 0)
-        connect_light(lights.pmf(*batch.choices[i].emitter), path, hit, wo, *bsdf, batch.lights[i], batch);
+        connect_light(lights, *batch.choices[i].emitter, path, hit, wo, *bsdf, batch.lights[i], batch);
 
       const BsdfSample next = parts_.sample_direction(*bsdf, hit, wo, random, vertex);
       if (!next.valid() || is_black(next.weight)) continue;
@@ -136,15 +152,17 @@ class PathTracer final : public Integrator {
     return radiance * parts_.direction_weight(path.previous_pdf, lights.pmf(*emitter) * pdf_light);
   }
 
-  /// Next-event estimation: f cos L / pdf, weighted against direction sampling, if nothing lies between. `pmf`: with
-  /// which the light was chosen.
-  void connect_light(float pmf, const Path& path, const SurfaceHit& hit, const Vec3& wo, const BsdfClosure& bsdf,
-                     const EmitterSample& light, PathBatch& batch) const {
+  /// Next-event estimation: f cos L / pdf, weighted against direction sampling, if nothing lies between. `light`: a
+  /// sample of `emitter`.
+  void connect_light(const Lights& lights, const Emitter& emitter, const Path& path, const SurfaceHit& hit,
+                     const Vec3& wo, const BsdfClosure& bsdf, const EmitterSample& light, PathBatch& batch) const {
     if (is_black(light.radiance)) return;
     const BsdfValue f = parts_.eval_direction(bsdf, hit, wo, hit.frame.to_local(light.wi));
     if (is_black(f.value)) return;
-    const float weight = parts_.light_weight_over_pdf(light.is_delta, pmf * light.pdf_solid_angle, f.pdf_solid_angle);
+    const float pdf_light = lights.pmf(emitter) * light.pdf_solid_angle;
+    const float weight = parts_.light_weight_over_pdf(light.is_delta, pdf_light, f.pdf_solid_angle);
     const size_t n = batch.n_connections++;
+    parts_.connect_with(emitter, n, batch);
     make_in_place(batch.connections[n], [&] {
       return PathBatch::Connection{path.throughput * f.value * light.radiance * weight, path.sample};
     });

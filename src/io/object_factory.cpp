@@ -108,7 +108,10 @@ std::shared_ptr<const SceneObject> SceneFactory::create(const ObjectDescription&
     const auto* plugin = find_plugin(plugins, description, diagnostics_);
     if (!plugin) return nullptr;
     Parameters parameters(description, *this, diagnostics_);
-    return make_checked(parameters, plugin->make);
+    const auto made = make_checked(parameters, plugin->make);
+    if constexpr (requires { made->set_group(description.id); })
+      if (made) made->set_group(description.id);
+    return made;
   };
   if (description.kind == "texture") return through(texture_plugins());
   if (description.kind == "bsdf") return through(bsdf_plugins());

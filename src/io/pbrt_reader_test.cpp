@@ -92,7 +92,7 @@ const std::string kXmlHead = R"(<integrator type="path"><integer name="max_depth
 <sensor type="perspective"><float name="fov" value="45"/><string name="fov_axis" value="smaller"/>
 <float name="far_clip" value="1e7"/>
 <transform name="to_world"><scale x="-1"/><lookat origin="3, 4, 1.5" target=".5, .5, 0" up="0, 0, 1"/></transform>
-<sampler type="independent"><integer name="sample_count" value="32"/></sampler>
+<sampler type="sobol"><integer name="sample_count" value="32"/></sampler>
 <film type="hdrfilm"><integer name="width" value="60"/><integer name="height" value="40"/><rfilter type="box"/></film>
 </sensor>
 )";

@@ -10,7 +10,6 @@ namespace covary {
 
 void trace_direct_light(const Scene& scene, const Integrator& direct_light, const PassSettings& settings,
                         const Film& film, Film& direct) {
-  if (direct.counts().empty()) direct = Film(film.frame_width(), film.frame_height(), film.crop(), film.groups());
   PassSettings same = settings;
   same.spp = SampleTarget(film.counts());
   same.limit = UINT32_MAX;

@@ -13,7 +13,7 @@ namespace covary {
 inline constexpr const char* kLayerNames[] = {"Direct", "Indirect"};
 
 /// Brings `direct` to the part of the samples of `film` that came by at most two edges (Integrator::of_direct_light(),
-/// prepared), in the same groups; an empty film is begun. `settings`: those of the film's pass. Returns early, with
+/// prepared), in the same groups. `settings`: those of the film's pass. Returns early, with
 /// fewer samples, once settings.stop is true.
 void trace_direct_light(const Scene& scene, const Integrator& direct_light, const PassSettings& settings,
                         const Film& film, Film& direct);

@@ -30,9 +30,9 @@ class Integrator;
 class LearningIntegrator;
 class LightTracingIntegrator;
 
-/// Parts of samples' radiances by the number of edges of their paths.
-struct RadianceByLength {
-  size_t n_lengths = 0;            ///< paths of 1 … n_lengths edges are told apart; 0: none
+/// Parts of samples' radiances: by the number of edges of their paths, or by the light that they come from.
+struct RadianceByPart {
+  size_t n_parts = 0;              ///< paths of 1 … n_parts edges, or groups of lights, are told apart; 0: none
   std::vector<Spectrum> radiance;  ///< those of one sample after another, in the order of trace()
 };
 
@@ -54,7 +54,7 @@ struct PathContext {
   bool stopped() const { return stop && stop->load(std::memory_order_relaxed); }
   /// PassSettings::importance of the pixel of each sample that trace() is called with; empty where there is none.
   std::span<const Spectrum> importance;
-  RadianceByLength by_length;  ///< filled by integrators that have Integrator::longest_path()
+  RadianceByPart by_part;  ///< filled by integrators that have Integrator::longest_path(), or come of by_light()
 };
 
 /// One camera ray, the random numbers of its path, and the estimate of the radiance arriving along it.
@@ -102,8 +102,11 @@ class Integrator : public SceneObject {
   /// Itself where it traces light (light_pass.h), otherwise null.
   virtual LightTracingIntegrator* light_tracing() { return nullptr; }
   const LightTracingIntegrator* light_tracing() const { return const_cast<Integrator*>(this)->light_tracing(); }
-  /// Most edges of its paths where trace() fills PathContext::by_length.
+  /// Most edges of its paths where trace() fills PathContext::by_part.
   virtual std::optional<int> longest_path() const { return {}; }
+  /// Another, whose trace() takes the same samples and fills PathContext::by_part: by Emitter::group(), part i is that
+  /// of groups[i], and the last one is of all other lights. Null where it cannot tell.
+  virtual std::shared_ptr<Integrator> by_light(std::span<const std::string> /*groups*/) const { return nullptr; }
   /// Another, whose samples hold the part of this one's with the same random numbers that came by at most two edges:
   /// emission seen directly and direct light. Null where it has no such part.
   virtual std::shared_ptr<Integrator> of_direct_light() const { return nullptr; }

@@ -212,7 +212,7 @@ class FailingLengths : public Integrator {
   void prepare(const Scene& scene) override { path_->prepare(scene); }
   std::unique_ptr<ThreadState> make_thread_state() const override { return path_->make_thread_state(); }
   void trace(const Scene& scene, std::span<CameraSample> samples, PathContext& context) const override {
-    if (context.by_length.n_lengths > 0) throw Error(ErrorCode::kInput, "no lengths today");
+    if (context.by_part.n_parts > 0) throw Error(ErrorCode::kInput, "no lengths today");
     path_->trace(scene, samples, context);
   }
   std::string description() const override { return path_->description(); }

@@ -11,6 +11,7 @@
 #include "integrators/aov.h"
 #include "passes/direct_light.h"
 #include "passes/path_length_images.h"
+#include "passes/sample_parts.h"
 #include "passes/training.h"
 #include "plans/budget.h"
 #include "plans/integrator_choice.h"
@@ -52,9 +53,10 @@ RenderMemory render_memory(const LoadedScene& scene, const Plan& plan, const Ren
   if (has_light_pass(scene, plan)) passes.push_back(light_pass_plan(plan, passes));
   RenderMemory memory = render_memory(plan, passes, window.width, window.height, request.aovs || plan.reads_guides);
   memory.training = training_memory(scene);
-  if (request.layers) {
-    // Films of both layers, which the denoiser copies, and images of each for each candidate.
-    const double images = std::size(kLayerNames) * (2.0 * passes.back().groups + kImagesOfLayer);
+  if (request.splits_layers()) {
+    // Films of all layers, which the denoiser copies, and images of each for each candidate.
+    const size_t n = request.layers ? std::size(kLayerNames) : light_groups(*scene.scene).size() + 1;
+    const double images = static_cast<double>(n) * (2.0 * passes.back().groups + kImagesOfLayer);
     memory.films += window.width * window.height * images * kImageBytes;
   }
   if (request.path_lengths) memory.films += window.width * window.height * kMostEdges * kImageBytes;

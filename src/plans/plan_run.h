@@ -62,7 +62,7 @@ class PlanRun {
   }
   /// The film needs no estimate, but for its error or layers.
   bool needs_estimate() const {
-    return !plan_.film_is_image || film_has_errors() || request_.until > 0 || request_.layers;
+    return !plan_.film_is_image || film_has_errors() || request_.until > 0 || request_.splits_layers();
   }
   /// Of the whole window; empty where the plan reads none or they are not there.
   Guides guides() const {
@@ -105,13 +105,14 @@ class PlanRun {
   ErrorRounds rounds_;                  // where an error is wanted
   std::vector<size_t> first_of_phase_;  // index of the first pass of each phase that has begun
   RenderResult result_;
-  std::shared_ptr<Integrator> direct_light_;  // with RenderRequest::layers, as the two below
-  std::vector<Film> layers_;                  // of kLayerNames; empty until they have been traced
-  uint64_t done_ = 0;                         // samples of this call, of earlier phases and rounds
+  std::shared_ptr<Integrator> of_layers_;  // with RenderRequest::splits_layers(), as the two below
+  std::vector<std::string> layer_names_;
+  std::vector<Film> layers_;  // of these names; empty until they have been traced
+  uint64_t done_ = 0;         // samples of this call, of earlier phases and rounds
   Stopwatch watch_, since_checkpoint_;
   bool consistent_ = true;                  // the films are as they were between two waves
   bool unsaved_ = false;                    // they have samples that are on no disk
-  double estimate_stopped_after_ = 0;  // seconds
+  double estimate_stopped_after_ = 0;       // seconds
   std::optional<double> estimate_seconds_;  // what the next estimate takes
 };
 

@@ -9,11 +9,13 @@
 #include <utility>
 
 #include "combine/combine.h"
+#include "combine/layer_sources.h"
 #include "core/error.h"
 #include "core/stop.h"
 #include "integrators/aov.h"
 #include "passes/direct_light.h"
 #include "passes/path_length_images.h"
+#include "passes/sample_parts.h"
 #include "plans/light_plan.h"
 #include "plans/pass_files.h"
 #include "plans/result_files.h"
@@ -42,7 +44,7 @@ EstimatorResult PlanRun::estimate_rows(int first_row, int n_rows, std::span<cons
     beside.guides = {&images[0], &images[1], &images[2], &images[3]};
   }
   for (size_t i = 0; i < layers.size(); ++i)
-    beside.layers.push_back({kLayerNames[i], rows_of(layers[i], first_row, n_rows)});
+    beside.layers.push_back({layer_names_[i], rows_of(layers[i], first_row, n_rows)});
   EstimatorResult image = plan_.estimate(camera_passes(state_.passes), first_row, n_rows, beside);
   const Pass* light = light_pass(state_.passes);
   const GroupedImage light_rows = light ? rows_of(light->film, first_row, n_rows) : GroupedImage{};
@@ -61,7 +63,7 @@ bool PlanRun::estimate() {
   EstimatorResult image;
   result_.image = {};
   result_.predicted.reset();
-  const bool with_layers = request_.layers && !result_.interrupted;
+  const bool with_layers = request_.splits_layers() && !result_.interrupted;
   if (with_layers) trace_layers();
   if (with_layers && stopped()) return false;
   const std::span<const Film> layers = with_layers ? std::span<const Film>(layers_) : std::span<const Film>();
@@ -69,7 +71,7 @@ bool PlanRun::estimate() {
     estimate_stopped_after_ = watch.seconds();
     return false;
   }
-  for (size_t i = 0; i < image.layers.size(); ++i) result_.aovs[kLayerNames[i]] = std::move(image.layers[i]);
+  for (size_t i = 0; i < image.layers.size(); ++i) result_.aovs[layer_names_[i]] = std::move(image.layers[i]);
   double samples = 0;
   for (const Pass& pass : camera_passes(films())) samples += pass.film.mean_count();
   result_.predicted = predicted_error(image, samples, plan_.reliable_samples);
@@ -105,15 +107,22 @@ void PlanRun::render_auxiliary_images() {
 /// As many samples as the last pass has, those that earlier calls have traced among them.
 void PlanRun::trace_layers() {
   const Pass& pass = camera_passes(films()).back();
-  if (!direct_light_) {
-    direct_light_ = pass.integrator->of_direct_light();
-    direct_light_->prepare(*scene_.scene);
-    layers_.resize(std::size(kLayerNames));
+  if (!of_layers_) {
+    if (request_.layers) layer_names_.assign(std::begin(kLayerNames), std::end(kLayerNames));
+    const std::vector<std::string> groups = light_groups(*scene_.scene);
+    if (request_.light_groups) {
+      for (const std::string& group : groups) layer_names_.push_back("Combined_" + group);
+      layer_names_.emplace_back(kRest);
+    }
+    of_layers_ = request_.layers ? pass.integrator->of_direct_light() : pass.integrator->by_light(groups);
+    of_layers_->prepare(*scene_.scene);
+    layers_ = films_of_parts(pass.film, layer_names_.size(), pass.film.groups());
   }
   PassSettings settings = pass.settings;
   settings.stop = callbacks_.stop;
   settings.progress = nullptr;
-  trace_direct_light(*scene_.scene, *direct_light_, settings, pass.film, layers_[0]);
+  if (request_.light_groups) return trace_parts(*scene_.scene, *of_layers_, settings, pass.film, layers_);
+  trace_direct_light(*scene_.scene, *of_layers_, settings, pass.film, layers_[0]);
   if (!stopped()) layers_[1] = indirect_light(pass.film, layers_[0]);
 }
 

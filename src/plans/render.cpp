@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "core/error.h"
+#include "passes/sample_parts.h"
 #include "plans/budget.h"
 #include "plans/integrator_choice.h"
 #include "plans/light_plan.h"
@@ -13,6 +14,16 @@
 
 namespace covary {
 namespace {
+
+void check_light_groups(const LoadedScene& scene) {
+  constexpr size_t kMost = 32;
+  const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
+  const std::vector<std::string> groups = light_groups(*scene.scene);
+  if (groups.empty()) usage("`light-groups`: no light of the scene has an id, by which it belongs to a group");
+  if (groups.size() > kMost)
+    usage(fmt::format("`light-groups`: the lights have {} ids; at most {} are told apart", groups.size(), kMost));
+  if (!integrator_of(scene).by_light(groups)) usage("`light-groups` need an integrator that tells lights apart: path");
+}
 
 void check(const LoadedScene& scene, const Plan& plan, const RenderRequest& request) {
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
@@ -22,8 +33,12 @@ void check(const LoadedScene& scene, const Plan& plan, const RenderRequest& requ
     usage(plan.name + " needs the number of samples to be known before, so there can be no limit of time or error");
   if (request.path_lengths && !integrator_of(scene).longest_path())
     usage("images by the number of edges need an integrator that knows them, such as controlled-path");
-  if (request.layers && !plan.splits_layers)
-    usage(plan.name + " makes no `layers`; `estimator` none does, denoised or not");
+  if (request.splits_layers() && !plan.splits_layers)
+    usage(fmt::format("{} makes no `{}`; `estimator` none does, denoised or not", plan.name,
+                      request.layers ? "layers" : "light-groups"));
+  if (request.layers && request.light_groups)
+    usage("`layers` and `light-groups`: either of them adds up to the image; give one");
+  if (request.light_groups) check_light_groups(scene);
   if (request.layers && !integrator_of(scene).of_direct_light())
     usage("`layers` need an integrator that tells direct light from indirect: path");
   if (request.until > 0 && !plan.predicts_error) usage(plan.name + " does not estimate its error");

@@ -37,6 +37,10 @@ struct RenderRequest {
   /// Also the images Direct and Indirect, which add up to the image (passes/direct_light.h). Needs an integrator
   /// that tells direct light, and a plan that splits layers.
   bool layers = false;
+  /// In place of these the images Combined_GROUP of each group of the scene's lights, and Rest for those in none.
+  /// Needs an integrator that tells lights apart.
+  bool light_groups = false;
+  bool splits_layers() const { return layers || light_groups; }
   /// Of passes with common random numbers; other parts than both need an integrator with light subpaths.
   CrnPart crn_part = CrnPart::kBoth;
 

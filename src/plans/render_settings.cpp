@@ -134,6 +134,8 @@ void declare_output(Settings& s, RenderRequest& r) {
   s.flag("aovs", r.aovs, "Add the images Albedo, N (normal) and P (position) to the output");
   s.flag("layers", r.layers,
          "Add the layers Direct and Indirect to the output: denoised as the image is, they add up to it");
+  s.flag("light-groups", r.light_groups,
+         "Add a layer Combined_ID of the light of each id of lights, and Rest for the others, likewise");
   s.flag("path-lengths", r.path_lengths, "Add an image for each number of edges of paths (Edges01, …) to the output",
          {.effect = OptionEffect::kPasses});
   s.group("Training of controlled-path and guided-path");

@@ -4,6 +4,8 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
+#include <utility>
 
 #include "core/ray.h"
 #include "core/spectrum.h"
@@ -64,6 +66,9 @@ enum class PrefetchStep {
 
 class Emitter : public SceneObject {
  public:
+  /// Of the group of lights that compositors tell from others: its id in the scene's file; empty without one.
+  const std::string& group() const { return group_; }
+  void set_group(std::string group) { group_ = std::move(group); }
   /// The light as it shines in a scene with these bounds of everything that can be hit (never an empty radius). Lights
   /// infinitely far away return a copy that knows where the scene lies; null: the light itself.
   virtual std::shared_ptr<const Emitter> in_scene(const Bounds3& /*bounds*/) const { return nullptr; }
@@ -125,6 +130,9 @@ class Emitter : public SceneObject {
   virtual Spectrum power() const = 0;
   /// False where power() and part_power() look at some points only, as of a texture: what they find black may shine.
   virtual bool knows_power() const { return true; }
+
+ private:
+  std::string group_;
 };
 
 }  // namespace covary

@@ -17,6 +17,29 @@ PLAIN = ("--oidn", "off")
 MATERIALS = ROOM.replace("room", "materials")
 
 
+#: Lights of two groups, of which one has a lamp and a point, and a sky that is in none; $fog: media or nothing.
+LAMPS = """<scene version="3.0.0">
+  <default name="fill" value="1"/>
+  <integrator type="path"/>
+  <sensor type="perspective">
+    <transform name="to_world"><lookat origin="0, 1, 4" target="0, 0.5, 0" up="0, 1, 0"/></transform>
+    <film type="hdrfilm"><integer name="width" value="24"/><integer name="height" value="16"/></film></sensor>
+  <shape type="rectangle"><transform name="to_world"><rotate x="1" angle="-90"/><scale value="4"/></transform></shape>
+  <shape type="sphere"><float name="radius" value="0.5"/><point name="center" x="0" y="0.5" z="0"/>
+    <bsdf type="dielectric"/></shape>
+  <emitter type="area" id="key"><rgb name="radiance" value="9, 8, 7"/></emitter>
+  <shape type="sphere"><float name="radius" value="0.3"/><point name="center" x="1" y="2" z="0"/><ref id="key"/></shape>
+  <shape type="sphere"><float name="radius" value="0.2"/><point name="center" x="-1" y="2" z="1"/>
+    <ref id="key"/></shape>
+  <emitter type="point" id="fill"><point name="position" x="-2" y="2" z="2"/>
+    <rgb name="intensity" value="$fill, $fill, $fill"/></emitter>
+  <emitter type="constant"><rgb name="radiance" value="0.1, 0.2, 0.3"/></emitter>
+  $fog
+</scene>"""
+FOG = """<shape type="cube"><transform name="to_world"><scale value="3.5"/></transform><bsdf type="null"/>
+  <medium name="interior" type="homogeneous"><float name="sigma_t" value="0.1"/></medium></shape>"""
+
+
 def exponential_noise(seed):
     """Numbers of an exponential distribution, as noise of renders is skewed."""
     generator = random.Random(seed)
@@ -250,8 +273,36 @@ class Denoise(RenderTest):
         self.bad(1, "no image 'Dirct'; did you mean 'Direct'?", *two, "--layers", "Dirct")
         self.bad(2, "--layers are denoised by a mixture, which needs a second render of another seed", "denoise",
                  "1.exr", "-o", "c.exr", "--layers", "Direct")
-        self.bad(2, "iicv makes no --layers; denoised independent images have them", "combine", "--crn", "1.exr",
-                 "--independent", "2.exr", "-o", "c.exr", "--layers", "Direct", "--force")
+        refused = self.run_covary("combine", "--crn", "1.exr", "--independent", "2.exr", "-o", "c.exr", "--layers",
+                                  "Direct", "--force")
+        self.assertEqual(refused.returncode, 2)
+        self.assertIn("iicv makes no --layers; denoised independent images have them", refused.stderr)
+
+    def test_light_groups(self):
+        """By the ids of lights, on surfaces and in media; they add up, and each has its lights alone."""
+        layers = ("Combined_key", "Combined_fill", "Rest")
+        for fog in ("", FOG):
+            self.write("lamps.xml", LAMPS.replace("$fog", fog).encode())
+            lamps = ("render", "lamps.xml", "--spp", "8", "--light-groups", "--no-preview")
+            for options in (("--estimator", "none"), ("--oidn", "off"), ("--oidn", os.environ["STAND_IN_DENOISER"])):
+                self.good(*lamps, "-o", "a.exr", *options)
+                self.assert_add_up("a.exr", *layers)
+            self.good(*lamps, "-o", "a.exr", "--estimator", "none")
+            self.good(*lamps, "-o", "b.exr", "--estimator", "none", "-D", "fill=2")
+            once, twice = (read_exr((self.path / name).read_bytes()) for name in ("a.exr", "b.exr"))
+            self.assertGreater(min(sum(once[f"{layer}.G"]) for layer in layers), 0)
+            for a, b in zip(once["Combined_fill.G"], twice["Combined_fill.G"]):
+                self.assertAlmostEqual(2 * a, b, delta=1e-5 * b)
+            self.assertEqual([once[name] for name in ("Combined_key.G", "Rest.G")],
+                             [twice[name] for name in ("Combined_key.G", "Rest.G")])
+        self.good("render", "lamps.xml", "--spp", "4", "--estimator", "none", "-o", "c.exr", "--no-preview")
+        self.good("render", "lamps.xml", "--spp", "8", "--estimator", "none", "-o", "c.exr", "--resume", "--no-preview")
+        self.assertEqual(read_exr((self.path / "c.exr").read_bytes())["G"], once["G"], "the image is as without")
+        room = ("render", ROOM, "-o", "d.exr", "--light-groups")
+        self.bad(2, "no light of the scene has an id", *room)
+        self.bad(2, "--layers and --light-groups: either of them adds up", *room, "--layers")
+        self.bad(2, "--light-groups need an integrator that tells lights apart: path", *lamps, "-o", "d.exr",
+                 "--integrator", "bdpt")
 
     def assert_add_up(self, name, *layers):
         channels = read_exr((self.path / name).read_bytes())

@@ -38,7 +38,9 @@ def without_none(values):
 COMBINE = {"crn": NO_GROUPS, "independent": NO_GROUPS, "estimator": ("iicvv", "", *NO_TEXT), "light": (3, "x", [1]),
            "counts": (3, "x", [1], -numpy.ones((20, 24), int), numpy.ones((3, 3), int)),
            "samples": without_none(NO_SPP), "denoise": ("yes", "", *NO_TEXT), "albedo": without_none(NO_IMAGE),
-           "normal": without_none(NO_IMAGE), "oidn": ("/nowhere", *NO_TEXT), "std_error": (1, "yes"), "force": NO_FLAG,
+           "normal": without_none(NO_IMAGE), "denoising_albedo": without_none(NO_IMAGE),
+           "denoising_normal": without_none(NO_IMAGE), "layers": (3, "x", [1], {"a": 3}, {3: NO_IMAGE}),
+           "oidn": ("/nowhere", *NO_TEXT), "std_error": (1, "yes"), "force": NO_FLAG,
            "progress": NO_FUNCTION}
 METRIC = {"image": NO_GROUPS, "reference": NO_GROUPS, "reference2": NO_IMAGE, "low_dynamic_range": NO_FLAG}
 NO_SCENE = (3, None, [1])
@@ -46,7 +48,8 @@ RENDER = {"scene": (*NO_SCENE, ""), "spp": without_none(NO_SPP), "estimator": ("
           "integrator": ("pth", *NO_TEXT), "until": NO_LIMIT, "until_p95": NO_LIMIT, "time": NO_LIMIT, "seed": NO_SEED,
           "denoise": ("yes", *NO_TEXT), "oidn": NO_TEXT, "output": NO_PATH, "passes": NO_PATH,
           "resume": (True, *NO_FLAG), "overwrite": (True, *NO_FLAG), "checkpoint": (-1, 5, "1", True),
-          "preview": (True, *NO_FLAG), "aovs": NO_FLAG, "layers": NO_FLAG, "path_lengths": NO_FLAG,
+          "preview": (True, *NO_FLAG), "aovs": NO_FLAG, "layers": NO_FLAG, "light_groups": NO_FLAG,
+          "path_lengths": NO_FLAG,
           "crop": (3, "0,0,4,4", (0, 0, 4), (0, 0, 0, 0), (-1, 0, 4, 4), (0, 0, 4.5, 4), (0, 0, 400, 4)),
           "filter": ("bx", *NO_TEXT), "sampling": ("common", *NO_TEXT), "sampler": ("halton", *NO_TEXT),
           "crn_part": ("all", None, *NO_TEXT), "groups": (0, -1, 1025, 2.5, "12"),
@@ -176,7 +179,8 @@ class Arguments(PackageTest):
         if not function.startswith("covary.") or function.count(".") > 1 or function == "covary.denoise":
             return {}
         guides = {"denoise": "balanced", "oidn": "off"}
-        return {"albedo": guides, "normal": {**guides, "albedo": self.crn[0]}, "oidn": {"denoise": "balanced"},
+        return {"albedo": guides, "normal": {**guides, "albedo": self.crn[0]}, "denoising_albedo": guides,
+                "denoising_normal": {**guides, "denoising_albedo": self.crn[0]}, "oidn": {"denoise": "balanced"},
                 "counts": {"samples": 24}}.get(name, {})
 
     def refused(self, function, call, given, name, value):
@@ -243,10 +247,10 @@ class Arguments(PackageTest):
         self.assertIn("resolution", inspect.signature(covary.Scene.load).parameters)
 
     def test_options_of_combining_are_arguments(self):
-        """All that the library declares, under their names but for these; guides are two images, and some are of files
+        """All that the library declares, under their names but for these; guides are four images, and some are of files
         and of the program alone."""
         declared = {option["name"].replace("-", "_"): option for option in covary._covary.combine_options()}
-        other = {"error": ["std_error"], "guides": ["albedo", "normal"]}
+        other = {"error": ["std_error"], "guides": ["albedo", "normal", "denoising_albedo", "denoising_normal"]}
         files = {"output", "crn_layer", "independent_layer", "explain", "memory"}
         arguments = inspect.signature(covary.combine).parameters
         self.assertEqual({name for option in declared if option not in files for name in other.get(option, [option])},

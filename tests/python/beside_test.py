@@ -151,12 +151,12 @@ class Denoise(BesideTest):
         numpy.testing.assert_allclose(sum(result.aovs.values()), result.image, rtol=1e-5, atol=1e-6)
         numpy.testing.assert_allclose(result.aovs["half"], 0.5 * result.image, rtol=1e-4, atol=1e-5)
         self.write_guides(("Albedo", "N"), (self.albedo, self.normal))
-        self.run_program("combine", "--independent", "independent.exr", "-o", "out.exr", "--denoise", "auto", "--oidn", "off", "--guides",
-                         "guides.exr", "--quiet", "--error")
+        self.run_program("combine", "--independent", "independent.exr", "-o", "out.exr", "--denoise", "auto",
+                         "--oidn", "off", "--guides", "guides.exr", "--quiet", "--error")
         self.assert_same_bits(result.image.reshape(-1, 3), rgb(self.path / "out.exr"))
-        self.assertIn("crn: without it, independent images can only be denoised",
+        self.assertIn("crn: found None; without it, independent images can only be denoised",
                       self.message_of(covary.UsageError, covary.combine, None, independent))
-        self.assertIn("crn: 'iduw' needs the image with common random numbers",
+        self.assertIn("crn: found None; 'iduw' needs the image with common random numbers",
                       self.message_of(covary.UsageError, covary.combine, None, independent, "iduw"))
         self.assertIn("the layer 'x' has 24 x 19 pixels", self.message_of(
             covary.InputError, covary.combine, None, independent, denoise="auto", layers={"x": independent[:, 1:]}))

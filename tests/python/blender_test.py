@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """covary.blender by the package bpy, without a window. The add-on has tests of its own (tests/blender)."""
 import sys
+import types
 import unittest
 
 import covary
@@ -21,6 +22,14 @@ class Missing(PackageTest):
             del sys.modules["bpy"]
             if kept:
                 sys.modules["bpy"] = kept
+
+
+class Samplers(PackageTest):
+    def test_what_is_lost_is_said(self):
+        for pattern, words in (("BLUE_NOISE", "arranged over its pixels"), ("TABULATED_SOBOL", ""), ("AUTOMATIC", "")):
+            cycles = types.SimpleNamespace(sampling_pattern=pattern)
+            self.assertIn(words, _cycles.blue_noise(cycles), pattern)
+            self.assertEqual(bool(words), bool(_cycles.blue_noise(cycles)))
 
 
 class Render(PackageTest):

@@ -118,6 +118,22 @@ class Render(WithMitsuba):
             self.assertGreater(result.aovs["Albedo"].mean(), 0.2)
             self.assertAlmostEqual(float(numpy.linalg.norm(result.aovs["N"], axis=-1).max()), 1, delta=0.05)
 
+    def test_guides_behind_glass(self):
+        """A pane in front of a wall: the pane's own, which has no albedo, and the wall's in the colour of the glass."""
+        place = self.mi.ScalarTransform4f
+        scene = self.scene_with({"type": "box"})
+        scene["ball"] = {"type": "rectangle", "to_world": place().translate([0, 0, -1]).scale(9),
+                         "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.2, 0.5, 0.8]}}}
+        scene["pane"] = {"type": "rectangle", "to_world": place().translate([0, 0, 1]).rotate([0, 1, 0], 30).scale(2),
+                         "bsdf": {"type": "thindielectric", "int_ior": 1.01,
+                                  "specular_transmittance": {"type": "rgb", "value": [1, 0.5, 1]}}}
+        aovs = covary.mitsuba.render(self.mi.load_dict(scene), 12, denoise="error", oidn="off").aovs
+        seen = {name: aovs[name][10:20, 20:28].mean((0, 1)) for name in aovs}
+        numpy.testing.assert_allclose(seen["Albedo"], 0, atol=1e-6)
+        numpy.testing.assert_allclose(seen["N"], [0.5, 0, 0.866], atol=1e-3)
+        numpy.testing.assert_allclose(seen["DenoisingAlbedo"], [0.2, 0.25, 0.8], atol=0.01)
+        numpy.testing.assert_allclose(seen["DenoisingNormal"], [0, 0, 1], atol=0.01)
+
     def test_filter(self):
         result = covary.mitsuba.render(self.mi.load_dict(self.scene_with({"type": "gaussian"})), 12)
         self.assertIn("was replaced by a box one pixel wide, because", result.warnings[0])

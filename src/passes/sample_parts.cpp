@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "passes/sample_parts.h"
+
+#include <algorithm>
+
+#include "core/parallel.h"
+
+namespace covary {
+namespace {
+
+constexpr size_t kBatch = 256;  // samples traced together
+
+/// One thread's.
+struct Worker {
+  explicit Worker(const Integrator& integrator) : context(integrator) {}
+  PathContext context;
+  std::vector<CameraSample> samples;
+  std::vector<int> pixels;  // of these samples, in the row
+};
+
+class PartTracer {
+ public:
+  PartTracer(const Scene& scene, const Integrator& integrator, const PassSettings& settings, const Film& film,
+             std::span<Film> parts)
+      : scene_(scene), integrator_(integrator), settings_(settings), film_(film), parts_(parts) {}
+
+  void trace() {
+    PerThread<Worker> workers;
+    parallel_for(film_.height(), [&](int y) { trace_row(y, workers.local(integrator_)); });
+  }
+
+ private:
+  bool stopped() const { return settings_.stop && settings_.stop->load(std::memory_order_relaxed); }
+
+  void trace_row(int y, Worker& worker) {
+    worker.context.stop = settings_.stop;
+    for (int x = 0; x < film_.width(); ++x)
+      for (uint32_t s = parts_[0].count(x, y), n = film_.count(x, y); s < n && !stopped(); ++s) {
+        worker.samples.push_back(camera_sample(scene_, settings_, film_.crop().x + x, film_.crop().y + y, s));
+        worker.pixels.push_back(x);
+        if (worker.samples.size() == kBatch) trace_batch(y, worker);
+      }
+    trace_batch(y, worker);
+  }
+
+  void trace_batch(int y, Worker& worker) {
+    worker.context.by_part.n_parts = parts_.size();
+    if (!stopped() && !worker.samples.empty()) integrator_.trace(scene_, worker.samples, worker.context);
+    for (size_t s = 0; s < worker.samples.size() && !stopped(); ++s) {
+      const bool good = enters(worker.samples[s].radiance);
+      for (size_t i = 0; i < parts_.size(); ++i)
+        parts_[i].add(worker.pixels[s], y, good ? worker.context.by_part.radiance[s * parts_.size() + i] : Spectrum());
+    }
+    worker.samples.clear(), worker.pixels.clear();
+  }
+
+  bool enters(const Spectrum& value) const {
+    return is_finite(value) && ((value.r >= 0 && value.g >= 0 && value.b >= 0) || integrator_.allows_negative());
+  }
+
+  const Scene& scene_;
+  const Integrator& integrator_;
+  const PassSettings& settings_;
+  const Film& film_;
+  const std::span<Film> parts_;
+};
+
+}  // namespace
+
+void trace_parts(const Scene& scene, const Integrator& integrator, const PassSettings& settings, const Film& film,
+                 std::span<Film> parts) {
+  if (!parts.empty()) PartTracer(scene, integrator, settings, film, parts).trace();
+}
+
+std::vector<Film> films_of_parts(const Film& film, size_t n_parts, int groups) {
+  return std::vector(n_parts, Film(film.frame_width(), film.frame_height(), film.crop(), groups));
+}
+
+std::vector<std::string> light_groups(const Scene& scene) {
+  std::vector<std::string> groups;
+  for (const auto& light : scene.emitters())
+    if (!light->group().empty() && std::find(groups.begin(), groups.end(), light->group()) == groups.end())
+      groups.push_back(light->group());
+  return groups;
+}
+
+}  // namespace covary
