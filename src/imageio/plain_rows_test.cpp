@@ -108,17 +108,19 @@ TEST(PlainRows, HdrIsWhatOpenImageIoReads) {
   const TemporaryFolder folder;
   const std::string path = folder.file("a.hdr");
   const std::vector<uint8_t> bits = noise(size_t{2} * kWidth * kHeight * 3);
-  std::vector<float> values(size_t{kWidth} * kHeight * 3);
-  for (size_t i = 0; i < values.size(); ++i)  // runs of equal pixels, black ones, and all exponents
-    values[i] = i < 60 ? 0 : i < 150 ? 0.7f : std::ldexp(static_cast<float>(bits[2 * i]), bits[2 * i + 1] / 2 - 64);
-  ImageToEncode image{kWidth, kHeight};
-  image.floats = values.data();
-  const std::vector<unsigned char> content = encode_image("hdr", image);
-  std::ofstream(path, std::ios::binary).write(reinterpret_cast<const char*>(content.data()), std::ssize(content));
-  expect_same_as_openimageio(open_plain_hdr(path).get(), path);
-  std::filesystem::resize_file(path, content.size() - 5);
-  const auto reader = open_plain_hdr(path);
-  EXPECT_TRUE(contains(message_of([&] { reader->read_floats(0, 3); }), "damaged or incomplete image: it ends early"));
+  for (const int width : {kWidth, 5}) {
+    std::vector<float> values(static_cast<size_t>(width) * kHeight * 3);
+    for (size_t i = 0; i < values.size(); ++i)  // runs of equal pixels, black ones, and all exponents
+      values[i] = i < 60 ? 0 : i < 120 ? 0.7f : std::ldexp(static_cast<float>(bits[2 * i]), bits[2 * i + 1] / 2 - 64);
+    ImageToEncode image{width, kHeight};
+    image.floats = values.data();
+    const std::vector<unsigned char> content = encode_image("hdr", image);
+    std::ofstream(path, std::ios::binary).write(reinterpret_cast<const char*>(content.data()), std::ssize(content));
+    expect_same_as_openimageio(open_plain_hdr(path).get(), path);
+    std::filesystem::resize_file(path, content.size() - 5);
+    const auto reader = open_plain_hdr(path);
+    EXPECT_TRUE(contains(message_of([&] { reader->read_floats(0, 3); }), "damaged or incomplete image: it ends early"));
+  }
 }
 
 /// Textures are read by these; what they leave is left to OpenImageIO.
