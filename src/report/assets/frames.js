@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames of a sequence, which are the scenes of a comparer: played, or looked for by a slider. View, split and zoom stay.
+// Frames of a sequence, which are the scenes of a comparer: played, or looked for by a slider. View, split and zoom
+// stay.
 
 class FramePlayer {
   constructor(comparer) {
