@@ -21,11 +21,19 @@ Planes::Planes(int width, int height, int count, int border, float value)
 namespace {
 
 /// Whether no exponent is the one of infinities and NaN. Integers, whose sum has no order.
-bool all_finite(const float* values, int n) {
+bool all_finite(const float* values, size_t n) {
   constexpr uint32_t kExponent = 0x7f800000;
   uint32_t bad = 0;
-  for (int i = 0; i < n; ++i) bad |= (std::bit_cast<uint32_t>(values[i]) & kExponent) == kExponent;
+  for (size_t i = 0; i < n; ++i) bad |= (std::bit_cast<uint32_t>(values[i]) & kExponent) == kExponent;
   return bad == 0;
+}
+
+/// Whether n pixels in a row are finite in both images.
+bool all_finite(const GroupedImage& a, const GroupedImage& b, int x, int y, int n) {
+  const auto are_finite = [&](const GroupedImage& image) {
+    return all_finite(image.pixel(x, y), static_cast<size_t>(n) * 3 * image.groups);
+  };
+  return are_finite(a) && (b.data == a.data || are_finite(b));
 }
 
 }  // namespace
@@ -34,14 +42,12 @@ std::vector<unsigned char> finite_pixels(const GroupedImage& a, const GroupedIma
   std::vector<unsigned char> valid(static_cast<size_t>(a.width) * a.height, 1);
   std::atomic<long> bad{0};
   parallel_for(a.height, 8, [&](int y) {
+    if (all_finite(a, b, 0, y, a.width)) return;
     long bad_in_row = 0;
     for (int x = 0; x < a.width; ++x) {
-      bool finite = true;
-      for (const GroupedImage* image : {&a, &b}) finite &= all_finite(image->pixel(x, y), 3 * image->groups);
-      if (!finite) {
-        valid[static_cast<size_t>(y) * a.width + x] = 0;
-        ++bad_in_row;
-      }
+      if (all_finite(a, b, x, y, 1)) continue;
+      valid[static_cast<size_t>(y) * a.width + x] = 0;
+      ++bad_in_row;
     }
     bad += bad_in_row;
   });
