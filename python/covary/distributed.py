@@ -23,6 +23,7 @@ from ._arguments import array, check_some, checked, function, mapping_of, option
 from ._cluster import CLIENT, SceneFiles, check_versions, dask, make_plugin
 from ._combine import Progress, check_options, combine, guides_of
 from ._experiment import experiment, main
+from ._frames import frames
 from ._options import OptionValue, check_no_passes, option_texts
 from ._parts import Part, PartFolder, Rendered
 from ._render import SCENE, SEED, SPP, Scene, report_bad_samples
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     from ._result import FloatArray
     from .estimators import Estimator
 
-__all__ = ["ClusterResult", "SceneFiles", "experiment", "main", "render"]
+__all__ = ["ClusterResult", "SceneFiles", "experiment", "frames", "main", "render"]
 
 #: Estimators that look at films after the passes, and do not change what passes take.
 _ESTIMATORS = ("iicv", "cv-baseline", "iduw", "none")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/examples/render_on_slurm.sh: by a stand-in for sbatch that runs jobs at once, and by Slurm itself."""
+"""docs/examples/{render,frames}_on_slurm.sh: by a stand-in for sbatch that runs jobs at once, and by Slurm itself."""
 import json
 import os
 import shutil
@@ -12,7 +12,7 @@ from pathlib import Path
 
 COVARY, SOURCE = Path(os.environ["COVARY"]), Path(os.environ["SOURCE"])
 ROOM = SOURCE / "scenes" / "room.xml"
-SCRIPT = SOURCE / "docs" / "examples" / "render_on_slurm.sh"
+SCRIPT, FRAMES = (SOURCE / "docs" / "examples" / f"{what}_on_slurm.sh" for what in ("render", "frames"))
 SMALL = ("--resolution", "48x32")
 TASKS = 3
 
@@ -72,13 +72,15 @@ class Cluster(unittest.TestCase):
         self.assertTrue((self.path / "out.exr").exists())
 
 
-class Script(Cluster):
+class StandIn(Cluster):
     def setUp(self):
         super().setUp()
         (self.path / "bin").mkdir()
         (self.path / "bin" / "sbatch").write_text(SBATCH)
         (self.path / "bin" / "sbatch").chmod(0o755)
 
+
+class Script(StandIn):
     def test_parts_are_joined(self):
         self.render(8)
         self.check_result(8)
@@ -94,6 +96,43 @@ class Script(Cluster):
         self.assertIn("did you mean '--integrator'", self.render(8, "--integrater", "path", code=2))
         self.assertIn("two or more TASKS", self.render(8, tasks=1, code=2))
         self.assertFalse((self.path / "out.parts" / "1.log").exists())
+
+
+class Frames(StandIn):
+    """docs/examples/frames_on_slurm.sh."""
+
+    def render(self, samples, *options, frames="1-3", **keywords):
+        path = SOURCE / "scenes" / "room-path.json"
+        return self.run_in_folder(FRAMES, ROOM, "out_##.exr", frames, samples, *SMALL, "--camera-path", path, *options,
+                                  **keywords)
+
+    def check_frames(self, samples, *options):
+        """The bits of one machine."""
+        path = SOURCE / "scenes" / "room-path.json"
+        self.run_in_folder(COVARY, "render", ROOM, "-o", "film_#.exr", "--frames", "1-3", "--estimator", "none",
+                           "--groups", 4, "--aovs", "--spp", samples, "--camera-path", path, *SMALL, *options)
+        self.run_in_folder(COVARY, "denoise", "film_#.exr", "-o", "here_##.exr")
+        for frame in (1, 2, 3):
+            facts = self.run_in_folder(COVARY, "compare", f"out_0{frame}.exr", "--reference", f"here_0{frame}.exr",
+                                       "--metric", "mse", "--json", "-")
+            self.assertEqual(json.loads(facts.splitlines()[0])["mse"], 0)
+
+    def test_frames_are_denoised_with_history(self):
+        self.render(8)
+        self.check_frames(8)
+
+    def test_a_killed_task_costs_its_frame_alone(self):
+        self.render(200, "--checkpoint", "0.02", KILLED="2")
+        self.assertFalse((self.path / "out_02.exr").exists())
+        self.assertIn("complete: false", self.run_in_folder(COVARY, "info", "out_.parts/2.exr"))
+        times = [(self.path / f"out_.parts/{frame}.exr").stat().st_mtime_ns for frame in (1, 3)]
+        self.render(200, "--checkpoint", "0.02")
+        self.check_frames(200, "--checkpoint", "0.02")
+        self.assertEqual([(self.path / f"out_.parts/{frame}.exr").stat().st_mtime_ns for frame in (1, 3)], times)
+
+    def test_wrong_options_are_found_before_there_are_jobs(self):
+        self.assertIn("did you mean '--integrator'", self.render(8, "--integrater", "path", code=2))
+        self.assertIn("FIRST-LAST", self.render(8, frames="3", code=2))
 
 
 class Slurm(Cluster):

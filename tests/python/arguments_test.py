@@ -91,6 +91,9 @@ BAD = {
     "covary.distributed.experiment": {
         "client": (None, 3), "suite": (None, *NO_PATH), "output": (None, *NO_PATH), "arguments": (3, "--quick", [3]),
         "progress": NO_FUNCTION},
+    "covary.distributed.frames": {
+        "client": (None, 3), "scene": (None, *NO_PATH), "output": (None, *NO_PATH), "first": (-1, 0.5, *NO_NUMBERS),
+        "last": (-1, 0.5, *NO_NUMBERS), "options": (3, "--spp", [3]), "progress": NO_FUNCTION},
     "covary.distributed.main": {"words": (3, "x", [3])},
     "covary.distributed.SceneFiles": {"scene": ("room.xml", None)},
     "covary.mitsuba.render": {
@@ -161,6 +164,8 @@ class Arguments(PackageTest):
                  "covary.view": {"images": image}, "covary.metrics.compute": {"name": "mse", **of_metric},
                  "covary.distributed.render": {"client": Client(), "scene": self.scene, "spp": 24},
                  "covary.distributed.experiment": {"client": Client(), "suite": "iicv-table1", "output": "out"},
+                 "covary.distributed.frames": {"client": Client(), "scene": ROOM, "output": "f_#.exr", "first": 1,
+                                               "last": 2},
                  "covary.mitsuba.render": {"scene": "x.xml", "spp": 24},
                  "covary.blender.render": {"spp": 24}, "covary.blender.show": {"result": self.result}}
         if function.startswith("covary.metrics.") and function not in given:

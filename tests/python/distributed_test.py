@@ -214,6 +214,33 @@ class Cluster(PackageTest):
         self.assertEqual(len(killed), 2)
         self.assert_same_bits(here.image, there.image)
 
+    def test_frames(self):
+        """Bits of one machine, though a worker is killed; complete frames are not rendered again."""
+        words = ["--resolution", "48x32", "--spp", "8", "--estimator", "none", "--groups", "4", "--threads", "1"]
+        self.run_program("render", str(ROOM), "-o", "here_#.exr", "--frames", "1-4", "--no-preview", "--quiet", *words)
+        killed = []
+
+        def kill(done, total):
+            if done == 1:
+                killed.append(next(iter(self.client.run(os.getpid).values())))
+                os.kill(killed[0], signal.SIGKILL)
+        before = os.getcwd()
+        self.addCleanup(os.chdir, before)
+        os.chdir(self.path)
+        files = covary.distributed.frames(self.client, ROOM, "there_#.exr", 1, 4, words, progress=kill)
+        self.assertEqual([path.name for path in files], [f"there_{n}.exr" for n in range(1, 5)])
+        self.assertEqual(len(killed), 1)
+        for n, path in enumerate(files, 1):
+            for layer in ("", "group03"):
+                self.assert_same_bits(covary.read_image(f"here_{n}.exr", layer), covary.read_image(path, layer))
+        times = [path.stat().st_mtime_ns for path in files]
+        covary.distributed.frames(self.client, ROOM, "there_#.exr", 1, 4, words)
+        self.assertEqual([path.stat().st_mtime_ns for path in files], times)
+        for options, message in ((["--history", "on"], "--history makes each frame of the one before"),
+                                 (["--spp", "x"], "frame ")):
+            self.assertIn(message, self.message_of(covary.UsageError, covary.distributed.frames, self.client, ROOM,
+                                                   "f_#.exr", 1, 2, options))
+
     def test_experiment(self):
         """The numbers of one machine, whose commands are named; a second time nothing is run."""
         (self.path / "suite.json").write_text(json.dumps(SUITE))

@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Frames of a sequence on the workers of Dask: each is a task of the program `covary render --frames N`, whose file is
+on a disk that all machines share. What a frame holds follows from its number alone, so that a frame which was lost with
+its worker is rendered again with the same bits, by any other, which continues what `--resume` finds."""
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from . import _covary
+from ._arguments import checked, function, list_of, optional, path, text, whole
+from ._cluster import CLIENT, check_versions, dask
+from ._combine import Progress
+from ._program import program
+from .errors import Error, UsageError
+
+_RETRIES = 5  # of a frame that an error of the machine ended
+
+
+def _render_frame(words: tuple[str, ...], folder: str) -> tuple[int, str]:
+    """On a worker: exit code and messages of the program."""
+    code, _, errors = _covary.run_program(["/usr/bin/env", "-C", folder, str(program()), *words])
+    return code, errors
+
+
+def _words(scene: str, output: str, frame: int, options: Sequence[str]) -> tuple[str, ...]:
+    return ("render", scene, "-o", output, "--frames", str(frame), "--resume", "--no-preview", "--quiet", *options)
+
+
+@checked(client=CLIENT, scene=path, output=path, first=whole(0, 999999), last=whole(0, 999999),
+         options=list_of(text, "a list of texts"), progress=optional(function))
+def frames(client: Any, scene: str | os.PathLike[str], output: str | os.PathLike[str], first: int, last: int,
+           options: Sequence[str] = (), *, progress: Progress | None = None) -> list[Path]:
+    """`covary render SCENE -o OUTPUT --frames FIRST-LAST OPTIONS…` with each frame on a worker of a
+    dask.distributed.Client, in the folder where this process is, which all machines must share. Returns the paths of
+    the frames, which have the bits of one machine. Frames that are complete are not rendered again, so that the same
+    call continues after an interruption.
+
+    output: a name with '#' in place of the frame's number, "out_####.exr".
+    options: further options of the command, e.g. ["--spp", "16", "--camera-path", "path.json"]. `--history` is refused,
+        because it makes a frame of the one before: `covary denoise` of frames does so afterwards.
+    progress: called with (done, total) frames.
+
+    Raises UsageError and Error with the messages of the command.
+    """
+    check_versions(client)
+    if any(word.split("=", 1)[0] == "--history" for word in options):
+        raise UsageError("options: --history makes each frame of the one before; render frames with --groups and "
+                         "without --denoise, and give them to covary denoise")
+    numbers = list(range(first, last + 1))
+    if not numbers:
+        raise UsageError(f"last: found {last}; accepted is {first}, the first frame, or more")
+    folder, name = os.getcwd(), os.fspath(output)
+    futures = {client.submit(_render_frame, _words(os.fspath(scene), name, frame, options), folder, pure=False,
+                             retries=_RETRIES): frame for frame in numbers}
+    done = 0
+    try:
+        for future in dask().as_completed(futures, loop=client.loop):
+            code, errors = future.result()
+            if code != 0:
+                raise (UsageError if code == 2 else Error)(
+                    f"frame {futures[future]}: {errors.strip().removeprefix('covary: ')}")
+            future.release()
+            done += 1
+            if progress is not None:
+                progress(done, len(numbers))
+    except BaseException:
+        client.cancel(list(futures))
+        raise
+    start = name.rindex("#") + 1
+    digits = start - len(name[:start].rstrip("#"))
+    return [Path(f"{name[:start - digits]}{frame:0{digits}}{name[start:]}") for frame in numbers]
