@@ -20,6 +20,7 @@
 #include "commands.h"
 #include "comparison_warnings.h"
 #include "core/error.h"
+#include "film/film_file.h"
 #include "film/image_file.h"
 #include "film/outputs.h"
 #include "frame_files.h"
@@ -161,11 +162,14 @@ void Page::add_errors(const Shown& image, const Image& pixels, nlohmann::ordered
   const std::string errors = image.path + ":StdError";
   const auto layer = std::find_if(images.begin(), images.end(), [&](const auto& i) { return i.id == errors; });
   if (layer == images.end() || layer->pixels.channels != 3) return;
-  const double predicted = predicted_relmse({pixels, layer->pixels});
+  std::string predicted = fmt::format("{:.3g}", predicted_relmse({pixels, layer->pixels}));
+  const bool is_whole = image.source.place.window == window;  // bounds are those of the whole image
+  if (const auto bounds = predicted_bounds(inspect_image(image.path)); bounds && is_whole)
+    predicted += fmt::format(" ({:.2g} to {:.2g})", (*bounds)[0], (*bounds)[1]);
   if (reference)
-    entry["note"] = fmt::format("predicted {:.3g}", predicted);
+    entry["note"] = "predicted " + predicted;
   else
-    entry["label"] = fmt::format("predicted relMSE {:.3g}", predicted);
+    entry["label"] = "predicted relMSE " + predicted;
 }
 
 /// The other layers of the image's file, those of one channel as such.

@@ -100,6 +100,16 @@ std::map<std::string, std::string> film_attributes(const ExrFile& file, const st
 
 }  // namespace
 
+std::optional<std::array<double, 2>> predicted_bounds(const ImageInfo& file) {
+  const auto text = file.attributes.find(std::string(kPrefix) + film_key::kPredictedBounds);
+  if (text == file.attributes.end()) return std::nullopt;
+  const size_t space = text->second.find(' ');
+  const auto low = parse_number<double>(text->second.substr(0, space));
+  const auto high = parse_number<double>(space == std::string::npos ? "" : text->second.substr(space + 1));
+  if (!low || !high) return std::nullopt;
+  return std::array{*low, *high};
+}
+
 std::map<std::string, std::string> read_film_attributes(const std::string& path) {
   std::map<std::string, std::string> attributes = film_attributes(ExrFile(path), path);
   std::erase_if(attributes, [](const auto& item) { return is_derived(item.first); });

@@ -3,9 +3,12 @@
 // same bits.
 #pragma once
 
+#include <array>
+#include <optional>
 #include <string>
 
 #include "film/film.h"
+#include "film/image_file.h"
 
 namespace covary {
 
@@ -15,6 +18,9 @@ namespace film_key {
 inline constexpr const char* kPredicted = "predicted_relmse";
 inline constexpr const char* kPredictedBounds = "predicted_relmse_80";
 }  // namespace film_key
+
+/// kPredictedBounds of a file; empty where it has none.
+std::optional<std::array<double, 2>> predicted_bounds(const ImageInfo& file);
 
 /// Writes `film`; the file appears under its name only when complete. `std_error`, where not empty, is the standard
 /// error of what the file shows, for the layer StdError, which is not read. Throws Error(kIo).

@@ -12,6 +12,7 @@
 #include "core/content_hash.h"
 #include "core/error.h"
 #include "core/parallel.h"
+#include "film/film_file.h"
 #include "film/image_file.h"
 #include "lab/scene_images.h"
 #include "metrics/metrics.h"
@@ -22,6 +23,7 @@ namespace {
 /// Errors of one image that are kept: the rest costs less than reading them.
 struct ImageErrors {
   double relmse_trimmed = kNone, mae = 0, flip = 0, above5 = 0, predicted_relmse = kNone, coverage = kNone;
+  std::array<double, 2> bounds = {kNone, kNone};
 };
 
 /// The standard errors in the file; empty where it has none, or where another layer is looked at.
@@ -72,13 +74,14 @@ double number_or_none(const nlohmann::json& json, const char* name) {
 ImageErrors image_errors(const Image& image, const std::string& path, const SceneInstance& scene,
                          const std::vector<Image>& references, const Cache& cache, const std::string& key) {
   if (const std::optional<nlohmann::json> kept = cache.read_json("measures", key + ".json");
-      kept && kept->contains("coverage"))
+      kept && kept->contains("predicted_relmse_low"))
     return {number_or_none(*kept, "relmse_trimmed"),
             number_or_none(*kept, "mae"),
             number_or_none(*kept, "flip"),
             number_or_none(*kept, "above5"),
             number_or_none(*kept, "predicted_relmse"),
-            number_or_none(*kept, "coverage")};
+            number_or_none(*kept, "coverage"),
+            {number_or_none(*kept, "predicted_relmse_low"), number_or_none(*kept, "predicted_relmse_high")}};
   const Image std_error = standard_errors(path, scene);
   const auto error = [&](Metric metric) { return mean_metric(metric, image, references, scene); };
   const ImageErrors errors{error(Metric::kRelMseTrimmed),
@@ -86,15 +89,29 @@ ImageErrors image_errors(const Image& image, const std::string& path, const Scen
                            error(Metric::kFlip),
                            error(Metric::kAbove5),
                            predicted_relmse(std_error, references),
-                           coverage(image, std_error, references)};
+                           coverage(image, std_error, references),
+                           std_error.data.empty()
+                               ? ImageErrors().bounds
+                               : predicted_bounds(inspect_image(path)).value_or(ImageErrors().bounds)};
   cache.write_json("measures", key + ".json",
                    {{"relmse_trimmed", errors.relmse_trimmed},
                     {"mae", errors.mae},
                     {"flip", errors.flip},
                     {"above5", errors.above5},
                     {"predicted_relmse", errors.predicted_relmse},
-                    {"coverage", errors.coverage}});
+                    {"coverage", errors.coverage},
+                    {"predicted_relmse_low", errors.bounds[0]},
+                    {"predicted_relmse_high", errors.bounds[1]}});
   return errors;
+}
+
+void set_bounds(Cell& cell) {
+  double predicted = 0, bounded = 0, hold = 0;
+  for (const RunResult& run : cell.runs) {
+    predicted += std::isfinite(run.predicted_relmse), bounded += std::isfinite(run.predicted_low);
+    hold += run.predicted_low <= run.relmse && run.relmse <= run.predicted_high;
+  }
+  cell.bounded = bounded / predicted, cell.bounds_hold = hold / bounded;
 }
 
 Image mean_of(const std::vector<Image>& images) {
@@ -274,6 +291,7 @@ void measure(Cell& cell, const SceneInstance& scene, const std::vector<Image>& r
     run.frames = frame_errors(images[s], references, scene);
     const SequenceSummary of_frames = summary_of(run.frames);
     run.temporal = of_frames.temporal, run.temporal_flip = of_frames.temporal_flip;
+    run.predicted_low = errors.bounds[0], run.predicted_high = errors.bounds[1];
   });
   cell.split = split_error(images, references);
   for (size_t s = 0; s < n; ++s) {
@@ -308,6 +326,7 @@ void measure(Cell& cell, const SceneInstance& scene, const std::vector<Image>& r
   std::vector<std::vector<FrameErrors>> frames;
   for (const RunResult& run : cell.runs) frames.push_back(run.frames);
   cell.frames = mean_over_renders(frames);
+  set_bounds(cell);
   cell.suspicions = suspicions(cell.split, unbiased);
 }
 

@@ -28,13 +28,14 @@ Image constant(float value) {
 
 /// Writes an image into the test's folder, with standard errors where they are given.
 std::string write(const std::string& name, Image image, std::optional<float> std_error = {},
-                  const ImagePlace& place = {kWidth, kHeight, {0, 0, kWidth, kHeight}}) {
+                  const ImagePlace& place = {kWidth, kHeight, {0, 0, kWidth, kHeight}},
+                  const std::map<std::string, std::string>& attributes = {}) {
   std::string path = test_file(name);
   std::vector<ExrPlane> planes;
   add_image_planes("", image, planes);
   Image errors = constant(std_error.value_or(0));
   if (std_error) add_image_planes("StdError", errors, planes);
-  write_exr(path, place, {}, planes);
+  write_exr(path, place, attributes, planes);
   return path;
 }
 
@@ -114,6 +115,27 @@ TEST_F(Measure, PredictedErrorsComeFromTheLayerOfStandardErrors) {
   EXPECT_TRUE(std::isnan(plain.predicted_over_true.value));
   EXPECT_TRUE(std::isnan(plain.coverage.value));
   EXPECT_TRUE(std::isnan(plain.mae_of_mean)) << "one run has no mean image of its own";
+}
+
+TEST_F(Measure, BoundsAreThoseOfTheImagesAndCounted) {
+  const auto write_with = [&](const std::string& name, float value, const std::string& bounds) {
+    return write(name, constant(value), 0.1f, {kWidth, kHeight, {0, 0, kWidth, kHeight}},
+                 {{"covary:predicted_relmse_80", bounds}});
+  };
+  Cell cell;
+  cell.runs = {
+      run_of(1, write_with("in.exr", 1.2f, "0.03 0.05"), 1, 0),
+      run_of(2, write_with("out.exr", 1.2f, "0.01 0.02"), 1, 0), run_of(3, write("no.exr", constant(1.2f), 0.1f), 1, 0),
+      run_of(4, write_with("damaged.exr", 1.2f, "0.01"), 1, 0), run_of(5, write("none.exr", constant(1.2f)), 1, 0)};
+  keys_ = {"1", "2", "3", "4", "5"};
+  for (int again = 0; again < 2; ++again) {  // the second time from the cache
+    measure_cell(cell);
+    EXPECT_EQ(cell.runs[0].predicted_low, 0.03);
+    EXPECT_EQ(cell.runs[1].predicted_high, 0.02);
+    EXPECT_TRUE(std::isnan(cell.runs[3].predicted_low));
+    EXPECT_EQ(cell.bounded, 0.5) << "two of four that have standard errors";
+    EXPECT_EQ(cell.bounds_hold, 0.5) << "relMSE 0.04, about";
+  }
 }
 
 TEST_F(Measure, IntervalsCountTheNoiseOfReferences) {

@@ -231,7 +231,9 @@ Json quality_table(const Results& results, size_t budget) {
                column("flip", "FLIP", "number"),
                column("above5", "Pixels above 5 %", "percent"),
                column("predicted", "Predicted / true error", "ratio"),
-               column("coverage", "Intervals that hold", "percent")};
+               column("coverage", "Intervals of values that hold", "percent"),
+               column("bounded", "With bounds of the relMSE", "percent"),
+               column("hold", "Bounds that hold", "percent")};
   columns[6]["digits"] = 4;
   Json rows = cell_rows(results, budget, [](const Cell& cell, Json& row) {
     const SplitError& split = cell.split.relative;
@@ -246,6 +248,8 @@ Json quality_table(const Results& results, size_t budget) {
     row["above5"] = number(cell.above5.value);
     row["predicted"] = value_of(cell.predicted_over_true);
     row["coverage"] = number(cell.coverage.value);
+    row["bounded"] = number(cell.bounded);
+    row["hold"] = number(cell.bounds_hold);
   });
   return table("Errors divided, " + results.suite.budgets[budget].label(), columns, rows);
 }

@@ -21,6 +21,8 @@ struct RunResult {
   RunRecord record;
   double relmse = 0, relmse_trimmed = 0, mse = 0, mae = 0, flip = 0, above5 = 0, mean_ratio = 0;
   double predicted_relmse = kNone;  ///< from the run's own standard errors, where it has them
+  /// Between which the run itself says that its relMSE is in 80 of 100 renders; none where it does not.
+  double predicted_low = kNone, predicted_high = kNone;
   /// Part of the values that differ from the reference by 1.96 standard errors at most, the reference's included.
   double coverage = kNone;
   double temporal = kNone, temporal_flip = kNone;  ///< of frames: metrics/sequence_errors.h
@@ -54,6 +56,8 @@ struct Cell {
   Estimate temporal_gain;           ///< temporal error of the baseline over that of this method
   std::vector<FrameErrors> frames;  ///< means over seeds
   std::optional<WorstRegions> worst;
+  double bounded = kNone;        ///< part of the runs with a prediction that say between which bounds their relMSE is
+  double bounds_hold = kNone;    ///< part of these whose relMSE is there
   double published_relmse = kNone, published_ratio = kNone;
   std::vector<std::string> suspicions;
 };

@@ -66,6 +66,8 @@ void add_cell(Table& table, const Cell& cell) {
     table.add("worst_region_relmse", cell.worst->relmse.ratio);
     table.add("worst_region_temporal", cell.worst->temporal.ratio);
   }
+  table.add("bounded", cell.bounded);
+  table.add("bounds_hold", cell.bounds_hold);
   table.add("published_relmse", cell.published_relmse);
   table.add("published_ratio", cell.published_ratio);
   table.add("seconds_load", cell.load_seconds);
@@ -87,6 +89,8 @@ void add_run(Table& table, const RunResult& run) {
   table.add("above5", run.above5);
   table.add("mean_ratio", run.mean_ratio);
   table.add("predicted_relmse", run.predicted_relmse);
+  table.add("predicted_relmse_low", run.predicted_low);
+  table.add("predicted_relmse_high", run.predicted_high);
   table.add("coverage", run.coverage);
   table.add("temporal", run.temporal);
   table.add("temporal_flip", run.temporal_flip);
