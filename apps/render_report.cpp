@@ -14,6 +14,7 @@
 #include "passes/light_pass.h"
 #include "passes/training.h"
 #include "plans/budget.h"
+#include "plans/integrator_trial.h"
 #include "plans/memory.h"
 #include "progress.h"
 #include "risk_report.h"
@@ -90,6 +91,15 @@ nlohmann::ordered_json seconds_of(const RenderReport& report) {
 /// What holds only for some renders.
 void add_results(const RenderReport& report, const Estimator& estimator, nlohmann::ordered_json& json) {
   const RenderResult& result = report.result;
+  for (const IntegratorTrial& trial : result.trials) {
+    nlohmann::ordered_json found = {{"integrator", trial.integrator}};
+    if (trial.left_out.empty())
+      found["relative_variance"] = trial.variance, found["rays_per_sample"] = trial.rays;
+    else
+      found["left_out"] = trial.left_out;
+    json["integrator_trial"]["tried"].push_back(found);
+  }
+  if (!result.chosen.empty()) json["integrator_trial"]["chosen"] = result.chosen;
   if (const IntegratorReport of = result.integrator->report(); !of.name.empty()) json[of.name] = json_of(of);
   if (const Pass* light = light_pass(result.passes)) json["light_paths"] = light_paths(light->film);
   if (result.predicted) {
@@ -169,6 +179,8 @@ void print_summary(const RenderReport& report) {
              load_seconds, scene.scene->build_seconds(),
              format_count(result.camera_sum([](const Pass& p) { return p.result.n_samples; }) / seconds),
              format_count(result.sum([](const Pass& p) { return p.result.n_rays; }) / seconds));
+  if (!result.trials.empty())
+    fmt::print(stderr, "integrator {} (variance x rays)\n", text_of(result.chosen, result.trials));
   const IntegratorReport of = result.integrator->report();
   if (!of.summary.empty()) fmt::print(stderr, "{} in {:.2f} s\n", of.summary, result.seconds.train);
   for (const std::string& warning : of.warnings) fmt::print(stderr, "warning: {}\n", as_flags(warning));

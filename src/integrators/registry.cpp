@@ -4,6 +4,7 @@
 
 namespace covary {
 
+std::shared_ptr<Integrator> make_auto(Settings&, const PathLengthSettings&);
 std::shared_ptr<Integrator> make_bdpt(Settings&, const PathLengthSettings&);
 std::shared_ptr<Integrator> make_controlled_path(Settings&, const PathLengthSettings&);
 std::shared_ptr<Integrator> make_depth(Settings&, const PathLengthSettings&);
@@ -13,8 +14,9 @@ std::shared_ptr<Integrator> make_path(Settings&, const PathLengthSettings&);
 
 std::span<const IntegratorPlugin> integrator_plugins() {
   static constexpr IntegratorPlugin kPlugins[] = {
-      {"bdpt", make_bdpt},     {"controlled-path", make_controlled_path}, {"depth", make_depth},
-      {"direct", make_direct}, {"guided-path", make_guided_path},         {"path", make_path},
+      {"auto", make_auto},   {"bdpt", make_bdpt},     {"controlled-path", make_controlled_path},
+      {"depth", make_depth}, {"direct", make_direct}, {"guided-path", make_guided_path},
+      {"path", make_path},
   };
   return kPlugins;
 }

@@ -5,10 +5,14 @@
 
 namespace covary {
 
+std::string registered_name(const Integrator& integrator) {
+  const std::string text = integrator.description();
+  return text.substr(0, text.find(' '));
+}
+
 void require_sees_media(const Integrator& integrator, const Scene& scene) {
   if (!scene.has_media() || integrator.sees_media()) return;
-  const std::string text = integrator.description();
-  throw Error(ErrorCode::kInput, scene.first_medium() + ": the integrator '" + text.substr(0, text.find(' ')) +
+  throw Error(ErrorCode::kInput, scene.first_medium() + ": the integrator '" + registered_name(integrator) +
                                      "' does not see participating media; 'path' does");
 }
 

@@ -110,6 +110,9 @@ class Integrator : public SceneObject {
   /// Another, whose samples hold the part of this one's with the same random numbers that came by at most two edges:
   /// emission seen directly and direct light. Null where it has no such part.
   virtual std::shared_ptr<Integrator> of_direct_light() const { return nullptr; }
+  /// Integrators one of which it stands for, the simplest first: which one is measured before a render
+  /// (plans/integrator_trial.h), as it does not trace itself. Of all others empty.
+  virtual std::span<const std::shared_ptr<Integrator>> choices() const { return {}; }
   /// What it cannot see of the scene, as warnings.
   virtual std::vector<std::string> blind_spots(const Scene& /*scene*/) const { return {}; }
   /// Whether it follows light through participating media.
@@ -117,6 +120,9 @@ class Integrator : public SceneObject {
   /// After the render.
   virtual IntegratorReport report() const { return {}; }
 };
+
+/// The first word of its description.
+std::string registered_name(const Integrator& integrator);
 
 /// Throws Error(kInput), "FILE:LINE: medium '…': …", where the scene has media and the integrator does not see them.
 void require_sees_media(const Integrator& integrator, const Scene& scene);

@@ -53,4 +53,13 @@ class SampleTarget {
   std::vector<uint32_t> map_;
 };
 
+/// So many samples in the middle pixel of each square of stride x stride pixels, none in others.
+inline SampleTarget one_in_each_square(const CropWindow& window, int stride, uint32_t samples) {
+  if (stride == 1) return samples;
+  std::vector<uint32_t> map(static_cast<size_t>(window.width) * window.height);
+  for (int y = stride / 2; y < window.height; y += stride)
+    for (int x = stride / 2; x < window.width; x += stride) map[static_cast<size_t>(y) * window.width + x] = samples;
+  return SampleTarget(std::move(map));
+}
+
 }  // namespace covary

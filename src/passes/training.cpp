@@ -51,7 +51,8 @@ bool train(const Scene& scene, LearningIntegrator& integrator, const TrainingSet
   integrator.restart();
   if (integrator.training_spp() > 0) {
     PassSettings pass;
-    pass.seed = settings.seed, pass.pass = kTrainingPass, pass.spp = integrator.training_spp();
+    pass.seed = settings.seed, pass.pass = kTrainingPass,
+    pass.spp = one_in_each_square(settings.window, settings.stride, integrator.training_spp());
     pass.filter = settings.filter, pass.stop = settings.stop, pass.progress = settings.progress;
     pass.learner = &integrator;
     Film film(scene.camera().width(), scene.camera().height(), settings.window, settings.image ? 2 : 1);

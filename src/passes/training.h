@@ -121,6 +121,7 @@ struct TrainingSettings {
   /// PassSettings::seed of the training: renders of different seeds learn from different samples.
   uint64_t seed = 0;
   TrainingImage* image = nullptr;  ///< when set, gets the image of the samples
+  int stride = 1;                  ///< of the pixels one in each square of so many teaches; with an `image`, 1
 };
 
 /// Trains a prepared integrator from the beginning, by training_spp() independent samples in each pixel, and freezes

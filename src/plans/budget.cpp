@@ -18,6 +18,8 @@ namespace covary {
 namespace {
 
 constexpr uint32_t kFirstBudget = 96;
+/// Of the next budget towards a wanted error: more than this goes beyond what was asked for, less asks more often.
+constexpr double kMargin = 1.02, kLeastGrowth = 1.06;
 
 }  // namespace
 
@@ -86,7 +88,7 @@ double samples_per_second(const LoadedScene& scene, const Integrator& integrator
 }
 
 uint32_t next_budget(uint32_t budget, double predicted, double target, uint32_t limit, double most) {
-  const double factor = std::clamp(1.1 * predicted / target, 1.25, most);
+  const double factor = std::clamp(kMargin * predicted / target, kLeastGrowth, most);
   return static_cast<uint32_t>(std::min<double>(limit, std::ceil(factor * budget)));
 }
 

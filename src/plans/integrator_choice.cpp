@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "plans/render.h"
 #include "scene/property_source.h"
 
 namespace covary {
@@ -64,6 +65,10 @@ const Integrator& integrator_of(const LoadedScene& scene) {
   const auto* integrator = dynamic_cast<const Integrator*>(scene.integrator.get());
   COVARY_CHECK(integrator, "the scene was loaded with an integrator");
   return *integrator;
+}
+
+const Integrator& integrator_of(const LoadedScene& scene, const RenderRequest& request) {
+  return request.integrator ? *request.integrator : integrator_of(scene);
 }
 
 std::string unknown_integrator(const std::string& name) {

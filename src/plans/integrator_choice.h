@@ -22,6 +22,9 @@ std::function<std::shared_ptr<SceneObject>(Parameters&)> integrator_maker(const 
 
 /// The integrator of a scene that was loaded with one: its settings, for no scene yet.
 const Integrator& integrator_of(const LoadedScene& scene);
+/// The one that a request names in its place, or that.
+struct RenderRequest;
+const Integrator& integrator_of(const LoadedScene& scene, const RenderRequest& request);
 
 /// The message for an unknown name, with the names there are.
 std::string unknown_integrator(const std::string& name);

@@ -32,15 +32,15 @@ const Pass* light_pass(std::span<const Pass> passes) {
   return !passes.empty() && passes.back().plan.light ? &passes.back() : nullptr;
 }
 
-bool has_light_pass(const LoadedScene& scene, const Plan& plan) {
+bool has_light_pass(const LoadedScene& scene, const Plan& plan, const RenderRequest& request) {
   if (!scene.integrator) return false;
-  const LightTracingIntegrator* tracer = integrator_of(scene).light_tracing();
+  const LightTracingIntegrator* tracer = integrator_of(scene, request).light_tracing();
   return tracer && tracer->wants_light_pass(plan.has_crn_pass);
 }
 
 std::shared_ptr<Integrator> prepared_integrator(const LoadedScene& scene, const Plan& plan,
                                                 const RenderRequest& request) {
-  std::shared_ptr<Integrator> integrator = integrator_of(scene).clone();
+  std::shared_ptr<Integrator> integrator = integrator_of(scene, request).clone();
   LightTracingIntegrator* tracer = integrator->light_tracing();
   if (request.crn_part != CrnPart::kBoth && !tracer)
     throw Error(ErrorCode::kUsage,

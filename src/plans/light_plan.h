@@ -10,7 +10,7 @@
 namespace covary {
 
 /// Whether a render of the scene by the plan has a light pass.
-bool has_light_pass(const LoadedScene& scene, const Plan& plan);
+bool has_light_pass(const LoadedScene& scene, const Plan& plan, const RenderRequest& request);
 
 /// A clone of the scene's integrator for one render: prepared, and told of the pixels and passes where it traces light.
 /// Throws Error(kUsage) where it does not fit the request.

@@ -50,9 +50,9 @@ RenderMemory render_memory(const LoadedScene& scene, const Plan& plan, const Ren
   std::vector<PassPlan> passes;
   for (const Phase& phase : plan.phases)
     for (const PassPlan& pass : phase.passes(state)) passes.push_back(pass);
-  if (has_light_pass(scene, plan)) passes.push_back(light_pass_plan(plan, passes));
+  if (has_light_pass(scene, plan, request)) passes.push_back(light_pass_plan(plan, passes));
   RenderMemory memory = render_memory(plan, passes, window.width, window.height, request.aovs || plan.reads_guides);
-  memory.training = training_memory(scene);
+  memory.training = training_memory(scene, request);
   if (request.splits_layers()) {
     // Films of all layers, which the denoiser copies, and images of each for each candidate.
     const size_t n = request.layers ? std::size(kLayerNames) : light_groups(*scene.scene).size() + 1;
@@ -63,9 +63,9 @@ RenderMemory render_memory(const LoadedScene& scene, const Plan& plan, const Ren
   return memory;
 }
 
-double training_memory(const LoadedScene& scene) {
+double training_memory(const LoadedScene& scene, const RenderRequest& request) {
   if (!scene.integrator) return 0;
-  const LearningIntegrator* learning = integrator_of(scene).learning();
+  const LearningIntegrator* learning = integrator_of(scene, request).learning();
   return learning ? static_cast<double>(learning->training_memory()) : 0;
 }
 

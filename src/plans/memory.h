@@ -21,7 +21,7 @@ struct RenderMemory {
 RenderMemory render_memory(const Plan& plan, std::span<const PassPlan> passes, int width, int height, bool aovs);
 
 /// Bytes that a scene's integrator may take to learn; 0 where it does not.
-double training_memory(const LoadedScene& scene);
+double training_memory(const LoadedScene& scene, const RenderRequest& request);
 
 /// The same for the passes of the plan's first phase, which the scene and the request alone determine.
 RenderMemory render_memory(const LoadedScene& scene, const Plan& plan, const RenderRequest& request);

@@ -14,8 +14,9 @@ namespace covary {
 
 /// Attributes of films beside those of film/film.h.
 namespace film_key {
-inline constexpr const char* kTemporary = "temporary";  ///< "true": removed once the image of the render is written
-inline constexpr const char* kBudgets = "budgets";      ///< of a render to a wanted error (error_rounds.h): "96 168"
+inline constexpr const char* kTemporary = "temporary";     ///< "true": removed once the image of the render is written
+inline constexpr const char* kTrial = "integrator_trial";  ///< which one was chosen and why (integrator_trial.h)
+inline constexpr const char* kBudgets = "budgets";         ///< of a render to a wanted error (error_rounds.h): "96 168"
 /// Of a frame of a sequence, in film and result: a hash of all that its image depends on.
 inline constexpr const char* kFrame = "frame";
 }  // namespace film_key

@@ -50,7 +50,7 @@ PlanRun::PlanRun(const LoadedScene& scene, const Plan& plan, const RenderRequest
       integrator_(prepared_integrator(scene, plan, request)),
       state_{scene, request, callbacks.stop, integrator_, 0, 0, {}},
       rounds_(first_budget(scene, request)) {
-  plan_.traces_light = has_light_pass(scene, plan);
+  plan_.traces_light = has_light_pass(scene, plan, request);
 }
 
 RenderResult PlanRun::run() {
@@ -181,7 +181,7 @@ void PlanRun::begin_phase(const Phase& phase) {
   std::vector<PassPlan> all = plans;
   for (const Pass& pass : state_.passes) all.push_back(pass.plan);
   RenderMemory memory = render_memory(plan_, all, window_.width, window_.height, needs_aovs());
-  memory.training = training_memory(scene_);
+  memory.training = training_memory(scene_, request_);
   check_memory(memory, window_.width, window_.height);
   for (PassPlan& plan : plans) {
     if (plan.light) plan.groups = light_groups(plan_, std::span(state_.passes).subspan(first_of_phase_.back()));

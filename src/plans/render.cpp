@@ -9,6 +9,7 @@
 #include "passes/sample_parts.h"
 #include "plans/budget.h"
 #include "plans/integrator_choice.h"
+#include "plans/integrator_trial.h"
 #include "plans/light_plan.h"
 #include "plans/plan_run.h"
 
@@ -62,7 +63,14 @@ Sampler sampler_of(const LoadedScene& scene, const RenderRequest& request) {
 RenderResult render(const LoadedScene& scene, const Plan& plan, const RenderRequest& request,
                     const RenderCallbacks& callbacks) {
   check(scene, plan, request);
-  return PlanRun(scene, plan, request, callbacks).run();
+  if (callbacks.stage && !integrator_of(scene, request).choices().empty()) callbacks.stage(RenderStage::kTraining);
+  RequestOfChoice of = request_of_choice(scene, request, callbacks.stop);
+  RenderResult result = PlanRun(scene, plan, of.request, callbacks).run();
+  result.seconds.trial += of.seconds;
+  if (of.trials.empty()) return result;
+  result.trials = std::move(of.trials);
+  result.chosen = registered_name(*of.request.integrator);
+  return result;
 }
 
 Image preview_of(std::span<const Pass> passes) {

@@ -21,6 +21,8 @@ namespace covary {
 /// What is asked for, beside the plan.
 struct RenderRequest {
   uint64_t seed = 0;
+  /// In place of the scene's: where that stands for several, the one that was chosen.
+  std::shared_ptr<const Integrator> integrator;
   std::optional<FilterSettings> filter;  ///< default: the scene's
   std::optional<Sampler> sampler;        ///< of camera samples; default: sampler_of()
   std::optional<CropWindow> crop;        ///< default: the scene's; inside the frame
@@ -82,14 +84,26 @@ struct RenderSeconds {
   double train = 0;      ///< of the integrator's training
   double surrogate = 0;  ///< part of it: of making the importance of pixels
   double solve = 0;      ///< part of it: of making of samples what the integrator reads
-  double trial = 0;      ///< of finding out, for a time limit, how fast passes and estimator are
-  double estimate = 0;   ///< after the passes
+  double trial =
+      0;  ///< of finding out which integrator is best, and, for a time limit, how fast passes and estimator are
+  double estimate = 0;  ///< after the passes
   double write = 0;
   double limited = 0;  ///< of what the time limit counts, in this call
 };
 
+/// What a trial found of an integrator.
+struct IntegratorTrial {
+  std::string integrator;  ///< registered name
+  /// Variance of a sample, relative to the brightness as in relMSE, and rays that a sample takes; 0: not tried.
+  double variance = 0, rays = 0;
+  std::string left_out;  ///< why it was not tried
+};
+
 /// What has become of a plan.
 struct RenderResult {
+  /// Where the scene's integrator stands for several, in its order; and the registered name of the one that was chosen.
+  std::vector<IntegratorTrial> trials;
+  std::string chosen;
   std::shared_ptr<const Integrator> integrator;  ///< of the last passes, with what it has learnt
   std::vector<Pass> passes;
   /// Where the film alone is the image, at most its standard error. Empty of a render that was interrupted before every

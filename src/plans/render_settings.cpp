@@ -172,7 +172,7 @@ RenderRequest request_of(const RenderSettings& settings, const LoadedScene& scen
 }
 
 void take_training(const LoadedScene& scene, RenderRequest& request) {
-  const LearningIntegrator* learning = integrator_of(scene).learning();
+  const LearningIntegrator* learning = integrator_of(scene, request).learning();
   const uint32_t training = learning ? learning->training_spp() : 0;
   const bool open_ended = request.seconds > 0 || request.until > 0;
   if (training == 0 || (!request.spp && open_ended)) return;
@@ -192,6 +192,7 @@ std::vector<std::string> replay_words(OptionValues values, const Pass& pass, con
   for (const Option& option : options)
     if (option.effect != OptionEffect::kSamples && !(option.name == "oidn" && is_by_oidn)) values.erase(option.name);
   values["seed"] = std::to_string(pass.settings.seed);
+  if (values.contains("integrator")) values["integrator"] = registered_name(*pass.integrator);  // which may be a choice
   const bool is_crn = pass.settings.sampling == Sampling::kCrn, is_sobol = pass.settings.sampler == Sampler::kSobol;
   if (!pass.plan.light) values["sampling"] = is_crn ? "crn" : "independent";
   if (!is_crn) values.erase("crn-part");

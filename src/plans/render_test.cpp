@@ -323,9 +323,9 @@ TEST(Budget, AContinuedFilmKeepsItsGroups) {
 }
 
 TEST(Budget, FollowsThePredictedError) {
-  EXPECT_EQ(next_budget(96, 0.02, 0.01, 1000, 4), 212u) << "1.1 times what 1 / samples says";
+  EXPECT_EQ(next_budget(96, 0.02, 0.01, 1000, 4), 196u) << "1.02 times what 1 / samples says";
   EXPECT_EQ(next_budget(96, 1, 0.01, 1000, 4), 384u) << "at most four times";
-  EXPECT_EQ(next_budget(96, 0.0101, 0.01, 1000, 4), 120u) << "at least a quarter more";
+  EXPECT_EQ(next_budget(96, 0.0101, 0.01, 1000, 4), 102u) << "at least 6 % more";
   EXPECT_EQ(next_budget(96, 1, 0.01, 300, 4), 300u);
   EXPECT_EQ(next_budget(96, 1, 0.01, 1000, 2), 192u);
 }

@@ -5,6 +5,7 @@
 #include "core/error.h"
 #include "passes/light_pass.h"
 #include "plans/budget.h"
+#include "plans/integrator_trial.h"
 #include "plans/light_plan.h"
 #include "plans/render.h"
 #include "plans/training_stage.h"
@@ -33,8 +34,9 @@ PassSettings settings_of(const LoadedScene& scene, const RenderRequest& request,
 
 }  // namespace
 
-std::vector<ReplayedSample> replay(const LoadedScene& scene, const Plan& plan, const RenderRequest& request,
+std::vector<ReplayedSample> replay(const LoadedScene& scene, const Plan& plan, const RenderRequest& asked,
                                    std::span<const SampleAddress> addresses) {
+  const RenderRequest request = request_of_choice(scene, asked, nullptr).request;
   std::vector<PassSettings> passes;
   for (const SampleAddress& address : addresses) passes.push_back(settings_of(scene, request, address));
   const auto integrator = prepared_integrator(scene, plan, request);
@@ -54,8 +56,8 @@ ReplayedSample replay(const LoadedScene& scene, const Plan& plan, const RenderRe
   return replay(scene, plan, request, std::span(&address, 1))[0];
 }
 
-ReplayedLightPath replay_light(const LoadedScene& scene, const Plan& plan, const RenderRequest& request,
-                               uint64_t path) {
+ReplayedLightPath replay_light(const LoadedScene& scene, const Plan& plan, const RenderRequest& asked, uint64_t path) {
+  const RenderRequest request = request_of_choice(scene, asked, nullptr).request;
   const auto integrator = prepared_integrator(scene, plan, request);
   const LightTracingIntegrator* tracer = light_tracer(*integrator);
   if (!tracer)
