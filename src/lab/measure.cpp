@@ -67,6 +67,12 @@ double coverage(const Image& image, const Image& errors, const std::vector<Image
   return static_cast<double>(n_inside) / static_cast<double>(n);
 }
 
+/// What an image alone says of its relMSE; frames say it one by one.
+std::array<double, 2> bounds_of(const std::vector<std::string>& files) {
+  const auto none = ImageErrors().bounds;
+  return files.size() == 1 ? predicted_bounds(inspect_image(files[0])).value_or(none) : none;
+}
+
 double number_or_none(const nlohmann::json& json, const char* name) {
   return json.contains(name) && json[name].is_number() ? json[name].get<double>() : kNone;
 }
@@ -90,9 +96,7 @@ ImageErrors image_errors(const Image& image, const std::string& path, const Scen
                            error(Metric::kAbove5),
                            predicted_relmse(std_error, references),
                            coverage(image, std_error, references),
-                           std_error.data.empty()
-                               ? ImageErrors().bounds
-                               : predicted_bounds(inspect_image(path)).value_or(ImageErrors().bounds)};
+                           std_error.data.empty() ? ImageErrors().bounds : bounds_of(files_of(scene.frames, path))};
   cache.write_json("measures", key + ".json",
                    {{"relmse_trimmed", errors.relmse_trimmed},
                     {"mae", errors.mae},
