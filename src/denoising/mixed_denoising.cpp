@@ -246,7 +246,8 @@ MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<Candid
   }
 
   const std::array<const Image*, 2> images = {&mixture.halves[0], &mixture.halves[1]};
-  const HeldOutInput held_out{images, input.independent, input.guide, &valid, usual_error(makers)};
+  const Image place = disagreement(whole, *input.guide, mixture.image);
+  const HeldOutInput held_out{images, input.independent, input.guide, &valid, usual_error(makers), &place};
 
   MixedDenoising out;
   for (const CandidateMaker& maker : makers) out.names.insert(out.names.end(), maker.names.begin(), maker.names.end());

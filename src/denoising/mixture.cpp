@@ -141,6 +141,31 @@ Image mixed(const CandidateSet& set, const std::vector<Image>& weights, const st
 
 }  // namespace
 
+Image disagreement(const CandidateSet& set, const Image& guide, const Image& image) {
+  constexpr int kRadius = 2;
+  const int width = image.width, height = image.height;
+  Image of_pixels(width, height, 1), means(width, height, 1);
+  parallel_for(height, 8, [&](int y) {
+    for (int x = 0; x < width; ++x) {
+      float sum = 0;
+      for (const Image& candidate : set.candidates)
+        for (int c = 0; c < 3; ++c) sum += sqr(candidate.pixel(x, y)[c] - image.pixel(x, y)[c]);
+      *of_pixels.pixel(x, y) =
+          sum * relative_weight(guide.pixel(x, y)) / (3 * static_cast<float>(set.candidates.size()));
+    }
+  });
+  parallel_for(height, 8, [&](int y) {
+    for (int x = 0; x < width; ++x) {
+      float sum = 0, n = 0;
+      for (int j = std::max(0, y - kRadius); j <= std::min(height - 1, y + kRadius); ++j)
+        for (int i = std::max(0, x - kRadius); i <= std::min(width - 1, x + kRadius); ++i)
+          sum += *of_pixels.pixel(i, j), n += 1;
+      *means.pixel(x, y) = sum / n;
+    }
+  });
+  return means;
+}
+
 Mixture mix(const MixtureInput& input) {
   const int m = static_cast<int>(input.whole->candidates.size());
   const int width = input.guide->width, height = input.guide->height;

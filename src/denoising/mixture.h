@@ -59,6 +59,10 @@ struct Mixture {
   std::vector<Image> weights;   ///< x_p, one channel each; what is missing to one is the base image's
 };
 
+/// Squared differences of the candidates from an image over the guide's G'^2 + 0.01: means over candidates, channels,
+/// and the 5 x 5 pixels around each; one channel.
+Image disagreement(const CandidateSet& set, const Image& guide, const Image& image);
+
 /// At most this many candidates.
 inline constexpr int kMostCandidates = 8;
 

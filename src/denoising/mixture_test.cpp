@@ -10,6 +10,7 @@
 
 #include "estimators/test_images.h"
 #include "risk/held_out_error.h"
+#include "risk/relative_weight.h"
 
 namespace covary {
 namespace {
@@ -220,6 +221,29 @@ TEST(HeldOutError, IsTheUsualOneWhereHeldOutSamplesAreNoise) {
   const double over_variance = sum / static_cast<double>(error.data.size()) / 0.002;
   EXPECT_GT(over_variance, 0.6);
   EXPECT_LT(over_variance, 1.3) << "the light alone makes the squared error 30 times as large";
+}
+
+TEST(HeldOutError, IsWhereImagesDisagreeAndAsLargeInAll) {
+  const Experiment e(6);
+  const Image a = flat(0, 0.002, 13), b = flat(0, 0.002, 14);
+  HeldOutInput input{{&a, &b}, {&e.independent[0], &e.independent[1]}, &e.guide, &e.valid};
+  const Image before = held_out_error(input);
+  Image image = flat(0, 0, 0), candidate = image;  // a disagreement of 0.1 to the left, of 0.4 to the right
+  for (int y = 0; y < kSize; ++y)
+    for (int x = 0; x < kSize; ++x)
+      for (int c = 0; c < 3; ++c) candidate.pixel(x, y)[c] += x < kSize / 2 ? 0.1f : 0.4f;
+  const Image place = disagreement({{}, {image, candidate}}, e.guide, image);
+  EXPECT_NEAR(*place.pixel(1, 1), 0.01f / 2 * relative_weight(e.guide.pixel(1, 1)), 1e-6f);
+  input.disagreement = &place;
+  const Image after = held_out_error(input);
+  double sums[2] = {}, ends[2] = {};
+  for (int y = 0; y < kSize; ++y) {
+    for (int x = 0; x < kSize; ++x) sums[0] += sqr(before.pixel(x, y)[0]), sums[1] += sqr(after.pixel(x, y)[0]);
+    ends[0] += sqr(after.pixel(0, y)[0] / before.pixel(0, y)[0]);
+    ends[1] += sqr(after.pixel(kSize - 1, y)[0] / before.pixel(kSize - 1, y)[0]);
+  }
+  EXPECT_NEAR(sums[1] / sums[0], 1, 0.02) << "one channel of three";
+  EXPECT_NEAR(ends[1] / ends[0], 16, 2);
 }
 
 /// Rows of an image whose held-out error is `error` in each of `n` parts, give or take `spread`.

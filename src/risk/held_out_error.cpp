@@ -92,6 +92,30 @@ double factor_of_image(const HeldOutInput& in) {
   return 2 * usual * std::pow(error_of_whole(all) / (usual * all.variance), trust);
 }
 
+/// Makes the relative squared error of each pixel proportional to `disagreement`; the whole image's stays as it is.
+void place(const Image& disagreement, const HeldOutInput& in, Image& std_error) {
+  if (std::none_of(disagreement.data.begin(), disagreement.data.end(), [](float d) { return d > 0; })) return;
+  const int width = std_error.width;
+  std::vector<std::array<double, 2>> rows(static_cast<size_t>(std_error.height));  // before and after
+  parallel_for(std_error.height, 8, [&](int y) {
+    auto& [before, after] = rows[static_cast<size_t>(y)];
+    for (int x = 0; x < width; ++x) {
+      if (!(*in.valid)[static_cast<size_t>(y) * width + x]) continue;
+      float* error = std_error.pixel(x, y);
+      const float squares = sqr(error[0]) + sqr(error[1]) + sqr(error[2]),
+                  weight = relative_weight(in.guide->pixel(x, y));
+      const float wanted = *disagreement.pixel(x, y);
+      if (squares > 0)
+        for (int c = 0; c < 3; ++c) error[c] *= std::sqrt(wanted / (weight * squares));
+      before += weight * squares, after += squares > 0 ? wanted : 0;
+    }
+  });
+  double before = 0, after = 0;
+  for (const auto& row : rows) before += row[0], after += row[1];
+  if (!(after > 0)) return;
+  for (float& value : std_error.data) value *= static_cast<float>(std::sqrt(before / after));
+}
+
 /// The weight of each squared error is that of the image it belongs to: independent of the held-out samples.
 HeldOutRow held_out_row(const HeldOutInput& in, const EstimatorResult& whole, int y) {
   const int width = whole.estimate.width;
@@ -193,6 +217,7 @@ Image held_out_error(const HeldOutInput& input) {
       for (int c = 0; c < 3; ++c) result.pixel(x + l, y)[c] = std::sqrt(scale * sums[c][l]);
     }
   });
+  if (input.disagreement) place(*input.disagreement, input, result);
   return result;
 }
 

@@ -24,10 +24,14 @@ struct HeldOutInput {
   const Image* guide = nullptr;                       ///< G of guided_cells.h
   const std::vector<unsigned char>* valid = nullptr;  ///< pixels with 0 are left out, and have no error
   double error_over_variance = 0.5;                   ///< what the whole's error over v usually is; without bias 1/2
+  /// By how much images that were made otherwise of the same samples differ from the whole's, squared and relative, one
+  /// channel; null: there are none. Of held_out_error() only.
+  const Image* disagreement = nullptr;
 };
 
-/// The estimated standard error of an image that the same method made of both halves. Bit-identical for any number of
-/// threads.
+/// The estimated standard error of an image that the same method made of both halves. How large it is in all follows
+/// from these. Where it is, the disagreement knows better: bias has a part in that, which halves have in common
+/// (docs/notes/error-estimates.md). Bit-identical for any number of threads.
 Image held_out_error(const HeldOutInput& input);
 
 /// What both halves tell of their images, as means over the values, each over G'^2 + 0.01.
