@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # frames_on_slurm.sh SCENE.xml OUT_####.exr FIRST-LAST SAMPLES [OPTION…]: renders a sequence on a cluster with Slurm. An
-# array has a task for each frame, which renders SAMPLES samples per pixel in four groups into OUT_.parts/FRAME.exr. A job
-# after them denoises these one after the other, each with the history of the frame before. OPTIONs are those of `covary
-# render`, such as --camera-path. The same command again, after anything was killed, renders what is missing.
+# array has a task for each frame, which renders SAMPLES samples per pixel in four groups into OUT_.parts/FRAME.exr. A
+# job after them denoises these one after the other, each with the history of the frame before. OPTIONs are those of
+# `covary render`, such as --camera-path. The same command again, after anything was killed, renders what is missing.
 #
 # Scene, camera path, OUT and covary must be where all nodes see them. Partition, time and memory are chosen as for any
 # job, by SBATCH_PARTITION, SBATCH_TIMELIMIT, SBATCH_MEM_PER_NODE and the other variables of sbatch.
@@ -20,7 +20,7 @@ if [ "${1-}" = --join ]; then
   exec covary denoise "$2/#.exr" -o "$3" --frames "$4"
 fi
 
-[ $# -ge 4 ] && [[ $2 = *#* && $3 = *-* ]] || { sed -n '3,7s/^# //p' "$0" >&2; exit 2; }
+[ $# -ge 4 ] && [[ $2 = *#* && $3 = *-* ]] || { sed -n '3,6s/^# //p' "$0" >&2; exit 2; }
 scene=$(realpath "$1") out=$(realpath -m "$2") frames=$3 samples=$4
 shift 4
 parts=${out%.exr} parts=${parts//#/}.parts
