@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How the work of a render grows: a table of processor time and memory over the number of lights, triangles or pixels.
+"""How the work of a render grows: a table of processor time and memory over the number of lights, triangles (of one
+mesh, or of instances of one of 20,000) or pixels.
 
-    growth.py lights|triangles|pixels [--covary PROGRAM] [--numbers N...] [--spp N] [--repeat N]
+    growth.py lights|triangles|instances|pixels [--covary PROGRAM] [--numbers N...] [--spp N] [--repeat N]
 
 Renders with plain path tracing on one thread, 96 x 54 pixels where pixels are not what grows. `read`: processor time of
 a render of one sample per pixel, reading and building included; `sample`: what each further sample of a pixel takes;
@@ -19,6 +20,7 @@ import sys
 import tempfile
 
 NUMBERS = {"lights": [1, 10, 100, 1000, 10000, 100000], "triangles": [200, 2000, 20000, 200000, 2000000],
+           "instances": [100000, 1000000, 10000000, 100000000],
            "pixels": [230400, 921600, 3686400, 8294400, 33177600]}
 SCENE = """<scene version="3.0.0">
   <integrator type="path"><integer name="max_depth" value="4"/></integrator>
@@ -81,6 +83,20 @@ def triangles_scene(n, folder):
     return SCENE.format(shapes=mesh + "\n" + lamp(0, 0, 1, 20)), count
 
 
+def instances_scene(n, folder):
+    """Copies of a mesh of 20,000 triangles in a square grid, n triangles together."""
+    count = write_hills(folder / "hills.ply", 20000)
+    side = max(1, round(math.sqrt(n / count)))
+    shapes = ["""  <shape type="shapegroup" id="hills"><shape type="ply"><string name="filename" value="hills.ply"/>
+    <bsdf type="diffuse"><rgb name="reflectance" value="0.5"/></bsdf></shape></shape>"""]
+    for i in range(side * side):
+        x, z = (10 * (k + 0.5) / side - 5 for k in divmod(i, side))
+        shapes.append(f"""  <shape type="instance"><ref id="hills"/>
+    <transform name="to_world"><scale value="{1 / side:.9g}"/>
+      <translate x="{x:.9g}" z="{z:.9g}"/></transform></shape>""")
+    return SCENE.format(shapes="\n".join(shapes + [lamp(0, 0, 1, 20)])), count * side * side
+
+
 def exponent(numbers, values):
     """p of values ~ numbers^p by least squares of logarithms, over the second half; NaN for less than two."""
     first = len(numbers) // 2 if len(numbers) > 2 else 0
@@ -128,8 +144,8 @@ def main():
             folder, resolution, pixels = pathlib.Path(name), "", 96 * 54
             if arguments.what == "lights":
                 text = lights_scene(n)
-            elif arguments.what == "triangles":
-                text, n = triangles_scene(n, folder)
+            elif arguments.what in ("triangles", "instances"):
+                text, n = (triangles_scene if arguments.what == "triangles" else instances_scene)(n, folder)
             else:
                 text, height = lights_scene(4), round(math.sqrt(n * 9 / 16))
                 width = round(n / height)

@@ -6,7 +6,7 @@ import tempfile
 import unittest
 import xml.etree.ElementTree as xml
 
-from growth import exponent, lights_scene, write_hills
+from growth import exponent, instances_scene, lights_scene, write_hills
 
 
 class GrowthTest(unittest.TestCase):
@@ -29,6 +29,13 @@ class GrowthTest(unittest.TestCase):
             self.assertEqual(write_hills(path, 200), 200)
             data = path.read_bytes()
             self.assertEqual(len(data[data.index(b"end_header\n") + 11:]), 11 * 11 * 12 + 200 * 13)
+
+    def test_instances_are_as_many_as_told(self):
+        with tempfile.TemporaryDirectory() as folder:
+            text, count = instances_scene(170000, pathlib.Path(folder))
+        instances = [s for s in xml.fromstring(text).findall("shape") if s.get("type") == "instance"]
+        self.assertEqual(len(instances), 9)
+        self.assertEqual(count, 9 * 20000)
 
 
 if __name__ == "__main__":

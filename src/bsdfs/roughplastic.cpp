@@ -15,8 +15,12 @@
 // As plastic.cpp, with the transmittance T of the rough interface in place of 1 - F:
 //     f_diffuse = T(wi) T(wo) rho / (pi eta^2 (1 - rho Ri)).
 // T(cos) is tabulated when the model is made, by quadrature over the visible normals; Ri is the mean reflectance of the
-// interface from inside, by the same quadrature.
+// interface from inside, by the same quadrature. Models with the same interface share its table.
 #include <array>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <tuple>
 #include <vector>
 
 #include "bsdfs/coated.h"
@@ -92,6 +96,17 @@ class RoughTransmittance {
   float internal_reflectance_;
 };
 
+/// That of an interface; the same object while one lives. Thread-safe.
+std::shared_ptr<const RoughTransmittance> shared_transmittance(const Microfacet& normals, float eta) {
+  static std::mutex mutex;
+  static std::map<std::tuple<MicrofacetType, float, float>, std::weak_ptr<const RoughTransmittance>> known;
+  const std::lock_guard lock(mutex);
+  std::weak_ptr<const RoughTransmittance>& place = known[{normals.type(), normals.alpha_u(), eta}];
+  std::shared_ptr<const RoughTransmittance> table = place.lock();
+  if (!table) place = table = std::make_shared<const RoughTransmittance>(normals, eta);
+  return table;
+}
+
 class RoughPlasticClosure final : public CoatedClosure<RoughPlasticClosure> {
  public:
   /// `base`: rho / (pi eta^2 (1 - rho Ri)).
@@ -133,7 +148,7 @@ class RoughPlastic final : public Bsdf {
  public:
   RoughPlastic(const RoughSurface& surface, float eta, bool nonlinear, ColourInput diffuse, ColourInput specular)
       : surface_(surface),
-        transmittance_(surface.normals, eta),
+        transmittance_(shared_transmittance(surface.normals, eta)),
         eta_(eta),
         nonlinear_(nonlinear),
         diffuse_(std::move(diffuse)),
@@ -145,17 +160,18 @@ class RoughPlastic final : public Bsdf {
   uint32_t flags() const override { return kGlossyReflection | kDiffuseReflection; }
   const BsdfClosure* bind(const SurfaceHit& hit, bool, TransportMode, Arena& arena) const override {
     const Spectrum rho = diffuse_.eval(hit);
-    const float internal = transmittance_.internal_reflectance();
+    const float internal = transmittance_->internal_reflectance();
     const Spectrum trapped = nonlinear_ ? rho * internal : Spectrum(internal);
     const Spectrum base = rho * kInvPi / ((Spectrum(1) - trapped) * sqr(eta_));
-    return arena.make<RoughPlasticClosure>(surface_, transmittance_, eta_, specular_weight_, base, specular_.eval(hit));
+    return arena.make<RoughPlasticClosure>(surface_, *transmittance_, eta_, specular_weight_, base,
+                                           specular_.eval(hit));
   }
   const Texture* main_texture() const override { return diffuse_.texture(); }
   Spectrum albedo(const SurfaceHit& hit) const override { return clamp01(diffuse_.eval(hit)); }
 
  private:
   RoughSurface surface_;
-  RoughTransmittance transmittance_;
+  std::shared_ptr<const RoughTransmittance> transmittance_;
   float eta_, specular_weight_;
   bool nonlinear_;
   ColourInput diffuse_, specular_;

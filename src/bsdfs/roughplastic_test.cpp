@@ -43,6 +43,25 @@ TEST(RoughPlastic, BaseApproachesThatOfSmoothPlastic) {
   EXPECT_NEAR(rough / smooth, (1 - 0.596f) / (1 - 0.983f * 0.596f), 0.01f);
 }
 
+TEST(RoughPlastic, EachInterfaceHasItsOwnTransmittance) {
+  const Vec3 w = direction(60, 0);
+  const auto value = [&](const char* distribution, double alpha, double ior) {
+    return Bound({{"type", "roughplastic"},
+                  {"distribution", distribution},
+                  {"alpha", alpha},
+                  {"int_ior", ior},
+                  {"specular_reflectance", 0.0}},
+                 w)
+        ->eval(w, w)
+        .value.g;
+  };
+  const Bound first({{"type", "roughplastic"}, {"alpha", 0.3}}, w);  // its table lives on
+  const float same = value("beckmann", 0.3, 1.49);
+  EXPECT_EQ(value("beckmann", 0.3, 1.49), same);
+  for (const float other : {value("ggx", 0.3, 1.49), value("beckmann", 0.5, 1.49), value("beckmann", 0.3, 1.6)})
+    EXPECT_GT(std::abs(other / same - 1), 1e-3f);
+}
+
 TEST(RoughPlastic, WrongParametersAreNamed) {
   expect_contains(bsdf_errors({{"type", "roughplastic"}, {"alpha_u", 0.1}, {"alpha_v", 0.2}}),
                   "is not one number; accepted: one number 'alpha'");
