@@ -127,6 +127,7 @@ std::string file_of_frame(const std::string& path, int frame) {
 }
 
 bool are_frames(const FrameOptions& o, const FramePatterns& patterns) {
+  motion_source(o);  // a wrong --motion-scale is told before any file is read
   if (patterns.images.empty() || !is_frame_pattern_of_input(patterns.images[0])) {
     if (!o.frames.empty()) usage("--frames: the input has no '#' for the frame's number");
     return false;
