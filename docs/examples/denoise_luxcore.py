@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""denoise_luxcore.py RENDER.cfg [SAMPLES]: two renders by LuxCore (pip install pyluxcore) with different seeds, their
-albedo and normal: a.exr, a.albedo.exr, a.normal.exr and the same of b. Then:
+"""denoise_luxcore.py RENDER.cfg [SAMPLES [RENDERS]]: two renders (or more) by LuxCore (pip install pyluxcore) with
+different seeds, their albedo and normal: a.exr, a.albedo.exr, a.normal.exr and the same of b. Then:
 
     covary denoise a.exr b.exr --albedo a.albedo.exr --normal a.normal.exr -o out.exr
 """
@@ -12,7 +12,7 @@ import pyluxcore
 
 pyluxcore.Init()
 LAYERS = (("RGB", ""), ("ALBEDO", ".albedo"), ("AVG_SHADING_NORMAL", ".normal"))
-for seed, name in enumerate("ab", start=1):
+for seed, name in enumerate("abcdefghijkl"[:int(sys.argv[3]) if len(sys.argv) > 3 else 2], start=1):
     settings = pyluxcore.Properties(sys.argv[1])
     settings.DeleteAll(settings.GetAllNames("film.outputs."))
     settings.DeleteAll(settings.GetAllNames("film.imagepipelines."))  # no denoiser, no tone curve

@@ -75,6 +75,16 @@ class Denoise(unittest.TestCase):
         said = self.run_in_folder(COVARY, "denoise", "a.exr", "b.exr", *guides, "-o", "out.exr", "--oidn", "off")
         self.assertIn("of 2 groups, guided by albedo and normal", said)
 
+    def test_more_renders(self):
+        """Of eight the predicted error has an interval."""
+        if RENDERER == "blender":
+            return  # has no such argument
+        self.run_in_folder(sys.executable, SOURCE / f"docs/examples/denoise_{RENDERER}.py", self.scene(), 2, 8)
+        said = self.run_in_folder(COVARY, "denoise", *(f"{name}.exr" for name in "abcdefgh"), "-o", "out.exr", "--oidn",
+                                  "off")
+        self.assertIn("of 8 groups", said)
+        self.assertNotIn("no interval can be given", said)
+
 
 if __name__ == "__main__":
     unittest.main()
