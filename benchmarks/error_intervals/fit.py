@@ -15,7 +15,7 @@ import math
 from pathlib import Path
 
 import numpy
-from measure import HERE, KINDS, measure_all, render_all
+from measure import FEWEST_GROUPS, HERE, KINDS, measure_all, render_all
 from variants import SCENES, family_of
 
 TABLE, DATA = HERE.parent.parent / "src/risk/error_interval_table.h", HERE / "renders.csv"
@@ -24,8 +24,7 @@ RIDGE, NOISE_FLOOR = 0.1, 0.1
 #: difference of logarithms from which on a render counts little
 OUTLIER = 0.5
 TRUSTED, LEAST, MOST, MISSING_COVARIANCE = 0.5, 0.5, 30, 0.27
-MOST_OF_LARGEST, MOST_FACTOR, FEWEST_PIXELS = 0.6, 5, 20
-FEWEST_GROUPS = 8
+MOST_OF_LARGEST, MOST_FACTOR, FEWEST_PIXELS = 0.55, 5, 20
 #: What bounds are off at least, of a median render: scenes of others differ more from ours than ours do
 LEAST_FACTOR = 1.15
 
@@ -123,7 +122,8 @@ class Fit:
 
 def usable(row):
     """Whether an interval can be given, and the references know the error to half of it."""
-    share = float(row["light_of_largest"]) / max(float(row["light"]), 1e-30)
+    equal = 1 / float(row["groups"])  # the share of each of groups of equal light
+    share = (float(row["light_of_largest"]) / max(float(row["light"]), 1e-30) - equal) / (1 - equal)
     return (float(row["variance"]) > 0 and float(row["relmse"]) > 2 * float(row["reference_noise"])
             and share <= MOST_OF_LARGEST
             and float(row["noise"])**2 >= FEWEST_PIXELS * float(row["noise_squares"]))
@@ -147,10 +147,15 @@ struct FittedErrors {{
 inline constexpr FittedErrors kFittedErrors[] = {{
 {rows}
 }};
+/// Of denoised means of fewer groups than kFewestGroups: by filters, by a network.
+inline constexpr FittedErrors kFittedToFew[] = {{
+{few}
+}};
 // clang-format on
 
-/// There is no interval where the largest group of each pixel has a larger share of the light, the bounds are further
-/// off than this factor, fewer pixels hold the noise, or there are fewer groups.
+/// There is no interval where the largest group of each pixel has a larger share of the light that is not common to all
+/// groups, the bounds are further off than this factor, fewer pixels hold the noise, or there are fewer groups and the
+/// kind has no fit for few.
 inline constexpr double kMostOfLargest = {share}, kMostFactor = {factor};
 inline constexpr int kFewestPixels = {fewest}, kFewestGroups = {groups};
 
@@ -161,11 +166,12 @@ inline constexpr int kFewestPixels = {fewest}, kFewestGroups = {groups};
 def fit_all(arguments):
     with open(arguments.data, newline="") as file:
         rows = list(csv.DictReader(file))
-    fits = []
+    texts = {True: [], False: []}
     for kind in KINDS:
-        fits.append(Fit(rows, kind))
-        fits[-1].report()
-    TABLE.write_text(TABLE_TEXT.format(rows="\n".join(fit.text() for fit in fits), share=MOST_OF_LARGEST,
+        fit = Fit(rows, kind)
+        fit.report()
+        texts[kind.startswith("few")].append(fit.text())
+    TABLE.write_text(TABLE_TEXT.format(rows="\n".join(texts[False]), few="\n".join(texts[True]), share=MOST_OF_LARGEST,
                                        factor=MOST_FACTOR, fewest=FEWEST_PIXELS, groups=FEWEST_GROUPS))
 
 

@@ -11,8 +11,10 @@ from variants import size_of, write_variant
 
 HERE = Path(__file__).resolve().parent
 SCENES = HERE.parent.parent / "scenes"
-#: Samples, seed, and groups as a render has them
-RENDERS = [(16, 1, 8), (48, 2, 12), (144, 3, 12)]
+#: Samples, seed, and groups: as a render has them, and few, as two or four renders of any renderer are
+RENDERS = [(16, 1, 8), (48, 2, 12), (144, 3, 12), (16, 4, 2), (48, 5, 2), (144, 6, 2), (48, 7, 4)]
+#: Groups from which on there are intervals of every kind; with fewer, of denoised means alone, fitted by themselves
+FEWEST_GROUPS = 8
 #: Of these there is an image with common random numbers, of as many samples
 MOST_OF_PAIRS = 48
 REFERENCE_SPP, REFERENCE_SEEDS = 128, (1001, 1002)
@@ -22,7 +24,9 @@ KINDS = {"mean": [],
          "filters": ["--denoise", "auto", "--oidn", "off"],
          "network": ["--denoise", "auto"],
          "pair-filters": ["--estimator", "iicv", "--error", "--denoise", "auto", "--oidn", "off"],
-         "pair-network": ["--estimator", "iicv", "--error", "--denoise", "auto"]}
+         "pair-network": ["--estimator", "iicv", "--error", "--denoise", "auto"],
+         "few-filters": ["--denoise", "auto", "--oidn", "off"],
+         "few-network": ["--denoise", "auto"]}
 
 
 def run(arguments, *words):
@@ -44,7 +48,7 @@ def render_all(arguments):
         scene = write_variant(name, SCENES, folder)
         films = [(f"{name}-{spp}-{seed}", spp, seed, ["--groups", groups, "--aovs"]) for spp, seed, groups in RENDERS]
         films += [(f"{name}-{spp}-{seed}-crn", spp, seed, ["--groups", groups, "--sampling", "crn"])
-                  for spp, seed, groups in RENDERS if spp <= MOST_OF_PAIRS]
+                  for spp, seed, groups in RENDERS if spp <= MOST_OF_PAIRS and groups >= FEWEST_GROUPS]
         films += [(f"{name}-ref-{seed}", REFERENCE_SPP, seed, []) for seed in REFERENCE_SEEDS]
         for stem, spp, seed, more in films:
             if not (folder / f"{stem}.done").exists():
@@ -106,8 +110,10 @@ def measure_all(arguments):
         references = [pixels(arguments, arguments.work / f"{name}-ref-{seed}.exr") for seed in REFERENCE_SEEDS]
         guide = denoised_reference(arguments, name)
         noise = products(guide, *references, guide).std() / math.sqrt(guide[:, :, 0].size)
-        for spp, seed, _ in RENDERS:
+        for spp, seed, groups in RENDERS:
             for kind in KINDS:
+                if kind.startswith("few") != (groups < FEWEST_GROUPS):
+                    continue
                 if kind.startswith("pair") and spp > MOST_OF_PAIRS:
                     continue
                 image, facts = image_of(arguments, name, spp, seed, kind)

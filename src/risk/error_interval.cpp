@@ -43,7 +43,13 @@ void scale(Image& std_error, double factor) {
   for (float& value : std_error.data) value *= static_cast<float>(std::sqrt(factor));
 }
 
-const FittedErrors& fit_of(ErrorKind kind) { return kFittedErrors[static_cast<size_t>(kind)]; }
+/// Whether images of this kind and of few groups have a fit of their own.
+bool fitted_to_few(ErrorKind kind) { return kind == ErrorKind::kFilters || kind == ErrorKind::kNetwork; }
+
+const FittedErrors& fit_of(ErrorKind kind, double groups) {
+  if (groups < kFewestGroups && fitted_to_few(kind)) return kFittedToFew[kind == ErrorKind::kNetwork];
+  return kFittedErrors[static_cast<size_t>(kind)];
+}
 
 }  // namespace
 
@@ -62,7 +68,7 @@ ErrorFeatures error_features(const RiskRow& s) {
 }
 
 LogError fitted_error(const RiskRow& sums, ErrorKind kind) {
-  const FittedErrors& fit = fit_of(kind);
+  const FittedErrors& fit = fit_of(kind, sums.groups);
   const ErrorFeatures x = error_features(sums);
   LogError error;
   error.middle = std::log(sums.variance / sums.values) + dot(fit.middle, x);
@@ -71,13 +77,13 @@ LogError fitted_error(const RiskRow& sums, ErrorKind kind) {
   return error;
 }
 
-std::string unknown_error(const RiskRow& sums, const LogError& error) {
-  if (sums.groups < kFewestGroups)
+std::string unknown_error(const RiskRow& sums, ErrorKind kind, const LogError& error) {
+  if (sums.groups < kFewestGroups && !fitted_to_few(kind))
     return fmt::format("{:.0f} groups of samples are too few, it takes {}", sums.groups, kFewestGroups);
   const double n = sums.noise * sums.noise / sums.noise_squares, pixels = sums.values / 3;
   if (n < kFewestPixels) return fmt::format("{:.0f} of {:.0f} pixels hold most of the noise", std::max(1.0, n), pixels);
   const double share = sums.light > 0 ? sums.light_of_largest / sums.light : 1;
-  if (share > kMostOfLargest)
+  if ((share - 1 / sums.groups) / (1 - 1 / sums.groups) > kMostOfLargest)  // 0 where all groups hold as much
     return fmt::format("{:.0f} % of the light are in one of {:.0f} groups of each pixel", 100 * share, sums.groups);
   if (std::max(error.high - error.middle, error.middle - error.low) > std::log(kMostFactor))
     return "few samples hold most of the light";
@@ -100,7 +106,7 @@ void apply_interval(EstimatorResult& result) {
   const bool scaled = result.risk_kind != ErrorKind::kMean;
   if (scaled) scale(result.std_error, middle);
   result.interval = ErrorInterval{scaled ? 1 : middle, std::exp(error.low - error.middle),
-                                  std::exp(error.high - error.middle), unknown_error(sums, error)};
+                                  std::exp(error.high - error.middle), unknown_error(sums, result.risk_kind, error)};
 }
 
 }  // namespace covary

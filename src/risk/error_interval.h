@@ -35,10 +35,12 @@ ErrorFeatures error_features(const RiskRow& sums);
 struct LogError {
   double middle = 0, low = 0, high = 0;
 };
+/// Denoised means of fewer than kFewestGroups groups, such as two renders, have fits of their own: the kurtosis of few
+/// groups tells little, and v is noisier.
 LogError fitted_error(const RiskRow& sums, ErrorKind kind);
 
 /// Why no interval can be given; empty where one can.
-std::string unknown_error(const RiskRow& sums, const LogError& error);
+std::string unknown_error(const RiskRow& sums, ErrorKind kind, const LogError& error);
 
 /// Scales the standard error of `result` so that its relMSE is the middle of the interval (that of a mean stays as it
 /// is, unbiased in every pixel), and sets `result.interval` and `result.risk_sums`. Empties `result.risk_rows`; does

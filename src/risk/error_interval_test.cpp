@@ -89,6 +89,18 @@ TEST(ErrorInterval, IsNotGivenWithFewGroups) {
   EXPECT_EQ(result.interval->unknown, "7 groups of samples are too few, it takes 8");
 }
 
+TEST(ErrorInterval, OfDenoisedMeansOfFewGroupsHasAFitOfItsOwn) {
+  RiskRow sums = known_sums();
+  sums.groups = 2;
+  sums.light_of_largest = 0.7 * sums.light;  // of two groups at least half
+  EXPECT_NEAR(fitted_error(sums, ErrorKind::kFilters).middle, middle_by_hand(sums, kFittedToFew[0].middle), 1e-12);
+  EXPECT_NEAR(fitted_error(sums, ErrorKind::kNetwork).middle, middle_by_hand(sums, kFittedToFew[1].middle), 1e-12);
+  EXPECT_EQ(unknown_error(sums, ErrorKind::kNetwork, {0, -0.5, 0.5}), "");
+  sums.light_of_largest = 0.9 * sums.light;
+  EXPECT_EQ(unknown_error(sums, ErrorKind::kNetwork, {0, -0.5, 0.5}),
+            "90 % of the light are in one of 2 groups of each pixel");
+}
+
 TEST(ErrorInterval, IsThatOfTheTable) {
   const RiskRow sums = known_sums();
   EXPECT_NEAR(fitted_error(sums, ErrorKind::kMean).middle, middle_by_hand(sums, kFittedErrors[0].middle), 1e-12);
@@ -110,7 +122,7 @@ TEST(ErrorInterval, IsWiderWhereFewerPixelsHoldTheNoise) {
     few.noise_squares = few.noise * few.noise / 100;  // one hundredth of the pixels
     const LogError error = fitted_error(few, kind), usual = fitted_error(known_sums(), kind);
     EXPECT_GT(error.high - error.low, 1.02 * (usual.high - usual.low)) << static_cast<int>(kind);
-    EXPECT_EQ(unknown_error(few, {0, -0.5, 0.5}), "") << "wide, but not refused";
+    EXPECT_EQ(unknown_error(few, kind, {0, -0.5, 0.5}), "") << "wide, but not refused";
   }
 }
 

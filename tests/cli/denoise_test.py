@@ -200,6 +200,11 @@ class Denoise(RenderTest):
                 attributes = json.loads(self.good("info", "k.exr", "--json").stdout)["attributes"]
                 for told, bound in zip(attributes["covary:predicted_relmse_80"].split(), (low, high), strict=True):
                     self.assertAlmostEqual(float(told) / bound, 1, 3)
+        for seed in "12":
+            self.good("render", MATERIALS, *SMALL[:2], "-o", f"{seed}.exr", "--spp", "48", "--estimator", "none",
+                      "--denoise", "none", "--rfilter", "box", "--seed", seed, "--quiet")
+        last = self.good("denoise", "1.exr", "2.exr", "-o", "two.exr", *PLAIN).stderr.splitlines()[-1]
+        self.assertRegex(last, r"^predicted relMSE 0\.\d+, between 0\.\d+ and 0\.\d+ \(80 %\)")
         # What a film says of its image is no part of the film.
         film = ("render", MATERIALS, *SMALL[:2], "--estimator", "none", "--groups", "12", "--quiet", "--spp", "24")
         self.good(*film, "-o", "f.exr", "--json", "f.json")
