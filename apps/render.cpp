@@ -170,7 +170,7 @@ Outputs files_of(const RenderOptions& options) {
                                                "interruption",
                                                options.request().output));
   if (std::filesystem::is_directory(options.request().passes))
-    for (const char* name : {"crn", "independent", "pilot-1", "light"}) {
+    for (const char* name : {"crn", "crn-1", "first-1", "independent", "pilot-1", "light"}) {
       const std::string path = (std::filesystem::path(options.request().passes) / name).string();
       outputs.writes("--passes", path + ".exr", OutputKind::kFilm);
       outputs.writes("--passes", path + ".json", OutputKind::kText);

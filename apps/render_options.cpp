@@ -46,7 +46,9 @@ void check_options(RenderOptions& options) {
   if (estimator.adaptive && given("sampling")) usage("--sampling: --adaptive always takes independent random numbers");
   if (passes != EstimatorPasses::kPair && settings.passes.sampling != Sampling::kCrn && given("crn-part"))
     usage("--crn-part needs a pass with common random numbers");
-  if (passes != EstimatorPasses::kPair && given("split"))
+  if (settings.passes.chooses_split && !options.stages.empty())
+    usage("--save-stages: --split auto decides while it renders which stages there are");
+  if (passes != EstimatorPasses::kPair && given("split") && !settings.passes.chooses_split)
     usage("--split is an option of estimators with two passes, not of " + name);
   if (passes == EstimatorPasses::kSamples && given("groups"))
     usage(fmt::format("--groups: {} are fitted to the samples of a pixel themselves, not to means of groups", name));
@@ -98,7 +100,7 @@ LoadedScene load(const RenderOptions& options) {
 
 Estimator estimator_of(const RenderOptions& options) { return estimator_of(options.settings, options.of_estimator); }
 
-Plan make_plan(const RenderOptions& options) { return estimator_plan(estimator_of(options), options.settings.passes); }
+Plan make_plan(const RenderOptions& options) { return render_plan(options.settings, options.of_estimator); }
 
 RenderRequest make_request(const RenderOptions& options, const LoadedScene& scene) {
   RenderRequest request = request_of(options.settings, scene);

@@ -76,6 +76,11 @@ nlohmann::ordered_json statistics_of(const Pass& pass) {
   json["samples"] = pass.result.n_samples;
   json["rays"] = pass.result.n_rays;
   json["seconds"] = pass.result.seconds;
+  if (const auto& trial = pass.trial; trial && trial->samples > 0)
+    json["split_trial"] = {{"samples_per_pixel", trial->samples},
+                           {"relmse_independent", trial->independent},
+                           {"relmse_with_crn", trial->with_crn},
+                           {"crn_wins", trial->crn_wins}};
   return json;
 }
 

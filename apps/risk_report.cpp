@@ -70,6 +70,7 @@ void print_risks(const CombinedImage& combined, const DenoisingChoice& choice) {
 void add_risks(const std::optional<MeasuredRisks>& risks, nlohmann::ordered_json& json) {
   if (!risks) return;
   json["predicted_bias_share"] = risks->bias_share;
+  json["held_out_relmse"] = risks->held_out;
   for (const auto& [name, relmse] : risks->images) json["risks"][name] = relmse;
 }
 

@@ -129,7 +129,7 @@ def _check_together(estimator: str | None, given: Mapping[str, Any]) -> None:
     if given["sampling"] is not None and passes not in ("any", None):
         raise UsageError(f"sampling: found {given['sampling']!r} with estimator {estimator!r}, which chooses itself; "
                          "it is an argument of estimator 'none'")
-    if given["split"] is not None and passes not in ("pair", None):
+    if given["split"] not in (None, "auto") and passes not in ("pair", None):
         raise UsageError(f"split: found {given['split']!r} with estimator {estimator!r}; it is an argument of "
                          "estimators with two passes")
 
@@ -152,7 +152,8 @@ def _check_scene_arguments(scene: PathOrScene, options: Mapping[str, Any]) -> No
          filter=optional(choice(get_args(Filter))), sampling=optional(choice(get_args(Sampling))),
          sampler=optional(choice(get_args(Sampler))), crn_part=choice(get_args(CrnPart)),
          groups=optional(whole(1, _covary.most_groups)),
-         split=optional(several("(CRN, independent), two numbers above 0", real(0, above=True), real(0, above=True))),
+         split=optional(either("(CRN, independent), two numbers above 0, or 'auto'",
+                               several("", real(0, above=True), real(0, above=True)), choice(("auto",)))),
          films_only=flag, save_training=optional(path), load_training=optional(path), progress=optional(function))
 def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | None = None, *, integrator: str = "",
            until: float | None = None, until_p95: float | None = None, time: float | None = None, seed: int = 0,
@@ -162,7 +163,8 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
            layers: bool = False, light_groups: bool = False, path_lengths: bool = False,
            crop: tuple[int, int, int, int] | None = None,
            filter: Filter | None = None, sampling: Sampling | None = None, sampler: Sampler | None = None,
-           crn_part: CrnPart = "both", groups: int | None = None, split: tuple[float, float] | None = None,
+           crn_part: CrnPart = "both", groups: int | None = None,
+           split: tuple[float, float] | Literal["auto"] | None = None,
            films_only: bool = False, save_training: str | PathLike[str] | None = None,
            load_training: str | PathLike[str] | None = None, progress: Progress | None = None,
            **options: OptionValue) -> RenderResult:
@@ -186,7 +188,8 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
     crop: x, y, width and height in the frame.
     sampling: of the one pass of estimator "none"; by default "independent".
     sampler: "sobol" for Owen-scrambled Sobol' points in each group of samples; by default the scene's.
-    groups: of samples whose means films keep; split: parts of the samples for the CRN and the independent pass.
+    groups: of samples whose means films keep; split: parts of the samples for the CRN and the independent pass, or
+        "auto", which finds out whether common random numbers pay under the mean that is denoised.
     films_only: take the passes and make no image of them; result.image is then the mean of all samples.
     progress: called with (done, total) samples, up to 20 times a second.
 

@@ -66,7 +66,7 @@ struct Choice {
 };
 
 Plan plan_of(const RenderSettings& settings, const Choice& choice) {
-  Plan plan = estimator_plan(estimator_of(settings, choice.of_estimator), settings.passes);
+  Plan plan = render_plan(settings, choice.of_estimator);
   if (choice.films_only && settings.request.splits_layers())
     throw Error(ErrorCode::kUsage, "layers: films_only=True makes no image that they would be parts of");
   if (choice.films_only) {

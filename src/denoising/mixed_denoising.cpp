@@ -121,7 +121,7 @@ double risk_of_base(const DenoisingPart& part, const Image& guide, const std::ve
 MeasuredRisks risks_of(const DenoisingParts& parts, const std::array<CandidateSet, 2>& halves,
                        const std::vector<std::string>& names, const HeldOutInput& mixture, double predicted) {
   const HalvesRisk mixed = risk_of_halves(mixture);
-  MeasuredRisks risks;
+  MeasuredRisks risks{.held_out = mixed.of_whole(), .bias_share = 0, .images = {}};
   if (predicted > 0) risks.bias_share = std::clamp(1 - 0.5 * mixed.variance / predicted, 0.0, 1.0);
   risks.images.push_back({parts.name, risk_of_base(parts.whole, *mixture.guide, parts.valid)});
   for (size_t p = 0; p < names.size(); ++p) {

@@ -74,6 +74,8 @@ struct HeldOutVerdict {
 
 /// What a mixture of images tells of its error and of those of its parts, each alone, as relMSE of all samples.
 struct MeasuredRisks {
+  /// Of the mixture, by held-out samples alone: comparable where they are the same. May be negative, as it is noisy.
+  double held_out = 0;
   double bias_share = 0;  ///< of the mixture's predicted error: what is squared bias
   struct OfImage {
     std::string name;  ///< "mean", or the estimator's; then those of the candidates

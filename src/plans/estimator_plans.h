@@ -50,6 +50,7 @@ struct PassChoice {
   Sampling sampling = Sampling::kIndependent;  ///< of estimators whose one pass may be of either kind
   std::optional<int> groups;                   ///< default: as the plans above have it
   std::optional<std::array<double, 2>> split;  ///< default: Estimator::split
+  bool chooses_split = false;                  ///< render_plan() of render_settings.h finds it out (split_plan.h)
 };
 /// The one of these plans that the estimator needs.
 Plan estimator_plan(const Estimator& estimator, const PassChoice& choice = {});

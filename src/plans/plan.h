@@ -46,6 +46,14 @@ struct PassPlan {
   std::string id() const { return number == 0 ? name : name + "-" + std::to_string(number); }
 };
 
+/// What a trial of common random numbers found (split_plan.h): relMSE of denoised images of equally many samples, by
+/// held-out ones, which may be negative.
+struct SplitTrial {
+  double samples = 0;  ///< per pixel, of both passes; 0: there was no trial
+  double independent = 0, with_crn = 0;
+  bool crn_wins = false;
+};
+
 /// A pass while it is rendered.
 struct Pass {
   PassPlan plan;
@@ -59,8 +67,9 @@ struct Pass {
   /// Of a light pass: the samples that keep step with the camera's, which may be more than a film can hold where only
   /// time ends the render.
   double wanted = 0;
-  bool misses_error = false;  ///< the plan was asked for an error that needs more samples than it may take
-  PassResult result;          ///< of all calls together, earlier ones included where a folder of passes keeps them
+  bool misses_error = false;        ///< the plan was asked for an error that needs more samples than it may take
+  std::optional<SplitTrial> trial;  ///< of split_plan.h: what decided on its samples
+  PassResult result;  ///< of all calls together, earlier ones included where a folder of passes keeps them
 };
 
 /// What phases read.

@@ -11,6 +11,7 @@
 #include "passes/light_pass.h"
 #include "passes/training.h"
 #include "plans/integrator_choice.h"
+#include "plans/split_plan.h"
 
 namespace covary {
 namespace {
@@ -37,11 +38,13 @@ std::string read_crop(const std::string& text, std::optional<CropWindow>& crop) 
   return "";
 }
 
-std::string read_split(const std::string& text, std::optional<std::array<double, 2>>& split) {
+std::string read_split(const std::string& text, PassChoice& passes) {
+  passes.chooses_split = text == "auto";
+  if (passes.chooses_split) return "";
   const auto parts = parse_reals(text, ':', 2);
-  if (!parts || (*parts)[0] <= 0 || (*parts)[1] <= 0) return "CRN:INDEPENDENT, two numbers above 0, e.g. 1:1";
+  if (!parts || (*parts)[0] <= 0 || (*parts)[1] <= 0) return "auto or CRN:INDEPENDENT, two numbers above 0, e.g. 1:1";
   const double sum = (*parts)[0] + (*parts)[1];
-  split = {(*parts)[0] / sum, (*parts)[1] / sum};
+  passes.split = {(*parts)[0] / sum, (*parts)[1] / sum};
   return "";
 }
 
@@ -112,8 +115,9 @@ void declare_sampling(Settings& s, RenderSettings& v) {
   s.choice("sampling", v.passes.sampling, kSamplings,
            "Random numbers per pixel, or common to all; a single pass (estimator none)",
            {.effect = OptionEffect::kSamples});
-  s.text_as("split", v.passes.split, "CRN:INDEPENDENT", read_split,
-            "Parts of the samples for the two passes; default: the estimator's, 1:1 of most");
+  s.text_as("split", v.passes, "auto|CRN:INDEPENDENT", read_split,
+            "Parts of the samples for the two passes; default: the estimator's, 1:1 of most. auto, of the mean that is "
+            "denoised: common random numbers for a fourth where a trial finds them better");
   s.whole(
       "groups", v.passes.groups, {.low = 1, .high = Film::kMaxGroups},
       "Groups of samples whose means films keep; default: the largest from 12 to 8 that divides the samples, else 12, "
@@ -155,6 +159,16 @@ void declare(Settings& settings, RenderSettings& v) {
 
 Estimator estimator_of(const RenderSettings& settings, const OptionValues& of_estimator) {
   return with_denoising(make_estimator(settings.estimator, of_estimator), settings.denoising);
+}
+
+Plan render_plan(const RenderSettings& settings, const OptionValues& of_estimator) {
+  const Estimator estimator = estimator_of(settings, of_estimator);
+  if (!settings.passes.chooses_split) return estimator_plan(estimator, settings.passes);
+  if (estimator.passes != EstimatorPasses::kIndependent || estimator.adaptive)
+    throw Error(ErrorCode::kUsage,
+                "`split` auto is for the mean of independent samples that is denoised (`denoise`), "
+                "without `adaptive`");
+  return split_plan(estimator, with_denoising(make_estimator("iicv", {}), settings.denoising), settings.passes.groups);
 }
 
 RenderRequest request_of(const RenderSettings& settings, const LoadedScene& scene) {
@@ -227,6 +241,8 @@ std::vector<std::string> pass_words(OptionValues given, const OptionValues& of_i
   for (const auto& [option, value] : of_integrator) words.insert(words.end(), {"--" + option, value});
   const bool is_plain_pair = estimator.passes == EstimatorPasses::kPair && !estimator.adaptive;
   const bool is_denoised_mean = estimator.passes == EstimatorPasses::kAny && settings.denoising.denoises();
+  // What is denoised decides on these passes.
+  if (settings.passes.chooses_split) words.push_back(estimator_of(settings, of_estimator).text);
   words.push_back(is_plain_pair ? "pair" : is_denoised_mean ? "groups" : name);
   return words;
 }

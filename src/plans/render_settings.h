@@ -30,6 +30,9 @@ void declare(Settings& settings, RenderSettings& render);
 /// The estimator with these options of its own, denoised as the settings say. Throws Error(kUsage).
 Estimator estimator_of(const RenderSettings& settings, const OptionValues& of_estimator);
 
+/// The plan of that estimator, as the settings choose its passes. Throws Error(kUsage).
+Plan render_plan(const RenderSettings& settings, const OptionValues& of_estimator);
+
 /// The request, with what the scene's integrator takes of the settings. Throws Error(kUsage) for an option that nothing
 /// takes.
 RenderRequest request_of(const RenderSettings& settings, const LoadedScene& scene);

@@ -55,7 +55,7 @@ TEST(RenderSettings, WhatIsNoValueIsRefused) {
               fmt::format("`crop` '{}': expected X,Y,WIDTH,HEIGHT in pixels, e.g. 240,560,240,160", text));
   for (const char* text : {"1", "0:1", "1:0", "1:2:3", "half"})
     EXPECT_EQ(problem("split", text),
-              fmt::format("`split` '{}': expected CRN:INDEPENDENT, two numbers above 0, e.g. 1:1", text));
+              fmt::format("`split` '{}': expected auto or CRN:INDEPENDENT, two numbers above 0, e.g. 1:1", text));
   for (const char* text : {"0.1", "relmse=0", "relmse=x", "relmse-p95=-1", "mse=1"})
     EXPECT_EQ(problem("until", text),
               fmt::format("`until` '{}': expected relmse=X or relmse-p95=X with X > 0, e.g. relmse=0.005", text));
@@ -88,6 +88,8 @@ TEST(RenderSettings, WordsOfPassesLeaveOutWhatOnlyTheImageNeeds) {
   EXPECT_EQ(pass_words({{"denoise", "bias"}}, {}, {}), standard);
   EXPECT_EQ(pass_words({{"estimator", "none"}, {"denoise", "auto"}, {"oidn", "off"}}, {}, {}), standard);
   EXPECT_NE(pass_words({{"estimator", "none"}}, {}, {}), standard) << "a film without groups";
+  EXPECT_NE(pass_words({{"split", "auto"}}, {}, {}), pass_words({{"split", "auto"}, {"denoise", "bias"}}, {}, {}))
+      << "what is denoised decides";
   const auto of_estimator = [](const char* name, const OptionValues& values) {
     return pass_words({{"estimator", name}}, {}, values);
   };

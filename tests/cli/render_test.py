@@ -104,6 +104,22 @@ class Plans(RenderTest):
         self.assertRegex(last, r"^predicted relMSE 0\.0\d+, .*\d+ % of it squared bias; the mean of the samples has "
                                r"0\.")
 
+    def test_common_random_numbers_on_trial(self):
+        split = ("--split", "auto", "--oidn", "off", "--crop", "8,8,24,18")
+        facts = self.statistics("-o", "a.exr", "--spp", "256", *split)
+        self.assertEqual(sum(p["samples_per_pixel"] for p in facts["passes"]), 256)
+        self.assertEqual([p["sampling"] for p in facts["passes"]], ["independent", "crn"] * 2)
+        trial = facts["passes"][2]["split_trial"]
+        self.assertEqual(trial["crn_wins"], trial["relmse_with_crn"] < trial["relmse_independent"])
+        self.assertEqual(trial["crn_wins"], facts["passes"][3]["samples_per_pixel"] > 0)
+        self.assertIn("after 32 samples per pixel held-out ones tell of a relMSE of ", facts["note"])
+        self.good("render", ROOM, *SMALL, "-o", "b.exr", "--spp", "8", *split, "--passes", "films")
+        self.good("render", ROOM, *SMALL, "-o", "b.exr", "--spp", "16", "--groups", "8", *split, "--passes", "films",
+                  "--resume")
+        self.good("render", ROOM, *SMALL, "-o", "c.exr", "--spp", "16", "--groups", "8", *split[2:])
+        self.same("b.exr", "c.exr")
+        self.bad(2, "--save-stages: --split auto", "render", ROOM, "-o", "d.exr", *split, "--save-stages", "stages")
+
     def test_what_is_named_is_not_denoised(self):
         for options in (("--estimator", "none"), ("--denoise", "none"), ("--sampling", "independent")):
             self.assertEqual(self.statistics("-o", "a.exr", "--spp", "4", *options)["estimator"], "none")
@@ -293,7 +309,7 @@ class Plans(RenderTest):
         self.bad(2, "--sampling is an option of --estimator none", *render, "--estimator", "iicv", "--sampling", "crn")
         self.bad(2, "--split is an option of estimators with two passes", *render, "--estimator", "none", "--split",
                  "1:2")
-        self.bad(2, "expected CRN:INDEPENDENT", *render, "--split", "half")
+        self.bad(2, "expected auto or CRN:INDEPENDENT", *render, "--split", "half")
         self.bad(2, "expected relmse=X", *render, "--until", "0.01")
         self.bad(2, "expected relmse=X", *render, "--until", "relmse=0.01x")
         self.bad(2, "iduw does not estimate its error", *render, "--until", "relmse=0.01", "--estimator", "iduw")
