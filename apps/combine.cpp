@@ -323,7 +323,7 @@ void combine_frames(const CombineOptions& o, const FramePatterns& patterns) {
     throw Error(ErrorCode::kUsage, fmt::format("--json '{}': of frames, expected is a name with '#', or -", o.json));
   for_each_frame(o.of_frames, patterns, o.denoising.denoises(), [&](int frame, std::shared_ptr<const History> history) {
     CombineOptions one = frame_options(o, frame);
-    one.denoising.history = std::move(history);
+    one.denoising.history.before = std::move(history);
     combine_files(one);
   });
 }

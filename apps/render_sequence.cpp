@@ -136,8 +136,12 @@ std::shared_ptr<const History> history_of(const std::string& path, const RenderR
   Image depth(before.image.width, before.image.height, 1);
   const std::vector<ExrPlane> planes = {{"Depth", ExrPlane::Type::kFloat, depth.data.data(), sizeof(float)}};
   ExrFile(path).read(planes);
+  std::array<Image, 2> samples;
+  const std::vector<std::string> layers = image_layers(inspect_image(path).channels);
+  if (std::find(layers.begin(), layers.end(), kKeptSamples[0]) != layers.end())
+    for (size_t half = 0; half < samples.size(); ++half) samples[half] = read_image(path, kKeptSamples[half]).image;
   return std::make_shared<History>(
-      reproject(before.image, depth, {request.beside.at("Depth"), request.beside.at("Motion")}));
+      reproject(before.image, depth, {request.beside.at("Depth"), request.beside.at("Motion")}, samples));
 }
 
 class SequenceRender {
@@ -196,8 +200,10 @@ class SequenceRender {
     }
     trace_motion(before, times_.time(frame - 1), *scene_, request);
     request.attributes[film_key::kFrame] = hash;
+    MixingHistory& history = one.settings.denoising.history;
+    history.keep_samples = options_.sequence.history;
     if (options_.sequence.history && follows)
-      one.settings.denoising.history = history_of(frame_name(options_.request().output, frame - 1), request);
+      history.before = history_of(frame_name(options_.request().output, frame - 1), request);
     ProgressLine progress(fmt::format("{} frame {}", stem(), frame), options_.quiet);
     const RenderResult result = render_watched(one, *scene_, request, display_.get(), progress, stop);
     try {

@@ -22,16 +22,23 @@ constexpr float kPrior = 1;
 /// right for the whole where its error, which for the halves is all bias, counts twice.
 constexpr float kShare = 2;
 
+/// How far what was moved by parts of a pixel is to be trusted, beside a frame's image with an error `scale` times as
+/// large as that of the whole.
+float trust_at(const History& history, const Image& std_error, float scale, int x, int y) {
+  if (!history.known[static_cast<size_t>(y) * history.image.width + x]) return 0;
+  const float* s = std_error.pixel(x, y);
+  const float variance = sqr(scale) * (sqr(s[0]) + sqr(s[1]) + sqr(s[2])) / 3;
+  return variance > 0 ? variance / (variance + kOfMoving * *history.squared_error.pixel(x, y)) : 0;
+}
+
 /// C of a frame's image or of that of a half, whose error is `scale` times as large.
 Image candidate(const Image& frame, const History& history, const Image& std_error, float scale) {
   Image result = frame;
   parallel_for(frame.height, 8, [&](int y) {
     for (int x = 0; x < frame.width; ++x) {
-      if (!history.known[static_cast<size_t>(y) * frame.width + x]) continue;
+      const float trust = trust_at(history, std_error, scale, x, y);
+      if (!(trust > 0)) continue;
       const float* s = std_error.pixel(x, y);
-      const float variance = sqr(scale) * (sqr(s[0]) + sqr(s[1]) + sqr(s[2])) / 3;
-      if (!(variance > 0)) continue;
-      const float trust = variance / (variance + kOfMoving * *history.squared_error.pixel(x, y));
       for (int c = 0; c < 3; ++c) {
         const float m = frame.pixel(x, y)[c], most = kInterval * scale * s[c];
         result.pixel(x, y)[c] = m + std::clamp(history.image.pixel(x, y)[c] - m, -most, most) * trust;
@@ -41,18 +48,19 @@ Image candidate(const Image& frame, const History& history, const Image& std_err
   return result;
 }
 
-}  // namespace
+/// Most of R that R' is made of, so that new samples always count.
+constexpr float kMostOfSamples = 0.9f;
 
-Image add_history(const History& history, const HistoryInput& input, Mixture& frame) {
-  const int width = frame.image.width, height = frame.image.height;
-  if (history.image.width != width || history.image.height != height)
-    throw Error(ErrorCode::kInput, "the history has another size than the frame");
-  const CandidateSet whole{frame.image, {candidate(frame.image, history, *input.std_error, 1)}};
-  std::array<CandidateSet, 2> halves;
-  for (const int half : {0, 1}) {
-    const Image& image = frame.halves[half];
-    halves[half] = {image, {candidate(image, history, *input.std_error, std::sqrt(2.0f))}};
-  }
+/// Y with the most of R.
+Image with_samples(const Image& own, const Image& before, const Image& trust) {
+  Image result = own;
+  for (size_t i = 0; i < result.data.size(); ++i)
+    result.data[i] += kMostOfSamples * trust.data[i / 3] * (before.data[i] - own.data[i]);
+  return result;
+}
+
+Mixture mixture_of(const HistoryInput& input, const CandidateSet& whole, const std::array<CandidateSet, 2>& halves,
+                   float bias_share) {
   MixtureInput of_history;
   of_history.whole = &whole;
   of_history.halves = {&halves[0], &halves[1]};
@@ -60,12 +68,48 @@ Image add_history(const History& history, const HistoryInput& input, Mixture& fr
   of_history.guide = input.guide;
   of_history.valid = input.valid;
   of_history.prior = kPrior;
-  of_history.bias_share = kShare;
+  of_history.bias_share = bias_share;
   of_history.counts = input.counts;
-  Mixture mixture = mix(of_history);
+  return mix(of_history);
+}
+
+void check_size(const Image& before, const Image& now) {
+  if (before.width != now.width || before.height != now.height)
+    throw Error(ErrorCode::kInput, "the history has another size than the frame");
+}
+
+}  // namespace
+
+void add_samples(const History& history, const HistoryInput& input, Image& mean, std::array<Image, 2>& halves) {
+  std::array<CandidateSet, 2> sets;
+  Image before = history.samples[0];
+  check_size(before, mean);
+  for (size_t i = 0; i < before.data.size(); ++i) before.data[i] = 0.5f * (before.data[i] + history.samples[1].data[i]);
+  Image trust(mean.width, mean.height, 1);
+  for (int y = 0; y < mean.height; ++y)
+    for (int x = 0; x < mean.width; ++x) *trust.pixel(x, y) = trust_at(history, *input.std_error, 1, x, y);
+  for (const int half : {0, 1}) sets[half] = {halves[half], {with_samples(halves[half], history.samples[half], trust)}};
+  Mixture mixture = mixture_of(input, {mean, {with_samples(mean, before, trust)}}, sets, kShare);
+  mean = std::move(mixture.image);
+  halves = std::move(mixture.halves);
+}
+
+Image add_history(const History& history, const HistoryInput& input, const Mixture* accumulated, Mixture& frame) {
+  check_size(history.image, frame.image);
+  CandidateSet whole{frame.image, {candidate(frame.image, history, *input.std_error, 1)}};
+  std::array<CandidateSet, 2> halves;
+  for (const int half : {0, 1}) {
+    const Image& image = frame.halves[half];
+    halves[half] = {image, {candidate(image, history, *input.std_error, std::sqrt(2.0f))}};
+    if (accumulated) halves[half].candidates.push_back(accumulated->halves[half]);
+  }
+  if (accumulated) whole.candidates.push_back(accumulated->image);
+  Mixture mixture = mixture_of(input, whole, halves, kShare);
   frame.image = std::move(mixture.image);
   frame.halves = std::move(mixture.halves);
   Image weights = std::move(mixture.weights[0]);
+  if (accumulated)
+    for (size_t i = 0; i < weights.data.size(); ++i) weights.data[i] += mixture.weights[1].data[i];
   for (Image& own : frame.weights)
     for (size_t i = 0; i < own.data.size(); ++i) own.data[i] *= 1 - weights.data[i];
   return weights;

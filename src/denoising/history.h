@@ -13,6 +13,15 @@
 //
 // Clamping to the values of the frame is usual in temporal antialiasing [Karis2014]; to a confidence interval and with
 // measured weights is ours. That the image before is a control variate for re-rendering is in [Rousselle2016].
+//
+// Where the samples of frames before are kept, they count twice. Means of both halves of them, R_A and R_B, and of the
+// frame's own, Y_A and Y_B, become
+//
+//     R'_h = Y_h + b (R_h - Y_h),   b: by mix(), so that Y_B judges R_A, and Y_A judges R_B,
+//
+// one by the variances of both and by what has changed. R'_A and R'_B remain independent, and the frame's denoiser makes
+// a mixture D of them as it does of its own samples. D is a second candidate beside C, which the frame's own samples
+// judge.
 #pragma once
 
 #include <array>
@@ -27,7 +36,11 @@ struct History {
   Image image;                       ///< 3 channels
   Image squared_error;               ///< 1 channel: e
   std::vector<unsigned char> known;  ///< 0: nothing is known there
+  std::array<Image, 2> samples;      ///< R_A and R_B, 3 channels; empty where they were not kept
 };
+
+/// Layers of a frame's file with R'_A and R'_B, EstimatorResult::kept_samples.
+inline constexpr std::array<const char*, 2> kKeptSamples = {"HistoryA", "HistoryB"};
 
 struct HistoryInput {
   std::array<const Moments*, 2> independent = {};     ///< as in MixtureInput
@@ -37,9 +50,12 @@ struct HistoryInput {
   std::array<const Image*, 2> counts = {};            ///< as there
 };
 
-/// Adds the history to the frame's mixture and to its halves. The weights of `frame` become what is left to it;
-/// returned are those of the history, one channel. Bit-identical for any number of threads. Throws Error(kInput) where
-/// sizes differ.
-Image add_history(const History& history, const HistoryInput& input, Mixture& frame);
+/// Adds History::samples to the frame's own: from Y, Y_A and Y_B to the mean of R'_A and R'_B and these. Bit-identical for any number of threads. Throws Error(kInput) where sizes differ.
+void add_samples(const History& history, const HistoryInput& input, Image& mean, std::array<Image, 2>& halves);
+
+/// Adds the history to the frame's mixture and to its halves; `accumulated`: D and its halves, or null. The weights of
+/// `frame` become what is left to it; returned are those of C and D together, one channel. Bit-identical for any number
+/// of threads. Throws Error(kInput) where sizes differ.
+Image add_history(const History& history, const HistoryInput& input, const Mixture* accumulated, Mixture& frame);
 
 }  // namespace covary

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "denoising/denoising_parts.h"
 #include "estimators/test_images.h"
 
 namespace covary {
@@ -51,13 +52,12 @@ struct Frame {
     std::fill(std_error.data.begin(), std_error.data.end(), std_deviation());
   }
   static float std_deviation() { return static_cast<float>(std::sqrt(kFrameVariance / 2)); }
-  Image add(const History& history) {
-    return add_history(history, {{&independent[0], &independent[1]}, &std_error, &guide, &valid, {}}, mixture);
-  }
+  HistoryInput input() const { return {{&independent[0], &independent[1]}, &std_error, &guide, &valid, {}}; }
+  Image add(const History& history) { return add_history(history, input(), nullptr, mixture); }
 };
 
 History history(Image image) {
-  return {std::move(image), Image(kSize, kSize, 1), std::vector<unsigned char>(size_t{kSize} * kSize, 1)};
+  return {std::move(image), Image(kSize, kSize, 1), std::vector<unsigned char>(size_t{kSize} * kSize, 1), {}};
 }
 
 double mean_squared_error(const Image& image) {
@@ -110,9 +110,54 @@ TEST(History, HasNoPartWhereItIsUnknownOrUncertain) {
   EXPECT_NE(frame.mixture.image.data, before.data);
 }
 
+struct Samples {
+  std::array<Image, 2> halves;
+  Image mean;
+  explicit Samples(const Frame& frame, const std::array<Image, 2>& before) : mean(kSize, kSize, 3) {
+    for (const int half : {0, 1}) halves[half] = mean_image(frame.independent[half]);
+    for (size_t i = 0; i < mean.data.size(); ++i) mean.data[i] = 0.5f * (halves[0].data[i] + halves[1].data[i]);
+    History all = history(flat(0, 0, 0));
+    all.samples = before;
+    add_samples(all, frame.input(), mean, halves);
+  }
+};
+
+TEST(History, AddsSamplesByTheirVariance) {
+  const Frame frame(6);
+  const Samples added(frame, {flat(0, kNoise / 4, 71), flat(0, kNoise / 4, 72)});
+  // The best weight of the history is 0.8, which leaves a fifth of the variance.
+  EXPECT_NEAR(mean_squared_error(added.halves[0]) / kNoise, 0.2, 0.02);
+  EXPECT_NEAR(mean_squared_error(added.mean) / kNoise, 0.1, 0.01);
+  double covariance = 0;
+  for (size_t i = 0; i < added.mean.data.size(); ++i)
+    covariance += (added.halves[0].data[i] - kTruth) * (added.halves[1].data[i] - kTruth);
+  EXPECT_LT(std::abs(covariance / static_cast<double>(added.mean.data.size())), 0.01 * kNoise) << "still independent";
+  EXPECT_GT(mean_squared_error(Samples(frame, {flat(0, 0, 0), flat(0, 0, 0)}).halves[0]), 0.005 * kNoise)
+      << "new samples always count";
+}
+
+TEST(History, AddsNoSamplesOfWhatHasChanged) {
+  const Frame frame(7);
+  const Samples added(frame, {flat(0.8f, kNoise / 4, 71), flat(0.8f, kNoise / 4, 72)});
+  EXPECT_LT(mean_squared_error(added.mean) / (kNoise / 2), 1.2);
+}
+
+TEST(History, TakesWhatWasMadeOfAllSamplesWhereItIsBetter) {
+  for (const auto& [offset, most] : {std::pair{0.0f, 0.3}, std::pair{0.3f, 1.05}}) {
+    Frame frame(8);
+    const double alone = mean_squared_error(frame.mixture.image);
+    const Mixture better{flat(offset, kFrameVariance / 20, 81),
+                         {flat(offset, kFrameVariance / 10, 82), flat(offset, kFrameVariance / 10, 83)},
+                         {}};
+    const Image weights = add_history(history(flat(1, 0, 0)), frame.input(), &better, frame.mixture);
+    EXPECT_LT(mean_squared_error(frame.mixture.image), most * alone);
+    EXPECT_NEAR(frame.mixture.weights[0].data[7], 0.6f * (1 - weights.data[7]), 1e-6f);
+  }
+}
+
 TEST(History, OfAnotherSizeIsAnError) {
   Frame frame(5);
-  EXPECT_THROW(frame.add({Image(3, 2, 3), Image(3, 2, 1), std::vector<unsigned char>(6)}), Error);
+  EXPECT_THROW(frame.add({Image(3, 2, 3), Image(3, 2, 1), std::vector<unsigned char>(6), {}}), Error);
 }
 
 }  // namespace

@@ -7,15 +7,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <deque>
 #include <iterator>
 
 #include "core/error.h"
-#include "core/parallel.h"
 #include "denoising/denoise.h"
 #include "denoising/layers.h"
 #include "denoising/mixture.h"
-#include "filters/residual_correction.h"
+#include "denoising/parts_mixture.h"
 #include "risk/held_out_bias.h"
 #include "risk/held_out_error.h"
 #include "risk/image_risk.h"
@@ -28,14 +26,13 @@ namespace {
 struct ModeSettings {
   DenoiseMode mode;
   const char* name;
-  float bias_share, prior;
-  bool residual_correction;
+  PartsWeighting weighting;
 };
-constexpr ModeSettings kModes[] = {{DenoiseMode::kNone, "none", 1, 0, false},
-                                   {DenoiseMode::kAuto, "auto", 1, 1, false},
-                                   {DenoiseMode::kBias, "bias", 4, 0, true},
-                                   {DenoiseMode::kBalanced, "balanced", 2, 0, true},
-                                   {DenoiseMode::kError, "error", 1, 1, false}};
+constexpr ModeSettings kModes[] = {{DenoiseMode::kNone, "none", {1, 0, false}},
+                                   {DenoiseMode::kAuto, "auto", {1, 1, false}},
+                                   {DenoiseMode::kBias, "bias", {4, 0, true}},
+                                   {DenoiseMode::kBalanced, "balanced", {2, 0, true}},
+                                   {DenoiseMode::kError, "error", {1, 1, false}}};
 
 ModeSettings settings_of(DenoiseMode mode) {
   return *std::find_if(std::begin(kModes), std::end(kModes), [&](const ModeSettings& m) { return m.mode == mode; });
@@ -44,66 +41,6 @@ ModeSettings settings_of(DenoiseMode mode) {
 /// Memory beside that of the estimator, about: images of three sets of samples, planes of filters and sums, half of 12
 /// groups; of the mean, it without fireflies; with the network, what that takes and its candidates.
 constexpr double kBytesPerPixel = 480, kBytesOfMean = 220, kBytesWithOidn = 1400;
-
-/// Of the mean: what its variance counts beside its square, and how much the weights of the whole image count; both
-/// measured (docs/methods/denoising.md).
-constexpr float kCountOfVariance = 2, kPriorOfMean = 10;
-
-/// Weights of candidates around a mean that have the least error with 16 samples if all pixels of all scenes have the
-/// same; measured (docs/notes/denoising.md).
-struct UsualWeight {
-  const char* name;
-  float with_network, without;
-};
-constexpr UsualWeight kUsual[] = {
-    {"oidn", 0.85f, 0}, {"oidn-wide", 0.05f, 0}, {"sharp", 0.05f, 0.4f}, {"demodulated", 0.05f, 0.6f}};
-
-/// How much usual weights count for those of the whole image, with so many samples per pixel or fewer; less with more.
-constexpr float kCountOfUsual = 0.2f, kSamplesOfUsual = 16;
-
-/// `h`: the mean of its independent image.
-CandidateInput input_of(const DenoisingPart& part, const Image& h, const std::vector<unsigned char>& valid) {
-  if (const auto& limited = part.limited)
-    return {&limited->estimate, &limited->std_error, &h, &limited->independent, &valid};
-  return {&part.image.estimate, &part.image.std_error, &h, &part.independent, &valid};
-}
-
-/// Of each of the parts.
-std::vector<CandidateSet> candidates_of(const std::vector<const DenoisingPart*>& parts,
-                                        const std::vector<unsigned char>& valid,
-                                        const std::vector<CandidateMaker>& makers) {
-  std::deque<Image> h;
-  std::vector<CandidateInput> inputs;
-  std::vector<CandidateSet> sets;
-  for (const DenoisingPart* part : parts) {
-    h.push_back(mean_image(part->independent));
-    inputs.push_back(input_of(*part, h.back(), valid));
-    sets.push_back({part->image.estimate, {}});
-  }
-  for (const CandidateMaker& maker : makers) {
-    std::vector<std::vector<Image>> images = maker.make(inputs);
-    for (size_t i = 0; i < sets.size(); ++i)
-      std::move(images[i].begin(), images[i].end(), std::back_inserter(sets[i].candidates));
-  }
-  return sets;
-}
-
-/// The first candidate: the image with little noise.
-const Image& guide_of(const CandidateSet& set) { return set.candidates[0]; }
-
-/// What errors of a half's pixels count where its image is noisy: 1 / (G'^2 + 0.01 + 2 s^2), G: the image with little
-/// noise, s: the standard error. By the noisy image itself, pixels that are bright by chance would count little.
-Image counts_of(const DenoisingPart& part, const Image& guide) {
-  Image counts(guide.width, guide.height, 1);
-  parallel_for(guide.height, 16, [&](int y) {
-    for (int x = 0; x < guide.width; ++x) {
-      float variance = 0;
-      for (int c = 0; c < 3; ++c) variance += sqr(part.image.std_error.pixel(x, y)[c]) / 3;
-      *counts.pixel(x, y) = 1 / (1 / relative_weight(guide.pixel(x, y)) + kCountOfVariance * variance);
-    }
-  });
-  return counts;
-}
 
 /// relMSE of the image itself, by its standard error.
 double risk_of_base(const DenoisingPart& part, const Image& guide, const std::vector<unsigned char>& valid) {
@@ -148,35 +85,6 @@ int runs_of(const std::vector<CandidateMaker>& makers) {
   return runs;
 }
 
-float count_of_usual(const GroupedImage& image) {
-  double samples = 0;
-  for (int y = 0; y < image.height; ++y)
-    for (int x = 0; x < image.width; ++x) samples += image.count(x, y);
-  samples /= static_cast<double>(image.width) * image.height;
-  return kCountOfUsual * static_cast<float>(std::min(1.0, kSamplesOfUsual / std::max(samples, 1.0)));
-}
-
-bool has_network(const std::vector<CandidateMaker>& makers) {
-  return std::any_of(makers.begin(), makers.end(), [](const CandidateMaker& m) { return m.network; });
-}
-
-/// Of all candidates, with a sum of 1; empty where none is known.
-std::vector<float> usual_weights(const std::vector<CandidateMaker>& makers) {
-  const bool network = has_network(makers);
-  std::vector<float> weights;
-  float sum = 0;
-  for (const CandidateMaker& maker : makers)
-    for (const std::string& name : maker.names) {
-      const auto usual =
-          std::find_if(std::begin(kUsual), std::end(kUsual), [&](const UsualWeight& u) { return name == u.name; });
-      weights.push_back(usual == std::end(kUsual) ? 0 : network ? usual->with_network : usual->without);
-      sum += weights.back();
-    }
-  if (sum == 0) return {};
-  for (float& weight : weights) weight /= sum;
-  return weights;
-}
-
 /// HeldOutInput::error_over_variance
 double usual_error(const std::vector<CandidateMaker>& makers) {
   double usual = 0.5;
@@ -215,39 +123,54 @@ DenoiseMode denoise_mode(const std::string& name) {
               fmt::format("`denoise` '{}': expected {}", name, fmt::join(denoise_mode_names(), ", ")));
 }
 
-MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<CandidateMaker>& makers, DenoiseMode mode,
-                                  bool std_error, std::span<const Layer> layers, const History* history) {
-  const ModeSettings chosen = settings_of(mode);
-  const std::vector<unsigned char>& valid = parts.valid;
-  std::vector<CandidateSet> sets = candidates_of({&parts.whole, &parts.halves[0], &parts.halves[1]}, valid, makers);
-  CandidateSet whole = std::move(sets[0]);
-  const std::array<CandidateSet, 2> halves = {std::move(sets[1]), std::move(sets[2])};
-  MixtureInput input;
-  input.whole = &whole;
-  input.halves = {&halves[0], &halves[1]};
-  input.independent = {&parts.halves[0].independent, &parts.halves[1].independent};
-  input.guide = &guide_of(whole);
-  input.valid = &valid;
-  input.bias_share = chosen.bias_share;
-  input.prior = parts.is_mean ? kPriorOfMean : chosen.prior;
-  if (parts.is_mean) input.usual = usual_weights(makers);
-  if (!input.usual.empty()) input.usual_count = count_of_usual(parts.groups);
-  std::array<Image, 2> counts;
-  for (int half = 0; parts.is_mean && half < 2; ++half) {
-    counts[half] = counts_of(parts.halves[half], guide_of(halves[half]));
-    input.counts[half] = &counts[half];
-  }
-  Mixture mixture = mix(input);
-  if (chosen.residual_correction && !parts.is_mean) {
-    add_residual_correction(parts.whole.independent, {}, valid, parts.whole.image.std_error, mixture.image);
-    for (int half : {0, 1})
-      add_residual_correction(parts.halves[half].independent, {}, valid, parts.halves[half].image.std_error,
-                              mixture.halves[half]);
-  }
+namespace {
 
+/// The mixture of independent samples whose halves have these means.
+Mixture mixture_of_halves(const std::array<Image, 2>& halves, const std::vector<CandidateMaker>& makers,
+                          const PartsWeighting& chosen) {
+  GroupedImage groups{halves[0].width, halves[0].height, 2};
+  std::vector<float> data;
+  data.reserve(2 * halves[0].data.size());
+  for (size_t i = 0; i < halves[0].data.size(); i += 3)
+    for (const Image& half : halves) data.insert(data.end(), &half.data[i], &half.data[i] + 3);
+  groups.data = data.data();
+  return mix_parts(parts_of_mean(groups), makers, chosen).mixture;
+}
+
+/// Mixes the frames before in, and keeps samples for the next one.
+void use_history(const MixingHistory& use, const DenoisingParts& parts, const std::vector<CandidateMaker>& makers,
+                 const PartsWeighting& chosen, const Image& frame_error, MixedParts& mixed,
+                 std::vector<Image>& kept_samples) {
+  HistoryInput input{{&parts.halves[0].independent, &parts.halves[1].independent},
+                     &frame_error,
+                     &guide_of(mixed.whole),
+                     &parts.valid,
+                     {}};
+  for (const int half : {0, 1})
+    if (parts.is_mean) input.counts[half] = &mixed.counts[half];
+  std::array<Image, 2> halves = {parts.halves[0].image.estimate, parts.halves[1].image.estimate};
+  std::optional<Mixture> accumulated;
+  if (use.before && parts.is_mean && !use.before->samples[0].data.empty()) {
+    Image mean = parts.whole.image.estimate;
+    add_samples(*use.before, input, mean, halves);
+    accumulated = mixture_of_halves(halves, makers, chosen);
+  }
+  if (use.before) add_history(*use.before, input, accumulated ? &*accumulated : nullptr, mixed.mixture);
+  if (use.keep_samples && parts.is_mean) std::move(halves.begin(), halves.end(), std::back_inserter(kept_samples));
+}
+
+}  // namespace
+
+MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<CandidateMaker>& makers, DenoiseMode mode,
+                                  bool std_error, std::span<const Layer> layers, const MixingHistory& history) {
+  const PartsWeighting chosen = settings_of(mode).weighting;
+  const std::vector<unsigned char>& valid = parts.valid;
+  MixedParts mixed = mix_parts(parts, makers, chosen);
+  Mixture& mixture = mixed.mixture;
   const std::array<const Image*, 2> images = {&mixture.halves[0], &mixture.halves[1]};
-  const Image place = disagreement(whole, *input.guide, mixture.image);
-  const HeldOutInput held_out{images, input.independent, input.guide, &valid, usual_error(makers), &place};
+  const std::array<const Moments*, 2> independent = {&parts.halves[0].independent, &parts.halves[1].independent};
+  const Image place = disagreement(mixed.whole, guide_of(mixed.whole), mixture.image);
+  const HeldOutInput held_out{images, independent, &guide_of(mixed.whole), &valid, usual_error(makers), &place};
 
   MixedDenoising out;
   for (const CandidateMaker& maker : makers) out.names.insert(out.names.end(), maker.names.begin(), maker.names.end());
@@ -256,19 +179,20 @@ MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<Candid
   result.estimate = mixture.image;
   if (std_error) {
     result.std_error = held_out_error(held_out);
-    result.bias = held_out_bias({images, {&guide_of(halves[0]), &guide_of(halves[1])}, input.independent, &valid});
-    result.risk_rows = image_risk(
-        {&result.estimate, images, &parts.whole.independent, input.independent, &parts.groups, input.guide, &valid});
+    result.bias =
+        held_out_bias({images, {&guide_of(mixed.halves[0]), &guide_of(mixed.halves[1])}, independent, &valid});
+    result.risk_rows = image_risk({&result.estimate, images, &parts.whole.independent, independent, &parts.groups,
+                                   &guide_of(mixed.whole), &valid});
     result.risk_kind = kind_of(makers, parts.is_mean);
-    result.risks = risks_of(parts, halves, out.names, held_out, predicted_relmse(result));
+    result.risks = risks_of(parts, mixed.halves, out.names, held_out, predicted_relmse(result));
   }
-  if (history) {  // after the error, which is that of the frame alone
+  if (history.before || history.keep_samples) {  // after the error, which is that of the frame alone
     const Image frame_error = std_error ? result.std_error : held_out_error(held_out);
-    add_history(*history, {input.independent, &frame_error, input.guide, &valid, input.counts}, mixture);
+    use_history(history, parts, makers, chosen, frame_error, mixed, result.kept_samples);
     result.estimate = std::move(mixture.image);
   }
   out.weights = std::move(mixture.weights);
-  out.candidates = std::move(whole.candidates);
+  out.candidates = std::move(mixed.whole.candidates);
   result.layers = layers_of(parts, makers, out, layers);
   result.network_runs = runs_of(makers);
   return out;
@@ -320,7 +244,7 @@ Run run_of_pair(const Estimator& base, const MixedDenoisingOptions& options, boo
     std::vector<CandidateMaker> makers = {filtered_candidates(settings.guides)};
     if (with_oidn) makers.push_back(neural_candidates(settings.guides, options.oidn));
     return denoise_by_mixture(parts_of_pair(base, crn, independent, settings), makers, options.mode, settings.std_error,
-                              {}, options.history.get());
+                              {}, options.history);
   };
 }
 
@@ -332,7 +256,7 @@ Run run_of_mean(const MixedDenoisingOptions& options, bool with_oidn) {
     makers.push_back(filtered_candidates(settings.guides, CandidateBase::kMean));
     if (!can_be_mixed(independent)) return single_candidate(independent, makers, settings.layers);
     return denoise_by_mixture(parts_of_mean(independent), makers, options.mode, settings.std_error, settings.layers,
-                              options.history.get());
+                              options.history);
   };
 }
 

@@ -31,12 +31,17 @@ enum class DenoiseMode {
   kError,     ///< least error
 };
 
+/// Of a frame of moving pictures, mixed in where there are samples enough for a mixture; layers have no part in it.
+struct MixingHistory {
+  std::shared_ptr<const History> before;  ///< of the frame before; or null
+  bool keep_samples = false;              ///< of a mean: EstimatorResult::kept_samples for the next frame
+};
+
 struct MixedDenoisingOptions {
   DenoiseMode mode = DenoiseMode::kBalanced;
   bool use_oidn = true;  ///< candidates of Open Image Denoise, where it is installed
   DenoiseOptions oidn;   ///< where it is; a library that is named and is not there is an error
-  /// Of a frame of moving pictures, mixed in where there are samples enough for a mixture; layers have no part in it.
-  std::shared_ptr<const History> history;
+  MixingHistory history;
 };
 
 /// The estimator's image denoised. `base` is an estimator of a pair that predicts its error, and the result needs twice
@@ -50,9 +55,9 @@ bool can_be_denoised(const Estimator& estimator);
 
 /// MixedDenoisingOptions by words, as options have them.
 struct DenoisingChoice {
-  std::string mode = "none";               ///< of denoise_mode_names()
-  std::string oidn;                        ///< a library or a folder of it; "": where it is found, "off": without it
-  std::shared_ptr<const History> history;  ///< MixedDenoisingOptions::history, which no word says
+  std::string mode = "none";  ///< of denoise_mode_names()
+  std::string oidn;           ///< a library or a folder of it; "": where it is found, "off": without it
+  MixingHistory history;      ///< MixedDenoisingOptions::history, which no word says
   bool denoises() const { return mode != "none"; }
   bool uses_oidn() const { return denoises() && oidn != "off"; }
 };
@@ -71,9 +76,10 @@ struct MixedDenoising {
   std::vector<Image> candidates;   ///< made of all samples
   std::vector<Image> weights;      ///< one channel each
 };
-/// `std_error`: with the error of the result. `layers`: of a mean; its result has them, too. `history`: or null.
+/// `std_error`: with the error of the result. `layers`: of a mean; its result has them, too.
 MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<CandidateMaker>& makers, DenoiseMode mode,
-                                  bool std_error, std::span<const Layer> layers = {}, const History* history = nullptr);
+                                  bool std_error, std::span<const Layer> layers = {},
+                                  const MixingHistory& history = {});
 
 /// Samples per pixel, in two groups or more, whose halves can judge candidates.
 inline constexpr int kFewestMixedSamples = 4;

@@ -93,6 +93,9 @@ struct EstimatorResult {
   Image bias;
   /// Parts of the estimate that add up to it, for PairSettings::layers in their order; empty where there were none.
   std::vector<Image> layers;
+  /// Of a frame of moving pictures: means of both halves of its samples and of those of frames before, for the next one
+  /// (denoising/history.h); empty where they were not asked for.
+  std::vector<Image> kept_samples;
   /// Pixels with a non-finite value in either input. They are left out everywhere else and show the mean of their
   /// finite groups, or zero where there are none.
   long nonfinite_pixels = 0;

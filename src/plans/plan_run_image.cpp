@@ -12,6 +12,7 @@
 #include "combine/layer_sources.h"
 #include "core/error.h"
 #include "core/stop.h"
+#include "denoising/history.h"
 #include "integrators/aov.h"
 #include "passes/direct_light.h"
 #include "passes/path_length_images.h"
@@ -72,6 +73,8 @@ bool PlanRun::estimate() {
     return false;
   }
   for (size_t i = 0; i < image.layers.size(); ++i) result_.aovs[layer_names_[i]] = std::move(image.layers[i]);
+  for (size_t i = 0; i < image.kept_samples.size(); ++i)
+    result_.aovs[kKeptSamples[i]] = std::move(image.kept_samples[i]);
   double samples = 0;
   for (const Pass& pass : camera_passes(films())) samples += pass.film.mean_count();
   result_.predicted = predicted_error(image, samples, plan_.reliable_samples);

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
+#include <vector>
 
 #include "core/error.h"
 #include "core/parallel.h"
@@ -55,36 +57,59 @@ bool is_edge(const Image& motion, int x, int y) {
   return false;
 }
 
+/// Where a pixel's point was.
+struct Place {
+  int x, y;
+  bool rests;
+  Tap h, v;  // where it does not rest
+
+  /// The value of an image there; `difference`: that to linear interpolation.
+  float value(const Image& image, int c, float& difference) const {
+    difference = 0;
+    if (rests) return image.pixel(x, y)[c];
+    float sum = 0, low = kInfinity, high = -kInfinity, linear = 0;
+    for (int j = 0; j < 4; ++j)
+      for (int i = 0; i < 4; ++i) {
+        const int column = std::clamp(h.first + i, 0, image.width - 1),
+                  row = std::clamp(v.first + j, 0, image.height - 1);
+        const float pixel = image.pixel(column, row)[c];
+        sum += h.weights[i] * v.weights[j] * pixel;
+        if (i == 0 || i == 3 || j == 0 || j == 3) continue;
+        low = std::min(low, pixel), high = std::max(high, pixel);
+        linear += (i == 2 ? h.part : 1 - h.part) * (j == 2 ? v.part : 1 - v.part) * pixel;
+      }
+    difference = sum - linear;
+    return std::clamp(sum, low, high);
+  }
+};
+
+/// Where the points of a frame were in the one before.
 class Reprojection {
  public:
-  Reprojection(const Image& before, const Image& depth_before, const MotionLayers& now)
-      : before_(before), depth_before_(depth_before), now_(now) {}
+  Reprojection(const Image& depth_before, const MotionLayers& now) : depth_before_(depth_before), now_(now) {}
 
-  /// False: not known.
-  bool move(int x, int y, float* value, float& squared_error) const {
+  /// Nothing where that is not known.
+  std::optional<Place> place(int x, int y) const {
     const float* motion = now_.motion.pixel(x, y);
     if (std::abs(motion[0]) < kAtRest && std::abs(motion[1]) < kAtRest) {
-      if (!is_same_depth(x, y, x, y)) return false;
-      std::copy_n(before_.pixel(x, y), 3, value);
-      return true;
+      if (!is_same_depth(x, y, x, y)) return std::nullopt;
+      return Place{x, y, true, {}, {}};
     }
+    const int width = depth_before_.width, height = depth_before_.height;
     const float old_x = static_cast<float>(x) + 0.5f + motion[0], old_y = static_cast<float>(y) + 0.5f + motion[1];
-    if (!(old_x >= 0.5f && old_y >= 0.5f && old_x < static_cast<float>(before_.width) - 0.5f &&
-          old_y < static_cast<float>(before_.height) - 0.5f) ||
+    if (!(old_x >= 0.5f && old_y >= 0.5f && old_x < static_cast<float>(width) - 0.5f &&
+          old_y < static_cast<float>(height) - 0.5f) ||
         is_edge(now_.motion, x, y))
-      return false;
+      return std::nullopt;
     const Tap h = tap(old_x), v = tap(old_y);
     for (const int j : {1, 2})
       for (const int i : {1, 2})
-        if (!is_same_depth(x, y, column(h.first + i), row(v.first + j))) return false;
-    for (int c = 0; c < 3; ++c) squared_error += sqr(interpolate(h, v, c, value[c])) / 3;
-    return true;
+        if (!is_same_depth(x, y, std::clamp(h.first + i, 0, width - 1), std::clamp(v.first + j, 0, height - 1)))
+          return std::nullopt;
+    return Place{x, y, false, h, v};
   }
 
  private:
-  int column(int x) const { return std::clamp(x, 0, before_.width - 1); }
-  int row(int y) const { return std::clamp(y, 0, before_.height - 1); }
-
   bool is_same_depth(int x, int y, int old_x, int old_y) const {
     const float depth = *now_.depth.pixel(x, y), old = *depth_before_.pixel(old_x, old_y);
     if (depth == 0 || old == 0) return depth == old;
@@ -93,29 +118,22 @@ class Reprojection {
     return std::abs(old - expected) <= relative * expected + kOfSlope * slope(now_.depth, x, y);
   }
 
-  /// The difference to linear interpolation.
-  float interpolate(const Tap& h, const Tap& v, int c, float& value) const {
-    float sum = 0, low = kInfinity, high = -kInfinity, linear = 0;
-    for (int j = 0; j < 4; ++j)
-      for (int i = 0; i < 4; ++i) {
-        const float pixel = before_.pixel(column(h.first + i), row(v.first + j))[c];
-        sum += h.weights[i] * v.weights[j] * pixel;
-        if (i == 0 || i == 3 || j == 0 || j == 3) continue;
-        low = std::min(low, pixel), high = std::max(high, pixel);
-        linear += (i == 2 ? h.part : 1 - h.part) * (j == 2 ? v.part : 1 - v.part) * pixel;
-      }
-    value = std::clamp(sum, low, high);
-    return sum - linear;
-  }
-
-  const Image& before_;
   const Image& depth_before_;
   const MotionLayers& now_;
 };
 
-}  // namespace
-
-namespace {
+/// Moves the pixel of an image to where it is now; its squared difference to linear interpolation, or nothing where a
+/// value is not finite.
+std::optional<float> move(const Image& before, const Place& place, float* value) {
+  float squares = 0;
+  for (int c = 0; c < 3; ++c) {
+    float difference;
+    value[c] = place.value(before, c, difference);
+    if (!std::isfinite(value[c])) return std::nullopt;
+    squares += sqr(difference) / 3;
+  }
+  return squares;
+}
 
 /// Means over 3 x 3 pixels, as far as they are in the image.
 Image smoothed(const Image& image) {
@@ -133,19 +151,30 @@ Image smoothed(const Image& image) {
 
 }  // namespace
 
-History reproject(const Image& before, const Image& depth_before, const MotionLayers& now) {
+History reproject(const Image& before, const Image& depth_before, const MotionLayers& now,
+                  const std::array<Image, 2>& samples) {
   const int width = now.depth.width, height = now.depth.height;
-  for (const Image* image : {&before, &depth_before, &now.motion})
+  const bool has_samples = !samples[0].data.empty();
+  std::vector<const Image*> images = {&before, &depth_before, &now.motion};
+  if (has_samples) images.insert(images.end(), {&samples[0], &samples[1]});
+  for (const Image* image : images)
     if (image->width != width || image->height != height)
       throw Error(ErrorCode::kInput, "frames of a sequence differ in size");
-  History history{Image(width, height, 3), Image(width, height, 1),
-                  std::vector<unsigned char>(static_cast<size_t>(width) * height)};
-  const Reprojection reprojection(before, depth_before, now);
+  History history{Image(width, height, 3),
+                  Image(width, height, 1),
+                  std::vector<unsigned char>(static_cast<size_t>(width) * height),
+                  {}};
+  if (has_samples) history.samples = {history.image, history.image};
+  const Reprojection reprojection(depth_before, now);
   parallel_for(height, 4, [&](int y) {
     for (int x = 0; x < width; ++x) {
-      float* value = history.image.pixel(x, y);
-      const bool known = reprojection.move(x, y, value, *history.squared_error.pixel(x, y)) &&
-                         std::all_of(value, value + 3, [](float v) { return std::isfinite(v); });
+      const std::optional<Place> place = reprojection.place(x, y);
+      if (!place) continue;
+      const std::optional<float> squares = move(before, *place, history.image.pixel(x, y));
+      bool known = squares.has_value();
+      for (size_t i = 0; has_samples && i < samples.size(); ++i)
+        known = move(samples[i], *place, history.samples[i].pixel(x, y)) && known;
+      *history.squared_error.pixel(x, y) = squares.value_or(0);
       history.known[static_cast<size_t>(y) * width + x] = known;
     }
   });

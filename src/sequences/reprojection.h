@@ -22,6 +22,9 @@ struct MotionLayers {
 /// Not known is what lies out of the window; what was hidden, by depth: one of the four pixels around is not as far
 /// away as the point was; and, where things move against each other or the background (by more than a quarter of a
 /// pixel from a pixel to the next), the pixels at edges, which show both.
-History reproject(const Image& before, const Image& depth_before, const MotionLayers& now);
+///
+/// `samples`: History::samples of the frame before, which are moved like the picture; or empty.
+History reproject(const Image& before, const Image& depth_before, const MotionLayers& now,
+                  const std::array<Image, 2>& samples = {});
 
 }  // namespace covary

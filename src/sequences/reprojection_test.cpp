@@ -114,6 +114,14 @@ TEST(Reprojection, LeavesOutEdgesOfWhatMovesOtherwise) {
   for (const int x : {10, 13}) EXPECT_TRUE(is_known(history, x, 5));
 }
 
+TEST(Reprojection, MovesSamplesLikeThePicture) {
+  const History history = reproject(waves(0, 0), constant(5), moving(-1.7f, 2.3f), {waves(0, 0), waves(3, 1)});
+  const History other = reproject(waves(3, 1), constant(5), moving(-1.7f, 2.3f));
+  EXPECT_EQ(history.samples[0].data, history.image.data);
+  EXPECT_EQ(history.samples[1].data, other.image.data);
+  EXPECT_EQ(history.known, other.known);
+}
+
 TEST(Reprojection, NeedsFramesOfOneSize) { EXPECT_THROW(reproject(Image(3, 2, 3), constant(5), moving(0, 0)), Error); }
 
 }  // namespace

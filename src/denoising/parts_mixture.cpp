@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "denoising/parts_mixture.h"
+
+#include <algorithm>
+#include <deque>
+#include <iterator>
+
+#include "core/parallel.h"
+#include "filters/residual_correction.h"
+#include "risk/relative_weight.h"
+
+namespace covary {
+namespace {
+
+/// Of the mean: what its variance counts beside its square, and how much the weights of the whole image count; both
+/// measured (docs/methods/denoising.md).
+constexpr float kCountOfVariance = 2, kPriorOfMean = 10;
+
+/// Weights of candidates around a mean that have the least error with 16 samples if all pixels of all scenes have the
+/// same; measured (docs/notes/denoising.md).
+struct UsualWeight {
+  const char* name;
+  float with_network, without;
+};
+constexpr UsualWeight kUsual[] = {
+    {"oidn", 0.85f, 0}, {"oidn-wide", 0.05f, 0}, {"sharp", 0.05f, 0.4f}, {"demodulated", 0.05f, 0.6f}};
+
+/// How much usual weights count for those of the whole image, with so many samples per pixel or fewer; less with more.
+constexpr float kCountOfUsual = 0.2f, kSamplesOfUsual = 16;
+
+/// What errors of a half's pixels count where its image is noisy: 1 / (G'^2 + 0.01 + 2 s^2), G: the image with little
+/// noise, s: the standard error. By the noisy image itself, pixels that are bright by chance would count little.
+Image counts_of(const DenoisingPart& part, const Image& guide) {
+  Image counts(guide.width, guide.height, 1);
+  parallel_for(guide.height, 16, [&](int y) {
+    for (int x = 0; x < guide.width; ++x) {
+      float variance = 0;
+      for (int c = 0; c < 3; ++c) variance += sqr(part.image.std_error.pixel(x, y)[c]) / 3;
+      *counts.pixel(x, y) = 1 / (1 / relative_weight(guide.pixel(x, y)) + kCountOfVariance * variance);
+    }
+  });
+  return counts;
+}
+
+float count_of_usual(const GroupedImage& image) {
+  double samples = 0;
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x) samples += image.count(x, y);
+  samples /= static_cast<double>(image.width) * image.height;
+  return kCountOfUsual * static_cast<float>(std::min(1.0, kSamplesOfUsual / std::max(samples, 1.0)));
+}
+
+/// Of all candidates, with a sum of 1; empty where none is known.
+std::vector<float> usual_weights(const std::vector<CandidateMaker>& makers) {
+  const bool network = has_network(makers);
+  std::vector<float> weights;
+  float sum = 0;
+  for (const CandidateMaker& maker : makers)
+    for (const std::string& name : maker.names) {
+      const auto usual =
+          std::find_if(std::begin(kUsual), std::end(kUsual), [&](const UsualWeight& u) { return name == u.name; });
+      weights.push_back(usual == std::end(kUsual) ? 0 : network ? usual->with_network : usual->without);
+      sum += weights.back();
+    }
+  if (sum == 0) return {};
+  for (float& weight : weights) weight /= sum;
+  return weights;
+}
+
+}  // namespace
+
+bool has_network(const std::vector<CandidateMaker>& makers) {
+  return std::any_of(makers.begin(), makers.end(), [](const CandidateMaker& m) { return m.network; });
+}
+
+CandidateInput input_of(const DenoisingPart& part, const Image& h, const std::vector<unsigned char>& valid) {
+  if (const auto& limited = part.limited)
+    return {&limited->estimate, &limited->std_error, &h, &limited->independent, &valid};
+  return {&part.image.estimate, &part.image.std_error, &h, &part.independent, &valid};
+}
+
+std::vector<CandidateSet> candidates_of(const std::vector<const DenoisingPart*>& parts,
+                                        const std::vector<unsigned char>& valid,
+                                        const std::vector<CandidateMaker>& makers) {
+  std::deque<Image> h;
+  std::vector<CandidateInput> inputs;
+  std::vector<CandidateSet> sets;
+  for (const DenoisingPart* part : parts) {
+    h.push_back(mean_image(part->independent));
+    inputs.push_back(input_of(*part, h.back(), valid));
+    sets.push_back({part->image.estimate, {}});
+  }
+  for (const CandidateMaker& maker : makers) {
+    std::vector<std::vector<Image>> images = maker.make(inputs);
+    for (size_t i = 0; i < sets.size(); ++i)
+      std::move(images[i].begin(), images[i].end(), std::back_inserter(sets[i].candidates));
+  }
+  return sets;
+}
+
+MixedParts mix_parts(const DenoisingParts& parts, const std::vector<CandidateMaker>& makers,
+                     const PartsWeighting& chosen) {
+  std::vector<CandidateSet> sets =
+      candidates_of({&parts.whole, &parts.halves[0], &parts.halves[1]}, parts.valid, makers);
+  MixedParts mixed{std::move(sets[0]), {std::move(sets[1]), std::move(sets[2])}, {}, {}};
+  MixtureInput input;
+  input.whole = &mixed.whole;
+  input.halves = {&mixed.halves[0], &mixed.halves[1]};
+  input.independent = {&parts.halves[0].independent, &parts.halves[1].independent};
+  input.guide = &guide_of(mixed.whole);
+  input.valid = &parts.valid;
+  input.bias_share = chosen.bias_share;
+  input.prior = parts.is_mean ? kPriorOfMean : chosen.prior;
+  if (parts.is_mean) input.usual = usual_weights(makers);
+  if (!input.usual.empty()) input.usual_count = count_of_usual(parts.groups);
+  for (int half = 0; parts.is_mean && half < 2; ++half) {
+    mixed.counts[half] = counts_of(parts.halves[half], guide_of(mixed.halves[half]));
+    input.counts[half] = &mixed.counts[half];
+  }
+  Mixture& mixture = mixed.mixture = mix(input);
+  if (chosen.residual_correction && !parts.is_mean) {
+    add_residual_correction(parts.whole.independent, {}, parts.valid, parts.whole.image.std_error, mixture.image);
+    for (int half : {0, 1})
+      add_residual_correction(parts.halves[half].independent, {}, parts.valid, parts.halves[half].image.std_error,
+                              mixture.halves[half]);
+  }
+  return mixed;
+}
+
+}  // namespace covary

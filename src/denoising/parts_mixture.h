@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// Candidates of some samples, and their mixture (mixture.h).
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "denoising/candidates.h"
+#include "denoising/denoising_parts.h"
+#include "denoising/mixture.h"
+
+namespace covary {
+
+struct PartsWeighting {
+  float bias_share = 1;              ///< MixtureInput::bias_share
+  float prior = 0;                   ///< MixtureInput::prior of pairs
+  bool residual_correction = false;  ///< of the mixture, of pairs
+};
+
+struct MixedParts {
+  CandidateSet whole;
+  std::array<CandidateSet, 2> halves;
+  std::array<Image, 2> counts;  ///< MixtureInput::counts; empty of a pair
+  Mixture mixture;
+};
+
+/// What candidates are made of; `h`: the mean of the part's independent image. All must outlive the result.
+CandidateInput input_of(const DenoisingPart& part, const Image& h, const std::vector<unsigned char>& valid);
+
+/// Candidates of each of the parts.
+std::vector<CandidateSet> candidates_of(const std::vector<const DenoisingPart*>& parts,
+                                        const std::vector<unsigned char>& valid,
+                                        const std::vector<CandidateMaker>& makers);
+
+/// The first candidate: the image with little noise.
+inline const Image& guide_of(const CandidateSet& set) { return set.candidates[0]; }
+
+/// Whether a neural network makes some of them.
+bool has_network(const std::vector<CandidateMaker>& makers);
+
+MixedParts mix_parts(const DenoisingParts& parts, const std::vector<CandidateMaker>& makers,
+                     const PartsWeighting& chosen);
+
+}  // namespace covary
