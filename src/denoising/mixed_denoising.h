@@ -34,7 +34,7 @@ enum class DenoiseMode {
 /// Of a frame of moving pictures, mixed in where there are samples enough for a mixture; layers have no part in it.
 struct MixingHistory {
   std::shared_ptr<const History> before;  ///< of the frame before; or null
-  bool keep_samples = false;              ///< of a mean: EstimatorResult::kept_samples for the next frame
+  bool keep_samples = false;              ///< EstimatorResult::kept_samples, of a mean denoised by a network
 };
 
 struct MixedDenoisingOptions {

@@ -243,6 +243,33 @@ TEST(MixedDenoising, GivesTheNetworkGuidesBehindGlass) {
 }
 
 /// A denoiser sees no fireflies, the mean keeps them.
+/// Frames of one scene at rest, denoised by what leaves them as they are: the error falls with the frames' number.
+TEST(MixedDenoising, OfFramesUsesSamplesOfFramesBefore) {
+  CandidateMaker same;
+  same.names = {"same"};
+  same.network = true;
+  same.make = one_by_one([](const CandidateInput& in) { return std::vector<Image>{*in.estimate}; });
+  MixingHistory history{nullptr, true};
+  std::vector<double> errors;
+  for (const uint64_t seed : {51, 52, 53, 54}) {
+    const test::Grouped frame = test::noisy_image(kWidth, kHeight, 4, seed, 1.0f, 0);
+    const EstimatorResult result =
+        denoise_by_mixture(parts_of_mean(frame.view()), {same}, DenoiseMode::kAuto, false, {}, history).result;
+    ASSERT_EQ(result.kept_samples.size(), 2u);
+    errors.push_back(square_error(result.estimate, 1 / kOutliers));
+    history.before = std::make_shared<History>(History{result.estimate,
+                                                       Image(kWidth, kHeight, 1),
+                                                       std::vector<unsigned char>(size_t{kWidth} * kHeight, 1),
+                                                       {result.kept_samples[0], result.kept_samples[1]}});
+  }
+  EXPECT_LT(errors[1], 0.7 * errors[0]);
+  EXPECT_LT(errors[3], 0.45 * errors[0]);
+  same.network = false;
+  const test::Grouped frame = test::noisy_image(kWidth, kHeight, 4, 55, 1.0f, 0);
+  EXPECT_TRUE(denoise_by_mixture(parts_of_mean(frame.view()), {same}, DenoiseMode::kAuto, false, {}, history)
+                  .result.kept_samples.empty());
+}
+
 TEST(MixedDenoising, OfASinglePassKeepsFirefliesFromCandidates) {
   test::Grouped image = test::noisy_image(kWidth, kHeight, 12, 5, 1.0f, 0);
   float* group = &image.data[((20 * kWidth + 30) * 12 + 4) * 3];
