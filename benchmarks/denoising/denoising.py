@@ -11,12 +11,17 @@ import json
 import math
 import os
 import subprocess
+import sys
 import xml.etree.ElementTree
 from pathlib import Path
 
 import numpy
 
 HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent))
+
+from layers import read_image  # noqa: E402
+
 REFERENCE_SEEDS = (1001, 1002)
 #: In the order of columns; "oidn" is what the others are compared with.
 METHODS = ("path tracing", "iicv", "oidn", "auto", "own filters")
@@ -106,15 +111,6 @@ class Scene:
                      *(["--oidn", "off"] if method == "own filters" else []))
         return output
 
-    def pixels(self, path):
-        raw = self.folder / "pixels.pfm"
-        self.run("convert", path, raw, "--overwrite")
-        with open(raw, "rb") as file:
-            assert file.readline().strip() == b"PF"
-            width, height = map(int, file.readline().split())
-            kind = "<f4" if float(file.readline()) < 0 else ">f4"
-            return numpy.frombuffer(file.read(), kind).reshape(height, width, 3)[::-1].astype(float)
-
     def errors(self, path):
         """relMSE in product form, and FLIP against the first reference."""
         first, second = self.references()
@@ -125,9 +121,9 @@ class Scene:
 
     def squared_bias(self, images):
         """Mean over pairs of seeds of (M1 - R1)(M2 - R2) over the squared reference: noise of neither is in it."""
-        first, second = map(self.pixels, self.references())
+        first, second = map(read_image, self.references())
         weight = 1 / (((first + second) / 2).mean(2, keepdims=True)**2 + 0.01)
-        images = [self.pixels(path) for path in images]
+        images = [read_image(path) for path in images]
         pairs = [(weight * ((a - first) * (b - second) + (a - second) * (b - first)) / 2).mean()
                  for a, b in itertools.combinations(images, 2)]
         return sum(pairs) / len(pairs)

@@ -4,12 +4,17 @@ import csv
 import json
 import math
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy
 from variants import size_of, write_variant
 
 HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent))
+
+from layers import read_image  # noqa: E402
+
 SCENES = HERE.parent.parent / "scenes"
 #: Samples, seed, and groups: as a render has them, and few, as two or four renders of any renderer are
 RENDERS = [(16, 1, 8), (48, 2, 12), (144, 3, 12), (16, 4, 2), (48, 5, 2), (144, 6, 2), (48, 7, 4)]
@@ -56,17 +61,6 @@ def render_all(arguments):
                 (folder / f"{stem}.done").touch()
 
 
-def pixels(arguments, path):
-    """The image of a file, in double precision."""
-    raw = arguments.work / "pixels.pfm"
-    run(arguments, "convert", path, raw, "--overwrite")
-    with open(raw, "rb") as file:
-        assert file.readline().strip() == b"PF"
-        width, height = map(int, file.readline().split())
-        kind = "<f4" if float(file.readline()) < 0 else ">f4"
-        return numpy.frombuffer(file.read(), kind).reshape(height, width, 3)[::-1].astype(float)
-
-
 def denoised_reference(arguments, name):
     """What errors are relative to. Where references are dark by chance, their own brightness would make errors count
     more just where the references' errors agree, which made a relMSE of .0075 one of .028 (Door, twice 512 samples)."""
@@ -74,7 +68,7 @@ def denoised_reference(arguments, name):
     references = [arguments.work / f"{name}-ref-{seed}.exr" for seed in REFERENCE_SEEDS]
     if not image.exists():
         run(arguments, "denoise", *references, "-o", image, "--quiet", "--force")
-    return pixels(arguments, image)
+    return read_image(image)
 
 
 def products(image, first, second, guide):
@@ -91,7 +85,7 @@ def image_of(arguments, name, spp, seed, kind):
         groups = next(groups for n, s, groups in RENDERS if (n, s) == (spp, seed))
         render(arguments, write_variant(name, SCENES, arguments.work), size_of(name), spp, seed, film, "--groups",
                groups, "--aovs", "--resume", "--json", facts)
-        return pixels(arguments, film), json.loads(facts.read_text())
+        return read_image(film), json.loads(facts.read_text())
     films = ["--independent", film, "--guides", film]
     if kind.startswith("pair"):
         films += ["--crn", arguments.work / f"{name}-{spp}-{seed}-crn.exr"]
@@ -100,14 +94,14 @@ def image_of(arguments, name, spp, seed, kind):
     image.unlink(missing_ok=True)
     # Of dark rooms many pixels are 0 in all groups, which looks like one render twice.
     run(arguments, "combine", *films, *KINDS[kind], "-o", image, "--json", facts, "--quiet", "--force")
-    return pixels(arguments, image), json.loads(facts.read_text())
+    return read_image(image), json.loads(facts.read_text())
 
 
 def measure_all(arguments):
     """A row for each image: kind, truth and the sums that the program tells; written after each scene."""
     rows = []
     for name in arguments.variants:
-        references = [pixels(arguments, arguments.work / f"{name}-ref-{seed}.exr") for seed in REFERENCE_SEEDS]
+        references = [read_image(arguments.work / f"{name}-ref-{seed}.exr") for seed in REFERENCE_SEEDS]
         guide = denoised_reference(arguments, name)
         noise = products(guide, *references, guide).std() / math.sqrt(guide[:, :, 0].size)
         for spp, seed, groups in RENDERS:

@@ -17,10 +17,10 @@ import numpy
 import scenes
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "tests/cli"))
+sys.path[:0] = [str(ROOT / "benchmarks"), str(ROOT / "tests/cli")]
 
-from exr_reader import header, read_exr  # noqa: E402
 from exr_writer import exr  # noqa: E402
+from layers import read_image, read_layers  # noqa: E402
 
 REFERENCE_SEEDS = (1001, 1002)
 #: SequenceSettings::seed_of() of src/sequences: seeds of two frames of one command are that far apart
@@ -36,21 +36,6 @@ def run(options, *words):
     if result.returncode:
         raise SystemExit(f"{' '.join(command)}\n{result.stderr}")
     return result.stdout
-
-
-def layers(path, *names):
-    """Layers of an EXR file of covary, each (height, width, 3); "" is the image itself."""
-    data = path.read_bytes()
-    x0, y0, x1, y1 = numpy.frombuffer(header(data)[0]["dataWindow"], "<i4")
-    channels = read_exr(data)
-    result = []
-    for name in names:
-        parts = [f"{name}.{end}" if name else end for end in ("XYZ" if f"{name}.X" in channels else "RGB")]
-        if any(part not in channels for part in parts):
-            raise SystemExit(f"{path}: found no layer {name or 'RGB'}; it has {', '.join(channels)}")
-        result.append(numpy.stack([numpy.array(channels[part], float).reshape(y1 - y0 + 1, x1 - x0 + 1)
-                                   for part in parts], -1))
-    return result
 
 
 def render(options, scene, spp, seed, out, *more):
@@ -95,8 +80,8 @@ def frames_alone(options, name, spp, seed, folder):
         if options.network and not denoised.exists():
             run(options, "denoise", raw, "--mode", "oidn", "-o", denoised, "--quiet")
         mixed = render(options, scene, spp, seed_of(seed, frame), folder / f"auto_{frame:04d}.exr", "--denoise", "auto")
-        mixture += layers(mixed, "")
-        positions += layers(raw, "P")
+        mixture.append(read_image(mixed))
+        positions += read_layers(raw, "P")
     positions = numpy.stack(positions)
     for frame, image in enumerate(accumulation.accumulated(name, numpy.stack(mixture), positions), 1):
         channels = {c: image[..., i].ravel().tolist() for i, c in enumerate("RGB")}
@@ -112,7 +97,7 @@ def sequence(options, name, spp, seed, folder):
     if not last.exists():
         run(options, "render", *render_sequence, "--resolution", options.resolution, "--rfilter", "box", "--spp", spp,
             "--seed", seed, "--no-preview", "--quiet", *options.options.split(), "-o", folder / "sequence_####.exr")
-    return numpy.stack([layers(folder / f"sequence_{frame:04d}.exr", "Motion")[0] for frame in frame_numbers(options)])
+    return numpy.stack([read_layers(folder / f"sequence_{frame:04d}.exr", "Motion")[0] for frame in frame_numbers(options)])
 
 
 def render_methods(options, name, spp, seed, folder):
