@@ -343,10 +343,4 @@ InputReport InputChecks::report() const {
   return r;
 }
 
-InputReport examine_inputs(const GroupedImage& crn, const GroupedImage& independent) {
-  InputChecks checks(crn.width, crn.height, crn.groups, independent.groups);
-  checks.add_rows(crn, independent);
-  return checks.report();
-}
-
 }  // namespace covary

@@ -57,7 +57,4 @@ class InputChecks {
   std::unique_ptr<State> state_;
 };
 
-/// The report on whole images.
-InputReport examine_inputs(const GroupedImage& crn, const GroupedImage& independent);
-
 }  // namespace covary

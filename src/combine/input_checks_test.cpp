@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "core/error.h"
+#include "estimators/examine_inputs.h"
 #include "estimators/test_images.h"
 
 namespace covary {

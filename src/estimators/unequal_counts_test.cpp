@@ -3,11 +3,11 @@
 // change no bit; elsewhere estimators agree with the double-precision reference, which weights as their headers say.
 #include <gtest/gtest.h>
 
-#include "combine/input_checks.h"
 #include "core/error.h"
 #include "estimators/compare_with_reference.h"
 #include "estimators/control_variates.h"
 #include "estimators/cv_baseline.h"
+#include "estimators/examine_inputs.h"
 #include "estimators/iduw.h"
 #include "estimators/iicv.h"
 #include "estimators/mean.h"
