@@ -19,9 +19,9 @@ void GuidedCells::sum(int x, int y, vfloat* sums) const {
   const vfloat grey = (f[0] + f[1] + f[2]) * (kBandwidth / 3);
   const vfloat factor = -1.0f / (grey * grey + kLeastSquare);
   std::fill_n(sums, count_, vfloat{});
-  const int row = y / kGuidedCell;
-  for (int dy = -kGuidedRadius; dy <= kGuidedRadius; ++dy)
-    for (int dx = -kReach; dx <= kReach; dx += kGuidedCell) {
+  const int row = y / kCell;
+  for (int dy = -kRadius; dy <= kRadius; ++dy)
+    for (int dx = -kReach; dx <= kReach; dx += kCell) {
       vfloat distance = {};
       for (int c = 0; c < 3; ++c) {
         const vfloat difference = load(cells_.row(c, row + dy) + x + dx) - f[c];

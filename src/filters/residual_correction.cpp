@@ -4,8 +4,7 @@
 #include <algorithm>
 #include <array>
 
-#include "core/parallel.h"
-#include "filters/planes.h"
+#include "filters/guided_cells.h"
 
 namespace covary {
 
@@ -25,51 +24,18 @@ constexpr float kNoise = 0.2f;
 constexpr float kWideNoise = 1;
 constexpr float kLeastSquare = 1e-4f;  // of the bandwidth of the residual
 
-/// Cells of side x side pixels, one row of cells per row, repeated horizontally so that column x holds the cell of
-/// pixel x: mean of F^ (kFar for cells without valid pixels), sums over the valid pixels of n (h - F^), n and n^2 var h
-/// (over RGB), with n the pixel's count over the image's mean.
+/// Of cells of side x side pixels with the guide F^: sums over the valid pixels of n (h - F^), n and n^2 var h (over
+/// RGB), with n the pixel's count over the image's mean.
 Planes make_cells(int side, const Moments& h, const std::vector<unsigned char>& valid, const Image& f, int border) {
-  const int width = f.width, height = f.height, cell_rows = (height + side - 1) / side;
-  Planes cells(width, cell_rows, kPlanes, border, 0.0f);
-  for (int c = 0; c < 3; ++c)
-    for (int row = -border; row < cell_rows + border; ++row)
-      std::fill_n(cells.row(kGuide + c, row) - border, cells.stride(), kFar);
-  const ptrdiff_t plane = cells.row(1, 0) - cells.row(0, 0), of_mean = h.mean.row(1, 0) - h.mean.row(0, 0),
-                  of_noise = h.variance_of_mean.row(1, 0) - h.variance_of_mean.row(0, 0);
-  parallel_for(cell_rows, [&](int row) {
-    float* const to = cells.row(0, row);
-    const int y0 = side * row, y1 = std::min(height, y0 + side);
-    for (int x0 = 0; x0 < width; x0 += side) {
-      float guide[3] = {}, residual[3] = {}, variance = 0, weight = 0, count = 0;
-      for (int y = y0; y < y1; ++y) {
-        const float* const mean = h.mean.row(0, y);
-        const float* const noise = h.variance_of_mean.row(0, y);
-        for (int x = x0; x < std::min(width, x0 + side); ++x) {
-          if (!valid[static_cast<size_t>(y) * width + x]) continue;
-          const float n = h.relative_count ? h.relative_count->row(0, y)[x] : 1.0f;
-          const float* const p = f.pixel(x, y);
-          count += 1;
-          weight += n;
-          for (int c = 0; c < 3; ++c) {
-            guide[c] += p[c];
-            residual[c] += n * (mean[c * of_mean + x] - p[c]);
-            variance += n * n * noise[c * of_noise + x];
-          }
-        }
-      }
-      if (count == 0) continue;
-      // Beyond the last column, too: neighbouring cells are read a multiple of `side` from any column of a cell.
-      for (int x = x0; x < x0 + side; ++x) {
-        for (int c = 0; c < 3; ++c) {
-          to[(kGuide + c) * plane + x] = guide[c] / count;
-          to[(kResidual + c) * plane + x] = residual[c];
-        }
-        to[kWeight * plane + x] = weight;
-        to[kVariance * plane + x] = variance;
-      }
+  const auto add = [&](int x, int y, float* sums) {
+    const float n = h.relative_count ? h.relative_count->row(0, y)[x] : 1.0f;
+    for (int c = 0; c < 3; ++c) {
+      sums[kResidual - 3 + c] += n * (h.mean.row(c, y)[x] - f.pixel(x, y)[c]);
+      sums[kVariance - 3] += n * n * h.variance_of_mean.row(c, y)[x];
     }
-  });
-  return cells;
+    sums[kWeight - 3] += n;
+  };
+  return sums_by_cell(side, border, f, valid, kPlanes - 3, add);
 }
 
 /// Weighted mean of residuals around kLanes pixels.
