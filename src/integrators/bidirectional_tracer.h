@@ -80,20 +80,8 @@ class BidirectionalTracer final : public LightTracingIntegrator {
     state.sums.resize(samples.size());
     for (uint32_t i = 0; i < samples.size(); ++i) start_path(scene, samples[i], i, state);
 
-    const UniformLights lights(scene);
-    for (int depth = 0; !batch.paths.empty(); ++depth) {
-      find_surfaces(scene, depth, lengths_.hide_emitters, batch, context);
-      if (depth + 1 >= lengths_.min_depth)
-        for (size_t i = 0; i < batch.paths.size(); ++i)
-          samples[batch.paths[i].sample].radiance +=
-              emission(scene, lights, depth, batch.paths[i], batch.rays[i], batch.hits[i], state);
-      if (depth + 1 >= lengths_.max_depth || context.stopped()) break;
-      end_paths_without_surface(batch);
-      const bool use_light_samples = depth + 2 >= lengths_.min_depth && !lights.empty();
-      if (use_light_samples) sample_lights(scene, lights, samples, batch);
-      scatter(lights, depth, use_light_samples, samples, state, context);
-      trace_connections(scene, samples, state, context);
-    }
+    follow_paths(scene, lengths_, samples, batch, context,
+                 Steps{*this, scene, UniformLights(scene), samples, state, context});
   }
 
   void trace_light_paths(const Scene& scene, const LightPaths& paths, std::vector<LightSplat>& splats,
@@ -125,6 +113,48 @@ class BidirectionalTracer final : public LightTracingIntegrator {
     const Path& path;
     const SubpathSums& sums;
     int t;
+  };
+
+  /// What follow_paths() does at each edge of camera subpaths.
+  struct Steps {
+    const BidirectionalTracer& tracer;
+    const Scene& scene;
+    const UniformLights lights;
+    std::span<CameraSample> samples;
+    State& state;
+    PathContext& context;
+    bool use_light_samples = false;
+
+    void arrive(int depth, size_t i) {
+      const PathBatch& batch = state.camera;
+      if (depth + 1 >= tracer.lengths_.min_depth)
+        samples[batch.paths[i].sample].radiance +=
+            tracer.emission(scene, lights, depth, batch.paths[i], batch.rays[i], batch.hits[i], state);
+    }
+
+    bool goes_on(int /*depth*/, const Path& /*path*/) const { return true; }
+
+    void sample_lights(int depth) {
+      use_light_samples = depth + 2 >= tracer.lengths_.min_depth && !lights.empty();
+      if (use_light_samples) covary::sample_lights(scene, lights, samples, state.camera);
+    }
+
+    bool scatter(int depth, uint32_t i, const PathVertex& at) {
+      PathBatch& batch = state.camera;
+      Path& path = batch.paths[i];
+      SubpathSums& sums = state.sums[path.sample];
+      sums =
+          tracer.mis_.arrive(sums, mis_cosine(at.hit.ng, batch.rays[i].d), length_squared(at.hit.p - path.previous_p));
+      const CameraVertex end{at.hit, at.wo, at.bsdf, path, sums, depth + 2};
+      if (use_light_samples && batch.lights[i].pdf_solid_angle > 0)
+        tracer.join_to_light(lights.pmf(*batch.choices[i].emitter), *batch.choices[i].emitter, batch.lights[i], end,
+                             state);
+      if (at.hit.bsdf_flags & kSmooth)
+        for (const LightVertex& light : state.light.path(state.light_path[path.sample])) tracer.join(light, end, state);
+      return tracer.go_on(depth, at, path, sums, batch.rays[i]);
+    }
+
+    void connect(int /*depth*/) { tracer.trace_connections(scene, samples, state, context); }
   };
 
   /// Most surfaces that a light subpath needs if it is joined to t vertices from the camera.
@@ -177,10 +207,9 @@ class BidirectionalTracer final : public LightTracingIntegrator {
   /// s = 0: contribution of what the path's ray met.
   Spectrum emission(const Scene& scene, const UniformLights& lights, int depth, const Path& path, const Ray& ray,
                     const SurfaceHit& hit, const State& state) const {
-    const Emitter* emitter = path.found ? hit.emitter : scene.environment();
-    if (!emitter || (!path.found && lengths_.hide_emitters && path.only_null)) return {};
-    const EnvironmentLight light =
-        path.found ? EnvironmentLight{emitter->surface_radiance(hit, -ray.d)} : emitter->environment(ray.d);
+    const Emitter* emitter = emitter_met(path, hit, scene.environment(), lengths_.hide_emitters);
+    if (!emitter) return {};
+    const EnvironmentLight light = light_met(*emitter, path, ray, hit);
     const Spectrum radiance = path.throughput * light.radiance;
     if (is_black(radiance)) return {};
     const SubpathSums& left = state.sums[path.sample];
@@ -196,50 +225,23 @@ class BidirectionalTracer final : public LightTracingIntegrator {
     return radiance * static_cast<float>(weight);
   }
 
-  /// Evaluates the surfaces: connections to lights and light subpaths, and the next rays. Paths that end are removed.
-  void scatter(const UniformLights& lights, int depth, bool use_light_samples, std::span<CameraSample> samples,
-               State& state, PathContext& context) const {
-    PathBatch& batch = state.camera;
-    batch.alive.clear();
-    for (uint32_t i = 0; i < batch.paths.size(); ++i) {
-      Path& path = batch.paths[i];
-      const SurfaceHit& hit = batch.hits[i];
-      const Vec3 wo = hit.frame.to_local(-batch.rays[i].d);
-      SubpathSums& sums = state.sums[path.sample];
-      sums = mis_.arrive(sums, mis_cosine(hit.ng, batch.rays[i].d), length_squared(hit.p - path.previous_p));
-      const uint32_t vertex = next_vertex(path, hit, depth);
-      context.arena.reset();
-      const BsdfClosure* bsdf = hit.bsdf->bind(hit, wo.z > 0, TransportMode::kRadiance, context.arena);
-      const CameraVertex end{hit, wo, *bsdf, path, sums, depth + 2};
-      if (use_light_samples && batch.lights[i].pdf_solid_angle > 0)
-        join_to_light(lights.pmf(*batch.choices[i].emitter), *batch.choices[i].emitter, batch.lights[i], end, state);
-      if (hit.bsdf_flags & kSmooth)
-        for (const LightVertex& light : state.light.path(state.light_path[path.sample])) join(light, end, state);
-
-      if (!go_on(depth, vertex, samples[path.sample], hit, wo, *bsdf, path, sums, batch.rays[i])) continue;
-      batch.alive.push_back(i);
-    }
-    keep_alive(batch);
-  }
-
   /// Draws the next ray of a camera subpath; false where it ends.
-  bool go_on(int depth, uint32_t vertex, CameraSample& sample, const SurfaceHit& hit, const Vec3& wo,
-             const BsdfClosure& bsdf, Path& path, SubpathSums& sums, Ray& ray) const {
-    const PathRandom& random = sample.random;
+  bool go_on(int depth, const PathVertex& at, Path& path, SubpathSums& sums, Ray& ray) const {
+    const PathRandom& random = at.sample.random;
     const BsdfSample next =
-        bsdf.sample(wo, random.get_1d(vertex, Event::kLobe), random.get_2d(vertex, Event::kDirection));
+        at.bsdf.sample(at.wo, random.get_1d(at.address, Event::kLobe), random.get_2d(at.address, Event::kDirection));
     if (!next.valid() || is_black(next.weight)) return false;
     scatter_path(path, next);
     if (depth + 1 >= lengths_.rr_depth) {
-      const float weight = play_roulette(parts_, path, path.throughput, vertex, sample);
+      const float weight = play_roulette(parts_, path, path.throughput, at.address, at.sample);
       if (!(weight > 0)) return false;
       path.throughput *= weight;
     }
-    const Vec3 wi = hit.frame.to_world(next.wi);
-    sums = mis_.leave(sums, mis_cosine(hit.ng, wi), scatter_pdfs(bsdf, wo, next));
+    const Vec3 wi = at.hit.frame.to_world(next.wi);
+    sums = mis_.leave(sums, mis_cosine(at.hit.ng, wi), scatter_pdfs(at.bsdf, at.wo, next));
     if (parts_.max_light_vertices() == 1) sums.vc = 0;
-    path.previous_p = hit.p;
-    make_in_place(ray, [&] { return Ray{offset_origin(hit, wi), wi, kInfinity}; });
+    path.previous_p = at.hit.p;
+    make_in_place(ray, [&] { return Ray{offset_origin(at.hit, wi), wi, kInfinity}; });
     return true;
   }
 

@@ -29,7 +29,7 @@ struct ControlledVertex {
   Spectrum plain;          ///< the plain estimate without the throughput, so far, over the albedo scale
 };
 
-struct ControlledPathState : CameraPath {
+struct ControlledPathState : PathState {
   uint32_t last_vertex = 0;  ///< address of the numbers of the last vertex
 };
 

@@ -33,7 +33,6 @@
 #include "integrators/controlled_batch.h"
 #include "integrators/controlled_parts.h"
 #include "integrators/mis.h"
-#include "integrators/path_lengths.h"
 #include "integrators/path_steps.h"
 #include "integrators/primary_sample.h"
 #include "sampling/coefficient_table.h"
@@ -44,6 +43,9 @@ namespace covary {
 
 template <typename Parts>
 class ControlledTracer {
+  using Path = ControlledBatch::Path;
+  static constexpr uint32_t kNoLight = ControlledSample::kNoLight;
+
  public:
   ControlledTracer(const Scene& scene, const ControlledScene& control, const PathLengthSettings& lengths,
                    std::span<CameraSample> samples, PathContext& context)
@@ -55,42 +57,24 @@ class ControlledTracer {
         context_(context),
         batch_(context.state_as<ControlledBatch>()) {}
 
-  // All paths of the batch advance together, in short loops, as in PathTracer.
   void trace() {
     if (lengths_.max_depth <= 0) return;
     start_paths(samples_, batch_);
     context_.by_part.radiance.assign(samples_.size() * context_.by_part.n_parts, Spectrum());
-    const bool any_light = !control_.lights->empty() || control_.environment;
-    for (int depth = 0; !batch_.paths.empty(); ++depth) {
-      find_surfaces(scene_, depth, lengths_.hide_emitters, batch_, context_);
-      for (size_t i = 0; i < batch_.paths.size(); ++i)
-        meet_light(depth, batch_.paths[i], batch_.rays[i], batch_.hits[i]);
-      if (depth + 1 >= lengths_.max_depth || context_.stopped()) break;
-      keep_paths(batch_, [&](Path& path) { return path.found && (depth < lengths_.rr_depth || survives(path)); });
-      const bool connect = depth + 2 >= lengths_.min_depth && any_light;
-      choose_lights(*control_.lights, control_.environment, samples_, connect, batch_);
-      choose_cells(depth);
-      sample_lights(*control_.lights, control_.environment, batch_);
-      find_cells();
-      scatter(depth);
-      trace_connections(depth + 2);
-      if constexpr (Parts::kCloseEnded)
-        for (const uint32_t sample : batch_.ended) close(sample, depth + 2, true);
-    }
+    follow_paths(scene_, lengths_, samples_, batch_, context_, *this);
     batch_.indirect.finish();
   }
 
- private:
-  using Path = ControlledBatch::Path;
-  static constexpr uint32_t kNoLight = ControlledSample::kNoLight;
+  // The steps of follow_paths().
 
   /// Adds the emission of what the path's ray met, which closes the vertex from which the ray came.
-  void meet_light(int depth, const Path& path, const Ray& ray, const SurfaceHit& hit) {
+  void arrive(int depth, size_t i) {
+    const Path& path = batch_.paths[i];
+    const SurfaceHit& hit = batch_.hits[i];
     EnvironmentLight light;
-    const Emitter* emitter = path.found ? hit.emitter : control_.environment;
-    if (emitter && depth + 1 >= lengths_.min_depth && (path.found || !lengths_.hide_emitters || !path.only_null))
-      light = path.found ? EnvironmentLight{emitter->surface_radiance(hit, -ray.d)}
-                         : control_.environment->environment(ray.d);
+    if (depth + 1 >= lengths_.min_depth)
+      if (const Emitter* emitter = emitter_met(path, hit, control_.environment, lengths_.hide_emitters))
+        light = light_met(*emitter, path, batch_.rays[i], hit);
     ControlledVertex& vertex = batch_.vertices[path.sample];
     float r = 1;
     uint32_t cluster = kNoLight;
@@ -109,13 +93,65 @@ class ControlledTracer {
     close(path.sample, depth + 1, false);
   }
 
-  bool survives(Path& path) {
+  /// Plays Russian roulette.
+  bool goes_on(int depth, Path& path) {
+    if (depth < lengths_.rr_depth) return true;
     const float weight =
         play_roulette(roulette::Parts(), path, path.throughput, path.last_vertex, samples_[path.sample]);
     path.throughput *= weight;
     return weight > 0;
   }
 
+  void sample_lights(int depth) {
+    const bool any_light = !control_.lights->empty() || control_.environment;
+    choose_lights(*control_.lights, control_.environment, samples_, depth + 2 >= lengths_.min_depth && any_light,
+                  batch_);
+    choose_cells(depth);
+    covary::sample_lights(*control_.lights, control_.environment, batch_);
+    find_cells();
+    batch_.ended.clear();
+  }
+
+  bool scatter(int depth, uint32_t i, const PathVertex& at) {
+    Path& path = batch_.paths[i];
+    const SurfaceHit& hit = at.hit;
+    const ControlledBatch::LightChoice& choice = batch_.choices[i];
+    path.last_vertex = at.address;
+    ControlledVertex& vertex = batch_.vertices[path.sample];
+    vertex.open = choice.open;
+    if (vertex.open) {
+      open(vertex, path, hit, choice);
+      if (!control_.lights->empty())
+        add_light(at, path, batch_.lights[i], control_.cluster_of[choice.light], (*control_.lights)[choice.light].pmf);
+      if (control_.environment) add_light(at, path, batch_.environments[i], kNoLight, 1);
+    }
+
+    const PathRandom& random = at.sample.random;
+    const Vec2 u = random.get_2d(at.address, Event::kDirection);
+    const BsdfSample next = at.bsdf.sample(at.wo, random.get_1d(at.address, Event::kLobe), u);
+    const bool failed = !next.valid() || is_black(next.weight);
+    if (control_.indirect && vertex.open && choice.in_cell && (Parts::kCountFailed || !failed))
+      control_indirect(depth, path, batch_.rays[i], hit, u);
+    if (failed) {
+      if (!vertex.open) return false;
+      if (Parts::kCountFailed && !control_.light_samples_only) take(vertex, Spectrum(), kNoLight, 0);
+      batch_.ended.push_back(path.sample);
+      return false;
+    }
+    vertex.direction_weight = next.weight;
+    scatter_path(path, next);
+    lead_on(path, batch_.rays[i], hit, next, hit.frame.to_world(next.wi));
+    return true;
+  }
+
+  /// Finishes the light samples, and the vertices of paths that have ended.
+  void connect(int depth) {
+    trace_connections(depth + 2);
+    if constexpr (Parts::kCloseEnded)
+      for (const uint32_t sample : batch_.ended) close(sample, depth + 2, true);
+  }
+
+ private:
   /// In which cells the vertices lie.
   void choose_cells(int depth) {
     for (size_t i = 0; i < batch_.paths.size(); ++i) {
@@ -161,46 +197,6 @@ class ControlledTracer {
   }
 
   bool uses_cells() const { return batch_.recording || table_.n_cells() > 0; }
-
-  /// Evaluates the surfaces: connections to the light samples, and the next rays. Paths that end are removed.
-  void scatter(int depth) {
-    batch_.alive.clear(), batch_.ended.clear();
-    for (uint32_t i = 0; i < batch_.paths.size(); ++i) {
-      Path& path = batch_.paths[i];
-      const SurfaceHit& hit = batch_.hits[i];
-      const PathRandom& random = samples_[path.sample].random;
-      const Vec3 wo = hit.frame.to_local(-batch_.rays[i].d);
-      path.last_vertex = next_vertex(path, hit, depth);
-      context_.arena.reset();
-      const BsdfClosure* bsdf = hit.bsdf->bind(hit, wo.z > 0, TransportMode::kRadiance, context_.arena);
-      ControlledVertex& vertex = batch_.vertices[path.sample];
-      vertex.open = batch_.choices[i].open;
-      if (vertex.open) {
-        open(vertex, path, hit, batch_.choices[i]);
-        if (!control_.lights->empty())
-          connect(path, hit, wo, *bsdf, batch_.lights[i], control_.cluster_of[batch_.choices[i].light],
-                  (*control_.lights)[batch_.choices[i].light].pmf);
-        if (control_.environment) connect(path, hit, wo, *bsdf, batch_.environments[i], kNoLight, 1);
-      }
-
-      const Vec2 u = random.get_2d(path.last_vertex, Event::kDirection);
-      const BsdfSample next = bsdf->sample(wo, random.get_1d(path.last_vertex, Event::kLobe), u);
-      const bool failed = !next.valid() || is_black(next.weight);
-      if (control_.indirect && vertex.open && batch_.choices[i].in_cell && (Parts::kCountFailed || !failed))
-        control_indirect(depth, path, batch_.rays[i], hit, u);
-      if (failed) {
-        if (!vertex.open) continue;
-        if (Parts::kCountFailed && !control_.light_samples_only) take(vertex, Spectrum(), kNoLight, 0);
-        batch_.ended.push_back(path.sample);
-        continue;
-      }
-      vertex.direction_weight = next.weight;
-      scatter_path(path, next);
-      lead_on(path, batch_.rays[i], hit, next, hit.frame.to_world(next.wi));
-      batch_.alive.push_back(i);
-    }
-    keep_alive(batch_);
-  }
 
   /// Begins the estimate of a vertex: Σ N β of its control.
   void open(ControlledVertex& vertex, const Path& path, const SurfaceHit& hit,
@@ -305,10 +301,9 @@ class ControlledTracer {
   }
 
   /// Next-event estimation: f cos L / p, if nothing lies between. `pmf`: with which the light was chosen.
-  void connect(const Path& path, const SurfaceHit& hit, const Vec3& wo, const BsdfClosure& bsdf,
-               const EmitterSample& light, uint32_t cluster, float pmf) {
+  void add_light(const PathVertex& at, const Path& path, const EmitterSample& light, uint32_t cluster, float pmf) {
     if (light.pdf_solid_angle > 0 && !is_black(light.radiance)) {
-      const BsdfValue f = bsdf.eval(wo, hit.frame.to_local(light.wi));
+      const BsdfValue f = at.bsdf.eval(at.wo, at.hit.frame.to_local(light.wi));
       if (!is_black(f.value)) {
         const float pdf = pmf * light.pdf_solid_angle, pdf_direction = light.is_delta ? 0 : f.pdf_solid_angle;
         const size_t n = batch_.n_connections++;
@@ -316,7 +311,7 @@ class ControlledTracer {
           return ControlledBatch::Connection{f.value * light.radiance * (1 / (pdf + pdf_direction)), path.sample,
                                              cluster, mis::balance(pdf, pdf_direction)};
         });
-        make_in_place(batch_.shadow_rays[n], [&] { return shadow_ray(hit, light); });
+        make_in_place(batch_.shadow_rays[n], [&] { return shadow_ray(at.hit, light); });
         return;
       }
     }

@@ -40,7 +40,7 @@ class DirectIntegrator final : public Integrator {
       for (size_t i = 0; i < batch.paths.size(); ++i)
         samples[batch.paths[i].sample].radiance += seen_directly(scene, batch, i);
     if (lengths_.max_depth < 2 || lengths_.min_depth > 2 || lights.empty()) return;
-    end_paths_without_surface(batch);
+    keep_paths(batch, [](const PathState& path) { return path.found; });
     for (int k = 0; k < settings_.emitter_samples && !context.stopped(); ++k)
       sample_light(scene, lights, static_cast<uint32_t>(k), samples, batch, context);
     for (int k = 0; k < settings_.bsdf_samples && !context.stopped(); ++k)

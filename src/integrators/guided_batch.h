@@ -11,7 +11,7 @@
 
 namespace covary {
 
-struct GuidedPathState : CameraPath {
+struct GuidedPathState : PathState {
   Spectrum bsdf_throughput{1};  ///< what it would be if the BSDF had drawn all directions
   uint32_t last_vertex = 0;     ///< address of the numbers of the last vertex
   bool recorded = false;        ///< the last direction sample is the last of the path's trail

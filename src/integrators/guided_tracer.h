@@ -19,13 +19,14 @@
 #include "core/in_place.h"
 #include "integrators/guided_vertex_control.h"
 #include "integrators/mis.h"
-#include "integrators/path_lengths.h"
 #include "integrators/path_steps.h"
 
 namespace covary {
 
 template <typename Parts>
 class GuidedTracer {
+  using Path = GuidedBatch::Path;
+
  public:
   GuidedTracer(const Scene& scene, const GuidedScene& guided, const PathLengthSettings& lengths,
                std::span<CameraSample> samples, PathContext& context)
@@ -38,34 +39,15 @@ class GuidedTracer {
         batch_(context.state_as<GuidedBatch>()),
         control_(guided, guide_, samples, context, batch_) {}
 
-  // All paths of the batch advance together, in short loops, as in PathTracer.
   void trace() {
     if (lengths_.max_depth <= 0) return;
     start_paths(samples_, batch_);
-    const bool any_light = guided_.lights && (!guided_.lights->empty() || guided_.environment);
-    for (int depth = 0; !batch_.paths.empty(); ++depth) {
-      find_surfaces(scene_, depth, lengths_.hide_emitters, batch_, context_);
-      for (size_t i = 0; i < batch_.paths.size(); ++i) arrive(depth, i);
-      if (depth + 1 >= lengths_.max_depth || context_.stopped()) break;
-      keep_paths(batch_, [&](Path& path) { return path.found && (depth < lengths_.rr_depth || survives(path)); });
-      find_leaves();
-      connecting_ = any_light && depth + 2 >= lengths_.min_depth;
-      if (connecting_) {
-        choose_lights(*guided_.lights, guided_.environment, samples_, true, batch_);
-        sample_lights(*guided_.lights, guided_.environment, batch_);
-      }
-      scatter(depth);
-      if (connecting_) trace_connections();
-      if (batch_.recording) begin_steps();
-      if (batch_.recording_control) control_.begin_steps();
-      for (const uint32_t sample : batch_.ended) control_.close(sample);
-    }
+    follow_paths(scene_, lengths_, samples_, batch_, context_, *this);
     if (batch_.recording) finish_steps();
     if (batch_.recording_control) control_.finish_steps();
   }
 
- private:
-  using Path = GuidedBatch::Path;
+  // The steps of follow_paths().
 
   /// Adds the emission of what the path's ray met, which closes the vertex from which the ray came.
   void arrive(int depth, size_t i) {
@@ -79,15 +61,76 @@ class GuidedTracer {
     control_.close(path.sample);
   }
 
+  /// Roulette is judged by what BSDF sampling alone would carry; see above.
+  bool goes_on(int depth, Path& path) {
+    if (depth < lengths_.rr_depth) return true;
+    const float weight =
+        play_roulette(roulette::Parts(), path, path.bsdf_throughput, path.last_vertex, samples_[path.sample]);
+    path.throughput *= weight;
+    path.bsdf_throughput *= weight;
+    return weight > 0;
+  }
+
+  void sample_lights(int depth) {
+    find_leaves();
+    const bool any_light = guided_.lights && (!guided_.lights->empty() || guided_.environment);
+    connecting_ = any_light && depth + 2 >= lengths_.min_depth;
+    if (connecting_) {
+      choose_lights(*guided_.lights, guided_.environment, samples_, true, batch_);
+      covary::sample_lights(*guided_.lights, guided_.environment, batch_);
+    }
+    batch_.ended.clear(), batch_.connection_parts.clear(), batch_.connection_weights.clear();
+  }
+
+  bool scatter(int /*depth*/, uint32_t i, const PathVertex& at) {
+    Path& path = batch_.paths[i];
+    const SurfaceHit& hit = at.hit;
+    path.last_vertex = at.address;
+    make_guide(hit, at.wo, at.bsdf, i);
+    control_.open(path, connecting_);
+    if (connecting_ && batch_.choices[i].open) {
+      if (!guided_.lights->empty())
+        add_light(at, path, batch_.lights[i], (*guided_.lights)[batch_.choices[i].light].pmf,
+                  guided_.cluster_of[batch_.choices[i].light]);
+      if (guided_.environment) add_light(at, path, batch_.environments[i], 1, ControlledSample::kNoLight);
+    }
+
+    const GuidedDirection direction = guide_.sample(field_, hit, at.wo, at.bsdf, at.sample.random, at.address);
+    const BsdfSample& next = direction.sample;
+    path.recorded = false;
+    const bool ends = !next.valid() || is_black(next.weight);
+    if (batch_.vertices[path.sample].active) control_.keep_direction(path.sample, direction, !ends);
+    if (ends) {
+      if (!batch_.vertices[path.sample].active) return false;
+      if (Parts::kCountFailed) control_.take_direction(path.sample, 0, ControlledSample::kNoLight);
+      batch_.ended.push_back(path.sample);
+      return false;
+    }
+    scatter_path(path, next);
+    path.bsdf_throughput *= next.weight * (direction.pdf_bsdf > 0 ? next.pdf / direction.pdf_bsdf : 1);
+    const Vec3 wi = hit.frame.to_world(next.wi);
+    lead_on(path, batch_.rays[i], hit, next, wi);
+    if (batch_.recording && !next.is_delta() && guide_.guidable > 0) record(path, hit.p, wi, direction);
+    return true;
+  }
+
+  /// Finishes the light samples, and the vertices of paths that have ended.
+  void connect(int /*depth*/) {
+    if (connecting_) trace_connections();
+    if (batch_.recording) begin_steps();
+    if (batch_.recording_control) control_.begin_steps();
+    for (const uint32_t sample : batch_.ended) control_.close(sample);
+  }
+
+ private:
   /// Sets `r_light` and `light` where a light sample could have found what was met.
   void add_emission(int depth, size_t i, float& r_light, uint32_t& light_cluster) {
     const Path& path = batch_.paths[i];
     const SurfaceHit& hit = batch_.hits[i];
     if (depth + 1 < lengths_.min_depth) return;
-    const Emitter* emitter = path.found ? hit.emitter : guided_.environment;
-    if (!emitter || (!path.found && lengths_.hide_emitters && path.only_null)) return;
-    const EnvironmentLight light = path.found ? EnvironmentLight{emitter->surface_radiance(hit, -batch_.rays[i].d)}
-                                              : emitter->environment(batch_.rays[i].d);
+    const Emitter* emitter = emitter_met(path, hit, guided_.environment, lengths_.hide_emitters);
+    if (!emitter) return;
+    const EnvironmentLight light = light_met(*emitter, path, batch_.rays[i], hit);
     if (is_black(light.radiance)) return;
     const Spectrum radiance = path.throughput * light.radiance;
     if (path.previous_delta || !guided_.lights) {
@@ -105,15 +148,6 @@ class GuidedTracer {
     samples_[path.sample].radiance += radiance * r;
   }
 
-  /// Roulette is judged by what BSDF sampling alone would carry; see above.
-  bool survives(Path& path) {
-    const float weight =
-        play_roulette(roulette::Parts(), path, path.bsdf_throughput, path.last_vertex, samples_[path.sample]);
-    path.throughput *= weight;
-    path.bsdf_throughput *= weight;
-    return weight > 0;
-  }
-
   /// The leaves in which the vertices lie, before they are read.
   void find_leaves() {
     if (field_.n_leaves() == 0) return;
@@ -124,48 +158,6 @@ class GuidedTracer {
       for (size_t line = 0; line < sizeof leaf; line += 64)
         __builtin_prefetch(reinterpret_cast<const char*>(&leaf) + line);
     }
-  }
-
-  /// Evaluates the surfaces: connections to the light samples, and the next rays. Paths that end are removed.
-  void scatter(int depth) {
-    batch_.alive.clear(), batch_.ended.clear(), batch_.connection_parts.clear();
-    batch_.connection_weights.clear();
-    for (uint32_t i = 0; i < batch_.paths.size(); ++i) {
-      Path& path = batch_.paths[i];
-      const SurfaceHit& hit = batch_.hits[i];
-      const PathRandom& random = samples_[path.sample].random;
-      const Vec3 wo = hit.frame.to_local(-batch_.rays[i].d);
-      path.last_vertex = next_vertex(path, hit, depth);
-      context_.arena.reset();
-      const BsdfClosure* bsdf = hit.bsdf->bind(hit, wo.z > 0, TransportMode::kRadiance, context_.arena);
-      make_guide(hit, wo, *bsdf, i);
-      control_.open(path, connecting_);
-      if (connecting_ && batch_.choices[i].open) {
-        if (!guided_.lights->empty())
-          connect(path, hit, wo, *bsdf, batch_.lights[i], (*guided_.lights)[batch_.choices[i].light].pmf,
-                  guided_.cluster_of[batch_.choices[i].light]);
-        if (guided_.environment) connect(path, hit, wo, *bsdf, batch_.environments[i], 1, ControlledSample::kNoLight);
-      }
-
-      const GuidedDirection direction = guide_.sample(field_, hit, wo, *bsdf, random, path.last_vertex);
-      const BsdfSample& next = direction.sample;
-      path.recorded = false;
-      const bool ends = !next.valid() || is_black(next.weight);
-      if (batch_.vertices[path.sample].active) control_.keep_direction(path.sample, direction, !ends);
-      if (ends) {
-        if (!batch_.vertices[path.sample].active) continue;
-        if (Parts::kCountFailed) control_.take_direction(path.sample, 0, ControlledSample::kNoLight);
-        batch_.ended.push_back(path.sample);
-        continue;
-      }
-      scatter_path(path, next);
-      path.bsdf_throughput *= next.weight * (direction.pdf_bsdf > 0 ? next.pdf / direction.pdf_bsdf : 1);
-      const Vec3 wi = hit.frame.to_world(next.wi);
-      lead_on(path, batch_.rays[i], hit, next, wi);
-      if (batch_.recording && !next.is_delta() && guide_.guidable > 0) record(path, hit.p, wi, direction);
-      batch_.alive.push_back(i);
-    }
-    keep_alive(batch_);
   }
 
   /// Sets guide_ for the vertex of path i.
@@ -180,11 +172,10 @@ class GuidedTracer {
 
   /// Next-event estimation: f cos L / p, if nothing lies between. `pmf`: with which the light of `cluster` was chosen;
   /// kNoLight: the environment.
-  void connect(const Path& path, const SurfaceHit& hit, const Vec3& wo, const BsdfClosure& bsdf,
-               const EmitterSample& light, float pmf, uint32_t cluster) {
+  void add_light(const PathVertex& at, const Path& path, const EmitterSample& light, float pmf, uint32_t cluster) {
     const bool active = batch_.vertices[path.sample].active;
     if (light.pdf_solid_angle > 0 && !is_black(light.radiance)) {
-      const BsdfValue f = bsdf.eval(wo, hit.frame.to_local(light.wi));
+      const BsdfValue f = at.bsdf.eval(at.wo, at.hit.frame.to_local(light.wi));
       if (!is_black(f.value)) {
         GuidedBatch::ConnectionParts parts;
         float pdf_direction = 0;
@@ -204,7 +195,7 @@ class GuidedTracer {
         make_in_place(batch_.connections[n], [&] {
           return GuidedBatch::Connection{path.throughput * value, path.sample, place};
         });
-        make_in_place(batch_.shadow_rays[n], [&] { return shadow_ray(hit, light); });
+        make_in_place(batch_.shadow_rays[n], [&] { return shadow_ray(at.hit, light); });
         if (!active) return;
         parts.value = value, parts.light = cluster, parts.r_light = mis::balance(pdf, pdf_direction);
         batch_.connection_parts.push_back(parts);

@@ -10,7 +10,7 @@
 namespace covary {
 
 /// What a camera path that goes on carries.
-struct CameraPath {
+struct PathState {
   Spectrum throughput{1};
   float eta = 1;               ///< product of relative indices, undoes the radiance scaling in roulette
   Vec3 previous_p;             ///< where the last direction sample started
@@ -23,7 +23,7 @@ struct CameraPath {
 };
 
 /// Camera paths that an integrator advances together, and for each of them what its loops hand on to one another.
-/// `PathType`: what a path carries, a CameraPath or more; `ChoiceType`: which light a vertex samples, and with which
+/// `PathType`: what a path carries, a PathState or more; `ChoiceType`: which light a vertex samples, and with which
 /// numbers; `ConnectionType`: a light sample that counts if nothing lies between.
 template <typename PathType, typename ChoiceType, typename ConnectionType>
 struct CameraBatch : ThreadState {
@@ -71,7 +71,7 @@ struct LightConnection {
 };
 
 /// The batch of PathTracer.
-struct PathBatch final : CameraBatch<CameraPath, EmitterChoice, LightConnection> {
+struct PathBatch final : CameraBatch<PathState, EmitterChoice, LightConnection> {
   std::vector<const Emitter*> connected;  ///< the lights of the connections, where lights are told apart
 };
 

@@ -8,6 +8,7 @@
 
 #include "core/in_place.h"
 #include "integrators/path_batch.h"
+#include "integrators/path_lengths.h"
 #include "integrators/primary_sample.h"
 #include "integrators/roulette.h"
 
@@ -62,20 +63,20 @@ void keep_paths(Batch& batch, const Keep& keep) {
 
 /// The vertex at which a path reads the random numbers of the surface that it has met. Mirrors and glass have addresses
 /// of their own: a path that met one reads, at the surfaces behind it, the same numbers as its neighbour that did not.
-inline uint32_t next_vertex(CameraPath& path, const SurfaceHit& hit, int depth) {
+inline uint32_t next_vertex(PathState& path, const SurfaceHit& hit, int depth) {
   return hit.bsdf_flags & kSmooth ? kFirstSurfaceVertex + path.n_smooth++
                                   : kDeltaVertices + static_cast<uint32_t>(depth);
 }
 
 /// What a direction sample does to all that a path carries.
-inline void scatter_path(CameraPath& path, const BsdfSample& next) {
+inline void scatter_path(PathState& path, const BsdfSample& next) {
   path.throughput *= next.weight;
   path.eta *= next.eta;
   if (!(next.flags & kNullTransmission)) path.only_null = false;
 }
 
 /// Leads a path on from a surface, in the world's direction `wi` of the sample.
-inline void lead_on(CameraPath& path, Ray& ray, const SurfaceHit& hit, const BsdfSample& next, const Vec3& wi) {
+inline void lead_on(PathState& path, Ray& ray, const SurfaceHit& hit, const BsdfSample& next, const Vec3& wi) {
   path.previous_p = hit.p;
   path.previous_pdf = next.pdf;
   path.previous_delta = next.is_delta();
@@ -95,7 +96,7 @@ void visit_connections(const Scene& scene, Batch& batch, PathContext& context, c
 /// Russian roulette by `parts` (roulette.h) with the number of `vertex`, for a path that carries `throughput`: the
 /// factor of survivors, or 0 where the path ends.
 template <typename Parts>
-float play_roulette(const Parts& parts, const CameraPath& path, const Spectrum& throughput, uint32_t vertex,
+float play_roulette(const Parts& parts, const PathState& path, const Spectrum& throughput, uint32_t vertex,
                     CameraSample& sample) {
   const float survival = parts.survival_probability(throughput, path.eta, sample.random.sampling());
   if (sample.random.get_1d(vertex, Event::kRoulette) < survival) return parts.survivor_weight(survival);
@@ -111,17 +112,66 @@ inline void add_connections(const Scene& scene, std::span<CameraSample> samples,
   });
 }
 
-/// Removes the paths that left the scene.
-inline void end_paths_without_surface(PathBatch& batch) {
-  keep_paths(batch, [](const PathBatch::Path& path) { return path.found; });
-}
-
 /// Removes the paths that are not among Batch::alive, with their next rays.
 template <typename Batch>
 void keep_alive(Batch& batch) {
   for (size_t n = 0; n < batch.alive.size(); ++n)
     if (const uint32_t i = batch.alive[n]; i != n) batch.paths[n] = batch.paths[i], batch.rays[n] = batch.rays[i];
   batch.resize(batch.alive.size());
+}
+
+/// The light that the ray of a path may have met, of a surface or the environment, or null.
+inline const Emitter* emitter_met(const PathState& path, const SurfaceHit& hit, const Emitter* environment,
+                                  bool hide_emitters) {
+  if (path.found) return hit.emitter;
+  return hide_emitters && path.only_null ? nullptr : environment;
+}
+/// What it sends along the ray; the density is that of the environment.
+inline EnvironmentLight light_met(const Emitter& emitter, const PathState& path, const Ray& ray,
+                                  const SurfaceHit& hit) {
+  return path.found ? EnvironmentLight{emitter.surface_radiance(hit, -ray.d)} : emitter.environment(ray.d);
+}
+
+/// A surface that a path has reached, ready to be sampled.
+struct PathVertex {
+  const SurfaceHit& hit;
+  const BsdfClosure& bsdf;
+  Vec3 wo;               ///< to where the path came from, in the surface's frame
+  uint32_t address;      ///< of its random numbers
+  CameraSample& sample;  ///< of the path
+};
+
+/// The loop of all integrators that follow paths from the camera. The paths of a batch that has been started advance
+/// together, one edge at a time, in short loops whose iterations do not depend on each other: while one waits for memory
+/// or a division, the processor works on the next. What an integrator does at each edge, its `steps` say, `depth` edges
+/// from the camera:
+/// - arrive(depth, i): the ray of path i has found what it meets, or left the scene;
+/// - goes_on(depth, path): whether a path that has met a surface is followed further;
+/// - sample_lights(depth): for the vertices of all paths that are left;
+/// - scatter(depth, i, vertex): connects the vertex, draws the next ray; false where the path ends;
+/// - connect(depth): traces the connections.
+template <typename Batch, typename Steps>
+void follow_paths(const Scene& scene, const PathLengthSettings& lengths, std::span<CameraSample> samples, Batch& batch,
+                  PathContext& context, Steps&& steps) {
+  for (int depth = 0; !batch.paths.empty(); ++depth) {
+    find_surfaces(scene, depth, lengths.hide_emitters, batch, context);
+    for (size_t i = 0; i < batch.paths.size(); ++i) steps.arrive(depth, i);
+    if (depth + 1 >= lengths.max_depth || context.stopped()) break;
+    keep_paths(batch, [&](auto& path) { return path.found && steps.goes_on(depth, path); });
+    steps.sample_lights(depth);
+    batch.alive.clear();
+    for (uint32_t i = 0; i < batch.paths.size(); ++i) {
+      const SurfaceHit& hit = batch.hits[i];
+      const Vec3 wo = hit.frame.to_local(-batch.rays[i].d);
+      const uint32_t address = next_vertex(batch.paths[i], hit, depth);
+      context.arena.reset();
+      const BsdfClosure* bsdf = hit.bsdf->bind(hit, wo.z > 0, TransportMode::kRadiance, context.arena);
+      if (steps.scatter(depth, i, PathVertex{hit, *bsdf, wo, address, samples[batch.paths[i].sample]}))
+        batch.alive.push_back(i);
+    }
+    keep_alive(batch);
+    steps.connect(depth);
+  }
 }
 
 /// One light sample for each vertex whose surface can use it. All choices come first, so that memory answers to one

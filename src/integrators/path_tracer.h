@@ -14,7 +14,6 @@
 
 #include "core/in_place.h"
 #include "integrators/mis.h"
-#include "integrators/path_lengths.h"
 #include "integrators/path_steps.h"
 #include "integrators/primary_sample.h"
 #include "integrators/roulette.h"
@@ -71,103 +70,101 @@ class PathTracer final : public Integrator {
   void prepare(const Scene& scene) override { parts_.prepare(scene); }
   std::unique_ptr<ThreadState> make_thread_state() const override { return std::make_unique<PathBatch>(); }
 
-  // All paths of the batch advance together, one edge at a time, in short loops whose iterations do not depend on each
-  // other: while one waits for memory or a division, the processor works on the next.
   void trace(const Scene& scene, std::span<CameraSample> samples, PathContext& context) const override {
     if (lengths_.max_depth <= 0) return;
     PathBatch& batch = context.state_as<PathBatch>();
-    const auto& lights = parts_.lights(scene);
-    start_paths(samples, batch);
     parts_.begin(samples.size(), context);
-
-    for (int depth = 0; !batch.paths.empty(); ++depth) {
-      find_surfaces(scene, depth, lengths_.hide_emitters, batch, context);
-      if (depth + 1 >= lengths_.min_depth)
-        for (size_t i = 0; i < batch.paths.size(); ++i) {
-          const Path& path = batch.paths[i];
-          const Spectrum radiance = emission(scene, lights, path, batch.rays[i], batch.hits[i]);
-          samples[path.sample].radiance += radiance;
-          parts_.add_light(path.found ? batch.hits[i].emitter : scene.environment(), path.sample, radiance, context);
-        }
-      if (depth + 1 >= lengths_.max_depth || context.stopped()) break;
-      end_paths_without_surface(batch);
-
-      const bool connect = depth + 2 >= lengths_.min_depth && !lights.empty();
-      if (connect) sample_lights(scene, lights, samples, batch);
-      scatter(lights, depth, connect, samples, batch, context);
-      visit_connections(scene, batch, context, [&](const PathBatch::Connection& connection, bool hidden) {
-        if (hidden) return;
-        samples[connection.sample].radiance += connection.radiance;
-        const auto n = static_cast<size_t>(&connection - batch.connections.data());
-        parts_.add_light(parts_.light_of(n, batch), connection.sample, connection.radiance, context);
-      });
-    }
+    start_paths(samples, batch);
+    follow_paths(scene, lengths_, samples, batch, context,
+                 Steps{*this, scene, parts_.lights(scene), samples, batch, context});
   }
 
   std::string description() const override { return name_ + " " + lengths_.text(); }
 
  private:
-  using Path = PathBatch::Path;
-  using Lights = std::remove_cvref_t<decltype(std::declval<const Parts&>().lights(std::declval<const Scene&>()))>;
+  /// What follow_paths() does at each edge.
+  struct Steps {
+    using Path = PathBatch::Path;
+    using Lights = decltype(std::declval<const Parts&>().lights(std::declval<const Scene&>()));
 
-  /// Evaluates the surfaces: connections to the light samples, and the next rays. Paths that end are removed.
-  void scatter(const Lights& lights, int depth, bool connect, std::span<CameraSample> samples, PathBatch& batch,
-               PathContext& context) const {
-    batch.alive.clear();
-    for (uint32_t i = 0; i < batch.paths.size(); ++i) {
+    const PathTracer& tracer;
+    const Scene& scene;
+    const Lights lights;
+    std::span<CameraSample> samples;
+    PathBatch& batch;
+    PathContext& context;
+    bool connecting = false;  ///< vertices take light samples
+
+    void arrive(int depth, size_t i) {
+      if (depth + 1 < tracer.lengths_.min_depth) return;
+      const Path& path = batch.paths[i];
+      const Spectrum radiance = emission(path, batch.rays[i], batch.hits[i]);
+      samples[path.sample].radiance += radiance;
+      tracer.parts_.add_light(path.found ? batch.hits[i].emitter : scene.environment(), path.sample, radiance, context);
+    }
+
+    bool goes_on(int /*depth*/, const Path& /*path*/) const { return true; }
+
+    void sample_lights(int depth) {
+      connecting = depth + 2 >= tracer.lengths_.min_depth && !lights.empty();
+      if (connecting) covary::sample_lights(scene, lights, samples, batch);
+    }
+
+    bool scatter(int depth, uint32_t i, const PathVertex& vertex) {
       Path& path = batch.paths[i];
-      const SurfaceHit& hit = batch.hits[i];
-      const PathRandom& random = samples[path.sample].random;
-      const Vec3 wo = hit.frame.to_local(-batch.rays[i].d);
-      const uint32_t vertex = next_vertex(path, hit, depth);
-      context.arena.reset();
-      const BsdfClosure* bsdf = hit.bsdf->bind(hit, wo.z > 0, TransportMode::kRadiance, context.arena);
-      if (connect && batch.lights[i].pdf_solid_angle > 0)
-        connect_light(lights, *batch.choices[i].emitter, path, hit, wo, *bsdf, batch.lights[i], batch);
+      if (connecting && batch.lights[i].pdf_solid_angle > 0)
+        connect_light(*batch.choices[i].emitter, path, vertex, batch.lights[i]);
 
-      const BsdfSample next = parts_.sample_direction(*bsdf, hit, wo, random, vertex);
-      if (!next.valid() || is_black(next.weight)) continue;
+      const BsdfSample next =
+          tracer.parts_.sample_direction(vertex.bsdf, vertex.hit, vertex.wo, vertex.sample.random, vertex.address);
+      if (!next.valid() || is_black(next.weight)) return false;
       scatter_path(path, next);
-      if (depth + 1 >= lengths_.rr_depth) {
-        const float weight = play_roulette(parts_, path, path.throughput, vertex, samples[path.sample]);
-        if (!(weight > 0)) continue;
+      if (depth + 1 >= tracer.lengths_.rr_depth) {
+        const float weight = play_roulette(tracer.parts_, path, path.throughput, vertex.address, vertex.sample);
+        if (!(weight > 0)) return false;
         path.throughput *= weight;
       }
-      lead_on(path, batch.rays[i], hit, next, hit.frame.to_world(next.wi));
-      batch.alive.push_back(i);
+      lead_on(path, batch.rays[i], vertex.hit, next, vertex.hit.frame.to_world(next.wi));
+      return true;
     }
-    keep_alive(batch);
-  }
 
-  /// Contribution of what the path's ray met, weighted against light sampling.
-  Spectrum emission(const Scene& scene, const Lights& lights, const Path& path, const Ray& ray,
-                    const SurfaceHit& hit) const {
-    const Emitter* emitter = path.found ? hit.emitter : scene.environment();
-    if (!emitter || (!path.found && lengths_.hide_emitters && path.only_null)) return {};
-    const EnvironmentLight light =
-        path.found ? EnvironmentLight{emitter->surface_radiance(hit, -ray.d)} : emitter->environment(ray.d);
-    const Spectrum radiance = path.throughput * light.radiance;
-    if (path.previous_delta || is_black(radiance)) return radiance;
-    const float pdf_light = path.found ? emitter->pdf_solid_angle(path.previous_p, hit) : light.pdf_solid_angle;
-    return radiance * parts_.direction_weight(path.previous_pdf, lights.pmf(*emitter) * pdf_light);
-  }
+    void connect(int /*depth*/) {
+      visit_connections(scene, batch, context, [&](const PathBatch::Connection& connection, bool hidden) {
+        if (hidden) return;
+        samples[connection.sample].radiance += connection.radiance;
+        const auto n = static_cast<size_t>(&connection - batch.connections.data());
+        tracer.parts_.add_light(tracer.parts_.light_of(n, batch), connection.sample, connection.radiance, context);
+      });
+    }
 
-  /// Next-event estimation: f cos L / pdf, weighted against direction sampling, if nothing lies between. `light`: a
-  /// sample of `emitter`.
-  void connect_light(const Lights& lights, const Emitter& emitter, const Path& path, const SurfaceHit& hit,
-                     const Vec3& wo, const BsdfClosure& bsdf, const EmitterSample& light, PathBatch& batch) const {
-    if (is_black(light.radiance)) return;
-    const BsdfValue f = parts_.eval_direction(bsdf, hit, wo, hit.frame.to_local(light.wi));
-    if (is_black(f.value)) return;
-    const float pdf_light = lights.pmf(emitter) * light.pdf_solid_angle;
-    const float weight = parts_.light_weight_over_pdf(light.is_delta, pdf_light, f.pdf_solid_angle);
-    const size_t n = batch.n_connections++;
-    parts_.connect_with(emitter, n, batch);
-    make_in_place(batch.connections[n], [&] {
-      return PathBatch::Connection{path.throughput * f.value * light.radiance * weight, path.sample};
-    });
-    make_in_place(batch.shadow_rays[n], [&] { return shadow_ray(hit, light); });
-  }
+    /// Contribution of what the path's ray met, weighted against light sampling.
+    Spectrum emission(const Path& path, const Ray& ray, const SurfaceHit& hit) const {
+      const Emitter* emitter = emitter_met(path, hit, scene.environment(), tracer.lengths_.hide_emitters);
+      if (!emitter) return {};
+      const EnvironmentLight light = light_met(*emitter, path, ray, hit);
+      const Spectrum radiance = path.throughput * light.radiance;
+      if (path.previous_delta || is_black(radiance)) return radiance;
+      const float pdf_light = path.found ? emitter->pdf_solid_angle(path.previous_p, hit) : light.pdf_solid_angle;
+      return radiance * tracer.parts_.direction_weight(path.previous_pdf, lights.pmf(*emitter) * pdf_light);
+    }
+
+    /// Next-event estimation: f cos L / pdf, weighted against direction sampling, if nothing lies between.
+    /// `light`: a sample of `emitter`.
+    void connect_light(const Emitter& emitter, const Path& path, const PathVertex& vertex, const EmitterSample& light) {
+      if (is_black(light.radiance)) return;
+      const SurfaceHit& hit = vertex.hit;
+      const BsdfValue f = tracer.parts_.eval_direction(vertex.bsdf, hit, vertex.wo, hit.frame.to_local(light.wi));
+      if (is_black(f.value)) return;
+      const float pdf_light = lights.pmf(emitter) * light.pdf_solid_angle;
+      const float weight = tracer.parts_.light_weight_over_pdf(light.is_delta, pdf_light, f.pdf_solid_angle);
+      const size_t n = batch.n_connections++;
+      tracer.parts_.connect_with(emitter, n, batch);
+      make_in_place(batch.connections[n], [&] {
+        return PathBatch::Connection{path.throughput * f.value * light.radiance * weight, path.sample};
+      });
+      make_in_place(batch.shadow_rays[n], [&] { return shadow_ray(hit, light); });
+    }
+  };
 
   std::string name_;
   PathLengthSettings lengths_;
