@@ -87,7 +87,7 @@ OptionValues with_what_it_needs(const std::string& name, OptionValues values) {
     return std::any_of(options.begin(), options.end(), [&](const char* o) { return values.contains(o); });
   };
   if (given({"ridge"}) && name == "iicv") values["penalty"] = "homogeneous";
-  if (given({"max-region", "min-centre-drop", "pyramid", "region-sides"})) values["filter"] = "paper";
+  if (given({"max-region", "min-centre-drop", "pyramid"})) values["filter"] = "paper";
   if (has(options_of_estimator(name), "adaptive")) values["adaptive"] = "";
   return values;
 }
@@ -130,20 +130,17 @@ TEST(EstimatorRegistry, ValuesReachTheOptions) {
                  {{"k", "9"}, {"window", "5"}, {"ridge", "0.001"}, {"exclude-target", ""}, {"coefficients", "shared"}}),
             cv_baseline(g, h, baseline).estimate.data);
   DependentTestsOptions tests;
-  tests.filter = DependentFilter::kPaper, tests.norm = Norm::kL2, tests.weights = CombinationWeights::kCounts;
-  tests.regions = {6, 0.001f, Pyramid::kCount, true}, tests.variance = VarianceSource::kDependent, tests.smoothing = 3;
+  tests.filter = DependentFilter::kPaper, tests.weights = CombinationWeights::kCounts;
+  tests.regions = {6, 0.001f, Pyramid::kCount}, tests.smoothing = 3;
   EXPECT_EQ(made("dependent-tests", {{"filter", "paper"},
-                                     {"norm", "l2"},
                                      {"weights", "counts"},
                                      {"max-region", "6"},
                                      {"min-centre-drop", "0.001"},
                                      {"pyramid", "count"},
-                                     {"region-sides", "odd"},
-                                     {"sigma", "dependent"},
                                      {"sigma-window", "3"}}),
             dependent_tests(g, h, tests).estimate.data);
   DependentTestsOptions exact;
-  exact.bound.window = 7, exact.guard = 0;
+  exact.window = 7, exact.guard = 0;
   EXPECT_EQ(made("dependent-tests", {{"window", "7"}, {"guard", "off"}}), dependent_tests(g, h, exact).estimate.data);
   EXPECT_EQ(make_estimator("polynomials", {{"dimensions", "2"}}).film_settings, "polynomials dimensions=2");
   EXPECT_EQ(make_estimator("iicv", {{"paper", ""}, {"k", "50"}}).text, "iicv --paper --k 50");
@@ -187,8 +184,7 @@ TEST(EstimatorRegistry, AdaptiveEstimatorsHaveTheirNumbers) {
                                                   {"allocation", "uniform"},
                                                   {"relative-error", "0.25"},
                                                   {"min-spp", "3"},
-                                                  {"max-spp", "30"},
-                                                  {"norm", "l2"}});
+                                                  {"max-spp", "30"}});
   ASSERT_TRUE(plain.adaptive);
   EXPECT_EQ(plain.adaptive->first_spp, 7);
   const CountOptions& counts = plain.adaptive->counts;
@@ -196,7 +192,6 @@ TEST(EstimatorRegistry, AdaptiveEstimatorsHaveTheirNumbers) {
   EXPECT_EQ(counts.relative_error, 0.25f);
   EXPECT_EQ(counts.min_spp, 3);
   EXPECT_EQ(counts.max_spp, 30);
-  EXPECT_EQ(counts.norm, Norm::kL2);
   EXPECT_FALSE(counts.first_pass_counts);
   const auto message = [](const std::string& name, const OptionValues& values) {
     return message_of([&] { make_estimator(name, values); }, ErrorCode::kUsage);
@@ -208,7 +203,6 @@ TEST(EstimatorRegistry, AdaptiveEstimatorsHaveTheirNumbers) {
   EXPECT_TRUE(
       contains(message("iduw", {{"relative-error", "1"}}), "is an option of `estimator` iicv, dependent-tests, none"));
   EXPECT_TRUE(contains(message("iicv", {{"allocation", "uniform"}}), "`allocation` has no effect without `adaptive`"));
-  EXPECT_TRUE(contains(message("none", {{"norm", "l2"}}), "`norm` has no effect without `adaptive`"));
   const Estimator iicv = make_estimator("iicv", {{"adaptive", ""}, {"max-spp", "99"}});
   ASSERT_TRUE(iicv.adaptive);
   EXPECT_EQ(iicv.adaptive->counts.max_spp, 99);
@@ -279,7 +273,6 @@ TEST(EstimatorRegistry, OptionsWithoutEffectAreErrors) {
       {"dependent-tests", "max-region", {{"max-region", "3"}}},
       {"dependent-tests", "min-centre-drop", {{"min-centre-drop", "0.1"}}},
       {"dependent-tests", "pyramid", {{"pyramid", "count"}}},
-      {"dependent-tests", "region-sides", {{"region-sides", "odd"}}},
       {"dependent-tests", "window", {{"paper", ""}, {"window", "5"}}},
       {"dependent-tests", "guard", {{"paper", ""}, {"guard", "on"}}},
       {"dependent-tests", "window", {{"filter", "paper"}, {"window", "5"}}},

@@ -14,19 +14,18 @@ constexpr float kTolerance = 1e-5f;  // of both sides of the equation, relative
 /// Variances are at least this, relative to the square of the brightness that has no noise.
 constexpr float kLeastVariance = 1e-12f;
 
-/// 1 / v_q and 3 sqrt(v_q) of every pixel, for sigma_q = 1 where the sigma of the centre is that of all; pixels without
-/// samples have weight 0 and are no beginning.
+/// 1 / v_q and 3 sqrt(v_q) of every pixel for sigma = 1; pixels without samples have weight 0 and are no beginning.
 struct Precision {
   Planes weight, radius;
 
-  Precision(const FilterInput& input, bool common_sigma)
+  explicit Precision(const FilterInput& input)
       : weight(input.width(), input.height(), 1, input.count.border(), 0),
         radius(input.width(), input.height(), 1, input.count.border(), kFar) {
     parallel_for(input.height(), 8, [&](int y) {
       for (int x = 0; x < input.width(); ++x) {
         const float count = input.count.row(0, y)[x];
         if (count <= 0) continue;
-        const float v = (common_sigma ? 1.0f : positive_variance(input, x, y)) / count;
+        const float v = 1 / count;
         weight.row(0, y)[x] = 1 / v;
         radius.row(0, y)[x] = 3 * std::sqrt(v);
       }
@@ -36,7 +35,7 @@ struct Precision {
   /// sigma^2 of a pixel, or nearly nothing.
   static float positive_variance(const FilterInput& input, int x, int y) {
     const Spectrum colour(input.dependent.row(0, y)[x], input.dependent.row(1, y)[x], input.dependent.row(2, y)[x]);
-    const float brightness = std::min(length(input.norm, colour), 1e6f);
+    const float brightness = std::min(colour_length(colour), 1e6f);
     return std::max(input.variance.row(0, y)[x], kLeastVariance * (brightness * brightness + kLeastVariance));
   }
 };
@@ -44,17 +43,16 @@ struct Precision {
 /// The window of one batch of pixels: differences, then weights.
 class Window {
  public:
-  Window(const FilterInput& input, const Precision& precision, const BoundOptions& options)
+  Window(const FilterInput& input, const Precision& precision, int window)
       : input_(input),
         precision_(precision),
-        common_sigma_(options.common_sigma),
-        radius_(options.window / 2),
+        radius_(window / 2),
         differences_((2 * radius_ + 1) * (2 * radius_ + 1)) {}
 
   /// Writes the first n pixels of the batch at (x, y).
   void apply(int x, int y, int n, const Planes* scale, FilteredImage& result) {
     x_ = x, y_ = y;
-    for (int l = 0; common_sigma_ && l < n; ++l) variance_[l] = Precision::positive_variance(input_, x + l, y);
+    for (int l = 0; l < n; ++l) variance_[l] = Precision::positive_variance(input_, x + l, y);
     const vfloat right_side = 9.0f * variance_;
     vfloat lambda = read_differences(scale ? load(scale->row(0, y) + x) : splat(1));
     // Newton from above: the left side is convex, so that each step stays above the solution. A pixel's steps do not
@@ -90,10 +88,9 @@ class Window {
     const vfloat r = load(d.row(0, y_) + x_), g = load(d.row(1, y_) + x_), b = load(d.row(2, y_) + x_);
     vfloat bound = splat(kFar);
     const vfloat deviation = sqrt(variance_);
-    const bool is_sum = input_.norm == Norm::kL1;
     for_each([&](size_t i, int qy, int qx) {
       const vfloat dr = load(d.row(0, qy) + qx) - r, dg = load(d.row(1, qy) + qx) - g, db = load(d.row(2, qy) + qx) - b;
-      const vfloat difference = is_sum ? max(dr, -dr) + max(dg, -dg) + max(db, -db) : sqrt(dr * dr + dg * dg + db * db);
+      const vfloat difference = max(dr, -dr) + max(dg, -dg) + max(db, -db);
       differences_[i] = min(difference * scale, splat(kFar));
       bound = min(bound, differences_[i] + deviation * load(precision_.radius.row(0, qy) + qx));
     });
@@ -125,7 +122,6 @@ class Window {
       sum += weighted * excess;
     });
     const vfloat own = max(lambda, splat(0)) * load(precision_.weight.row(0, y_) + x_);
-    const float* variance = input_.variance.row(0, y_) + x_;
     for (int l = 0; l < n; ++l) {
       const int x = x_ + l;
       const bool alone = slope[l] <= 0;  // no pixel of the window has samples
@@ -133,30 +129,28 @@ class Window {
       result.region.pixel(x, y_)[0] = partners[l];
       result.centre_weight.pixel(x, y_)[0] = alone ? 0 : own[l] / slope[l];
       result.bound.pixel(x, y_)[0] = alone ? std::numeric_limits<float>::infinity() : lambda[l];
-      // sum f^2 v = sum weighted excess / slope^2, in units of sigma^2 where that is common.
-      const float least = input_.count.row(0, y_)[x], scale = common_sigma_ ? 1 : variance[l];
+      // sum f^2 v = sum weighted excess / slope^2, in units of sigma^2.
       result.effective_samples.pixel(x, y_)[0] =
-          alone ? 0 : std::max(least, scale * slope[l] * slope[l] / std::max(sum[l], 1e-30f));
+          alone ? 0 : std::max(input_.count.row(0, y_)[x], slope[l] * slope[l] / std::max(sum[l], 1e-30f));
     }
   }
 
   const FilterInput& input_;
   const Precision& precision_;
-  bool common_sigma_;
   int radius_, x_ = 0, y_ = 0;
-  vfloat variance_ = splat(1);  ///< of the centres where it is common, otherwise 1: v_q has it
+  vfloat variance_ = splat(1);  ///< sigma^2 of the centres
   std::vector<vfloat> differences_;
 };
 
 }  // namespace
 
-FilteredImage bound_filter(const FilterInput& input, const BoundOptions& options, const Planes* difference_scale) {
-  const Precision precision(input, options.common_sigma);
+FilteredImage bound_filter(const FilterInput& input, int window, const Planes* difference_scale) {
+  const Precision precision(input);
   FilteredImage result(input.width(), input.height());
   parallel_for(input.height(), 4, [&](int y) {
-    Window window(input, precision, options);
+    Window batch(input, precision, window);
     for (int x = 0; x < input.width(); x += kLanes)
-      window.apply(x, y, std::min(kLanes, input.width() - x), difference_scale, result);
+      batch.apply(x, y, std::min(kLanes, input.width() - x), difference_scale, result);
   });
   return result;
 }

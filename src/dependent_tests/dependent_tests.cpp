@@ -22,7 +22,7 @@ Planes difference_scale(const FilterInput& input, const std::vector<unsigned cha
     Planes planes(input.width(), input.height(), 1, 0, 0);
     parallel_for(input.height(), 8, [&](int y) {
       for (int x = 0; x < input.width(); ++x)
-        planes.row(0, y)[x] = length(input.norm, {colours.row(0, y)[x], colours.row(1, y)[x], colours.row(2, y)[x]});
+        planes.row(0, y)[x] = colour_length({colours.row(0, y)[x], colours.row(1, y)[x], colours.row(2, y)[x]});
     });
     return planes;
   };
@@ -90,8 +90,8 @@ void mix(const GroupedImage& crn, const GroupedImage& independent, const std::ve
   const Image dependent = image_of(input.dependent);
   std::vector<MixtureCandidate> candidates = {{&dependent, nullptr}, {&filtered.colour, &filtered.centre_weight}};
   std::optional<FilteredImage> narrow;
-  if (options.filter == DependentFilter::kExact && options.bound.window > 3) {
-    narrow.emplace(bound_filter(input, {3, options.bound.common_sigma}, scale));
+  if (options.filter == DependentFilter::kExact && options.window > 3) {
+    narrow.emplace(bound_filter(input, 3, scale));
     candidates.push_back({&narrow->colour, &narrow->centre_weight});
   }
   const Image mixture =
@@ -115,13 +115,12 @@ Image filter_and_combine(const GroupedImage& crn, const GroupedImage& independen
                          const std::vector<unsigned char>& valid, const DependentTestsOptions& options,
                          DependentTestsStages* stages) {
   const bool exact = options.filter == DependentFilter::kExact;
-  const int border = exact ? options.bound.window / 2 : options.regions.max_region;
-  const FilterInput input =
-      filter_input(crn, independent, valid, options.norm, options.variance, options.smoothing, border);
+  const int border = exact ? options.window / 2 : options.regions.max_region;
+  const FilterInput input = filter_input(crn, independent, valid, options.variance, options.smoothing, border);
   std::optional<Planes> scale;
   if (exact && options.guard > 0) scale = difference_scale(input, valid, options.guard);
   FilteredImage filtered =
-      exact ? bound_filter(input, options.bound, scale ? &*scale : nullptr) : region_filter(input, options.regions);
+      exact ? bound_filter(input, options.window, scale ? &*scale : nullptr) : region_filter(input, options.regions);
   Image estimate = combine(crn, input, filtered, options.weights);
   if (options.weights == CombinationWeights::kMeasured)
     mix(crn, independent, valid, options, input, filtered, scale ? &*scale : nullptr, estimate);
@@ -168,7 +167,7 @@ std::vector<std::string> DependentTestsOptions::validate() const {
   if (!(regions.min_centre_drop >= 0))
     problems.push_back(
         fmt::format("min-centre-drop is {}, expected zero or a positive number", regions.min_centre_drop));
-  check_window("window", bound.window, 3);
+  check_window("window", window, 3);
   check_window("sigma-window", smoothing, 1);
   check_window("measure-window", measure_window, 3);
   if (guard != 0) check_window("guard-window", guard, 1);
@@ -204,7 +203,7 @@ EstimatorResult dependent_tests(const GroupedImage& crn, const GroupedImage& ind
 
 int dependent_tests_reach(const DependentTestsOptions& options) {
   const bool paper = options.filter == DependentFilter::kPaper;
-  const int window = paper ? options.regions.max_region : options.bound.window;
+  const int window = paper ? options.regions.max_region : options.window;
   const int filter = std::max(window / 2 + options.smoothing / 2, paper ? 0 : options.guard / 2);
   const bool measured = options.weights == CombinationWeights::kMeasured;
   return filter + (measured ? least_error_mixture_reach(options.measure_window) : 0);
@@ -216,7 +215,7 @@ namespace {
 void check_effects(Settings& p, const DependentTestsOptions& o) {
   const bool exact = o.filter == DependentFilter::kExact;
   p.only_if(exact, {"window", "guard"}, "with the published filter (`paper`, `filter` paper)");
-  p.only_if(!exact, {"max-region", "min-centre-drop", "pyramid", "region-sides"},
+  p.only_if(!exact, {"max-region", "min-centre-drop", "pyramid"},
             "with `filter` exact: only the published filter (`filter` paper) has regions");
 }
 
@@ -227,19 +226,14 @@ void declare(Settings& p, DependentTestsOptions& o) {
   static constexpr std::pair<const char*, DependentFilter> kFilters[] = {{"exact", DependentFilter::kExact},
                                                                          {"paper", DependentFilter::kPaper}};
   static constexpr std::pair<const char*, Pyramid> kPyramids[] = {{"side", Pyramid::kSide}, {"count", Pyramid::kCount}};
-  static constexpr std::pair<const char*, bool> kSides[] = {{"all", false}, {"odd", true}};
   static constexpr std::pair<const char*, CombinationWeights> kWeights[] = {
       {"measured", CombinationWeights::kMeasured},
       {"effective", CombinationWeights::kEffective},
       {"counts", CombinationWeights::kCounts}};
-  static constexpr std::pair<const char*, VarianceSource> kSources[] = {{"both", VarianceSource::kBoth},
-                                                                        {"dependent", VarianceSource::kDependent}};
   static constexpr std::pair<const char*, int> kGuards[] = {{"on", DependentTestsOptions().guard}, {"off", 0}};
   p.choice<DependentFilter>("filter", o.filter, kFilters,
                             "Weights that minimise the error bound, or the published ones", kPasses);
-  p.choice<Norm>("norm", o.norm, kNorms, kNormHelp, kPasses);
-  p.whole("window", o.bound.window, kWindowRange, kWindowHelp);
-  p.choice<VarianceSource>("sigma", o.variance, kSources, "Passes from which the noise of a sample is estimated");
+  p.whole("window", o.window, kWindowRange, kWindowHelp);
   p.whole("sigma-window", o.smoothing, {.low = 1, .high = 63, .odd = true},
           "Side of the window that averages the noise");
   p.choice<int>("guard", o.guard, kGuards, "Trust the CRN image less where it is too dark");
@@ -248,7 +242,6 @@ void declare(Settings& p, DependentTestsOptions& o) {
          "Regions grow while the weight of their centre drops by at least this much");
   p.choice<Pyramid>("pyramid", o.regions.pyramid, kPyramids,
                     "Height of the pyramid: side of the region, or its pixels");
-  p.choice<bool>("region-sides", o.regions.odd_sides, kSides, "Sides of regions: all, or the odd, which do not shift");
   p.choice<CombinationWeights>("weights", o.weights, kWeights,
                                "Mixture of the images: by measured error, worth, or samples");
   check_effects(p, o);
@@ -264,7 +257,6 @@ Estimator make_dependent_tests(Settings& p) {
   if (paper) adaptive.counts.smoothing = 1;
   ask_for(p, adaptive);
   declare(p, o);
-  adaptive.counts.norm = o.norm;
   adaptive.counts.classes = o.filter == DependentFilter::kPaper;
   std::vector<std::string> problems = o.validate();
   const std::vector<std::string> of_counts = adaptive.validate();

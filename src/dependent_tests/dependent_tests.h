@@ -43,9 +43,8 @@ enum class CombinationWeights {
 
 struct DependentTestsOptions {
   DependentFilter filter = DependentFilter::kExact;
-  Norm norm = Norm::kL1;
   RegionOptions regions;  ///< of kPaper
-  BoundOptions bound;     ///< of kExact
+  int window = 7;         ///< of kExact: side of the square around a pixel, odd, 3 … 63
   CombinationWeights weights = CombinationWeights::kMeasured;
   VarianceSource variance = VarianceSource::kBoth;
   int smoothing = 7;  ///< side of the window over which sigma^2 is averaged, odd, 1 … 63

@@ -93,7 +93,6 @@ class RegionBatch {
     for (int m = 2; m <= options_.max_region && any(grows); ++m) {
       grows &= ~add_places(m, region);
       if (!any(grows)) break;
-      if (options_.odd_sides && m % 2 == 0) continue;
       const Kernel kernel(region, deviation_, options_.pyramid);
       vfloat sum{};
       for (size_t i = 0; i < places_.first[m]; ++i)
@@ -120,8 +119,7 @@ class RegionBatch {
       const vint inside = (column >= splat_int(0)) & (column < splat_int(input_.width())) &
                           splat_int(qy >= 0 && qy < input_.height() ? -1 : 0);
       const vfloat dr = load(d.row(0, qy) + qx) - r, dg = load(d.row(1, qy) + qx) - g, db = load(d.row(2, qy) + qx) - b;
-      const vfloat length =
-          input_.norm == Norm::kL1 ? max(dr, -dr) + max(dg, -dg) + max(db, -db) : sqrt(dr * dr + dg * dg + db * db);
+      const vfloat length = max(dr, -dr) + max(dg, -dg) + max(db, -db);
       differs |= inside & (load(input_.count.row(0, qy) + qx) != count_);
       inside_[i] = inside ? splat(1) : splat(0);
       differences_[i] = inside ? length : splat(0);

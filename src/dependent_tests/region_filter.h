@@ -34,8 +34,6 @@ struct RegionOptions {
   /// ([Csonka2002] Fig. 4).
   float min_centre_drop = 0.01f;
   Pyramid pyramid = Pyramid::kSide;
-  /// Only regions of odd sides, which have the pixel in their middle; even ones shift the image by up to half a pixel.
-  bool odd_sides = false;
 };
 
 /// What a filter makes of the independent image. One channel each, but `colour`.

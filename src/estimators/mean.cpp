@@ -74,10 +74,6 @@ Estimator make_none(Settings& parameters) {
   std::vector<std::string> problems;
   estimator.adaptive = ask_for_adaptive(
       p, standard, "A first pass distributes the samples over the pixels; denoised, it is averaged in", problems);
-  Norm norm = standard.counts.norm;
-  p.choice<Norm>("norm", norm, kNorms, kNormHelp, {.effect = OptionEffect::kPasses});
-  if (estimator.adaptive) estimator.adaptive->counts.norm = norm;
-  p.only_if(estimator.adaptive.has_value(), {"norm"}, "without `adaptive`: no noise is compared with a brightness");
   throw_if_any("none", problems);
   estimator.passes = EstimatorPasses::kAny;
   estimator.summary = "the mean";

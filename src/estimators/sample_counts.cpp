@@ -38,8 +38,8 @@ Planes brightness(const FilterInput& input) {
   Planes plane(input.width(), input.height(), 1, 0, 0);
   for (int y = 0; y < input.height(); ++y)
     for (int x = 0; x < input.width(); ++x)
-      plane.row(0, y)[x] = length(
-          input.norm, {input.dependent.row(0, y)[x], input.dependent.row(1, y)[x], input.dependent.row(2, y)[x]});
+      plane.row(0, y)[x] =
+          colour_length({input.dependent.row(0, y)[x], input.dependent.row(1, y)[x], input.dependent.row(2, y)[x]});
   return plane;
 }
 
@@ -48,8 +48,7 @@ Planes brightness(const FilterInput& input) {
 std::vector<double> squared_errors(const GroupedImage& image, const CountOptions& options) {
   long n_nonfinite = 0;
   const std::vector<unsigned char> valid = finite_pixels(image, image, n_nonfinite);
-  const FilterInput input =
-      filter_input(image, image, valid, options.norm, VarianceSource::kDependent, options.smoothing, 0);
+  const FilterInput input = filter_input(image, image, valid, VarianceSource::kDependent, options.smoothing, 0);
   const bool exact = options.allocation == Allocation::kEqualError;
   Planes means = brightness(input);
   if (!exact) means = box_mean(means, valid, options.smoothing, 0, 0);
@@ -256,8 +255,7 @@ void ask_for(Settings& parameters, AdaptiveSampling& sampling) {
   p.whole("dependent-spp", sampling.first_spp, {.low = 1},
           "Samples of the first pass; else half, at most 50 (not iicv)",
           {.aliases = {"pilot-spp"}, .effect = OptionEffect::kPasses});
-  p.choice<Allocation>("allocation", o.allocation, kAllocations, "How the last pass's samples are shared",
-                       kPasses);
+  p.choice<Allocation>("allocation", o.allocation, kAllocations, "How the last pass's samples are shared", kPasses);
   sampling.names_allocation = p.is_given("allocation");
   p.real("relative-error", o.relative_error, {.low = 0, .above_low = true},
          "Target relative error per pixel (3 sigma); `spp` becomes the cap", kPasses);

@@ -30,7 +30,6 @@
 #include <vector>
 
 #include "film/grouped_image.h"
-#include "filters/norm.h"
 #include "settings/settings.h"
 
 namespace covary {
@@ -39,7 +38,6 @@ enum class Allocation { kEqualError, kLeastError, kUniform, kDenoised };
 
 struct CountOptions {
   Allocation allocation = Allocation::kLeastError;
-  Norm norm = Norm::kL1;
   std::optional<float> relative_error;  ///< eps > 0
   int min_spp = 1;                      ///< samples that each pixel gets at least, >= 0
   std::optional<int> max_spp;           ///< and at most, >= min_spp and 1; default: no limit

@@ -3,17 +3,16 @@
 // how many there are.
 #pragma once
 
+#include <cmath>
 #include <vector>
 
 #include "film/grouped_image.h"
-#include "filters/norm.h"
 #include "filters/planes.h"
 
 namespace covary {
 
 /// Planes have a border that reads as "no partner": far away, without samples.
 struct FilterInput {
-  Norm norm = Norm::kL1;
   Planes dependent;    ///< 3: means C_d of the CRN image; kFar outside and at pixels that are not valid
   Planes independent;  ///< 3: means C_i of the independent image
   Planes variance;     ///< 1: sigma^2 of one sample
@@ -22,6 +21,12 @@ struct FilterInput {
   int width() const { return count.width(); }
   int height() const { return count.height(); }
 };
+
+/// Length of a colour or of a difference of colours: sum of the absolute values of the channels, [Csonka2002] end of
+/// Sec. 4.
+inline float colour_length(const Spectrum& colour) {
+  return std::abs(colour.r) + std::abs(colour.g) + std::abs(colour.b);
+}
 
 /// sigma^2 from the samples of the CRN image, or of both images weighted by their degrees of freedom.
 enum class VarianceSource { kDependent, kBoth };
@@ -32,8 +37,7 @@ double variance_freedom(const GroupedImage& image, int x, int y);
 
 /// `smoothing`: side of the window over which sigma^2 is averaged, odd; 1: not at all.
 FilterInput filter_input(const GroupedImage& crn, const GroupedImage& independent,
-                         const std::vector<unsigned char>& valid, Norm norm, VarianceSource source, int smoothing,
-                         int border);
+                         const std::vector<unsigned char>& valid, VarianceSource source, int smoothing, int border);
 
 /// Mean of the pixels of a window inside the frame where `valid` is not 0, for each pixel of plane 0; 0 where there are
 /// none. The result has the border and, outside, the value `outside`.
