@@ -1,10 +1,11 @@
-# covary_module(<name> SOURCES a.cpp ... HEADERS a.h ... DEPENDS module-or-target ... TESTS a_test.cpp ...)
+# covary_module(<name> SOURCES a.cpp ... HEADERS a.h ... DEPENDS module-or-target ... TESTS a_test.cpp ...
+#               TESTS_ALONE b_test.cpp ...)
 #
 # A module is one folder of src/: a library `covary_<name>` made of SOURCES, which may use only the modules it DEPENDS
 # on (tests/layers checks the includes), and one program `<name>_tests` made of the TESTS that lie beside the code.
 # HEADERS are those for other programs, installed with all that they include (CovaryLibrary.cmake).
 function(covary_module name)
-  cmake_parse_arguments(MODULE "" "" "SOURCES;HEADERS;DEPENDS;TESTS;TEST_DEPENDS" ${ARGN})
+  cmake_parse_arguments(MODULE "" "" "SOURCES;HEADERS;DEPENDS;TESTS;TESTS_ALONE;TEST_DEPENDS" ${ARGN})
   if(MODULE_SOURCES)
     add_library(covary_${name} STATIC ${MODULE_SOURCES})
     covary_precompile(covary_${name})
@@ -19,21 +20,28 @@ function(covary_module name)
   list(TRANSFORM MODULE_HEADERS PREPEND ${name}/)
   set_property(GLOBAL APPEND PROPERTY COVARY_HEADERS ${MODULE_HEADERS})
   if(MODULE_TESTS AND COVARY_TESTS)
-    covary_test(${name}_tests SOURCES ${MODULE_TESTS} DEPENDS covary_${name} ${MODULE_TEST_DEPENDS})
+    covary_test(${name}_tests SOURCES ${MODULE_TESTS} ALONE ${MODULE_TESTS_ALONE}
+      DEPENDS covary_${name} ${MODULE_TEST_DEPENDS})
   endif()
 endfunction()
 
-# covary_test(<program> SOURCES ... DEPENDS ... [LABEL statistical|nightly]): a GoogleTest program, each of its tests
-# known to CTest.
+# covary_test(<program> SOURCES ... ALONE ... DEPENDS ... [LABEL statistical|nightly]): a GoogleTest program, each of its
+# tests known to CTest. SOURCES are compiled several at a time, which takes a third of the time: what they include is
+# read, and its templates are made, once. So no two of them may use a name for different things; those that must are
+# ALONE. Presets for development compile every file by itself.
 function(covary_test program)
-  cmake_parse_arguments(TEST "" "LABEL" "SOURCES;DEPENDS" ${ARGN})
-  add_executable(${program} ${TEST_SOURCES})
+  cmake_parse_arguments(TEST "" "LABEL" "SOURCES;ALONE;DEPENDS" ${ARGN})
+  add_executable(${program} ${TEST_SOURCES} ${TEST_ALONE})
+  if(NOT CMAKE_DISABLE_PRECOMPILE_HEADERS)
+    set_target_properties(${program} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
+    set_source_files_properties(${TEST_ALONE} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+  endif()
   target_include_directories(${program} PRIVATE ${PROJECT_SOURCE_DIR}/src ${PROJECT_SOURCE_DIR}/tests)
   target_link_libraries(${program} PRIVATE ${TEST_DEPENDS} GTest::gtest_main)
   covary_precompile(${program})
   # Only files that name it know where the source tree lies: the others compile to the same object in every checkout, so
   # a compiler cache serves them all.
-  foreach(source ${TEST_SOURCES})
+  foreach(source ${TEST_SOURCES} ${TEST_ALONE})
     cmake_path(ABSOLUTE_PATH source BASE_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR} OUTPUT_VARIABLE path)
     file(STRINGS ${path} uses REGEX COVARY_SOURCE_DIR LIMIT_COUNT 1)
     if(uses)
