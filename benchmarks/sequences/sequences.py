@@ -97,7 +97,8 @@ def sequence(options, name, spp, seed, folder):
     if not last.exists():
         run(options, "render", *render_sequence, "--resolution", options.resolution, "--rfilter", "box", "--spp", spp,
             "--seed", seed, "--no-preview", "--quiet", *options.options.split(), "-o", folder / "sequence_####.exr")
-    return numpy.stack([read_layers(folder / f"sequence_{frame:04d}.exr", "Motion")[0] for frame in frame_numbers(options)])
+    return numpy.stack([read_layers(folder / f"sequence_{frame:04d}.exr", "Motion")[0]
+                        for frame in frame_numbers(options)])
 
 
 def render_methods(options, name, spp, seed, folder):
