@@ -27,8 +27,8 @@ endfunction()
 
 # covary_test(<program> SOURCES ... ALONE ... DEPENDS ... [LABEL statistical|nightly]): a GoogleTest program, each of its
 # tests known to CTest. SOURCES are compiled several at a time, which takes a third of the time: what they include is
-# read, and its templates are made, once. So no two of them may use a name for different things; those that must are
-# ALONE. Presets for development compile every file by itself.
+# read, and its templates are made, once. So no two of them may define the same name; those that must are ALONE. Presets
+# for development compile every file by itself.
 function(covary_test program)
   cmake_parse_arguments(TEST "" "LABEL" "SOURCES;ALONE;DEPENDS" ${ARGN})
   add_executable(${program} ${TEST_SOURCES} ${TEST_ALONE})
