@@ -26,9 +26,9 @@ function(covary_module name)
 endfunction()
 
 # covary_test(<program> SOURCES ... TOGETHER ... DEPENDS ... [LABEL statistical|nightly]): a GoogleTest program, each of
-# its tests known to CTest. Files that are TOGETHER are compiled eight at a time, which takes half of the time: what they
-# include is read, and its templates are made, once. So no two of them may define the same name, not even in an anonymous
-# namespace. The presets for development compile every file by itself.
+# its tests known to CTest. Files that are TOGETHER are compiled eight at a time, which takes half of the time: what
+# they include is read, and its templates are made, once. So no two of them may define the same name, not even in an
+# anonymous namespace. The presets for development compile every file by itself.
 function(covary_test program)
   cmake_parse_arguments(TEST "" "LABEL" "SOURCES;TOGETHER;DEPENDS" ${ARGN})
   add_executable(${program} ${TEST_SOURCES} ${TEST_TOGETHER})

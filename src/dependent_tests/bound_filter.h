@@ -20,9 +20,9 @@ namespace covary {
 
 /// `window`: side of the square around a pixel, odd, 3 … 63. The sigma of the pixel itself stands for all pixels of its
 /// window, as the paper has it: with each one's own, weights would favour pixels whose samples happened to be dark, and
-/// so to vary little. `difference_scale`: one plane of factors >= 0 for the differences Delta_q of each pixel, or null; kFar leaves a
-/// pixel alone with those of equal C_d. The border of the input must be at least half the window. Bit-identical for any
-/// number of threads.
+/// so to vary little. `difference_scale`: one plane of factors >= 0 for the differences Delta_q of each pixel, or null;
+/// kFar leaves a pixel alone with those of equal C_d. The border of the input must be at least half the window.
+/// Bit-identical for any number of threads.
 FilteredImage bound_filter(const FilterInput& input, int window, const Planes* difference_scale = nullptr);
 
 }  // namespace covary

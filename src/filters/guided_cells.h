@@ -11,10 +11,10 @@
 
 namespace covary {
 
-/// `count` sums over the valid pixels of each cell of side x side pixels: planes 0 to 2 are the means of the guide, kFar
-/// in cells without valid pixels and in the border, planes from 3 on the sums. A row of cells is a row; column x holds
-/// the cell of pixel x. `border`: in columns, and rows of cells. `add(x, y, sums)` adds what the valid pixel contributes
-/// to the sums of its cell; called from any thread.
+/// `count` sums over the valid pixels of each cell of side x side pixels: planes 0 to 2 are the means of the guide,
+/// kFar in cells without valid pixels and in the border, planes from 3 on the sums. A row of cells is a row; column x
+/// holds the cell of pixel x. `border`: in columns, and rows of cells. `add(x, y, sums)` adds what the valid pixel
+/// contributes to the sums of its cell; called from any thread.
 template <typename Add>
 Planes sums_by_cell(int side, int border, const Image& guide, const std::vector<unsigned char>& valid, int count,
                     const Add& add) {

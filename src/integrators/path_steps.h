@@ -142,9 +142,9 @@ struct PathVertex {
 };
 
 /// The loop of all integrators that follow paths from the camera. The paths of a batch that has been started advance
-/// together, one edge at a time, in short loops whose iterations do not depend on each other: while one waits for memory
-/// or a division, the processor works on the next. What an integrator does at each edge, its `steps` say, `depth` edges
-/// from the camera:
+/// together, one edge at a time, in short loops whose iterations do not depend on each other: while one waits for
+/// memory or a division, the processor works on the next. What an integrator does at each edge, its `steps` say,
+/// `depth` edges from the camera:
 /// - arrive(depth, i): the ray of path i has found what it meets, or left the scene;
 /// - goes_on(depth, path): whether a path that has met a surface is followed further;
 /// - sample_lights(depth): for the vertices of all paths that are left;

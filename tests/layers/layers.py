@@ -156,7 +156,7 @@ def links_follow_arrows(root):
         if not os.path.exists(os.path.join(root, path)):
             continue
         text = "\n".join(text.split("#")[0] for _, text in lines(root, path))
-        for names in re.findall(r"\bDEPENDS\b([^)]*?)(?=\bTESTS(?:_TOGETHER)?\b|\bTEST_DEPENDS\b|\bSOURCES\b|\))", text):
+        for names in re.findall(r"\bDEPENDS\b([^)]*?)(?=\b(?:TESTS|TESTS_TOGETHER|TEST_DEPENDS|SOURCES)\b|\))", text):
             for target in re.findall(r"covary_(\w+)", names):
                 if target in ARROWS and target not in visible_modules(module):
                     problems.append(f"{path}:1: {module} may not depend on covary_{target}")
