@@ -40,7 +40,7 @@ ModeSettings settings_of(DenoiseMode mode) {
 
 /// Memory beside that of the estimator, about: images of three sets of samples, planes of filters and sums, half of 12
 /// groups; of the mean, it without fireflies; with the network, what that takes and its candidates.
-constexpr double kBytesPerPixel = 480, kBytesOfMean = 220, kBytesWithOidn = 1400;
+constexpr double kBytesPerPixel = 440, kBytesOfMean = 220, kBytesWithOidn = 1250;
 
 /// relMSE of the image itself, by its standard error.
 double risk_of_base(const DenoisingPart& part, const Image& guide, const std::vector<unsigned char>& valid) {

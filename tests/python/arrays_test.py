@@ -77,11 +77,12 @@ class BadArrays(PackageTest):
         for found, values in (("list", CRN.tolist()), ("int", 1), ("numpy.ndarray of float64", CRN.astype("f8")),
                               ("numpy.ndarray of float16", CRN.astype("f2")),
                               ("numpy.ndarray of >f4", CRN.astype(">f4")), ("numpy.ndarray of int32", CRN.astype("i4")),
-                              ("NoneType", None), ("array.array", array.array("d", [1.0]))):
+                              ("array.array", array.array("d", [1.0]))):
             message = self.refused(values, error=TypeError)
             self.assertTrue(message.startswith(f"crn: found {found}; accepted is an array of NumPy"), message)
             self.assertIn("of float32 [T, H, W, 3]", message)
         self.assertIn("independent: found", self.refused(CRN, None, TypeError))
+        self.assertTrue(self.refused(None, error=covary.UsageError).startswith("crn: found None; without it"))
 
     def test_shapes(self):
         for shape, values in (("[20, 24, 3]", CRN[0]), ("[12, 20, 24, 2]", CRN[..., :2]),
