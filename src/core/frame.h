@@ -49,8 +49,6 @@ inline float cos2_theta(const Vec3& w) { return w.z * w.z; }
 inline float sin2_theta(const Vec3& w) { return std::max(0.0f, w.x * w.x + w.y * w.y); }
 inline float sin_theta(const Vec3& w) { return std::sqrt(sin2_theta(w)); }
 inline float tan2_theta(const Vec3& w) { return sin2_theta(w) / cos2_theta(w); }
-inline float abs_cos_theta(const Vec3& w) { return std::abs(w.z); }
-inline bool same_hemisphere(const Vec3& a, const Vec3& b) { return a.z * b.z > 0; }
 /// Mirror direction about the z axis.
 inline Vec3 reflect(const Vec3& w) { return {-w.x, -w.y, w.z}; }
 /// Mirror direction about the unit vector `m`.

@@ -75,9 +75,4 @@ void throw_if_stopped() {
   if (tbb::is_current_task_group_canceling()) throw Stopped();
 }
 
-std::function<bool()> stop_question() {
-  const tbb::task_group_context* context = tbb::task::current_context();
-  return [context] { return context && const_cast<tbb::task_group_context*>(context)->is_group_execution_cancelled(); };
-}
-
 }  // namespace covary

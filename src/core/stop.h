@@ -26,8 +26,4 @@ bool run_stoppable(const std::atomic<bool>* stop, const std::function<void()>& b
 /// Throws Stopped inside of work that is to end: between long steps that are no parallel loops.
 void throw_if_stopped();
 
-/// Says, to any thread, whether the work that makes it is to end; to be asked while that work waits: for libraries that
-/// have loops of their own.
-std::function<bool()> stop_question();
-
 }  // namespace covary

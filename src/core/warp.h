@@ -19,7 +19,6 @@ inline Vec2 square_to_disk(Vec2 u) {
   const float near = radius * a.cos, far = radius * a.sin;
   return {along_x ? near : far, along_x ? far : near};
 }
-inline float disk_pdf() { return kInvPi; }
 
 /// Cosine-weighted on the upper hemisphere; density cos(theta)/pi per unit solid angle.
 inline Vec3 square_to_cosine_hemisphere(Vec2 u) {
@@ -58,6 +57,5 @@ inline float interval_to_tent(float u, float radius) {
   const float from_end = radius * (1 - std::sqrt(2 * std::min(u, 1 - u)));
   return u < 0.5f ? -from_end : from_end;
 }
-inline float tent_pdf(float x, float radius) { return std::max(0.0f, 1 - std::abs(x) / radius) / radius; }
 
 }  // namespace covary::warp

@@ -145,14 +145,6 @@ Image Film::mean_image() const {
   return image;
 }
 
-Image Film::group_image(int group) const {
-  COVARY_CHECK(group >= 0 && group < groups_, fmt::format("group {} of {}", group, groups_));
-  Image image(width(), height(), 3);
-  for (int y = 0; y < height(); ++y)
-    for (int x = 0; x < width(); ++x) std::copy_n(groups_of(x, y) + group * 3, 3, image.pixel(x, y));
-  return image;
-}
-
 double Film::mean_count() const {
   const uint64_t sum = std::accumulate(counts_.begin(), counts_.end(), uint64_t{0});
   return counts_.empty() ? 0 : static_cast<double>(sum) / static_cast<double>(counts_.size());

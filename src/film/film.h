@@ -83,7 +83,6 @@ class Film {
   const float* groups_of(int x, int y) const { return groups_data_.data() + index(x, y) * groups_ * 3; }
 
   Image mean_image() const;
-  Image group_image(int group) const;
   /// Samples per pixel, averaged over the film; exact where all pixels have the same count.
   double mean_count() const;
 
