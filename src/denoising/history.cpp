@@ -11,7 +11,8 @@
 namespace covary {
 namespace {
 
-constexpr float kInterval = 1.5f;  // k, in standard errors
+constexpr float kInterval = 2;   // k, in standard errors
+constexpr int kErrorWindow = 5;  // side, pixels
 /// c: both interpolations have errors in common, which their difference does not tell. With 1, regions of moving edges
 /// of light had 1.28 times the error of frames alone, with 10 and more at most 1.01, in a prototype on one sequence
 /// with one seed (docs/methods/sequences.md).
@@ -29,6 +30,28 @@ float trust_at(const History& history, const Image& std_error, float scale, int 
   const float* s = std_error.pixel(x, y);
   const float variance = sqr(scale) * (sqr(s[0]) + sqr(s[1]) + sqr(s[2])) / 3;
   return variance > 0 ? variance / (variance + kOfMoving * *history.squared_error.pixel(x, y)) : 0;
+}
+
+/// Medians of the standard error over windows. That of a pixel alone is small where its samples happen to be dark and
+/// large where they are bright, so that history, limited by it, would darken frames: by 1.2 % of a still room with 8
+/// samples. Means would let what glints widen the intervals of all around it.
+Image steady(const Image& std_error) {
+  Image result = std_error;
+  const int radius = kErrorWindow / 2;
+  parallel_for(result.height, 8, [&](int y) {
+    std::vector<float> window;
+    for (int x = 0; x < result.width; ++x)
+      for (int c = 0; c < result.channels; ++c) {
+        window.clear();
+        for (int j = std::max(y - radius, 0); j <= std::min(y + radius, result.height - 1); ++j)
+          for (int i = std::max(x - radius, 0); i <= std::min(x + radius, result.width - 1); ++i)
+            window.push_back(std_error.pixel(i, j)[c]);
+        const auto middle = window.begin() + static_cast<std::ptrdiff_t>(window.size() / 2);
+        std::nth_element(window.begin(), middle, window.end());
+        result.pixel(x, y)[c] = *middle;
+      }
+  });
+  return result;
 }
 
 /// C of a frame's image or of that of a half, whose error is `scale` times as large.
@@ -96,11 +119,12 @@ void add_samples(const History& history, const HistoryInput& input, Image& mean,
 
 Image add_history(const History& history, const HistoryInput& input, const Mixture* accumulated, Mixture& frame) {
   check_size(history.image, frame.image);
-  CandidateSet whole{frame.image, {candidate(frame.image, history, *input.std_error, 1)}};
+  const Image std_error = steady(*input.std_error);
+  CandidateSet whole{frame.image, {candidate(frame.image, history, std_error, 1)}};
   std::array<CandidateSet, 2> halves;
   for (const int half : {0, 1}) {
     const Image& image = frame.halves[half];
-    halves[half] = {image, {candidate(image, history, *input.std_error, std::sqrt(2.0f))}};
+    halves[half] = {image, {candidate(image, history, std_error, std::sqrt(2.0f))}};
     if (accumulated) halves[half].candidates.push_back(accumulated->halves[half]);
   }
   if (accumulated) whole.candidates.push_back(accumulated->image);
