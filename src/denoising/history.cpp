@@ -11,7 +11,7 @@
 namespace covary {
 namespace {
 
-constexpr float kInterval = 2;   // k, in standard errors
+constexpr float kInterval = 3;   // k, in standard errors
 constexpr int kErrorWindow = 5;  // side, pixels
 /// c: both interpolations have errors in common, which their difference does not tell. With 1, regions of moving edges
 /// of light had 1.28 times the error of frames alone, with 10 and more at most 1.01, in a prototype on one sequence
@@ -54,14 +54,14 @@ Image steady(const Image& std_error) {
   return result;
 }
 
-/// C of a frame's image or of that of a half, whose error is `scale` times as large.
-Image candidate(const Image& frame, const History& history, const Image& std_error, float scale) {
+/// C of a frame's image or of that of a half, whose error is `scale` times as large. `limits`: steady(std_error).
+Image candidate(const Image& frame, const History& history, const Image& std_error, const Image& limits, float scale) {
   Image result = frame;
   parallel_for(frame.height, 8, [&](int y) {
     for (int x = 0; x < frame.width; ++x) {
       const float trust = trust_at(history, std_error, scale, x, y);
       if (!(trust > 0)) continue;
-      const float* s = std_error.pixel(x, y);
+      const float* s = limits.pixel(x, y);
       for (int c = 0; c < 3; ++c) {
         const float m = frame.pixel(x, y)[c], most = kInterval * scale * s[c];
         result.pixel(x, y)[c] = m + std::clamp(history.image.pixel(x, y)[c] - m, -most, most) * trust;
@@ -119,12 +119,12 @@ void add_samples(const History& history, const HistoryInput& input, Image& mean,
 
 Image add_history(const History& history, const HistoryInput& input, const Mixture* accumulated, Mixture& frame) {
   check_size(history.image, frame.image);
-  const Image std_error = steady(*input.std_error);
-  CandidateSet whole{frame.image, {candidate(frame.image, history, std_error, 1)}};
+  const Image limits = steady(*input.std_error);
+  CandidateSet whole{frame.image, {candidate(frame.image, history, *input.std_error, limits, 1)}};
   std::array<CandidateSet, 2> halves;
   for (const int half : {0, 1}) {
     const Image& image = frame.halves[half];
-    halves[half] = {image, {candidate(image, history, std_error, std::sqrt(2.0f))}};
+    halves[half] = {image, {candidate(image, history, *input.std_error, limits, std::sqrt(2.0f))}};
     if (accumulated) halves[half].candidates.push_back(accumulated->halves[half]);
   }
   if (accumulated) whole.candidates.push_back(accumulated->image);

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // What frames before show of the same scene, mixed into a frame where held-out samples find that better (ours).
 //
-// M: the mixture of the frame alone; s: its standard error, the median of 5 x 5 pixels; H: the history, moved to where
-// it is seen now, of samples that are independent of the frame's. The candidate is
+// M: the mixture of the frame alone, with the standard error s, of which s* is the median of 5 x 5 pixels; H: the
+// history, moved to where it is seen now, of samples that are independent of the frame's. The candidate is
 //
-//     C = M + clamp(H - M, -k s, k s) / (1 + c e / s'^2),   e: squared error of H for being moved by parts of pixels,
-//                                                           s'^2: mean of s^2 over the channels,
+//     C = M + clamp(H - M, -k s*, k s*) / (1 + c e / s'^2),   e: squared error of H for being moved by parts of pixels,
+//                                                             s'^2: mean of s^2 over the channels,
 //
 // so that history never leaves the interval in which the frame itself may be: what has changed (moving shadows, lamps
 // that are dimmed) leaves no trail, and edges are not blurred by being moved time and again. With halves M_A and M_B in
