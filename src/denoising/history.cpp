@@ -82,8 +82,7 @@ Image with_samples(const Image& own, const Image& before, const Image& trust) {
   return result;
 }
 
-Mixture mixture_of(const HistoryInput& input, const CandidateSet& whole, const std::array<CandidateSet, 2>& halves,
-                   float bias_share) {
+Mixture mixture_of(const HistoryInput& input, const CandidateSet& whole, const std::array<CandidateSet, 2>& halves) {
   MixtureInput of_history;
   of_history.whole = &whole;
   of_history.halves = {&halves[0], &halves[1]};
@@ -91,7 +90,7 @@ Mixture mixture_of(const HistoryInput& input, const CandidateSet& whole, const s
   of_history.guide = input.guide;
   of_history.valid = input.valid;
   of_history.prior = kPrior;
-  of_history.bias_share = bias_share;
+  of_history.bias_share = kShare;
   of_history.counts = input.counts;
   return mix(of_history);
 }
@@ -112,7 +111,7 @@ void add_samples(const History& history, const HistoryInput& input, Image& mean,
   for (int y = 0; y < mean.height; ++y)
     for (int x = 0; x < mean.width; ++x) *trust.pixel(x, y) = trust_at(history, *input.std_error, 1, x, y);
   for (const int half : {0, 1}) sets[half] = {halves[half], {with_samples(halves[half], history.samples[half], trust)}};
-  Mixture mixture = mixture_of(input, {mean, {with_samples(mean, before, trust)}}, sets, kShare);
+  Mixture mixture = mixture_of(input, {mean, {with_samples(mean, before, trust)}}, sets);
   mean = std::move(mixture.image);
   halves = std::move(mixture.halves);
 }
@@ -128,7 +127,7 @@ Image add_history(const History& history, const HistoryInput& input, const Mixtu
     if (accumulated) halves[half].candidates.push_back(accumulated->halves[half]);
   }
   if (accumulated) whole.candidates.push_back(accumulated->image);
-  Mixture mixture = mixture_of(input, whole, halves, kShare);
+  Mixture mixture = mixture_of(input, whole, halves);
   frame.image = std::move(mixture.image);
   frame.halves = std::move(mixture.halves);
   Image weights = std::move(mixture.weights[0]);
