@@ -75,10 +75,15 @@ void ProgressLine::limit(double seconds) {
   of_limit_ = Stopwatch();
 }
 
-void ProgressLine::toward(double reached, double goal) {
+void ProgressLine::toward(const PredictedError& reached, double goal) {
   const std::lock_guard lock(mutex_);
-  note_ = fmt::format("  predicted relMSE {:.2g}, goal {:.2g}", reached, goal);
-  least_total_ = static_cast<uint64_t>(static_cast<double>(done_) * std::max(1.0, reached / goal));
+  note_ = fmt::format("  relMSE {:.2g} ({})", reached.relmse,
+                      reached.bounds ? fmt::format("{:.2g} to {:.2g}", reached.bounds->low, reached.bounds->high)
+                      : reached.doubt.empty() ? "predicted"
+                                              : "unreliable");
+  if (!(goal > 0)) return;
+  note_ += fmt::format(", goal {:.2g}", goal);
+  least_total_ = static_cast<uint64_t>(static_cast<double>(done_) * std::max(1.0, reached.relmse / goal));
 }
 
 void ProgressLine::show(const std::string& text) {
@@ -97,8 +102,9 @@ std::string ProgressLine::bar_text(int columns) const {
     left = in_time;
   }
   fraction = std::clamp(fraction, 0.0, 1.0);
-  const std::string end = fmt::format(" {:3.0f} %  {} samples/s  {} left{}", 100 * fraction, format_count(rate),
-                                      format_duration(left), note_);
+  // Beside an error there is no room for the rate on 80 columns.
+  const std::string speed = note_.empty() ? fmt::format("{} samples/s  ", format_count(rate)) : "";
+  const std::string end = fmt::format(" {:3.0f} %  {}{} left{}", 100 * fraction, speed, format_duration(left), note_);
   const std::string start = fmt::format("{}: {} ", label_, phase_);
   const int room = columns - static_cast<int>(start.size() + end.size()) - 2, width = std::min(room, kBarColumns);
   if (width < 4) return start + end;

@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "core/stopwatch.h"
+#include "risk/predicted_error.h"
 
 namespace covary {
 
@@ -28,9 +29,9 @@ class ProgressLine {
   void update(uint64_t done, uint64_t total);
   /// A time budget, from now on, that ends the work if `total` is not reached first.
   void limit(double seconds);
-  /// The error that the samples so far have reached, where they go on until `goal`: shown, and as errors fall like
-  /// 1 / samples, the total is at least so many samples as that will take.
-  void toward(double reached, double goal);
+  /// The error that the samples so far have reached: shown with its bounds. Where they go on until `goal` > 0, as errors
+  /// fall like 1 / samples, the total is at least so many samples as that will take.
+  void toward(const PredictedError& reached, double goal);
   /// This text in place of all that.
   void show(const std::string& text);
   /// Clears the line (terminal) before other output.

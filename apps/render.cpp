@@ -85,8 +85,7 @@ RenderResult render_watched(const RenderOptions& options, const LoadedScene& sce
   callbacks.progress = [&](uint64_t done, uint64_t total) {
     progress.update(done, options.request().seconds > 0 && !options.request().spp ? 0 : total);
   };
-  if (options.request().until > 0)
-    callbacks.predicted = [&](double error) { progress.toward(error, options.request().until); };
+  callbacks.predicted = [&](const PredictedError& error) { progress.toward(error, options.request().until); };
   callbacks.wave = [&](std::span<const Pass> passes) {
     if (!display || !display->ready() || since_preview.seconds() < kPreviewSeconds) return;
     display->update(preview_of(passes));

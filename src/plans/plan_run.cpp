@@ -121,10 +121,11 @@ bool PlanRun::render_to_limits() {
       if (!estimate()) return false;
     }
     result_.seconds.limited = watch_.seconds();
-    if (request_.until > 0) {
-      result_.until_reached = error_to_limit() <= request_.until;
-      if (callbacks_.predicted) callbacks_.predicted(error_to_limit());
-    }
+    if (request_.until > 0) result_.until_reached = error_to_limit() <= request_.until;
+    if (callbacks_.predicted && result_.predicted)
+      callbacks_.predicted(request_.until_in_blocks
+                               ? PredictedError{error_to_limit(), std::nullopt, result_.predicted->doubt}
+                               : *result_.predicted);
     const bool out_of_time = timed() && seconds_left(plan_.phases.size() - 1, 1) <= 0;
     if (result_.until_reached.value_or(true) || state_.budget >= limit || out_of_time) return true;
     rounds_.add(next_budget(state_.budget, error_to_limit(), request_.until, limit,

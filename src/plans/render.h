@@ -70,8 +70,8 @@ struct RenderCallbacks {
   /// The render ends at the next tile once this is true; may be set from a signal handler.
   const std::atomic<bool>* stop = nullptr;
   std::function<void(RenderStage)> stage;  ///< one begins
-  /// With RenderRequest::until, after each estimate: the predicted error that it is about.
-  std::function<void(double)> predicted;
+  /// After each estimate that has one: the predicted error, that of blocks with RenderRequest::until_in_blocks.
+  std::function<void(const PredictedError&)> predicted;
   /// After each tile, from any thread; must be thread-safe. Counts the samples and light paths of the current phase.
   std::function<void(uint64_t done, uint64_t total)> progress;
   /// Between waves, when films may be read, and once in about half a second in passes of a single wave.

@@ -41,12 +41,19 @@ class Progress(CliTest):
         text = self.shown("combine", "--crn", "films/crn.exr", "--independent", "films/independent.exr", "-o", "d.exr")
         self.in_order(text, "d: loading", "d: estimating", "d: writing", "d.exr: ")
 
-    def test_until_shows_the_error_that_is_reached(self):
+    def test_the_error_that_is_reached_is_shown_with_its_bounds(self):
         text = self.shown(*RENDER, "--estimator", "iicv", "--until", "relmse=0.0015", "-o", "a.exr", columns=120)
-        self.in_order(text, "estimating", "rendering  predicted relMSE ", ", goal 0.0015", "estimating", "writing")
-        reached = [float(x) for x in re.findall(r"predicted relMSE ([0-9.e-]+), goal", text)]
+        self.in_order(text, "estimating", "rendering  relMSE ", ", goal 0.0015", "estimating", "writing")
+        known = r"  relMSE ([0-9.e-]+) \((?:([0-9.e-]+) to ([0-9.e-]+)|unreliable)\), goal 0.0015"
+        reached = [float(x) for x, _, _ in re.findall(known, text)]
         self.assertGreater(reached[0], 0.0015)
         self.assertLessEqual(reached[-1], 0.0015)
+        bounds = [tuple(map(float, found)) for found in re.findall(known, text) if found[1]]
+        self.assertTrue(bounds, text)
+        self.assertTrue(all(low < middle < high for middle, low, high in bounds), bounds)
+        self.assertRegex(text, r"\d %  \d+:\d\d left  relMSE ")
+        text = self.shown(*RENDER, "--estimator", "iicv", "--spp", "48", "-o", "b.exr", columns=120)
+        self.assertRegex(text, r"writing  relMSE [0-9.e-]+ \([^)]+\)(?!, goal)")
 
     def test_the_line_fits_the_terminal(self):
         text = self.shown(*RENDER, "--spp", "96", "-o", "a.exr", columns=30)
