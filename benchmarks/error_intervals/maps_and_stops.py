@@ -20,7 +20,8 @@ import numpy
 
 HERE = Path(__file__).resolve().parent
 sys.path.append(os.fspath(HERE.parent / "denoising"))
-from denoising import Scene, geometric_mean  # noqa: E402
+from denoising import Scene, geometric_mean, read_image  # noqa: E402
+from layers import read_layers  # noqa: E402
 
 REGIONS = (16, 9)
 OWN = HERE.parent.parent / "scenes"
@@ -43,17 +44,12 @@ class Measured(Scene):
         guide = self.folder / "guide.exr"
         if not guide.exists():
             self.run("denoise", *self.references(), "-o", guide, "--quiet", "--force")
-        self.weight = 1 / (self.pixels(guide).mean(2, keepdims=True)**2 + 0.01)
-        self.truth = [self.pixels(path) for path in self.references()]
+        self.weight = 1 / (read_image(guide).mean(2, keepdims=True)**2 + 0.01)
+        self.truth = [read_image(path) for path in self.references()]
 
     def error_map(self, image):
         """Squared error of each pixel, relative, without that of the references."""
         return (self.weight * (image - self.truth[0]) * (image - self.truth[1])).mean(2)
-
-    def layer(self, path, name):
-        part = self.folder / "layer.exr"
-        self.run("convert", path, part, "--layer", name, "--overwrite")
-        return self.pixels(part)
 
 
 def regions(errors):
@@ -71,11 +67,11 @@ def spearman(a, b):
 def maps(options, scene):
     for spp in options.spp:
         films = [scene.render("auto", spp, seed) for seed in options.seeds]
-        images = [scene.pixels(film) for film in films]
+        images = [read_image(film) for film in films]
         truth = regions(sum(map(scene.error_map, images)) / len(images))
         found = []
         for film, image in zip(films, images, strict=True):
-            squares = scene.layer(film, "StdError")**2
+            squares = read_layers(film, "StdError")[0]**2
             found.append(spearman(regions((squares / (image.mean(2, keepdims=True)**2 + 0.01)).mean(2)), truth))
         halves = [regions(sum(map(scene.error_map, images[half::2]))) for half in (0, 1)]
         print(f"{scene.name}, {spp} samples, {len(films)} seeds: Spearman {numpy.mean(found):.2f} in the mean, "
@@ -92,7 +88,7 @@ def stops(options, scene):
         scene.run("render", scene.path, "--resolution", scene.resolution, "--until", f"relmse={goal}", "--spp", 2000,
                   "--seed", seed, "--no-preview", "--quiet", "--overwrite", "-o", image, "--json", facts)
         told = json.loads(facts.read_text())
-        true = scene.error_map(scene.pixels(image)).mean()
+        true = scene.error_map(read_image(image)).mean()
         found.append(true / goal)
         print(f"{scene.name}, goal {goal}, seed {seed}: {told['samples_per_pixel']:g} samples, told over goal "
               f"{told['predicted_relmse'] / goal:.2f}, true over goal {true / goal:.2f}", flush=True)
