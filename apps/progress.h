@@ -29,8 +29,8 @@ class ProgressLine {
   void update(uint64_t done, uint64_t total);
   /// A time budget, from now on, that ends the work if `total` is not reached first.
   void limit(double seconds);
-  /// The error that the samples so far have reached: shown with its bounds. Where they go on until `goal` > 0, the total
-  /// is at least so many samples as that will take, as errors fall like 1 / samples.
+  /// The error that the samples so far have reached, shown with its bounds. Where they go on until `goal` > 0, the
+  /// total is at least so many samples as that will take, as errors fall like 1 / samples.
   void toward(const PredictedError& reached, double goal);
   /// This text in place of all that.
   void show(const std::string& text);
