@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Images of any renderer, as plain arrays, become one with less noise.
+// Combines images from any renderer, given as plain arrays, into one with less noise.
 //
 //     combine_arrays WIDTH HEIGHT GROUPS CRN INDEPENDENT OUT
 //
-// CRN and INDEPENDENT are files of floats, [y][x][group][rgb]: of each pixel the means of GROUPS groups of samples, in
-// the first with the same random numbers in all pixels, in the second with each pixel's own. OUT is [y][x][rgb].
+// CRN and INDEPENDENT are files of floats [y][x][group][rgb]: per pixel, the means of GROUPS groups of samples, with
+// the same random numbers in every pixel and with independent ones, respectively. OUT is [y][x][rgb].
 #include <covary/core/error.h>
 #include <covary/estimators/iicv.h>
 #include <covary/risk/predicted_error.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An integrator of one's own, with an option: light after at most so many reflections.
+// A custom integrator with an option: paths of at most so many reflections.
 //
 //     own_integrator SCENE.xml [max-reflections=N]
 #include <covary/combine/registry.h>
@@ -44,7 +44,7 @@ int main(int argc, char** argv) try {
   if (argc == 3 && std::strncmp(argv[2], "max-reflections=", 16) == 0) given["max-reflections"] = argv[2] + 16;
   LoadOptions load;
   load.make_integrator = [&](Parameters& parameters) {
-    PropertySource source(parameters, given);  // of the scene file, and what is given in place of it
+    PropertySource source(parameters, given);  // the scene file's parameters, overridden by `given`
     Settings settings(source);
     const auto integrator = std::make_shared<Reflections>();
     settings.whole("max-reflections", integrator->most, {.low = 0, .high = 1000}, "Most reflections");

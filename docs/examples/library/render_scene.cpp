@@ -14,7 +14,7 @@
 int main(int argc, char** argv) try {
   if (argc != 3) return std::fprintf(stderr, "render_scene SCENE.xml OUT.exr\n"), 2;
   covary::LoadOptions load;
-  load.width = 120, load.height = 80;                   // instead of the scene's size
+  load.width = 120, load.height = 80;                   // override the scene's size
   load.make_integrator = covary::integrator_maker({});  // the scene's integrator
   const covary::LoadedScene scene = covary::load_scene(argv[1], load);
 
