@@ -52,8 +52,6 @@ std::string read_file(const std::string& path) {
   return text.str();
 }
 
-std::string program_path() { return fs::read_symlink("/proc/self/exe").string(); }
-
 /// Version and commit; where the commit does not say what was built, the program's own content.
 std::string program_version() {
   std::string text = version_text();

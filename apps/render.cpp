@@ -235,7 +235,7 @@ void render(RenderOptions options) {
 
 void add_render(CLI::App& app) {
   const auto o = std::make_shared<RenderOptions>();
-  CLI::App* command = app.add_subcommand("render", "Render a scene (Mitsuba XML, pbrt) into an image (EXR)");
+  CLI::App* command = app.add_subcommand("render", "Render a scene (Mitsuba XML, pbrt, glTF) into an image (EXR)");
   add_render_options(*command, *o);
   command->callback([o] { render(*o); });
 }

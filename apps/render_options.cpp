@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <limits>
 
 #include "command_description.h"
@@ -18,6 +19,7 @@
 #include "value_names.h"
 
 namespace covary {
+namespace fs = std::filesystem;
 
 void check_options(RenderOptions& options) {
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
@@ -148,10 +150,25 @@ void add_output_options(CLI::App& command, RenderOptions& o) {
   command.option_defaults()->group(kBasicOptions);
 }
 
+/// The file named so or, where there is none, the small scene of that name in the installation or the source tree that
+/// the program lies in.
+std::string scene_file(const std::string& word) {
+  const fs::path beside = fs::path(program_path()).parent_path();
+  if (!fs::exists(word) && fs::path(word).filename() == word)
+    for (const fs::path& tree : {beside / ".." / "share" / "covary", beside / ".." / ".."})
+      if (const fs::path file = tree / "scenes" / (word + ".xml"); fs::exists(file))
+        return file.lexically_normal().string();
+  return word;
+}
+
 }  // namespace
 
+std::string program_path() { return fs::read_symlink("/proc/self/exe").string(); }
+
 void add_render_options(CLI::App& command, RenderOptions& o) {
-  command.add_option("SCENE", o.scene, "Scene file: Mitsuba XML, or pbrt")->required();
+  command.add_option("SCENE", o.scene, "Scene: Mitsuba XML, pbrt, glTF; or the name of a small one, such as room")
+      ->transform(scene_file)
+      ->required();
   add_options(command, options_of<RenderSettings>(), o.values);
   add_define_option(command, o.defines);
   add_threads_option(command, o.threads);

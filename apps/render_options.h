@@ -28,6 +28,9 @@ struct RenderOptions {
   bool is_replay() const { return !replay.empty() || replay_light; }
 };
 
+/// The file of this program.
+std::string program_path();
+
 void add_render_options(CLI::App& command, RenderOptions& options);
 
 /// Reads `values`, and checks everything that can be wrong before the scene is loaded: throws Error(kUsage). --sampling

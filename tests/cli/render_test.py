@@ -362,6 +362,14 @@ class Files(RenderTest):
         self.bad(2, "-o '/dev/null' is no regular file", *self.RENDER, "-o", "/dev/null")
         self.write("file", b"")
 
+    def test_small_scenes_have_names(self):
+        hashes = [json.loads(self.good("info", image, "--json").stdout)["attributes"]["covary:scene_hash"]
+                  for image, scene in (("name.exr", "room"), ("file.exr", ROOM))
+                  if self.good("render", scene, *SMALL, "--spp", "4", "--estimator", "none", "-o", image)]
+        self.assertEqual(*hashes)
+        (self.path / "room").write_text("not a scene")  # a file of this name comes first
+        self.bad(1, "room", "render", "room", *SMALL, "-o", "out.exr")
+
     def test_no_file_of_the_scene_is_overwritten(self):
         self.image("sky.exr", (1, 1, 1), size=(8, 4))
         self.write("scene.xml",
