@@ -12,6 +12,8 @@ import sys
 import bpy
 
 arguments = [] if bpy.data.filepath else sys.argv[1:]
+if not arguments and not bpy.data.filepath:
+    sys.exit(__doc__)
 if arguments:
     bpy.ops.wm.open_mainfile(filepath=os.path.abspath(arguments[0]))
 scene = bpy.context.scene

@@ -10,6 +10,8 @@ import time
 
 import pyluxcore
 
+if len(sys.argv) < 2:
+    sys.exit(__doc__)
 pyluxcore.Init()
 LAYERS = (("RGB", ""), ("ALBEDO", ".albedo"), ("AVG_SHADING_NORMAL", ".normal"))
 for seed, name in enumerate("abcdefghijkl"[:int(sys.argv[3]) if len(sys.argv) > 3 else 2], start=1):

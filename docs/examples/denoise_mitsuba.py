@@ -9,6 +9,8 @@ import sys
 
 import mitsuba as mi
 
+if len(sys.argv) < 2:
+    sys.exit(__doc__)
 mi.set_variant("scalar_rgb")  # "llvm_ad_rgb" where LLVM is installed: 2 to 8 times as fast
 scene = mi.load_file(sys.argv[1])
 samples = int(sys.argv[2]) if len(sys.argv) > 2 else 64
