@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# frames_on_slurm.sh SCENE.xml OUT_####.exr FIRST-LAST SAMPLES [OPTION…]: renders a sequence on a cluster with Slurm. An
-# array has a task for each frame, which renders SAMPLES samples per pixel in four groups into OUT_.parts/FRAME.exr. A
-# job after them denoises these one after the other, each with the history of the frame before. OPTIONs are those of
-# `covary render`, such as --camera-path. The same command again, after anything was killed, renders what is missing.
+# frames_on_slurm.sh SCENE.xml OUT_####.exr FIRST-LAST [WAVESx]SAMPLES [OPTION…]: renders a sequence on a cluster with
+# Slurm. An array has a task for each wave of each frame, which renders SAMPLES samples per pixel (of the only wave, in
+# four groups) into OUT_.parts/FRAME-WAVE.exr with a seed of its own. A job after them denoises the frames one after the
+# other, each with the history of the frame before. OPTIONs are those of `covary render`, such as --camera-path. The
+# same command again, after anything was killed, renders what is missing.
 #
 # Scene, camera path, OUT and covary must be where all nodes see them. Partition, time and memory are chosen as for any
 # job, by SBATCH_PARTITION, SBATCH_TIMELIMIT, SBATCH_MEM_PER_NODE and the other variables of sbatch.
@@ -11,24 +12,28 @@
 set -euo pipefail
 
 if [ "${1-}" = --part ]; then  # the job replaces this shell, so that it gets Slurm's signals and keeps its film
-  scene=$2 parts=$3 samples=$4
-  shift 4
-  exec covary render "$scene" -o "$parts/#.exr" --frames "$SLURM_ARRAY_TASK_ID" --estimator none --groups 4 --aovs \
-    --spp "$samples" --threads "${SLURM_CPUS_PER_TASK:-1}" --resume --no-preview --quiet "$@"
+  scene=$2 parts=$3 waves=$4 samples=$5 wave=$((SLURM_ARRAY_TASK_ID % $4))
+  shift 5
+  [ "$waves" -gt 1 ] || set -- --groups 4 "$@"
+  exec covary render "$scene" -o "$parts/#-$((wave + 1)).exr" --frames $((SLURM_ARRAY_TASK_ID / waves)) --seed $wave \
+    --estimator none --aovs --spp "$samples" --threads "${SLURM_CPUS_PER_TASK:-1}" --resume --no-preview --quiet "$@"
 fi
 if [ "${1-}" = --join ]; then
-  exec covary denoise "$2/#.exr" -o "$3" --frames "$4"
+  mapfile -t films < <(seq -f "$2/#-%.0f.exr" "$5")
+  exec covary denoise "${films[@]}" -o "$3" --frames "$4"
 fi
 
-[ $# -ge 4 ] && [[ $2 = *#* && $3 = *-* ]] || { sed -n '3,6s/^# //p' "$0" >&2; exit 2; }
-scene=$(realpath "$1") out=$(realpath -m "$2") frames=$3 samples=$4
+[ $# -ge 4 ] && [[ $2 = *#* && $3 = *-* ]] || { sed -n '3,7s/^# //p' "$0" >&2; exit 2; }
+scene=$(realpath "$1") out=$(realpath -m "$2") frames=$3 samples=${4##*x} waves=1
+[[ $4 != *x* ]] || waves=${4%%x*}
 shift 4
 parts=${out%.exr} parts=${parts//#/}.parts
 mkdir -p "$parts"
 covary render "$scene" --estimator none --groups 4 --spp "$samples" "$@" --frames "${frames%%-*}" --replay 0,0,0 \
   > /dev/null  # wrong options end here
-array=$(sbatch --parsable --job-name=frames --array="$frames" --output="$parts/%a.log" \
-  "$0" --part "$scene" "$parts" "$samples" "$@")
+tasks=$((${frames%-*} * waves))-$((${frames#*-} * waves + waves - 1))
+array=$(sbatch --parsable --job-name=frames --array="$tasks" --output="$parts/%a.log" \
+  "$0" --part "$scene" "$parts" "$waves" "$samples" "$@")
 sbatch --parsable --job-name=join --dependency="afterok:$array" --kill-on-invalid-dep=yes --output="$parts/join.log" \
-  "$0" --join "$parts" "$out" "$frames" > /dev/null
+  "$0" --join "$parts" "$out" "$frames" "$waves" > /dev/null
 echo "job $array; afterwards $out; messages in $parts"

@@ -29,10 +29,29 @@ def _words(scene: str, output: str, frame: int, options: Sequence[str]) -> tuple
     return ("render", scene, "-o", output, "--frames", str(frame), "--resume", "--no-preview", "--quiet", *options)
 
 
+def _waves(output: str, options: Sequence[str], waves: int, seed: int) -> list[tuple[str, list[str]]]:
+    """Name and options of each wave."""
+    if waves == 1 and seed == 0:
+        return [(output, list(options))]
+    if any(word.split("=", 1)[0] == "--seed" for word in options):
+        raise UsageError("options: --seed is given by seed= and waves=")
+    start, end = os.path.splitext(output)
+    return [(f"{start}-{wave + 1}{end}" if waves > 1 else output, [*options, "--seed", str(seed + wave)])
+            for wave in range(waves)]
+
+
+def _path(name: str, frame: int) -> Path:
+    start = name.rindex("#") + 1
+    digits = start - len(name[:start].rstrip("#"))
+    return Path(f"{name[:start - digits]}{frame:0{digits}}{name[start:]}")
+
+
 @checked(client=CLIENT, scene=path, output=path, first=whole(0, 999999), last=whole(0, 999999),
-         options=list_of(text, "a list of texts"), progress=optional(function))
+         options=list_of(text, "a list of texts"), waves=whole(1, 1000), seed=whole(0, 999999),
+         progress=optional(function))
 def frames(client: Any, scene: str | os.PathLike[str], output: str | os.PathLike[str], first: int, last: int,
-           options: Sequence[str] = (), *, progress: Progress | None = None) -> list[Path]:
+           options: Sequence[str] = (), *, waves: int = 1, seed: int = 0,
+           progress: Progress | None = None) -> list[Path]:
     """`covary render SCENE -o OUTPUT --frames FIRST-LAST OPTIONS…` with each frame on a worker of a
     dask.distributed.Client, in the folder where this process is, which all machines must share. Returns the paths of
     the frames, which have the bits of one machine. Frames that are complete are not rendered again, so that the same
@@ -41,7 +60,9 @@ def frames(client: Any, scene: str | os.PathLike[str], output: str | os.PathLike
     output: a name with '#' in place of the frame's number, "out_####.exr".
     options: further options of the command, e.g. ["--spp", "16", "--camera-path", "path.json"]. `--history` is refused,
         because it makes a frame of the one before: `covary denoise` of frames does so afterwards.
-    progress: called with (done, total) frames.
+    waves: so many tasks of each frame, all with the samples that the options name. Number k of them has the seed
+        `seed` + k - 1 and writes OUTPUT with "-k" before its ending; `covary denoise` takes them all, without --groups.
+    progress: called with (done, total) tasks.
 
     Raises UsageError and Error with the messages of the command.
     """
@@ -52,9 +73,9 @@ def frames(client: Any, scene: str | os.PathLike[str], output: str | os.PathLike
     numbers = list(range(first, last + 1))
     if not numbers:
         raise UsageError(f"last: found {last}; accepted is {first}, the first frame, or more")
-    folder, name = os.getcwd(), os.fspath(output)
-    futures = {client.submit(_render_frame, _words(os.fspath(scene), name, frame, options), folder, pure=False,
-                             retries=_RETRIES): frame for frame in numbers}
+    folder, tasks = os.getcwd(), _waves(os.fspath(output), options, waves, seed)
+    futures = {client.submit(_render_frame, _words(os.fspath(scene), name, frame, words), folder, pure=False,
+                             retries=_RETRIES): frame for frame in numbers for name, words in tasks}
     done = 0
     try:
         for future in dask().as_completed(futures, loop=client.loop):
@@ -65,10 +86,8 @@ def frames(client: Any, scene: str | os.PathLike[str], output: str | os.PathLike
             future.release()
             done += 1
             if progress is not None:
-                progress(done, len(numbers))
+                progress(done, len(futures))
     except BaseException:
         client.cancel(list(futures))
         raise
-    start = name.rindex("#") + 1
-    digits = start - len(name[:start].rstrip("#"))
-    return [Path(f"{name[:start - digits]}{frame:0{digits}}{name[start:]}") for frame in numbers]
+    return [_path(name, frame) for frame in numbers for name, _ in tasks]

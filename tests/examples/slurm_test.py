@@ -21,18 +21,18 @@ TASKS = 3
 SBATCH = """#!/usr/bin/env bash
 while [[ $1 = --* ]]; do
   case $1 in
-    --array=1-*) tasks=${1##*-};;
+    --array=*) first=${1#*=} first=${first%-*} tasks=${1##*-};;
     --output=*) log=${1#*=};;
     --dependency=afterok:*) [ ! -e failed ] || exit 0;;
   esac
   shift
 done
 rm -f failed
-for task in $(seq ${tasks:-1}); do
+for task in $(seq ${first:-1} ${tasks:-1}); do
   export SLURM_ARRAY_TASK_ID=$task
   if [ "$KILLED" = "$task" ]; then
     "$@" > "${log/\\%a/$task}" 2>&1 &
-    until [ -s "$4/$task.exr" ]; do sleep 0.01; done
+    until [ -s "$4/${FILM:-$task}.exr" ]; do sleep 0.01; done
     kill -9 $!
     touch failed
   else
@@ -71,6 +71,25 @@ class Cluster(unittest.TestCase):
         self.assertIn(f"of {TASKS} groups, guided by albedo and normal", (self.path / "out.parts/join.log").read_text())
         self.assertTrue((self.path / "out.exr").exists())
 
+    def render_frames(self, samples, *options, frames="1-3", **keywords):
+        path = SOURCE / "scenes" / "room-path.json"
+        return self.run_in_folder(FRAMES, ROOM, "out_##.exr", frames, samples, *SMALL, "--camera-path", path, *options,
+                                  **keywords)
+
+    def check_frames(self, samples, *options, waves=1):
+        """The bits of one machine."""
+        path = SOURCE / "scenes" / "room-path.json"
+        films = [f"film_#-{wave}.exr" for wave in range(waves)]
+        groups = ["--groups", 4] if waves == 1 else []
+        for seed, film in enumerate(films):
+            self.run_in_folder(COVARY, "render", ROOM, "-o", film, "--frames", "1-3", "--estimator", "none", "--aovs",
+                               "--spp", samples, "--seed", seed, "--camera-path", path, *groups, *SMALL, *options)
+        self.run_in_folder(COVARY, "denoise", *films, "-o", "here_##.exr")
+        for frame in (1, 2, 3):
+            facts = self.run_in_folder(COVARY, "compare", f"out_0{frame}.exr", "--reference", f"here_0{frame}.exr",
+                                       "--metric", "mse", "--json", "-")
+            self.assertEqual(json.loads(facts.splitlines()[0])["mse"], 0)
+
 
 class StandIn(Cluster):
     def setUp(self):
@@ -101,38 +120,24 @@ class Script(StandIn):
 class Frames(StandIn):
     """docs/examples/frames_on_slurm.sh."""
 
-    def render(self, samples, *options, frames="1-3", **keywords):
-        path = SOURCE / "scenes" / "room-path.json"
-        return self.run_in_folder(FRAMES, ROOM, "out_##.exr", frames, samples, *SMALL, "--camera-path", path, *options,
-                                  **keywords)
-
-    def check_frames(self, samples, *options):
-        """The bits of one machine."""
-        path = SOURCE / "scenes" / "room-path.json"
-        self.run_in_folder(COVARY, "render", ROOM, "-o", "film_#.exr", "--frames", "1-3", "--estimator", "none",
-                           "--groups", 4, "--aovs", "--spp", samples, "--camera-path", path, *SMALL, *options)
-        self.run_in_folder(COVARY, "denoise", "film_#.exr", "-o", "here_##.exr")
-        for frame in (1, 2, 3):
-            facts = self.run_in_folder(COVARY, "compare", f"out_0{frame}.exr", "--reference", f"here_0{frame}.exr",
-                                       "--metric", "mse", "--json", "-")
-            self.assertEqual(json.loads(facts.splitlines()[0])["mse"], 0)
-
     def test_frames_are_denoised_with_history(self):
-        self.render(8)
+        self.render_frames(8)
         self.check_frames(8)
 
     def test_a_killed_task_costs_its_frame_alone(self):
-        self.render(200, "--checkpoint", "0.02", KILLED="2")
+        """Task 5 is the second wave of frame 2."""
+        self.render_frames("2x100", "--checkpoint", "0.02", KILLED="5", FILM="2-2")
         self.assertFalse((self.path / "out_02.exr").exists())
-        self.assertIn("complete: false", self.run_in_folder(COVARY, "info", "out_.parts/2.exr"))
-        times = [(self.path / f"out_.parts/{frame}.exr").stat().st_mtime_ns for frame in (1, 3)]
-        self.render(200, "--checkpoint", "0.02")
-        self.check_frames(200, "--checkpoint", "0.02")
-        self.assertEqual([(self.path / f"out_.parts/{frame}.exr").stat().st_mtime_ns for frame in (1, 3)], times)
+        self.assertIn("complete: false", self.run_in_folder(COVARY, "info", "out_.parts/2-2.exr"))
+        others = [self.path / f"out_.parts/{film}.exr" for film in ("1-1", "1-2", "2-1", "3-1", "3-2")]
+        times = [film.stat().st_mtime_ns for film in others]
+        self.render_frames("2x100", "--checkpoint", "0.02")
+        self.check_frames(100, "--checkpoint", "0.02", waves=2)
+        self.assertEqual([film.stat().st_mtime_ns for film in others], times)
 
     def test_wrong_options_are_found_before_there_are_jobs(self):
-        self.assertIn("did you mean '--integrator'", self.render(8, "--integrater", "path", code=2))
-        self.assertIn("FIRST-LAST", self.render(8, frames="3", code=2))
+        self.assertIn("did you mean '--integrator'", self.render_frames(8, "--integrater", "path", code=2))
+        self.assertIn("FIRST-LAST", self.render_frames(8, frames="3", code=2))
 
 
 class Slurm(Cluster):
@@ -181,6 +186,17 @@ class Slurm(Cluster):
         self.render(self.SAMPLES)
         self.wait(lambda: not self.queue())
         self.check_result(self.SAMPLES)
+
+    def test_a_wave_of_a_frame_is_killed(self):
+        films = self.path / "out_.parts"
+        self.render_frames(f"2x{self.SAMPLES}", "--checkpoint", "0.2")
+        self.wait(lambda: any(films.glob("2-?.exr")))
+        self.run_in_folder("scancel", "--full", "--signal=KILL", self.running()[0])
+        self.wait(lambda: not self.queue())
+        self.assertFalse((self.path / "out_01.exr").exists(), "joined though a task was killed")
+        self.render_frames(f"2x{self.SAMPLES}", "--checkpoint", "0.2")
+        self.wait(lambda: not self.queue())
+        self.check_frames(self.SAMPLES, "--checkpoint", "0.2", waves=2)
 
 
 if __name__ == "__main__":

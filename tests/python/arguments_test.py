@@ -93,7 +93,8 @@ BAD = {
         "progress": NO_FUNCTION},
     "covary.distributed.frames": {
         "client": (None, 3), "scene": (None, *NO_PATH), "output": (None, *NO_PATH), "first": (-1, 0.5, *NO_NUMBERS),
-        "last": (-1, 0.5, *NO_NUMBERS), "options": (3, "--spp", [3]), "progress": NO_FUNCTION},
+        "last": (-1, 0.5, *NO_NUMBERS), "options": (3, "--spp", [3]), "waves": (0, 1001, 1.5, *NO_NUMBERS),
+        "seed": (-1, 10**6, *NO_NUMBERS), "progress": NO_FUNCTION},
     "covary.distributed.main": {"words": (3, "x", [3])},
     "covary.distributed.SceneFiles": {"scene": ("room.xml", None)},
     "covary.mitsuba.render": {

@@ -236,6 +236,14 @@ class Cluster(PackageTest):
         times = [path.stat().st_mtime_ns for path in files]
         covary.distributed.frames(self.client, ROOM, "there_#.exr", 1, 4, words)
         self.assertEqual([path.stat().st_mtime_ns for path in files], times)
+        words[3] = "4"
+        waves = covary.distributed.frames(self.client, ROOM, "wave_#.exr", 1, 2, words, waves=2, seed=5)
+        self.assertEqual([path.name for path in waves], [f"wave_{n}-{k}.exr" for n in (1, 2) for k in (1, 2)])
+        self.run_program("render", str(ROOM), "-o", "second_#.exr", "--frames", "2", "--seed", "6", "--no-preview",
+                         "--quiet", *words)
+        self.assert_same_bits(covary.read_image("second_2.exr"), covary.read_image(waves[3]))
+        self.assertIn("seed=", self.message_of(covary.UsageError, covary.distributed.frames, self.client, ROOM,
+                                               "f_#.exr", 1, 2, ["--seed", "3"], waves=2))
         for options, message in ((["--history", "on"], "--history makes each frame of the one before"),
                                  (["--spp", "x"], "frame ")):
             self.assertIn(message, self.message_of(covary.UsageError, covary.distributed.frames, self.client, ROOM,
