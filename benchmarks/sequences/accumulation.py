@@ -21,11 +21,11 @@ def transformed(matrix, points):
     return points @ matrix[:3, :3].T + matrix[:3, 3]
 
 
-def projected(points, to_world, width, height):
+def projected(points, to_world, width, height, fov=54):
     """Pixel coordinates (x, y), centres at halves, and the distance along the view."""
     local = transformed(numpy.linalg.inv(to_world), points)
     depth = local[..., 2]
-    scale = width / 2 / math.tan(math.radians(scenes.FOV / 2)) / numpy.where(depth > 1e-6, depth, numpy.inf)
+    scale = width / 2 / math.tan(math.radians(fov / 2)) / numpy.where(depth > 1e-6, depth, numpy.inf)
     return numpy.stack([width / 2 - scale * local[..., 0], height / 2 - scale * local[..., 1]], -1), depth
 
 
@@ -48,8 +48,8 @@ def motion(name, points, frame, frames):
     to the right and y down; and the points themselves as they were then. Frames count from 1."""
     height, width = points.shape[:2]
     then = before(name, points, frame, frames)
-    here, _ = projected(points, scenes.camera(name, frame, frames), width, height)
-    there, _ = projected(then, scenes.camera(name, frame - 1, frames), width, height)
+    here, there = (projected(place, scenes.camera(name, at, frames), width, height, scenes.fov(name))[0]
+                   for place, at in ((points, frame), (then, frame - 1)))
     return there - here, then
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Five sequences made of scenes/room.xml, with what moves known exactly: a moving camera, a turning box whose shadow
-moves along, a turning mirror, a lamp that is dimmed, and one in which nothing moves.
+moves along, a turning mirror, a lamp that is dimmed, and one in which nothing moves; and a camera that moves through
+Bitterli's Kitchen, where --kitchen tells its file.
 
 NAME_0001.xml, NAME_0002.xml, … are scenes in which nothing moves, one for each frame; the references are renders of
 these, so that a fault of what interpolates motion shows as an error. A renderer of sequences takes one scene NAME.xml,
@@ -14,16 +15,20 @@ from xml.etree import ElementTree
 import numpy
 
 ROOM = Path(__file__).resolve().parents[2] / "scenes/room.xml"
-#: horizontal field of view of the room's camera in degrees
-FOV = 54
 NAMES = ["camera", "still", "box", "mirror", "lamp"]
 #: origin and target at the first frame and at the last one, whatever their number
-CAMERA_FROM, CAMERA_TO = ((0.5, 1.45, 3.8), (-0.1, 0.95, -1)), ((-0.2, 1.35, 3.0), (0.3, 1.0, -1))
+ENDS = {"camera": (((0.5, 1.45, 3.8), (-0.1, 0.95, -1)), ((-0.2, 1.35, 3.0), (0.3, 1.0, -1))),
+        "kitchen": (((1.211, 1.80475, 3.85239), (-0.541, 1.638, 0.261)), ((1.17, 1.784, 3.315), (-0.35, 1.6, 0.2)))}
 
 
 def part_of(frame, frames):
     """How much of the sequence has passed, 0 to 1. Frames count from 1."""
     return (frame - 1) / max(1, frames - 1)
+
+
+def fov(name):
+    """The camera's horizontal field of view in degrees."""
+    return 60 if name == "kitchen" else 54
 
 
 def translate(x, y, z):
@@ -53,9 +58,9 @@ def look_at(origin, target, up=(0, 1, 0)):
 
 
 def camera(name, frame, frames):
-    """The camera's matrix to the world; all sequences but `camera` have the room's own."""
-    t = part_of(frame, frames) if name == "camera" else 0
-    ends = [[numpy.array(point) for point in end] for end in (CAMERA_FROM, CAMERA_TO)]
+    """The camera's matrix to the world; those that do not move have the room's own."""
+    t = part_of(frame, frames) if name in ENDS else 0
+    ends = [[numpy.array(point) for point in end] for end in ENDS.get(name, ENDS["camera"])]
     return look_at(*((1 - t) * first + t * last for first, last in zip(*ends)))
 
 
@@ -126,9 +131,9 @@ def scene_of(room, name, frame, frames):
     return root
 
 
-def camera_path(frames):
+def camera_path(name, frames):
     """What --camera-path reads."""
-    return {"keyframes": [{"time": frame, "to_world": camera("camera", frame, frames).tolist()}
+    return {"keyframes": [{"time": frame, "to_world": camera(name, frame, frames).tolist()}
                           for frame in range(1, frames + 1)]}
 
 
@@ -136,9 +141,18 @@ def still_name(name, frame):
     return f"{name}_{frame:04d}.xml"
 
 
-def write_sequence(name, frames, folder):
-    """Writes a sequence's files; the name of the scene, or the pattern of names, that a renderer of sequences takes."""
-    room = ElementTree.parse(ROOM).getroot()
+def scene_file(path):
+    """A scene whose textures and shapes are found from any folder."""
+    root = ElementTree.parse(path).getroot()
+    for name in root.iterfind(".//string[@name='filename']"):
+        name.set("value", str((path.parent / name.get("value")).resolve()))
+    return root
+
+
+def write_sequence(name, frames, folder, kitchen=None):
+    """Writes a sequence's files; the name of the scene, or the pattern of names, that a renderer of sequences takes.
+    `kitchen`: file of the scene of that sequence."""
+    room = scene_file(kitchen if name == "kitchen" else ROOM)
     for frame in range(1, frames + 1):
         ElementTree.ElementTree(scene_of(room, name, frame, frames)).write(folder / still_name(name, frame))
     if name == "lamp":
@@ -147,7 +161,8 @@ def write_sequence(name, frames, folder):
     if name in MOVING:
         animate(add_shape(root, name), MOVING[name][2], frames)
     ElementTree.ElementTree(root).write(folder / f"{name}.xml")
-    if name != "camera":
+    if name not in ENDS:
         return f"{name}.xml", []
-    (folder / "camera.json").write_text(json.dumps(camera_path(frames), indent=1) + "\n")
-    return "camera.xml", ["--camera-path", folder / "camera.json"]
+    path = folder / f"{name}.json"
+    path.write_text(json.dumps(camera_path(name, frames), indent=1) + "\n")
+    return f"{name}.xml", ["--camera-path", path]

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """sequences.py references|measure --work FOLDER [NAME...]
 
-Five sequences (scenes.py): references of every frame, and a table of what methods make of few samples. `references`
-renders what FOLDER does not hold yet, two images of each frame; `measure` renders the methods and compares. Each frame
-alone is rendered from a scene of its own, in which nothing moves; `sequence` is one command for all frames. A frame's
-seed is that of --seeds plus 1,000,000 times its number, as the command for all frames has it. Needs numpy.
+Five sequences, six with --kitchen (scenes.py): references of every frame, and a table of what methods make of few
+samples. `references` renders what FOLDER does not hold yet, two images of each frame; `measure` renders the methods
+and compares. Each frame alone is rendered from a scene of its own, in which nothing moves; `sequence` is one command
+for all frames. A frame's seed is that of --seeds plus 1,000,000 times its number, as the command for all frames has
+it. Needs numpy.
 Errors are given as multiples of those of `auto`, the mixture of each frame alone."""
 import argparse
 import json
@@ -46,6 +47,10 @@ def render(options, scene, spp, seed, out, *more):
     return out
 
 
+def write_sequence(options, name):
+    return scenes.write_sequence(name, options.frames, options.work, options.kitchen)
+
+
 def seed_of(seed, frame):
     return seed + SEEDS_OF_FRAME * frame
 
@@ -56,7 +61,7 @@ def frame_numbers(options):
 
 def render_references(options):
     for name in options.names:
-        scenes.write_sequence(name, options.frames, options.work)
+        write_sequence(options, name)
         for frame in frame_numbers(options):
             for seed in REFERENCE_SEEDS:
                 render(options, options.work / scenes.still_name(name, frame), options.reference_spp, seed,
@@ -91,7 +96,7 @@ def frames_alone(options, name, spp, seed, folder):
 
 def sequence(options, name, spp, seed, folder):
     """Renders all frames by one command; their motion vectors."""
-    scene, more = scenes.write_sequence(name, options.frames, options.work)
+    scene, more = write_sequence(options, name)
     last = folder / f"sequence_{options.frames:04d}.exr"
     render_sequence = [options.work / scene, *more, "--frames", f"1-{options.frames}"]
     if not last.exists():
@@ -131,7 +136,7 @@ def measure(options):
     print(f"| sequence | spp | method | {' | '.join(titles).replace('_', ' ')} |\n|{'---|' * (3 + len(titles))}",
           flush=True)
     for name in options.names:
-        scenes.write_sequence(name, options.frames, options.work)
+        write_sequence(options, name)
         for spp in options.spp:
             results = []
             for seed in options.seeds:
@@ -153,9 +158,11 @@ def measure(options):
 def main(arguments):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("task", choices=["references", "measure"])
-    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(scenes.NAMES)}; all when absent")
+    parser.add_argument("names", nargs="*", metavar="NAME",
+                        help=f"of {', '.join(scenes.NAMES)}, kitchen; all when absent")
     parser.add_argument("--work", required=True, type=Path, metavar="FOLDER", help="scenes, renders and sequences.json")
     parser.add_argument("--covary", default=str(ROOT / "build/release/covary"), metavar="PROGRAM")
+    parser.add_argument("--kitchen", type=Path, metavar="SCENE", help="file of the scene of the sequence kitchen")
     parser.add_argument("--frames", type=int, default=16)
     parser.add_argument("--resolution", default="320x180", metavar="WxH")
     parser.add_argument("--spp", type=int, nargs="+", default=[16, 64])
@@ -166,10 +173,11 @@ def main(arguments):
     parser.add_argument("--options", default="--history on", help="of the command for all frames")
     parser.add_argument("--nice", type=int, default=0)
     options = parser.parse_args(arguments)
-    options.names = options.names or scenes.NAMES
-    unknown = [name for name in options.names if name not in scenes.NAMES]
+    names = scenes.NAMES + ["kitchen"] * (options.kitchen is not None)
+    options.names = options.names or names
+    unknown = [name for name in options.names if name not in names]
     if unknown:
-        parser.error(f"no sequence is called {unknown[0]}; there are {', '.join(scenes.NAMES)}")
+        parser.error(f"no sequence is called {unknown[0]}; there are {', '.join(names)}")
     if options.frames < 2:
         parser.error(f"--frames must be 2 or more; found {options.frames}")
     if len(set(options.seeds)) < len(options.seeds) or not all(0 <= seed < SEEDS_OF_FRAME for seed in options.seeds):

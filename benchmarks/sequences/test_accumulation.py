@@ -13,7 +13,7 @@ def planes(frames, deviation):
     for frame in range(1, frames + 1):
         to_world = scenes.camera("camera", frame, frames)
         y, x = numpy.mgrid[0:90, 0:160] + 0.5
-        half = numpy.tan(numpy.radians(scenes.FOV / 2))
+        half = numpy.tan(numpy.radians(scenes.fov("camera") / 2))
         rays = numpy.stack([(80 - x) / 80 * half, (45 - y) / 80 * half, numpy.ones_like(x)], -1)
         rays = rays @ to_world[:3, :3].T
         distance = (-1 - to_world[2, 3]) / rays[..., 2]
