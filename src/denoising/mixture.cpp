@@ -2,9 +2,11 @@
 #include "denoising/mixture.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/error.h"
 #include "core/parallel.h"
+#include "filters/filter_input.h"
 #include "filters/guided_cells.h"
 #include "risk/relative_weight.h"
 
@@ -141,29 +143,35 @@ Image mixed(const CandidateSet& set, const std::vector<Image>& weights, const st
 
 }  // namespace
 
-Image disagreement(const CandidateSet& set, const Image& guide, const Image& image) {
-  constexpr int kRadius = 2;
+Image disagreement(const CandidateSet& set, const Image& guide, const Image& image,
+                   const std::vector<unsigned char>& valid) {
+  constexpr int kWindow = 5;
+  constexpr double kLeast = 1.0 / 30;
   const int width = image.width, height = image.height;
-  Image of_pixels(width, height, 1), means(width, height, 1);
-  parallel_for(height, 8, [&](int y) {
-    for (int x = 0; x < width; ++x) {
-      float sum = 0;
-      for (const Image& candidate : set.candidates)
+  const size_t m = set.candidates.size();
+  std::vector<Planes> means;
+  for (const Image& candidate : set.candidates) {
+    Planes of_pixels(width, height, 1, 0, 0);
+    parallel_for(height, 8, [&](int y) {
+      for (int x = 0; x < width; ++x) {
+        float sum = 0;
         for (int c = 0; c < 3; ++c) sum += sqr(candidate.pixel(x, y)[c] - image.pixel(x, y)[c]);
-      *of_pixels.pixel(x, y) =
-          sum * relative_weight(guide.pixel(x, y)) / (3 * static_cast<float>(set.candidates.size()));
-    }
-  });
+        of_pixels.row(0, y)[x] = sum / 3 * relative_weight(guide.pixel(x, y));
+      }
+    });
+    means.push_back(box_mean(of_pixels, valid, kWindow, 0, 0));
+  }
+  Image result(width, height, 1);
   parallel_for(height, 8, [&](int y) {
     for (int x = 0; x < width; ++x) {
-      float sum = 0, n = 0;
-      for (int j = std::max(0, y - kRadius); j <= std::min(height - 1, y + kRadius); ++j)
-        for (int i = std::max(0, x - kRadius); i <= std::min(width - 1, x + kRadius); ++i)
-          sum += *of_pixels.pixel(i, j), n += 1;
-      *means.pixel(x, y) = sum / n;
+      double sum = 0, product = 1;
+      for (const Planes& mean : means) sum += mean.row(0, y)[x];
+      const double least = kLeast * sum / static_cast<double>(m);
+      for (const Planes& mean : means) product *= std::max<double>(mean.row(0, y)[x], least);
+      *result.pixel(x, y) = static_cast<float>(std::pow(product, 1.0 / static_cast<double>(m)));
     }
   });
-  return means;
+  return result;
 }
 
 Mixture mix(const MixtureInput& input) {

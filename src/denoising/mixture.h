@@ -59,9 +59,11 @@ struct Mixture {
   std::vector<Image> weights;   ///< x_p, one channel each; what is missing to one is the base image's
 };
 
-/// Squared differences of the candidates from an image over the guide's G'^2 + 0.01: means over candidates, channels,
-/// and the 5 x 5 pixels around each; one channel.
-Image disagreement(const CandidateSet& set, const Image& guide, const Image& image);
+/// Squared differences of the candidates from an image over the guide's G'^2 + 0.01, means over channels and the 5 x 5
+/// pixels around each: their geometric mean over the candidates, as one that is wrong alone tells little; none counts as
+/// less than 1/30 of their mean, so that one that is the image does not hide what others tell. One channel.
+Image disagreement(const CandidateSet& set, const Image& guide, const Image& image,
+                   const std::vector<unsigned char>& valid);
 
 /// At most this many candidates.
 inline constexpr int kMostCandidates = 8;

@@ -232,8 +232,11 @@ TEST(HeldOutError, IsWhereImagesDisagreeAndAsLargeInAll) {
   for (int y = 0; y < kSize; ++y)
     for (int x = 0; x < kSize; ++x)
       for (int c = 0; c < 3; ++c) candidate.pixel(x, y)[c] += x < kSize / 2 ? 0.1f : 0.4f;
-  const Image place = disagreement({{}, {image, candidate}}, e.guide, image);
-  EXPECT_NEAR(*place.pixel(1, 1), 0.01f / 2 * relative_weight(e.guide.pixel(1, 1)), 1e-6f);
+  const Image place = disagreement({{}, {candidate, candidate}}, e.guide, image, e.valid);
+  const float of_left = 0.01f * relative_weight(e.guide.pixel(1, 1));
+  EXPECT_NEAR(*place.pixel(1, 1), of_left, 1e-6f);
+  const Image beside = disagreement({{}, {image, candidate}}, e.guide, image, e.valid);
+  EXPECT_NEAR(*beside.pixel(1, 1), std::sqrt(of_left / 60 * of_left), 1e-6f) << "at least 1/30 of their mean";
   input.disagreement = &place;
   const Image after = held_out_error(input);
   double sums[2] = {}, ends[2] = {};
