@@ -86,20 +86,23 @@ RiskRow risk_of_row(const ImageRiskInput& in, int y) {
   return row;
 }
 
-/// The median brightness of the 3 x 3 pixels around each: a pixel that is bright by chance would hide its own error.
-Image median_brightness(const Image& image) {
+/// The mean brightness of the 5 x 5 pixels around each but its own: a pixel that is bright by chance would hide its own
+/// error, and a median is too dark where light is rarely found.
+Image brightness_around(const Image& image) {
+  constexpr int kRadius = 2;
   Image guide(image.width, image.height, 3);
   parallel_for(image.height, 8, [&](int y) {
     for (int x = 0; x < image.width; ++x) {
-      std::array<float, 9> around;
-      size_t n = 0;
-      for (int j = std::max(0, y - 1); j <= std::min(image.height - 1, y + 1); ++j)
-        for (int i = std::max(0, x - 1); i <= std::min(image.width - 1, x + 1); ++i) {
+      double sum = 0;
+      int n = 0;
+      for (int j = std::max(0, y - kRadius); j <= std::min(image.height - 1, y + kRadius); ++j)
+        for (int i = std::max(0, x - kRadius); i <= std::min(image.width - 1, x + kRadius); ++i) {
+          if (i == x && j == y) continue;
           const float* p = image.pixel(i, j);
-          around[n++] = (p[0] + p[1] + p[2]) / 3;
+          sum += p[0] + p[1] + p[2], n += 3;
         }
-      std::nth_element(around.begin(), around.begin() + n / 2, around.begin() + n);
-      std::fill_n(guide.pixel(x, y), 3, around[n / 2]);
+      const float* own = image.pixel(x, y);
+      std::fill_n(guide.pixel(x, y), 3, n ? static_cast<float>(sum / n) : (own[0] + own[1] + own[2]) / 3);
     }
   });
   return guide;
@@ -120,7 +123,7 @@ void add_risk_of_mean(const GroupedImage& groups, EstimatorResult& mean) {
   const Moments independent = moments(groups, valid, 0, 0.0f);
   Image finite = mean.estimate;
   fill_invalid(groups, groups, valid, finite);
-  const Image guide = median_brightness(finite);
+  const Image guide = brightness_around(finite);
   mean.risk_rows = image_risk({&mean.estimate, {}, &independent, {}, &groups, &guide, &valid});
   mean.risk_kind = ErrorKind::kMean;
 }

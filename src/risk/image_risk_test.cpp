@@ -127,6 +127,17 @@ TEST(ImageRisk, OfAMeanKnowsFireflies) {
   EXPECT_NEAR(sum_of(risk_of_mean(samples.image)).error, 3 * v / 0.01, 1e-3 * v / 0.01);
 }
 
+/// Every fourth pixel has found a light of brightness 1/4: most are black, but none of them is as dark as that.
+TEST(ImageRisk, OfAMeanKnowsTheBrightnessOfRareLight) {
+  Samples samples(7);
+  std::fill(samples.data.begin(), samples.data.end(), 0.0f);
+  for (size_t y = 0; y < kHeight; ++y)
+    for (size_t x = 0; x < kWidth; ++x)
+      for (size_t c = 0; (x + y) % 4 == 0 && c < 3; ++c) samples.data[(y * kWidth + x) * kGroups * 3 + c] = kGroups;
+  const double wanted = 3.0 * kWidth * kHeight / 4 / (0.25 * 0.25 + 0.01);
+  EXPECT_NEAR(sum_of(risk_of_mean(samples.image)).error / wanted, 1, 0.1);
+}
+
 TEST(ImageRisk, OfAMeanOfOneGroupIsNotKnown) {
   Samples samples(7);
   samples.image.groups = 1;
@@ -146,7 +157,7 @@ TEST(ImageRisk, TellsWhatTheLargestGroupsHold) {
 TEST(ImageRisk, HasRowsThatDoNotDependOnOthersFarAway) {
   const Samples samples(9);
   const std::vector<RiskRow> whole = risk_of_mean(samples.image), upper = risk_of_mean(rows_of(samples.image, 0, 24));
-  for (size_t y = 0; y < 23; ++y) EXPECT_EQ(upper[y].error, whole[y].error);
+  for (size_t y = 0; y < 22; ++y) EXPECT_EQ(upper[y].error, whole[y].error);
 }
 
 }  // namespace
