@@ -46,6 +46,12 @@ void scale(Image& std_error, double factor) {
 /// Whether images of this kind and of few groups have a fit of their own.
 bool fitted_to_few(ErrorKind kind) { return kind == ErrorKind::kFilters || kind == ErrorKind::kNetwork; }
 
+/// Which part of log(relMSE / V) is left to the features of an image: less, the more a mixture is the mean.
+double not_the_mean(const RiskRow& sums, ErrorKind kind) {
+  if (kind == ErrorKind::kMean || kind == ErrorKind::kPair || sums.groups < kFewestGroups) return 1;
+  return 1 - std::min(1.0, sums.variance / sums.noise);
+}
+
 const FittedErrors& fit_of(ErrorKind kind, double groups) {
   if (groups < kFewestGroups && fitted_to_few(kind)) return kFittedToFew[kind == ErrorKind::kNetwork];
   return kFittedErrors[static_cast<size_t>(kind)];
@@ -71,7 +77,7 @@ LogError fitted_error(const RiskRow& sums, ErrorKind kind) {
   const FittedErrors& fit = fit_of(kind, sums.groups);
   const ErrorFeatures x = error_features(sums);
   LogError error;
-  error.middle = std::log(sums.variance / sums.values) + dot(fit.middle, x);
+  error.middle = std::log(sums.variance / sums.values) + not_the_mean(sums, kind) * dot(fit.middle, x);
   const double spread = std::exp(std::clamp(dot(fit.log_spread, x), fit.least_log_spread, fit.most_log_spread));
   error.low = error.middle + fit.low * spread, error.high = error.middle + fit.high * spread;
   return error;

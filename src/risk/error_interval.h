@@ -3,10 +3,11 @@
 // little bias and much noise; the variance V between halves is steady but knows no bias. Both, and what speaks for rare
 // light, are features of a fit to renders of scenes whose truth is known (benchmarks/error_intervals):
 //
-//     log(relMSE / V) = a . x + s r,   log s = b . x,
+//     log(relMSE / V) = p a . x + s r,   log s = b . x,
 //
-// r: what the fit leaves open, whose quantiles are those of scenes that it did not see. Where few pixels or single
-// groups hold the noise or the light, or the bounds are far from each other, no interval is given.
+// r: what the fit leaves open, whose quantiles are those of scenes that it did not see; p: 1, of mixtures 1 - V / v,
+// 0 where they are the mean h, whose error is V. Where few pixels or single groups hold the noise or the light, or the
+// bounds are far from each other, no interval is given.
 #pragma once
 
 #include <array>
