@@ -6,9 +6,10 @@ few samples and with many, as far as FOLDER does not hold them yet; asks the pro
 and compares the image with two references, relMSE in product form; writes both to renders.csv beside this file; and
 writes the coefficients that fit them best to src/risk/error_interval_table.h. Needs numpy.
 
-The middle is a ridge regression of log(relMSE / V), the spread one of the log of what it leaves open; a mixture that
-is the mean of the samples, V = v, has V as its error, and one that is it in part is drawn there. Each render counts by how well its references know its error. Quantiles are those of families of scenes that were left out, so
-that the interval is as wide as scenes differ from those that were fitted."""
+The middle is a ridge regression of log(relMSE / V), the spread one of the log of what it leaves open; a mixture that is
+the mean of the samples, V = v, has V as its error, and one that is it in part is drawn there. Each render counts by how
+well its references know its error. Quantiles are those of families of scenes that were left out, so that the interval
+is as wide as scenes differ from those that were fitted."""
 import argparse
 import csv
 import math

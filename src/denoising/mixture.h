@@ -60,8 +60,8 @@ struct Mixture {
 };
 
 /// Squared differences of the candidates from an image over the guide's G'^2 + 0.01, means over channels and the 5 x 5
-/// pixels around each: their geometric mean over the candidates, as one that is wrong alone tells little; none counts as
-/// less than 1/30 of their mean, so that one that is the image does not hide what others tell. One channel.
+/// pixels around each: their geometric mean over the candidates, as one that is wrong alone tells little. None counts
+/// as less than 1/30 of their mean, so that one that is the image does not hide what others tell. One channel.
 Image disagreement(const CandidateSet& set, const Image& guide, const Image& image,
                    const std::vector<unsigned char>& valid);
 

@@ -213,7 +213,7 @@ TEST(LightPlan, UntilAWantedErrorLightPathsKeepStep) {
   const LoadedScene scene = light_scene();
   RenderRequest request;
   request.seed = 5;
-  request.until = 0.004;
+  request.until = 0.002;
   const RenderResult result = render(scene, plan_of("none", 8), request);
   EXPECT_TRUE(*result.until_reached);
   EXPECT_GT(result.samples_per_pixel(), 96);
