@@ -80,6 +80,8 @@ Json json_of(const RunResult& run) {
           {"predicted_relmse_low", number(run.predicted_low)},
           {"predicted_relmse_high", number(run.predicted_high)},
           {"coverage", number(run.coverage)},
+          {"temporal", number(run.temporal)},
+          {"temporal_flip", number(run.temporal_flip)},
           {"samples_per_pixel", r.samples_per_pixel},
           {"seconds", seconds_of(r)},
           {"peak_memory_bytes", r.peak_memory_bytes},

@@ -56,8 +56,8 @@ struct Cell {
   Estimate temporal_gain;           ///< temporal error of the baseline over that of this method
   std::vector<FrameErrors> frames;  ///< means over seeds
   std::optional<WorstRegions> worst;
-  double bounded = kNone;        ///< part of the runs with a prediction that say between which bounds their relMSE is
-  double bounds_hold = kNone;    ///< part of these whose relMSE is there
+  double bounded = kNone;      ///< part of the runs with a prediction that say between which bounds their relMSE is
+  double bounds_hold = kNone;  ///< part of these whose relMSE is there
   double published_relmse = kNone, published_ratio = kNone;
   std::vector<std::string> suspicions;
 };
@@ -119,8 +119,8 @@ struct Results {
 /// First word of the value of "format", the first key.
 inline constexpr const char* kResultsFormat = "covary-experiment";
 nlohmann::ordered_json to_json(const Results& results);
-/// Long format: scene, method, budget, unit, seed, quantity, value, standard_error, low, high.
-std::string to_csv(const Results& results);
+/// Of to_json(), in long format: scene, method, budget, unit, seed, quantity, value, standard_error, low, high.
+std::string to_csv(const nlohmann::ordered_json& results);
 
 /// Processor, cores, memory, operating system.
 nlohmann::ordered_json machine_facts();
