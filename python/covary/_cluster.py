@@ -7,14 +7,18 @@ import hashlib
 import importlib.metadata
 import os
 import tempfile
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from . import _covary
 from ._arguments import Rule, checked, instance, path
 from ._render import Scene
 from .errors import IoError, UsageError
 
+T = TypeVar("T")
+
+_RETRIES = 5  # of a task that an error of the machine ended
 _CLUSTER = ("cluster = SLURMCluster(…); cluster.scale(100); client = Client(cluster). scale() itself returns None, and "
             "Client(None) starts workers on this machine, which Client(LocalCluster()) does where it is wanted")
 
@@ -97,6 +101,20 @@ def dask() -> Any:
     except ImportError as error:
         raise ImportError("covary.distributed needs Dask: pip install distributed") from error
     return distributed
+
+
+def results(client: Any, run: Callable[..., Any],
+            tasks: Iterable[tuple[T, tuple[Any, ...]]]) -> Iterator[tuple[T, Any]]:
+    """Tasks with what `run(*arguments)` returns on a worker, as they come. Those that are left are cancelled where one
+    fails or the caller goes on without them."""
+    futures = {client.submit(run, *arguments, pure=False, retries=_RETRIES): task for task, arguments in tasks}
+    try:
+        for future in dask().as_completed(futures, loop=client.loop):
+            yield futures[future], future.result()
+            future.release()
+    except BaseException:
+        client.cancel(list(futures))
+        raise
 
 
 def _versions() -> tuple[str, str]:

@@ -18,13 +18,11 @@ from typing import Any
 
 from . import _covary
 from ._arguments import checked, function, list_of, optional, path, text
-from ._cluster import CLIENT, SceneFiles, check_versions, dask, make_plugin
+from ._cluster import CLIENT, SceneFiles, check_versions, dask, make_plugin, results
 from ._combine import Progress
 from ._program import program, run_program
 from ._render import Scene
 from .errors import Error, UsageError
-
-_RETRIES = 5  # of a part that an error of the machine ended
 
 
 @dataclass(frozen=True)
@@ -121,20 +119,12 @@ def _make_runs(client: Any, pieces: Sequence[_Piece], cache: Path, program_hash:
                                        for key in json.loads(record.read_text()))
 
     left = [piece for piece in pieces if not is_done(piece)]
-    done = len(pieces) - len(left)
-    futures = {client.submit(_run, piece, pure=False, retries=_RETRIES): piece for piece in left}
-    try:
-        for future in dask().as_completed(futures, loop=client.loop):
-            runs = future.result()
-            _keep(runs, cache)
-            (records / futures[future].name(program_hash)).write_text(json.dumps(sorted(runs)))
-            future.release()
-            done += 1
-            if progress is not None:
-                progress(done, len(pieces))
-    except BaseException:
-        client.cancel(list(futures))
-        raise
+    found = results(client, _run, ((piece, (piece,)) for piece in left))
+    for done, (piece, runs) in enumerate(found, len(pieces) - len(left) + 1):
+        _keep(runs, cache)
+        (records / piece.name(program_hash)).write_text(json.dumps(sorted(runs)))
+        if progress is not None:
+            progress(done, len(pieces))
 
 
 @checked(client=CLIENT, suite=path, output=path, arguments=list_of(text, "a list of texts"),

@@ -11,12 +11,10 @@ from typing import Any
 
 from . import _covary
 from ._arguments import checked, function, list_of, optional, path, text, whole
-from ._cluster import CLIENT, check_versions, dask
+from ._cluster import CLIENT, check_versions, results
 from ._combine import Progress
 from ._program import program
 from .errors import Error, UsageError
-
-_RETRIES = 5  # of a frame that an error of the machine ended
 
 
 def _render_frame(words: tuple[str, ...], folder: str) -> tuple[int, str]:
@@ -73,21 +71,11 @@ def frames(client: Any, scene: str | os.PathLike[str], output: str | os.PathLike
     numbers = list(range(first, last + 1))
     if not numbers:
         raise UsageError(f"last: found {last}; accepted is {first}, the first frame, or more")
-    folder, tasks = os.getcwd(), _waves(os.fspath(output), options, waves, seed)
-    futures = {client.submit(_render_frame, _words(os.fspath(scene), name, frame, words), folder, pure=False,
-                             retries=_RETRIES): frame for frame in numbers for name, words in tasks}
-    done = 0
-    try:
-        for future in dask().as_completed(futures, loop=client.loop):
-            code, errors = future.result()
-            if code != 0:
-                raise (UsageError if code == 2 else Error)(
-                    f"frame {futures[future]}: {errors.strip().removeprefix('covary: ')}")
-            future.release()
-            done += 1
-            if progress is not None:
-                progress(done, len(futures))
-    except BaseException:
-        client.cancel(list(futures))
-        raise
-    return [_path(name, frame) for frame in numbers for name, _ in tasks]
+    folder, parts = os.getcwd(), _waves(os.fspath(output), options, waves, seed)
+    tasks = [(frame, (_words(os.fspath(scene), name, frame, words), folder)) for frame in numbers for name, words in parts]
+    for done, (frame, (code, errors)) in enumerate(results(client, _render_frame, tasks), 1):
+        if code != 0:
+            raise (UsageError if code == 2 else Error)(f"frame {frame}: {errors.strip().removeprefix('covary: ')}")
+        if progress is not None:
+            progress(done, len(tasks))
+    return [_path(name, frame) for frame in numbers for name, _ in parts]

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from . import _covary
 from ._arguments import array, check_some, checked, function, mapping_of, optional, path, real, text, whole
-from ._cluster import CLIENT, SceneFiles, check_versions, dask, make_plugin
+from ._cluster import CLIENT, SceneFiles, check_versions, dask, make_plugin, results
 from ._combine import Progress, check_options, combine, guides_of
 from ._experiment import experiment, main
 from ._frames import frames
@@ -44,7 +44,6 @@ _ESTIMATORS = ("iicv", "cv-baseline", "iduw", "none")
 _OF_ONE_PASS = ("denoise", "oidn")
 #: Keywords of covary.render() that say what passes take.
 _SETTINGS = ("filter", "sampling", "sampler", "groups", "split")
-_RETRIES = 5  # of a part that an error of the machine ended; dead workers are counted by Dask (allowed-failures)
 
 
 @dataclass(frozen=True)
@@ -269,7 +268,9 @@ def render(client: Any, scene: Scene | str | os.PathLike[str], spp: int, estimat
     if n_kept:
         show()
     try:
-        for part, rendered in _rendered(client, job, left):
+        for part, rendered in results(client, _render_part, ((part, (job, part)) for part in left)):
+            if isinstance(rendered, Error):
+                raise rendered
             if kept is not None:
                 kept.keep(part, rendered)
             canvas.add(part, rendered)
@@ -294,21 +295,6 @@ def _take_kept(kept: PartFolder | None, parts: list[Part], canvas: _Canvas) -> l
         else:
             canvas.add(part, rendered)
     return left
-
-
-def _rendered(client: Any, job: _Job, parts: list[Part]) -> Iterator[tuple[Part, Rendered]]:
-    """Parts as they come from the workers."""
-    futures = {client.submit(_render_part, job, part, pure=False, retries=_RETRIES): part for part in parts}
-    try:
-        for future in dask().as_completed(futures, loop=client.loop):
-            rendered = future.result()
-            if isinstance(rendered, Error):
-                raise rendered
-            yield futures[future], rendered
-            future.release()
-    except BaseException:
-        client.cancel(list(futures))
-        raise
 
 
 def _result(canvas: _Canvas, plan: _Plan, n_kept: int, seconds: float) -> ClusterResult:
