@@ -5,6 +5,7 @@
 
 #include "core/parallel.h"
 #include "filters/filter_input.h"
+#include "filters/window_sums.h"
 
 namespace covary {
 namespace {
@@ -54,28 +55,19 @@ struct Difference {
 /// `variance_of_h`: one plane, summed over RGB.
 Difference guided_difference(const Moments& g, const Moments& h, const Planes& variance_of_h, int x, int y,
                              vfloat squared_bandwidth) {
-  const vfloat factor = -kLog2E / max(squared_bandwidth, splat(1e-30f));
-  const vfloat g0 = load(g.mean.row(0, y) + x), g1 = load(g.mean.row(1, y) + x), g2 = load(g.mean.row(2, y) + x);
-  constexpr int kRadius = kMissingWindow / 2;
+  const vfloat centre[3] = {load(g.mean.row(0, y) + x), load(g.mean.row(1, y) + x), load(g.mean.row(2, y) + x)};
   vfloat m0 = {}, m1 = {}, m2 = {}, variance = {}, of_pixel = {}, weights = {};
-  for (int dy = -kRadius; dy <= kRadius; ++dy)
-    for (int dx = -kRadius; dx <= kRadius; ++dx) {
-      const auto at = [=](const Planes& planes, int c) { return load(planes.row(c, y + dy) + x + dx); };
-      const vfloat q0 = at(g.mean, 0), q1 = at(g.mean, 1), q2 = at(g.mean, 2);
-      vfloat distance = {};
-      distance += (q0 - g0) * (q0 - g0);
-      distance += (q1 - g1) * (q1 - g1);
-      distance += (q2 - g2) * (q2 - g2);
-      vfloat w = exp2_of_nonpositive(distance * factor);
-      if (h.relative_count) w *= at(*h.relative_count, 0);
-      weights += w;
-      m0 += w * (at(h.mean, 0) - q0);
-      m1 += w * (at(h.mean, 1) - q1);
-      m2 += w * (at(h.mean, 2) - q2);
-      const vfloat v = at(variance_of_h, 0);
-      variance += w * w * v;
-      of_pixel += w * v;
-    }
+  add_alike({g.mean, 0, kMissingWindow / 2}, x, y, centre, squared_bandwidth, [&](vfloat w, int qx, int qy) {
+    const auto at = [=](const Planes& planes, int c) { return load(planes.row(c, qy) + qx); };
+    if (h.relative_count) w *= at(*h.relative_count, 0);
+    weights += w;
+    m0 += w * (at(h.mean, 0) - at(g.mean, 0));
+    m1 += w * (at(h.mean, 1) - at(g.mean, 1));
+    m2 += w * (at(h.mean, 2) - at(g.mean, 2));
+    const vfloat v = at(variance_of_h, 0);
+    variance += w * w * v;
+    of_pixel += w * v;
+  });
   return {{m0 / weights, m1 / weights, m2 / weights}, variance / (weights * weights), of_pixel / weights};
 }
 

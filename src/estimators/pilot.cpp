@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "estimators/pilot.h"
 
+#include "filters/window_sums.h"
+
 namespace covary {
 namespace {
 
@@ -17,21 +19,19 @@ Rgb load_rgb(const Planes& p, int x, int y) {
 /// Cross-bilateral mean of `image` at (x + lane, y), weighted by `counts` unless null.
 template <bool kCounted>
 Rgb guided_mean(const Moments& g, const Planes& image, const Planes* counts, int radius, int x, int y) {
-  const Rgb centre = load_rgb(g.mean, x, y), variance = load_rgb(g.variance_of_mean, x, y);
-  const vfloat inverse_bandwidth = -kLog2E / max(variance.r + variance.g + variance.b, splat(1e-30f));
+  const Rgb variance = load_rgb(g.variance_of_mean, x, y), own = load_rgb(g.mean, x, y);
+  const vfloat centre[3] = {own.r, own.g, own.b};
   vfloat weights = {};
   Rgb sum = {};
-  for (int dy = -radius; dy <= radius; ++dy)
-    for (int dx = -radius; dx <= radius; ++dx) {
-      const Rgb q = load_rgb(g.mean, x + dx, y + dy), v = load_rgb(image, x + dx, y + dy);
-      const vfloat dr = q.r - centre.r, dg = q.g - centre.g, db = q.b - centre.b;
-      vfloat w = exp2_of_nonpositive((dr * dr + dg * dg + db * db) * inverse_bandwidth);  // w_j of [YM2025] Eq. (11)
-      if constexpr (kCounted) w *= load(counts->row(0, y + dy) + x + dx);
-      weights += w;
-      sum.r += w * v.r;
-      sum.g += w * v.g;
-      sum.b += w * v.b;
-    }
+  // w_j of [YM2025] Eq. (11)
+  add_alike({g.mean, 0, radius}, x, y, centre, variance.r + variance.g + variance.b, [&](vfloat w, int qx, int qy) {
+    const Rgb v = load_rgb(image, qx, qy);
+    if constexpr (kCounted) w *= load(counts->row(0, qy) + qx);
+    weights += w;
+    sum.r += w * v.r;
+    sum.g += w * v.g;
+    sum.b += w * v.b;
+  });
   const vfloat inverse = 1.0f / weights;  // the pixel itself has weight 1, or its count
   return {sum.r * inverse, sum.g * inverse, sum.b * inverse};
 }
@@ -50,28 +50,19 @@ void store_rgb(Planes& planes, int x, int y, int n, const Rgb& values) {
 
 }  // namespace
 
-Planes pilot_error(const Moments& g, const Moments& h, int window, bool smoothed, int border) {
+Planes pilot_error(const Moments& g, const Moments& h, int window, int border) {
   const int radius = window / 2, width = h.mean.width(), height = h.mean.height();
   const Planes* counts = h.relative_count ? &*h.relative_count : nullptr;
-  // Smoothing reads windows of the squares; outside the frame its weights are zero, and the values must be finite.
-  Planes squares(width, height, 3, smoothed ? radius : border, smoothed ? 0.0f : kUseless);
+  Planes squares(width, height, 3, border, kUseless);
   for_each_batch(width, height, [&](int x, int y, int n) {
     const Rgb pilot = counts ? guided_mean<true>(g, h.mean, counts, radius, x, y)
                              : guided_mean<false>(g, h.mean, nullptr, radius, x, y);
     const Rgb value = load_rgb(h.mean, x, y);
     const vfloat r = pilot.r - value.r, gg = pilot.g - value.g, b = pilot.b - value.b;
-    const vfloat count = counts && smoothed ? load(counts->row(0, y) + x) : splat(1.0f);
     // [YM2025] Eq. (11) but for its factor n, which belongs to the groups (control_variates.h).
-    store_rgb(squares, x, y, n, {r * r * count, gg * gg * count, b * b * count});
+    store_rgb(squares, x, y, n, {r * r, gg * gg, b * b});
   });
-  if (!smoothed) return squares;
-  Planes result(width, height, 3, border, kUseless);
-  for_each_batch(width, height, [&](int x, int y, int n) {
-    const Rgb mean = guided_mean<false>(g, squares, nullptr, radius, x, y);
-    const vfloat count = counts ? load(counts->row(0, y) + x) : splat(1.0f);
-    store_rgb(result, x, y, n, {mean.r / count, mean.g / count, mean.b / count});
-  });
-  return result;
+  return squares;
 }
 
 }  // namespace covary

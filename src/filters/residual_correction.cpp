@@ -5,6 +5,7 @@
 #include <array>
 
 #include "filters/guided_cells.h"
+#include "filters/window_sums.h"
 
 namespace covary {
 
@@ -51,49 +52,19 @@ struct GuidedMean {
   }
 };
 
-/// What guided_mean() sums up, and what of the target it reads.
-struct GuidedSums {
-  vfloat f[3], factor;
-  vfloat weights = {}, squares = {}, r0 = {}, r1 = {}, r2 = {};
-
-  /// Adds n cells, `side` columns apart; p: their planes.
-  template <int n>
-  void add(const float* const* p, ptrdiff_t dx, int side) {
-    vfloat w[n];
-#pragma GCC unroll 8
-    for (int i = 0; i < n; ++i) {
-      const vfloat d0 = load(p[kGuide] + dx + i * side) - f[0], d1 = load(p[kGuide + 1] + dx + i * side) - f[1],
-                   d2 = load(p[kGuide + 2] + dx + i * side) - f[2];
-      w[i] = (d0 * d0 + d1 * d1 + d2 * d2) * factor;
-    }
-#pragma GCC unroll 8
-    for (int i = 0; i < n; ++i) w[i] = exp2_of_nonpositive(w[i]);
-#pragma GCC unroll 8
-    for (int i = 0; i < n; ++i) {
-      const ptrdiff_t at = dx + i * side;
-      weights += w[i] * load(p[kWeight] + at);
-      squares += w[i] * w[i] * load(p[kVariance] + at);
-      r0 += w[i] * load(p[kResidual] + at);
-      r1 += w[i] * load(p[kResidual + 1] + at);
-      r2 += w[i] * load(p[kResidual + 2] + at);
-    }
-  }
-};
-
 /// r of residual_correction.h at the pixels (x + lane, y) with values f, over (2 radius + 1)^2 cells.
 template <int side>
 GuidedMean guided_mean(const Planes& cells, int radius, int x, int y, const vfloat* f, vfloat squared_bandwidth) {
-  constexpr int kAtOnce = 3;
-  GuidedSums sums{{f[0], f[1], f[2]}, -kLog2E / max(squared_bandwidth, splat(1e-30f))};
-  const int row = y / side, reach = radius * side;
-  for (int dy = -radius; dy <= radius; ++dy) {
-    const float* p[kPlanes];
-    for (int i = 0; i < kPlanes; ++i) p[i] = cells.row(i, row + dy) + x;
-    int dx = -reach;
-    for (; dx + (kAtOnce - 1) * side <= reach; dx += kAtOnce * side) sums.add<kAtOnce>(p, dx, side);
-    for (; dx <= reach; dx += side) sums.add<1>(p, dx, side);
-  }
-  return {sums.weights, {sums.r0, sums.r1, sums.r2}, sums.squares};
+  vfloat weights = {}, squares = {}, r0 = {}, r1 = {}, r2 = {};
+  add_alike<3>({cells, kGuide, radius, side}, x, y / side, f, squared_bandwidth, [&](vfloat w, int column, int row) {
+    const auto at = [&](int plane) { return load(cells.row(plane, row) + column); };
+    weights += w * at(kWeight);
+    squares += w * w * at(kVariance);
+    r0 += w * at(kResidual);
+    r1 += w * at(kResidual + 1);
+    r2 += w * at(kResidual + 2);
+  });
+  return {weights, {r0, r1, r2}, squares};
 }
 
 /// Adds to each valid pixel what `correction(x, y, f, variance)` gives, three vfloats for the pixels (x + lane, y)

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/parallel.h"
+#include "filters/window_sums.h"
 #include "risk/relative_weight.h"
 
 namespace covary {
@@ -90,24 +91,21 @@ GuidedMean guided_mean(const Planes& cells, int half, int radius, int x, int y) 
   vfloat g[3];
   for (int c = 0; c < 3; ++c) g[c] = load(cells.row(guide + c, y) + x);
   const vfloat grey = (g[0] + g[1] + g[2]) * (1.0f / 3);
-  const vfloat factor = -1.0f / (kBandwidth * kBandwidth * grey * grey + kLeastSquare);
   GuidedMean sums;
   vfloat weights = {}, squares = {}, counts = {}, relative[3] = {};
-  for (int dy = -radius; dy <= radius; ++dy)
-    for (int dx = -radius; dx <= radius; ++dx) {
-      const auto at = [&](int plane) { return load(cells.row(plane, y + dy) + x + dx); };
-      vfloat distance = {};
-      for (int c = 0; c < 3; ++c) distance += (at(guide + c) - g[c]) * (at(guide + c) - g[c]);
-      const vfloat weight = exp_of_nonpositive(distance * factor), count = at(kCount);
-      weights += weight * count;
-      squares += weight * weight * count * count;
-      counts += count;
-      for (int c = 0; c < 3; ++c) {
-        sums.mean[c] += weight * at(residual + c);
-        sums.variance[c] += weight * weight * at(kSquare + c);
-        relative[c] += at(kRelative + c);
-      }
+  const vfloat squared_bandwidth = kBandwidth * kBandwidth * grey * grey + kLeastSquare;
+  add_alike({cells, guide, radius}, x, y, g, squared_bandwidth, [&](vfloat weight, int column, int row) {
+    const auto at = [&](int plane) { return load(cells.row(plane, row) + column); };
+    const vfloat count = at(kCount);
+    weights += weight * count;
+    squares += weight * weight * count * count;
+    counts += count;
+    for (int c = 0; c < 3; ++c) {
+      sums.mean[c] += weight * at(residual + c);
+      sums.variance[c] += weight * weight * at(kSquare + c);
+      relative[c] += at(kRelative + c);
     }
+  });
   const vfloat inverse = 1.0f / max(weights, splat(1e-20f));
   const vfloat per_cell = squares * (grey * grey + 0.01f) / max(counts * kPixels, splat(1e-20f));
   sums.cells = weights * weights / max(squares, splat(1e-20f));

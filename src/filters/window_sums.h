@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// Cross-bilateral sums over the places of a window that look like its centre: pixels, or cells of them.
+#pragma once
+
+#include "filters/planes.h"
+
+namespace covary {
+
+/// Planes that tell which places are alike, and where to look.
+struct AlikeWindow {
+  const Planes& guide;
+  int first;     ///< plane of red; green and blue follow
+  int radius;    ///< in places; the planes' borders must hold the window
+  int step = 1;  ///< columns from one place to the next
+};
+
+/// Calls add(w, column, row) for the places around (x + lane, y), with their weights in the lanes,
+///     w = exp(-||guide - centre||^2 / bandwidth^2),   0 where the norm is large or a NaN.
+/// Weights of `kAtOnce` places are computed side by side, which hides how long an exponential takes.
+template <int kAtOnce = 1, typename Add>
+[[gnu::always_inline]] inline void add_alike(const AlikeWindow& window, int x, int y, const lanes::vfloat* centre,
+                                             lanes::vfloat squared_bandwidth, const Add& add) {
+  using namespace lanes;
+  const vfloat c0 = centre[0], c1 = centre[1], c2 = centre[2];
+  const vfloat factor = -kLog2E / max(squared_bandwidth, splat(1e-30f));
+  const int reach = window.radius * window.step;
+  for (int row = y - window.radius; row <= y + window.radius; ++row) {
+    const float* p[3];
+    for (int c = 0; c < 3; ++c) p[c] = window.guide.row(window.first + c, row) + x;
+    const auto exponent = [&](int dx) {
+      const vfloat d0 = load(p[0] + dx) - c0, d1 = load(p[1] + dx) - c1, d2 = load(p[2] + dx) - c2;
+      return (d0 * d0 + d1 * d1 + d2 * d2) * factor;
+    };
+    int dx = -reach;
+    for (; dx + (kAtOnce - 1) * window.step <= reach; dx += kAtOnce * window.step) {
+      vfloat w[kAtOnce];
+#pragma GCC unroll 8
+      for (int i = 0; i < kAtOnce; ++i) w[i] = exponent(dx + i * window.step);
+#pragma GCC unroll 8
+      for (int i = 0; i < kAtOnce; ++i) w[i] = exp2_of_nonpositive(w[i]);
+#pragma GCC unroll 8
+      for (int i = 0; i < kAtOnce; ++i) add(w[i], x + dx + i * window.step, row);
+    }
+    for (; dx <= reach; dx += window.step) add(exp2_of_nonpositive(exponent(dx)), x + dx, row);
+  }
+}
+
+}  // namespace covary
