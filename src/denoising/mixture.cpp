@@ -8,6 +8,7 @@
 #include "core/parallel.h"
 #include "filters/filter_input.h"
 #include "filters/guided_cells.h"
+#include "filters/mixture_weights.h"
 #include "risk/relative_weight.h"
 
 namespace covary {
@@ -15,16 +16,8 @@ namespace {
 
 using namespace lanes;
 
-/// Ridge of the normal equations, relative to their mean diagonal: candidates that are alike share a weight.
-constexpr float kRidge = 1e-3f;
-/// Sweeps over all pairs of candidates; more change weights by less than 0.01 (mixture_test).
-constexpr int kSweeps = 24;
-
-/// Planes of normal equations: the upper triangle of the matrix row by row, the right-hand side, and the variance of
-/// the halves' U_p, summed over p.
-constexpr int n_planes(int m) { return m * (m + 1) / 2 + m + 1; }
-/// Sums of normal equations in every lane.
-using Sums = std::array<vfloat, n_planes(kMostCandidates)>;
+/// Sums of normal equations in every lane; v is the variance of the halves' U_p, summed over p.
+using Sums = std::array<vfloat, n_normal_sums(kMostCandidates)>;
 using Weights = std::array<float, kMostCandidates>;
 
 /// Adds the normal equations of one pixel to `sums`, in 1 / (squared radiance).
@@ -60,46 +53,6 @@ void add_pixel(const MixtureInput& in, int m, int x, int y, float* sums) {
     for (int c = 0; c < 3; ++c) sums[plane] += variance * sqr(u[0][p][c] - u[1][p][c]);
 }
 
-/// Minimises x'Ax/2 - b'x + strength v ||x - prior||^2 / 2 over x >= 0, sum x <= 1, in every lane, by exact steps along
-/// the edges between two candidates; v: mean variance of the U_p. The base image, number m, has zero rows.
-void solve(int m, const Sums& sums, const Weights& prior, float strength, std::array<vfloat, kMostCandidates + 1>& x) {
-  std::array<std::array<vfloat, kMostCandidates>, kMostCandidates> a;
-  std::array<vfloat, kMostCandidates> b;
-  int plane = 0;
-  for (int p = 0; p < m; ++p)
-    for (int q = p; q < m; ++q, ++plane) a[p][q] = a[q][p] = sums[plane];
-  for (int p = 0; p < m; ++p, ++plane) b[p] = sums[plane];
-  vfloat ridge = {};
-  for (int p = 0; p < m; ++p) ridge += max(a[p][p], vfloat{});
-  ridge = (ridge * kRidge + sums[plane] * strength) / static_cast<float>(m) + 1e-30f;
-  for (int p = 0; p < m; ++p) {
-    a[p][p] += ridge;
-    b[p] += ridge * prior[p];
-  }
-  std::array<vfloat, kMostCandidates + 1> gradient;
-  for (int p = 0; p < m; ++p) {
-    x[p] = splat(1.0f / static_cast<float>(m + 1));
-    gradient[p] = -b[p];
-    for (int q = 0; q < m; ++q) gradient[p] += a[p][q] * (1.0f / static_cast<float>(m + 1));
-  }
-  x[m] = splat(1.0f / static_cast<float>(m + 1));
-  gradient[m] = vfloat{};
-  const auto element = [&](int p, int q) { return p < m && q < m ? a[p][q] : vfloat{}; };
-  for (int sweep = 0; sweep < kSweeps; ++sweep)
-    for (int p = 0; p < m; ++p)
-      for (int q = p + 1; q <= m; ++q) {
-        // Moves `step` of weight from q to p. Along an edge that is not convex, to its better end.
-        const vfloat curvature = element(p, p) + element(q, q) - 2 * element(p, q);
-        const vfloat slope = gradient[q] - gradient[p];
-        const vfloat wanted =
-            curvature > ridge ? slope / max(curvature, ridge) : (slope > 0.0f ? splat(1.0f) : splat(-1.0f));
-        const vfloat step = min(max(wanted, -x[p]), x[q]);
-        x[p] += step;
-        x[q] -= step;
-        for (int i = 0; i < m; ++i) gradient[i] += step * (element(i, p) - element(i, q));
-      }
-}
-
 /// The weights that are best for the whole image, if all pixels have the same.
 Weights weights_everywhere(const MixtureInput& in, int m) {
   const int width = in.guide->width, height = in.guide->height;
@@ -109,7 +62,7 @@ Weights weights_everywhere(const MixtureInput& in, int m) {
       if ((*in.valid)[static_cast<size_t>(y) * width + x]) add_pixel(in, m, x, y, rows[static_cast<size_t>(y)].data());
   });
   Sums sums{};
-  for (int i = 0; i < n_planes(m); ++i) {
+  for (int i = 0; i < n_normal_sums(m); ++i) {
     double sum = 0;
     for (const auto& row : rows) sum += row[i];
     sums[i] = splat(static_cast<float>(sum));
@@ -117,7 +70,7 @@ Weights weights_everywhere(const MixtureInput& in, int m) {
   std::array<vfloat, kMostCandidates + 1> x;
   Weights usual{};
   std::copy(in.usual.begin(), in.usual.end(), usual.begin());
-  solve(m, sums, usual, in.usual_count, x);
+  solve_mixture(m, sums.data(), usual.data(), in.usual_count, x.data());
   Weights weights{};
   for (int p = 0; p < m; ++p) weights[p] = x[p][0];
   return weights;
@@ -179,7 +132,7 @@ Mixture mix(const MixtureInput& input) {
   const int width = input.guide->width, height = input.guide->height;
   COVARY_CHECK(m >= 1 && m <= kMostCandidates, "between one and kMostCandidates candidates");
   COVARY_CHECK(input.usual_count == 0 || std::ssize(input.usual) == m, "a usual weight for each candidate");
-  const GuidedCells cells(*input.guide, *input.valid, n_planes(m),
+  const GuidedCells cells(*input.guide, *input.valid, n_normal_sums(m),
                           [&](int x, int y, float* sums) { add_pixel(input, m, x, y, sums); });
   Mixture mixture;
   mixture.weights.assign(m, Image(width, height, 1));
@@ -188,7 +141,7 @@ Mixture mix(const MixtureInput& input) {
     Sums sums;
     cells.sum(x, y, sums.data());
     std::array<vfloat, kMostCandidates + 1> weights;
-    solve(m, sums, everywhere, input.prior, weights);
+    solve_mixture(m, sums.data(), everywhere.data(), input.prior, weights.data());
     for (int p = 0; p < m; ++p)
       for (int l = 0; l < n; ++l) mixture.weights[p].pixel(x + l, y)[0] = weights[p][l];
   });

@@ -28,6 +28,7 @@
 #include <array>
 #include <vector>
 
+#include "filters/mixture_weights.h"
 #include "filters/planes.h"
 
 namespace covary {
@@ -64,9 +65,6 @@ struct Mixture {
 /// as less than 1/30 of their mean, so that one that is the image does not hide what others tell. One channel.
 Image disagreement(const CandidateSet& set, const Image& guide, const Image& image,
                    const std::vector<unsigned char>& valid);
-
-/// At most this many candidates.
-inline constexpr int kMostCandidates = 8;
 
 /// Bit-identical for any number of threads.
 Mixture mix(const MixtureInput& input);

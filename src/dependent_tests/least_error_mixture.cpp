@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 
 #include "core/error.h"
+#include "filters/mixture_weights.h"
 
 namespace covary {
 namespace {
@@ -14,7 +14,6 @@ using namespace lanes;
 
 constexpr int kBrightnessWindow = 7;  // side of the means of the weights' brightness
 constexpr float kOffset = 0.01f;      // of squared brightness, as in relMSE
-constexpr double kRidge = 1e-3;       // of the mean diagonal of A
 constexpr int kBlock = 32;            // rows that are worked on together
 
 /// 1 / (brightness^2 + 0.01) of each pixel, 0 where it is left out.
@@ -36,7 +35,7 @@ Planes error_weights(const FilterInput& input, std::vector<unsigned char> used) 
   return weights;
 }
 
-/// The sums of A and b: the triangle of A row by row, then b.
+/// The sums of n_normal_sums().
 class Mixer {
  public:
   Mixer(const FilterInput& input, const Planes& noise, const Planes& weights,
@@ -47,7 +46,7 @@ class Mixer {
         candidates_(candidates),
         radius_(window / 2),
         n_(static_cast<int>(candidates.size())),
-        n_sums_(n_ * (n_ + 1) / 2 + n_) {}
+        n_sums_(n_normal_sums(n_)) {}
 
   void mix_rows(int first, int last, Image& result) const {
     const int top = std::max(0, first - radius_), bottom = std::min(input_.height(), last + radius_);
@@ -72,7 +71,7 @@ class Mixer {
         difference[j][c] = candidates_[j].colour->pixel(x, y)[c] - input_.independent.row(c, y)[x];
     int i = 0;
     for (int j = 0; j < n_; ++j)
-      for (int k = 0; k <= j; ++k) {
+      for (int k = j; k < n_; ++k) {
         float product = 0;
         for (int c = 0; c < 3; ++c) product += difference[j][c] * difference[k][c];
         terms.row(i++, row)[x] = weight * product;
@@ -94,56 +93,25 @@ class Mixer {
   }
 
   void mix_row(int y, const Planes& columns, Image& result) const {
-    vfloat sums[kMixtureCandidates * (kMixtureCandidates + 3) / 2];
+    std::array<vfloat, n_normal_sums(kMixtureCandidates)> sums;
+    std::array<vfloat, kMixtureCandidates + 1> weights;
     for (int x = 0; x < input_.width(); x += kLanes) {
       for (int i = 0; i < n_sums_; ++i) {
         sums[i] = vfloat{};
         for (int dx = -radius_; dx <= radius_; ++dx) sums[i] += load(columns.row(i, 0) + x + dx);
       }
-      for (int l = 0; l < std::min(kLanes, input_.width() - x); ++l) {
-        std::array<double, kMixtureCandidates*(kMixtureCandidates + 3) / 2> of_pixel{};
-        for (int i = 0; i < n_sums_; ++i) of_pixel[i] = sums[i][l];
-        write(x + l, y, of_pixel.data(), result);
-      }
+      solve_mixture(n_, sums.data(), nullptr, 0, weights.data());
+      for (int l = 0; l < std::min(kLanes, input_.width() - x); ++l) write(x + l, y, weights.data(), l, result);
     }
   }
 
-  /// Solves A a = b by Cholesky's decomposition.
-  std::array<double, kMixtureCandidates> coefficients(const double* sums) const {
-    double factor[kMixtureCandidates][kMixtureCandidates], trace = 0;
-    for (int j = 0; j < n_; ++j) trace += sums[j * (j + 3) / 2];
-    std::array<double, kMixtureCandidates> a{};
-    if (!(trace > 0) || !std::isfinite(trace)) return a;
-    const double* b = sums + n_ * (n_ + 1) / 2;
-    for (int j = 0; j < n_; ++j)
-      for (int k = 0; k <= j; ++k) {
-        double value = sums[j * (j + 1) / 2 + k] + (j == k ? kRidge * trace / n_ : 0);
-        for (int i = 0; i < k; ++i) value -= factor[j][i] * factor[k][i];
-        factor[j][k] = j == k ? std::sqrt(std::max(value, 1e-12 * trace)) : value / factor[k][k];
-      }
-    for (int j = 0; j < n_; ++j) {
-      a[j] = b[j];
-      for (int i = 0; i < j; ++i) a[j] -= factor[j][i] * a[i];
-      a[j] /= factor[j][j];
-    }
-    for (int j = n_ - 1; j >= 0; --j) {
-      for (int i = j + 1; i < n_; ++i) a[j] -= factor[i][j] * a[i];
-      a[j] /= factor[j][j];
-    }
-    for (double& value : a) value = value > 0 ? std::min(value, 1.0) : 0.0;
-    return a;
-  }
-
-  void write(int x, int y, const double* sums, Image& result) const {
+  void write(int x, int y, const vfloat* weights, int lane, Image& result) const {
     float* out = result.pixel(x, y);
-    for (int c = 0; c < 3; ++c) out[c] = input_.independent.row(c, y)[x];
-    if (weights_.row(0, y)[x] == 0) return;
-    const std::array<double, kMixtureCandidates> a = coefficients(sums);
     for (int c = 0; c < 3; ++c) {
-      const double own = out[c];
-      double value = own;
-      for (int j = 0; j < n_; ++j) value += a[j] * (candidates_[j].colour->pixel(x, y)[c] - own);
-      out[c] = static_cast<float>(value);
+      const float own = input_.independent.row(c, y)[x];
+      out[c] = own;
+      for (int j = 0; weights_.row(0, y)[x] > 0 && j < n_; ++j)
+        out[c] += weights[j][lane] * (candidates_[j].colour->pixel(x, y)[c] - own);
     }
   }
 

@@ -10,8 +10,8 @@
 //     sum_jk a_j a_k <X_j - C_i, X_k - C_i> - 2 sum_j a_j v (1 - o_j),        v = sum over channels of var C_i,
 //
 // without bias and whatever the errors of X_j are: noise, distortion, or errors common to whole regions. It is summed
-// over a window around each pixel, with the weights of relMSE, and made least: A a = b. As v goes to 0, so do the a_j
-// of images that keep an error.
+// over a window around each pixel, with the weights of relMSE, and made least over a >= 0, sum a <= 1. As v goes to 0,
+// so do the a_j of images that keep an error.
 #pragma once
 
 #include <span>

@@ -9,7 +9,7 @@
 
 #include "estimators/test_images.h"
 
-namespace covary {
+namespace covary::least_error_mixture_test {
 namespace {
 
 constexpr int kWidth = 60, kHeight = 50;
@@ -54,6 +54,27 @@ double mean_square_error(const Image& image) {
   return sum / static_cast<double>(image.data.size());
 }
 
+/// The x of least x'Ax / 2 - b'x over x >= 0, sum x <= 1, among the solutions for all sets of weights that are not
+/// zero, where their sum is free and where it is 1.
+Eigen::Vector3d least_over_simplex(const Eigen::Matrix3d& A, const Eigen::Vector3d& b) {
+  Eigen::Vector3d best = Eigen::Vector3d::Zero();
+  for (int set = 1; set < 16; ++set) {
+    Eigen::Matrix4d system = Eigen::Matrix4d::Identity();  // the last row: the multiplier of the sum
+    Eigen::Vector4d right = Eigen::Vector4d::Zero();
+    for (int j = 0; j < 3; ++j) {
+      if (!(set >> j & 1)) continue;
+      for (int k = 0; k < 3; ++k) system(j, k) = set >> k & 1 ? A(j, k) : 0;
+      right[j] = b[j];
+      if (set & 8) system(j, 3) = system(3, j) = 1;
+    }
+    if (set & 8) system(3, 3) = 0, right[3] = 1;
+    const Eigen::Vector3d x = system.fullPivLu().solve(right).head<3>();
+    const auto value = [&](const Eigen::Vector3d& at) { return 0.5 * at.dot(A * at) - b.dot(at); };
+    if (x.minCoeff() > -1e-9 && x.sum() < 1 + 1e-9 && value(x) < value(best)) best = x;
+  }
+  return best;
+}
+
 TEST(LeastErrorMixture, EqualsTheSolutionWrittenOut) {
   Scene scene(0.3);
   const Image a = noisy(2, 0.9, 0.3), b = noisy(3, 1.1, 0.2), c = noisy(4, 1, 0.4);
@@ -88,11 +109,10 @@ TEST(LeastErrorMixture, EqualsTheSolutionWrittenOut) {
         }
       }
     A += 1e-3 * A.trace() / 3 * Eigen::Matrix3d::Identity();
-    const Eigen::Vector3d solution = A.inverse() * right;
+    const Eigen::Vector3d solution = least_over_simplex(A, right);
     for (int i = 0; i < 3; ++i) {
       double expected = h(px, py, i);
-      for (int j = 0; j < 3; ++j)
-        expected += std::clamp(solution[j], 0.0, 1.0) * (candidates[j].colour->pixel(px, py)[i] - h(px, py, i));
+      for (int j = 0; j < 3; ++j) expected += solution[j] * (candidates[j].colour->pixel(px, py)[i] - h(px, py, i));
       EXPECT_NEAR(result.pixel(px, py)[i], expected, 1e-4) << px << " " << py;
     }
   }
@@ -146,4 +166,4 @@ TEST(LeastErrorMixture, WithoutNoiseOrDifferenceItIsTheImageItself) {
 }
 
 }  // namespace
-}  // namespace covary
+}  // namespace covary::least_error_mixture_test
