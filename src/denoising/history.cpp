@@ -77,8 +77,9 @@ constexpr float kMostOfSamples = 0.9f;
 /// Y with the most of R.
 Image with_samples(const Image& own, const Image& before, const Image& trust) {
   Image result = own;
-  for (size_t i = 0; i < result.data.size(); ++i)
+  parallel_for(result.data.size(), 4096, [&](size_t i) {
     result.data[i] += kMostOfSamples * trust.data[i / 3] * (before.data[i] - own.data[i]);
+  });
   return result;
 }
 
@@ -108,8 +109,9 @@ void add_samples(const History& history, const HistoryInput& input, Image& mean,
   check_size(before, mean);
   for (size_t i = 0; i < before.data.size(); ++i) before.data[i] = 0.5f * (before.data[i] + history.samples[1].data[i]);
   Image trust(mean.width, mean.height, 1);
-  for (int y = 0; y < mean.height; ++y)
+  parallel_for(mean.height, 8, [&](int y) {
     for (int x = 0; x < mean.width; ++x) *trust.pixel(x, y) = trust_at(history, *input.std_error, 1, x, y);
+  });
   for (const int half : {0, 1}) sets[half] = {halves[half], {with_samples(halves[half], history.samples[half], trust)}};
   Mixture mixture = mixture_of(input, {mean, {with_samples(mean, before, trust)}}, sets);
   mean = std::move(mixture.image);
