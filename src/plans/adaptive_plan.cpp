@@ -13,6 +13,7 @@
 #include "estimators/mean.h"
 #include "plans/budget.h"
 #include "plans/denoised_passes.h"
+#include "plans/estimator_plans.h"
 #include "plans/render.h"
 #include "risk/image_risk.h"
 
@@ -145,7 +146,6 @@ void set_estimate(const Estimator& estimator, Plan& plan) {
     plan.estimate = mean_of_last;
     return;
   }
-  plan.estimate_memory = estimator.memory;
   if (estimator.passes == EstimatorPasses::kPair) {
     plan.estimate = [apply, std_error = estimator.predicts_error](std::span<const Pass> passes, int first_row,
                                                                   int n_rows, const Beside&) {
@@ -155,8 +155,6 @@ void set_estimate(const Estimator& estimator, Plan& plan) {
     };
     return;
   }
-  plan.network = estimator.network;
-  plan.reads_guides = true;
   plan.estimate_memory.of_halves_per_group = 3 * sizeof(float);  // the film of both
   plan.estimate = [apply](std::span<const Pass> passes, int first_row, int n_rows, const Beside& beside) {
     const Film film = joined(passes[0].film, passes[1].film);
@@ -175,11 +173,7 @@ Plan adaptive_plan(const Estimator& estimator, std::optional<int> groups) {
   check_allocation(estimator.adaptive->counts, is_denoised);
   const Method method{*estimator.adaptive, estimator.name, groups, estimator.fewest_groups,
                       is_denoised ? DenoisedMean(estimator.apply) : DenoisedMean()};
-  Plan plan;
-  plan.name = estimator.name;
-  plan.estimator = estimator.text;
-  plan.predicts_error = estimator.predicts_error;
-  plan.reliable_samples = estimator.reliable_samples;
+  Plan plan = plan_of(estimator);
   plan.takes_unfinished = is_denoised || (is_pair && !method.sampling.reads_groups);
   plan.groups_follow_speed = is_denoised && !groups;
   plan.has_crn_pass = is_pair;

@@ -49,13 +49,27 @@ void set_only_target(const PlanState& state, std::span<Pass> passes) {
 }
 
 /// The same for all methods that need no more, so that they can share films: at least four groups.
-Shares shares_of(const PairMethod& method) {
+Shares shares_of(const Estimator& estimator, const PassChoice& choice) {
   constexpr int kEnough = 4;
-  const int fewest = method.groups.value_or(std::max(kEnough, method.fewest_groups));
-  return {{method.split.begin(), method.split.end()}, static_cast<uint32_t>(fewest)};
+  const int fewest = choice.groups.value_or(std::max(kEnough, estimator.fewest_groups));
+  const std::array<double, 2> split = choice.split.value_or(estimator.split);
+  return {{split.begin(), split.end()}, static_cast<uint32_t>(fewest)};
 }
 
 }  // namespace
+
+Plan plan_of(const Estimator& estimator) {
+  Plan plan;
+  plan.name = estimator.name;
+  plan.estimator = estimator.text;
+  plan.network = estimator.network;
+  plan.predicts_error = estimator.predicts_error;
+  plan.reliable_samples = estimator.reliable_samples;
+  plan.estimate_memory = estimator.memory;
+  plan.reads_guides = estimator.reads_guides;
+  plan.splits_layers = estimator.splits_layers;
+  return plan;
+}
 
 Plan plain_plan(Sampling sampling, std::optional<int> groups) {
   Plan plan;
@@ -82,15 +96,9 @@ Plan plain_plan(Sampling sampling, std::optional<int> groups) {
 }
 
 Plan independent_plan(const Estimator& estimator, std::optional<int> groups) {
-  Plan plan = plain_plan(Sampling::kIndependent, groups);
-  plan.name = estimator.name;
-  plan.estimator = estimator.text;
-  plan.network = estimator.network;
-  plan.film_is_image = plan.takes_training = false;
+  Plan plan = plan_of(estimator);
+  plan.predicts_error = true;
   plan.groups_follow_speed = !groups;
-  plan.estimate_memory = estimator.memory;
-  plan.reads_guides = estimator.reads_guides;
-  plan.splits_layers = estimator.splits_layers;
   plan.estimate = [apply = estimator.apply](std::span<const Pass> passes, int first_row, int n_rows,
                                             const Beside& beside) {
     PairSettings settings;
@@ -99,20 +107,21 @@ Plan independent_plan(const Estimator& estimator, std::optional<int> groups) {
     settings.layers = beside.layers;
     return apply({}, rows_of(passes[0].film, first_row, n_rows), settings);
   };
-  plan.phases[0].passes = [groups](const PlanState& state) {
+  Phase phase;
+  phase.passes = [groups](const PlanState& state) {
     PassPlan pass;
     pass.name = "independent";
     pass.groups = groups.value_or(number_of_groups(whole_budget(1), state));
     pass.fewest_groups = groups ? 0 : 1;
     return std::vector{pass};
   };
+  phase.set_targets = set_only_target;
+  plan.phases = {phase};
   return plan;
 }
 
 Plan samples_plan(const Estimator& estimator) {
-  Plan plan;
-  plan.name = estimator.name;
-  plan.estimator = estimator.text;
+  Plan plan = plan_of(estimator);
   plan.film_is_image = plan.fixed_samples = true;
   plan.estimate = mean_of_first;
   Phase phase;
@@ -131,43 +140,31 @@ Plan samples_plan(const Estimator& estimator) {
   return plan;
 }
 
-Plan pair_plan(const PairMethod& method) {
-  Plan plan;
-  plan.name = method.name;
-  plan.estimator = method.estimator;
-  plan.network = method.network;
+Plan pair_plan(const Estimator& estimator, const PassChoice& choice) {
+  Plan plan = plan_of(estimator);
   plan.has_crn_pass = true;
-  plan.predicts_error = method.predicts_error;
-  plan.reliable_samples = method.reliable_samples;
-  plan.groups_follow_speed = !method.groups;
-  plan.estimate_memory = method.memory;
-  plan.reads_guides = method.reads_guides;
-  plan.estimate = [estimate = method.estimate](std::span<const Pass> passes, int first_row, int n_rows,
-                                               const Beside& beside) {
-    PairSettings settings;
-    settings.crn_samples = static_cast<int64_t>(std::llround(passes[0].film.mean_count()));
-    settings.guides = beside.guides;
-    return estimate(rows_of(passes[0].film, first_row, n_rows), rows_of(passes[1].film, first_row, n_rows), settings);
+  plan.groups_follow_speed = !choice.groups;
+  plan.estimate = [apply = estimator.apply, std_error = estimator.predicts_error](
+                      std::span<const Pass> passes, int first_row, int n_rows, const Beside& beside) {
+    const PairSettings settings{std::llround(passes[0].film.mean_count()), std_error, true, beside.guides, {}};
+    return apply(rows_of(passes[0].film, first_row, n_rows), rows_of(passes[1].film, first_row, n_rows), settings);
   };
+  const Shares shares = shares_of(estimator, choice);
   Phase phase;
-  phase.passes = [method](const PlanState& state) {
-    const int groups = method.groups.value_or(number_of_groups(shares_of(method), state));
-    if (groups < method.fewest_groups)
+  phase.passes = [=, name = estimator.name, fewest = estimator.fewest_groups,
+                  chosen = choice.groups](const PlanState& state) {
+    const int groups = chosen.value_or(number_of_groups(shares, state));
+    if (groups < fewest)
       throw Error(ErrorCode::kUsage, fmt::format("{} groups are too few: {} needs at least {} groups to measure how "
                                                  "pixels vary together",
-                                                 groups, method.name, method.fewest_groups));
+                                                 groups, name, fewest));
     std::vector<PassPlan> passes(2);
     passes[0].name = "crn", passes[0].sampling = Sampling::kCrn;
     passes[1].name = "independent";
-    for (PassPlan& pass : passes) {
-      pass.groups = groups;
-      pass.fewest_groups = method.groups ? 0 : method.fewest_groups;
-    }
+    for (PassPlan& pass : passes) pass.groups = groups, pass.fewest_groups = chosen ? 0 : fewest;
     return passes;
   };
-  phase.set_targets = [shares = shares_of(method)](const PlanState& state, std::span<Pass> passes) {
-    set_budget(shares, state, passes);
-  };
+  phase.set_targets = [shares](const PlanState& state, std::span<Pass> passes) { set_budget(shares, state, passes); };
   plan.phases = {phase};
   return plan;
 }
@@ -177,23 +174,7 @@ Plan estimator_plan(const Estimator& estimator, const PassChoice& choice) {
   if (estimator.passes == EstimatorPasses::kAny) return plain_plan(choice.sampling, choice.groups);
   if (estimator.passes == EstimatorPasses::kIndependent) return independent_plan(estimator, choice.groups);
   if (estimator.passes == EstimatorPasses::kSamples) return samples_plan(estimator);
-  PairMethod method;
-  method.name = estimator.name;
-  method.estimator = estimator.text;
-  method.network = estimator.network;
-  method.split = choice.split.value_or(estimator.split);
-  method.groups = choice.groups;
-  method.fewest_groups = estimator.fewest_groups;
-  method.predicts_error = estimator.predicts_error;
-  method.reliable_samples = estimator.reliable_samples;
-  method.memory = estimator.memory;
-  method.reads_guides = estimator.reads_guides;
-  method.estimate = [apply = estimator.apply, std_error = estimator.predicts_error](
-                        const GroupedImage& crn, const GroupedImage& independent, PairSettings settings) {
-    settings.std_error = std_error;
-    return apply(crn, independent, settings);
-  };
-  return pair_plan(method);
+  return pair_plan(estimator, choice);
 }
 
 }  // namespace covary

@@ -29,9 +29,10 @@ inline RenderRequest request_of(uint32_t spp) {
 
 /// CRN and independent pass; the image is the average of the first groups of both.
 inline Plan average_plan() {
-  PairMethod method;
-  method.name = method.estimator = "average";
-  method.estimate = [](const GroupedImage& crn, const GroupedImage& independent, const PairSettings&) {
+  Estimator method;
+  method.name = method.text = "average";
+  method.fewest_groups = 3;
+  method.apply = [](const GroupedImage& crn, const GroupedImage& independent, const PairSettings&) {
     EstimatorResult result;
     result.estimate = Image(crn.width, crn.height, 3);
     for (int y = 0; y < crn.height; ++y)
