@@ -11,7 +11,6 @@
 #include "commands.h"
 #include "core/error.h"
 #include "declared_options.h"
-#include "defines.h"
 #include "numbers.h"
 #include "passes/light_pass.h"
 #include "plans/integrator_choice.h"
@@ -138,10 +137,6 @@ void add_output_options(CLI::App& command, RenderOptions& o) {
   command.add_option("--display-server", o.display_server, "A running tev, which shows the image while it renders")
       ->type_name(kServerValue);
   add_stages_option(command, o.stages);
-  command
-      .add_option("--debug-strategies", o.debug_strategies,
-                  "New folder for images of each technique (s, t) of bidirectional path tracing, rendered beside")
-      ->type_name(kFolderValue);
   command.add_option("--replay", o.replay, "Print one sample of each film instead of rendering")
       ->type_name("X,Y,SAMPLE[,PASS]");
   command.add_option("--replay-light", o.replay_light, "Print what one light path adds to the image")

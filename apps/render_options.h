@@ -14,7 +14,7 @@
 namespace covary {
 
 struct RenderOptions {
-  std::string scene, json, stages, replay, display_server, debug_strategies;
+  std::string scene, json, stages, replay, display_server;
   OptionValues values, of_integrator, of_estimator, of_sequence;  ///< as given
   RenderSettings settings;                                        ///< what `values` say, by check_options()
   SequenceSettings sequence;                                      ///< the same of `of_sequence`

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render_sequence.h"
+#include "render_steps.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -22,7 +22,6 @@
 #include "plans/budget.h"
 #include "plans/camera_path.h"
 #include "plans/pass_files.h"
-#include "render_steps.h"
 #include "sequences/reprojection.h"
 
 namespace covary {
@@ -33,9 +32,8 @@ namespace fs = std::filesystem;
 void check(const RenderOptions& options) {
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
   const RenderRequest& request = options.request();
-  for (const auto& [name, given] : {std::pair{"--save-stages", !options.stages.empty()},
-                                    {"--debug-strategies", !options.debug_strategies.empty()},
-                                    {"--save-training", !request.save_training.empty()}})
+  for (const auto& [name, given] :
+       {std::pair{"--save-stages", !options.stages.empty()}, {"--save-training", !request.save_training.empty()}})
     if (given) usage(fmt::format("{} is an option of single images, not of --frames", name));
   const DenoisingChoice& denoising = options.settings.denoising;
   if (options.sequence.history && (!denoising.denoises() || request.splits_layers()))

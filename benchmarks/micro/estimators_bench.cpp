@@ -53,7 +53,7 @@ struct Input {
       independent{kWidth, kHeight, kGroups, independent_data.data()};
   std::vector<unsigned char> valid = std::vector<unsigned char>(static_cast<size_t>(kWidth) * kHeight, 1);
   Moments g = moments(crn, valid, kBorder, kFar), h = moments(independent, valid, kBorder, 0.0f);
-  Planes error = pilot_error(g, h, 11, false, kBorder);
+  Planes error = pilot_error(g, h, 11, kBorder);
 };
 
 const Input& input() {
@@ -80,7 +80,7 @@ void one_moments(benchmark::State& state) {
 void one_pilot(benchmark::State& state) {
   const Input& in = input();
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
-  for (auto _ : state) benchmark::DoNotOptimize(pilot_error(in.g, in.h, 11, false, kBorder));
+  for (auto _ : state) benchmark::DoNotOptimize(pilot_error(in.g, in.h, 11, kBorder));
   count(state);
   count_work(state, "flops", 121 * 36);
 }

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """dependent_tests.py COVARY KITCHEN.xml FOLDER: the pictures and tables of docs/notes/dependent-tests.md, after the
-figures of Csonka et al. 2002, and the pyramids of docs/methods/bdpt.md. Needs `pip install pillow`.
+figures of Csonka et al. 2002. Needs `pip install pillow`.
 
 Bidirectional path tracing without light tracing, seed 1; errors against two references by path tracing, seeds 900000001
 and 900000002. KITCHEN: scene_v3.xml of Country Kitchen by Jay-Artist, CC BY 3.0, from Benedikt Bitterli, Rendering
-resources; beside its folder veach-bidir and veach-ajar from there."""
+resources."""
 import json
 import pathlib
 import subprocess
@@ -121,8 +121,6 @@ def figure4(kitchen, folder):
             if (side, drop) in ((3, "0.1"), (4, "0.01")):
                 kitchen.run("convert", kitchen.at / f"{name}.exr", kitchen.at / f"{name}.png")
                 panels.append(kitchen.panel(f"{side}, {drop}", name))
-    kitchen.combine("count", "films", *PAPER, "--pyramid", "count")
-    kitchen.row("m_max 4, 0.01, pyramid of the count", "count")
     sheet(folder / "dependent-tests-4.jpg", panels + [kitchen.panel("reference", "reference900000001")])
 
 
@@ -148,33 +146,10 @@ def first_samples(scene):
             scene.row(f"n = {n}, {title}", f"{title}{n}")
 
 
-MAX_EDGES = 5
-
-
-def pyramid(covary, at, scene, resolution, spp, target, **look):
-    """The images of all techniques after their weights."""
-    at = at / target.stem
-    at.mkdir()
-    subprocess.run([covary, "render", scene, "--resolution", resolution, "--estimator", "none", "--integrator", "bdpt",
-                    "--rfilter", "box", "--spp", str(spp), "--max-depth", str(MAX_EDGES), "--seed", "1", "--quiet",
-                    "-o", at / "whole.exr", "--debug-strategies", at / "techniques"], check=True, capture_output=True)
-    save_pyramid(at / "techniques/pyramid.png", target, **look)
-
-
-def save_pyramid(source, target, first_row=0, brightness=1.0):
-    image = Image.open(source).convert("RGB").point(lambda v: min(255, round(brightness * v)))
-    image.crop((0, image.height // MAX_EDGES * first_row, *image.size)).save(target, quality=85)
-
-
 def main():
     covary, kitchen, folder = sys.argv[1], sys.argv[2], pathlib.Path(sys.argv[3])
     with tempfile.TemporaryDirectory() as temporary:
         at = pathlib.Path(temporary)
-        pyramid(covary, at, ROOT / "scenes/caustic.xml", "120x90", 64, folder / "bdpt-techniques.jpg")
-        others = pathlib.Path(kitchen).parents[1]
-        dark = {"first_row": 1, "brightness": 1.6}  # directly visible lights: next to nothing
-        pyramid(covary, at, others / "veach-bidir/scene_v3.xml", "80x60", 256, folder / "bdpt-bidir.jpg", **dark)
-        pyramid(covary, at, others / "veach-ajar/scene_v3.xml", "80x45", 512, folder / "bdpt-ajar.jpg", **dark)
         box = Scene(covary, at, "box", ROOT / "scenes/box.xml", "--resolution", "80x80", reference_spp=1024)
         figure1(box, folder)
         stages(box, 2, folder)

@@ -19,7 +19,7 @@
 #include "settings/option_names.h"
 #include "support/files.h"
 
-namespace covary {
+namespace covary::registry_test {
 namespace {
 
 using test_support::contains, test_support::message_of;
@@ -86,8 +86,7 @@ OptionValues with_what_it_needs(const std::string& name, OptionValues values) {
   const auto given = [&](std::initializer_list<const char*> options) {
     return std::any_of(options.begin(), options.end(), [&](const char* o) { return values.contains(o); });
   };
-  if (given({"ridge"}) && name == "iicv") values["penalty"] = "homogeneous";
-  if (given({"max-region", "min-centre-drop", "pyramid"})) values["filter"] = "paper";
+  if (given({"max-region", "min-centre-drop"})) values["filter"] = "paper";
   if (has(options_of_estimator(name), "adaptive")) values["adaptive"] = "";
   return values;
 }
@@ -108,21 +107,19 @@ TEST(EstimatorRegistry, ValuesReachTheOptions) {
   const GroupedImage g = crn().view(), h = independent().view();
   IicvOptions o;
   o.k = 9, o.window = 7, o.include_target = false, o.shared_coefficients = false, o.symmetric = false;
-  o.penalty = Penalty::kSmoothed, o.pilot_window = 5, o.sample_fraction = 0.25f, o.mean_constraint = 3.5f;
+  o.pilot_window = 5, o.sample_fraction = 0.25f, o.mean_constraint = 3.5f;
   EXPECT_EQ(made("iicv", {{"k", "9"},
                           {"window", "7"},
                           {"exclude-target", ""},
                           {"coefficients", "per-channel"},
                           {"asymmetric", ""},
-                          {"penalty", "smoothed"},
                           {"pilot-window", "5"},
                           {"sample-fraction", "0.25"},
                           {"mean-constraint", "3.5"}}),
             iicv(g, h, o).estimate.data);
-  IicvOptions homogeneous;
-  homogeneous.penalty = Penalty::kHomogeneous, homogeneous.ridge = 0.5f, homogeneous.residual_correction = false;
-  EXPECT_EQ(made("iicv", {{"penalty", "homogeneous"}, {"ridge", "0.5"}, {"residual-correction", "off"}}),
-            iicv(g, h, homogeneous).estimate.data);
+  IicvOptions sample;
+  sample.penalty = Penalty::kSample, sample.residual_correction = false;
+  EXPECT_EQ(made("iicv", {{"penalty", "sample"}, {"residual-correction", "off"}}), iicv(g, h, sample).estimate.data);
   CvBaselineOptions baseline;
   baseline.k = 9, baseline.window = 5, baseline.ridge = 0.001f, baseline.include_target = false;
   baseline.shared_coefficients = true;
@@ -131,12 +128,11 @@ TEST(EstimatorRegistry, ValuesReachTheOptions) {
             cv_baseline(g, h, baseline).estimate.data);
   DependentTestsOptions tests;
   tests.filter = DependentFilter::kPaper, tests.weights = CombinationWeights::kCounts;
-  tests.regions = {6, 0.001f, Pyramid::kCount}, tests.smoothing = 3;
+  tests.regions = {6, 0.001f}, tests.smoothing = 3;
   EXPECT_EQ(made("dependent-tests", {{"filter", "paper"},
                                      {"weights", "counts"},
                                      {"max-region", "6"},
                                      {"min-centre-drop", "0.001"},
-                                     {"pyramid", "count"},
                                      {"sigma-window", "3"}}),
             dependent_tests(g, h, tests).estimate.data);
   DependentTestsOptions exact;
@@ -166,7 +162,6 @@ TEST(EstimatorRegistry, EachEstimatorDoesWhatItSays) {
     if (!estimator.explain) continue;
     EXPECT_FALSE(estimator.explain(crn().view(), independent().view(), 5, 5).empty());
   }
-  EXPECT_EQ(make_estimator("iicv", {{"penalty", "cross-fit"}}).fewest_groups, 4);
 }
 
 TEST(EstimatorRegistry, AdaptiveEstimatorsHaveTheirNumbers) {
@@ -253,26 +248,17 @@ TEST(EstimatorRegistry, OptionsWithoutEffectAreErrors) {
     return message_of([&] { make_estimator(name, values); }, ErrorCode::kUsage);
   };
   EXPECT_EQ(message("iicv", {{"penalty", "sample"}, {"pilot-window", "5"}}),
-            "`pilot-window` has no effect with this `penalty`: only pilot, smoothed and cross-fit have a pilot");
-  EXPECT_EQ(message("iicv", {{"penalty", "homogeneous"}, {"sample-fraction", "0.5"}, {"asymmetric", ""}}),
-            "`sample-fraction`, `asymmetric` have no effect with `penalty` homogeneous: all neighbours have the same "
-            "penalty");
+            "`pilot-window` has no effect with `penalty` sample, which has no pilot");
   struct Case {
     const char *estimator, *option;
     OptionValues values;
   };
   const Case cases[] = {
-      {"iicv", "pilot-window", {{"penalty", "homogeneous"}, {"pilot-window", "11"}}},
-      {"iicv", "ridge", {{"penalty", "pilot"}, {"ridge", "1"}}},
-      {"iicv", "ridge", {{"ridge", "1"}}},
-      {"iicv", "sample-fraction", {{"penalty", "homogeneous"}, {"sample-fraction", "0.5"}}},
-      {"iicv", "asymmetric", {{"penalty", "homogeneous"}, {"asymmetric", ""}}},
       {"iicv", "asymmetric", {{"sample-fraction", "1"}, {"asymmetric", ""}}},
       {"iicv", "sample-fraction", {{"penalty", "sample"}, {"asymmetric", ""}, {"sample-fraction", "0.5"}}},
       {"iicv", "max-spp", {{"max-spp", "99"}}},
       {"dependent-tests", "max-region", {{"max-region", "3"}}},
       {"dependent-tests", "min-centre-drop", {{"min-centre-drop", "0.1"}}},
-      {"dependent-tests", "pyramid", {{"pyramid", "count"}}},
       {"dependent-tests", "window", {{"paper", ""}, {"window", "5"}}},
       {"dependent-tests", "guard", {{"paper", ""}, {"guard", "on"}}},
       {"dependent-tests", "window", {{"filter", "paper"}, {"window", "5"}}},
@@ -281,7 +267,7 @@ TEST(EstimatorRegistry, OptionsWithoutEffectAreErrors) {
     EXPECT_TRUE(message(c.estimator, c.values).starts_with(fmt::format("`{}` has no effect ", c.option)))
         << message(c.estimator, c.values);
   // These decide themselves that the others have one.
-  EXPECT_NO_THROW(make_estimator("iicv", {{"penalty", "cross-fit"}, {"pilot-window", "5"}}));
+  EXPECT_NO_THROW(make_estimator("iicv", {{"penalty", "pilot"}, {"pilot-window", "5"}}));
   EXPECT_NO_THROW(make_estimator("dependent-tests", {{"filter", "exact"}, {"window", "5"}}));
   EXPECT_NO_THROW(make_estimator("dependent-tests", {{"filter", "paper"}, {"max-region", "5"}}));
 }
@@ -353,4 +339,4 @@ TEST(EstimatorRegistry, IsNamedInTheReadme) {
 }
 
 }  // namespace
-}  // namespace covary
+}  // namespace covary::registry_test

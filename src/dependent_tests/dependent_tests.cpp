@@ -8,7 +8,7 @@
 #include <optional>
 
 #include "dependent_tests/least_error_mixture.h"
-#include "estimators/common_options.h"
+#include "estimators/control_variates.h"
 #include "estimators/estimator.h"
 
 namespace covary {
@@ -215,7 +215,7 @@ namespace {
 void check_effects(Settings& p, const DependentTestsOptions& o) {
   const bool exact = o.filter == DependentFilter::kExact;
   p.only_if(exact, {"window", "guard"}, "with the published filter (`paper`, `filter` paper)");
-  p.only_if(!exact, {"max-region", "min-centre-drop", "pyramid"},
+  p.only_if(!exact, {"max-region", "min-centre-drop"},
             "with `filter` exact: only the published filter (`filter` paper) has regions");
 }
 
@@ -225,7 +225,6 @@ const OptionTraits kPasses{.effect = OptionEffect::kPasses};
 void declare(Settings& p, DependentTestsOptions& o) {
   static constexpr std::pair<const char*, DependentFilter> kFilters[] = {{"exact", DependentFilter::kExact},
                                                                          {"paper", DependentFilter::kPaper}};
-  static constexpr std::pair<const char*, Pyramid> kPyramids[] = {{"side", Pyramid::kSide}, {"count", Pyramid::kCount}};
   static constexpr std::pair<const char*, CombinationWeights> kWeights[] = {
       {"measured", CombinationWeights::kMeasured},
       {"effective", CombinationWeights::kEffective},
@@ -240,8 +239,6 @@ void declare(Settings& p, DependentTestsOptions& o) {
   p.whole("max-region", o.regions.max_region, {.low = 1, .high = 63}, "Largest side of a region of `filter` paper");
   p.real("min-centre-drop", o.regions.min_centre_drop, {.low = 0},
          "Regions grow while the weight of their centre drops by at least this much");
-  p.choice<Pyramid>("pyramid", o.regions.pyramid, kPyramids,
-                    "Height of the pyramid: side of the region, or its pixels");
   p.choice<CombinationWeights>("weights", o.weights, kWeights,
                                "Mixture of the images: by measured error, worth, or samples");
   check_effects(p, o);

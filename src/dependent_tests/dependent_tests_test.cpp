@@ -14,7 +14,7 @@
 #include "film/groups.h"
 #include "support/files.h"
 
-namespace covary {
+namespace covary::dependent_tests_test {
 namespace {
 
 using test_support::contains, test_support::message_of;
@@ -72,7 +72,7 @@ double bound_of(const std::vector<Partner>& window, const std::vector<double>& w
 }
 
 /// The published weights, computed anew for one side.
-std::vector<double> published_weights(const FilterInput& input, int x, int y, int m, Pyramid pyramid) {
+std::vector<double> published_weights(const FilterInput& input, int x, int y, int m) {
   const std::vector<Partner> window = partners(input, x, y, -((m - 1) / 2), m / 2);
   const auto M = static_cast<double>(window.size());
   const double N = input.count.row(0, y)[x], sigma = std::sqrt(input.variance.row(0, y)[x]);
@@ -81,7 +81,7 @@ std::vector<double> published_weights(const FilterInput& input, int x, int y, in
   std::vector<double> weights;
   for (const Partner& q : window) {
     const double f = 1 / M + std::sqrt(N) / (3 * sigma * std::sqrt(M)) * (mean - q.difference);
-    const double d = (pyramid == Pyramid::kSide ? m : M) / std::sqrt(2.0) - std::hypot(q.x - x, q.y - y);
+    const double d = m / std::sqrt(2.0) - std::hypot(q.x - x, q.y - y);
     weights.push_back(std::max(0.0, f) * std::max(0.0, d));
     sum += weights.back();
   }
@@ -159,8 +159,7 @@ TEST(Filters, WeightsAddUpToOne) {
     for (int x = 0; x < kWidth; ++x)
       for (int c = 0; c < 3; ++c) input.independent.row(c, y)[x] = 0.7f;
   for (const FilteredImage& result :
-       {bound_filter(input, 9), region_filter(input, {.max_region = 7, .min_centre_drop = 0}),
-        region_filter(input, {.max_region = 6, .min_centre_drop = 0, .pyramid = Pyramid::kCount})})
+       {bound_filter(input, 9), region_filter(input, {.max_region = 7, .min_centre_drop = 0})})
     for (const float value : result.colour.data) EXPECT_NEAR(value, 0.7f, 1e-5f);
 }
 
@@ -186,26 +185,24 @@ TEST(Filters, ManySamplesMakeTheExactOneVanishAndNotThePublishedOne) {
 }
 
 TEST(RegionFilter, IncrementalSumsEqualDirectOnes) {
-  for (const Pyramid pyramid : {Pyramid::kSide, Pyramid::kCount})
-    for (const int m : {2, 3, 4, 5, 8}) {
-      const FilterInput input = random_input(7, 0.3f, 12);
-      const FilteredImage result =
-          region_filter(input, {.max_region = m, .min_centre_drop = -1, .pyramid = pyramid});  // always grows
-      for (const auto& [x, y] : {std::pair{9, 6}, {0, 0}, {18, 12}, {0, 7}}) {
-        const std::vector<Partner> window = partners(input, x, y, -((m - 1) / 2), m / 2);
-        const std::vector<double> weights = published_weights(input, x, y, m, pyramid);
-        double colour = 0;
-        for (size_t i = 0; i < window.size(); ++i)
-          colour += weights[i] * input.independent.row(1, window[i].y)[window[i].x];
-        EXPECT_EQ(result.region.pixel(x, y)[0], static_cast<float>(window.size()));
-        EXPECT_NEAR(result.colour.pixel(x, y)[1], colour, 1e-4);
-        EXPECT_NEAR(result.bound.pixel(x, y)[0], bound_of(window, weights), 1e-3);
-      }
+  for (const int m : {2, 3, 4, 5, 8}) {
+    const FilterInput input = random_input(7, 0.3f, 12);
+    const FilteredImage result = region_filter(input, {.max_region = m, .min_centre_drop = -1});  // always grows
+    for (const auto& [x, y] : {std::pair{9, 6}, {0, 0}, {18, 12}, {0, 7}}) {
+      const std::vector<Partner> window = partners(input, x, y, -((m - 1) / 2), m / 2);
+      const std::vector<double> weights = published_weights(input, x, y, m);
+      double colour = 0;
+      for (size_t i = 0; i < window.size(); ++i)
+        colour += weights[i] * input.independent.row(1, window[i].y)[window[i].x];
+      EXPECT_EQ(result.region.pixel(x, y)[0], static_cast<float>(window.size()));
+      EXPECT_NEAR(result.colour.pixel(x, y)[1], colour, 1e-4);
+      EXPECT_NEAR(result.bound.pixel(x, y)[0], bound_of(window, weights), 1e-3);
     }
+  }
 }
 
 TEST(RegionFilter, GrowsWhileTheCentreLosesWeight) {
-  // One colour: f = 1/M, so that f*[0] is 1, 0.631, 0.225 … for the pyramid of the side.
+  // One colour: f = 1/M, so that f*[0] is 1, 0.631, 0.225 …
   const FilterInput input = random_input(8, 0, 10);
   const auto region = [&](float drop, int most) {
     return region_filter(input, {.max_region = most, .min_centre_drop = drop}).region.pixel(9, 6)[0];
@@ -216,8 +213,6 @@ TEST(RegionFilter, GrowsWhileTheCentreLosesWeight) {
   EXPECT_EQ(region(0.01f, 1), 1);
   EXPECT_NEAR(region_filter(input, {.max_region = 2}).centre_weight.pixel(9, 6)[0], 0.631, 1e-3);
   EXPECT_NEAR(region_filter(input, {.max_region = 3}).centre_weight.pixel(9, 6)[0], 0.225, 1e-3);
-  EXPECT_NEAR(region_filter(input, {.max_region = 2, .pyramid = Pyramid::kCount}).centre_weight.pixel(9, 6)[0], 0.358,
-              1e-3);
 }
 
 TEST(RegionFilter, StopsAtOtherClasses) {
@@ -428,4 +423,4 @@ TEST(DependentTests, SaysWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace covary
+}  // namespace covary::dependent_tests_test

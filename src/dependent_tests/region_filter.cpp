@@ -47,10 +47,10 @@ struct Region {
 struct Kernel {
   vfloat slope, offset, height;  // f = offset - slope * Delta, d = height - distance
 
-  Kernel(const Region& region, vfloat deviation, Pyramid pyramid)
+  Kernel(const Region& region, vfloat deviation)
       : slope(1.0f / (deviation * sqrt(region.size))),  // sqrt(N) / (3 sigma sqrt(M))
         offset(1.0f / region.size + slope * region.differences / region.size),
-        height((pyramid == Pyramid::kSide ? region.side : region.size) * std::sqrt(0.5f)) {}
+        height(region.side * std::sqrt(0.5f)) {}
 
   vfloat weight(vfloat difference, float distance) const {
     return max(offset - slope * difference, splat(0)) * max(height - distance, splat(0));  // f+ d, Sec. 4
@@ -93,7 +93,7 @@ class RegionBatch {
     for (int m = 2; m <= options_.max_region && any(grows); ++m) {
       grows &= ~add_places(m, region);
       if (!any(grows)) break;
-      const Kernel kernel(region, deviation_, options_.pyramid);
+      const Kernel kernel(region, deviation_);
       vfloat sum{};
       for (size_t i = 0; i < places_.first[m]; ++i)
         sum += inside_[i] * kernel.weight(differences_[i], places_.list[i].distance);
@@ -130,7 +130,7 @@ class RegionBatch {
   }
 
   void write(const Region& region, int n, FilteredImage& result) const {
-    const Kernel kernel(region, deviation_, options_.pyramid);
+    const Kernel kernel(region, deviation_);
     float side = 1;
     for (int l = 0; l < n; ++l) side = std::max(side, region.side[l]);
     const size_t last = places_.first[static_cast<size_t>(side)];

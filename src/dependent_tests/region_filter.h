@@ -5,8 +5,9 @@
 //     f_q  = 1/M + sqrt(N) / (3 sigma sqrt(M)) (sum_r Delta_r / M - Delta_q),   Delta_q = |C_d[p] - C_d[q]|
 //     f*_q = f_q^+ d_q / sum_r f_r^+ d_r,
 //
-// sigma and N those of p, d a pyramid that falls with the distance from p. Growth ends where a pixel has another number
-// of samples than p, or where f*_p falls by less than min_centre_drop; the last region accepted counts.
+// sigma and N those of p, d_q = max(m / sqrt(2) - distance, 0) a pyramid that ends at the corners of the square. Growth
+// ends where a pixel has another number of samples than p, or where f*_p falls by less than min_centre_drop; the last
+// region accepted counts.
 //
 // Left open by the paper and chosen here: squares of even side reach one pixel farther to the right and down, so that
 // regions are nested; pixels outside the frame are left out; a pixel without noise (sigma = 0) or samples (N = 0)
@@ -21,19 +22,12 @@
 
 namespace covary {
 
-/// Height of the pyramid, d_q = height - distance in pixels, at least 0.
-enum class Pyramid {
-  kSide,   ///< m / sqrt(2), so that it ends at the corners of the square
-  kCount,  ///< M / sqrt(2), as printed
-};
-
 struct RegionOptions {
   /// Largest side m of a region, 1 … 63; 1: no filter. Default 4 ([Csonka2002] Sec. 6).
   int max_region = 4;
   /// Delta f[0]_min, >= 0: regions grow while the weight of the centre falls by at least so much. Default 0.01
   /// ([Csonka2002] Fig. 4).
   float min_centre_drop = 0.01f;
-  Pyramid pyramid = Pyramid::kSide;
 };
 
 /// What a filter makes of the independent image. One channel each, but `colour`.

@@ -21,7 +21,6 @@
 #pragma once
 
 #include "estimators/estimator_result.h"
-#include "estimators/pixel_probe.h"
 #include "film/grouped_image.h"
 #include "filters/residual_correction.h"
 
@@ -32,11 +31,8 @@ struct Estimator;
 
 /// How the error variances V_h of the independent image are estimated.
 enum class Penalty {
-  kPilot,        ///< squared difference from a cross-bilateral pilot, [YM2025] Eq. (11): the paper's
-  kSample,       ///< sample variance of the groups; the paper's ablation
-  kSmoothed,     ///< the pilot's squares averaged over the guided window: less energy loss, more error
-  kHomogeneous,  ///< the same for all neighbours, `ridge` times the mean diagonal of X^T X / (T - 1): nearly unbiased
-  kCrossFit,     ///< pilot of one half of the independent groups, applied to the other half; average of both
+  kPilot,   ///< squared difference from a cross-bilateral pilot, [YM2025] Eq. (11): the paper's
+  kSample,  ///< sample variance of the groups; the paper's ablation
 };
 
 struct IicvOptions {
@@ -55,11 +51,9 @@ struct IicvOptions {
   Penalty penalty = Penalty::kPilot;
   /// Side of the pilot's window. Default 11 ([YM2025] Eq. (11)); odd, 3 … 63.
   int pilot_window = 11;
-  /// Factor of Penalty::kHomogeneous, > 0. Default 1: both images are estimates of the same integrals.
-  float ridge = 1.0f;
   /// Part of the penalty that is the sample variance of h instead of what `penalty` says (and never symmetric), 0 … 1.
   /// The realised error of a pilot tells outliers but depends on the value it judges; the sample variance is right on
-  /// average. Not used by kHomogeneous. Default 0.5 (measured); the paper has 0.
+  /// average. Default 0.5 (measured); the paper has 0.
   float sample_fraction = 0.5f;
   /// Weight of the condition that the coefficients reproduce the CRN mean, sum_i beta_i g_i = f; >= 0. It treats errors
   /// in proportion to brightness, so many times as large as the errors there are, as common to all pixels of the CRN
@@ -71,7 +65,7 @@ struct IicvOptions {
   /// Also estimate the standard error of the result: [YM2025] Eq. (8), with the residuals of the fit corrected for its
   /// degrees of freedom. It is the error before the residual correction, which changes it little.
   bool std_error = false;
-  PixelProbe* probe = nullptr;  ///< optional; inside the image; not with kCrossFit, which has two sets of coefficients
+  PixelProbe* probe = nullptr;  ///< optional; inside the image
 
   /// The published estimator with its published settings.
   static IicvOptions paper();
@@ -80,8 +74,7 @@ struct IicvOptions {
 };
 
 /// Throws Error(kUsage) that lists every problem of options and inputs. `crn` needs at least 3 groups, `independent` 2
-/// (4 for kCrossFit) where its sample variance is used, as with the defaults, and otherwise 1. Bit-identical for any
-/// number of threads.
+/// where its sample variance is used, as with the defaults, and otherwise 1. Bit-identical for any number of threads.
 EstimatorResult iicv(const GroupedImage& crn, const GroupedImage& independent, const IicvOptions& options = {});
 
 /// How far from a pixel, in rows or columns, the input can influence it. A part of an image that begins at a row and

@@ -8,12 +8,11 @@ namespace covary {
 
 /// (cross-bilateral mean of h over the window - h)^2 per channel, weights
 ///   w_j = exp(-||g_j - g_i||^2 / variance of g_i),   the norm over RGB, the variance summed over RGB.
-/// `smoothed`: these squares are averaged once more with the same weights. `g`: moments of the CRN image with kFar
-/// outside; `h`: moments of the independent image with 0 outside. The result's border is `border` wide and kUseless.
-/// Bandwidth 0 (all CRN groups equal) gives weight 1 to pixels with exactly the same value, 0 to others.
+/// `g`: moments of the CRN image with kFar outside; `h`: moments of the independent image with 0 outside. The result's
+/// border is `border` wide and kUseless. Bandwidth 0 (all CRN groups equal) gives weight 1 to pixels with exactly the
+/// same value, 0 to others.
 ///
-/// Where pixels of the independent image have unequal counts n_j, weights are n_j w_j, and what is averaged by
-/// `smoothed` is the error per sample: squares times n_j, divided by n_i in the end.
-Planes pilot_error(const Moments& g, const Moments& h, int window, bool smoothed, int border);
+/// Where pixels of the independent image have unequal counts n_j, weights are n_j w_j.
+Planes pilot_error(const Moments& g, const Moments& h, int window, int border);
 
 }  // namespace covary

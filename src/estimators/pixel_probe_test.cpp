@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The control variates that a probe reports are those the estimate was made of.
-#include "estimators/pixel_probe.h"
+#include "estimators/estimator_result.h"
 
 #include <gtest/gtest.h>
 
@@ -62,15 +62,6 @@ TEST(PixelProbe, LeavesOutPlacesOutsideTheFrame) {
   for (const ControlVariate& v : probe.control_variates) {
     EXPECT_TRUE(probe.x + v.dx >= 0 && probe.x + v.dx < 4 && probe.y + v.dy >= 0 && probe.y + v.dy < 3);
   }
-}
-
-TEST(PixelProbe, CrossFittedPenaltiesHaveNoSingleAnswer) {
-  const test::Grouped crn = test::crn_image(12, 12, 12, 5), independent = test::independent_image(12, 12, 12, 5);
-  IicvOptions options;
-  options.penalty = Penalty::kCrossFit;
-  PixelProbe probe{1, 1, {}};
-  options.probe = &probe;
-  EXPECT_THROW(iicv(crn.view(), independent.view(), options), Error);
 }
 
 }  // namespace

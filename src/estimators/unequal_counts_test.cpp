@@ -41,8 +41,7 @@ bool same(const EstimatorResult& a, const EstimatorResult& b) {
 TEST(UnequalCounts, EqualOnesChangeNoBit) {
   const test::Grouped crn = crn_image(), independent = independent_image();
   const test::Grouped crn_counted = with_counts(crn, 24), independent_counted = with_counts(independent, 36);
-  for (const Penalty penalty :
-       {Penalty::kPilot, Penalty::kSample, Penalty::kSmoothed, Penalty::kHomogeneous, Penalty::kCrossFit}) {
+  for (const Penalty penalty : {Penalty::kPilot, Penalty::kSample}) {
     IicvOptions options;
     options.penalty = penalty;
     options.std_error = true;
@@ -116,25 +115,6 @@ TEST(UnequalCounts, IicvAgreesWithTheReference) {
         }
     }
   }
-}
-
-TEST(UnequalCounts, SmoothedPenaltiesAreErrorsPerSample) {
-  const test::Grouped crn = with_counts(crn_image(), 30), independent = with_counts(independent_image(), 12, 60);
-  const GroupedImage view = independent.view();
-  RgbImage pilot = reference::pilot_of(crn.view(), view, 11);
-  for (int i = 0; i < kWidth * kHeight; ++i)
-    for (double& e : pilot[i]) e *= view.counts[i];
-  const RgbImage smoothed = reference::map_pixels(view, [&](int x, int y) {
-    Rgb e = reference::guided_mean(crn.view(), pilot, 11, x, y);
-    for (double& v : e) v /= view.count(x, y);
-    return e;
-  });
-  IicvOptions options = IicvOptions::paper();
-  options.penalty = Penalty::kSmoothed;
-  EXPECT_LT(compare(iicv(crn.view(), view, options), crn.view(), view, smoothed, 25, 11, true,
-                    {true, true, 0, kSmallestPenalty})
-                .estimate,
-            3e-3);
 }
 
 // Parts of an image whose counts differ only elsewhere must give the bits of the whole.

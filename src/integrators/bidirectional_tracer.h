@@ -59,7 +59,6 @@ class BidirectionalTracer final : public LightTracingIntegrator {
   std::shared_ptr<Integrator> clone() const override {
     return std::make_shared<BidirectionalTracer>(settings_, parts_);
   }
-  const BidirectionalSettings* bidirectional() const override { return &settings_; }
   void prepare(const Scene& scene) override {
     if (scene.camera().is_orthographic())
       throw Error(

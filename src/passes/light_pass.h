@@ -21,8 +21,6 @@
 
 namespace covary {
 
-struct BidirectionalSettings;
-
 enum class LightTracing {
   kAuto,  ///< on, but not beside a pass with common random numbers
   kOn,
@@ -80,8 +78,6 @@ class LightTracingIntegrator : public Integrator {
  public:
   using Integrator::light_tracing;
   LightTracingIntegrator* light_tracing() final { return this; }
-  /// Its settings where it is bidirectional path tracing, whose techniques technique_images.h shows; otherwise null.
-  virtual const BidirectionalSettings* bidirectional() const { return nullptr; }
   /// Says how the integrator is used: `n_pixels` are rendered, and `beside_crn` says whether some of them with common
   /// random numbers. Called after prepare() and before description() or any tracing; without it, no light is traced.
   void fix_light_tracing(uint64_t n_pixels, bool beside_crn);

@@ -64,26 +64,6 @@ class Bdpt(CliTest):
             self.good("render", "scene.xml", "-o", "a.exr", "--spp", "16", "--quiet", "--no-preview", *options)
             self.assertEqual({v for channel in self.pixels("a.exr") for v in channel}, {0.0}, options)
 
-    def test_images_of_techniques(self):
-        whole = self.render("a.exr", "--spp", "4", "--debug-strategies", "techniques")
-        names = {path.name for path in (self.path / "techniques").iterdir()}
-        found = (re.fullmatch(r"s(\d)_t(\d)\.exr", name) for name in names)
-        techniques = {match.groups() for match in found if match}
-        self.assertLessEqual({("0", "2"), ("1", "2"), ("2", "2"), ("1", "3"), ("3", "2"), ("2", "3")}, techniques)
-        self.assertFalse([t for t in techniques if t[1] == "1"], "no light is traced")
-        self.assertEqual(len(names), 2 * len(techniques) + 2)
-        total = [[0.0] * (24 * 16) for _ in range(3)]
-        for s, t in techniques:
-            weighted, alone = (self.pixels(f"techniques/s{s}_t{t}{end}.exr") for end in ("", "_unweighted"))
-            for c in range(3):
-                total[c] = [a + b for a, b in zip(total[c], weighted[c])]
-                self.assertTrue(all(a <= b + 1e-6 for a, b in zip(weighted[c], alone[c])))
-        for c in range(3):
-            for a, b in zip(total[c], whole[c]):
-                self.assertAlmostEqual(a, b, delta=1e-4 * max(1, b))
-        self.bad(2, "is not an empty folder", "render", "scene.xml", "-o", "b.exr", "--debug-strategies", "techniques")
-        self.bad(2, "integrator 'bdpt'", "render", "path.xml", "-o", "b.exr", "--debug-strategies", "new")
-
 
 if __name__ == "__main__":
     unittest.main()

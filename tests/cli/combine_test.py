@@ -179,7 +179,7 @@ class Combine(CliTest):
 
     def test_estimators_differ(self):
         results = []
-        for options in ([], ["--paper"], ["--penalty", "homogeneous"], ["--variance", "sample"],
+        for options in ([], ["--paper"], ["--variance", "sample"],
                         ["--coefficients", "per-channel"],
                         ["--asymmetric"], ["--exclude-target"], ["--k", "9"], ["--window", "7"],
                         ["--residual-correction", "off"],

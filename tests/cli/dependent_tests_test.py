@@ -34,7 +34,7 @@ class DependentTests(RenderTest):
         self.assertLess(errors["exact"], errors["paper"])
 
     def test_combine_of_kept_films_gives_the_same_bits(self):
-        for options in ((), ("--filter", "paper", "--pyramid", "count")):
+        for options in ((), ("--filter", "paper", "--max-region", "3")):
             self.good("render", ROOM, *SMALL, "-o", "a.exr", *METHOD, *options, "--spp", "32", "--passes", "films",
                       "--overwrite")
             self.good("combine", "--crn", "films/crn.exr", "--independent", "films/independent.exr", "-o", "b.exr",

@@ -369,7 +369,7 @@ class Numbers(OutputsTest):
 
     def test_names(self):
         combine = ("combine", "--crn", "a.exr", "--independent", "b.exr", "-o", "o.exr")
-        self.bad(2, "--penalty: 'foo': expected pilot, sample, smoothed, homogeneous, cross-fit; see", *combine,
+        self.bad(2, "--penalty: 'foo': expected pilot, sample; see", *combine,
                  "--penalty", "foo")
         self.bad(2, "--penalty: '3': expected pilot", *combine, "--penalty", "3")
         self.bad(2, "--penalty: 'sampel'; did you mean 'sample'", *combine, "--penalty", "sampel")

@@ -185,7 +185,6 @@ class Frames(SequenceTest):
         for arguments, message in (
                 (("-o", "f.exr"), "-o 'f.exr': with --frames, expected is a name with '#'"),
                 (("-o", "f_#.exr", "--json", "f.json"), "--json 'f.json': with --frames, expected is a name with '#'"),
-                (("-o", "f_#.exr", "--debug-strategies", "parts"), "--debug-strategies is an option of single images"),
                 (("-o", "f_#.exr", "--save-training", "t"), "--save-training is an option of single images")):
             result = self.render(*arguments)
             self.assertEqual(result.returncode, 2)

@@ -464,7 +464,7 @@ class Foreign(ExperimentTest):
         for option, value, what in (("--oidn", "evil.so", "a library"), ("--save-training", "x", "a file"),
                                     ("--load-training", "x", "a file"), ("--save-stages", "x", "a folder"),
                                     ("--display-server", "example.org:80", "a server"), ("--json", "x", "a file"),
-                                    ("--debug-strategies", "x", "a folder"), ("--passes", "x", "a folder"),
+                                    ("--passes", "x", "a folder"),
                                     ("--save-passes", "x", "a folder"), ("-o", "x", "a file"),
                                     ("--output", "x", "a file")):
             with self.subTest(option):

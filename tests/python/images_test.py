@@ -47,8 +47,8 @@ class Combine(FilesTest):
         self.assert_same_bits(result.bias.reshape(-1, 3), channels(path, [f"Bias.{c}" for c in "RGB"]))
 
     def test_options(self):
-        for options, words in (({"paper": True}, ["--paper"]), ({"k": 9, "penalty": "homogeneous", "ridge": 0.1},
-                                ["--k", 9, "--penalty", "homogeneous", "--ridge", 0.1]),
+        for options, words in (({"paper": True}, ["--paper"]), ({"k": 9, "penalty": "sample", "window": 9},
+                                ["--k", 9, "--penalty", "sample", "--window", 9]),
                                ({"residual_correction": "off"}, ["--feedback", "off"])):
             result = covary.combine(self.crn, self.independent, **options)
             self.assert_same_bits(result.image.reshape(-1, 3), rgb(self.combine_files(*words)))
