@@ -1,34 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "bsdfs/registry.h"
 
+#include "scene/plugin_list.h"
+
 namespace covary {
 
-std::span<const Plugin<Bsdf>> bsdf_plugins() {
-  static constexpr Plugin<Bsdf> kPlugins[] = {
-      {"blendbsdf", make_blendbsdf},
-      {"bumpmap", make_bumpmap},
-      {"circular", make_circular},
-      {"conductor", make_conductor},
-      {"dielectric", make_dielectric},
-      {"diffuse", make_diffuse},
-      {"hair", make_hair},
-      {"mask", make_mask},
-      {"measured", make_measured},
-      {"normalmap", make_normalmap},
-      {"null", make_null},
-      {"plastic", make_plastic},
-      {"polarizer", make_polarizer},
-      {"pplastic", make_pplastic},
-      {"principled", make_principled},
-      {"principledthin", make_principledthin},
-      {"retarder", make_retarder},
-      {"roughconductor", make_roughconductor},
-      {"roughdielectric", make_roughdielectric},
-      {"roughplastic", make_roughplastic},
-      {"thindielectric", make_thindielectric},
-      {"twosided", make_twosided},
-  };
-  return kPlugins;
-}
+// clang-format off
+#define COVARY_BSDFS(PLUGIN, T) \
+  PLUGIN(T, blendbsdf) PLUGIN(T, bumpmap) PLUGIN(T, circular) PLUGIN(T, conductor) PLUGIN(T, dielectric) \
+  PLUGIN(T, diffuse) PLUGIN(T, hair) PLUGIN(T, mask) PLUGIN(T, measured) PLUGIN(T, normalmap) PLUGIN(T, null) \
+  PLUGIN(T, plastic) PLUGIN(T, polarizer) PLUGIN(T, pplastic) PLUGIN(T, principled) PLUGIN(T, principledthin) \
+  PLUGIN(T, retarder) PLUGIN(T, roughconductor) PLUGIN(T, roughdielectric) PLUGIN(T, roughplastic) \
+  PLUGIN(T, thindielectric) PLUGIN(T, twosided)
+// clang-format on
+
+COVARY_PLUGINS(Bsdf, bsdf_plugins, COVARY_BSDFS)
 
 }  // namespace covary

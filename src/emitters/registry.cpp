@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "emitters/registry.h"
 
+#include "scene/plugin_list.h"
+
 namespace covary {
 
-std::span<const Plugin<Emitter>> emitter_plugins() {
-  static constexpr Plugin<Emitter> kPlugins[] = {
-      {"area", make_area},     {"constant", make_constant}, {"directional", make_directional},
-      {"envmap", make_envmap}, {"point", make_point},       {"projector", make_projector},
-      {"spot", make_spot},     {"sunsky", make_sunsky},
-  };
-  return kPlugins;
-}
+// clang-format off
+#define COVARY_EMITTERS(PLUGIN, T) \
+  PLUGIN(T, area) PLUGIN(T, constant) PLUGIN(T, directional) PLUGIN(T, envmap) PLUGIN(T, point) \
+  PLUGIN(T, projector) PLUGIN(T, spot) PLUGIN(T, sunsky)
+// clang-format on
+
+COVARY_PLUGINS(Emitter, emitter_plugins, COVARY_EMITTERS)
 
 }  // namespace covary

@@ -1,31 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "media/registry.h"
 
+#include "scene/plugin_list.h"
+
 namespace covary {
 
-std::span<const Plugin<Medium>> medium_plugins() {
-  static constexpr Plugin<Medium> kPlugins[] = {
-      {"heterogeneous", make_heterogeneous},
-      {"homogeneous", make_homogeneous},
-  };
-  return kPlugins;
-}
+// clang-format off
+#define COVARY_MEDIA(PLUGIN, T) \
+  PLUGIN(T, heterogeneous) PLUGIN(T, homogeneous)
+#define COVARY_PHASE_FUNCTIONS(PLUGIN, T) \
+  PLUGIN(T, hg) PLUGIN(T, isotropic) PLUGIN(T, rayleigh)
+#define COVARY_VOLUMES(PLUGIN, T) \
+  PLUGIN(T, constvolume) PLUGIN(T, gridvolume)
+// clang-format on
 
-std::span<const Plugin<PhaseFunction>> phase_plugins() {
-  static constexpr Plugin<PhaseFunction> kPlugins[] = {
-      {"hg", make_hg},
-      {"isotropic", make_isotropic},
-      {"rayleigh", make_rayleigh},
-  };
-  return kPlugins;
-}
-
-std::span<const Plugin<Volume>> volume_plugins() {
-  static constexpr Plugin<Volume> kPlugins[] = {
-      {"constvolume", make_constvolume},
-      {"gridvolume", make_gridvolume},
-  };
-  return kPlugins;
-}
+COVARY_PLUGINS(Medium, medium_plugins, COVARY_MEDIA)
+COVARY_PLUGINS(PhaseFunction, phase_plugins, COVARY_PHASE_FUNCTIONS)
+COVARY_PLUGINS(Volume, volume_plugins, COVARY_VOLUMES)
 
 }  // namespace covary

@@ -1,19 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "textures/registry.h"
 
+#include "scene/plugin_list.h"
+
 namespace covary {
 
-std::span<const Plugin<Texture>> texture_plugins() {
-  static constexpr Plugin<Texture> kPlugins[] = {
-      {"bitmap", make_bitmap},
-      {"checkerboard", make_checkerboard},
-      {"mesh_attribute", make_mesh_attribute},
-      {"rawconstant", make_rawconstant},
-      {"scale", make_scaled},
-      {"uniform", make_uniform},
-      {"vertexcolor", make_vertex_colour},
-  };
-  return kPlugins;
-}
+// clang-format off
+#define COVARY_TEXTURES(PLUGIN, T) \
+  PLUGIN(T, bitmap) PLUGIN(T, checkerboard) PLUGIN(T, mesh_attribute) PLUGIN(T, rawconstant) PLUGIN(T, scale) \
+  PLUGIN(T, uniform) PLUGIN(T, vertexcolor)
+// clang-format on
+
+COVARY_PLUGINS(Texture, texture_plugins, COVARY_TEXTURES)
 
 }  // namespace covary

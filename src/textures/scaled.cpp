@@ -36,7 +36,7 @@ class ScaledTexture final : public Texture {
 
 }  // namespace
 
-std::shared_ptr<Texture> make_scaled(Parameters& parameters) {
+std::shared_ptr<Texture> make_scale(Parameters& parameters) {
   const Spectrum scale = parameters.get_spectrum("scale", Spectrum(1), SpectrumRole::kEmission);
   const auto nested = parameters.children<Texture>("texture");
   if (nested.size() != 1) {

@@ -32,7 +32,7 @@ class MeshAttributeTexture final : public Texture {
 
 }  // namespace
 
-std::shared_ptr<Texture> make_vertex_colour(Parameters&) {
+std::shared_ptr<Texture> make_vertexcolor(Parameters&) {
   return std::make_shared<MeshAttributeTexture>("vertex_color", 1.0f);
 }
 

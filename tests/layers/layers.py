@@ -234,7 +234,8 @@ REGISTRIES = {
 def documented_names_match_registries(root):
     """docs/scene-format.md has a heading for each plugin of each module's registry, and no others.
 
-    A registry line is `{"name", make_something}`; in the page, plugins are the names in backquotes in `###` headings
+    A registry has `PLUGIN(T, name)`, or lines `{"name", make_something}`; in the page, plugins are the names in
+    backquotes in `###` headings
     below the `##` heading that ends in "(`module`)".
     """
     documented, module = {}, None
@@ -251,7 +252,8 @@ def documented_names_match_registries(root):
             if not os.path.exists(os.path.join(root, path)):
                 continue
             text = "\n".join(text.split("//")[0] for _, text in lines(root, path))
-            found = re.findall(r'\{\s*"(\w+)"\s*,\s*(?:make_|k[A-Z])\w+\s*\}', text)
+            found = re.findall(r'\{\s*"(\w+)"\s*,\s*(?:make_|k[A-Z])\w+\s*\}|PLUGIN\(T, (\w+)\)', text)
+            found = [first or second for first, second in found]
             registered.update(found)
             if not found:
                 problems.append(f"{path}:1: no plugin found here; is it still written as {{\"name\", make_name}}?")
