@@ -7,10 +7,7 @@
 // the signs of the direction's x and y are those of (x, y).
 #pragma once
 
-#include "core/distribution.h"
-#include "core/spectrum.h"
-#include "core/vec.h"
-#include "textures/image.h"
+#include "emitters/environment_image.h"
 
 namespace covary {
 
@@ -26,17 +23,10 @@ class EqualAreaImage {
   EqualAreaImage compensated() const { return {image_, 1, true}; }
   bool is_compensated() const { return compensated_; }
 
-  struct Lookup {
-    Spectrum value;
-    float pdf_solid_angle;  ///< density of sample() at the direction
-  };
+  using Lookup = EnvironmentImage::Lookup;
   Lookup lookup(const Vec3& d) const;
 
-  struct Sample {
-    Vec3 d;
-    Spectrum value;
-    float pdf_solid_angle;  ///< 0 when the image is black
-  };
+  using Sample = EnvironmentImage::Sample;
   Sample sample(Vec2 u) const;
   void prefetch_table(Vec2) const {}
   void prefetch_texels(Vec2) const {}
