@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "support/model_checks.h"
 
-namespace covary::testing {
+namespace covary::testing::mask_test {
 namespace {
 
 const Json kPlastic{{"type", "plastic"}};
@@ -46,4 +46,4 @@ TEST(Mask, TakesOneModel) {
 }
 
 }  // namespace
-}  // namespace covary::testing
+}  // namespace covary::testing::mask_test

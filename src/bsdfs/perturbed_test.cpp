@@ -2,7 +2,7 @@
 // bumpmap and normalmap, which differ only in where the normal comes from.
 #include "support/model_checks.h"
 
-namespace covary::testing {
+namespace covary::testing::perturbed_test {
 namespace {
 
 const Json kDiffuse{{"type", "diffuse"}};
@@ -102,4 +102,4 @@ TEST(NormalMap, MissingTextureIsNamed) {
 }
 
 }  // namespace
-}  // namespace covary::testing
+}  // namespace covary::testing::perturbed_test

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "support/model_checks.h"
 
-namespace covary::testing {
+namespace covary::testing::roughplastic_test {
 namespace {
 
 std::vector<Json> plastics() {
@@ -69,4 +69,4 @@ TEST(RoughPlastic, WrongParametersAreNamed) {
 }
 
 }  // namespace
-}  // namespace covary::testing
+}  // namespace covary::testing::roughplastic_test

@@ -17,7 +17,7 @@
 #include "risk/predicted_error.h"
 #include "support/files.h"
 
-namespace covary {
+namespace covary::combine_test {
 namespace {
 
 using test_support::contains, test_support::message_of;
@@ -136,4 +136,4 @@ TEST(Combine, ErrorsOfTheInputsAreThrownUnlessForced) {
 }
 
 }  // namespace
-}  // namespace covary
+}  // namespace covary::combine_test

@@ -9,7 +9,7 @@
 
 #include "estimators/test_images.h"
 
-namespace covary {
+namespace covary::difference_checks_test {
 namespace {
 
 constexpr int kWidth = 250, kHeight = 160;
@@ -75,4 +75,4 @@ TEST(DifferenceChecks, LooksAtEveryPairOfNeighbours) {
 }
 
 }  // namespace
-}  // namespace covary
+}  // namespace covary::difference_checks_test

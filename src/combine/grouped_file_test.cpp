@@ -9,7 +9,7 @@
 #include "film/film_file.h"
 #include "support/files.h"
 
-namespace covary {
+namespace covary::grouped_file_test {
 namespace {
 
 constexpr int kWidth = 7, kHeight = 5;
@@ -145,4 +145,4 @@ TEST_F(GroupedFileTest, SaysWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace covary
+}  // namespace covary::grouped_file_test

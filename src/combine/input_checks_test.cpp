@@ -12,7 +12,7 @@
 #include "estimators/examine_inputs.h"
 #include "estimators/test_images.h"
 
-namespace covary {
+namespace covary::input_checks_test {
 namespace {
 
 constexpr int kWidth = 80, kHeight = 60, kGroups = 12;
@@ -158,4 +158,4 @@ TEST(InputChecks, SaysWhatItCannotCheck) {
 }
 
 }  // namespace
-}  // namespace covary
+}  // namespace covary::input_checks_test

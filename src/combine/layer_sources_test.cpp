@@ -12,8 +12,9 @@
 #include "combine/registry.h"
 #include "core/error.h"
 #include "denoising/mixed_denoising.h"
+#include "estimators/test_images.h"
 
-namespace covary {
+namespace covary::layer_sources_test {
 namespace {
 
 constexpr int kWidth = 32, kHeight = 24, kGroups = 4;
@@ -22,11 +23,8 @@ constexpr int kWidth = 32, kHeight = 24, kGroups = 4;
 struct Lamps {
   std::vector<float> both, key, fill;
   Lamps() {
-    uint32_t state = 7;
-    const auto uniform = [&] {
-      state = state * 1664525u + 1013904223u;
-      return static_cast<float>(state >> 8) / 16777216.0f;
-    };
+    uint64_t n = 0;
+    const auto uniform = [&] { return test::noise(7, 0, n++) + 0.5f; };
     for (int i = 0; i < kWidth * kHeight * kGroups * 3; ++i) {
       key.push_back(uniform() < 0.5f ? uniform() : 0), fill.push_back(0.3f * uniform());
       both.push_back(key.back() + fill.back());
@@ -99,4 +97,4 @@ TEST(LayerSources, AreOfTheImagesPixelsAndGroups) {
 }
 
 }  // namespace
-}  // namespace covary
+}  // namespace covary::layer_sources_test

@@ -7,7 +7,7 @@
 
 #include "support/files.h"
 
-namespace covary {
+namespace covary::light_film_test {
 namespace {
 
 using test_support::contains, test_support::message_of;
@@ -39,4 +39,4 @@ TEST(LightFilm, OneGroupHasNoStandardError) {
 }
 
 }  // namespace
-}  // namespace covary
+}  // namespace covary::light_film_test

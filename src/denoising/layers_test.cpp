@@ -19,11 +19,8 @@ constexpr int kWidth = 48, kHeight = 40, kGroups = 8;
 struct Scene {
   std::vector<float> all, direct, indirect;
   Scene() {
-    uint32_t state = 1;
-    const auto uniform = [&] {
-      state = state * 1664525u + 1013904223u;
-      return static_cast<float>(state >> 8) / 16777216.0f;
-    };
+    uint64_t n = 0;
+    const auto uniform = [&] { return test::noise(1, 0, n++) + 0.5f; };
     for (int i = 0; i < kWidth * kHeight * kGroups * 3; ++i) {
       const int x = i / (3 * kGroups) % kWidth;
       direct.push_back(x < kWidth / 2 ? 0.5f + uniform() : 0.0f);

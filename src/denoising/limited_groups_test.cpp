@@ -9,7 +9,7 @@
 
 #include "estimators/test_images.h"
 
-namespace covary {
+namespace covary::limited_groups_test {
 namespace {
 
 constexpr int kWidth = 40, kHeight = 30, kGroups = 6;
@@ -75,4 +75,4 @@ TEST(LimitedGroups, DoesNotDependOnThreads) {
 }
 
 }  // namespace
-}  // namespace covary
+}  // namespace covary::limited_groups_test

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace covary {
+namespace covary::mirrored_halves_test {
 namespace {
 
 constexpr int kWidth = 5, kHeight = 3;
@@ -58,4 +58,4 @@ TEST(MirroredHalves, LeavesASingleImageAsItIsDenoised) {
 }
 
 }  // namespace
-}  // namespace covary
+}  // namespace covary::mirrored_halves_test

@@ -18,7 +18,7 @@
 #include "risk/relative_weight.h"
 #include "support/files.h"
 
-namespace covary {
+namespace covary::mixed_denoising_test {
 namespace {
 
 using test_support::message_of;
@@ -397,4 +397,4 @@ TEST(MixedDenoising, SaysWhatItCannotDo) {
 }
 
 }  // namespace
-}  // namespace covary
+}  // namespace covary::mixed_denoising_test

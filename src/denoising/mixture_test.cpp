@@ -12,7 +12,7 @@
 #include "risk/held_out_error.h"
 #include "risk/relative_weight.h"
 
-namespace covary {
+namespace covary::mixture_test {
 namespace {
 
 constexpr int kSize = 48;
@@ -295,4 +295,4 @@ TEST(Calibration, SaysHowFarBothPredictionsAgree) {
 }
 
 }  // namespace
-}  // namespace covary
+}  // namespace covary::mixture_test

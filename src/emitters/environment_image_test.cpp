@@ -7,7 +7,7 @@
 #include "core/random.h"
 #include "statistics/chi2.h"
 
-namespace covary {
+namespace covary::environment_image_test {
 namespace {
 
 /// Random colours, a quarter of the texels black, and one "sun" texel that holds most of the light.
@@ -166,4 +166,4 @@ TEST(EnvironmentImage, EveryRandomNumberGivesAUnitDirection) {
 }
 
 }  // namespace
-}  // namespace covary
+}  // namespace covary::environment_image_test

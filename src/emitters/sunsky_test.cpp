@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "emitters/registry.h"
-#include "emitters/sun_position.h"
+#include "emitters/sky_model.h"
 #include "support/describe.h"
 #include "support/light_scene.h"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The variance of samples that films keep: its value, its bits however a film came about, files and merging.
-#include "film/sample_variance.h"
+#include "film/groups.h"
 
 #include <gtest/gtest.h>
 

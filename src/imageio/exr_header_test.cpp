@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "imageio/exr_header.h"
+#include "imageio/exr_image.h"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>

@@ -10,8 +10,6 @@
 #include <fstream>
 
 #include "core/error.h"
-#include "imageio/hdr.h"
-#include "imageio/jpeg.h"
 #include "imageio/png.h"
 #include "support/files.h"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Files of curves, attributes of PLY files, and the shapes made of them.
-#include "io/curve_file.h"
+#include "io/shapes.h"
 
 #include <gtest/gtest.h>
 

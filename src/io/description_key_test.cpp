@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/description_key.h"
+#include "io/object_factory.h"
 
 #include <gtest/gtest.h>
 

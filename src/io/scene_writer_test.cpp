@@ -10,7 +10,7 @@
 #include <fstream>
 
 #include "core/random.h"
-#include "formats/file_view.h"
+#include "formats/file_resolver.h"
 #include "io/convert_scene.h"
 #include "io/scene_file.h"
 #include "scene/embedded_data.h"

@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <fstream>
 
-#include "lab/builtin_suites.h"
 #include "support/files.h"
 
 namespace covary::lab {

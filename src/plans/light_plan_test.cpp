@@ -21,7 +21,7 @@
 #include "support/light_tracer.h"
 #include "support/plans.h"
 
-namespace covary {
+namespace covary::light_plan_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -300,4 +300,4 @@ TEST(LightPlan, MemoryCountsTheLightFilm) {
 }
 
 }  // namespace
-}  // namespace covary
+}  // namespace covary::light_plan_test

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plans/pass_costs.h"
+#include "plans/pass_files.h"
 
 #include <gtest/gtest.h>
 
 #include "support/files.h"
 
-namespace covary {
+namespace covary::pass_costs_test {
 namespace {
 
 using test_support::message_of;
@@ -47,4 +47,4 @@ TEST(PassCosts, AreRefusedWhenTheyCannotBeRight) {
 }
 
 }  // namespace
-}  // namespace covary
+}  // namespace covary::pass_costs_test

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plans/pixel_importance.h"
+#include "plans/training_stage.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 
 #include "support/plans.h"
 
-namespace covary {
+namespace covary::pixel_importance_test {
 namespace {
 
 const std::string kRoom = std::string(COVARY_SOURCE_DIR) + "/scenes/room.xml";
@@ -42,4 +42,4 @@ TEST(PixelImportance, OfABlackImageIsFinite) {
 }
 
 }  // namespace
-}  // namespace covary
+}  // namespace covary::pixel_importance_test

@@ -19,7 +19,7 @@
 #include "support/files.h"
 #include "support/plans.h"
 
-namespace covary {
+namespace covary::render_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -268,11 +268,13 @@ std::vector<std::pair<uint32_t, int>> taken(const Plan& plan, const RenderReques
 
 TEST(Budget, IsTakenToTheSample) {
   using Taken = std::vector<std::pair<uint32_t, int>>;
-  PairMethod method;
-  method.name = "average", method.estimate = [](const GroupedImage&, const GroupedImage&, const PairSettings&) {
+  Estimator method;
+  PassChoice choice;
+  method.name = "average", method.fewest_groups = 3,
+  method.apply = [](const GroupedImage&, const GroupedImage&, const PairSettings&) {
     return EstimatorResult{.estimate = Image(3, 2, 3)};
   };
-  const auto pair = [&](uint32_t spp) { return taken(pair_plan(method), request_of(spp)); };
+  const auto pair = [&](uint32_t spp) { return taken(pair_plan(method, choice), request_of(spp)); };
   EXPECT_EQ(pair(192), (Taken{{96, 12}, {96, 12}}));
   EXPECT_EQ(pair(96), (Taken{{48, 12}, {48, 12}}));
   EXPECT_EQ(pair(32), (Taken{{16, 8}, {16, 8}}));
@@ -286,9 +288,9 @@ TEST(Budget, IsTakenToTheSample) {
     EXPECT_EQ(pair(spp), more) << "methods that share films agree";
     method.fewest_groups = 4;
   }
-  method.fewest_groups = 3, method.groups = 3;
+  method.fewest_groups = 3, choice.groups = 3;
   EXPECT_EQ(pair(7), (Taken{{4, 3}, {3, 3}}));
-  method.split = {0.25, 0.75};
+  choice.split = {0.25, 0.75};
   EXPECT_EQ(pair(33), (Taken{{8, 3}, {25, 3}}));
   EXPECT_EQ(taken(plain_plan(Sampling::kIndependent), request_of(7)), (Taken{{7, 1}}));
   EXPECT_EQ(taken(plain_plan(Sampling::kCrn), request_of(32)), (Taken{{32, 8}}));
@@ -331,4 +333,4 @@ TEST(Budget, FollowsThePredictedError) {
 }
 
 }  // namespace
-}  // namespace covary
+}  // namespace covary::render_test

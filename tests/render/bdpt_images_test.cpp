@@ -5,17 +5,14 @@
 // means at alpha = 5e-7. Each case asserts that it rejects, with power 0.99, the relative error that it says.
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <numeric>
 
 #include "bdpt_scenes.h"
 #include "film/splat_layer.h"
 #include "integrators/bidirectional_tracer.h"
 #include "integrators/path_tracer.h"
-#include "integrators/technique_images.h"
 #include "statistics/p_values.h"
 
-namespace covary {
+namespace covary::bdpt_images_test {
 namespace {
 
 constexpr int kRenders = 32, kSize = 8;
@@ -220,46 +217,6 @@ TEST(BdptImages, SmallScenesDoNotKnowTheUnitOfLength) {
   }
 }
 
-// Each technique that finds all paths of a length has their whole image, before its weight. All surfaces are diffuse
-// and well apart.
-TEST(BdptImages, CompleteTechniquesAlone) {
-  constexpr int kMaxEdges = 4;
-  const TestScene scene = load_text(bdpt_scene(
-      leaning_floor(diffuse(0.8)) +
-          rectangle("<scale value='4'/><rotate x='1' angle='180'/><translate y='4' z='11'/>", diffuse(0.8)) +
-          rectangle("<scale value='2'/><rotate x='1' angle='60'/><translate y='4' z='3'/>", diffuse(0) + area_light(5)),
-      kSize, kMaxEdges, "<string name='light_tracing' value='on'/>", sensor()));
-  auto& tracer = dynamic_cast<LightTracingIntegrator&>(*scene.loaded.integrator);
-  tracer.fix_light_tracing(kSize * kSize, false);
-  std::map<std::pair<int, int>, std::vector<double>> differences;  // of a technique alone from the weighted sum
-  double whole = 0;
-  for (uint64_t seed = 0; seed < kRenders; ++seed) {
-    PassSettings settings;
-    settings.seed = seed, settings.spp = 256, settings.filter = scene.loaded.filter;
-    std::map<int, double> sums;
-    std::map<std::pair<int, int>, double> alone;
-    for (const TechniqueImage& image : render_techniques(scene.scene(), tracer, settings, {0, 0, kSize, kSize})) {
-      const auto mean_of = [](const Image& pixels) {
-        return std::accumulate(pixels.data.begin(), pixels.data.end(), 0.0) / static_cast<double>(pixels.data.size());
-      };
-      sums[image.s + image.t] += mean_of(image.weighted);
-      alone[{image.s, image.t}] = mean_of(image.unweighted);
-    }
-    for (const auto& [technique, value] : alone)
-      differences[technique].push_back(value - sums[technique.first + technique.second]);
-    whole += sums[3] / kRenders;
-  }
-  for (int n = 3; n <= kMaxEdges + 1; ++n)
-    for (int s = 0; s < n; ++s) {
-      SCOPED_TRACE("(" + std::to_string(s) + ", " + std::to_string(n - s) + ")");
-      const std::vector<double>& of_technique = differences[{s, n - s}];
-      ASSERT_EQ(of_technique.size(), static_cast<size_t>(kRenders));
-      const statistics::TestResult result = statistics::t_test(of_technique, 0);
-      EXPECT_TRUE(result.accepted) << result.message;
-    }
-  EXPECT_GT(whole, 0);
-}
-
 // Any number of light paths for each sample has the same mean.
 TEST(BdptImages, FewOrManyLightPaths) {
   const std::string xml = bdpt_scene(leaning_floor(diffuse(0.6)) + area_lights(), kSize, 3, "", sensor());
@@ -272,4 +229,4 @@ TEST(BdptImages, FewOrManyLightPaths) {
 }
 
 }  // namespace
-}  // namespace covary
+}  // namespace covary::bdpt_images_test

@@ -15,7 +15,7 @@
 #include "statistics/p_values.h"
 #include "support/volume_text.h"
 
-namespace covary {
+namespace covary::media_test {
 namespace {
 
 using test_support::contains;
@@ -272,4 +272,4 @@ TEST(Media, OtherIntegratorsRefuseThem) {
 }
 
 }  // namespace
-}  // namespace covary
+}  // namespace covary::media_test
