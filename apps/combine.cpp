@@ -2,8 +2,9 @@
 // covary combine: image-space control variates for images made by any renderer.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-
 #include <tbb/global_control.h>
+#include <nlohmann/json.hpp>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -12,7 +13,6 @@
 #include <functional>
 #include <limits>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <vector>
 
@@ -20,8 +20,8 @@
 #include "combine/combine_settings.h"
 #include "combine/pair_input.h"
 #include "combine/result_file.h"
-#include "combine_counts.h"
 #include "commands.h"
+#include "core/error.h"
 #include "core/memory_limit.h"
 #include "core/stopwatch.h"
 #include "declared_options.h"
@@ -178,6 +178,19 @@ void check_files_of_command(const CombineOptions& o) {
     if (!path.empty()) outputs.reads(path);
   outputs.writes("-o", o.output, OutputKind::kFilm);
   outputs.writes("--json", o.json, OutputKind::kText);
+}
+
+/// `path`: of the independent image's counts; empty: nothing is done. All pixels of the CRN image (may be null) have
+/// `crn_samples`, or what its files tell on average. Throws Error(kUsage) where neither is known, and as
+/// GroupedFile::take_counts().
+void take_counts(const std::string& path, std::optional<int> crn_samples, GroupedFile* crn, GroupedFile& independent) {
+  if (path.empty()) return;
+  independent.take_counts(path);
+  if (!crn || crn->has_counts()) return;
+  const auto samples = crn_samples ? static_cast<uint32_t>(*crn_samples) : std::lround(crn->samples());
+  if (samples == 0)
+    throw Error(ErrorCode::kUsage, "--counts needs --samples N, the samples per pixel of the CRN image");
+  crn->take_count(static_cast<uint32_t>(samples));
 }
 
 /// What the command combines, with the files that it reads from.

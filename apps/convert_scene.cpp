@@ -9,10 +9,10 @@
 
 #include "commands.h"
 #include "core/error.h"
-#include "defines.h"
+#include "declared_options.h"
 #include "film/output_file.h"
 #include "film/outputs.h"
-#include "formats/file_view.h"
+#include "formats/file_resolver.h"
 #include "plans/integrator_choice.h"
 #include "value_names.h"
 

@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include "command_description.h"
+#include "core/error.h"
 #include "settings/option_names.h"
 #include "value_names.h"
 
@@ -73,6 +74,25 @@ void add_option(CLI::App& command, const Option& what, OptionValues& values) {
 
 void add_options(CLI::App& command, const std::vector<Option>& options, OptionValues& values) {
   for (const Option& option : options) add_option(command, option, values);
+}
+
+void add_define_option(CLI::App& command, std::vector<std::string>& defines) {
+  command.add_option("-D,--define", defines, "Value of one of the scene's <default> elements")
+      ->type_name("name=value")
+      ->take_all()
+      ->expected(1)
+      ->allow_extra_args(false);
+}
+
+std::map<std::string, std::string> parse_defines(const std::vector<std::string>& defines) {
+  std::map<std::string, std::string> result;
+  for (const std::string& define : defines) {
+    const size_t equals = define.find('=');
+    if (equals == 0 || equals == std::string::npos)
+      throw Error(ErrorCode::kUsage, "-D '" + define + "': expected name=value");
+    result[define.substr(0, equals)] = define.substr(equals + 1);
+  }
+  return result;
 }
 
 }  // namespace covary

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <map>
+#include <string>
 #include <vector>
 
 #include "settings/option.h"
@@ -12,5 +14,12 @@ namespace covary {
 /// Adds the options to the command: what is given on its command line is put into `values`, by names without dashes and
 /// checked as the declaration says. `values` must live as long as the command.
 void add_options(CLI::App& command, const std::vector<Option>& options, OptionValues& values);
+
+// -D name=value on the command line: values for the scene's <default> elements.
+
+void add_define_option(CLI::App& command, std::vector<std::string>& defines);
+
+/// Throws Error(kUsage) for a text that is not name=value.
+std::map<std::string, std::string> parse_defines(const std::vector<std::string>& defines);
 
 }  // namespace covary

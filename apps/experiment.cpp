@@ -18,10 +18,10 @@
 #include "interruption.h"
 #include "io/scene_file.h"
 #include "json_output.h"
-#include "lab/builtin_suites.h"
 #include "lab/experiment.h"
 #include "lab/overrides.h"
 #include "lab/report_document.h"
+#include "lab/suite.h"
 #include "numbers.h"
 #include "progress.h"
 #include "render_options.h"
@@ -218,8 +218,9 @@ void check_methods(const lab::Suite& suite) {
 }
 
 void write_results(const lab::Results& results, const std::string& folder) {
-  write_text_file(folder + kResults, json_text(to_json(results), 1));
-  write_text_file(folder + kTable, to_csv(results));
+  const nlohmann::ordered_json json = to_json(results);
+  write_text_file(folder + kResults, json_text(json, 1));
+  write_text_file(folder + kTable, lab::to_csv(json));
   nlohmann::ordered_json document = lab::report_document(results);
   std::vector<ReportImage> images;
   lab::add_pictures(results, document, images);

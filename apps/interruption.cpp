@@ -7,7 +7,7 @@
 #include <cstring>
 
 #include "core/error.h"
-#include "film/unfinished_files.h"
+#include "film/output_file.h"
 
 namespace covary {
 namespace {

@@ -14,7 +14,7 @@
 #include "film/outputs.h"
 #include "integrators/registry.h"
 #include "numbers.h"
-#include "passes/guide_probe.h"
+#include "passes/training.h"
 #include "plans/budget.h"
 #include "plans/light_plan.h"
 #include "plans/result_files.h"

@@ -25,12 +25,9 @@
 #include "plans/result_files.h"
 #include "progress.h"
 #include "render_options.h"
-#include "render_report.h"
-#include "render_sequence.h"
 #include "render_steps.h"
 #include "settings/option_names.h"
 #include "stages.h"
-#include "technique_files.h"
 
 namespace covary {
 namespace {
@@ -219,7 +216,6 @@ void render(RenderOptions options) {
     if (options.sequence.is_sequence()) place_frame(options, scene);
     return print_replay(options, scene);
   }
-  if (!options.debug_strategies.empty()) check_technique_folder(options.debug_strategies, scene);
   std::optional<StopFlag> stop(std::in_place);
   const RenderResult result =
       render_watched(options, scene, make_request(options, scene), display.get(), progress, *stop);
@@ -228,7 +224,6 @@ void render(RenderOptions options) {
     throw Unfinished(stop->exit_code(), fmt::format("interrupted when '{}' was written", options.request().output));
   stop.reset();  // there is nothing more to keep
   if (result.complete) write_stages(options, result);
-  if (!options.debug_strategies.empty()) write_techniques(options.debug_strategies, scene, result, nullptr);
 }
 
 }  // namespace

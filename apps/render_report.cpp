@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "render_report.h"
+#include "render_steps.h"
 
 #include <fmt/format.h>
 

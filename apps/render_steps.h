@@ -3,15 +3,50 @@
 #pragma once
 
 #include <memory>
+#include <nlohmann/json.hpp>
 
 #include "film/display.h"
 #include "film/outputs.h"
 #include "interruption.h"
+#include "plans/render.h"
 #include "progress.h"
 #include "render_options.h"
-#include "render_report.h"
 
 namespace covary {
+
+// What is said of a render: statistics, the summary, samples that could not be used.
+
+/// What is reported of.
+struct RenderReport {
+  const RenderOptions& options;
+  const LoadedScene& scene;
+  const RenderResult& result;
+  double load_seconds = 0;  ///< of reading the scene, without building the ray tracer's hierarchy
+  int threads = 0;
+};
+
+/// The object of --json.
+nlohmann::ordered_json statistics(const RenderReport& report);
+
+/// Lines on stderr about samples that were not finite or negative, with the commands that repeat them.
+void report_bad_samples(const RenderOptions& options, const Pass& pass);
+
+/// Lines on stderr about a finished render.
+void print_summary(const RenderReport& report);
+
+// covary render --frames: a scene to numbered images. The scene is loaded and built once, or where it
+// is a pattern of names, for each frame; each frame is the image that
+// `render` makes of it alone with the same camera and seed, whichever other frames the command has.
+
+/// Renders all frames of options.sequence in their order. With --resume, those that are complete stay as they are.
+/// Throws Error(kUsage) for options that fit no sequence, Error(kInput) for a complete frame of other settings, and
+/// Unfinished after a signal and where frames missed --until.
+void render_sequence(const RenderOptions& options, int threads);
+
+/// For --replay: the options of the only frame of options.sequence; throws Error(kUsage) where there are more.
+void take_frame(RenderOptions& options);
+/// Then puts the camera where it is in that frame.
+void place_frame(const RenderOptions& options, LoadedScene& scene);
 
 /// What the command reads and writes, as far as it is known before the scene is loaded.
 Outputs files_of(const RenderOptions& options);

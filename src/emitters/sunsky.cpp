@@ -29,7 +29,6 @@
 #include "emitters/rotation.h"
 #include "emitters/scene_sphere.h"
 #include "emitters/sky_model.h"
-#include "emitters/sun_position.h"
 
 namespace covary {
 namespace {

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <optional>
 
-#include "estimators/common_options.h"
 #include "estimators/control_variates.h"
 #include "estimators/estimator.h"
 #include "estimators/missing_light.h"

@@ -7,7 +7,6 @@
 #pragma once
 
 #include "estimators/estimator_result.h"
-#include "estimators/pixel_probe.h"
 #include "film/grouped_image.h"
 
 namespace covary {

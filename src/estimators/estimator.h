@@ -15,7 +15,6 @@
 
 #include "core/spectrum.h"
 #include "estimators/estimator_result.h"
-#include "estimators/pixel_probe.h"
 #include "estimators/sample_counts.h"
 #include "film/grouped_image.h"
 

@@ -103,12 +103,27 @@ struct EstimatorResult {
   std::vector<HeldOutRow> held_out;
   std::vector<RiskRow> risk_rows;  ///< of each row, for apply_interval(); empty where nothing tells of the error
   ErrorKind risk_kind = ErrorKind::kFilters;
-  int network_runs = 0;  ///< of Estimator::network: images and guides that it denoised
+  int network_runs = 0;                   ///< of Estimator::network: images and guides that it denoised
   std::optional<RiskRow> risk_sums;       ///< of all rows, by apply_interval()
   std::optional<ErrorInterval> interval;  ///< of the predicted relMSE, by apply_interval()
   std::string note;  ///< what whoever asked for the image should know of how it was made; mostly empty
   std::optional<MeasuredRisks> risks;     ///< of mixtures with a predicted error
   std::optional<HeldOutVerdict> verdict;  ///< by calibrate(); empty where nothing was held out
+};
+
+// A look into image-space control variates: what one pixel was made of.
+
+/// One control variate of a pixel: where it is, and its coefficient beta_i of [YM2025] Eq. (7).
+struct ControlVariate {
+  int dx = 0, dy = 0;  ///< from the target
+  float beta[3] = {};  ///< per channel; equal where coefficients are shared
+};
+
+/// Asks for the control variates of one pixel, and holds the answer: nearest places first, without places
+/// outside the frame; empty where the pixel is not valid.
+struct PixelProbe {
+  int x = 0, y = 0;
+  std::vector<ControlVariate> control_variates;
 };
 
 }  // namespace covary

@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "core/parallel.h"
-#include "estimators/common_options.h"
+#include "estimators/control_variates.h"
 #include "estimators/estimator.h"
 #include "filters/planes.h"
 

@@ -4,10 +4,9 @@
 #include <cmath>
 #include <limits>
 
-#include "film/groups.h"
-
-#include "estimators/common_options.h"
+#include "estimators/control_variates.h"
 #include "estimators/estimator.h"
+#include "film/groups.h"
 
 namespace covary {
 namespace {

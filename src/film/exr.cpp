@@ -23,7 +23,7 @@
 
 #include "core/parallel.h"
 #include "film/output_file.h"
-#include "imageio/exr_header.h"
+#include "imageio/exr_image.h"
 
 namespace covary {
 namespace Imf = OPENEXR_IMF_NAMESPACE;

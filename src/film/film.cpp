@@ -9,7 +9,6 @@
 #include <numeric>
 
 #include "film/groups.h"
-#include "film/sample_variance.h"
 
 namespace covary {
 namespace {

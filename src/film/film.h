@@ -74,7 +74,7 @@ class Film {
   /// samples; add_sums() and set() cannot be used then.
   void keep_sample_variance();
   bool keeps_sample_variance() const { return !variance_in_groups_.empty(); }
-  /// Unbiased estimate of the variance of one sample (film/sample_variance.h): from all samples where the film keeps
+  /// Unbiased estimate of the variance of one sample (film/groups.h): from all samples where the film keeps
   /// their variance, otherwise from its groups; zero where these tell nothing.
   Spectrum sample_variance(int x, int y) const;
   /// Gives a pixel that has no samples the value that `count` samples together led to. For films with one group.

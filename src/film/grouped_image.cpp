@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "core/error.h"
-#include "film/sample_variance.h"
+#include "film/groups.h"
 
 namespace covary {
 namespace {

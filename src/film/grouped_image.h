@@ -31,7 +31,7 @@ struct GroupedImage {
   uint32_t count(int x, int y) const {
     return counts ? counts[static_cast<size_t>(y) * width + x] : static_cast<uint32_t>(groups);
   }
-  /// Estimated variance of one sample (film/sample_variance.h); of a group where no counts are known. Zero where less
+  /// Estimated variance of one sample (film/groups.h); of a group where no counts are known. Zero where less
   /// than two samples or groups tell.
   Spectrum sample_variance(int x, int y) const;
   bool has_equal_groups(int x, int y) const { return count(x, y) % static_cast<uint32_t>(groups) == 0; }

@@ -6,6 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "core/spectrum.h"
+
 namespace covary {
 
 /// Samples that `group` has of the `count` samples of a pixel: sample s belongs to group s mod `groups`.
@@ -25,5 +27,14 @@ std::vector<uint32_t> split_samples(uint32_t total, std::span<const double> part
 
 /// The same, each number rounded up to a multiple of `groups`: where a total is only about what is wanted.
 std::vector<uint32_t> split_into_whole_groups(uint32_t total, std::span<const double> parts, int groups);
+
+// The variance of the samples of a pixel, from what a film keeps of them.
+
+/// Estimates the variance of one sample of each channel, unbiased, from a pixel's `count` samples in `groups` groups
+/// with the sizes of film/groups.h. `means`: groups x RGB. `in_groups`: mean squared deviation of the samples from the
+/// mean of their group, RGB, as films may keep it; all samples then count. Null: the means alone tell, with a relative
+/// standard error of about sqrt(2 / (groups - 1)). Zero where fewer than two samples, or groups with samples, tell
+/// nothing.
+Spectrum sample_variance(const float* means, const float* in_groups, int groups, uint32_t count);
 
 }  // namespace covary

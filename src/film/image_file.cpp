@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "core/memory_limit.h"
-#include "imageio/exr_header.h"
+#include "imageio/exr_image.h"
 #include "imageio/image_io.h"
 
 namespace covary {

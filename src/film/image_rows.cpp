@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "core/srgb.h"
-#include "imageio/exr_header.h"
+#include "imageio/exr_image.h"
 
 namespace covary {
 namespace {

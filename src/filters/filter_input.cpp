@@ -31,8 +31,7 @@ float scalar_variance(const Spectrum& variance) {
 float pooled_variance(const GroupedImage& a, const GroupedImage& b, int x, int y) {
   const double of_a = variance_freedom(a, x, y), of_b = variance_freedom(b, x, y);
   if (of_a + of_b <= 0) return 0;
-  const double sum =
-      of_a * scalar_variance(a.sample_variance(x, y)) + of_b * scalar_variance(b.sample_variance(x, y));
+  const double sum = of_a * scalar_variance(a.sample_variance(x, y)) + of_b * scalar_variance(b.sample_variance(x, y));
   return static_cast<float>(sum / (of_a + of_b));
 }
 
@@ -80,15 +79,13 @@ Planes box_mean(const Planes& image, const std::vector<unsigned char>& valid, in
       const size_t row = static_cast<size_t>(q) * pixels;
       add(&sums[row], sum.data()), add(&numbers[row], number.data());
     }
-    for (size_t x = 0; x < pixels; ++x)
-      result.row(0, y)[x] = number[x] ? static_cast<float>(sum[x] / number[x]) : 0.0f;
+    for (size_t x = 0; x < pixels; ++x) result.row(0, y)[x] = number[x] ? static_cast<float>(sum[x] / number[x]) : 0.0f;
   });
   return result;
 }
 
 FilterInput filter_input(const GroupedImage& crn, const GroupedImage& independent,
-                         const std::vector<unsigned char>& valid, VarianceSource source, int smoothing,
-                         int border) {
+                         const std::vector<unsigned char>& valid, VarianceSource source, int smoothing, int border) {
   FilterInput input;
   input.dependent = mean_planes(crn, valid, border, kFar);
   input.independent = mean_planes(independent, valid, border, 0);

@@ -4,6 +4,8 @@
 
 #include <memory>
 #include <string>
+#include <unordered_set>
+#include <vector>
 
 #include "scene/parameters.h"
 
@@ -13,5 +15,32 @@ using ObjectBuilder = std::shared_ptr<ObjectDescription>;
 ObjectBuilder make_object(const std::string& kind, const std::string& type, const SourceLocation& where);
 /// Transformations are kept as their 16 numbers say, which is all that a file can hold: its inverse is that of them.
 void set_property(ObjectDescription& object, const std::string& name, Value value);
+
+/// Calls `visit(object, property)` for each property of `root` and of all objects that it holds or refers to, directly
+/// or not, each object once.
+template <typename Visit>
+void visit_properties(const ObjectDescription& root, const Visit& visit) {
+  std::unordered_set<const ObjectDescription*> seen;
+  std::vector<const ObjectDescription*> open = {&root};
+  while (!open.empty()) {
+    const ObjectDescription* object = open.back();
+    open.pop_back();
+    for (const Property& property : object->properties) {
+      visit(*object, property);
+      const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value);
+      if (child && *child && seen.insert(child->get()).second) open.push_back(child->get());
+    }
+  }
+}
+
+// Meshes that stand in a scene's own file become PLY files in memory, the property `data` of a shape `ply`.
+
+struct EmbeddedMesh {
+  std::vector<double> positions, normals, uvs;  ///< three, three and two numbers a vertex; the last two may be empty
+  std::vector<double> corners;                  ///< three indices a triangle, whole and in range
+};
+
+/// The mesh as a binary PLY file.
+std::string ply_text(const EmbeddedMesh& mesh);
 
 }  // namespace covary

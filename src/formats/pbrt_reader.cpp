@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "core/content_hash.h"
-#include "formats/file_view.h"
+#include "formats/file_resolver.h"
 #include "formats/pbrt_objects.h"
 #include "formats/pbrt_parameters.h"
 #include "formats/scene_references.h"

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "formats/embedded_mesh.h"
+#include "formats/object_builder.h"
 #include "formats/pbrt_objects.h"
 #include "scene/embedded_data.h"
 

@@ -10,7 +10,7 @@
 #include <unordered_set>
 
 #include "core/content_hash.h"
-#include "formats/object_graph.h"
+#include "formats/object_builder.h"
 #include "formats/xml_values.h"
 #include "scene/embedded_data.h"
 

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "formats/file_view.h"
+#include "formats/file_resolver.h"
 #include "formats/xml_values.h"
 
 namespace covary {

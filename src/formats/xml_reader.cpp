@@ -9,7 +9,7 @@
 #include <unordered_map>
 
 #include "core/content_hash.h"
-#include "formats/file_view.h"
+#include "formats/file_resolver.h"
 #include "formats/scene_references.h"
 #include "formats/spectrum_objects.h"
 #include "formats/upgrade.h"

@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "formats/embedded_mesh.h"
+#include "formats/object_builder.h"
 #include "gltf/gltf_file.h"
 
 namespace covary {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "imageio/hdr.h"
+#include "imageio/plain_rows.h"
 
 #include <array>
 #include <cmath>
@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "core/error.h"
-#include "imageio/plain_rows.h"
 
 namespace covary {
 namespace {

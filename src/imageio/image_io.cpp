@@ -13,11 +13,9 @@
 
 #include "core/error.h"
 #include "core/memory_limit.h"
-#include "imageio/exr_header.h"
 #include "imageio/exr_image.h"
-#include "imageio/hdr.h"
 #include "imageio/image_module.h"
-#include "imageio/jpeg.h"
+#include "imageio/plain_rows.h"
 #include "imageio/png.h"
 
 namespace covary {

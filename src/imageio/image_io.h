@@ -2,7 +2,7 @@
 // Image files in every format OpenImageIO knows. OpenImageIO brings some 250 shared libraries, which take longer to
 // load than a small scene to render. So it lies behind a shared module, libcovary_imageio.so, which is loaded when a
 // function of this header needs it. EXR files of ordinary channels, films, textures in PNG, JPEG and HDR, and PNG files
-// that are written do not: imageio/exr_image.h, film/exr.h, imageio/png.h, imageio/jpeg.h, imageio/hdr.h.
+// that are written do not: imageio/exr_image.h, film/exr.h, imageio/png.h, imageio/plain_rows.h.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "imageio/jpeg.h"
+#include "imageio/plain_rows.h"
 
 #include <cstdio>
 
@@ -10,7 +10,6 @@
 #include <array>
 
 #include "core/error.h"
-#include "imageio/plain_rows.h"
 
 namespace covary {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Image files whose rows a small library reads from the top down: what png.h, jpeg.h and hdr.h share.
+// Image files whose rows a small library reads from the top down: what png.h, plain_rows.h and plain_rows.h share.
 #pragma once
 
 #include <cstdint>
@@ -26,5 +26,13 @@ using OpenRows = std::function<std::unique_ptr<PlainRows>(std::FILE*)>;
 /// A reader of the file `path`, whose header has the name of the format and no attributes; nullptr where `open` throws
 /// Error.
 std::unique_ptr<ImageReader> open_plain_rows(const std::string& path, const char* format, OpenRows open);
+
+/// The pixels that OpenImageIO reads of an HDR file (32-bit_rle_rgbe, rows from the top down), to the same bits;
+/// without attributes. nullptr where it is another file. Format: G. Ward, Real Pixels, in: Graphics Gems II, 1991.
+std::unique_ptr<ImageReader> open_plain_hdr(const std::string& path);
+
+/// The pixels that OpenImageIO reads of a JPEG file, to the same bits; without attributes. nullptr where it is not a
+/// JPEG file, damaged, or neither grey nor RGB.
+std::unique_ptr<ImageReader> open_plain_jpeg(const std::string& path);
 
 }  // namespace covary

@@ -12,7 +12,7 @@
 #include "integrators/controlled_batch.h"
 #include "integrators/controlled_tracer.h"
 #include "passes/training.h"
-#include "sampling/light_groups.h"
+#include "sampling/light_set.h"
 
 namespace covary {
 

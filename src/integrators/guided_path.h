@@ -11,7 +11,7 @@
 #include "integrators/guided_batch.h"
 #include "integrators/guided_tracer.h"
 #include "passes/training.h"
-#include "sampling/light_groups.h"
+#include "sampling/light_set.h"
 
 namespace covary {
 

@@ -9,7 +9,7 @@
 
 namespace covary {
 
-/// The control variates of the vertices of a batch (guided_control.h): opened at a vertex, closed when its direction
+/// The control variates of the vertices of a batch (guided_batch.h): opened at a vertex, closed when its direction
 /// and light samples are taken; and what each of them teaches.
 template <typename Parts>
 class GuidedVertexControl {

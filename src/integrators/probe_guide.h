@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "integrators/guided_path.h"
-#include "passes/guide_probe.h"
+#include "passes/training.h"
 
 namespace covary {
 

@@ -8,12 +8,11 @@
 #include <set>
 
 #include "emitters/equal_area_image.h"
-#include "formats/file_view.h"
-#include "formats/object_graph.h"
-#include "io/scene_file.h"
+#include "formats/file_resolver.h"
+#include "formats/object_builder.h"
 #include "imageio/png.h"
+#include "io/scene_file.h"
 #include "scene/embedded_data.h"
-#include "textures/embedded_image.h"
 #include "textures/image.h"
 
 namespace covary {

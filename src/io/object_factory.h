@@ -6,8 +6,10 @@
 #include <span>
 #include <string>
 #include <unordered_map>
+#include <unordered_set>
 
 #include "formats/file_resolver.h"
+#include "formats/object_builder.h"
 #include "scene/parameters.h"
 
 namespace covary {
@@ -72,6 +74,21 @@ auto make_checked(Parameters& parameters, Make&& make) -> decltype(make(paramete
     parameters.error(error.what());
     return nullptr;
   }
+}
+
+/// A text that two descriptions without nested objects share exactly when they describe the same thing: equal kind,
+/// type and parameters in any order. Ids and places in the file do not matter.
+std::string description_key(const ObjectDescription& object);
+
+/// The objects that another one than the scene holds or refers to: those written at the top of the scene's file for
+/// this alone have no place in the scene itself.
+inline std::unordered_set<const ObjectDescription*> held_objects(const ObjectDescription& scene) {
+  std::unordered_set<const ObjectDescription*> held;
+  visit_properties(scene, [&](const ObjectDescription& object, const Property& property) {
+    const ObjectPtr* child = std::get_if<ObjectPtr>(&property.value);
+    if (child && *child && &object != &scene) held.insert(child->get());
+  });
+  return held;
 }
 
 }  // namespace covary

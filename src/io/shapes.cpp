@@ -15,10 +15,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
+#include "core/error.h"
 #include "core/memory_limit.h"
-#include "formats/file_view.h"
-#include "io/curve_file.h"
-#include "io/mesh_attributes.h"
+#include "formats/file_resolver.h"
+#include "formats/object_builder.h"
+#include "formats/xml_values.h"
 #include "media/volume_file.h"
 #include "meshes/mesh_file.h"
 #include "scene/analytic_shape.h"
@@ -194,6 +197,103 @@ std::span<const Plugin<Shape>> shape_plugins() {
       {"sphere", make_sphere},
   };
   return kPlugins;
+}
+
+std::vector<std::string> wanted_attributes(const ObjectDescription& shape) {
+  std::vector<std::string> names;
+  visit_properties(shape, [&](const ObjectDescription& object, const Property& property) {
+    if (object.kind != "texture" || object.type != "mesh_attribute" || property.name != "name") return;
+    const std::string* name = std::get_if<std::string>(&property.value);
+    if (name && std::find(names.begin(), names.end(), *name) == names.end()) names.push_back(*name);
+  });
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+std::function<ShapePtr(const Transform&)> copies_of(const ShapePtr& shape, const AreaLight* light,
+                                                    const SourceLocation& where) {
+  return [shape, prototype = light ? light->clone() : nullptr, where](const Transform& to_world) {
+    try {
+      const ShapePtr copy = shape->transformed(to_world);
+      copy->share_surface(*shape);
+      if (prototype) {
+        const std::shared_ptr<AreaLight> own = prototype->clone();
+        own->attach(copy.get());
+        copy->set_emitter(own);
+      }
+      return copy;
+    } catch (const Error& error) {
+      throw Error(error.code(), where.text() + ": " + error.what());
+    }
+  };
+}
+
+ObjectPtr in_own_space(const ObjectPtr& shape, KeyedTransformPtr& to_world) {
+  for (const Property& property : shape->properties) {
+    const KeyedTransformPtr* animation = std::get_if<KeyedTransformPtr>(&property.value);
+    if (!animation || property.name != "to_world") continue;
+    to_world = *animation;
+    auto rest = std::make_shared<ObjectDescription>(*shape);
+    std::erase_if(rest->properties, [](const Property& p) { return p.name == "to_world"; });
+    return rest;
+  }
+  return shape;
+}
+
+namespace {
+
+class Reader {
+ public:
+  Reader(CurveKind kind, const Transform& to_world)
+      : n_least_(kind == CurveKind::kLinear ? 2 : 4), to_world_(to_world) {}
+
+  void read(std::string_view text) {
+    while (!text.empty()) {
+      ++line_;
+      const size_t end = std::min(text.find('\n'), text.size());
+      std::string_view line = text.substr(0, end);
+      if (line.ends_with('\r')) line.remove_suffix(1);
+      text.remove_prefix(std::min(end + 1, text.size()));
+      const bool blank = line.find_first_not_of(" \t") == std::string_view::npos;
+      blank ? end_curve() : add_point(line);
+    }
+    end_curve();
+  }
+  std::vector<CurvePoint> points;
+  std::vector<uint32_t> segments;
+
+ private:
+  void add_point(std::string_view line) {
+    try {
+      const std::vector<double> v = parse_numbers(line, 4);
+      const Vec3 p = to_world_.point({static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])});
+      if (v[3] < 0) throw Error(ErrorCode::kInput, fmt::format("the radius is {}; it must not be negative", v[3]));
+      points.push_back({p.x, p.y, p.z, static_cast<float>(v[3])});
+    } catch (const Error& error) {
+      throw Error(ErrorCode::kInput, fmt::format("line {}: {}", line_, error.what()));
+    }
+  }
+  void end_curve() {
+    const size_t n = points.size() - first_;
+    if (n == 0) return;
+    if (n < n_least_)
+      throw Error(ErrorCode::kInput, fmt::format("line {}: the curve before it has {} control points; at least {} are "
+                                                 "needed",
+                                                 line_, n, n_least_));
+    for (size_t i = first_; i + n_least_ <= points.size(); ++i) segments.push_back(static_cast<uint32_t>(i));
+    first_ = points.size();
+  }
+
+  size_t n_least_, first_ = 0, line_ = 0;
+  Transform to_world_;
+};
+
+}  // namespace
+
+std::shared_ptr<CurveShape> read_curves(std::string_view text, CurveKind kind, const Transform& to_world) {
+  Reader reader(kind, to_world);
+  reader.read(text);
+  return std::make_shared<CurveShape>(kind, std::move(reader.points), std::move(reader.segments));
 }
 
 }  // namespace covary

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "film/film.h"
@@ -97,5 +98,10 @@ nlohmann::ordered_json to_json(const Suite& suite);
 /// the name of a built-in suite it is searched here, in the source tree and the installation that `program`, the path
 /// of `covary`, lies in. `word` names the suite on the command line. Throws Error(kUsage) where there is none.
 std::string scenes_folder(const Suite& suite, const std::string& word, const std::string& program);
+
+// The suites that come with the program: suites/*.json of the source tree.
+
+/// Text of each suite by name, "iicv-table1".
+const std::map<std::string, std::string_view>& builtin_suites();
 
 }  // namespace covary::lab

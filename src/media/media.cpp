@@ -9,13 +9,37 @@
 // | sample_emitters | boolean      | true    | whether points in the medium sample lights                         |
 // | has_spectral_extinction | boolean |       | accepted, no effect                                                |
 // | (nested)       | phase         | isotropic |                                                                  |
+//
+// constvolume: one value everywhere.
+//
+// | name     | type      | default  | meaning                              |
+// |----------|-----------|----------|--------------------------------------|
+// | value    | colour    | 1        |                                      |
+// | to_world | transform | identity | moves the unit cube, which is its box |
 #include <fmt/format.h>
 
-#include "media/constant_volume.h"
+#include "core/transform.h"
 #include "media/registry.h"
+#include "scene/volume.h"
 
 namespace covary {
 namespace {
+
+/// The same value everywhere. Its box is the unit cube moved by `to_world`, as in Mitsuba.
+class ConstantVolume final : public Volume {
+ public:
+  explicit ConstantVolume(const Spectrum& value, const Transform& to_world = {})
+      : value_(value), bounds_(to_world.bounds({{0, 0, 0}, {1, 1, 1}})) {}
+  Spectrum eval(const Vec3&) const override { return value_; }
+  Spectrum largest() const override { return value_; }
+  Spectrum smallest() const override { return value_; }
+  Bounds3 bounds() const override { return bounds_; }
+  bool is_constant() const override { return true; }
+
+ private:
+  Spectrum value_;
+  Bounds3 bounds_;
+};
 
 /// Collisions of a ray with a medium of varying extinction, at most: more would take too long, or no ray would move.
 constexpr float kMostCollisions = 1e6f;
@@ -60,5 +84,10 @@ std::shared_ptr<Medium> make_medium(Parameters& p, bool homogeneous) {
 
 std::shared_ptr<Medium> make_homogeneous(Parameters& p) { return make_medium(p, true); }
 std::shared_ptr<Medium> make_heterogeneous(Parameters& p) { return make_medium(p, false); }
+
+std::shared_ptr<Volume> make_constvolume(Parameters& p) {
+  const Spectrum value = p.get_spectrum("value", Spectrum(1), SpectrumRole::kIndex);
+  return std::make_shared<ConstantVolume>(value, p.get_transform("to_world"));
+}
 
 }  // namespace covary

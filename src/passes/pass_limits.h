@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <vector>
 
 #include "core/stopwatch.h"
 #include "passes/render_pass.h"
@@ -36,5 +37,8 @@ class PassLimits {
   std::atomic<uint64_t> done_{0};
   std::atomic<bool> out_of_time_{false};
 };
+
+/// Sorts by pixel and sample and keeps the first few; which ones does not depend on the order they came in.
+void keep_first(std::vector<BadSample>& samples);
 
 }  // namespace covary

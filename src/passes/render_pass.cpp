@@ -10,7 +10,6 @@
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "core/warp.h"
-#include "passes/first_bad_samples.h"
 #include "passes/pass_limits.h"
 #include "passes/training.h"
 

@@ -2,7 +2,9 @@
 #include "passes/sample_parts.h"
 
 #include <algorithm>
+#include <functional>
 
+#include "core/error.h"
 #include "core/parallel.h"
 
 namespace covary {
@@ -82,6 +84,36 @@ std::vector<std::string> light_groups(const Scene& scene) {
     if (!light->group().empty() && std::find(groups.begin(), groups.end(), light->group()) == groups.end())
       groups.push_back(light->group());
   return groups;
+}
+
+void trace_direct_light(const Scene& scene, const Integrator& direct_light, const PassSettings& settings,
+                        const Film& film, Film& direct) {
+  PassSettings same = settings;
+  same.spp = SampleTarget(film.counts());
+  same.limit = UINT32_MAX;
+  same.seconds = 0;
+  same.checkpoint = nullptr;
+  render_pass(scene, direct_light, same, direct);
+}
+
+Film indirect_light(const Film& film, const Film& direct) {
+  COVARY_CHECK(film.counts() == direct.counts() && film.groups() == direct.groups(), "both hold the same samples");
+  Film result = film;
+  std::transform(film.data().begin(), film.data().end(), direct.data().begin(), result.data().begin(), std::minus<>());
+  return result;
+}
+
+std::vector<Image> path_length_images(const Scene& scene, const Integrator& integrator, const PassSettings& settings,
+                                      const Film& film) {
+  if (!integrator.longest_path())
+    throw Error(ErrorCode::kUsage, "the integrator has no images by the number of edges; controlled-path has");
+  const auto n = static_cast<size_t>(std::clamp(*integrator.longest_path(), 0, kMostEdges));
+  std::vector<Film> parts = films_of_parts(film, n, 1);
+  trace_parts(scene, integrator, settings, film, parts);
+  std::vector<Image> images;
+  if (settings.stop && settings.stop->load(std::memory_order_relaxed)) return images;
+  for (const Film& part : parts) images.push_back(part.mean_image());
+  return images;
 }
 
 }  // namespace covary

@@ -25,4 +25,31 @@ std::vector<Film> films_of_parts(const Film& film, size_t n_parts, int groups);
 /// The groups of the scene's lights (Emitter::group()), in their order; those without one are in none.
 std::vector<std::string> light_groups(const Scene& scene);
 
+// The image's layers of direct and indirect light, for compositing: direct light is traced again with the same random
+// numbers and shorter paths, and indirect light is what is left of the film.
+
+/// The layers' names, in films and files.
+inline constexpr const char* kLayerNames[] = {"Direct", "Indirect"};
+
+/// Brings `direct` to the part of the samples of `film` that came by at most two edges (Integrator::of_direct_light(),
+/// prepared), in the same groups. `settings`: those of the film's pass. Returns early, with
+/// fewer samples, once settings.stop is true.
+void trace_direct_light(const Scene& scene, const Integrator& direct_light, const PassSettings& settings,
+                        const Film& film, Film& direct);
+
+/// What a film holds beside that part of the same samples.
+Film indirect_light(const Film& film, const Film& direct);
+
+// The image by the number of edges of its paths: what is seen of the lights themselves (1), by one reflection (2), …
+
+/// Most edges of a path that are told apart; longer paths are in none of the images.
+inline constexpr int kMostEdges = 16;
+
+/// Image i holds the part of the film's samples that came by paths of i + 1 edges; as many images as there are lengths,
+/// at most kMostEdges. Together they are the film's mean where no path has more edges. Traces the samples again, which
+/// takes as long as the film did. `settings`: those of the film's render; reads stop, and then returns none. Throws
+/// Error(kUsage) for an integrator without Integrator::longest_path().
+std::vector<Image> path_length_images(const Scene& scene, const Integrator& integrator, const PassSettings& settings,
+                                      const Film& film);
+
 }  // namespace covary

@@ -3,7 +3,7 @@
 
 #include "core/content_hash.h"
 #include "core/stopwatch.h"
-#include "passes/guide_probe.h"
+#include "core/trigonometry.h"
 
 namespace covary {
 
@@ -75,6 +75,11 @@ bool train(const Scene& scene, LearningIntegrator& integrator, const TrainingSet
   }
   integrator.freeze();
   return true;
+}
+
+Vec3 probe_direction(float x, float y) {
+  const SinCos polar = sincos_turns(0.5f * y), turn = sincos_turns(x);
+  return {polar.sin * turn.cos, polar.cos, polar.sin * turn.sin};
 }
 
 }  // namespace covary

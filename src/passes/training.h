@@ -69,7 +69,7 @@ class LearningIntegrator : public Integrator {
 
   /// Whether it has learnt functions of directions, which probe() shows.
   virtual bool learns_directions() const { return false; }
-  /// What it knows at the first surface along `ray`, by guide_probe.h; nothing where there is no surface.
+  /// What it knows at the first surface along `ray`, by training.h; nothing where there is no surface.
   virtual std::optional<GuideProbe> probe(const Scene& scene, const Ray& ray, int height, uint32_t spp,
                                           uint64_t seed) const;
 
@@ -127,5 +127,19 @@ struct TrainingSettings {
 /// Trains a prepared integrator from the beginning, by training_spp() independent samples in each pixel, and freezes
 /// it. False when stopped before that; it can be trained again.
 bool train(const Scene& scene, LearningIntegrator& integrator, const TrainingSettings& settings);
+
+// What an integrator that guides paths knows at a surface, as functions of the direction: latitude-longitude images
+// around the y axis.
+
+/// Row 0 is +y. Column 0 begins at +x and turns towards +z.
+struct GuideProbe {
+  Vec3 position;
+  Image radiance;  ///< that arrives, by brute force
+  Image density;   ///< per unit solid angle, with which the next direction is drawn, delta lobes excluded; grey
+  Image control;  ///< Σ_k β_k N_k λ_k of the leaf's control variate per unit solid angle, scaled; RGB, can be negative
+};
+
+/// Direction of the point (x, y) of a probe's image, in [0, 1]².
+Vec3 probe_direction(float x, float y);
 
 }  // namespace covary

@@ -2,8 +2,10 @@
 // How many samples each pass takes, and in how many groups.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "plans/plan.h"
@@ -47,5 +49,26 @@ double samples_per_second(const LoadedScene& scene, const Integrator& integrator
 /// The next budget on the way to a relMSE of `target`: error falls like 1 / samples, or more slowly. At most `most`
 /// times as large.
 uint32_t next_budget(uint32_t budget, double predicted, double target, uint32_t limit, double most);
+
+/// The budgets of a render to a wanted error, one after the other: each is decided on the films of the one before, when
+/// these are complete. A render that is resumed goes the same way again, so the films keep the budgets
+/// (film_key::kBudgets): decided anew on films that are half-way to the next one, they would differ.
+class ErrorRounds {
+ public:
+  explicit ErrorRounds(uint32_t first) : budgets_{first} {}
+  uint32_t budget() const { return budgets_[now_]; }
+  /// Takes the budgets of a film that another call began, unless more are known, and `limit` for those above it. Throws
+  /// Error(kInput), naming `path`, where they make no sense.
+  void take(const std::string& text, uint32_t limit, const std::string& path);
+  /// Goes on to the next budget if an earlier call decided on one.
+  bool repeat();
+  /// Goes on to a budget that was decided now.
+  void add(uint32_t budget);
+  std::string text() const;
+
+ private:
+  std::vector<uint32_t> budgets_;
+  size_t now_ = 0;
+};
 
 }  // namespace covary

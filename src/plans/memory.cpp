@@ -9,8 +9,6 @@
 
 #include "core/error.h"
 #include "integrators/aov.h"
-#include "passes/direct_light.h"
-#include "passes/path_length_images.h"
 #include "passes/sample_parts.h"
 #include "passes/training.h"
 #include "plans/budget.h"

@@ -2,10 +2,12 @@
 // Films of a render on disk while it goes on, and for other estimators after it.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "plans/plan.h"
 #include "plans/render.h"
@@ -16,7 +18,7 @@ namespace covary {
 namespace film_key {
 inline constexpr const char* kTemporary = "temporary";     ///< "true": removed once the image of the render is written
 inline constexpr const char* kTrial = "integrator_trial";  ///< which one was chosen and why (integrator_trial.h)
-inline constexpr const char* kBudgets = "budgets";         ///< of a render to a wanted error (error_rounds.h): "96 168"
+inline constexpr const char* kBudgets = "budgets";         ///< of a render to a wanted error (budget.h): "96 168"
 /// Of a frame of a sequence, in film and result: a hash of all that its image depends on.
 inline constexpr const char* kFrame = "frame";
 }  // namespace film_key
@@ -48,5 +50,19 @@ void save_passes(const RenderRequest& request, std::span<Pass> passes, bool comp
 
 /// Removes the temporary files, and their folder when it is empty then.
 void remove_passes(const RenderRequest& request, std::span<const Pass> passes);
+
+// What the samples of a kept film cost: the text of the JSON file beside it.
+
+struct PassCosts {
+  uint64_t samples = 0, rays = 0;
+  double seconds = 0;           ///< of rendering
+  double estimate_seconds = 0;  ///< part of `seconds`: what fitting took; 0 where a pass only renders
+};
+
+/// Throws Error(kInput) where the text is not such a JSON object, or a value cannot be right.
+PassCosts parse_pass_costs(std::string_view text);
+
+/// The text that parse_pass_costs() reads; without `estimate_seconds` where that is 0.
+std::string to_text(const PassCosts& costs);
 
 }  // namespace covary

@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "film/splat_layer.h"
-#include "passes/first_bad_samples.h"
 #include "passes/light_pass.h"
+#include "passes/pass_limits.h"
 
 namespace covary {
 namespace {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/stopwatch.h"
-#include "plans/error_rounds.h"
+#include "plans/budget.h"
 #include "plans/render.h"
 
 namespace covary {

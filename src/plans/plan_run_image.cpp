@@ -14,8 +14,6 @@
 #include "core/stop.h"
 #include "denoising/history.h"
 #include "integrators/aov.h"
-#include "passes/direct_light.h"
-#include "passes/path_length_images.h"
 #include "passes/sample_parts.h"
 #include "plans/light_plan.h"
 #include "plans/pass_files.h"

@@ -33,10 +33,10 @@ struct RenderRequest {
   double until = 0;              ///< > 0: add samples until the predicted relMSE is this
   bool until_in_blocks = false;  ///< `until` means predicted_blocks() of predicted_error.h, not the whole image
   bool aovs = false;             ///< also the images Albedo, N and P
-  /// Also the images Edges01, Edges02, … of the last pass of camera samples (passes/path_length_images.h), which
+  /// Also the images Edges01, Edges02, … of the last pass of camera samples (passes/sample_parts.h), which
   /// needs the integrator controlled-path.
   bool path_lengths = false;
-  /// Also the images Direct and Indirect, which add up to the image (passes/direct_light.h). Needs an integrator
+  /// Also the images Direct and Indirect, which add up to the image (passes/sample_parts.h). Needs an integrator
   /// that tells direct light, and a plan that splits layers.
   bool layers = false;
   /// In place of these the images Combined_GROUP of each group of the scene's lights, and Rest for those in none.
@@ -48,7 +48,7 @@ struct RenderRequest {
 
   std::string output;    ///< EXR file of the result; empty: no file is written
   bool preview = false;  ///< also a PNG beside it
-  /// Files that keep what the integrator learns (training_file.h), written after the training and read in place of it;
+  /// Files that keep what the integrator learns (training_stage.h), written after the training and read in place of it;
   /// empty: none.
   std::string save_training, load_training;
   std::string oidn;        ///< where Open Image Denoise is, for integrators that use it; empty: where it is found

@@ -1,14 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "plans/training_stage.h"
 
+#include <algorithm>
+#include <cerrno>
 #include <cmath>
+#include <cstring>
+#include <fstream>
 #include <optional>
+#include <sstream>
 
+#include "core/error.h"
 #include "core/stop.h"
 #include "core/stopwatch.h"
 #include "denoising/denoise.h"
-#include "plans/pixel_importance.h"
-#include "plans/training_file.h"
+#include "film/output_file.h"
+#include "filters/joint_bilateral.h"
+#include "integrators/aov.h"
+#include "passes/training.h"
+#include "sampling/training_bytes.h"
 
 namespace covary {
 
@@ -43,6 +52,62 @@ void add_training(const Film& film, const TrainingImage& training, int first_row
       const double n = film.count(x, first_row + y), all = n + training.samples_at(x, first_row + y);
       for (int c = 0; c < 3; ++c) image.std_error.pixel(x, y)[c] *= static_cast<float>(std::sqrt(n / all));
     }
+}
+
+std::vector<Spectrum> pixel_importance(const Scene& scene, const FilterSettings& filter, const Film& film,
+                                       const std::optional<DenoiseOptions>& oidn, const std::atomic<bool>* stop) {
+  constexpr float kSmallest = 0.01f;  // as in relMSE
+  constexpr uint32_t kGuideSamples = 2;
+  PassSettings settings;
+  settings.pass = kTrainingPass, settings.filter = filter;
+  Film guides(film.frame_width(), film.frame_height(), film.crop(), 1);
+  render_aovs(scene, settings, kGuideSamples, guides, stop);
+  if (!guides.aovs.contains("N")) return {};
+  const Image &albedo = guides.aovs.at("Albedo"), &normal = guides.aovs.at("N");
+  const Image value =
+      oidn ? denoise(film.mean_image(), &albedo, &normal, *oidn) : joint_bilateral(film.mean_image(), albedo, normal);
+  std::vector<Spectrum> importance;
+  for (int y = 0; y < value.height; ++y)
+    for (int x = 0; x < value.width; ++x) {
+      Spectrum weight;
+      for (int c = 0; c < 3; ++c) weight[c] = 1 / std::sqrt(sqr(std::max(value.pixel(x, y)[c], 0.0f)) + kSmallest);
+      importance.push_back(weight);
+    }
+  return importance;
+}
+
+namespace {
+
+/// The integrator if it keeps what it learns, else throws.
+template <typename Learning>
+Learning& keeper(Learning* learning) {
+  if (!learning || !learning->keeps_training())
+    throw Error(ErrorCode::kUsage,
+                "only the integrator controlled-path with control variates and guided-path keep a training file");
+  return *learning;
+}
+
+/// What was learnt from.
+std::string key(const std::string& scene_hash, const LearningIntegrator& integrator) {
+  return scene_hash + "; " + integrator.settings_text();
+}
+
+}  // namespace
+
+void save_training(const std::string& scene_hash, const Integrator& integrator, const std::string& path) {
+  const LearningIntegrator& learnt = keeper(integrator.learning());
+  write_text_file(path, training_file_bytes(key(scene_hash, learnt), learnt.trained_bytes()));
+}
+
+void load_training(const std::string& scene_hash, Integrator& integrator, const std::string& path) {
+  LearningIntegrator& learning = keeper(integrator.learning());
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream content;
+  if (file) content << file.rdbuf();
+  if (!file || !content)
+    throw Error(ErrorCode::kIo, "cannot read the training file '" + path + "': " + std::strerror(errno));
+  const std::string bytes = content.str();
+  learning.use_bytes(training_file_body(bytes, key(scene_hash, learning), path), path);
 }
 
 }  // namespace covary

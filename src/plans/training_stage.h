@@ -2,9 +2,18 @@
 // The training of a scene's integrator before the phases of a plan, and what its samples add to the image.
 #pragma once
 
+#include <atomic>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "denoising/denoise.h"
+#include "film/film.h"
 #include "film/grouped_image.h"
+#include "passes/integrator.h"
 #include "passes/training.h"
 #include "plans/render.h"
+#include "scene/scene.h"
 
 namespace covary {
 
@@ -17,5 +26,23 @@ bool train(const LoadedScene& scene, const RenderRequest& request, Integrator& i
 /// Makes the standard errors of rows first_row, … of the film's image those of film and training together: the
 /// training's image has, about, the variance of so many samples of the film.
 void add_training(const Film& film, const TrainingImage& training, int first_row, EstimatorResult& image);
+
+// What integrators that learn are told of the image before they begin.
+
+/// How much an error counts in each channel of each pixel, so that relative errors count alike: 1 / √(value² + 0.01),
+/// with the value of the denoised film ([Hua2023] Eq. 25) and the constant of relMSE. Denoised by joint_bilateral(), or
+/// with `oidn` by Open Image Denoise, which then has to be there. Empty when stopped.
+std::vector<Spectrum> pixel_importance(const Scene& scene, const FilterSettings& filter, const Film& film,
+                                       const std::optional<DenoiseOptions>& oidn, const std::atomic<bool>* stop);
+
+// Files that keep what an integrator has learnt (docs/file-formats.md).
+
+/// Writes what a trained integrator has learnt in the scene of this hash. Throws Error(kUsage) where it learns nothing
+/// that is kept (LearningIntegrator::keeps_training), and Error(kIo).
+void save_training(const std::string& scene_hash, const Integrator& integrator, const std::string& path);
+
+/// Gives it to a prepared integrator, which is then not trained. Throws Error(kUsage) likewise, Error(kIo), and
+/// Error(kInput) for a file that is damaged, of another version, or of another scene or other settings.
+void load_training(const std::string& scene_hash, Integrator& integrator, const std::string& path);
 
 }  // namespace covary

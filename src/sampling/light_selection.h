@@ -3,10 +3,12 @@
 #pragma once
 
 #include <algorithm>
+#include <span>
 #include <unordered_map>
 #include <vector>
 
 #include "core/distribution.h"
+#include "scene/emitter.h"
 #include "scene/scene.h"
 
 namespace covary {
@@ -30,7 +32,7 @@ class UniformLights {
   float pmf_;
 };
 
-/// In proportion to the luminance of Emitter::power(), by sampling/light_weights.h. A light that is known to have no
+/// In proportion to the luminance of Emitter::power(), by sampling/light_selection.h. A light that is known to have no
 /// power is never chosen; where none has any, or one has infinitely much, all are equally likely.
 class PowerLights {
  public:
@@ -53,5 +55,16 @@ inline Ray shadow_ray(const SurfaceHit& hit, const EmitterSample& light) {
   const float distance = length(d);
   return {o, d * (1 / distance), distance * (1 - 10 * kRayEpsilon)};
 }
+
+// Weights by which lights are chosen in proportion to their powers. A light may become unlikely, never impossible.
+
+struct LightPower {
+  double power;  ///< at least 0; any number where none is known
+  bool exact;    ///< false: an estimate from some points, Emitter::knows_power()
+};
+
+/// In proportion to the powers. A light whose power is an estimate weighs at least 1 % of the mean light, so that one
+/// whose few bright points were missed is found. All weigh the same where no power is positive or one is not finite.
+std::vector<double> weights_by_power(std::span<const LightPower> lights);
 
 }  // namespace covary

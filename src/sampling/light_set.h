@@ -10,6 +10,7 @@
 
 #include "core/distribution.h"
 #include "core/large_vector.h"
+#include "sampling/light_clusters.h"
 #include "sampling/system_sums.h"
 #include "scene/scene.h"
 
@@ -19,7 +20,7 @@ namespace covary {
 enum class LightSelection {
   kTriangle,  ///< uniform over emissive triangles [Hua2023] §6; analytic shapes and delta lights count as one each
   kShape,     ///< uniform over shapes and delta lights, then by area, as `path` samples them
-  kPower,     ///< in proportion to the power, the mean of its channels, by light_weights.h
+  kPower,     ///< in proportion to the power, the mean of its channels, by light_selection.h
   kLearned,   ///< first as kPower; who learns from samples changes it by LightSet::change()
 };
 
@@ -74,5 +75,11 @@ class LightSet {
   std::vector<uint32_t> first_;  // number of the first part of each of emitters_
   Discrete selection_;
 };
+
+/// Clusters of the lights of a set, at most `limit` (at least 1); see cluster_lights(). `scene`: its bounds.
+LightClusters cluster_light_set(const LightSet& lights, const Bounds3& scene, uint32_t limit);
+
+/// The expected number of samples that a vertex takes of each cluster, which takes one of the whole set.
+std::vector<float> expected_samples(const LightClusters& clusters, const LightSet& lights);
 
 }  // namespace covary

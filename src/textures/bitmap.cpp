@@ -27,7 +27,7 @@
 #include "core/warp.h"
 #include "scene/embedded_data.h"
 #include "textures/block_layout.h"
-#include "textures/embedded_image.h"
+#include "textures/image.h"
 #include "textures/registry.h"
 
 namespace covary {

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace covary {
@@ -28,5 +29,9 @@ TexelImage read_texels(const std::string& path);
 
 /// The image as linear RGB floats, three per pixel; throws like read_texels.
 TexelImage read_linear_rgb(const std::string& path);
+
+/// An image that stands in a scene's own file (scene/embedded_data.h): binary PGM or PPM of 8 bits, which have sRGB
+/// values, or PFM of little-endian floats. Throws Error(kInput) for anything else, and for values that are not finite.
+TexelImage read_embedded_image(std::string_view bytes);
 
 }  // namespace covary

@@ -17,7 +17,7 @@
 #include "io/load_scene.h"
 #include "lab/suite.h"
 #include "meshes/mesh_file.h"
-#include "plans/pass_costs.h"
+#include "plans/pass_files.h"
 #include "sampling/coefficient_table.h"
 #include "sampling/guiding_field.h"
 #include "support/leaks.h"
