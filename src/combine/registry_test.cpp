@@ -282,7 +282,7 @@ TEST(EstimatorRegistry, SaysWhatIsWrong) {
   EXPECT_EQ(message("iduw", {{"k", "3"}}), "`k` is an option of `estimator` iicv, cv-baseline, not of iduw");
   EXPECT_EQ(message("iicv", {{"windwo", "3"}}), "`windwo` is not an option of any estimator; did you mean 'window'?");
   EXPECT_EQ(message("iicv", {{"k", "3x"}}), "`k` '3x': expected a whole number of at least 1");
-  EXPECT_EQ(message("iicv", {{"ridge", "nan"}}), "`ridge` 'nan': expected a number above 0");
+  EXPECT_EQ(message("iicv", {{"sample-fraction", "nan"}}), "`sample-fraction` 'nan': expected a number from 0 to 1");
   EXPECT_EQ(message("iicv", {{"residual-correction", "of"}}),
             "`residual-correction` 'of'; did you mean 'off' or 'on'?: expected on, off");
   EXPECT_TRUE(contains(message("iicv", {{"k", "500"}}), "k is 500, expected 1 to 121"));
