@@ -19,7 +19,7 @@
 #include "support/light_scene.h"
 #include "textures/bitmap.h"
 
-namespace covary::emission_density_test {
+namespace covary {
 namespace {
 
 using namespace test_support;
@@ -284,4 +284,4 @@ TEST(Emission, InfiniteLightsLightASurfaceEvenly) {
 }
 
 }  // namespace
-}  // namespace covary::emission_density_test
+}  // namespace covary

@@ -7,7 +7,7 @@
 #include "core/random.h"
 #include "statistics/chi2.h"
 
-namespace covary::environment_image_test {
+namespace covary {
 namespace {
 
 /// Random colours, a quarter of the texels black, and one "sun" texel that holds most of the light.
@@ -166,4 +166,4 @@ TEST(EnvironmentImage, EveryRandomNumberGivesAUnitDirection) {
 }
 
 }  // namespace
-}  // namespace covary::environment_image_test
+}  // namespace covary

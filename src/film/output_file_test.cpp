@@ -17,7 +17,7 @@
 #include "film/image_writer.h"
 #include "support/files.h"
 
-namespace covary::output_file_test {
+namespace covary {
 namespace {
 
 namespace fs = std::filesystem;
@@ -163,4 +163,4 @@ TEST(OutputFile, AFullDiskLeavesTheOldFile) {
 }
 
 }  // namespace
-}  // namespace covary::output_file_test
+}  // namespace covary

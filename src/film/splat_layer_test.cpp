@@ -16,7 +16,7 @@
 #include "film/merge.h"
 #include "support/files.h"
 
-namespace covary::splat_layer_test {
+namespace covary {
 namespace {
 
 using test_support::contains, test_support::message_of, test_support::test_file;
@@ -211,4 +211,4 @@ TEST(SplatLayer, RefusesFilmsThatAreNotItsOwn) {
 }
 
 }  // namespace
-}  // namespace covary::splat_layer_test
+}  // namespace covary

@@ -9,7 +9,7 @@
 #include "support/describe.h"
 #include "support/files.h"
 
-namespace covary::load_scene_test {
+namespace covary {
 namespace {
 
 using test_support::contains;
@@ -391,4 +391,4 @@ TEST_F(LoadScene, ReportsFilesThatCannotBeRead) {
 }
 
 }  // namespace
-}  // namespace covary::load_scene_test
+}  // namespace covary

@@ -7,7 +7,7 @@
 #include "io/load_scene.h"
 #include "support/files.h"
 
-namespace covary::media_test {
+namespace covary {
 namespace {
 
 using test_support::contains;
@@ -89,4 +89,4 @@ TEST(MediaInFiles, MitsubasPathTracersForMediaArePath) {
 }
 
 }  // namespace
-}  // namespace covary::media_test
+}  // namespace covary

@@ -5,7 +5,7 @@
 #include "io/load_scene.h"
 #include "support/files.h"
 
-namespace covary::references_test {
+namespace covary {
 namespace {
 
 using test_support::contains;
@@ -112,4 +112,4 @@ TEST(SceneReferences, WrongWrappers) {
 }
 
 }  // namespace
-}  // namespace covary::references_test
+}  // namespace covary

@@ -19,7 +19,7 @@
 #include "support/files.h"
 #include "support/plans.h"
 
-namespace covary::adaptive_plan_test {
+namespace covary {
 namespace {
 
 namespace fs = std::filesystem;
@@ -379,4 +379,4 @@ TEST(UnbiasedPlan, PassesTheTestThatThePublishedCombinationFails) {
 }
 
 }  // namespace
-}  // namespace covary::adaptive_plan_test
+}  // namespace covary

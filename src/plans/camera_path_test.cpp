@@ -10,7 +10,7 @@
 #include "plans/render.h"
 #include "support/plans.h"
 
-namespace covary::camera_path_test {
+namespace covary {
 namespace {
 
 const char* const kTwoKeys = R"({"frames_per_second": 2, "keyframes": [
@@ -94,4 +94,4 @@ TEST(PlacedCamera, MayNotScale) {
 }
 
 }  // namespace
-}  // namespace covary::camera_path_test
+}  // namespace covary

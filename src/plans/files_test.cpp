@@ -20,7 +20,7 @@
 #include "support/files.h"
 #include "support/plans.h"
 
-namespace covary::files_test {
+namespace covary {
 namespace {
 
 namespace fs = std::filesystem;
@@ -379,4 +379,4 @@ TEST(Memory, MoreThanTheLimitIsRefusedBeforeItIsTaken) {
 }
 
 }  // namespace
-}  // namespace covary::files_test
+}  // namespace covary

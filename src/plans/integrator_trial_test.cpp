@@ -12,7 +12,7 @@
 #include "support/files.h"
 #include "support/plans.h"
 
-namespace covary::integrator_trial_test {
+namespace covary {
 namespace {
 
 const std::string kRoom = std::string(COVARY_SOURCE_DIR) + "/scenes/room.xml";
@@ -118,4 +118,4 @@ TEST(IntegratorTrial, RendersContinuesAndReplaysTheChosenOne) {
 }
 
 }  // namespace
-}  // namespace covary::integrator_trial_test
+}  // namespace covary

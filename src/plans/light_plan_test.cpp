@@ -21,7 +21,7 @@
 #include "support/light_tracer.h"
 #include "support/plans.h"
 
-namespace covary::light_plan_test {
+namespace covary {
 namespace {
 
 namespace fs = std::filesystem;
@@ -300,4 +300,4 @@ TEST(LightPlan, MemoryCountsTheLightFilm) {
 }
 
 }  // namespace
-}  // namespace covary::light_plan_test
+}  // namespace covary

@@ -5,7 +5,7 @@
 
 #include "support/files.h"
 
-namespace covary::pass_costs_test {
+namespace covary {
 namespace {
 
 using test_support::message_of;
@@ -47,4 +47,4 @@ TEST(PassCosts, AreRefusedWhenTheyCannotBeRight) {
 }
 
 }  // namespace
-}  // namespace covary::pass_costs_test
+}  // namespace covary

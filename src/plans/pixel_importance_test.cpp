@@ -7,7 +7,7 @@
 
 #include "support/plans.h"
 
-namespace covary::pixel_importance_test {
+namespace covary {
 namespace {
 
 const std::string kRoom = std::string(COVARY_SOURCE_DIR) + "/scenes/room.xml";
@@ -42,4 +42,4 @@ TEST(PixelImportance, OfABlackImageIsFinite) {
 }
 
 }  // namespace
-}  // namespace covary::pixel_importance_test
+}  // namespace covary

@@ -8,7 +8,7 @@
 
 #include "support/plans.h"
 
-namespace covary::ray_costs_test {
+namespace covary {
 namespace {
 
 /// A box with one open side in front of nothing: paths that miss it are one ray long.
@@ -36,4 +36,4 @@ TEST(RayCosts, AreHigherWhereThereIsSomething) {
 }
 
 }  // namespace
-}  // namespace covary::ray_costs_test
+}  // namespace covary

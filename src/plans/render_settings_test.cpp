@@ -7,7 +7,7 @@
 
 #include "support/files.h"
 
-namespace covary::render_settings_test {
+namespace covary {
 namespace {
 
 using test_support::message_of;
@@ -115,4 +115,4 @@ TEST(RenderSettings, WordsOfPassesLeaveOutWhatOnlyTheImageNeeds) {
 }
 
 }  // namespace
-}  // namespace covary::render_settings_test
+}  // namespace covary

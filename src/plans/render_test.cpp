@@ -19,7 +19,7 @@
 #include "support/files.h"
 #include "support/plans.h"
 
-namespace covary::render_test {
+namespace covary {
 namespace {
 
 namespace fs = std::filesystem;
@@ -333,4 +333,4 @@ TEST(Budget, FollowsThePredictedError) {
 }
 
 }  // namespace
-}  // namespace covary::render_test
+}  // namespace covary

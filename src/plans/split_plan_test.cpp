@@ -13,7 +13,7 @@
 #include "support/files.h"
 #include "support/plans.h"
 
-namespace covary::split_plan_test {
+namespace covary {
 namespace {
 
 using test_support::contains, test_support::message_of, test_support::TemporaryFolder;
@@ -114,4 +114,4 @@ TEST(SplitPlan, OnlyOfADenoisedMean) {
 }
 
 }  // namespace
-}  // namespace covary::split_plan_test
+}  // namespace covary

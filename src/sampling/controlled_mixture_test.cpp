@@ -9,7 +9,7 @@
 #include "sampling/coefficient_solver.h"
 #include "sampling/system_sums.h"
 
-namespace covary::controlled_mixture_test {
+namespace covary {
 namespace {
 
 constexpr uint32_t kNoLight = ControlledSample::kNoLight;
@@ -370,4 +370,4 @@ TEST(ControlledMixture, EasesOversampling) {
 }
 
 }  // namespace
-}  // namespace covary::controlled_mixture_test
+}  // namespace covary

@@ -4,7 +4,7 @@
 
 #include "render_fixture.h"
 
-namespace covary::auxiliary_images_test {
+namespace covary {
 namespace {
 
 constexpr int kSide = 8;
@@ -84,4 +84,4 @@ TEST(AuxiliaryImages, ParallelMirrorsEndTheWay) {
 }
 
 }  // namespace
-}  // namespace covary::auxiliary_images_test
+}  // namespace covary

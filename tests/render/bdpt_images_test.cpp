@@ -12,7 +12,7 @@
 #include "integrators/path_tracer.h"
 #include "statistics/p_values.h"
 
-namespace covary::bdpt_images_test {
+namespace covary {
 namespace {
 
 constexpr int kRenders = 32, kSize = 8;
@@ -229,4 +229,4 @@ TEST(BdptImages, FewOrManyLightPaths) {
 }
 
 }  // namespace
-}  // namespace covary::bdpt_images_test
+}  // namespace covary

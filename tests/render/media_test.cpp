@@ -15,7 +15,7 @@
 #include "statistics/p_values.h"
 #include "support/volume_text.h"
 
-namespace covary::media_test {
+namespace covary {
 namespace {
 
 using test_support::contains;
@@ -272,4 +272,4 @@ TEST(Media, OtherIntegratorsRefuseThem) {
 }
 
 }  // namespace
-}  // namespace covary::media_test
+}  // namespace covary
