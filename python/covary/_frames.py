@@ -72,7 +72,8 @@ def frames(client: Any, scene: str | os.PathLike[str], output: str | os.PathLike
     if not numbers:
         raise UsageError(f"last: found {last}; accepted is {first}, the first frame, or more")
     folder, parts = os.getcwd(), _waves(os.fspath(output), options, waves, seed)
-    tasks = [(frame, (_words(os.fspath(scene), name, frame, words), folder)) for frame in numbers for name, words in parts]
+    tasks = [(frame, (_words(os.fspath(scene), name, frame, words), folder))
+             for frame in numbers for name, words in parts]
     for done, (frame, (code, errors)) in enumerate(results(client, _render_frame, tasks), 1):
         if code != 0:
             raise (UsageError if code == 2 else Error)(f"frame {frame}: {errors.strip().removeprefix('covary: ')}")
