@@ -69,7 +69,7 @@ void check_explain(const CombineOptions& o, const Estimator& estimator, const Gr
   const CropWindow& window = file.place().window;
   const int x = o.explain->x - window.x, y = o.explain->y - window.y;
   if (estimator.reads_guides)
-    throw Error(ErrorCode::kUsage, "--explain: with --denoise, a pixel is no sum of control variates");
+    throw Error(ErrorCode::kUsage, "--explain: with --denoise, a pixel is not a sum of control variates");
   if (!estimator.explain)
     throw Error(ErrorCode::kUsage, "--explain: " + o.estimator + " has no control variates with coefficients");
   if (x < 0 || y < 0 || x >= window.width || y >= window.height)

@@ -215,9 +215,8 @@ void add_compare(CLI::App& app) {
   const auto o = std::make_shared<CompareOptions>();
   CLI::App* command = app.add_subcommand("compare", "Errors of images against a reference");
   command
-      ->add_option(
-          "IMAGES", o->images,
-          "Images of any renderer (EXR, PNG, HDR, PFM, …), or frames, out_####.exr, whose changes are compared, too")
+      ->add_option("IMAGES", o->images,
+                   "Images (EXR, PNG, HDR, PFM, …), or frames (out_####.exr), whose changes are compared, too")
       ->type_name(kFileValue)
       ->required();
   command->add_option("-r,--reference", o->reference, "The reference image, or ref_####.exr")
@@ -225,7 +224,7 @@ void add_compare(CLI::App& app) {
       ->required();
   command
       ->add_option("--reference2", o->reference2,
-                   "A second reference with samples of its own: products (F - R1)(F - R2) cancel the references' noise")
+                   "A second, independent reference: products (F - R1)(F - R2) cancel the references' noise")
       ->type_name(kFileValue);
   command
       ->add_option("-m,--metric", o->metrics,
@@ -234,7 +233,7 @@ void add_compare(CLI::App& app) {
       ->delimiter(',')
       ->allow_extra_args(false)
       ->capture_default_str();
-  command->add_option("--layer", o->layer, "Compare this layer (N, group03, …) in place of R G B")->type_name("LAYER");
+  command->add_option("--layer", o->layer, "Compare this layer (N, group03, …) instead of R G B")->type_name("LAYER");
   command
       ->add_option("--json", o->json, "One JSON object per image and line; to standard output without FILE or with -")
       ->expected(0, 1)
@@ -245,12 +244,12 @@ void add_compare(CLI::App& app) {
       ->delimiter(',')
       ->expected(2)
       ->check(finite_number());
-  command->add_option("--frames", o->frames, "Of out_####.exr: these frames; default: those there are")
+  command->add_option("--frames", o->frames, "Only these frames of out_####.exr; default: all")
       ->type_name("FIRST-LAST");
   command
-      ->add_option("--baseline", o->baseline,
-                   "Of frames: a sequence (…_####.exr) whose errors are the units of a second table, with the worst "
-                   "region of 32 x 32 pixels")
+      ->add_option(
+          "--baseline", o->baseline,
+          "A sequence (…_####.exr) that a second table is relative to, with the worst region of 32 x 32 pixels")
       ->type_name(kFileValue);
   command->callback([o] { compare(*o); });
 }

@@ -182,10 +182,10 @@ bool compares_frames(const CompareOptions& o) {
     if (is_frame_pattern_of_input(path) != of_frames)
       usage(fmt::format("'{}' and '{}': either all images are names with '#', or none", o.images[0], path));
   if (!of_frames && !(o.frames + o.baseline).empty())
-    usage("--frames and --baseline are about frames, whose names have a '#' for the number");
+    usage("--frames and --baseline need frames, whose names have a '#' for the number");
   if (of_frames && !o.error_map.empty()) usage("--error-map is an option of single images, not of frames");
   if (!o.baseline.empty() && !is_frame_pattern_of_input(o.baseline))
-    usage(fmt::format("--baseline '{}' has no '#' in place of the frame's number", o.baseline));
+    usage(fmt::format("--baseline '{}' has no '#' for the frame number", o.baseline));
   return of_frames;
 }
 

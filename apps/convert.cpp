@@ -204,10 +204,9 @@ void convert_frames(const ConvertOptions& options) {
   const std::string& output = options.files.back();
   for (const std::string& input : inputs)
     if (!is_frame_pattern(input))
-      throw Error(ErrorCode::kUsage,
-                  fmt::format("'{}': of a video, expected are names with '#' in place of the frame's number, e.g. "
-                              "out_####.exr",
-                              input));
+      throw Error(ErrorCode::kUsage, fmt::format("'{}': of a video, expected names with '#' for the frame number, e.g. "
+                                                 "out_####.exr",
+                                                 input));
   const std::vector<int> frames = frames_on_disk(inputs[0]);
   if (frames.empty()) throw Error(ErrorCode::kInput, fmt::format("there are no frames '{}'", inputs[0]));
   Outputs outputs;
@@ -259,25 +258,25 @@ void add_convert(CLI::App& app) {
   CLI::App* command =
       app.add_subcommand("convert", "Convert images, or layers of films, to EXR, PNG, HDR, PFM, JPEG or TIFF");
   command
-      ->add_option(
-          "FILES", o->files,
-          "Images of any renderer (EXR, HDR, PFM, …), put side by side, and last the new one: its name "
-          "tells the format (.exr .pfm .tif: 32-bit linear, .hdr: linear, .png .jpg: 8-bit sRGB; .mp4 .mkv .mov "
-          ".webm: a video of in_####.exr, by ffmpeg)")
+      ->add_option("FILES", o->files,
+                   "Images (EXR, HDR, PFM, …), put side by side, and last the output, whose name sets the format (.exr "
+                   ".pfm .tif: 32-bit linear, .hdr: linear, .png .jpg: 8-bit sRGB; .mp4 .mkv .mov "
+                   ".webm: a video of in_####.exr, by ffmpeg)")
       ->type_name(kFileValue)
       ->option_text("IN... OUT")
       ->required();
   command->add_option("-e,--exposure", o->exposure, "Stops: the image is multiplied by 2^E")
       ->check(real_number(-100, 100))
       ->capture_default_str();
-  command->add_option("--fps", o->rate, "Of a video: frames per second; default: 24")->check(real_number(0.01, 1000));
-  command->add_option("--layer", o->layer, "Layer (N, group03, …) or single channel (samples) in place of R G B")
+  command->add_option("--fps", o->rate, "Frames per second of a video; default: 24")->check(real_number(0.01, 1000));
+  command->add_option("--layer", o->layer, "Layer (N, group03, …) or single channel (samples) instead of R G B")
       ->type_name("LAYER");
-  command->add_flag("--false-colours", o->colours,
-                    "Brightness as colours over three powers of ten, with a scale below: for --layer StdError");
+  command->add_flag(
+      "--false-colours", o->colours,
+      "Show brightness as colours over three powers of ten, with a scale below, e.g. for --layer StdError");
   command->add_flag("--accept-changed", o->accept_changed,
-                    "Take an image of covary that another program changed: the new one says nothing of its origin");
-  command->add_flag("--overwrite", o->overwrite, "Replace OUT, whatever it is; else only pictures made by convert");
+                    "Accept an image of covary that another program changed; the output records no origin");
+  command->add_flag("--overwrite", o->overwrite, "Replace any existing OUT, not only pictures made by convert");
   command->callback([o] { convert(*o); });
 }
 

@@ -86,19 +86,17 @@ void convert_scene(const ConvertSceneOptions& options) {
 
 void add_convert_scene(CLI::App& app) {
   const auto o = std::make_shared<ConvertSceneOptions>();
-  CLI::App* command = app.add_subcommand("convert-scene", "Convert scenes of pbrt-v4 or glTF 2.0 to Mitsuba's XML");
+  CLI::App* command =
+      app.add_subcommand("convert-scene", "Convert pbrt-v4, glTF 2.0 or older Mitsuba scenes to Mitsuba 3 XML");
   command
-      ->add_option(
-          "SCENE", o->input,
-          "Scene of pbrt-v4 (.pbrt) or glTF 2.0 (.glb, .gltf), or Mitsuba's of any version (.xml), brought to 3.0")
+      ->add_option("SCENE", o->input, "pbrt-v4 (.pbrt), glTF 2.0 (.glb, .gltf) or Mitsuba scene of any version (.xml)")
       ->type_name(kFileValue)
       ->option_text("SCENE")
       ->required();
   command
-      ->add_option(
-          "OUT", o->output,
-          "The new scene (.xml). Meshes and images that stand in SCENE become files in the folder OUT-files beside "
-          "it; other files stay where they are")
+      ->add_option("OUT", o->output,
+                   "The new scene (.xml, Mitsuba 3.0). Meshes and images inside SCENE become files in the folder "
+                   "OUT-files; other files stay where they are")
       ->type_name(kFileValue)
       ->option_text("OUT.xml")
       ->required();

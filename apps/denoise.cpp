@@ -181,8 +181,8 @@ bool is_by_network(const Options& o) { return o.mode == kNetwork || (o.mode.empt
 void check_options(const Options& o) {
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
   if (o.inputs.empty() || o.output.empty()) usage("expected are IN.exr and -o OUT.exr, or --check");
-  if (o.no_guides && !(o.albedo + o.normal).empty()) usage("--albedo and --normal: with --no-guides there are none");
-  if (o.no_guides && o.clean_guides) usage("--clean-guides: with --no-guides there are none");
+  if (o.no_guides && !(o.albedo + o.normal).empty()) usage("--albedo and --normal have no effect with --no-guides");
+  if (o.no_guides && o.clean_guides) usage("--clean-guides has no effect with --no-guides");
   for (size_t i = 0; i < o.inputs.size(); ++i)
     for (size_t k = 0; k < i; ++k)
       if (is_same_file(o.inputs[i], o.inputs[k]))
@@ -236,10 +236,10 @@ void add_denoise(CLI::App& app) {
   const auto o = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand("denoise", "Denoise an image, or several renders of different seeds");
   command
-      ->add_option("IN", o->inputs,
-                   "Linear image (EXR); its layers of albedo and normal are guides, by the names of any renderer. "
-                   "Several renders of any renderer that "
-                   "differ in their seed alone, or a film with groups, give a better image and its error")
+      ->add_option(
+          "IN", o->inputs,
+          "Linear image (EXR), guided by its albedo and normal layers, whatever the renderer calls them. Several "
+          "renders that differ only in their seed, or a film with groups, give a better image and its error")
       ->type_name(kFileValue)
       ->expected(1, 1000);
   command->add_option("-o,--output", o->output, "The result (EXR)")->type_name(kFileValue);
@@ -252,28 +252,25 @@ void add_denoise(CLI::App& app) {
       ->check(one_of(modes));
   command
       ->add_option("--oidn", o->oidn,
-                   "Open Image Denoise's library, its folder, the folder of Python's package pyoidn, or of an "
-                   "environment that holds it; 'off': mixtures without it")
+                   "Open Image Denoise's library or its folder, or that of the Python package pyoidn or of its "
+                   "environment; 'off': mixtures without it")
       ->type_name("off|LIBRARY");
-  command->add_flag("--check", o->check, "Print version and path of Open Image Denoise as it is found, and do nothing");
-  command
-      ->add_option("--albedo", o->albedo,
-                   "The guide of reflectance, where its layer has another name, or a file of its own; default: what "
-                   "the renderer calls so")
+  command->add_flag("--check", o->check, "Only print the version and path of Open Image Denoise");
+  command->add_option("--albedo", o->albedo, "Layer or file of the albedo; default: by the renderer's usual name")
       ->type_name("LAYER|FILE");
-  command->add_option("--normal", o->normal, "The same for normals, from -1 to 1")->type_name("LAYER|FILE");
+  command->add_option("--normal", o->normal, "Layer or file of the normals, from -1 to 1; default: likewise")
+      ->type_name("LAYER|FILE");
   command
       ->add_option("--layers", o->layers,
-                   "Layers of the inputs, denoised with the picture's weights, so that they add up to it; Rest is what "
-                   "they leave of it")
+                   "Layers of the inputs to denoise with the picture's weights; with Rest, they add up to it")
       ->type_name("LAYER")
       ->delimiter(',');
-  command->add_flag("--no-guides", o->no_guides, "Do not use these layers");
-  command->add_flag("--clean-guides", o->clean_guides,
-                    "With --mode oidn, denoise these layers first, each alone: less error where they are noisy, for "
-                    "three times the time");
+  command->add_flag("--no-guides", o->no_guides, "Do not use guides");
+  command->add_flag(
+      "--clean-guides", o->clean_guides,
+      "With --mode oidn, denoise the guides first: less error if they are noisy, in three times the time");
   add_frame_options(*command, o->of_frames, "Denoise");
-  command->add_flag("--force", o->force, "Denoise even where the renders do not fit each other");
+  command->add_flag("--force", o->force, "Denoise even if the renders do not match");
   command->add_flag("--quiet", o->quiet, "No summary");
   command->callback([o] { run(*o); });
 }

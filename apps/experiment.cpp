@@ -306,25 +306,24 @@ void add_experiment(CLI::App& app) {
   command->add_option("-o,--output", o->output, "Folder for report.html, results.json and results.csv")
       ->type_name(kFolderValue);
   command->add_flag("--list", o->list, "List the built-in suites");
-  command->add_flag("--print", o->print, "Print the suite as it would be run, as a start for one's own");
+  command->add_flag("--print", o->print, "Print the suite as it would be run, to start your own from");
   command->add_option("--scenes", o->scenes, "Folder of the suite's scene files")->type_name(kFolderValue);
   command->add_option("--cache", o->cache, "Folder of finished runs; default: cache in the output folder")
       ->type_name(kFolderValue);
   command->add_flag("--quick", o->overrides.quick,
                     "Small: 3 seeds, up to 192 samples per pixel, frames of up to 32400 pixels, crops of up to 12000");
-  const auto list = [](CLI::Option* option) { option->delimiter(',')->group("In place of the suite's"); };
-  const auto single = [](CLI::Option* option) { option->group("In place of the suite's"); };
+  const auto list = [](CLI::Option* option) { option->delimiter(',')->group("Overriding the suite"); };
+  const auto single = [](CLI::Option* option) { option->group("Overriding the suite"); };
   single(
       command->add_option("--seeds", o->seeds, "A number of seeds, or seeds separated by commas")->type_name("SEEDS"));
   list(command->add_option("--spp", o->spp, "Budgets in samples per pixel")->transform(whole_number(1u, 1u << 30)));
   list(command->add_option("--time", o->seconds, "Budgets in seconds")->check(positive_number()));
-  single(command->add_option("--crop", o->overrides.crop, "X,Y,WIDTH,HEIGHT, or WIDTHxHEIGHT in the middle")
+  single(command->add_option("--crop", o->overrides.crop, "X,Y,WIDTH,HEIGHT, or a centred WIDTHxHEIGHT")
              ->type_name("X,Y,WIDTH,HEIGHT"));
-  single(command->add_option("--resolution", o->overrides.resolution, "WIDTHxHEIGHT of the frames")
-             ->type_name("WIDTHxHEIGHT"));
+  single(command->add_option("--resolution", o->overrides.resolution, "Size of the frames")->type_name("WIDTHxHEIGHT"));
   // Names may hold commas.
-  single(command->add_option("--scenes-only", o->overrides.scenes, "Only these of its scenes")->type_name("NAME"));
-  single(command->add_option("--methods-only", o->overrides.methods, "Only these of its methods, and the baseline")
+  single(command->add_option("--scenes-only", o->overrides.scenes, "Only these scenes")->type_name("NAME"));
+  single(command->add_option("--methods-only", o->overrides.methods, "Only these methods, and the baseline")
              ->type_name("NAME"));
   single(command->add_option("--baseline", o->overrides.baseline, "Method that ratios refer to")->type_name("NAME"));
   single(command
@@ -337,8 +336,8 @@ void add_experiment(CLI::App& app) {
   add_threads_option(*command, o->threads, "Threads of each render");
   command
       ->add_option("--part", o->part,
-                   "K/N: make only the K-th of N parts of the runs, into the cache; when all parts are there, the "
-                   "command without --part measures them")
+                   "K/N: make only the K-th of N parts of the runs; when all are in the cache, the command without "
+                   "--part measures them")
       ->type_name("K/N");
   command->add_flag("--keep-passes", o->keep_passes, "Keep the films of all passes in the cache");
   command->add_flag("--quiet", o->quiet, "Failures only");

@@ -52,9 +52,9 @@ void check_motion(const std::string& before, const std::string& now, const std::
   const std::string instead =
       signs ? fmt::format("; multiplied by {},{} (--motion-scale) it fits better", (*signs)[0], (*signs)[1]) : "";
   throw Error(ErrorCode::kInput,
-              fmt::format("'{}': its motion does not lead to where things are in '{}': the difference is {:.2f} times "
-                          "that without motion{}. Expected are pixels to the right and down, from a pixel to where its "
-                          "point was in the frame before; see --motion-scale, or --no-history",
+              fmt::format("'{}': its motion does not match '{}': after warping, the difference is {:.2f} times that "
+                          "without motion{}. Expected are pixels to the right and down, from a pixel to its point's "
+                          "position in the previous frame; see --motion-scale, or --no-history",
                           now, before, fit, instead));
 }
 
@@ -67,7 +67,7 @@ void check_seeds(const std::string& before, const std::string& now) {
   };
   const std::string own = seed(now);
   if (!own.empty() && own == seed(before))
-    throw Error(ErrorCode::kInput, fmt::format("'{}' and '{}' have the same seed, {}; frames need seeds of their own, "
+    throw Error(ErrorCode::kInput, fmt::format("'{}' and '{}' have the same seed, {}; each frame needs its own seed, "
                                                "or --no-history",
                                                before, now, own));
 }
@@ -95,17 +95,16 @@ std::string motion_pattern(const MotionSource& source, const FramePatterns& patt
 }  // namespace
 
 void add_frame_options(CLI::App& command, FrameOptions& o, const std::string& what) {
-  command.add_option("--frames", o.frames, "Of in_####.exr: these frames; default: those there are")
-      ->type_name("FIRST-LAST");
-  command.add_option("--motion", o.motion.motion, "Of frames: the layer of motion to the frame before")
+  command.add_option("--frames", o.frames, "Only these frames of in_####.exr; default: all")->type_name("FIRST-LAST");
+  command.add_option("--motion", o.motion.motion, "Layer with the motion to the previous frame")
       ->type_name("LAYER")
       ->capture_default_str();
-  command.add_option("--depth", o.motion.depth, "Of frames: the layer of depth, if there is one")
+  command.add_option("--depth", o.motion.depth, "Layer with the depth, if any")
       ->type_name("LAYER")
       ->capture_default_str();
   command
       .add_option("--motion-scale", o.motion_scale,
-                  "What motion is multiplied by to be pixels to the right and down; 1,-1 where Y points up")
+                  "Factors that turn motion into pixels to the right and down; 1,-1 if Y points up")
       ->type_name("X,Y");
   command.add_flag("--no-history", o.no_history, what + " each frame alone");
 }
@@ -134,9 +133,9 @@ bool are_frames(const FrameOptions& o, const FramePatterns& patterns) {
   }
   for (const std::string& path : patterns.images)
     if (!is_frame_pattern_of_input(path))
-      usage(fmt::format("'{}' has no '#' in place of the frame's number, others do", path));
+      usage(fmt::format("'{}' has no '#' for the frame number, but others do", path));
   if (patterns.output.empty() || !is_frame_pattern(patterns.output))
-    usage(fmt::format("-o '{}': of frames, expected is a name such as out_####.exr", patterns.output));
+    usage(fmt::format("-o '{}': for frames, expected a name such as out_####.exr", patterns.output));
   return true;
 }
 

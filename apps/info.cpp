@@ -116,7 +116,7 @@ void info(const InfoOptions& options) {
 
 void add_info(CLI::App& app) {
   const auto options = std::make_shared<InfoOptions>();
-  CLI::App* command = app.add_subcommand("info", "What a film, image or scene holds: size, channels, attributes");
+  CLI::App* command = app.add_subcommand("info", "Describe a film, image or scene: size, channels, attributes");
   command->add_option("FILE", options->path, "A film or image, or a scene file (.xml, .pbrt, .glb, .gltf)")
       ->type_name(kFileValue)
       ->required();

@@ -95,12 +95,12 @@ void advise_on_images(const MergeOptions& options) {
   if (first.empty()) return;
   const bool all_kept = folders.size() == options.inputs.size();
   if (all_kept) commands = commands_of_films(folders, options.output, estimator);
-  std::string advice = all_kept ? "; its films are there, so merge these and combine them:"
+  std::string advice = all_kept           ? "; its films are there, so merge these and combine them:"
                        : commands.empty() ? "; merge the films that it was made of"
                                           : "; render with --passes, which keeps the films, and merge these:";
   for (const std::string& command : commands) advice += "\n  " + command;
   throw Error(ErrorCode::kInput,
-              fmt::format("{} is no film but an image that '{}' made of films, and holds no samples that could be "
+              fmt::format("{} is not a film but an image that '{}' made from films, without samples that could be "
                           "merged{}",
                           first, estimator, advice));
 }
@@ -129,7 +129,7 @@ void merge(const MergeOptions& options) {
 void add_merge(CLI::App& app) {
   const auto options = std::make_shared<MergeOptions>();
   CLI::App* command = app.add_subcommand("merge", "Merge films of one scene with different seeds into one film");
-  command->add_option("FILMS", options->inputs, "Films (EXR) that covary render --passes or --estimator none wrote")
+  command->add_option("FILMS", options->inputs, "Films (EXR), written by covary render --passes or --estimator none")
       ->type_name(kFileValue)
       ->required()
       ->expected(2, 100000);

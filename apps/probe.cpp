@@ -135,13 +135,14 @@ void probe(ProbeOptions options) {
 void add_probe(CLI::App& app) {
   const auto options = std::make_shared<ProbeOptions>();
   CLI::App* command = app.add_subcommand(
-      "probe", "What guided-path has learnt at the surface behind a pixel, as an image (EXR) and its preview (PNG)");
+      "probe",
+      "Show what guided-path has learnt at the surface seen by a pixel, as an image (EXR) and its preview (PNG)");
   add_render_options(*command, options->render);
   command->add_option("--pixel", options->pixel, "X,Y of the frame")->type_name("X,Y")->required();
   command->add_option("--height", options->height, "Rows of the images, which are twice as wide")
       ->transform(whole_number(1, 4096))
       ->capture_default_str();
-  command->add_option("--samples", options->samples, "Samples of the radiance of each direction")
+  command->add_option("--samples", options->samples, "Samples of the radiance in each direction")
       ->transform(whole_number(1u, 1u << 20))
       ->capture_default_str();
   for (CLI::Option* option : command->get_options([](const CLI::Option* o) { return !has_effect(*o); }))

@@ -162,9 +162,10 @@ Outputs files_of(const RenderOptions& options) {
   if (options.is_replay()) return outputs;
   outputs.writes("-o", options.request().output, OutputKind::kFilm);
   if (output_target(options.request().output).is_special)
-    throw Error(ErrorCode::kUsage, fmt::format("-o '{}' is no regular file, which a render needs to continue after an "
-                                               "interruption",
-                                               options.request().output));
+    throw Error(ErrorCode::kUsage,
+                fmt::format("-o '{}' is not a regular file, which a render needs to continue after an "
+                            "interruption",
+                            options.request().output));
   if (std::filesystem::is_directory(options.request().passes))
     for (const char* name : {"crn", "crn-1", "first-1", "independent", "pilot-1", "light"}) {
       const std::string path = (std::filesystem::path(options.request().passes) / name).string();
@@ -189,7 +190,7 @@ void warn_of_scene(const RenderOptions& options, const LoadedScene& scene) {
   for (const std::string& warning : scene.warnings) fmt::print(stderr, "warning: {}\n", as_flags(warning));
   const auto given = [&](const char* option) { return options.values.contains(option); };
   if (given("sampling") && !given("estimator") && !given("denoise") && !options.is_replay() && !options.quiet)
-    fmt::print(stderr, "note: --sampling takes one film, as --estimator none does, and leaves out --denoise\n");
+    fmt::print(stderr, "note: --sampling renders a single pass without --denoise\n");
 }
 
 namespace {

@@ -134,7 +134,7 @@ namespace {
 
 void add_output_options(CLI::App& command, RenderOptions& o) {
   command.option_defaults()->group("Output");
-  command.add_option("--display-server", o.display_server, "A running tev, which shows the image while it renders")
+  command.add_option("--display-server", o.display_server, "Show the image in a running tev while rendering")
       ->type_name(kServerValue);
   add_stages_option(command, o.stages);
   command.add_option("--replay", o.replay, "Print one sample of each film instead of rendering")
@@ -161,7 +161,7 @@ std::string scene_file(const std::string& word) {
 std::string program_path() { return fs::read_symlink("/proc/self/exe").string(); }
 
 void add_render_options(CLI::App& command, RenderOptions& o) {
-  command.add_option("SCENE", o.scene, "Scene: Mitsuba XML, pbrt, glTF; or the name of a small one, such as room")
+  command.add_option("SCENE", o.scene, "Scene: Mitsuba XML, pbrt or glTF; or the name of a built-in one, such as room")
       ->transform(scene_file)
       ->required();
   add_options(command, options_of<RenderSettings>(), o.values);

@@ -42,7 +42,7 @@ void check(const RenderOptions& options) {
        {std::pair{"-o", request.output}, {"--passes", request.passes}, {"--json", options.json}})
     if (!path.empty() && !is_frame_pattern(path))
       usage(
-          fmt::format("{} '{}': with --frames, expected is a name with '#' in place of the frame's number, e.g. "
+          fmt::format("{} '{}': with --frames, expected a name with '#' for the frame number, e.g. "
                       "{}",
                       name, path, std::string(name) == "-o" ? "out_####.exr" : "out_####"));
 }
@@ -86,9 +86,10 @@ bool is_complete(const std::string& path, const std::string& hash) {
   };
   if (value(film_key::kComplete) == "false") return false;
   if (value(film_key::kFrame) == hash) return true;
-  throw Error(ErrorCode::kInput, fmt::format("--resume: '{}' is no frame of this command: its scene, camera, seed or "
-                                             "options are others; without --resume it is replaced",
-                                             path));
+  throw Error(ErrorCode::kInput,
+              fmt::format("--resume: '{}' is not a frame of this command: its scene, camera, seed or "
+                          "options differ; without --resume it is replaced",
+                          path));
 }
 
 /// When frames are, and where the camera is then.
@@ -240,7 +241,7 @@ void render_sequence(const RenderOptions& options, int threads) { SequenceRender
 
 void take_frame(RenderOptions& options) {
   const std::vector<int> frames = options.sequence.frames->numbers();
-  if (frames.size() != 1) throw Error(ErrorCode::kUsage, "--replay is about one frame, such as --frames 7");
+  if (frames.size() != 1) throw Error(ErrorCode::kUsage, "--replay needs a single frame, e.g. --frames 7");
   options = frame_options(options, frames[0]);
 }
 

@@ -49,7 +49,7 @@ void add_prediction(const PredictedError& predicted, nlohmann::ordered_json& jso
 
 void print_findings(const std::vector<Finding>& findings, bool force, bool quiet) {
   if (const std::string errors = errors_text(findings); !errors.empty() && !force)
-    throw Error(ErrorCode::kInput, "the inputs do not fit: " + errors + " (--force combines them nevertheless)");
+    throw Error(ErrorCode::kInput, "the inputs do not fit: " + errors + " (--force combines them anyway)");
   for (const Finding& f : findings) {
     const bool note = f.severity == Finding::Severity::kNote;
     if (!note || !quiet) fmt::print(stderr, "{}: {}\n", note ? "note" : "warning", as_flags(f.text));

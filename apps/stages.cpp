@@ -31,8 +31,7 @@ Image coloured(Image map) {
 
 void add_stages_option(CLI::App& command, std::string& folder) {
   command
-      .add_option("--save-stages", folder,
-                  "Folder for images of the single steps (EXR and PNG); of estimators that have some")
+      .add_option("--save-stages", folder, "Folder for images of each step (EXR and PNG), if the estimator has steps")
       ->type_name(kFolderValue);
 }
 

@@ -60,7 +60,7 @@ void VideoWriter::add(const Image& frame) {
                                                frame.height, width_, height_));
   bytes_.resize(frame.data.size());
   std::transform(frame.data.begin(), frame.data.end(), bytes_.begin(), [](float linear) {
-    const float value = linear > 0 ? std::min(linear, 1.0f) : 0;  // and what is no number
+    const float value = linear > 0 ? std::min(linear, 1.0f) : 0;  // and what is not a number
     return static_cast<unsigned char>(std::lround(255 * linear_to_srgb(value)));
   });
   if (std::fwrite(bytes_.data(), 1, bytes_.size(), pipe_) != bytes_.size()) finish();

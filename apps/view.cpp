@@ -332,7 +332,7 @@ void check_frames(const ViewOptions& options) {
       throw Error(ErrorCode::kUsage,
                   fmt::format("'{}' and '{}': either all images are names with '#', or none", options.images[0], path));
   if (!options.is_sequence() && !options.frames.empty())
-    throw Error(ErrorCode::kUsage, "--frames is about frames, whose names have a '#' for the number");
+    throw Error(ErrorCode::kUsage, "--frames needs frames, whose names have a '#' for the number");
 }
 
 void view(const ViewOptions& options) {
@@ -367,23 +367,22 @@ void add_view(CLI::App& app) {
   CLI::App* command = app.add_subcommand("view", "Compare images in the browser: one page without a network");
   command
       ->add_option("IMAGES", o->images,
-                   "Images of any renderer (EXR, PNG, HDR, PFM, …), all of one frame; or sequences, out_####.exr, "
-                   "to be played side by side")
+                   "Images (EXR, PNG, HDR, PFM, …) of the same frame, or sequences (out_####.exr) to play side by side")
       ->type_name(kFileValue)
       ->required();
-  command->add_option("-r,--reference", o->reference, "Shows errors relative to this image")->type_name(kFileValue);
+  command->add_option("-r,--reference", o->reference, "Show errors relative to this image")->type_name(kFileValue);
   command->add_option("-o,--output", o->output, "Write the page (HTML) here instead of opening it")
       ->type_name(kFileValue);
-  command->add_option("--layer", o->layer, "Show this layer (N, group03, …) in place of R G B")->type_name("LAYER");
-  command->add_option("--inset", o->insets, "X,Y,WIDTH,HEIGHT: magnify this crop; may be given again")
+  command->add_option("--layer", o->layer, "Show this layer (N, group03, …) instead of R G B")->type_name("LAYER");
+  command->add_option("--inset", o->insets, "Magnify this crop; may be repeated")
       ->type_name("X,Y,WIDTH,HEIGHT")
       ->take_all()
       ->expected(1)
       ->allow_extra_args(false);
   command->add_flag(
       "--small", o->small,
-      "Leave out FLIP and the other layers of the files (StdError, Albedo, N, …): a smaller page, sooner");
-  command->add_option("--frames", o->frames, "Of out_####.exr: these frames; default: those there are")
+      "Leave out FLIP and the files' other layers (StdError, Albedo, N, …): a smaller page, written faster");
+  command->add_option("--frames", o->frames, "Only these frames of out_####.exr; default: all")
       ->type_name("FIRST-LAST");
   command->add_option("--fps", o->fps, "Frames per second at which a sequence is played")
       ->check(positive_number())

@@ -55,7 +55,7 @@ def frames(client: Any, scene: str | os.PathLike[str], output: str | os.PathLike
     the frames, which have the bits of one machine. Frames that are complete are not rendered again, so that the same
     call continues after an interruption.
 
-    output: a name with '#' in place of the frame's number, "out_####.exr".
+    output: a name with '#' for the frame number, "out_####.exr".
     options: further options of the command, e.g. ["--spp", "16", "--camera-path", "path.json"]. `--history` is refused,
         because it makes a frame of the one before: `covary denoise` of frames does so afterwards.
     waves: so many tasks of each frame, all with the samples that the options name. Number k of them has the seed

@@ -201,7 +201,7 @@ def _plan(scene: Scene, spp: int, estimator: str | None, seed: int, sample_range
     if estimator in (None, "none"):
         check_some(render_here, options)
         if unknown := set(options) - set(_OF_ONE_PASS):
-            raise UsageError(f"{min(unknown)}: is no argument of estimator {estimator or 'none'!r}; accepted are "
+            raise UsageError(f"{min(unknown)}: is not an argument of estimator {estimator or 'none'!r}; accepted are "
                              f"{', '.join(_OF_ONE_PASS)}")
     else:
         check_options(estimator, options)

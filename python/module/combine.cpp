@@ -245,7 +245,7 @@ nb::dict combine(nb::object crn, nb::object independent, const Beside& beside, c
     state.total = 2;
     request.checked = [&](const InputFindings& inputs) {
       if (const std::string errors = errors_text(inputs.findings); !errors.empty() && !request.force)
-        throw Error(ErrorCode::kInput, "the inputs do not fit: " + errors + " (force=True combines them nevertheless)");
+        throw Error(ErrorCode::kInput, "the inputs do not fit: " + errors + " (force=True combines them anyway)");
       state.done = 1;
     };
     pair.check_shapes();

@@ -216,7 +216,7 @@ class MaterialFile {
     const std::vector<float> nodes = file_.floats(field);
     bool right = file_.shape(field).size() == 1 && !nodes.empty() && nodes.front() >= least && nodes.back() <= most;
     for (size_t i = 1; right && i < nodes.size(); ++i) right = nodes[i - 1] < nodes[i];
-    if (!right) throw refusal(fmt::format("has a field '{}' that is no list of angles in rising order", field));
+    if (!right) throw refusal(fmt::format("has a field '{}' that is not a list of increasing angles", field));
     return nodes;
   }
   /// The last two dimensions of a field.

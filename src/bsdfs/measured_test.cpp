@@ -96,7 +96,7 @@ TEST(Measured, WrongFilesAreNamed) {
   const auto plain = plain_fields(1);
   expect_contains(bsdf_errors({{"type", "measured"}}), "bsdf 'measured': the string 'filename' is missing");
   expect_contains(bsdf_errors(measured(kFolder + "bsdfs.json")), "cannot be used: ");
-  expect_contains(bsdf_errors(measured(kFolder + "bsdfs.json")), "is no tensor file");
+  expect_contains(bsdf_errors(measured(kFolder + "bsdfs.json")), "is not a tensor file");
   auto spectral = plain;
   spectral.push_back(float_field("wavelengths", {1}, {500}));
   expect_contains(bsdf_errors(measured(write(spectral))), "use the file of this material that ends in _rgb.bsdf");
@@ -110,7 +110,7 @@ TEST(Measured, WrongFilesAreNamed) {
                   "'luminance' is zero everywhere in slice 0");
   expect_contains(errors(plain, 6, float_field("rgb", {1, 2, 2, 2, 2}, std::vector<float>(16, 1))),
                   "expected [1, 2, 3, 2, 2]");
-  expect_contains(errors(plain, 1, float_field("theta_i", {2}, {1, 1})), "'theta_i' that is no list of angles");
+  expect_contains(errors(plain, 1, float_field("theta_i", {2}, {1, 1})), "'theta_i' that is not a list of angles");
   auto third = plain;
   third[0] = float_field("phi_i", {3}, {-2.1f, -1, 0});
   for (size_t i = 4; i <= 6; ++i) {

@@ -63,7 +63,7 @@ TensorFile::TensorFile(const std::string& path) : path_(path) {
   char magic[sizeof(kMagic)] = {};
   stream.read(magic, sizeof(magic));
   if (!stream || std::memcmp(magic, kMagic, sizeof(magic)) != 0)
-    throw refusal(path, "is no tensor file: expected one that begins with 'tensor_file'");
+    throw refusal(path, "is not a tensor file: expected one that begins with 'tensor_file'");
   HeaderReader header(stream, path);
   const int major = header.number<uint8_t>(), minor = header.number<uint8_t>();
   if (major != 1 || minor != 0)

@@ -61,8 +61,8 @@ TEST(TensorFile, WrongFieldsAreNamed) {
 }
 
 TEST(TensorFile, DamagedFilesAreRefused) {
-  EXPECT_EQ(refused(""), ": is no tensor file: expected one that begins with 'tensor_file'");
-  EXPECT_EQ(refused("tensor_fool\0\1\0"), ": is no tensor file: expected one that begins with 'tensor_file'");
+  EXPECT_EQ(refused(""), ": is not a tensor file: expected one that begins with 'tensor_file'");
+  EXPECT_EQ(refused("tensor_fool\0\1\0"), ": is not a tensor file: expected one that begins with 'tensor_file'");
   const std::string whole = tensor_text(kFields);
   std::string other = whole;
   other[12] = 2;

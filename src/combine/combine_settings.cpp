@@ -30,13 +30,13 @@ void declare_images(Settings& s, CombineSettings& v) {
   s.texts("independent", v.independent, "FILE", "Image with independent random numbers, likewise",
           {.aliases = {"pt"}, .names = OptionNames::kFile});
   s.text("output", v.output, "FILE", "The result (EXR)", {.aliases = {"o"}, .names = OptionNames::kFile});
-  s.text("crn-layer", v.crn_layer, "LAYER", "Layer of the CRN image where its files hold several");
-  s.text("independent-layer", v.independent_layer, "LAYER",
-         "Layer of the independent image where its files hold several", {.aliases = {"pt-layer"}});
-  s.text("counts", v.counts, "FILE",
-         "EXR with the samples of each pixel of the independent image, all groups together, where its files do not "
-         "tell and pixels differ",
-         kFile);
+  s.text("crn-layer", v.crn_layer, "LAYER", "Layer of the CRN image if its files have several");
+  s.text("independent-layer", v.independent_layer, "LAYER", "Layer of the independent image if its files have several",
+         {.aliases = {"pt-layer"}});
+  s.text(
+      "counts", v.counts, "FILE",
+      "EXR with the samples per pixel of the independent image over all groups, if they vary and its files do not say",
+      kFile);
   s.text("light", v.light, "FILE", "Light film (light.exr of covary render `passes`) to add to the result", kFile);
 }
 
@@ -44,23 +44,23 @@ void declare_images(Settings& s, CombineSettings& v) {
 
 void declare(Settings& s, CombineSettings& v) {
   declare_images(s, v);
-  s.one_of("estimator", v.estimator, pair_estimator_names(), "iicv, or a comparator");
+  s.one_of("estimator", v.estimator, pair_estimator_names(), "iicv, or a method to compare with");
   declare(s, v.denoising);
   s.group("");
-  s.text("guides", v.guides, "FILE",
-         "For `denoise`: image (EXR) of the same pixels whose layers Albedo and N show the surfaces", kFile);
+  s.text("guides", v.guides, "FILE", "For `denoise`: image (EXR) of the same pixels with the layers Albedo and N",
+         kFile);
   s.texts("layers", v.layers, "LAYER",
-          "For `denoise`: layers of the independent image's files, denoised so that they add up to the result, with "
-          "Rest for what they leave of it");
+          "For `denoise`: layers of the independent image's files to denoise with it; with Rest, they add up to the "
+          "result");
   s.whole("samples", v.samples, {.low = 1, .high = std::numeric_limits<int>::max()},
-          fmt::format("With `counts`, or {}: samples per pixel of the CRN image; default: what its file tells",
+          fmt::format("With `counts`, or {}: samples per pixel of the CRN image; default: as its file says",
                       fmt::join(estimators_with_samples(), ", ")));
   s.flag("error", v.error, "Add the standard error as channels StdError.R, .G, .B");
   s.text_as("explain", v.explain, "X,Y", read_pixel, "Print the control variates of this pixel and their coefficients");
-  s.flag("force", v.force, "Combine even where the check of the inputs finds errors");
+  s.flag("force", v.force, "Combine even if the check of the inputs finds errors");
   s.real("memory", v.memory_mib, {.low = 0, .above_low = true},
-         "MiB to work in: larger images are worked on in bands, with the same bits, or refused by estimators that need "
-         "whole images; default: 4096 for bands, most of the machine's for whole images");
+         "Memory limit in MiB: larger images are processed in bands, with the same bits, or refused by estimators that "
+         "need whole images; default: 4096 for bands, most of the machine's memory for whole images");
 }
 
 }  // namespace covary

@@ -83,11 +83,10 @@ void DifferenceChecks::report(std::vector<Finding>& findings) const {
     else if (is_brighter)
       findings.push_back(
           {Finding::Severity::kError,
-           fmt::format(
-               "of renders {} and {} one is brighter in {:.0f} % of the pixels that differ; of renders that "
-               "differ in their seed alone it is one half: exposure, lights or numbers of samples differ, or their "
-               "pixels share random numbers",
-               t + 1, t + 2, 100 * brighter)});
+           fmt::format("one of the renders {} and {} is brighter in {:.0f} % of the pixels that differ; if only their "
+                       "seeds differed, it would be one half: exposure, lights or numbers of samples differ, or their "
+                       "pixels share random numbers",
+                       t + 1, t + 2, 100 * brighter)});
     else
       continue;
     return;  // one such pair tells enough

@@ -309,7 +309,7 @@ InputReport InputChecks::report() const {
     if (identical && independent.mean > 0)
       r.findings.push_back({Severity::kError,
                             "independent image: all groups are identical: the same seed was rendered twice, or there "
-                            "is no noise to take away; give every render its own seed"});
+                            "is no noise to remove; give every render its own seed"});
     return r;
   }
 
@@ -336,7 +336,7 @@ InputReport InputChecks::report() const {
   else if (r.independent_horizontal.pairs < kFewPairs)
     r.findings.push_back(
         {Severity::kNote,
-         fmt::format("independent image: only {} pairs of pixels with noise; correlations are little tested",
+         fmt::format("independent image: only {} pairs of pixels with noise; correlations are hardly tested",
                      r.independent_horizontal.pairs)});
 
   if (crn_groups >= 3 && independent_groups >= 3 && r.nonfinite_pixels == 0) check_means(crn, independent, r);

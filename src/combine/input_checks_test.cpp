@@ -153,7 +153,7 @@ TEST(InputChecks, SaysWhatItCannotCheck) {
             "recommended\n");
   const test::Grouped flat = test::constant_image(8, 8, 12, 0.5f);
   EXPECT_EQ(findings(flat, flat),
-            "independent image: only 0 pairs of pixels with noise; correlations are little tested\n");
+            "independent image: only 0 pairs of pixels with noise; correlations are hardly tested\n");
   EXPECT_THROW(examine_inputs(crn.view(), flat.view()), Error);
 }
 

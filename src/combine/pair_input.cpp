@@ -61,7 +61,7 @@ void check_light(const ImageOrigin& crn, const ImageOrigin& independent, const I
   }
   if (!light) return;
   if (!light->is_light_film)
-    throw Error(ErrorCode::kInput, fmt::format("`light` '{}' is no light film: it lacks the attribute "
+    throw Error(ErrorCode::kInput, fmt::format("`light` '{}' is not a light film: it lacks the attribute "
                                                "covary:light_paths_per_sample",
                                                light->name));
   if (!(light->place == crn.place))

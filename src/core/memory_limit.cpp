@@ -59,7 +59,7 @@ double memory_limit() {
 void require_memory(const std::string& file, const std::string& what, double bytes) {
   const double held = held_bytes(), limit = memory_limit();
   if (held + bytes <= limit) return;
-  throw Error(ErrorCode::kInput, fmt::format("{}: {} needs {} of memory beside the {} in use; {}", file, what,
+  throw Error(ErrorCode::kInput, fmt::format("{}: {} needs {} of memory in addition to the {} in use; {}", file, what,
                                              bytes_text(bytes), bytes_text(held), memory_limit_text()));
 }
 

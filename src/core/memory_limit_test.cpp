@@ -40,7 +40,7 @@ TEST_F(MemoryLimit, IsThatOfTheEnvironment) {
   EXPECT_EQ(memory_limit(), 4.5e9);
   EXPECT_EQ(message(4e9, ErrorCode::kInput), "");
   const std::string text = message(4.6e9, ErrorCode::kInput);
-  EXPECT_NE(text.find("a.png: a texture of 30000 x 30000 pixels needs 4.6 GB of memory beside the "),
+  EXPECT_NE(text.find("a.png: a texture of 30000 x 30000 pixels needs 4.6 GB of memory in addition to the "),
             std::string::npos);
   EXPECT_NE(text.find(" in use; the limit is 4.5 GB: use less, or raise it by the environment variable COVARY_MEMORY "),
             std::string::npos)

@@ -307,12 +307,11 @@ Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& opt
 void declare(Settings& s, DenoisingChoice& v, bool is_all) {
   s.group("Denoising");
   s.one_of("denoise", v.mode, denoise_mode_names(),
-           "Mix the image with denoised ones where held-out samples find that better: for the least error (auto), or "
-           "with less bias",
+           "Mix in denoised images where held-out samples prefer them: for the least error (auto), or with less bias",
            {.level = OptionLevel::kBasic});
   s.text("oidn", v.oidn, "off|LIBRARY",
          std::string(is_all ? "For `denoise`" : "For `denoise` and `cv-surrogate` oidn") +
-             ": Open Image Denoise's library or a folder of it; default: where it is found; 'off': without it",
+             ": Open Image Denoise's library or its folder; default: searched for; 'off': not used",
          {.names = OptionNames::kLibrary});
   s.only_if(v.denoises() || !is_all, {"oidn"}, kNotDenoised);
 }

@@ -234,13 +234,13 @@ void declare(Settings& p, DependentTestsOptions& o) {
                             "Weights that minimise the error bound, or the published ones", kPasses);
   p.whole("window", o.window, kWindowRange, kWindowHelp);
   p.whole("sigma-window", o.smoothing, {.low = 1, .high = 63, .odd = true},
-          "Side of the window that averages the noise");
+          "Side of the window over which noise is averaged");
   p.choice<int>("guard", o.guard, kGuards, "Trust the CRN image less where it is too dark");
-  p.whole("max-region", o.regions.max_region, {.low = 1, .high = 63}, "Largest side of a region of `filter` paper");
+  p.whole("max-region", o.regions.max_region, {.low = 1, .high = 63}, "Maximum side of a region of `filter` paper");
   p.real("min-centre-drop", o.regions.min_centre_drop, {.low = 0},
-         "Regions grow while the weight of their centre drops by at least this much");
+         "Regions grow while their centre's weight drops by at least this much");
   p.choice<CombinationWeights>("weights", o.weights, kWeights,
-                               "Mixture of the images: by measured error, worth, or samples");
+                               "Image weights: measured errors, effective samples, samples");
   check_effects(p, o);
 }
 

@@ -48,7 +48,7 @@ TEST(Projector, EmissionHasItsDensity) {
 
 TEST(Projector, NamesWhatIsWrong) {
   EXPECT_NE(make({{"fov", 180.0}}).errors.find("it must lie in (0, 180)"), std::string::npos);
-  EXPECT_NE(make({{"fov", 40.0}, {"focal_length", std::string("50mm")}}).errors.find("cannot stand beside 'fov'"),
+  EXPECT_NE(make({{"fov", 40.0}, {"focal_length", std::string("50mm")}}).errors.find("cannot be combined with 'fov'"),
             std::string::npos);
 }
 

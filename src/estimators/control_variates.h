@@ -94,7 +94,7 @@ void apply_control_variates(const ControlVariateInput& input, const ControlVaria
 inline constexpr OptionRange kVariatesRange{.low = 1};
 inline constexpr const char* kVariatesHelp = "Number of control variates";
 inline constexpr OptionRange kWindowRange{.low = 3, .high = 63, .odd = true};
-inline constexpr const char* kWindowHelp = "Side of the window of neighbours";
+inline constexpr const char* kWindowHelp = "Side of the neighbourhood window";
 inline constexpr const char* kExcludeTargetHelp = "Leave the target out of its own control variates";
 /// Whether coefficients are shared.
 inline constexpr std::pair<const char*, bool> kCoefficients[] = {{"shared", true}, {"per-channel", false}};

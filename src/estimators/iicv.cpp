@@ -120,14 +120,14 @@ Estimator make_iicv(Settings& parameters) {
                       : IicvOptions();
   p.whole("k", o.k, kVariatesRange, kVariatesHelp);
   p.whole("window", o.window, kWindowRange, kWindowHelp);
-  p.choice<Penalty>("penalty", o.penalty, kPenalties, "Error of the independent pixels", {.aliases = {"variance"}});
+  p.choice<Penalty>("penalty", o.penalty, kPenalties, "Error of independent pixels", {.aliases = {"variance"}});
   p.whole("pilot-window", o.pilot_window, kWindowRange, "Side of the pilot's window");
-  if (p.flag("asymmetric", "Penalty of the neighbour alone, not averaged with the target's")) o.symmetric = false;
+  if (p.flag("asymmetric", "Use the neighbour's penalty alone, not averaged with the target's")) o.symmetric = false;
   if (p.flag("exclude-target", kExcludeTargetHelp)) o.include_target = false;
   p.choice<bool>("coefficients", o.shared_coefficients, kCoefficients, kCoefficientsHelp);
-  p.real("sample-fraction", o.sample_fraction, {.low = 0, .high = 1}, "Part of the penalty that is the sample variance",
+  p.real("sample-fraction", o.sample_fraction, {.low = 0, .high = 1}, "Fraction of the sample variance in the penalty",
          {.aliases = {"sample-share"}});
-  p.real("mean-constraint", o.mean_constraint, {.low = 0}, "Weight of the condition sum beta g = f",
+  p.real("mean-constraint", o.mean_constraint, {.low = 0}, "Weight of the constraint sum beta g = f",
          {.aliases = {"conservation"}});
   p.choice<bool>("residual-correction", o.residual_correction, kOnOff,
                  "Add back the smoothed residual, which the penalty suppresses", {.aliases = {"feedback"}});
@@ -139,7 +139,7 @@ Estimator make_iicv(Settings& parameters) {
   standard.reads_groups = true;
   Estimator estimator;
   estimator.adaptive =
-      ask_for_adaptive(p, standard, "Distribute the independent samples over the pixels by the CRN pass", problems);
+      ask_for_adaptive(p, standard, "The CRN pass decides how many independent samples each pixel gets", problems);
   throw_if_any("iicv", problems);
 
   estimator.summary = "imperfect image-space control variates";

@@ -72,7 +72,7 @@ Estimator make_none(Settings& parameters) {
   standard.counts.first_pass_counts = false;
   std::vector<std::string> problems;
   estimator.adaptive = ask_for_adaptive(
-      p, standard, "A first pass distributes the samples over the pixels; denoised, it is averaged in", problems);
+      p, standard, "A first pass decides how many samples each pixel gets; if denoised, it is averaged in", problems);
   throw_if_any("none", problems);
   estimator.passes = EstimatorPasses::kAny;
   estimator.summary = "the mean";

@@ -253,15 +253,15 @@ void ask_for(Settings& parameters, AdaptiveSampling& sampling) {
   Settings& p = parameters;
   CountOptions& o = sampling.counts;
   p.whole("dependent-spp", sampling.first_spp, {.low = 1},
-          "Samples of the first pass; else half, at most 50 (not iicv)",
+          "First pass's samples; default half, at most 50 (iicv: half)",
           {.aliases = {"pilot-spp"}, .effect = OptionEffect::kPasses});
-  p.choice<Allocation>("allocation", o.allocation, kAllocations, "How the last pass's samples are shared", kPasses);
+  p.choice<Allocation>("allocation", o.allocation, kAllocations, "Distribution of the last pass's samples", kPasses);
   sampling.names_allocation = p.is_given("allocation");
   p.real("relative-error", o.relative_error, {.low = 0, .above_low = true},
          "Target relative error per pixel (3 sigma); `spp` becomes the cap", kPasses);
   p.whole("min-spp", o.min_spp, {.low = static_cast<double>(sampling.least_min_spp)},
-          "Fewest samples of a pixel in the last pass", kPasses);
-  p.whole("max-spp", o.max_spp, {.low = 1}, "Most samples of a pixel in the last pass", kPasses);
+          "Minimum samples per pixel in the last pass", kPasses);
+  p.whole("max-spp", o.max_spp, {.low = 1}, "Maximum samples per pixel in the last pass", kPasses);
 }
 
 std::optional<AdaptiveSampling> ask_for_adaptive(Settings& parameters, AdaptiveSampling standard,

@@ -120,7 +120,7 @@ TEST(ImageWriter, SaysWhatItCannotWrite) {
   EXPECT_TRUE(contains(message_of([&] { write_image(test_file("wide.jpg"), wide, {}, {}); }, ErrorCode::kIo),
                        "cannot write " + test_file("wide.jpg") + ": 65501 x 1 pixels; a JPEG holds up to 65500"));
   EXPECT_TRUE(contains(message_of([] { write_image("/nowhere/a.tif", picture(), {}, {}); }, ErrorCode::kIo),
-                       "cannot write /nowhere/a.tif: there is no folder /nowhere"));
+                       "cannot write /nowhere/a.tif: no such folder /nowhere"));
   EXPECT_TRUE(
       contains(message_of([] { write_image("/nowhere/a.pfm", picture(), {}, {}); }, ErrorCode::kIo), "no folder"));
 }

@@ -86,8 +86,7 @@ OutputTarget output_target(const std::string& path) {
   const fs::path name = fs::path(target.path).filename(), folder = fs::path(target.path).parent_path();
   if (name.empty()) throw Error(ErrorCode::kIo, fmt::format("cannot write '{}': it names no file", path));
   std::error_code ignored;
-  if (!folder.empty() && !fs::is_directory(folder, ignored))
-    fail_to_write(path, "there is no folder " + folder.string());
+  if (!folder.empty() && !fs::is_directory(folder, ignored)) fail_to_write(path, "no such folder " + folder.string());
   if (access(folder.empty() ? "." : folder.c_str(), W_OK | X_OK) != 0) fail_to_write(path, std::strerror(errno));
   return target;
 }

@@ -130,7 +130,7 @@ TEST(OutputFile, WritesIntoTheFileThatIsStandardOutput) {
 
 TEST(OutputFile, SaysWhyItCannotWrite) {
   EXPECT_TRUE(
-      contains(message_of([] { OutputFile("/nowhere/a.exr"); }), "cannot write /nowhere/a.exr: there is no folder"));
+      contains(message_of([] { OutputFile("/nowhere/a.exr"); }), "cannot write /nowhere/a.exr: no such folder"));
   EXPECT_TRUE(contains(message_of([] { OutputFile(test_folder().string()); }), ": it is a folder"));
   EXPECT_TRUE(contains(message_of([] { OutputFile(""); }), "it names no file"));
   EXPECT_TRUE(

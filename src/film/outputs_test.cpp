@@ -90,7 +90,7 @@ TEST(Outputs, NamesSayWhatFilesHold) {
 TEST(Outputs, SayBeforeTheWorkThatNothingCanBeWritten) {
   Outputs outputs;
   EXPECT_TRUE(contains(message_of([&] { outputs.writes("-o", "/nowhere/a.exr", OutputKind::kFilm); }, ErrorCode::kIo),
-                       "cannot write /nowhere/a.exr: there is no folder /nowhere"));
+                       "cannot write /nowhere/a.exr: no such folder /nowhere"));
   EXPECT_TRUE(contains(message_of([&] { outputs.writes("-o", test_folder(), OutputKind::kFilm); }, ErrorCode::kIo),
                        "it is a folder"));
 }

@@ -60,7 +60,7 @@ double index_of_refraction(PbrtParameters& p) {
       {"glass-F5", 1.60342}, {"glass-SF5", 1.67271},   {"glass-SF10", 1.72828},  {"glass-SF11", 1.78472}};
   const auto glass = eta->strings.size() == 1 ? kGlasses.find(eta->strings[0]) : kGlasses.end();
   if (glass != kGlasses.end()) return glass->second;
-  p.error_at(*eta, "is no index of refraction that is supported: expected a float, or a glass such as 'glass-BK7'");
+  p.error_at(*eta, "is not a supported index of refraction: expected a float, or a glass such as 'glass-BK7'");
   return 1.5;
 }
 
@@ -74,7 +74,7 @@ ObjectBuilder conductor(PbrtParameters& p, const PbrtNames& names) {
     if (!value) return nullptr;
     const auto* colour = std::get_if<ColourValue>(&*value);
     if (!colour) {
-      p.error("has a 'reflectance' that is no 'rgb'; others are not supported");
+      p.error("has a 'reflectance' that is not an 'rgb'; others are not supported");
       return nullptr;
     }
     // pbrt: the k that reflects this much at eta = 1.
@@ -201,7 +201,7 @@ ObjectBuilder hair(PbrtParameters& p, const PbrtNames& names) {
   } else if (p.has("reflectance")) {
     const auto value = spectrum_value(p, "reflectance", names);
     const auto* colour = value ? std::get_if<ColourValue>(&*value) : nullptr;
-    if (value && !colour) p.error("has a 'reflectance' that is no 'rgb'; others are not supported");
+    if (value && !colour) p.error("has a 'reflectance' that is not an 'rgb'; others are not supported");
     if (!colour) return nullptr;
     // [Chiang2016]: absorption = (ln colour / D(beta_n))^2, as in bsdfs/hair.cpp.
     const double d =

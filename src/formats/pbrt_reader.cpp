@@ -107,7 +107,7 @@ class Reader {
       parameters(tokens, "Accelerator");
     } else {
       const auto known = split_list(kDirectives);
-      tokens.stop(token, fmt::format("'{}' is no directive that is supported{}", word,
+      tokens.stop(token, fmt::format("'{}' is not a supported directive{}", word,
                                      did_you_mean(word, {known.begin(), known.end()})));
     }
   }

@@ -88,7 +88,7 @@ ObjectBuilder bilinear_mesh(PbrtParameters& p, const PbrtPlacement& placement) {
       size = std::max({size, std::abs(v[1] - v[0]), std::abs(v[2] - v[0])});
     }
     if (off > 1e-4 * size) {
-      p.error(fmt::format("is no parallelogram in patch {}; supported are parallelograms", patch / 4));
+      p.error(fmt::format("is not a parallelogram in patch {}; only parallelograms are supported", patch / 4));
       return nullptr;
     }
     for (size_t i = 0; i < 4; ++i) {

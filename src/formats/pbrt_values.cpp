@@ -17,8 +17,8 @@ ObjectPtr find_texture(PbrtParameters& p, const PbrtParameter& parameter, const 
   if (found != all.end()) return found->second;
   std::vector<std::string> known;
   for (const auto& [other, texture] : all) known.push_back(other);
-  p.error_at(parameter,
-             fmt::format("names the texture '{}', which is no texture of {}{}", name, of, did_you_mean(name, known)));
+  p.error_at(parameter, fmt::format("names the texture '{}', which is not a texture of {}{}", name, of,
+                                    did_you_mean(name, known)));
   return nullptr;
 }
 
@@ -29,7 +29,7 @@ std::optional<SampledSpectrum> sampled(PbrtParameters& p, const PbrtParameter& p
   try {
     return make_spectrum(wavelengths, values);
   } catch (const Error& error) {
-    p.error_at(parameter, std::string("is no list of wavelengths and values: ") + error.what());
+    p.error_at(parameter, std::string("is not a list of wavelengths and values: ") + error.what());
     return std::nullopt;
   }
 }
@@ -38,7 +38,7 @@ std::optional<ColourValue> rgb(PbrtParameters& p, const PbrtParameter& parameter
   const std::vector<double>& n = parameter.numbers;
   if (n.size() == 3 && std::ranges::all_of(n, [](double x) { return x >= 0; }))
     return ColourValue{{static_cast<float>(n[0]), static_cast<float>(n[1]), static_cast<float>(n[2])}};
-  p.error_at(parameter, "is no colour; expected three numbers, not negative");
+  p.error_at(parameter, "is not a colour; expected three non-negative numbers");
   return std::nullopt;
 }
 
@@ -170,7 +170,7 @@ Spectrum light_colour(PbrtParameters& p, const std::string& name) {
   else if (parameter->type == "spectrum" && parameter->strings.empty())
     spectrum = sampled(p, *parameter);
   else
-    p.error_at(*parameter, "is no colour of a light: expected 'rgb', 'blackbody' with a temperature, or 'spectrum'");
+    p.error_at(*parameter, "is not a light colour: expected 'rgb', 'blackbody' with a temperature, or 'spectrum'");
   if (!spectrum) return Spectrum(1);
   const Spectrum colour = spectrum_to_rgb(*spectrum, SpectrumRole::kEmission);
   const float y = luminance(colour);

@@ -50,7 +50,7 @@ ObjectPtr spot(PbrtParameters& p, const Transform& to_world) {
 ObjectPtr infinite(PbrtParameters& p, const Transform& to_world) {
   refuse(p, {"portal", "illuminance"});
   if (const PbrtParameter* file = p.find("filename")) {
-    if (p.has("L")) p.error_at(*file, "stands beside 'L'; only one of them can be given");
+    if (p.has("L")) p.error_at(*file, "is given with 'L'; only one of them is allowed");
     auto map = make_object("emitter", "envmap", p.where());
     set_property(*map, "filename", p.get_string("filename", ""));
     set_property(*map, "mapping", std::string("equal_area"));

@@ -78,7 +78,7 @@ GltfFile::GltfFile(std::string_view bytes, const std::string& name, FileResolver
     problem = error.what();
   }
   if (!read || !problem.empty())
-    throw Error(ErrorCode::kInput, fmt::format("{}: is no glTF file that can be read: {}", name,
+    throw Error(ErrorCode::kInput, fmt::format("{}: is not a readable glTF file: {}", name,
                                                problem.empty() ? "it ends too soon" : first_line(problem)));
   if (!warning.empty()) warn(first_line(warning));
   if (!model_.asset.version.starts_with("2."))

@@ -109,7 +109,7 @@ const GltfTextures::Pixels* GltfTextures::decoded(int index) {
     return nullptr;
   };
   if (width <= 0 || height <= 0 || width > 32768 || height > 32768)
-    return fail("is no picture in PNG or JPEG that can be read");
+    return fail("is not a readable PNG or JPEG picture");
   require_memory(file_.where().text(), fmt::format("image {} of {} x {} pixels", index, width, height),
                  20.0 * width * height);
   const std::vector<unsigned char> bytes = std::move(image.image);

@@ -21,7 +21,7 @@ constexpr int kNarrow = 8;  // narrower rows are not packed
 class HdrRows final : public PlainRows {
  public:
   explicit HdrRows(std::FILE* file) : file_(file) {
-    if (const std::string first = line(); first != "#?RADIANCE" && first != "#?RGBE") fail("it is no HDR file");
+    if (const std::string first = line(); first != "#?RADIANCE" && first != "#?RGBE") fail("it is not an HDR file");
     bool has_format = false;
     for (int i = 0; i < kMaxLines; ++i) {
       const std::string text = line();

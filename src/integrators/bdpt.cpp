@@ -11,7 +11,7 @@ std::shared_ptr<Integrator> make_bdpt(Settings& settings, const PathLengthSettin
   own.lengths = lengths;
   settings.group("Integrator bdpt", OptionEffect::kSamples);
   declare(settings, own.light_tracing);
-  settings.choice("heuristic", own.heuristic, kHeuristics, "How techniques are weighted: with exponent 2, or balanced");
+  settings.choice("heuristic", own.heuristic, kHeuristics, "MIS heuristic: power (exponent 2), or balance");
   return std::make_shared<BidirectionalTracer<BidirectionalParts>>(own);
 }
 

@@ -56,7 +56,7 @@ struct ControlSettings {
   }
   /// Whether the training is done by plain samples and coefficients are solved once after it, as published.
   bool solves_once() const { return paper && !per_pixel(); }
-  /// Whether each pixel has coefficients of its own, for the first surface, instead of each cell of space.
+  /// Whether each pixel has its own coefficients, for the first surface, instead of each cell of space.
   bool per_pixel() const { return kind == ControlKind::kOptimalMis; }
   /// Whether there is a coefficient of each light and technique for each cell.
   bool has_cells() const { return kind == ControlKind::kRgb || kind == ControlKind::kMono; }
@@ -84,9 +84,9 @@ inline void declare(Settings& s, ControlSettings& v) {
   static constexpr std::pair<const char*, bool> kSurrogates[] = {{"filter", false}, {"oidn", true}};
   s.group("Integrator controlled-path", OptionEffect::kSamples);
   if (s.preset("cv-paper")) v = ControlSettings::published();
-  s.choice("cv", v.kind, kControlKinds, "Coefficients by colour, for all, of light samples alone, by pixel",
+  s.choice("cv", v.kind, kControlKinds, "Coefficients: per channel, one, of light samples only, per pixel",
            {.film = "cv={}"});
-  s.choice("lights", v.lights, kSelections, "Choice of lights: any triangle, any shape, by power, as learnt",
+  s.choice("lights", v.lights, kSelections, "How lights are chosen: by triangle, shape, power, or as learnt",
            {.film = "lights={}"});
   s.flag("cv-paper", v.paper,
          "As published: `lights` triangle `cv-grid` 64 `cv-train` 8, cells by position, solved once",
@@ -95,22 +95,19 @@ inline void declare(Settings& s, ControlSettings& v) {
                     {"auto", ControlSettings::kAutomaticGrid},
                     "Cells along the scene's longest side; auto: 32 to 256 by pixel size", {.film = "grid={}"});
   s.whole("cv-train", v.train_spp, {.low = 1, .high = ControlSettings::kMaxTrainingSpp},
-          "Samples per pixel to learn from, a part of `spp`", {.film = "train={}"});
-  s.whole("cv-clusters", v.clusters, {.low = 1, .high = 1 << 30}, "Most clusters of lights", {.film = "clusters={}"});
+          "Training samples per pixel, included in `spp`", {.film = "train={}"});
+  s.whole("cv-clusters", v.clusters, {.low = 1, .high = 1 << 30}, "Maximum number of light clusters",
+          {.film = "clusters={}"});
   s.whole("cv-memory", v.memory_mib, {.low = 1, .high = 1 << 30},
-          "MiB of sums and coefficients while learning, then cells become wider", {.film = "memory={}"});
-  s.choice("cv-variance", v.relative, kVariances, "What is made least: relative or absolute variance",
-           {.film = "variance={}"});
+          "Memory limit of the training in MiB, beyond which cells are widened", {.film = "memory={}"});
+  s.choice("cv-variance", v.relative, kVariances, "Minimise relative or absolute variance", {.film = "variance={}"});
   // Without a word in films where it is the default, as it is of all films from before there was the option.
-  s.choice("cv-surrogate", v.oidn, kSurrogates,
-           "Values of pixels from the first samples: by a filter or Open Image Denoise",
+  s.choice("cv-surrogate", v.oidn, kSurrogates, "How the first samples are denoised: by a filter or Open Image Denoise",
            {.film = v.oidn ? "surrogate={}" : ""});
-  s.on_off("cv-prefix", v.prefix, "Whether samples weigh by the throughput of the path before them",
+  s.on_off("cv-prefix", v.prefix, "Weight training samples by the path's throughput before the vertex",
            {.film = "prefix={}"});
-  s.on_off("cv-albedo", v.albedo, "Whether coefficients are multiplied by the albedo of the surface",
-           {.film = "albedo"});
-  s.on_off("cv-indirect", v.indirect, "Whether light that other surfaces reflect is controlled, too",
-           {.film = "indirect"});
+  s.on_off("cv-albedo", v.albedo, "Multiply coefficients by the surface's albedo", {.film = "albedo"});
+  s.on_off("cv-indirect", v.indirect, "Control indirect light, too", {.film = "indirect"});
   s.only_if(v.learns(),
             {"cv-paper", "cv-grid", "cv-train", "cv-clusters", "cv-memory", "cv-variance", "cv-surrogate", "cv-prefix"},
             "with `cv` off: nothing is learnt (unless `lights` learned)");
@@ -119,8 +116,8 @@ inline void declare(Settings& s, ControlSettings& v) {
   s.only_if(v.has_cells(), {"cv-albedo", "cv-indirect"},
             "with this `cv`: only rgb and mono have coefficients of cells");
   s.only_if(!v.per_pixel(), {"cv-grid", "cv-variance", "cv-surrogate", "cv-prefix"},
-            "with `cv` optimal-mis: each pixel has coefficients of its own");
-  s.only_if(v.relative, {"cv-surrogate"}, "with `cv-variance` absolute: values of pixels are not asked for");
+            "with `cv` optimal-mis: each pixel has its own coefficients");
+  s.only_if(v.relative, {"cv-surrogate"}, "with `cv-variance` absolute: pixel values are not needed");
 }
 
 }  // namespace covary

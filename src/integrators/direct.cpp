@@ -141,12 +141,10 @@ std::shared_ptr<Integrator> make_direct(Settings& s, const PathLengthSettings& l
   DirectSettings v;
   s.group("Direct light", OptionEffect::kSamples);
   s.whole("shading-samples", v.shading_samples, {.low = 1, .high = kMostSamples},
-          "Light samples and direction samples of each camera sample");
+          "Light samples and BSDF samples per camera sample");
   v.emitter_samples = v.bsdf_samples = v.shading_samples;
-  s.whole("emitter-samples", v.emitter_samples, {.low = 0, .high = kMostSamples},
-          "Light samples, where their number is another");
-  s.whole("bsdf-samples", v.bsdf_samples, {.low = 0, .high = kMostSamples},
-          "Direction samples, where their number is another");
+  s.whole("emitter-samples", v.emitter_samples, {.low = 0, .high = kMostSamples}, "Light samples, if different");
+  s.whole("bsdf-samples", v.bsdf_samples, {.low = 0, .high = kMostSamples}, "BSDF samples, if different");
   if (v.emitter_samples + v.bsdf_samples == 0)
     throw Error(ErrorCode::kInput, "emitter_samples and bsdf_samples are both 0; there must be a sample");
   return std::make_shared<DirectIntegrator>(v, lengths);

@@ -39,22 +39,22 @@ inline void declare(Settings& s, GuideSettings& v) {
       {"rgb", ControlKind::kRgb}, {"mono", ControlKind::kMono}, {"off", ControlKind::kOff}};
   s.group("Integrator guided-path", OptionEffect::kSamples);
   s.whole("guiding-lobes", v.lobes, {.low = 1, .high = VmfLobes::kMax},
-          "Lobes of a leaf at first; splitting makes up to twice as many",
+          "Initial lobes per leaf; splitting makes up to twice as many",
           {.aliases = {"guide-lobes"}, .film = "lobes={}"});
   s.whole("guiding-leaf", v.leaf_samples,
           {.low = GuideSettings::kMinLeafSamples, .high = GuideSettings::kMaxLeafSamples},
-          "Samples of a leaf; one with more is split", {.aliases = {"guide-leaf"}, .film = "leaf={}"});
+          "Samples per leaf; leaves with more are split", {.aliases = {"guide-leaf"}, .film = "leaf={}"});
   s.whole("guiding-train", v.train_spp, {.low = 1, .high = GuideSettings::kMaxTrainingSpp},
-          "Samples per pixel to learn from, a part of `spp`", {.aliases = {"guide-train"}, .film = "train={}"});
+          "Training samples per pixel, included in `spp`", {.aliases = {"guide-train"}, .film = "train={}"});
   s.real<float>("guiding-fraction", v.fraction, {.low = 0, .high = 1, .above_low = true, .below_high = true},
-                {"learned", GuideSettings::kLearnedFraction}, "Fraction of guided directions, or learned by leaf",
+                {"learned", GuideSettings::kLearnedFraction}, "Fraction of guided directions; learned: per leaf",
                 {.aliases = {"guide-fraction"}, .film = "fraction={}"});
-  s.real("guiding-roughness", v.roughness, {.low = 0, .high = 1}, "Lobes of BSDFs that are less rough are not guided",
+  s.real("guiding-roughness", v.roughness, {.low = 0, .high = 1}, "BSDF lobes with a lower roughness are not guided",
          {.aliases = {"guide-roughness"}, .film = "roughness={:f}"});
   s.on_off("nee", v.nee, "Light samples at each vertex (next-event estimation)", {.film = "nee={}"});
   s.choice("cv", v.control, kControls, "Control variates on the lobes", {.film = "cv={}"});
   s.whole("cv-train", v.control_train_spp, {.low = 1, .high = GuideSettings::kMaxTrainingSpp},
-          "Samples per pixel to learn their coefficients from, after the lobes", {.film = "cv_train={}"});
+          "Training samples per pixel for their coefficients, after those for the lobes", {.film = "cv_train={}"});
   s.only_if(v.controlled(), {"cv-train"}, "without control variates (`cv` rgb or mono)");
 }
 

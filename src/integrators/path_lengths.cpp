@@ -8,10 +8,10 @@ void declare(Settings& s, PathLengthSettings& v) {
   int max_depth = v.max_depth == PathLengthSettings::kUnlimited ? -1 : v.max_depth;
   s.group("Paths", OptionEffect::kSamples);
   s.whole("max-depth", max_depth, {.low = -1, .high = kMost},
-          "Most path edges: 1 is emission seen directly, 2 direct light; -1: no limit", {.level = OptionLevel::kBasic});
+          "Maximum path edges: 1 is visible emission, 2 direct light; -1: no limit", {.level = OptionLevel::kBasic});
   s.whole("min-depth", v.min_depth, {.low = 0, .high = kMost}, "Leave out paths with fewer edges than this");
   s.whole("rr-depth", v.rr_depth, {.low = 1, .high = kMost}, "Edges after which Russian roulette may end a path");
-  s.on_off("hide-emitters", v.hide_emitters, "Whether lights that the camera sees directly are black");
+  s.on_off("hide-emitters", v.hide_emitters, "Show lights that the camera sees directly as black");
   v.max_depth = max_depth < 0 ? PathLengthSettings::kUnlimited : max_depth;
 }
 

@@ -354,8 +354,8 @@ TEST_F(GltfReader, WhatIsWrongIsNamed) {
   expect([](Gltf& f) { f.scene["cameras"][0]["perspective"]["yfov"] = 0; }, "has a field of view of 0");
   expect([](Gltf& f) { f.scene["asset"]["version"] = "1.0"; }, "is of glTF 1.0; supported is 2.0");
   expect([](Gltf& f) { f.scene["scenes"][0]["nodes"] = json::array(); }, "has neither a camera nor a mesh");
-  EXPECT_TRUE(contains(message_of([&] { load_scene(write("a.glb", "glTF")); }), "is no glTF file that can be read"));
-  EXPECT_TRUE(contains(message_of([&] { load_scene(write("a.gltf", "{")); }), "is no glTF file that can be read"));
+  EXPECT_TRUE(contains(message_of([&] { load_scene(write("a.glb", "glTF")); }), "is not a readable glTF file"));
+  EXPECT_TRUE(contains(message_of([&] { load_scene(write("a.gltf", "{")); }), "is not a readable glTF file"));
   LoadOptions options;
   options.defines["a"] = "1";
   EXPECT_TRUE(contains(message_of([&] { load_scene(folder_.file("a.gltf"), options); }),

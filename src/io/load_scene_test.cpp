@@ -150,7 +150,7 @@ TEST_F(LoadScene, SaysWhatToUseInstead) {
 <shape type="merge"><shape type="cube"/></shape><emitter type="timed_sunsky"/>)");
   for (const char* message :
        {"scene.xml:2:1: sensor 'batch' is not supported: denoising would look across the edges of "
-        "its pictures; render each of its sensors by itself. Supported: 'orthographic'",
+        "its pictures; render each of its sensors separately. Supported: 'orthographic'",
         "shape 'merge' is not supported: put the shapes that it holds in its place",
         "emitter 'timed_sunsky' is not supported: nothing moves; use 'sunsky'"})
     EXPECT_TRUE(contains(found, message));

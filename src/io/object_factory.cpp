@@ -47,7 +47,7 @@ std::string advice(const ObjectDescription& description) {
   static constexpr const char* kSplats = "its integrator is not supported either";
   static constexpr Advice kAll[] = {
       {"sensor", "batch",
-       "denoising would look across the edges of its pictures; render each of its sensors by itself"},
+       "denoising would look across the edges of its pictures; render each of its sensors separately"},
       {"sensor", "distant", kNoPicture},
       {"sensor", "irradiancemeter", kNoPicture},
       {"sensor", "radiancemeter", kNoPicture},

@@ -353,10 +353,10 @@ LightSource "projection" "string filename" "a.png"
            "scene.pbrt:4:16: parameter 'radios' of Shape \"sphere\" is not supported; did you mean 'radius'?",
            "scene.pbrt:4:1: Shape \"sphere\" has zmin 0; supported are whole ones, -1",
            "scene.pbrt:5:1: Shape \"curve\" has basis 'linear' and degree 3; supported are 'bezier'",
-           "scene.pbrt:6:20: parameter 'reflectance' of Material \"diffuse\" names the texture 'wood', which is no "
+           "scene.pbrt:6:20: parameter 'reflectance' of Material \"diffuse\" names the texture 'wood', which is not a "
            "texture of spectra",
            "scene.pbrt:7:1: Shape \"trianglemesh\" has the index 3; there are 3 vertices",
-           "scene.pbrt:8:24: parameter 'filename' of LightSource \"infinite\" stands beside 'L'",
+           "scene.pbrt:8:24: parameter 'filename' of LightSource \"infinite\" is given with 'L'",
            "scene.pbrt:9:1: AreaLightSource \"diffuse\" shines on both sides",
            "scene.pbrt:10:1: no material has the name 'gold'",
            "scene.pbrt:11:16: parameter 'radius' of Shape \"sphere\" has the type 'rgb'; expected 'float'",
@@ -396,8 +396,7 @@ TEST_F(Pbrt, MistakesOfTheTextEndTheReading) {
   const auto starts = [&](const std::string& text, const std::string& message) {
     EXPECT_TRUE(errors(text).starts_with(message)) << errors(text);
   };
-  starts("WorldBegin\nShap \"sphere\"\n",
-         "scene.pbrt:2:1: 'Shap' is no directive that is supported; did you mean 'Shape");
+  starts("WorldBegin\nShap \"sphere\"\n", "scene.pbrt:2:1: 'Shap' is not a supported directive; did you mean 'Shape");
   starts("Shape \"sphere\n", "scene.pbrt:1:7: a string has no end");
   starts("Translate 1 2\n", "scene.pbrt:2:1: found the end of the file; expected a number");
   starts("Scale 1 2 x\n", "scene.pbrt:1:11: found 'x'; expected a number");

@@ -200,7 +200,7 @@ std::vector<std::string> suspicions(const ErrorSplit& split, bool unbiased) {
   std::vector<std::string> found;
   const SplitError& e = split.relative;
   if (split.n_references == 2 && split.reference_error == 0) {
-    found.push_back("both references are the same image, so that errors hold the reference's own noise");
+    found.push_back("both references are the same image, so errors include the reference's noise");
     return found;
   }
   const auto half = [](double z) { return z > 0 ? "first" : "second"; };

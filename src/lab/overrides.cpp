@@ -58,7 +58,7 @@ void check_sizes(const Overrides& o) {
     throw Error(ErrorCode::kUsage, fmt::format("`resolution` '{}': expected WIDTHxHEIGHT", o.resolution));
   if (!o.crop.empty() && whole_numbers(o.crop, 'x').size() != 2 && whole_numbers(o.crop, ',').size() != 4)
     throw Error(ErrorCode::kUsage,
-                fmt::format("`crop` '{}': expected X,Y,WIDTH,HEIGHT, or WIDTHxHEIGHT in the middle", o.crop));
+                fmt::format("`crop` '{}': expected X,Y,WIDTH,HEIGHT, or a centred WIDTHxHEIGHT", o.crop));
 }
 
 }  // namespace

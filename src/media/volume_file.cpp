@@ -33,7 +33,7 @@ T at(const char* header, size_t place) {
 VolumeFile parse_header(const std::string& path, const char* header, size_t n_bytes) {
   const auto refuse = [&](const std::string& what) { return Error(ErrorCode::kInput, path + ": " + what); };
   if (n_bytes < kHeaderBytes || std::memcmp(header, "VOL", 3) != 0)
-    throw refuse("is no volume file: expected a header of 48 bytes that begins with 'VOL'");
+    throw refuse("is not a volume file: expected a header of 48 bytes that begins with 'VOL'");
   if (const int version = at<uint8_t>(header, 3); version != 3)
     throw refuse(fmt::format("is a volume file of version {}; accepted is 3", version));
   if (const int encoding = at<int32_t>(header, 4); encoding != 1)

@@ -92,7 +92,7 @@ std::vector<std::string> reference_warnings(const ImageFacts& image, const Image
   std::vector<std::string> warnings;
   const bool mixed = attribute(reference, "estimator").find("--denoise") != std::string::npos;
   if (mixed || !attribute(reference, "denoiser").empty())
-    warnings.push_back(reference.name + " is denoised, and so biased: it is no reference for errors");
+    warnings.push_back(reference.name + " is denoised, and so biased: it cannot be a reference for errors");
   const double samples = samples_of(image), of_reference = samples_of(reference);
   if (of_reference > 0 && of_reference <= samples)
     warnings.push_back(

@@ -30,12 +30,12 @@ void check_members(const Json& object, std::initializer_list<std::string_view> n
 }
 
 double number(const Json& value, const std::string& what) {
-  if (!value.is_number()) throw Error(ErrorCode::kInput, fmt::format("{} is no number", what));
+  if (!value.is_number()) throw Error(ErrorCode::kInput, fmt::format("{} is not a number", what));
   return value.get<double>();
 }
 
 Matrix4 matrix(const Json& value) {
-  const char* const expected = "'to_world' is no matrix: expected are 4 rows of 4 numbers, or 16 numbers by rows";
+  const char* const expected = "'to_world' is not a matrix: expected 4 rows of 4 numbers, or 16 numbers by rows";
   const auto refuse_unless = [&](bool is_right) {
     if (!is_right) throw Error(ErrorCode::kInput, expected);
   };

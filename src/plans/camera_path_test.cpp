@@ -43,10 +43,11 @@ TEST(CameraPath, SaysWhatIsWrongAndWhere) {
             file + "unknown member 'frames'; expected are 'frames_per_second', 'keyframes'");
   EXPECT_EQ(problem_of(R"({"frames_per_second": 0, "keyframes": []})"), file + "'frames_per_second' is not above 0");
   EXPECT_EQ(problem_of(R"({"keyframes": [{"time": 0}]})"), file + "keyframe 0: 'to_world' is missing");
-  EXPECT_EQ(problem_of(R"({"keyframes": [{"time": "0", "to_world": []}]})"), file + "keyframe 0: 'time' is no number");
+  EXPECT_EQ(problem_of(R"({"keyframes": [{"time": "0", "to_world": []}]})"),
+            file + "keyframe 0: 'time' is not a number");
   for (const char* matrix : {"[]", "[[1], [1], [1], [1]]", "[1, 2, 3, 4]", "1"})
     EXPECT_EQ(problem_of(fmt::format(R"({{"keyframes": [{{"time": 0, "to_world": {}}}]}})", matrix)),
-              file + "keyframe 0: 'to_world' is no matrix: expected are 4 rows of 4 numbers, or 16 numbers by rows");
+              file + "keyframe 0: 'to_world' is not a matrix: expected 4 rows of 4 numbers, or 16 numbers by rows");
   EXPECT_EQ(problem_of(std::string(100, '[')), file + "arrays and objects nest deeper than 64");
   EXPECT_THROW(read_camera_path("/nowhere/p.json"), Error);
 }

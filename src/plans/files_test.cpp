@@ -321,7 +321,7 @@ TEST(Failure, FilmsOfAnImageThatCannotBeWrittenAreKept) {
     fs::remove(folder.file("images"));
     return make(passes, row, n_rows, beside);
   };
-  warnings_of_failure("there is no folder", scene, plan, request);
+  warnings_of_failure("no such folder", scene, plan, request);
   EXPECT_EQ(read_film(folder.file("films/crn.exr")).mean_count(), 12);
   EXPECT_FALSE(fs::exists(folder.file("films/.lock")));
 }

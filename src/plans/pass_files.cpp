@@ -112,10 +112,11 @@ void check_replaceable(const std::string& path) {
   try {
     read_film_attributes(path);
   } catch (const Error& error) {
-    throw Error(ErrorCode::kInput,
-                fmt::format("'{}' would be replaced by the film of a pass, and is no film: {}; give another name for "
-                            "the folder or the output",
-                            path, error.what()));
+    throw Error(
+        ErrorCode::kInput,
+        fmt::format("'{}' would be replaced by the film of a pass, and is not a film: {}; give another name for "
+                    "the folder or the output",
+                    path, error.what()));
   }
 }
 

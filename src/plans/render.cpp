@@ -22,8 +22,8 @@ void check_light_groups(const LoadedScene& scene) {
   const std::vector<std::string> groups = light_groups(*scene.scene);
   if (groups.empty()) usage("`light-groups`: no light of the scene has an id, by which it belongs to a group");
   if (groups.size() > kMost)
-    usage(fmt::format("`light-groups`: the lights have {} ids; at most {} are told apart", groups.size(), kMost));
-  if (!integrator_of(scene).by_light(groups)) usage("`light-groups` need an integrator that tells lights apart: path");
+    usage(fmt::format("`light-groups`: the lights have {} ids; at most {} are distinguished", groups.size(), kMost));
+  if (!integrator_of(scene).by_light(groups)) usage("`light-groups` need an integrator that separates lights: path");
 }
 
 void check(const LoadedScene& scene, const Plan& plan, const RenderRequest& request) {
@@ -41,7 +41,7 @@ void check(const LoadedScene& scene, const Plan& plan, const RenderRequest& requ
     usage("`layers` and `light-groups`: either of them adds up to the image; give one");
   if (request.light_groups) check_light_groups(scene);
   if (request.layers && !integrator_of(scene).of_direct_light())
-    usage("`layers` need an integrator that tells direct light from indirect: path");
+    usage("`layers` need an integrator that separates direct from indirect light: path");
   if (request.until > 0 && !plan.predicts_error) usage(plan.name + " does not estimate its error");
 }
 

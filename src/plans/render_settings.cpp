@@ -70,22 +70,20 @@ void declare_basic(Settings& s, RenderSettings& v) {
   s.group("Rendering");
   s.text("output", r.output, "FILE", "The image (EXR); a PNG preview appears beside it",
          {.aliases = {"o"}, .level = OptionLevel::kBasic, .names = OptionNames::kFile});
-  s.whole("spp", r.spp, {.low = 1, .high = kMostSamples},
-          "Samples per pixel of all passes together; default: the scene's", kBasicPasses);
-  s.text_as(
-      "until", r, "relmse=X", read_until,
-      "relmse=X: add samples until the predicted error is X, at most `spp`; relmse-p95=X: until 95 % of the blocks "
-      "of 16 x 16 pixels have no more",
-      kBasicPasses);
+  s.whole("spp", r.spp, {.low = 1, .high = kMostSamples}, "Samples per pixel over all passes; default: the scene's",
+          kBasicPasses);
+  s.text_as("until", r, "relmse=X", read_until,
+            "relmse=X: add samples until the predicted error is X, up to `spp`; relmse-p95=X: until it is in 95 % of "
+            "the blocks of 16 x 16 pixels",
+            kBasicPasses);
   std::optional<double> seconds;
   s.real("time", seconds, {.low = 0, .above_low = true},
-         "Seconds for rendering and estimating, not for loading or writing", kBasicPasses);
+         "Seconds for rendering and estimating, without loading and writing", kBasicPasses);
   if (seconds) r.seconds = *seconds;
   s.one_of("integrator", v.integrator, integrator_names(), "Integrator instead of the scene's", kBasicSamples);
   const bool is_named = s.is_given("estimator") || s.is_given("sampling");
   s.one_of("estimator", v.estimator, estimator_names(),
-           "How samples become the image; none: the mean of one pass. One that is named is not denoised unless "
-           "`denoise` is given, too",
+           "How samples become the image; none: their mean. If given, nothing is denoised without `denoise`",
            kBasicPasses);
   v.denoising.mode = is_named ? "none" : "auto";
   declare(s, v.denoising, false);
@@ -94,9 +92,9 @@ void declare_basic(Settings& s, RenderSettings& v) {
   s.text_as("resolution", v, "WIDTHxHEIGHT", read_resolution, "Size of the full frame; default: the scene's",
             kBasicSamples);
   s.text_as("crop", r.crop, "X,Y,WIDTH,HEIGHT", read_crop, "Render only these pixels of the frame", kBasicSamples);
-  s.text("passes", r.passes, "FOLDER", "Keep the film of every pass here",
+  s.text("passes", r.passes, "FOLDER", "Folder to keep the film of every pass in",
          {.aliases = {"save-passes"}, .level = OptionLevel::kBasic, .names = OptionNames::kFolder});
-  s.flag("resume", r.resume, "Continue the films of an interrupted render, or those in `passes`",
+  s.flag("resume", r.resume, "Continue an interrupted render, or the films in `passes`",
          {.level = OptionLevel::kBasic});
 }
 
@@ -108,23 +106,21 @@ void declare_sampling(Settings& s, RenderSettings& v) {
   s.group("Sampling", OptionEffect::kPasses);
   std::string sampler, filter;
   s.one_of("sampler", sampler, {"independent", "sobol"},
-           "Random numbers of the samples of a group: independent, or Owen-scrambled Sobol' points; default: the "
-           "scene's, any but independent meaning sobol",
+           "Random numbers within a group of samples: independent, or Owen-scrambled Sobol' points; default: the "
+           "scene's (sobol unless it is independent)",
            {.effect = OptionEffect::kSamples});
   if (!sampler.empty()) v.request.sampler = sampler == "sobol" ? Sampler::kSobol : Sampler::kIndependent;
   s.choice("sampling", v.passes.sampling, kSamplings,
-           "Random numbers per pixel, or common to all; a single pass (estimator none)",
+           "Random numbers of a single pass (`estimator` none): independent, or common to all pixels",
            {.effect = OptionEffect::kSamples});
   s.text_as("split", v.passes, "auto|CRN:INDEPENDENT", read_split,
-            "Parts of the samples for the two passes; default: the estimator's, 1:1 of most. auto, of the mean that is "
-            "denoised: common random numbers for a fourth where a trial finds them better");
-  s.whole(
-      "groups", v.passes.groups, {.low = 1, .high = Film::kMaxGroups},
-      "Groups of samples whose means films keep; default: the largest from 12 to 8 that divides the samples, else 12, "
-      "or as many as samples; 1 for a single independent pass");
+            "Ratio of the samples of the two passes; default: the estimator's, usually 1:1. auto (denoised mean): a "
+            "fourth with common random numbers if a trial prefers that");
+  s.whole("groups", v.passes.groups, {.low = 1, .high = Film::kMaxGroups},
+          "Groups of samples per pixel, whose means films keep; default: the largest number from 12 to 8 that divides "
+          "the samples, else 12 or the number of samples; 1 for a single independent pass");
   s.choice("crn-part", v.request.crn_part, kParts,
-           "Which part of a path has the common random numbers, for integrators that trace light",
-           {.effect = OptionEffect::kSamples});
+           "Subpaths with common random numbers, for integrators that trace light", {.effect = OptionEffect::kSamples});
   s.one_of("rfilter", filter, {"box", "tent", "gaussian"}, "Reconstruction filter instead of the scene's",
            {.effect = OptionEffect::kSamples});
   if (!filter.empty()) v.request.filter = filter_named(filter);
@@ -132,19 +128,18 @@ void declare_sampling(Settings& s, RenderSettings& v) {
 
 void declare_output(Settings& s, RenderRequest& r) {
   s.group("Output");
-  s.flag("overwrite", r.overwrite, "Replace films that are there already, in `passes` or of an interrupted render");
-  s.real("checkpoint", r.checkpoint_seconds, {.low = 0}, "Seconds between writing unfinished films; 0: never");
+  s.flag("overwrite", r.overwrite, "Replace existing films, in `passes` or of an interrupted render");
+  s.real("checkpoint", r.checkpoint_seconds, {.low = 0}, "Seconds between saving unfinished films; 0: never");
   r.preview = !s.flag("no-preview", "Do not write the PNG");
   s.flag("aovs", r.aovs, "Add the images Albedo, N (normal) and P (position) to the output");
-  s.flag("layers", r.layers,
-         "Add the layers Direct and Indirect to the output: denoised as the image is, they add up to it");
+  s.flag("layers", r.layers, "Add the layers Direct and Indirect, which add up to the image, denoised or not");
   s.flag("light-groups", r.light_groups,
-         "Add a layer Combined_ID of the light of each id of lights, and Rest for the others, likewise");
-  s.flag("path-lengths", r.path_lengths, "Add an image for each number of edges of paths (Edges01, …) to the output",
+         "Add a layer Combined_ID for the lights of each id, and Rest for the others, likewise");
+  s.flag("path-lengths", r.path_lengths, "Add an image for each path length in edges (Edges01, …)",
          {.effect = OptionEffect::kPasses});
   s.group("Training of controlled-path and guided-path");
-  s.text("save-training", r.save_training, "FILE", "Keep here what was learnt", {.names = OptionNames::kFile});
-  s.text("load-training", r.load_training, "FILE", "Such a file, to use in place of a training",
+  s.text("save-training", r.save_training, "FILE", "Save the training", {.names = OptionNames::kFile});
+  s.text("load-training", r.load_training, "FILE", "Use a saved training",
          {.names = OptionNames::kFile, .effect = OptionEffect::kSamples});
 }
 

@@ -38,13 +38,13 @@ struct Method {
 std::string reason(const SplitTrial& trial) {
   if (trial.samples == 0)
     return fmt::format(
-        "`split` auto takes independent samples alone: common random numbers are tried from {} samples "
-        "per pixel on, in enough groups",
+        "`split` auto uses independent samples only: common random numbers are tried from {} samples per pixel on, "
+        "with enough groups",
         kFewestTried);
   return fmt::format(
-      "`split` auto takes {}: after {:g} samples per pixel held-out ones tell of a relMSE of {:.3g} with "
-      "common random numbers, {:.3g} without",
-      trial.crn_wins ? "common random numbers for a fourth of the samples" : "independent samples alone", trial.samples,
+      "`split` auto uses {}: after {:g} samples per pixel, held-out samples predict a relMSE of {:.3g} with common "
+      "random numbers and {:.3g} without",
+      trial.crn_wins ? "common random numbers for a fourth of the samples" : "independent samples only", trial.samples,
       trial.with_crn, trial.independent);
 }
 

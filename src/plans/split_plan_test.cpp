@@ -51,7 +51,7 @@ TEST(SplitPlan, NothingIsTriedWithFewSamples) {
     for (const Pass& pass : result.passes) EXPECT_EQ(pass.settings.sampling, Sampling::kIndependent);
     const RenderResult plain = render(scene, estimator_plan(said_to_err(1, false)), request_of(spp));
     EXPECT_EQ(result.image.estimate.data, plain.image.estimate.data) << "the same samples";
-    EXPECT_TRUE(contains(result.image.note, "independent samples alone")) << result.image.note;
+    EXPECT_TRUE(contains(result.image.note, "independent samples only")) << result.image.note;
   }
 }
 

@@ -363,7 +363,7 @@ TEST_F(TrainingFile, IsRefusedWhenTruncatedAnywhere) {
 }
 
 TEST_F(TrainingFile, IsRefusedWhenItIsSomethingElse) {
-  EXPECT_EQ("a.training: is no training file; `save-training` writes them", refused("P6 640 480 255", "scene 1"));
+  EXPECT_EQ("a.training: is not a training file, as `save-training` writes them", refused("P6 640 480 255", "scene 1"));
   EXPECT_EQ("a.training: was trained for another scene or with other settings: 'scene 1'; 'scene 2' is needed",
             refused(bytes_, "scene 2"));
   std::string newer = bytes_;

@@ -35,7 +35,7 @@ std::string training_file_bytes(const std::string& key, std::string_view body) {
 std::string_view training_file_body(std::string_view bytes, const std::string& key, const std::string& where) {
   ByteReader reader(bytes, where);
   if (!bytes.starts_with(kMagic.substr(0, bytes.size())))
-    reader.fail("is no training file; `save-training` writes them");
+    reader.fail("is not a training file, as `save-training` writes them");
   reader.take(kMagic.size());
   const auto version = reader.read<uint32_t>();
   if (version != kVersion)

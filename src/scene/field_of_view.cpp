@@ -13,7 +13,7 @@ FieldOfView get_field_of_view(Parameters& p) {
   FieldOfView view;
   static const std::vector<std::string> kAxes = {"x", "y", "diagonal", "smaller", "larger"};
   const bool has_fov = p.has("fov"), has_length = p.has("focal_length");
-  if (has_fov && has_length) p.error_at("focal_length", "cannot stand beside 'fov'");
+  if (has_fov && has_length) p.error_at("focal_length", "cannot be combined with 'fov'");
   if (has_fov) {
     view.degrees = p.get_float("fov", 50);
     if (!(view.degrees > 0 && view.degrees < 180)) {

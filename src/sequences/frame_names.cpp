@@ -32,7 +32,7 @@ struct Parts {
 
 Parts parts_of(const std::string& pattern) {
   if (pattern.find('#') == std::string::npos)
-    throw Error(ErrorCode::kUsage, fmt::format("'{}': expected is a name with '#' in place of the frame's number, e.g. "
+    throw Error(ErrorCode::kUsage, fmt::format("'{}': expected a name with '#' for the frame number, e.g. "
                                                "out_####.exr",
                                                pattern));
   const size_t last = pattern.rfind('#');

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files of a sequence: one name with a run of '#' in place of the frame's number, as many digits at least as there are
+// Files of a sequence: one name with a run of '#' for the frame number, as many digits at least as there are
 // '#': "out_####.exr" stands for out_0001.exr, out_0002.exr, …
 #pragma once
 

@@ -220,7 +220,7 @@ TEST(Bitmap, ReportsWrongParameters) {
   EXPECT_EQ(missing.object, nullptr);
   EXPECT_NE(missing.errors.find("test.xml:1:1: texture 'bitmap': the string 'filename' is missing"), std::string::npos)
       << missing.errors;
-  std::ofstream(folder.file("a.png")) << "this is no image";
+  std::ofstream(folder.file("a.png")) << "this is not an image";
   const auto made = make_plugin<Texture>(texture_plugins(), "texture", "bitmap",
                                          {{"filename", folder.file("a.png")},
                                           {"wrap_mode", std::string("repeated")},

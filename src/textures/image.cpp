@@ -140,7 +140,7 @@ TexelImage read_linear_rgb(const std::string& path) {
 
 namespace {
 
-[[noreturn]] void fail() { throw Error(ErrorCode::kInput, "the embedded image is no PGM, PPM or PFM file"); }
+[[noreturn]] void fail() { throw Error(ErrorCode::kInput, "the embedded image is not a PGM, PPM or PFM file"); }
 
 /// The header's next word; one blank behind it is taken, too.
 std::string_view take_word(std::string_view& bytes) {

@@ -197,7 +197,7 @@ class Combine(CliTest):
         result = self.bad(1, "are CRN and independent image swapped?", "combine", *inputs)
         self.assertIn("the files say that the CRN image was rendered with sampling 'independent' and the independent "
                       "image with 'crn'", result.stderr)
-        self.assertIn("(--force combines them nevertheless)", result.stderr)
+        self.assertIn("(--force combines them anyway)", result.stderr)
         forced = self.good("combine", *inputs, "--force")
         self.assertIn("warning: independent image: errors of neighbouring pixels", forced.stderr)
         self.assertTrue((self.path / "out.exr").exists())

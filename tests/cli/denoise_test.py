@@ -255,7 +255,7 @@ class Denoise(RenderTest):
         self.bad(1, "no layer 'albdo'; did you mean 'albedo'?", *two, "--albedo", "albdo")
         self.write("small.exr", exr({c: [0.5] * 6 for c in "RGB"}, (3, 2)))
         self.bad(1, "'small.exr' has 3 x 2 pixels, 'mitsuba0.exr' 48 x 32", *two, "--albedo", "small.exr")
-        self.bad(2, "--albedo and --normal: with --no-guides there are none", *two, "--no-guides", "--albedo", "x")
+        self.bad(2, "--albedo and --normal have no effect with --no-guides", *two, "--no-guides", "--albedo", "x")
 
     def test_layers_add_up(self):
         """Of two renders, with and without a network, by covary denoise and combine."""
@@ -306,7 +306,7 @@ class Denoise(RenderTest):
         room = ("render", ROOM, "-o", "d.exr", "--light-groups")
         self.bad(2, "no light of the scene has an id", *room)
         self.bad(2, "--layers and --light-groups: either of them adds up", *room, "--layers")
-        self.bad(2, "--light-groups need an integrator that tells lights apart: path", *lamps, "-o", "d.exr",
+        self.bad(2, "--light-groups need an integrator that separates lights: path", *lamps, "-o", "d.exr",
                  "--integrator", "bdpt")
 
     def assert_add_up(self, name, *layers):
@@ -354,7 +354,7 @@ class Denoise(RenderTest):
         self.assertEqual(facts["samples_per_pixel"], 4)
 
     def test_clean_guides(self):
-        self.bad(2, "--clean-guides: with --no-guides there are none", "denoise", "a.exr", "-o", "b.exr",
+        self.bad(2, "--clean-guides has no effect with --no-guides", "denoise", "a.exr", "-o", "b.exr",
                  "--clean-guides", "--no-guides")
         if self.run_covary("denoise", "--check").returncode != 0:
             return

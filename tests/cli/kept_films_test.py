@@ -105,7 +105,7 @@ class EarlierFilms(FilmsTest):
         for overwrite in ("--overwrite", "--resume"):
             self.assertEqual(self.run_covary(*RENDER, overwrite).returncode, 1)
             self.assertEqual(self.tree("out.passes"), mine)
-        self.bad(1, "and is no film", *RENDER, "--overwrite")
+        self.bad(1, "and is not a film", *RENDER, "--overwrite")
 
     def test_a_linked_folder(self):
         self.good("render", ROOM, *SMALL, "-o", "else.exr", "--spp", "24", *IICV, "--passes", "elsewhere")

@@ -71,7 +71,7 @@ class Render(LightTest):
         self.assertEqual(on, same)
         warned = self.good(*combine, "-o", "dark.exr").stderr
         self.assertIn("lacks the light of a light film", warned)
-        self.bad(1, "is no light film", *combine, "--light", "off.exr", "-o", "bad.exr")
+        self.bad(1, "is not a light film", *combine, "--light", "off.exr", "-o", "bad.exr")
         self.bad(1, "is a light film, which --light adds", "combine", "--crn", "films/light.exr", "--independent",
                  "films/independent.exr", "-o", "bad.exr", "--quiet")
         self.bad(2, "are the same file", *combine, "--light", "films/crn.exr", "-o", "bad.exr")

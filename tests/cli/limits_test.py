@@ -176,7 +176,7 @@ class Limits(unittest.TestCase):
                               f"{file}</texture></bsdf></shape>"),
                     (environment, f'<emitter type="envmap">{file}</emitter>')):
                 self.write("s.xml", scene(body))
-                self.refused_scene(f"{name}: a texture of 12000 x 12000 pixels needs {needed} of memory beside the ",
+                self.refused_scene(f"{name}: a texture of 12000 x 12000 pixels needs {needed} of memory in addition to the ",
                                    "s.xml", small)
             for arguments in (("compare", name, "-r", name, "--error-map", "map.png"), ("convert", name, "out.png"),
                               ("view", name, "-o", "a.html")):
@@ -241,7 +241,7 @@ class Limits(unittest.TestCase):
         self.refused_scene("s.xml: tracing rays through 1776080 triangles and other shapes needs 159.8 MB of memory",
                            "s.xml", limited)
         self.write("s.xml", scene(mesh.format("") * 300))
-        self.refused_scene("a.ply: its mesh needs 2.5 MB of memory beside the ", "s.xml", limited)
+        self.refused_scene("a.ply: its mesh needs 2.5 MB of memory in addition to the ", "s.xml", limited)
 
     def test_files_of_many_layers(self):
         channels = sorted(f"layer{i:05}.{c}" for i in range(20000) for c in "RGB")

@@ -58,7 +58,7 @@ class OneScreen(HelpTest):
         self.assertNotIn("--cv-grid", shown)
         hidden = len({line for line in self.good("render", "--help-all").stdout.splitlines()
                       if re.match(r" +-", line)}) - len({line for line in lines if re.match(r" +-", line)})
-        self.assertIn(f"{hidden} other options", lines[-1])
+        self.assertIn(f"{hidden} more options", lines[-1])
 
     def test_all_options(self):
         text = self.good("render", "--help-all").stdout

@@ -290,7 +290,7 @@ class Warnings(OutputsTest):
         for changes in ({"denoiser": "Open Image Denoise"}, {"estimator": "iicv --denoise balanced"}):
             r = self.attributed("r.exr", 2, **changes)
             self.assertEqual(self.warnings(a, "-r", r),
-                             ["r.exr is denoised, and so biased: it is no reference for errors"])
+                             ["r.exr is denoised, and so biased: it cannot be a reference for errors"])
 
     def test_parts_of_images(self):
         r = self.attributed("r.exr", 2, settings="bdpt light_tracing=on; filter box radius=0.5")

@@ -216,7 +216,7 @@ class Plans(RenderTest):
         for seed in ("1", "2"):
             self.statistics("-o", f"{seed}.exr", *IICV, "--spp", "8", "--seed", seed)
         refused = self.run_covary("merge", "1.exr", "2.exr", "-o", "both.exr").stderr
-        self.assertIn("covary: 1.exr is no film but an image that 'iicv' made of films", refused)
+        self.assertIn("covary: 1.exr is not a film but an image that 'iicv' made from films", refused)
         again = [line.strip() for line in refused.splitlines() if line.startswith("  covary render ")]
         self.assertEqual([line.rsplit(" --passes ")[-1] for line in again], ["1.films", "2.films"])
         for line in again:
@@ -296,7 +296,7 @@ class Plans(RenderTest):
         self.good("render", ROOM, *SMALL, *films, "-o", "c.exr", "--estimator", "none")
         self.assertEqual(*(read_exr((self.path / name).read_bytes())["G"] for name in ("a.exr", "c.exr")))
         self.bad(2, "iicv makes no --layers", "render", ROOM, "-o", "d.exr", *IICV, "--layers")
-        self.bad(2, "--layers need an integrator that tells direct light from indirect: path", "render", ROOM, "-o",
+        self.bad(2, "--layers need an integrator that separates direct from indirect light: path", "render", ROOM, "-o",
                  "d.exr", "--layers", "--integrator", "bdpt")
 
     def test_wrong_options(self):
@@ -304,7 +304,7 @@ class Plans(RenderTest):
         for options, noted in ((("--sampling", "crn"), True), (("--sampling", "crn", "--estimator", "none"), False)):
             errors = self.good("render", ROOM, "--resolution", "8x6", "--no-preview", "-o", "s.exr", "--overwrite",
                                "--spp", "4", *options).stderr
-            self.assertEqual("note: --sampling takes one film, as --estimator none does, and leaves out --denoise"
+            self.assertEqual("note: --sampling renders a single pass without --denoise"
                              in errors, noted)
         self.bad(2, "--sampling is an option of --estimator none", *render, "--estimator", "iicv", "--sampling", "crn")
         self.bad(2, "--split is an option of estimators with two passes", *render, "--estimator", "none", "--split",
@@ -359,7 +359,7 @@ class Files(RenderTest):
             self.bad(2, f"-o '{name}': the name must end in .exr", *self.RENDER, "-o", name)
         self.bad(2, "--json 'a.exr' names an image", *self.RENDER, "-o", "b.exr", "--json", "a.exr")
         self.bad(2, "--json 'b.png' names an image", *self.RENDER, "-o", "b.exr", "--json", "b.png")
-        self.bad(2, "-o '/dev/null' is no regular file", *self.RENDER, "-o", "/dev/null")
+        self.bad(2, "-o '/dev/null' is not a regular file", *self.RENDER, "-o", "/dev/null")
         self.write("file", b"")
 
     def test_small_scenes_have_names(self):

@@ -102,7 +102,7 @@ class BadArrays(PackageTest):
         holed[3, 2, 1, 0] = numpy.nan
         message = self.refused(holed, error=covary.InputError)
         self.assertIn("CRN: 1 of 480 pixels hold NaN or infinite values, the first at (1, 2) in group 3", message)
-        self.assertTrue(message.endswith("(force=True combines them nevertheless)"))
+        self.assertTrue(message.endswith("(force=True combines them anyway)"))
         self.assertEqual(covary.combine(holed, INDEPENDENT, force=True).nonfinite_pixels, 1)
 
     def test_swapped(self):

@@ -58,7 +58,7 @@ class Light(BesideTest):
         self.assertIn("crn lacks the light of a light film; light adds it", covary.combine(*images).warnings)
         self.assertIn("crn is a light film, which light adds", self.message_of(
             covary.InputError, covary.combine, self.films["light"], images[1], light=self.films["light"]))
-        self.assertIn("is no light film: it lacks the attribute", self.message_of(
+        self.assertIn("is not a light film: it lacks the attribute", self.message_of(
             covary.InputError, covary.combine, *images, light=images[0]))
         self.assertIn("shows other pixels", self.message_of(
             covary.InputError, covary.combine, *pair(height=19), light=self.films["light"]))
