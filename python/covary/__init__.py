@@ -2,11 +2,11 @@
 """Less Monte Carlo noise by control variates and correlated sampling.
 
     import covary
-    result = covary.render(covary.scenes.path("room"), spp=48)      # or a file of yours, Mitsuba XML
+    result = covary.render(covary.scenes.path("room"), spp=48)      # or your own scene file
     result.save("room.png")
 
-result.image is a float32 array [H, W, 3] of linear Rec. 709 radiance. combine() takes the images of any renderer, as
-arrays [T, H, W, 3]. docs/python.md is the manual.
+result.image is a float32 array [H, W, 3] of linear Rec. 709 radiance. combine() takes images of any renderer as arrays
+[T, H, W, 3]. docs/python.md is the manual.
 """
 from . import errors, metrics, progress, scenes
 from ._combine import InputReport, check_inputs, combine

@@ -37,31 +37,31 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = "iicv", *, li
             normal: Any = None, denoising_albedo: Any = None, denoising_normal: Any = None,
             layers: Mapping[str, Any] | None = None, oidn: str | PathLike[str] = "", std_error: bool | None = None,
             force: bool = False, progress: Progress | None = None, **options: OptionValue) -> Result:
-    """One image of two: `crn`, whose pixels share their random numbers, and `independent`, whose pixels do not.
+    """Combines `crn`, whose pixels share their random numbers, and `independent`, whose pixels do not, into one image.
 
-    Each is an array of float32 [T, H, W, 3], the means of T groups of samples (renders with different seeds), of NumPy,
-    PyTorch or anything with DLPack or the buffer protocol and with any strides; or a Film. Values are linear; 12 groups
-    are recommended. Memory that is [H, W, T, 3], as of read_groups() and Film.groups, is read where it lies. Without
-    crn (None), `independent` alone is denoised, of two renders or groups on.
+    Each is a float32 array [T, H, W, 3], the means of T groups of samples (renders with different seeds), from NumPy,
+    PyTorch or anything with DLPack or the buffer protocol, with any strides; or a Film. Values are linear; 12 groups are
+    recommended. The memory order [H, W, T, 3], as from read_groups() and Film.groups, is read in place. Without crn
+    (None), `independent` alone is denoised, from two groups on.
 
-    estimator: "iicv", or a comparator; its options follow as keywords (covary.estimators has each with its types).
-    light: the film of light paths, that of a pass "light", which is added to the result.
-    counts: samples of each pixel of the independent image, all groups together, where these differ: whole numbers
-        [H, W]; a Film knows its own. With them, samples.
+    estimator: "iicv", or a method to compare with; its options follow as keywords (typed in covary.estimators).
+    light: the film of light paths (pass "light"), to add to the result.
+    counts: samples per pixel of the independent image over all groups, if they vary: whole numbers [H, W]; a Film
+        knows its own. Needs samples.
     samples: samples per pixel of the CRN image, for counts and for estimators that need them.
-    denoise: mix the image with denoised ones where held-out samples find that better: for the least error ("auto",
-        "error"), for least bias, or balanced. albedo, normal: guides [H, W, 3] for it, the normal only together with
-        the albedo; denoising_albedo, denoising_normal: the same of what is seen in mirrors and through glass, for the
-        network (of render(), aovs["DenoisingAlbedo"] and so on); oidn: Open Image Denoise's library or a folder of it,
-        by default where it is found; "off": without it.
-    layers: parts of `independent` by name, such as direct light, in its groups: denoised as it is, they are in the
-        result's aovs, and add up to its image, with "Rest" for what they leave of it.
-    std_error: estimate the error, too; by default where the estimator can.
-    force: combine even where the checks of the inputs find errors.
+    denoise: mix in denoised images where held-out samples prefer them: for the least error ("auto", "error"), for
+        little bias ("bias"), or balanced. albedo, normal: guides [H, W, 3], the normal only with the albedo;
+        denoising_albedo, denoising_normal: guides seen through mirrors and glass, for the network (from render():
+        aovs["DenoisingAlbedo"], …); oidn: Open Image Denoise's library or its folder, by default searched for;
+        "off": not used.
+    layers: parts of `independent` by name, such as direct light, in the same groups: denoised with it, they are in the
+        result's aovs, and add up to its image with "Rest".
+    std_error: estimate the error, too; by default if the estimator can.
+    force: combine even if the checks of the inputs find errors.
     progress: called with (done, total) steps.
 
-    The values are those of `covary combine` in every bit. Raises InputError where the inputs do not fit, UsageError for
-    options that the estimator does not have.
+    The result has the bits of `covary combine`. Raises InputError if the inputs do not match, UsageError for options
+    that the estimator does not have.
     """
     check_no_passes(options, "here are images that are rendered: counts= tells the samples that their pixels have")
     return Result(**_covary.combine(crn, independent, None if counts is None else _counts(counts), light, albedo,

@@ -32,7 +32,7 @@ _CHECKPOINT_SECONDS = 300.0  # as the program
 
 
 class Scene:
-    """A scene in memory, with the integrator that it is rendered by. Made by Scene.load()."""
+    """A scene in memory, with its integrator. Made by Scene.load()."""
 
     def __init__(self, path: str, loading: dict[str, Any]) -> None:
         self._path, self._loading = path, loading
@@ -49,11 +49,11 @@ class Scene:
              defines: Mapping[str, object] | None = None) -> Scene:
         """Reads a Mitsuba XML scene.
 
-        resolution: (width, height) of the full frame in place of the scene's.
-        integrator: "path", "bdpt", … in place of the scene's.
-        min_depth, max_depth: fewest and most edges of a path; -1 for no limit.
-        integrator_options: properties of the <integrator> element, in place of the file's or beside them.
-        defines: values of the scene's <default> names, `-D` of the command line.
+        resolution: (width, height) of the full frame, instead of the scene's.
+        integrator: "path", "bdpt", …, instead of the scene's.
+        min_depth, max_depth: minimum and maximum edges of a path; -1 for no limit.
+        integrator_options: properties of the <integrator> element, which override the file's.
+        defines: values of the scene's <default> names, as by -D on the command line.
         Raises InputError with every problem of the file.
         """
         texts = {name: str(value) for name, value in (defines or {}).items()}
@@ -63,7 +63,7 @@ class Scene:
 
     @checked(integrator=text)
     def with_integrator(self, integrator: str) -> Scene:
-        """The scene, read again where it has another integrator than this."""
+        """The scene, read again if its integrator is a different one."""
         if integrator in ("", self._loading["integrator"]):
             return self
         return Scene(self._path, {**self._loading, "integrator": integrator})
@@ -84,7 +84,7 @@ class Scene:
 
     @property
     def integrator(self) -> str:
-        """Name of the integrator; "" where the file has none and none was asked for."""
+        """Name of the integrator; "" if neither the file nor the caller names one."""
         name: str = self._loading["integrator"] or self._loaded.integrator
         return name
 
@@ -94,12 +94,12 @@ class Scene:
 
     @property
     def files(self) -> list[str]:
-        """All files that the scene's file names and that were read."""
+        """All files named by the scene file that were read."""
         return list(self._loaded.files)
 
     @property
     def content_hash(self) -> str:
-        """Of the scene's XML, the defines and all files it reads."""
+        """Hash of the scene's XML, the defines and all files that it reads."""
         return self._loaded.content_hash
 
     def __repr__(self) -> str:
@@ -168,32 +168,32 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
            films_only: bool = False, save_training: str | PathLike[str] | None = None,
            load_training: str | PathLike[str] | None = None, progress: Progress | None = None,
            **options: OptionValue) -> RenderResult:
-    """Renders a scene, or the file of one, as `covary render` does; the values are the same in every bit.
+    """Renders a scene, or a scene file, as `covary render` does, to the same bits.
 
-    spp: samples per pixel of all passes together; by default the scene's, or no limit with `until` or `time`.
-    estimator: "none", the default, is the mean of independent samples; "iicv" takes half of the samples with common
-        random numbers. Its options follow as keywords.
-    integrator: in place of the scene's.
-    until: adds samples until the predicted relMSE is this; until_p95: until 95 % of the blocks of 16 x 16 pixels have
-        no more.
+    spp: samples per pixel over all passes; by default the scene's, or no limit with `until` or `time`.
+    estimator: "none", the default, is the mean of independent samples; "iicv" uses common random numbers for half of
+        the samples. Its options follow as keywords.
+    integrator: instead of the scene's.
+    until: add samples until the predicted relMSE is this; until_p95: until it is in 95 % of the blocks of 16 x 16
+        pixels.
     time: seconds for rendering and estimating together.
-    denoise, oidn: as combine() has them; the guides are rendered. The default is "auto", and "none" where an estimator
-        or `sampling` is named.
-    output: EXR file of the result; preview: also a PNG beside it.
-    passes: folder that keeps the films; resume: continues those that are there; overwrite: replaces them;
-        checkpoint: seconds between writing unfinished films, by default 300 where there is a place for them; 0: never.
-    aovs: also the images Albedo, N and P; layers: also Direct and Indirect, which add up to the image;
-        light_groups: in place of these Combined_ID of each id of lights, and Rest;
-        path_lengths: also images of paths of each length, by controlled-path.
+    denoise, oidn: as for combine(); the guides are rendered. The default is "auto", or "none" if an estimator or
+        `sampling` is given.
+    output: EXR file of the result; preview: write a PNG beside it.
+    passes: folder to keep the films in; resume: continue existing films; overwrite: replace them;
+        checkpoint: seconds between saving unfinished films, by default 300 with `output` or `passes`; 0: never.
+    aovs: add the images Albedo, N and P; layers: add Direct and Indirect, which add up to the image;
+        light_groups: add Combined_ID for the lights of each id, and Rest, instead;
+        path_lengths: add an image for each path length.
     crop: x, y, width and height in the frame.
-    sampling: of the one pass of estimator "none"; by default "independent".
+    sampling: of the single pass of estimator "none"; by default "independent".
     sampler: "sobol" for Owen-scrambled Sobol' points in each group of samples; by default the scene's.
-    groups: of samples whose means films keep; split: parts of the samples for the CRN and the independent pass, or
-        "auto", which finds out whether common random numbers pay under the mean that is denoised.
-    films_only: take the passes and make no image of them; result.image is then the mean of all samples.
+    groups: number of groups of samples whose means films keep; split: ratio of the samples of the CRN and the
+        independent pass, or "auto", which tries whether common random numbers improve the denoised mean.
+    films_only: render the passes only; result.image is then the mean of all samples.
     progress: called with (done, total) samples, up to 20 times a second.
 
-    Ctrl-C ends the render within a tile; with `output` or `passes` what there is was kept, and `resume=True` continues.
+    Ctrl-C ends the render within a tile; with `output` or `passes` samples are kept, and `resume=True` continues.
     """
     _check_scene_arguments(scene, options)
     _check_together(estimator, {"resume": resume, "overwrite": overwrite, "checkpoint": checkpoint, "preview": preview,
