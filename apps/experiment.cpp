@@ -192,7 +192,7 @@ void check_files(const ExperimentCommand& command, const lab::Suite& suite, cons
     if (fs::exists(command.output + name) && !is_results(command.output + kResults))
       throw Error(
           ErrorCode::kUsage,
-          fmt::format("-o '{0}': {0}{1} is there and no experiment made it; give another folder, or one that an "
+          fmt::format("-o '{0}': {0}{1} exists and was not made by an experiment; give another folder, or one that an "
                       "experiment has written to",
                       command.output, name));
 }

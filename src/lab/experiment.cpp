@@ -362,7 +362,7 @@ class Experiment {
         continue;
       results_.warnings.push_back(
           fmt::format("{}: the reference's own relMSE, {:.2g}, is above that of the best method, {:.2g}: errors are "
-                      "still unbiased, but a reference of more samples would make them more certain",
+                      "still unbiased, but a reference with more samples would reduce their uncertainty",
                       results_.suite.scenes[s].name, best->split.reference_error, best->split.relative.error.value));
     }
   }

@@ -60,7 +60,7 @@ class Builder : public nlohmann::json_sax<Json> {
   bool end_array() override { return end(); }
   bool key(string_t& name) override {
     key_line_ = line_;
-    if (open_.back()->contains(name)) fail(line_, fmt::format("the key '{}' stands twice in one object", name));
+    if (open_.back()->contains(name)) fail(line_, fmt::format("the key '{}' appears twice in one object", name));
     key_ = name;
     return true;
   }
@@ -233,7 +233,7 @@ void ObjectReader::finish() {
   for (const auto& [name, value] : object_.items())
     if (std::find(known_.begin(), known_.end(), name) == known_.end())
       problem(name,
-              fmt::format("unknown key{}; known here are {}", did_you_mean(name, known_), fmt::join(known_, ", ")));
+              fmt::format("unknown key{}; known keys are {}", did_you_mean(name, known_), fmt::join(known_, ", ")));
 }
 
 }  // namespace covary::lab

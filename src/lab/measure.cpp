@@ -270,10 +270,10 @@ void warn_of_left_out(Results& results, const std::vector<size_t>& common, size_
           std::find(summary.unusable.begin(), summary.unusable.end(), s) != summary.unusable.end())
         methods += (methods.empty() ? "" : ", ") + suite.methods[summary.method].name;
     if (!methods.empty())
-      results.warnings.push_back(fmt::format(
-          "no summary at {} counts {}, where {} has no error above zero, or no ratio: more seeds, or better "
-          "references, would help",
-          suite.budgets[budget].label(), suite.scenes[s].name, methods));
+      results.warnings.push_back(
+          fmt::format("no summary at {} counts {}, where {} has no positive error, or no ratio: more seeds, or better "
+                      "references, would help",
+                      suite.budgets[budget].label(), suite.scenes[s].name, methods));
   }
 }
 

@@ -105,24 +105,18 @@ Json scenes_table(const Results& results) {
 }
 
 const std::vector<std::string> kHowMeasured = {
-    "Every number is a mean over seeds. Intervals hold the true value with probability 95 %: Student's t over the "
-    "seeds, widened "
-    "by the references' own noise.",
+    "Every number is a mean over seeds. Intervals contain the true value with probability 95 %: Student's t over the "
+    "seeds, widened by the references' own noise.",
     "relMSE and MSE use the product (F − R₁)(F − R₂) of the differences to two independent references, in which the "
-    "references' "
-    "noise cancels; the squared bias is the same product over pairs of different seeds. Both can come out negative "
-    "where they are "
-    "too small to be seen. MAE and FLIP are against the mean of the references and contain its noise.",
-    "Equal samples: error of the baseline over error of the method with the same number of samples; where the numbers "
-    "taken differ by more than 1 %, each error is multiplied by its samples, as if errors fell like 1 / samples. Equal "
-    "time: the same with each "
-    "error multiplied by the method's time (render, estimate and later steps, without loading), as if errors fell like "
-    "1 / time; where "
-    "a budget is in seconds, the errors are those of that time.",
-    "Of scenes with frames, errors are means over all frames. Temporal error: relMSE of the differences of successive "
-    "frames, which are flicker and trails; temporal FLIP: |FLIP of successive frames − FLIP of those of the "
-    "reference|; "
-    "worst region: largest ratio of mean errors, with the baseline's, of any region."};
+    "references' noise cancels; the squared bias is the same product over pairs of different seeds. Negative values "
+    "are too small to measure. MAE and FLIP are against the mean of the references and include its noise.",
+    "Equal samples: error of the baseline over error of the method with the same number of samples; if the numbers of "
+    "samples differ by more than 1 %, each error is multiplied by its samples, as if errors fell like 1 / samples. "
+    "Equal time: the same with each error multiplied by the method's time (render, estimate and later steps, without "
+    "loading), as if errors fell like 1 / time; with a budget in seconds, the errors themselves.",
+    "For sequences, errors are means over all frames. Temporal error: relMSE of the differences of successive frames, "
+    "which measures flicker and trails; temporal FLIP: |FLIP of successive frames − FLIP of those of the reference|; "
+    "worst region: largest ratio of mean errors to the baseline's in any region."};
 
 /// Of a sequence, the last frame is shown.
 Image shown_image(const Image& pixels, const SceneInstance& scene) { return images_of(pixels, scene).back(); }
@@ -227,8 +221,8 @@ std::string verdict(const Results& results, size_t budget, const std::string& co
   if (!best) return "";
   const Estimate& gain = best->*ratio;
   if (!(gain.value > 1))
-    return fmt::format("{} no method has less error than '{}': the nearest is '{}', with {:.2g} times as much.",
-                       condition, suite.baseline, suite.methods[best->method].name, 1 / gain.value);
+    return fmt::format("{} no method has less error than '{}'; next is '{}', with {:.2g} times as much.", condition,
+                       suite.baseline, suite.methods[best->method].name, 1 / gain.value);
   std::string text = fmt::format("{} '{}' has the least error: {:.2g} times less than '{}'", condition,
                                  suite.methods[best->method].name, gain.value, suite.baseline);
   if (!std::isfinite(gain.low)) return text + ".";

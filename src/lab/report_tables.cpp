@@ -54,7 +54,7 @@ std::string method_title(const Results& results, size_t method, size_t budget) {
 /// What a caption adds where ratios for equal samples are of errors at other numbers of samples.
 std::string normalised_note(const Results& results, size_t budget) {
   const bool any = any_cell(results, budget, [](const Cell& c) { return c.equal_sample_normalised; });
-  return any ? "; where methods took other numbers of samples, equal samples: ratio of error × samples" : "";
+  return any ? "; if methods took different numbers of samples, equal samples: ratio of error × samples" : "";
 }
 
 /// Rows of the cells at a budget that `use` takes; scene and method come first.

@@ -423,7 +423,7 @@ class Mistakes(ExperimentTest):
         for name in ("report.html", "results.csv", "results.json"):
             file = self.path / "out" / name
             file.write_text("somebody's")
-            self.bad(2, f"-o 'out': out/{name} is there and no experiment made it", "--quiet")
+            self.bad(2, f"-o 'out': out/{name} exists and was not made by an experiment", "--quiet")
             self.assertEqual(file.read_text(), "somebody's")
             file.unlink()
         suite = self.path / "results.json"
