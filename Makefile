@@ -1,34 +1,31 @@
 # SPDX-License-Identifier: Apache-2.0
-# Entry to the project. `make demo` and `make test` start from a bare Debian 12: they install what is missing, build and
-# run.
+# Entry points. `make demo` and `make test` work on a bare Debian: they install what is missing, build and run.
 #
-#   make setup            install missing packages (needs root or sudo only when something is missing)
+#   make setup            install missing packages (needs root or sudo only if something is missing)
 #   make build            build/release/covary
-#   make demo             render a small scene plainly, with IICV and by the default into out/
-#   make test             build and run all tests but the nightly ones      TESTS=regex selects some
-#   make check            all there is: lint of every file, the tests under sanitizers and of a build by Clang with the
-#                         checks of the standard library, a minute of each fuzz target; takes hours
-#                         FUZZ=seconds for each target
-#   make bench            build and run the micro benchmarks: the time of each stage, and what part of its limit it
-#                         reaches; build/release/bench.json            BENCH=regex selects some; BASELINE=an earlier
-#                         bench.json to compare with; HISTORY=benchmarks/results.md adds a row to that table
-#   make lint             formatting, static analysis, rules of the tree    ALL=1 analyses all files, not changed ones
+#   make demo             render a small scene by path tracing, IICV and the default into out/
+#   make test             build and run all tests except nightly ones        TESTS=regex selects some
+#   make check            lint every file, run the tests under sanitizers and with Clang and the standard library's
+#                         assertions, run each fuzz target for a minute (FUZZ=seconds); takes hours
+#   make bench            build and run the micro benchmarks: time of each stage, and the fraction of its limit that it
+#                         reaches; build/release/bench.json            BENCH=regex selects some; BASELINE=FILE compares
+#                         with an earlier bench.json; HISTORY=benchmarks/results.md adds a row to that table
+#   make lint             formatting, static analysis, rules of the tree    ALL=1 analyses all files, not only changes
 #   make install          build for every x86-64 processor (docs/library.md) and install under PREFIX (default
-#                         /usr/local); ARCH=native builds for this machine alone, in a third of the time; with Open
-#                         Image Denoise of PyPI (scripts/oidn), but for OIDN=OFF
-#   make deb              a package of Debian, of what `make install` installs, in dist/
+#                         /usr/local), with Open Image Denoise from PyPI (scripts/oidn) unless OIDN=OFF; ARCH=native
+#                         builds only for machines like this one, in a third of the time
+#   make deb              Debian package of what `make install` installs, in dist/
 #   make docs             the documentation as a site, build/site/index.html (Sphinx, from PyPI)
-#   make wheel            the Python package as a wheel for every x86-64 processor, and its sources, in dist/
-#                         (docs/python.md); ARCH=native for machines like this alone
-#   make blender          the add-on of Blender as dist/covary-blender.zip; with the program of a wheel in dist/, if any
-#   make asan|tsan        build and run the tests under the sanitizers of addresses, leaks and undefined behaviour;
-#                         under that of threads
-#   make dev|clang        the same with checks of the standard library, by GCC; by Clang
+#   make wheel            the Python package as a wheel for every x86-64 processor, and its source distribution, in
+#                         dist/ (docs/python.md); ARCH=native: only for machines like this one
+#   make blender          the Blender add-on, dist/covary-blender.zip; includes the program if dist/ has a wheel
+#   make asan|tsan        build and test under the address, leak and undefined-behaviour sanitizers; thread sanitizer
+#   make dev|clang        build and test with the standard library's assertions, by GCC or by Clang
 #   make clean            remove build/ and out/
 #
-# ARCH=x86-64-v3 builds for every AVX2 machine instead of this one; WERROR=ON makes warnings errors (dev and clang
-# always do) until WERROR=OFF, so that what is built once is built for all targets above; JOBS=n limits parallelism
-# (default: processors, fewer when memory is short).
+# ARCH=x86-64-v3 builds for every AVX2 machine instead of this one. WERROR=ON makes warnings errors until WERROR=OFF
+# (dev and clang always do), so that the targets above share one build. JOBS=n limits parallelism (default: number of
+# processors, fewer if memory is short).
 
 ARCH   ?= native
 PREFIX ?= /usr/local
