@@ -40,8 +40,8 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = "iicv", *, li
     """Combines `crn`, whose pixels share their random numbers, and `independent`, whose pixels do not, into one image.
 
     Each is a float32 array [T, H, W, 3], the means of T groups of samples (renders with different seeds), from NumPy,
-    PyTorch or anything with DLPack or the buffer protocol, with any strides; or a Film. Values are linear; 12 groups are
-    recommended. The memory order [H, W, T, 3], as from read_groups() and Film.groups, is read in place. Without crn
+    PyTorch or anything with DLPack or the buffer protocol, with any strides; or a Film. Values are linear; 12 groups
+    are recommended. The memory order [H, W, T, 3], as from read_groups() and Film.groups, is read in place. Without crn
     (None), `independent` alone is denoised, from two groups on.
 
     estimator: "iicv", or a method to compare with; its options follow as keywords (typed in covary.estimators).

@@ -176,7 +176,7 @@ class Limits(unittest.TestCase):
                               f"{file}</texture></bsdf></shape>"),
                     (environment, f'<emitter type="envmap">{file}</emitter>')):
                 self.write("s.xml", scene(body))
-                self.refused_scene(f"{name}: a texture of 12000 x 12000 pixels needs {needed} of memory in addition to the ",
+                self.refused_scene(f"{name}: a texture of 12000 x 12000 pixels needs {needed} of memory in ",
                                    "s.xml", small)
             for arguments in (("compare", name, "-r", name, "--error-map", "map.png"), ("convert", name, "out.png"),
                               ("view", name, "-o", "a.html")):
