@@ -318,7 +318,7 @@ TEST(CompareCells, RowsAverageTheSameScenes) {
   EXPECT_EQ(iicv.unusable, std::vector<size_t>{1});
   EXPECT_EQ(results.summaries[2].n_scenes, 3u) << "at the other budget all are usable";
   ASSERT_EQ(results.warnings.size(), 1u);
-  EXPECT_TRUE(contains(results.warnings[0], "no summary at 24 spp counts door, where iicv has no error above zero"));
+  EXPECT_TRUE(contains(results.warnings[0], "no summary at 24 spp counts door, where iicv has no positive error"));
 
   // A method that is usable nowhere has a row that says so and takes no scene from the others.
   Results broken = one;

@@ -120,9 +120,9 @@ TEST(ReportTables, ShowTheSamplesThatWereTaken) {
   EXPECT_EQ(error_table(results, 0)["columns"][1]["title"], "pt");
   EXPECT_EQ(error_table(results, 0)["columns"][2]["title"], "iicv (36 spp)");
   EXPECT_EQ(summary_table(results, 0)["rows"][0]["spp"], 36);
-  EXPECT_FALSE(contains(ratio_table(results, 0)["caption"], "other numbers of samples"));
+  EXPECT_FALSE(contains(ratio_table(results, 0)["caption"], "different numbers of samples"));
   results.cells[1].equal_sample_normalised = true, results.cells[1].samples_per_pixel = 36;
-  EXPECT_TRUE(contains(ratio_table(results, 0)["caption"], "other numbers of samples"));
+  EXPECT_TRUE(contains(ratio_table(results, 0)["caption"], "different numbers of samples"));
   EXPECT_EQ(ratio_table(results, 0)["rows"][1]["spp"], 36);
 }
 

@@ -54,7 +54,7 @@ class Compare(CliTest):
 
     def test_wrong_input(self):
         for arguments, message in ((("out_#.exr", "out_1.exr"), "either all images are names with '#', or none"),
-                                   (("out_1.exr", "--frames", "1"), "--frames and --baseline are about frames"),
+                                   (("out_1.exr", "--frames", "1"), "--frames and --baseline need frames"),
                                    (("out_#.exr", "--error-map", "e.png"), "--error-map is an option of single images"),
                                    (("out_#.exr", "--baseline", "out_1.exr"), "--baseline 'out_1.exr' has no '#'"),
                                    (("out_#.exr", "--frames", "3-4"), "out_4.exr"),
@@ -111,7 +111,7 @@ class Video(CliTest):
 
     def test_wrong_input(self):
         self.write("v.mp4", b"precious")
-        for arguments, message in ((("f_01.exr", "w.mp4"), "'f_01.exr': of a video, expected are names with '#'"),
+        for arguments, message in ((("f_01.exr", "w.mp4"), "'f_01.exr': of a video, expected names with '#'"),
                                    (("g_##.exr", "w.mp4"), "there are no frames 'g_##.exr'"),
                                    (("f_##.exr", "v.mp4"), "--overwrite to replace it"),
                                    (("f_01.exr", "a.png", "--fps", "3"), "--fps is an option of videos")):

@@ -112,7 +112,7 @@ class Plans(RenderTest):
         trial = facts["passes"][2]["split_trial"]
         self.assertEqual(trial["crn_wins"], trial["relmse_with_crn"] < trial["relmse_independent"])
         self.assertEqual(trial["crn_wins"], facts["passes"][3]["samples_per_pixel"] > 0)
-        self.assertIn("after 32 samples per pixel held-out ones tell of a relMSE of ", facts["note"])
+        self.assertIn("after 32 samples per pixel, held-out samples predict a relMSE of ", facts["note"])
         self.good("render", ROOM, *SMALL, "-o", "b.exr", "--spp", "8", *split, "--passes", "films")
         self.good("render", ROOM, *SMALL, "-o", "b.exr", "--spp", "16", "--groups", "8", *split, "--passes", "films",
                   "--resume")

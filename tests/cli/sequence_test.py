@@ -183,8 +183,8 @@ class Frames(SequenceTest):
 
     def test_wrong_input(self):
         for arguments, message in (
-                (("-o", "f.exr"), "-o 'f.exr': with --frames, expected is a name with '#'"),
-                (("-o", "f_#.exr", "--json", "f.json"), "--json 'f.json': with --frames, expected is a name with '#'"),
+                (("-o", "f.exr"), "-o 'f.exr': with --frames, expected a name with '#'"),
+                (("-o", "f_#.exr", "--json", "f.json"), "--json 'f.json': with --frames, expected a name with '#'"),
                 (("-o", "f_#.exr", "--save-training", "t"), "--save-training is an option of single images")):
             result = self.render(*arguments)
             self.assertEqual(result.returncode, 2)
@@ -196,7 +196,7 @@ class Frames(SequenceTest):
         alone = self.run_covary("render", "room.xml", "-o", "f.exr", "--camera-path", "path.json")
         self.assertIn("--camera-path has no effect without --frames", alone.stderr)
         self.write_text("path.json", '{"keyframes": [{"time": 0, "to_world": [2]}]}')
-        self.assertIn("camera path 'path.json': keyframe 0: 'to_world' is no", self.render("-o", "f_#.exr").stderr)
+        self.assertIn("camera path 'path.json': keyframe 0: 'to_world' is not a", self.render("-o", "f_#.exr").stderr)
         scaled = [[2 * v for v in row[:3]] + row[3:] for row in START]
         scaled[3] = [0, 0, 0, 1]
         self.write_path((0, scaled))
@@ -313,7 +313,7 @@ class Denoise(SequenceTest):
     def test_wrong_input(self):
         for arguments, message in (
                 (("a_#.exr", "b_1.exr", "-o", "d_#.exr"), "'b_1.exr' has no '#'"),
-                (("a_#.exr", "b_#.exr", "-o", "d.exr"), "-o 'd.exr': of frames, expected is a name such as"),
+                (("a_#.exr", "b_#.exr", "-o", "d.exr"), "-o 'd.exr': for frames, expected a name such as"),
                 (("a_#.exr", "b_#.exr", "-o", "d_#.exr", "--frames", "3-1"), "--frames '3-1': expected FIRST-LAST"),
                 (("a_#.exr", "b_#.exr", "-o", "d_#.exr", "--motion-scale", "1"), "--motion-scale '1': expected X,Y"),
                 (("a_1.exr", "b_1.exr", "-o", "d.exr", "--frames", "1"), "--frames: the input has no '#'"),
@@ -364,10 +364,10 @@ class Combine(SequenceTest):
     def test_wrong_input(self):
         (self.path / "a#").mkdir()
         (self.path / "a#" / "crn.exr").write_bytes((self.path / "p_1/crn.exr").read_bytes())
-        for arguments, message in ((("-o", "c.exr"), "-o 'c.exr': of frames, expected is a name such as"),
+        for arguments, message in ((("-o", "c.exr"), "-o 'c.exr': for frames, expected a name such as"),
                                    (("-o", "c_#.exr", "--json", "c.json"), "--json 'c.json': of frames, expected"),
                                    (("-o", "c_#.exr", "--save-stages", "s"), "--save-stages is an option of single"),
-                                   (("-o", "c_#.exr", "--crn", "a#/crn.exr"), "'a#/crn.exr' has no '#' in place"),
+                                   (("-o", "c_#.exr", "--crn", "a#/crn.exr"), "'a#/crn.exr' has no '#' for"),
                                    (("-o", "c_#.exr", "--denoise", "auto"), "no layer 'Motion' of motion")):
             result = self.combine(*arguments)
             self.assertNotEqual(result.returncode, 0)

@@ -671,7 +671,7 @@ class View(PageTest):
             "o.value)"), ["frame 2", "frame 3"])
         self.assertIn("either all images are names with '#', or none",
             self.covary("a_##.exr", "a_01.exr", "-o", "two.html").stderr)
-        self.assertIn("--frames is about frames", self.covary("a_01.exr", "-o", "two.html", "--frames", "1").stderr)
+        self.assertIn("--frames needs frames", self.covary("a_01.exr", "-o", "two.html", "--frames", "1").stderr)
 
     def middle(self):
         left, top, width, height = self.page.box(".stage")
