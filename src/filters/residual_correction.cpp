@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 
+#include "core/error.h"
 #include "filters/guided_cells.h"
 #include "filters/window_sums.h"
 
@@ -123,6 +124,8 @@ void add_residual_correction(const Moments& h, const ResidualCorrectionOptions& 
 
 void add_residual(const Moments& h, const ResidualOptions& options, const std::vector<unsigned char>& valid,
                   Image& estimate) {
+  COVARY_CHECK(options.cell == 2 || options.cell == 4, "cells of the residual have sides of 2 or 4 pixels");
+  const auto mean_around = options.cell == 2 ? guided_mean<2> : guided_mean<4>;
   const int radius = options.window / 2 / options.cell;
   const Planes cells = make_cells(options.cell, h, valid, estimate, radius * options.cell);
   for_each_batch(estimate.width, estimate.height, [&](int x, int y, int n) {
@@ -131,7 +134,7 @@ void add_residual(const Moments& h, const ResidualOptions& options, const std::v
       for (int l = 0; l < kLanes; ++l) f[c][l] = estimate.pixel(std::min(x + l, estimate.width - 1), y)[c];
       brightness += f[c] * (options.bandwidth / 3);
     }
-    const GuidedMean mean = guided_mean<4>(cells, radius, x, y, f, brightness * brightness + kLeastSquare);
+    const GuidedMean mean = mean_around(cells, radius, x, y, f, brightness * brightness + kLeastSquare);
     for (int l = 0; l < n; ++l)
       if (valid[static_cast<size_t>(y) * estimate.width + x + l])
         for (int c = 0; c < 3; ++c) estimate.pixel(x + l, y)[c] += mean.value(c)[l];

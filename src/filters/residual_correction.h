@@ -49,7 +49,7 @@ struct ResidualCorrectionOptions {
 struct ResidualOptions {
   float bandwidth = 0.5f;  ///< k > 0
   int window = 61;         ///< side, in pixels
-  int cell = 4;            ///< side of the cells over which it is taken
+  int cell = 4;            ///< side of the cells over which it is taken, 2 or 4
 };
 
 /// Cells are aligned with coordinates that are multiples of this.
