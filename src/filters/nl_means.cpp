@@ -21,6 +21,7 @@ using namespace lanes;
 
 constexpr int kPatch = 1;  // radius
 constexpr int kBorder = kNlMeansRadius + kPatch;
+constexpr float kOfPatch = 3 * (2 * kPatch + 1) * (2 * kPatch + 1);  // values
 /// Pairs in a row that are looked at; pixels of a tile, so that the pairs touching them are no more. `kTileHeight`: not
 /// many more pairs than pixels. `kBand`: what its rows read and write stays in the second-level cache.
 constexpr int kRow = 256, kTileWidth = kRow - kNlMeansRadius - 2 * kPatch, kTileHeight = 64, kBand = 16;
@@ -30,22 +31,25 @@ constexpr ptrdiff_t kStride = kTileWidth + 2 * kBorder + kLanes, kPlane = kStrid
 constexpr int kSums = 4;
 /// Offsets whose pixels are added together.
 constexpr int kAtOnce = 7;
-/// Errors below this are taken for none; squared errors above that for it.
+/// Sums of two squared errors below this are taken for none; squared errors above that for it.
 constexpr float kSmallestVariance = 1e-10f, kLargestVariance = 1e30f;
 
-/// Of one direction of pairs each.
-struct BothWays {
-  vfloat forward = {}, backward = {};
+/// What both directions of a pair are made of, summed over three channels: with v, u the variances of its pixels,
+/// A = ((f - f')^2 - min(v, u)) / (v + u) and B = v / (v + u). Forward its distance is A - B, backward A - (1 - B).
+struct PairSums {
+  vfloat a = {}, b = {};
 };
 
-/// Distances of pixels in a row from those `there` floats on, and theirs from these, summed over three planes.
-BothWays pixel_distances(const float* f, const float* variance, ptrdiff_t there) {
-  BothWays sum;
+/// Of pixels in a row and those `there` floats on.
+PairSums pixel_sums(const float* f, const float* variance, ptrdiff_t there) {
+  PairSums sum;
   for (int c = 0; c < 3; ++c, f += kPlane, variance += kPlane) {
-    const vfloat difference = load(f) - load(f + there), v = load(variance), u = load(variance + there);
-    const vfloat quotient = reciprocal(v + u + kSmallestVariance), rest = difference * difference - min(v, u);
-    sum.forward += (rest - v) * quotient;
-    sum.backward += (rest - u) * quotient;
+    const vfloat difference = load(f) - load(f + there);
+    vfloat v = load(variance), u = load(variance + there);
+    keep_in_register(v), keep_in_register(u);
+    const vfloat quotient = reciprocal(v + u);
+    sum.a += (difference * difference - min(v, u)) * quotient;
+    sum.b += v * quotient;
   }
   return sum;
 }
@@ -70,7 +74,7 @@ void copy_around(const Tile& tile, const Image& image, bool is_error, int first,
       float* const row = planes.row(first + c, y);
       for (int x = -kBorder; x < tile.width + kBorder; ++x) {
         const float value = pixels[3 * std::clamp(tile.x + x, 0, image.width - 1) + c];
-        row[x] = is_error ? std::min(value * value, kLargestVariance) : value;
+        row[x] = is_error ? std::min(value * value, kLargestVariance) + kSmallestVariance / 2 : value;
       }
     }
   }
@@ -128,7 +132,7 @@ class Filter {
     std::vector<Planes> planes;                     // of each steering
     Planes mask;                                    // 1 at valid pixels, 0 elsewhere and outside
     std::array<std::array<Rows, 2>, kBand> guides;  // exp(-||q_p - q_(p + o)||^2), for valid p + o, and for valid p
-    std::array<std::array<Rows, 2>, 2> distances;   // of pixels, summed over three; of even rows and of odd ones
+    std::array<std::array<Rows, 2>, 2> pair_sums;   // A and B, summed over three; of even rows and of odd ones
     std::vector<std::array<Rows, 2>> weights;       // of each task, forward and backward
     std::vector<float> totals;                      // of each row of the tile
   };
@@ -155,7 +159,7 @@ class Filter {
     for (size_t i = 0; i < order.size(); ++i) {
       const NlMeansTask& task = given.tasks[order[i]];
       const bool is_half = i > 0 && given.tasks[order[i - 1]].bandwidth == 2 * task.bandwidth;
-      s.scales.push_back(is_half ? 0 : -kLog2E / (9 * 3 * task.bandwidth * task.bandwidth));
+      s.scales.push_back(is_half ? 0 : -kLog2E / (kOfPatch * task.bandwidth * task.bandwidth));
       for (const Image* image : task.sources) {
         auto source =
             std::find_if(s.sources.begin(), s.sources.end(), [&](auto& other) { return other.image == image; });
@@ -270,24 +274,25 @@ class Filter {
     const float* const guide[] = {with_weights ? guides[0][k].begin() : nullptr,
                                   with_weights ? guides[1][k].begin() : nullptr};
     float *before[2], *before_that[2], *weights[2];
-    for (const int direction : {0, 1}) {
-      before[direction] = b.distances[(y + 1) & 1][direction][k].begin();
-      before_that[direction] = b.distances[y & 1][direction][k].begin();
-      weights[direction] = b.weights[0][direction][k].begin();
+    for (const int i : {0, 1}) {
+      before[i] = b.pair_sums[(y + 1) & 1][i][k].begin();
+      before_that[i] = b.pair_sums[y & 1][i][k].begin();
+      weights[i] = b.weights[0][i][k].begin();
     }
     constexpr size_t kTask = sizeof(b.weights[0]) / sizeof(float);
     const float* const scales = steerings_[steering].scales.data();
     const size_t n_tasks = steerings_[steering].scales.size();
-    BothWays pixels = pixel_distances(f, variance, there);
+    PairSums pixels = pixel_sums(f, variance, there);
     for (int x = 0; x < n; x += kLanes) {
       const int next_x = x + kLanes;
-      BothWays next = pixels;
-      if (next_x < n + 2 * kPatch) next = pixel_distances(f + next_x, variance + next_x, there);
-      const vfloat sums[] = {sum_of_three(pixels.forward, next.forward), sum_of_three(pixels.backward, next.backward)};
+      PairSums next = pixels;
+      if (next_x < n + 2 * kPatch) next = pixel_sums(f + next_x, variance + next_x, there);
+      const vfloat sums[] = {sum_of_three(pixels.a, next.a), sum_of_three(pixels.b, next.b)};
       if constexpr (with_weights) {
         const vfloat of_guides[] = {load(guide[0] + x), load(guide[1] + x)};
-        const vfloat distances[] = {load(before_that[0] + x) + load(before[0] + x) + sums[0],
-                                    load(before_that[1] + x) + load(before[1] + x) + sums[1]};
+        const vfloat A = load(before_that[0] + x) + load(before[0] + x) + sums[0],
+                     B = load(before_that[1] + x) + load(before[1] + x) + sums[1];
+        const vfloat distances[] = {A - B, A + (B - kOfPatch)};
         vfloat likenesses[2];
         for (size_t i = 0; i < n_tasks; ++i)
           for (const int direction : {0, 1}) {
@@ -301,7 +306,7 @@ class Filter {
             store(weights[direction] + i * kTask + x, min(likeness, of_guides[direction]));
           }
       }
-      for (const int direction : {0, 1}) store(before_that[direction] + x, sums[direction]);
+      for (const int i : {0, 1}) store(before_that[i] + x, sums[i]);
       pixels = next;
     }
   }
@@ -325,13 +330,14 @@ class Filter {
   template <int n>
   [[gnu::noinline]] void add_values(const float* values, int width, const Offsets& o, int sign, const Source::Use* uses,
                                     float* total, const Buffers& b) const {
-    const float* weights[kAtOnce][n];
+    const auto& of_first = b.weights[uses[0].task][sign > 0 ? 0 : 1];
+    const float* weights[kAtOnce];  // of the first task at column 0, and how far from there are those of each
+    for (int k = 0; k < o.n; ++k) weights[k] = of_first[k].begin() + std::max(0, sign * (o.dx + k));
     float* sums[n];
+    ptrdiff_t place[n];
     for (int i = 0; i < n; ++i) {
       sums[i] = total + uses[i].total * kRow;
-      for (int k = 0; k < o.n; ++k)
-        weights[k][i] =
-            b.weights[uses[i].task][sign > 0 ? 0 : 1][k].begin() + std::max(0, sign * (o.dx + k));  // of column 0
+      place[i] = b.weights[uses[i].task][sign > 0 ? 0 : 1][0].begin() - of_first[0].begin();
     }
     for (int x = 0; x < width; x += kLanes) {
       vfloat sum[n][kSums];
@@ -339,9 +345,14 @@ class Filter {
         for (int c = 0; c < kSums; ++c) sum[i][c] = load(sums[i] + c * kRow + x);
       for (int k = 0; k < o.n; ++k) {
         vfloat weight[n];
-        for (int i = 0; i < n; ++i) sum[i][3] += weight[i] = load(weights[k][i] + x);
+        for (int i = 0; i < n; ++i) {
+          weight[i] = load(weights[k] + (x + place[i]));
+          keep_in_register(weight[i]);
+          sum[i][3] += weight[i];
+        }
         for (int c = 0; c < 3; ++c) {
-          const vfloat value = load(values + c * kPlane + sign * k + x);
+          vfloat value = load(values + c * kPlane + sign * k + x);
+          keep_in_register(value);
           for (int i = 0; i < n; ++i) sum[i][c] += weight[i] * value;
         }
       }
