@@ -2,19 +2,21 @@
 #include "denoising/denoising_parts.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
 #include "core/parallel.h"
 #include "denoising/limited_groups.h"
+#include "filters/filter_input.h"
 #include "risk/halves.h"
 
 namespace covary {
 namespace {
 
-/// What the pixels around count, in groups, and how far they reach.
+/// What the pixels around count, in groups, and the side of their window.
 constexpr float kPriorFreedom = 2;
-constexpr int kVarianceRadius = 2;
+constexpr int kVarianceWindow = 5;
 
 /// Pixels that the estimator leaves out may hold anything.
 void make_finite(Image& image) {
@@ -33,26 +35,17 @@ DenoisingPart part_of_pair(const Estimator& base, const GroupedImage& crn, const
   return part;
 }
 
-/// Mean of the valid pixels around one.
-float mean_around(const Planes& plane, const std::vector<unsigned char>& valid, int c, int x, int y) {
-  float sum = 0, n = 0;
-  for (int j = std::max(0, y - kVarianceRadius); j <= std::min(plane.height() - 1, y + kVarianceRadius); ++j)
-    for (int i = std::max(0, x - kVarianceRadius); i <= std::min(plane.width() - 1, x + kVarianceRadius); ++i) {
-      if (!valid[static_cast<size_t>(j) * plane.width() + i]) continue;
-      sum += plane.row(c, j)[i], n += 1;
-    }
-  return n > 0 ? sum / n : 0;
-}
-
 /// `scale` times the variance, of which `freedom` groups more than one tell, drawn to that around.
 Image std_error_of(const Planes& variance, const std::vector<unsigned char>& valid, int freedom, float scale) {
   Image result(variance.width(), variance.height(), 3);
+  std::array<Planes, 3> around;
+  for (int c = 0; c < 3; ++c) around[c] = box_mean(variance, valid, kVarianceWindow, 0, 0, c);
   const float own = static_cast<float>(freedom) / (static_cast<float>(freedom) + kPriorFreedom);
   parallel_for(result.height, 8, [&](int y) {
     for (int x = 0; x < result.width; ++x)
       for (int c = 0; c < 3; ++c) {
         if (!valid[static_cast<size_t>(y) * result.width + x]) continue;
-        const float mean = mean_around(variance, valid, c, x, y);
+        const float mean = around[c].row(0, y)[x];
         result.pixel(x, y)[c] = std::sqrt(scale * (own * variance.row(c, y)[x] + (1 - own) * mean));
       }
   });

@@ -54,7 +54,8 @@ Planes mean_planes(const GroupedImage& image, const std::vector<unsigned char>& 
   return planes;
 }
 
-Planes box_mean(const Planes& image, const std::vector<unsigned char>& valid, int window, int border, float outside) {
+Planes box_mean(const Planes& image, const std::vector<unsigned char>& valid, int window, int border, float outside,
+                int plane) {
   const int width = image.width(), height = image.height(), radius = window / 2;
   // Of each row the sums of its windows and how many valid pixels these have.
   const auto pixels = static_cast<size_t>(width);
@@ -68,7 +69,7 @@ Planes box_mean(const Planes& image, const std::vector<unsigned char>& valid, in
     std::vector<double> values(pixels + 2 * radius);
     std::vector<int> ones(pixels + 2 * radius);
     for (size_t x = 0; x < pixels; ++x)
-      if (valid[row + x]) values[x + radius] = image.row(0, y)[x], ones[x + radius] = 1;
+      if (valid[row + x]) values[x + radius] = image.row(plane, y)[x], ones[x + radius] = 1;
     for (int q = 0; q <= 2 * radius; ++q) add(values.data() + q, &sums[row]), add(ones.data() + q, &numbers[row]);
   });
   Planes result(width, height, 1, border, outside);

@@ -39,9 +39,10 @@ double variance_freedom(const GroupedImage& image, int x, int y);
 FilterInput filter_input(const GroupedImage& crn, const GroupedImage& independent,
                          const std::vector<unsigned char>& valid, VarianceSource source, int smoothing, int border);
 
-/// Mean of the pixels of a window inside the frame where `valid` is not 0, for each pixel of plane 0; 0 where there are
+/// Mean of the pixels of a window inside the frame where `valid` is not 0, for each pixel of a plane; 0 where there are
 /// none. The result has the border and, outside, the value `outside`.
-Planes box_mean(const Planes& image, const std::vector<unsigned char>& valid, int window, int border, float outside);
+Planes box_mean(const Planes& image, const std::vector<unsigned char>& valid, int window, int border, float outside,
+                int plane = 0);
 
 /// Plane c is the mean of channel c of all samples of a pixel, 0 where it has none; `outside` beyond the frame and
 /// where `valid` is 0.
