@@ -4,11 +4,31 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 
 #include "core/error.h"
+#include "core/parallel.h"
 
 namespace covary {
 namespace {
+
+/// Triangles whose normals are found at once, in parallel, before they are added in their order.
+constexpr size_t kBlock = size_t{1} << 16;
+
+/// The normal of a triangle times the angle at each of its corners; zero where it has no area.
+std::array<Vec3, 3> normals_by_angle(const MeshData& mesh, const std::array<uint32_t, 3>& t) {
+  const Vec3 p[3] = {mesh.positions[t[0]], mesh.positions[t[1]], mesh.positions[t[2]]};
+  const Vec3 normal = cross(p[1] - p[0], p[2] - p[0]);
+  const float length_of_normal = length(normal);
+  std::array<Vec3, 3> parts{};
+  if (!(length_of_normal > 0)) return parts;
+  for (int k = 0; k < 3; ++k) {
+    const Vec3 a = p[(k + 1) % 3] - p[k], b = p[(k + 2) % 3] - p[k];
+    const float angle = std::atan2(length(cross(a, b)), dot(a, b));
+    parts[k] = normal * (angle / length_of_normal);
+  }
+  return parts;
+}
 
 /// One normal per point, weighted by angles; zero where no triangle of positive area meets the point.
 std::vector<Vec3> smooth_normals(const MeshData& mesh, const std::vector<uint32_t>& points) {
@@ -16,16 +36,12 @@ std::vector<Vec3> smooth_normals(const MeshData& mesh, const std::vector<uint32_
   const size_t n_points =
       points.empty() ? mesh.positions.size() : size_t{1} + *std::max_element(points.begin(), points.end());
   std::vector<Vec3> sums(n_points);
-  for (const auto& t : mesh.triangles) {
-    const Vec3 p[3] = {mesh.positions[t[0]], mesh.positions[t[1]], mesh.positions[t[2]]};
-    const Vec3 normal = cross(p[1] - p[0], p[2] - p[0]);
-    const float length_of_normal = length(normal);
-    if (!(length_of_normal > 0)) continue;
-    for (int k = 0; k < 3; ++k) {
-      const Vec3 a = p[(k + 1) % 3] - p[k], b = p[(k + 2) % 3] - p[k];
-      const float angle = std::atan2(length(cross(a, b)), dot(a, b));
-      sums[point_of(t[k])] += normal * (angle / length_of_normal);
-    }
+  std::vector<std::array<Vec3, 3>> parts(std::min(kBlock, mesh.triangles.size()));
+  for (size_t first = 0; first < mesh.triangles.size(); first += kBlock) {
+    const size_t n = std::min(kBlock, mesh.triangles.size() - first);
+    parallel_for(n, 1024, [&](size_t i) { parts[i] = normals_by_angle(mesh, mesh.triangles[first + i]); });
+    for (size_t i = 0; i < n; ++i)
+      for (int k = 0; k < 3; ++k) sums[point_of(mesh.triangles[first + i][k])] += parts[i][k];
   }
   for (Vec3& n : sums) {
     const float l = length(n);
