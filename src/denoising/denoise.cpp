@@ -29,7 +29,7 @@ constexpr const char* kLibrary = "libOpenImageDenoise.so.2";
 
 /// The part of the library's C interface (version 2) that is used here; handles are opaque.
 struct Api {
-  static constexpr int kDeviceCpu = 1, kFormatFloat3 = 3;
+  static constexpr int kDeviceCpu = 1, kFormatFloat3 = 3, kBalancedQuality = 5;
   void* (*new_device)(int type) = nullptr;
   void (*commit_device)(void* device) = nullptr;
   void (*release_device)(void* device) = nullptr;
@@ -40,6 +40,7 @@ struct Api {
   void (*set_image)(void* filter, const char* name, void* data, int format, size_t width, size_t height,
                     size_t byte_offset, size_t pixel_stride, size_t row_stride) = nullptr;
   void (*set_bool)(void* filter, const char* name, bool value) = nullptr;
+  void (*set_int)(void* filter, const char* name, int value) = nullptr;
   /// `question` is asked while the filter works, which ends early once it says false.
   void (*set_progress)(void* filter, bool (*question)(void* data, double done), void* data) = nullptr;
   void (*commit_filter)(void* filter) = nullptr;
@@ -153,6 +154,7 @@ Api load(const DenoiseOptions& options, std::string* path = nullptr) {
   bind(library, "oidnNewFilter", api.new_filter);
   bind(library, "oidnSetSharedFilterImage", api.set_image);
   bind(library, "oidnSetFilterBool", api.set_bool);
+  bind(library, "oidnSetFilterInt", api.set_int);
   bind(library, "oidnSetFilterProgressMonitorFunction", api.set_progress);
   bind(library, "oidnCommitFilter", api.commit_filter);
   bind(library, "oidnExecuteFilter", api.execute_filter);
@@ -222,7 +224,7 @@ namespace {
 struct Run {
   std::shared_ptr<const Denoiser::Library> library;
   std::deque<std::pair<const char*, Image>> inputs;  ///< by the filter's names; at least one
-  bool hdr = false, clean_guides = false;
+  bool hdr = false, clean_guides = false, small_network = false;
   Image result;
   std::atomic<bool> cancelled{false};
 
@@ -241,6 +243,7 @@ struct Run {
     set("output", result);
     if (hdr) api.set_bool(filter.get(), "hdr", true);
     if (clean_guides) api.set_bool(filter.get(), "cleanAux", true);
+    if (small_network) api.set_int(filter.get(), "quality", Api::kBalancedQuality);
     api.set_progress(
         filter.get(), [](void* data, double) { return !static_cast<std::atomic<bool>*>(data)->load(); }, &cancelled);
     api.commit_filter(filter.get());
@@ -287,6 +290,7 @@ Image Denoiser::denoise_guide(const std::string& name, const Image& guide) {
   const auto run = std::make_shared<Run>();
   run->library = library_;
   run->inputs.emplace_back(name == "albedo" ? "albedo" : "normal", finite(guide));
+  run->small_network = true;
   ++runs_;
   return image_of(run);
 }

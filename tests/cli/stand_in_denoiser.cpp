@@ -40,6 +40,7 @@ void oidnSetSharedFilterImage(void* filter, const char* name, void* data, int, s
   static_cast<Filter*>(filter)->insert_or_assign(name, Plane{static_cast<float*>(data), width, height});
 }
 void oidnSetFilterBool(void*, const char*, bool) {}
+void oidnSetFilterInt(void*, const char*, int) {}
 void oidnSetFilterProgressMonitorFunction(void*, bool (*)(void*, double), void*) {}
 void oidnCommitFilter(void*) {}
 void oidnExecuteFilter(void* filter) {
