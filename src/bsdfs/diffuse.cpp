@@ -9,6 +9,7 @@
 #include "bsdfs/inputs.h"
 #include "bsdfs/registry.h"
 #include "core/warp.h"
+#include "scene/lambertian.h"
 
 namespace covary {
 namespace {
@@ -42,22 +43,26 @@ class DiffuseClosure final : public BsdfClosure {
   Spectrum reflectance_;
 };
 
-class Diffuse final : public Bsdf {
+class Diffuse final : public Bsdf, public MaybeLambertian {
  public:
   explicit Diffuse(ColourInput reflectance)
-      : reflectance_(std::move(reflectance)), constant_(reflectance_.constant()) {}
+      : reflectance_(std::move(reflectance)),
+        constant_(reflectance_.constant()),
+        lambertian_{reflectance_.constant()} {}
 
   uint32_t flags() const override { return kDiffuseReflection; }
   const BsdfClosure* bind(const SurfaceHit& hit, bool, TransportMode, Arena& arena) const override {
     if (reflectance_.is_constant()) return &constant_;
     return arena.make<DiffuseClosure>(reflectance_.eval(hit));
   }
+  const Lambertian* lambertian() const override { return reflectance_.is_constant() ? &lambertian_ : nullptr; }
   const Texture* main_texture() const override { return reflectance_.texture(); }
   Spectrum albedo(const SurfaceHit& hit) const override { return clamp01(reflectance_.eval(hit)); }
 
  private:
   ColourInput reflectance_;
   DiffuseClosure constant_;
+  Lambertian lambertian_;  // where it is constant
 };
 
 }  // namespace

@@ -7,8 +7,11 @@
 // | allow_transmission | bool   | false   | accept nested models that transmit light                             |
 //
 // The model on the back sees directions mirrored about the surface.
+#include <optional>
+
 #include "bsdfs/inputs.h"
 #include "bsdfs/registry.h"
+#include "scene/lambertian.h"
 
 namespace covary {
 namespace {
@@ -95,10 +98,13 @@ class TransmittingClosure final : public BsdfClosure {
   bool same_, importance_;
 };
 
-class TwoSided final : public Bsdf {
+class TwoSided final : public Bsdf, public MaybeLambertian {
  public:
   TwoSided(BsdfPtr front, BsdfPtr back)
-      : front_(std::move(front)), back_(std::move(back)), transmits_((flags() & kTransmission) != 0) {}
+      : front_(std::move(front)), back_(std::move(back)), transmits_((flags() & kTransmission) != 0) {
+    if (const Lambertian* nested = front_ == back_ ? lambertian_of(*front_) : nullptr)
+      lambertian_ = {nested->reflectance, true};
+  }
 
   uint32_t flags() const override { return front_->flags() | back_->flags(); }
   const BsdfClosure* bind(const SurfaceHit& hit, bool wo_front, TransportMode mode, Arena& arena) const override {
@@ -110,6 +116,7 @@ class TwoSided final : public Bsdf {
   bool depends_on_side() const override { return !transmits_; }
   bool needs_derivatives() const override { return front_->needs_derivatives() || back_->needs_derivatives(); }
   const Texture* main_texture() const override { return front_->main_texture(); }
+  const Lambertian* lambertian() const override { return lambertian_ ? &*lambertian_ : nullptr; }
   Spectrum albedo(const SurfaceHit& hit) const override { return front_->albedo(hit); }
 
  private:
@@ -122,6 +129,7 @@ class TwoSided final : public Bsdf {
 
   BsdfPtr front_, back_;
   bool transmits_;
+  std::optional<Lambertian> lambertian_;
 };
 
 }  // namespace

@@ -5,8 +5,8 @@
 #include "integrators/bdpt_weights.h"
 #include "integrators/light_subpaths.h"
 #include "integrators/path_lengths.h"
-#include "integrators/roulette.h"
 #include "passes/light_pass.h"
+#include "sampling/roulette.h"
 
 namespace covary {
 

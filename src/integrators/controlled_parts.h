@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <span>
 
-#include "integrators/mis.h"
 #include "sampling/coefficient_table.h"
 #include "sampling/light_set.h"
+#include "sampling/mis.h"
 
 namespace covary {
 

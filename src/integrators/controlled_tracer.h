@@ -32,12 +32,12 @@
 
 #include "integrators/controlled_batch.h"
 #include "integrators/controlled_parts.h"
-#include "integrators/mis.h"
 #include "integrators/path_steps.h"
 #include "integrators/primary_sample.h"
 #include "sampling/coefficient_table.h"
 #include "sampling/light_selection.h"
 #include "sampling/light_set.h"
+#include "sampling/mis.h"
 
 namespace covary {
 

@@ -3,11 +3,11 @@
 // first surface, combined by multiple importance sampling with the power heuristic [Veach1997] §9.2. Of N and M samples
 // the densities are weighted by N / (N + M) and M / (N + M), as in Mitsuba. Without light samples, lights that are a
 // point or a direction are dark; without direction samples, mirrors are.
-#include "integrators/mis.h"
 #include "integrators/path_lengths.h"
 #include "integrators/path_steps.h"
 #include "passes/integrator.h"
 #include "sampling/light_selection.h"
+#include "sampling/mis.h"
 
 namespace covary {
 namespace {

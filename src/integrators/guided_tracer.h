@@ -18,8 +18,8 @@
 
 #include "core/in_place.h"
 #include "integrators/guided_vertex_control.h"
-#include "integrators/mis.h"
 #include "integrators/path_steps.h"
+#include "sampling/mis.h"
 
 namespace covary {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "integrators/primary_sample.h"
-#include "integrators/roulette.h"
+#include "sampling/roulette.h"
 
 namespace covary {
 namespace {

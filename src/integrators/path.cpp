@@ -11,8 +11,12 @@ namespace {
 
 constexpr int kDirectEdges = 2;  // of paths from the camera by one surface to a light
 
+struct Plain : PathParts {
+  static constexpr bool kInBlocks = true;
+};
+
 /// Tells apart from which lights radiance comes.
-struct ByLight : PathParts {
+struct ByLight : Plain {
   std::shared_ptr<const LightParts> parts;
   void begin(size_t n_samples, PathContext& context) const { parts->begin(n_samples, context); }
   void add_light(const Emitter* light, uint32_t sample, const Spectrum& radiance, PathContext& context) const {
@@ -53,7 +57,7 @@ class PathIntegrator final : public Integrator {
   std::shared_ptr<Integrator> of_direct_light() const override {
     PathLengthSettings direct = lengths_;
     direct.max_depth = std::min(direct.max_depth, kDirectEdges);
-    return std::make_shared<PathIntegrator<PathParts>>(direct);
+    return std::make_shared<PathIntegrator<Plain>>(direct);
   }
   bool sees_media() const override { return true; }
   std::string description() const override { return surfaces_.description(); }
@@ -67,7 +71,7 @@ class PathIntegrator final : public Integrator {
 }  // namespace
 
 std::shared_ptr<Integrator> make_path(Settings&, const PathLengthSettings& lengths) {
-  return std::make_shared<PathIntegrator<PathParts>>(lengths);
+  return std::make_shared<PathIntegrator<Plain>>(lengths);
 }
 
 }  // namespace covary

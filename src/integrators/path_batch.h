@@ -6,6 +6,7 @@
 
 #include "core/in_place.h"
 #include "passes/integrator.h"
+#include "sampling/lambertian_block.h"
 
 namespace covary {
 
@@ -54,7 +55,8 @@ struct CameraBatch : ThreadState {
   std::vector<Connection> connections;
   std::vector<Ray> shadow_rays;  ///< one of each connection
   std::vector<uint8_t> blocked;
-  std::vector<uint32_t> alive;  ///< places of the paths that go on
+  std::vector<uint8_t> goes_on;  ///< whether a path is followed further
+  std::vector<uint32_t> alive;   ///< places of the paths that go on
 };
 
 /// A light that was chosen.
@@ -72,6 +74,8 @@ struct LightConnection {
 
 /// The batch of PathTracer.
 struct PathBatch final : CameraBatch<PathState, EmitterChoice, LightConnection> {
+  LambertianMeshes meshes;
+  LambertianBlock block;
   std::vector<const Emitter*> connected;  ///< the lights of the connections, where lights are told apart
 };
 

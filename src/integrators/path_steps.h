@@ -10,7 +10,7 @@
 #include "integrators/path_batch.h"
 #include "integrators/path_lengths.h"
 #include "integrators/primary_sample.h"
-#include "integrators/roulette.h"
+#include "sampling/roulette.h"
 
 namespace covary {
 
@@ -32,20 +32,34 @@ void skip_area_lights(const Scene& scene, Path& path, Ray& ray, SurfaceHit& hit,
   }
 }
 
-/// Nearest hits of all rays; `depth`: edges before them.
-template <typename Batch>
-void find_surfaces(const Scene& scene, int depth, bool hide_emitters, Batch& batch, PathContext& context) {
+/// The mark of a hit that is left as it was found.
+inline void leave_apart(SurfaceHit& hit) { hit.bsdf = nullptr, hit.bsdf_flags = 0, hit.emitter = nullptr; }
+
+/// Nearest hits of all rays; `depth`: edges before them. Hits that `set_apart` are left as they were found, and have no
+/// BSDF.
+template <typename Batch, typename SetApart>
+void find_surfaces(const Scene& scene, int depth, bool hide_emitters, Batch& batch, PathContext& context,
+                   const SetApart& set_apart) {
   const size_t n = batch.paths.size();
   scene.nearest(batch.rays, batch.ray_hits, depth == 0);
   context.n_rays += n;
   for (size_t i = 0; i < n; ++i) {
     batch.paths[i].found = batch.ray_hits[i].found();
     if (!batch.paths[i].found) continue;
+    if (set_apart(i)) {
+      leave_apart(batch.hits[i]);
+      continue;
+    }
     scene.resolve(batch.rays[i], batch.ray_hits[i], batch.hits[i]);
     if (const Texture* texture = batch.hits[i].shape->main_texture()) texture->prefetch(batch.hits[i].uv);
   }
   if (hide_emitters && depth == 0)
     for (size_t i = 0; i < n; ++i) skip_area_lights(scene, batch.paths[i], batch.rays[i], batch.hits[i], context);
+}
+
+template <typename Batch>
+void find_surfaces(const Scene& scene, int depth, bool hide_emitters, Batch& batch, PathContext& context) {
+  find_surfaces(scene, depth, hide_emitters, batch, context, [](size_t) { return false; });
 }
 
 /// Removes the paths of which `keep` is false; it is asked once for each, in their order.
@@ -54,8 +68,14 @@ void keep_paths(Batch& batch, const Keep& keep) {
   size_t n_kept = 0;
   for (size_t i = 0; i < batch.paths.size(); ++i) {
     if (!keep(batch.paths[i])) continue;
-    if (n_kept != i)
-      batch.paths[n_kept] = batch.paths[i], batch.rays[n_kept] = batch.rays[i], batch.hits[n_kept] = batch.hits[i];
+    if (n_kept != i) {
+      batch.paths[n_kept] = batch.paths[i], batch.rays[n_kept] = batch.rays[i];
+      batch.ray_hits[n_kept] = batch.ray_hits[i];
+      if (batch.hits[i].bsdf)
+        batch.hits[n_kept] = batch.hits[i];
+      else
+        leave_apart(batch.hits[n_kept]);
+    }
     ++n_kept;
   }
   batch.resize(n_kept);
@@ -154,21 +174,34 @@ template <typename Batch, typename Steps>
 void follow_paths(const Scene& scene, const PathLengthSettings& lengths, std::span<CameraSample> samples, Batch& batch,
                   PathContext& context, Steps&& steps) {
   for (int depth = 0; !batch.paths.empty(); ++depth) {
-    find_surfaces(scene, depth, lengths.hide_emitters, batch, context);
+    find_surfaces(scene, depth, lengths.hide_emitters, batch, context, [&](size_t i) {
+      if constexpr (requires { steps.finish_apart(depth); })
+        return steps.sets_apart(batch.rays[i], batch.ray_hits[i]);
+      else
+        return false;
+    });
     for (size_t i = 0; i < batch.paths.size(); ++i) steps.arrive(depth, i);
     if (depth + 1 >= lengths.max_depth || context.stopped()) break;
     keep_paths(batch, [&](auto& path) { return path.found && steps.goes_on(depth, path); });
     steps.sample_lights(depth);
-    batch.alive.clear();
+    batch.goes_on.assign(batch.paths.size(), false);
     for (uint32_t i = 0; i < batch.paths.size(); ++i) {
       const SurfaceHit& hit = batch.hits[i];
+      if constexpr (requires { steps.finish_apart(depth); })
+        if (!hit.bsdf) {
+          steps.scatter_apart(depth, i);
+          continue;
+        }
       const Vec3 wo = hit.frame.to_local(-batch.rays[i].d);
       const uint32_t address = next_vertex(batch.paths[i], hit, depth);
       context.arena.reset();
       const BsdfClosure* bsdf = hit.bsdf->bind(hit, wo.z > 0, TransportMode::kRadiance, context.arena);
-      if (steps.scatter(depth, i, PathVertex{hit, *bsdf, wo, address, samples[batch.paths[i].sample]}))
-        batch.alive.push_back(i);
+      batch.goes_on[i] = steps.scatter(depth, i, PathVertex{hit, *bsdf, wo, address, samples[batch.paths[i].sample]});
     }
+    if constexpr (requires { steps.finish_apart(depth); }) steps.finish_apart(depth);
+    batch.alive.clear();
+    for (uint32_t i = 0; i < batch.paths.size(); ++i)
+      if (batch.goes_on[i]) batch.alive.push_back(i);
     keep_alive(batch);
     steps.connect(depth);
   }

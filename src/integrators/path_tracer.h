@@ -13,12 +13,12 @@
 #include <utility>
 
 #include "core/in_place.h"
-#include "integrators/mis.h"
 #include "integrators/path_steps.h"
 #include "integrators/primary_sample.h"
-#include "integrators/roulette.h"
 #include "passes/integrator.h"
 #include "sampling/light_selection.h"
+#include "sampling/mis.h"
+#include "sampling/roulette.h"
 
 namespace covary {
 
@@ -26,6 +26,10 @@ namespace covary {
 /// below is compiled, so exchanging one costs nothing. Many threads use one object; its functions are const but for
 /// prepare().
 struct PathParts : roulette::Parts {
+  /// Whether light choice, directions, their weights and roulette are those below, so that Lambertian vertices may be
+  /// shaded in blocks, which have the same.
+  static constexpr bool kInBlocks = false;
+
   /// Called before the first path.
   void prepare(const Scene&) {}
 
@@ -126,6 +130,66 @@ class PathTracer final : public Integrator {
       }
       lead_on(path, batch.rays[i], vertex.hit, next, vertex.hit.frame.to_world(next.wi));
       return true;
+    }
+
+    /// Lambertian vertices of meshes, which are shaded in blocks.
+    bool sets_apart(const Ray& ray, const RayHit& hit) {
+      return Parts::kInBlocks && batch.meshes.find(scene, ray, hit);
+    }
+
+    void scatter_apart(int depth, uint32_t i) {
+      LambertianBlock& block = batch.block;
+      Path& path = batch.paths[i];
+      block.add(i, path.throughput, path.eta, batch.rays[i], batch.ray_hits[i],
+                *batch.meshes.find(scene, batch.rays[i], batch.ray_hits[i]), samples[path.sample].random,
+                kFirstSurfaceVertex + path.n_smooth++);
+      if (block.full()) finish_apart(depth);
+    }
+
+    /// Connects and scatters the vertices of the block.
+    void finish_apart(int depth) {
+      LambertianBlock& block = batch.block;
+      if (block.size() == 0) return;
+      block.find_surfaces(scene);
+      if (connecting) connect_block(block);
+      block.scatter();
+      const bool roulette = depth + 1 >= tracer.lengths_.rr_depth;
+      if (roulette) block.survive(samples[0].random.sampling());
+      for (int l = 0; l < block.size(); ++l) {
+        const uint32_t i = block.index[l];
+        Path& path = batch.paths[i];
+        path.throughput = block.throughput[l];
+        if (!(block.pdf[l] > 0)) {
+          if (roulette && std::isnan(block.survival[l])) samples[path.sample].radiance = path.throughput;
+          continue;
+        }
+        batch.goes_on[i] = true;
+        path.previous_p = block.p[l], path.previous_pdf = block.pdf[l];
+        path.previous_delta = path.only_null = false;
+        make_in_place(batch.rays[i], [&] { return Ray{block.o[l], block.d[l], kInfinity}; });
+      }
+      block.clear();
+    }
+
+    void connect_block(LambertianBlock& block) {
+      const Emitter* emitters[LambertianBlock::kCapacity];
+      for (int l = 0; l < block.size(); ++l) emitters[l] = &lights.select(block.u_choice[l]);
+      if (scene.environment())  // the only lights with large tables
+        for (const PrefetchStep step : {PrefetchStep::kTable, PrefetchStep::kValues})
+          for (int l = 0; l < block.size(); ++l) emitters[l]->prefetch({block.u_light_x[l], block.u_light_y[l]}, step);
+      for (int l = 0; l < block.size(); ++l) block.sample_light(l, *emitters[l]);
+      block.connect(lights.pmf(*emitters[0]));
+      for (int l = 0; l < block.size(); ++l) {
+        if (is_black(block.contribution[l])) continue;
+        const size_t n = batch.n_connections++;
+        tracer.parts_.connect_with(*emitters[l], n, batch);
+        make_in_place(batch.connections[n], [&] {
+          return PathBatch::Connection{block.contribution[l], batch.paths[block.index[l]].sample};
+        });
+        make_in_place(batch.shadow_rays[n], [&] {
+          return Ray{block.shadow_o[l], block.shadow_d[l], block.shadow_t[l]};
+        });
+      }
     }
 
     void connect(int /*depth*/) {

@@ -123,11 +123,16 @@ void set_placement(RTCGeometry geometry, const Transform& to_world) {
 /// Rays are handed to Embree in packets: camera rays gain most, scattered ones a little, single ones lose little.
 constexpr size_t kPacket = 16;
 
+/// What all rays have and Embree leaves as it is.
+void begin_packet(RTCRay16& packet) {
+  for (size_t i = 0; i < kPacket; ++i)
+    packet.tnear[i] = 0, packet.time[i] = 0, packet.mask[i] = ~0u, packet.id[i] = 0, packet.flags[i] = 0;
+}
+
 void set_ray(RTCRay16& packet, size_t i, const Ray& ray) {
   packet.org_x[i] = ray.o.x, packet.org_y[i] = ray.o.y, packet.org_z[i] = ray.o.z;
   packet.dir_x[i] = ray.d.x, packet.dir_y[i] = ray.d.y, packet.dir_z[i] = ray.d.z;
-  packet.tnear[i] = 0, packet.tfar[i] = ray.t_max, packet.time[i] = 0, packet.mask[i] = ~0u;
-  packet.id[i] = 0, packet.flags[i] = 0;
+  packet.tfar[i] = ray.t_max;
 }
 
 /// What a query says of itself: Embree 3 has it in the context, Embree 4 beside it.
@@ -256,9 +261,10 @@ void RayTracer::commit() { rtcCommitScene(top_.scene); }
 
 void RayTracer::nearest(std::span<const Ray> rays, std::span<RayHit> hits, bool coherent) const {
   Query query(coherent);
+  RTCRayHit16 packet;
+  begin_packet(packet.ray);
   for (size_t first = 0; first < rays.size(); first += kPacket) {
     const size_t n = std::min(kPacket, rays.size() - first);
-    RTCRayHit16 packet;
     alignas(64) int valid[kPacket];
     for (size_t i = 0; i < kPacket; ++i) {
       valid[i] = i < n ? -1 : 0;
@@ -284,9 +290,10 @@ void RayTracer::nearest(std::span<const Ray> rays, std::span<RayHit> hits, bool 
 
 void RayTracer::occluded(std::span<const Ray> rays, std::span<uint8_t> blocked) const {
   Query query(false);
+  RTCRay16 packet;
+  begin_packet(packet);
   for (size_t first = 0; first < rays.size(); first += kPacket) {
     const size_t n = std::min(kPacket, rays.size() - first);
-    RTCRay16 packet;
     alignas(64) int valid[kPacket];
     for (size_t i = 0; i < kPacket; ++i) {
       valid[i] = i < n ? -1 : 0;

@@ -98,7 +98,8 @@ EmitterSample Sphere::sample_towards(const Vec3& reference, Vec2 u, float u_prim
   const Vec3 outward = normalize(reference + sample.wi * sample.distance - center_);
   sample.p = center_ + outward * radius_;
   sample.n = outward * sign_;
-  sample.uv = spherical_uv(to_local(outward));
+  // Of no use where the light emits alike everywhere, in which case its power is known.
+  if (!emitter() || !emitter()->knows_power()) sample.uv = spherical_uv(to_local(outward));
   sample.pdf_solid_angle = warp::cone_pdf_solid_angle(one_minus_cos_max);
   return sample;
 }

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "film/film_file.h"
+#include "integrators/path_tracer.h"
 #include "render_fixture.h"
 
 namespace covary {
@@ -41,6 +42,36 @@ TEST(Determinism, OneTwoAndFiveThreads) {
       EXPECT_TRUE(same_bits(films[0], films[1]));
       EXPECT_TRUE(same_bits(films[0], films[2]));
     }
+}
+
+/// Flat and smooth meshes, one-sided and two-sided, of one reflectance and of textures, delta and other lights; the
+/// number of samples leaves blocks partly filled.
+TEST(Determinism, VerticesInBlocksHaveTheBitsOfSingleOnes) {
+  const std::string body = R"(
+    <shape type="cube"><boolean name="flip_normals" value="true"/>
+      <transform name="to_world"><scale value="4"/></transform>
+      <bsdf type="diffuse"><rgb name="reflectance" value="0.7, 0.5, 0.3"/></bsdf></shape>
+    <shape type="rectangle"><transform name="to_world"><translate x="-1" y="0.3" z="3.5"/></transform>
+      <bsdf type="twosided"><bsdf type="diffuse"><rgb name="reflectance" value="0.2, 0.9, 0"/></bsdf></bsdf></shape>
+    <shape type="obj"><string name="filename" value=")" +
+                           std::string(COVARY_SOURCE_DIR) + R"(/tests/against_mitsuba/octahedron.obj"/>
+      <transform name="to_world"><translate x="1" z="3"/></transform>
+      <bsdf type="twosided"><bsdf type="diffuse"><texture name="reflectance" type="checkerboard">
+        <transform name="to_uv"><scale x="4" y="4"/></transform></texture></bsdf></bsdf></shape>
+    <shape type="sphere"><point name="center" x="0" y="-1" z="3"/><float name="radius" value="0.5"/>
+      <bsdf type="roughconductor"/></shape>
+    <shape type="rectangle"><transform name="to_world"><scale value="0.5"/><rotate x="1" angle="90"/>
+      <translate y="3.9" z="3"/></transform><bsdf type="diffuse"/>
+      <emitter type="area"><rgb name="radiance" value="9, 8, 7"/></emitter></shape>
+    <emitter type="point"><point name="position" x="-2" y="1" z="1"/></emitter>
+    <emitter type="directional"><vector name="direction" x="0.1" y="-1" z="0.2"/></emitter>)";
+  const std::string xml = scene_text(body, 33, 21);
+  const MakeIntegrator one_by_one = [](const PathLengthSettings& lengths) {
+    return std::make_shared<PathTracer<PathParts>>("path", lengths);
+  };
+  for (const Sampling sampling : {Sampling::kIndependent, Sampling::kCrn})
+    EXPECT_TRUE(
+        same_bits(render(load_text(xml), 11, 0, sampling), render(load_text(xml, 0, one_by_one), 11, 0, sampling)));
 }
 
 TEST(Determinism, AnotherSeedGivesOtherBits) {

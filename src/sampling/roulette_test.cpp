@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "integrators/roulette.h"
+#include "sampling/roulette.h"
 
 #include <gtest/gtest.h>
 

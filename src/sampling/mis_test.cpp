@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "integrators/mis.h"
+#include "sampling/mis.h"
 
 #include <gtest/gtest.h>
 

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sampling/lambertian_block.h"
+
+#include <cmath>
+
+#include "core/frame.h"
+#include "core/warp.h"
+#include "sampling/mis.h"
+#include "sampling/roulette.h"
+
+namespace covary {
+
+/// Calls body(lane) for all vertices and up to the end of the last vector; what lies there is not used.
+template <typename Body>
+void LambertianBlock::for_each_lane(const Body& body) {
+  constexpr int kLanes = 16;
+  for (int first = 0; first < size_; first += kLanes) {
+#pragma GCC ivdep
+    for (int lane = 0; lane < kLanes; ++lane) body(first + lane);
+  }
+}
+
+void LambertianMeshes::ask(const Scene& scene, const Ray& ray, const RayHit& found, Known& known) {
+  known.asked = true;
+  SurfaceHit hit;
+  scene.resolve(ray, found, hit);
+  const Lambertian* model = lambertian_of(*hit.bsdf);
+  if (model && !hit.emitter) known.surface = {dynamic_cast<const TriangleMesh*>(hit.shape), *model};
+}
+
+void LambertianBlock::add(uint32_t i, const Spectrum& path_throughput, float eta, const Ray& ray, const RayHit& hit,
+                          const LambertianMesh& surface, const PathRandom& random, uint32_t address) {
+  const int l = size_++;
+  const TriangleMesh& mesh = *surface.mesh;
+  index[l] = i;
+  for (int k = 0; k < 3; ++k) {
+    const TriangleMesh::Vertex& vertex = mesh.vertices()[mesh.triangles()[hit.primitive][k]];
+    corners_[k].p.set(l, vertex.p);
+    corners_[k].n.set(l, vertex.n);
+  }
+  b1_[l] = hit.barycentric.x, b2_[l] = hit.barycentric.y;
+  both_sides_[l] = surface.model.both_sides;
+  wo_.set(l, -ray.d);
+  reflectance_.set(l, surface.model.reflectance);
+  throughput.set(l, path_throughput);
+  eta_[l] = eta;
+  const Vec2 light = random.get_2d(address, Event::kLightPosition),
+             direction = random.get_2d(address, Event::kDirection);
+  u_choice[l] = random.get_1d(address, Event::kLightChoice);
+  u_light_x[l] = light.x, u_light_y[l] = light.y;
+  u_primitive[l] = random.get_1d(address, Event::kLightPrimitive);
+  u_x[l] = direction.x, u_y[l] = direction.y;
+  u_roulette[l] = random.get_1d(address, Event::kRoulette);
+}
+
+void LambertianBlock::find_surfaces(const Scene& scene) {
+  for_each_lane([&](int l) {
+    const float b1 = b1_[l], b2 = b2_[l], b0 = 1 - b1 - b2;
+    const Vec3 p0 = corners_[0].p[l], p1 = corners_[1].p[l], p2 = corners_[2].p[l];
+    const Vec3 at = p0 * b0 + p1 * b1 + p2 * b2;
+    const Vec3 ng = normalize(cross(p1 - p0, p2 - p0));
+    const Vec3 interpolated = corners_[0].n[l] * b0 + corners_[1].n[l] * b1 + corners_[2].n[l] * b2;
+    const float l2 = length_squared(interpolated);
+    const float scale = 1 / std::sqrt(l2);
+    const bool smooth = l2 > 0;  // a mesh without normals has zero vectors
+    const Vec3 n{smooth ? interpolated.x * scale : ng.x, smooth ? interpolated.y * scale : ng.y,
+                 smooth ? interpolated.z * scale : ng.z};
+    const Frame frame(n);
+    p.set(l, at), ng_.set(l, ng);
+    s_.set(l, frame.s), t_.set(l, frame.t), n_.set(l, frame.n);
+    offset_[l] = scene.ray_offset(at);
+    const float cosine = dot(wo_[l], frame.n);
+    side_[l] = cosine > 0 ? 1 : (both_sides_[l] && -cosine > 0 ? -1 : 0);
+  });
+}
+
+void LambertianBlock::sample_light(int l, const Emitter& emitter) {
+  const EmitterSample light = emitter.sample_towards(p[l], {u_light_x[l], u_light_y[l]}, u_primitive[l]);
+  light_wi_.set(l, light.wi);
+  light_distance_[l] = light.distance, light_pdf_[l] = light.pdf_solid_angle;
+  light_radiance_.set(l, light.radiance);
+  light_is_delta_[l] = light.is_delta;
+}
+
+void LambertianBlock::connect(float pmf) {
+  for_each_lane([&](int l) {
+    const Vec3 wi = light_wi_[l];
+    const float cosine = dot(wi, n_[l]) * side_[l];
+    const float pdf_direction = cosine > 0 ? cosine * kInvPi : 0;
+    const Spectrum f = reflectance_[l] * pdf_direction;
+    const float pdf_light = pmf * light_pdf_[l];
+    const float weight = light_is_delta_[l] ? 1 / pdf_light : mis::power_over_pdf(pdf_light, pdf_direction);
+    const Spectrum value = throughput[l] * f * light_radiance_[l] * weight;
+    const bool counts = light_pdf_[l] > 0 && !is_black(f);
+    contribution.r[l] = counts ? value.r : 0, contribution.g[l] = counts ? value.g : 0;
+    contribution.b[l] = counts ? value.b : 0;
+
+    const Vec3 origin = offset_origin(p[l], ng_[l], offset_[l], wi);
+    const bool infinite = light_distance_[l] == kInfinity;
+    const Vec3 to = p[l] + wi * light_distance_[l] - origin;
+    const float distance = length(to), inverse = 1 / distance;
+    shadow_o.set(l, origin);
+    shadow_d.x[l] = infinite ? wi.x : to.x * inverse, shadow_d.y[l] = infinite ? wi.y : to.y * inverse;
+    shadow_d.z[l] = infinite ? wi.z : to.z * inverse;
+    shadow_t[l] = infinite ? kInfinity : distance * (1 - 10 * kRayEpsilon);
+  });
+}
+
+void LambertianBlock::scatter() {
+  for_each_lane([&](int l) {
+    const Vec3 wi = warp::square_to_cosine_hemisphere({u_x[l], u_y[l]});
+    const float density = warp::cosine_hemisphere_pdf_solid_angle(wi.z);
+    const Spectrum reflectance = reflectance_[l];
+    pdf[l] = side_[l] != 0 && !is_black(reflectance) ? density : 0;
+    throughput.set(l, throughput[l] * reflectance);
+    const Vec3 out = Frame(s_[l], t_[l], n_[l]).to_world({wi.x, wi.y, wi.z * side_[l]});
+    d.set(l, out);
+    o.set(l, offset_origin(p[l], ng_[l], offset_[l], out));
+  });
+}
+
+void LambertianBlock::survive(Sampling sampling) {
+  for_each_lane([&](int l) {
+    const Spectrum before = throughput[l];
+    const float probability = roulette::survival_probability(before, eta_[l], sampling);
+    survival[l] = pdf[l] > 0 ? probability : 0;
+    const bool survives = u_roulette[l] < probability;
+    pdf[l] = survives ? pdf[l] : 0;
+    const Spectrum after = before * roulette::survivor_weight(probability);
+    throughput.r[l] = survives ? after.r : before.r, throughput.g[l] = survives ? after.g : before.g;
+    throughput.b[l] = survives ? after.b : before.b;
+  });
+}
+
+}  // namespace covary

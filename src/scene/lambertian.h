@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "core/spectrum.h"
+
+namespace covary {
+
+/// f = reflectance / pi, at every point alike.
+struct Lambertian {
+  Spectrum reflectance;
+  bool both_sides = false;  ///< else black for directions below the shading normal
+};
+
+/// What a Bsdf is, too, that may be no more than that. Integrators shade such surfaces many at a time.
+class MaybeLambertian {
+ public:
+  /// Null where it is more: textured, for example.
+  virtual const Lambertian* lambertian() const = 0;
+
+ protected:
+  ~MaybeLambertian() = default;
+};
+
+/// Of any model; null where it is not known to be one.
+inline const Lambertian* lambertian_of(const auto& bsdf) {
+  const auto* maybe = dynamic_cast<const MaybeLambertian*>(&bsdf);
+  return maybe ? maybe->lambertian() : nullptr;
+}
+
+}  // namespace covary
