@@ -5,8 +5,10 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include <algorithm>
 #include <vector>
 
+#include "denoising/parts_mixture.h"
 #include "estimators/test_images.h"
 
 namespace covary::limited_groups_test {
@@ -42,6 +44,32 @@ TEST(LimitedGroups, KeepsWhatTheOtherHalfFindsAround) {
   Picture same_half;
   for (int c = 0; c < 3; ++c) same_half.at(20, 10, 3)[c] = same_half.at(20, 10, 5)[c] = 100;
   EXPECT_EQ(LimitedGroups(same_half.view(), same_half.valid).view().pixel(20, 10)[9], kBrighter);
+}
+
+// Nothing is like these two pixels, so that filters keep them.
+TEST(LimitedGroups, WhatTheNetworkDeniesIsInNoCandidate) {
+  Picture p;
+  for (int c = 0; c < 3; ++c) p.at(20, 10, 3)[c] = p.at(23, 7, 4)[c] = 100;
+  for (int i = 0; i < 3 * kGroups; ++i) p.at(5, 5, 0)[i] = 50;  // a small lamp, in all groups
+  CandidateMaker network, filter;
+  network.names = {"oidn"}, network.network = true;
+  network.make = one_by_one([](const CandidateInput& in) {
+    Image flat = *in.estimate;
+    std::fill(flat.data.begin(), flat.data.end(), 1.0f);
+    return std::vector{flat};
+  });
+  filter.names = {"sharp"};
+  filter.make = one_by_one([](const CandidateInput& in) { return std::vector{*in.estimate}; });
+  const DenoisingParts parts = parts_of_mean(p.view());
+  const auto candidate = [&](const std::vector<CandidateMaker>& makers) {
+    return candidates_of({&parts.whole}, parts.valid, makers)[0].candidates.back();
+  };
+  const Image before = candidate({filter}), limited = candidate({network, filter});
+  EXPECT_NEAR(before.pixel(20, 10)[0], 17.5, 1e-4) << "without a network";
+  EXPECT_FLOAT_EQ(limited.pixel(20, 10)[0], 1.5f);
+  EXPECT_FLOAT_EQ(limited.pixel(23, 7)[0], 1.5f);
+  EXPECT_EQ(limited.pixel(5, 5)[0], 50);
+  EXPECT_EQ(limited.pixel(30, 20)[0], 1);
 }
 
 TEST(LimitedGroups, KeepsNegativeValuesAndPixelsThatAreNotValid) {

@@ -67,6 +67,34 @@ std::vector<float> usual_weights(const std::vector<CandidateMaker>& makers) {
   return weights;
 }
 
+/// A pixel that no other is like keeps a firefly in every filter's image. So candidates are at most so many times as
+/// bright as the network's image, the first candidate, in the 3 x 3 pixels around, or as bright as two standard errors
+/// below the pixel itself.
+constexpr float kBrighterThanNetwork = 1.5f;
+
+void limit_by_network(const CandidateInput& in, CandidateSet& set) {
+  const Image& network = set.candidates[0];
+  const auto sum = [](const Image& image, int x, int y) {
+    const float* rgb = image.pixel(x, y);
+    return rgb[0] + rgb[1] + rgb[2];
+  };
+  parallel_for(network.height, 16, [&](int y) {
+    for (int x = 0; x < network.width; ++x) {
+      float around = 0;
+      for (int j = std::max(0, y - 1); j <= std::min(network.height - 1, y + 1); ++j)
+        for (int i = std::max(0, x - 1); i <= std::min(network.width - 1, x + 1); ++i)
+          around = std::max(around, sum(network, i, j));
+      const float limit =
+          std::max(kBrighterThanNetwork * around, sum(*in.estimate, x, y) - 2 * sum(*in.std_error, x, y));
+      for (size_t p = 1; p < set.candidates.size(); ++p) {
+        const float own = sum(set.candidates[p], x, y);
+        if (!(own > limit)) continue;
+        for (int c = 0; c < 3; ++c) set.candidates[p].pixel(x, y)[c] *= limit / own;
+      }
+    }
+  });
+}
+
 }  // namespace
 
 bool has_network(const std::vector<CandidateMaker>& makers) {
@@ -95,6 +123,8 @@ std::vector<CandidateSet> candidates_of(const std::vector<const DenoisingPart*>&
     for (size_t i = 0; i < sets.size(); ++i)
       std::move(images[i].begin(), images[i].end(), std::back_inserter(sets[i].candidates));
   }
+  for (size_t i = 0; i < sets.size(); ++i)
+    if (parts[i]->limited && has_network(makers)) limit_by_network(inputs[i], sets[i]);
   return sets;
 }
 
