@@ -101,13 +101,14 @@ class Scene:
                            min(8, spp))
         if method == "path tracing":
             return film
+        guides = self.render("guides", 2, 1, "--estimator", "none", "--denoise", "none", "--aovs")  # of any seed
         output = self.folder / f"{method.replace(' ', '-')}-{spp}-{seed}.exr"
         output.unlink(missing_ok=True)
         if method == "oidn":
             self.run("denoise", film, "--mode", "oidn", "--clean-guides", "--albedo", "DenoisingAlbedo", "--normal",
                      "DenoisingNormal", "--quiet", "-o", output)
         else:
-            self.run("combine", "--independent", film, "--guides", film, "--denoise", "auto", "--quiet", "-o", output,
+            self.run("combine", "--independent", film, "--guides", guides, "--denoise", "auto", "--quiet", "-o", output,
                      *(["--oidn", "off"] if method == "own filters" else []))
         return output
 

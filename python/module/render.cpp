@@ -166,7 +166,7 @@ Guides guides_of(const std::map<std::string, Image>& aovs) {
     const auto found = aovs.find(name);
     return found == aovs.end() ? nullptr : &found->second;
   };
-  return {find("Albedo"), find("N"), find("DenoisingAlbedo"), find("DenoisingNormal")};
+  return {find("Albedo"), find("N"), find("DenoisingAlbedo"), find("DenoisingNormal"), true};
 }
 
 /// What render() would make of the films of its passes, in their order, and the auxiliary images: those of a render in

@@ -110,11 +110,16 @@ std::vector<std::vector<Image>> filtered_layers(const FilterGuides& guides, cons
   return all;
 }
 
-/// Open Image Denoise with guides that it has denoised.
+/// Open Image Denoise with guides that it has denoised, unless they are clean.
 class GuidedNetwork {
  public:
   GuidedNetwork(const Guides& guides, const DenoiseOptions& options) : denoiser_(options) {
     if (!guides.albedo) return;
+    if (guides.clean) {
+      albedo_ = *guides.albedo;
+      if (guides.normal) normal_ = *guides.normal;
+      return;
+    }
     albedo_ = denoiser_.denoise_guide("albedo", *guides.albedo);
     if (guides.normal) normal_ = denoiser_.denoise_guide("normal", *guides.normal);
   }
@@ -178,8 +183,8 @@ CandidateMaker filtered_candidates(const Guides& guides, CandidateBase base) {
 
 Guides network_guides(const Guides& guides) {
   const bool has_both = guides.denoising_albedo && (guides.denoising_normal || !guides.normal);
-  if (!has_both) return {guides.albedo, guides.normal, nullptr, nullptr};
-  return {guides.denoising_albedo, guides.denoising_normal, nullptr, nullptr};
+  if (!has_both) return {guides.albedo, guides.normal, nullptr, nullptr, guides.clean};
+  return {guides.denoising_albedo, guides.denoising_normal, nullptr, nullptr, guides.clean};
 }
 
 CandidateMaker neural_candidates(const Guides& guides, const DenoiseOptions& options, CandidateBase base) {

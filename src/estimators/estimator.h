@@ -37,6 +37,7 @@ struct Guides {
   /// The same of what is seen in mirrors and through glass, in their colour; null: as above.
   const Image* denoising_albedo = nullptr;
   const Image* denoising_normal = nullptr;
+  bool clean = false;  ///< have little noise, so that a network need not denoise them first
 };
 
 /// A part of the samples' light, such as that which comes straight from lights.

@@ -28,7 +28,8 @@ constexpr const char* kMost = "samples_most";
 /// Attributes that follow from the film's numbers: written, and not kept in Film::attributes when read.
 bool is_derived(const std::string& key) {
   return key == kFormat || key == kGroups || key == kSamples || key == kFewest || key == kMost ||
-         key == kFileChecksums || key == kShown || key == film_key::kPredicted || key == film_key::kPredictedBounds;
+         key == kFileChecksums || key == kShown || key == film_key::kPredicted || key == film_key::kPredictedBounds ||
+         key == film_key::kCleanGuides;
 }
 
 std::string group_name(int group) { return fmt::format("group{:02d}", group); }

@@ -17,6 +17,7 @@ namespace covary {
 namespace film_key {
 inline constexpr const char* kPredicted = "predicted_relmse";
 inline constexpr const char* kPredictedBounds = "predicted_relmse_80";
+inline constexpr const char* kCleanGuides = "clean_guides";  ///< "true": the auxiliary images have little noise
 }  // namespace film_key
 
 /// kPredictedBounds of a file; empty where it has none.

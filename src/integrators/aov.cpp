@@ -14,6 +14,12 @@ namespace covary {
 namespace {
 
 constexpr size_t kImages = std::size(kAuxiliaryImages);
+/// The image P, whose unit is the scene's.
+constexpr size_t kPosition = 2;
+/// Samples after which a pixel asks whether the standard errors of its means are small enough (measured:
+/// docs/notes/denoising.md).
+constexpr uint32_t kRound = 16;
+constexpr float kTolerance = 0.01f;
 
 /// What one camera ray adds to each image.
 using AuxiliarySample = std::array<Vec3, kImages>;
@@ -88,10 +94,33 @@ AuxiliarySample auxiliary_sample(const Scene& scene, const CameraSample& sample,
   return values;
 }
 
+/// Means over the samples of a pixel: `most`, or as many rounds as it takes until each is known to kTolerance.
+AuxiliarySample auxiliary_means(const Scene& scene, const PassSettings& settings, int x, int y, uint32_t most,
+                                Arena& arena) {
+  AuxiliarySample sums{}, squares{};
+  float largest = kInfinity;  // variance of the means of albedos and normals
+  uint32_t n = 0;
+  while (n < most && largest > sqr(kTolerance)) {
+    for (const uint32_t end = std::min(most, n + kRound); n < end; ++n) {
+      const AuxiliarySample values = auxiliary_sample(scene, camera_sample(scene, settings, x, y, n), arena);
+      for (size_t i = 0; i < kImages; ++i) sums[i] += values[i], squares[i] += values[i] * values[i];
+    }
+    largest = 0;
+    const auto count = static_cast<float>(n);
+    for (size_t i = 0; i < kImages; ++i)
+      for (int c = 0; c < 3 && i != kPosition; ++c)
+        largest = std::max(largest, (squares[i][c] - sqr(sums[i][c]) / count) / sqr(count));
+  }
+  for (Vec3& sum : sums) sum *= 1 / static_cast<float>(n);
+  return sums;
+}
+
 }  // namespace
 
-void render_aovs(const Scene& scene, const PassSettings& settings, uint32_t spp, Film& film,
+void render_aovs(const Scene& scene, const PassSettings& pass, uint32_t most, Film& film,
                  const std::atomic<bool>* stop) {
+  PassSettings settings = pass;
+  settings.sampler = Sampler::kSobol, settings.groups = 1;
   std::array<Image, kImages> images;
   for (Image& image : images) image = Image(film.width(), film.height(), 3);
   const auto stopped = [&] { return stop && stop->load(std::memory_order_relaxed); };
@@ -99,15 +128,9 @@ void render_aovs(const Scene& scene, const PassSettings& settings, uint32_t spp,
     if (stopped()) return;
     Arena arena;
     for (int x = 0; x < film.width(); ++x) {
-      AuxiliarySample sums{};
-      for (uint32_t s = 0; s < spp; ++s) {
-        const CameraSample sample = camera_sample(scene, settings, film.crop().x + x, film.crop().y + y, s);
-        const AuxiliarySample values = auxiliary_sample(scene, sample, arena);
-        for (size_t i = 0; i < kImages; ++i) sums[i] += values[i];
-      }
-      const float scale = 1 / static_cast<float>(spp);
+      const AuxiliarySample means = auxiliary_means(scene, settings, film.crop().x + x, film.crop().y + y, most, arena);
       for (size_t i = 0; i < kImages; ++i)
-        for (int c = 0; c < 3; ++c) images[i].pixel(x, y)[c] = sums[i][c] * scale;
+        for (int c = 0; c < 3; ++c) images[i].pixel(x, y)[c] = means[i][c];
     }
   });
   if (stopped()) return;

@@ -15,7 +15,8 @@ inline constexpr const char* kAuxiliaryImages[] = {"Albedo", "N", "P", "Denoisin
 /// Mirrors and glass that are followed to the surface behind them.
 inline constexpr int kFollowedBounces = 8;
 
-/// Fills film.aovs with the images, each the mean over `spp` filtered camera rays:
+/// Fills film.aovs with the images, each the mean over filtered camera rays: `most` of them, or as many rounds of 16 as
+/// it takes until the standard errors of the pixel's albedos and normals are below 0.01:
 ///
 ///     Albedo           reflectance of the first surface, in [0, 1]
 ///     N, P             its shading normal and position in world space
@@ -28,9 +29,9 @@ inline constexpr int kFollowedBounces = 8;
 ///
 /// Where a ray meets a surface of mirror or glass, one direction is drawn as a path's is, at most kFollowedBounces
 /// times; a ray that is still between mirrors then takes the last of them. Rays that leave the scene count as zero. The
-/// film positions and random numbers are those of the first `spp` samples of the pass of these settings, whose own
-/// number of samples is not read. Ends at the next row once `stop` is true, and leaves film.aovs as it is.
-void render_aovs(const Scene& scene, const PassSettings& settings, uint32_t spp, Film& film,
+/// random numbers are the points of a Sobol' sequence with the pass's key: as good as four times as many independent
+/// ones. Ends at the next row once `stop` is true, and leaves film.aovs as it is.
+void render_aovs(const Scene& scene, const PassSettings& pass, uint32_t most, Film& film,
                  const std::atomic<bool>* stop = nullptr);
 
 }  // namespace covary

@@ -68,7 +68,7 @@ class PlanRun {
   Guides guides() const {
     if (!plan_.reads_guides || result_.aovs.empty()) return {};
     const auto image = [this](const char* name) { return &result_.aovs.at(name); };
-    return {image("Albedo"), image("N"), image("DenoisingAlbedo"), image("DenoisingNormal")};
+    return {image("Albedo"), image("N"), image("DenoisingAlbedo"), image("DenoisingNormal"), true};
   }
   bool needs_aovs() const { return request_.aovs || plan_.reads_guides; }
   bool stopped() const { return callbacks_.stop && callbacks_.stop->load(); }

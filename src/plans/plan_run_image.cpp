@@ -26,8 +26,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kTrialRows = 64;        // at least, where the time of the estimate is found out
-constexpr uint32_t kAovSamples = 16;  // per pixel of auxiliary images
+constexpr int kTrialRows = 64;            // at least, where the time of the estimate is found out
+constexpr uint32_t kMostAovSamples = 64;  // per pixel of auxiliary images
 /// Seconds of work after which films that nobody asked for are worth writing before the image is made of them.
 constexpr double kWorthKeeping = 10;
 constexpr double kEstimateOfInterrupted = 0.5;  // seconds that it may take; after these the image is the mean
@@ -40,7 +40,7 @@ EstimatorResult PlanRun::estimate_rows(int first_row, int n_rows, std::span<cons
   if (plan_.reads_guides && !result_.aovs.empty()) {  // empty where the render was stopped before
     const char* const names[] = {"Albedo", "N", "DenoisingAlbedo", "DenoisingNormal"};
     for (size_t i = 0; i < images.size(); ++i) images[i] = rows_of(result_.aovs.at(names[i]), first_row, n_rows);
-    beside.guides = {&images[0], &images[1], &images[2], &images[3]};
+    beside.guides = {&images[0], &images[1], &images[2], &images[3], true};
   }
   for (size_t i = 0; i < layers.size(); ++i)
     beside.layers.push_back({layer_names_[i], rows_of(layers[i], first_row, n_rows)});
@@ -100,7 +100,7 @@ double PlanRun::time_estimate() {
 void PlanRun::render_auxiliary_images() {
   const Stopwatch watch;
   Pass& last = state_.passes[camera_passes(state_.passes).size() - 1];
-  render_aovs(*scene_.scene, last.settings, kAovSamples, last.film, callbacks_.stop);
+  render_aovs(*scene_.scene, last.settings, kMostAovSamples, last.film, callbacks_.stop);
   result_.aovs = std::exchange(last.film.aovs, {});
   result_.seconds.auxiliary = watch.seconds();
 }

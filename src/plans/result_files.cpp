@@ -35,19 +35,20 @@ void write_result_files(const Plan& plan, const RenderRequest& request, RenderRe
     film.aovs = aovs;
     film.shown = result.image.estimate;
     for (const auto& [key, value] : prediction_attributes(result.predicted)) film.attributes[key] = value;
+    if (aovs.contains("Albedo")) film.attributes[film_key::kCleanGuides] = "true";
     write_film(request.output, film, result.image.std_error);
   } else {
     const Film& film = last;
     std::map<std::string, std::string> attributes;
-    for (const char* key :
-         {film_key::kSeed, film_key::kSceneHash, film_key::kSettings, film_key::kVersion, film_key::kCommand,
-          film_key::kFrame})
+    for (const char* key : {film_key::kSeed, film_key::kSceneHash, film_key::kSettings, film_key::kVersion,
+                            film_key::kCommand, film_key::kFrame})
       if (film.attributes.count(key)) attributes[std::string("covary:") + key] = film.attributes.at(key);
     const bool estimated = !result.image.estimate.data.empty();
     attributes["covary:estimator"] = estimated ? plan.estimator : "none";
     if (estimated && !plan.network.empty()) attributes["covary:denoiser"] = plan.network;
     if (result.interrupted) attributes[std::string("covary:") + film_key::kComplete] = "false";
     attributes["covary:samples"] = fmt::format("{:g}", result.samples_per_pixel());
+    if (aovs.contains("Albedo")) attributes[std::string("covary:") + film_key::kCleanGuides] = "true";
     const ImagePlace place{film.frame_width(), film.frame_height(), film.crop()};
     EstimatorResult mean;  // of an interrupted render whose films are too young for the estimator
     if (!estimated) mean.estimate = result.picture();

@@ -25,12 +25,12 @@ std::string mirror(const std::string& colour) {
 }
 const std::string kPane = "<bsdf type='thindielectric'/>";
 
-std::map<std::string, Image> images_of(const std::string& body) {
+std::map<std::string, Image> images_of(const std::string& body, uint32_t most = kSamples) {
   const TestScene scene = load_text(scene_text(body, kSide, kSide));
   Film film = new_film(scene);
   PassSettings settings;
   settings.filter = scene.loaded.filter;
-  render_aovs(scene.scene(), settings, kSamples, film);
+  render_aovs(scene.scene(), settings, most, film);
   return film.aovs;
 }
 
@@ -53,6 +53,23 @@ TEST(AuxiliaryImages, WithoutMirrorsBothKindsHaveTheSameBits) {
   expect_constant(images.at("Albedo"), {0.2f, 0.5f, 0.8f});
   expect_constant(images.at("N"), {0, 0, -1});
 }
+
+// A dark wall hides a half of a bright one; its edge lies in the middle of pixels, or where `shift` tells.
+double largest_error(uint32_t most, double edge) {
+  const std::string half =
+      "<shape type='rectangle'><transform name='to_world'><rotate y='1' angle='180'/><translate "
+      "x='" +
+      std::to_string(1 + edge) + "' z='4'/></transform>" + diffuse("0.1") + "</shape>";
+  const Image albedo = images_of(half + wall(5, diffuse("0.9")), most).at("Albedo");
+  const Image exact = images_of(half + wall(5, diffuse("0.9")), 1 << 14).at("Albedo");
+  double largest = 0;
+  for (size_t i = 0; i < albedo.data.size(); ++i)
+    largest = std::max(largest, std::abs(double{albedo.data[i]} - exact.data[i]));
+  return largest;
+}
+
+// 64 independent samples of the 20 pixels or so have errors of up to 0.1.
+TEST(AuxiliaryImages, EdgesAreExactWithFewSamples) { EXPECT_LT(largest_error(64, 0.03), 0.04); }
 
 TEST(AuxiliaryImages, AMirrorShowsWhatItReflectsInItsColour) {
   const auto images = images_of(wall(5, mirror("0.5, 0.25, 1")) + wall(-5, diffuse("0.2, 0.4, 0.8"), true));
