@@ -110,7 +110,8 @@ TEST(Measured, WrongFilesAreNamed) {
                   "'luminance' is zero everywhere in slice 0");
   expect_contains(errors(plain, 6, float_field("rgb", {1, 2, 2, 2, 2}, std::vector<float>(16, 1))),
                   "expected [1, 2, 3, 2, 2]");
-  expect_contains(errors(plain, 1, float_field("theta_i", {2}, {1, 1})), "'theta_i' that is not a list of angles");
+  expect_contains(errors(plain, 1, float_field("theta_i", {2}, {1, 1})),
+                  "'theta_i' that is not a list of increasing angles");
   auto third = plain;
   third[0] = float_field("phi_i", {3}, {-2.1f, -1, 0});
   for (size_t i = 4; i <= 6; ++i) {

@@ -122,7 +122,7 @@ TEST(ImageWriter, SaysWhatItCannotWrite) {
   EXPECT_TRUE(contains(message_of([] { write_image("/nowhere/a.tif", picture(), {}, {}); }, ErrorCode::kIo),
                        "cannot write /nowhere/a.tif: no such folder /nowhere"));
   EXPECT_TRUE(
-      contains(message_of([] { write_image("/nowhere/a.pfm", picture(), {}, {}); }, ErrorCode::kIo), "no folder"));
+      contains(message_of([] { write_image("/nowhere/a.pfm", picture(), {}, {}); }, ErrorCode::kIo), "no such folder"));
 }
 
 }  // namespace

@@ -72,7 +72,7 @@ TEST(SplitPlan, ATrialDecides) {
     EXPECT_EQ(trial.crn_wins, wins);
     EXPECT_EQ(trial.samples, 32);
     EXPECT_DOUBLE_EQ(trial.independent, 0.75);
-    EXPECT_TRUE(contains(result.image.note, wins ? "for a fourth" : "samples alone")) << result.image.note;
+    EXPECT_TRUE(contains(result.image.note, wins ? "for a fourth" : "independent samples only")) << result.image.note;
     const Film independent = joined(result.passes[0].film, result.passes[2].film);
     const Spectrum mean = independent.mean(5, 6);
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(result.image.estimate.pixel(5, 6)[c], mean[c] + (wins ? 1 : 0), 1e-5);
