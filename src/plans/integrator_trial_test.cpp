@@ -114,7 +114,7 @@ TEST(IntegratorTrial, RendersContinuesAndReplaysTheChosenOne) {
   std::vector<SampleAddress> all(static_cast<size_t>(film.mean_count()), {Sampling::kIndependent, 0, 7, 9, 0, {}});
   for (size_t i = 0; i < all.size(); ++i) all[i].sample = i;
   for (const ReplayedSample& sample : replay(scene, plan, request, all)) sum += sample.value;
-  EXPECT_NEAR(sum.g / static_cast<float>(all.size()), film.mean(7, 9).g, 1e-3f * film.mean(7, 9).g);
+  EXPECT_NEAR(sum.g / static_cast<float>(all.size()), film.mean(7, 9).g, 1e-6f * film.mean(7, 9).g);
 }
 
 }  // namespace

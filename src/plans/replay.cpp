@@ -42,7 +42,11 @@ std::vector<ReplayedSample> replay(const LoadedScene& scene, const Plan& plan, c
   const auto integrator = prepared_integrator(scene, plan, request);
   const FilterSettings filter = request.filter.value_or(scene.filter);
   RenderSeconds seconds;
-  train(scene, request, *integrator, {window_of(scene, request), filter, nullptr, nullptr, {}}, seconds);
+  // As the render does: its sums for two halves of the image round otherwise than for one.
+  TrainingImage image;
+  TrainingSettings training{window_of(scene, request), filter, nullptr, nullptr, {}};
+  if (plan.takes_training) training.image = &image;
+  train(scene, request, *integrator, training, seconds);
   std::vector<ReplayedSample> samples;
   for (size_t i = 0; i < addresses.size(); ++i) {
     const SampleAddress& at = addresses[i];
