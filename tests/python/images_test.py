@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """combine(), metrics, images and films: the values and messages of the command line."""
+import inspect
 import json
 import subprocess
 import unittest
@@ -107,9 +108,9 @@ class Estimators(FilesTest):
             name = estimator["name"].replace("-", "_")
             self.assertEqual(hasattr(covary, name), estimator["passes"] == "pair", name)
             if estimator["passes"] == "pair":
-                text = getattr(covary, name).__doc__
+                text = inspect.getdoc(getattr(covary, name))
                 for option in estimator["options"]:
-                    line = f"\n    {option['name'].replace('-', '_')}:"
+                    line = f"\n{option['name'].replace('-', '_')}:"
                     (self.assertNotIn if option["of_passes"] else self.assertIn)(line, text)
 
     def test_options_of_passes_are_refused(self):
