@@ -39,7 +39,7 @@ def projected(points, to_world, width, height, fov):
 
 
 def motion_layers(points, hit, now, before, fov):
-    """Motion.X, .Y, .Z and Depth (docs/methods/sequences.md, "Depth and motion")."""
+    """Motion.X, .Y, .Z and Depth (docs/sequences.md, "Depth and motion")."""
     height, width = points.shape[:2]
     x, y, depth = projected(points, now, width, height, fov)
     old_x, old_y, old_depth = projected(points, before, width, height, fov)
