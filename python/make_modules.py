@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""make_modules.py PACKAGE: writes estimators.py, metrics.py and _covary.pyi into the folder PACKAGE, which holds the
-extension module, from the registries that this was built with. So each estimator and metric is a function with types
-and a docstring, and none has to be written by hand."""
+"""make_modules.py PACKAGE: writes estimators.py, metrics.py, _keywords.py and _covary.pyi into the folder PACKAGE,
+which holds the extension module, from the registries that this was built with. So each estimator and metric is a
+function with types and a docstring, and none has to be written by hand."""
+import ast
 import importlib.util
 import keyword
 import sys
@@ -46,7 +47,8 @@ def type_and_default(option):
     None stands for them; flags are off."""
     if option["type"] == "flag":
         return "bool", "False"
-    python_type = {"whole": "int", "real": "float", "choice": literal(option["choices"])}[option["type"]]
+    text = "str | PathLike[str]" if option["is_path"] else "str"
+    python_type = {"whole": "int", "real": "float", "choice": literal(option["choices"]), "text": text}[option["type"]]
     return f"{python_type} | None", "None"
 
 
@@ -113,6 +115,25 @@ def estimators_module(estimators):
     return "\n".join([head, f"__all__ = {names!r}", "", *types, *(f"\n\n{estimator_function(e)}" for e in pairs), ""])
 
 
+def arguments_of_render(source):
+    functions = [node for node in ast.parse(source).body if isinstance(node, ast.FunctionDef)]
+    render = next(function for function in functions if function.name == "render")
+    under_other_names = {"no_preview", "resolution", "rfilter"}
+    return {argument.arg for argument in (*render.args.args, *render.args.kwonlyargs)} | under_other_names
+
+
+def keywords_module(lists, own):
+    """What type checkers are told of keywords that render() takes as options are declared, beside its own arguments."""
+    types = {}
+    for option in (option for options in lists for option in options):
+        types.setdefault(identifier(option["name"]), set()).update(type_and_default(option)[0].split(" | "))
+    lines = "\n".join(wrapped(f"{name}: {' | '.join(sorted(kinds))}", "    ") for name, kinds in sorted(types.items())
+                      if name not in own)
+    head = HEAD.format("Keywords of functions that take options.", ", Literal, TypedDict",
+                       "if TYPE_CHECKING:\n    from os import PathLike\n\n")
+    return f"{head.replace(' Any,', '')}class RenderOptions(TypedDict, total=False):\n{lines}\n"
+
+
 METRIC = '''
 
 def {name}(image: Any, reference: Any, reference2: Any = None, *, low_dynamic_range: bool = False) -> float:
@@ -146,7 +167,11 @@ def stub_of(module):
 def main():
     package = Path(sys.argv[1])
     module = load_extension(package)
-    (package / "estimators.py").write_text(estimators_module(module.estimators()))
+    estimators = module.estimators()
+    (package / "estimators.py").write_text(estimators_module(estimators))
+    (package / "_keywords.py").write_text(
+        keywords_module([module.render_options(), *(estimator["options"] for estimator in estimators)],
+                        arguments_of_render((package / "_render.py").read_text())))
     (package / "metrics.py").write_text(metrics_module(module.metrics()))
     (package / "_covary.pyi").write_text(stub_of(module))
 

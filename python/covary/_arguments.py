@@ -247,15 +247,17 @@ def either(words: str, *rules: Rule) -> Rule:
     return Rule(words, convert)
 
 
-def checked(**rules: Rule) -> Callable[[Callable[P, R]], Callable[P, R]]:
+def checked(declared: Mapping[str, Rule] | None = None, /, **rules: Rule) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Gives each argument of a function its rule. Arguments without a rule, and rules without an argument, are an error
-    of the package, found when it is imported."""
+    of the package, found when it is imported. `declared`: rules of options that arrive in the function's **options."""
     def decorate(called: Callable[P, R]) -> Callable[P, R]:
         signature = inspect.signature(called)
-        named = [parameter.name for parameter in signature.parameters.values()
+        shown = list(signature.parameters.values())
+        named = [parameter.name for parameter in shown
                  if parameter.kind is not parameter.VAR_KEYWORD and parameter.name != "self"]
         if set(named) != set(rules):
             raise TypeError(f"{called.__qualname__}: the rules are of {sorted(rules)}, the arguments {sorted(named)}")
+        more = {name: rule for name, rule in (declared or {}).items() if name not in rules}
 
         @functools.wraps(called)
         def call(*arguments: P.args, **keywords: P.kwargs) -> R:
@@ -263,12 +265,14 @@ def checked(**rules: Rule) -> Callable[[Callable[P, R]], Callable[P, R]]:
                 bound = signature.bind(*arguments, **keywords)
             except TypeError:  # Python's own message, which names the function
                 return called(*arguments, **keywords)
-            for name, rule in rules.items():
-                if name in bound.arguments:
-                    bound.arguments[name] = rule(name, bound.arguments[name])
+            for given, known in ((bound.arguments, rules), (bound.arguments.get("options", {}), more)):
+                given.update({name: rule(name, given[name]) for name, rule in known.items() if name in given})
             return called(*bound.args, **bound.kwargs)
 
-        call.rules = rules  # type: ignore[attr-defined]
+        call.rules = {**rules, **more}  # type: ignore[attr-defined]
+        if more:  # what help and completion show
+            shown[-1:-1] = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None) for name in more]
+            call.__signature__ = signature.replace(parameters=shown)  # type: ignore[attr-defined]
         return call
 
     return decorate

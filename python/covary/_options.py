@@ -8,7 +8,7 @@ from os import PathLike, fspath
 from typing import Any, Union
 
 from . import _covary
-from ._arguments import Rule, flag, optional, real, scalar, text, whole
+from ._arguments import Rule, choice, flag, optional, path, real, scalar, text, whole
 from .errors import UsageError
 
 OptionValue = Union[bool, int, float, str, None]
@@ -32,9 +32,25 @@ def _options_of(estimator: str) -> dict[str, dict[str, Any]]:
 
 
 def _rule_of(option: dict[str, Any]) -> Rule:
-    rule = {"flag": flag, "whole": whole(), "real": real(), "choice": text}[option["type"]]
+    rule = {"flag": flag, "whole": whole(), "real": real()}.get(option["type"], text)
     bounds = f" ({option['range']})" if option["range"] and option["type"] in ("whole", "real") else ""
     return optional(Rule(rule.accepted + bounds, rule.convert))
+
+
+def underscored(name: str) -> str:
+    return name.replace("-", "_")
+
+
+def declared_rules(options: Iterable[dict[str, Any]]) -> dict[str, Rule]:
+    """Of declared options as keywords."""
+    def rule_of(option: dict[str, Any]) -> Rule:
+        if option["type"] == "flag":
+            return flag
+        if option["type"] == "choice":
+            return optional(choice(option["choices"]))
+        return optional(path) if option["is_path"] else _rule_of(option)
+
+    return {underscored(option["name"]): rule_of(option) for option in options}
 
 
 def text_options(options: Mapping[str, OptionValue], estimator: str) -> dict[str, str]:

@@ -2,6 +2,7 @@
 """Scenes and rendering."""
 from __future__ import annotations
 
+import inspect
 import shlex
 import warnings
 from collections.abc import Mapping
@@ -14,18 +15,18 @@ from ._arguments import (
     text, whole,
 )
 from ._combine import DENOISE, DenoiseMode, Progress
-from ._options import OptionValue, option_texts, passes_of, text_options
+from ._options import declared_rules, option_texts, passes_of, text_options, underscored
 from ._result import BadSample, RenderResult, text_of_bad_samples
 from .errors import BadSamplesWarning, UsageError
 
 if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from ._keywords import RenderOptions
     from .estimators import Estimator
 
 PathOrScene = Union[str, "PathLike[str]", "Scene"]
 Filter = Literal["box", "tent", "gaussian"]
-Sampling = Literal["independent", "crn"]
-Sampler = Literal["independent", "sobol"]
-CrnPart = Literal["both", "camera", "light"]
 
 _SCALARS = optional(mapping_of(scalar, "a mapping from names to True, False, numbers or texts"))
 _CHECKPOINT_SECONDS = 300.0  # as the program
@@ -142,37 +143,35 @@ def _check_scene_arguments(scene: PathOrScene, options: Mapping[str, Any]) -> No
         raise UsageError(f"{', '.join(found)}: not of render(), but of Scene.load(): render(Scene.load({load}), …)")
 
 
-@checked(scene=SCENE, spp=optional(SPP), estimator=optional(text), integrator=text, until=optional(real(0, above=True)),
+#: Options that are keywords as they are declared. Not those that are arguments by another name, or of Scene.load().
+_DECLARED = {name: rule for name, rule in declared_rules(_covary.render_options()).items()
+             if name not in ("rfilter", "no_preview", "resolution")}
+
+
+@checked(_DECLARED,
+         scene=SCENE, spp=optional(SPP), estimator=optional(text), integrator=text, until=optional(real(0, above=True)),
          until_p95=optional(real(0, above=True)), time=optional(real(0, above=True)), seed=SEED,
          denoise=optional(DENOISE), oidn=empty_or(path), output=optional(path), passes=optional(path), resume=flag,
-         overwrite=flag,
-         checkpoint=optional(real(0)), preview=flag, aovs=flag, layers=flag, light_groups=flag, path_lengths=flag,
+         overwrite=flag, checkpoint=optional(real(0)), preview=flag,
          crop=optional(several("(x, y, width, height) in pixels", whole(0, 65535), whole(0, 65535), whole(1, 65536),
                                whole(1, 65536))),
-         filter=optional(choice(get_args(Filter))), sampling=optional(choice(get_args(Sampling))),
-         sampler=optional(choice(get_args(Sampler))), crn_part=choice(get_args(CrnPart)),
-         groups=optional(whole(1, _covary.most_groups)),
+         filter=optional(choice(get_args(Filter))),
          split=optional(either("(CRN, independent), two numbers above 0, or 'auto'",
                                several("", real(0, above=True), real(0, above=True)), choice(("auto",)))),
-         films_only=flag, save_training=optional(path), load_training=optional(path), progress=optional(function))
+         films_only=flag, progress=optional(function))
 def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | None = None, *, integrator: str = "",
            until: float | None = None, until_p95: float | None = None, time: float | None = None, seed: int = 0,
            denoise: DenoiseMode | None = None, oidn: str | PathLike[str] = "",
            output: str | PathLike[str] | None = None, passes: str | PathLike[str] | None = None, resume: bool = False,
-           overwrite: bool = False, checkpoint: float | None = None, preview: bool = False, aovs: bool = False,
-           layers: bool = False, light_groups: bool = False, path_lengths: bool = False,
-           crop: tuple[int, int, int, int] | None = None,
-           filter: Filter | None = None, sampling: Sampling | None = None, sampler: Sampler | None = None,
-           crn_part: CrnPart = "both", groups: int | None = None,
-           split: tuple[float, float] | Literal["auto"] | None = None,
-           films_only: bool = False, save_training: str | PathLike[str] | None = None,
-           load_training: str | PathLike[str] | None = None, progress: Progress | None = None,
-           **options: OptionValue) -> RenderResult:
+           overwrite: bool = False, checkpoint: float | None = None, preview: bool = False,
+           crop: tuple[int, int, int, int] | None = None, filter: Filter | None = None,
+           split: tuple[float, float] | Literal["auto"] | None = None, films_only: bool = False,
+           progress: Progress | None = None, **options: Unpack[RenderOptions]) -> RenderResult:
     """Renders a scene, or a scene file, as `covary render` does, to the same bits.
 
     spp: samples per pixel over all passes; by default the scene's, or no limit with `until` or `time`.
     estimator: "none", the default, is the mean of independent samples; "iicv" uses common random numbers for half of
-        the samples. Its options follow as keywords.
+        the samples. Its options are keywords, too.
     integrator: instead of the scene's.
     until: add samples until the predicted relMSE is this; until_p95: until it is in 95 % of the blocks of 16 x 16
         pixels.
@@ -182,24 +181,21 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
     output: EXR file of the result; preview: write a PNG beside it.
     passes: folder to keep the films in; resume: continue existing films; overwrite: replace them;
         checkpoint: seconds between saving unfinished films, by default 300 with `output` or `passes`; 0: never.
-    aovs: add the images Albedo, N and P; layers: add Direct and Indirect, which add up to the image;
-        light_groups: add Combined_ID for the lights of each id, and Rest, instead;
-        path_lengths: add an image for each path length.
     crop: x, y, width and height in the frame.
-    sampling: of the single pass of estimator "none"; by default "independent".
-    sampler: "sobol" for Owen-scrambled Sobol' points in each group of samples; by default the scene's.
-    groups: number of groups of samples whose means films keep; split: ratio of the samples of the CRN and the
-        independent pass, or "auto", which tries whether common random numbers improve the denoised mean.
+    split: ratio of the samples of the CRN and the independent pass, or "auto", which tries whether common random
+        numbers improve the denoised mean.
     films_only: render the passes only; result.image is then the mean of all samples.
     progress: called with (done, total) samples, up to 20 times a second.
-
+    {declared}
     Ctrl-C ends the render within a tile; with `output` or `passes` samples are kept, and `resume=True` continues.
     """
-    _check_scene_arguments(scene, options)
+    keywords: dict[str, Any] = dict(options)
+    _check_scene_arguments(scene, keywords)
     _check_together(estimator, {"resume": resume, "overwrite": overwrite, "checkpoint": checkpoint, "preview": preview,
                                 "output": output, "passes": passes, "until": until, "until_p95": until_p95,
-                                "sampling": sampling, "split": split})
-    texts = text_options(options, estimator or "none")
+                                "sampling": keywords.get("sampling"), "split": split})
+    declared = {name.replace("_", "-"): keywords.pop(name) for name in _DECLARED if name in keywords}
+    texts = text_options(keywords, estimator or "none")
     chosen = scene if isinstance(scene, Scene) else Scene.load(scene, integrator=integrator)
     chosen = chosen.with_integrator(integrator)
     if checkpoint is None:
@@ -211,11 +207,8 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
         "until": next((f"{name}={error!r}" for name, error in until_words.items() if error is not None), None),
         "integrator": loading["integrator"] or None, "estimator": estimator, "denoise": denoise,
         "oidn": fspath(oidn) or None, "resolution": loading["resolution"], "crop": crop, "passes": passes,
-        "resume": resume, "overwrite": overwrite, "checkpoint": checkpoint, "no-preview": not preview, "aovs": aovs,
-        "layers": layers, "light-groups": light_groups, "path-lengths": path_lengths, "sampling": sampling,
-        "sampler": sampler, "split": split, "groups": groups,
-        "crn-part": None if crn_part == "both" else crn_part, "rfilter": filter,
-        "save-training": save_training, "load-training": load_training})
+        "resume": resume, "overwrite": overwrite, "checkpoint": checkpoint, "no-preview": not preview, "split": split,
+        "rfilter": filter, **declared})
     properties = {"min_depth": loading["min_depth"], "max_depth": loading["max_depth"], **loading["integrator_options"]}
     of_integrator = {name.replace("_", "-"): {"True": "on", "False": "off"}.get(str(value), str(value))
                      for name, value in properties.items() if value is not None}
@@ -223,6 +216,11 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
     made["bad_samples"] = [_bad_sample(chosen, bad) for bad in made["bad_samples"]]
     report_bad_samples(made)
     return RenderResult(**made)
+
+
+render.__doc__ = (render.__doc__ or "").replace("{declared}", "".join(
+    f"{underscored(option['name'])}: {option['help']}.\n    " for option in _covary.render_options()
+    if underscored(option["name"]) in _DECLARED.keys() - inspect.getfullargspec(inspect.unwrap(render)).kwonlyargs))
 
 
 def report_bad_samples(made: dict[str, Any], depth: int = 4) -> None:

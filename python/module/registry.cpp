@@ -56,6 +56,7 @@ nb::dict option_dict(const Option& option) {
   d["default"] = option.default_value;
   d["range"] = option.range.text();
   d["choices"] = option.choices;
+  d["is_path"] = option.names == OptionNames::kFile || option.names == OptionNames::kFolder;
   d["help"] = as_arguments(option.help);
   d["of_passes"] = is_adaptive_option(option.name);
   return d;

@@ -14,53 +14,10 @@
 #include "passes/light_pass.h"
 #include "passes/training_image.h"
 #include "plans/plan.h"
+#include "plans/render_request.h"
 #include "risk/predicted_error.h"
 
 namespace covary {
-
-/// What is asked for, beside the plan.
-struct RenderRequest {
-  uint64_t seed = 0;
-  /// In place of the scene's: where that stands for several, the one that was chosen.
-  std::shared_ptr<const Integrator> integrator;
-  std::optional<FilterSettings> filter;  ///< default: the scene's
-  std::optional<Sampler> sampler;        ///< of camera samples; default: sampler_of()
-  std::optional<CropWindow> crop;        ///< default: the scene's; inside the frame
-  /// Samples per pixel of all passes together, 1 … 2^30. Default: the scene's, or no limit where `seconds` or `until`
-  /// is given.
-  std::optional<uint32_t> spp;
-  double seconds = 0;            ///< > 0: limit for rendering and estimating together
-  double until = 0;              ///< > 0: add samples until the predicted relMSE is this
-  bool until_in_blocks = false;  ///< `until` means predicted_blocks() of predicted_error.h, not the whole image
-  bool aovs = false;             ///< also the images Albedo, N and P
-  /// Also the images Edges01, Edges02, … of the last pass of camera samples (passes/sample_parts.h), which
-  /// needs the integrator controlled-path.
-  bool path_lengths = false;
-  /// Also the images Direct and Indirect, which add up to the image (passes/sample_parts.h). Needs an integrator
-  /// that tells direct light, and a plan that splits layers.
-  bool layers = false;
-  /// In place of these the images Combined_GROUP of each group of the scene's lights, and Rest for those in none.
-  /// Needs an integrator that tells lights apart.
-  bool light_groups = false;
-  bool splits_layers() const { return layers || light_groups; }
-  /// Of passes with common random numbers; other parts than both need an integrator with light subpaths.
-  CrnPart crn_part = CrnPart::kBoth;
-
-  std::string output;    ///< EXR file of the result; empty: no file is written
-  bool preview = false;  ///< also a PNG beside it
-  /// Files that keep what the integrator learns (training_stage.h), written after the training and read in place of it;
-  /// empty: none.
-  std::string save_training, load_training;
-  std::string oidn;        ///< where Open Image Denoise is, for integrators that use it; empty: where it is found
-  std::string passes;      ///< folder that keeps the films; empty: only while they are not finished
-  bool resume = false;     ///< continue films that are there
-  bool overwrite = false;  ///< films that are in `passes` may be replaced; without it and `resume` they are an error
-  double checkpoint_seconds = 0;  ///< > 0: seconds between writing unfinished films
-  /// Images of the window that only the caller knows, written as layers of the output: 1 or 3 channels.
-  std::map<std::string, Image> beside;
-  /// Attributes of films and image that only the caller knows, such as film_key::kVersion and kCommand.
-  std::map<std::string, std::string> attributes;
-};
 
 /// What a render does for a while. Rendering and estimating may come again, with RenderRequest::until.
 enum class RenderStage { kTraining, kRendering, kEstimating, kWriting };

@@ -17,24 +17,12 @@ namespace covary {
 namespace {
 
 constexpr int kLargestSide = 65536;
-constexpr double kMostSamples = 1 << 30;
-constexpr OptionTraits kBasicPasses{.level = OptionLevel::kBasic, .effect = OptionEffect::kPasses};
-constexpr OptionTraits kBasicSamples{.level = OptionLevel::kBasic, .effect = OptionEffect::kSamples};
 
 std::string read_resolution(const std::string& text, RenderSettings& v) {
   const auto size = parse_whole_numbers(text, 'x', 2);
   if (!size || (*size)[0] < 1 || (*size)[1] < 1 || (*size)[0] > kLargestSide || (*size)[1] > kLargestSide)
     return fmt::format("WIDTHxHEIGHT, each from 1 to {}, e.g. 1280x720", kLargestSide);
   v.width = static_cast<int>((*size)[0]), v.height = static_cast<int>((*size)[1]);
-  return "";
-}
-
-std::string read_crop(const std::string& text, std::optional<CropWindow>& crop) {
-  const auto c = parse_whole_numbers(text, ',', 4);
-  if (!c || *std::max_element(c->begin(), c->end()) > kLargestSide)
-    return "X,Y,WIDTH,HEIGHT in pixels, e.g. 240,560,240,160";
-  const auto at = [&](size_t i) { return static_cast<int>((*c)[i]); };
-  crop = {at(0), at(1), at(2), at(3)};
   return "";
 }
 
@@ -45,6 +33,32 @@ std::string read_split(const std::string& text, PassChoice& passes) {
   if (!parts || (*parts)[0] <= 0 || (*parts)[1] <= 0) return "auto or CRN:INDEPENDENT, two numbers above 0, e.g. 1:1";
   const double sum = (*parts)[0] + (*parts)[1];
   passes.split = {(*parts)[0] / sum, (*parts)[1] / sum};
+  return "";
+}
+
+void declare_passes(Settings& s, PassChoice& v) {
+  static constexpr std::pair<const char*, Sampling> kSamplings[] = {{"independent", Sampling::kIndependent},
+                                                                    {"crn", Sampling::kCrn}};
+  s.group("Sampling", OptionEffect::kPasses);
+  s.choice("sampling", v.sampling, kSamplings,
+           "Random numbers of a single pass (`estimator` none): independent, or common to all pixels",
+           {.effect = OptionEffect::kSamples});
+  s.text_as("split", v, "auto|CRN:INDEPENDENT", read_split,
+            "Ratio of the samples of the two passes; default: the estimator's, usually 1:1. auto (denoised mean): a "
+            "fourth with common random numbers if a trial prefers that");
+  s.whole("groups", v.groups, {.low = 1, .high = Film::kMaxGroups},
+          "Groups of samples per pixel, whose means films keep; default: the largest number from 12 to 8 that divides "
+          "the samples, else 12 or the number of samples; 1 for a single independent pass");
+}
+
+}  // namespace
+
+std::string read_crop(const std::string& text, std::optional<CropWindow>& crop) {
+  const auto c = parse_whole_numbers(text, ',', 4);
+  if (!c || *std::max_element(c->begin(), c->end()) > kLargestSide)
+    return "X,Y,WIDTH,HEIGHT in pixels, e.g. 240,560,240,160";
+  const auto at = [&](size_t i) { return static_cast<int>((*c)[i]); };
+  crop = {at(0), at(1), at(2), at(3)};
   return "";
 }
 
@@ -65,21 +79,8 @@ FilterSettings filter_named(const std::string& name) {
   return {FilterKind::kGaussian, 2.0f, 0.5f};
 }
 
-void declare_basic(Settings& s, RenderSettings& v) {
-  RenderRequest& r = v.request;
-  s.group("Rendering");
-  s.text("output", r.output, "FILE", "The image (EXR); a PNG preview appears beside it",
-         {.aliases = {"o"}, .level = OptionLevel::kBasic, .names = OptionNames::kFile});
-  s.whole("spp", r.spp, {.low = 1, .high = kMostSamples}, "Samples per pixel over all passes; default: the scene's",
-          kBasicPasses);
-  s.text_as("until", r, "relmse=X", read_until,
-            "relmse=X: add samples until the predicted error is X, up to `spp`; relmse-p95=X: until it is in 95 % of "
-            "the blocks of 16 x 16 pixels",
-            kBasicPasses);
-  std::optional<double> seconds;
-  s.real("time", seconds, {.low = 0, .above_low = true},
-         "Seconds for rendering and estimating, without loading and writing", kBasicPasses);
-  if (seconds) r.seconds = *seconds;
+void declare(Settings& s, RenderSettings& v) {
+  declare_goal(s, v.request);
   s.one_of("integrator", v.integrator, integrator_names(), "Integrator instead of the scene's", kBasicSamples);
   const bool is_named = s.is_given("estimator") || s.is_given("sampling");
   s.one_of("estimator", v.estimator, estimator_names(),
@@ -88,68 +89,10 @@ void declare_basic(Settings& s, RenderSettings& v) {
   v.denoising.mode = is_named ? "none" : "auto";
   declare(s, v.denoising, false);
   s.group("Rendering");
-  s.whole("seed", r.seed, {.low = 0}, "Seed of the random numbers", kBasicSamples);
   s.text_as("resolution", v, "WIDTHxHEIGHT", read_resolution, "Size of the full frame; default: the scene's",
             kBasicSamples);
-  s.text_as("crop", r.crop, "X,Y,WIDTH,HEIGHT", read_crop, "Render only these pixels of the frame", kBasicSamples);
-  s.text("passes", r.passes, "FOLDER", "Folder to keep the film of every pass in",
-         {.aliases = {"save-passes"}, .level = OptionLevel::kBasic, .names = OptionNames::kFolder});
-  s.flag("resume", r.resume, "Continue an interrupted render, or the films in `passes`",
-         {.level = OptionLevel::kBasic});
-}
-
-void declare_sampling(Settings& s, RenderSettings& v) {
-  static constexpr std::pair<const char*, Sampling> kSamplings[] = {{"independent", Sampling::kIndependent},
-                                                                    {"crn", Sampling::kCrn}};
-  static constexpr std::pair<const char*, CrnPart> kParts[] = {
-      {"both", CrnPart::kBoth}, {"camera", CrnPart::kCamera}, {"light", CrnPart::kLight}};
-  s.group("Sampling", OptionEffect::kPasses);
-  std::string sampler, filter;
-  s.one_of("sampler", sampler, {"independent", "sobol"},
-           "Random numbers within a group of samples: independent, or Owen-scrambled Sobol' points; default: the "
-           "scene's (sobol unless it is independent)",
-           {.effect = OptionEffect::kSamples});
-  if (!sampler.empty()) v.request.sampler = sampler == "sobol" ? Sampler::kSobol : Sampler::kIndependent;
-  s.choice("sampling", v.passes.sampling, kSamplings,
-           "Random numbers of a single pass (`estimator` none): independent, or common to all pixels",
-           {.effect = OptionEffect::kSamples});
-  s.text_as("split", v.passes, "auto|CRN:INDEPENDENT", read_split,
-            "Ratio of the samples of the two passes; default: the estimator's, usually 1:1. auto (denoised mean): a "
-            "fourth with common random numbers if a trial prefers that");
-  s.whole("groups", v.passes.groups, {.low = 1, .high = Film::kMaxGroups},
-          "Groups of samples per pixel, whose means films keep; default: the largest number from 12 to 8 that divides "
-          "the samples, else 12 or the number of samples; 1 for a single independent pass");
-  s.choice("crn-part", v.request.crn_part, kParts,
-           "Subpaths with common random numbers, for integrators that trace light", {.effect = OptionEffect::kSamples});
-  s.one_of("rfilter", filter, {"box", "tent", "gaussian"}, "Reconstruction filter instead of the scene's",
-           {.effect = OptionEffect::kSamples});
-  if (!filter.empty()) v.request.filter = filter_named(filter);
-}
-
-void declare_output(Settings& s, RenderRequest& r) {
-  s.group("Output");
-  s.flag("overwrite", r.overwrite, "Replace existing films, in `passes` or of an interrupted render");
-  s.real("checkpoint", r.checkpoint_seconds, {.low = 0}, "Seconds between saving unfinished films; 0: never");
-  r.preview = !s.flag("no-preview", "Do not write the PNG");
-  s.flag("aovs", r.aovs, "Add the images Albedo, N (normal) and P (position) to the output");
-  s.flag("layers", r.layers, "Add the layers Direct and Indirect, which add up to the image, denoised or not");
-  s.flag("light-groups", r.light_groups,
-         "Add a layer Combined_ID for the lights of each id, and Rest for the others, likewise");
-  s.flag("path-lengths", r.path_lengths, "Add an image for each path length in edges (Edges01, …)",
-         {.effect = OptionEffect::kPasses});
-  s.group("Training of controlled-path and guided-path");
-  s.text("save-training", r.save_training, "FILE", "Save the training", {.names = OptionNames::kFile});
-  s.text("load-training", r.load_training, "FILE", "Use a saved training",
-         {.names = OptionNames::kFile, .effect = OptionEffect::kSamples});
-}
-
-}  // namespace
-
-void declare(Settings& settings, RenderSettings& v) {
-  declare_basic(settings, v);
-  declare_sampling(settings, v);
-  declare_output(settings, v.request);
-  if (v.request.resume && v.request.overwrite) throw Error(ErrorCode::kUsage, "`overwrite` excludes `resume`");
+  declare_passes(s, v.passes);
+  declare(s, v.request);
 }
 
 Estimator estimator_of(const RenderSettings& settings, const OptionValues& of_estimator) {

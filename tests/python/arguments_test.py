@@ -52,7 +52,7 @@ RENDER = {"scene": (*NO_SCENE, ""), "spp": without_none(NO_SPP), "estimator": ("
           "path_lengths": NO_FLAG,
           "crop": (3, "0,0,4,4", (0, 0, 4), (0, 0, 0, 0), (-1, 0, 4, 4), (0, 0, 4.5, 4), (0, 0, 400, 4)),
           "filter": ("bx", *NO_TEXT), "sampling": ("common", *NO_TEXT), "sampler": ("halton", *NO_TEXT),
-          "crn_part": ("all", None, *NO_TEXT), "groups": (0, -1, 1025, 2.5, "12"),
+          "crn_part": ("all", *NO_TEXT), "groups": (0, -1, 1025, 2.5, "12"),
           "split": (1, "1:1", "half", (1,), (1, 0), (1, -1), ("1", 1)), "films_only": NO_FLAG, "save_training": NO_PATH,
           "load_training": NO_PATH, "progress": NO_FUNCTION}
 #: By function and argument. What a value is refused for may also be found by the library.
@@ -290,17 +290,6 @@ class Arguments(PackageTest):
                         covary.Scene.load(ROOM, integrator=integrator, integrator_options=given)
                     except covary.UsageError as error:  # where it needs another one
                         self.assertIn("has no effect with", str(error))
-
-    def test_names_are_those_of_the_library(self):
-        """Each that the signatures list is one that the library takes."""
-        from covary import _render
-        for argument, names in (("filter", _render.Filter), ("sampler", _render.Sampler),
-                                ("sampling", _render.Sampling), ("crn_part", _render.CrnPart)):
-            more = {"estimator": "none"} if argument in ("sampling", "crn_part") else {}
-            for name in names.__args__:
-                if argument == "crn_part" and name != "both":
-                    continue  # needs an integrator with light subpaths
-                self.assertEqual(covary.render(self.scene, 8, **more, **{argument: name}).image.shape, (20, 24, 3))
 
 
 class Client:

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is asked for of a render, beside the plan. Members stand beside the declarations of the options that set them
+// (settings/settings.h), so that an option of rendering is a member and a line here, and the code that uses it.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "core/error.h"
+#include "film/film.h"
+#include "passes/light_pass.h"
+#include "settings/settings.h"
+
+namespace covary {
+
+struct RenderRequest {
+  uint64_t seed = 0;
+  /// In place of the scene's: where that stands for several, the one that was chosen.
+  std::shared_ptr<const Integrator> integrator;
+  std::optional<FilterSettings> filter;  ///< default: the scene's
+  std::optional<Sampler> sampler;        ///< of camera samples; default: sampler_of()
+  std::optional<CropWindow> crop;        ///< default: the scene's; inside the frame
+  /// Samples per pixel of all passes together, 1 … 2^30. Default: the scene's, or no limit where `seconds` or `until`
+  /// is given.
+  std::optional<uint32_t> spp;
+  double seconds = 0;            ///< > 0: limit for rendering and estimating together
+  double until = 0;              ///< > 0: add samples until the predicted relMSE is this
+  bool until_in_blocks = false;  ///< `until` means predicted_blocks() of predicted_error.h, not the whole image
+  bool aovs = false;             ///< also the images Albedo, N and P
+  /// Also the images Edges01, Edges02, … of the last pass of camera samples (passes/sample_parts.h), which
+  /// needs the integrator controlled-path.
+  bool path_lengths = false;
+  /// Also the images Direct and Indirect, which add up to the image (passes/sample_parts.h). Needs an integrator
+  /// that tells direct light, and a plan that splits layers.
+  bool layers = false;
+  /// In place of these the images Combined_GROUP of each group of the scene's lights, and Rest for those in none.
+  /// Needs an integrator that tells lights apart.
+  bool light_groups = false;
+  bool splits_layers() const { return layers || light_groups; }
+  /// Of passes with common random numbers; other parts than both need an integrator with light subpaths.
+  CrnPart crn_part = CrnPart::kBoth;
+
+  std::string output;    ///< EXR file of the result; empty: no file is written
+  bool preview = false;  ///< also a PNG beside it
+  /// Files that keep what the integrator learns (training_stage.h), written after the training and read in place of it;
+  /// empty: none.
+  std::string save_training, load_training;
+  std::string oidn;        ///< where Open Image Denoise is, for integrators that use it; empty: where it is found
+  std::string passes;      ///< folder that keeps the films; empty: only while they are not finished
+  bool resume = false;     ///< continue films that are there
+  bool overwrite = false;  ///< films that are in `passes` may be replaced; without it and `resume` they are an error
+  double checkpoint_seconds = 0;  ///< > 0: seconds between writing unfinished films
+  /// Images of the window that only the caller knows, written as layers of the output: 1 or 3 channels.
+  std::map<std::string, Image> beside;
+  /// Attributes of films and image that only the caller knows, such as film_key::kVersion and kCommand.
+  std::map<std::string, std::string> attributes;
+};
+
+inline constexpr double kMostSamples = 1 << 30;
+inline constexpr OptionTraits kBasicPasses{.level = OptionLevel::kBasic, .effect = OptionEffect::kPasses};
+inline constexpr OptionTraits kBasicSamples{.level = OptionLevel::kBasic, .effect = OptionEffect::kSamples};
+
+// Readers of texts: what was expected, or an empty text.
+std::string read_until(const std::string& text, RenderRequest& request);
+std::string read_crop(const std::string& text, std::optional<CropWindow>& crop);
+FilterSettings filter_named(const std::string& name);
+
+/// How long the render goes on, and where the image is.
+inline void declare_goal(Settings& s, RenderRequest& r) {
+  s.group("Rendering");
+  s.text("output", r.output, "FILE", "The image (EXR); a PNG preview appears beside it",
+         {.aliases = {"o"}, .level = OptionLevel::kBasic, .names = OptionNames::kFile});
+  s.whole("spp", r.spp, {.low = 1, .high = kMostSamples}, "Samples per pixel over all passes; default: the scene's",
+          kBasicPasses);
+  s.text_as("until", r, "relmse=X", read_until,
+            "relmse=X: add samples until the predicted error is X, up to `spp`; relmse-p95=X: until it is in 95 % of "
+            "the blocks of 16 x 16 pixels",
+            kBasicPasses);
+  std::optional<double> seconds;
+  s.real("time", seconds, {.low = 0, .above_low = true},
+         "Seconds for rendering and estimating, without loading and writing", kBasicPasses);
+  if (seconds) r.seconds = *seconds;
+}
+
+inline void declare(Settings& s, RenderRequest& r) {
+  static constexpr std::pair<const char*, CrnPart> kParts[] = {
+      {"both", CrnPart::kBoth}, {"camera", CrnPart::kCamera}, {"light", CrnPart::kLight}};
+  s.group("Rendering");
+  s.whole("seed", r.seed, {.low = 0}, "Seed of the random numbers", kBasicSamples);
+  s.text_as("crop", r.crop, "X,Y,WIDTH,HEIGHT", read_crop, "Render only these pixels of the frame", kBasicSamples);
+  s.text("passes", r.passes, "FOLDER", "Folder to keep the film of every pass in",
+         {.aliases = {"save-passes"}, .level = OptionLevel::kBasic, .names = OptionNames::kFolder});
+  s.flag("resume", r.resume, "Continue an interrupted render, or the films in `passes`",
+         {.level = OptionLevel::kBasic});
+  s.group("Sampling", OptionEffect::kSamples);
+  std::string sampler, filter;
+  s.one_of("sampler", sampler, {"independent", "sobol"},
+           "Random numbers within a group of samples: independent, or Owen-scrambled Sobol' points; default: the "
+           "scene's (sobol unless it is independent)");
+  if (!sampler.empty()) r.sampler = sampler == "sobol" ? Sampler::kSobol : Sampler::kIndependent;
+  s.choice("crn-part", r.crn_part, kParts, "Subpaths with common random numbers, for integrators that trace light");
+  s.one_of("rfilter", filter, {"box", "tent", "gaussian"}, "Reconstruction filter instead of the scene's");
+  if (!filter.empty()) r.filter = filter_named(filter);
+  s.group("Output");
+  s.flag("overwrite", r.overwrite, "Replace existing films, in `passes` or of an interrupted render");
+  s.real("checkpoint", r.checkpoint_seconds, {.low = 0}, "Seconds between saving unfinished films; 0: never");
+  r.preview = !s.flag("no-preview", "Do not write the PNG");
+  s.flag("aovs", r.aovs, "Add the images Albedo, N (normal) and P (position) to the output");
+  s.flag("layers", r.layers, "Add the layers Direct and Indirect, which add up to the image, denoised or not");
+  s.flag("light-groups", r.light_groups,
+         "Add a layer Combined_ID for the lights of each id, and Rest for the others, likewise");
+  s.flag("path-lengths", r.path_lengths, "Add an image for each path length in edges (Edges01, …)",
+         {.effect = OptionEffect::kPasses});
+  s.group("Training of controlled-path and guided-path");
+  s.text("save-training", r.save_training, "FILE", "Save the training", {.names = OptionNames::kFile});
+  s.text("load-training", r.load_training, "FILE", "Use a saved training",
+         {.names = OptionNames::kFile, .effect = OptionEffect::kSamples});
+  if (r.resume && r.overwrite) throw Error(ErrorCode::kUsage, "`overwrite` excludes `resume`");
+}
+
+}  // namespace covary
