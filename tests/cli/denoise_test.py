@@ -182,10 +182,11 @@ class Denoise(RenderTest):
         self.good("combine", "--independent", "films/independent.exr", "-o", "b.exr", "--denoise", "auto", *PLAIN,
                   "--json", "b.json")
         self.assertIn("predicted_relmse_high", json.loads((self.path / "b.json").read_text()))
-        # The standard error in colours, with a scale below it.
+        # The standard error in colours, whose scale is told.
         width, height = map(int, SMALL[1].split("x"))
-        self.good("convert", "a.exr", "errors.png", "--layer", "StdError", "--false-colours")
-        self.assertEqual((self.path / "errors.png").read_bytes()[16:24], bytes([0, 0, 0, width, 0, 0, 0, height + 17]))
+        told = self.good("convert", "a.exr", "errors.png", "--layer", "StdError", "--false-colours").stderr
+        self.assertRegex(told, r"^errors.png: [\d.e-]+ black, .* pale yellow \(logarithmic\)\n$")
+        self.assertEqual((self.path / "errors.png").read_bytes()[16:24], bytes([0, 0, 0, width, 0, 0, 0, height]))
 
     def test_intervals_of_all_kinds(self):
         for name, options in (("mean", ("--estimator", "none", "--groups", "12")), ("pair", ("--estimator", "iicv")),
