@@ -20,16 +20,11 @@
 namespace covary {
 namespace {
 
-class BumpMap final : public Bsdf {
+class BumpMap final : public PerturbingBsdf {
  public:
-  BumpMap(TexturePtr displacement, BsdfPtr nested, float scale, bool flip_invalid, bool shadow_terminator)
-      : displacement_(std::move(displacement)),
-        nested_(std::move(nested)),
-        scale_(scale),
-        flip_invalid_(flip_invalid),
-        shadow_terminator_(shadow_terminator) {}
+  BumpMap(TexturePtr displacement, BsdfPtr nested, Parameters& p)
+      : PerturbingBsdf(std::move(nested), p), displacement_(std::move(displacement)), scale_(p.get_float("scale", 1)) {}
 
-  uint32_t flags() const override { return nested_->flags(); }
   const BsdfClosure* bind(const SurfaceHit& hit, bool wo_front, TransportMode mode, Arena& arena) const override {
     const PerturbedModel model = PerturbedModel::bind(*nested_, flip_invalid_, hit, wo_front, mode, arena);
     const Vec2 gradient = displacement_->grad_1(hit) * scale_;
@@ -41,23 +36,15 @@ class BumpMap final : public Bsdf {
     if (dot(hit.frame.to_local(hit.ng), n) < 0) n = -n;
     return make_perturbed(model, {n, tangent, flip_invalid_, shadow_terminator_}, mode, arena);
   }
-  bool depends_on_side() const override { return nested_->depends_on_side(); }
-  bool needs_derivatives() const override { return true; }
-  Spectrum albedo(const SurfaceHit& hit) const override { return nested_->albedo(hit); }
 
  private:
   TexturePtr displacement_;
-  BsdfPtr nested_;
   float scale_;
-  bool flip_invalid_, shadow_terminator_;
 };
 
 }  // namespace
 
 std::shared_ptr<Bsdf> make_bumpmap(Parameters& parameters) {
-  const float scale = parameters.get_float("scale", 1);
-  const bool flip_invalid = parameters.get_bool("flip_invalid_normals", true);
-  const bool shadow_terminator = parameters.get_bool("use_shadowing_function", true);
   size_t n_textures = 0;
   for (const Property& property : parameters.object().properties)
     if (const ObjectPtr* object = std::get_if<ObjectPtr>(&property.value))
@@ -65,8 +52,9 @@ std::shared_ptr<Bsdf> make_bumpmap(Parameters& parameters) {
   const std::vector<TexturePtr> textures = parameters.children<Texture>("texture");
   const std::vector<BsdfPtr> nested = get_nested_bsdfs(parameters, 1, 1);
   if (n_textures != 1) parameters.error(fmt::format("has {} nested textures; it takes exactly 1", n_textures));
-  if (n_textures != 1 || textures.empty() || nested.empty()) return nullptr;
-  return std::make_shared<BumpMap>(textures[0], nested[0], scale, flip_invalid, shadow_terminator);
+  auto made = std::make_shared<BumpMap>(textures.empty() ? nullptr : textures[0], nested.empty() ? nullptr : nested[0],
+                                        parameters);
+  return n_textures != 1 || textures.empty() || nested.empty() ? nullptr : made;
 }
 
 }  // namespace covary

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Two lobes on the side of the normal: the reflection of a rough coating, and a diffuse base below it.
+// Two lobes on the side of the normal: the reflection of a coating, and a diffuse base below it.
 #pragma once
 
 #include "bsdfs/roughness.h"
@@ -8,8 +8,28 @@
 
 namespace covary {
 
-/// Closure of such a model. `Model` derives from it and has eval() and specular_pmf(cosine of wo), the probability of
-/// the coating's lobe.
+/// Such a model, with its colours.
+class CoatedBsdf : public Bsdf {
+ public:
+  const Texture* main_texture() const final { return diffuse_.texture(); }
+  Spectrum albedo(const SurfaceHit& hit) const final { return clamp01(diffuse_.eval(hit)); }
+
+ protected:
+  explicit CoatedBsdf(Parameters& p)
+      : diffuse_(p, "diffuse_reflectance", 0.5f), specular_(p, "specular_reflectance", 1) {
+    const float sum = diffuse_.mean() + specular_.mean();
+    specular_weight_ = sum > 0 ? specular_.mean() / sum : 0.5f;
+  }
+  /// The index of a rough coating must differ from 1.
+  static void check_index(float eta, Parameters& p) {
+    if (eta == 1) p.error("'int_ior' and 'ext_ior' are equal; they must differ");
+  }
+  ColourInput diffuse_, specular_;
+  float specular_weight_;
+};
+
+/// Closure of a model with a rough coating. `Model` derives from it and has eval() and specular_pmf(cosine of wo), the
+/// probability of the coating's lobe.
 template <typename Model>
 class CoatedClosure : public BsdfClosure {
  public:

@@ -37,7 +37,7 @@ class ConductorClosure final : public BsdfClosure {
 
 class Conductor final : public Bsdf {
  public:
-  Conductor(ConductorInput index, ColourInput scale) : index_(std::move(index)), scale_(std::move(scale)) {}
+  explicit Conductor(Parameters& p) : index_(get_conductor(p)), scale_(p, "specular_reflectance", 1) {}
 
   uint32_t flags() const override { return kDeltaReflection; }
   const BsdfClosure* bind(const SurfaceHit& hit, bool, TransportMode, Arena& arena) const override {
@@ -55,10 +55,6 @@ class Conductor final : public Bsdf {
 
 }  // namespace
 
-std::shared_ptr<Bsdf> make_conductor(Parameters& parameters) {
-  ConductorInput index = get_conductor(parameters);
-  return std::make_shared<Conductor>(std::move(index),
-                                     ColourInput(parameters.get_texture("specular_reflectance", Spectrum(1))));
-}
+std::shared_ptr<Bsdf> make_conductor(Parameters& parameters) { return std::make_shared<Conductor>(parameters); }
 
 }  // namespace covary

@@ -91,8 +91,8 @@ class Smooth final : public Bsdf {
  public:
   explicit Smooth(Parameters& parameters)
       : eta_(get_relative_ior(parameters, "bk7")),
-        reflectance_(parameters.get_texture("specular_reflectance", Spectrum(1))),
-        transmittance_(parameters.get_texture("specular_transmittance", Spectrum(1))) {}
+        reflectance_(parameters, "specular_reflectance", 1),
+        transmittance_(parameters, "specular_transmittance", 1) {}
 
   uint32_t flags() const override { return Closure::kFlags; }
   const BsdfClosure* bind(const SurfaceHit& hit, bool, TransportMode mode, Arena& arena) const override {

@@ -45,8 +45,8 @@ class DiffuseClosure final : public BsdfClosure {
 
 class Diffuse final : public Bsdf, public MaybeLambertian {
  public:
-  explicit Diffuse(ColourInput reflectance)
-      : reflectance_(std::move(reflectance)),
+  explicit Diffuse(Parameters& p)
+      : reflectance_(p, "reflectance", 0.5f),
         constant_(reflectance_.constant()),
         lambertian_{reflectance_.constant()} {}
 
@@ -67,8 +67,6 @@ class Diffuse final : public Bsdf, public MaybeLambertian {
 
 }  // namespace
 
-std::shared_ptr<Bsdf> make_diffuse(Parameters& parameters) {
-  return std::make_shared<Diffuse>(ColourInput(parameters.get_texture("reflectance", Spectrum(0.5f))));
-}
+std::shared_ptr<Bsdf> make_diffuse(Parameters& parameters) { return std::make_shared<Diffuse>(parameters); }
 
 }  // namespace covary

@@ -14,6 +14,8 @@ namespace covary {
 /// A colour parameter, looked up once when it does not depend on the point.
 class ColourInput {
  public:
+  ColourInput(Parameters& parameters, const std::string& name, float fallback)
+      : ColourInput(parameters.get_texture(name, Spectrum(fallback))) {}
   explicit ColourInput(TexturePtr texture) : texture_(std::move(texture)) {
     mean_ = texture_->mean();
     if (texture_->is_constant()) value_ = texture_->eval(SurfaceHit{}), texture_ = nullptr;

@@ -16,15 +16,11 @@
 namespace covary {
 namespace {
 
-class NormalMap final : public Bsdf {
+class NormalMap final : public PerturbingBsdf {
  public:
-  NormalMap(TexturePtr normals, BsdfPtr nested, bool flip_invalid, bool shadow_terminator)
-      : normals_(std::move(normals)),
-        nested_(std::move(nested)),
-        flip_invalid_(flip_invalid),
-        shadow_terminator_(shadow_terminator) {}
+  NormalMap(TexturePtr normals, BsdfPtr nested, Parameters& p)
+      : PerturbingBsdf(std::move(nested), p), normals_(std::move(normals)) {}
 
-  uint32_t flags() const override { return nested_->flags(); }
   const BsdfClosure* bind(const SurfaceHit& hit, bool wo_front, TransportMode mode, Arena& arena) const override {
     const PerturbedModel model = PerturbedModel::bind(*nested_, flip_invalid_, hit, wo_front, mode, arena);
     const Spectrum c = normals_->eval(hit);
@@ -35,14 +31,9 @@ class NormalMap final : public Bsdf {
     const Frame uv = Frame::from_tangent({0, 0, 1}, hit.frame.to_local(hit.dp_du));
     return make_perturbed(model, {uv.to_world(stored * (1 / l)), uv.s, flip_invalid_, shadow_terminator_}, mode, arena);
   }
-  bool depends_on_side() const override { return nested_->depends_on_side(); }
-  bool needs_derivatives() const override { return true; }
-  Spectrum albedo(const SurfaceHit& hit) const override { return nested_->albedo(hit); }
 
  private:
   TexturePtr normals_;
-  BsdfPtr nested_;
-  bool flip_invalid_, shadow_terminator_;
 };
 
 }  // namespace
@@ -50,11 +41,9 @@ class NormalMap final : public Bsdf {
 std::shared_ptr<Bsdf> make_normalmap(Parameters& parameters) {
   const TexturePtr normals = parameters.find_texture("normalmap");
   if (!normals && !parameters.has("normalmap")) parameters.error("the texture 'normalmap' is missing");
-  const bool flip_invalid = parameters.get_bool("flip_invalid_normals", true);
-  const bool shadow_terminator = parameters.get_bool("use_shadowing_function", true);
   const std::vector<BsdfPtr> nested = get_nested_bsdfs(parameters, 1, 1);
-  if (nested.empty() || !normals) return nullptr;
-  return std::make_shared<NormalMap>(normals, nested[0], flip_invalid, shadow_terminator);
+  auto made = std::make_shared<NormalMap>(normals, nested.empty() ? nullptr : nested[0], parameters);
+  return nested.empty() || !normals ? nullptr : made;
 }
 
 }  // namespace covary

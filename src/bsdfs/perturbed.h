@@ -2,7 +2,7 @@
 // A model whose shading normal is perturbed, for bump and normal maps.
 #pragma once
 
-#include "scene/bsdf.h"
+#include "bsdfs/inputs.h"
 
 namespace covary {
 
@@ -41,5 +41,23 @@ struct PerturbedModel {
 /// carry no importance, and the densities of the light's side (reverse_pdf, reverse_pmf) are 0.
 const BsdfClosure* make_perturbed(const PerturbedModel& model, const Perturbation& perturbation, TransportMode mode,
                                   Arena& arena);
+
+/// A model around another one, whose normal it perturbs as its parameters say.
+class PerturbingBsdf : public Bsdf {
+ public:
+  uint32_t flags() const final { return nested_->flags(); }
+  bool depends_on_side() const final { return nested_->depends_on_side(); }
+  bool needs_derivatives() const final { return true; }
+  Spectrum albedo(const SurfaceHit& hit) const final { return nested_->albedo(hit); }
+
+ protected:
+  PerturbingBsdf(BsdfPtr nested, Parameters& p)
+      : nested_(std::move(nested)),
+        flip_invalid_(p.get_bool("flip_invalid_normals", true)),
+        shadow_terminator_(p.get_bool("use_shadowing_function", true)) {}
+
+  BsdfPtr nested_;
+  bool flip_invalid_, shadow_terminator_;
+};
 
 }  // namespace covary

@@ -13,10 +13,9 @@
 // mean internal reflectance Fi and scatters again. Summing the bounces (a geometric series):
 //     f_diffuse = (1 - F(wi)) (1 - F(wo)) rho / (pi eta^2 (1 - rho Fi))
 // Without `nonlinear` the denominator has Fi in place of rho Fi, which keeps the hue of textures.
+#include "bsdfs/coated.h"
 #include "bsdfs/fresnel.h"
-#include "bsdfs/inputs.h"
 #include "bsdfs/registry.h"
-#include "core/warp.h"
 
 namespace covary {
 namespace {
@@ -71,17 +70,13 @@ class PlasticClosure final : public BsdfClosure {
   Spectrum base_, specular_;
 };
 
-class Plastic final : public Bsdf {
+class Plastic final : public CoatedBsdf {
  public:
-  Plastic(float eta, bool nonlinear, ColourInput diffuse, ColourInput specular)
-      : eta_(eta),
-        internal_reflectance_(fresnel_diffuse_reflectance(1 / eta)),
-        nonlinear_(nonlinear),
-        diffuse_(std::move(diffuse)),
-        specular_(std::move(specular)) {
-    const float sum = diffuse_.mean() + specular_.mean();
-    specular_weight_ = sum > 0 ? specular_.mean() / sum : 0.5f;
-  }
+  explicit Plastic(Parameters& p)
+      : CoatedBsdf(p),
+        eta_(get_relative_ior(p, "polypropylene")),
+        internal_reflectance_(fresnel_diffuse_reflectance(1 / eta_)),
+        nonlinear_(p.get_bool("nonlinear", false)) {}
 
   uint32_t flags() const override { return kDeltaReflection | kDiffuseReflection; }
   const BsdfClosure* bind(const SurfaceHit& hit, bool, TransportMode, Arena& arena) const override {
@@ -90,23 +85,14 @@ class Plastic final : public Bsdf {
     const Spectrum base = rho / ((Spectrum(1) - trapped) * sqr(eta_));
     return arena.make<PlasticClosure>(eta_, specular_weight_, base, specular_.eval(hit));
   }
-  const Texture* main_texture() const override { return diffuse_.texture(); }
-  Spectrum albedo(const SurfaceHit& hit) const override { return clamp01(diffuse_.eval(hit)); }
 
  private:
-  float eta_, internal_reflectance_, specular_weight_;
+  float eta_, internal_reflectance_;
   bool nonlinear_;
-  ColourInput diffuse_, specular_;
 };
 
 }  // namespace
 
-std::shared_ptr<Bsdf> make_plastic(Parameters& parameters) {
-  const float eta = get_relative_ior(parameters, "polypropylene");
-  const bool nonlinear = parameters.get_bool("nonlinear", false);
-  ColourInput diffuse(parameters.get_texture("diffuse_reflectance", Spectrum(0.5f)));
-  return std::make_shared<Plastic>(eta, nonlinear, std::move(diffuse),
-                                   ColourInput(parameters.get_texture("specular_reflectance", Spectrum(1))));
-}
+std::shared_ptr<Bsdf> make_plastic(Parameters& parameters) { return std::make_shared<Plastic>(parameters); }
 
 }  // namespace covary

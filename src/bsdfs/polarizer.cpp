@@ -35,7 +35,7 @@ class FilterClosure final : public BsdfClosure {
 
 class Filter final : public Bsdf {
  public:
-  Filter(float factor, ColourInput transmittance) : factor_(factor), transmittance_(std::move(transmittance)) {}
+  Filter(float factor, Parameters& p) : factor_(factor), transmittance_(p, "transmittance", 1) {}
   uint32_t flags() const override { return kNullTransmission; }
   const BsdfClosure* bind(const SurfaceHit& hit, bool, TransportMode, Arena& arena) const override {
     return arena.make<FilterClosure>(transmittance_.eval(hit) * factor_);
@@ -47,27 +47,23 @@ class Filter final : public Bsdf {
   ColourInput transmittance_;
 };
 
-std::shared_ptr<Bsdf> make_filter(Parameters& parameters, float factor) {
-  return std::make_shared<Filter>(factor, ColourInput(parameters.get_texture("transmittance", Spectrum(1))));
-}
-
 }  // namespace
 
 std::shared_ptr<Bsdf> make_polarizer(Parameters& parameters) {
   parameters.find_texture("theta", SpectrumRole::kEmission);
   parameters.get_bool("polarizing", true);
-  return make_filter(parameters, 0.5f);
+  return std::make_shared<Filter>(0.5f, parameters);
 }
 
 std::shared_ptr<Bsdf> make_circular(Parameters& parameters) {
   parameters.get_bool("left_handed", false);
-  return make_filter(parameters, 0.5f);
+  return std::make_shared<Filter>(0.5f, parameters);
 }
 
 std::shared_ptr<Bsdf> make_retarder(Parameters& parameters) {
   parameters.find_texture("theta", SpectrumRole::kEmission);
   parameters.find_texture("delta", SpectrumRole::kEmission);
-  return make_filter(parameters, 1);
+  return std::make_shared<Filter>(1.0f, parameters);
 }
 
 }  // namespace covary

@@ -46,12 +46,16 @@ class PPlasticClosure final : public CoatedClosure<PPlasticClosure> {
   Spectrum base_, specular_;
 };
 
-class PPlastic final : public Bsdf {
+class PPlastic final : public CoatedBsdf {
  public:
-  PPlastic(RoughnessInput roughness, float eta, ColourInput diffuse, ColourInput specular)
-      : roughness_(std::move(roughness)), eta_(eta), diffuse_(std::move(diffuse)), specular_(std::move(specular)) {
-    const float sum = diffuse_.mean() + specular_.mean();
-    specular_weight_ = sum > 0 ? specular_.mean() / sum : 0.5f;
+  explicit PPlastic(Parameters& p)
+      : CoatedBsdf(p),
+        roughness_(get_roughness(p)),
+        eta_(p.has("eta") ? p.get_float("eta", 1.5f, 1e-3f, 100) : get_relative_ior(p, "polypropylene")) {
+    if (eta_ == 1 && p.has("eta"))
+      p.error("'eta' is 1; it must not be");
+    else
+      check_index(eta_, p);
   }
 
   uint32_t flags() const override { return kGlossyReflection | kDiffuseReflection; }
@@ -60,29 +64,14 @@ class PPlastic final : public Bsdf {
                                        specular_.eval(hit));
   }
   bool needs_derivatives() const override { return roughness_.anisotropic; }
-  const Texture* main_texture() const override { return diffuse_.texture(); }
-  Spectrum albedo(const SurfaceHit& hit) const override { return clamp01(diffuse_.eval(hit)); }
 
  private:
   RoughnessInput roughness_;
-  float eta_, specular_weight_;
-  ColourInput diffuse_, specular_;
+  float eta_;
 };
 
 }  // namespace
 
-std::shared_ptr<Bsdf> make_pplastic(Parameters& parameters) {
-  RoughnessInput roughness = get_roughness(parameters);
-  const bool relative = parameters.has("eta");
-  const float eta =
-      relative ? parameters.get_float("eta", 1.5f, 1e-3f, 100) : get_relative_ior(parameters, "polypropylene");
-  ColourInput diffuse(parameters.get_texture("diffuse_reflectance", Spectrum(0.5f)));
-  ColourInput specular(parameters.get_texture("specular_reflectance", Spectrum(1)));
-  if (eta == 1) {
-    parameters.error(relative ? "'eta' is 1; it must not be" : "'int_ior' and 'ext_ior' are equal; they must differ");
-    return nullptr;
-  }
-  return std::make_shared<PPlastic>(std::move(roughness), eta, std::move(diffuse), std::move(specular));
-}
+std::shared_ptr<Bsdf> make_pplastic(Parameters& parameters) { return std::make_shared<PPlastic>(parameters); }
 
 }  // namespace covary

@@ -52,12 +52,15 @@ class Gtr1 {
   float alpha2_, scale_;
 };
 
-/// The parameters at one point.
-struct PrincipledPoint {
-  Spectrum base_color;
-  float roughness, anisotropic, metallic, spec_trans, spec_tint, sheen, sheen_tint, flatness, clearcoat,
+/// The parameters: as inputs, or at one point.
+template <typename Colour, typename Number>
+struct PrincipledParameters {
+  Colour base_color;
+  Number roughness, anisotropic, metallic, spec_trans, spec_tint, sheen, sheen_tint, flatness, clearcoat,
       clearcoat_gloss;
 };
+using PrincipledInputs = PrincipledParameters<ColourInput, NumberInput>;
+using PrincipledPoint = PrincipledParameters<Spectrum, float>;
 
 struct PrincipledSettings {
   float eta, diffuse_rate, specular_rate, clearcoat_rate;
@@ -258,12 +261,7 @@ class PrincipledClosure final : public BsdfClosure {
 
 class Principled final : public Bsdf {
  public:
-  struct Inputs {
-    ColourInput base_color;
-    NumberInput roughness, anisotropic, metallic, spec_trans, spec_tint, sheen, sheen_tint, flatness, clearcoat,
-        clearcoat_gloss;
-  };
-  Principled(Inputs inputs, const PrincipledSettings& settings)
+  Principled(PrincipledInputs inputs, const PrincipledSettings& settings)
       : in_(std::move(inputs)),
         settings_(settings),
         anisotropic_(!in_.anisotropic.is_constant() || in_.anisotropic.constant() > 0),
@@ -300,7 +298,7 @@ class Principled final : public Bsdf {
 
   PrincipledPoint constant_point() const { return constant_ ? point({}) : PrincipledPoint{}; }
 
-  Inputs in_;
+  PrincipledInputs in_;
   PrincipledSettings settings_;
   bool anisotropic_, refracts_, constant_;
   PrincipledClosure constant_closures_[2];
@@ -321,17 +319,18 @@ float get_eta(Parameters& parameters, bool refracts) {
 }  // namespace
 
 std::shared_ptr<Bsdf> make_principled(Parameters& parameters) {
-  Principled::Inputs in{ColourInput(parameters.get_texture("base_color", Spectrum(0.5f))),
-                        get_fraction(parameters, "roughness", 0.5f),
-                        get_fraction(parameters, "anisotropic", 0),
-                        get_fraction(parameters, "metallic", 0),
-                        get_fraction(parameters, "spec_trans", 0),
-                        get_fraction(parameters, "spec_tint", 0),
-                        get_fraction(parameters, "sheen", 0),
-                        get_fraction(parameters, "sheen_tint", 0),
-                        get_fraction(parameters, "flatness", 0),
-                        get_fraction(parameters, "clearcoat", 0),
-                        get_fraction(parameters, "clearcoat_gloss", 0)};
+  const auto fraction = [&](const char* name, float fallback = 0) { return get_fraction(parameters, name, fallback); };
+  PrincipledInputs in{ColourInput(parameters, "base_color", 0.5f),
+                      fraction("roughness", 0.5f),
+                      fraction("anisotropic"),
+                      fraction("metallic"),
+                      fraction("spec_trans"),
+                      fraction("spec_tint"),
+                      fraction("sheen"),
+                      fraction("sheen_tint"),
+                      fraction("flatness"),
+                      fraction("clearcoat"),
+                      fraction("clearcoat_gloss")};
   const bool refracts = !in.spec_trans.is_constant() || in.spec_trans.constant() > 0;
   const auto rate = [&](const char* name) { return parameters.get_float(name, 1, 0, 1e6f); };
   const PrincipledSettings settings{get_eta(parameters, refracts), rate("diffuse_reflectance_sampling_rate"),

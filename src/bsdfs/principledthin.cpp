@@ -27,10 +27,14 @@
 namespace covary {
 namespace {
 
-struct ThinPoint {
-  Spectrum base_color;
-  float roughness, anisotropic, spec_trans, eta, spec_tint, sheen, sheen_tint, flatness, diff_trans;
+/// The parameters: as inputs, or at one point.
+template <typename Colour, typename Number>
+struct ThinParameters {
+  Colour base_color;
+  Number roughness, anisotropic, spec_trans, eta, spec_tint, sheen, sheen_tint, flatness, diff_trans;
 };
+using ThinInputs = ThinParameters<ColourInput, NumberInput>;
+using ThinPoint = ThinParameters<Spectrum, float>;
 
 struct ThinRates {
   float specular_reflection, specular_transmission, diffuse_reflection, diffuse_transmission;
@@ -178,11 +182,7 @@ class ThinClosure final : public BsdfClosure {
 
 class PrincipledThin final : public Bsdf {
  public:
-  struct Inputs {
-    ColourInput base_color;
-    NumberInput roughness, anisotropic, spec_trans, eta, spec_tint, sheen, sheen_tint, flatness, diff_trans;
-  };
-  PrincipledThin(Inputs inputs, const ThinRates& rates) : in_(std::move(inputs)), rates_(rates) {
+  PrincipledThin(ThinInputs inputs, const ThinRates& rates) : in_(std::move(inputs)), rates_(rates) {
     const auto may_exceed_0 = [](const NumberInput& n) { return !n.is_constant() || n.constant() > 0; };
     anisotropic_ = may_exceed_0(in_.anisotropic);
     flags_ = kDiffuseReflection | (may_exceed_0(in_.diff_trans) ? uint32_t{kDiffuseTransmission} : 0u) |
@@ -208,7 +208,7 @@ class PrincipledThin final : public Bsdf {
   Spectrum albedo(const SurfaceHit& hit) const override { return clamp01(in_.base_color.eval(hit)); }
 
  private:
-  Inputs in_;
+  ThinInputs in_;
   ThinRates rates_;
   uint32_t flags_;
   bool anisotropic_;
@@ -217,16 +217,17 @@ class PrincipledThin final : public Bsdf {
 }  // namespace
 
 std::shared_ptr<Bsdf> make_principledthin(Parameters& parameters) {
-  PrincipledThin::Inputs in{ColourInput(parameters.get_texture("base_color", Spectrum(0.5f))),
-                            get_fraction(parameters, "roughness", 0.5f),
-                            get_fraction(parameters, "anisotropic", 0),
-                            get_fraction(parameters, "spec_trans", 0),
-                            NumberInput(parameters.get_texture("eta", 1.5f)),
-                            get_fraction(parameters, "spec_tint", 0),
-                            get_fraction(parameters, "sheen", 0),
-                            get_fraction(parameters, "sheen_tint", 0),
-                            get_fraction(parameters, "flatness", 0),
-                            get_fraction(parameters, "diff_trans", 0, 2)};
+  const auto fraction = [&](const char* name, float fallback = 0) { return get_fraction(parameters, name, fallback); };
+  ThinInputs in{ColourInput(parameters, "base_color", 0.5f),
+                fraction("roughness", 0.5f),
+                fraction("anisotropic"),
+                fraction("spec_trans"),
+                NumberInput(parameters.get_texture("eta", 1.5f)),
+                fraction("spec_tint"),
+                fraction("sheen"),
+                fraction("sheen_tint"),
+                fraction("flatness"),
+                get_fraction(parameters, "diff_trans", 0, 2)};
   if (in.eta.is_constant() && !(in.eta.constant() >= 0.01f && in.eta.constant() <= 100))
     parameters.error_at("eta", fmt::format("is {}; accepted: a number in [0.01, 100]", in.eta.constant()));
   const auto rate = [&](const char* name) { return parameters.get_float(name, 1, 0, 1e6f); };

@@ -60,8 +60,8 @@ class RoughConductorClosure final : public BsdfClosure {
 
 class RoughConductor final : public Bsdf {
  public:
-  RoughConductor(RoughnessInput roughness, ConductorInput index, ColourInput scale)
-      : roughness_(std::move(roughness)), index_(std::move(index)), scale_(std::move(scale)) {}
+  explicit RoughConductor(Parameters& p)
+      : roughness_(get_roughness(p)), index_(get_conductor(p)), scale_(p, "specular_reflectance", 1) {}
 
   uint32_t flags() const override { return kGlossyReflection; }
   const BsdfClosure* bind(const SurfaceHit& hit, bool, TransportMode, Arena& arena) const override {
@@ -83,10 +83,7 @@ class RoughConductor final : public Bsdf {
 }  // namespace
 
 std::shared_ptr<Bsdf> make_roughconductor(Parameters& parameters) {
-  RoughnessInput roughness = get_roughness(parameters);
-  ConductorInput index = get_conductor(parameters);
-  return std::make_shared<RoughConductor>(std::move(roughness), std::move(index),
-                                          ColourInput(parameters.get_texture("specular_reflectance", Spectrum(1))));
+  return std::make_shared<RoughConductor>(parameters);
 }
 
 }  // namespace covary

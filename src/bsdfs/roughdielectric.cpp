@@ -99,11 +99,13 @@ class RoughDielectricClosure final : public BsdfClosure {
 
 class RoughDielectric final : public Bsdf {
  public:
-  RoughDielectric(RoughnessInput roughness, float eta, ColourInput reflectance, ColourInput transmittance)
-      : roughness_(std::move(roughness)),
-        eta_(eta),
-        reflectance_(std::move(reflectance)),
-        transmittance_(std::move(transmittance)) {}
+  explicit RoughDielectric(Parameters& p)
+      : roughness_(get_roughness(p)),
+        eta_(get_relative_ior(p, "bk7")),
+        reflectance_(p, "specular_reflectance", 1),
+        transmittance_(p, "specular_transmittance", 1) {
+    if (eta_ == 1) p.error("'int_ior' and 'ext_ior' are equal; they must differ");
+  }
 
   uint32_t flags() const override { return kFlags; }
   const BsdfClosure* bind(const SurfaceHit& hit, bool, TransportMode mode, Arena& arena) const override {
@@ -126,15 +128,7 @@ class RoughDielectric final : public Bsdf {
 }  // namespace
 
 std::shared_ptr<Bsdf> make_roughdielectric(Parameters& parameters) {
-  RoughnessInput roughness = get_roughness(parameters);
-  const float eta = get_relative_ior(parameters, "bk7");
-  if (eta == 1) {
-    parameters.error("'int_ior' and 'ext_ior' are equal; they must differ");
-    return nullptr;
-  }
-  return std::make_shared<RoughDielectric>(std::move(roughness), eta,
-                                           ColourInput(parameters.get_texture("specular_reflectance", Spectrum(1))),
-                                           ColourInput(parameters.get_texture("specular_transmittance", Spectrum(1))));
+  return std::make_shared<RoughDielectric>(parameters);
 }
 
 }  // namespace covary

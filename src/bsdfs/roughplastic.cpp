@@ -144,17 +144,15 @@ class RoughPlasticClosure final : public CoatedClosure<RoughPlasticClosure> {
   Spectrum base_, specular_;
 };
 
-class RoughPlastic final : public Bsdf {
+class RoughPlastic final : public CoatedBsdf {
  public:
-  RoughPlastic(const RoughSurface& surface, float eta, bool nonlinear, ColourInput diffuse, ColourInput specular)
-      : surface_(surface),
-        transmittance_(shared_transmittance(surface.normals, eta)),
-        eta_(eta),
-        nonlinear_(nonlinear),
-        diffuse_(std::move(diffuse)),
-        specular_(std::move(specular)) {
-    const float sum = diffuse_.mean() + specular_.mean();
-    specular_weight_ = sum > 0 ? specular_.mean() / sum : 0.5f;
+  RoughPlastic(const RoughnessInput& roughness, Parameters& p)
+      : CoatedBsdf(p),
+        surface_(roughness.eval({})),
+        eta_(get_relative_ior(p, "polypropylene")),
+        nonlinear_(p.get_bool("nonlinear", false)) {
+    check_index(eta_, p);
+    if (eta_ != 1) transmittance_ = shared_transmittance(surface_.normals, eta_);
   }
 
   uint32_t flags() const override { return kGlossyReflection | kDiffuseReflection; }
@@ -166,34 +164,21 @@ class RoughPlastic final : public Bsdf {
     return arena.make<RoughPlasticClosure>(surface_, *transmittance_, eta_, specular_weight_, base,
                                            specular_.eval(hit));
   }
-  const Texture* main_texture() const override { return diffuse_.texture(); }
-  Spectrum albedo(const SurfaceHit& hit) const override { return clamp01(diffuse_.eval(hit)); }
 
  private:
   RoughSurface surface_;
   std::shared_ptr<const RoughTransmittance> transmittance_;
-  float eta_, specular_weight_;
+  float eta_;
   bool nonlinear_;
-  ColourInput diffuse_, specular_;
 };
 
 }  // namespace
 
 std::shared_ptr<Bsdf> make_roughplastic(Parameters& parameters) {
   const RoughnessInput roughness = get_roughness(parameters);
-  const float eta = get_relative_ior(parameters, "polypropylene");
-  const bool nonlinear = parameters.get_bool("nonlinear", false);
-  ColourInput diffuse(parameters.get_texture("diffuse_reflectance", Spectrum(0.5f)));
-  ColourInput specular(parameters.get_texture("specular_reflectance", Spectrum(1)));
-  if (roughness.anisotropic || !roughness.alpha_u.is_constant()) {
+  if (roughness.anisotropic || !roughness.alpha_u.is_constant())
     parameters.error_at(roughness.anisotropic ? "alpha_u" : "alpha", "is not one number; accepted: one number 'alpha'");
-    return nullptr;
-  }
-  if (eta == 1) {
-    parameters.error("'int_ior' and 'ext_ior' are equal; they must differ");
-    return nullptr;
-  }
-  return std::make_shared<RoughPlastic>(roughness.eval({}), eta, nonlinear, std::move(diffuse), std::move(specular));
+  return std::make_shared<RoughPlastic>(roughness, parameters);
 }
 
 }  // namespace covary
