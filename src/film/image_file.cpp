@@ -33,22 +33,33 @@ constexpr std::array kSuffixes = {std::array{"r", "g", "b"}, std::array{"red", "
 /// What they call the picture among their layers, in small letters (docs/other-renderers.md).
 constexpr std::array kPictures = {"combined", "ci", "c", "rgba", "rgb", "beauty"};
 
+using Suffixes = std::array<const char*, 3>;
+
+/// The channels of `layer` that end so, in small letters; empty where one is missing.
+std::vector<std::string> channels_that_end(const std::vector<ExrFile::Channel>& channels, const std::string& layer,
+                                           const Suffixes& suffixes) {
+  const std::string prefix = layer.empty() ? "" : layer + ".";
+  std::vector<std::string> names;
+  for (const char* suffix : suffixes) {
+    const auto ends_so = [&](const ExrFile::Channel& c) {
+      return c.name.starts_with(prefix) && lower(c.name.substr(prefix.size())) == suffix;
+    };
+    const auto found = std::find_if(channels.begin(), channels.end(), ends_so);
+    if (found == channels.end()) return {};
+    names.push_back(found->name);
+  }
+  return names;
+}
+
 /// The channels of `layer` when it has three that belong together, or one of luminance; empty when not.
 std::vector<std::string> find_layer(const std::vector<ExrFile::Channel>& channels, const std::string& layer) {
-  const std::string prefix = layer.empty() ? "" : layer + ".";
-  const auto find = [&](const std::string& suffix) {
-    for (const ExrFile::Channel& c : channels)
-      if (c.name.starts_with(prefix) && lower(c.name.substr(prefix.size())) == suffix) return c.name;
-    return std::string();
-  };
-  for (const auto& suffixes : {kSuffixes[0], kSuffixes[1], std::array{"x", "y", "z"}}) {
-    std::vector<std::string> names{find(suffixes[0]), find(suffixes[1]), find(suffixes[2])};
-    // X Y Z without a layer would be a colour space, not the components of a vector.
-    if (!names[0].empty() && !names[1].empty() && !names[2].empty() && (suffixes[0][0] == 'r' || !layer.empty()))
-      return names;
-  }
-  const std::string grey = find("y");
-  return grey.empty() ? std::vector<std::string>{} : std::vector{grey, grey, grey};
+  std::vector<Suffixes> accepted(kSuffixes.begin(), kSuffixes.end());
+  // X Y Z without a layer would be a colour space, not the components of a vector.
+  if (!layer.empty()) accepted.push_back({"x", "y", "z"});
+  accepted.push_back({"y", "y", "y"});
+  for (const Suffixes& suffixes : accepted)
+    if (std::vector<std::string> names = channels_that_end(channels, layer, suffixes); !names.empty()) return names;
+  return {};
 }
 
 /// Channels by the layer they are of, and the layers' names in the file's order.
@@ -188,16 +199,9 @@ std::vector<ColourLayer> colour_layers(const std::vector<ExrFile::Channel>& chan
   const ChannelsByLayer by_layer(channels);
   std::vector<ColourLayer> layers;
   for (const std::string& name : by_layer.names)
-    for (const auto& suffixes : kSuffixes) {
-      ColourLayer layer{name, {}};
-      for (const ExrFile::Channel& c : by_layer.channels.at(name)) {
-        const std::string suffix = lower(std::string(last_part(c.name)));
-        const auto found = std::find(suffixes.begin(), suffixes.end(), suffix);
-        if (found != suffixes.end()) layer.channels[found - suffixes.begin()] = c.name;
-      }
-      const auto is_missing = [](const std::string& channel) { return channel.empty(); };
-      if (std::none_of(layer.channels.begin(), layer.channels.end(), is_missing)) layers.push_back(std::move(layer));
-    }
+    for (const Suffixes& suffixes : kSuffixes)
+      if (auto found = channels_that_end(by_layer.channels.at(name), name, suffixes); !found.empty())
+        layers.push_back({name, {found[0], found[1], found[2]}});
   return layers;
 }
 
