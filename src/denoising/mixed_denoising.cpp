@@ -171,7 +171,9 @@ MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<Candid
   Mixture& mixture = mixed.mixture;
   const std::array<const Image*, 2> images = {&mixture.halves[0], &mixture.halves[1]};
   const std::array<const Moments*, 2> independent = {&parts.halves[0].independent, &parts.halves[1].independent};
-  const Image place = disagreement(mixed.whole, guide_of(mixed.whole), mixture.image, valid);
+  Image place;
+  if (std_error || history.before || history.keep_samples)  // what asks for an error
+    place = disagreement(mixed.whole, guide_of(mixed.whole), mixture.image, valid);
   const HeldOutInput held_out{images, independent, &guide_of(mixed.whole), &valid, usual_error(makers), &place};
 
   MixedDenoising out;
