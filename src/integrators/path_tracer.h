@@ -140,9 +140,8 @@ class PathTracer final : public Integrator {
     void scatter_apart(int depth, uint32_t i) {
       LambertianBlock& block = batch.block;
       Path& path = batch.paths[i];
-      block.add(i, path.throughput, path.eta, batch.rays[i], batch.ray_hits[i],
-                *batch.meshes.find(scene, batch.rays[i], batch.ray_hits[i]), samples[path.sample].random,
-                kFirstSurfaceVertex + path.n_smooth++);
+      block.add(i, path.throughput, path.eta, batch.rays[i], batch.ray_hits[i], batch.meshes.at(batch.ray_hits[i]),
+                samples[path.sample].random, kFirstSurfaceVertex + path.n_smooth++);
       if (block.full()) finish_apart(depth);
     }
 

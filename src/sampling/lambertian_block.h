@@ -30,6 +30,8 @@ class LambertianMeshes {
     if (!known.asked) ask(scene, ray, hit, known);
     return known.surface.mesh ? &known.surface : nullptr;
   }
+  /// Of a hit for which find() was not null.
+  const LambertianMesh& at(const RayHit& hit) const { return known_[hit.geometry].surface; }
 
  private:
   struct Known {
