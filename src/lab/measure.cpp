@@ -20,10 +20,16 @@
 namespace covary::lab {
 namespace {
 
-/// Errors of one image that are kept: the rest costs less than reading them.
-struct ImageErrors {
-  double relmse_trimmed = kNone, mae = 0, flip = 0, above5 = 0, predicted_relmse = kNone, coverage = kNone;
-  std::array<double, 2> bounds = {kNone, kNone};
+/// Errors of a run's image that are kept in the cache: the rest costs less than reading them.
+constexpr std::pair<const char*, double RunResult::*> kKept[] = {
+    {"relmse_trimmed", &RunResult::relmse_trimmed},
+    {"mae", &RunResult::mae},
+    {"flip", &RunResult::flip},
+    {"above5", &RunResult::above5},
+    {"predicted_relmse", &RunResult::predicted_relmse},
+    {"coverage", &RunResult::coverage},
+    {"predicted_relmse_low", &RunResult::predicted_low},
+    {"predicted_relmse_high", &RunResult::predicted_high},
 };
 
 /// The standard errors in the file; empty where it has none, or where another layer is looked at.
@@ -67,46 +73,32 @@ double coverage(const Image& image, const Image& errors, const std::vector<Image
   return static_cast<double>(n_inside) / static_cast<double>(n);
 }
 
-/// What an image alone says of its relMSE; frames say it one by one.
-std::array<double, 2> bounds_of(const std::vector<std::string>& files) {
-  const auto none = ImageErrors().bounds;
-  return files.size() == 1 ? predicted_bounds(inspect_image(files[0])).value_or(none) : none;
-}
-
 double number_or_none(const nlohmann::json& json, const char* name) {
   return json.contains(name) && json[name].is_number() ? json[name].get<double>() : kNone;
 }
 
-ImageErrors image_errors(const Image& image, const std::string& path, const SceneInstance& scene,
-                         const std::vector<Image>& references, const Cache& cache, const std::string& key) {
+/// Sets what kKept lists.
+void measure_image(const Image& image, const SceneInstance& scene, const std::vector<Image>& references,
+                   const Cache& cache, const std::string& key, RunResult& run) {
   if (const std::optional<nlohmann::json> kept = cache.read_json("measures", key + ".json");
-      kept && kept->contains("predicted_relmse_low"))
-    return {number_or_none(*kept, "relmse_trimmed"),
-            number_or_none(*kept, "mae"),
-            number_or_none(*kept, "flip"),
-            number_or_none(*kept, "above5"),
-            number_or_none(*kept, "predicted_relmse"),
-            number_or_none(*kept, "coverage"),
-            {number_or_none(*kept, "predicted_relmse_low"), number_or_none(*kept, "predicted_relmse_high")}};
+      kept && kept->contains("predicted_relmse_low")) {
+    for (const auto& [name, member] : kKept) run.*member = number_or_none(*kept, name);
+    return;
+  }
+  const std::string& path = run.record.image;
   const Image std_error = standard_errors(path, scene);
   const auto error = [&](Metric metric) { return mean_metric(metric, image, references, scene); };
-  const ImageErrors errors{error(Metric::kRelMseTrimmed),
-                           error(Metric::kMae),
-                           error(Metric::kFlip),
-                           error(Metric::kAbove5),
-                           predicted_relmse(std_error, references),
-                           coverage(image, std_error, references),
-                           std_error.data.empty() ? ImageErrors().bounds : bounds_of(files_of(scene.frames, path))};
-  cache.write_json("measures", key + ".json",
-                   {{"relmse_trimmed", errors.relmse_trimmed},
-                    {"mae", errors.mae},
-                    {"flip", errors.flip},
-                    {"above5", errors.above5},
-                    {"predicted_relmse", errors.predicted_relmse},
-                    {"coverage", errors.coverage},
-                    {"predicted_relmse_low", errors.bounds[0]},
-                    {"predicted_relmse_high", errors.bounds[1]}});
-  return errors;
+  run.relmse_trimmed = error(Metric::kRelMseTrimmed);
+  run.mae = error(Metric::kMae), run.flip = error(Metric::kFlip), run.above5 = error(Metric::kAbove5);
+  run.predicted_relmse = predicted_relmse(std_error, references);
+  run.coverage = coverage(image, std_error, references);
+  // What an image alone says of its relMSE; frames say it one by one.
+  if (const std::vector<std::string> files = files_of(scene.frames, path); files.size() == 1 && !std_error.data.empty())
+    if (const auto bounds = predicted_bounds(inspect_image(files[0])))
+      run.predicted_low = (*bounds)[0], run.predicted_high = (*bounds)[1];
+  nlohmann::json kept;
+  for (const auto& [name, member] : kKept) kept[name] = run.*member;
+  cache.write_json("measures", key + ".json", kept);
 }
 
 void set_bounds(Cell& cell) {
@@ -288,14 +280,10 @@ void measure(Cell& cell, const SceneInstance& scene, const std::vector<Image>& r
     RunResult& run = cell.runs[s];
     images[s] = read_window(run.record.image, scene);
     const std::string key = key_text(run_keys[s] + " " + reference_key + scene.entry.layer);
-    const ImageErrors errors = image_errors(images[s], run.record.image, scene, references, cache, key);
-    run.relmse_trimmed = errors.relmse_trimmed, run.mae = errors.mae, run.flip = errors.flip,
-    run.above5 = errors.above5;
-    run.predicted_relmse = errors.predicted_relmse, run.coverage = errors.coverage;
+    measure_image(images[s], scene, references, cache, key, run);
     run.frames = frame_errors(images[s], references, scene);
     const SequenceSummary of_frames = summary_of(run.frames);
     run.temporal = of_frames.temporal, run.temporal_flip = of_frames.temporal_flip;
-    run.predicted_low = errors.bounds[0], run.predicted_high = errors.bounds[1];
   });
   cell.split = split_error(images, references);
   for (size_t s = 0; s < n; ++s) {
