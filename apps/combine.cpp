@@ -371,7 +371,7 @@ void add_combine(CLI::App& app) {
   add_options(*command, of_estimator, o->of_estimator);
   add_stages_option(*command, o->stages);
   add_threads_option(*command, o->threads);
-  command->add_option("--json", o->json, "File for statistics; '-': standard output")->type_name(kFileValue);
+  add_value(*command, "--json", o->json, kFileValue, "File for statistics; '-': standard output");
   command->add_flag("--quiet", o->quiet, "Warnings and errors only");
   add_frame_options(*command, o->of_frames, "With --denoise, combine");
   command->callback([o] { run(*o); });

@@ -13,6 +13,7 @@
 #include "commands.h"
 #include "compare_frames.h"
 #include "comparison_warnings.h"
+#include "declared_options.h"
 #include "film/image_rows.h"
 #include "film/image_writer.h"
 #include "film/outputs.h"
@@ -214,43 +215,31 @@ void compare(const CompareOptions& options) {
 void add_compare(CLI::App& app) {
   const auto o = std::make_shared<CompareOptions>();
   CLI::App* command = app.add_subcommand("compare", "Errors of images against a reference");
-  command
-      ->add_option("IMAGES", o->images,
-                   "Images (EXR, PNG, HDR, PFM, …), or frames (out_####.exr), whose changes are compared, too")
-      ->type_name(kFileValue)
+  add_value(*command, "IMAGES", o->images, kFileValue,
+            "Images (EXR, PNG, HDR, PFM, …), or frames (out_####.exr), whose changes are compared, too")
       ->required();
-  command->add_option("-r,--reference", o->reference, "The reference image, or ref_####.exr")
-      ->type_name(kFileValue)
-      ->required();
-  command
-      ->add_option("--reference2", o->reference2,
-                   "A second, independent reference: products (F - R1)(F - R2) cancel the references' noise")
-      ->type_name(kFileValue);
-  command
-      ->add_option("-m,--metric", o->metrics,
-                   "relmse, relmse-trimmed, mse, mae, mape, flip, above5; several separated by commas")
-      ->type_name("METRIC")
+  add_value(*command, "-r,--reference", o->reference, kFileValue, "The reference image, or ref_####.exr")->required();
+  add_value(*command, "--reference2", o->reference2, kFileValue,
+            "A second, independent reference: products (F - R1)(F - R2) cancel the references' noise");
+  add_value(*command, "-m,--metric", o->metrics, "METRIC",
+            "relmse, relmse-trimmed, mse, mae, mape, flip, above5; several separated by commas")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->capture_default_str();
-  command->add_option("--layer", o->layer, "Compare this layer (N, group03, …) instead of R G B")->type_name("LAYER");
+  add_value(*command, "--layer", o->layer, "LAYER", "Compare this layer (N, group03, …) instead of R G B");
   command
       ->add_option("--json", o->json, "One JSON object per image and line; to standard output without FILE or with -")
       ->expected(0, 1)
       ->type_name("[FILE]");
-  command->add_option("--error-map", o->error_map, "PNG of the first metric's error per pixel; its scale is printed")
-      ->type_name(kFileValue);
+  add_value(*command, "--error-map", o->error_map, kFileValue,
+            "PNG of the first metric's error per pixel; its scale is printed");
   command->add_option("--error-range", o->error_range, "LOW,HIGH: ends of the error map's scale")
       ->delimiter(',')
       ->expected(2)
       ->check(finite_number());
-  command->add_option("--frames", o->frames, "Only these frames of out_####.exr; default: all")
-      ->type_name("FIRST-LAST");
-  command
-      ->add_option(
-          "--baseline", o->baseline,
-          "A sequence (…_####.exr) that a second table is relative to, with the worst region of 32 x 32 pixels")
-      ->type_name(kFileValue);
+  add_value(*command, "--frames", o->frames, "FIRST-LAST", "Only these frames of out_####.exr; default: all");
+  add_value(*command, "--baseline", o->baseline, kFileValue,
+            "A sequence (…_####.exr) that a second table is relative to, with the worst region of 32 x 32 pixels");
   command->callback([o] { compare(*o); });
 }
 

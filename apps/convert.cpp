@@ -12,6 +12,7 @@
 
 #include "commands.h"
 #include "core/error.h"
+#include "declared_options.h"
 #include "film/image_writer.h"
 #include "film/output_file.h"
 #include "film/outputs.h"
@@ -180,20 +181,18 @@ void add_convert(CLI::App& app) {
   const auto o = std::make_shared<ConvertOptions>();
   CLI::App* command =
       app.add_subcommand("convert", "Convert images, or layers of films, to EXR, PNG, HDR, PFM, JPEG or TIFF");
-  command
-      ->add_option("FILES", o->files,
-                   "Images (EXR, HDR, PFM, …), put side by side, and last the output, whose name sets the format (.exr "
-                   ".pfm .tif: 32-bit linear, .hdr: linear, .png .jpg: 8-bit sRGB; .mp4 .mkv .mov "
-                   ".webm: a video of in_####.exr, by ffmpeg)")
-      ->type_name(kFileValue)
+  add_value(*command, "FILES", o->files, kFileValue,
+            "Images (EXR, HDR, PFM, …), put side by side, and last the output, whose name sets the format (.exr "
+            ".pfm .tif: 32-bit linear, .hdr: linear, .png .jpg: 8-bit sRGB; .mp4 .mkv .mov "
+            ".webm: a video of in_####.exr, by ffmpeg)")
       ->option_text("IN... OUT")
       ->required();
   command->add_option("-e,--exposure", o->exposure, "Stops: the image is multiplied by 2^E")
       ->check(real_number(-100, 100))
       ->capture_default_str();
   command->add_option("--fps", o->rate, "Frames per second of a video; default: 24")->check(real_number(0.01, 1000));
-  command->add_option("--layer", o->layer, "Layer (N, group03, …) or single channel (samples) instead of R G B")
-      ->type_name("LAYER");
+  add_value(*command, "--layer", o->layer, "LAYER",
+            "Layer (N, group03, …) or single channel (samples) instead of R G B");
   command->add_flag("--false-colours", o->colours,
                     "Show brightness in the colours of error maps, e.g. for --layer StdError; their scale is printed");
   command->add_flag("--accept-changed", o->accept_changed,

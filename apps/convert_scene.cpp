@@ -88,16 +88,13 @@ void add_convert_scene(CLI::App& app) {
   const auto o = std::make_shared<ConvertSceneOptions>();
   CLI::App* command =
       app.add_subcommand("convert-scene", "Convert pbrt-v4, glTF 2.0 or older Mitsuba scenes to Mitsuba 3 XML");
-  command
-      ->add_option("SCENE", o->input, "pbrt-v4 (.pbrt), glTF 2.0 (.glb, .gltf) or Mitsuba scene of any version (.xml)")
-      ->type_name(kFileValue)
+  add_value(*command, "SCENE", o->input, kFileValue,
+            "pbrt-v4 (.pbrt), glTF 2.0 (.glb, .gltf) or Mitsuba scene of any version (.xml)")
       ->option_text("SCENE")
       ->required();
-  command
-      ->add_option("OUT", o->output,
-                   "The new scene (.xml, Mitsuba 3.0). Meshes and images inside SCENE become files in the folder "
-                   "OUT-files; other files stay where they are")
-      ->type_name(kFileValue)
+  add_value(*command, "OUT", o->output, kFileValue,
+            "The new scene (.xml, Mitsuba 3.0). Meshes and images inside SCENE become files in the folder "
+            "OUT-files; other files stay where they are")
       ->option_text("OUT.xml")
       ->required();
   add_define_option(*command, o->defines);

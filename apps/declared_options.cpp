@@ -77,8 +77,7 @@ void add_options(CLI::App& command, const std::vector<Option>& options, OptionVa
 }
 
 void add_define_option(CLI::App& command, std::vector<std::string>& defines) {
-  command.add_option("-D,--define", defines, "Value of one of the scene's <default> elements")
-      ->type_name("name=value")
+  add_value(command, "-D,--define", defines, "name=value", "Value of one of the scene's <default> elements")
       ->take_all()
       ->expected(1)
       ->allow_extra_args(false);

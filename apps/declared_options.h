@@ -15,6 +15,13 @@ namespace covary {
 /// checked as the declaration says. `values` must live as long as the command.
 void add_options(CLI::App& command, const std::vector<Option>& options, OptionValues& values);
 
+/// Adds an option with a value, which the help calls `kind`.
+template <typename T>
+CLI::Option* add_value(CLI::App& command, const std::string& names, T& value, const char* kind,
+                       const std::string& help) {
+  return command.add_option(names, value, help)->type_name(kind);
+}
+
 // -D name=value on the command line: values for the scene's <default> elements.
 
 void add_define_option(CLI::App& command, std::vector<std::string>& defines);

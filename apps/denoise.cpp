@@ -19,6 +19,7 @@
 #include "commands.h"
 #include "core/error.h"
 #include "core/stopwatch.h"
+#include "declared_options.h"
 #include "denoising/mixed_denoising.h"
 #include "film/image_file.h"
 #include "film/outputs.h"
@@ -235,14 +236,11 @@ void run(const Options& o) {
 void add_denoise(CLI::App& app) {
   const auto o = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand("denoise", "Denoise an image, or several renders of different seeds");
-  command
-      ->add_option(
-          "IN", o->inputs,
-          "Linear image (EXR), guided by its albedo and normal layers, whatever the renderer calls them. Several "
-          "renders that differ only in their seed, or a film with groups, give a better image and its error")
-      ->type_name(kFileValue)
+  add_value(*command, "IN", o->inputs, kFileValue,
+            "Linear image (EXR), guided by its albedo and normal layers, whatever the renderer calls them. Several "
+            "renders that differ only in their seed, or a film with groups, give a better image and its error")
       ->expected(1, 1000);
-  command->add_option("-o,--output", o->output, "The result (EXR)")->type_name(kFileValue);
+  add_value(*command, "-o,--output", o->output, kFileValue, "The result (EXR)");
   std::vector<std::string> modes = {kNetwork};
   modes.insert(modes.end(), denoise_mode_names().begin() + 1, denoise_mode_names().end());
   command
@@ -250,20 +248,16 @@ void add_denoise(CLI::App& app) {
                    "Open Image Denoise alone, or a mixture of denoised images with little bias, balanced, or with the "
                    "least error; default: auto for several renders or groups, oidn for a single image")
       ->check(one_of(modes));
-  command
-      ->add_option("--oidn", o->oidn,
-                   "Open Image Denoise's library or its folder, or that of the Python package pyoidn or of its "
-                   "environment; 'off': mixtures without it")
-      ->type_name("off|LIBRARY");
+  add_value(*command, "--oidn", o->oidn, "off|LIBRARY",
+            "Open Image Denoise's library or its folder, or that of the Python package pyoidn or of its "
+            "environment; 'off': mixtures without it");
   command->add_flag("--check", o->check, "Only print the version and path of Open Image Denoise");
-  command->add_option("--albedo", o->albedo, "Layer or file of the albedo; default: by the renderer's usual name")
-      ->type_name("LAYER|FILE");
-  command->add_option("--normal", o->normal, "Layer or file of the normals, from -1 to 1; default: likewise")
-      ->type_name("LAYER|FILE");
-  command
-      ->add_option("--layers", o->layers,
-                   "Layers of the inputs to denoise with the picture's weights; with Rest, they add up to it")
-      ->type_name("LAYER")
+  add_value(*command, "--albedo", o->albedo, "LAYER|FILE",
+            "Layer or file of the albedo; default: by the renderer's usual name");
+  add_value(*command, "--normal", o->normal, "LAYER|FILE",
+            "Layer or file of the normals, from -1 to 1; default: likewise");
+  add_value(*command, "--layers", o->layers, "LAYER",
+            "Layers of the inputs to denoise with the picture's weights; with Rest, they add up to it")
       ->delimiter(',');
   command->add_flag("--no-guides", o->no_guides, "Do not use guides");
   command->add_flag(

@@ -13,6 +13,7 @@
 #include "commands.h"
 #include "core/content_hash.h"
 #include "core/error.h"
+#include "declared_options.h"
 #include "film/output_file.h"
 #include "film/outputs.h"
 #include "interruption.h"
@@ -301,44 +302,37 @@ void experiment(ExperimentCommand command) {
 void add_experiment(CLI::App& app) {
   const auto o = std::make_shared<ExperimentCommand>();
   CLI::App* command = app.add_subcommand("experiment", "Compare methods over scenes, budgets and seeds");
-  command->add_option("SUITE", o->suite, "A suite (JSON), a scene (XML), or the name of a built-in suite")
-      ->type_name(kFileValue);
-  command->add_option("-o,--output", o->output, "Folder for report.html, results.json and results.csv")
-      ->type_name(kFolderValue);
+  add_value(*command, "SUITE", o->suite, kFileValue, "A suite (JSON), a scene (XML), or the name of a built-in suite");
+  add_value(*command, "-o,--output", o->output, kFolderValue, "Folder for report.html, results.json and results.csv");
   command->add_flag("--list", o->list, "List the built-in suites");
   command->add_flag("--print", o->print, "Print the suite as it would be run, to start your own from");
-  command->add_option("--scenes", o->scenes, "Folder of the suite's scene files")->type_name(kFolderValue);
-  command->add_option("--cache", o->cache, "Folder of finished runs; default: cache in the output folder")
-      ->type_name(kFolderValue);
+  add_value(*command, "--scenes", o->scenes, kFolderValue, "Folder of the suite's scene files");
+  add_value(*command, "--cache", o->cache, kFolderValue,
+            "Folder of finished runs; default: cache in the output folder");
   command->add_flag("--quick", o->overrides.quick,
                     "Small: 3 seeds, up to 192 samples per pixel, frames of up to 32400 pixels, crops of up to 12000");
   const auto list = [](CLI::Option* option) { option->delimiter(',')->group("Overriding the suite"); };
   const auto single = [](CLI::Option* option) { option->group("Overriding the suite"); };
-  single(
-      command->add_option("--seeds", o->seeds, "A number of seeds, or seeds separated by commas")->type_name("SEEDS"));
+  single(add_value(*command, "--seeds", o->seeds, "SEEDS", "A number of seeds, or seeds separated by commas"));
   list(command->add_option("--spp", o->spp, "Budgets in samples per pixel")->transform(whole_number(1u, 1u << 30)));
   list(command->add_option("--time", o->seconds, "Budgets in seconds")->check(positive_number()));
-  single(command->add_option("--crop", o->overrides.crop, "X,Y,WIDTH,HEIGHT, or a centred WIDTHxHEIGHT")
-             ->type_name("X,Y,WIDTH,HEIGHT"));
-  single(command->add_option("--resolution", o->overrides.resolution, "Size of the frames")->type_name("WIDTHxHEIGHT"));
+  single(add_value(*command, "--crop", o->overrides.crop, "X,Y,WIDTH,HEIGHT",
+                   "X,Y,WIDTH,HEIGHT, or a centred WIDTHxHEIGHT"));
+  single(add_value(*command, "--resolution", o->overrides.resolution, "WIDTHxHEIGHT", "Size of the frames"));
   // Names may hold commas.
-  single(command->add_option("--scenes-only", o->overrides.scenes, "Only these scenes")->type_name("NAME"));
-  single(command->add_option("--methods-only", o->overrides.methods, "Only these methods, and the baseline")
-             ->type_name("NAME"));
-  single(command->add_option("--baseline", o->overrides.baseline, "Method that ratios refer to")->type_name("NAME"));
+  single(add_value(*command, "--scenes-only", o->overrides.scenes, "NAME", "Only these scenes"));
+  single(add_value(*command, "--methods-only", o->overrides.methods, "NAME", "Only these methods, and the baseline"));
+  single(add_value(*command, "--baseline", o->overrides.baseline, "NAME", "Method that ratios refer to"));
   single(command
              ->add_option("--reference-spp", o->overrides.reference_spp,
                           "Samples per pixel of each of the two halves of the references")
              ->transform(whole_number(1u, 1u << 30)));
-  single(command->add_option("--reference", o->overrides.reference_files, "One or two references (EXR)")
-             ->type_name(kFileValue)
+  single(add_value(*command, "--reference", o->overrides.reference_files, kFileValue, "One or two references (EXR)")
              ->expected(1, 2));
   add_threads_option(*command, o->threads, "Threads of each render");
-  command
-      ->add_option("--part", o->part,
-                   "K/N: make only the K-th of N parts of the runs; when all are in the cache, the command without "
-                   "--part measures them")
-      ->type_name("K/N");
+  add_value(*command, "--part", o->part, "K/N",
+            "K/N: make only the K-th of N parts of the runs; when all are in the cache, the command without "
+            "--part measures them");
   command->add_flag("--keep-passes", o->keep_passes, "Keep the films of all passes in the cache");
   command->add_flag("--quiet", o->quiet, "Failures only");
   command->callback([o] { experiment(*o); });

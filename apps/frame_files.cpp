@@ -12,6 +12,7 @@
 #include "combine/grouped_source.h"
 #include "core/error.h"
 #include "core/number_text.h"
+#include "declared_options.h"
 #include "estimators/mean.h"
 #include "film/image_file.h"
 #include "sequences/frame_names.h"
@@ -95,17 +96,12 @@ std::string motion_pattern(const MotionSource& source, const FramePatterns& patt
 }  // namespace
 
 void add_frame_options(CLI::App& command, FrameOptions& o, const std::string& what) {
-  command.add_option("--frames", o.frames, "Only these frames of in_####.exr; default: all")->type_name("FIRST-LAST");
-  command.add_option("--motion", o.motion.motion, "Layer with the motion to the previous frame")
-      ->type_name("LAYER")
+  add_value(command, "--frames", o.frames, "FIRST-LAST", "Only these frames of in_####.exr; default: all");
+  add_value(command, "--motion", o.motion.motion, "LAYER", "Layer with the motion to the previous frame")
       ->capture_default_str();
-  command.add_option("--depth", o.motion.depth, "Layer with the depth, if any")
-      ->type_name("LAYER")
-      ->capture_default_str();
-  command
-      .add_option("--motion-scale", o.motion_scale,
-                  "Factors that turn motion into pixels to the right and down; 1,-1 if Y points up")
-      ->type_name("X,Y");
+  add_value(command, "--depth", o.motion.depth, "LAYER", "Layer with the depth, if any")->capture_default_str();
+  add_value(command, "--motion-scale", o.motion_scale, "X,Y",
+            "Factors that turn motion into pixels to the right and down; 1,-1 if Y points up");
   command.add_flag("--no-history", o.no_history, what + " each frame alone");
 }
 

@@ -117,8 +117,7 @@ void info(const InfoOptions& options) {
 void add_info(CLI::App& app) {
   const auto options = std::make_shared<InfoOptions>();
   CLI::App* command = app.add_subcommand("info", "Describe a film, image or scene: size, channels, attributes");
-  command->add_option("FILE", options->path, "A film or image, or a scene file (.xml, .pbrt, .glb, .gltf)")
-      ->type_name(kFileValue)
+  add_value(*command, "FILE", options->path, kFileValue, "A film or image, or a scene file (.xml, .pbrt, .glb, .gltf)")
       ->required();
   add_define_option(*command, options->defines);
   command->add_flag("--json", options->json, "One JSON object");

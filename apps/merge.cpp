@@ -11,6 +11,7 @@
 
 #include "commands.h"
 #include "core/shell_text.h"
+#include "declared_options.h"
 #include "estimators/mean.h"
 #include "film/film_file.h"
 #include "film/image_file.h"
@@ -129,11 +130,11 @@ void merge(const MergeOptions& options) {
 void add_merge(CLI::App& app) {
   const auto options = std::make_shared<MergeOptions>();
   CLI::App* command = app.add_subcommand("merge", "Merge films of one scene with different seeds into one film");
-  command->add_option("FILMS", options->inputs, "Films (EXR), written by covary render --passes or --estimator none")
-      ->type_name(kFileValue)
+  add_value(*command, "FILMS", options->inputs, kFileValue,
+            "Films (EXR), written by covary render --passes or --estimator none")
       ->required()
       ->expected(2, 100000);
-  command->add_option("-o,--output", options->output, "The merged film (EXR)")->type_name(kFileValue)->required();
+  add_value(*command, "-o,--output", options->output, kFileValue, "The merged film (EXR)")->required();
   command->callback([options] { merge(*options); });
 }
 

@@ -138,7 +138,7 @@ void add_probe(CLI::App& app) {
       "probe",
       "Show what guided-path has learnt at the surface seen by a pixel, as an image (EXR) and its preview (PNG)");
   add_render_options(*command, options->render);
-  command->add_option("--pixel", options->pixel, "X,Y of the frame")->type_name("X,Y")->required();
+  add_value(*command, "--pixel", options->pixel, "X,Y", "X,Y of the frame")->required();
   command->add_option("--height", options->height, "Rows of the images, which are twice as wide")
       ->transform(whole_number(1, 4096))
       ->capture_default_str();

@@ -8,6 +8,7 @@
 
 #include "commands.h"
 #include "core/error.h"
+#include "declared_options.h"
 #include "film/image_writer.h"
 #include "metrics/error_map.h"
 #include "value_names.h"
@@ -30,9 +31,8 @@ Image coloured(Image map) {
 }  // namespace
 
 void add_stages_option(CLI::App& command, std::string& folder) {
-  command
-      .add_option("--save-stages", folder, "Folder for images of each step (EXR and PNG), if the estimator has steps")
-      ->type_name(kFolderValue);
+  add_value(command, "--save-stages", folder, kFolderValue,
+            "Folder for images of each step (EXR and PNG), if the estimator has steps");
 }
 
 void check_stages(const std::string& folder, const Estimator& estimator) {

@@ -20,6 +20,7 @@
 #include "commands.h"
 #include "comparison_warnings.h"
 #include "core/error.h"
+#include "declared_options.h"
 #include "film/film_file.h"
 #include "film/image_file.h"
 #include "film/outputs.h"
@@ -365,29 +366,24 @@ void view(const ViewOptions& options) {
 void add_view(CLI::App& app) {
   const auto o = std::make_shared<ViewOptions>();
   CLI::App* command = app.add_subcommand("view", "Compare images in the browser: one page without a network");
-  command
-      ->add_option("IMAGES", o->images,
-                   "Images (EXR, PNG, HDR, PFM, …) of the same frame, or sequences (out_####.exr) to play side by side")
-      ->type_name(kFileValue)
+  add_value(*command, "IMAGES", o->images, kFileValue,
+            "Images (EXR, PNG, HDR, PFM, …) of the same frame, or sequences (out_####.exr) to play side by side")
       ->required();
-  command->add_option("-r,--reference", o->reference, "Show errors relative to this image")->type_name(kFileValue);
-  command->add_option("-o,--output", o->output, "Write the page (HTML) here instead of opening it")
-      ->type_name(kFileValue);
-  command->add_option("--layer", o->layer, "Show this layer (N, group03, …) instead of R G B")->type_name("LAYER");
-  command->add_option("--inset", o->insets, "Magnify this crop; may be repeated")
-      ->type_name("X,Y,WIDTH,HEIGHT")
+  add_value(*command, "-r,--reference", o->reference, kFileValue, "Show errors relative to this image");
+  add_value(*command, "-o,--output", o->output, kFileValue, "Write the page (HTML) here instead of opening it");
+  add_value(*command, "--layer", o->layer, "LAYER", "Show this layer (N, group03, …) instead of R G B");
+  add_value(*command, "--inset", o->insets, "X,Y,WIDTH,HEIGHT", "Magnify this crop; may be repeated")
       ->take_all()
       ->expected(1)
       ->allow_extra_args(false);
   command->add_flag(
       "--small", o->small,
       "Leave out FLIP and the files' other layers (StdError, Albedo, N, …): a smaller page, written faster");
-  command->add_option("--frames", o->frames, "Only these frames of out_####.exr; default: all")
-      ->type_name("FIRST-LAST");
+  add_value(*command, "--frames", o->frames, "FIRST-LAST", "Only these frames of out_####.exr; default: all");
   command->add_option("--fps", o->fps, "Frames per second at which a sequence is played")
       ->check(positive_number())
       ->capture_default_str();
-  command->add_option("--title", o->title, "Title of the page; default: the images' names")->type_name("TITLE");
+  add_value(*command, "--title", o->title, "TITLE", "Title of the page; default: the images' names");
   command->callback([o] { view(*o); });
 }
 
