@@ -45,8 +45,6 @@ void check_options(RenderOptions& options) {
   if (estimator.adaptive && given("split"))
     usage(fmt::format("--split: the first pass of {} has its own number of samples, --dependent-spp", name));
   if (estimator.adaptive && given("sampling")) usage("--sampling: --adaptive always takes independent random numbers");
-  if (passes != EstimatorPasses::kPair && settings.passes.sampling != Sampling::kCrn && given("crn-part"))
-    usage("--crn-part needs a pass with common random numbers");
   if (settings.passes.chooses_split && !options.stages.empty())
     usage("--save-stages: --split auto decides while it renders which stages there are");
   if (passes != EstimatorPasses::kPair && given("split") && !settings.passes.chooses_split)
@@ -134,11 +132,10 @@ namespace {
 
 void add_output_options(CLI::App& command, RenderOptions& o) {
   command.option_defaults()->group("Output");
-  command.add_option("--display-server", o.display_server, "Show the image in a running tev while rendering")
-      ->type_name(kServerValue);
+  add_value(command, "--display-server", o.display_server, kServerValue,
+            "Show the image in a running tev while rendering");
   add_stages_option(command, o.stages);
-  command.add_option("--replay", o.replay, "Print one sample of each film instead of rendering")
-      ->type_name("X,Y,SAMPLE[,PASS]");
+  add_value(command, "--replay", o.replay, "X,Y,SAMPLE[,PASS]", "Print one sample of each film instead of rendering");
   command.add_option("--replay-light", o.replay_light, "Print what one light path adds to the image")
       ->transform(whole_number(uint64_t{0}, (uint64_t{1} << 40) - 1))
       ->type_name("NUMBER");
@@ -167,7 +164,7 @@ void add_render_options(CLI::App& command, RenderOptions& o) {
   add_options(command, options_of<RenderSettings>(), o.values);
   add_define_option(command, o.defines);
   add_threads_option(command, o.threads);
-  command.add_option("--json", o.json, "Statistics; '-': to standard output")->type_name(kFileValue);
+  add_value(command, "--json", o.json, kFileValue, "Statistics; '-': to standard output");
   command.add_flag("--quiet", o.quiet, "No progress and no summary");
   add_output_options(command, o);
   add_options(command, options_of<SequenceSettings>(), o.of_sequence);

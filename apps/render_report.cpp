@@ -23,8 +23,6 @@
 namespace covary {
 namespace {
 
-const char* sampling_name(const Pass& pass) { return pass.settings.sampling == Sampling::kCrn ? "crn" : "independent"; }
-
 /// Command that repeats one sample of a pass: the user's own, with the sample in place of the outputs.
 std::string replay_command(const RenderOptions& o, const Pass& pass, const BadSample& bad) {
   std::vector<std::string> words = {"covary", "render", o.scene};
@@ -67,7 +65,8 @@ void report_bad_samples(const RenderOptions& options, const Pass& pass) {
 namespace {
 
 nlohmann::ordered_json statistics_of(const Pass& pass) {
-  nlohmann::ordered_json json = {{"sampling", sampling_name(pass)}, {"sampler", sampler_name(pass.settings.sampler)}};
+  nlohmann::ordered_json json = {{"sampling", sampling_name(pass.settings.sampling)},
+                                 {"sampler", sampler_name(pass.settings.sampler)}};
   if (pass.plan.light)
     json["light_paths"] = light_paths(pass.film);
   else

@@ -167,14 +167,14 @@ class BidirectionalTracer final : public LightTracingIntegrator {
     state.light_path.clear();
     for (const CameraSample& sample : samples) {
       const uint32_t guess = state.light_path.empty() ? 0 : state.light_path.back() + 1;
-      const uint32_t place = place_of(sample.light_random.subpath(Subpath::kLight), guess, kept);
+      const uint32_t place = place_of(sample.random.subpath(Subpath::kLight), guess, kept);
       if (place == kept.size()) break;
       state.light_path.push_back(place);
     }
     if (state.light_path.size() == samples.size()) return;
     kept.clear(), state.light_path.clear();
     for (const CameraSample& sample : samples) {
-      const PathRandom random = sample.light_random.subpath(Subpath::kLight);
+      const PathRandom random = sample.random.subpath(Subpath::kLight);
       const uint32_t guess = state.light_path.empty() ? 0 : state.light_path.back() + 1;
       const uint32_t place = place_of(random, guess, kept);
       if (place == kept.size()) kept.push_back(random);

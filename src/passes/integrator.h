@@ -62,8 +62,6 @@ struct CameraSample {
   Ray ray;
   PathRandom random;  ///< the integrator reads numbers at vertices >= 1 only
   Spectrum radiance;  ///< zero on entry
-  /// Where the numbers of a light subpath come from, if there is one: subpath(Subpath::kLight) of these.
-  PathRandom light_random = random;
 };
 
 /// What an integrator tells of a render besides its image.

@@ -79,16 +79,13 @@ std::vector<Tile> make_tiles(const Film& film) {
   return tiles;
 }
 
-/// `common`: whether the numbers are those of the pass's sampling; otherwise each pixel has its own.
-PathRandom sample_random(const PassSettings& settings, const Camera& camera, int x, int y, uint64_t sample,
-                         bool common) {
+PathRandom sample_random(const PassSettings& settings, const Camera& camera, int x, int y, uint64_t sample) {
   const uint64_t pixel = static_cast<uint64_t>(y) * camera.width() + x;
-  const Sampling sampling = common ? settings.sampling : Sampling::kIndependent;
-  const uint32_t pass = common ? settings.pass : settings.pass | kOwnNumbers;
-  if (settings.sampler == Sampler::kIndependent) return {sampling, settings.seed, pass, pixel, sample};
+  if (settings.sampler == Sampler::kIndependent)
+    return {settings.sampling, settings.seed, settings.pass, pixel, sample};
   const auto groups = static_cast<uint32_t>(settings.groups);
-  return PathRandom::sobol(sampling, settings.seed, pass, pixel, static_cast<uint32_t>(sample % groups),
-                           static_cast<uint32_t>(sample / groups));
+  return PathRandom::sobol(settings.sampling, settings.seed, settings.pass, pixel,
+                           static_cast<uint32_t>(sample % groups), static_cast<uint32_t>(sample / groups));
 }
 
 /// True when the sample may enter the film; otherwise it is counted and remembered.
@@ -212,10 +209,7 @@ void keep_first(std::vector<BadSample>& samples) {
   if (samples.size() > kMaxBadSamples) samples.resize(kMaxBadSamples);
 }
 
-const char* sampling_name(Sampling sampling, CrnPart part) {
-  if (sampling != Sampling::kCrn) return "independent";
-  return part == CrnPart::kCamera ? "crn-camera" : part == CrnPart::kLight ? "crn-light" : "crn";
-}
+const char* sampling_name(Sampling sampling) { return sampling == Sampling::kCrn ? "crn" : "independent"; }
 
 const char* sampler_name(Sampler sampler) { return sampler == Sampler::kSobol ? "sobol" : "independent"; }
 
@@ -243,11 +237,8 @@ Vec2 film_position(const FilterSettings& filter, int x, int y, const PathRandom&
 }
 
 CameraSample camera_sample(const Scene& scene, const PassSettings& settings, int x, int y, uint64_t sample) {
-  const CrnPart part = settings.sampling == Sampling::kCrn ? settings.crn_part : CrnPart::kBoth;
-  const PathRandom random = sample_random(settings, scene.camera(), x, y, sample, part != CrnPart::kLight);
-  const Ray ray = scene.camera().ray(film_position(settings.filter, x, y, random), random.get_2d(0, Event::kLens));
-  if (part == CrnPart::kBoth) return {ray, random, {}};
-  return {ray, random, {}, sample_random(settings, scene.camera(), x, y, sample, part != CrnPart::kCamera)};
+  const PathRandom random = sample_random(settings, scene.camera(), x, y, sample);
+  return {scene.camera().ray(film_position(settings.filter, x, y, random), random.get_2d(0, Event::kLens)), random, {}};
 }
 
 PassResult render_pass(const Scene& scene, const Integrator& integrator, const PassSettings& settings, Film& film) {

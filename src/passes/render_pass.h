@@ -75,24 +75,16 @@ class LearningIntegrator;
 /// The value of a pixel from all its samples together. Called by several threads at once.
 using PixelEstimate = std::function<Spectrum(std::span<const CameraSample>)>;
 
-/// What the pixels of a pass with common random numbers have in common, where samples have a light subpath as well.
-enum class CrnPart { kBoth, kCamera, kLight };
-
-/// "independent", "crn", "crn-camera" or "crn-light": attribute of films.
-const char* sampling_name(Sampling sampling, CrnPart part);
+/// "independent" or "crn": attribute of films.
+const char* sampling_name(Sampling sampling);
 /// "independent" or "sobol".
 const char* sampler_name(Sampler sampler);
-
-/// Bit of PassSettings::pass in the keys of what pixels of a CRN pass do not have in common, so that it shares no
-/// numbers with the independent pass of the same number.
-inline constexpr uint32_t kOwnNumbers = 1u << 29;
 
 struct PassSettings {
   Sampling sampling = Sampling::kIndependent;
   Sampler sampler = Sampler::kIndependent;
   /// Of the film; with Sampler::kSobol sample s reads point s / groups of the sequences of group s mod groups.
   int groups = 1;
-  CrnPart crn_part = CrnPart::kBoth;  ///< of Sampling::kCrn
   uint64_t seed = 0;
   uint32_t pass = 0;  ///< position in the plan; passes of one plan never share numbers
   SampleTarget spp;   ///< samples per pixel to reach

@@ -42,10 +42,6 @@ std::shared_ptr<Integrator> prepared_integrator(const LoadedScene& scene, const 
                                                 const RenderRequest& request) {
   std::shared_ptr<Integrator> integrator = integrator_of(scene, request).clone();
   LightTracingIntegrator* tracer = integrator->light_tracing();
-  if (request.crn_part != CrnPart::kBoth && !tracer)
-    throw Error(ErrorCode::kUsage,
-                "the paths of this integrator have no light part that could have numbers of its own; "
-                "integrators that trace light have");
   require_sees_media(*integrator, *scene.scene);
   integrator->prepare(*scene.scene);
   if (tracer) {

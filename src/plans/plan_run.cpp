@@ -201,7 +201,6 @@ Pass PlanRun::begin_pass(const PassPlan& plan) {
   pass.settings.sampling = plan.sampling;
   const Sampler sampler = sampler_of(scene_, request_);
   pass.settings.sampler = plan.light ? Sampler::kIndependent : sampler;
-  pass.settings.crn_part = request_.crn_part;
   pass.settings.seed = request_.seed;
   pass.settings.pass = plan.light ? kLightPass + plan.number : plan.number;
   pass.settings.filter = filter_;
@@ -212,7 +211,7 @@ Pass PlanRun::begin_pass(const PassPlan& plan) {
   const std::string number = plan.number ? fmt::format("; pass {}", plan.number) : "";
   pass.film.attributes = request_.attributes;
   pass.film.attributes.insert_or_assign(film_key::kSeed, std::to_string(request_.seed));
-  pass.film.attributes.insert_or_assign(film_key::kSampling, sampling_name(plan.sampling, request_.crn_part));
+  pass.film.attributes.insert_or_assign(film_key::kSampling, sampling_name(plan.sampling));
   pass.film.attributes.insert_or_assign(film_key::kSceneHash, scene_.content_hash);
   const LearningIntegrator* learning = state_.integrator->learning();
   pass.film.attributes.insert_or_assign(

@@ -40,8 +40,6 @@ struct RenderRequest {
   /// Needs an integrator that tells lights apart.
   bool light_groups = false;
   bool splits_layers() const { return layers || light_groups; }
-  /// Of passes with common random numbers; other parts than both need an integrator with light subpaths.
-  CrnPart crn_part = CrnPart::kBoth;
 
   std::string output;    ///< EXR file of the result; empty: no file is written
   bool preview = false;  ///< also a PNG beside it
@@ -86,8 +84,6 @@ inline void declare_goal(Settings& s, RenderRequest& r) {
 }
 
 inline void declare(Settings& s, RenderRequest& r) {
-  static constexpr std::pair<const char*, CrnPart> kParts[] = {
-      {"both", CrnPart::kBoth}, {"camera", CrnPart::kCamera}, {"light", CrnPart::kLight}};
   s.group("Rendering");
   s.whole("seed", r.seed, {.low = 0}, "Seed of the random numbers", kBasicSamples);
   s.text_as("crop", r.crop, "X,Y,WIDTH,HEIGHT", read_crop, "Render only these pixels of the frame", kBasicSamples);
@@ -101,7 +97,6 @@ inline void declare(Settings& s, RenderRequest& r) {
            "Random numbers within a group of samples: independent, or Owen-scrambled Sobol' points; default: the "
            "scene's (sobol unless it is independent)");
   if (!sampler.empty()) r.sampler = sampler == "sobol" ? Sampler::kSobol : Sampler::kIndependent;
-  s.choice("crn-part", r.crn_part, kParts, "Subpaths with common random numbers, for integrators that trace light");
   s.one_of("rfilter", filter, {"box", "tent", "gaussian"}, "Reconstruction filter instead of the scene's");
   if (!filter.empty()) r.filter = filter_named(filter);
   s.group("Output");

@@ -147,7 +147,6 @@ std::vector<std::string> replay_words(OptionValues values, const Pass& pass, con
   if (values.contains("integrator")) values["integrator"] = registered_name(*pass.integrator);  // which may be a choice
   const bool is_crn = pass.settings.sampling == Sampling::kCrn, is_sobol = pass.settings.sampler == Sampler::kSobol;
   if (!pass.plan.light) values["sampling"] = is_crn ? "crn" : "independent";
-  if (!is_crn) values.erase("crn-part");
   if (is_sobol) values["groups"] = std::to_string(pass.settings.groups);
   if (is_sobol || values.contains("sampler")) values["sampler"] = sampler_name(pass.settings.sampler);
   // Whether light is traced decides on the weights of strategies.

@@ -23,7 +23,6 @@ TEST(RenderSettings, ValuesReachTheRequest) {
                                                           {"seed", "18446744073709551615"},
                                                           {"sampler", "sobol"},
                                                           {"rfilter", "tent"},
-                                                          {"crn-part", "camera"},
                                                           {"no-preview", ""}});
   EXPECT_EQ(s.request.spp, 48u);
   EXPECT_EQ(s.request.until, 0.25);
@@ -36,7 +35,6 @@ TEST(RenderSettings, ValuesReachTheRequest) {
   EXPECT_EQ(s.request.seed, UINT64_MAX);
   EXPECT_EQ(s.request.sampler, Sampler::kSobol);
   EXPECT_EQ(s.request.filter->kind, FilterKind::kTent);
-  EXPECT_EQ(s.request.crn_part, CrnPart::kCamera);
   EXPECT_FALSE(s.request.preview);
   const RenderSettings standard = settings_from<RenderSettings>({});
   EXPECT_TRUE(standard.request.preview);

@@ -25,7 +25,6 @@ PassSettings settings_of(const LoadedScene& scene, const RenderRequest& request,
                 "a sample of `sampler` sobol is one of a group; `groups` says how many groups the "
                 "film has, 'covary info FILM' shows it");
   settings.groups = address.groups.value_or(1);
-  settings.crn_part = request.crn_part;
   settings.seed = request.seed;
   settings.pass = address.pass;
   settings.filter = request.filter.value_or(scene.filter);

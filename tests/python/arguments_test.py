@@ -52,7 +52,7 @@ RENDER = {"scene": (*NO_SCENE, ""), "spp": without_none(NO_SPP), "estimator": ("
           "path_lengths": NO_FLAG,
           "crop": (3, "0,0,4,4", (0, 0, 4), (0, 0, 0, 0), (-1, 0, 4, 4), (0, 0, 4.5, 4), (0, 0, 400, 4)),
           "filter": ("bx", *NO_TEXT), "sampling": ("common", *NO_TEXT), "sampler": ("halton", *NO_TEXT),
-          "crn_part": ("all", *NO_TEXT), "groups": (0, -1, 1025, 2.5, "12"),
+          "groups": (0, -1, 1025, 2.5, "12"),
           "split": (1, "1:1", "half", (1,), (1, 0), (1, -1), ("1", 1)), "films_only": NO_FLAG, "save_training": NO_PATH,
           "load_training": NO_PATH, "progress": NO_FUNCTION}
 #: By function and argument. What a value is refused for may also be found by the library.

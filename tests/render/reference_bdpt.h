@@ -54,7 +54,7 @@ class Sampler {
   Contributions camera_sample(const CameraSample& sample) const {
     Contributions result;
     const std::vector<Vertex> camera = camera_walk(sample);
-    const std::vector<Vertex> light = light_walk(sample.light_random.subpath(Subpath::kLight));
+    const std::vector<Vertex> light = light_walk(sample.random.subpath(Subpath::kLight));
     uint32_t n_smooth = 0;
     for (size_t i = 1; i < camera.size(); ++i) {  // t = i + 1
       if (const auto hit = hit_light(camera, i)) keep(result, 0, *hit);
