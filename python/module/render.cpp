@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "plans/render.h"
 
+#include <fmt/format.h>
+
 #include <mutex>
 #include <optional>
 #include <span>
@@ -64,6 +66,14 @@ struct Choice {
   Options values, of_estimator;  ///< as the command line has them
   bool films_only = false;       ///< no image is made of the films
 };
+
+/// Values in the ranges of their options alone.
+RenderSettings settings_of(const Options& values) {
+  for (const Option& option : options_of<RenderSettings>())
+    if (const auto given = values.find(option.name); given != values.end() && !accepted(option, given->second))
+      throw Error(ErrorCode::kUsage, fmt::format("`{}` {}", option.name, problem_of(option, given->second)));
+  return settings_from<RenderSettings>(values);
+}
 
 Plan plan_of(const RenderSettings& settings, const Choice& choice) {
   Plan plan = render_plan(settings, choice.of_estimator);
@@ -131,7 +141,7 @@ nb::dict dict_of(RenderResult&& result, const std::string& estimator, const std:
 
 nb::dict render_scene(const LoadedScene& scene, const Choice& choice, const Options& of_integrator,
                       nb::object progress) {
-  const RenderSettings settings = settings_from<RenderSettings>(choice.values);
+  const RenderSettings settings = settings_of(choice.values);
   const Plan plan = plan_of(settings, choice);
   RenderRequest request = request_of(settings, scene);
   request.attributes[film_key::kVersion] = COVARY_VERSION;
@@ -160,19 +170,10 @@ nb::dict render_scene(const LoadedScene& scene, const Choice& choice, const Opti
   return made;
 }
 
-/// Rows of all of them at once, as render() has them.
-Guides guides_of(const std::map<std::string, Image>& aovs) {
-  const auto find = [&](const char* name) -> const Image* {
-    const auto found = aovs.find(name);
-    return found == aovs.end() ? nullptr : &found->second;
-  };
-  return {find("Albedo"), find("N"), find("DenoisingAlbedo"), find("DenoisingNormal"), true};
-}
-
 /// What render() would make of the films of its passes, in their order, and the auxiliary images: those of a render in
 /// parts. Has render()'s bits.
 nb::dict image_of_films(const Options& values, const Options& of_estimator, nb::dict films, nb::dict aovs) {
-  const RenderSettings settings = settings_from<RenderSettings>(values);
+  const RenderSettings settings = settings_of(values);
   const Plan plan = plan_of(settings, {values, of_estimator});
   RenderResult result;
   for (const auto& [name, film] : films) {
@@ -189,7 +190,7 @@ nb::dict image_of_films(const Options& values, const Options& of_estimator, nb::
       [&](WorkState& state) {
         const Stopwatch watch;
         Beside beside;
-        if (plan.reads_guides) beside.guides = guides_of(result.aovs);
+        if (plan.reads_guides) beside.guides = guides_among(result.aovs);
         const auto estimate = [&] {
           result.image = plan.estimate(result.passes, 0, result.passes[0].film.height(), beside);
           finish(result.image, nullptr);

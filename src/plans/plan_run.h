@@ -65,11 +65,7 @@ class PlanRun {
     return !plan_.film_is_image || film_has_errors() || request_.until > 0 || request_.splits_layers();
   }
   /// Of the whole window; empty where the plan reads none or they are not there.
-  Guides guides() const {
-    if (!plan_.reads_guides || result_.aovs.empty()) return {};
-    const auto image = [this](const char* name) { return &result_.aovs.at(name); };
-    return {image("Albedo"), image("N"), image("DenoisingAlbedo"), image("DenoisingNormal"), true};
-  }
+  Guides guides() const { return plan_.reads_guides ? guides_among(result_.aovs) : Guides(); }
   bool needs_aovs() const { return request_.aovs || plan_.reads_guides; }
   bool stopped() const { return callbacks_.stop && callbacks_.stop->load(); }
   /// The passes of every phase are there.

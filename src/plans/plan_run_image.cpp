@@ -36,12 +36,10 @@ constexpr double kEstimateOfInterrupted = 0.5;  // seconds that it may take; aft
 
 EstimatorResult PlanRun::estimate_rows(int first_row, int n_rows, std::span<const Film> layers) const {
   std::array<Image, 4> images;
-  Beside beside;
-  if (plan_.reads_guides && !result_.aovs.empty()) {  // empty where the render was stopped before
-    const char* const names[] = {"Albedo", "N", "DenoisingAlbedo", "DenoisingNormal"};
-    for (size_t i = 0; i < images.size(); ++i) images[i] = rows_of(result_.aovs.at(names[i]), first_row, n_rows);
-    beside.guides = {&images[0], &images[1], &images[2], &images[3], true};
-  }
+  Beside beside{guides(), {}};
+  Guides& g = beside.guides;
+  for (size_t i = 0; const Image** guide : {&g.albedo, &g.normal, &g.denoising_albedo, &g.denoising_normal})
+    if (*guide) images[i] = rows_of(**guide, first_row, n_rows), *guide = &images[i++];
   for (size_t i = 0; i < layers.size(); ++i)
     beside.layers.push_back({layer_names_[i], rows_of(layers[i], first_row, n_rows)});
   EstimatorResult image = plan_.estimate(camera_passes(state_.passes), first_row, n_rows, beside);

@@ -55,6 +55,14 @@ const Pass& PlanState::pass(const std::string& name, uint32_t number) const {
 
 Image RenderResult::picture() const { return image.estimate.data.empty() ? preview_of(passes) : image.estimate; }
 
+Guides guides_among(const std::map<std::string, Image>& aovs) {
+  const auto find = [&](const char* name) {
+    const auto found = aovs.find(name);
+    return found == aovs.end() ? nullptr : &found->second;
+  };
+  return {find("Albedo"), find("N"), find("DenoisingAlbedo"), find("DenoisingNormal"), true};
+}
+
 Sampler sampler_of(const LoadedScene& scene, const RenderRequest& request) {
   const bool is_independent = scene.sampler_type.empty() || scene.sampler_type == "independent";
   return request.sampler.value_or(is_independent ? Sampler::kIndependent : Sampler::kSobol);

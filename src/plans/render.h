@@ -103,6 +103,9 @@ struct RenderResult {
   Image picture() const;
 };
 
+/// The images of RenderResult::aovs that guide a denoiser; null where they are not there.
+Guides guides_among(const std::map<std::string, Image>& aovs);
+
 /// The sampler of camera samples: the request's, or else what stands for that of the scene: independent numbers for
 /// `independent` and where the scene has none, Sobol' points for each of Mitsuba's stratified and low-discrepancy ones.
 Sampler sampler_of(const LoadedScene& scene, const RenderRequest& request);
