@@ -277,8 +277,8 @@ TEST(EstimatorRegistry, SaysWhatIsWrong) {
     return message_of([&] { make_estimator(name, values); });
   };
   EXPECT_EQ(message("iidw", {}),
-            "no estimator is named 'iidw'; did you mean 'iduw' or 'iicv'?; expected iicv, cv-baseline, iduw, "
-            "dependent-tests, polynomials, none");
+            fmt::format("no estimator is named 'iidw'; did you mean 'iduw' or 'iicv'?; expected {}",
+                        fmt::join(estimator_names(), ", ")));
   EXPECT_EQ(message("iduw", {{"k", "3"}}), "`k` is an option of `estimator` iicv, cv-baseline, not of iduw");
   EXPECT_EQ(message("iicv", {{"windwo", "3"}}), "`windwo` is not an option of any estimator; did you mean 'window'?");
   EXPECT_EQ(message("iicv", {{"k", "3x"}}), "`k` '3x': expected a whole number of at least 1");
