@@ -13,7 +13,9 @@ namespace {
 
 class ConstantLight final : public Emitter {
  public:
-  explicit ConstantLight(const Spectrum& radiance) : radiance_(radiance) {}
+  explicit ConstantLight(Parameters& p) : radiance_(p.get_spectrum("radiance", Spectrum(1), SpectrumRole::kEmission)) {
+    p.get_transform("to_world");  // harmless: nothing to rotate
+  }
 
   std::shared_ptr<const Emitter> in_scene(const Bounds3& bounds) const override {
     auto placed = std::make_shared<ConstantLight>(*this);
@@ -48,9 +50,6 @@ class ConstantLight final : public Emitter {
 
 }  // namespace
 
-std::shared_ptr<Emitter> make_constant(Parameters& parameters) {
-  parameters.get_transform("to_world");  // harmless: nothing to rotate
-  return std::make_shared<ConstantLight>(parameters.get_spectrum("radiance", Spectrum(1), SpectrumRole::kEmission));
-}
+std::shared_ptr<Emitter> make_constant(Parameters& parameters) { return std::make_shared<ConstantLight>(parameters); }
 
 }  // namespace covary

@@ -14,8 +14,13 @@ namespace {
 
 class DirectionalLight final : public Emitter {
  public:
-  DirectionalLight(const Vec3& direction, const Spectrum& irradiance)
-      : direction_(direction), irradiance_(irradiance) {}
+  explicit DirectionalLight(Parameters& p)
+      : direction_(p.get_vec3("direction", p.get_transform("to_world").vector({0, 0, 1}))),
+        irradiance_(p.get_spectrum("irradiance", Spectrum(1), SpectrumRole::kEmission)) {
+    if (p.has("direction") && p.has("to_world")) p.error_at("direction", "cannot be combined with 'to_world'");
+    if (!(length_squared(direction_) > 0)) p.error_at("direction", "has length zero");
+    direction_ = normalize(direction_);
+  }
 
   std::shared_ptr<const Emitter> in_scene(const Bounds3& bounds) const override {
     auto placed = std::make_shared<DirectionalLight>(*this);
@@ -52,15 +57,7 @@ class DirectionalLight final : public Emitter {
 }  // namespace
 
 std::shared_ptr<Emitter> make_directional(Parameters& parameters) {
-  if (parameters.has("direction") && parameters.has("to_world"))
-    parameters.error_at("direction", "cannot be combined with 'to_world'");
-  Vec3 direction = parameters.get_vec3("direction", parameters.get_transform("to_world").vector({0, 0, 1}));
-  if (!(length_squared(direction) > 0)) {
-    parameters.error_at("direction", "has length zero");
-    direction = {0, 0, 1};
-  }
-  return std::make_shared<DirectionalLight>(
-      normalize(direction), parameters.get_spectrum("irradiance", Spectrum(1), SpectrumRole::kEmission));
+  return std::make_shared<DirectionalLight>(parameters);
 }
 
 }  // namespace covary

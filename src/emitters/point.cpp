@@ -15,7 +15,11 @@ namespace {
 
 class PointLight final : public Emitter {
  public:
-  PointLight(const Vec3& position, const Spectrum& intensity) : position_(position), intensity_(intensity) {}
+  explicit PointLight(Parameters& p)
+      : position_(p.get_vec3("position", p.get_transform("to_world").point({0, 0, 0}))),
+        intensity_(p.get_spectrum("intensity", Spectrum(1), SpectrumRole::kEmission)) {
+    if (p.has("position") && p.has("to_world")) p.error_at("position", "cannot be combined with 'to_world'");
+  }
 
   bool is_delta_position() const override { return true; }
 
@@ -40,12 +44,6 @@ class PointLight final : public Emitter {
 
 }  // namespace
 
-std::shared_ptr<Emitter> make_point(Parameters& parameters) {
-  if (parameters.has("position") && parameters.has("to_world"))
-    parameters.error_at("position", "cannot be combined with 'to_world'");
-  const Vec3 position = parameters.get_vec3("position", parameters.get_transform("to_world").point({0, 0, 0}));
-  return std::make_shared<PointLight>(position,
-                                      parameters.get_spectrum("intensity", Spectrum(1), SpectrumRole::kEmission));
-}
+std::shared_ptr<Emitter> make_point(Parameters& parameters) { return std::make_shared<PointLight>(parameters); }
 
 }  // namespace covary

@@ -16,89 +16,81 @@
 namespace covary {
 namespace {
 
-struct ProjectorSettings {
-  PointFrame frame;
-  TexturePtr irradiance;
-  float scale = 1;
-  float tan_x = 1, tan_y = 1;  // half extents of the picture at distance 1
-};
-
 class Projector final : public Emitter {
  public:
-  explicit Projector(ProjectorSettings settings) : s_(std::move(settings)) {}
+  explicit Projector(Parameters& p)
+      : frame_(get_point_frame(p)),
+        irradiance_(p.get_texture("irradiance", Spectrum(1), SpectrumRole::kEmission)),
+        scale_(p.get_float("scale", 1, 0)) {
+    const FieldOfView view = get_field_of_view(p);
+    const float aspect = irradiance_->aspect();
+    tan_x_ = half_extent_x(view.degrees, view.axis, aspect), tan_y_ = tan_x_ / aspect;
+  }
 
   bool is_delta_position() const override { return true; }
 
   EmitterSample sample_towards(const Vec3& reference, Vec2, float) const override {
-    return sample_point(s_.frame.position, reference,
-                        [&](const Vec3& d) { return intensity(s_.frame.rotation.to_local(d)); });
+    return sample_point(frame_.position, reference,
+                        [&](const Vec3& d) { return intensity(frame_.rotation.to_local(d)); });
   }
 
   /// Positions in the picture by its luminance.
   EmissionSample sample_emission(Vec2, Vec2 u_direction, float) const override {
-    const Texture::PositionSample at = s_.irradiance->sample_position(u_direction);
+    const Texture::PositionSample at = irradiance_->sample_position(u_direction);
     if (!(at.pdf > 0)) return {};
     const Vec3 local = direction(at.uv);
-    return emit_from_point(s_.frame.position, s_.frame.rotation.to_world(local), intensity_at(at.uv, local.z),
+    return emit_from_point(frame_.position, frame_.rotation.to_world(local), intensity_at(at.uv, local.z),
                            at.pdf * per_solid_angle(local.z));
   }
 
   EmissionPdf pdf_emission(const SurfaceHit&, const Vec3& w) const override {
-    const Vec3 local = s_.frame.rotation.to_local(w);
+    const Vec3 local = frame_.rotation.to_local(w);
     Vec2 uv;
-    return {1, find(local, uv) ? s_.irradiance->pdf_position(uv) * per_solid_angle(local.z) : 0};
+    return {1, find(local, uv) ? irradiance_->pdf_position(uv) * per_solid_angle(local.z) : 0};
   }
 
   /// Of an intensity pi E / cos^3 the integral over directions is pi times that of E over the picture at distance 1.
   Spectrum power() const override {
-    const float area = kPi * s_.scale * 4 * s_.tan_x * s_.tan_y;
+    const float area = kPi * scale_ * 4 * tan_x_ * tan_y_;
     SurfaceHit hit;
-    if (s_.irradiance->is_constant()) return s_.irradiance->eval(hit) * area;
-    return mean_over_texture(*s_.irradiance,
+    if (irradiance_->is_constant()) return irradiance_->eval(hit) * area;
+    return mean_over_texture(*irradiance_,
                              [&](const Vec2& uv, float pdf) {
                                hit.uv = uv;
-                               return s_.irradiance->eval(hit) / Spectrum(pdf);
+                               return irradiance_->eval(hit) / Spectrum(pdf);
                              }) *
            area;
   }
-  bool knows_power() const override { return s_.irradiance->is_constant(); }
+  bool knows_power() const override { return irradiance_->is_constant(); }
 
  private:
-  Vec3 direction(Vec2 uv) const { return normalize(Vec3{(1 - 2 * uv.x) * s_.tan_x, (1 - 2 * uv.y) * s_.tan_y, 1}); }
+  Vec3 direction(Vec2 uv) const { return normalize(Vec3{(1 - 2 * uv.x) * tan_x_, (1 - 2 * uv.y) * tan_y_, 1}); }
   /// The point of the picture in the unit direction `local`; false: it is outside.
   bool find(const Vec3& local, Vec2& uv) const {
     if (!(local.z > 0)) return false;
-    uv = {0.5f * (1 - local.x / (local.z * s_.tan_x)), 0.5f * (1 - local.y / (local.z * s_.tan_y))};
+    uv = {0.5f * (1 - local.x / (local.z * tan_x_)), 0.5f * (1 - local.y / (local.z * tan_y_))};
     return uv.x >= 0 && uv.x <= 1 && uv.y >= 0 && uv.y <= 1;
   }
   /// Density per unit solid angle of what has density 1 in the picture's unit square.
-  float per_solid_angle(float cosine) const { return 1 / (4 * s_.tan_x * s_.tan_y * cosine * cosine * cosine); }
+  float per_solid_angle(float cosine) const { return 1 / (4 * tan_x_ * tan_y_ * cosine * cosine * cosine); }
   /// Power per unit solid angle.
   Spectrum intensity_at(Vec2 uv, float cosine) const {
     SurfaceHit hit;
     hit.uv = uv;
-    return s_.irradiance->eval(hit) * (kPi * s_.scale / (cosine * cosine * cosine));
+    return irradiance_->eval(hit) * (kPi * scale_ / (cosine * cosine * cosine));
   }
   Spectrum intensity(const Vec3& local) const {
     Vec2 uv;
     return find(local, uv) ? intensity_at(uv, local.z) : Spectrum();
   }
 
-  ProjectorSettings s_;
+  PointFrame frame_;
+  TexturePtr irradiance_;
+  float scale_, tan_x_, tan_y_;  // tan: half extents of the picture at distance 1
 };
 
 }  // namespace
 
-std::shared_ptr<Emitter> make_projector(Parameters& parameters) {
-  ProjectorSettings settings;
-  settings.irradiance = parameters.get_texture("irradiance", Spectrum(1), SpectrumRole::kEmission);
-  settings.scale = parameters.get_float("scale", 1, 0);
-  const FieldOfView view = get_field_of_view(parameters);
-  const float aspect = settings.irradiance->aspect();
-  settings.tan_x = half_extent_x(view.degrees, view.axis, aspect);
-  settings.tan_y = settings.tan_x / aspect;
-  settings.frame = get_point_frame(parameters);
-  return std::make_shared<Projector>(std::move(settings));
-}
+std::shared_ptr<Emitter> make_projector(Parameters& parameters) { return std::make_shared<Projector>(parameters); }
 
 }  // namespace covary
