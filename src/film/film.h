@@ -115,7 +115,7 @@ class Film {
 /// Names of attributes with a meaning to this module.
 namespace film_key {
 inline constexpr const char* kSeed = "seed";             ///< decimal; after a merge all seeds, ascending: "1,2,7"
-inline constexpr const char* kSampling = "sampling";     ///< "independent", "crn", "crn-camera" or "crn-light"
+inline constexpr const char* kSampling = "sampling";     ///< "independent" or "crn"
 inline constexpr const char* kSceneHash = "scene_hash";  ///< content of the scene
 inline constexpr const char* kSettings = "settings";     ///< all options that change the samples except the seed
 inline constexpr const char* kTraining = "training";     ///< hash of what the integrator learned, if it learns
