@@ -147,9 +147,7 @@ GuideImages read_guides(const CombineOptions& o, const Estimator& estimator, con
   if (!guides.normal) guides.normal = find_guide(o.guides, info, GuideKind::kNormal);
   if (!guides.albedo)
     throw Error(ErrorCode::kInput,
-                fmt::format("--guides '{}' has no layer Albedo (Albedo.R, .G, .B) nor what other renderers call "
-                            "so, and may have a layer N",
-                            o.guides));
+                fmt::format("--guides '{}' has no layer Albedo (Albedo.R, .G, .B) under any known name", o.guides));
   for (const auto& guide : {guides.albedo, guides.normal, guides.denoising_albedo, guides.denoising_normal})
     if (guide && (guide->width != file.width() || guide->height != file.height()))
       throw Error(ErrorCode::kInput, fmt::format("--guides '{}' has {} x {} pixels, the images have {} x {}", o.guides,
@@ -336,7 +334,7 @@ CombineOptions frame_options(const CombineOptions& o, int frame) {
 void combine_frames(const CombineOptions& o, const FramePatterns& patterns) {
   if (!o.stages.empty()) throw Error(ErrorCode::kUsage, "--save-stages is an option of single images, not of frames");
   if (!o.json.empty() && o.json != "-" && !is_frame_pattern(o.json))
-    throw Error(ErrorCode::kUsage, fmt::format("--json '{}': of frames, expected is a name with '#', or -", o.json));
+    throw Error(ErrorCode::kUsage, fmt::format("--json '{}': of frames, expected a name with '#', or -", o.json));
   for_each_frame(o.of_frames, patterns, o.denoising.denoises(), [&](int frame, std::shared_ptr<const History> history) {
     CombineOptions one = frame_options(o, frame);
     one.denoising.history.before = std::move(history);

@@ -160,7 +160,7 @@ void check_options(const CompareOptions& options) {
     if (options.error_map.empty()) usage("--error-range needs --error-map");
     const bool positive = options.metrics[0] == "flip" || options.error_range[0] > 0;
     if (!positive || !(options.error_range[0] < options.error_range[1]))
-      usage(fmt::format("--error-range {},{}: expected are two rising positive numbers", options.error_range[0],
+      usage(fmt::format("--error-range {},{}: expected two rising positive numbers", options.error_range[0],
                         options.error_range[1]));
   }
 }

@@ -103,7 +103,7 @@ void check_not_lost(const ConvertOptions& options) {
       is_own_picture(output))
     return;
   throw Error(ErrorCode::kUsage,
-              fmt::format("the output '{}', which is the last name given, is there already and not a picture that "
+              fmt::format("the output '{}', which is the last name given, already exists and not a picture that "
                           "'covary convert' made; give another name, or --overwrite to replace it",
                           output));
 }

@@ -28,7 +28,7 @@ struct ConvertSceneOptions {
 
 [[noreturn]] void refuse(const std::string& path) {
   throw Error(ErrorCode::kUsage,
-              fmt::format("the output '{}' is there already; give another name, or --overwrite to replace it", path));
+              fmt::format("the output '{}' already exists; give another name, or --overwrite to replace it", path));
 }
 
 bool holds(const std::string& path, std::string_view bytes) {

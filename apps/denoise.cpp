@@ -181,7 +181,7 @@ bool is_by_network(const Options& o) { return o.mode == kNetwork || (o.mode.empt
 
 void check_options(const Options& o) {
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
-  if (o.inputs.empty() || o.output.empty()) usage("expected are IN.exr and -o OUT.exr, or --check");
+  if (o.inputs.empty() || o.output.empty()) usage("expected IN.exr and -o OUT.exr, or --check");
   if (o.no_guides && !(o.albedo + o.normal).empty()) usage("--albedo and --normal have no effect with --no-guides");
   if (o.no_guides && o.clean_guides) usage("--clean-guides has no effect with --no-guides");
   for (size_t i = 0; i < o.inputs.size(); ++i)

@@ -55,7 +55,7 @@ void check_effects(const CLI::App& command) {
   for (const CLI::Option* option : command.get_options())
     if (option->count() > 0 && !has_effect(*option))
       throw Error(ErrorCode::kUsage,
-                  "--" + option->get_lnames()[0] + " has no effect on a probe, which renders no image");
+                  "--" + option->get_lnames()[0] + " has no effect on probes, which render no image");
 }
 
 using Images = std::array<const Image*, 3>;
@@ -120,7 +120,7 @@ void probe(ProbeOptions options) {
       scene.scene->camera().ray({static_cast<float>(at[0]) + 0.5f, static_cast<float>(at[1]) + 0.5f}, {0.5f, 0.5f});
   const std::optional<GuideProbe> found =
       learning->probe(*scene.scene, ray, options.height, options.samples, render.request().seed);
-  if (!found) throw Error(ErrorCode::kUsage, fmt::format("no surface lies behind the pixel {}", options.pixel));
+  if (!found) throw Error(ErrorCode::kUsage, fmt::format("no surface is visible at pixel {}", options.pixel));
   progress.finish();
   const Image image = side_by_side({&found->radiance, &found->density, &found->control});
   write_image(output, image, {image.width, image.height, {0, 0, image.width, image.height}}, {});

@@ -42,10 +42,10 @@ class Rule:
             return self.convert(value)
         except _WrongType as reason:
             found = str(reason) or f"{_shown(value)} ({type(value).__name__})"
-            raise TypeError(f"{name}: found {found}; accepted is {self.accepted}") from None
+            raise TypeError(f"{name}: found {found}; expected {self.accepted}") from None
         except _WrongValue as reason:
             found = str(reason) or _shown(value)
-            raise UsageError(f"{name}: found {found}; accepted is {self.accepted}") from None
+            raise UsageError(f"{name}: found {found}; expected {self.accepted}") from None
 
 
 def _shown(value: Any) -> str:

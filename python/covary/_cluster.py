@@ -25,11 +25,11 @@ _CLUSTER = ("cluster = SLURMCluster(…); cluster.scale(100); client = Client(cl
 
 def _client(value: Any) -> Any:
     if value is None or not (hasattr(value, "submit") and hasattr(value, "register_plugin")):
-        raise TypeError(f"client: found {value!r} ({type(value).__name__}); accepted is a dask.distributed.Client: "
+        raise TypeError(f"client: found {value!r} ({type(value).__name__}); expected a dask.distributed.Client: "
                         f"{_CLUSTER}")
     if getattr(value, "_start_arg", value) is None and getattr(value, "cluster", None) is not None:
         raise UsageError("client: found one that was made without a cluster, so that it started workers on this "
-                         f"machine by itself; accepted is a client of a cluster or an address: {_CLUSTER}")
+                         f"machine by itself; expected a client of a cluster or an address: {_CLUSTER}")
     return value
 
 

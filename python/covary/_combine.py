@@ -84,9 +84,9 @@ def _counts(counts: Any) -> Any:
     numbers = numpy.asarray(counts)
     if numbers.dtype.kind not in "ui" or numbers.ndim != 2:
         found = f"{numbers.dtype} {list(numbers.shape)}" if numbers.ndim else repr(counts)
-        raise TypeError(f"counts: found {found}; accepted are whole numbers, [H, W]")
+        raise TypeError(f"counts: found {found}; expected whole numbers, [H, W]")
     if numbers.size and not 0 <= int(numbers.min()) <= int(numbers.max()) <= _covary.most_samples:
-        raise ValueError(f"counts: found {numbers.min()} to {numbers.max()}; accepted are 0 to {_covary.most_samples}")
+        raise ValueError(f"counts: found {numbers.min()} to {numbers.max()}; expected 0 to {_covary.most_samples}")
     return numpy.ascontiguousarray(numbers, numpy.uint32)
 
 

@@ -170,7 +170,7 @@ def main(words: Sequence[str]) -> int:
     parser.add_argument("-o", "--output", required=True)
     known, rest = parser.parse_known_args(list(words))
     if rest[:1] != ["experiment"] or len(rest) < 2 or rest[1].startswith("-"):
-        print("covary: expected is experiment SUITE -o DIR --cluster ADDRESS [OPTIONS]", file=sys.stderr)
+        print("covary: expected experiment SUITE -o DIR --cluster ADDRESS [OPTIONS]", file=sys.stderr)
         return 2
 
     def show(done: int, total: int) -> None:

@@ -70,7 +70,7 @@ def frames(client: Any, scene: str | os.PathLike[str], output: str | os.PathLike
                          "without --denoise, and give them to covary denoise")
     numbers = list(range(first, last + 1))
     if not numbers:
-        raise UsageError(f"last: found {last}; accepted is {first}, the first frame, or more")
+        raise UsageError(f"last: found {last}; expected at least {first}, the first frame")
     folder, parts = os.getcwd(), _waves(os.fspath(output), options, waves, seed)
     tasks = [(frame, (_words(os.fspath(scene), name, frame, words), folder))
              for frame in numbers for name, words in parts]

@@ -125,7 +125,7 @@ def _check_together(estimator: str | None, given: Mapping[str, Any]) -> None:
     needs(("preview",), ("output",), "output")
     for first, second in (("resume", "overwrite"), ("until", "until_p95")):
         if given[first] and given[second]:
-            raise UsageError(f"found {first} and {second}; accepted is one of them")
+            raise UsageError(f"found {first} and {second}; expected one of them")
     passes = passes_of(estimator or "none")
     if given["sampling"] is not None and passes not in ("any", None):
         raise UsageError(f"sampling: found {given['sampling']!r} with estimator {estimator!r}, which chooses itself; "

@@ -185,10 +185,10 @@ def _plan(scene: Scene, spp: int, estimator: str | None, seed: int, sample_range
     """Raises all that would be wrong with any part, and with the estimate after the last, before one is rendered."""
     if estimator is not None and estimator not in _ESTIMATORS:
         raise UsageError(f"estimator '{estimator}' looks at other pixels or samples while it renders; on a cluster "
-                         f"accepted are {', '.join(_ESTIMATORS)}")
+                         f"expected one of {', '.join(_ESTIMATORS)}")
     check_no_passes([*options, *settings], "it looks at the whole frame, of which a worker has a tile")
     if unknown := set(settings) - set(_SETTINGS):
-        raise UsageError(f"settings: found {min(unknown)!r}; accepted are {', '.join(_SETTINGS)}")
+        raise UsageError(f"settings: found {min(unknown)!r}; expected one of {', '.join(_SETTINGS)}")
     settings = check_some(render_here, settings, "settings")
     if settings.get("split") == "auto":
         raise UsageError("split 'auto' tries out the whole frame, of which a worker has a tile")
@@ -197,11 +197,11 @@ def _plan(scene: Scene, spp: int, estimator: str | None, seed: int, sample_range
                          "the samples, and each has a seed of its own from `seed` on")
     if scene.integrator not in ("path", ""):
         raise UsageError(f"the integrator '{scene.integrator}' trains or traces light over the whole frame; on a "
-                         "cluster accepted is path")
+                         "cluster use path")
     if estimator in (None, "none"):
         check_some(render_here, options)
         if unknown := set(options) - set(_OF_ONE_PASS):
-            raise UsageError(f"{min(unknown)}: is not an argument of estimator {estimator or 'none'!r}; accepted are "
+            raise UsageError(f"{min(unknown)}: is not an argument of estimator {estimator or 'none'!r}; expected one of "
                              f"{', '.join(_OF_ONE_PASS)}")
     else:
         check_options(estimator, options)

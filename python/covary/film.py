@@ -25,7 +25,7 @@ def merge_films(films: Sequence[Film | str | PathLike[str]]) -> Film:
     members = [film for film in films if isinstance(film, Film)]
     paths = [fspath(film) for film in films if not isinstance(film, Film)]
     if members and paths:
-        raise TypeError("films: found Film objects and names of files; accepted are either")
+        raise TypeError("films: found Film objects and names of files; expected one or the other")
     return Film._merge_files(paths) if paths else Film._merge(members)
 
 

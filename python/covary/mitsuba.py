@@ -54,7 +54,7 @@ def _module() -> Any:
                          f"{', '.join(vectorised)} first")
     if variant not in vectorised:
         raise UsageError(f"the variant '{variant}' of Mitsuba takes samples one by one, which a sampler in Python is "
-                         f"too slow for; accepted are {', '.join(vectorised)}")
+                         f"too slow for; expected one of {', '.join(vectorised)}")
     return mitsuba
 
 
@@ -215,7 +215,7 @@ def _integrator(mi: Any, scene: Any, given: Any) -> Any:
     name = type(integrator).__name__
     if isinstance(integrator, mi.AdjointIntegrator):
         raise UsageError(f"the integrator {name} follows light to pixels anywhere, so that no random numbers belong to "
-                         "a pixel; accepted are integrators that begin at the camera, such as path")
+                         "a pixel; expected an integrator that begins at the camera, such as path")
     if ".ad" in type(integrator).__module__ or name.lower().startswith("prb"):
         raise UsageError(f"the integrator {name} is made for derivatives, which the combination of two images does not "
                          "have; use path or another one for images")
@@ -244,7 +244,7 @@ def _check_sensor(sensor: Any) -> list[str]:
     """What is changed in the sensor, with the reason. Raises where that is impossible."""
     if sensor.needs_aperture_sample() or sensor.shutter_open_time() > 0:
         raise UsageError(f"the sensor {type(sensor).__name__} draws points on its lens or in time, which the sensor "
-                         "around it would not; accepted are pinhole cameras at one moment")
+                         "around it would not; expected a pinhole camera with a closed shutter")
     warnings = []
     sampler = repr(sensor.sampler()).split("[")[0].strip()
     if sampler != "IndependentSampler":

@@ -48,7 +48,7 @@ def _file_of(argument: str, image: Any, folder: Path, name: str) -> str:
     if isinstance(image, (str, PathLike)):
         return fspath(image)
     if not name or "/" in name or name.startswith("."):
-        raise ValueError(f"images: found the name {name!r}; accepted are names without '/' that begin with no dot")
+        raise ValueError(f"images: found the name {name!r}; expected a name without '/' and without a leading dot")
     path = str(folder / f"{name}.exr")
     try:
         _covary.write_image(path, getattr(image, "image", image), {})  # of a result

@@ -20,5 +20,5 @@ def path(name: str) -> Path:
     """The file of the scene of this name, for Scene.load() and render()."""
     file = _FOLDER / f"{name}.xml"
     if name not in names():
-        raise UsageError(f"name: found {name!r}; accepted is one of {', '.join(names())}")
+        raise UsageError(f"name: found {name!r}; expected one of {', '.join(names())}")
     return file

@@ -20,7 +20,7 @@ constexpr const char* kArrays = "an array of NumPy or PyTorch, or one with DLPac
 
 [[noreturn]] void raise_type(nb::handle object, const std::string& name, const std::string& shape,
                              const std::string& found) {
-  std::string message = fmt::format("{}: found {}; accepted is {}, of float32 [{}]", name,
+  std::string message = fmt::format("{}: found {}; expected {}, of float32 [{}]", name,
                                     found.empty() ? describe(object) : found, kArrays, shape);
   if (nb::hasattr(object, "dtype")) message += "; convert with array.astype(numpy.float32), or tensor.float()";
   throw nb::type_error(message.c_str());
@@ -47,7 +47,8 @@ void check_shape(const Floats& floats, const std::string& name, const std::strin
                          : floats.shape[i] == wanted[i];
   if (!fits)
     throw nb::value_error(
-        fmt::format("{}: found the shape {}; accepted is [{}], no size 0", name, text_of(floats.shape), shape).c_str());
+        fmt::format("{}: found the shape {}; expected [{}], none of them 0", name, text_of(floats.shape), shape)
+            .c_str());
 }
 
 /// NumPy array of memory that a vector holds, which goes when the array does.

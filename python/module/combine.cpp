@@ -39,7 +39,7 @@ class Input {
   void take_counts(std::span<const uint32_t> counts) {
     if (film_)
       throw Error(ErrorCode::kInput, name_ +
-                                         ": the film tells itself how many samples its pixels have; 'counts' is "
+                                         ": the film already says how many samples its pixels have; 'counts' is "
                                          "not needed");
     counts_.assign(counts.begin(), counts.end());
     samples_ = std::accumulate(counts_.begin(), counts_.end(), 0.0) / static_cast<double>(counts_.size());
@@ -114,7 +114,7 @@ struct Pair {
   void take_counts(const Counts& counts, std::optional<int> samples) {
     if (counts.shape(0) != static_cast<size_t>(independent.height()) ||
         counts.shape(1) != static_cast<size_t>(independent.width()))
-      throw nb::value_error(fmt::format("counts: found the shape [{}, {}]; accepted is [{}, {}]", counts.shape(0),
+      throw nb::value_error(fmt::format("counts: found the shape [{}, {}]; expected [{}, {}]", counts.shape(0),
                                         counts.shape(1), independent.height(), independent.width())
                                 .c_str());
     independent.take_counts({counts.data(), counts.size()});
@@ -205,7 +205,7 @@ const Film* film_of(nb::handle light) {
   Film* film = nullptr;
   if (!light.is_none() && !nb::try_cast(light, film))
     throw nb::type_error(
-        fmt::format("light: found {}; accepted is a covary.Film, that of a pass 'light'", describe(light)).c_str());
+        fmt::format("light: found {}; expected the covary.Film of a pass 'light'", describe(light)).c_str());
   return film;
 }
 
@@ -300,7 +300,7 @@ nb::object correlation(const Correlation& c) {
 }
 
 nb::dict check(nb::object crn, nb::object independent) {
-  if (crn.is_none()) throw nb::type_error("crn: found None; accepted is a covary.Film or an array");
+  if (crn.is_none()) throw nb::type_error("crn: found None; expected a covary.Film or an array");
   Pair pair(crn, independent, nullptr);
   InputFindings inputs;
   run_work(

@@ -29,7 +29,7 @@ std::string option_text(const std::string& name, nb::handle value) {
   if (nb::isinstance<nb::bool_>(value)) return nb::cast<bool>(value) ? "on" : "off";
   if (nb::isinstance<nb::str>(value) || nb::isinstance<nb::int_>(value) || nb::isinstance<nb::float_>(value))
     return nb::cast<std::string>(nb::str(value));
-  throw nb::type_error(("integrator_options['" + name + "']: accepted are bool, int, float and str").c_str());
+  throw nb::type_error(("integrator_options['" + name + "']: expected a bool, int, float or str").c_str());
 }
 
 struct SceneChoice {

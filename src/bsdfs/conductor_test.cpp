@@ -32,10 +32,11 @@ TEST(Conductor, LobesFitTogether) {
 
 TEST(Conductor, WrongParametersAreNamed) {
   const std::string text = bsdf_errors({{"type", "conductor"}, {"material", "cu"}});
-  expect_contains(text, "parameter 'material' of bsdf 'conductor' is the unknown conductor 'cu'; accepted: none, Ag");
+  expect_contains(text,
+                  "parameter 'material' of bsdf 'conductor' is the unknown conductor 'cu'; expected one of none, Ag");
   expect_contains(text, "did you mean");
   expect_contains(bsdf_errors({{"type", "conductor"}, {"material", "Au"}, {"k", 1.0}}),
-                  "is 'Au' together with 'eta' or 'k'; accepted: one or the other");
+                  "is 'Au' together with 'eta' or 'k'; expected one or the other");
 }
 
 }  // namespace

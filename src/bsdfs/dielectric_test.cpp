@@ -62,7 +62,7 @@ TEST(Dielectric, TakesIndicesByName) {
 TEST(Dielectric, WrongParametersAreNamed) {
   const std::string text = bsdf_errors({{"type", "dielectric"}, {"int_ior", "watter"}});
   expect_contains(text, "parameter 'int_ior' of bsdf 'dielectric' is the unknown material 'watter'");
-  expect_contains(text, "accepted: a number in [0.01, 100], vacuum");
+  expect_contains(text, "expected a number in [0.01, 100] or one of vacuum");
   expect_contains(text, "did you mean 'water'");
   expect_contains(bsdf_errors({{"type", "dielectric"}, {"ext_ior", -1.0}}), "it must lie in [0.01, 100]");
 }

@@ -53,8 +53,8 @@ float get_ior(Parameters& parameters, const std::string& name, const std::string
     names.push_back(entry.name);
     list += (list.empty() ? "" : ", ") + names.back();
   }
-  parameters.error_at(name, fmt::format("is the unknown material '{}'; accepted: a number in [0.01, 100], {}{}", value,
-                                        list, did_you_mean(value, names)));
+  parameters.error_at(name, fmt::format("is the unknown material '{}'; expected a number in [0.01, 100] or one of {}{}",
+                                        value, list, did_you_mean(value, names)));
   return fallback_ior;
 }
 
@@ -68,13 +68,13 @@ ConductorInput get_conductor(Parameters& parameters) {
   const std::string material = parameters.get_string("material", "none");
   if (material != "none" && (has_eta || has_k))
     parameters.error_at("material",
-                        fmt::format("is '{}' together with 'eta' or 'k'; accepted: one or the other", material));
+                        fmt::format("is '{}' together with 'eta' or 'k'; expected one or the other", material));
   const auto constant = [](const Spectrum& value) { return ColourInput(std::make_shared<ConstantTexture>(value)); };
   if (material != "none" && !has_eta && !has_k) {
     if (const ConductorPreset* preset = find_conductor_preset(material))
       return {constant(preset->eta), constant(preset->k)};
     const std::vector<std::string> names = conductor_preset_names();
-    parameters.error_at("material", fmt::format("is the unknown conductor '{}'; accepted: none, {}{}", material,
+    parameters.error_at("material", fmt::format("is the unknown conductor '{}'; expected one of none, {}{}", material,
                                                 fmt::join(names, ", "), did_you_mean(material, names)));
   }
   // The pair eta = 0, k = 1 reflects everything at every angle.
@@ -89,9 +89,9 @@ RoughnessInput get_roughness(Parameters& parameters) {
   const bool sample_visible = parameters.get_bool("sample_visible", true);
   const bool has_u = parameters.has("alpha_u"), has_v = parameters.has("alpha_v");
   if (has_u != has_v)
-    parameters.error_at(has_u ? "alpha_u" : "alpha_v", "is given alone; accepted: both 'alpha_u' and 'alpha_v'");
+    parameters.error_at(has_u ? "alpha_u" : "alpha_v", "is given alone; expected both 'alpha_u' and 'alpha_v'");
   if ((has_u || has_v) && parameters.has("alpha"))
-    parameters.error_at("alpha", "is given together with 'alpha_u' or 'alpha_v'; accepted: one or the other");
+    parameters.error_at("alpha", "is given together with 'alpha_u' or 'alpha_v'; expected one or the other");
   const auto get = [&](const char* name) {
     return NumberInput(parameters.get_texture(name, Spectrum(0.1f), SpectrumRole::kIndex));
   };

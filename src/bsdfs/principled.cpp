@@ -307,7 +307,7 @@ class Principled final : public Bsdf {
 float get_eta(Parameters& parameters, bool refracts) {
   if (parameters.has("eta")) {
     if (parameters.has("specular"))
-      parameters.error_at("specular", "is given together with 'eta'; accepted: one of the two");
+      parameters.error_at("specular", "is given together with 'eta'; expected one of the two");
     const float eta = parameters.get_float("eta", 1.5f, 0.01f, 100.0f);
     return refracts && eta == 1 ? 1.001f : eta;
   }

@@ -14,7 +14,7 @@ namespace covary {
 inline NumberInput get_fraction(Parameters& parameters, const std::string& name, float fallback, float highest = 1) {
   NumberInput input(parameters.get_texture(name, fallback));
   if (input.is_constant() && !(input.constant() >= 0 && input.constant() <= highest))
-    parameters.error_at(name, fmt::format("is {}; accepted: a number in [0, {}]", input.constant(), highest));
+    parameters.error_at(name, fmt::format("is {}; expected a number in [0, {}]", input.constant(), highest));
   return input;
 }
 

@@ -229,7 +229,7 @@ std::shared_ptr<Bsdf> make_principledthin(Parameters& parameters) {
                 fraction("flatness"),
                 get_fraction(parameters, "diff_trans", 0, 2)};
   if (in.eta.is_constant() && !(in.eta.constant() >= 0.01f && in.eta.constant() <= 100))
-    parameters.error_at("eta", fmt::format("is {}; accepted: a number in [0.01, 100]", in.eta.constant()));
+    parameters.error_at("eta", fmt::format("is {}; expected a number in [0.01, 100]", in.eta.constant()));
   const auto rate = [&](const char* name) { return parameters.get_float(name, 1, 0, 1e6f); };
   const ThinRates rates{rate("specular_reflectance_sampling_rate"), rate("specular_transmittance_sampling_rate"),
                         rate("diffuse_reflectance_sampling_rate"), rate("diffuse_transmittance_sampling_rate")};

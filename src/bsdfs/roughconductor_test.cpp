@@ -57,13 +57,12 @@ TEST(RoughConductor, RoughnessMayBeATexture) {
 }
 
 TEST(RoughConductor, WrongParametersAreNamed) {
-  expect_contains(
-      bsdf_errors({{"type", "roughconductor"}, {"alpha_u", 0.1}}),
-      "parameter 'alpha_u' of bsdf 'roughconductor' is given alone; accepted: both 'alpha_u' and 'alpha_v'");
+  expect_contains(bsdf_errors({{"type", "roughconductor"}, {"alpha_u", 0.1}}),
+                  "parameter 'alpha_u' of bsdf 'roughconductor' is given alone; expected both 'alpha_u' and 'alpha_v'");
   expect_contains(bsdf_errors({{"type", "roughconductor"}, {"alpha", 0.1}, {"alpha_u", 0.1}, {"alpha_v", 0.1}}),
-                  "is given together with 'alpha_u' or 'alpha_v'; accepted: one or the other");
+                  "is given together with 'alpha_u' or 'alpha_v'; expected one or the other");
   expect_contains(bsdf_errors({{"type", "roughconductor"}, {"distribution", "phong"}}),
-                  "is 'phong'; accepted: 'beckmann', 'ggx'");
+                  "is 'phong'; expected one of 'beckmann', 'ggx'");
 }
 
 }  // namespace

@@ -177,7 +177,7 @@ class RoughPlastic final : public CoatedBsdf {
 std::shared_ptr<Bsdf> make_roughplastic(Parameters& parameters) {
   const RoughnessInput roughness = get_roughness(parameters);
   if (roughness.anisotropic || !roughness.alpha_u.is_constant())
-    parameters.error_at(roughness.anisotropic ? "alpha_u" : "alpha", "is not one number; accepted: one number 'alpha'");
+    parameters.error_at(roughness.anisotropic ? "alpha_u" : "alpha", "is not one number; expected one number 'alpha'");
   return std::make_shared<RoughPlastic>(roughness, parameters);
 }
 

@@ -64,7 +64,7 @@ TEST(RoughPlastic, EachInterfaceHasItsOwnTransmittance) {
 
 TEST(RoughPlastic, WrongParametersAreNamed) {
   expect_contains(bsdf_errors({{"type", "roughplastic"}, {"alpha_u", 0.1}, {"alpha_v", 0.2}}),
-                  "is not one number; accepted: one number 'alpha'");
+                  "is not one number; expected one number 'alpha'");
   expect_contains(bsdf_errors({{"type", "roughplastic"}, {"int_ior", "air"}}), "they must differ");
 }
 

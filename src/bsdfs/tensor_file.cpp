@@ -67,7 +67,7 @@ TensorFile::TensorFile(const std::string& path) : path_(path) {
   HeaderReader header(stream, path);
   const int major = header.number<uint8_t>(), minor = header.number<uint8_t>();
   if (major != 1 || minor != 0)
-    throw refusal(path, fmt::format("is a tensor file of version {}.{}; accepted is 1.0", major, minor));
+    throw refusal(path, fmt::format("is a tensor file of version {}.{}; expected 1.0", major, minor));
   const auto n_fields = header.number<uint32_t>();
   for (uint32_t i = 0; i < n_fields; ++i) {
     const std::string name = header.text(header.number<uint16_t>());

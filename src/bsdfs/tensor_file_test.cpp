@@ -66,7 +66,7 @@ TEST(TensorFile, DamagedFilesAreRefused) {
   const std::string whole = tensor_text(kFields);
   std::string other = whole;
   other[12] = 2;
-  EXPECT_EQ(refused(other), ": is a tensor file of version 2.0; accepted is 1.0");
+  EXPECT_EQ(refused(other), ": is a tensor file of version 2.0; expected 1.0");
   other = whole;
   other[23] = 12;  // the type of the first field: after 18 bytes, its name of 2 + 1 and 2
   EXPECT_EQ(refused(other), ": has values of unknown type 12 in field 1");

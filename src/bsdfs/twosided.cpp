@@ -141,7 +141,7 @@ std::shared_ptr<Bsdf> make_twosided(Parameters& parameters) {
   auto result = std::make_shared<TwoSided>(nested.front(), nested.back());
   if (!allow_transmission && (result->flags() & kTransmission)) {
     parameters.error(
-        "a nested model transmits light; accepted: models that only reflect, or any with 'allow_transmission'");
+        "a nested model transmits light; expected one that only reflects, or any with 'allow_transmission'");
     return nullptr;
   }
   return result;

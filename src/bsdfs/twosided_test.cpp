@@ -38,7 +38,7 @@ TEST(TwoSided, WrongNestedModelsAreNamed) {
   expect_contains(bsdf_errors({{"type", "twosided"}}),
                   "bsdf 'twosided': has 0 nested reflectance models; it takes 1 or 2");
   expect_contains(bsdf_errors({{"type", "twosided"}, {"a", {{"type", "dielectric"}}}}),
-                  "a nested model transmits light; accepted: models that only reflect");
+                  "a nested model transmits light; expected one that only reflects");
   EXPECT_EQ(bsdf_errors({{"type", "twosided"}, {"a", {{"type", "dielectric"}}}, {"allow_transmission", true}}), "");
 }
 

@@ -49,7 +49,7 @@ double samples_per_pixel(const ExrFile& file, const std::string& path) {
   if (text.empty()) return 0;
   const double value = parse_real(text).value_or(-1);
   if (!(value >= 0 && value < 1e15))
-    fail(path, fmt::format("attribute {} is '{}'; expected is a number of samples per pixel", key, text));
+    fail(path, fmt::format("attribute {} is '{}'; expected a number of samples per pixel", key, text));
   return value;
 }
 
@@ -140,7 +140,7 @@ void GroupedFile::add_file(const std::string& path, const std::string& layer, bo
   for (size_t g = first_group; g < groups_.size(); ++g)
     for (const std::string& channel : groups_[g].channels) {
       const std::string& type = file.find(channel)->type;
-      if (type == "uint") fail(path, fmt::format("channel {} holds integers; expected are float values", channel));
+      if (type == "uint") fail(path, fmt::format("channel {} holds integers; expected float values", channel));
       has_half_ |= type == "half";
       read.push_back(channel);
     }
@@ -176,7 +176,7 @@ void GroupedFile::take_film_facts(const std::string& path, const ExrFile& file, 
 }
 
 void GroupedFile::take_counts(const std::string& path) {
-  if (has_counts()) fail(name_, "tells itself how many samples its pixels have; '" + path + "' is not needed");
+  if (has_counts()) fail(name_, "already says how many samples its pixels have; '" + path + "' is not needed");
   auto file = std::make_unique<ExrFile>(path);
   if (!(file->place() == place_)) {
     const CropWindow &there = file->place().window, &here = place_.window;
@@ -185,7 +185,7 @@ void GroupedFile::take_counts(const std::string& path) {
   }
   const bool is_only = file->channels().size() == 1;
   if (!is_only && !file->find(kCounts))
-    fail(path, fmt::format("expected is one channel, or one that is named '{}'; {}", kCounts, list_layers(*file, {})));
+    fail(path, fmt::format("expected one channel, or one that is named '{}'; {}", kCounts, list_layers(*file, {})));
   counts_channel_ = is_only ? file->channels()[0].name : kCounts;
   file->check({&counts_channel_, 1});
   counts_file_ = std::move(file);
@@ -219,7 +219,7 @@ void GroupedFile::read_counts(int first_row, int n_rows, std::vector<uint32_t>& 
   counts_file_->read_rows({&plane, 1}, first_row, n_rows);
   for (size_t i = 0; i < n_pixels; ++i) {
     if (!(values[i] >= 0 && values[i] <= 0x1p30f && values[i] == std::floor(values[i])))
-      fail(counts_path_, fmt::format("{} at ({}, {}); expected are whole numbers of samples", values[i],
+      fail(counts_path_, fmt::format("{} at ({}, {}); expected whole numbers of samples", values[i],
                                      i % static_cast<size_t>(width()), first_row + i / static_cast<size_t>(width())));
     counts[i] = static_cast<uint32_t>(values[i]);
   }

@@ -136,7 +136,7 @@ TEST_F(GroupedFileTest, SaysWhatIsWrong) {
   for (const char* samples : {"many", "12 or so", "-4", "nan", "1e30"})
     EXPECT_EQ(
         message({write("odd.exr", {""}, 0, {{"covary:samples", samples}})}),
-        fmt::format("odd.exr: attribute covary:samples is '{}'; expected is a number of samples per pixel", samples));
+        fmt::format("odd.exr: attribute covary:samples is '{}'; expected a number of samples per pixel", samples));
   std::vector<float> depth(kWidth * kHeight);
   const ExrPlane plane{"Z", ExrPlane::Type::kFloat, depth.data(), sizeof(float)};
   const std::string z = folder_.file("z.exr");

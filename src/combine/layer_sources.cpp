@@ -32,7 +32,7 @@ WholeLayers::WholeLayers(const GroupedImage& picture, std::span<const LayerSourc
   for (const LayerSource& source : sources) {
     if (source.name == kRest ||
         std::any_of(layers_.begin(), layers_.end(), [&](const Layer& other) { return other.name == source.name; }))
-      fail(source.name, "is there twice");
+      fail(source.name, "appears twice");
     check(source, picture);
     Layer& layer = layers_.emplace_back(Layer{source.name, source.groups.all()});
     layer.image.counts = picture.counts, layer.image.mean_count = picture.mean_count;

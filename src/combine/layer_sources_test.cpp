@@ -88,7 +88,7 @@ TEST(LayerSources, AreOfTheImagesPixelsAndGroups) {
                 .find("the layer 'key' has 32 x 24 pixels in 2 groups, the image 32 x 24 in 4"),
             std::string::npos);
   EXPECT_NE(message(lamps.request({{"key", Lamps::source(lamps.key)}, {"key", Lamps::source(lamps.key)}}))
-                .find("the layer 'key' is there twice"),
+                .find("the layer 'key' appears twice"),
             std::string::npos);
   std::vector<float> broken = lamps.key;
   broken[5] = NAN;

@@ -31,7 +31,7 @@ void check_origins(const ImageOrigin& crn, const ImageOrigin& independent, std::
     findings.push_back({Severity::kError, "the files say that the CRN image was rendered with sampling '" +
                                               crn.sampling + "' and the independent image with '" +
                                               independent.sampling +
-                                              "'; expected are `sampling` crn and `sampling` independent"});
+                                              "'; expected `sampling` crn and `sampling` independent"});
   if (!crn.scene_hash.empty() && !independent.scene_hash.empty() && crn.scene_hash != independent.scene_hash)
     findings.push_back({Severity::kError, "the files say that they show different scenes (attribute scene_hash)"});
   if (!crn.settings.empty() && !independent.settings.empty() && crn.settings != independent.settings)

@@ -50,7 +50,7 @@ double memory_limit() {
   const std::string_view text = given;
   const double gigabytes = parse_real(text).value_or(0);
   if (!(gigabytes * 1e9 >= kLeastMemoryLimit && gigabytes < 1e9))
-    throw Error(ErrorCode::kUsage, fmt::format("the environment variable {} is '{}'; expected is a number of GB, at "
+    throw Error(ErrorCode::kUsage, fmt::format("the environment variable {} is '{}'; expected a number of GB, at "
                                                "least {:g}",
                                                kVariable, text, kLeastMemoryLimit / 1e9));
   return gigabytes * 1e9;

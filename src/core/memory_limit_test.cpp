@@ -47,7 +47,7 @@ TEST_F(MemoryLimit, IsThatOfTheEnvironment) {
       << text;
   for (const char* wrong : {"much", "4 GB", "-1", "0", "0.1", "nan"}) {
     set(wrong);
-    EXPECT_NE(message(4e9, ErrorCode::kUsage).find("expected is a number of GB, at least 0.2"), std::string::npos)
+    EXPECT_NE(message(4e9, ErrorCode::kUsage).find("expected a number of GB, at least 0.2"), std::string::npos)
         << wrong;
   }
 }

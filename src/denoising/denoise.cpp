@@ -140,7 +140,7 @@ Api load(const DenoiseOptions& options, std::string* path = nullptr) {
     throw Error(
         ErrorCode::kUsage,
         fmt::format(
-            "Open Image Denoise is not there ({}); install it with `pip install pyoidn`, or name {}, its "
+            "Open Image Denoise was not found ({}); install it with `pip install pyoidn`, or name {}, its "
             "folder or the Python environment that holds it with `oidn` or the environment variable COVARY_OIDN",
             why, kLibrary));
   if (path) *path = library.path;
@@ -164,10 +164,11 @@ Api load(const DenoiseOptions& options, std::string* path = nullptr) {
 
 void check_size(const char* name, const Image& rgb, const Image* guide) {
   if (guide && (guide->width != rgb.width || guide->height != rgb.height || guide->channels != 3))
-    throw Error(ErrorCode::kInput,
-                fmt::format("denoise: the {} is {} x {} with {} channels, the image {} x {}; expected "
-                            "are 3 channels and the same size",
-                            name, guide->width, guide->height, guide->channels, rgb.width, rgb.height));
+    throw Error(
+        ErrorCode::kInput,
+        fmt::format(
+            "denoise: the {} is {} x {} with {} channels, the image {} x {}; expected 3 channels and the same size",
+            name, guide->width, guide->height, guide->channels, rgb.width, rgb.height));
 }
 
 Image finite(const Image& image) {
@@ -179,9 +180,8 @@ Image finite(const Image& image) {
 
 void check_images(const Image& rgb, const Image* albedo, const Image* normal) {
   if (rgb.width < 1 || rgb.height < 1 || rgb.channels != 3)
-    throw Error(ErrorCode::kInput,
-                fmt::format("denoise: the image is {} x {} with {} channels; expected are 3 channels", rgb.width,
-                            rgb.height, rgb.channels));
+    throw Error(ErrorCode::kInput, fmt::format("denoise: the image is {} x {} with {} channels; expected 3 channels",
+                                               rgb.width, rgb.height, rgb.channels));
   check_size("albedo", rgb, albedo);
   check_size("normal", rgb, normal);
   if (normal && !albedo) throw Error(ErrorCode::kInput, "denoise: a normal without an albedo; the denoiser needs both");

@@ -74,8 +74,8 @@ TEST(Denoise, FindsTheWheelFromEveryFolderOfIt) {
   above.push_back(library);
   for (const std::string& path : above) {
     const std::string message = message_of([&] { denoise(Image(4, 3, 3), nullptr, nullptr, {path}); });
-    EXPECT_NE(message.find("Open Image Denoise is not there (" + library), std::string::npos) << path << "\n"
-                                                                                              << message;
+    EXPECT_NE(message.find("Open Image Denoise was not found (" + library), std::string::npos) << path << "\n"
+                                                                                               << message;
   }
   // A folder that leads nowhere is named itself.
   const std::string elsewhere = (test_folder() / "venv" / "lib" / "python3.11" / "site-packages" / "other").string();
@@ -88,18 +88,18 @@ TEST(Denoise, SaysWhatIsMissing) {
   const Image image(4, 3, 3), other(4, 2, 3), grey(4, 3, 1);
   const std::string message =
       message_of([&] { denoise(image, nullptr, nullptr, {"/nowhere/libOpenImageDenoise.so.2"}); });
-  EXPECT_NE(message.find("Open Image Denoise is not there (/nowhere/libOpenImageDenoise.so.2: "), std::string::npos)
+  EXPECT_NE(message.find("Open Image Denoise was not found (/nowhere/libOpenImageDenoise.so.2: "), std::string::npos)
       << message;
   EXPECT_NE(message.find("; install it with `pip install pyoidn`, or name libOpenImageDenoise.so.2, its folder or "
                          "the Python environment that holds it with `oidn` or the environment variable COVARY_OIDN"),
             std::string::npos)
       << message;
   EXPECT_EQ(message_of([&] { denoise(image, &other, nullptr); }),
-            "denoise: the albedo is 4 x 2 with 3 channels, the image 4 x 3; expected are 3 channels and the same size");
+            "denoise: the albedo is 4 x 2 with 3 channels, the image 4 x 3; expected 3 channels and the same size");
   EXPECT_EQ(message_of([&] { denoise(image, nullptr, &image); }),
             "denoise: a normal without an albedo; the denoiser needs both");
   EXPECT_EQ(message_of([&] { denoise(grey, nullptr, nullptr); }),
-            "denoise: the image is 4 x 3 with 1 channels; expected are 3 channels");
+            "denoise: the image is 4 x 3 with 1 channels; expected 3 channels");
 }
 
 }  // namespace

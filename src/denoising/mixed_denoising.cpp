@@ -227,8 +227,8 @@ MixedDenoising single_candidate(const GroupedImage& independent, const std::vect
   for (size_t i = 0; i < parts.valid.size(); ++i)
     if (parts.valid[i]) std::copy_n(&set.candidates[best].data[3 * i], 3, &out.result.estimate.data[3 * i]);
   out.result.note = fmt::format(
-      "fewer than {} samples per pixel are too few to judge denoised images by: the picture is the candidate '{}', and "
-      "its error is not known",
+      "with fewer than {} samples per pixel denoised images cannot be judged: the picture is the candidate '{}', and "
+      "its error is unknown",
       kFewestMixedSamples, out.names[best]);
   out.weights.assign(set.candidates.size(), Image(independent.width, independent.height, 1));
   std::fill(out.weights[best].data.begin(), out.weights[best].data.end(), 1.0f);
@@ -320,8 +320,8 @@ void declare(Settings& s, DenoisingChoice& v, bool is_all) {
 
 std::string missing_network(const DenoisingChoice& choice) {
   if (!choice.uses_oidn() || !choice.oidn.empty() || !find_denoiser().empty()) return "";
-  return "Open Image Denoise is not installed, so that the image is denoised by filters alone; `pip install pyoidn` "
-         "brings it (`oidn` off: without these words)";
+  return "Open Image Denoise is not installed, so only filters denoise the image; `pip install pyoidn` installs it "
+         "(`oidn` off silences this note)";
 }
 
 }  // namespace covary

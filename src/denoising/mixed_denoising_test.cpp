@@ -391,7 +391,7 @@ TEST(MixedDenoising, SaysWhatItCannotDo) {
   const Inputs in(9);
   EXPECT_NE(message_of([&] {
               with_denoising(make_estimator("iicv"), elsewhere).apply(in.crn.view(), in.independent.view(), {});
-            }).find("Open Image Denoise is not there (/nowhere/"),
+            }).find("Open Image Denoise was not found (/nowhere/"),
             std::string::npos);
   EXPECT_EQ(denoiser(DenoiseMode::kError).fewest_groups, 6);
 }

@@ -205,7 +205,7 @@ std::shared_ptr<Emitter> make_sunsky(Parameters& parameters) {
   const Spectrum albedo = parameters.get_spectrum("albedo", Spectrum(0.3f), SpectrumRole::kReflectance);
   for (int c = 0; c < 3; ++c)
     if (!(albedo[c] >= 0 && albedo[c] <= 1)) {
-      parameters.error_at("albedo", "is outside of [0, 1]");
+      parameters.error_at("albedo", "is outside [0, 1]");
       return nullptr;
     }
   const float sun_scale = parameters.get_float("sun_scale", 1, 0), sky_scale = parameters.get_float("sky_scale", 1, 0);

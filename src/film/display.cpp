@@ -141,7 +141,7 @@ struct Display::Connection {
         lost = true;
         next.reset();
       }
-      warn(fmt::format("display server {}: {}; rendering goes on without it", address_text, error.what()));
+      warn(fmt::format("display server {}: {}; rendering continues without it", address_text, error.what()));
     }
     if (descriptor >= 0) close(descriptor);
   }

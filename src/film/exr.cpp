@@ -194,8 +194,8 @@ ExrFile::ExrFile(const std::string& path, ChecksumPolicy checksums) : path_(path
                   frame_height = extent(display.min.y, display.max.y);
     if (std::min({width, height, frame_width, frame_height}) < 1 ||
         std::max({width, height, frame_width, frame_height}) > kMaxSize)
-      fail(path, fmt::format("{} x {} pixels in a frame of {} x {}; accepted are 1 to {} in each direction", width,
-                             height, frame_width, frame_height, kMaxSize));
+      fail(path, fmt::format("{} x {} pixels in a frame of {} x {}; expected 1 to {} in each direction", width, height,
+                             frame_width, frame_height, kMaxSize));
     ImagePlace place{static_cast<int>(frame_width), static_cast<int>(frame_height), {}};
     place.window = {window.min.x - display.min.x, window.min.y - display.min.y, static_cast<int>(width),
                     static_cast<int>(height)};

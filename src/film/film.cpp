@@ -63,7 +63,7 @@ Film::Film(int frame_width, int frame_height, const CropWindow& crop, int groups
                 fmt::format("the crop of {} x {} pixels at ({}, {}) is empty or not inside the frame of {} x {}",
                             crop.width, crop.height, crop.x, crop.y, frame_width, frame_height));
   if (groups < 1 || groups > kMaxGroups)
-    throw Error(ErrorCode::kInput, fmt::format("{} groups; accepted are 1 to {}", groups, kMaxGroups));
+    throw Error(ErrorCode::kInput, fmt::format("{} groups; expected 1 to {}", groups, kMaxGroups));
   const size_t n_pixels = static_cast<size_t>(crop.width) * crop.height;
   counts_.assign(n_pixels, 0);
   groups_data_.assign(n_pixels * groups * 3, 0.0f);

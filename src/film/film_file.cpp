@@ -147,7 +147,7 @@ Film read_film(const std::string& path) {
   const std::string text = attributes[kGroups];
   const int groups = parse_number<int>(text).value_or(0);
   if (groups < 1 || groups > Film::kMaxGroups)
-    fail(path, fmt::format("attribute covary:groups is '{}'; expected is 1 to {}", text, Film::kMaxGroups));
+    fail(path, fmt::format("attribute covary:groups is '{}'; expected 1 to {}", text, Film::kMaxGroups));
   // Before memory is taken: all channels must be there, with the right type.
   if (!file.find(group_name(groups - 1) + ".R") && groups > 1)
     fail(path, fmt::format("channel {}.R of a film with {} groups is missing", group_name(groups - 1), groups));
@@ -174,7 +174,7 @@ Film read_film(const std::string& path) {
     if (!found) fail(path, fmt::format("channel {} of a film with {} groups is missing", plane.name, groups));
     const char* expected = plane.type == ExrPlane::Type::kUint ? "uint" : "float";
     if (found->type != expected)
-      fail(path, fmt::format("channel {} is of type {}; expected is {}", plane.name, found->type, expected));
+      fail(path, fmt::format("channel {} is of type {}; expected {}", plane.name, found->type, expected));
   }
   for (const ExrFile::Channel& channel : file.channels())
     if (layer_of(channel.name) != kStdError &&

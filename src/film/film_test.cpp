@@ -123,7 +123,7 @@ TEST(Film, CountsPixelsWithNegativeValues) {
 TEST(Film, RejectsImpossibleSizes) {
   EXPECT_TRUE(contains(message_of([] { Film(0, 5, {0, 0, 1, 1}, 1); }), "film of 0 x 5 pixels"));
   EXPECT_TRUE(contains(message_of([] { Film(4, 4, {2, 0, 3, 1}, 1); }), "3 x 1 pixels at (2, 0)"));
-  EXPECT_TRUE(contains(message_of([] { Film(4, 4, {0, 0, 4, 4}, 0); }), "0 groups; accepted are 1 to 1024"));
+  EXPECT_TRUE(contains(message_of([] { Film(4, 4, {0, 0, 4, 4}, 0); }), "0 groups; expected 1 to 1024"));
   Film film(1, 1, {0, 0, 1, 1}, 1);
   film.counts()[0] = 0xffffffffu;
   EXPECT_TRUE(contains(message_of([&] { film.add(0, 0, Spectrum(1)); }), "4294967296 samples at pixel"));

@@ -222,13 +222,13 @@ TEST(FilmFile, RejectsFilesThatAreNoFilms) {
   EXPECT_TRUE(contains(message(), "film format '9'; this version reads '1'"));
   for (const char* groups : {"", "0", "-1", "1025", "two", "99999999999"}) {
     write_exr(path, place, {{"covary:film", "1"}, {"covary:groups", groups}}, planes);
-    EXPECT_TRUE(contains(message(), std::string("covary:groups is '") + groups + "'; expected is 1 to 1024"));
+    EXPECT_TRUE(contains(message(), std::string("covary:groups is '") + groups + "'; expected 1 to 1024"));
   }
   write_exr(path, place, {{"covary:film", "1"}, {"covary:groups", "1"}}, planes);
   EXPECT_TRUE(contains(message(), "channel samples of a film with 1 groups is missing"));
   planes.push_back({"samples", ExrPlane::Type::kFloat, values.data(), 4});
   write_exr(path, place, {{"covary:film", "1"}, {"covary:groups", "1"}}, planes);
-  EXPECT_TRUE(contains(message(), "channel samples is of type float; expected is uint"));
+  EXPECT_TRUE(contains(message(), "channel samples is of type float; expected uint"));
   planes.back() = {"samples", ExrPlane::Type::kUint, counts.data(), 4};
   write_exr(path, place, {{"covary:film", "1"}, {"covary:groups", "1"}}, planes);
   EXPECT_EQ(message(), "no error");

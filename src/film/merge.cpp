@@ -29,7 +29,7 @@ std::string attribute(const Attributes& attributes, const std::string& key) {
 std::set<uint64_t> seeds_of(const Attributes& attributes, const std::string& name) {
   const std::string text = attribute(attributes, film_key::kSeed);
   const auto fail = [&] {
-    throw Error(ErrorCode::kInput, fmt::format("{}: attribute seed is '{}'; expected are whole numbers below 2^64, "
+    throw Error(ErrorCode::kInput, fmt::format("{}: attribute seed is '{}'; expected whole numbers below 2^64, "
                                                "separated by commas",
                                                name, text));
   };

@@ -25,8 +25,7 @@ SplatLayer::SplatLayer(Film& film) : film_(film) {
   const std::vector<uint32_t>& counts = film.counts();
   COVARY_CHECK(!counts.empty(), "a light film needs pixels");
   if (!std::all_of(counts.begin(), counts.end(), [&](uint32_t n) { return n == counts[0]; }))
-    throw Error(ErrorCode::kInput,
-                "the pixels of a light film differ in their number of samples; expected are equal ones");
+    throw Error(ErrorCode::kInput, "the pixels of a light film differ in their number of samples; expected equal ones");
   const std::string expected = fmt::to_string(kBundlePaths);
   std::string& found = film.attributes[film_key::kLightPaths];
   if (counts[0] > 0 && found != expected)

@@ -74,12 +74,12 @@ ObjectBuilder make_pbrt_curve(PbrtParameters& p, const PbrtPlacement& placement)
   p.ignore({"splitdepth", "N"});
   const bool bezier = basis == "bezier";
   if ((!bezier && basis != "bspline") || degree < 2 || degree > 3 || (!bezier && degree == 2)) {
-    p.error(fmt::format("has basis '{}' and degree {}; supported are 'bezier' of degree 2 or 3 and 'bspline' of 3",
-                        basis, degree));
+    p.error(fmt::format("has basis '{}' and degree {}; supported: 'bezier' of degree 2 or 3 and 'bspline' of 3", basis,
+                        degree));
     return nullptr;
   }
   if (type != "flat" && type != "cylinder") {
-    p.error(fmt::format("has the type '{}'; supported are 'flat' and 'cylinder', both as round tubes", type));
+    p.error(fmt::format("has the type '{}'; supported: 'flat' and 'cylinder', both as round tubes", type));
     return nullptr;
   }
   const size_t n = numbers.size() / 3, d = static_cast<size_t>(degree);

@@ -102,7 +102,7 @@ ObjectBuilder conductor(PbrtParameters& p, const PbrtNames& names) {
   }
   const auto eta = spectrum_value(p, "eta", names), k = spectrum_value(p, "k", names);
   if (!eta || !k) {
-    p.error("needs 'eta' and 'k' of one metal, or two colours or spectra");
+    p.error("needs 'eta' and 'k' of one metal, or as two colours or spectra");
     return nullptr;
   }
   set_property(*model, "eta", *eta);
@@ -139,7 +139,7 @@ ObjectBuilder coated_diffuse(PbrtParameters& p, const PbrtNames& names) {
   if (!rough->smooth()) {
     const auto *u = std::get_if<double>(&rough->u), *v = std::get_if<double>(&rough->v);
     if (!u || !v || *u != *v) {
-      p.error("has a roughness that is a texture, or differs along u and v; supported is one number");
+      p.error("has a roughness that is a texture, or differs along u and v; supported: one number");
       return nullptr;
     }
     set_property(*model, "distribution", std::string("ggx"));
@@ -149,7 +149,7 @@ ObjectBuilder coated_diffuse(PbrtParameters& p, const PbrtNames& names) {
   set_property(*model, "nonlinear", true);
   set_property(*model, "int_ior", index_of_refraction(p));
   set_property(*model, "ext_ior", 1.0);
-  p.warn(fmt::format("is read as '{}', whose clear layer takes no light away", model->type));
+  p.warn(fmt::format("is read as '{}', whose clear layer absorbs no light", model->type));
   return two_sided(model);
 }
 
@@ -231,7 +231,7 @@ ObjectBuilder base_material(const std::string& type, PbrtParameters& p, const Pb
     return two_sided(model);
   }
   p.error(
-      "is not supported; supported are materials 'coateddiffuse', 'conductor', 'dielectric', 'diffuse', 'hair', "
+      "is not supported; supported: materials 'coateddiffuse', 'conductor', 'dielectric', 'diffuse', 'hair', "
       "'interface', 'measured', 'mix' and 'thindielectric'");
   return nullptr;
 }

@@ -20,8 +20,8 @@ std::optional<Spectrum> cross_section(PbrtParameters& p, const char* name) {
 
 ObjectBuilder make_pbrt_medium(const std::string& type, PbrtParameters& p) {
   if (type != "homogeneous") {
-    p.error(fmt::format("is of the type '{}'; supported is 'homogeneous'. Grids can be given in XML, by 'gridvolume'",
-                        type));
+    p.error(
+        fmt::format("is of the type '{}'; supported: 'homogeneous'. Grids can be given in XML, by 'gridvolume'", type));
     return nullptr;
   }
   for (const char* name : {"Le", "preset"})

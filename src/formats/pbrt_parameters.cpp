@@ -60,7 +60,7 @@ PbrtToken PbrtTokens::next() {
   } else if (first == '"') {
     token.kind = PbrtToken::kString;
     for (;;) {
-      if (place_ == text_.size() || text_[place_] == '\n') stop(token, "a string has no end");
+      if (place_ == text_.size() || text_[place_] == '\n') stop(token, "unterminated string");
       char c = take();
       if (c == '"') break;
       if (c == '\\' && place_ < text_.size()) {

@@ -43,7 +43,7 @@ class Reader {
       return result;  // the reason was told
     }
     if (!in_world_) diagnostics_.error(scene_->where, "the scene has no WorldBegin");
-    if (!states_.empty()) diagnostics_.error(states_.back().where, "this block has no end");
+    if (!states_.empty()) diagnostics_.error(states_.back().where, "unterminated block");
     if (group_) diagnostics_.error(group_->where, "this object has no ObjectEnd");
     for (const ObjectPtr& object : finish_pbrt_view(std::move(view_), scene_->where)) add(object);
     result.scene = scene_;
@@ -99,7 +99,7 @@ class Reader {
       if (word == "Import") state_ = before;
     } else if (word == "ColorSpace") {
       if (const std::string name = tokens.string("a colour space"); name != "srgb")
-        diagnostics_.error(where_, fmt::format("colour space '{}' is not supported; supported is 'srgb'", name));
+        diagnostics_.error(where_, fmt::format("colour space '{}' is not supported; supported: 'srgb'", name));
     } else if (word == "Option") {
       parameters(tokens, "Option").ignore({});
     } else if (word == "Accelerator") {
@@ -125,7 +125,7 @@ class Reader {
     } else if (word == "ObjectBegin") {
       const std::string name = tokens.string("a name");
       push(true);
-      if (group_) diagnostics_.error(where_, "an object inside of an object");
+      if (group_) diagnostics_.error(where_, "an object inside an object");
       group_ = make_object("shape", "shapegroup", where_);
       group_->id = name;
       if (!groups_.emplace(name, group_).second)
@@ -300,7 +300,7 @@ class Reader {
       return;
     }
     if (group_) {
-      diagnostics_.error(where_, "an instance inside of an object is not supported");
+      diagnostics_.error(where_, "an instance inside an object is not supported");
       return;
     }
     if (!found->second) return;
@@ -318,7 +318,7 @@ class Reader {
     }
     if (depth + 1 >= kDeepest || ++n_includes_ > kMostIncludes) {
       diagnostics_.error(where,
-                         fmt::format("more than {} files inside of each other, or {} in all", kDeepest, kMostIncludes));
+                         fmt::format("more than {} files inside each other, or {} in all", kDeepest, kMostIncludes));
       throw PbrtStop();
     }
     const std::string path = files_.resolve(name, where, diagnostics_);
@@ -338,14 +338,14 @@ class Reader {
   }
   void push(bool whole) {
     if (states_.size() >= kMostStates) {
-      diagnostics_.error(where_, fmt::format("more than {} blocks inside of each other", kMostStates));
+      diagnostics_.error(where_, fmt::format("more than {} nested blocks", kMostStates));
       throw PbrtStop();
     }
     states_.push_back({state_, whole, where_});
   }
   void pop(bool whole) {
     if (states_.empty() || states_.back().whole != whole) {
-      diagnostics_.error(where_, "the end of a block that was not begun");
+      diagnostics_.error(where_, "the end of a block that was never begun");
       throw PbrtStop();
     }
     if (whole)

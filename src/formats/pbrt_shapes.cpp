@@ -111,7 +111,7 @@ ObjectBuilder bilinear_mesh(PbrtParameters& p, const PbrtPlacement& placement) {
 void expect_whole(PbrtParameters& p, const char* name, double whole) {
   const double value = p.get_float(name, whole);
   if (std::abs(value - whole) > 1e-4 * std::max(std::abs(whole), 1.0))
-    p.error(fmt::format("has {} {}; supported are whole ones, {}", name, value, whole));
+    p.error(fmt::format("has {} {}; supported: whole ones, {}", name, value, whole));
 }
 
 ObjectBuilder sphere(PbrtParameters& p, const PbrtPlacement& placement) {
@@ -160,7 +160,7 @@ ObjectBuilder make_pbrt_shape(const std::string& type, PbrtParameters& p, const 
     return result;
   }
   p.error(
-      "is not supported; supported are shapes 'bilinearmesh', 'curve', 'cylinder', 'disk', 'plymesh', 'sphere' and "
+      "is not supported; supported: shapes 'bilinearmesh', 'curve', 'cylinder', 'disk', 'plymesh', 'sphere' and "
       "'trianglemesh'");
   return nullptr;
 }

@@ -45,7 +45,7 @@ std::optional<ColourValue> rgb(PbrtParameters& p, const PbrtParameter& parameter
 /// pbrt's mapping of (u, v), then `more`.
 Transform texture_mapping(PbrtParameters& p, const Transform& more) {
   if (const std::string mapping = p.get_string("mapping", "uv"); mapping != "uv")
-    p.error(fmt::format("has the mapping '{}'; supported is 'uv'", mapping));
+    p.error(fmt::format("has the mapping '{}'; supported: 'uv'", mapping));
   const auto number = [&](const char* name, double fallback) {
     return static_cast<float>(p.get_float(name, fallback));
   };
@@ -67,12 +67,12 @@ ObjectBuilder image_texture(PbrtParameters& p) {
   if (wrap == "repeat" || wrap == "clamp")
     set_property(*bitmap, "wrap_mode", wrap);
   else
-    p.error(fmt::format("has wrap '{}'; supported are 'repeat' and 'clamp'", wrap));
+    p.error(fmt::format("has wrap '{}'; supported: 'repeat' and 'clamp'", wrap));
   set_property(*bitmap, "filter_type", std::string(filter == "point" ? "nearest" : "bilinear"));
   p.ignore({"maxanisotropy"});
   const std::string encoding = p.get_string("encoding", "sRGB");
   if (encoding != "sRGB" && encoding != "linear")
-    p.error(fmt::format("has encoding '{}'; supported are 'sRGB' and 'linear'", encoding));
+    p.error(fmt::format("has encoding '{}'; supported: 'sRGB' and 'linear'", encoding));
   set_property(*bitmap, "raw", encoding == "linear");
   if (p.get_bool("invert", false)) p.error("is inverted, which is not supported");
   const double scale = p.get_float("scale", 1);
@@ -92,7 +92,7 @@ std::optional<Value> either(PbrtParameters& p, const std::string& name, double f
 }
 
 ObjectBuilder checkerboard(PbrtParameters& p, bool of_numbers, const PbrtNames& names) {
-  if (p.get_integer("dimension", 2) != 2) p.error("has three dimensions; supported are two");
+  if (p.get_integer("dimension", 2) != 2) p.error("has three dimensions; supported: two");
   auto board = make_object("texture", "checkerboard", p.where());
   // Squares of pbrt have the length 1, those here 1/2.
   set_property(*board, "to_uv", texture_mapping(p, Transform::scale({0.5f, 0.5f, 1})));
@@ -108,7 +108,7 @@ ObjectBuilder scaled_texture(PbrtParameters& p, bool of_numbers, const PbrtNames
   const auto factor = float_value(p, "scale", 1, names);
   if (!texture || !factor) return nullptr;
   if (!std::holds_alternative<double>(*factor)) {
-    p.error("scales by a texture; supported is a number");
+    p.error("scales by a texture; supported: a number");
     return nullptr;
   }
   auto scaled = make_object("texture", "scale", p.where());
@@ -191,7 +191,7 @@ ObjectBuilder make_pbrt_texture(const std::string& type, PbrtParameters& p, cons
     set_property(*constant, "value", *value);
     return constant;
   }
-  p.error("is not supported; supported are textures 'checkerboard', 'constant', 'imagemap' and 'scale'");
+  p.error("is not supported; supported: textures 'checkerboard', 'constant', 'imagemap' and 'scale'");
   return nullptr;
 }
 

@@ -40,7 +40,7 @@ ObjectPtr spot(PbrtParameters& p, const Transform& to_world) {
   try {
     set_property(*light, "to_world", to_world * Transform::look_at(aim.from, aim.to, up));
   } catch (const Error&) {
-    p.error("shines from a point to the same point");
+    p.error("has the same point as origin and target");
     return nullptr;
   }
   if (edge > 0) p.warn("has a smooth edge, which is linear here");
@@ -83,16 +83,16 @@ ObjectPtr make_pbrt_light(const std::string& type, PbrtParameters& p, const Tran
   }
   if (type == "spot") return spot(p, to_world);
   if (type == "infinite") return infinite(p, to_world);
-  const char* instead = type == "projection"    ? " Its like in XML is 'projector'."
+  const char* instead = type == "projection"    ? " In XML, use 'projector'."
                         : type == "goniometric" ? " A 'point' without its pattern shines alike in all directions."
                                                 : "";
-  p.error(fmt::format("is not supported; supported are lights 'distant', 'infinite', 'point' and 'spot'.{}", instead));
+  p.error(fmt::format("is not supported; supported: lights 'distant', 'infinite', 'point' and 'spot'.{}", instead));
   return nullptr;
 }
 
 ObjectPtr make_pbrt_area_light(const std::string& type, PbrtParameters& p) {
   if (type != "diffuse") {
-    p.error("is not supported; supported is 'diffuse'");
+    p.error("is not supported; supported: 'diffuse'");
     return nullptr;
   }
   refuse(p, {"power", "filename"});
@@ -104,7 +104,7 @@ ObjectPtr make_pbrt_area_light(const std::string& type, PbrtParameters& p) {
 
 void read_pbrt_camera(const std::string& type, PbrtParameters& p, const Transform& world_to_camera, PbrtView& view) {
   if (type != "perspective" && type != "orthographic") {
-    p.error("is not supported; supported are cameras 'orthographic' and 'perspective'");
+    p.error("is not supported; supported: cameras 'orthographic' and 'perspective'");
     return;
   }
   refuse(p, {"screenwindow", "frameaspectratio"});
@@ -127,7 +127,7 @@ void read_pbrt_camera(const std::string& type, PbrtParameters& p, const Transfor
 
 void read_pbrt_film(const std::string& type, PbrtParameters& p, PbrtView& view) {
   if (type != "rgb" && type != "gbuffer" && type != "spectral") {
-    p.error("is not supported; supported are films 'rgb', 'gbuffer' and 'spectral'");
+    p.error("is not supported; supported: films 'rgb', 'gbuffer' and 'spectral'");
     return;
   }
   auto film = make_object("film", "hdrfilm", p.where());
@@ -149,7 +149,7 @@ void read_pbrt_film(const std::string& type, PbrtParameters& p, PbrtView& view) 
   }
   const std::string sensor = p.get_string("sensor", "cie1931");
   if (sensor != "cie1931" || p.get_float("iso", 100) != 100 || p.get_float("exposuretime", 1) != 1)
-    p.warn("has a sensor of its own; the picture is that of 'cie1931' at ISO 100");
+    p.warn("has a sensor of its own; it is rendered as 'cie1931' at ISO 100");
   p.ignore({"filename", "savefp16", "diagonal", "whitebalance", "maxcomponentvalue", "coordinatesystem", "nbuckets",
             "lambdamin", "lambdamax"});
   view.film = film;

@@ -135,8 +135,7 @@ class Reader {
       return kNewestVersion;
     }
     if (parts[0] > kNewestVersion) {
-      diagnostics_.error(where,
-                         fmt::format("version '{}' is not known; accepted are 0.x to {}.x", text, kNewestVersion));
+      diagnostics_.error(where, fmt::format("version '{}' is not known; expected 0.x to {}.x", text, kNewestVersion));
       return kNewestVersion;
     }
     return parts[0];

@@ -82,7 +82,7 @@ GltfFile::GltfFile(std::string_view bytes, const std::string& name, FileResolver
                                                problem.empty() ? "it ends too soon" : first_line(problem)));
   if (!warning.empty()) warn(first_line(warning));
   if (!model_.asset.version.starts_with("2."))
-    error(fmt::format("the file is of glTF {}; supported is 2.0", model_.asset.version));
+    error(fmt::format("the file is of glTF {}; supported: 2.0", model_.asset.version));
   check_extensions();
   for (const tinygltf::Buffer& buffer : model_.buffers)
     if (!buffer.uri.empty()) reads(buffer.uri);

@@ -90,7 +90,7 @@ ObjectBuilder GltfMaterials::surface(const tinygltf::Material& m) {
 
 ObjectPtr GltfMaterials::make(const tinygltf::Material& m) {
   if (m.extensions.contains("KHR_materials_unlit"))
-    file_.warn(fmt::format("material '{}' is to be seen without light: it is lit as others are", m.name));
+    file_.warn(fmt::format("material '{}' is unlit; it is rendered lit", m.name));
   ObjectBuilder model = surface(m);
   const bool thin = model->type == "principledthin";
   const bool solid_glass = std::any_of(model->properties.begin(), model->properties.end(),

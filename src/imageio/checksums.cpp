@@ -61,7 +61,7 @@ std::optional<Checksums> find_checksums(const std::string& path, const std::map<
   }
   std::optional<Checksums> found = parse(it->second);
   if (!found)
-    throw Error(ErrorCode::kInput, fmt::format("{}: damaged: the attribute {} is '{}'; expected are '{}' and words of "
+    throw Error(ErrorCode::kInput, fmt::format("{}: damaged: the attribute {} is '{}'; expected '{}' and words of "
                                                "{} hexadecimal digits, one for the header and one for each channel",
                                                path, kChecksums, it->second, kMethod, kDigits));
   return found;

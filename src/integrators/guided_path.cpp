@@ -117,8 +117,8 @@ void GuidedPath::on_freeze() {
 std::vector<std::string> GuidedPath::blind_spots(const Scene& scene) const {
   const auto n = std::ranges::count_if(scene.emitters(), [](const auto& light) { return light->is_delta(); });
   if (settings_.nee || n == 0) return {};
-  return {fmt::format("without light samples (`nee` off), lights at a point or in one direction are not seen: {} of {}",
-                      n, scene.emitters().size())};
+  return {fmt::format("without light samples (`nee` off), point and directional lights are invisible: {} of {}", n,
+                      scene.emitters().size())};
 }
 
 IntegratorReport GuidedPath::report() const {

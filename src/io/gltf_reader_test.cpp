@@ -352,7 +352,7 @@ TEST_F(GltfReader, WhatIsWrongIsNamed) {
   expect([](Gltf& f) { f.scene["nodes"][1]["children"] = {1}; }, "is not there, or has several parents");
   expect([](Gltf& f) { f.scene["materials"][0]["normalTexture"]["index"] = 7; }, "there is no texture 7");
   expect([](Gltf& f) { f.scene["cameras"][0]["perspective"]["yfov"] = 0; }, "has a field of view of 0");
-  expect([](Gltf& f) { f.scene["asset"]["version"] = "1.0"; }, "is of glTF 1.0; supported is 2.0");
+  expect([](Gltf& f) { f.scene["asset"]["version"] = "1.0"; }, "is of glTF 1.0; supported: 2.0");
   expect([](Gltf& f) { f.scene["scenes"][0]["nodes"] = json::array(); }, "has neither a camera nor a mesh");
   EXPECT_TRUE(contains(message_of([&] { load_scene(write("a.glb", "glTF")); }), "is not a readable glTF file"));
   EXPECT_TRUE(contains(message_of([&] { load_scene(write("a.gltf", "{")); }), "is not a readable glTF file"));

@@ -107,7 +107,7 @@ TEST(Limits, VersionsOfTheFormat) {
               "no error")
         << version;
   EXPECT_EQ(message_of([&] { load_scene_text("<scene version=\"99.0\">" + kSensor + "</scene>", "s.xml"); }),
-            "s.xml:1:1: version '99.0' is not known; accepted are 0.x to 3.x");
+            "s.xml:1:1: version '99.0' is not known; expected 0.x to 3.x");
 }
 
 TEST(Messages, AFileThatIsNoRegularFile) {

@@ -131,7 +131,7 @@ TEST_F(LoadScene, ReportsWrongSensors) {
       "scene.xml:2:25: parameter 'fov' of sensor 'thinlens' is 180; it must lie in (0, 180)\n"
       "scene.xml:4:1: film 'hdrfilm': the crop window of 1000 x 576 pixels at (0, 0) leaves the film of 768 x 576\n"
       "scene.xml:4:22: parameter 'width' of film 'hdrfilm' is 0; it must lie in [1, 65536]\n"
-      "scene.xml:5:1: parameter 'file_format' of film 'hdrfilm' is 'png'; accepted: 'openexr', 'exr'\n"
+      "scene.xml:5:1: parameter 'file_format' of film 'hdrfilm' is 'png'; expected one of 'openexr', 'exr'\n"
       "scene.xml:5:41: rfilter 'lanczos' is not supported: it has negative parts, from which no position can be drawn; "
       "use 'gaussian'. Supported: 'box', 'gaussian', 'tent'\n"
       "scene.xml:6:23: unknown sampler 'sobl'; did you mean 'sobol'? Supported: 'halton', 'hammersley', 'independent', "

@@ -349,10 +349,10 @@ LightSource "projection" "string filename" "a.png"
 )");
   for (const char* message : {
            "scene.pbrt:1:22: parameter 'screenwindow' of Camera \"perspective\" is not supported",
-           "scene.pbrt:3:1: Material \"velvet\" is not supported; supported are materials 'coateddiffuse', ",
+           "scene.pbrt:3:1: Material \"velvet\" is not supported; supported: materials 'coateddiffuse', ",
            "scene.pbrt:4:16: parameter 'radios' of Shape \"sphere\" is not supported; did you mean 'radius'?",
-           "scene.pbrt:4:1: Shape \"sphere\" has zmin 0; supported are whole ones, -1",
-           "scene.pbrt:5:1: Shape \"curve\" has basis 'linear' and degree 3; supported are 'bezier'",
+           "scene.pbrt:4:1: Shape \"sphere\" has zmin 0; supported: whole ones, -1",
+           "scene.pbrt:5:1: Shape \"curve\" has basis 'linear' and degree 3; supported: 'bezier'",
            "scene.pbrt:6:20: parameter 'reflectance' of Material \"diffuse\" names the texture 'wood', which is not a "
            "texture of spectra",
            "scene.pbrt:7:1: Shape \"trianglemesh\" has the index 3; there are 3 vertices",
@@ -361,16 +361,16 @@ LightSource "projection" "string filename" "a.png"
            "scene.pbrt:10:1: no material has the name 'gold'",
            "scene.pbrt:11:16: parameter 'radius' of Shape \"sphere\" has the type 'rgb'; expected 'float'",
            "scene.pbrt:12:1: no object before this one has the name 'tree'",
-           "scene.pbrt:13:1: Texture \"spectrum\" \"marble\" is not supported; supported are textures 'checkerboard'",
+           "scene.pbrt:13:1: Texture \"spectrum\" \"marble\" is not supported; supported: textures 'checkerboard'",
            "no.ply",
            "scene.pbrt:15:1: Material \"coateddiffuse\" has an 'albedo'",
            "scene.pbrt:16:17: Scale: ",
-           "scene.pbrt:17:1: MakeNamedMedium \"smoke\" is of the type 'uniformgrid'; supported is 'homogeneous'",
+           "scene.pbrt:17:1: MakeNamedMedium \"smoke\" is of the type 'uniformgrid'; supported: 'homogeneous'",
            "scene.pbrt:18:52: parameter 'preset' of MakeNamedMedium \"milk\" is not supported; give 'sigma_a'",
            "scene.pbrt:18:80: parameter 'Le' of MakeNamedMedium \"milk\" is not supported: media emit no light",
            "scene.pbrt:19:1: no medium before this one has the name 'mist'",
-           "scene.pbrt:20:1: LightSource \"projection\" is not supported; supported are lights 'distant', 'infinite', "
-           "'point' and 'spot'. Its like in XML is 'projector'",
+           "scene.pbrt:20:1: LightSource \"projection\" is not supported; supported: lights 'distant', 'infinite', "
+           "'point' and 'spot'. In XML, use 'projector'",
        })
     EXPECT_TRUE(contains(found, message));
 }
@@ -397,13 +397,13 @@ TEST_F(Pbrt, MistakesOfTheTextEndTheReading) {
     EXPECT_TRUE(errors(text).starts_with(message)) << errors(text);
   };
   starts("WorldBegin\nShap \"sphere\"\n", "scene.pbrt:2:1: 'Shap' is not a supported directive; did you mean 'Shape");
-  starts("Shape \"sphere\n", "scene.pbrt:1:7: a string has no end");
+  starts("Shape \"sphere\n", "scene.pbrt:1:7: unterminated string");
   starts("Translate 1 2\n", "scene.pbrt:2:1: found the end of the file; expected a number");
   starts("Scale 1 2 x\n", "scene.pbrt:1:11: found 'x'; expected a number");
-  starts("WorldBegin AttributeEnd", "scene.pbrt:1:12: the end of a block that was not begun");
+  starts("WorldBegin AttributeEnd", "scene.pbrt:1:12: the end of a block that was never begun");
   starts("WorldBegin\nShape \"sphere\" \"color c\" [ 1 1 1 ]",
          "scene.pbrt:2:16: unknown type 'color' of parameter 'c'; files of pbrt-v3 are brought to version 4");
-  starts("WorldBegin\nAttributeBegin\n", "scene.pbrt:2:1: this block has no end");
+  starts("WorldBegin\nAttributeBegin\n", "scene.pbrt:2:1: unterminated block");
   starts("", "scene.pbrt:1:1: the scene has no WorldBegin");
   starts("]", "scene.pbrt:1:1: found ']'; expected a directive");
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs of the program, kept on disk: what is there already is not run again, and what is there is always whole.
+// Runs of the program, kept on disk: what already exists is not run again, and what is there is always whole.
 //
 // The cache is a folder:
 //     runs/KEY/image.exr, stats.json    output of the render (or of the last command after it)

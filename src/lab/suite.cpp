@@ -104,7 +104,7 @@ std::vector<std::string> validate(const Suite& suite) {
   if (suite.seeds.empty()) problems.push_back("there are no seeds");
   std::set<uint64_t> seeds;
   for (uint64_t seed : suite.seeds) {
-    if (!seeds.insert(seed).second) problems.push_back(fmt::format("the seed {} is there twice", seed));
+    if (!seeds.insert(seed).second) problems.push_back(fmt::format("the seed {} appears twice", seed));
     for (uint64_t reserved : kReferenceSeeds)
       if (seed == reserved)
         problems.push_back(

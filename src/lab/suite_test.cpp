@@ -164,7 +164,7 @@ TEST(Suite, ValidatesAsAWhole) {
   suite.published_ratio["room"]["iicvv"]["24"] = 2;
   std::string all;
   for (const std::string& problem : validate(suite)) all += problem + "\n";
-  for (const char* part : {"the seed 1 is there twice", "the seed 900000002 is reserved for references",
+  for (const char* part : {"the seed 1 appears twice", "the seed 900000002 is reserved for references",
                            "no method is named 'ptt'; did you mean 'pt'", "method 'clean': '--seed' is chosen by",
                            "method 'clean': '--spp' is chosen by", "show: 25 spp is not one of the budgets",
                            "scene 'room' has no reference", "published: no method is named 'iicvv'"})

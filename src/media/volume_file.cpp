@@ -35,19 +35,18 @@ VolumeFile parse_header(const std::string& path, const char* header, size_t n_by
   if (n_bytes < kHeaderBytes || std::memcmp(header, "VOL", 3) != 0)
     throw refuse("is not a volume file: expected a header of 48 bytes that begins with 'VOL'");
   if (const int version = at<uint8_t>(header, 3); version != 3)
-    throw refuse(fmt::format("is a volume file of version {}; accepted is 3", version));
+    throw refuse(fmt::format("is a volume file of version {}; expected 3", version));
   if (const int encoding = at<int32_t>(header, 4); encoding != 1)
-    throw refuse(fmt::format("holds values of encoding {}; accepted is 1, 32-bit floats", encoding));
+    throw refuse(fmt::format("holds values of encoding {}; expected 1, 32-bit floats", encoding));
   VolumeFile file;
   for (size_t axis = 0; axis < 3; ++axis) {
     file.size[axis] = at<int32_t>(header, 8 + 4 * axis);
     if (file.size[axis] < 1 || file.size[axis] > kMostCells)
-      throw refuse(
-          fmt::format("has {} cells along {}; accepted are 1 to {}", file.size[axis], "xyz"[axis], kMostCells));
+      throw refuse(fmt::format("has {} cells along {}; expected 1 to {}", file.size[axis], "xyz"[axis], kMostCells));
   }
   file.channels = at<int32_t>(header, 20);
   if (file.channels != 1 && file.channels != 3)
-    throw refuse(fmt::format("has {} channels; accepted are 1 and 3", file.channels));
+    throw refuse(fmt::format("has {} channels; expected 1 or 3", file.channels));
   for (int axis = 0; axis < 3; ++axis) {
     file.bounds.lower[axis] = at<float>(header, 24 + 4 * static_cast<size_t>(axis));
     file.bounds.upper[axis] = at<float>(header, 36 + 4 * static_cast<size_t>(axis));

@@ -98,11 +98,11 @@ TEST(VolumeFile, EveryDefectIsNamed) {
   };
   EXPECT_TRUE(contains(message("VOX" + kGrey.substr(3)), "begins with 'VOL'"));
   EXPECT_TRUE(contains(message("VOL"), "a header of 48 bytes"));
-  EXPECT_TRUE(contains(message(changed(3, 2)), "of version 2; accepted is 3"));
-  EXPECT_TRUE(contains(message(changed(4, 2)), "encoding 2; accepted is 1"));
+  EXPECT_TRUE(contains(message(changed(3, 2)), "of version 2; expected 3"));
+  EXPECT_TRUE(contains(message(changed(4, 2)), "encoding 2; expected 1"));
   EXPECT_TRUE(contains(message(changed(12, 0)), "has 0 cells along y"));
   EXPECT_TRUE(contains(message(changed(8, -5)), "has -5 cells along x"));
-  EXPECT_TRUE(contains(message(changed(20, 6)), "has 6 channels; accepted are 1 and 3"));
+  EXPECT_TRUE(contains(message(changed(20, 6)), "has 6 channels; expected 1 or 3"));
   EXPECT_TRUE(contains(message(kGrey + "x"), "has 73 bytes; a grid of 2 x 1 x 3 cells with 1 channels has 72"));
   EXPECT_TRUE(contains(message(kGrey.substr(0, 71)), "has 71 bytes"));
   // The largest header: no memory is taken for what the file has not.

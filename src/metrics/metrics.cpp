@@ -224,8 +224,8 @@ const MetricInfo& find_metric(const std::string& name) {
     if (info.name == name) return info;
     names.push_back(info.name);
   }
-  throw Error(ErrorCode::kUsage, fmt::format("unknown metric '{}'{}; accepted are {}", name, did_you_mean(name, names),
-                                             fmt::join(names, ", ")));
+  throw Error(ErrorCode::kUsage, fmt::format("unknown metric '{}'{}; expected one of {}", name,
+                                             did_you_mean(name, names), fmt::join(names, ", ")));
 }
 
 MetricResult compute_metric(Metric metric, ComparedRows& rows, bool low_dynamic_range, bool with_map) {

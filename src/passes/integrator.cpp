@@ -13,7 +13,7 @@ std::string registered_name(const Integrator& integrator) {
 void require_sees_media(const Integrator& integrator, const Scene& scene) {
   if (!scene.has_media() || integrator.sees_media()) return;
   throw Error(ErrorCode::kInput, scene.first_medium() + ": the integrator '" + registered_name(integrator) +
-                                     "' does not see participating media; 'path' does");
+                                     "' does not support participating media; 'path' does");
 }
 
 }  // namespace covary

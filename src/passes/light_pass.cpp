@@ -66,7 +66,7 @@ uint32_t light_round_end(uint32_t count, int groups) {
 
 PassResult render_light_pass(const Scene& scene, const LightTracingIntegrator& integrator, const PassSettings& settings,
                              Film& film) {
-  COVARY_CHECK(settings.pass >= kLightPass, "a light pass has numbers of its own");
+  COVARY_CHECK(settings.pass >= kLightPass, "a light pass has random numbers of its own");
   COVARY_CHECK(integrator.traces_light(), "the integrator traces no light here");
   const uint32_t target = std::min(settings.spp.largest(), settings.limit);
   SplatLayer layer(film);

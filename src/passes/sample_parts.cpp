@@ -106,7 +106,7 @@ Film indirect_light(const Film& film, const Film& direct) {
 std::vector<Image> path_length_images(const Scene& scene, const Integrator& integrator, const PassSettings& settings,
                                       const Film& film) {
   if (!integrator.longest_path())
-    throw Error(ErrorCode::kUsage, "the integrator has no images by the number of edges; controlled-path has");
+    throw Error(ErrorCode::kUsage, "the integrator has no images for each path length; controlled-path has");
   const auto n = static_cast<size_t>(std::clamp(*integrator.longest_path(), 0, kMostEdges));
   std::vector<Film> parts = films_of_parts(film, n, 1);
   trace_parts(scene, integrator, settings, film, parts);

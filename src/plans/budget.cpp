@@ -107,7 +107,7 @@ void ErrorRounds::take(const std::string& text, uint32_t limit, const std::strin
     budgets.push_back(static_cast<uint32_t>(budget));
   }
   if (!good || budgets.empty())
-    throw Error(ErrorCode::kInput, fmt::format("{}: attribute covary:budgets is '{}'; expected are numbers of samples "
+    throw Error(ErrorCode::kInput, fmt::format("{}: attribute covary:budgets is '{}'; expected numbers of samples "
                                                "per pixel, ascending",
                                                path, text));
   for (uint32_t& budget : budgets) budget = std::min(budget, limit);

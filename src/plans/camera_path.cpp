@@ -25,8 +25,7 @@ using Json = nlohmann::ordered_json;
 void check_members(const Json& object, std::initializer_list<std::string_view> names) {
   for (const auto& [name, value] : object.items())
     if (std::find(names.begin(), names.end(), name) == names.end())
-      throw Error(ErrorCode::kInput,
-                  fmt::format("unknown member '{}'; expected are '{}'", name, fmt::join(names, "', '")));
+      throw Error(ErrorCode::kInput, fmt::format("unknown member '{}'; expected '{}'", name, fmt::join(names, "', '")));
 }
 
 double number(const Json& value, const std::string& what) {
@@ -53,7 +52,7 @@ Matrix4 matrix(const Json& value) {
 
 TransformKey keyframe(const Json& value, size_t index) {
   try {
-    if (!value.is_object()) throw Error(ErrorCode::kInput, "expected is an object");
+    if (!value.is_object()) throw Error(ErrorCode::kInput, "expected an object");
     check_members(value, {"time", "to_world"});
     for (const char* name : {"time", "to_world"})
       if (!value.contains(name)) throw Error(ErrorCode::kInput, fmt::format("'{}' is missing", name));
@@ -67,7 +66,7 @@ CameraPath parse(const std::string& text) {
   if (line_nested_too_deep(text))
     throw Error(ErrorCode::kInput, fmt::format("arrays and objects nest deeper than {}", kMaxJsonDepth));
   const Json json = Json::parse(text, nullptr, false);
-  if (!json.is_object()) throw Error(ErrorCode::kInput, "expected is a JSON object");
+  if (!json.is_object()) throw Error(ErrorCode::kInput, "expected a JSON object");
   check_members(json, {"frames_per_second", "keyframes"});
   const double rate = json.contains("frames_per_second") ? number(json["frames_per_second"], "'frames_per_second'") : 1;
   if (!(rate > 0) || !std::isfinite(rate)) throw Error(ErrorCode::kInput, "'frames_per_second' is not above 0");

@@ -36,11 +36,11 @@ TEST(CameraPath, CountsFramesByTheirRate) {
 
 TEST(CameraPath, SaysWhatIsWrongAndWhere) {
   const std::string file = "camera path 'p.json': ";
-  EXPECT_EQ(problem_of("{"), file + "expected is a JSON object");
+  EXPECT_EQ(problem_of("{"), file + "expected a JSON object");
   EXPECT_EQ(problem_of("{}"), file + "the array 'keyframes' is missing");
   EXPECT_EQ(problem_of(R"({"keyframes": []})"), file + "there are no keyframes");
   EXPECT_EQ(problem_of(R"({"frames": []})"),
-            file + "unknown member 'frames'; expected are 'frames_per_second', 'keyframes'");
+            file + "unknown member 'frames'; expected 'frames_per_second', 'keyframes'");
   EXPECT_EQ(problem_of(R"({"frames_per_second": 0, "keyframes": []})"), file + "'frames_per_second' is not above 0");
   EXPECT_EQ(problem_of(R"({"keyframes": [{"time": 0}]})"), file + "keyframe 0: 'to_world' is missing");
   EXPECT_EQ(problem_of(R"({"keyframes": [{"time": "0", "to_world": []}]})"),

@@ -145,7 +145,7 @@ TEST(Passes, FilmsThatAreThereAreNeitherUsedNorReplacedUnasked) {
   for (uint32_t spp : {12, 24, 48}) {
     request.spp = spp;
     const std::string message = message_of([&] { render(scene, average_plan(), request); }, ErrorCode::kInput);
-    EXPECT_TRUE(contains(message, "films/crn.exr' is there already; `resume` continues it"));
+    EXPECT_TRUE(contains(message, "films/crn.exr' already exists; `resume` continues it"));
     EXPECT_TRUE(contains(message, "`overwrite` replaces it"));
   }
   request.resume = true;

@@ -48,7 +48,7 @@ uint32_t budget_of(const LoadedScene& scene, const RenderRequest& request) {
 
 /// Why an integrator is not tried; empty where it is. One that learns needs samples to gain from what it learnt.
 std::string left_out(const Integrator& integrator, const Scene& scene, uint32_t budget) {
-  if (scene.has_media() && !integrator.sees_media()) return "it does not see participating media";
+  if (scene.has_media() && !integrator.sees_media()) return "it does not support participating media";
   if (2 * training_of(integrator) > budget)
     return fmt::format("its training takes {} of {} samples", training_of(integrator), budget);
   return "";

@@ -31,18 +31,18 @@ TEST(PassCosts, AreReadAsTheyWereWritten) {
 
 TEST(PassCosts, AreRefusedWhenTheyCannotBeRight) {
   EXPECT_EQ(error(with("rays", "3")), "no error");
-  EXPECT_EQ(error(with("seconds", "-1e9")), "'seconds' is -1000000000.0, expected is a number from 0 on");
-  EXPECT_EQ(error(with("seconds", "\"1\"")), "'seconds' is string, expected is a number from 0 on");
-  EXPECT_EQ(error(with("rays", "-1")), "'rays' is -1, expected is a whole number from 0 on");
-  EXPECT_EQ(error(with("rays", "1.5")), "'rays' is 1.5, expected is a whole number from 0 on");
+  EXPECT_EQ(error(with("seconds", "-1e9")), "'seconds' is -1000000000.0, expected a number from 0 on");
+  EXPECT_EQ(error(with("seconds", "\"1\"")), "'seconds' is string, expected a number from 0 on");
+  EXPECT_EQ(error(with("rays", "-1")), "'rays' is -1, expected a whole number from 0 on");
+  EXPECT_EQ(error(with("rays", "1.5")), "'rays' is 1.5, expected a whole number from 0 on");
   EXPECT_EQ(error(with("samples", "18446744073709551616")),
-            "'samples' is 1.8446744073709552e+19, expected is a whole number from 0 on");
-  EXPECT_EQ(error(with("samples", "null")), "'samples' is null, expected is a whole number from 0 on");
+            "'samples' is 1.8446744073709552e+19, expected a whole number from 0 on");
+  EXPECT_EQ(error(with("samples", "null")), "'samples' is null, expected a whole number from 0 on");
   EXPECT_EQ(error(with("estimate_seconds", "4")), "'estimate_seconds' is above 'seconds'");
   EXPECT_EQ(error("{\"samples\": 1}"), "'rays' is missing");
   for (const std::string& text :
        {std::string(), std::string("[1]"), with("seconds", "1e999"), std::string("{\"rays\"")})
-    EXPECT_EQ(error(text), "expected is a JSON object") << text;
+    EXPECT_EQ(error(text), "expected a JSON object") << text;
   EXPECT_EQ(error(std::string(200000, '[')), "arrays and objects nest deeper than 64");
 }
 

@@ -149,16 +149,15 @@ void check_earlier_films(const Plan& plan, const RenderRequest& request) {
   if (!continues && is_unfinished_film(request.output))
     throw Error(ErrorCode::kInput,
                 fmt::format("'{}' is the film of an interrupted render; {}", request.output,
-                            request.resume ? "this command does not continue it, its own one does; `overwrite` "
+                            request.resume ? "only the command that started it can continue it; `overwrite` "
                                              "replaces it"
                                            : "`resume` continues it, and `overwrite` replaces it"));
   std::error_code ignored;
   if (is_film || request.resume || !request.passes.empty()) return;
   for (const fs::directory_entry& entry : fs::directory_iterator(passes_folder(request), ignored))
     if (entry.path().extension() == ".exr")
-      throw Error(ErrorCode::kInput,
-                  fmt::format("'{}' is there already, in the folder for the films of this render; {}",
-                              entry.path().string(), kWaysOut));
+      throw Error(ErrorCode::kInput, fmt::format("'{}' already exists, in the folder for the films of this render; {}",
+                                                 entry.path().string(), kWaysOut));
 }
 
 void take_film_on_disk(const Plan& plan, const RenderRequest& request,
@@ -167,16 +166,16 @@ void take_film_on_disk(const Plan& plan, const RenderRequest& request,
   pass.temporary = !kept && !is_output && !pass.path.empty();
   if (pass.path.empty()) return;
   if (!is_output && fs::is_symlink(pass.path))
-    throw Error(ErrorCode::kInput, fmt::format("'{}' is a link, which films are not written through; remove it, or "
-                                               "give another name for the folder or the output",
-                                               pass.path));
+    throw Error(ErrorCode::kInput,
+                fmt::format("'{}' is a symbolic link; films are not written through links; remove it, or "
+                            "give another name for the folder or the output",
+                            pass.path));
   if (!fs::exists(pass.path)) return;
   if (request.resume) {
     resume(request, pass);
     if (kept && fs::exists(costs_path(pass))) read_costs(warn, pass);
   } else if (!is_output) {
-    if (!request.overwrite)
-      throw Error(ErrorCode::kInput, fmt::format("'{}' is there already; {}", pass.path, kWaysOut));
+    if (!request.overwrite) throw Error(ErrorCode::kInput, fmt::format("'{}' already exists; {}", pass.path, kWaysOut));
     check_replaceable(pass.path);
   }
 }
@@ -215,7 +214,7 @@ T amount(const Json& costs, const char* key) {
   if (it == costs.end()) fail(fmt::format("'{}' is missing", key));
   const bool fits = std::is_integral_v<T> ? it->is_number_unsigned() : it->is_number();
   if (!fits || !(it->get<double>() >= 0) || !std::isfinite(it->get<double>()))
-    fail(fmt::format("'{}' is {}, expected is a {} from 0 on", key, it->is_number() ? it->dump() : it->type_name(),
+    fail(fmt::format("'{}' is {}, expected a {} from 0 on", key, it->is_number() ? it->dump() : it->type_name(),
                      std::is_integral_v<T> ? "whole number" : "number"));
   return it->get<T>();
 }
@@ -225,7 +224,7 @@ T amount(const Json& costs, const char* key) {
 PassCosts parse_pass_costs(std::string_view text) {
   if (line_nested_too_deep(text)) fail(fmt::format("arrays and objects nest deeper than {}", kMaxJsonDepth));
   const Json json = Json::parse(text, nullptr, false);
-  if (!json.is_object()) fail("expected is a JSON object");
+  if (!json.is_object()) fail("expected a JSON object");
   PassCosts costs{amount<uint64_t>(json, "samples"), amount<uint64_t>(json, "rays"), amount<double>(json, "seconds")};
   if (json.contains("estimate_seconds")) costs.estimate_seconds = amount<double>(json, "estimate_seconds");
   if (costs.estimate_seconds > costs.seconds) fail("'estimate_seconds' is above 'seconds'");

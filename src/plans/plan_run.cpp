@@ -78,8 +78,7 @@ void PlanRun::warn_of_missing_light() const {
   if (plan_.traces_light || !scene_.has_delta_lights_and_surfaces || !callbacks_.warning ||
       !integrator_->light_tracing())
     return;
-  callbacks_.warning(
-      "without light tracing the image lacks what mirrors and glass cast of lights that are a point or a direction");
+  callbacks_.warning("without light tracing the image lacks visible caustics from point and directional lights");
 }
 
 void PlanRun::warn_of_other_sampler() const {
@@ -234,7 +233,7 @@ void PlanRun::between_waves() {
   if (callbacks_.wave) callbacks_.wave(state_.passes);
   if (request_.checkpoint_seconds <= 0 || since_checkpoint_.seconds() < request_.checkpoint_seconds) return;
   unsaved_ = true;
-  try_to_keep_films(false, "rendering goes on, and the next checkpoint tries again");
+  try_to_keep_films(false, "rendering continues, and the next checkpoint tries again");
 }
 
 void PlanRun::warn_of_other_samples(uint32_t asked) const {

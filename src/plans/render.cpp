@@ -29,11 +29,11 @@ void check_light_groups(const LoadedScene& scene) {
 void check(const LoadedScene& scene, const Plan& plan, const RenderRequest& request) {
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
   if (request.spp && (*request.spp < 1 || *request.spp > kMaxBudget))
-    usage(fmt::format("{} samples per pixel; expected are 1 to {}", *request.spp, kMaxBudget));
+    usage(fmt::format("{} samples per pixel; expected 1 to {}", *request.spp, kMaxBudget));
   if (plan.fixed_samples && (request.seconds > 0 || request.until > 0))
-    usage(plan.name + " needs the number of samples to be known before, so there can be no limit of time or error");
+    usage(plan.name + " must know the number of samples in advance, so time and error limits are impossible");
   if (request.path_lengths && !integrator_of(scene).longest_path())
-    usage("images by the number of edges need an integrator that knows them, such as controlled-path");
+    usage("an image for each path length needs an integrator that supports it, such as controlled-path");
   if (request.splits_layers() && !plan.splits_layers)
     usage(fmt::format("{} makes no `{}`; `estimator` none does, denoised or not", plan.name,
                       request.layers ? "layers" : "light-groups"));

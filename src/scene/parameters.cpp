@@ -187,7 +187,8 @@ std::string Parameters::get_choice(const std::string& name, const std::string& f
                                    const std::vector<std::string>& choices) {
   std::string value = get_string(name, fallback);
   if (std::find(choices.begin(), choices.end(), value) != choices.end()) return value;
-  error_at(name, fmt::format("is '{}'; accepted: {}{}", value, quoted_list(choices), did_you_mean(value, choices)));
+  error_at(name,
+           fmt::format("is '{}'; expected one of {}{}", value, quoted_list(choices), did_you_mean(value, choices)));
   return fallback;
 }
 

@@ -115,10 +115,10 @@ TEST_F(ParametersTest, AcceptsBrightColoursForEmissionAndIndices) {
 TEST_F(ParametersTest, ListsChoices) {
   Parameters& p = with({{"distribution", std::string("gggx")}});
   EXPECT_EQ(p.get_choice("distribution", "beckmann", {"beckmann", "ggx"}), "beckmann");
-  EXPECT_EQ(
-      errors(),
-      "scene.xml:2:5: parameter 'distribution' of bsdf 'test' is 'gggx'; accepted: 'beckmann', 'ggx'; did you mean "
-      "'ggx'?");
+  EXPECT_EQ(errors(),
+            "scene.xml:2:5: parameter 'distribution' of bsdf 'test' is 'gggx'; expected one of 'beckmann', 'ggx'; did "
+            "you mean "
+            "'ggx'?");
 }
 
 TEST_F(ParametersTest, ReportsUnknownParametersWithTheNearestKnownOnes) {

@@ -230,10 +230,10 @@ TEST(Bitmap, ReportsWrongParameters) {
                              folder.file("a.png") + ": "),
             std::string::npos)
       << made.errors;
-  EXPECT_NE(
-      made.errors.find("test.xml:3:1: parameter 'wrap_mode' of texture 'bitmap' is 'repeated'; accepted: 'repeat', "
-                       "'mirror', 'clamp'; did you mean 'repeat'?"),
-      std::string::npos)
+  EXPECT_NE(made.errors.find(
+                "test.xml:3:1: parameter 'wrap_mode' of texture 'bitmap' is 'repeated'; expected one of 'repeat', "
+                "'mirror', 'clamp'; did you mean 'repeat'?"),
+            std::string::npos)
       << made.errors;
   EXPECT_NE(made.errors.find("test.xml:4:1: unknown parameter 'filter' of texture 'bitmap'"), std::string::npos)
       << made.errors;

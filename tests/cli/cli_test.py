@@ -174,7 +174,7 @@ class Compare(CliTest):
         for name in ("m-a.png", "m-ref.png", "m-a-2.png"):
             self.assertTrue((self.path / name).exists(), name)
         self.bad(2, "must end in .png", "compare", "a.exr", "-r", "ref.exr", "--error-map", "e.jpg")
-        self.bad(2, "--error-range 1,0.1: expected are two rising", "compare", "a.exr", "-r", "ref.exr", "--error-map",
+        self.bad(2, "--error-range 1,0.1: expected two rising", "compare", "a.exr", "-r", "ref.exr", "--error-map",
                  "e.png", "--error-range", "1,0.1")
         self.bad(2, "--error-range needs --error-map", "compare", "a.exr", "-r", "ref.exr", "--error-range", "1,2")
 

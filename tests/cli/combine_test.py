@@ -292,8 +292,8 @@ class Combine(CliTest):
         self.counted("small.exr", [24] * 48, (8, 6))
         self.bad(1, "small.exr: 8 x 6 pixels at (0, 0); independent.exr has 24 x 20 at (0, 0)", *inputs, "small.exr")
         self.counted("odd.exr", [24] * 30 + [1.5] + [24] * (WIDTH * HEIGHT - 31), kind=FLOAT)
-        self.bad(1, "odd.exr: 1.5 at (6, 1); expected are whole numbers of samples", *inputs, "odd.exr")
-        self.bad(1, "plain.exr: expected is one channel, or one that is named 'samples'; channels in it: group00.B",
+        self.bad(1, "odd.exr: 1.5 at (6, 1); expected whole numbers of samples", *inputs, "odd.exr")
+        self.bad(1, "plain.exr: expected one channel, or one that is named 'samples'; channels in it: group00.B",
                  *inputs[:2], "crn.exr", *inputs[3:], "plain.exr")
         self.bad(2, "are the same file", *inputs, "independent.exr")
 

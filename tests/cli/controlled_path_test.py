@@ -125,7 +125,7 @@ class Surrogate(LearningTest, CliTest):
         result = self.run_covary(*PLAIN, "--spp", "6", "-o", "a.exr", "--passes", "films", "--cv-surrogate", "oidn",
                                  env={**os.environ, "COVARY_OIDN": "/nowhere"})
         self.assertEqual(result.returncode, 2, result.stderr)
-        self.assertIn("Open Image Denoise is not there (/nowhere", result.stderr)
+        self.assertIn("Open Image Denoise was not found (/nowhere", result.stderr)
         self.assertFalse((self.path / "a.exr").exists())
 
     def test_library_that_pip_installed_beside_the_program(self):
@@ -150,7 +150,7 @@ class Surrogate(LearningTest, CliTest):
         self.assertEqual(self.pixels("b.exr")["R"], self.pixels("c.exr")["R"])
         replay = self.good(*by_oidn, "--oidn", library, "--replay", "7,5,0", env=nowhere).stdout
         self.assertNotEqual(replay, self.good(*PLAIN, "--spp", "6", "--replay", "7,5,0").stdout)
-        self.bad(2, "Open Image Denoise is not there (/nowhere/lib.so", *by_oidn, "-o", "d.exr", "--oidn",
+        self.bad(2, "Open Image Denoise was not found (/nowhere/lib.so", *by_oidn, "-o", "d.exr", "--oidn",
                  "/nowhere/lib.so")
         self.bad(2, "--cv-surrogate oidn needs Open Image Denoise, which --oidn off leaves out", *by_oidn, "-o",
                  "d.exr", "--oidn", "off")

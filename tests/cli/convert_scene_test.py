@@ -34,15 +34,15 @@ class ConvertScene(CliTest):
         names = re.findall(r'"(out-files/[0-9a-f]{16}\.ply)"', (self.path / "out.xml").read_text())
         self.assertEqual([str(p.relative_to(self.path)) for p in self.path.glob("out-files/*")], names)
         self.picture("out.xml", "a.exr")
-        # What is there already is replaced when that is asked for.
-        self.bad(2, "the output 'out.xml' is there already; give another name, or --overwrite", "convert-scene",
+        # What already exists is replaced when that is asked for.
+        self.bad(2, "the output 'out.xml' already exists; give another name, or --overwrite", "convert-scene",
                  "mesh.pbrt", "out.xml")
         (self.path / "out.xml").write_text("mine")
         self.good("convert-scene", "mesh.pbrt", "out.xml", "--overwrite")
         self.picture("out.xml", "b.exr")
         (self.path / names[0]).write_text("mine")
         (self.path / "out.xml").unlink()
-        self.bad(2, f"the output '{names[0]}' is there already", "convert-scene", "mesh.pbrt", "out.xml")
+        self.bad(2, f"the output '{names[0]}' already exists", "convert-scene", "mesh.pbrt", "out.xml")
         self.assertEqual((self.path / names[0]).read_text(), "mine")
         self.good("convert-scene", "mesh.pbrt", "out.xml", "--overwrite")
         self.picture("out.xml", "c.exr")

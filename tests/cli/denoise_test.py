@@ -105,7 +105,7 @@ class Denoise(RenderTest):
         self.bad(2, "--oidn has no effect without --denoise auto, bias, balanced or error", "render", ROOM, "-o",
                  "a.exr", *IICV, *PLAIN)
         self.bad(2, "--denoise", "render", ROOM, "-o", "a.exr", "--denoise", "much")
-        self.bad(2, "Open Image Denoise is not there (/nowhere/lib.so", "render", ROOM, *SMALL, "-o", "a.exr",
+        self.bad(2, "Open Image Denoise was not found (/nowhere/lib.so", "render", ROOM, *SMALL, "-o", "a.exr",
                  "--denoise", "error", "--oidn", "/nowhere/lib.so", "--spp", "24")
         self.good("render", ROOM, *SMALL, "-o", "b.exr", *IICV, "--spp", "24", "--passes", "films")
         inputs = ("combine", "--crn", "films/crn.exr", "--independent", "films/independent.exr", "-o", "c.exr")
@@ -367,9 +367,9 @@ class Denoise(RenderTest):
         self.assertLess(self.relmse("clean.exr", "r.exr"), self.relmse("a.exr", "r.exr"))
 
     def test_check(self):
-        self.bad(2, "Open Image Denoise is not there (/nowhere/lib.so", "denoise", "--check", "--oidn",
+        self.bad(2, "Open Image Denoise was not found (/nowhere/lib.so", "denoise", "--check", "--oidn",
                  "/nowhere/lib.so")
-        self.bad(2, "expected are IN.exr and -o OUT.exr, or --check", "denoise")
+        self.bad(2, "expected IN.exr and -o OUT.exr, or --check", "denoise")
         result = self.run_covary("denoise", "--check", env={**os.environ, "COVARY_OIDN": ""})
         if result.returncode == 0:
             self.assertRegex(result.stdout, r"\AOpen Image Denoise 2\.\d+\.\d+\n.*libOpenImageDenoise\.so\.2\n\Z")

@@ -101,7 +101,7 @@ class EarlierFilms(FilmsTest):
         self.assertEqual(self.tree("out.passes"), mine)
         self.image("out.passes/crn.exr", (1, 2, 3))
         mine = self.tree("out.passes")
-        self.refused("'out.passes/crn.exr' is there already", *RENDER)
+        self.refused("'out.passes/crn.exr' already exists", *RENDER)
         for overwrite in ("--overwrite", "--resume"):
             self.assertEqual(self.run_covary(*RENDER, overwrite).returncode, 1)
             self.assertEqual(self.tree("out.passes"), mine)
@@ -145,7 +145,7 @@ class Checkpoints(FilmsTest):
         whole = read_exr((self.path / "out.exr").read_bytes())
         result = self.good(*command, preexec_fn=self.limited())
         self.assertIn("warning: the films could not be kept: cannot write out.passes/crn.exr: File too large; "
-                      "rendering goes on, and the next checkpoint tries again\n", result.stderr)
+                      "rendering continues, and the next checkpoint tries again\n", result.stderr)
         self.assertEqual(read_exr((self.path / "out.exr").read_bytes()), whole)
         self.assertEqual([p.name for p in self.path.rglob("*.part")], [])
 

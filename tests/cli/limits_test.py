@@ -184,7 +184,7 @@ class Limits(unittest.TestCase):
             self.assertEqual(self.run_limited("info", name, environment=small)[0], 0)
         code, text = self.run_limited("compare", "a.exr", "-r", "a.exr", environment={"COVARY_MEMORY": "a lot"})
         self.assertEqual(code, 2)
-        self.assertIn("the environment variable COVARY_MEMORY is 'a lot'; expected is a number of GB, at least 0.2",
+        self.assertIn("the environment variable COVARY_MEMORY is 'a lot'; expected a number of GB, at least 0.2",
                       text)
 
     def test_what_is_made_of_images(self):

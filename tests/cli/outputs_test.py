@@ -78,7 +78,7 @@ class Overwriting(OutputsTest):
         self.write("old.hdr", b"#?RADIANCE")
         for names in (("a.exr", "b.exr"), ("a.exr", "pt.exr", "b.exr"), ("a.exr", "photograph.png"),
                       ("a.exr", "old.hdr")):
-            self.bad(2, f"the output '{names[-1]}', which is the last name given, is there already and not a picture "
+            self.bad(2, f"the output '{names[-1]}', which is the last name given, already exists and not a picture "
                      "that 'covary convert' made; give another name, or --overwrite", "convert", *names)
         self.assertEqual((self.path / "b.exr").read_bytes(), before)
         for name in ("new.exr", "new.png"):

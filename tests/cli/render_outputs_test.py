@@ -160,7 +160,7 @@ class Passes(RenderTest):
         before = self.films()
         for options in (("--spp", "24"), ("--spp", "48"), ("--spp", "96"), ("--spp", "48", "--seed", "7"),
                         ("--spp", "48", "--max-depth", "3")):
-            message = self.bad(1, "'films/crn.exr' is there already; --resume", *self.RENDER, *options).stderr
+            message = self.bad(1, "'films/crn.exr' already exists; --resume", *self.RENDER, *options).stderr
             self.assertIn("--overwrite replaces it", message)
         message = self.bad(1, "this command asks for 7", *self.RENDER, "--spp", "48", "--seed", "7", "--resume").stderr
         self.assertIn("--overwrite replaces it", message)

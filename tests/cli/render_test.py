@@ -624,7 +624,7 @@ class Pbrt(RenderTest):
 
     def test_mistakes_have_a_place(self):
         (self.path / "wrong.pbrt").write_text('WorldBegin\nShape "cube"\n')
-        self.bad(1, 'wrong.pbrt:2:1: Shape "cube" is not supported; supported are shapes', "render", "wrong.pbrt", "-o",
+        self.bad(1, 'wrong.pbrt:2:1: Shape "cube" is not supported; supported: shapes', "render", "wrong.pbrt", "-o",
                  "a.exr")
 
 

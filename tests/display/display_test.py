@@ -75,7 +75,7 @@ class DisplayServer(unittest.TestCase):
         self.assertEqual(result.returncode, 0)
         self.assertEqual(result.stderr, f"warning: display server 127.0.0.1:{port}: cannot connect: "
                                         "Connection refused; "
-                                        "rendering goes on without it\n")
+                                        "rendering continues without it\n")
         self.assertTrue((self.path / "a.exr").exists())
 
     def test_wrong_address(self):

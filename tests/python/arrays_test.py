@@ -79,7 +79,7 @@ class BadArrays(PackageTest):
                               ("numpy.ndarray of >f4", CRN.astype(">f4")), ("numpy.ndarray of int32", CRN.astype("i4")),
                               ("array.array", array.array("d", [1.0]))):
             message = self.refused(values, error=TypeError)
-            self.assertTrue(message.startswith(f"crn: found {found}; accepted is an array of NumPy"), message)
+            self.assertTrue(message.startswith(f"crn: found {found}; expected an array of NumPy"), message)
             self.assertIn("of float32 [T, H, W, 3]", message)
         self.assertIn("independent: found", self.refused(CRN, None, TypeError))
         self.assertTrue(self.refused(None, error=covary.UsageError).startswith("crn: found None; without it"))
@@ -87,7 +87,7 @@ class BadArrays(PackageTest):
     def test_shapes(self):
         for shape, values in (("[20, 24, 3]", CRN[0]), ("[12, 20, 24, 2]", CRN[..., :2]),
                               ("[0, 20, 24, 3]", CRN[:0]), ("[12, 20, 0, 3]", CRN[:, :, :0])):
-            self.assertEqual(self.refused(values), f"crn: found the shape {shape}; accepted is [T, H, W, 3], no size 0")
+            self.assertEqual(self.refused(values), f"crn: found the shape {shape}; expected [T, H, W, 3], none of them 0")
         self.assertIn("the CRN image is 24 x 20 and the independent image 24 x 19",
                       self.refused(CRN, INDEPENDENT[:, 1:]))
 

@@ -62,7 +62,7 @@ class Light(BesideTest):
             covary.InputError, covary.combine, *images, light=images[0]))
         self.assertIn("shows other pixels", self.message_of(
             covary.InputError, covary.combine, *pair(height=19), light=self.films["light"]))
-        self.assertIn("light: found numpy.ndarray of float32; accepted is a covary.Film", self.message_of(
+        self.assertIn("light: found numpy.ndarray of float32; expected the covary.Film", self.message_of(
             TypeError, covary.combine, *images, light=images[0].mean))
 
 
@@ -90,13 +90,13 @@ class Counts(BesideTest):
                          self.message_of(covary.UsageError, covary.combine, *self.images, counts=self.counts))
         film = covary.film_from_groups(self.images[1], 24)
         for error, text, images, counts in (
-                (TypeError, "counts: found float64 [20, 24]; accepted are whole numbers, [H, W]", self.images,
+                (TypeError, "counts: found float64 [20, 24]; expected whole numbers, [H, W]", self.images,
                  self.counts * 1.0),
                 (TypeError, "counts: found int64 [480]", self.images, self.counts.ravel()),
                 (ValueError, "counts: found -1 to", self.images, self.counts - self.counts.min() - 1),
-                (ValueError, "counts: found the shape [19, 24]; accepted is [20, 24]", self.images, self.counts[1:]),
+                (ValueError, "counts: found the shape [19, 24]; expected [20, 24]", self.images, self.counts[1:]),
                 (covary.UsageError, "fewer than the 12 groups", self.images, self.counts * 0 + 3),
-                (covary.InputError, "independent: the film tells itself", (self.images[0], film), self.counts)):
+                (covary.InputError, "independent: the film already says", (self.images[0], film), self.counts)):
             self.assertIn(text, self.message_of(error, covary.combine, *images, counts=counts, samples=24))
 
 
@@ -174,7 +174,7 @@ class Denoise(BesideTest):
                          self.failure_of_program(*FILES, "--denoise", "bias", "--estimator",
                                                  "dependent-tests").replace("--", ""))
         self.assertIn("only together with the albedo", message(covary.UsageError, denoise="bias", normal=self.normal))
-        self.assertIn("albedo: found the shape [19, 24, 3]; accepted is [20, 24, 3]",
+        self.assertIn("albedo: found the shape [19, 24, 3]; expected [20, 24, 3]",
                       message(ValueError, denoise="bias", albedo=self.albedo[1:]))
         for guide in ("albedo", "normal"):
             guides = {"albedo": self.albedo, "normal": self.normal}
@@ -201,7 +201,7 @@ class Denoise(BesideTest):
         result = covary.render(scene, spp=400, until_p95=0.2)
         self.assertTrue(result.until_reached)
         self.assertLessEqual(result.predicted_relmse_p95, 0.2)
-        self.assertIn("accepted is one of them", self.message_of(
+        self.assertIn("expected one of them", self.message_of(
             covary.UsageError, covary.render, scene, until=0.1, until_p95=0.1))
 
 

@@ -302,13 +302,13 @@ class Cluster(PackageTest):
         for options in ({"adaptive": True}, {"settings": {"adaptive": True}}):
             self.assertIn("looks at the whole frame", refused(self.scene(), 24, **options))
         self.assertIn("tries out the whole frame", refused(self.scene(), 24, settings={"split": "auto"}))
-        self.assertIn("accepted is path", refused(self.scene(integrator="bdpt"), 24))
+        self.assertIn("use path", refused(self.scene(integrator="bdpt"), 24))
 
     def test_clients_of_no_cluster(self):
         """scale() of a cluster returns None, and Client(None) starts workers here without being asked."""
         from distributed import Client
         message = self.message_of(TypeError, covary.distributed.render, self.cluster.scale(2), self.scene(), 24)
-        self.assertIn("client: found None (NoneType); accepted is a dask.distributed.Client: cluster = ", message)
+        self.assertIn("client: found None (NoneType); expected a dask.distributed.Client: cluster = ", message)
         with Client(None, n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None,
                     set_as_default=False) as client:
             for call in (lambda: covary.distributed.render(client, self.scene(), 24),
@@ -326,7 +326,7 @@ class Cluster(PackageTest):
             for keywords, text in (({"windo": 3}, "did you mean 'window'?"), ({"k": 0.5}, "k: found 0.5"),
                                    ({"settings": {"groups": 2}}, "2 groups are too few"),
                                    ({"denoise": "error", "oidn": "/nowhere"}, "/nowhere"),
-                                   ({"settings": {"output": "x.exr"}}, "settings: found 'output'; accepted are filter"),
+                                   ({"settings": {"output": "x.exr"}}, "settings: found 'output'; expected one of filter"),
                                    ({"settings": {"sampling": "crn"}}, "sampling: found 'crn' with estimator 'iicv'"),
                                    ({"window": 4}, "window is 4")):
                 self.assertIn(text, self.message_of(covary.UsageError, covary.distributed.render, self.client,

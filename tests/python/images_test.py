@@ -214,7 +214,7 @@ class Films(PackageTest):
             self.assert_same_bits(merged.groups, other.groups)
             self.assertTrue((merged.counts == other.counts).all())
         self.assertIn("seed", self.message_of(covary.InputError, covary.merge_films, [films[0], films[0]]))
-        self.assertIn("accepted are either", self.message_of(TypeError, covary.merge_films, [films[0], "0.exr"]))
+        self.assertIn("expected one or the other", self.message_of(TypeError, covary.merge_films, [films[0], "0.exr"]))
         self.assertIn("found none", self.message_of(ValueError, covary.merge_films, []))
 
     def test_combined(self):
@@ -222,7 +222,7 @@ class Films(PackageTest):
         films = [covary.film_from_groups(values, 24, sampling=kind)
                  for values, kind in ((crn, "crn"), (independent, "independent"))]
         self.assert_same_bits(covary.combine(*films).image, covary.combine(crn, independent).image)
-        self.assertIn("expected are sampling crn", self.message_of(covary.InputError, covary.combine, *films[::-1]))
+        self.assertIn("expected sampling crn", self.message_of(covary.InputError, covary.combine, *films[::-1]))
         self.assertEqual(covary.combine(films[0], independent).image.shape, (HEIGHT, WIDTH, 3))
 
 

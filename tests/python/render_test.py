@@ -140,7 +140,7 @@ class Render(PackageTest):
                       self.message_of(covary.UsageError, covary.render, scene, integrator="pth"))
         self.assertEqual(self.message_of(covary.IoError, covary.render, "nix.xml"),
                          self.failure_of_program("render", "nix.xml", "-o", "x.exr"))
-        self.assertIn("integrator_options: found 'x': []; accepted is a mapping",
+        self.assertIn("integrator_options: found 'x': []; expected a mapping",
                       self.message_of(TypeError, self.scene, integrator_options={"x": []}))
         (self.path / "bad.xml").write_text("<scene version='3.0.0'><shape type='cub'/></scene>")
         self.assertEqual(self.message_of(covary.InputError, covary.Scene.load, self.path / "bad.xml"),

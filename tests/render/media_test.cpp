@@ -266,7 +266,7 @@ TEST(Media, OtherIntegratorsRefuseThem) {
       EXPECT_EQ(message, "no error") << plugin.name;
     else
       EXPECT_TRUE(contains(message, ": medium 'homogeneous': the integrator '" + std::string(plugin.name) +
-                                        "' does not see participating media; 'path' does"))
+                                        "' does not support participating media; 'path' does"))
           << message;
   }
 }
