@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The settings of `covary combine`. Python's combine() takes images in place of files, and the same settings of what is
-// made of them.
+// The settings of `covary combine`. Python's combine() takes images instead of files, and otherwise the same settings.
 #pragma once
 
 #include <optional>
@@ -22,7 +21,7 @@ struct CombineSettings {
   std::vector<std::string> crn;          ///< files of one image, see GroupedFile; empty: `independent` is denoised
   std::vector<std::string> independent;  ///< likewise
   std::string output;
-  std::string crn_layer, independent_layer;  ///< of files that hold several
+  std::string crn_layer, independent_layer;  ///< of files with several layers
   std::string counts;                        ///< file with the samples of each pixel of the independent image
   std::string light;                         ///< film of light paths
   std::string guides;                        ///< file with the guides of the denoising
@@ -31,9 +30,9 @@ struct CombineSettings {
   std::optional<int> samples;  ///< samples per pixel of the CRN image
   DenoisingChoice denoising;
   bool error = false;  ///< estimate the standard error, too
-  bool force = false;  ///< combine in spite of errors of the inputs
+  bool force = false;  ///< combine in spite of errors in the inputs
   std::optional<PixelPosition> explain;
-  std::optional<double> memory_mib;  ///< to work in
+  std::optional<double> memory_mib;  ///< memory limit
 };
 void declare(Settings& settings, CombineSettings& v);
 

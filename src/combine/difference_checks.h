@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks of renders that shall differ in their seed alone, by their differences: noise of one render is independent of
-// its other pixels, and as often above that of another render as below it.
+// Checks renders that should only differ in their seed, by their differences: the noise of a render is independent of
+// its other pixels, and as often above another render as below it.
 #pragma once
 
 #include <vector>
@@ -12,11 +12,11 @@ namespace covary {
 
 class DifferenceChecks {
  public:
-  /// Of `groups` renders of this size; of large ones rows are left out.
+  /// For `groups` renders of this size; of large ones some rows are left out.
   DifferenceChecks(int width, int height, int groups);
   /// The next rows.
   void add_rows(const GroupedImage& image);
-  /// Appends an error for renders that were denoised before, that share random numbers, or of which one is brighter.
+  /// Appends an error if renders were denoised before, share random numbers, or one is brighter.
   void report(std::vector<Finding>& findings) const;
 
  private:

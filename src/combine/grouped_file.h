@@ -17,23 +17,23 @@ namespace covary {
 
 class GroupedFile {
  public:
-  /// One path: all groups, as layers that differ in a number (group00.R, group00.G, …), or a single image. Several
-  /// paths: one image each, the groups in the order given. An image is a colour layer of film/image_file.h; where a
-  /// file holds several, the picture among them is taken if there is one, and `layer` names it otherwise (or the
-  /// layers of the groups without their number). Throws Error(kIo), and Error(kInput) with the layers there are.
+  /// One path: all groups, as layers whose names differ in a number (group00.R, group00.G, …), or a single image.
+  /// Several paths: one image each, with the groups in that order. An image is a colour layer of film/image_file.h; if
+  /// a file has several, `layer` names one (without the number of the group), or else the picture is used. Throws
+  /// Error(kIo), and Error(kInput) with the layers found.
   explicit GroupedFile(const std::vector<std::string>& paths, const std::string& layer = "");
 
   int width() const { return place_.window.width; }
   int height() const { return place_.window.height; }
   const ImagePlace& place() const { return place_; }
   int groups() const { return static_cast<int>(groups_.size()); }
-  /// Samples per pixel of all groups together, their mean where pixels differ; 0 where the files do not tell.
+  /// Samples per pixel of all groups together, averaged over pixels; 0 if the files do not say.
   double samples() const { return samples_; }
-  /// Whether it is known how many samples each pixel has, so that read_rows() gives counts.
+  /// Whether the number of samples of each pixel is known, so that read_rows() gives counts.
   bool has_counts() const { return has_counts_ || counts_file_ || count_of_all_ > 0; }
-  /// Says so for files that do not: an EXR file of the same pixels, with one channel of whole numbers, or one that is
+  /// Sets the counts for files without them: an EXR file of the same pixels with one channel of whole numbers, or one
   /// named "samples": samples of all groups together, which then have the sizes of film/groups.h. Throws Error(kIo),
-  /// and Error(kInput) where the file is not like that or the counts are known already.
+  /// and Error(kInput) if the file is different or the counts are known already.
   void take_counts(const std::string& path);
   /// The same number, > 0, for all pixels.
   void take_count(uint32_t samples);
@@ -45,7 +45,7 @@ class GroupedFile {
   /// A light film (film/splat_layer.h); an image to which one was added.
   bool is_light_film() const { return !light_paths_per_sample_.empty(); }
   bool has_light_added() const { return !light_film_.empty(); }
-  /// Whether a channel has 16 bits only.
+  /// Whether any channel has only 16 bits.
   bool has_half() const { return has_half_; }
   /// For messages.
   const std::string& name() const { return name_; }
@@ -53,8 +53,8 @@ class GroupedFile {
   /// Rows of both arrays of a GroupedImage.
   struct Rows {
     std::vector<float> data;
-    std::vector<uint32_t> counts;           ///< where has_counts(); empty otherwise, where groups must be equal
-    std::vector<float> variance_in_groups;  ///< GroupedImage::variance_in_groups, of films that keep it
+    std::vector<uint32_t> counts;           ///< if has_counts(); otherwise empty, and groups are equal
+    std::vector<float> variance_in_groups;  ///< GroupedImage::variance_in_groups, for films that keep it
   };
   /// Rows [first_row, first_row + n_rows).
   void read_rows(int first_row, int n_rows, Rows& rows) const;
@@ -67,7 +67,8 @@ class GroupedFile {
     std::array<std::string, 3> channels;
   };
   void add_file(const std::string& path, const std::string& layer, bool only_file);
-  /// What films of covary tell. Groups of one film follow from its counts; others must have equal numbers of samples.
+  /// From covary's films. The groups of one film follow from its counts; other groups must have equal numbers of
+  /// samples.
   void take_film_facts(const std::string& path, const ExrFile& file, bool may_be_film);
   void read_counts(int first_row, int n_rows, std::vector<uint32_t>& counts) const;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the rows of a grouped image come from: files, read as far as they are needed, or memory.
+// Where the rows of a grouped image come from: files, read as needed, or memory.
 #pragma once
 
 #include <functional>
@@ -13,9 +13,9 @@ namespace covary {
 struct GroupedSource {
   ImageOrigin origin;
   int width = 0, height = 0, groups = 0;
-  /// Samples per pixel, on average; 0 where that is not known.
+  /// Samples per pixel, on average; 0 if unknown.
   double samples = 0;
-  /// Rows first … first + n - 1. What they point to stays as it is until the next call.
+  /// Rows first … first + n - 1. What they point to is valid until the next call.
   std::function<GroupedImage(int first, int n)> rows;
 
   GroupedImage all() const { return rows(0, height); }

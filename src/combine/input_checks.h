@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks two grouped images, from any renderer, for what the image-space control variates assume of them: finite linear
-// values; pixels of the independent image independent of each other and of the CRN image; pixels of the CRN image
-// really sharing their random numbers; groups that are independent renders of one scene.
+// Checks that two grouped images, from any renderer, meet the assumptions of image-space control variates: finite
+// linear values; pixels of the independent image independent of each other and of the CRN image; pixels of the CRN
+// image that share their random numbers; groups that are independent renders of one scene.
 #pragma once
 
 #include <memory>
@@ -15,11 +15,12 @@ namespace covary {
 struct Finding {
   enum class Severity { kNote, kWarning, kError };
   Severity severity;
-  /// What is wrong and, for errors, the setting to change in the renderer that made the image.
+  /// What is wrong and, for errors, which setting of the renderer to change.
   std::string text;
 };
 
-/// Mean rank correlation over the groups of pairs of pixels, with its standard error, were the pairs independent.
+/// Mean rank correlation over the groups of pairs of pixels, and the standard error it would have for independent
+/// pairs.
 struct Correlation {
   double value = 0, standard_error = 0;
   long pairs = 0;  ///< 0: not measured (fewer than 3 groups, or no noise)
@@ -36,18 +37,17 @@ struct InputReport {
   bool has_errors() const;
 };
 
-/// Measures the images and says what is wrong. Looks at every pixel for its values and at no more than about 250 000
-/// pairs for each correlation. Images can be given in bands of rows, from top to bottom; pairs across bands are left
-/// out.
+/// Measures the images and reports what is wrong. Checks the values of every pixel, and at most about 250 000 pairs for
+/// each correlation. Images may be given in bands of rows, from top to bottom; pairs across bands are left out.
 class InputChecks {
  public:
-  /// Groups of unequal sizes: ranks of values do not look at sizes, means of groups are weighted by their samples. The
-  /// images need not have the same number of groups; with fewer than 3, correlations cannot be measured, which is a
-  /// warning. `crn_groups` 0: there is no CRN image, and pixels of the other need not be independent of each other,
-  /// only its groups.
+  /// Groups may have unequal sizes: rank correlations ignore sizes, means of groups are weighted by their samples. The
+  /// images may have different numbers of groups; with fewer than 3, correlations cannot be measured, which is a
+  /// warning. `crn_groups` 0: there is no CRN image, and pixels of the independent image may depend on each other, but
+  /// not its groups.
   InputChecks(int width, int height, int crn_groups, int independent_groups);
   ~InputChecks();
-  /// The next rows of both images. Throws Error(kUsage) where sizes differ or there is nothing.
+  /// The next rows of both images. Throws Error(kUsage) if sizes differ or there are no rows.
   void add_rows(const GroupedImage& crn, const GroupedImage& independent);
   /// After the last row.
   InputReport report() const;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Layers of an independent image, such as direct light or the light of single lamps, of any renderer.
+// Layers of an independent image from any renderer, such as direct light or the light of single lamps.
 #pragma once
 
 #include <span>
@@ -16,14 +16,14 @@ struct LayerSource {
   GroupedSource groups;
 };
 
-/// Of what the layers that were given leave of the image.
+/// The rest of the image that the given layers leave.
 inline constexpr const char* kRest = "Rest";
 
-/// Layers that together are the image: those of `sources`, and kRest where these leave more than a thousandth of it
-/// (less is what rounding, such as that of 16-bit files, may leave).
+/// Layers that add up to the image: those of `sources`, and kRest if these leave more than a thousandth of it (less may
+/// be rounding, for example of 16-bit files).
 class WholeLayers {
  public:
-  /// What `picture` and the sources point to must live as long. Throws Error(kInput) where a layer has other pixels or
+  /// What `picture` and the sources point to must live as long. Throws Error(kInput) if a layer has other pixels or
   /// groups, is named twice or kRest, or has a value that is not finite where the picture's is.
   WholeLayers(const GroupedImage& picture, std::span<const LayerSource> sources);
   std::span<const Layer> view() const { return layers_; }

@@ -8,8 +8,8 @@
 namespace covary {
 
 /// Adds the mean of rows of a light film to an image made of camera samples alone, from its row `first_row` on. Both
-/// are independent, so the squares of their standard errors add; where `result` has one, the light film needs two
-/// groups or more. Throws Error(kInput).
+/// are independent, so their variances add; if `result` has a standard error, the light film needs two groups or more.
+/// Throws Error(kInput).
 void add_light(const GroupedImage& light, EstimatorResult& result, int first_row = 0);
 
 }  // namespace covary

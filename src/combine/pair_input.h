@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Two images for an estimator of pairs, as programs are given them: what their files or films say of themselves, and
-// what the caller asks for.
+// Two images for a two-image estimator, as programs receive them: what their files or films say of themselves, and what
+// the caller asks for.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@
 
 namespace covary {
 
-/// What is known of an image beside its pixels; texts are empty where nothing is.
+/// What is known of an image besides its pixels; unknown texts are empty.
 struct ImageOrigin {
   std::string name;  ///< for messages
   ImagePlace place;
@@ -26,33 +26,33 @@ struct ImageOrigin {
   bool has_light_added = false;      ///< an image to which a light film was added
 };
 
-/// Appends to `findings` what the origins say against combining the images. Throws Error(kInput) where they do not show
-/// the same pixels.
+/// Appends to `findings` what in the origins speaks against combining the images. Throws Error(kInput) if they do not
+/// show the same pixels.
 void check_origins(const ImageOrigin& crn, const ImageOrigin& independent, std::vector<Finding>& findings);
 
 /// Appends to `findings` what the origins say about light films: `light` is the one to add, or null. Throws
-/// Error(kInput) where it is none, or shows other pixels.
+/// Error(kInput) if it is not a light film, or shows other pixels.
 void check_light(const ImageOrigin& crn, const ImageOrigin& independent, const ImageOrigin* light,
                  std::vector<Finding>& findings);
 
-/// The errors among the findings, separated by "; "; empty where there are none.
+/// The errors among the findings, separated by "; "; empty if there are none.
 std::string errors_text(const std::vector<Finding>& findings);
 
 /// Whether a group of a pixel has no samples.
 bool lacks_samples(const GroupedImage& image);
-/// The report on such images, which an estimator with adaptive sampling may take: that they were not checked.
+/// The report on such images, which an adaptive estimator may take: they were not checked.
 InputReport unchecked_report();
 
-/// Names of those that need the number of samples of the CRN image.
+/// Names of the estimators that need the number of samples of the CRN image.
 std::vector<std::string> estimators_with_samples();
-/// `samples`: per pixel of the CRN image, where the caller gives them; `known_samples`: as the image tells, 0 where it
-/// does not. Throws Error(kUsage) for a setting that the estimator does not have.
+/// `samples`: per pixel of the CRN image, if the caller gives them; `known_samples`: according to the image, 0 if
+/// unknown. Throws Error(kUsage) for a setting that the estimator does not have.
 PairSettings pair_settings(const Estimator& estimator, std::optional<int> samples, double known_samples,
                            bool std_error);
 
-/// Why images are not enough for the estimator; empty where they are, or where there is none of that name.
+/// Why the estimator cannot work on images; empty if it can, or if there is no estimator of that name.
 std::string needs_samples_text(const std::string& name);
-/// make_estimator() for those of two images. Throws Error(kUsage) for any other, too.
+/// make_estimator() for two-image estimators. Throws Error(kUsage) for any other.
 Estimator make_pair_estimator(const std::string& name, const OptionValues& values);
 
 }  // namespace covary

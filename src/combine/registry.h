@@ -25,11 +25,11 @@ std::span<const EstimatorPlugin> estimator_plugins();
 inline constexpr const char* kDefaultEstimator = "iicv";
 inline constexpr const char* kNoEstimator = "none";  ///< the film is the image
 
-/// Throws Error(kUsage) for a name that there is not, with the names there are; for an option that the estimator does
-/// not have, with those that have it; and for values out of range.
+/// Throws Error(kUsage) for an unknown name, listing the known ones; for an option that the estimator does not have,
+/// listing those that have it; and for values out of range.
 Estimator make_estimator(const std::string& name, const OptionValues& values = {});
 
-/// Names of the estimators that `accepts` says yes to, with their default options.
+/// Names of the estimators for which `accepts` is true, with their default options.
 template <typename Predicate>
 std::vector<std::string> estimators_where(const Predicate& accepts) {
   std::vector<std::string> names;
@@ -41,14 +41,14 @@ std::vector<std::string> estimator_names();
 /// Those of a CRN and an independent image.
 std::vector<std::string> pair_estimator_names();
 
-/// The options of an estimator with their defaults. Throws Error(kUsage) as make_estimator().
+/// The options of an estimator with their defaults. Throws Error(kUsage) like make_estimator().
 std::vector<Option> options_of_estimator(const std::string& name);
-/// Those of several; equal names are one option.
+/// The options of several estimators; equal names are one option.
 std::vector<Option> options_of_estimators(const std::vector<std::string>& names);
-/// Names of the estimators that have the option, without dashes; empty where none has.
+/// Names of the estimators that have the option, without dashes; empty if none has.
 std::vector<std::string> estimators_with_option(const std::string& option);
 
-/// The estimator denoised as the words say. Throws Error(kUsage) where it cannot be.
+/// The estimator with the denoising that the texts describe. Throws Error(kUsage) if it cannot be denoised.
 Estimator with_denoising(const Estimator& base, const DenoisingChoice& choice);
 
 }  // namespace covary

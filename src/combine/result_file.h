@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The image an estimator made, on disk.
+// Writes the image that an estimator made.
 #pragma once
 
 #include <map>
@@ -13,12 +13,11 @@
 
 namespace covary {
 
-/// What attributes of files say of the error of an image, by film_key::kPredicted and kPredictedBounds.
+/// Attributes that describe the predicted error of an image, film_key::kPredicted and kPredictedBounds.
 std::map<std::string, std::string> prediction_attributes(const std::optional<PredictedError>& predicted);
 
-/// Writes R, G, B, where there are an error estimate StdError.R, .G, .B and Bias.R, .G, .B, and the auxiliary images by
-/// name, with string attributes. The file appears under its name only when complete. Throws Error(kIo). The arguments
-/// are only read.
+/// Writes R, G, B, if there is an error estimate StdError.R, .G, .B and Bias.R, .G, .B, and the auxiliary images by
+/// name, with string attributes. The file appears under its name only when complete. Throws Error(kIo).
 void write_result(const std::string& path, const ImagePlace& place,
                   const std::map<std::string, std::string>& attributes, EstimatorResult& result,
                   std::map<std::string, Image>& aovs);

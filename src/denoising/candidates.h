@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// Images with less noise and more bias than the one they are made of: candidates for mixture.h.
+// Candidates for mixture.h: images with less noise and more bias than the one they are made of.
 //
-// Without a neural network (nl_means.h, steered by the estimator's image and its standard error, guided by albedo and
-// normal): that image with two bandwidths; the independent image with the same weights; and the image over the albedo,
-// filtered with the normal as the only guide, times the albedo. With Open Image Denoise: images denoised with
-// guides that were denoised before: of a pair the independent image alone, as the errors of the other, which pixels
-// have in common, are not what the network was trained on.
+// Without a neural network, NL-means (nl_means.h) steered by the estimator's image and its standard error, with albedo
+// and normal as guides, makes: that image with two bandwidths; the independent image with the same weights; and the
+// image divided by the albedo, filtered with the normal as the only guide and multiplied by the albedo. Open Image
+// Denoise uses guides that were denoised first. Of a pair, it only denoises the independent image: the other's errors
+// are shared between pixels, which the network was not trained on.
 //
-// Where the image is the mean of the independent samples itself, the images of the one are left out, and those of Open
-// Image Denoise come with what they took away from pixels alike given back (ResidualOptions of residual_correction.h).
-// The network's image of all samples is a mean with those of the halves there (mirrored_halves.h).
+// Where the image itself is the mean of the independent samples, the candidates made from the independent image are
+// left out, and Open Image Denoise's images get residual correction (ResidualOptions in residual_correction.h). The
+// network's image of all samples is then averaged with those of the halves (mirrored_halves.h).
 #pragma once
 
 #include <functional>
@@ -23,7 +23,7 @@
 
 namespace covary {
 
-/// What candidates are made of: the images of one set of samples. All values are finite.
+/// The inputs of candidates: the images of one set of samples. All values are finite.
 struct CandidateInput {
   const Image* estimate = nullptr;
   const Image* std_error = nullptr;    ///< of the estimate
@@ -32,36 +32,36 @@ struct CandidateInput {
   const std::vector<unsigned char>* valid = nullptr;
 };
 
-/// Makes candidates, the same of any samples.
+/// Makes candidates; the same kinds for any samples.
 struct CandidateMaker {
-  /// The images of each of several sets of samples, all with the same valid pixels: all samples, or these and both
-  /// halves of them.
+  /// The candidates of each set of samples; all sets have the same valid pixels: all samples alone, or these and both
+  /// halves.
   using Make = std::function<std::vector<std::vector<Image>>(std::span<const CandidateInput>)>;
 
   std::vector<std::string> names;  ///< of its images, in their order
   Make make;
-  /// The same of the layers of one set of samples (PairSettings::layers, means without fireflies): for each candidate
-  /// the images of all layers. Those of filters add up to the candidate's, those of a network about. For
+  /// The layers of one set of samples (PairSettings::layers, means without fireflies): for each candidate, the images
+  /// of all layers. A filter's layers add up to the candidate, a network's only approximately. For
   /// CandidateBase::kMean.
   std::function<std::vector<std::vector<Image>>(const CandidateInput&, std::span<const Image> layers)> make_layers;
-  /// What the squared error of a mixture that has these usually is, over the variance of mixtures of half of the
-  /// samples: the more of it they take away, the more of the error is bias. Measured (docs/methods/error-estimates.md).
+  /// Typical squared error of a mixture of these candidates over the variance of mixtures of half of the samples: the
+  /// more noise candidates remove, the more of the error is bias. Measured (docs/methods/error-estimates.md).
   double error_over_variance = 0.65;
   bool network = false;       ///< a neural network makes them
-  std::function<int()> runs;  ///< of the network, so far; none without one
-  /// Number of the one to show where samples are too few to judge.
+  std::function<int()> runs;  ///< runs of the network so far; none without one
+  /// Index of the candidate to show where there are too few samples to judge.
   int best_of_few = 0;
 };
 
-/// Candidates of one set of samples after the other.
+/// The candidates of several makers, one after the other.
 CandidateMaker::Make one_by_one(std::function<std::vector<Image>(const CandidateInput&)> make);
 
-/// Whose images: an estimator's of two passes, or the mean of independent samples.
+/// Which image is denoised: that of a two-pass estimator, or the mean of independent samples.
 enum class CandidateBase { kPair, kMean };
 
-/// Filters without a network. The guides are copied.
+/// Filters without a network. Copies the guides.
 CandidateMaker filtered_candidates(const Guides& guides, CandidateBase base = CandidateBase::kPair);
-/// The guides of a neural network: those of what is seen in mirrors and through glass, where they are known.
+/// Guides of a neural network: those seen in mirrors and through glass, where available.
 Guides network_guides(const Guides& guides);
 /// Images denoised by a neural network. Throws like denoise().
 CandidateMaker neural_candidates(const Guides& guides, const DenoiseOptions& options,

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // Layers of a denoised image (ours): parts of the light, such as direct and indirect light, denoised so that they add
-// up to the picture. Each layer is made as the picture is, by the picture's own weights:
+// up to the picture. Each layer is made as the picture is, with the picture's weights:
 //
 //     L_k = d_k + sum_p x_p (C_p,k - d_k),
 //
-// d_k: mean of the layer's samples, C_p,k: the layer as candidate p has it. Filters are linear, so that theirs add up;
-// a network's do not. What is missing to the picture M is given to each in proportion to what it has,
+// d_k: mean of the layer's samples, C_p,k: candidate p of the layer. Filters are linear, so their layers add up; a
+// network's do not. The difference from the picture M is distributed in proportion to the layers' values,
 //
 //     L'_k = L_k + (M - sum_j L_j) |L_k| / sum_j |L_j|,
 //
-// which scales layers that are positive. Claim: sum_k L'_k = M up to rounding, at every pixel.
+// which scales positive layers. Claim: sum_k L'_k = M up to rounding, at every pixel.
 #pragma once
 
 #include <span>
@@ -25,7 +25,7 @@ struct LayersInput {
   const Image* image = nullptr;  ///< the picture
   const GroupedImage* independent = nullptr;
   std::span<const Layer> layers;
-  CandidateInput candidates;  ///< what those of the picture were made of
+  CandidateInput candidates;  ///< the inputs of the picture's candidates
   std::span<const CandidateMaker> makers;
   std::span<const Image> weights;  ///< of the picture, for the candidates of all makers
 };

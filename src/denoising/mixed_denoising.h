@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Denoising that knows its error (ours): the image of an estimator and images with less noise and more bias
-// (candidates.h), mixed at each pixel in the proportions that held-out samples find best (mixture.h). The estimator is
-// one of two passes, or the mean of a single one.
+// Denoising that knows its error (ours): an estimator's image and images with less noise and more bias (candidates.h),
+// mixed at each pixel in the proportions that held-out samples find best (mixture.h). The estimator uses two passes, or
+// is the mean of a single one.
 //
-// Claim: consistent where the estimator is, because the weights of candidates that are wrong vanish as samples tell so.
-// Its error is measured, bias included (held_out_error.h).
+// Claim: consistent if the estimator is, because the weights of biased candidates vanish as samples reveal the bias.
+// The error, including bias, is measured (held_out_error.h).
 #pragma once
 
 #include <map>
@@ -25,68 +25,67 @@ namespace covary {
 /// What the mixture minimises, from least bias to least error.
 enum class DenoiseMode {
   kNone,      ///< no denoising
-  kAuto,      ///< what leaves the least error, the default of renders
+  kAuto,      ///< least error, the default of renders
   kBias,      ///< squared bias counts four times as much as variance; residual correction
   kBalanced,  ///< twice as much; residual correction
   kError,     ///< least error
 };
 
-/// Of a frame of moving pictures, mixed in where there are samples enough for a mixture; layers have no part in it.
+/// For a frame of a sequence, mixed in if there are enough samples for a mixture; layers do not use it.
 struct MixingHistory {
-  std::shared_ptr<const History> before;  ///< of the frame before; or null
+  std::shared_ptr<const History> before;  ///< of the previous frame; or null
   bool keep_samples = false;              ///< EstimatorResult::kept_samples, of a mean denoised by a network
 };
 
 struct MixedDenoisingOptions {
   DenoiseMode mode = DenoiseMode::kBalanced;
-  bool use_oidn = true;  ///< candidates of Open Image Denoise, where it is installed
-  DenoiseOptions oidn;   ///< where it is; a library that is named and is not there is an error
+  bool use_oidn = true;  ///< use Open Image Denoise, if it is installed
+  DenoiseOptions oidn;   ///< path of its library; an error if it is not there
   MixingHistory history;
 };
 
-/// The estimator's image denoised. `base` is an estimator of a pair that predicts its error, and the result needs twice
-/// its groups; or the mean, and the result is one of a single pass (EstimatorPasses::kIndependent), mixed where there
-/// are kFewestMixedSamples, and the best candidate where there are fewer. It reads guides and needs the whole image.
-/// Throws Error(kUsage) for another base.
+/// Denoises the estimator's image. `base` is either a two-pass estimator that predicts its error, and the result needs
+/// twice its groups; or the mean, and the result takes a single pass (EstimatorPasses::kIndependent), mixed with at
+/// least kFewestMixedSamples samples and otherwise the best single candidate. Reads guides and needs the whole image.
+/// Throws Error(kUsage) for any other base.
 Estimator with_denoising(const Estimator& base, const MixedDenoisingOptions& options);
 
 /// Whether an estimator can be the base.
 bool can_be_denoised(const Estimator& estimator);
 
-/// MixedDenoisingOptions by words, as options have them.
+/// MixedDenoisingOptions as texts, as the command line has them.
 struct DenoisingChoice {
-  std::string mode = "none";  ///< of denoise_mode_names()
-  std::string oidn;           ///< a library or a folder of it; "": where it is found, "off": without it
-  MixingHistory history;      ///< MixedDenoisingOptions::history, which no word says
+  std::string mode = "none";  ///< one of denoise_mode_names()
+  std::string oidn;           ///< a library or its folder; "": searched for, "off": not used
+  MixingHistory history;      ///< MixedDenoisingOptions::history; there is no text for it
   bool denoises() const { return mode != "none"; }
   bool uses_oidn() const { return denoises() && oidn != "off"; }
 };
-/// `is_all`: nothing else of the caller's is done by Open Image Denoise, so that `oidn` is an error without `denoise`.
+/// `is_all`: the caller uses Open Image Denoise for nothing else, so `oidn` without `denoise` is an error.
 void declare(Settings& settings, DenoisingChoice& choice, bool is_all = true);
 constexpr const char* kNotDenoised = "without `denoise` auto, bias, balanced or error";
 
-/// What is to be said where Open Image Denoise would take part and is not there: that it is missing, and how to get it.
-/// Empty where it is there, or not wanted.
+/// The note that Open Image Denoise is wanted but missing, and how to get it; empty if it is found or not wanted.
 std::string missing_network(const DenoisingChoice& choice);
 
-/// What with_denoising() does, with any candidates.
+/// Implements with_denoising(), for any candidates.
 struct MixedDenoising {
   EstimatorResult result;
   std::vector<std::string> names;  ///< of the candidates
   std::vector<Image> candidates;   ///< made of all samples
   std::vector<Image> weights;      ///< one channel each
 };
-/// `std_error`: with the error of the result. `layers`: of a mean; its result has them, too.
+/// `std_error`: estimate the result's error. `layers`: of a mean; the result then has layers, too.
 MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<CandidateMaker>& makers, DenoiseMode mode,
                                   bool std_error, std::span<const Layer> layers = {},
                                   const MixingHistory& history = {});
 
-/// Samples per pixel, in two groups or more, whose halves can judge candidates.
+/// Samples per pixel from which on halves, of two groups or more, can judge candidates.
 inline constexpr int kFewestMixedSamples = 4;
 
 /// The modes by name, "none" first.
 const std::vector<std::string>& denoise_mode_names();
-/// Throws Error(kUsage) for a name that there is not.
+/// Throws Error(kUsage) for an unknown name.
 DenoiseMode denoise_mode(const std::string& name);
 
 }  // namespace covary

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Candidates of some samples, and their mixture (mixture.h).
+// The candidates of each set of samples, and their mixture (mixture.h).
 #pragma once
 
 #include <array>
@@ -13,21 +13,21 @@ namespace covary {
 
 struct PartsWeighting {
   float bias_share = 1;              ///< MixtureInput::bias_share
-  float prior = 0;                   ///< MixtureInput::prior of pairs
-  bool residual_correction = false;  ///< of the mixture, of pairs
+  float prior = 0;                   ///< MixtureInput::prior for pairs
+  bool residual_correction = false;  ///< typical weights, for pairs
 };
 
 struct MixedParts {
   CandidateSet whole;
   std::array<CandidateSet, 2> halves;
-  std::array<Image, 2> counts;  ///< MixtureInput::counts; empty of a pair
+  std::array<Image, 2> counts;  ///< MixtureInput::counts; empty for a pair
   Mixture mixture;
 };
 
-/// What candidates are made of; `h`: the mean of the part's independent image. All must outlive the result.
+/// The input of candidates; `h`: the mean of the part's independent image. All must outlive the result.
 CandidateInput input_of(const DenoisingPart& part, const Image& h, const std::vector<unsigned char>& valid);
 
-/// Candidates of each of the parts.
+/// The candidates of each part.
 std::vector<CandidateSet> candidates_of(const std::vector<const DenoisingPart*>& parts,
                                         const std::vector<unsigned char>& valid,
                                         const std::vector<CandidateMaker>& makers);
@@ -35,7 +35,7 @@ std::vector<CandidateSet> candidates_of(const std::vector<const DenoisingPart*>&
 /// The first candidate: the image with little noise.
 inline const Image& guide_of(const CandidateSet& set) { return set.candidates[0]; }
 
-/// Whether a neural network makes some of them.
+/// Whether any of them come from a neural network.
 bool has_network(const std::vector<CandidateMaker>& makers);
 
 MixedParts mix_parts(const DenoisingParts& parts, const std::vector<CandidateMaker>& makers,

@@ -15,54 +15,54 @@ namespace covary {
 /// How passes share a budget of samples per pixel.
 struct Shares {
   std::vector<double> parts;  ///< of the passes; they add up to 1
-  /// Samples that each pass takes at least: as many as it has groups, so that each has one.
+  /// Minimum samples of each pass: one for each of its groups.
   uint32_t fewest = 1;
 };
 
-/// Samples per pixel of each pass that add up to `budget`, or more where that is less than the passes need.
+/// Samples per pixel of each pass; they add up to `budget`, or more if the passes need more.
 std::vector<uint32_t> samples_of_passes(const Shares& shares, uint32_t budget);
 
-/// Samples per pixel that no render exceeds.
+/// Maximum samples per pixel of any render.
 inline constexpr uint32_t kMaxBudget = 1u << 30;
 
-/// The part of the frame that is rendered. Throws Error(kUsage) where the request's is not inside the frame.
+/// The part of the frame to render. Throws Error(kUsage) if the request's is not inside the frame.
 CropWindow window_of(const LoadedScene& scene, const RenderRequest& request);
 
-/// The most samples per pixel of all passes together that may be taken.
+/// Maximum samples per pixel of all passes together.
 uint32_t largest_budget(const LoadedScene& scene, const RenderRequest& request);
-/// Those to begin with, before a wanted error is looked at for the first time.
+/// Samples per pixel before the error is checked for the first time.
 uint32_t first_budget(const LoadedScene& scene, const RenderRequest& request);
 
-/// How many groups each pass keeps that the estimator reads, where nobody asked for a number: choose_groups() of
-/// film/groups.h for the state's group_budget. With a limit of time, when the number of samples is only known roughly
-/// and nothing is gained by a divisor of it: 12, or fewer where there are fewer samples.
+/// Default number of groups of each pass that the estimator reads: choose_groups() of film/groups.h for the state's
+/// group_budget. With a time limit, where the number of samples is only roughly known, divisors gain nothing: 12, or
+/// fewer if there are fewer samples.
 int number_of_groups(const Shares& shares, const PlanState& state);
 
-/// Sets the samples per pixel of each pass for the state's budget: exactly, or on the way to a wanted error, which asks
-/// for no number, rounded up to whole groups unless that is more than the request allows.
+/// Sets the samples per pixel of each pass for the state's budget: exactly, or, on the way to a target error, rounded
+/// up to whole groups unless the request does not allow that.
 void set_budget(const Shares& shares, const PlanState& state, std::span<Pass> passes);
 
-/// Samples per second, from trials all over the window: some ten milliseconds. `stop` (may be null) ends them.
+/// Samples per second, from trials all over the window that take some ten milliseconds. `stop` (may be null) ends them.
 double samples_per_second(const LoadedScene& scene, const Integrator& integrator, const FilterSettings& filter,
                           const CropWindow& window, const std::atomic<bool>* stop);
 
-/// The next budget on the way to a relMSE of `target`: error falls like 1 / samples, or more slowly. At most `most`
-/// times as large.
+/// The next budget on the way to a relMSE of `target`, at most `most` times as large: the error falls like 1 / samples,
+/// or more slowly.
 uint32_t next_budget(uint32_t budget, double predicted, double target, uint32_t limit, double most);
 
-/// The budgets of a render to a wanted error, one after the other: each is decided on the films of the one before, when
-/// these are complete. A render that is resumed goes the same way again, so the films keep the budgets
-/// (film_key::kBudgets): decided anew on films that are half-way to the next one, they would differ.
+/// The successive budgets of a render to a target error: each is decided on the complete films of the one before. The
+/// films record the budgets (film_key::kBudgets), so that a resumed render repeats them: decided again on half-finished
+/// films, they would differ.
 class ErrorRounds {
  public:
   explicit ErrorRounds(uint32_t first) : budgets_{first} {}
   uint32_t budget() const { return budgets_[now_]; }
-  /// Takes the budgets of a film that another call began, unless more are known, and `limit` for those above it. Throws
-  /// Error(kInput), naming `path`, where they make no sense.
+  /// Takes over the budgets of a film that another call began, unless more are known, and `limit` for those above it.
+  /// Throws Error(kInput), naming `path`, if they are invalid.
   void take(const std::string& text, uint32_t limit, const std::string& path);
-  /// Goes on to the next budget if an earlier call decided on one.
+  /// Moves on to the next budget if an earlier call decided on one.
   bool repeat();
-  /// Goes on to a budget that was decided now.
+  /// Moves on to a newly decided budget.
   void add(uint32_t budget);
   std::string text() const;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Two independent passes of one denoised mean: where the second is to take its samples, and both together.
+// Two independent passes of one denoised mean: where the second one samples, and the film of both.
 #pragma once
 
 #include <functional>
@@ -14,12 +14,12 @@ namespace covary {
 using DenoisedMean =
     std::function<EstimatorResult(const GroupedImage& crn, const GroupedImage& independent, const PairSettings&)>;
 
-/// For sample_counts(): squared relative errors of the denoised image of `first`, of each pixel, over the cost of
-/// samples there. All 0 where the image does not know its error.
+/// For sample_counts(): squared relative error of the denoised image of `first` at each pixel, over the cost of a
+/// sample there. All 0 if the image does not know its error.
 std::vector<double> filtered_errors(const DenoisedMean& denoise, const Film& first, const PlanState& state);
 
-/// The film of the samples of both, which have the same groups, of equal sizes in each pixel of `first`. The second's
-/// numbers of samples follow from the first's values over many pixels, so that the sum is only nearly unbiased
+/// The film of both passes' samples, with the same groups, of equal sizes in each pixel of `first`. The second's
+/// numbers of samples depend on the first's values over many pixels, so the sum is only nearly unbiased
 /// (docs/notes/adaptive-counts.md).
 Film joined(const Film& first, const Film& last);
 

@@ -5,13 +5,12 @@
 
 namespace covary {
 
-/// A folder that this process alone works in, as long as the object lives: its file `.lock` is locked (flock) and holds
-/// the process's id. A lock of a process that has died is none; the file is removed at the end.
+/// Reserves a folder for this process as long as the object lives: its file `.lock` is locked (flock) and holds the
+/// process's id. The lock of a dead process does not count; the file is removed at the end.
 class FolderLock {
  public:
-  /// Makes the folder where it is missing. Throws Error(kIo) where `folder` is something else than a folder, cannot be
-  /// written to, or another process holds it, which the message names by its id. File systems without locks are taken
-  /// as they are.
+  /// Creates the folder if missing. Throws Error(kIo) if `folder` is not a folder, cannot be written to, or another
+  /// process holds it, naming that process's id. File systems without locks are used without one.
   explicit FolderLock(const std::string& folder);
   ~FolderLock();
   FolderLock(const FolderLock&) = delete;

@@ -16,17 +16,17 @@ struct IntegratorChoice {
   OptionValues options;  ///< in place of the scene's; by names without dashes: "max-depth", "cv-grid"
 };
 
-/// For LoadOptions::make_integrator. It throws Error(kUsage) for options that the integrator does not have or that are
-/// wrong.
+/// For LoadOptions::make_integrator. Throws Error(kUsage) for invalid options or options that the integrator does not
+/// have.
 std::function<std::shared_ptr<SceneObject>(Parameters&)> integrator_maker(const IntegratorChoice& choice);
 
-/// The integrator of a scene that was loaded with one: its settings, for no scene yet.
+/// The integrator that a scene was loaded with: its settings, not yet prepared.
 const Integrator& integrator_of(const LoadedScene& scene);
-/// The one that a request names in its place, or that.
+/// The one that the request names instead, or that.
 struct RenderRequest;
 const Integrator& integrator_of(const LoadedScene& scene, const RenderRequest& request);
 
-/// The message for an unknown name, with the names there are.
+/// The message for an unknown name, listing the known ones.
 std::string unknown_integrator(const std::string& name);
 
 }  // namespace covary

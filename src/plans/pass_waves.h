@@ -13,14 +13,14 @@ namespace covary {
 
 struct WaveLimits {
   const std::atomic<bool>* stop = nullptr;  ///< stop at the next tile
-  /// Where given, asked before each wave once every pixel has samples of every pass: seconds that are left.
+  /// If given, called before each wave once every pixel has samples of every pass: returns the seconds left.
   std::function<double()> seconds_left;
   std::function<void(uint64_t done, uint64_t total)> progress;  ///< samples and light paths of all passes together
   std::function<void()> wave;                                   ///< called between waves
 };
 
-/// Renders all passes up to their settings.spp. The pass with the smallest part of its samples is next, one wave at a
-/// time, so that the passes advance together. Returns the samples and light paths taken.
+/// Renders all passes up to their settings.spp, wave by wave; the pass that is furthest behind is next, so that passes
+/// advance together. Returns the samples and light paths taken.
 uint64_t render_passes(const Scene& scene, std::span<Pass> passes, const WaveLimits& limits);
 
 }  // namespace covary

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What render() does: carries a plan out, once. Inside plans/ only.
+// Implements render(): carries a plan out, once. Only used in plans/.
 #pragma once
 
 #include <algorithm>
@@ -23,9 +23,9 @@ class PlanRun {
   RenderResult run();
 
  private:
-  /// Renders and estimates, once or until the predicted error is small enough. False when interrupted.
+  /// Renders and estimates, once or until the predicted error is small enough. False if interrupted.
   bool render_to_limits();
-  /// Renders a phase, until `share` of the time limit is used. False when interrupted.
+  /// Renders a phase, until `share` of the time limit is used. False if interrupted.
   bool render_phase(size_t index, double share);
   double seconds_left(size_t phase, double share);
   void begin_phase(const Phase& phase);
@@ -34,7 +34,7 @@ class PlanRun {
   EstimatorResult estimate_rows(int first_row, int n_rows, std::span<const Film> layers = {}) const;
   void between_waves();
   void keep_films_before_more();
-  bool try_to_keep_films(bool complete, const char* then);  // false: a warning says why
+  bool try_to_keep_films(bool complete, const char* then);  // false: a warning gave the reason
   void keep_films_of_failure() noexcept;
   std::span<Pass> films() { return result_.passes.empty() ? state_.passes : result_.passes; }
   void warn_of_other_samples(uint32_t asked) const;
@@ -52,7 +52,7 @@ class PlanRun {
   }
   bool has_training() const { return !result_.training.mean.data.empty(); }
   bool timed() const { return request_.seconds > 0; }
-  /// What RenderRequest::until is about.
+  /// The error that RenderRequest::until limits.
   double error_to_limit() const {
     return request_.until_in_blocks ? result_.predicted_blocks : result_.predicted->relmse;
   }
@@ -60,24 +60,24 @@ class PlanRun {
   bool film_has_errors() const {
     return plan_.film_is_image && plan_.predicts_error && state_.passes[0].film.groups() > 1;
   }
-  /// The film needs no estimate, but for its error or layers.
+  /// The film needs no estimate, except for its error or layers.
   bool needs_estimate() const {
     return !plan_.film_is_image || film_has_errors() || request_.until > 0 || request_.splits_layers();
   }
-  /// Of the whole window; empty where the plan reads none or they are not there.
+  /// Of the whole window; empty if the plan reads none or they do not exist.
   Guides guides() const { return plan_.reads_guides ? guides_among(result_.aovs) : Guides(); }
   bool needs_aovs() const { return request_.aovs || plan_.reads_guides; }
   bool stopped() const { return callbacks_.stop && callbacks_.stop->load(); }
-  /// The passes of every phase are there.
+  /// The passes of every phase exist.
   bool all_begun() const {
     return first_of_phase_.size() == plan_.phases.size() && first_of_phase_.back() < state_.passes.size();
   }
-  /// All passes have the samples they should.
+  /// All passes have their target samples.
   bool complete() const {
     return all_begun() && std::all_of(state_.passes.begin(), state_.passes.end(),
                                       [](const Pass& p) { return p.count >= p.settings.spp.largest(); });
   }
-  /// Every group of every pixel has samples, so that an estimator can work.
+  /// Every group of every pixel has samples, so an estimator can work.
   bool can_estimate() const {
     return all_begun() && std::all_of(state_.passes.begin(), state_.passes.end(), [this](const Pass& p) {
              return plan_.takes_unfinished ||
@@ -96,20 +96,20 @@ class PlanRun {
   const RenderCallbacks& callbacks_;
   const CropWindow window_;
   const FilterSettings filter_;
-  const std::shared_ptr<Integrator> integrator_;  // of this render alone
+  const std::shared_ptr<Integrator> integrator_;  // only for this render
   PlanState state_;
-  ErrorRounds rounds_;                  // where an error is wanted
+  ErrorRounds rounds_;                  // if an error is wanted
   std::vector<size_t> first_of_phase_;  // index of the first pass of each phase that has begun
   RenderResult result_;
-  std::shared_ptr<Integrator> of_layers_;  // with RenderRequest::splits_layers(), as the two below
+  std::shared_ptr<Integrator> of_layers_;  // with RenderRequest::splits_layers(), like the two below
   std::vector<std::string> layer_names_;
-  std::vector<Film> layers_;  // of these names; empty until they have been traced
+  std::vector<Film> layers_;  // with these names; empty until traced
   uint64_t done_ = 0;         // samples of this call, of earlier phases and rounds
   Stopwatch watch_, since_checkpoint_;
-  bool consistent_ = true;                  // the films are as they were between two waves
-  bool unsaved_ = false;                    // they have samples that are on no disk
+  bool consistent_ = true;                  // the films are in the state between two waves
+  bool unsaved_ = false;                    // they have samples that are not on disk
   double estimate_stopped_after_ = 0;       // seconds
-  std::optional<double> estimate_seconds_;  // what the next estimate takes
+  std::optional<double> estimate_seconds_;  // of the next estimate
 };
 
 }  // namespace covary

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is asked for of a render, beside the plan. Members stand beside the declarations of the options that set them
-// (settings/settings.h), so that an option of rendering is a member and a line here, and the code that uses it.
+// The request of a render, besides the plan. Members stand beside the declarations of their options
+// (settings/settings.h), so an option of rendering is one member and one line here, and the code that uses it.
 #pragma once
 
 #include <cstdint>
@@ -18,42 +18,42 @@ namespace covary {
 
 struct RenderRequest {
   uint64_t seed = 0;
-  /// In place of the scene's: where that stands for several, the one that was chosen.
+  /// Replaces the scene's; if that stands for several, the chosen one.
   std::shared_ptr<const Integrator> integrator;
   std::optional<FilterSettings> filter;  ///< default: the scene's
   std::optional<Sampler> sampler;        ///< of camera samples; default: sampler_of()
   std::optional<CropWindow> crop;        ///< default: the scene's; inside the frame
-  /// Samples per pixel of all passes together, 1 … 2^30. Default: the scene's, or no limit where `seconds` or `until`
-  /// is given.
+  /// Samples per pixel of all passes together, 1 … 2^30. Default: the scene's, or no limit if `seconds` or `until` is
+  /// given.
   std::optional<uint32_t> spp;
   double seconds = 0;            ///< > 0: limit for rendering and estimating together
-  double until = 0;              ///< > 0: add samples until the predicted relMSE is this
+  double until = 0;              ///< > 0: add samples until the predicted relMSE is this small
   bool until_in_blocks = false;  ///< `until` means predicted_blocks() of predicted_error.h, not the whole image
   bool aovs = false;             ///< also the images Albedo, N and P
-  /// Also the images Edges01, Edges02, … of the last pass of camera samples (passes/sample_parts.h), which
-  /// needs the integrator controlled-path.
+  /// Also the images Edges01, Edges02, … of the last pass of camera samples (passes/sample_parts.h). Needs the
+  /// integrator controlled-path.
   bool path_lengths = false;
-  /// Also the images Direct and Indirect, which add up to the image (passes/sample_parts.h). Needs an integrator
-  /// that tells direct light, and a plan that splits layers.
+  /// Also the images Direct and Indirect, which add up to the image (passes/sample_parts.h). Needs an integrator that
+  /// separates direct light, and a plan that splits layers.
   bool layers = false;
-  /// In place of these the images Combined_GROUP of each group of the scene's lights, and Rest for those in none.
-  /// Needs an integrator that tells lights apart.
+  /// Instead, the images Combined_GROUP of each group of the scene's lights, and Rest for the others. Needs an
+  /// integrator that separates lights.
   bool light_groups = false;
   bool splits_layers() const { return layers || light_groups; }
 
   std::string output;    ///< EXR file of the result; empty: no file is written
   bool preview = false;  ///< also a PNG beside it
-  /// Files that keep what the integrator learns (training_stage.h), written after the training and read in place of it;
-  /// empty: none.
+  /// Files of the integrator's training (training_stage.h), written after the training and read instead of it; empty:
+  /// none.
   std::string save_training, load_training;
-  std::string oidn;        ///< where Open Image Denoise is, for integrators that use it; empty: where it is found
-  std::string passes;      ///< folder that keeps the films; empty: only while they are not finished
-  bool resume = false;     ///< continue films that are there
-  bool overwrite = false;  ///< films that are in `passes` may be replaced; without it and `resume` they are an error
+  std::string oidn;               ///< path of Open Image Denoise, for integrators that use it; empty: searched for
+  std::string passes;             ///< folder that keeps the films; empty: only while they are unfinished
+  bool resume = false;            ///< continue existing films
+  bool overwrite = false;         ///< films in `passes` may be replaced; without it and `resume` they are an error
   double checkpoint_seconds = 0;  ///< > 0: seconds between writing unfinished films
-  /// Images of the window that only the caller knows, written as layers of the output: 1 or 3 channels.
+  /// Images of the window from the caller, written as layers of the output: 1 or 3 channels.
   std::map<std::string, Image> beside;
-  /// Attributes of films and image that only the caller knows, such as film_key::kVersion and kCommand.
+  /// Attributes of films and image from the caller, such as film_key::kVersion and kCommand.
   std::map<std::string, std::string> attributes;
 };
 
@@ -61,12 +61,12 @@ inline constexpr double kMostSamples = 1 << 30;
 inline constexpr OptionTraits kBasicPasses{.level = OptionLevel::kBasic, .effect = OptionEffect::kPasses};
 inline constexpr OptionTraits kBasicSamples{.level = OptionLevel::kBasic, .effect = OptionEffect::kSamples};
 
-// Readers of texts: what was expected, or an empty text.
+// Parsers: they return what was expected, or an empty text.
 std::string read_until(const std::string& text, RenderRequest& request);
 std::string read_crop(const std::string& text, std::optional<CropWindow>& crop);
 FilterSettings filter_named(const std::string& name);
 
-/// How long the render goes on, and where the image is.
+/// How long the render goes on, and where the image goes.
 inline void declare_goal(Settings& s, RenderRequest& r) {
   s.group("Rendering");
   s.text("output", r.output, "FILE", "The image (EXR); a PNG preview appears beside it",

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The training of a scene's integrator before the phases of a plan, and what its samples add to the image.
+// Training of a scene's integrator before the phases of a plan, and what its samples add to the image.
 #pragma once
 
 #include <atomic>
@@ -17,31 +17,30 @@
 
 namespace covary {
 
-/// Trains a prepared integrator of the scene if it learns, or takes what it learnt from the request's file; keeps it in
-/// a file where the request names one. Sets settings.importance and seed, and of `seconds` those of the training. False
-/// when stopped.
+/// Trains a prepared integrator of the scene if it learns, or reads the request's training file; saves it if the
+/// request names a file. Sets settings.importance and seed, and the training's part of `seconds`. False if stopped.
 bool train(const LoadedScene& scene, const RenderRequest& request, Integrator& integrator, TrainingSettings settings,
            RenderSeconds& seconds);
 
-/// Makes the standard errors of rows first_row, … of the film's image those of film and training together: the
-/// training's image has, about, the variance of so many samples of the film.
+/// Updates the standard errors of rows first_row, … of the film's image to those of film and training together: the
+/// training's image has approximately the variance of that many samples of the film.
 void add_training(const Film& film, const TrainingImage& training, int first_row, EstimatorResult& image);
 
-// What integrators that learn are told of the image before they begin.
+// What integrators that learn are told about the image before they begin.
 
-/// How much an error counts in each channel of each pixel, so that relative errors count alike: 1 / √(value² + 0.01),
-/// with the value of the denoised film ([Hua2023] Eq. 25) and the constant of relMSE. Denoised by joint_bilateral(), or
-/// with `oidn` by Open Image Denoise, which then has to be there. Empty when stopped.
+/// Weight of an error in each channel of each pixel, so that relative errors count alike: 1 / √(value² + 0.01), with
+/// the value of the denoised film ([Hua2023] Eq. 25) and the constant of relMSE. Denoised by joint_bilateral(), or with
+/// `oidn` by Open Image Denoise, which must then be installed. Empty if stopped.
 std::vector<Spectrum> pixel_importance(const Scene& scene, const FilterSettings& filter, const Film& film,
                                        const std::optional<DenoiseOptions>& oidn, const std::atomic<bool>* stop);
 
-// Files that keep what an integrator has learnt (docs/file-formats.md).
+// Training files (docs/file-formats.md).
 
-/// Writes what a trained integrator has learnt in the scene of this hash. Throws Error(kUsage) where it learns nothing
-/// that is kept (LearningIntegrator::keeps_training), and Error(kIo).
+/// Writes what a trained integrator has learnt in the scene with this hash. Throws Error(kUsage) if it learns nothing
+/// that can be saved (LearningIntegrator::keeps_training), and Error(kIo).
 void save_training(const std::string& scene_hash, const Integrator& integrator, const std::string& path);
 
-/// Gives it to a prepared integrator, which is then not trained. Throws Error(kUsage) likewise, Error(kIo), and
+/// Loads it into a prepared integrator, which is then not trained. Throws Error(kUsage) likewise, Error(kIo), and
 /// Error(kInput) for a file that is damaged, of another version, or of another scene or other settings.
 void load_training(const std::string& scene_hash, Integrator& integrator, const std::string& path);
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// How wrong an image is, and between which bounds (ours). What its samples tell (image_risk.h) is an estimate R with
-// little bias and much noise; the variance V between halves is steady but knows no bias. Both, and what speaks for rare
-// light, are features of a fit to renders of scenes whose truth is known (benchmarks/error_intervals):
+// The error of an image and its bounds (ours). The samples give an estimate R with little bias and much noise
+// (image_risk.h); the variance V between halves is steady but blind to bias. Both, and signs of rare light, are
+// features of a model fitted to renders of scenes with known truth (benchmarks/error_intervals):
 //
 //     log(relMSE / V) = p a . x + s r,   log s = b . x,
 //
-// r: what the fit leaves open, whose quantiles are those of scenes that it did not see; p: 1, of mixtures 1 - V / v,
-// 0 where they are the mean h, whose error is V. Where few pixels or single groups hold the noise or the light, or the
-// bounds are far from each other, no interval is given.
+// r: the standardised residual, with quantiles from scenes left out of the fit; p: 1, for mixtures 1 - V / v, which is
+// 0 where they equal the mean h, whose error is V. No interval is given if few pixels or single groups hold most of the
+// noise or the light, or if the bounds are far apart.
 #pragma once
 
 #include <array>
@@ -17,35 +17,35 @@
 
 namespace covary {
 
-/// How many of 100 intervals hold the truth.
+/// How many of 100 intervals contain the truth.
 inline constexpr int kIntervalPercent = 80;
-/// Nothing is called reliable whose bounds are further from the middle than this factor.
+/// A prediction is called reliable if its bounds are within this factor of the middle.
 inline constexpr double kReliableFactor = 1.5;
 
 inline constexpr int kErrorFeatures = 9;
 using ErrorFeatures = std::array<double, kErrorFeatures>;
 
-/// Of the sums of a whole image that has a variance: 1; log(R / V), where noise hides it towards 0, and how much it is
-/// hidden, 0 to 1; logs of the noise of h over V, of the noise, of the kurtosis between groups, of how many pixels hold
-/// the noise, of the share of light that the largest group of each pixel has, and of the prediction by the standard
-/// error over V. R is the error of image_risk.h with 1.27 times its covariance: halves are smoothed more than the
-/// whole, and groups that are left out tell so much more.
+/// Features, from the sums of a whole image that has a variance: 1; log(R / V), shrunk towards 0 by noise, and the
+/// amount of shrinkage, 0 to 1; logs of the noise of h over V, of the noise, of the kurtosis between groups, of the
+/// number of pixels that hold the noise, of the light's fraction in the largest group of each pixel, and of the
+/// prediction by the standard error over V. R is the error of image_risk.h with 1.27 times its covariance, because a
+/// method smooths halves more than the whole (docs/notes/error-estimates.md).
 ErrorFeatures error_features(const RiskRow& sums);
 
-/// What is known of log(relMSE).
+/// The distribution of log(relMSE).
 struct LogError {
   double middle = 0, low = 0, high = 0;
 };
-/// Denoised means of fewer than kFewestGroups groups, such as two renders, have fits of their own: the kurtosis of few
-/// groups tells little, and v is noisier.
+/// Denoised means of fewer than kFewestGroups groups, such as two renders, have separate fits, because the kurtosis of
+/// few groups says little and v is noisier.
 LogError fitted_error(const RiskRow& sums, ErrorKind kind);
 
-/// Why no interval can be given; empty where one can.
+/// Why no interval can be given; empty if one can.
 std::string unknown_error(const RiskRow& sums, ErrorKind kind, const LogError& error);
 
-/// Scales the standard error of `result` so that its relMSE is the middle of the interval (that of a mean stays as it
-/// is, unbiased in every pixel), and sets `result.interval` and `result.risk_sums`. Empties `result.risk_rows`; does
-/// nothing where there are none.
+/// Scales the standard error of `result` so that its relMSE is the middle of the interval (not for a mean, which is
+/// unbiased in every pixel), and sets `result.interval` and `result.risk_sums`. Empties `result.risk_rows`; does
+/// nothing if there are none.
 void apply_interval(EstimatorResult& result);
 
 }  // namespace covary

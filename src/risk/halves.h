@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every second group of an image: half of its samples, independent of the other half, so that what was made of one can
-// be judged by the other.
+// Every second group of an image: half of its samples, independent of the other half, so that one can judge what was
+// made of the other.
 #pragma once
 
 #include <cstdint>
@@ -15,13 +15,13 @@ class HalfImage {
  public:
   /// `first`: 0 or 1; `image` has two groups or more.
   HalfImage(const GroupedImage& image, int first);
-  /// Valid while this object lives.
+  /// Valid as long as this object lives.
   GroupedImage view() const;
 
  private:
   GroupedImage shape_;
   std::vector<float> data_;
-  std::vector<uint32_t> counts_;  // empty where the image has none
+  std::vector<uint32_t> counts_;  // empty if the image has none
 };
 
 }  // namespace covary

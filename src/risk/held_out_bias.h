@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The bias of an image where it is significant (ours). M_A and M_B were made of the two halves of all samples by the
-// same method, h_A and h_B are the halves' independent images, whose expectation is right. Which pixels are alike is
-// told by the other half, so that the mean
+// The bias of an image where it is significant (ours). The same method made M_A and M_B from the two halves of all
+// samples; h_A and h_B are the halves' independent images, whose expectation is right. The other half decides which
+// pixels are alike, so the mean
 //
 //     d_A,i = sum_j w_ij (M_A,j - h_A,j) / sum_j w_ij,   w_ij = exp(-||G_B,j - G_B,i||^2 / ((0.5 G'_B,i)^2 + 1e-4)),
 //
@@ -10,12 +10,12 @@
 //
 //     b = (d_A + d_B) / 2,   s^2 = (v_A + v_B) / 4,   v_A = sum_j w_ij^2 (r_A,j - r_B,j)^2 / 2 / (sum_j w_ij)^2,
 //
-// r: M - h of a cell. Rare light is not in the cells that are alike, but maybe beside them: v is at least what the
-// relative variance of all cells of the window makes of it. The bias is significant where |b| > 3 s and both halves see
-// it, |d_A - d_B| < |b|, with 20 cells that are alike; there it is told as b (1 - s^2 / b^2), which takes away what
-// selection adds; elsewhere it is zero.
+// r: M - h of a cell. Rare light may be missing from the similar cells but present beside them, so v is at least what
+// the relative variance of all cells of the window implies. The bias is significant where |b| > 3 s, both halves agree,
+// |d_A - d_B| < |b|, and 20 cells are alike; there the result is b (1 - s^2 / b^2), which corrects for selection;
+// elsewhere it is zero.
 //
-// i and j are cells of 4 x 4 pixels in a window of 7 x 7 cells, and where that tells nothing of 15 x 15 cells.
+// i and j are cells of 4 x 4 pixels in a window of 7 x 7 cells or, where that finds nothing, of 15 x 15 cells.
 #pragma once
 
 #include <array>
@@ -29,7 +29,7 @@ struct HeldOutBiasInput {
   std::array<const Image*, 2> halves = {};            ///< M_A, M_B
   std::array<const Image*, 2> guides = {};            ///< G_A, G_B: images of the same halves with little noise
   std::array<const Moments*, 2> independent = {};     ///< h_A, h_B
-  const std::vector<unsigned char>* valid = nullptr;  ///< pixels with 0 are left out, and have no bias
+  const std::vector<unsigned char>* valid = nullptr;  ///< pixels with 0 are left out and have no bias
 };
 
 /// Cells are aligned with coordinates that are multiples of this.
@@ -37,8 +37,8 @@ inline constexpr int kBiasCell = 4;
 /// How far from a pixel, in rows or columns, the images can influence its bias.
 inline constexpr int kBiasReach = 8 * kBiasCell;
 
-/// The significant bias of each value, positive where the image is too bright, in linear radiance; of images made of
-/// half of the samples, so that that of the whole is as large or smaller. Bit-identical for any number of threads.
+/// The significant bias of each value, positive where the image is too bright, in linear radiance; for images made of
+/// half of the samples, so the whole image's is at most as large. Bit-identical for any number of threads.
 Image held_out_bias(const HeldOutBiasInput& input);
 
 }  // namespace covary

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// The squared error of the image that is written, without a reference (ours). With the mean h of independent samples,
-// whose variance is v, and any image M that was made of them,
+// The squared error of the written image, without a reference (ours). With the mean h of independent samples, whose
+// variance is v, and any image M made from them,
 //
 //     E (M - mu)^2 = E[ (M - h)^2 - v + 2 cov(M, h) ],
 //
-// bias included. The covariance comes from both halves of the samples: for an M that is locally linear in them,
+// including bias. The covariance comes from both halves of the samples: for an M that is locally linear in them,
 //
 //     cov(M, h) = E[ (M_A - M_B) (h_A - h_B) ] / 4,   and likewise   var M = E (M_A - M_B)^2 / 4.
 //
-// Weights that were chosen by both halves, as those of mixtures, let each half follow the other's samples, so that the
-// covariance and with it the estimate come out too small where noise is strong. The noise of the estimate is that of h,
-// mostly, about sqrt(2) v per value, so that an image has it over many pixels only. Beside it are sums that tell how
-// noisy it is: error_interval.h makes an error and its interval of all of them.
+// Where both halves chose the weights, as in mixtures, each half follows the other's samples, so the covariance and
+// with it the estimate are too small under strong noise. The noise of the estimate is mostly that of h, about sqrt(2) v
+// per value, so it is only useful over many pixels. Further sums measure how noisy it is: error_interval.h derives an
+// error and its interval from all of them.
 #pragma once
 
 #include <array>
@@ -27,20 +27,20 @@ struct ImageRiskInput {
   std::array<const Image*, 2> halves = {};          ///< M_A, M_B; null where M is h itself
   const Moments* independent = nullptr;             ///< h and v
   std::array<const Moments*, 2> independents = {};  ///< h_A, h_B; null where M is h itself
-  const GroupedImage* groups = nullptr;             ///< of which h is the mean
-  const Image* guide = nullptr;                     ///< whose brightness errors are relative to
+  const GroupedImage* groups = nullptr;             ///< the groups whose mean is h
+  const Image* guide = nullptr;                     ///< errors are relative to its brightness
   const std::vector<unsigned char>* valid = nullptr;
 };
 
-/// Sums over every row of the image. Rows do not depend on each other, so that those of bands can be joined, and are
-/// bit-identical for any number of threads.
+/// Sums over each row of the image. Rows do not depend on each other, so those of bands can be joined. Bit-identical
+/// for any number of threads.
 std::vector<RiskRow> image_risk(const ImageRiskInput& input);
 
-/// Sets the rows and kind of `mean`, which is that of these groups and has their standard error; nothing where pixels
-/// have one group.
+/// Sets the rows and kind of `mean`, the mean of these groups with their standard error; does nothing if pixels have
+/// one group.
 void add_risk_of_mean(const GroupedImage& groups, EstimatorResult& mean);
 
-/// All rows together.
+/// Sums over all rows.
 RiskRow sum_of(const std::vector<RiskRow>& rows);
 
 }  // namespace covary
