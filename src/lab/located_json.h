@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// JSON whose members know their line, and a reader of objects that collects every mistake with its place.
+// JSON whose members know their line, and a reader of objects that reports every mistake with its location.
 #pragma once
 
 #include <map>
@@ -16,36 +16,36 @@ struct LocatedJson {
   std::map<std::string, int> lines;  ///< of each value by JSON pointer: "/scenes/0/file"; "" is the whole
 };
 
-/// Throws Error(kInput) with the line where the text is not JSON, nests deeper than kMaxJsonDepth, or a key stands
-/// twice in an object.
+/// Throws Error(kInput) with the line if the text is not JSON, nests deeper than kMaxJsonDepth, or a key appears twice
+/// in an object.
 LocatedJson parse_located(const std::string& text, const std::string& name);
 
 /// The value as JSON text, shortened for messages.
 std::string shown(const nlohmann::ordered_json& value);
 
-/// Reads one object member by member. Mistakes are added to `problems` as "file:line: where: what"; a member nobody
-/// asked for is one of them.
+/// Reads one object member by member. Mistakes are added to `problems` as "file:line: where: what"; a member that
+/// nobody asked for is one.
 class ObjectReader {
  public:
   ObjectReader(const LocatedJson& document, std::string pointer, std::vector<std::string>& problems);
 
-  /// The member's value, or null where it is missing. The name counts as known.
+  /// The member's value, or null if missing. The name counts as known.
   const nlohmann::ordered_json* find(const std::string& name);
   std::optional<std::string> text(const std::string& name);
-  /// As text(), and missing or empty is a mistake.
+  /// Like text(), but missing or empty is a mistake.
   std::string required_text(const std::string& name);
   std::optional<double> positive(const std::string& name);
   /// A whole number in [lowest, highest].
   std::optional<int64_t> whole(const std::string& name, int64_t lowest, int64_t highest);
   std::vector<std::string> texts(const std::string& name);
-  /// Pointers to the elements of an array member; empty where it is missing. An element of another type is a mistake.
+  /// Pointers to the elements of an array member; empty if missing. An element of another type is a mistake.
   std::vector<std::string> objects(const std::string& name);
-  /// Pointer of a member that is an object; empty where it is missing.
+  /// Pointer to an object member; empty if missing.
   std::optional<std::string> object(const std::string& name);
 
-  /// Adds a problem at a member, or at the object itself where `name` is empty.
+  /// Adds a problem at a member, or at the object itself if `name` is empty.
   void problem(const std::string& name, const std::string& text);
-  /// To be called when everything was asked for: reports the members that nobody knows.
+  /// Call after reading everything: reports unknown members.
   void finish();
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Choices of the command line in place of a suite's own: smaller presets need no new file.
+// Command-line overrides of a suite: smaller presets need no new file.
 #pragma once
 
 #include <optional>
@@ -23,11 +23,10 @@ struct Overrides {
   bool quick = false;
 };
 
-/// Frames that the suite neither sizes nor crops have so many pixels at most in a quick experiment, and its crops so
-/// many.
+/// In a quick experiment, maximum number of pixels of frames that the suite neither sizes nor crops, and of its crops.
 inline constexpr int64_t kQuickPixels = 32400, kQuickCropPixels = 12000;
 
-/// Throws Error(kUsage) where a scene or method named is not in the suite, or sizes are none.
+/// Throws Error(kUsage) if a named scene or method is not in the suite, or for invalid sizes.
 void apply(const Overrides& overrides, Suite& suite);
 
 }  // namespace covary::lab

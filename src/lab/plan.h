@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// From a suite to command lines: what to run, in which order, and under which keys results are kept.
+// From a suite to command lines: what to run, in which order, and the cache keys of results.
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 
 namespace covary::lab {
 
-/// A scene as found on disk, with the suite's choices applied.
+/// A scene found on disk, with the suite's choices applied.
 struct SceneInstance {
   SceneEntry entry;
   std::string file;  ///< path
@@ -29,23 +29,23 @@ struct SceneInstance {
   uint64_t n_pixels() const { return static_cast<uint64_t>(window.width) * window.height * n_images(); }
 };
 
-/// The files that an image of a scene is: its path or, of frames, that of each, where the path has a '#'.
+/// The files of a scene's image: its path or, if the path has a '#', the path of each frame.
 std::vector<std::string> files_of(std::span<const int> frames, const std::string& path);
 
-/// A scene of a suite whose files lie in `folder`. Nothing of it is looked at but the camera path, which `hash` is of.
+/// A scene of a suite whose files lie in `folder`. Reads only the camera path, which `hash` covers.
 SceneInstance located(const SceneEntry& entry, const std::string& folder);
 
-/// Numbers >= 0 between separators ("10,20,30", "240x135"); empty where the text is anything else.
+/// Numbers >= 0 between separators ("10,20,30", "240x135"); empty for any other text.
 std::vector<int> whole_numbers(const std::string& text, char separator);
 
-/// Frame and window of a scene whose own frame is `width` x `height`. `max_pixels` > 0 scales a frame that the suite
-/// neither sizes nor crops down to so many pixels. Throws Error(kUsage) for texts that are no size or crop, or a crop
-/// outside the frame.
+/// Frame and window of a scene whose own frame is `width` x `height`. `max_pixels` > 0 scales down to this many pixels
+/// a frame that the suite neither sizes nor crops. Throws Error(kUsage) for texts that are not a size or crop, or a
+/// crop outside the frame.
 void place(SceneInstance& scene, int width, int height, int64_t max_pixels);
 
-/// One child process to run: a render and the commands that follow it.
+/// One child process: a render and the commands that follow it.
 struct Run {
-  size_t scene = 0, method = 0, budget = 0;  ///< indices into the suite; method and budget mean nothing for references
+  size_t scene = 0, method = 0, budget = 0;  ///< indices into the suite; method and budget are unused for references
   uint64_t seed = 0;
   std::vector<std::string> options;  ///< of `covary render SCENE`, without outputs
   std::vector<std::vector<std::string>> then;
@@ -56,22 +56,22 @@ struct Run {
   std::string passes_key;   ///< the same for all runs that can share the films of their passes
 };
 
-/// What does not change from run to run.
+/// What is the same for all runs.
 struct PlanContext {
   std::string program_version;  ///< part of every key
-  /// What a method's options of `covary render` say of the samples that its passes take: equal words, equal passes.
+  /// The options of a method's `covary render` that determine the samples of passes: equal words, equal passes.
   std::function<std::vector<std::string>(const std::vector<std::string>&)> pass_words;
 };
 
-/// Both halves of the reference that is to be rendered for a scene.
+/// Both halves of the reference that must be rendered for a scene.
 std::vector<Run> reference_runs(const Suite& suite, const SceneInstance& scene, const PlanContext& context);
 
 /// All runs of scene number `index`: seeds outermost, so that an interrupted experiment has every method; runs that
-/// share passes follow one another.
+/// share passes are adjacent.
 std::vector<Run> runs_of_scene(const Suite& suite, size_t index, const SceneInstance& scene,
                                const PlanContext& context);
 
-/// Parts that the runs of a scene can be divided into at most: the halves of a reference that is to be rendered, and
+/// Maximum number of parts that the runs of a scene can be divided into: the halves of a reference to be rendered, and
 /// all methods with one seed and budget.
 size_t number_of_parts(const Suite& suite, const SceneEntry& scene);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One program run as a child, so that its failure or crash stays its own.
+// Runs one program as a child, so that its failure or crash does no harm.
 #pragma once
 
 #include <atomic>
@@ -20,8 +20,8 @@ struct ProcessResult {
 };
 
 /// Runs `command` (path of the program, then its arguments) to its end. When *stop becomes true the child gets SIGINT
-/// once; Ctrl-C at the terminal does not reach it by itself. The child is killed when the calling process dies, however
-/// that happens. Throws Error(kIo) when no process can be started.
+/// once; Ctrl-C at the terminal does not reach it directly. The child is killed when the calling process dies, for
+/// whatever reason. Throws Error(kIo) if no process can be started.
 ProcessResult run_process(const std::vector<std::string>& command, const std::atomic<bool>* stop = nullptr);
 
 }  // namespace covary::lab

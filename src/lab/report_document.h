@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Results as a document of tables, plots and a comparer, as write_report() draws it (docs/report.md).
+// Results as a document of tables, plots and a comparer, for write_report() (docs/report.md).
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -11,7 +11,7 @@
 
 namespace covary::lab {
 
-/// The document without pictures: they cost reading.
+/// The document without pictures, which take time to read.
 nlohmann::ordered_json report_document(const Results& results);
 
 /// Appends the comparer to the document and its images to `images`: for each scene the reference (mean of its halves)
@@ -20,11 +20,11 @@ nlohmann::ordered_json report_document(const Results& results);
 void add_pictures(const Results& results, nlohmann::ordered_json& document, std::vector<ReportImage>& images);
 
 /// The method, other than the baseline, with the largest ratio to it at this budget (geometric mean over scenes; at
-/// equal samples, or at equal time where the budget is in seconds). Empty where there is none.
+/// equal samples, or at equal time if the budget is in seconds). Empty if there is none.
 std::string best_method(const Results& results, size_t budget);
 
-/// What the numbers of a budget come to, in sentences: which method has the least error at equal samples, at equal time
-/// and by FLIP, and which are not clearly worse. Only methods that have every scene count.
+/// A budget's conclusions in sentences: which method has the least error at equal samples, at equal time and by FLIP,
+/// and which are not clearly worse. Only counts methods that have every scene.
 std::vector<std::string> verdicts(const Results& results, size_t budget);
 
 /// Index of the budget that pictures and single tables show: the suite's `show`, or the last.

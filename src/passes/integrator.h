@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Integrators estimate the radiance along camera rays. They know nothing of pixels, films or estimators.
+// Integrators estimate the radiance along camera rays. They know nothing about pixels, films or estimators.
 #pragma once
 
 #include <atomic>
@@ -19,7 +19,7 @@
 
 namespace covary {
 
-/// What an integrator keeps for one thread from call to call of trace(): arrays that would cost time to make anew, and
+/// State of an integrator for one thread, kept between calls of trace(): arrays that are expensive to allocate, and
 /// what samples teach until it is collected.
 class ThreadState {
  public:
@@ -30,16 +30,16 @@ class Integrator;
 class LearningIntegrator;
 class LightTracingIntegrator;
 
-/// Parts of samples' radiances: by the number of edges of their paths, or by the light that they come from.
+/// Parts of the samples' radiance: by the path length in edges, or by light source.
 struct RadianceByPart {
-  size_t n_parts = 0;              ///< paths of 1 … n_parts edges, or groups of lights, are told apart; 0: none
-  std::vector<Spectrum> radiance;  ///< those of one sample after another, in the order of trace()
+  size_t n_parts = 0;              ///< paths of 1 … n_parts edges, or groups of lights, are separated; 0: none
+  std::vector<Spectrum> radiance;  ///< n_parts values for each sample, in the order of trace()
 };
 
-/// What one thread keeps while it traces paths of one integrator.
+/// State of one thread while it traces paths of one integrator.
 struct PathContext {
   explicit PathContext(const Integrator& integrator);
-  /// The integrator's own state, which must be what its make_thread_state() makes.
+  /// The integrator's own state, made by its make_thread_state().
   template <typename State>
   State& state_as() const {
     return static_cast<State&>(*state);
@@ -48,72 +48,72 @@ struct PathContext {
   Arena arena;
   uint64_t n_rays = 0;
   std::unique_ptr<ThreadState> state;
-  /// May be null. Once it is true, trace() may return early, with samples that are to be thrown away: paths that never
-  /// end are asked at each of their edges.
+  /// May be null. Once it is true, trace() may return early, with samples to be discarded: paths that never end check
+  /// it at each edge.
   const std::atomic<bool>* stop = nullptr;
   bool stopped() const { return stop && stop->load(std::memory_order_relaxed); }
-  /// PassSettings::importance of the pixel of each sample that trace() is called with; empty where there is none.
+  /// PassSettings::importance of the pixel of each sample of this call of trace(); empty if there is none.
   std::span<const Spectrum> importance;
-  RadianceByPart by_part;  ///< filled by integrators that have Integrator::longest_path(), or come of by_light()
+  RadianceByPart by_part;  ///< filled by integrators with Integrator::longest_path(), or from by_light()
 };
 
 /// One camera ray, the random numbers of its path, and the estimate of the radiance arriving along it.
 struct CameraSample {
   Ray ray;
-  PathRandom random;  ///< the integrator reads numbers at vertices >= 1 only
+  PathRandom random;  ///< the integrator only uses numbers at vertices >= 1
   Spectrum radiance;  ///< zero on entry
 };
 
-/// What an integrator tells of a render besides its image.
+/// What an integrator reports about a render besides its image.
 struct IntegratorReport {
   using Number = std::variant<uint64_t, double>;
-  std::string name;  ///< of the numbers together; empty where there is nothing to tell
+  std::string name;  ///< of the numbers together; empty if there are none
   std::vector<std::pair<std::string, Number>> numbers;
   std::string summary;  ///< one line
   std::vector<std::string> warnings;
 };
 
-/// How an integrator lives: it is made from parameters, gets the scene by prepare(), is trained if it learns
-/// (passes/training.h), and then traces. From prepare() or training on, nothing that all threads see changes.
-/// A loaded scene holds one that is never prepared; each render works with a clone.
+/// Life cycle of an integrator: made from parameters, given the scene by prepare(), trained if it learns
+/// (passes/training.h), then traces. After prepare() or training, nothing that threads share changes. A loaded scene
+/// holds an integrator that is never prepared; each render works with a clone.
 class Integrator : public SceneObject {
  public:
-  /// Another with the same settings, which knows no scene and has learnt nothing. Thread-safe.
+  /// A copy with the same settings, without scene or training. Thread-safe.
   virtual std::shared_ptr<Integrator> clone() const = 0;
-  /// Called with the scene before anything but description(); again with the same scene it changes nothing.
+  /// Called with the scene before anything but description(); calling it again with the same scene has no effect.
   virtual void prepare(const Scene& /*scene*/) {}
-  /// A fresh state for a thread; null when trace() keeps nothing. Thread-safe.
+  /// A fresh state for a thread; null if trace() needs none. Thread-safe.
   virtual std::unique_ptr<ThreadState> make_thread_state() const { return nullptr; }
-  /// Sets the radiance of each sample. Samples come in batches because hundreds of independent paths keep the machine
-  /// busier than one; the value of a sample does not depend on its batch. Thread-safe.
+  /// Sets the radiance of each sample. Samples come in batches, because hundreds of independent paths use the machine
+  /// better than one; a sample's value does not depend on its batch. Thread-safe.
   virtual void trace(const Scene& scene, std::span<CameraSample> samples, PathContext& context) const = 0;
-  /// True when samples may be negative in a correct estimate, as differences are; the film then keeps them, where
-  /// otherwise they count as errors and enter as black.
+  /// True if samples of a correct estimate may be negative, as differences are. The film then keeps them; otherwise
+  /// they count as errors and enter as black.
   virtual bool allows_negative() const { return false; }
-  /// Registered name and settings, as they go into a film's attributes: equal text, equal estimator.
+  /// Registered name and settings, for a film's attributes: equal text, equal estimator.
   virtual std::string description() const = 0;
 
-  // What some integrators can do besides. Nobody asks for the type of one.
-  /// Itself where it learns from samples (training.h), otherwise null.
+  // Optional capabilities; callers query these, never the integrator's type.
+  /// This, if it learns from samples (training.h), otherwise null.
   virtual LearningIntegrator* learning() { return nullptr; }
   const LearningIntegrator* learning() const { return const_cast<Integrator*>(this)->learning(); }
-  /// Itself where it traces light (light_pass.h), otherwise null.
+  /// This, if it traces light (light_pass.h), otherwise null.
   virtual LightTracingIntegrator* light_tracing() { return nullptr; }
   const LightTracingIntegrator* light_tracing() const { return const_cast<Integrator*>(this)->light_tracing(); }
-  /// Most edges of its paths where trace() fills PathContext::by_part.
+  /// Longest path length in edges if trace() fills PathContext::by_part.
   virtual std::optional<int> longest_path() const { return {}; }
-  /// Another, whose trace() takes the same samples and fills PathContext::by_part: by Emitter::group(), part i is that
-  /// of groups[i], and the last one is of all other lights. Null where it cannot tell.
+  /// An integrator whose trace() takes the same samples and fills PathContext::by_part by Emitter::group(): part i is
+  /// the light of groups[i], the last part that of all other lights. Null if it cannot separate them.
   virtual std::shared_ptr<Integrator> by_light(std::span<const std::string> /*groups*/) const { return nullptr; }
-  /// Another, whose samples hold the part of this one's with the same random numbers that came by at most two edges:
-  /// emission seen directly and direct light. Null where it has no such part.
+  /// An integrator whose samples, with the same random numbers, hold the part with at most two edges: directly visible
+  /// emission and direct light. Null if there is no such part.
   virtual std::shared_ptr<Integrator> of_direct_light() const { return nullptr; }
-  /// Integrators one of which it stands for, the simplest first: which one is measured before a render
-  /// (plans/integrator_trial.h), as it does not trace itself. Of all others empty.
+  /// The integrators it stands for, the simplest first: a trial before the render chooses one
+  /// (plans/integrator_trial.h), because this one does not trace. Empty for all others.
   virtual std::span<const std::shared_ptr<Integrator>> choices() const { return {}; }
-  /// What it cannot see of the scene, as warnings.
+  /// What the integrator cannot see of the scene, as warnings.
   virtual std::vector<std::string> blind_spots(const Scene& /*scene*/) const { return {}; }
-  /// Whether it follows light through participating media.
+  /// Whether it supports participating media.
   virtual bool sees_media() const { return false; }
   /// After the render.
   virtual IntegratorReport report() const { return {}; }
@@ -122,7 +122,7 @@ class Integrator : public SceneObject {
 /// The first word of its description.
 std::string registered_name(const Integrator& integrator);
 
-/// Throws Error(kInput), "FILE:LINE: medium '…': …", where the scene has media and the integrator does not see them.
+/// Throws Error(kInput), "FILE:LINE: medium '…': …", if the scene has media and the integrator does not support them.
 void require_sees_media(const Integrator& integrator, const Scene& scene);
 
 inline PathContext::PathContext(const Integrator& integrator) : state(integrator.make_thread_state()) {}

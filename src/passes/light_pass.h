@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Light tracing: what paths from the lights add to the film. An integrator that traces light (bidirectional path
-// tracing) splits its strategies: camera samples hold those that end in their own pixel; those that join a light path
-// to the lens land on any pixel, and a pass of its own traces light paths for them, into a light film
+// tracing) splits its techniques: camera samples have those that end in their own pixel. Those that connect a light
+// path to the lens land on any pixel; a separate pass traces light paths for them, into a light film
 // (film/splat_layer.h) beside the films of camera samples. The image is what is made of the camera's films, plus the
 // light film.
 //
-// Light paths are numbered through, and every random number of one is a function of (seed, pass, path): the film has
-// the same bits for any number of threads and after interruptions.
+// Light paths are numbered, and every random number of one is a function of (seed, pass, path): the film has the same
+// bits for any number of threads and after interruptions.
 #pragma once
 
 #include <cstdint>
@@ -42,7 +42,7 @@ inline void declare(Settings& s, LightTracingSettings& v) {
   s.only_if(v.mode != LightTracing::kOff, {"light-paths"}, "without light tracing (`light-tracing` off)");
 }
 
-/// PassSettings::pass of light passes begin here, so that they share no numbers with passes of camera samples.
+/// PassSettings::pass of light passes starts here, so that they share no numbers with passes of camera samples.
 inline constexpr uint32_t kLightPass = 3u << 30;
 
 /// Light paths to trace.
@@ -54,12 +54,12 @@ struct LightPaths {
   SplatFilter filter;
   CropWindow window;  ///< pixels that are rendered
 
-  /// The numbers of a path. Its walk reads those of subpath(Subpath::kLight), as the light subpath of a camera sample
-  /// does. What joins vertex v of the walk to the lens reads these themselves at vertex v: kLens for the point on the
-  /// lens, kPixel for pixel_at().
+  /// The numbers of a path. Its walk uses those of subpath(Subpath::kLight), like the light subpath of a camera sample.
+  /// What connects vertex v of the walk to the lens uses these at vertex v: kLens for the point on the lens, kPixel for
+  /// pixel_at().
   PathRandom random(uint64_t path) const { return {Sampling::kIndependent, seed, pass, 0, path}; }
-  /// The pixel of a splat at the film position; weight 0 where none that is rendered gets it, so that nothing more
-  /// need be traced. `u`: kPixel.
+  /// The pixel of a splat at the film position; weight 0 if no rendered pixel gets it, so that nothing more needs
+  /// tracing. `u`: kPixel.
   SplatPixel pixel_at(Vec2 film, Vec2 u) const;
 };
 
@@ -67,41 +67,41 @@ struct LightPaths {
 struct LightSplat {
   uint64_t path;
   int x, y;
-  /// Radiance of the pixel that this path alone would give: throughput * Camera importance / density * weight of the
-  /// strategy * SplatPixel::weight; not divided by the number of light paths.
+  /// Radiance of the pixel from this path alone: throughput * Camera importance / density * weight of the technique *
+  /// SplatPixel::weight; not divided by the number of light paths.
   Spectrum value;
 };
 
-/// An integrator that traces light. From fix_light_tracing() on nothing changes that all threads see.
+/// An integrator that traces light. After fix_light_tracing(), nothing that threads share changes.
 class LightTracingIntegrator : public Integrator {
  public:
   using Integrator::light_tracing;
   LightTracingIntegrator* light_tracing() final { return this; }
-  /// Says how the integrator is used: `n_pixels` are rendered, and `beside_crn` says whether some of them with common
-  /// random numbers. Called after prepare() and before description() or any tracing; without it, no light is traced.
+  /// Sets how the integrator is used: `n_pixels` are rendered, and `beside_crn` says whether any use common random
+  /// numbers. Called after prepare() and before description() or tracing; without it, no light is traced.
   void fix_light_tracing(uint64_t n_pixels, bool beside_crn);
-  /// What fix_light_tracing() decides.
+  /// The decision of fix_light_tracing().
   bool wants_light_pass(bool beside_crn) const {
     return settings_.mode == LightTracing::kOn || (settings_.mode == LightTracing::kAuto && !beside_crn);
   }
-  /// Whether there is a light pass beside the camera's. Where not, strategies that join a light path to the lens have
+  /// Whether there is a light pass beside the camera's. If not, techniques that connect a light path to the lens have
   /// weight 0.
   bool traces_light() const { return paths_per_spp_ > 0; }
-  /// Light paths for one sample in each of the pixels that are rendered: how many samples of the strategies that join
-  /// to the lens a pixel has, for one of each of the others (film density 1 per pixel area). For the weights. 0 where
-  /// no light is traced.
+  /// Light paths per sample in each rendered pixel: how many samples of the techniques that connect to the lens a pixel
+  /// has for one of each other technique (film density 1 per pixel area). Used for MIS weights. 0 if no light is
+  /// traced.
   double light_paths_per_spp() const { return paths_per_spp_; }
 
-  /// Appends the splats of the paths, those of a path one after another in an order that follows from the path alone;
-  /// the paths may come in any order. A path's splats do not depend on which others are traced with it. Values that
-  /// are not finite or negative are handed on, too: the pass counts them. Thread-safe.
+  /// Appends the splats of the paths, those of a path together, in an order that depends on the path alone; the paths
+  /// may come in any order. A path's splats do not depend on which others are traced with it. Values that are not
+  /// finite or negative are passed on, because the pass counts them. Thread-safe.
   virtual void trace_light_paths(const Scene& scene, const LightPaths& paths, std::vector<LightSplat>& splats,
                                  PathContext& context) const = 0;
 
  protected:
   explicit LightTracingIntegrator(const LightTracingSettings& settings) : settings_(settings) {}
-  /// For description(): "light_tracing=on light_paths_per_spp=3072". The number is there because weights depend on it,
-  /// those of camera samples as well.
+  /// For description(): "light_tracing=on light_paths_per_spp=3072". The number is included because weights depend on
+  /// it, also those of camera samples.
   std::string light_tracing_text() const;
 
  private:
@@ -113,10 +113,10 @@ class LightTracingIntegrator : public Integrator {
 const LightTracingIntegrator* light_tracer(const Integrator& integrator);
 
 /// Traces light paths into `film` until it has settings.spp samples, at most settings.limit, or the stop flag or
-/// settings.seconds end it. A sample of a light film is a bundle of kBundlePaths light paths, and these numbers are
-/// multiples of the film's groups; settings.pass is kLightPass or more. `sampling`, `estimate` and `learner` have no
-/// meaning here. Bundles come in rounds: what an interrupted round has gathered is dropped. In the result, `n_samples`
-/// counts light paths, and a BadSample's `sample` is the number of one; so does `progress`.
+/// settings.seconds end it. A sample of a light film is a bundle of kBundlePaths light paths; these numbers are
+/// multiples of the film's groups, and settings.pass is at least kLightPass. `sampling`, `estimate` and `learner` are
+/// unused. Bundles come in rounds: an interrupted round is dropped. In the result, `n_samples` counts light paths, as
+/// `progress` does, and a BadSample's `sample` is the number of one.
 PassResult render_light_pass(const Scene& scene, const LightTracingIntegrator& integrator, const PassSettings& settings,
                              Film& film);
 
@@ -124,7 +124,7 @@ PassResult render_light_pass(const Scene& scene, const LightTracingIntegrator& i
 /// group, then four times as many each time, later the next multiple of SplatLayer's rounds.
 uint32_t light_round_end(uint32_t count, int groups);
 
-/// What one light path adds to a film with this crop window, by render_light_pass().
+/// What one light path adds to a film with this crop window in render_light_pass().
 struct ReplayedLightPath {
   std::vector<LightSplat> splats;
   uint64_t n_rays = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where what a pixel shows was in the frame before.
+// Where the contents of a pixel were in the previous frame.
 #pragma once
 
 #include <atomic>
@@ -9,22 +9,20 @@
 
 namespace covary {
 
-/// What lies behind the centres of the pixels: no sample is drawn, so that edges are sharp and no value is a mean of
-/// two surfaces.
+/// What lies behind the pixel centres: no sample is drawn, so edges are sharp and no value averages two surfaces.
 struct MotionImages {
   /// 1 channel: distance of the first surface from the camera (orthographic: from its plane along the ray), in units of
-  /// the scene; 0 where there is none. A thin lens counts as the pinhole in its middle.
+  /// the scene; 0 if there is none. A thin lens counts as a pinhole at its centre.
   Image depth;
-  /// 3 channels, each the previous value minus that of this frame: film position of the same point, in pixels, X to the
-  /// right and Y down; and its depth. Where a ray leaves the scene, the point is at infinity in that direction, and
-  /// depth has no part. A point that the previous camera had behind it gets (width of the frame, 0, 0), which leads out
-  /// of the frame.
+  /// 3 channels, each the previous value minus the current one: film position of the same point, in pixels, X to the
+  /// right and Y down; and its depth. If a ray leaves the scene, the point is at infinity in that direction, and the
+  /// depth is unused. A point behind the previous camera gets (width of the frame, 0, 0), which leads out of the frame.
   Image motion;
 };
 
-/// Of the pixels of `window`, which lies in the frame of the scene's camera; `previous` has a frame of the same size.
-/// Shapes were where their animations say for the time `then`. Mirrors and glass count as surfaces. Where `stop`
-/// becomes true, the rest of the pixels are 0.
+/// For the pixels of `window`, inside the frame of the scene's camera; `previous` has a frame of the same size. Shapes
+/// were where their animations put them at the time `then`. Mirrors and glass count as surfaces. Once `stop` is true,
+/// the remaining pixels are 0.
 MotionImages motion_images(const Scene& scene, const Camera& previous, double then, const CropWindow& window,
                            const std::atomic<bool>* stop = nullptr);
 

@@ -10,19 +10,19 @@
 
 namespace covary {
 
-/// When a pass ends early, and whom it tells how far it is: PassSettings::seconds, stop and progress, for the threads
-/// of one call. Time counts from its making.
+/// Decides when a pass ends early, and reports its progress: PassSettings::seconds, stop and progress, for the threads
+/// of one call. The clock starts at construction.
 class PassLimits {
  public:
   /// `total`: samples that the call is to take.
   PassLimits(const PassSettings& settings, uint64_t total) : settings_(settings), total_(total) {}
 
-  /// Thread-safe, as advance() is.
+  /// Thread-safe, like advance().
   bool ended() const {
     return out_of_time_.load(std::memory_order_relaxed) ||
            (settings_.stop && settings_.stop->load(std::memory_order_relaxed));
   }
-  /// To be called after each piece of work, with the samples that it took.
+  /// Call after each piece of work, with its number of samples.
   void advance(uint64_t n_new) {
     const uint64_t now = done_.fetch_add(n_new) + n_new;
     if (settings_.seconds > 0 && watch_.seconds() >= settings_.seconds) out_of_time_ = true;
@@ -38,7 +38,7 @@ class PassLimits {
   std::atomic<bool> out_of_time_{false};
 };
 
-/// Sorts by pixel and sample and keeps the first few; which ones does not depend on the order they came in.
+/// Sorts by pixel and sample and keeps the first few, independently of the order in which they came.
 void keep_first(std::vector<BadSample>& samples);
 
 }  // namespace covary

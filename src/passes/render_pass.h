@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// A pass: renders samples of one scene into a film. The film's own counts say what is still to do, so starting,
-// resuming and adding samples are the same operation, and the result has the same bits however the work was split:
-// every sample is a function of its address (core/random.h), and a pixel's samples are added one by one in their order.
-// Pixels may have and want different numbers of samples.
+// A pass: renders samples of one scene into a film. The film's own counts say what is left to do, so starting, resuming
+// and adding samples are the same operation, and the result has the same bits however the work was split: every sample
+// is a function of its address (core/random.h), and a pixel's samples are added one by one in order. Pixels may have
+// different numbers and targets of samples.
 #pragma once
 
 #include <algorithm>
@@ -19,7 +19,7 @@
 
 namespace covary {
 
-/// How many samples the pixels of a film shall have: one number for all, or a map with a number for each.
+/// Target number of samples of a film's pixels: one number for all, or a map with a number for each.
 class SampleTarget {
  public:
   SampleTarget(uint32_t all = 0) : largest_(all) {}  // NOLINT(google-explicit-constructor): the usual case is a number
@@ -39,7 +39,7 @@ class SampleTarget {
   /// Whether it is a number, or a map of the film's size.
   bool fits(const Film& film) const { return map_.empty() || map_.size() == film.counts().size(); }
 
-  /// Samples that `film` lacks, all pixels together, where no pixel gets more than `limit`.
+  /// Samples that `film` still needs, over all pixels, if no pixel gets more than `limit`.
   uint64_t missing(const Film& film, uint32_t limit = UINT32_MAX) const {
     uint64_t sum = 0;
     for (size_t i = 0; i < film.counts().size(); ++i) {
@@ -48,7 +48,7 @@ class SampleTarget {
     }
     return sum;
   }
-  /// The largest N such that every pixel of `film` has N samples or its target; largest() when all have their targets.
+  /// The largest N such that every pixel of `film` has N samples or its target; largest() if all have their targets.
   uint32_t reached(const Film& film) const {
     uint32_t fewest = largest_;
     for (size_t i = 0; i < film.counts().size(); ++i)
@@ -61,7 +61,7 @@ class SampleTarget {
   std::vector<uint32_t> map_;
 };
 
-/// So many samples in the middle pixel of each square of stride x stride pixels, none in others.
+/// This many samples in the middle pixel of each square of stride x stride pixels, none in others.
 inline SampleTarget one_in_each_square(const CropWindow& window, int stride, uint32_t samples) {
   if (stride == 1) return samples;
   std::vector<uint32_t> map(static_cast<size_t>(window.width) * window.height);
@@ -83,35 +83,35 @@ const char* sampler_name(Sampler sampler);
 struct PassSettings {
   Sampling sampling = Sampling::kIndependent;
   Sampler sampler = Sampler::kIndependent;
-  /// Of the film; with Sampler::kSobol sample s reads point s / groups of the sequences of group s mod groups.
+  /// Of the film; with Sampler::kSobol, sample s uses point s / groups of the sequences of group s mod groups.
   int groups = 1;
   uint64_t seed = 0;
   uint32_t pass = 0;  ///< position in the plan; passes of one plan never share numbers
   SampleTarget spp;   ///< samples per pixel to reach
-  /// No pixel is taken beyond so many samples; what it wants more is left for later calls.
+  /// No pixel gets more samples than this; the rest is left for later calls.
   uint32_t limit = UINT32_MAX;
   FilterSettings filter;
-  /// When set, takes the place of the mean. The samples of a pixel are then taken in one go, and a thread holds all
-  /// spp of them; the film has one group, its pixels are finished or have no samples, and `limit` is not used.
+  /// If set, replaces the mean. The samples of a pixel are then taken in one go, and a thread holds all spp of them;
+  /// the film has one group, its pixels are finished or have no samples, and `limit` is unused.
   PixelEstimate estimate;
-  /// The integrator of this pass where it is to learn from all of these samples (passes/training.h), otherwise
-  /// null. The film has as many samples in each pixel as were learnt from so far.
+  /// The integrator of this pass if it learns from all of these samples (passes/training.h), otherwise null. The film
+  /// has as many samples in each pixel as were learnt from so far.
   LearningIntegrator* learner = nullptr;
-  /// How much an error counts in each channel of each pixel of the film, row by row, for a learner; empty: 1. May be
-  /// set between waves, by `checkpoint`.
+  /// Weight of an error in each channel of each pixel of the film, row by row, for a learner; empty: 1. `checkpoint`
+  /// may set it between waves.
   std::span<const Spectrum> importance;
-  double seconds = 0;  ///< stop after this time when > 0, in the middle of a wave
+  double seconds = 0;  ///< if > 0, stop after this time, even within a wave
   /// Set from a signal handler to stop at the next tile.
   const std::atomic<bool>* stop = nullptr;
   /// Called from any thread after each tile with the samples done since the start; must be thread-safe.
   std::function<void(uint64_t done, uint64_t total)> progress;
-  /// Called between waves, and with `estimate` about twice a second, when no thread works on the film and it may be
-  /// written.
+  /// Called between waves, and with `estimate` about twice a second, when no thread works on the film, so that it may
+  /// be written.
   std::function<void()> checkpoint;
 };
 
-/// A sample whose value is not finite, or negative where Integrator::allows_negative() is false. It enters the film as
-/// black and is counted.
+/// A sample that is not finite, or negative if Integrator::allows_negative() is false. It enters the film as black and
+/// is counted.
 struct BadSample {
   int x, y;  ///< pixel in the full frame
   uint64_t sample;
@@ -123,19 +123,19 @@ struct PassResult {
   uint64_t n_rays = 0;     ///< camera, BSDF and shadow rays
   uint64_t n_not_finite = 0, n_negative = 0;
   std::vector<BadSample> bad_samples;  ///< the first few, ordered by pixel and sample
-  bool complete = false;               ///< every pixel has the smaller of settings.spp and settings.limit
+  bool complete = false;               ///< every pixel has min(settings.spp, settings.limit) samples
   double seconds = 0;
-  double estimate_seconds = 0;  ///< part of `seconds`: what settings.estimate took of the threads' time
+  double estimate_seconds = 0;  ///< part of `seconds`: the threads' time in settings.estimate
 };
 
-/// Renders until every pixel of `film` has settings.spp samples, at most settings.limit, or time or the stop flag ends
-/// it.
+/// Renders until every pixel of `film` has settings.spp samples, at most settings.limit, or until time or the stop flag
+/// ends it.
 PassResult render_pass(const Scene& scene, const Integrator& integrator, const PassSettings& settings, Film& film);
 
-/// The sample that render_pass() takes for (x, y, sample), before it is traced; x, y in the full frame.
+/// The sample that render_pass() takes for (x, y, sample), before tracing; x, y in the full frame.
 CameraSample camera_sample(const Scene& scene, const PassSettings& settings, int x, int y, uint64_t sample);
 
-/// The value of one sample, with the film position it was taken at: what render_pass() adds for (x, y, sample).
+/// The value of one sample and its film position: what render_pass() adds for (x, y, sample).
 struct ReplayedSample {
   Vec2 position;
   Spectrum value;
@@ -144,9 +144,9 @@ struct ReplayedSample {
 ReplayedSample replay_sample(const Scene& scene, const Integrator& integrator, const PassSettings& settings, int x,
                              int y, uint64_t sample);
 
-/// Samples per pixel at the end of a wave that begins with `count`, for a film of `groups` groups: twice as many, from
-/// one in each group on, and later the next multiple of about 16. So no pixel has less than half of the samples of
-/// another when time runs out in the middle of a wave.
+/// Samples per pixel at the end of a wave that begins with `count`, for a film of `groups` groups: twice as many,
+/// starting with one in each group, and later the next multiple of about 16. So if time runs out within a wave, no
+/// pixel has less than half of the samples of another.
 uint32_t wave_end(uint32_t count, int groups);
 
 /// Position of a sample in pixels of the full frame, distributed around the pixel's centre like the filter.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reconstruction filters for what lands anywhere on the film: the counterpart of film_position() in render_pass.h.
+// Reconstruction filters for splats, which land anywhere on the film: the counterpart of film_position() in
+// render_pass.h.
 #pragma once
 
 #include "core/vec.h"
@@ -7,14 +8,14 @@
 
 namespace covary {
 
-/// A pixel of the full frame, or beside it, that gets a splat times `weight`; nothing where that is 0.
+/// A pixel of the full frame, or beside it, that gets a splat times `weight`; none if that is 0.
 struct SplatPixel {
   int x = 0, y = 0;
   float weight = 0;
 };
 
 /// Chooses the one pixel that a splat belongs to. A pixel's mean is an integral over the film with the filter h around
-/// its centre as a density, so a splat at a film position is worth h times its value to each pixel within the filter's
+/// its centre as a density, so a splat at a film position adds h times its value to each pixel within the filter's
 /// radius. One of these is chosen with probability proportional to h, and gets the value times the sum of h over all of
 /// them: one splat, one pixel, like camera samples.
 class SplatFilter {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Integrators that learn: from the samples of some waves of a pass they collect what later samples use, e.g. sums in
-// cells of space or mixtures of directions to guide paths by.
+// cells of space, or mixtures of directions for guiding.
 //
 //     wave of 1 sample per pixel, wave of 1 more, of 2, of 4, …          (render_pass.h: wave_end)
 //       trace()        threads record into their states
@@ -9,10 +9,10 @@
 //       end_wave()     what the next wave's trace() reads
 //     freeze()         from here on a sample is a function of its address alone, as those of other integrators
 //
-// The samples of a wave read only what earlier waves taught, so their mean is right in expectation and they may stay
-// in the film (PassSettings::learner). train() below, with which a render by a plan begins, makes an image of them
-// (training_image.h). The hash of the frozen state goes into a film's attributes: films of different training are not
-// continued, but may be merged, since each is right in expectation.
+// The samples of a wave only depend on earlier waves, so their mean is unbiased and they may stay in the film
+// (PassSettings::learner). train() below, with which a planned render begins, makes an image of them
+// (training_image.h). The hash of the frozen state goes into a film's attributes: films with different training are not
+// continued, but may be merged, because each is unbiased.
 #pragma once
 
 #include <memory>
@@ -27,7 +27,7 @@
 
 namespace covary {
 
-/// What the samples of one tile taught.
+/// The training data from one tile's samples.
 class TrainingRecord {
  public:
   virtual ~TrainingRecord() = default;
@@ -39,41 +39,41 @@ class LearningIntegrator : public Integrator {
  public:
   using Integrator::learning;
   LearningIntegrator* learning() final { return this; }
-  /// Samples per pixel that it wants to learn from, by its parameters; 0: it is to be frozen as it is.
+  /// Samples per pixel of the training, according to the parameters; 0: it is frozen as it is.
   virtual uint32_t training_spp() const = 0;
   /// How the waves of the training become an image.
   virtual WaveWeights wave_weights() const { return WaveWeights::kVariance; }
-  /// Samples per pixel of the training after which the importance of each pixel (PassSettings::importance) is made of
-  /// the image so far; 0: it is not asked for.
+  /// Samples per pixel of the training after which the importance of each pixel (PassSettings::importance) is computed
+  /// from the image so far; 0: not needed.
   virtual uint32_t pilot_spp() const { return 0; }
-  /// Whether the importance is made again after each later wave, of all samples so far.
+  /// Whether the importance is computed again after each later wave, from all samples so far.
   virtual bool pilot_goes_on() const { return true; }
-  /// Whether that image is denoised by Open Image Denoise for it, instead of a filter that is always there.
+  /// Whether Open Image Denoise denoises that image for it, instead of a built-in filter.
   virtual bool pilot_by_oidn() const { return false; }
-  /// Bytes that what is learnt may take, at most; 0: few.
+  /// Maximum memory of the training in bytes; 0: little.
   virtual size_t training_memory() const { return 0; }
   /// What trace() has recorded in a thread's state since the last call, or null. Not called when frozen. Thread-safe.
   virtual std::unique_ptr<TrainingRecord> take_record(ThreadState& state) const = 0;
   /// Adds a record. Called by one thread at a time, in the order of tiles, never null.
   virtual void absorb(const TrainingRecord& record) = 0;
 
-  /// Whether what was learnt can be kept, by the two functions below.
+  /// Whether the training can be saved, by the two functions below.
   virtual bool keeps_training() const { return false; }
-  /// What was learnt, as bytes; after freeze().
+  /// The training as bytes; after freeze().
   virtual std::string trained_bytes() const { return {}; }
-  /// Takes bytes of trained_bytes() in place of a training; after prepare(), before the training. Throws Error(kInput)
-  /// for bytes that are no such thing; `where` names their source.
+  /// Loads trained_bytes() instead of training; after prepare(). Throws Error(kInput) for other bytes; `where` names
+  /// their source.
   virtual void use_bytes(std::string_view /*bytes*/, const std::string& /*where*/) {}
   /// Registered name and settings.
   virtual std::string settings_text() const = 0;
 
-  /// Whether it has learnt functions of directions, which probe() shows.
+  /// Whether it has learnt functions of directions, for probe().
   virtual bool learns_directions() const { return false; }
-  /// What it knows at the first surface along `ray`, by training.h; nothing where there is no surface.
+  /// The learnt functions at the first surface along `ray`, by training.h; empty if there is no surface.
   virtual std::optional<GuideProbe> probe(const Scene& scene, const Ray& ray, int height, uint32_t spp,
                                           uint64_t seed) const;
 
-  /// Forgets what was learnt, if anything.
+  /// Forgets the training, if any.
   void restart();
   /// Ends a wave after which each pixel has taken `spp` samples; called when no thread traces.
   void end_wave(uint32_t spp);
@@ -83,7 +83,7 @@ class LearningIntegrator : public Integrator {
   /// Samples per pixel learnt from so far.
   uint32_t trained_spp() const { return trained_spp_; }
   bool frozen() const { return frozen_; }
-  /// Seconds that making what trace() reads has taken since restart().
+  /// Seconds since restart() spent on building what trace() reads.
   double update_seconds() const { return update_seconds_; }
   /// settings_text() and the hash of the frozen state; "untrained" before.
   std::string description() const final;
@@ -91,13 +91,13 @@ class LearningIntegrator : public Integrator {
   std::string training_text() const;
 
  protected:
-  /// Called by restart(): back to what trace() reads and absorb() adds to before anything was learnt.
+  /// Called by restart(): back to the untrained state.
   virtual void on_restart() = 0;
-  /// Makes of all that was absorbed what trace() reads; may use many threads, whose number must not change a bit.
+  /// Builds what trace() reads from everything absorbed; may use many threads, whose number must not change a bit.
   virtual void update() = 0;
-  /// Called by freeze(): nothing is recorded from here on, and what only training needs can go.
+  /// Called by freeze(): nothing is recorded from here on, and data that only training needs can be freed.
   virtual void on_freeze() {}
-  /// Hash (core/content_hash.h) of all that trace() reads of what was learnt.
+  /// Hash (core/content_hash.h) of all learnt data that trace() reads.
   virtual uint64_t state_hash() const = 0;
 
  private:
@@ -111,31 +111,31 @@ class LearningIntegrator : public Integrator {
 inline constexpr uint32_t kTrainingPass = 1u << 31;
 
 struct TrainingSettings {
-  CropWindow window;  ///< pixels whose samples teach, a part of the camera's frame
+  CropWindow window;  ///< pixels of the training samples, a part of the camera's frame
   FilterSettings filter;
   const std::atomic<bool>* stop = nullptr;                      ///< as in PassSettings
   std::function<void(uint64_t done, uint64_t total)> progress;  ///< as in PassSettings
-  /// Makes the importance of each pixel from the film after pilot_spp() samples, and of later waves; empty: 1
+  /// Computes the importance of each pixel from the film after pilot_spp() samples, and after later waves; empty: 1
   /// everywhere.
   std::function<std::vector<Spectrum>(const Film&)> importance;
   /// PassSettings::seed of the training: renders of different seeds learn from different samples.
   uint64_t seed = 0;
-  TrainingImage* image = nullptr;  ///< when set, gets the image of the samples
-  int stride = 1;                  ///< of the pixels one in each square of so many teaches; with an `image`, 1
+  TrainingImage* image = nullptr;  ///< if set, receives the image of the samples
+  int stride = 1;                  ///< one pixel in each square of this side is used; 1 with an `image`
 };
 
-/// Trains a prepared integrator from the beginning, by training_spp() independent samples in each pixel, and freezes
-/// it. False when stopped before that; it can be trained again.
+/// Trains a prepared integrator from scratch, with training_spp() independent samples in each pixel, and freezes it.
+/// False if stopped before that; it can be trained again.
 bool train(const Scene& scene, LearningIntegrator& integrator, const TrainingSettings& settings);
 
-// What an integrator that guides paths knows at a surface, as functions of the direction: latitude-longitude images
-// around the y axis.
+// What a guided integrator knows at a surface, as functions of the direction: latitude-longitude images around the y
+// axis.
 
 /// Row 0 is +y. Column 0 begins at +x and turns towards +z.
 struct GuideProbe {
   Vec3 position;
-  Image radiance;  ///< that arrives, by brute force
-  Image density;   ///< per unit solid angle, with which the next direction is drawn, delta lobes excluded; grey
+  Image radiance;  ///< incident radiance, by brute force
+  Image density;   ///< density of the next direction per unit solid angle, delta lobes excluded; grey
   Image control;  ///< Σ_k β_k N_k λ_k of the leaf's control variate per unit solid angle, scaled; RGB, can be negative
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files of a sequence: one name with a run of '#' for the frame number, as many digits at least as there are
-// '#': "out_####.exr" stands for out_0001.exr, out_0002.exr, …
+// File names of sequences, with a run of '#' for the frame number, padded to at least that many digits: "out_####.exr"
+// stands for out_0001.exr, out_0002.exr, …
 #pragma once
 
 #include <string>
@@ -14,21 +14,21 @@ struct FrameRange {
   std::vector<int> numbers() const;
 };
 
-/// Reads "7", "1-48" or "1-48:2"; false where the text is none of these, or a number is above 999,999.
+/// Parses "7", "1-48" or "1-48:2"; false if the text is none of these, or a number is above 999,999.
 bool read_frame_range(const std::string& text, FrameRange& range);
 
 /// Whether there is a run of '#' in the last part of the path.
 bool is_frame_pattern(const std::string& pattern);
 
-/// The same of a file to read, which may also lie in folders of frames: "passes_####/crn.exr". A file of just that name
-/// is none.
+/// The same for a file to read, whose frames may also lie in folders: "passes_####/crn.exr". False if a file has
+/// exactly that name.
 bool is_frame_pattern_of_input(const std::string& pattern);
 
-/// The file of a frame: the last run of '#' is replaced. Throws Error(kUsage) where there is none.
+/// The file of a frame: replaces the last run of '#'. Throws Error(kUsage) if there is none.
 std::string frame_name(const std::string& pattern, int frame);
 
-/// The numbers of the frames whose files are there, ascending. Throws like frame_name(), and Error(kIo) where the
-/// folder cannot be read.
+/// The frame numbers of the existing files, ascending. Throws like frame_name(), and Error(kIo) if the folder cannot be
+/// read.
 std::vector<int> frames_on_disk(const std::string& pattern);
 
 }  // namespace covary

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is asked for of a rendered sequence, declared once (settings/settings.h).
+// The options of a rendered sequence, declared once (settings/settings.h).
 #pragma once
 
 #include <optional>
@@ -13,15 +13,15 @@ namespace covary {
 enum class FrameSeeds { kOwn, kSame };
 
 struct SequenceSettings {
-  std::string camera_path;  ///< JSON file (plans/camera_path.h); empty: the camera rests
+  std::string camera_path;  ///< JSON file (plans/camera_path.h); empty: the camera stands still
   std::optional<FrameRange> frames;
   double frames_per_second = 0;  ///< frame n is at the time n / this; 0: as the camera path says, or 1
   FrameSeeds seeds = FrameSeeds::kOwn;
-  bool history = false;  ///< frames before are mixed in
+  bool history = false;  ///< previous frames are mixed in
 
   bool is_sequence() const { return frames.has_value(); }
-  /// Of a frame, where that of the command is `seed`: no two frames have one in common, nor have those of commands
-  /// whose seeds are below 1,000,000.
+  /// The seed of a frame, given the command's `seed`: no two frames share one, nor do frames of commands whose seeds
+  /// are below 1,000,000.
   uint64_t seed_of(uint64_t seed, int frame) const {
     return seeds == FrameSeeds::kSame ? seed : seed + static_cast<uint64_t>(frame) * 1'000'000;
   }
