@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The program's commands and options as plain data, read from the command-line parser: what the man page and the shell
-// completions are made of, and the help.
+// The program's commands and options as plain data, read from the command-line parser: the source of the man page,
+// shell completions and help.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -10,11 +10,11 @@
 namespace covary {
 
 struct OptionDescription {
-  /// With their dashes, short ones first; empty for a positional argument.
+  /// With dashes, short ones first; empty for a positional argument.
   std::vector<std::string> names;
-  /// What follows the option, as the help names it ("UINT", "X,Y", or the name of a positional); "" for a flag.
+  /// The placeholder of the value in the help ("UINT", "X,Y", or the name of a positional); "" for a flag.
   std::string value;
-  /// All that is accepted, where that is a short list.
+  /// All accepted values, if that is a short list.
   std::vector<std::string> choices;
   std::string text;   ///< one sentence
   std::string group;  ///< heading in the help
@@ -28,26 +28,26 @@ struct CommandDescription {
   std::vector<OptionDescription> options, positionals;
 };
 
-/// What stands behind the option in the help: its choices, or what its value is.
+/// The text behind the option in the help: its choices, or its placeholder.
 std::string value_text(const OptionDescription& option);
 
 /// The options of `app` itself.
 CommandDescription describe_command(const CLI::App& app);
-/// The subcommands of `app`, in their order.
+/// The subcommands of `app`, in order.
 std::vector<CommandDescription> describe_subcommands(const CLI::App& app);
 
-/// Heading in the help of the options that everybody needs, those that have no group of their own.
+/// Heading in the help for options without a group, which everybody needs.
 inline constexpr const char* kBasicOptions = "Options";
 /// The headings of the command's options, in the order in which they first appear.
 std::vector<std::string> groups_of(const CommandDescription& command);
 
-/// The help of a command, in lines of at most 100 columns; without `all`, of kBasicOptions alone.
+/// The help of a command, in lines of at most 100 columns; without `all`, only kBasicOptions.
 std::string help_text(const CLI::App& app, const std::string& name, bool all);
 
-/// Page of the section 1 of the manual, in the macros of man(7).
+/// A page of section 1 of the manual, in the macros of man(7).
 std::string man_page(const CLI::App& app, const std::string& version);
 
-/// Completion script for `shell`: bash, zsh or fish. Throws Error(kUsage) for another one.
+/// Completion script for `shell`: bash, zsh or fish. Throws Error(kUsage) for any other.
 std::string completion_script(const CLI::App& app, const std::string& shell);
 
 }  // namespace covary

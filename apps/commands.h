@@ -25,10 +25,10 @@ void add_help(CLI::App& app);
 /// All of them, with the help of the program.
 void add_commands(CLI::App& app);
 
-/// Exit code where a wanted error was not reached.
+/// Exit code if a target error was not reached.
 inline constexpr int kTargetMissed = 3;
 
-/// The command line as given, with quotes where a shell needs them; for the `command` attribute of films.
+/// The command line as given, quoted where a shell needs it; for the `command` attribute of films.
 const std::string& command_line();
 
 }  // namespace covary

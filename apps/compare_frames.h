@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// covary compare of numbered frames: errors of frames, of their changes, and of the worst region.
+// covary compare for numbered frames: errors of frames, of their changes, and of the worst region.
 #pragma once
 
 #include <optional>
@@ -17,11 +17,11 @@ struct CompareOptions {
   std::optional<std::string> json;  // "" and "-": standard output
 };
 
-/// Whether the images are names with '#'. Throws Error(kUsage) where only some are, or options do not fit.
+/// Whether the images are names with '#'. Throws Error(kUsage) if only some are, or options do not fit.
 bool compares_frames(const CompareOptions& options);
 
-/// Prints a table of the frames' errors, and writes the JSON that is asked for. References without a '#' are those of
-/// all frames.
+/// Prints a table of the frames' errors, and writes the requested JSON. References without a '#' are used for all
+/// frames.
 void compare_frames(const CompareOptions& options);
 
 }  // namespace covary

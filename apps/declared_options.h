@@ -11,11 +11,11 @@
 
 namespace covary {
 
-/// Adds the options to the command: what is given on its command line is put into `values`, by names without dashes and
-/// checked as the declaration says. `values` must live as long as the command.
+/// Adds the options to the command: values given on its command line are put into `values`, by names without dashes,
+/// and checked according to the declaration. `values` must live as long as the command.
 void add_options(CLI::App& command, const std::vector<Option>& options, OptionValues& values);
 
-/// Adds an option with a value, which the help calls `kind`.
+/// Adds an option with a value; `kind` is its placeholder in the help.
 template <typename T>
 CLI::Option* add_value(CLI::App& command, const std::string& names, T& value, const char* kind,
                        const std::string& help) {

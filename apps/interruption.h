@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Ctrl-C (SIGINT), a request to end (SIGTERM) and the end of the terminal (SIGHUP): the only place that handles them.
+// The only place that handles Ctrl-C (SIGINT), requests to end (SIGTERM) and the end of the terminal (SIGHUP).
 #pragma once
 
 #include <atomic>
@@ -7,13 +7,12 @@
 
 namespace covary {
 
-/// For main(), once: from here on each of the signals ends the program at once, whatever it does, with the exit code
-/// 128 + its number, and no half-written file is left. Whoever started the program may have it ignore some (nohup):
-/// these stay ignored.
+/// For main(), once: from here on each of the signals ends the program at once, with exit code 128 + its number and no
+/// half-written file. Signals that the parent process had set to be ignored (nohup) stay ignored.
 void catch_signals();
 
-/// As long as it lives, the first signal only sets a flag, for work that has something to keep; the second one ends the
-/// program at once. Not more than one at a time.
+/// While this object lives, the first signal only sets a flag, for work with something to save; the second one ends the
+/// program at once. At most one object at a time.
 class StopFlag {
  public:
   StopFlag();
@@ -23,7 +22,7 @@ class StopFlag {
   /// The token for the library.
   const std::atomic<bool>* token() const;
   bool is_set() const;
-  /// Of a program that has ended early: 130 for Ctrl-C.
+  /// Exit code of an interrupted program: 130 for Ctrl-C.
   int exit_code() const;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// JSON as commands write it.
+// JSON output of commands.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -7,14 +7,14 @@
 
 namespace covary {
 
-/// The value as text; names of files and texts in them need not be UTF-8, which JSON must be: bytes that are not are
-/// replaced by U+FFFD. `indent` < 0: one line.
+/// The value as text. File names need not be UTF-8, but JSON must be: invalid bytes are replaced by U+FFFD. `indent` <
+/// 0: one line.
 std::string json_text(const nlohmann::ordered_json& value, int indent = 2);
 
 /// Writes the text to the file, or to standard output for "" and "-". Throws Error(kIo).
 void write_text_output(const std::string& path, const std::string& text);
 
-/// The most memory that this process has held so far.
+/// Peak memory of this process so far.
 double peak_memory_bytes();
 
 }  // namespace covary

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Numbers on the command line, the same in all commands: decimal digits ("010" is ten, "0x10" is none), nothing behind
-// them, within the range of what they are for, never not-a-number.
+// Numbers on the command line, the same in all commands: decimal digits ("010" is ten, "0x10" is invalid), nothing
+// after them, in the valid range, never NaN.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -20,7 +20,7 @@ CLI::Validator whole_number(T low, T high) {
     const std::optional<T> value = parse_number<T>(text);
     if (!value || *value < low || *value > high)
       return "'" + text + "': expected a whole number from " + std::to_string(low) + " to " + std::to_string(high);
-    text = std::to_string(*value);  // without zeros in front, which CLI11 would take for octal
+    text = std::to_string(*value);  // without leading zeros, which CLI11 would read as octal
     return "";
   };
   return {check, "", "whole number"};
@@ -35,7 +35,7 @@ CLI::Validator finite_number();
 /// For CLI::Option::check(): one of these names.
 CLI::Validator one_of(const std::vector<std::string>& names);
 
-/// Whole numbers from 0 on, separated by `separator`; throws Error(kUsage) that names the option.
+/// Whole numbers from 0 on, separated by `separator`; throws Error(kUsage) naming the option.
 std::vector<int64_t> parse_numbers(const std::string& option, const std::string& text, char separator, size_t count,
                                    const std::string& example);
 

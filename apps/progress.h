@@ -12,9 +12,9 @@
 
 namespace covary {
 
-/// A line on stderr that shows what a command does, how far it is, its rate and the time left. On a terminal the line
-/// is redrawn a few times a second and no wider than the terminal; otherwise a new line with a bar appears every ten
-/// seconds, so that logs stay short. All functions may be called from any thread.
+/// A line on stderr that shows what a command does, its progress, rate and the time left. On a terminal the line is
+/// redrawn a few times a second, no wider than the terminal; otherwise a new line with a bar appears every ten seconds,
+/// so that logs stay short. All functions may be called from any thread.
 class ProgressLine {
  public:
   ProgressLine(std::string label, bool quiet);
@@ -23,16 +23,16 @@ class ProgressLine {
   ProgressLine(const ProgressLine&) = delete;
   ProgressLine& operator=(const ProgressLine&) = delete;
 
-  /// What is done from now on: "loading". It is shown with the seconds it takes until update() says how far it is.
+  /// Starts a phase, such as "loading", shown with its seconds until update() reports progress.
   void begin(const std::string& phase);
   /// Samples of the phase. `total` == 0: unknown.
   void update(uint64_t done, uint64_t total);
-  /// A time budget, from now on, that ends the work if `total` is not reached first.
+  /// A time limit, from now on, that ends the work if `total` is not reached first.
   void limit(double seconds);
-  /// The error that the samples so far have reached, shown with its bounds. Where they go on until `goal` > 0, the
-  /// total is at least so many samples as that will take, as errors fall like 1 / samples.
+  /// The error reached so far, shown with its bounds. With a `goal` > 0, the total is at least the number of samples
+  /// that it will take, because errors fall like 1 / samples.
   void toward(const PredictedError& reached, double goal);
-  /// This text in place of all that.
+  /// Shows this text instead.
   void show(const std::string& text);
   /// Clears the line (terminal) before other output.
   void clear();
@@ -57,7 +57,7 @@ class ProgressLine {
   double seconds_limit_ = 0;
   double next_;  // when to draw, seconds of the line
   std::condition_variable end_;
-  std::thread redrawing_;  // on a terminal: the seconds of phases that say nothing
+  std::thread redrawing_;  // on a terminal: shows the seconds of phases without progress
 };
 
 /// 75 -> "1:15", 4000 -> "1:06:40".

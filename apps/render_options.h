@@ -16,7 +16,7 @@ namespace covary {
 struct RenderOptions {
   std::string scene, json, stages, replay, display_server;
   OptionValues values, of_integrator, of_estimator, of_sequence;  ///< as given
-  RenderSettings settings;                                        ///< what `values` say, by check_options()
+  RenderSettings settings;                                        ///< the meaning of `values`, by check_options()
   SequenceSettings sequence;                                      ///< the same of `of_sequence`
   std::vector<std::string> defines;
   std::optional<uint64_t> replay_light;  ///< number of a light path
@@ -40,11 +40,11 @@ void check_options(RenderOptions& options);
 /// The scene, with the integrator that the options choose. Throws Error.
 LoadedScene load(const RenderOptions& options);
 
-/// What the options ask for, checked by check_options().
+/// The request of the options, checked by check_options().
 Estimator estimator_of(const RenderOptions& options);
 Plan make_plan(const RenderOptions& options);
 RenderRequest make_request(const RenderOptions& options, const LoadedScene& scene);
-/// The sample that --replay names: of each film of the plan, or of that one which --sampling names.
+/// The sample of --replay: of each film of the plan, or only of the one that --sampling names.
 std::vector<SampleAddress> replayed_samples(const RenderOptions& options);
 
 }  // namespace covary

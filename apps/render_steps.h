@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Steps of `covary render` that an image and the frames of a sequence have in common.
+// Steps of `covary render` that images and frames of sequences share.
 #pragma once
 
 #include <memory>
@@ -14,41 +14,41 @@
 
 namespace covary {
 
-// What is said of a render: statistics, the summary, samples that could not be used.
+// Reports on a render: statistics, summary, unusable samples.
 
-/// What is reported of.
+/// What is reported.
 struct RenderReport {
   const RenderOptions& options;
   const LoadedScene& scene;
   const RenderResult& result;
-  double load_seconds = 0;  ///< of reading the scene, without building the ray tracer's hierarchy
+  double load_seconds = 0;  ///< for reading the scene, without building the BVH
   int threads = 0;
 };
 
 /// The object of --json.
 nlohmann::ordered_json statistics(const RenderReport& report);
 
-/// Lines on stderr about samples that were not finite or negative, with the commands that repeat them.
+/// Lines on stderr about samples that were not finite or negative, with the commands that replay them.
 void report_bad_samples(const RenderOptions& options, const Pass& pass);
 
 /// Lines on stderr about a finished render.
 void print_summary(const RenderReport& report);
 
-// covary render --frames: a scene to numbered images. The scene is loaded and built once, or where it
-// is a pattern of names, for each frame; each frame is the image that
-// `render` makes of it alone with the same camera and seed, whichever other frames the command has.
+// covary render --frames: a scene to numbered images. The scene is loaded and built once or, if it is a pattern of
+// names, once per frame. Each frame is the image that `render` makes of it alone with the same camera and seed,
+// whichever other frames the command has.
 
-/// Renders all frames of options.sequence in their order. With --resume, those that are complete stay as they are.
-/// Throws Error(kUsage) for options that fit no sequence, Error(kInput) for a complete frame of other settings, and
-/// Unfinished after a signal and where frames missed --until.
+/// Renders all frames of options.sequence in order. With --resume, complete frames stay as they are. Throws
+/// Error(kUsage) for options that do not fit a sequence, Error(kInput) for a complete frame with other settings, and
+/// Unfinished after a signal or if frames missed --until.
 void render_sequence(const RenderOptions& options, int threads);
 
-/// For --replay: the options of the only frame of options.sequence; throws Error(kUsage) where there are more.
+/// For --replay: the options of the only frame of options.sequence; throws Error(kUsage) if there are more.
 void take_frame(RenderOptions& options);
-/// Then puts the camera where it is in that frame.
+/// Then moves the camera to its place in that frame.
 void place_frame(const RenderOptions& options, LoadedScene& scene);
 
-/// What the command reads and writes, as far as it is known before the scene is loaded.
+/// The files that the command reads and writes, as far as known before the scene is loaded.
 Outputs files_of(const RenderOptions& options);
 
 /// The viewer that the options name, or null.
@@ -57,7 +57,7 @@ std::unique_ptr<Display> display_of(const RenderOptions& options);
 /// Warnings and a note on stderr.
 void warn_of_scene(const RenderOptions& options, const LoadedScene& scene);
 
-/// Renders with a line of progress and, where there is one, a viewer.
+/// Renders with a progress line and, if requested, a viewer.
 RenderResult render_watched(const RenderOptions& options, const LoadedScene& scene, const RenderRequest& request,
                             Display* display, ProgressLine& progress, const StopFlag& stop);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is said of images to combine, and of the error of a denoised image: its size, its bias, and what others would
-// have had.
+// Reports on images to combine, and on the error of a denoised image: its size, its bias, and the errors that other
+// images would have had.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -17,28 +17,28 @@
 namespace covary {
 
 /// "predicted relMSE 0.0021, between 0.0016 and 0.0029 (80 %), 18 % of it squared bias; the mean of the samples has
-/// 0.012, Open Image Denoise alone 0.0025 (unreliable: known to a factor of 1.8)", as far as it is known.
+/// 0.012, Open Image Denoise alone 0.0025 (unreliable: known to a factor of 1.8)", as far as known.
 std::string prediction_text(const PredictedError& predicted, const std::optional<MeasuredRisks>& risks);
 
-/// Lines on stderr: what is wrong with the inputs, and, unless `quiet`, notes. Throws Error(kInput) instead where there
-/// are errors, unless `force` makes warnings of them.
+/// Lines on stderr: problems of the inputs and, unless `quiet`, notes. Throws Error(kInput) instead if there are
+/// errors, unless `force` turns them into warnings.
 void print_findings(const std::vector<Finding>& findings, bool force, bool quiet);
-/// Lines on stderr: the network that is missing, and `note`, where there are such.
+/// Lines on stderr: the missing network, and `note`, if any.
 void print_notes(const DenoisingChoice& choice, const std::string& note);
-/// These notes of an image, and last its risks.
+/// These notes of an image, followed by its risks.
 void print_risks(const CombinedImage& combined, const DenoisingChoice& choice);
 
-/// "predicted_relmse", its bounds "predicted_relmse_low" and "_high", "predicted_relmse_reliable" and why not.
+/// "predicted_relmse", its bounds "predicted_relmse_low" and "_high", "predicted_relmse_reliable" and the doubt.
 void add_prediction(const PredictedError& predicted, nlohmann::ordered_json& json);
 
-/// "predicted_bias_share" and "risks"; nothing where they are not known.
+/// "predicted_bias_share" and "risks"; nothing if unknown.
 void add_risks(const std::optional<MeasuredRisks>& risks, nlohmann::ordered_json& json);
 
-/// "error_sums": what the interval is made of; nothing where it is not known.
+/// "error_sums": the basis of the interval; nothing if unknown.
 void add_error_sums(const std::optional<RiskRow>& sums, nlohmann::ordered_json& json);
 
-/// "denoiser", the network that took part, "denoiser_runs", how many images and guides it denoised, and
-/// "denoiser_missing": that it could not, and how to get it.
+/// "denoiser", the network that was used, "denoiser_runs", how many images and guides it denoised, and
+/// "denoiser_missing": that it was missing, and how to get it.
 void add_network(const std::string& network, int runs, const DenoisingChoice& choice, nlohmann::ordered_json& json);
 
 }  // namespace covary

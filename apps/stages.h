@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// --save-stages: images of the single steps of an estimator, as files.
+// --save-stages: writes images of an estimator's steps.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -12,12 +12,12 @@ namespace covary {
 
 void add_stages_option(CLI::App& command, std::string& folder);
 
-/// Throws Error(kUsage) where a folder is named and the estimator has no single steps.
+/// Throws Error(kUsage) if a folder is named and the estimator has no steps to show.
 void check_stages(const std::string& folder, const Estimator& estimator);
 
-/// Writes each stage as NAME.exr and, to look at, NAME.png; does nothing where no folder is named. The folder is made
-/// if need be. Images of one channel are coloured from black over red to pale yellow, with decades where they span
-/// more than two. Throws Error(kIo).
+/// Writes each stage as NAME.exr, and NAME.png to look at; does nothing if no folder is named. Creates the folder if
+/// needed. Images of one channel are coloured from black over red to pale yellow, in decades if they span more than
+/// two. Throws Error(kIo).
 void save_stages(const std::string& folder, const Estimator& estimator, const GroupedImage& crn,
                  const GroupedImage& independent, const PairSettings& settings, const ImagePlace& place);
 

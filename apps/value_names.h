@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the help shows behind options whose text names something outside of the command. A suite may not give such
-// options (suite_words.h), nor any whose value has no name of its own but CLI11's "TEXT".
+// Placeholders in the help for options whose text names something outside the command. A suite may not use such options
+// (suite_words.h), nor any whose placeholder is CLI11's "TEXT".
 #pragma once
 
 #include "settings/option.h"
@@ -10,7 +10,7 @@ namespace covary {
 inline constexpr const char *kFileValue = "FILE", *kFolderValue = "FOLDER", *kLibraryValue = "LIBRARY",
                             *kServerValue = "HOST:PORT";
 
-/// The name for what a declared option names; null for a value.
+/// The placeholder of a declared option; null for a value.
 constexpr const char* value_name_of(OptionNames names) {
   switch (names) {
     case OptionNames::kValue:

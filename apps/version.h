@@ -5,8 +5,8 @@
 
 namespace covary {
 
-/// Version and, where the source tree was a git repository, the commit: "0.1.0 (1c24a5c9d2f3)"; "-dirty" follows the
-/// commit when files differed from it.
+/// Version and, if the source tree was a git repository, the commit: "0.1.0 (1c24a5c9d2f3)"; "-dirty" follows the
+/// commit if files differed from it.
 std::string version_text();
 
 }  // namespace covary

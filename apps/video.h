@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames to a video, by the program ffmpeg where it is installed.
+// Converts frames to a video with ffmpeg, if it is installed.
 #pragma once
 
 #include <cstdio>
@@ -13,20 +13,19 @@ namespace covary {
 /// Whether the name ends in .mp4, .mkv, .mov or .webm.
 bool is_video_name(const std::string& path);
 
-/// Frames go to ffmpeg's input one by one as 8-bit sRGB; the video has its name only when it is whole.
+/// Frames are sent to ffmpeg's input one by one as 8-bit sRGB; the video gets its name only when complete.
 class VideoWriter {
  public:
-  /// `rate`: frames per second. Throws Error(kIo) where the program cannot be started.
+  /// `rate`: frames per second. Throws Error(kIo) if ffmpeg cannot be started.
   VideoWriter(const std::string& path, double rate);
-  /// Ends ffmpeg, and removes what it wrote unless finish() did its work.
+  /// Ends ffmpeg, and removes its output unless finish() succeeded.
   ~VideoWriter();
   VideoWriter(const VideoWriter&) = delete;
   VideoWriter& operator=(const VideoWriter&) = delete;
 
-  /// Linear RGB. Throws Error(kInput) where the size is not that of the first frame, and Error(kIo) where ffmpeg has
-  /// ended.
+  /// Linear RGB. Throws Error(kInput) if the size differs from the first frame's, and Error(kIo) if ffmpeg has ended.
   void add(const Image& frame);
-  /// Throws Error(kIo) where ffmpeg failed or there was no frame.
+  /// Throws Error(kIo) if ffmpeg failed or there was no frame.
   void finish();
 
  private:

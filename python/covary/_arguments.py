@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the arguments of public functions may be, checked in one place: `@checked` gives each argument a rule, and a
-value that the rule refuses raises an exception with the argument's name, the value and what is accepted. Arrays are
-checked where their memory is read (module/arrays.cpp), names of estimators and their options by the registry."""
+"""Checks of the arguments of public functions: `@checked` gives each argument a rule, and a value that breaks its rule
+raises an exception with the argument's name, the value and what was expected. Arrays are checked where their memory is
+read (module/arrays.cpp), names of estimators and their options by the registry."""
 from __future__ import annotations
 
 import functools
@@ -31,13 +31,13 @@ class _WrongValue(Exception):
 
 @dataclass(frozen=True)
 class Rule:
-    """What an argument accepts, in words, and how it is brought into the form that the function works with."""
+    """What an argument accepts, in words, and its conversion to what the function works with."""
 
     accepted: str
     convert: Callable[[Any], Any]
 
     def __call__(self, name: str, value: Any) -> Any:
-        """The value as it is to be. Raises TypeError and UsageError, which is a ValueError."""
+        """The converted value. Raises TypeError and UsageError, which is a ValueError."""
         try:
             return self.convert(value)
         except _WrongType as reason:
@@ -178,7 +178,7 @@ def optional(rule: Rule) -> Rule:
 
 
 def empty_or(rule: Rule) -> Rule:
-    """The empty text, too, where it stands for nothing."""
+    """The empty text, too, if it means nothing."""
     return Rule(rule.accepted, lambda value: value if isinstance(value, str) and not value else rule.convert(value))
 
 
@@ -235,7 +235,7 @@ def instance(words: str, accepts: Callable[[Any], bool]) -> Rule:
 
 
 def either(words: str, *rules: Rule) -> Rule:
-    """What the first rule that accepts its type makes of it."""
+    """The first of the rules that accepts the type."""
     def convert(value: Any) -> Any:
         for rule in rules:
             try:
@@ -248,8 +248,8 @@ def either(words: str, *rules: Rule) -> Rule:
 
 
 def checked(declared: Mapping[str, Rule] | None = None, /, **rules: Rule) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Gives each argument of a function its rule. Arguments without a rule, and rules without an argument, are an error
-    of the package, found when it is imported. `declared`: rules of options that arrive in the function's **options."""
+    """Gives each argument of a function its rule. Arguments without a rule, and rules without an argument, are bugs of
+    the package, found when it is imported. `declared`: rules of options that arrive in the function's **options."""
     def decorate(called: Callable[P, R]) -> Callable[P, R]:
         signature = inspect.signature(called)
         shown = list(signature.parameters.values())
@@ -279,8 +279,8 @@ def checked(declared: Mapping[str, Rule] | None = None, /, **rules: Rule) -> Cal
 
 
 def check_some(function: Callable[..., Any], given: Mapping[str, Any], of: str = "") -> dict[str, Any]:
-    """Keywords for a checked function before it is called: those that it names, as its rules make them. `of`: the
-    argument that holds them."""
+    """Keywords for a checked function before it is called: the known ones, converted by its rules. `of`: the argument
+    that holds them."""
     rules: Mapping[str, Rule] = function.rules  # type: ignore[attr-defined]
     return {name: rules[name](f"{of}[{name!r}]" if of else name, value)
             for name, value in given.items() if name in rules}

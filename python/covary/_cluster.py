@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What work on a cluster begins with: a client of a cluster that somebody chose, the same versions everywhere, and the
-files of scenes on every worker."""
+"""The start of any work on a cluster: a client of a chosen cluster, the same versions everywhere, and the scene files
+on every worker."""
 from __future__ import annotations
 
 import hashlib
@@ -38,7 +38,7 @@ CLIENT = Rule("a dask.distributed.Client", _client)
 
 
 class SceneFiles:
-    """The files of a scene by their content, which every worker, also one that comes later, gets once."""
+    """The files of a scene by content; every worker, including late ones, gets them once."""
 
     @checked(scene=instance("a covary.Scene", lambda value: isinstance(value, Scene)))
     def __init__(self, scene: Scene) -> None:
@@ -58,7 +58,7 @@ class SceneFiles:
 
     @checked(parent=path)
     def write(self, parent: str | os.PathLike[str]) -> Path:
-        """Writes them into a folder of their own, unless they are there. Raises IoError."""
+        """Writes them into a separate folder, unless it exists. Raises IoError."""
         parent = Path(parent)
         folder = parent / self.folder
         if folder.exists():
@@ -81,7 +81,7 @@ class SceneFiles:
 
 
 def make_plugin(files: SceneFiles) -> Any:
-    """What `Client.register_plugin()` takes to write the files wherever a worker is or comes."""
+    """The plugin for `Client.register_plugin()` that writes the files on every worker, including late ones."""
     from distributed import WorkerPlugin  # type: ignore[import-not-found,import-untyped,unused-ignore]
 
     class Deliver(WorkerPlugin):  # type: ignore[misc,unused-ignore]
@@ -95,7 +95,7 @@ def make_plugin(files: SceneFiles) -> Any:
 
 
 def dask() -> Any:
-    """The module `distributed`. Raises ImportError with what to install."""
+    """The module `distributed`. Raises ImportError that says what to install."""
     try:
         import distributed  # type: ignore[import-not-found,import-untyped,unused-ignore]
     except ImportError as error:
@@ -105,8 +105,8 @@ def dask() -> Any:
 
 def results(client: Any, run: Callable[..., Any],
             tasks: Iterable[tuple[T, tuple[Any, ...]]]) -> Iterator[tuple[T, Any]]:
-    """Tasks with what `run(*arguments)` returns on a worker, as they come. Those that are left are cancelled where one
-    fails or the caller goes on without them."""
+    """Tasks with the results of `run(*arguments)` on a worker, as they complete. If one fails or the caller stops
+    iterating, the rest are cancelled."""
     futures = {client.submit(run, *arguments, pure=False, retries=_RETRIES): task for task, arguments in tasks}
     try:
         for future in dask().as_completed(futures, loop=client.loop):
@@ -123,7 +123,7 @@ def _versions() -> tuple[str, str]:
 
 
 def check_versions(client: Any) -> None:
-    """All must run one covary and one distributed: films of versions may differ, and so may what Dask sends."""
+    """All must run the same covary and distributed: films of other versions may differ, and so may Dask's messages."""
     here = _versions()
     found = {str(worker): tuple(there) for worker, there in client.run(_versions).items()}
     found["the scheduler"] = (here[0], client.get_versions()["scheduler"]["packages"]["distributed"])

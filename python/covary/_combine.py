@@ -71,14 +71,14 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = "iicv", *, li
 
 
 def guides_of(aovs: Mapping[str, Any]) -> dict[str, Any]:
-    """Auxiliary images by the names of combine()'s guides; None for those that there are not."""
+    """Auxiliary images by the names of combine()'s guides; None for missing ones."""
     return {name: aovs.get(layer) for name, layer in (("albedo", "Albedo"), ("normal", "N"),
                                                       ("denoising_albedo", "DenoisingAlbedo"),
                                                       ("denoising_normal", "DenoisingNormal"))}
 
 
 def _counts(counts: Any) -> Any:
-    """As the module takes them. Raises TypeError and ValueError for what are no numbers of samples."""
+    """As the module takes them. Raises TypeError and ValueError for invalid numbers of samples."""
     import numpy
 
     numbers = numpy.asarray(counts)
@@ -91,8 +91,8 @@ def _counts(counts: Any) -> Any:
 
 
 def check_options(estimator: str, options: Mapping[str, Any]) -> None:
-    """Raises what combine() would for its keywords; for those who render the images first. Those of the images are not
-    accepted."""
+    """Raises what combine() would for its keywords, for callers that render the images first. Keywords about the images
+    are not accepted."""
     given = check_some(combine, options)
     known = {name: given[name] for name in ("denoise", "oidn", "force", "std_error") if name in given}
     if len(known) < len(given):
@@ -105,7 +105,7 @@ def check_options(estimator: str, options: Mapping[str, Any]) -> None:
 
 @dataclass(frozen=True)
 class InputReport:
-    """What check_inputs() found. Correlations are (value, standard error), or None where they cannot be measured."""
+    """The findings of check_inputs(). Correlations are (value, standard error), or None if they cannot be measured."""
 
     #: Why combine() refuses the images, with the setting to change in the renderer that made them.
     errors: list[str]
@@ -129,6 +129,6 @@ class InputReport:
 
 @checked(crn=IMAGE, independent=IMAGE)
 def check_inputs(crn: Any, independent: Any) -> InputReport:
-    """Whether two images are what combine() assumes: finite and linear, with common random numbers in the one and
-    independent ones in the other, of one scene. Takes what combine() takes."""
+    """Checks whether two images meet combine()'s assumptions: finite and linear, of one scene, one with common and the
+    other with independent random numbers. Takes what combine() takes."""
     return InputReport(**_covary.check_inputs(crn, independent))

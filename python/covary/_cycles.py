@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What Cycles must render for covary: groups of samples, and the settings of the scene meanwhile (docs/blender.md).
+"""What Cycles must render for covary: groups of samples, and the scene settings they need (docs/blender.md).
 
-Standard library alone: the add-on of Blender has this file and errors.py, and no compiled part."""
+Uses only the standard library: the Blender add-on includes this file and errors.py, but no compiled part."""
 from __future__ import annotations
 
 from collections.abc import Iterator
@@ -28,12 +28,12 @@ def blender() -> Any:
 
 
 def pattern() -> str:
-    """The one whose numbers a scrambling distance makes common; its name changed with Blender 3.5."""
+    """The pattern whose scrambling distance can make numbers common; its name changed with Blender 3.5."""
     return "TABULATED_SOBOL" if blender().app.version >= (3, 5, 0) else "PROGRESSIVE_MULTI_JITTER"
 
 
 def compositor(scene: Any) -> tuple[Any, str, Any, str]:
-    """The entry of needed() that turns it off: from Blender 5.0 on there is one where it has nodes."""
+    """The entry of needed() that turns it off: from Blender 5.0 on, a compositor exists if it has nodes."""
     reason = "the compositor would change the pixels of each group"
     if hasattr(scene, "compositing_node_group"):
         return scene.render, "use_compositing", False, reason if scene.compositing_node_group else ""
@@ -41,14 +41,13 @@ def compositor(scene: Any) -> tuple[Any, str, Any, str]:
 
 
 def blue_noise(cycles: Any) -> str:
-    """Why the scene's pattern is not kept, where that is more than another order of the same points."""
+    """Why the scene's pattern is not kept, if that changes more than the order of the same points."""
     lost = "a group's errors would be arranged over its pixels, and its numbers could not be common"
     return lost if getattr(cycles, "sampling_pattern", "") == "BLUE_NOISE" else ""
 
 
 def needed(scene: Any) -> list[tuple[Any, str, Any, str]]:
-    """(owner, name, value, reason) of each setting that both images need; "" for those that leave the picture as it
-    is."""
+    """(owner, name, value, reason) of each setting that both images need; reason "" if the picture stays the same."""
     cycles, image = scene.cycles, scene.render.image_settings
     mixes = "it mixes the errors of neighbouring pixels, which control variates take for independent"
     clamps = "what it clamps is missing from the mean, differently in both images"
@@ -77,14 +76,14 @@ def needed(scene: Any) -> list[tuple[Any, str, Any, str]]:
 
 
 def changed(scene: Any) -> list[tuple[str, Any, Any, str]]:
-    """(name, value, value while groups render, reason) of what changes the picture."""
+    """(name, value, value while groups render, reason) of the settings that change the picture."""
     return [(name, getattr(owner, name), value, reason) for owner, name, value, reason in needed(scene)
             if reason and hasattr(owner, name) and getattr(owner, name) != value]
 
 
 @contextmanager
 def settings(scene: Any) -> Iterator[None]:
-    """The scene as it must be; everything is put back afterwards, also what a group changes."""
+    """Applies the required settings; afterwards restores everything, including what a group changes."""
     cycles, more = scene.cycles, ("samples", "sample_offset", "seed", "scrambling_distance", "use_sample_subset",
                                   "sample_subset_length")
     kept = [(owner, name, getattr(owner, name)) for owner, name, _, _ in needed(scene) if hasattr(owner, name)]
@@ -102,7 +101,7 @@ def settings(scene: Any) -> Iterator[None]:
 
 @contextmanager
 def kept_in_memory(scene: Any) -> Iterator[None]:
-    """Around the groups of one picture: Cycles prepares the scene once, not for each group."""
+    """For the groups of one picture: Cycles prepares the scene once, not for each group."""
     render = scene.render
     before, render.use_persistent_data = render.use_persistent_data, True
     try:
@@ -112,7 +111,7 @@ def kept_in_memory(scene: Any) -> Iterator[None]:
 
 
 def check(scene: Any, spp: int, groups: int = GROUPS) -> None:
-    """Raises UsageError for a scene of which no groups can be rendered, and in an old Blender."""
+    """Raises UsageError for a scene whose groups cannot be rendered, and in an old Blender."""
     blender()
     if scene.render.engine != "CYCLES":
         raise UsageError(f"found the engine {scene.render.engine}; only Cycles has common random numbers: "
@@ -152,7 +151,7 @@ class Group:
 
 
 def groups_of(spp: int, groups: int, seed: int) -> list[Group]:
-    """Those of one picture: half of its samples with common random numbers, half with independent ones. Each has a seed
-    of its own."""
+    """The groups of one picture: half of its samples with common random numbers, half with independent ones, each with
+    its own seed."""
     return [Group(kind, spp // (2 * groups), (2 * seed + number) * groups + group)
             for number, kind in enumerate(("crn", "independent")) for group in range(groups)]

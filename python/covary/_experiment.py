@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`covary experiment` with its runs on the workers of Dask. Each worker makes parts of the experiment by the program,
-as `covary experiment --part K/N` does; what the parts leave in their caches goes into the one here, where the program
-then finds all runs, measures them and writes the report. So the results are those of one machine in every bit but what
-depends on clocks."""
+"""`covary experiment` with its runs on Dask workers. Each worker runs parts of the experiment with the program, like
+`covary experiment --part K/N`; the contents of their caches are copied into the local one, where the program finds all
+runs, measures them and writes the report. So the results are bit for bit those of one machine, except for times."""
 from __future__ import annotations
 
 import argparse
@@ -37,13 +36,13 @@ class _Piece:
     options: tuple[str, ...]
 
     def name(self, program_hash: str) -> str:
-        """Of the record that says that it is done."""
+        """Name of the record that it is done."""
         text = json.dumps([program_hash, self.suite, self.folder, self.part, self.options])
         return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
 def _program_hash() -> str:
-    """Of its content: the keys of runs hold the build."""
+    """Hash of its content, because the keys of runs include the build."""
     return hashlib.sha256(program().read_bytes()).hexdigest()
 
 
@@ -55,8 +54,8 @@ def _check_programs(client: Any, here: str) -> None:
 
 
 def _run(piece: _Piece) -> dict[str, dict[str, bytes]]:
-    """On a worker: the files of the runs that succeeded, by key. Those that fail are tried again where the report is
-    made, which then has their messages."""
+    """Runs on a worker; returns the files of the successful runs, by key. Failed ones are tried again where the report
+    is made, which then has their messages."""
     from distributed import get_worker  # type: ignore[import-not-found,import-untyped,unused-ignore]
 
     parent = Path(get_worker().local_directory)
@@ -76,7 +75,7 @@ def _run(piece: _Piece) -> dict[str, dict[str, bytes]]:
 
 
 def _keep(runs: dict[str, dict[str, bytes]], cache: Path) -> None:
-    """Puts runs into the cache; each is there as a whole or not at all."""
+    """Puts runs into the cache, each completely or not at all."""
     for key, files in runs.items():
         if (cache / "runs" / key / "run.json").exists():
             continue
@@ -100,7 +99,7 @@ def _pieces(client: Any, suite: dict[str, Any], folder: Path, options: tuple[str
 
 
 def _ask(*words: str | os.PathLike[str]) -> str:
-    """What the program prints. Raises Error with its message."""
+    """The program's output. Raises Error with its message."""
     exit_code, output, errors = run_program("experiment", *words)
     if exit_code != 0:
         raise (UsageError if exit_code == 2 else Error)(errors.strip().removeprefix("covary: "))
@@ -109,7 +108,7 @@ def _ask(*words: str | os.PathLike[str]) -> str:
 
 def _make_runs(client: Any, pieces: Sequence[_Piece], cache: Path, program_hash: str,
                progress: Progress | None) -> None:
-    """On the workers, without those that the cache has."""
+    """Runs the parts on the workers, except those in the cache."""
     records = cache / "parts"
     records.mkdir(parents=True, exist_ok=True)
 
@@ -132,8 +131,7 @@ def _make_runs(client: Any, pieces: Sequence[_Piece], cache: Path, program_hash:
 def experiment(client: Any, suite: str | os.PathLike[str], output: str | os.PathLike[str],
                arguments: Sequence[str] = (), *, progress: Progress | None = None) -> Path:
     """`covary experiment SUITE -o OUTPUT ARGUMENTS…` with its runs on the workers of a dask.distributed.Client.
-    Returns the path of the report. What the cache has is not run again, so that the same call continues after an
-    interruption.
+    Returns the path of the report. Cached runs are not repeated, so the same call continues after an interruption.
 
     suite: a file (JSON, or a scene in XML) or the name of a built-in suite.
     arguments: further options of the command, e.g. ["--quick", "--scenes", "scenes"]; --threads is that of each run.

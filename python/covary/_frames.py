@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Frames of a sequence on the workers of Dask: each is a task of the program `covary render --frames N`, whose file is
-on a disk that all machines share. What a frame holds follows from its number alone, so that a frame which was lost with
-its worker is rendered again with the same bits, by any other, which continues what `--resume` finds."""
+"""Frames of a sequence on Dask workers: each is a task of the program `covary render --frames N`, whose file is on a
+shared disk. A frame depends on its number alone, so a frame that is lost with its worker is rendered again by any other
+with the same bits, continuing what `--resume` finds."""
 from __future__ import annotations
 
 import os
@@ -18,7 +18,7 @@ from .errors import Error, UsageError
 
 
 def _render_frame(words: tuple[str, ...], folder: str) -> tuple[int, str]:
-    """On a worker: exit code and messages of the program."""
+    """Runs on a worker; returns exit code and messages of the program."""
     code, _, errors = _covary.run_program(["/usr/bin/env", "-C", folder, str(program()), *words])
     return code, errors
 
@@ -51,7 +51,7 @@ def frames(client: Any, scene: str | os.PathLike[str], output: str | os.PathLike
            options: Sequence[str] = (), *, waves: int = 1, seed: int = 0,
            progress: Progress | None = None) -> list[Path]:
     """`covary render SCENE -o OUTPUT --frames FIRST-LAST OPTIONS…` with each frame on a worker of a
-    dask.distributed.Client, in the folder where this process is, which all machines must share. Returns the paths of
+    dask.distributed.Client, in this process's folder, which all machines must share. Returns the paths of
     the frames, which have the bits of one machine. Frames that are complete are not rendered again, so that the same
     call continues after an interruption.
 

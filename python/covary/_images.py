@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Images of files, and Open Image Denoise."""
+"""Image files, and Open Image Denoise."""
 from __future__ import annotations
 
 from collections.abc import Iterable
@@ -17,9 +17,9 @@ _FILES = either("the name of a file, or a list of them", path, list_of(path, "a 
 
 @checked(path=path, layer=text, accept_changed=flag)
 def read_image(path: str | PathLike[str], layer: str = "", *, accept_changed: bool = False) -> FloatArray:
-    """Linear RGB [H, W, 3] of a file of any format; `layer` chooses among those of an EXR: "N", "Albedo", …
+    """Reads linear RGB [H, W, 3] from a file of any format; `layer` selects a layer of an EXR: "N", "Albedo", …
 
-    accept_changed: take an EXR of covary, too, that another program changed, so that it does not fit its checksums.
+    accept_changed: accept an EXR of covary that another program changed, so that its checksums do not match.
     """
     image: FloatArray = _covary.read_image(fspath(path), layer, accept_changed)
     return image
@@ -27,7 +27,7 @@ def read_image(path: str | PathLike[str], layer: str = "", *, accept_changed: bo
 
 @checked(path=path, image=array, attributes=optional(attribute_texts))
 def write_image(path: str | PathLike[str], image: Any, attributes: dict[str, str] | None = None) -> None:
-    """Writes linear RGB [H, W, 3] in the format that the name tells: .exr .pfm .tif .hdr .png .jpg. Raises UsageError
+    """Writes linear RGB [H, W, 3] in the format of the extension: .exr .pfm .tif .hdr .png .jpg. Raises UsageError
     for other names."""
     _covary.write_image(fspath(path), image, attributes or {})
 
@@ -45,7 +45,7 @@ def read_groups(paths: str | PathLike[str] | Iterable[str | PathLike[str]], laye
 
 @checked(image=array, albedo=array, normal=array, library=empty_or(path))
 def denoise(image: Any, albedo: Any = None, normal: Any = None, *, library: str | PathLike[str] = "") -> FloatArray:
-    """The image [H, W, 3] by Open Image Denoise, where it is installed (`pip install pyoidn`). Biased.
+    """Denoises the image [H, W, 3] with Open Image Denoise, if installed (`pip install pyoidn`). Biased.
 
     albedo, normal: guides [H, W, 3], the normal only together with the albedo.
     library: its file or folder, as `covary denoise --oidn` takes it.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Options of estimators as the registry takes them: text by name, each of the type that the registry says."""
+"""Options of estimators in the registry's form: text by name, each of the type that the registry declares."""
 from __future__ import annotations
 
 import functools
@@ -20,13 +20,13 @@ def _registry() -> dict[str, dict[str, Any]]:
 
 
 def passes_of(estimator: str) -> str | None:
-    """"pair", "samples" or "any"; None where there is no such estimator."""
+    """"pair", "samples" or "any"; None if there is no such estimator."""
     return _registry()[estimator]["passes"] if estimator in _registry() else None
 
 
 @functools.cache
 def _options_of(estimator: str) -> dict[str, dict[str, Any]]:
-    """Of the registry, by each of their names."""
+    """The registry's options, by each of their names."""
     return {name: option for option in _registry().get(estimator, {}).get("options", ())
             for name in (option["name"], *option["aliases"])}
 
@@ -42,7 +42,7 @@ def underscored(name: str) -> str:
 
 
 def declared_rules(options: Iterable[dict[str, Any]]) -> dict[str, Rule]:
-    """Of declared options as keywords."""
+    """Rules of declared options as keywords."""
     def rule_of(option: dict[str, Any]) -> Rule:
         if option["type"] == "flag":
             return flag
@@ -72,7 +72,7 @@ _SEPARATORS = {"resolution": "x", "split": ":"}
 
 
 def option_texts(values: Mapping[str, Any]) -> dict[str, str]:
-    """Values of options of rendering as the command line has them; None and False are left out."""
+    """Values of rendering options in the command line's form; None and False are left out."""
     def text_of(name: str, value: Any) -> str:
         if isinstance(value, tuple):
             return _SEPARATORS.get(name, ",").join(map(repr, value))
@@ -89,7 +89,7 @@ def _of_passes() -> frozenset[str]:
 
 
 def check_no_passes(names: Iterable[str], reason: str) -> None:
-    """Raises UsageError for keywords that say how passes share their samples among pixels."""
+    """Raises UsageError for keywords that distribute samples among pixels."""
     found = _of_passes().intersection(name.replace("_", "-") for name in names)
     if found:
         name = min(found).replace("-", "_")

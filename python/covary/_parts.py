@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finished parts of a render on a cluster, in a folder: a render that begins again with the same settings takes what is
-there. A part is a folder that appears under its name only when it is complete, and belongs to the settings whose hash
-names the folder around it."""
+"""Finished parts of a render on a cluster, in a folder: a restarted render with the same settings uses them. A part is
+a folder that appears under its name only when complete; the hash of its settings names the folder around it."""
 from __future__ import annotations
 
 import hashlib
@@ -28,7 +27,7 @@ _FACTS = "part.json"
 
 @dataclass(frozen=True)
 class Part:
-    """A tile of the frame and a seed: what a worker renders follows from it alone."""
+    """A tile of the frame and a seed, which determine what a worker renders."""
 
     crop: tuple[int, int, int, int]
     seed: int
@@ -42,8 +41,8 @@ class Part:
 
 @dataclass(frozen=True)
 class Rendered:
-    """Of a part: the films of its passes, the images that guide a denoiser where one is wanted, and the samples that
-    count as black."""
+    """The result of a part: the films of its passes, the guides if a denoiser needs them, and the samples that count as
+    black."""
 
     films: dict[str, Film]
     aovs: dict[str, FloatArray] = field(default_factory=dict)
@@ -54,7 +53,7 @@ class Rendered:
 
 
 class PartFolder:
-    """The parts of one render. `settings`: all that decides on their pixels beside tile and seed."""
+    """The parts of one render. `settings`: everything that determines their pixels besides tile and seed."""
 
     def __init__(self, folder: str, settings: Mapping[str, Any]) -> None:
         facts = json.dumps({**settings, "version": _covary.version, "format": _FORMAT}, sort_keys=True, default=str)
@@ -73,7 +72,7 @@ class PartFolder:
         Path(file.name).rename(path)
 
     def keep(self, part: Part, rendered: Rendered) -> None:
-        """Raises IoError where the disk does not take it."""
+        """Raises IoError if it cannot be written."""
         place = self.path / part.name
         made = Path(tempfile.mkdtemp(dir=self.path, prefix=".part-"))
         try:
@@ -96,7 +95,7 @@ class PartFolder:
             shutil.rmtree(made, ignore_errors=True)
 
     def load(self, part: Part) -> Rendered | None:
-        """The part; None where it is not there, or is damaged, so that it is to be rendered again."""
+        """The part; None if it is missing or damaged, and must be rendered again."""
         place = self.path / part.name
         try:
             facts = json.loads((place / _FACTS).read_text())

@@ -11,7 +11,7 @@ from .errors import Error
 
 
 def program() -> Path:
-    """Path of the program: that of COVARY_PROGRAM where it is set, the package's own, or one on the search path."""
+    """Path of the program: COVARY_PROGRAM if set, or else the package's own, or one on the search path."""
     named = os.environ.get("COVARY_PROGRAM")
     own = Path(__file__).parent / "bin" / "covary"
     found = named or (str(own) if own.exists() else shutil.which("covary"))
@@ -22,5 +22,5 @@ def program() -> Path:
 
 
 def run_program(*words: str | os.PathLike[str]) -> tuple[int, str, str]:
-    """Exit code, standard output and error of the program, which ends with this process, however that ends."""
+    """Exit code, standard output and error of the program, which is ended if this process ends in any way."""
     return _covary.run_program([str(program()), *(os.fspath(word) for word in words)])

@@ -115,7 +115,7 @@ SPP = whole(1, _covary.most_samples)
 
 
 def _check_together(estimator: str | None, given: Mapping[str, Any]) -> None:
-    """Raises UsageError for arguments that have no effect beside, or without, others."""
+    """Raises UsageError for arguments that have no effect in this combination."""
     def needs(names: tuple[str, ...], others: tuple[str, ...], what: str) -> None:
         for name in names:
             if given[name] and not any(given[other] is not None for other in others):
@@ -224,7 +224,7 @@ render.__doc__ = (render.__doc__ or "").replace("{declared}", "".join(
 
 
 def report_bad_samples(made: dict[str, Any], depth: int = 4) -> None:
-    """Warns of them, `depth` calls up, where the caller's line is; puts the text into the result's warnings, too."""
+    """Warns about them at the caller's line, `depth` calls up, and adds the text to the result's warnings."""
     report = text_of_bad_samples(made["not_finite_samples"], made["negative_samples"], made["bad_samples"])
     if report:
         made["warnings"] = [*made["warnings"], report]
@@ -232,7 +232,7 @@ def report_bad_samples(made: dict[str, Any], depth: int = 4) -> None:
 
 
 def _bad_sample(scene: Scene, bad: dict[str, Any]) -> BadSample:
-    """With the command that replays it: what chose the scene and the numbers, with the sample in place of outputs."""
+    """The sample with the command that replays it: the options of the scene and its random numbers, without outputs."""
     defines = [word for name, value in scene._loading["defines"].items() for word in ("-D", f"{name}={value}")]
     replay = shlex.join(["covary", "render", scene.path, *defines, *bad["replay"]])
     return BadSample(**{**bad, "replay": replay})

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What combine() and render() return."""
+"""The results of combine() and render()."""
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
@@ -22,7 +22,7 @@ class Result:
 
     #: Linear Rec. 709, [H, W, 3].
     image: FloatArray = field(repr=False)
-    #: Estimated standard error of each value, [H, W, 3]; None where the estimator does not tell, or was not asked.
+    #: Estimated standard error of each value, [H, W, 3]; None if the estimator has none, or was not asked.
     std_error: FloatArray | None = field(repr=False)
     #: Estimated bias of each value where it is significant, positive where too bright, zero elsewhere, [H, W, 3]; None
     #: where it is not known.
@@ -49,7 +49,7 @@ class Result:
 
     @checked(path=path)
     def save(self, path: str | PathLike[str]) -> None:
-        """Writes the image in the format that the name tells: .exr .pfm .tif .hdr .png .jpg."""
+        """Writes the image in the format of the extension: .exr .pfm .tif .hdr .png .jpg."""
         attributes = {"covary:estimator": self.estimator}
         if self.samples_per_pixel is not None:
             attributes["covary:samples"] = f"{self.samples_per_pixel:g}"
@@ -62,13 +62,13 @@ class Result:
 
 
 def fields_of(result: Result) -> dict[str, Any]:
-    """Those of Result alone, by name: what results with more of them begin with."""
+    """The fields of Result itself, by name, for derived results."""
     return {each.name: getattr(result, each.name) for each in fields(Result)}
 
 
 @dataclass(frozen=True)
 class BadSample:
-    """A sample whose value is not finite, or negative where none may be. It counts as black."""
+    """A sample whose value is not finite, or negative although it must not be. It counts as black."""
 
     #: Name of its film in the result's `films`.
     film: str
@@ -89,7 +89,7 @@ class BadSample:
 
 
 def text_of_bad_samples(not_finite: int, negative: int, samples: list[BadSample]) -> str:
-    """As the program reports them; "" where there are none."""
+    """The program's report about them; "" if there are none."""
     if not samples:
         return ""
     lines = [f"{not_finite} samples were not finite and {negative} negative; they count as black. The first:"]
@@ -98,7 +98,7 @@ def text_of_bad_samples(not_finite: int, negative: int, samples: list[BadSample]
 
 @dataclass(frozen=True)
 class RenderResult(Result):
-    """What has become of a render."""
+    """The result of a render."""
 
     #: Films of the passes by name: "crn", "independent", …
     films: dict[str, _covary.Film] = field(repr=False)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class BlenderResult(Result):
-    """What has become of render()."""
+    """The result of render()."""
 
     #: "crn" and "independent", for other estimators.
     films: dict[str, Film] = field(repr=False)

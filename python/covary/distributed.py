@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rendering on a cluster by Dask (`pip install distributed`): tiles and ranges of samples on workers, which may come,
-go and die.
+"""Rendering on a Dask cluster (`pip install distributed`): tiles and ranges of samples on workers, which may join,
+leave and crash.
 
-A part is a tile of the frame and a seed. What a worker renders follows from the part alone, so a part that is lost with
-its worker is rendered again with the same bits, on any other, and each part enters the film once. Tiles are put
-together to the film of one machine in every bit; films of several seeds are merged as merge_films() does it. With a
-folder, parts are on the disk as soon as they are here, and a render that begins again takes them."""
+A part is a tile of the frame and a seed. It alone determines what a worker renders, so a part that is lost with its
+worker is rendered again by any other with the same bits, and each part enters the film once. The tiles make up the same
+film as on one machine, bit for bit; films of several seeds are merged by merge_films(). With a folder, parts are saved
+as they arrive, and a restarted render uses them."""
 from __future__ import annotations
 
 import os
@@ -48,7 +48,7 @@ _SETTINGS = ("filter", "sampling", "sampler", "groups", "split")
 
 @dataclass(frozen=True)
 class _Job:
-    """What all parts have in common."""
+    """What all parts share."""
 
     scene_folder: str
     file: str
@@ -61,7 +61,7 @@ _scenes: dict[tuple[str, str], Scene] = {}
 
 
 def _render_part(job: _Job, part: Part) -> Rendered | Error:
-    """On a worker: what a part leaves behind, or what is wrong with all parts, so that Dask does not try again."""
+    """Runs on a worker; returns a part's result, or an error that all parts share, so that Dask does not retry."""
     from distributed import get_worker  # type: ignore[import-not-found,import-untyped,unused-ignore]
 
     folder = Path(get_worker().local_directory) / job.scene_folder
@@ -88,7 +88,7 @@ def _tiles(width: int, height: int, side: int) -> Iterator[tuple[int, int, int, 
 
 
 def _first_of_each_film(samples: list[BadSample]) -> list[BadSample]:
-    """The first few by pixel and sample, as many as a render of the whole frame tells."""
+    """The first few by pixel and sample, as many as a render of the whole frame reports."""
     kept: dict[str, list[BadSample]] = {}
     for bad in sorted(samples, key=lambda bad: (bad.y, bad.x, bad.sample)):
         of_film = kept.setdefault(bad.film, [])
@@ -98,7 +98,7 @@ def _first_of_each_film(samples: list[BadSample]) -> list[BadSample]:
 
 
 class _Canvas:
-    """Films of the whole frame in the making, one for each pass and seed."""
+    """Unfinished films of the whole frame, one for each pass and seed."""
 
     def __init__(self, width: int, height: int) -> None:
         self.width, self.height = width, height
@@ -142,7 +142,7 @@ class _Canvas:
         return {name: merge_films(films) if len(films) > 1 else films[0] for name, films in made.items()}
 
     def image(self) -> FloatArray:
-        """The mean of all samples so far, black where there are none."""
+        """The mean of all samples so far, black without samples."""
         import numpy
 
         total = numpy.zeros((self.height, self.width, 3))
@@ -155,7 +155,7 @@ class _Canvas:
 
 @dataclass(frozen=True)
 class ClusterResult(Result):
-    """What has become of render()."""
+    """The result of render()."""
 
     films: dict[str, Film] = field(repr=False)
     #: Of the frame, and how many of them were in the folder already.
@@ -171,7 +171,7 @@ class ClusterResult(Result):
 
 @dataclass(frozen=True)
 class _Plan:
-    """A render that was checked: what workers do and what becomes of it."""
+    """A checked render: what workers do, and what is made of it."""
 
     scene: Scene
     estimator: str | None
@@ -182,7 +182,7 @@ class _Plan:
 
 def _plan(scene: Scene, spp: int, estimator: str | None, seed: int, sample_ranges: int, tile: int,
           settings: Mapping[str, Any], options: Mapping[str, Any]) -> _Plan:
-    """Raises all that would be wrong with any part, and with the estimate after the last, before one is rendered."""
+    """Raises every error that any part, or the estimate at the end, would cause, before rendering."""
     if estimator is not None and estimator not in _ESTIMATORS:
         raise UsageError(f"estimator '{estimator}' looks at other pixels or samples while it renders; on a cluster "
                          f"expected one of {', '.join(_ESTIMATORS)}")
@@ -201,8 +201,8 @@ def _plan(scene: Scene, spp: int, estimator: str | None, seed: int, sample_range
     if estimator in (None, "none"):
         check_some(render_here, options)
         if unknown := set(options) - set(_OF_ONE_PASS):
-            raise UsageError(f"{min(unknown)}: is not an argument of estimator {estimator or 'none'!r}; expected one of "
-                             f"{', '.join(_OF_ONE_PASS)}")
+            raise UsageError(f"{min(unknown)}: is not an argument of estimator {estimator or 'none'!r}; expected "
+                             f"one of {', '.join(_OF_ONE_PASS)}")
     else:
         check_options(estimator, options)
     of_combine = {"force", "std_error"}
@@ -227,8 +227,8 @@ def render(client: Any, scene: Scene | str | os.PathLike[str], spp: int, estimat
     """Renders on the workers of a dask.distributed.Client.
 
     spp: samples per pixel of all passes and ranges together.
-    estimator: as covary.render() has it; by default the mean of independent samples, denoised images mixed into it.
-    sample_ranges: into how many seeds, `seed` and those that follow, the samples are divided; their films are merged.
+    estimator: as in covary.render(); by default the mean of independent samples, mixed with denoised images.
+    sample_ranges: number of seeds, from `seed` on, among which the samples are divided; their films are merged.
         With 1 the result has the bits of `covary.render(scene, spp, estimator, seed=seed)`, with more those of
         merge_films() of such renders, for any number of workers and whatever becomes of them.
     tile: side of the tiles that are parts, in pixels.

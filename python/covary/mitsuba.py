@@ -33,7 +33,7 @@ _defined: dict[str, None] = {}
 
 @dataclass(frozen=True)
 class MitsubaResult(Result):
-    """What has become of render()."""
+    """The result of render()."""
 
     #: "crn" and "independent", for other estimators: `covary.combine(films["crn"], films["independent"], …)`.
     films: dict[str, Film] = field(repr=False)
