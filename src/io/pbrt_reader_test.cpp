@@ -314,7 +314,7 @@ Translate 3 0 0 Shape "sphere")");
     EXPECT_NEAR(hit.p.z, heights[i], 1e-3f);
   }
   write("ball.pbrt", "Include \"ball.pbrt\"\n");
-  EXPECT_TRUE(contains(errors(kPbrtHead + "Include \"ball.pbrt\"\n"), "more than 15 files inside of each other"));
+  EXPECT_TRUE(contains(errors(kPbrtHead + "Include \"ball.pbrt\"\n"), "more than 15 files inside each other"));
 }
 
 TEST_F(Pbrt, OrthographicCamerasSeeTheShorterSide) {

@@ -125,7 +125,7 @@ class Probe(CliTest):
         for option in (("--spp", "8"), ("--time", "1"), ("--until", "relmse=1"), ("--estimator", "none"), ("--aovs",),
                        ("--sampler", "sobol"), ("--denoise", "error"), ("--passes", "x"), ("--k", "7"), ("--resume",),
                        ("--json", "-"), ("--replay", "1,2,3"), ("--oidn", "off"), ("--checkpoint", "4")):
-            self.bad(2, option[0] + " has no effect on a probe", *self.PROBE, "--pixel", "4,4", *option)
+            self.bad(2, option[0] + " has no effect on probes", *self.PROBE, "--pixel", "4,4", *option)
             self.assertNotIn(option[0] + " ", listed)
             self.assertNotIn(f"'probe {option[0]}'", completed)
         self.assertIn("'probe --seed'", completed)

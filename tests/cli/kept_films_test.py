@@ -129,7 +129,7 @@ class EarlierFilms(FilmsTest):
         for more in ((), ("--overwrite",), ("--resume",)):
             self.bad(1, "'out.passes/crn.exr' is ", *RENDER, *more)
             self.assertEqual(self.tree(), before)
-        self.bad(1, "is a link, which films are not written through", *RENDER, "--overwrite")
+        self.bad(1, "is a symbolic link; films are not written through links", *RENDER, "--overwrite")
 
 
 class Checkpoints(FilmsTest):

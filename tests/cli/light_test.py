@@ -118,7 +118,7 @@ class Render(LightTest):
         start, end = text.index('  <shape type="disk">'), text.index('  <shape type="rectangle"> <!-- floor')
         lamp = '<emitter type="point"><point name="position" x="1.3" y="2" z="0.3"/></emitter>'
         self.write("point.xml", (text[:start] + lamp + text[end:]).encode())
-        lacks = "without light tracing the image lacks what mirrors and glass cast"
+        lacks = "without light tracing the image lacks visible caustics"
         render = ("render", "point.xml", *SMALL, "-o", "a.exr", *IICV, "--spp", "24")
         self.assertIn(lacks, self.good(*render).stderr)
         self.assertNotIn(lacks, self.good(*render, "--light-tracing", "on").stderr)

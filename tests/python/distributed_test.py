@@ -326,7 +326,8 @@ class Cluster(PackageTest):
             for keywords, text in (({"windo": 3}, "did you mean 'window'?"), ({"k": 0.5}, "k: found 0.5"),
                                    ({"settings": {"groups": 2}}, "2 groups are too few"),
                                    ({"denoise": "error", "oidn": "/nowhere"}, "/nowhere"),
-                                   ({"settings": {"output": "x.exr"}}, "settings: found 'output'; expected one of filter"),
+                                   ({"settings": {"output": "x.exr"}},
+                                    "settings: found 'output'; expected one of filter"),
                                    ({"settings": {"sampling": "crn"}}, "sampling: found 'crn' with estimator 'iicv'"),
                                    ({"window": 4}, "window is 4")):
                 self.assertIn(text, self.message_of(covary.UsageError, covary.distributed.render, self.client,
