@@ -7,9 +7,11 @@
 
 namespace covary {
 
-ObjectBuilder make_object(const std::string& kind, const std::string& type, const SourceLocation& where) {
+ObjectBuilder make_object(const std::string& kind, const std::string& type, const SourceLocation& where,
+                          std::initializer_list<std::pair<std::string, Value>> properties) {
   auto object = std::make_shared<ObjectDescription>();
   object->kind = kind, object->type = type, object->where = where;
+  for (const auto& [name, value] : properties) set_property(*object, name, value);
   return object;
 }
 

@@ -2,9 +2,11 @@
 // Descriptions of objects in the making, by the readers of formats that are not XML.
 #pragma once
 
+#include <initializer_list>
 #include <memory>
 #include <string>
 #include <unordered_set>
+#include <utility>
 #include <vector>
 
 #include "scene/parameters.h"
@@ -12,7 +14,8 @@
 namespace covary {
 
 using ObjectBuilder = std::shared_ptr<ObjectDescription>;
-ObjectBuilder make_object(const std::string& kind, const std::string& type, const SourceLocation& where);
+ObjectBuilder make_object(const std::string& kind, const std::string& type, const SourceLocation& where,
+                          std::initializer_list<std::pair<std::string, Value>> properties = {});
 /// Transformations are kept as their 16 numbers say, which is all that a file can hold: its inverse is that of them.
 void set_property(ObjectDescription& object, const std::string& name, Value value);
 

@@ -100,9 +100,7 @@ ObjectBuilder make_pbrt_curve(PbrtParameters& p, const PbrtPlacement& placement)
   }
   for (size_t i = 0; !bezier && i < n; ++i) text.add(point(i), radius(static_cast<double>(i) - 1));
   if (!bezier) text.end();
-  auto shape = make_object("shape", "bsplinecurve", p.where());
-  set_property(*shape, std::string(kEmbeddedData), text.text);
-  return shape;
+  return make_object("shape", "bsplinecurve", p.where(), {{std::string(kEmbeddedData), text.text}});
 }
 
 bool join_pbrt_curves(ObjectDescription& first, const ObjectDescription& more) {

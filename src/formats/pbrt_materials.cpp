@@ -12,9 +12,7 @@ namespace {
 
 /// pbrt's surfaces look the same from both sides.
 ObjectBuilder two_sided(const ObjectBuilder& model) {
-  auto sides = make_object("bsdf", "twosided", model->where);
-  set_property(*sides, "", ObjectPtr(model));
-  return sides;
+  return make_object("bsdf", "twosided", model->where, {{"", ObjectPtr(model)}});
 }
 
 /// Width of the distribution of normals along u and v.
@@ -226,8 +224,7 @@ ObjectBuilder base_material(const std::string& type, PbrtParameters& p, const Pb
   if (type == "hair") return hair(p, names);
   if (type == "mix") return mix(p, names);
   if (type == "measured") {
-    auto model = make_object("bsdf", "measured", p.where());
-    set_property(*model, "filename", p.get_string("filename", ""));
+    auto model = make_object("bsdf", "measured", p.where(), {{"filename", p.get_string("filename", "")}});
     return two_sided(model);
   }
   p.error(
@@ -241,22 +238,16 @@ ObjectBuilder base_material(const std::string& type, PbrtParameters& p, const Pb
 ObjectBuilder make_pbrt_material(const std::string& type, PbrtParameters& p, const PbrtNames& names) {
   ObjectBuilder model = base_material(type, p, names);
   if (const std::string file = p.get_string("normalmap", ""); !file.empty() && model) {
-    auto map = make_object("texture", "bitmap", p.where());
-    set_property(*map, "filename", file);
-    set_property(*map, "raw", true);
-    set_property(*map, "to_uv", Transform::translate({0, 1, 0}) * Transform::scale({1, -1, 1}));
-    auto mapped = make_object("bsdf", "normalmap", p.where());
-    set_property(*mapped, "normalmap", ObjectPtr(map));
-    set_property(*mapped, "", ObjectPtr(model));
+    auto map = make_object(
+        "texture", "bitmap", p.where(),
+        {{"filename", file}, {"raw", true}, {"to_uv", Transform::translate({0, 1, 0}) * Transform::scale({1, -1, 1})}});
+    auto mapped = make_object("bsdf", "normalmap", p.where(), {{"normalmap", ObjectPtr(map)}, {"", ObjectPtr(model)}});
     model = mapped;
   }
   if (!p.has("displacement") || !model) return model;
   const auto displacement = float_value(p, "displacement", 0, names);
   if (!displacement || !std::holds_alternative<ObjectPtr>(*displacement)) return model;
-  auto bumps = make_object("bsdf", "bumpmap", p.where());
-  set_property(*bumps, "", *displacement);
-  set_property(*bumps, "", ObjectPtr(model));
-  return bumps;
+  return make_object("bsdf", "bumpmap", p.where(), {{"", *displacement}, {"", ObjectPtr(model)}});
 }
 
 }  // namespace covary

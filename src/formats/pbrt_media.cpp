@@ -37,10 +37,10 @@ ObjectBuilder make_pbrt_medium(const std::string& type, PbrtParameters& p) {
   // Mitsuba takes no colour above 1 for an extinction.
   const float unit = std::max(max_component(extinction), 1.0f);
   extinction = extinction / unit;
-  auto medium = make_object("medium", "homogeneous", p.where());
-  set_property(*medium, "sigma_t", ColourValue{extinction});
-  set_property(*medium, "albedo", ColourValue{albedo});
-  set_property(*medium, "scale", p.get_float("scale", 1) * unit);
+  auto medium = make_object("medium", "homogeneous", p.where(),
+                            {{"sigma_t", ColourValue{extinction}},
+                             {"albedo", ColourValue{albedo}},
+                             {"scale", p.get_float("scale", 1) * unit}});
   const double g = p.get_float("g", 0);
   auto phase = make_object("phase", g == 0 ? "isotropic" : "hg", p.where());
   if (g != 0) set_property(*phase, "g", g);

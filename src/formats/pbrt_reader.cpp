@@ -265,9 +265,7 @@ class Reader {
     ObjectPtr material = state_.material;
     if (!material && !state_.material_failed) material = default_material();
     if (const auto* number = std::get_if<double>(&*alpha); material && (!number || *number < 1)) {
-      auto mask = make_object("bsdf", "mask", p.where());
-      set_property(*mask, "opacity", *alpha);
-      set_property(*mask, "", material);
+      auto mask = make_object("bsdf", "mask", p.where(), {{"opacity", *alpha}, {"", material}});
       material = mask;
     }
     if (material) set_property(*shape, "", material);
@@ -288,8 +286,8 @@ class Reader {
   /// pbrt's: diffuse, of reflectance 0.5.
   ObjectPtr default_material() {
     if (default_material_) return default_material_;
-    auto sides = make_object("bsdf", "twosided", scene_->where);
-    set_property(*sides, "", ObjectPtr(make_object("bsdf", "diffuse", scene_->where)));
+    auto sides = make_object("bsdf", "twosided", scene_->where,
+                             {{"", ObjectPtr(make_object("bsdf", "diffuse", scene_->where))}});
     return default_material_ = sides;
   }
 
@@ -304,9 +302,8 @@ class Reader {
       return;
     }
     if (!found->second) return;
-    auto instance = make_object("shape", "instance", where_);
-    set_property(*instance, "to_world", state_.placement.to_world);
-    set_property(*instance, "", ObjectPtr(found->second));
+    auto instance = make_object("shape", "instance", where_,
+                                {{"to_world", state_.placement.to_world}, {"", ObjectPtr(found->second)}});
     add(instance);
   }
 

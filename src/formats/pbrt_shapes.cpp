@@ -13,8 +13,7 @@ namespace {
 
 ObjectBuilder shape(const std::string& type, PbrtParameters& p, const PbrtPlacement& placement,
                     const Transform& own = Transform()) {
-  auto result = make_object("shape", type, p.where());
-  set_property(*result, "to_world", placement.to_world * own);
+  auto result = make_object("shape", type, p.where(), {{"to_world", placement.to_world * own}});
   if (placement.reverse_orientation) set_property(*result, "flip_normals", true);
   return result;
 }

@@ -58,8 +58,7 @@ Transform texture_mapping(PbrtParameters& p, const Transform& more) {
 }
 
 ObjectBuilder image_texture(PbrtParameters& p) {
-  auto bitmap = make_object("texture", "bitmap", p.where());
-  set_property(*bitmap, "filename", p.get_string("filename", ""));
+  auto bitmap = make_object("texture", "bitmap", p.where(), {{"filename", p.get_string("filename", "")}});
   // pbrt's v = 0 is the lower edge of the picture.
   const Transform flip = Transform::translate({0, 1, 0}) * Transform::scale({1, -1, 1});
   set_property(*bitmap, "to_uv", texture_mapping(p, flip));
@@ -77,10 +76,7 @@ ObjectBuilder image_texture(PbrtParameters& p) {
   if (p.get_bool("invert", false)) p.error("is inverted, which is not supported");
   const double scale = p.get_float("scale", 1);
   if (scale == 1) return bitmap;
-  auto scaled = make_object("texture", "scale", p.where());
-  set_property(*scaled, "scale", scale);
-  set_property(*scaled, "", ObjectPtr(bitmap));
-  return scaled;
+  return make_object("texture", "scale", p.where(), {{"scale", scale}, {"", ObjectPtr(bitmap)}});
 }
 
 /// A texture parameter of a texture: a number, a colour or another texture.
@@ -111,13 +107,11 @@ ObjectBuilder scaled_texture(PbrtParameters& p, bool of_numbers, const PbrtNames
     p.error("scales by a texture; supported: a number");
     return nullptr;
   }
-  auto scaled = make_object("texture", "scale", p.where());
-  set_property(*scaled, "scale", *factor);
+  auto scaled = make_object("texture", "scale", p.where(), {{"scale", *factor}});
   if (std::holds_alternative<ObjectPtr>(*texture)) {
     set_property(*scaled, "", *texture);
   } else {
-    auto constant = make_object("texture", "uniform", p.where());
-    set_property(*constant, "value", *texture);
+    auto constant = make_object("texture", "uniform", p.where(), {{"value", *texture}});
     set_property(*scaled, "", ObjectPtr(constant));
   }
   return scaled;

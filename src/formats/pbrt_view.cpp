@@ -32,10 +32,9 @@ ObjectPtr spot(PbrtParameters& p, const Transform& to_world) {
   const double cone = p.get_float("coneangle", 30), edge = p.get_float("conedeltaangle", 5);
   const Aim aim = read_aim(p);
   refuse(p, {"power"});
-  auto light = make_object("emitter", "spot", p.where());
-  set_property(*light, "intensity", scaled_colour(p, "I"));
-  set_property(*light, "cutoff_angle", cone);
-  set_property(*light, "beam_width", std::max(cone - edge, 0.0));
+  auto light = make_object(
+      "emitter", "spot", p.where(),
+      {{"intensity", scaled_colour(p, "I")}, {"cutoff_angle", cone}, {"beam_width", std::max(cone - edge, 0.0)}});
   const Vec3 z = aim.to - aim.from, up = std::abs(z.x) > std::abs(z.y) ? Vec3{0, 1, 0} : Vec3{1, 0, 0};
   try {
     set_property(*light, "to_world", to_world * Transform::look_at(aim.from, aim.to, up));
@@ -51,16 +50,13 @@ ObjectPtr infinite(PbrtParameters& p, const Transform& to_world) {
   refuse(p, {"portal", "illuminance"});
   if (const PbrtParameter* file = p.find("filename")) {
     if (p.has("L")) p.error_at(*file, "is given with 'L'; only one of them is allowed");
-    auto map = make_object("emitter", "envmap", p.where());
-    set_property(*map, "filename", p.get_string("filename", ""));
-    set_property(*map, "mapping", std::string("equal_area"));
-    set_property(*map, "scale", p.get_float("scale", 1));
-    set_property(*map, "to_world", to_world);
-    return map;
+    return make_object("emitter", "envmap", p.where(),
+                       {{"filename", p.get_string("filename", "")},
+                        {"mapping", std::string("equal_area")},
+                        {"scale", p.get_float("scale", 1)},
+                        {"to_world", to_world}});
   }
-  auto light = make_object("emitter", "constant", p.where());
-  set_property(*light, "radiance", scaled_colour(p, "L"));
-  return light;
+  return make_object("emitter", "constant", p.where(), {{"radiance", scaled_colour(p, "L")}});
 }
 
 }  // namespace
@@ -68,18 +64,15 @@ ObjectPtr infinite(PbrtParameters& p, const Transform& to_world) {
 ObjectPtr make_pbrt_light(const std::string& type, PbrtParameters& p, const Transform& to_world) {
   if (type == "point") {
     refuse(p, {"power"});
-    auto light = make_object("emitter", "point", p.where());
-    set_property(*light, "intensity", scaled_colour(p, "I"));
-    set_property(*light, "position", to_world.point(p.get_vec3("from", {0, 0, 0})));
-    return light;
+    return make_object(
+        "emitter", "point", p.where(),
+        {{"intensity", scaled_colour(p, "I")}, {"position", to_world.point(p.get_vec3("from", {0, 0, 0}))}});
   }
   if (type == "distant") {
     refuse(p, {"illuminance"});
     const Aim aim = read_aim(p);
-    auto light = make_object("emitter", "directional", p.where());
-    set_property(*light, "irradiance", scaled_colour(p, "L"));
-    set_property(*light, "direction", to_world.vector(aim.to - aim.from));
-    return light;
+    return make_object("emitter", "directional", p.where(),
+                       {{"irradiance", scaled_colour(p, "L")}, {"direction", to_world.vector(aim.to - aim.from)}});
   }
   if (type == "spot") return spot(p, to_world);
   if (type == "infinite") return infinite(p, to_world);
@@ -97,9 +90,7 @@ ObjectPtr make_pbrt_area_light(const std::string& type, PbrtParameters& p) {
   }
   refuse(p, {"power", "filename"});
   if (p.get_bool("twosided", false)) p.error("shines on both sides, which is not supported");
-  auto light = make_object("emitter", "area", p.where());
-  set_property(*light, "radiance", scaled_colour(p, "L"));
-  return light;
+  return make_object("emitter", "area", p.where(), {{"radiance", scaled_colour(p, "L")}});
 }
 
 void read_pbrt_camera(const std::string& type, PbrtParameters& p, const Transform& world_to_camera, PbrtView& view) {

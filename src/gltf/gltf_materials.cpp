@@ -96,8 +96,7 @@ ObjectPtr GltfMaterials::make(const tinygltf::Material& m) {
   const bool solid_glass = std::any_of(model->properties.begin(), model->properties.end(),
                                        [](const Property& p) { return p.name == "spec_trans"; });
   if (!thin && !solid_glass) {  // both sides are seen
-    auto sides = make_object("bsdf", "twosided", file_.where());
-    set_property(*sides, "", with_normals(m, model));
+    auto sides = make_object("bsdf", "twosided", file_.where(), {{"", with_normals(m, model)}});
     model = sides;
   }
   const ObjectPtr whole = thin || solid_glass ? with_normals(m, model) : ObjectPtr(model);
@@ -112,10 +111,7 @@ ObjectPtr GltfMaterials::with_normals(const tinygltf::Material& m, ObjectPtr mod
     file_.warn(fmt::format("the normals of material '{}' are taken as they are, without their scale", m.name));
   const ObjectPtr map = textures_->make(m.normalTexture.index, m.normalTexture.extensions, {GltfUse::kVector});
   if (!map) return model;
-  auto mapped = make_object("bsdf", "normalmap", file_.where());
-  set_property(*mapped, "normalmap", map);
-  set_property(*mapped, "", std::move(model));
-  return mapped;
+  return make_object("bsdf", "normalmap", file_.where(), {{"normalmap", map}, {"", std::move(model)}});
 }
 
 ObjectPtr GltfMaterials::with_opacity(const tinygltf::Material& m, ObjectPtr model) {

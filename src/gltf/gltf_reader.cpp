@@ -70,8 +70,7 @@ class Reader {
     if (!sensor_) look_at_everything();
     if (!has_light_) {
       file_.warn("the file has no light: it is lit from all sides");
-      auto sky = make_object("emitter", "constant", file_.where());
-      set_property(*sky, "radiance", 1.0);
+      auto sky = make_object("emitter", "constant", file_.where(), {{"radiance", 1.0}});
       add(sky);
     }
     add(sensor_);
@@ -204,9 +203,7 @@ class Reader {
       if (group.shapes) add(group.shapes);
     }
     if (!group.shapes) return;
-    auto instance = make_object("shape", "instance", file_.where());
-    set_property(*instance, "to_world", to_world);
-    set_property(*instance, "", group.shapes);
+    auto instance = make_object("shape", "instance", file_.where(), {{"to_world", to_world}, {"", group.shapes}});
     extend(group.bounds);
     add(instance);
   }
@@ -218,12 +215,8 @@ class Reader {
     const double width = std::round(static_cast<double>(kHeight) * aspect);
     set_property(*film, "width", static_cast<int64_t>(std::clamp(width, 1.0, static_cast<double>(kMostWidth))));
     set_property(*film, "height", kHeight);
-    auto sampler = make_object("sampler", "independent", file_.where());
-    set_property(*sampler, "sample_count", kSamples);
-    auto sensor = make_object("sensor", type, file_.where());
-    set_property(*sensor, "", ObjectPtr(film));
-    set_property(*sensor, "", ObjectPtr(sampler));
-    return sensor;
+    auto sampler = make_object("sampler", "independent", file_.where(), {{"sample_count", kSamples}});
+    return make_object("sensor", type, file_.where(), {{"", ObjectPtr(film)}, {"", ObjectPtr(sampler)}});
   }
 
   void place_camera(int index, const Transform& to_world) {
