@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// covary combine: image-space control variates for images made by any renderer.
+// covary combine: image-space control variates for images of any renderer.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <tbb/global_control.h>
@@ -61,7 +61,7 @@ void write(const CombineOptions& o, const CombineRequest& request, CombinedImage
                                                    {"covary:command", command_line()}};
   const double crn = request.crn ? request.crn->samples : 0, independent = request.independent.samples;
   if ((crn > 0 || !request.crn) && independent > 0) attributes["covary:samples"] = fmt::to_string(crn + independent);
-  if (!o.error) combined.image.std_error = {}, combined.image.bias = {};  // asked for by --json alone
+  if (!o.error) combined.image.std_error = {}, combined.image.bias = {};  // only requested by --json
   write_result(o.output, request.independent.origin.place, attributes, combined.image, combined.layers);
 }
 
@@ -79,7 +79,7 @@ void check_explain(const CombineOptions& o, const Estimator& estimator, const Gr
                             o.explain->y, window.width, window.height, window.x, window.y));
 }
 
-/// What one pixel is made of: f, and for each control variate its place, coefficients, CRN mean and independent mean.
+/// The parts of one pixel: f, and for each control variate its place, coefficients, CRN mean and independent mean.
 nlohmann::ordered_json explain(const CombineOptions& o, const CombineRequest& request) {
   const CropWindow& window = request.independent.origin.place.window;
   const int x = o.explain->x - window.x, y = o.explain->y - window.y;
@@ -155,7 +155,7 @@ GuideImages read_guides(const CombineOptions& o, const Estimator& estimator, con
   return guides;
 }
 
-/// A file used twice would be a control variate of itself, or a group without information of its own.
+/// A file used twice would be its own control variate, or a group without new information.
 void check_distinct(const CombineOptions& o) {
   std::vector<std::pair<const char*, std::string>> files;
   for (const std::string& path : o.crn) files.emplace_back("--crn", path);
@@ -181,8 +181,8 @@ void check_files_of_command(const CombineOptions& o) {
   outputs.writes("--json", o.json, OutputKind::kText);
 }
 
-/// `path`: of the independent image's counts; empty: nothing is done. All pixels of the CRN image (may be null) have
-/// `crn_samples`, or what its files tell on average. Throws Error(kUsage) where neither is known, and as
+/// `path`: the file with the independent image's counts; empty: does nothing. All pixels of the CRN image (may be null)
+/// have `crn_samples`, or the mean according to its files. Throws Error(kUsage) if neither is known, and like
 /// GroupedFile::take_counts().
 void take_counts(const std::string& path, std::optional<int> crn_samples, GroupedFile* crn, GroupedFile& independent) {
   if (path.empty()) return;
@@ -194,7 +194,7 @@ void take_counts(const std::string& path, std::optional<int> crn_samples, Groupe
   crn->take_count(static_cast<uint32_t>(samples));
 }
 
-/// What the command combines, with the files that it reads from.
+/// The inputs of the command, and the files they are read from.
 struct Inputs {
   std::optional<GroupedFile> crn;
   GroupedFile independent;
@@ -272,7 +272,7 @@ void write_stages(const CombineOptions& o, const CombineRequest& request) {
               request.settings, request.independent.origin.place);
 }
 
-/// Without a CRN image, the mean of the other is denoised.
+/// Without a CRN image, the mean of the independent one is denoised.
 void check_passes(CombineOptions& o) {
   if (!o.crn.empty()) return;
   const auto usage = [](const std::string& message) { throw Error(ErrorCode::kUsage, message); };
@@ -320,7 +320,7 @@ void combine_files(const CombineOptions& o) {
   if (!o.json.empty()) write_text_output(o.json, json_text(json));
 }
 
-/// The options of one frame alone.
+/// The options of a single frame.
 CombineOptions frame_options(const CombineOptions& o, int frame) {
   CombineOptions one = o;
   for (std::vector<std::string>* files : {&one.crn, &one.independent})

@@ -29,7 +29,7 @@ std::string names_of(const std::set<CLI::Option*>& options) {
   return text;
 }
 
-/// What the parser checks or does on its own, behind the description.
+/// Checks and actions of the parser, behind the description.
 std::string text_of(const CLI::Option& option) {
   std::string text = option.get_description();
   if (option.get_items_expected_max() > 0 && !option.get_default_str().empty())
@@ -55,7 +55,7 @@ OptionDescription describe_option(const CLI::Option& option) {
     result.choices = split(type.substr(open + 1, close - open - 1), ',');
   else if (type.find('|') != std::string::npos)
     result.choices = split(type, '|');
-  // Of "off|LIBRARY", the words are choices, and what is named is none.
+  // Of "off|LIBRARY", lower-case words are choices, the others placeholders.
   const auto is_path = [](const std::string& name) {
     return name == kFileValue || name == "[FILE]" || name == kFolderValue || name == kLibraryValue || name == "TEXT";
   };
@@ -68,7 +68,7 @@ OptionDescription describe_option(const CLI::Option& option) {
 }  // namespace
 
 std::string value_text(const OptionDescription& option) {
-  // Of "off|LIBRARY" the choices are not all.
+  // "off|LIBRARY" does not list all choices.
   const bool are_all = !option.choices.empty() && !option.takes_files;
   return are_all ? fmt::format("{}", fmt::join(option.choices, "|")) : option.value;
 }

@@ -29,7 +29,7 @@
 namespace covary {
 namespace {
 
-/// One image's errors; values in the order of the metrics asked for.
+/// One image's errors, in the order of the requested metrics.
 struct Comparison {
   CropWindow window;
   std::vector<MetricResult> results;
@@ -37,7 +37,7 @@ struct Comparison {
   double reference_mean() const { return results[0].reference_mean; }
 };
 
-/// Bands of rows are held at a time, and the map where one is wanted.
+/// Keeps bands of rows in memory, and the map if requested.
 void require_memory_to_compare(const CompareOptions& options, const std::string& path, const ComparedRows& rows,
                                size_t n_images) {
   constexpr double kImage = 3 * sizeof(float), kFlip = 120;  // metrics/flip.cpp
@@ -133,7 +133,7 @@ std::vector<std::string> map_paths(const CompareOptions& options) {
   return result;
 }
 
-/// One map per image, of the first metric, all on one scale.
+/// One map per image, of the first metric, all on the same scale.
 void write_error_maps(const CompareOptions& options, const std::vector<Comparison>& comparisons) {
   std::vector<Image> maps;
   for (const Comparison& c : comparisons) maps.push_back(c.results[0].map);
@@ -167,7 +167,7 @@ void check_options(const CompareOptions& options) {
 
 void check_files(const CompareOptions& options) {
   Outputs outputs;
-  // First, because "--json a.exr" takes the image for the name of the JSON file.
+  // Checked first, because "--json a.exr" takes the image for the name of the JSON file.
   if (options.json) outputs.writes("--json", *options.json, OutputKind::kText);
   outputs.reads(options.images);
   outputs.reads(options.reference);

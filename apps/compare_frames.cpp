@@ -26,7 +26,7 @@ using Json = nlohmann::ordered_json;
 /// One sequence: its errors frame by frame.
 struct ComparedSequence {
   std::string pattern;
-  std::vector<std::vector<double>> metrics;  ///< of each frame, in the order asked for
+  std::vector<std::vector<double>> metrics;  ///< of each frame, in the order requested
   SequenceErrors errors;
   SequenceSummary summary() const { return summary_of(errors.frames()); }
   std::vector<double> mean_metrics() const {
@@ -113,7 +113,7 @@ Json json_of(const CompareOptions& o, const ComparedSequence& s, const ComparedS
   return json;
 }
 
-/// A row of a table; what is not known is left empty.
+/// A row of a table; unknown values are left empty.
 void print_row(const std::string& name, size_t width, const std::vector<double>& values) {
   fmt::print("{:{}}", name, width);
   for (const double value : values) fmt::print("  {:>13}", std::isfinite(value) ? fmt::format("{:.6g}", value) : "-");

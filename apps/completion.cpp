@@ -62,7 +62,7 @@ std::string bash_script(const std::vector<CommandDescription>& commands) {
     }
     options += fmt::format("    {}) options={} ;;\n", command.name, quoted(fmt::format("{}", fmt::join(names, " "))));
   }
-  // Where the answer stays empty, readline offers files (-o default).
+  // If the answer is empty, readline offers files (-o default).
   return "# bash completion for covary, made by `covary help --completion bash`\n"
          "_covary() {\n"
          "  local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD-1]} options='' values=none\n"

@@ -36,7 +36,7 @@ struct ConvertOptions {
   ChecksumPolicy checksums() const { return accept_changed ? ChecksumPolicy::kIgnore : ChecksumPolicy::kCheck; }
 };
 
-/// The mean of the channels in the colours of error maps; tells what they stand for, but not of each frame of a video.
+/// The mean of the channels in the colours of error maps; prints their scale, but not for each frame of a video.
 Image in_false_colours(const Image& image, const std::string& output) {
   Image mean(image.width, image.height, 1);
   for (size_t i = 0; i < mean.data.size(); ++i) {
@@ -48,7 +48,7 @@ Image in_false_colours(const Image& image, const std::string& output) {
   return colour_errors(mean, scale);
 }
 
-/// The images from left to right, their upper edges in line, black below shorter ones.
+/// The images from left to right, aligned at the top, with black below shorter ones.
 Image side_by_side(const std::vector<Image>& images) {
   int width = 0, height = 0;
   for (const Image& image : images) {
@@ -65,8 +65,7 @@ Image side_by_side(const std::vector<Image>& images) {
   return result;
 }
 
-/// What is true of the new image: of several, nothing that one of them says; of a changed one, nothing that covary
-/// said.
+/// The attributes of the new image: none of the single ones' for several images; none of covary's for a changed one.
 std::map<std::string, std::string> attributes_of(const ConvertOptions& options) {
   std::map<std::string, std::string> attributes;
   if (options.files.size() == 2 && !options.accept_changed)
@@ -82,7 +81,7 @@ std::map<std::string, std::string> attributes_of(const ConvertOptions& options) 
   return attributes;
 }
 
-/// Whether the file is a picture that tells by itself that it can be made again: an EXR by this command, a PNG by any.
+/// Whether the file is a picture that can be made again, according to itself: an EXR by this command, a PNG by any.
 bool is_own_picture(const std::string& path) {
   if (lower_extension(path) == ".png") return is_own_png(path);
   if (lower_extension(path) != ".exr") return false;
@@ -95,7 +94,7 @@ bool is_own_picture(const std::string& path) {
   }
 }
 
-/// `convert *.exr` makes the last file that there is the output.
+/// `convert *.exr` would make the last existing file the output.
 void check_not_lost(const ConvertOptions& options) {
   const std::string& output = options.files.back();
   std::error_code ignored;
@@ -108,7 +107,7 @@ void check_not_lost(const ConvertOptions& options) {
                           output));
 }
 
-/// What is made of the images: one beside them where they are several, and a copy to write.
+/// What is made from the images: one image side by side if there are several, and a copy to write.
 void check_memory(const std::vector<Image>& images, const std::string& output) {
   constexpr double kPixel = 3 * sizeof(float);
   int width = 0, height = 0;
@@ -122,7 +121,7 @@ void expose(const ConvertOptions& options, Image& image) {
   if (options.colours) image = in_false_colours(image, options.files.back());
 }
 
-/// Numbered images, or several sequences side by side, to a video.
+/// Converts numbered images, or several sequences side by side, to a video.
 void convert_frames(const ConvertOptions& options) {
   constexpr double kUsualRate = 24;
   const std::vector<std::string> inputs(options.files.begin(), options.files.end() - 1);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// covary convert-scene: a scene of any format that is read, in Mitsuba's XML.
+// covary convert-scene: a scene of any supported format to Mitsuba's XML.
 #include "io/convert_scene.h"
 
 #include <fmt/format.h>
@@ -36,8 +36,8 @@ bool holds(const std::string& path, std::string_view bytes) {
   return file.text() == bytes;
 }
 
-/// Meshes first, the scene last: once its name is there, all that it names is. Files of meshes are called by their
-/// content, so that a scene that is replaced is whole until the last moment.
+/// Meshes first, the scene last: once it exists, so do all files that it names. Mesh files are named by content, so a
+/// scene that is being replaced stays complete until the last moment.
 void write_files(const ConvertSceneOptions& options, const ConvertedScene& scene) {
   const fs::path folder = fs::path(options.output).parent_path();
   for (const SceneDocumentFile& file : scene.document.files) {

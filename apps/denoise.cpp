@@ -35,7 +35,7 @@
 namespace covary {
 namespace {
 
-/// --mode: Open Image Denoise alone, or what a mixture is to be good at.
+/// --mode: Open Image Denoise alone, or the goal of a mixture.
 constexpr const char* kNetwork = "oidn";
 
 struct Options {
@@ -49,7 +49,7 @@ struct Options {
   DenoiseOptions denoiser() const { return {oidn}; }
 };
 
-/// --check: which library there is.
+/// --check: which library is used.
 void check(const Options& o) {
   const DenoiserInfo info = denoiser_info(o.denoiser());
   fmt::print("Open Image Denoise {}\n{}\n", info.version, info.path);
@@ -61,7 +61,7 @@ void warn_of_values(const std::string& path, const Image& image) {
     fmt::print(stderr, "warning: {}: {} of {} values are not finite; they count as 0\n", path, n, image.data.size());
 }
 
-/// The layers that guide, each the mean of the files that have it.
+/// The guide layers, each averaged over the files that have it.
 class GuideLayers {
  public:
   std::optional<Image> albedo, normal;
@@ -75,7 +75,7 @@ class GuideLayers {
     }
     divide(albedo, n_albedo_);
     divide(normal, n_normal_);
-    if (!albedo) normal.reset();  // Open Image Denoise takes normals beside an albedo alone
+    if (!albedo) normal.reset();  // Open Image Denoise only takes normals together with an albedo
   }
   Guides view() const { return {albedo ? &*albedo : nullptr, normal ? &*normal : nullptr}; }
   const char* text() const {

@@ -53,7 +53,7 @@ std::string read_file(const std::string& path) {
   return text.str();
 }
 
-/// Version and commit; where the commit does not say what was built, the program's own content.
+/// Version and commit; if the commit does not identify the build, a hash of the program's content.
 std::string program_version() {
   std::string text = version_text();
   if (!text.ends_with(')') || text.ends_with("-dirty)")) text += " " + hash_text(hash_bytes(read_file(program_path())));
@@ -132,7 +132,7 @@ lab::Part parse_part(const std::string& text) {
 // ---- progress
 // --------------------------------------------------------------------------------------------------------
 
-/// How far the experiment is, on a line of its own; failures stay above it.
+/// The experiment's progress, on a separate line; failures stay above it.
 void show_progress(const lab::Progress& p, ProgressLine& line) {
   if (p.kind == lab::Progress::Kind::kFailed) {
     line.clear();
@@ -167,7 +167,7 @@ lab::PlanContext plan_context() {
 
 constexpr const char *kResults = "/results.json", *kTable = "/results.csv", *kReport = "/report.html";
 
-/// Whether the file is the results of an experiment: "format" is the first key.
+/// Whether the file holds results of an experiment: "format" is the first key.
 bool is_results(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   std::string text(200, '\0');
@@ -175,7 +175,7 @@ bool is_results(const std::string& path) {
   return text.find(lab::kResultsFormat) != std::string::npos;
 }
 
-/// Before the experiment begins: nothing that it reads, and nothing of somebody else's, is overwritten by its results.
+/// Before the experiment begins: its results must not overwrite anything that it reads, or other people's files.
 void check_files(const ExperimentCommand& command, const lab::Suite& suite, const std::string& scenes) {
   Outputs outputs;
   outputs.reads(command.suite);
@@ -198,7 +198,7 @@ void check_files(const ExperimentCommand& command, const lab::Suite& suite, cons
                       command.output, name));
 }
 
-/// Reads the options of each method as `covary render` will, so that nothing runs before all of them are right. Other
+/// Reads the options of each method as `covary render` will, so that nothing runs before all of them are valid. Other
 /// mistakes of the suite are left to run_experiment().
 void check_methods(const lab::Suite& suite) {
   if (!lab::validate(suite).empty()) return;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// covary info: what an image or film holds, and whether it is as covary wrote it, or what a scene file describes.
+// covary info: what an image or film holds, and whether it is unchanged, or what a scene file describes.
 #include <fmt/format.h>
 
 #include <map>
@@ -55,7 +55,7 @@ std::string describe_channels(const std::vector<ExrFile::Channel>& channels) {
   return text;
 }
 
-/// Memory that a render of the scene with the usual settings takes, by estimator.
+/// Memory of a render of the scene with default settings, by estimator.
 std::map<std::string, double> memory_of_renders(const LoadedScene& scene) {
   std::map<std::string, double> memory;
   for (const char* name : {kDefaultEstimator, kNoEstimator})
@@ -109,7 +109,7 @@ void info(const InfoOptions& options) {
   else
     print_text(info, options.path);
   std::fflush(stdout);
-  check_image(options.path);  // last: what a damaged file says may help
+  check_image(options.path);  // last: even a damaged file's claims may help
 }
 
 }  // namespace

@@ -12,12 +12,12 @@
 namespace covary {
 namespace {
 
-// Atomics without locks are what a handler and threads may both use.
+// Lock-free atomics, which a handler and threads may share.
 std::atomic<bool> g_kept{false}, g_stop{false};
 std::atomic<int> g_signal{0};
 static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<int>::is_always_lock_free);
 
-/// Only calls that are allowed in a handler.
+/// Only async-signal-safe calls.
 extern "C" void on_signal(int signal) {
   if (g_kept && !g_stop) {
     g_signal = signal;

@@ -14,7 +14,7 @@ std::string json_text(const nlohmann::ordered_json& value, int indent) {
 
 void write_text_output(const std::string& path, const std::string& text) {
   if (path.empty() || path == "-")
-    std::fputs(text.c_str(), stdout);  // main() looks whether that could be written
+    std::fputs(text.c_str(), stdout);  // main() checks whether that could be written
   else
     write_text_file(path, text);
 }

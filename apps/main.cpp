@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The `covary` program. Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but not as well as wanted (--until), and
+// The `covary` program. Exit codes: 0 done, 1 failed, 2 wrong usage, 3 done but target error missed (--until), and
 // after a signal 128 + its number: 130 for Ctrl-C.
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -30,8 +30,8 @@ namespace {
 
 std::string g_command_line;
 
-/// Opens standard streams that are closed: the next file would get their number, and messages would be written into it.
-/// Standard output fails then, as it should; messages that nobody is to see are lost.
+/// Opens closed standard streams: otherwise the next file would get their number, and messages would be written into
+/// it. Standard output then fails, as it should; error messages are lost.
 void open_closed_streams() {
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
     if (fcntl(stream, F_GETFD) == -1) [[maybe_unused]]
@@ -50,14 +50,14 @@ int report(const char* program, const Error& error) {
   return error.code() == ErrorCode::kUsage ? 2 : 1;
 }
 
-/// Long options of `command` that `given` may have been meant to be: misspelt or cut short. Compared without dashes,
-/// which would make all short names alike.
+/// Long options of `command` that `given` may mean: misspelt or cut short. Compared without dashes, which would make
+/// all short names alike.
 std::vector<std::string> near_options(const CLI::App& command, const std::string& given) {
   std::vector<std::string> names;
   for (const CLI::Option* option : command.get_options())
     names.insert(names.end(), option->get_lnames().begin(), option->get_lnames().end());
   const std::string bare = given.substr(std::min(given.find_first_not_of('-'), given.size()));
-  if (bare.size() < 2) return {};  // all short names are like a letter
+  if (bare.size() < 2) return {};  // all short names resemble a letter
   std::vector<std::string> near = nearest_names(bare, names);
   if (near.empty())
     std::copy_if(names.begin(), names.end(), std::back_inserter(near), [&](auto& n) { return n.starts_with(bare); });
@@ -65,7 +65,7 @@ std::vector<std::string> near_options(const CLI::App& command, const std::string
   return near;
 }
 
-/// What is wrong with the first argument that no option takes; "" when there is none.
+/// What is wrong with the first argument that no option takes; "" if there is none.
 std::string describe_extra(const CLI::App& app) {
   const CLI::App& command = app.get_subcommands().empty() ? app : *app.get_subcommands()[0];
   const std::string name = &command == &app ? "covary" : "covary " + command.get_name();
@@ -107,7 +107,7 @@ int run(int argc, char** argv) {
     check_standard_output();
     return code;
   } catch (const CLI::ParseError& error) {
-    // A misspelt option comes before what CLI11 finds first: that the option meant is missing.
+    // Reports a misspelt option before what CLI11 finds first: that the intended option is missing.
     const std::string extra = describe_extra(app);
     if (!extra.empty()) throw Error(ErrorCode::kUsage, extra);
     const std::string command = app.get_subcommands().empty() ? "" : " " + app.get_subcommands()[0]->get_name();
@@ -118,7 +118,7 @@ int run(int argc, char** argv) {
   return 0;
 }
 
-/// The exit code; errors are told on standard error.
+/// The exit code; errors are printed on standard error.
 int run_and_report(int argc, char** argv) {
   try {
     return run(argc, argv);
@@ -161,12 +161,12 @@ int main(int argc, char** argv) {
   if (words.empty()) words.emplace_back();
   words[0] = "covary";
   covary::g_command_line = covary::shell_text(words);
-  // A file that outgrows its limit is an error like a full disk, which leaves no half-written file behind.
+  // A file that exceeds its size limit is an error like a full disk, which leaves no half-written file behind.
   std::signal(SIGXFSZ, SIG_IGN);
   covary::catch_signals();
   const int code = covary::run_and_report(argc, argv);
   if (covary::has_detached_work()) {
-    // Ctrl-C ends the program now, not when a library has come to the end of its step.
+    // Ctrl-C ends the program now, without waiting for a library's current step.
     std::cout.flush();
     std::fflush(nullptr);
     _exit(code);

@@ -7,7 +7,7 @@
 namespace covary {
 namespace {
 
-/// Text for man(7): nothing in it is a request or an escape, and "-" stays the character that shells know.
+/// Text for man(7): escapes requests and escapes, and keeps "-" the character that shells know.
 std::string escaped(const std::string& text) {
   std::string result;
   if (!text.empty() && (text[0] == '.' || text[0] == '\'')) result = "\\&";

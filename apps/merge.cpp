@@ -38,13 +38,13 @@ std::string attribute(const ImageInfo& info, const std::string& name) {
   return found == info.attributes.end() ? "" : found->second;
 }
 
-/// What a render made of films that it did not keep.
+/// The files that a render made from films that it did not keep.
 bool is_result(const ImageInfo& info) {
   return attribute(info, "film").empty() && !attribute(info, "estimator").empty();
 }
 
-/// The folder that keeps the films of an image: that of --passes in its command, found from here or from beside the
-/// image, or the one that an interrupted render leaves.
+/// The folder with the films of an image: the --passes of its command, relative to here or to the image, or the one
+/// that an interrupted render leaves.
 std::optional<fs::path> folder_of_films(const std::string& path, const ImageInfo& info) {
   const std::vector<std::string> words = words_of_shell_text(attribute(info, "command"));
   std::vector<fs::path> candidates;
@@ -76,7 +76,7 @@ std::vector<std::string> commands_of_films(const std::vector<fs::path>& folders,
   return commands;
 }
 
-/// Where one of the inputs is an image that holds no samples: what to merge instead. Throws Error(kInput).
+/// If an input is an image without samples: what to merge instead. Throws Error(kInput).
 void advise_on_images(const MergeOptions& options) {
   std::vector<std::string> commands;
   std::vector<fs::path> folders;

@@ -28,7 +28,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Samples per pixel that are asked for where none are taken but those of the training.
+/// Samples per pixel of the request if only the training takes any.
 constexpr uint32_t kAnyBudget = 1u << 20;
 
 struct ProbeOptions {
@@ -39,7 +39,7 @@ struct ProbeOptions {
   uint32_t samples = 64;
 };
 
-/// A probe trains and renders no image: refuses what only an image would show, which the help leaves out.
+/// A probe trains but renders no image: refuses options that only affect images, which the help leaves out.
 bool has_effect(const CLI::Option& option) {
   static constexpr const char* kUsed[] = {"help",  "help-all", "output",  "integrator",    "resolution",   "crop",
                                           "seed",  "define",   "threads", "quiet",         "no-preview",   "rfilter",
@@ -68,7 +68,7 @@ Image side_by_side(const Images& images) {
   return all;
 }
 
-/// To look at: one percent of the values is above white. Radiance and density differ by orders of magnitude.
+/// For display: one percent of the values is above white. Radiance and density differ by orders of magnitude.
 Image exposed(Image image) {
   std::vector<float> values = image.data;
   const auto white = values.begin() + static_cast<ptrdiff_t>(0.99 * static_cast<double>(values.size() - 1));

@@ -181,7 +181,7 @@ Outputs files_of(const RenderOptions& options) {
 std::unique_ptr<Display> display_of(const RenderOptions& options) {
   if (options.display_server.empty()) return nullptr;
   return std::make_unique<Display>(options.display_server, options.request().output, [](const std::string& text) {
-    // On a terminal over the line of progress.
+    // On a terminal, over the progress line.
     fmt::print(stderr, "{}warning: {}\n", isatty(2) == 1 ? "\r\033[K" : "", text);
   });
 }
@@ -223,7 +223,7 @@ void render(RenderOptions options) {
   report({options, scene, result, load_seconds, threads}, *stop);
   if (stop->is_set())
     throw Unfinished(stop->exit_code(), fmt::format("interrupted when '{}' was written", options.request().output));
-  stop.reset();  // there is nothing more to keep
+  stop.reset();  // there is nothing more to save
   if (result.complete) write_stages(options, result);
 }
 

@@ -64,7 +64,7 @@ void check_options(RenderOptions& options) {
 
 namespace {
 
-/// Options of the render that some integrators have no part in.
+/// Options of the render that some integrators do not use.
 void check_integrator(const RenderOptions& options, const LoadedScene& scene) {
   const std::string& name = options.settings.integrator.empty() ? scene.integrator_type : options.settings.integrator;
   if (options.replay_light && !integrator_of(scene).light_tracing())
@@ -142,8 +142,8 @@ void add_output_options(CLI::App& command, RenderOptions& o) {
   command.option_defaults()->group(kBasicOptions);
 }
 
-/// The file named so or, where there is none, the small scene of that name in the installation or the source tree that
-/// the program lies in.
+/// The file of that name or, if there is none, the small built-in scene of that name in the program's installation or
+/// source tree.
 std::string scene_file(const std::string& word) {
   const fs::path beside = fs::path(program_path()).parent_path();
   if (!fs::exists(word) && fs::path(word).filename() == word)

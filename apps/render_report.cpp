@@ -23,7 +23,7 @@
 namespace covary {
 namespace {
 
-/// Command that repeats one sample of a pass: the user's own, with the sample in place of the outputs.
+/// Command that replays one sample of a pass: the user's own, with the sample instead of the outputs.
 std::string replay_command(const RenderOptions& o, const Pass& pass, const BadSample& bad) {
   std::vector<std::string> words = {"covary", "render", o.scene};
   for (const std::string& define : o.defines) words.insert(words.end(), {"-D", define});
@@ -43,7 +43,7 @@ nlohmann::ordered_json json_of(const IntegratorReport& report) {
   return json;
 }
 
-/// Samples per pixel of the training; 0 without one, and where a file took its place.
+/// Samples per pixel of the training; 0 without one, or if it was loaded from a file.
 uint32_t training_samples_taken(const RenderReport& report) {
   const LearningIntegrator* learning = report.result.integrator->learning();
   return learning && report.options.request().load_training.empty() ? learning->trained_spp() : 0;
@@ -92,7 +92,7 @@ nlohmann::ordered_json seconds_of(const RenderReport& report) {
           {"write", result.seconds.write}};
 }
 
-/// What holds only for some renders.
+/// What only applies to some renders.
 void add_results(const RenderReport& report, const Estimator& estimator, nlohmann::ordered_json& json) {
   const RenderResult& result = report.result;
   for (const IntegratorTrial& trial : result.trials) {

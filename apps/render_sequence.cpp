@@ -47,7 +47,7 @@ void check(const RenderOptions& options) {
                       name, path, std::string(name) == "-o" ? "out_####.exr" : "out_####"));
 }
 
-/// The options of one frame alone.
+/// The options of a single frame.
 RenderOptions frame_options(const RenderOptions& options, int frame) {
   RenderOptions one = options;
   RenderRequest& request = one.settings.request;
@@ -61,8 +61,8 @@ RenderOptions frame_options(const RenderOptions& options, int frame) {
   return one;
 }
 
-/// A hash of what the image of the frame depends on: scene and camera, the camera before, seed and settings; with a
-/// history, `earlier`, the hash of the frame that it is made of.
+/// A hash of everything that the frame's image depends on: scene and camera, previous camera, seed and settings; with a
+/// history also `earlier`, the hash of the previous frame.
 std::string frame_hash(const RenderOptions& one, const LoadedScene& scene, const Transform& before,
                        const std::string& earlier) {
   OptionValues values = one.values;
@@ -76,7 +76,7 @@ std::string frame_hash(const RenderOptions& one, const LoadedScene& scene, const
   return hash_text(hash_bytes(text));
 }
 
-/// Whether the file is the whole frame. Throws where it is a whole image, and another one.
+/// Whether the file is the complete frame. Throws if it is a complete image of something else.
 bool is_complete(const std::string& path, const std::string& hash) {
   if (!fs::exists(path)) return false;
   const std::map<std::string, std::string> attributes = inspect_image(path).attributes;
@@ -92,7 +92,7 @@ bool is_complete(const std::string& path, const std::string& hash) {
                           path));
 }
 
-/// When frames are, and where the camera is then.
+/// The times of frames, and the camera's place at each.
 class FrameTimes {
  public:
   FrameTimes() = default;
@@ -102,13 +102,13 @@ class FrameTimes {
   }
 
   double time(int frame) const { return frame / rate_; }
-  /// The camera's place by the path, or else by the scene's animation; nothing where neither moves it.
+  /// The camera's place by the path, or else by the scene's animation; nothing if neither moves it.
   std::optional<Transform> camera(const LoadedScene& scene, int frame) const {
     if (path_) return path_->at(time(frame));
     if (scene.camera_to_world) return scene.camera_to_world->at(time(frame));
     return std::nullopt;
   }
-  /// Puts all that moves where it is in the frame.
+  /// Moves everything to its place in the frame.
   void place(int frame, const Transform& camera, LoadedScene& scene) const {
     scene.scene->move_to(time(frame));
     place_camera(scene, camera);
@@ -129,7 +129,7 @@ void trace_motion(const Transform& before, double then, const LoadedScene& scene
   request.beside["Motion"] = std::move(images.motion);
 }
 
-/// The history that the frame in the file is for one with these layers.
+/// The history from the previous frame's file for a frame with these layers.
 std::shared_ptr<const History> history_of(const std::string& path, const RenderRequest& request) {
   const PlacedImage before = read_image(path);
   Image depth(before.image.width, before.image.height, 1);
@@ -187,7 +187,7 @@ class SequenceRender {
     if (stop.is_set()) throw Unfinished(stop.exit_code(), interruption(index));
     if (has_many_scenes()) load_scene(one, std::span(outputs_).subspan(index, 1));
     RenderRequest request = make_request(one, *scene_);
-    const bool follows = frame - 1 == last_frame_;  // of frames that are farther apart nothing is known
+    const bool follows = frame - 1 == last_frame_;  // nothing is known about frames that are farther apart
     const Transform now = times_.camera(*scene_, frame).value_or(own_camera_);
     const Transform before = times_.camera(*scene_, frame - 1).value_or(follows ? last_camera_ : now);
     times_.place(frame, now, *scene_);

@@ -14,10 +14,10 @@ namespace {
 
 using Words = std::vector<std::string>;
 
-// In place of the files that an experiment adds to the command.
+// Stands for the files that an experiment adds to the command.
 constexpr const char *kInput = "the-input-of-the-experiment", *kOutput = "the-output-of-the-experiment";
 
-/// What a value that is called `name` in the help names outside; null for values.
+/// What a value with this placeholder names outside the suite; null for plain values.
 const char* what_is_named(const std::string& name) {
   static constexpr std::pair<const char*, const char*> kOutside[] = {{kFileValue, "a file"},
                                                                      {kFolderValue, "a folder"},
@@ -39,7 +39,7 @@ Words alternatives(const std::string& type) {
   return names;
 }
 
-/// What the value of the option names outside; null where it names nothing.
+/// What the option's value names outside the suite; null if nothing.
 const char* named_by(const CLI::Option& option, const std::string& value) {
   if (option.get_items_expected_max() == 0 || option.get_positional()) return nullptr;  // positionals are read
   const Words names = alternatives(option.get_type_name());
@@ -49,7 +49,7 @@ const char* named_by(const CLI::Option& option, const std::string& value) {
   return nullptr;
 }
 
-/// The word that gives the option; the first where it cannot be told.
+/// The word with the option; the first if it cannot be determined.
 size_t word_of(const CLI::Option& option, const Words& words) {
   const auto gives = [&](const std::string& word) {
     for (const std::string& name : option.get_lnames())
@@ -77,7 +77,7 @@ std::vector<lab::WordProblem> problems_of(const CLI::App& command, const Words& 
   return problems;
 }
 
-/// Thrown where all options are read, before anything is done.
+/// Thrown once all options are read, before anything is done.
 struct Parsed {};
 
 }  // namespace
@@ -96,7 +96,7 @@ std::vector<lab::WordProblem> check_suite_command(const Words& command) {
   try {
     app.parse(words);
   } catch (const CLI::Error& error) {
-    if (!is_render) refused = {{0, error.what()}};  // of renders, `experiment` tells
+    if (!is_render) refused = {{0, error.what()}};  // `experiment` reports those of renders
   } catch (const Parsed&) {
   }
   if (app.get_subcommands().empty()) return refused;

@@ -42,8 +42,7 @@ VideoWriter::~VideoWriter() {
 
 void VideoWriter::start(int width, int height) {
   width_ = width, height_ = height;
-  // Codecs want even sizes: a black column or row is added. Yellow-blue at half of the resolution is what all players
-  // show.
+  // Codecs need even sizes: a black column or row is added. Half-resolution chroma (yuv420p) is what all players show.
   const std::string command =
       shell_text({"ffmpeg", "-loglevel", "error", "-f", "rawvideo", "-pixel_format", "rgb24", "-video_size",
                   fmt::format("{}x{}", width, height), "-framerate", fmt::format("{}", rate_), "-i", "-", "-vf",

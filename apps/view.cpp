@@ -60,7 +60,7 @@ struct Shown {
 
 constexpr double kPixels = 3 * sizeof(float);  // bytes per pixel
 
-/// The shortest ends of the paths that differ from each other: "a/pt.exr" and "b/pt.exr", but "pt" where it is alone.
+/// The shortest distinct ends of the paths: "a/pt.exr" and "b/pt.exr", but "pt" if it is alone.
 void name_images(std::vector<Shown>& images) {
   for (Shown& image : images) image.name = fs::path(image.path).stem().string();
   for (Shown& image : images) {
@@ -91,7 +91,7 @@ std::vector<Shown> read_images(const ViewOptions& options) {
   const auto add = [&](const std::string& path, bool is_reference) {
     const auto same = [&](const Shown& image) { return image.path == path; };
     if (std::find_if(images.begin(), images.end(), same) != images.end()) return;
-    // Before any of it is read: the page holds the image twice more, cut and encoded.
+    // Before reading: the page holds the image twice more, cropped and encoded.
     const CropWindow window = inspect_image(path).place.window;
     require_image_memory(path, window.width, window.height, 3 * kPixels);
     images.push_back({path, "", read_image(path, options.layer), is_reference});
@@ -119,7 +119,7 @@ nlohmann::ordered_json parse_inset(const std::string& text, const CropWindow& wi
   return {{"x", v[0]}, {"y", v[1]}, {"w", v[2]}, {"h", v[3]}};
 }
 
-/// How the page colours a layer: directions and other vectors are no colours.
+/// How the page displays a layer: directions and other vectors are not colours.
 const char* display_of(const std::string& path, const std::vector<ExrFile::Channel>& channels,
                        const std::string& layer) {
   const std::vector<std::string> names = layer_channels(path, channels, layer);
@@ -141,7 +141,7 @@ std::vector<std::string> offered_layers(const std::vector<ExrFile::Channel>& cha
   return layers;
 }
 
-/// The page in the making.
+/// The unfinished page.
 struct Page {
   CropWindow window;
   bool small = false;
@@ -233,7 +233,7 @@ std::string names_of(const std::vector<Shown>& images) {
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
-/// Of images beside a reference or alone; an image that is both is no image here.
+/// Images beside a reference, or alone; an image that is also the reference is not listed as an image.
 std::vector<std::string> warnings_of(const ViewOptions& options) {
   std::vector<std::string> images = options.images, references, all;
   if (!options.reference.empty()) {
@@ -315,7 +315,7 @@ std::string temporary_page() {
   return path;
 }
 
-/// Asks the desktop to open the file; false where there is none.
+/// Asks the desktop to open the file; false if there is no desktop.
 bool open_in_browser(const std::string& path) {
   if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY")) return false;
   std::string program = "xdg-open", argument = path;
@@ -326,7 +326,7 @@ bool open_in_browser(const std::string& path) {
          waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
 
-/// Throws Error(kUsage) where only some of the images are frames.
+/// Throws Error(kUsage) if only some of the images are frames.
 void check_frames(const ViewOptions& options) {
   for (const std::string& path : options.images)
     if (is_frame_pattern_of_input(path) != options.is_sequence())

@@ -36,7 +36,7 @@ void throw_errors(const InputFindings& inputs) {
     throw Error(ErrorCode::kInput, "the inputs do not fit: " + errors);
 }
 
-/// Puts the n rows of `part` from its row `skipped` on into `whole`, from row y on.
+/// Copies the n rows of `part` from its row `skipped` on into `whole`, from row y on.
 void append(const EstimatorResult& part, int skipped, int y, int n, int height, EstimatorResult& whole) {
   const auto copy = [&](const Image& from, Image& to) {
     if (from.data.empty()) return;
@@ -65,7 +65,7 @@ void check_memory(const CombineRequest& request, double planned) {
                                       : memory_limit_text()));
 }
 
-/// The error of the light film is that of every image it is added to, and no bias. `before`: predicted without it.
+/// The light film's error is its variance alone and is added to every image. `before`: predicted without it.
 void add_risk_of_light(double before, EstimatorResult& result) {
   if (!result.risks) return;
   const double after = predicted_relmse(result);
@@ -76,7 +76,7 @@ void add_risk_of_light(double before, EstimatorResult& result) {
 /// Bytes per pixel of a layer while it is denoised: its groups, copies of them, and its images.
 double layer_bytes(int groups) { return 3 * sizeof(float) * (2.0 * groups + kImagesOfLayer); }
 
-/// With all layers, of the whole image.
+/// For the whole image with all layers.
 EstimatorResult estimate_layers(const CombineRequest& request, std::map<std::string, Image>& layers) {
   if (!request.estimator.splits_layers)
     throw Error(ErrorCode::kUsage,
@@ -102,7 +102,7 @@ EstimatorResult estimate(const CombineRequest& request) {
     const int n = std::min(step, height - y);
     const Band band = band_around(request, y, y + n);
     const EstimatorResult part = estimator.apply(band.crn, band.independent, request.settings);
-    long n_nonfinite = 0;  // without the rows around, which other bands count
+    long n_nonfinite = 0;  // without the surrounding rows, which belong to other bands
     finite_pixels(covary::rows_of(band.crn, y - band.first, n), covary::rows_of(band.independent, y - band.first, n),
                   n_nonfinite);
     whole.nonfinite_pixels += n_nonfinite;
@@ -120,7 +120,7 @@ double memory_of_rows(const CombineRequest& request, int rows) {
   const bool holds_out = request.settings.std_error && request.settings.held_out;
   const int groups = holds_out ? std::min(request.crn ? crn_groups : all_groups, request.independent.groups) : 0;
   const double values = kImage * all_groups + 2 * kCount;
-  // Of bands, the estimate of the whole image, its standard error and bias are beside them.
+  // For bands: the estimate of the whole image; its standard error and bias are stored beside them.
   const double results = rows < request.independent.height ? 3 * kImage * width * request.independent.height : 0;
   const double layers = request.layers.empty() ? 0 : static_cast<double>(request.layers.size() + 1);
   return n_pixels * (values + layers * layer_bytes(request.independent.groups)) +
@@ -141,7 +141,7 @@ double planned_memory(const CombineRequest& request) {
 }
 
 Band band_around(const CombineRequest& request, int first, int last) {
-  // Beginning at a multiple of a cell of the residual correction.
+  // Starts at a multiple of a cell of the residual correction.
   const int begin = std::max(0, first - request.estimator.reach) / kResidualCell * kResidualCell;
   const int n = std::min(request.independent.height, last + request.estimator.reach) - begin;
   return {rows_of(request.crn, begin, n), request.independent.rows(begin, n), begin};
@@ -154,7 +154,7 @@ InputFindings examine(const CombineRequest& request) {
   if (request.crn) check_origins(crn_origin, independent.origin, inputs.findings);
   check_light(crn_origin, independent.origin, request.light ? &request.light->origin : nullptr, inputs.findings);
   InputChecks checks(independent.width, independent.height, request.crn ? request.crn->groups : 0, independent.groups);
-  // Of renders by others: films of covary tell by themselves how they were made.
+  // Only for other renderers' images: covary's films say how they were made.
   const bool by_others = !request.crn && independent.origin.sampling.empty();
   DifferenceChecks differences(independent.width, independent.height, by_others ? independent.groups : 0);
   const int step = std::max(kFewestRows, rows_in_memory(request));

@@ -11,17 +11,17 @@
 namespace covary {
 namespace {
 
-// Beyond every pixel filter, within what denoisers mix. Measured correlations of signs of differences at this distance:
-// noise of any sampler at most 0.02; Open Image Denoise 0.16 to 0.51; our own filters 0.08 to 0.26.
+// Beyond every pixel filter, but within the reach of denoisers. Measured correlations of signs of differences at this
+// distance: noise of any sampler at most 0.02; Open Image Denoise 0.16 to 0.51; our own filters 0.08 to 0.26.
 constexpr int kDistance = 6;
 constexpr double kMaxCorrelation = 0.07;
-constexpr double kMaxExcess = 0.05;  // of the fraction of pixels in which one render is brighter, over one half
+constexpr double kMaxExcess = 0.05;  // of the fraction of pixels in which one render is brighter, beyond one half
 constexpr double kSigmas = 6;
 constexpr double kMostlyBrighter = 0.9;
 constexpr long kMaxPixels = 1000000;
 constexpr int kMaxPairs = 12;
 
-/// Sign of the difference of groups t and t + 1 in a pixel; 0 where it tells nothing.
+/// Sign of the difference of groups t and t + 1 in a pixel; 0 if undecided.
 int sign_of_difference(const GroupedImage& image, int x, int y, int t) {
   const uint32_t count = image.count(x, y);
   if (group_size(count, image.groups, t) != group_size(count, image.groups, t + 1)) return 0;
@@ -36,7 +36,7 @@ double DifferenceChecks::Pair::excess_brighter() const {
   return differ > 0 ? std::abs(static_cast<double>(brighter) / static_cast<double>(differ) - 0.5) : 0;
 }
 
-/// Of the signs, beyond what their mean alone makes.
+/// Correlation of the signs beyond what their mean alone implies.
 double DifferenceChecks::Pair::correlation() const {
   if (n == 0) return 0;
   const double mean = 2 * excess_brighter();
@@ -89,7 +89,7 @@ void DifferenceChecks::report(std::vector<Finding>& findings) const {
                        t + 1, t + 2, 100 * brighter)});
     else
       continue;
-    return;  // one such pair tells enough
+    return;  // one such pair is enough
   }
 }
 

@@ -29,8 +29,8 @@ std::string attribute(const ExrFile& file, const std::string& key) {
   return it == file.attributes().end() ? "" : it->second;
 }
 
-/// The attribute that holds the samples per pixel: of covary's films, or cycles.LAYER.samples of Blender's images; ""
-/// where there is none, or one for each of several layers.
+/// The attribute with the samples per pixel: of covary's films, or cycles.LAYER.samples of Blender's images; "" if
+/// there is none, or one for each of several layers.
 std::string samples_key(const ExrFile& file) {
   const char* own = "covary:samples";
   if (file.attributes().contains(own)) return own;
@@ -43,7 +43,7 @@ std::string samples_key(const ExrFile& file) {
   return found;
 }
 
-/// Mean number of samples per pixel as the file tells it; 0: not told.
+/// Mean number of samples per pixel according to the file; 0: unknown.
 double samples_per_pixel(const ExrFile& file, const std::string& path) {
   const std::string key = samples_key(file), text = key.empty() ? "" : attribute(file, key);
   if (text.empty()) return 0;
@@ -69,7 +69,7 @@ std::string list_layers(const ExrFile& file, const std::vector<ColourLayer>& lay
   return fmt::format("channels in it: {}", fmt::join(names, ", "));
 }
 
-/// Numbered layers STEM0, STEM1, …, in the order of their numbers; `stem` "" takes the only stem there is.
+/// Numbered layers STEM0, STEM1, …, in the order of their numbers; `stem` "" takes the only stem.
 std::vector<ColourLayer> numbered_layers(const std::vector<ColourLayer>& layers, const std::string& stem) {
   std::vector<std::pair<int, const ColourLayer*>> found;
   std::string first_stem;

@@ -51,7 +51,7 @@ class PairStatistics {
       : T_(groups_a == groups_b && groups_a >= 3 ? groups_a : 0),
         dx_(dx),
         dy_(dy),
-        // An odd step, so that no pattern of even period is hit always at the same phase.
+        // An odd step, so that a pattern of even period is not always hit at the same phase.
         step_(std::max(1L, n_pixels / kMaxPairs) | 1),
         values_(T_),
         first_(T_),
@@ -75,7 +75,7 @@ class PairStatistics {
   }
 
   Correlation result() const {
-    // Of independent ranks a correlation has variance 1 / (T - 1).
+    // Correlations of independent ranks have variance 1 / (T - 1).
     if (pairs_ == 0) return {};
     const double n = static_cast<double>(pairs_);
     return {sum_ / n, 1.0 / std::sqrt(n * (T_ - 1)), pairs_};
@@ -123,7 +123,7 @@ void add_values(const GroupedImage& image, int first_row, Values& v) {
 
 void finish(Values& v, long pixels) {
   const size_t T = v.group_means.size();
-  // Weights of mean 1: groups of more samples tell more.
+  // Weights of mean 1: larger groups count more.
   const double total = std::accumulate(v.group_samples.begin(), v.group_samples.end(), 0.0);
   for (double& samples : v.group_samples) samples = samples > 0 ? samples * static_cast<double>(T) / total : 1;
   for (size_t t = 0; t < T; ++t) {

@@ -99,7 +99,7 @@ bool is_good(const Spectrum& value, int x, int y, uint64_t sample, Worker& worke
   return false;
 }
 
-/// Up to which sample the pixels of a film are to be taken.
+/// The sample count up to which the pixels of a film are taken.
 struct Wave {
   const SampleTarget& target;
   uint32_t end;  // no pixel beyond
@@ -149,7 +149,7 @@ void trace_pixels(const Scene& scene, const Integrator& integrator, const PassSe
   worker.n_samples += n_samples;
 }
 
-/// Takes what the wave still wants of a tile, whole pixels together; returns the number of samples.
+/// Takes the samples that the wave still needs in a tile, whole pixels together; returns their number.
 uint64_t render_tile(const Scene& scene, const Integrator& integrator, const PassSettings& settings, const Tile& tile,
                      const Wave& wave, Film& film, Worker& worker) {
   const uint64_t before = worker.n_samples;
@@ -172,7 +172,7 @@ uint64_t render_tile(const Scene& scene, const Integrator& integrator, const Pas
   return worker.n_samples - before;
 }
 
-/// Calls render(i) for each of n tiles. A learner gets the tiles' records in their order, some tiles at a time.
+/// Calls render(i) for each of n tiles. A learner gets the tiles' records in order, some tiles at a time.
 template <typename Render>
 void render_tiles(size_t n, LearningIntegrator* learner, const Integrator& integrator, PerThread<Worker>& workers,
                   const Render& render) {
@@ -188,7 +188,7 @@ void render_tiles(size_t n, LearningIntegrator* learner, const Integrator& integ
   }
 }
 
-/// An integrator that learns has learnt, or learns from this pass.
+/// An integrator that learns must be trained, or learn from this pass.
 void check_learner(const Integrator& integrator, const PassSettings& settings, const Film& film) {
   const LearningIntegrator* learning = integrator.learning();
   const LearningIntegrator* learner = settings.learner;
@@ -256,8 +256,8 @@ PassResult render_pass(const Scene& scene, const Integrator& integrator, const P
   uint32_t reached = settings.spp.reached(film);
 
   PerThread<Worker> workers;
-  // In waves, so that all pixels advance together. The one wave of pixels that are estimated is cut into rounds of some
-  // time.
+  // In waves, so that all pixels advance together. If pixels are estimated from all their samples, their one wave is
+  // split into rounds of some time.
   while (reached < largest && !limits.ended()) {
     const Wave wave{settings.spp, settings.estimate
                                       ? largest

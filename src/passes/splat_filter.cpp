@@ -32,7 +32,8 @@ double SplatFilter::density(double distance) const {
 
 SplatFilter::Choice SplatFilter::choose(double position, double u) const {
   if (!(std::abs(position) < kFarthest)) return {};
-  // Centres within the radius, of the two at its ends the lower one: a box of one pixel holds its upper left corner.
+  // Centres within the radius; of two centres at its ends the lower one: a box of one pixel holds its upper left
+  // corner.
   const int first = static_cast<int>(std::floor(position - filter_.radius - 0.5)) + 1;
   const int last = static_cast<int>(std::floor(position + filter_.radius - 0.5));
   double sum = 0;

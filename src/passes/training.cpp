@@ -39,7 +39,7 @@ std::string LearningIntegrator::training_text() const { return frozen_ ? hash_te
 
 namespace {
 
-/// Whether the importance of pixels is made of the image so far, for the waves that are left.
+/// Whether the importance of pixels is computed from the current image, for the remaining waves.
 bool asks_for_importance(const LearningIntegrator& integrator) {
   const uint32_t now = integrator.trained_spp(), pilot = integrator.pilot_spp();
   return now == pilot || (pilot > 0 && now > pilot && now < integrator.training_spp() && integrator.pilot_goes_on());
@@ -65,7 +65,7 @@ bool train(const Scene& scene, LearningIntegrator& integrator, const TrainingSet
     pass.checkpoint = [&] {
       const bool asks = settings.importance && asks_for_importance(integrator), first = importance.empty();
       if (asks && first) make_importance();
-      // But for the first, a wave's variance is weighed by an importance that is not made of it.
+      // Except for the first, a wave's variance is weighted by an importance that does not depend on it.
       if (settings.image) waves.add(film, importance);
       if (asks && !first) make_importance();
     };

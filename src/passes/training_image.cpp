@@ -10,7 +10,7 @@
 namespace covary {
 namespace {
 
-constexpr double kTrimmed = 0.001;         // part of the squares that do not count: a few bright samples tell little
+constexpr double kTrimmed = 0.001;         // fraction of the squares that is ignored: a few bright samples say little
 constexpr size_t kFewestValues = 3 * 128;  // with fewer, all waves count by their samples
 
 size_t colour_of(const Film& film, size_t pixel) {
@@ -18,7 +18,7 @@ size_t colour_of(const Film& film, size_t pixel) {
   return (pixel % width + pixel / width) & 1;
 }
 
-/// Mean of the values without the largest; 1 where they are too few to tell, or all zero.
+/// Mean of the values without the largest; 1 if there are too few, or all are zero.
 double trimmed_mean(std::vector<float>& values) {
   const size_t n = values.size() - static_cast<size_t>(kTrimmed * static_cast<double>(values.size()));
   if (values.size() < kFewestValues) return 1;
@@ -41,7 +41,7 @@ struct WaveView {
   }
 };
 
-/// Variance of a sample, relative where `importance` says so, in the mean over the pixels of either colour.
+/// Variance of a sample, relative if `importance` is given, averaged over the pixels of each colour.
 std::array<double, 2> sample_variances(const WaveView& wave, std::span<const Spectrum> importance) {
   std::array<std::vector<float>, 2> squares;
   const double scale = 1 / (1.0 / wave.n(0) + 1.0 / wave.n(1));
@@ -78,7 +78,7 @@ void WaveCombination::add(const Film& film, std::span<const Spectrum> importance
 
 TrainingImage WaveCombination::result() const {
   TrainingImage result{sum_, {}};
-  // Earlier waves are no better than the last: where they seem so, it has met rare bright samples.
+  // Earlier waves are no better than the last: if they seem so, the last has met rare bright samples.
   for (size_t colour = 0; colour < 2; ++colour)
     result.samples[colour] = std::min<double>(end_, weight_sums_[colour] * last_variance_[colour]);
   for (int y = 0; y < sum_.height; ++y)

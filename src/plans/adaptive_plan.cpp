@@ -20,25 +20,25 @@
 namespace covary {
 namespace {
 
-constexpr double kFirstShare = 0.5;        // of the budget or the time, at most
-constexpr double kShareOfFirst = 1.0 / 3;  // of the budget, where it is a part of the image
-constexpr double kOverestimate = 1.1;      // of the samples that a limit of time allows
+constexpr double kFirstShare = 0.5;        // maximum fraction of the budget or the time
+constexpr double kShareOfFirst = 1.0 / 3;  // fraction of the budget if it is part of the image
+constexpr double kOverestimate = 1.1;      // fraction of the samples that the time limit allows
 
-constexpr uint32_t kFirstOfError = 50;  // samples of the first pass where a relative error says how many there are
+constexpr uint32_t kFirstOfError = 50;  // samples of the first pass if a relative error determines the rest
 
 struct Method {
   AdaptiveSampling sampling;
   std::string name;
-  std::optional<int> groups;  ///< that were asked for
+  std::optional<int> groups;  ///< as requested
   int fewest_groups = 1;
-  DenoisedMean denoise;  ///< of a denoised mean, whose first pass is a part of it
+  DenoisedMean denoise;  ///< of a denoised mean, which includes the first pass
 
   /// Of both films.
   uint32_t groups_of(const PlanState& state) const {
     if (groups) return static_cast<uint32_t>(*groups);
     if (denoise) return static_cast<uint32_t>(number_of_groups({{1.0}, 1}, state));
     if (!sampling.reads_groups) return 1;
-    constexpr uint32_t kEnough = 4;  // as of other estimators of two passes
+    constexpr uint32_t kEnough = 4;  // as for other two-pass estimators
     return static_cast<uint32_t>(number_of_groups({{kFirstShare, 1 - kFirstShare}, kEnough}, state));
   }
 };
@@ -57,7 +57,7 @@ uint32_t first_samples(const Method& method, const PlanState& state) {
   return std::max(samples / groups, 1u) * groups;
 }
 
-/// Samples per pixel that may be taken in all; infinite where only a relative error says how many.
+/// Maximum samples per pixel; infinite if only a relative error limits them.
 double whole_budget(const Method& method, const PlanState& state) {
   const bool is_open = method.sampling.counts.relative_error && !state.request.spp && !state.seconds_left;
   return is_open ? std::numeric_limits<double>::infinity() : state.budget;
@@ -90,7 +90,7 @@ void check_budget(const Method& method, const PlanState& state, uint32_t first) 
                           budget, method.name, first, least));
 }
 
-/// Samples per pixel that the time left is enough for.
+/// Samples per pixel for which the remaining time suffices.
 double samples_in_time(const PlanState& state) {
   const CropWindow window = window_of(state.scene, state.request);
   const FilterSettings filter = state.request.filter.value_or(state.scene.filter);

@@ -21,7 +21,7 @@ namespace covary {
 namespace {
 
 constexpr uint32_t kFirstBudget = 96;
-/// Of the next budget towards a wanted error: more than this goes beyond what was asked for, less asks more often.
+/// Of the next budget towards a target error: a larger one overshoots, a smaller one checks more often.
 constexpr double kMargin = 1.02, kLeastGrowth = 1.06;
 
 }  // namespace

@@ -35,7 +35,7 @@ constexpr double kBytesOfMean = 7 * sizeof(float);
 EstimatorResult mean_of_first(std::span<const Pass> passes, int first_row, int n_rows, const Beside& beside) {
   const GroupedImage groups = rows_of(passes[0].film, first_row, n_rows);
   EstimatorResult mean = mean_of_groups(groups);
-  // Pixels with common random numbers err together, which their variances do not tell.
+  // Pixels with common random numbers err together, which their variances do not show.
   if (passes[0].plan.sampling == Sampling::kIndependent) add_risk_of_mean(groups, mean);
   for (const Layer& layer : beside.layers) mean.layers.push_back(mean_of_groups(layer.image).estimate);
   return mean;
@@ -131,7 +131,7 @@ Plan samples_plan(const Estimator& estimator) {
     pass.name = "independent";
     pass.estimate = pixel_estimate(estimator.estimate_pixel, estimator.dimensions);
     pass.estimator = estimator.text;
-    // The number of samples belongs to the settings: an estimate of few samples cannot become one of more.
+    // The number of samples is one of the settings: an estimate from few samples cannot be extended.
     pass.settings = fmt::format("; {} samples={}", estimator.film_settings, state.group_budget);
     return std::vector{pass};
   };

@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Whether the path still names the open file: whoever held it before may have removed it.
+/// Whether the path still names the open file, which its previous owner may have removed.
 bool is_current(int file, const std::string& path) {
   struct stat opened {
   }, named{};
@@ -27,7 +27,7 @@ bool is_current(int file, const std::string& path) {
          opened.st_ino == named.st_ino;
 }
 
-/// "process 1234", as the file says.
+/// "process 1234", according to the file.
 std::string holder(int file) {
   std::array<char, 32> text{};
   const ssize_t size = pread(file, text.data(), text.size() - 1, 0);

@@ -21,16 +21,16 @@
 namespace covary {
 namespace {
 
-constexpr double kShare = 0.06;        // of the samples of the render that trials take, about
+constexpr double kShare = 0.06;        // fraction of the render's samples for trials, approximately
 constexpr uint32_t kSamples = 8;       // of each integrator at a pixel
-constexpr uint32_t kUsualBudget = 64;  // where nobody knows how many samples there will be
-constexpr int kFewestPixels = 1000;    // that are tried, of windows that have so many
+constexpr uint32_t kUsualBudget = 64;  // if the number of samples is unknown
+constexpr int kFewestPixels = 1000;    // tried pixels, if the window has as many
 constexpr double kClearlyBetter = 0.9;
-constexpr double kCutOff = 0.995;  // part of the values that larger ones are set to
-/// Makes another seed of the render's, so that trials share no numbers with its passes.
+constexpr double kCutOff = 0.995;  // fraction of the values that is clamped
+/// Changes the render's seed, so that trials share no numbers with its passes.
 constexpr uint64_t kOtherSeed = 0x9e3779b97f4a7c15;
 
-/// What the samples of one integrator tell at the pixels that are tried.
+/// Results of one integrator's samples at the tried pixels.
 struct Sampled {
   std::vector<Spectrum> means, variances;
   double rays = 0;  ///< of a sample
@@ -40,13 +40,13 @@ uint32_t training_of(const Integrator& integrator) {
   return integrator.learning() ? integrator.learning()->training_spp() : 0;
 }
 
-/// Samples per pixel of the render, as far as that is known.
+/// Samples per pixel of the render, as far as known.
 uint32_t budget_of(const LoadedScene& scene, const RenderRequest& request) {
   const bool is_open = !request.spp && (request.seconds > 0 || request.until > 0);
   return is_open ? kUsualBudget : request.spp.value_or(static_cast<uint32_t>(scene.spp));
 }
 
-/// Why an integrator is not tried; empty where it is. One that learns needs samples to gain from what it learnt.
+/// Why an integrator is not tried; empty if it is. One that learns needs samples left that profit from the training.
 std::string left_out(const Integrator& integrator, const Scene& scene, uint32_t budget) {
   if (scene.has_media() && !integrator.sees_media()) return "it does not support participating media";
   if (2 * training_of(integrator) > budget)
@@ -100,7 +100,7 @@ class Trials {
   uint64_t seed_ = 0;
 };
 
-/// The weight of relMSE at each pixel, of the mean brightness of all integrators at the 3 x 3 pixels around.
+/// The weight of relMSE at each pixel, from the mean brightness of all integrators in the surrounding 3 x 3 pixels.
 std::vector<double> weights_of(std::span<const std::optional<Sampled>> all, int columns) {
   const size_t n = all[0]->means.size();
   std::vector<double> brightness(n), weights(n);

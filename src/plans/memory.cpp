@@ -20,8 +20,8 @@ namespace covary {
 namespace {
 
 constexpr double kImageBytes = 3 * sizeof(float);  // per pixel
-constexpr double kImagesOfLayer = 12;              // while it is denoised
-constexpr double kSplatBytes = 16e6;               // of a round of light paths, about
+constexpr double kImagesOfLayer = 12;              // per pixel, during denoising
+constexpr double kSplatBytes = 16e6;               // of a round of light paths, approximately
 
 }  // namespace
 
@@ -36,7 +36,7 @@ RenderMemory render_memory(const Plan& plan, std::span<const PassPlan> passes, i
     if (pass.light && plan.film_is_image) memory.estimate += film;  // the sum of both films
   }
   if (aovs) memory.films += n_pixels * std::size(kAuxiliaryImages) * kImageBytes;
-  // A picture for a viewer or the preview.
+  // For a viewer or the preview.
   memory.estimate += plan.estimate_memory.bytes(n_pixels, fewest_groups) + n_pixels * kImageBytes;
   return memory;
 }

@@ -32,7 +32,7 @@ std::string frame_text(const Film& film) {
   return fmt::format("{} x {}, crop {},{},{},{}", film.frame_width(), film.frame_height(), c.x, c.y, c.width, c.height);
 }
 
-/// Reads what the samples of a kept film cost; what cannot be right is left out.
+/// Reads the cost of a kept film's samples; ignores impossible values.
 void read_costs(const std::function<void(const std::string&)>& warn, Pass& pass) {
   const std::string path = costs_path(pass);
   try {
@@ -54,7 +54,7 @@ void write_costs(const Pass& pass) {
                                              pass.settings.estimate ? result.estimate_seconds : 0}));
 }
 
-/// Puts the film at pass.path in the place of the empty one, which it must match.
+/// Replaces the empty film with the one at pass.path, which it must match.
 void resume(const RenderRequest& request, Pass& pass) {
   const std::string frame = frame_text(pass.film);
   const int groups = pass.film.groups(), fewest = pass.plan.fewest_groups;
@@ -78,7 +78,7 @@ void resume(const RenderRequest& request, Pass& pass) {
   for (const char* key : {film_key::kSceneHash, film_key::kSampling, film_key::kSeed, film_key::kSettings,
                           film_key::kTraining, film_key::kLightPaths, film_key::kLight})
     if (film.attributes[key] != wanted(key)) differs(key, film.attributes[key], wanted(key));
-  // A film that an earlier render was to keep is not removed by this one.
+  // Does not remove a film that an earlier render was asked to keep.
   pass.temporary = pass.temporary && film.attributes.count(film_key::kTemporary) > 0;
   const auto budgets = film.attributes.extract(film_key::kBudgets);
   film.attributes = attributes;
@@ -94,7 +94,7 @@ void make_folder(const fs::path& folder) {
     throw Error(ErrorCode::kIo, fmt::format("cannot make the folder '{}': {}", folder.string(), error.message()));
 }
 
-/// The file is the film of a render that was interrupted, and not a sum of films, which are in a folder beside it.
+/// Whether the file is the film of an interrupted render, and not a sum of films, which are in a folder beside it.
 bool is_unfinished_film(const std::string& path) {
   std::error_code ignored;
   if (!fs::is_regular_file(path, ignored)) return false;
@@ -107,7 +107,7 @@ bool is_unfinished_film(const std::string& path) {
   }
 }
 
-/// Only a film, in the folder itself, is replaced.
+/// Only replaces films in the folder itself.
 void check_replaceable(const std::string& path) {
   try {
     read_film_attributes(path);
@@ -207,7 +207,7 @@ using Json = nlohmann::ordered_json;
 
 [[noreturn]] void fail(const std::string& what) { throw Error(ErrorCode::kInput, what); }
 
-/// The member of `costs`, which must be a finite number from 0 on.
+/// The member of `costs`, which must be a finite number >= 0.
 template <typename T>
 T amount(const Json& costs, const char* key) {
   const auto it = costs.find(key);

@@ -23,21 +23,21 @@ void add(const PassResult& from, PassResult& to) {
   keep_first(to.bad_samples);
 }
 
-/// Part of the pass that is done.
+/// Fraction of the pass that is done.
 double fraction(const Pass& pass) {
   return pass.count / (pass.plan.light ? pass.wanted : static_cast<double>(pass.settings.spp.largest()));
 }
 
 bool is_complete(const Pass& pass) { return pass.count >= pass.settings.spp.largest(); }
 
-/// What is counted for the caller: camera samples and light paths that are missing.
+/// Remaining work for the progress: camera samples and light paths.
 uint64_t missing(const Pass& pass) {
   if (!pass.plan.light) return pass.settings.spp.missing(pass.film);
   const uint32_t target = pass.settings.spp.largest();
   return uint64_t{target - std::min(target, pass.count)} * kBundlePaths;
 }
 
-/// The pass that is farthest behind; null when all are complete.
+/// The pass that is farthest behind; null if all are complete.
 Pass* next_pass(std::span<Pass> passes) {
   Pass* next = nullptr;
   for (Pass& pass : passes)
@@ -45,8 +45,8 @@ Pass* next_pass(std::span<Pass> passes) {
   return next;
 }
 
-/// Samples of a light film at the end of the next round: at most as many more as the pass took in such a time, because
-/// what a round gathers is of use only when it is complete.
+/// Samples of a light film at the end of the next round: at most the number that the pass takes in this time, because a
+/// round is only useful when complete.
 uint32_t light_limit(const Pass& pass, std::optional<double> seconds) {
   const auto groups = static_cast<uint32_t>(pass.film.groups());
   const uint32_t end = light_round_end(pass.count, pass.film.groups());
@@ -76,7 +76,7 @@ uint64_t render_passes(const Scene& scene, std::span<Pass> passes, const WaveLim
     if (!wave.estimate) wave.limit = wave_end(pass.count, pass.film.groups());
     if (pass.plan.light) wave.limit = light_limit(pass, {});
     wave.stop = limits.stop;
-    wave.checkpoint = wave.estimate ? limits.wave : nullptr;  // that wave is all there is
+    wave.checkpoint = wave.estimate ? limits.wave : nullptr;  // there is only this wave
     wave.progress = [&](uint64_t now, uint64_t) {
       if (limits.progress) limits.progress(done + now, total);
     };

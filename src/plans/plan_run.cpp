@@ -21,8 +21,8 @@
 namespace covary {
 namespace {
 
-/// Largest factor from one budget to the next towards a wanted error; and where the predicted error is unreliable, so
-/// that one that is far too large does not cost that many samples before it is seen again.
+/// Largest factor from one budget to the next towards a target error; smaller if the predicted error is unreliable, so
+/// that a far too large prediction does not cost that many samples before the next check.
 constexpr double kMostGrowth = 4, kDoubtfulGrowth = 2;
 
 std::string filter_text(const FilterSettings& filter) {
@@ -98,7 +98,7 @@ bool PlanRun::render_to_limits() {
   const uint32_t limit = largest_budget(scene_, request_);
   state_.budget = state_.group_budget = rounds_.budget();
   if (timed() && plan_.groups_follow_speed) {
-    // What half of the time is enough for, so that no more groups are begun than can be filled.
+    // The number that half of the time suffices for, so that no more groups are begun than can be filled.
     const double samples =
         0.5 * request_.seconds * samples_per_second(scene_, *state_.integrator, filter_, window_, callbacks_.stop);
     state_.group_budget =
@@ -148,7 +148,7 @@ bool PlanRun::render_phase(size_t index, double share) {
   state_.guides = guides();
   if (timed()) state_.seconds_left = request_.seconds - watch_.seconds();
   if (request_.until > 0) {
-    state_.budget = rounds_.budget();  // a film may have told of an earlier call's
+    state_.budget = rounds_.budget();  // an earlier call's film may have recorded it
     for (Pass& pass : state_.passes) pass.film.attributes[film_key::kBudgets] = rounds_.text();
   }
   phase.set_targets(state_, passes.first(camera_passes(passes).size()));
@@ -239,7 +239,7 @@ void PlanRun::between_waves() {
 void PlanRun::warn_of_other_samples(uint32_t asked) const {
   double planned = 0;
   for (const Pass& pass : camera_passes(state_.passes)) {
-    if (pass.settings.spp.is_map()) return;  // its numbers are about what was asked for, or limited by other options
+    if (pass.settings.spp.is_map()) return;  // its numbers are approximate, or limited by other options
     planned += pass.settings.spp.largest();
   }
   if (planned != asked && callbacks_.warning)

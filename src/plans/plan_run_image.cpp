@@ -26,11 +26,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kTrialRows = 64;            // at least, where the time of the estimate is found out
+constexpr int kTrialRows = 64;            // at least, if the time of the estimate is measured
 constexpr uint32_t kMostAovSamples = 64;  // per pixel of auxiliary images
-/// Seconds of work after which films that nobody asked for are worth writing before the image is made of them.
+/// Seconds of work after which films are worth writing, even unasked, before the image is made of them.
 constexpr double kWorthKeeping = 10;
-constexpr double kEstimateOfInterrupted = 0.5;  // seconds that it may take; after these the image is the mean
+constexpr double kEstimateOfInterrupted = 0.5;  // seconds that it may take; after that the image is the mean
 
 }  // namespace
 
@@ -50,9 +50,9 @@ EstimatorResult PlanRun::estimate_rows(int first_row, int n_rows, std::span<cons
   return image;
 }
 
-/// False when interrupted; of a render that was interrupted before, when it takes too long.
+/// False if interrupted; for a render that was interrupted earlier, if it takes too long.
 bool PlanRun::estimate() {
-  // One that took so long until it was stopped takes too long from its start, too.
+  // An estimate that took too long before it was stopped is not tried again.
   if (result_.interrupted && estimate_stopped_after_ > kEstimateOfInterrupted) return false;
   begin(RenderStage::kEstimating);
   const Stopwatch watch;
@@ -84,7 +84,7 @@ bool PlanRun::estimate() {
   return true;
 }
 
-/// Seconds that the estimate will take, from a trial on rows in the middle: it depends on sizes, not on samples.
+/// Predicted seconds of the estimate, from a trial on rows in the middle: it depends on sizes, not on samples.
 double PlanRun::time_estimate() {
   if (plan_.film_is_image) return 0;  // a mean
   const Stopwatch watch;
@@ -103,7 +103,7 @@ void PlanRun::render_auxiliary_images() {
   result_.seconds.auxiliary = watch.seconds();
 }
 
-/// As many samples as the last pass has, those that earlier calls have traced among them.
+/// As many samples as the last pass has, including those that earlier calls have traced.
 void PlanRun::trace_layers() {
   const Pass& pass = camera_passes(films()).back();
   if (!of_layers_) {
@@ -138,14 +138,14 @@ bool PlanRun::try_to_keep_films(bool complete, const char* then) {
   return !unsaved_;
 }
 
-/// Films that have cost time are on disk before anything else is done with them.
+/// Films that took time are written before anything else is done with them.
 void PlanRun::keep_films_before_more() {
   const bool asked = !request_.passes.empty();
   if (unsaved_ && (asked || since_checkpoint_.seconds() > kWorthKeeping))
     try_to_keep_films(!stopped(), "the image is made nevertheless");
 }
 
-/// After an error that came when all films were whole.
+/// After an error when all films were complete.
 void PlanRun::keep_films_of_failure() noexcept {
   if (!consistent_ || !unsaved_ || done_ == 0 || films().empty() || films()[0].path.empty()) return;
   try {

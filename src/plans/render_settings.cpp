@@ -149,7 +149,7 @@ std::vector<std::string> replay_words(OptionValues values, const Pass& pass, con
   if (!pass.plan.light) values["sampling"] = is_crn ? "crn" : "independent";
   if (is_sobol) values["groups"] = std::to_string(pass.settings.groups);
   if (is_sobol || values.contains("sampler")) values["sampler"] = sampler_name(pass.settings.sampler);
-  // Whether light is traced decides on the weights of strategies.
+  // The weights of techniques depend on whether light is traced.
   if (pass.integrator->light_tracing()) values["light-tracing"] = light_tracer(*pass.integrator) ? "on" : "off";
   const std::vector<Option> of_integrators = options_of_integrators();
   options.insert(options.end(), of_integrators.begin(), of_integrators.end());
@@ -178,7 +178,7 @@ std::vector<std::string> pass_words(OptionValues given, const OptionValues& of_i
   for (const auto& [option, value] : of_integrator) words.insert(words.end(), {"--" + option, value});
   const bool is_plain_pair = estimator.passes == EstimatorPasses::kPair && !estimator.adaptive;
   const bool is_denoised_mean = estimator.passes == EstimatorPasses::kAny && settings.denoising.denoises();
-  // What is denoised decides on these passes.
+  // These passes depend on what is denoised.
   if (settings.passes.chooses_split) words.push_back(estimator_of(settings, of_estimator).text);
   words.push_back(is_plain_pair ? "pair" : is_denoised_mean ? "groups" : name);
   return words;

@@ -41,7 +41,7 @@ std::vector<ReplayedSample> replay(const LoadedScene& scene, const Plan& plan, c
   const auto integrator = prepared_integrator(scene, plan, request);
   const FilterSettings filter = request.filter.value_or(scene.filter);
   RenderSeconds seconds;
-  // As the render does: its sums for two halves of the image round otherwise than for one.
+  // Like the render: sums for two halves of the image round differently from sums for one.
   TrainingImage image;
   TrainingSettings training{window_of(scene, request), filter, nullptr, nullptr, {}};
   if (plan.takes_training) training.image = &image;

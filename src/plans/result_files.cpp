@@ -50,7 +50,7 @@ void write_result_files(const Plan& plan, const RenderRequest& request, RenderRe
     attributes["covary:samples"] = fmt::format("{:g}", result.samples_per_pixel());
     if (aovs.contains("Albedo")) attributes[std::string("covary:") + film_key::kCleanGuides] = "true";
     const ImagePlace place{film.frame_width(), film.frame_height(), film.crop()};
-    EstimatorResult mean;  // of an interrupted render whose films are too young for the estimator
+    EstimatorResult mean;  // of an interrupted render whose films have too few samples for the estimator
     if (!estimated) mean.estimate = result.picture();
     write_result(request.output, place, attributes, estimated ? result.image : mean, aovs);
   }

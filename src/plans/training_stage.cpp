@@ -78,7 +78,7 @@ std::vector<Spectrum> pixel_importance(const Scene& scene, const FilterSettings&
 
 namespace {
 
-/// The integrator if it keeps what it learns, else throws.
+/// The integrator, if its training can be saved; throws otherwise.
 template <typename Learning>
 Learning& keeper(Learning* learning) {
   if (!learning || !learning->keeps_training())

@@ -14,14 +14,14 @@
 namespace covary {
 namespace {
 
-/// Relative scatter at which what the samples tell counts as much as what is usual.
+/// Relative scatter at which the samples' estimate and the typical value count equally.
 constexpr double kTrusted = 0.5;
-/// No error is taken to be less than this part of the variance, or more than so many times as much.
+/// Bounds of the error as multiples of the variance.
 constexpr double kLeastOverVariance = 0.5, kMostOverVariance = 30;
-/// What halves miss of the covariance (docs/notes/error-estimates.md).
+/// Fraction of the covariance that halves miss (docs/notes/error-estimates.md).
 constexpr double kMissingCovariance = 0.27;
 
-/// How large a ratio is, and how much that is hidden by its noise.
+/// The logarithm of a ratio, and how much of it noise hides.
 struct Ratio {
   double log = 0, hidden = 1;
 };
@@ -43,10 +43,10 @@ void scale(Image& std_error, double factor) {
   for (float& value : std_error.data) value *= static_cast<float>(std::sqrt(factor));
 }
 
-/// Whether images of this kind and of few groups have a fit of their own.
+/// Whether images of this kind with few groups have a separate fit.
 bool fitted_to_few(ErrorKind kind) { return kind == ErrorKind::kFilters || kind == ErrorKind::kNetwork; }
 
-/// Which part of log(relMSE / V) is left to the features of an image: less, the more a mixture is the mean.
+/// Which part of log(relMSE / V) is left to the features of an image: less, the closer a mixture is to the mean.
 double not_the_mean(const RiskRow& sums, ErrorKind kind) {
   if (kind == ErrorKind::kMean || kind == ErrorKind::kPair || sums.groups < kFewestGroups) return 1;
   return 1 - std::min(1.0, sums.variance / sums.noise);
@@ -89,7 +89,7 @@ std::string unknown_error(const RiskRow& sums, ErrorKind kind, const LogError& e
   const double n = sums.noise * sums.noise / sums.noise_squares, pixels = sums.values / 3;
   if (n < kFewestPixels) return fmt::format("{:.0f} of {:.0f} pixels hold most of the noise", std::max(1.0, n), pixels);
   const double share = sums.light > 0 ? sums.light_of_largest / sums.light : 1;
-  if ((share - 1 / sums.groups) / (1 - 1 / sums.groups) > kMostOfLargest)  // 0 where all groups hold as much
+  if ((share - 1 / sums.groups) / (1 - 1 / sums.groups) > kMostOfLargest)  // 0 if all groups hold equal parts
     return fmt::format("{:.0f} % of the light are in one of {:.0f} groups of each pixel", 100 * share, sums.groups);
   if (std::max(error.high - error.middle, error.middle - error.low) > std::log(kMostFactor))
     return "few samples hold most of the light";

@@ -18,7 +18,7 @@ constexpr int kBorder = 7;             // the largest radius
 constexpr float kBandwidth = 0.5f;     // of the target's brightness
 constexpr float kLeastSquare = 1e-4f;  // of the bandwidth
 constexpr float kSignificant = 3;      // standard errors
-constexpr float kFewestCells = 20;     // that are alike: fewer know too little of their noise
+constexpr float kFewestCells = 20;     // similar cells: fewer determine their noise too poorly
 constexpr float kPixels = kBiasCell * kBiasCell;
 constexpr float kLeastRelative = 1e-4f;  // of the brightness: less is rounding
 static_assert(kBiasReach >= (kBorder + 1) * kBiasCell);
@@ -83,7 +83,7 @@ Planes cells_of(const HeldOutBiasInput& in) {
 /// d and v of one half at the cells (x + lane, y).
 struct GuidedMean {
   vfloat mean[3] = {}, variance[3] = {};
-  vfloat cells = {};  ///< so many of equal weights know as much
+  vfloat cells = {};  ///< as informative as this many of equal weights
 };
 
 GuidedMean guided_mean(const Planes& cells, int half, int radius, int x, int y) {
@@ -116,7 +116,7 @@ GuidedMean guided_mean(const Planes& cells, int half, int radius, int x, int y) 
   return sums;
 }
 
-/// The bias that both halves' means tell, zero where it is not significant.
+/// The bias according to both halves' means, zero where it is not significant.
 vfloat significant(const GuidedMean& of_a, const GuidedMean& of_b, int c, vfloat brightness) {
   const vfloat a = of_a.mean[c], b = of_b.mean[c], variance = 0.25f * (of_a.variance[c] + of_b.variance[c]);
   const vfloat bias = 0.5f * (a + b), square = bias * bias, difference = a - b, least = kLeastRelative * brightness;

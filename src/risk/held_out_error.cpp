@@ -17,11 +17,11 @@ namespace {
 
 using namespace lanes;
 
-/// Pixels of a part of a row, whose errors are taken together.
+/// Pixels of a part of a row, whose errors are summed.
 constexpr int kPart = 16;
 /// Relative standard error of the held-out error at which it counts as much as the estimator's own prediction.
 constexpr double kTrusted = 0.3;
-/// Least error of the whole over the variance of the halves: half, but for noise.
+/// Least error of the whole over the variance of the halves: half, except for noise.
 constexpr double kLeastOverVariance = 0.25;
 
 HeldOutRow sum_of(const std::vector<HeldOutRow>& rows) {
@@ -33,14 +33,14 @@ HeldOutRow sum_of(const std::vector<HeldOutRow>& rows) {
   return all;
 }
 
-/// Squared relative standard error c^2 of the held-out error; infinite where that says nothing.
+/// Squared relative standard error c^2 of the held-out error; infinite if that is not positive.
 double squared_uncertainty(const HeldOutRow& all) {
   if (all.parts < 2 || !(all.error > 0) || !std::isfinite(all.squares + all.variance))
     return std::numeric_limits<double>::infinity();
   return std::max(0.0, all.squares - all.error * all.error / all.parts) / square(all.error);
 }
 
-/// How much the held-out error counts, 0 to 1: 1 / (1 + (c / kTrusted)^2).
+/// Weight of the held-out error, 0 to 1: 1 / (1 + (c / kTrusted)^2).
 double trust_in(const HeldOutRow& all) { return 1 / (1 + squared_uncertainty(all) / square(kTrusted)); }
 
 /// The squared error of the image of all samples.
@@ -92,7 +92,7 @@ double factor_of_image(const HeldOutInput& in) {
   return 2 * usual * std::pow(error_of_whole(all) / (usual * all.variance), trust);
 }
 
-/// Makes the relative squared error of each pixel proportional to `disagreement`; the whole image's stays as it is.
+/// Makes the relative squared error of each pixel proportional to `disagreement`; the whole image's is unchanged.
 void place(const Image& disagreement, const HeldOutInput& in, Image& std_error) {
   if (std::none_of(disagreement.data.begin(), disagreement.data.end(), [](float d) { return d > 0; })) return;
   const int width = std_error.width;
@@ -116,7 +116,7 @@ void place(const Image& disagreement, const HeldOutInput& in, Image& std_error) 
   for (float& value : std_error.data) value *= static_cast<float>(std::sqrt(before / after));
 }
 
-/// The weight of each squared error is that of the image it belongs to: independent of the held-out samples.
+/// Each squared error is weighted by the image it belongs to: independent of the held-out samples.
 HeldOutRow held_out_row(const HeldOutInput& in, const EstimatorResult& whole, int y) {
   const int width = whole.estimate.width;
   HeldOutRow row = row_of_halves(in, width, y, [&](int x) {

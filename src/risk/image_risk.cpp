@@ -10,7 +10,7 @@
 namespace covary {
 namespace {
 
-/// Pixels of a part of a row, whose errors are taken together.
+/// Pixels of a part of a row, whose errors are summed.
 constexpr int kPart = 16;
 
 /// A pixel's sums over its channels.
@@ -23,7 +23,7 @@ PixelRisk risk_at(const ImageRiskInput& in, int x, int y) {
   for (int c = 0; c < 3; ++c) {
     const double h = in.independent->mean.row(c, y)[x], v = in.independent->variance_of_mean.row(c, y)[x];
     pixel.noise += v;
-    if (!in.halves[0]) {  // M is h: its error is its variance, and nothing is to be added to it
+    if (!in.halves[0]) {  // M is h: its error is its variance, and nothing needs to be added
       pixel.error += v, pixel.variance += v;
       continue;
     }
@@ -40,7 +40,7 @@ PixelRisk risk_at(const ImageRiskInput& in, int x, int y) {
   return pixel;
 }
 
-/// What the groups of a pixel hold and how much they differ.
+/// The fractions of light in a pixel's groups, and how much they differ.
 void add_groups(const ImageRiskInput& in, int x, int y, double weight, RiskRow& row) {
   const GroupedImage& image = *in.groups;
   const int T = image.groups;
@@ -60,7 +60,7 @@ void add_groups(const ImageRiskInput& in, int x, int y, double weight, RiskRow& 
     }
     row.squared_deviations += square(weight * second[c]), row.fourth_powers += square(weight) * fourth[c];
   }
-  const double brightness = std::sqrt(weight);  // 1 / (G' + 0.1), about
+  const double brightness = std::sqrt(weight);  // approximately 1 / (G' + 0.1)
   row.light += brightness * light, row.light_of_largest += brightness * largest;
 }
 
@@ -86,8 +86,8 @@ RiskRow risk_of_row(const ImageRiskInput& in, int y) {
   return row;
 }
 
-/// The mean brightness of the 5 x 5 pixels around each but its own: a pixel that is bright by chance would hide its own
-/// error, and a median is too dark where light is rarely found.
+/// The mean brightness of the surrounding 5 x 5 pixels without the pixel itself: a pixel that is bright by chance would
+/// hide its own error, and a median is too dark where light is rarely found.
 Image brightness_around(const Image& image) {
   constexpr int kRadius = 2;
   Image guide(image.width, image.height, 3);
@@ -118,7 +118,7 @@ std::vector<RiskRow> image_risk(const ImageRiskInput& input) {
 
 void add_risk_of_mean(const GroupedImage& groups, EstimatorResult& mean) {
   if (groups.groups < 2) return;
-  long ignored = 0;  // whoever shows the image counts them
+  long ignored = 0;  // counted where the image is shown
   const std::vector<unsigned char> valid = finite_pixels(groups, groups, ignored);
   const Moments independent = moments(groups, valid, 0, 0.0f);
   Image finite = mean.estimate;
