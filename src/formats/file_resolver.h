@@ -17,7 +17,7 @@ namespace covary {
 /// added.
 class FileResolver {
  public:
-  /// Folders are searched last added first, then the folder of the XML file that names the file.
+  /// Searches folders in reverse order of addition, then the folder of the XML file that names the file.
   void add_folder(const std::string& folder);
 
   /// Path of the existing regular file `name`; records an error at `where` and returns "" when there is none.
@@ -26,7 +26,7 @@ class FileResolver {
   /// Every file found so far by resolve(), by its path, with the name the scene used.
   std::map<std::string, std::string> files() const;
 
-  /// Hash of names and contents of these files; one that cannot be read counts as such.
+  /// Hash of names and contents of these files; an unreadable file counts as such.
   std::string content_hash(const std::string& scene_hash) const;
 
  private:

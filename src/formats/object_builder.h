@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Descriptions of objects in the making, by the readers of formats that are not XML.
+// Helpers of the readers of formats other than XML, to build descriptions of objects.
 #pragma once
 
 #include <initializer_list>
@@ -16,11 +16,12 @@ namespace covary {
 using ObjectBuilder = std::shared_ptr<ObjectDescription>;
 ObjectBuilder make_object(const std::string& kind, const std::string& type, const SourceLocation& where,
                           std::initializer_list<std::pair<std::string, Value>> properties = {});
-/// Transformations are kept as their 16 numbers say, which is all that a file can hold: its inverse is that of them.
+/// Transformations are defined by their 16 numbers, which is all that a file can hold: the inverse is computed from
+/// these.
 void set_property(ObjectDescription& object, const std::string& name, Value value);
 
-/// Calls `visit(object, property)` for each property of `root` and of all objects that it holds or refers to, directly
-/// or not, each object once.
+/// Calls `visit(object, property)` once for each property of `root` and of all objects that it holds or refers to,
+/// directly or indirectly.
 template <typename Visit>
 void visit_properties(const ObjectDescription& root, const Visit& visit) {
   std::unordered_set<const ObjectDescription*> seen;
@@ -36,11 +37,11 @@ void visit_properties(const ObjectDescription& root, const Visit& visit) {
   }
 }
 
-// Meshes that stand in a scene's own file become PLY files in memory, the property `data` of a shape `ply`.
+// Meshes inside a scene's own file become PLY files in memory, the property `data` of a shape `ply`.
 
 struct EmbeddedMesh {
-  std::vector<double> positions, normals, uvs;  ///< three, three and two numbers a vertex; the last two may be empty
-  std::vector<double> corners;                  ///< three indices a triangle, whole and in range
+  std::vector<double> positions, normals, uvs;  ///< three, three and two numbers per vertex; the last two may be empty
+  std::vector<double> corners;                  ///< three indices per triangle, integers in range
 };
 
 /// The mesh as a binary PLY file.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Objects of pbrt-v4's scene files as descriptions of the objects that scenes are made of here. What has no counterpart
-// is an error at its place in the file; what looks a little different is a warning.
+// Objects of pbrt-v4 scene files as descriptions of covary's own objects. Anything without a counterpart is an error at
+// its place in the file; a slight difference in looks is a warning.
 #pragma once
 
 #include <map>
@@ -16,7 +16,7 @@
 
 namespace covary {
 
-/// What later objects refer to by name. Null where an object could not be read.
+/// Named objects that later ones refer to. Null for an object that could not be read.
 struct PbrtNames {
   std::map<std::string, ObjectPtr> float_textures, spectrum_textures, materials, media;
 };
@@ -25,7 +25,7 @@ struct PbrtNames {
 std::optional<Value> float_value(PbrtParameters& p, const std::string& name, double fallback, const PbrtNames& names);
 /// A colour, a spectrum or a texture of colours; nullopt when absent or after an error.
 std::optional<Value> spectrum_value(PbrtParameters& p, const std::string& name, const PbrtNames& names);
-/// What a light sends: spectra are scaled to a luminance of 1, as pbrt has them; white when absent.
+/// The emission of a light: spectra are scaled to a luminance of 1, as in pbrt; white when absent.
 Spectrum light_colour(PbrtParameters& p, const std::string& name);
 
 /// A texture of class `type`; null after an error.
@@ -38,13 +38,13 @@ ObjectBuilder make_pbrt_shape(const std::string& type, PbrtParameters& p, const 
 
 /// The shape `curve`, a part of make_pbrt_shape().
 ObjectBuilder make_pbrt_curve(PbrtParameters& p, const PbrtPlacement& placement);
-/// Adds the curves of `more` to those of `first`, of scenes that have one of each hair; false where they are no curves.
+/// Adds the curves of `more` to those of `first`, for scenes with one shape per hair; false if they are not curves.
 bool join_pbrt_curves(ObjectDescription& first, const ObjectDescription& more);
 
 /// A medium; null after an error.
 ObjectBuilder make_pbrt_medium(const std::string& type, PbrtParameters& p);
 
-/// A light with a place of its own; null after an error, or where it is black.
+/// A light with its own position; null after an error, or if it is black.
 ObjectPtr make_pbrt_light(const std::string& type, PbrtParameters& p, const Transform& to_world);
 /// An area light for shapes; null after an error.
 ObjectPtr make_pbrt_area_light(const std::string& type, PbrtParameters& p);
@@ -60,7 +60,7 @@ void read_pbrt_film(const std::string& type, PbrtParameters& p, PbrtView& view);
 void read_pbrt_filter(const std::string& type, PbrtParameters& p, PbrtView& view);
 void read_pbrt_sampler(const std::string& type, PbrtParameters& p, PbrtView& view);
 void read_pbrt_integrator(const std::string& type, PbrtParameters& p, PbrtView& view);
-/// Sensor and integrator, with pbrt's defaults for what the file leaves out.
+/// Sensor and integrator, with pbrt's defaults for missing values.
 std::vector<ObjectPtr> finish_pbrt_view(PbrtView view, const SourceLocation& where);
 
 }  // namespace covary

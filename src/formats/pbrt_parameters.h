@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The words of pbrt-v4's scene files: tokens, and the parameter lists of directives, "float radius" [ 2 ].
+// Tokens of pbrt-v4 scene files, and the parameter lists of directives, "float radius" [ 2 ].
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@
 
 namespace covary {
 
-/// Ends the reading of a file at a word that makes no sense; the reason is in the diagnostics.
+/// Thrown to stop reading a file at an invalid word; the reason is in the diagnostics.
 struct PbrtStop {};
 
 struct PbrtToken {
@@ -26,7 +26,7 @@ class PbrtTokens {
  public:
   PbrtTokens(std::string_view text, std::string file, Diagnostics& diagnostics)
       : text_(text), file_(std::move(file)), diagnostics_(diagnostics) {}
-  /// Throws PbrtStop after an error for a string without its end.
+  /// Throws PbrtStop after an error for an unterminated string.
   PbrtToken next();
   PbrtToken peek();
   SourceLocation where(const PbrtToken& token) const { return {file_, token.line, token.column}; }
@@ -34,7 +34,7 @@ class PbrtTokens {
   const std::string& file() const { return file_; }
   bool at_end() { return peek().kind == PbrtToken::kEnd; }
 
-  /// The next token, which must be a string; `what` is what it should be.
+  /// The next token, which must be a string; `what` names the expected one.
   std::string string(const char* what);
   /// The next token, which must be a finite number.
   double number();
@@ -60,11 +60,11 @@ struct PbrtParameter {
   bool used = false;
 };
 
-/// The parameters of one directive. Getters mark them as used and record an error where type or length is wrong; they
-/// then return the fallback.
+/// The parameters of one directive. Getters mark them as used, and record an error and return the fallback if type or
+/// length is wrong.
 class PbrtParameters {
  public:
-  /// Reads from `tokens` up to the next directive. `what` stands for the object in messages: Shape "sphere".
+  /// Reads from `tokens` up to the next directive. `what` names the object in messages: Shape "sphere".
   PbrtParameters(PbrtTokens& tokens, std::string what, const SourceLocation& where, Diagnostics& diagnostics);
 
   const std::string& what() const { return what_; }
@@ -78,16 +78,16 @@ class PbrtParameters {
   std::string get_string(const std::string& name, const std::string& fallback);
   /// point3, vector3, normal3, and their older names.
   Vec3 get_vec3(const std::string& name, const Vec3& fallback);
-  /// The numbers of an array of `width` numbers an element; empty when absent.
+  /// The numbers of an array with `width` numbers per element; empty when absent.
   std::vector<double> get_array(const std::string& name, const std::string& type, size_t width);
 
   void error(const std::string& message);
   /// "parameter 'NAME' of WHAT MESSAGE"
   void error_at(const PbrtParameter& parameter, const std::string& message);
   void warn(const std::string& message);
-  /// Parameters that change nothing that is rendered here.
+  /// Parameters without effect on what is rendered here.
   void ignore(std::initializer_list<const char*> names);
-  /// An error for each parameter that nobody asked for.
+  /// An error for each parameter that was not asked for.
   void report_unknown();
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The directives of pbrt's scene files that move what follows them.
+// The directives of pbrt scene files that transform what follows them.
 #pragma once
 
 #include <map>
@@ -9,7 +9,7 @@
 
 namespace covary {
 
-/// What shapes and lights are placed with.
+/// The placement of shapes and lights.
 struct PbrtPlacement {
   Transform to_world;
   bool reverse_orientation = false;
@@ -17,7 +17,7 @@ struct PbrtPlacement {
 /// CoordinateSystem: transformations by name.
 using PbrtSystems = std::map<std::string, Transform>;
 
-/// Carries the directive `word` out, with the words that follow it; false where it is none of these.
+/// Executes the directive `word` with the words after it; false if it is not one of these.
 bool change_placement(const std::string& word, PbrtTokens& tokens, const SourceLocation& where,
                       PbrtPlacement& placement, PbrtSystems& systems, Diagnostics& diagnostics);
 

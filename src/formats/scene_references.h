@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// References between the objects of a scene file, once all of it is read: <ref> and <alias> become pointers, and
-// whatever would make later steps go on for ever, or for very long, is found and cut.
+// References between the objects of a scene file, resolved once all of it is read: <ref> and <alias> become pointers,
+// and cycles and excessive expansion, which would make later steps endless or very long, are found and cut.
 #pragma once
 
 #include <memory>
@@ -22,22 +22,19 @@ struct SceneAlias {
   SourceLocation where;
 };
 
-/// Puts the objects that they name in the place of descriptions of the kind `ref`, or nothing for unknown ones, which
-/// are errors.
+/// Replaces descriptions of the kind `ref` by the objects that they name; unknown ones are errors and become null.
 void resolve_references(const SceneObjects& objects, ObjectIds ids, const std::vector<SceneAlias>& aliases,
                         Diagnostics& diagnostics);
 
-/// Records an error for every reference that leads back to an object it is part of, and cuts it. Returns all objects,
-/// each after everything it holds.
+/// Records an error for every cyclic reference, and cuts it. Returns all objects, each after everything it holds.
 std::vector<ObjectDescription*> break_cycles(const SceneObjects& objects, Diagnostics& diagnostics);
 
-/// Finds objects that hold too many others, or more than `max_nesting` inside each other, when every reference is
-/// followed, one after the other.
+/// Finds objects that hold too many others, or more than `max_nesting` nested ones, when every reference is followed.
 class ExpansionLimit {
  public:
   ExpansionLimit(size_t max_nesting, Diagnostics& diagnostics) : max_nesting_(max_nesting), diagnostics_(diagnostics) {}
-  /// False after recording an error; the object then counts as one that holds nothing, as its user leaves it out. What
-  /// it holds was added before, or holds few itself.
+  /// False after recording an error; the object then counts as empty, because its user leaves it out. The objects it
+  /// holds were added before, or hold few themselves.
   bool add(const ObjectDescription& object);
 
  private:
@@ -49,8 +46,8 @@ class ExpansionLimit {
   std::unordered_map<const ObjectDescription*, Expanded> expanded_;
 };
 
-/// Records an error for objects that hold too many others, or more than `max_nesting` inside each other, when every
-/// reference is followed, and takes these out. `objects`: each after everything it holds.
+/// Records an error for objects that hold too many others, or more than `max_nesting` nested ones, when every reference
+/// is followed, and removes them. `objects`: each after everything it holds.
 void limit_expansion(const std::vector<ObjectDescription*>& objects, size_t max_nesting, Diagnostics& diagnostics);
 
 }  // namespace covary

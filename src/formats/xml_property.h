@@ -26,7 +26,7 @@ class PropertyReader {
 
  private:
   Value read_spectrum(const XmlAttributes& attributes, const SourceLocation& where);
-  /// The product of the operations, the first applied first. Wrong ones are recorded and left out.
+  /// The product of the operations, the first applied first. Invalid ones are recorded and left out.
   Transform read_transform(const XmlDocument& document, pugi::xml_node node);
   /// Its <transform time="…">, by which to_world moves.
   Value read_animation(const XmlDocument& document, pugi::xml_node node);

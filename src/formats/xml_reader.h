@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Mitsuba XML -> ObjectDescription trees: parameters substituted, includes read, references resolved, files of version
-// 0.x and 1.x brought to today's names (upgrade.h). What the objects mean is not decided here.
+// 0.x and 1.x upgraded (upgrade.h). The meaning of the objects is not decided here.
 #pragma once
 
 #include <map>
@@ -19,9 +19,8 @@ struct SceneXml {
   uint64_t hash = 0;
 };
 
-/// Reads the XML `text` and every file it includes. `name` stands for the text in messages, and its folder is where
-/// files are looked for first. Problems go to `diagnostics`; `files` gets the folders in which the scene's files are
-/// searched.
+/// Reads the XML `text` and every file it includes. `name` stands for the text in messages, and its folder is searched
+/// first for files. Problems go to `diagnostics`; `files` gets the folders in which the scene's files are searched.
 SceneXml read_scene_xml(std::string_view text, const std::string& name,
                         const std::map<std::string, std::string>& defines, FileResolver& files,
                         Diagnostics& diagnostics);

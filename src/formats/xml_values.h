@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Values as they are written in attributes of scene files. All functions throw Error(kInput) with the text they could
-// not read and what they accept; the caller adds the place.
+// Values in attributes of scene files. All functions throw Error(kInput) with the unreadable text and what they expect;
+// the caller adds the place.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A file of glTF 2.0 as tinygltf reads it, and what is found wrong with it.
+// A glTF 2.0 file as tinygltf reads it, and its problems.
 #pragma once
 
 #include <tiny_gltf.h>
@@ -22,13 +22,13 @@ class GltfFile {
   const tinygltf::Model& model() const { return model_; }
   const SourceLocation& where() const { return where_; }
   void error(const std::string& message);
-  /// A file that is read besides, for the hash of the scene; an error where it is missing.
+  /// Another file that is read, for the hash of the scene; an error if it is missing.
   void reads(const std::string& uri);
   /// Each message is given once.
   void warn(const std::string& message);
 
-  /// The numbers of an accessor of `width` numbers an element; integers are scaled to [-1, 1] where it says so. Empty
-  /// after an error, which names `what` it is.
+  /// The numbers of an accessor with `width` numbers per element; normalised integers are scaled to [-1, 1]. Empty
+  /// after an error, which names `what`.
   std::vector<double> numbers(int accessor, int width, const std::string& what);
   /// The bytes of a part of a buffer; empty after an error.
   std::string_view bytes_of_view(int view, const std::string& what);
@@ -43,7 +43,7 @@ class GltfFile {
   std::set<std::string> warned_;
 };
 
-/// The name of the file that a URI names: "%20" and its like are characters.
+/// The file name in a URI: "%20" and the like are decoded.
 std::string file_of_uri(const std::string& uri);
 /// An object of an extension; null where it is absent.
 const tinygltf::Value* find_extension(const tinygltf::ExtensionMap& extensions, const std::string& name);

@@ -19,7 +19,7 @@ class GltfMaterials {
 
   /// The reflectance model of a material; that of glTF's default one for -1.
   ObjectPtr model(int material);
-  /// The light that surfaces of the material send out; null where it has none.
+  /// The light that surfaces of the material emit; null if none.
   ObjectPtr light(int material);
   /// The set of texture coordinates that all its textures use.
   int texture_set(int material);

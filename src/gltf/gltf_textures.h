@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Textures of glTF as bitmaps. Images in files of their own stay there where they are used as they are; others become
-// part of the description: one channel of several, colours with a factor, images inside of the file.
+// Textures of glTF as bitmaps. Images in separate files that are used unchanged stay there; others become part of the
+// description: a single channel, colours with a factor, images inside the file.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 
 namespace covary {
 
-/// What of an image is meant.
+/// Which part of an image is used.
 struct GltfUse {
   enum Kind {
     kColour,   ///< sRGB, times `factor`
@@ -28,7 +28,7 @@ struct GltfUse {
 class GltfTextures {
  public:
   explicit GltfTextures(GltfFile& file) : file_(file) {}
-  /// The texture of this index, with the extensions of what names it; null after an error.
+  /// The texture with this index, with the extensions of its reference; null after an error.
   ObjectPtr make(int texture, const tinygltf::ExtensionMap& extensions, const GltfUse& use);
 
  private:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What can be made in parallel while a scene loads: everything that reads files or computes tables, which are textures
-// and emitters that hold no other object, and the surfaces of shapes.
+// Work that can be done in parallel while a scene loads: everything that reads files or computes tables, which are
+// textures and emitters without nested objects, and the surfaces of shapes.
 #pragma once
 
 #include <memory>
@@ -70,16 +70,16 @@ class SceneJobs {
   std::unordered_map<const ObjectDescription*, ShapeJob*> shapes_by_description_;
 };
 
-// What shapes take of memory, known before it is taken (core/memory_limit.h): a few lines of a scene can place a mesh
+// Memory of shapes, computed before it is allocated (core/memory_limit.h): a few lines of a scene can place a mesh
 // thousands of times.
 
-/// Bytes of the shape's arrays, about.
+/// Approximate bytes of the shape's arrays.
 double array_bytes(const Shape& shape);
 
-/// Bytes that a scene takes for the shape beside that, about: the ray tracer's tree, and tables to sample what emits.
+/// Approximate bytes that a scene needs for the shape besides these: the BVH, and sampling tables of emitters.
 double table_bytes(const Shape& shape, bool emits);
 
-/// Throws Error(kInput) where the tables of all shapes need too much. `file`: of the scene.
+/// Throws Error(kInput) if the tables of all shapes need too much. `file`: of the scene.
 void require_table_memory(const std::string& file, const SceneParts& parts);
 
 }  // namespace covary

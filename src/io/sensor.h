@@ -33,7 +33,7 @@ struct SensorSettings : SceneObject {
   SamplerSettings sampler;
 };
 
-// Each records an error for what it does not support.
+// Each records an error for whatever it does not support.
 std::shared_ptr<FilterObject> make_filter(Parameters& parameters);
 std::shared_ptr<FilmSettings> make_film(Parameters& parameters);
 std::shared_ptr<SamplerSettings> make_sampler(Parameters& parameters);
