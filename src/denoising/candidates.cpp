@@ -8,6 +8,7 @@
 
 #include "denoising/mirrored_halves.h"
 #include "filters/nl_means.h"
+#include "filters/regression.h"
 #include "filters/residual_correction.h"
 
 namespace covary {
@@ -37,15 +38,21 @@ Image combined(const Image& a, const Image& b, const Operation& operation) {
 
 struct FilterGuides {
   Planes all, normal;
-  Image albedo;  // at least kLeastAlbedo; empty where there is none
+  Image albedo;                 // at least kLeastAlbedo; empty where there is none
+  std::vector<Image> features;  // of the regression; none: without it
 };
 
-FilterGuides filter_guides(const Guides& guides) {
+FilterGuides filter_guides(const Guides& guides, bool regression) {
   FilterGuides result;
   const auto planes = [&](const Image& like, int count) {
     return Planes(like.width, like.height, count, kNlMeansRadius, 0.0f);
   };
   if (!guides.albedo) return result;
+  if (regression) {
+    const Guides behind_glass = network_guides(guides);
+    result.features.push_back(*behind_glass.albedo);
+    if (behind_glass.normal) result.features.push_back(*behind_glass.normal);
+  }
   result.all = planes(*guides.albedo, guides.normal ? 6 : 3);
   copy_guide(*guides.albedo, kAlbedoUnit, 0, result.all);
   result.albedo = *guides.albedo;
@@ -58,6 +65,16 @@ FilterGuides filter_guides(const Guides& guides) {
 }
 
 const Planes* or_null(const Planes& planes) { return planes.count() > 0 ? &planes : nullptr; }
+
+/// The regression of sources, beside their images by another filter.
+std::vector<Image> regressed(const FilterGuides& guides, const CandidateInput& in, std::vector<const Image*> sources,
+                             std::span<const Image> others) {
+  RegressionInput input{in.estimate, in.std_error, std::move(sources), {}};
+  for (const Image& other : others) input.others.push_back(&other);
+  std::vector<const Image*> features;
+  for (const Image& feature : guides.features) features.push_back(&feature);
+  return regressed(input, features, *in.valid);
+}
 
 /// Candidates of each of the inputs.
 std::vector<std::vector<Image>> filtered(const FilterGuides& guides, CandidateBase base,
@@ -81,7 +98,11 @@ std::vector<std::vector<Image>> filtered(const FilterGuides& guides, CandidateBa
     steerings.push_back({&image, &error, {{kSharp, {&image}}}});
   }
   images = nl_means(steerings, or_null(guides.normal), *inputs[0].valid);
-  for (size_t i = 0; i < all.size(); ++i) all[i].push_back(combined(images[i], guides.albedo, std::multiplies<>()));
+  for (size_t i = 0; i < all.size(); ++i) {
+    all[i].push_back(combined(images[i], guides.albedo, std::multiplies<>()));
+    if (!guides.features.empty())
+      all[i].insert(all[i].begin(), regressed(guides, inputs[i], {inputs[i].estimate}, {all[i].data(), 1})[0]);
+  }
   return all;
 }
 
@@ -107,6 +128,10 @@ std::vector<std::vector<Image>> filtered_layers(const FilterGuides& guides, cons
   images = nl_means(steerings, or_null(guides.normal), *in.valid);
   for (Image& image : images) image = combined(image, guides.albedo, std::multiplies<>());
   all.push_back(std::move(images));
+  if (guides.features.empty()) return all;
+  std::vector<const Image*> given;
+  for (const Image& layer : layers) given.push_back(&layer);
+  all.insert(all.begin(), regressed(guides, in, std::move(given), all[0]));
   return all;
 }
 
@@ -167,10 +192,11 @@ CandidateMaker::Make one_by_one(std::function<std::vector<Image>(const Candidate
   };
 }
 
-CandidateMaker filtered_candidates(const Guides& guides, CandidateBase base) {
-  const auto kept = std::make_shared<FilterGuides>(filter_guides(guides));
+CandidateMaker filtered_candidates(const Guides& guides, CandidateBase base, bool regression) {
+  const auto kept = std::make_shared<FilterGuides>(filter_guides(guides, regression));
   CandidateMaker maker;
-  maker.names = {"sharp"};
+  if (!kept->features.empty()) maker.names = {"regression"};
+  maker.names.emplace_back("sharp");
   if (base == CandidateBase::kPair) maker.names.emplace_back("sharp-independent");
   maker.names.emplace_back("smooth");
   if (!kept->albedo.data.empty()) maker.names.emplace_back("demodulated");

@@ -39,8 +39,8 @@ ModeSettings settings_of(DenoiseMode mode) {
 }
 
 /// Memory beside that of the estimator, about: images of three sets of samples, planes of filters and sums, half of 12
-/// groups; of the mean, it without fireflies; with the network, what that takes and its candidates.
-constexpr double kBytesPerPixel = 440, kBytesOfMean = 220, kBytesWithOidn = 1250;
+/// groups; of the mean, it without fireflies, and regression; with the network, what that takes and its candidates.
+constexpr double kBytesPerPixel = 440, kBytesOfMean = 340, kBytesWithOidn = 1250;
 
 /// relMSE of the image itself, by its standard error.
 double risk_of_base(const DenoisingPart& part, const Image& guide, const std::vector<unsigned char>& valid) {
@@ -257,7 +257,7 @@ Run run_of_mean(const MixedDenoisingOptions& options, bool with_oidn) {
     check_guides(settings.guides);
     std::vector<CandidateMaker> makers;
     if (with_oidn) makers.push_back(neural_candidates(settings.guides, options.oidn, CandidateBase::kMean));
-    makers.push_back(filtered_candidates(settings.guides, CandidateBase::kMean));
+    makers.push_back(filtered_candidates(settings.guides, CandidateBase::kMean, !with_oidn));
     if (!can_be_mixed(independent)) return single_candidate(independent, makers, settings.layers);
     return denoise_by_mixture(parts_of_mean(independent), makers, options.mode, settings.std_error, settings.layers,
                               options.history);

@@ -22,8 +22,11 @@ struct UsualWeight {
   const char* name;
   float with_network, without;
 };
-constexpr UsualWeight kUsual[] = {
-    {"oidn", 0.85f, 0}, {"oidn-wide", 0.05f, 0}, {"sharp", 0.05f, 0.4f}, {"demodulated", 0.05f, 0.6f}};
+constexpr UsualWeight kUsual[] = {{"oidn", 0.85f, 0},
+                                  {"oidn-wide", 0.05f, 0},
+                                  {"regression", 0, 0.7f},
+                                  {"sharp", 0.05f, 0.1f},
+                                  {"demodulated", 0.05f, 0.2f}};
 
 /// How much usual weights count for those of the whole image, with so many samples per pixel or fewer; less with more.
 constexpr float kCountOfUsual = 0.2f, kSamplesOfUsual = 16;

@@ -10,7 +10,7 @@
 #include <cmath>
 
 #include "core/parallel.h"
-#include "estimators/batch_algebra.h"
+#include "filters/batch_algebra.h"
 #include "estimators/pixel_records.h"
 #include "filters/neighbours.h"
 

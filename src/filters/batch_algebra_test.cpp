@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Lanes and the algebra of many small systems, against the standard library and Eigen in double precision.
-#include "estimators/batch_algebra.h"
+#include "filters/batch_algebra.h"
 
 #include <gtest/gtest.h>
 

@@ -185,6 +185,15 @@ inline void factor_rows(vfloat* G, int i0, int j0, const vfloat* inverse) {
 
 }  // namespace detail
 
+/// x = L^-T x, by columns of L^T, that is by rows of L. `L`, `inverse`: what solve_shifted leaves.
+inline void substitute_back(const vfloat* L, const vfloat* inverse, int m, vfloat* x) {
+  for (int j = m - 1; j >= 0; --j) {
+    const vfloat* const Lj = L + packed(j, 0);
+    x[j] *= inverse[j];
+    for (int q = 0; q < j; ++q) x[q] -= Lj[q] * x[j];
+  }
+}
+
 /// Solves (G + diag(shift)) x = b for positive semidefinite G and m positive shifts. `G`: packed, m rows, with room for
 /// 1 + n_more rows; on return it holds, below the diagonal, the Cholesky factor L. `bx`: b on entry, x on return.
 /// `inverse`: receives the inverses of the m diagonal elements of L. In exact arithmetic no pivot is below its shift;
@@ -200,13 +209,8 @@ inline void solve_shifted(vfloat* G, const vfloat* shift, int m, vfloat* bx, vfl
     factor_diagonal<NB>(G, shift, j0, inverse);
     for_each_tile(j0 + NB, n_rows, [&]<int NA>(int i0) { factor_rows<NA, NB>(G, i0, j0, inverse); });
   });
-  // Back substitution by columns of L^T, that is by rows of L.
   for (int j = 0; j < m; ++j) bx[j] = last[j];
-  for (int j = m - 1; j >= 0; --j) {
-    const vfloat* const Lj = G + packed(j, 0);
-    bx[j] *= inverse[j];
-    for (int q = 0; q < j; ++q) bx[q] -= Lj[q] * bx[j];
-  }
+  substitute_back(G, inverse, m, bx);
 }
 
 namespace detail {

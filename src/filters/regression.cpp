@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: Apache-2.0
+// Lanes are windows side by side, whose centres are three pixels apart. So planes hold each third column: of value
+// number `c` plane 3 c + r has the columns 3 i + r. Every band of rows adds to sums of its own, with a border; they are
+// put together in the bands' order.
+#include "filters/regression.h"
+
+#include <array>
+
+#include "core/error.h"
+#include "core/parallel.h"
+#include "filters/batch_algebra.h"
+
+namespace covary {
+namespace {
+
+using namespace lanes;
+
+constexpr int kStep = 3, kRadius = 10, kPatch = 1, kSide = 2 * kRadius + 1, kOffsets = kSide * kSide;
+constexpr int kBorder = kRadius + kPatch;
+constexpr int kBandRows = 8;  // of windows
+constexpr float kBandwidth = 0.5f, kOfPatch = 27;
+/// Ridge of slopes; pixels that are a unit of place; weight of the other image.
+constexpr float kRidge = 5e-4f, kPlaceUnit = 6, kOfOther = 1;
+constexpr float kSmallestVariance = 1e-10f, kLargestVariance = 1e30f;
+/// Terms of a plane: constant, columns, rows, features.
+constexpr int kMostTerms = 3 + kMostFeatures;
+
+using Terms = std::array<vfloat, kMostTerms>;
+/// Of pixels at all offsets of a row of windows.
+using RowTerms = std::array<std::array<vfloat, kSide>, kMostTerms>;
+
+/// Plane and column of the pixel `dx` columns from the centres.
+struct Place {
+  explicit Place(int dx) : residue((1 + dx + kStep * kBorder) % kStep), column((1 + dx - residue) / kStep) {}
+  int residue, column;
+};
+
+class Regression {
+ public:
+  Regression(const RegressionInput& input, std::span<const Image* const> features,
+             const std::vector<unsigned char>& valid)
+      : in_(input),
+        valid_(valid),
+        width_(input.image->width),
+        height_(input.image->height),
+        columns_((width_ + kStep - 1) / kStep),
+        n_terms_(3),
+        n_sources_(static_cast<int>(input.sources.size())) {
+    for (const Image* feature : features) n_terms_ += feature->channels;
+    COVARY_CHECK(n_terms_ <= kMostTerms, "at most kMostFeatures");
+    std::vector<const Image*> images = {in_.image, in_.std_error};
+    images.insert(images.end(), features.begin(), features.end());
+    first_source_ = 3 + n_terms_;
+    images.insert(images.end(), in_.sources.begin(), in_.sources.end());
+    planes_ = Planes(columns_, height_, kStep * (first_source_ + 3 * n_sources_), kBorder, 0);
+    int first = 0;
+    for (const Image* image : images)
+      copy(*image, image == in_.std_error && first == 3, first), first += image->channels;
+    mask_ = Planes(columns_, height_, kStep, kBorder, 0);
+    for (int y = 0; y < height_; ++y)
+      for (int x = 0; x < width_; ++x)
+        mask_.row(x % kStep, y)[x / kStep] = valid[static_cast<size_t>(y) * width_ + x] ? 1 : 0;
+  }
+
+  std::vector<Image> run() {
+    const int rows = (height_ + kStep - 1) / kStep;
+    std::vector<Planes> bands(static_cast<size_t>((rows + kBandRows - 1) / kBandRows));
+    parallel_for(static_cast<int>(bands.size()), [&](int number) {
+      const FlushTiny flush;
+      Planes& sums = bands[static_cast<size_t>(number)];
+      sums = Planes(columns_, kBandRows * kStep, kStep * (3 * n_sources_ + 1), kBorder, 0);
+      for (int row = 0; row < std::min(kBandRows, rows - number * kBandRows); ++row)
+        for (int x = 0; x < columns_; x += kLanes) add_windows(x, number * kBandRows + row, kStep * row + 1, sums);
+    });
+    std::vector<Image> images(static_cast<size_t>(n_sources_), Image(width_, height_, 3));
+    parallel_for(height_, 16, [&](int y) { finish(y, bands, images); });
+    return images;
+  }
+
+ private:
+  struct Windows {
+    std::array<vfloat, kOffsets> roots;  // of weights
+    RowTerms terms;
+  };
+
+  /// Beyond the frame its outermost pixels are repeated.
+  void copy(const Image& image, bool is_error, int first) {
+    parallel_for(height_ + 2 * kBorder, 16, [&](int row) {
+      const int y = row - kBorder;
+      const float* const pixels = image.pixel(0, std::clamp(y, 0, height_ - 1));
+      for (int c = 0; c < image.channels; ++c)
+        for (int r = 0; r < kStep; ++r) {
+          float* const to = planes_.row(kStep * (first + c) + r, y);
+          for (int i = -kBorder; i < columns_ + kBorder; ++i) {
+            const float value = pixels[image.channels * std::clamp(kStep * i + r, 0, width_ - 1) + c];
+            to[i] = is_error ? std::min(value * value, kLargestVariance) + kSmallestVariance / 2 : value;
+          }
+        }
+    });
+  }
+
+  vfloat value(int c, const Place& place, int x, int y) const {
+    return load(planes_.row(kStep * c + place.residue, y) + x + place.column);
+  }
+
+  /// `row` of windows, which is `from` in the sums.
+  void add_windows(int x, int row, int from, Planes& sums) const {
+    Windows w;
+    const int y = kStep * row + 1;
+    vfloat column;
+    for (int l = 0; l < kLanes; ++l) column[l] = static_cast<float>(x + l);
+    vfloat total = {};
+    for (int dy = -kRadius; dy <= kRadius; ++dy) {
+      if (y + dy < 0 || y + dy >= height_) continue;
+      for (int dx = -kRadius; dx <= kRadius; ++dx) {
+        const Place there(dx);
+        const vfloat mask = load(mask_.row(there.residue, y + dy) + x + there.column);
+        vfloat& root = w.roots[(dy + kRadius) * kSide + dx + kRadius];
+        root = column < static_cast<float>(columns_) ? root_of_weight(x, y, dx, dy) * mask : vfloat{};
+        total += root * root;
+      }
+    }
+    std::vector<Terms> planes(static_cast<size_t>(3 * n_sources_));
+    fit(x, y, total, w, planes);
+    for (int dy = -kRadius; dy <= kRadius; ++dy)
+      if (y + dy >= 0 && y + dy < height_) predict(x, y, dy, from + dy, planes, w, sums);
+  }
+
+  vfloat root_of_weight(int x, int y, int dx, int dy) const {
+    vfloat sum = {};
+    for (int px = -kPatch; px <= kPatch; ++px) {
+      const Place own(px), other(px + dx);
+      for (int py = -kPatch; py <= kPatch; ++py)
+        for (int c = 0; c < 3; ++c) {
+          const vfloat difference = value(c, own, x, y + py) - value(c, other, x, y + dy + py);
+          const vfloat v = value(3 + c, own, x, y + py), u = value(3 + c, other, x, y + dy + py);
+          sum += (difference * difference - v - min(v, u)) * reciprocal(v + u);
+        }
+    }
+    return exp2_of_nonpositive(min(sum * (-0.5f * kLog2E / (kOfPatch * kBandwidth * kBandwidth)), vfloat{}));
+  }
+
+  /// What the pixels of row y + dy are at, counted from the centres.
+  void find_terms(int x, int y, int dy, RowTerms& terms) const {
+    const Place centre(0);
+    for (int k = 0; k < kSide; ++k) {
+      terms[0][k] = splat(1);
+      terms[1][k] = splat(static_cast<float>(k - kRadius) / kPlaceUnit);
+      terms[2][k] = splat(static_cast<float>(dy) / kPlaceUnit);
+    }
+    for (int a = 3; a < n_terms_; ++a) {
+      const vfloat own = value(3 + a, centre, x, y);
+      for (int k = 0; k < kSide; ++k) terms[a][k] = value(3 + a, Place(k - kRadius), x, y + dy) - own;
+    }
+  }
+
+  /// The planes of all channels, from the weights, whose sums are `total`.
+  void fit(int x, int y, vfloat total, Windows& w, std::vector<Terms>& planes) const {
+    const int n = n_terms_, n_channels = 3 * n_sources_;
+    Terms products, inverse, shift;
+    std::vector<vfloat> sums(batch::packed_size(n + n_channels)), of_row(sums.size());
+    for (int dy = -kRadius; dy <= kRadius; ++dy) {
+      if (y + dy < 0 || y + dy >= height_) continue;
+      find_terms(x, y, dy, w.terms);
+      const vfloat* const roots = &w.roots[(dy + kRadius) * kSide];
+      std::array<vfloat, kSide> colours;
+      for (int a = 0; a < n; ++a)
+        for (int k = 0; k < kSide; ++k) w.terms[a][k] *= roots[k];
+      batch::gram(w.terms[0].data(), kSide, 1, n, kSide, of_row.data());
+      for (size_t i = 0; i < batch::packed_size(n); ++i) sums[i] += of_row[i];
+      for (int c = 0; c < n_channels; ++c) {
+        for (int k = 0; k < kSide; ++k) colours[k] = roots[k] * value(first_source_ + c, Place(k - kRadius), x, y + dy);
+        batch::multiply(w.terms[0].data(), kSide, 1, colours.data(), n, kSide, products.data());
+        vfloat* const row = &sums[batch::packed(n + c, 0)];
+        for (int a = 0; a < n; ++a) row[a] += products[a];
+      }
+    }
+    shift.fill(max(total * kRidge, splat(1e-30f)));
+    shift[0] = max(total * 1e-6f, splat(1e-30f));
+    std::copy_n(&sums[batch::packed(n, 0)], n, planes[0].begin());
+    batch::solve_shifted(sums.data(), shift.data(), n, planes[0].data(), inverse.data(), n_channels - 1);
+    for (int c = 1; c < n_channels; ++c) {
+      std::copy_n(&sums[batch::packed(n + c, 0)], n, planes[c].begin());
+      batch::substitute_back(sums.data(), inverse.data(), n, planes[c].data());
+    }
+  }
+
+  /// Adds what the planes are at the pixels of row y + dy, `row` of the sums.
+  void predict(int x, int y, int dy, int row, const std::vector<Terms>& planes, Windows& w, Planes& sums) const {
+    find_terms(x, y, dy, w.terms);
+    const auto add = [&](int c, const Place& place, vfloat term) {
+      float* const sum = sums.row(kStep * c + place.residue, row) + x + place.column;
+      store(sum, load(sum) + term);
+    };
+    for (int k = 0; k < kSide; ++k) {
+      const Place place(k - kRadius);
+      const vfloat root = w.roots[(dy + kRadius) * kSide + k], weight = root * root;
+      for (int c = 0; c < 3 * n_sources_; ++c) {
+        vfloat prediction = planes[c][0];
+        for (int a = 1; a < n_terms_; ++a) prediction += planes[c][a] * w.terms[a][k];
+        add(c, place, weight * prediction);
+      }
+      add(3 * n_sources_, place, weight);
+    }
+  }
+
+  void finish(int y, const std::vector<Planes>& bands, std::vector<Image>& images) const {
+    constexpr int kRows = kBandRows * kStep;
+    const int last = std::min((y + kBorder) / kRows, static_cast<int>(bands.size()) - 1);
+    for (int x = 0; x < width_; ++x)
+      for (int s = 0; s < n_sources_; ++s) {
+        const float* const other = in_.others[s]->pixel(x, y);
+        float total = kOfOther, sum[3];
+        for (int c = 0; c < 3; ++c) sum[c] = kOfOther * other[c];
+        for (int band = std::max(0, (y - kBorder) / kRows - 1); band <= last; ++band) {
+          const int row = y - band * kRows;
+          if (row >= kRows + kBorder) continue;
+          const auto at = [&](int c) { return bands[band].row(kStep * c + x % kStep, row)[x / kStep]; };
+          for (int c = 0; c < 3; ++c) sum[c] += at(3 * s + c);
+          total += at(3 * n_sources_);
+        }
+        const bool is_valid = valid_[static_cast<size_t>(y) * width_ + x];
+        for (int c = 0; c < 3; ++c) images[s].pixel(x, y)[c] = is_valid ? sum[c] / total : other[c];
+      }
+  }
+
+  const RegressionInput& in_;
+  const std::vector<unsigned char>& valid_;
+  const int width_, height_, columns_;
+  int n_terms_, n_sources_, first_source_;
+  Planes planes_, mask_;
+};
+
+}  // namespace
+
+std::vector<Image> regressed(const RegressionInput& input, std::span<const Image* const> features,
+                             const std::vector<unsigned char>& valid) {
+  return Regression(input, features, valid).run();
+}
+
+}  // namespace covary
