@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // covary view: an HTML page that compares images, opened in the browser or written to a file.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>

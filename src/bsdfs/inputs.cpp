@@ -2,6 +2,7 @@
 #include "bsdfs/inputs.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <algorithm>
 #include <cctype>
 

@@ -2,6 +2,7 @@
 #include "lab/located_json.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <iterator>

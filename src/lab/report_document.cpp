@@ -2,6 +2,7 @@
 #include "lab/report_document.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>

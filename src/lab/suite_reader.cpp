@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Suite files: JSON to Suite.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <limits>

@@ -3,6 +3,7 @@
 #include "metrics/provenance.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
 #include "film/output_file.h"

@@ -2,6 +2,7 @@
 #include "textures/image.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <strings.h>
 
 #include <algorithm>
