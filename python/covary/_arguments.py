@@ -271,7 +271,9 @@ def checked(declared: Mapping[str, Rule] | None = None, /, **rules: Rule) -> Cal
 
         call.rules = {**rules, **more}  # type: ignore[attr-defined]
         if more:  # what help and completion show
-            shown[-1:-1] = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None) for name in more]
+            standard = {name: False if rule is flag else None for name, rule in more.items()}
+            shown[-1:-1] = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=value)
+                            for name, value in standard.items()]
             call.__signature__ = signature.replace(parameters=shown)  # type: ignore[attr-defined]
         return call
 

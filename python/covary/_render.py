@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import shlex
+import textwrap
 import warnings
 from collections.abc import Mapping
 from os import PathLike, fspath
@@ -218,9 +219,10 @@ def render(scene: PathOrScene, spp: int | None = None, estimator: Estimator | No
     return RenderResult(**made)
 
 
-render.__doc__ = (render.__doc__ or "").replace("{declared}", "".join(
-    f"{underscored(option['name'])}: {option['help']}.\n    " for option in _covary.render_options()
-    if underscored(option["name"]) in _DECLARED.keys() - inspect.getfullargspec(inspect.unwrap(render)).kwonlyargs))
+render.__doc__ = (render.__doc__ or "").replace("    {declared}\n", "".join(
+    textwrap.fill(f"{underscored(option['name'])}: {option['help']}.", 120, initial_indent=" " * 4,
+                  subsequent_indent=" " * 8) + "\n" for option in _covary.render_options()
+    if underscored(option["name"]) in _DECLARED.keys() - inspect.signature(inspect.unwrap(render)).parameters) + "\n")
 
 
 def report_bad_samples(made: dict[str, Any], depth: int = 4) -> None:

@@ -249,6 +249,11 @@ class Arguments(PackageTest):
                                                                     "until_p95"}
         self.assertEqual({other.get(name, name) for name in declared} - {"resolution"}, taken)
         self.assertIn("resolution", inspect.signature(covary.Scene.load).parameters)
+        for name, parameter in inspect.signature(covary.render).parameters.items():
+            lines = re.findall(rf"^    (?:.*[ ,])?{name}[,:]", covary.render.__doc__, re.M)
+            if parameter.annotation is parameter.empty:  # as declared
+                self.assertEqual(lines, [f"    {name}:"])
+                self.assertIn(parameter.default, (None, False))
 
     def test_options_of_combining_are_arguments(self):
         """All that the library declares, under their names but for these; guides are four images, and some are of files
