@@ -15,6 +15,7 @@
 #include "plans/denoised_passes.h"
 #include "plans/estimator_plans.h"
 #include "plans/render.h"
+#include "risk/error_interval.h"
 #include "risk/image_risk.h"
 
 namespace covary {
@@ -99,15 +100,27 @@ double samples_in_time(const PlanState& state) {
   return std::floor(std::max(1.0, kOverestimate * std::max(0.0, *state.seconds_left) * speed / pixels));
 }
 
+/// Whether an error map of these samples would tell where errors are, rather than where single bright paths went.
+bool tells_where_errors_are(const GroupedImage& image) {
+  EstimatorResult mean = mean_of_groups(image);
+  add_risk_of_mean(image, mean);
+  return mean.risk_rows.empty() || !has_rare_light(sum_of(mean.risk_rows));
+}
+
 void set_last_target(const Method& method, const PlanState& state, Pass& last) {
   const Film& first = state.passes[0].film;
   double budget = whole_budget(method, state) - first.mean_count();
   if (state.seconds_left) budget = std::min(budget, samples_in_time(state));
   const GroupedImage image = rows_of(first, 0, first.height());
-  const CountOptions& options = method.sampling.counts;
+  CountOptions options = method.sampling.counts;
   const uint32_t multiple = method.denoise ? 1 : method.groups_of(state);
   std::vector<double> filtered;
-  if (options.allocation == Allocation::kDenoised) filtered = filtered_errors(method.denoise, first, state);
+  if (options.allocation == Allocation::kDenoised) {
+    if (tells_where_errors_are(image))
+      filtered = filtered_errors(method.denoise, first, state);
+    else
+      options.allocation = Allocation::kUniform;
+  }
   std::vector<uint32_t> counts = sample_counts(image, std::max(0.0, budget), options, multiple, filtered);
   last.misses_error = !have_relative_error(image, counts, options, multiple);
   last.settings.spp = SampleTarget(std::move(counts));

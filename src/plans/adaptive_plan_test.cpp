@@ -281,6 +281,24 @@ TEST(DenoisedPlan, TopsUpWhereTheFilteredImageIsWrong) {
   EXPECT_EQ(uniform.passes[0].film.data(), first.data());
 }
 
+/// Radiance 100 of one sample in a hundred.
+class FoundByChance : public Integrator {
+ public:
+  std::shared_ptr<Integrator> clone() const override { return std::make_shared<FoundByChance>(); }
+  void trace(const Scene&, std::span<CameraSample> samples, PathContext&) const override {
+    for (CameraSample& sample : samples)
+      sample.radiance = Spectrum(sample.random.get_1d(1, Event::kLobe) < 0.01f ? 100.0f : 0.01f);
+  }
+  std::string description() const override { return "found by chance"; }
+};
+
+TEST(DenoisedPlan, SpreadsSamplesEvenlyWhereLightIsFoundByChance) {
+  LoadedScene scene = load_sized(kRoom);
+  scene.integrator = std::make_shared<FoundByChance>();
+  const RenderResult result = render(scene, adaptive_plan(denoised()), request_of(72));
+  for (const uint32_t n : result.passes[1].film.counts()) EXPECT_EQ(n, 48u);
+}
+
 TEST(DenoisedPlan, SameBitsForAnyNumberOfThreads) {
   const LoadedScene scene = load_sized(kRoom);
   std::vector<float> first;

@@ -57,6 +57,8 @@ const FittedErrors& fit_of(ErrorKind kind, double groups) {
   return kFittedErrors[static_cast<size_t>(kind)];
 }
 
+double share_of_largest(const RiskRow& sums) { return sums.light > 0 ? sums.light_of_largest / sums.light : 1; }
+
 }  // namespace
 
 ErrorFeatures error_features(const RiskRow& s) {
@@ -83,14 +85,19 @@ LogError fitted_error(const RiskRow& sums, ErrorKind kind) {
   return error;
 }
 
+bool has_rare_light(const RiskRow& sums) {
+  const double share = share_of_largest(sums);
+  return (share - 1 / sums.groups) / (1 - 1 / sums.groups) > kMostOfLargest;  // 0 if all groups hold equal parts
+}
+
 std::string unknown_error(const RiskRow& sums, ErrorKind kind, const LogError& error) {
   if (sums.groups < kFewestGroups && !fitted_to_few(kind))
     return fmt::format("{:.0f} groups of samples are too few, it takes {}", sums.groups, kFewestGroups);
   const double n = sums.noise * sums.noise / sums.noise_squares, pixels = sums.values / 3;
   if (n < kFewestPixels) return fmt::format("{:.0f} of {:.0f} pixels hold most of the noise", std::max(1.0, n), pixels);
-  const double share = sums.light > 0 ? sums.light_of_largest / sums.light : 1;
-  if ((share - 1 / sums.groups) / (1 - 1 / sums.groups) > kMostOfLargest)  // 0 if all groups hold equal parts
-    return fmt::format("{:.0f} % of the light are in one of {:.0f} groups of each pixel", 100 * share, sums.groups);
+  if (has_rare_light(sums))
+    return fmt::format("{:.0f} % of the light are in one of {:.0f} groups of each pixel", 100 * share_of_largest(sums),
+                       sums.groups);
   if (std::max(error.high - error.middle, error.middle - error.low) > std::log(kMostFactor))
     return "few samples hold most of the light";
   return "";

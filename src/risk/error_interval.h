@@ -40,6 +40,10 @@ struct LogError {
 /// few groups says little and v is noisier.
 LogError fitted_error(const RiskRow& sums, ErrorKind kind);
 
+/// Whether the largest group of each pixel holds most of the light that is not common to all groups: single paths found
+/// it, and where they did says little of where others will.
+bool has_rare_light(const RiskRow& sums);
+
 /// Why no interval can be given; empty if one can.
 std::string unknown_error(const RiskRow& sums, ErrorKind kind, const LogError& error);
 
