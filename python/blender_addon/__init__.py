@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The add-on of Blender: an operator, render.covary, and its panel among the render properties of Cycles."""
+"""The Blender add-on: an operator, render.covary, and its panel among the render properties of Cycles."""
 from __future__ import annotations
 
 from .panel import register, unregister

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a press of the button does, as steps: groups rendered by Cycles, and the program that combines them. Each step
-begins, has ended at some time, and is then closed, so that a window lives on meanwhile."""
+"""The steps behind the button: groups rendered by Cycles, and the program that combines them. Each step is started,
+polled until it has ended, and closed, so that the window stays responsive."""
 from __future__ import annotations
 
 import shutil
@@ -19,11 +19,11 @@ from .errors import UsageError
 
 
 class Cancelled(Exception):
-    """By Esc."""
+    """Cancelled with Esc."""
 
 
 class Rendering:
-    """One group, by Cycles, into a file."""
+    """One group, rendered by Cycles into a file."""
 
     def __init__(self, scene: Any, group: Group, path: str) -> None:
         self.scene, self.group, self.path = scene, group, path
@@ -31,7 +31,7 @@ class Rendering:
         self._ended = self._cancelled = False
 
     def begin(self, window: bool) -> None:
-        """In a window the render goes on beside it; without one it has ended afterwards."""
+        """With a window the render continues in the background; without one it has ended on return."""
         self._stack.enter_context(self.group.settings(self.scene, self.path))
         if not window:
             bpy.ops.render.render(write_still=True, scene=self.scene.name)
@@ -51,19 +51,19 @@ class Rendering:
         self._ended = self._cancelled = True
 
     def ended(self) -> bool:
-        """In a window. A render that is complete is a job still for a moment, and Esc in the render window ends the job
-        without a word to handlers."""
+        """With a window. A complete render remains a job for a moment, and Esc in the render window ends the job
+        without calling handlers."""
         if bpy.app.is_job_running("RENDER"):
             return False
         self._cancelled = self._cancelled or not self._ended
         return True
 
     def close(self) -> None:
-        """Puts the settings of the scene back."""
+        """Restores the scene's settings."""
         self._stack.close()
 
     def check(self) -> None:
-        """Raises Cancelled, or UsageError where there is no file."""
+        """Raises Cancelled, or UsageError if there is no file."""
         if self._cancelled:
             raise Cancelled
         if not Path(self.path).exists():
@@ -71,7 +71,7 @@ class Rendering:
 
 
 class Combining:
-    """The program, over the groups of a picture."""
+    """The program, run on the groups of a picture."""
 
     def __init__(self, command: Sequence[str], output: str) -> None:
         self.command, self.output = command, output
@@ -89,7 +89,7 @@ class Combining:
         return self._process is not None and self._process.poll() is not None
 
     def close(self) -> None:
-        """Ends the program where it runs."""
+        """Ends the program if it is running."""
         if self._process is None:
             return
         if self._process.poll() is None:
@@ -105,7 +105,7 @@ class Combining:
 
 
 def output_of(scene: Any, frame: int) -> Path:
-    """The result's file: "covary_" before the name that Blender gives the frame."""
+    """The result's file: Blender's name of the frame with the prefix "covary_"."""
     with settings(scene):
         path = Path(bpy.path.abspath(scene.render.frame_path(frame=frame)))
     return path.with_name(f"covary_{path.stem}.exr")
@@ -117,7 +117,7 @@ def size_of(scene: Any) -> tuple[int, int]:
 
 
 def check_places(scene: Any, output: Path, groups: str) -> None:
-    """Raises UsageError where the result or the groups cannot be written."""
+    """Raises UsageError if the result or the groups cannot be written."""
     if scene.render.filepath.startswith("//") and not bpy.data.filepath:
         raise UsageError("the output path is relative to the .blend file, which has not been saved: save it, or choose "
                          "another output path (Output properties)")
@@ -144,7 +144,7 @@ def frames_of(scene: Any, animation: bool) -> range:
 
 
 class Job:
-    """All of it: one picture, or those of an animation."""
+    """The whole job: one picture, or those of an animation."""
 
     def __init__(self, scene: Any, named: str, animation: bool) -> None:
         """Raises UsageError for whatever would fail later."""
@@ -160,13 +160,13 @@ class Job:
         self.warnings: list[str] = []
 
     def text(self) -> str:
-        """What it does at the moment."""
+        """The current step, as text."""
         picture, step = divmod(self.done, 2 * GROUPS + 1)
         frame = f"frame {self.frames[min(picture, len(self.frames) - 1)]}, " if len(self.frames) > 1 else ""
         return frame + ("combining" if step == 2 * GROUPS else f"group {step + 1} of {2 * GROUPS}")
 
     def steps(self) -> Iterator[Rendering | Combining]:
-        """One after the other. Temporary files go when the iterator is closed."""
+        """The steps, one after the other. Temporary files are removed when the iterator is closed."""
         for frame in self.frames:
             if len(self.frames) > 1:
                 self.scene.frame_set(frame)
@@ -192,7 +192,7 @@ class Job:
 
 
 def show(path: str) -> None:
-    """The result in every image editor that shows a render, the render window among them."""
+    """Shows the result in every image editor that shows a render, including the render window."""
     image = bpy.data.images.load(path, check_existing=True)
     image.name = "covary"
     image.reload()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the add-on adds to Blender's window: preferences, settings of scenes, operators and panels."""
+"""The add-on's user interface: preferences, scene settings, operators and panels."""
 # Without `from __future__ import annotations`: Blender reads the annotations of properties.
 import textwrap
 import time
@@ -20,7 +20,7 @@ DENOISE = (("none", "None", "Nothing but the samples"),
 
 
 def whole_groups(choice: Any, context: Any) -> None:
-    """Rounds the number of samples to what the groups can share."""
+    """Rounds the number of samples to a multiple of the groups."""
     share = 2 * GROUPS
     rounded = -(-choice.samples // share) * share
     if choice.samples != rounded:
@@ -28,7 +28,7 @@ def whole_groups(choice: Any, context: Any) -> None:
 
 
 class Choice(bpy.types.PropertyGroup):  # type: ignore[misc,name-defined,unused-ignore]
-    """Of a scene."""
+    """Settings of a scene."""
 
     samples: bpy.props.IntProperty(  # type: ignore[valid-type,unused-ignore]
         name="Samples", default=192, min=6 * GROUPS, max=240000, step=2 * GROUPS, update=whole_groups,
@@ -40,7 +40,7 @@ class Choice(bpy.types.PropertyGroup):  # type: ignore[misc,name-defined,unused-
 
 
 class State(bpy.types.PropertyGroup):  # type: ignore[misc,name-defined,unused-ignore]
-    """Of the window manager: what runs, and what the last one said. Files do not keep it."""
+    """State in the window manager: the running job, and the last one's message. Not saved in files."""
 
     running: bpy.props.BoolProperty()  # type: ignore[valid-type,unused-ignore]
     cancel: bpy.props.BoolProperty()  # type: ignore[valid-type,unused-ignore]
@@ -65,7 +65,7 @@ class Preferences(bpy.types.AddonPreferences):  # type: ignore[misc,name-defined
 
 
 def named_program(context: Any) -> str:
-    """That of the preferences."""
+    """The program of the preferences."""
     return str(context.preferences.addons[__package__].preferences.program)
 
 
@@ -88,7 +88,7 @@ class RENDER_OT_covary(bpy.types.Operator):  # type: ignore[misc,name-defined,un
         name="Animation", description="All frames of the scene's range", options={"SKIP_SAVE"})
 
     def execute(self, context: Any) -> set[str]:
-        """Without a window: in one go."""
+        """Without a window: runs to the end."""
         self.step = None
         try:
             self._prepare(context)
@@ -100,7 +100,7 @@ class RENDER_OT_covary(bpy.types.Operator):  # type: ignore[misc,name-defined,un
         return self._finished(context)
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """With one: a step at a time, beside the window."""
+        """With a window: one step at a time."""
         if context.window_manager.covary.running:
             self.report({"ERROR"}, "covary: renders already")
             return {"CANCELLED"}
@@ -149,7 +149,7 @@ class RENDER_OT_covary(bpy.types.Operator):  # type: ignore[misc,name-defined,un
         self.steps = self.job.steps()
 
     def _open_window(self, context: Any) -> None:
-        """The one where Blender shows renders, once: each group would bring it to the front again."""
+        """Opens the window where Blender shows renders, once, because each group would bring it to the front again."""
         view = context.preferences.view
         if view.render_display_type != "NONE":
             bpy.ops.render.view_show("INVOKE_DEFAULT")
@@ -168,7 +168,7 @@ class RENDER_OT_covary(bpy.types.Operator):  # type: ignore[misc,name-defined,un
         redraw(context)
 
     def _release(self, context: Any) -> None:
-        """All as before, however it ended."""
+        """Restores everything, however the job ended."""
         if self.step is not None:
             self.step.close()
         self.steps.close() if hasattr(self.steps, "close") else None
@@ -216,7 +216,7 @@ class RENDER_OT_covary_cancel(bpy.types.Operator):  # type: ignore[misc,name-def
 
 
 class OfCycles:
-    """What both panels have in common."""
+    """What both panels share."""
 
     bl_space_type, bl_region_type, bl_context = "PROPERTIES", "WINDOW", "render"
     COMPAT_ENGINES = {"CYCLES"}
@@ -271,7 +271,7 @@ class RENDER_PT_covary_changes(OfCycles, bpy.types.Panel):  # type: ignore[misc,
 
 
 def of_menu(menu: Any, context: Any) -> None:
-    """What the menu Render has of it, with Cycles."""
+    """The entries in the menu Render, with Cycles."""
     if context.engine in OfCycles.COMPAT_ENGINES:
         name = RENDER_OT_covary.bl_idname
         menu.layout.separator()
@@ -301,7 +301,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Takes them away."""
+    """Removes them."""
     bpy.types.TOPBAR_MT_render.remove(of_menu)
     del bpy.types.Scene.covary
     del bpy.types.WindowManager.covary

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The program covary, which combines the groups in a process of its own. Standard library alone."""
+"""The program covary, which combines the groups in a separate process. Uses only the standard library."""
 from __future__ import annotations
 
 import json
@@ -17,7 +17,7 @@ DENOISE = ("none", "bias", "balanced", "error")
 
 
 def find(named: str, own: Path = OWN) -> Path:
-    """The program that the preferences name, the add-on's own copy, or one on the search path."""
+    """The program named in the preferences, the add-on's own copy, or one on the search path."""
     if named:
         path = Path(named).expanduser()
         if not path.is_file():
@@ -34,7 +34,7 @@ def find(named: str, own: Path = OWN) -> Path:
 
 
 def check(program: Path) -> str:
-    """Its version. Raises UsageError where it does not run: better before the groups are rendered than afterwards."""
+    """Its version. Raises UsageError if it does not run, so that this is known before the groups are rendered."""
     try:
         run = subprocess.run([program, "--version"], capture_output=True, text=True, check=False, env=environment())
     except OSError as error:
@@ -46,31 +46,31 @@ def check(program: Path) -> str:
 
 
 def environment() -> dict[str, str]:
-    """That of this process without what Blender set for its own Python and libraries."""
+    """This process's environment without Blender's settings for its own Python and libraries."""
     return {name: value for name, value in os.environ.items() if name not in ("PYTHONHOME", "PYTHONPATH")}
 
 
 def combine_command(program: Path, crn: Sequence[str], independent: Sequence[str], output: str, denoise: str,
                     statistics: str) -> list[str]:
-    """Combines files of groups into one image. What its checks take for mistakes are warnings here: who rendered these
-    files has made none, and a white world only looks like clipped values."""
+    """Combines files of groups into one image. Errors of its checks are only warnings here: the add-on rendered these
+    files correctly, and a white world only looks like clipped values."""
     return [str(program), "combine", "--force", "--crn", *crn, "--independent", *independent, "-o", output,
             "--denoise", denoise, "--json", statistics]
 
 
 def reason(messages: str) -> str:
-    """The last line of what a program wrote, without the program's name."""
+    """The last line of a program's output, without the program's name."""
     lines = messages.strip().splitlines()
     return lines[-1].strip().removeprefix("covary: ").removeprefix("error: ") if lines else ""
 
 
 def warnings(messages: str) -> list[str]:
-    """Those among the program's messages."""
+    """The warnings among the program's messages."""
     return [line.removeprefix("warning: ") for line in messages.splitlines() if line.startswith("warning: ")]
 
 
 def verdict(statistics: str) -> str:
-    """What the program measured, as a sentence; "" where it did not."""
+    """The program's measurements in a sentence; "" if there are none."""
     try:
         values = json.loads(Path(statistics).read_text())
     except (OSError, ValueError):
@@ -82,8 +82,8 @@ def verdict(statistics: str) -> str:
 
 
 def sentence(ours: float, plain: float) -> str:
-    """Compares the predicted error with that of as many independent samples, half of which were rendered. Samples of
-    Cycles in one go have less than those, in groups: up to a third was measured."""
+    """Compares the predicted error with that of as many independent samples, half of which were rendered. A plain
+    Cycles render has less error than independent groups: up to a third less was measured."""
     if ours < plain / 1.5:
         return f"Predicted error (relMSE) {ours:.2g}; independent samples would have {plain:.2g}."
     gain = "nothing" if ours >= plain else "little"

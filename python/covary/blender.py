@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Blender's Cycles as the renderer of both images, for scripts and `pip install bpy`.
 
-What is set and why is in docs/blender.md, which also tells of the add-on."""
+docs/blender.md has the settings with reasons, and describes the add-on."""
 from __future__ import annotations
 
 import tempfile
@@ -36,7 +36,7 @@ class BlenderResult(Result):
 
 @checked(scene=instance("a bpy.types.Scene", lambda value: hasattr(value, "cycles")))
 def changes(scene: Any) -> list[str]:
-    """What of the scene's settings render() changes while it renders and that changes the picture, with reasons."""
+    """Scene settings that render() changes while it renders and that affect the picture, with reasons."""
     return [f"{name} is {value!r} and was rendered with {other!r}: {reason}"
             for name, value, other, reason in _cycles.changed(scene)]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What covary raises, with the texts of the command line. Wrong types and shapes of arguments raise TypeError and
+"""The exceptions of covary, with the command line's messages. Wrong types and shapes of arguments raise TypeError and
 ValueError; Ctrl-C raises KeyboardInterrupt."""
 
 
@@ -12,7 +12,7 @@ class UsageError(Error, ValueError):
 
 
 class InputError(Error, ValueError):
-    """What a file or an image holds is wrong or not supported."""
+    """The content of a file or an image is wrong or not supported."""
 
 
 class IoError(Error, OSError):
@@ -24,4 +24,4 @@ class InternalError(Error, RuntimeError):
 
 
 class BadSamplesWarning(UserWarning):
-    """Samples of a render were not finite, or negative where none may be; they count as black."""
+    """Samples of a render were not finite, or negative although they must not be; they count as black."""

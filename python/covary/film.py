@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Films: what render passes leave behind, and making them of arrays or of each other."""
+"""Films, the results of render passes: merging them, and making them from arrays."""
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -44,5 +44,5 @@ def film_from_groups(groups: Any, samples: int, *, sampling: str = "", seed: int
 
 def _from_parts(frame: tuple[int, int], crop: tuple[int, int, int, int], groups: Any, counts: Any,
                 attributes: dict[str, str]) -> Film:
-    """A film of its group means [H, W, T, 3], counts [H, W] and the rest; what pickle calls."""
+    """A film from its group means [H, W, T, 3], counts [H, W] and the rest; called by pickle."""
     return Film._from_parts(frame, crop, groups, counts, attributes)

@@ -42,7 +42,7 @@ class MitsubaResult(Result):
 
 
 def _module() -> Any:
-    """Mitsuba with a variant that fits."""
+    """Mitsuba with a suitable variant."""
     try:
         import mitsuba  # type: ignore[import-not-found,import-untyped,unused-ignore]
     except ImportError as error:
@@ -121,7 +121,7 @@ def _common_numbers(mi: Any, drjit: Any) -> Any:
 
 
 def _sensor_around(mi: Any, drjit: Any) -> Any:
-    """The class of the sensor around another."""
+    """The class of the wrapper sensor."""
     class Around(mi.Sensor):  # type: ignore[misc,unused-ignore]
         """Another sensor with a film and a sampler of its own. With `groups`, the film holds the frame so many times,
         one below the other and each followed by a row that is thrown away."""
@@ -179,16 +179,16 @@ def _surface_guides(mi: Any, drjit: Any) -> Any:
             return mi.Spectrum(0.0), mi.Bool(True), [*first, *self._guides(behind, tint)]
 
         def _single(self, hit: Any) -> Any:
-            """Whether the surface scatters light in single directions alone."""
+            """Whether the surface only scatters light in single directions."""
             flags = hit.bsdf().flags()
             return hit.is_valid() & ~mi.has_flag(flags, mi.BSDFFlags.Smooth) & mi.has_flag(flags, mi.BSDFFlags.Delta)
 
         def _colour(self, values: Any) -> Any:
-            """Of spectra the mean."""
+            """The mean of a spectrum."""
             return mi.Color3f(values if len(values) == 3 else drjit.mean(values))
 
         def _guides(self, hit: Any, tint: Any) -> list[Any]:
-            """Albedo and normal, zero where there is no surface."""
+            """Albedo and normal, zero if there is no surface."""
             found = hit.is_valid()
             albedo = tint * self._colour(hit.bsdf().eval_diffuse_reflectance(hit, found))
             return [*drjit.select(found, drjit.clip(albedo, 0.0, 1.0), 0.0),
@@ -198,7 +198,7 @@ def _surface_guides(mi: Any, drjit: Any) -> Any:
 
 
 def _define_plugins(mi: Any) -> None:
-    """Registers both, once for each variant."""
+    """Registers the classes, once for each variant."""
     if mi.variant() in _defined:
         return
     import drjit  # type: ignore[import-not-found,import-untyped,unused-ignore]
@@ -232,7 +232,7 @@ def _size(sensor: Any) -> tuple[int, int]:
 
 
 def _around(mi: Any, sensor: Any, sampler: dict[str, Any], groups: int = 0) -> Any:
-    """A sensor for the pixels of another, or for several groups of them."""
+    """A wrapper sensor for the pixels of another, or for several groups of them."""
     width, height = _size(sensor)
     return mi.load_dict({
         "type": "covary_around", "inner": sensor, "sampler": sampler, "groups": groups,
@@ -241,7 +241,7 @@ def _around(mi: Any, sensor: Any, sampler: dict[str, Any], groups: int = 0) -> A
 
 
 def _check_sensor(sensor: Any) -> list[str]:
-    """What is changed in the sensor, with the reason. Raises where that is impossible."""
+    """The changes to the sensor, with reasons. Raises if they are impossible."""
     if sensor.needs_aperture_sample() or sensor.shutter_open_time() > 0:
         raise UsageError(f"the sensor {type(sensor).__name__} draws points on its lens or in time, which the sensor "
                          "around it would not; expected a pinhole camera with a closed shutter")
@@ -325,7 +325,7 @@ def render(scene: Any, spp: int, seed: int = 0, integrator: Any = None, sensor: 
 
 
 def _stacks(count: int, groups: int, width: int, height: int) -> Iterator[tuple[int, int]]:
-    """Of which groups are traced together: how many, and how many samples each has; sizes differ by one at most."""
+    """Batches of groups that are traced together: how many, and samples of each; sizes differ by one at most."""
     for size, number in ((count // groups + 1, count % groups), (count // groups, groups - count % groups)):
         lanes = width * (height + 1) * size
         together = max(1, min(_LANES_OF_STACK // lanes, _ROWS_OF_STACK // (height + 1)))

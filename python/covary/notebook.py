@@ -44,7 +44,7 @@ def _named(images: Mapping[str, Any] | Sequence[Any] | Any) -> dict[str, Any]:
 
 
 def _file_of(argument: str, image: Any, folder: Path, name: str) -> str:
-    """The image's file, written where it is an array or a result. `argument`: that it came with, for messages."""
+    """The image's file, written first if it is an array or a result. `argument`: its argument, for messages."""
     if isinstance(image, (str, PathLike)):
         return fspath(image)
     if not name or "/" in name or name.startswith("."):

@@ -11,7 +11,7 @@ _FOLDER = Path(__file__).parent / "share" / "covary" / "scenes"  # where the pac
 
 
 def names() -> list[str]:
-    """Of all of them."""
+    """The names of all of them."""
     return sorted(file.stem for file in _FOLDER.glob("*.xml"))
 
 
