@@ -66,7 +66,8 @@ TEST(Image, RejectsTruncatedFiles) {
     std::filesystem::resize_file(path, std::filesystem::file_size(path) / 2);
     const test_support::LeaksOfOthers of_openimageio;  // libpng jumps out of its reader past a string
     const std::string error = error_of(path);
-    EXPECT_NE(error.find(path + ": damaged or incomplete image: "), std::string::npos) << name << ": " << error;
+    const bool is_found_when_opened = error.find(path + ": not an image that can be read: TGA header claims") == 0;
+    EXPECT_TRUE(error.find(path + ": damaged or incomplete image: ") == 0 || is_found_when_opened) << name << error;
   }
 }
 
@@ -86,8 +87,10 @@ TEST(Image, RejectsEmptyAndAbsurdSizes) {
 
   const std::string pfm = folder.file("huge.pfm");
   write(pfm, "PF\n40000 40000\n-1.0\nabcdefgh");
-  EXPECT_NE(error_of(pfm).find(pfm + ": claims 40000 x 40000 pixels of 3 channels in 28 bytes"), std::string::npos)
-      << error_of(pfm);
+  const std::string error = error_of(pfm);
+  EXPECT_TRUE(error.find(pfm + ": claims 40000 x 40000 pixels of 3 channels in 28 bytes") == 0 ||
+              error.find(pfm + ": not an image that can be read: pnm header claims") == 0)  // OpenImageIO 3.1
+      << error;
 }
 
 TEST(Image, RejectsChannelsThatAreNotColours) {
