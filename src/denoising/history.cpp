@@ -7,16 +7,16 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "core/vec.h"
+#include "filters/guided_cells.h"
+#include "risk/relative_weight.h"
 
 namespace covary {
 namespace {
 
 constexpr float kInterval = 3;   // k, in standard errors
 constexpr int kErrorWindow = 5;  // side, pixels
-/// c: both interpolations have errors in common, which their difference does not tell. With 1, regions of moving edges
-/// of light had 1.28 times the error of frames alone, with 10 and more at most 1.01, in a prototype on one sequence
-/// with one seed (docs/methods/sequences.md).
-constexpr float kOfMoving = 20;
+/// c: both interpolations have errors in common, which their difference does not tell (docs/methods/sequences.md).
+constexpr float kOfMoving = 5;
 /// How much the weights of the whole image count (MixtureInput::prior).
 constexpr float kPrior = 1;
 /// MixtureInput::bias_share. Halves have twice the variance of the frame and the same history, so that history counts
@@ -71,8 +71,78 @@ Image candidate(const Image& frame, const History& history, const Image& std_err
   return result;
 }
 
+/// D of a frame's image or of that of a half, within the interval of the frame; arguments as of candidate().
+Image limited(const Image& frame, const Image& accumulated, const Image& std_error, const Image& limits, float scale) {
+  Image result = frame;
+  for (size_t i = 0; i < frame.data.size(); ++i) {
+    const float most = kInterval * scale * std::max(std_error.data[i], limits.data[i]);
+    result.data[i] += std::clamp(accumulated.data[i] - frame.data[i], -most, most);
+  }
+  return result;
+}
+
 /// Most of R that R' is made of, so that new samples always count.
 constexpr float kMostOfSamples = 0.9f;
+
+/// What squared errors of samples count: 1 / (F'^2 + 0.01) by the mean F of the frame's mixture and the history. By a
+/// picture made of the frame's samples alone, pixels that are bright by chance would count less, and with them what
+/// the history takes away.
+Image counts_of(const History& history, const Image& guide) {
+  Image counts(guide.width, guide.height, 1);
+  for (size_t i = 0; i < counts.data.size(); ++i) {
+    std::array<float, 3> mean;
+    for (size_t c = 0; c < 3; ++c) {
+      const float now = guide.data[3 * i + c];
+      mean[c] = history.known[i] ? 0.5f * (now + history.image.data[3 * i + c]) : now;
+    }
+    counts.data[i] = relative_weight(mean.data());
+  }
+  return counts;
+}
+
+/// Least and most that history is multiplied by.
+constexpr float kLeastFactor = 0.1f, kMostFactor = 10;
+
+/// What two pictures of the history are to be multiplied by, so that their light follows the frame's, per channel:
+///
+///     f = 1 + max(0, 1 - v / d^2) d / r,
+///
+/// over pixels that look alike, d: sum of what the frame's own samples differ by from them, of the variance v, which
+/// halves tell; r: their own sum. The shrinkage is that of James and Stein: where d is noise alone, f is near 1.
+Image light_factors(const History& history, const HistoryInput& input, const Image& counts,
+                    const std::array<const Image*, 2>& before) {
+  std::vector<unsigned char> valid = *input.valid;
+  for (size_t i = 0; i < valid.size(); ++i) valid[i] = valid[i] && history.known[i];
+  constexpr int kPlanes = 9;  // d, r and v of three channels
+  const GuidedCells cells(*input.guide, valid, kPlanes, [&](int x, int y, float* sums) {
+    const float count = std::sqrt(*counts.pixel(x, y));
+    for (int c = 0; c < 3; ++c) {
+      const float own[2] = {input.independent[0]->mean.row(c, y)[x], input.independent[1]->mean.row(c, y)[x]};
+      const float past[2] = {before[0]->pixel(x, y)[c], before[1]->pixel(x, y)[c]};
+      const float d[2] = {own[0] - past[0], own[1] - past[1]};
+      sums[c] += count * (d[0] + d[1]) / 2;
+      sums[3 + c] += count * (past[0] + past[1]) / 2;
+      sums[6 + c] += sqr(count * (d[0] - d[1])) / 4;
+    }
+  });
+  Image factors(counts.width, counts.height, 3);
+  std::fill(factors.data.begin(), factors.data.end(), 1.0f);
+  for_each_batch(counts.width, counts.height, [&](int x, int y, int n) {
+    std::array<lanes::vfloat, kPlanes> sums;
+    cells.sum(x, y, sums.data());
+    for (int l = 0; l < n; ++l)
+      for (int c = 0; c < 3; ++c) {
+        const float d = sums[c][l], r = sums[3 + c][l], v = sums[6 + c][l];
+        if (!valid[static_cast<size_t>(y) * counts.width + x + l] || !(r > 0) || !(sqr(d) > v)) continue;
+        factors.pixel(x + l, y)[c] = std::clamp(1 + (1 - v / sqr(d)) * d / r, kLeastFactor, kMostFactor);
+      }
+  });
+  return factors;
+}
+
+void multiply(const Image& factors, Image& image) {
+  for (size_t i = 0; i < image.data.size(); ++i) image.data[i] *= factors.data[i];
+}
 
 /// Y with the most of R.
 Image with_samples(const Image& own, const Image& before, const Image& trust) {
@@ -104,31 +174,42 @@ void check_size(const Image& before, const Image& now) {
 }  // namespace
 
 void add_samples(const History& history, const HistoryInput& input, Image& mean, std::array<Image, 2>& halves) {
-  std::array<CandidateSet, 2> sets;
-  Image before = history.samples[0];
-  check_size(before, mean);
-  for (size_t i = 0; i < before.data.size(); ++i) before.data[i] = 0.5f * (before.data[i] + history.samples[1].data[i]);
+  check_size(history.samples[0], mean);
+  const Image counts = counts_of(history, *input.guide);
+  std::array<Image, 2> samples = history.samples;
+  const Image factors = light_factors(history, input, counts, {&samples[0], &samples[1]});
+  for (Image& half : samples) multiply(factors, half);
+  Image before = samples[0];
+  for (size_t i = 0; i < before.data.size(); ++i) before.data[i] = 0.5f * (before.data[i] + samples[1].data[i]);
   Image trust(mean.width, mean.height, 1);
   parallel_for(mean.height, 8, [&](int y) {
     for (int x = 0; x < mean.width; ++x) *trust.pixel(x, y) = trust_at(history, *input.std_error, 1, x, y);
   });
-  for (const int half : {0, 1}) sets[half] = {halves[half], {with_samples(halves[half], history.samples[half], trust)}};
-  Mixture mixture = mixture_of(input, {mean, {with_samples(mean, before, trust)}}, sets);
+  std::array<CandidateSet, 2> sets;
+  for (const int half : {0, 1}) sets[half] = {halves[half], {with_samples(halves[half], samples[half], trust)}};
+  HistoryInput counted = input;
+  counted.counts = {&counts, &counts};
+  Mixture mixture = mixture_of(counted, {mean, {with_samples(mean, before, trust)}}, sets);
   mean = std::move(mixture.image);
   halves = std::move(mixture.halves);
 }
 
-Image add_history(const History& history, const HistoryInput& input, const Mixture* accumulated, Mixture& frame) {
-  check_size(history.image, frame.image);
+Image add_history(const History& before, const HistoryInput& input, const Mixture* accumulated, Mixture& frame) {
+  check_size(before.image, frame.image);
+  const Image counts = counts_of(before, *input.guide);
+  History history{before.image, before.squared_error, before.known, {}};
+  multiply(light_factors(before, input, counts, {&before.image, &before.image}), history.image);
   const Image limits = steady(*input.std_error);
   CandidateSet whole{frame.image, {candidate(frame.image, history, *input.std_error, limits, 1)}};
   std::array<CandidateSet, 2> halves;
   for (const int half : {0, 1}) {
     const Image& image = frame.halves[half];
     halves[half] = {image, {candidate(image, history, *input.std_error, limits, std::sqrt(2.0f))}};
-    if (accumulated) halves[half].candidates.push_back(accumulated->halves[half]);
+    if (accumulated)
+      halves[half].candidates.push_back(
+          limited(image, accumulated->halves[half], *input.std_error, limits, std::sqrt(2.0f)));
   }
-  if (accumulated) whole.candidates.push_back(accumulated->image);
+  if (accumulated) whole.candidates.push_back(limited(frame.image, accumulated->image, *input.std_error, limits, 1));
   Mixture mixture = mixture_of(input, whole, halves);
   frame.image = std::move(mixture.image);
   frame.halves = std::move(mixture.halves);

@@ -11,6 +11,10 @@
 // that are dimmed) leaves no trail, and edges are not blurred by being moved time and again. With halves M_A and M_B in
 // the place of M the same is made of each half, and mix() of mixture.h weights it as it does denoised images.
 //
+// Before, H and R are multiplied by what the frame's samples find that light has changed by, over pixels that look
+// alike: 1 + max(0, 1 - v / d^2) d / r with the difference d of sums, its variance v, and the sum r of the history
+// [JamesStein1961].
+//
 // Clamping to the values of the frame is usual in temporal antialiasing [Karis2014]; to a confidence interval and with
 // measured weights is ours. That the image before is a control variate for re-rendering is in [Rousselle2016].
 //
@@ -20,8 +24,8 @@
 //     R'_h = Y_h + b t (R_h - Y_h),   t = 0.9 / (1 + c e / s'^2),   b by mix(): Y_B judges R_A, and Y_A judges R_B.
 //
 // So b follows from the variances of both and from what has changed, and R'_A and R'_B are independent of each other.
-// The frame's denoiser makes a mixture D of them as it does of its own samples. D is a second candidate beside C; the
-// frame's own samples judge both.
+// The frame's denoiser makes a mixture D of them as it does of its own samples. D is a second candidate beside C, within
+// k max(s, s*) of M, so that a glint of one frame does not stay in the next ones; the frame's own samples judge both.
 #pragma once
 
 #include <array>

@@ -60,6 +60,12 @@ History history(Image image) {
   return {std::move(image), Image(kSize, kSize, 1), std::vector<unsigned char>(size_t{kSize} * kSize, 1), {}};
 }
 
+double mean_of(const Image& image) {
+  double sum = 0;
+  for (const float v : image.data) sum += v;
+  return sum / static_cast<double>(image.data.size());
+}
+
 double mean_squared_error(const Image& image) {
   double sum = 0;
   for (const float v : image.data) sum += (v - kTruth) * (v - kTruth);
@@ -80,9 +86,7 @@ TEST(History, DarkensNothingWhereDarkPixelsSeemCertain) {
   for (size_t i = 0; i < frame.std_error.data.size(); ++i)
     frame.std_error.data[i] *= std::exp(1.5f * (frame.mixture.image.data[i] - kTruth) / Frame::std_deviation());
   frame.add(history(flat(0, 0, 0)));
-  double sum = 0;
-  for (const float v : frame.mixture.image.data) sum += v - kTruth;
-  EXPECT_NEAR(sum / static_cast<double>(frame.mixture.image.data.size()), 0, 0.03f * Frame::std_deviation());
+  EXPECT_NEAR(mean_of(frame.mixture.image), kTruth, 0.03f * Frame::std_deviation());
 }
 
 TEST(History, LeadsNowhereWhereItIsWrong) {
@@ -146,6 +150,34 @@ TEST(History, AddsSamplesByTheirVariance) {
       << "new samples always count";
 }
 
+TEST(History, CountsErrorsOfSamplesAlikeWhereTheyAreBrightByChance) {
+  Frame frame(9);
+  std::array<Image, 2> counts = {Image(kSize, kSize, 1), Image(kSize, kSize, 1)};
+  HistoryInput input = frame.input();
+  for (const int half : {0, 1}) {  // by pictures in which the half's noise is left
+    for (int y = 0; y < kSize; ++y)
+      for (int x = 0; x < kSize; ++x)
+        *counts[half].pixel(x, y) = 1 / (0.01f + std::pow(frame.independent[half].mean.row(0, y)[x], 2.0f));
+    input.counts[half] = &counts[half];
+  }
+  History same = history(flat(0, 0, 0));
+  same.samples = {flat(0, kNoise, 171), flat(0, kNoise, 172)};
+  std::array<Image, 2> halves = {mean_image(frame.independent[0]), mean_image(frame.independent[1])};
+  Image mean = halves[0];
+  add_samples(same, input, mean, halves);
+  EXPECT_NEAR(mean_squared_error(halves[0]) / kNoise, 0.5, 0.03);  // 0.64 by those counts
+}
+
+TEST(History, FollowsLightThatIsDimmed) {
+  Frame frame(10);
+  const Samples added(frame, {flat(0.1f, kNoise / 4, 71), flat(0.1f, kNoise / 4, 72)});
+  EXPECT_NEAR(mean_of(added.mean), kTruth, 0.01) << "0.04 more without a factor for the history";
+  EXPECT_LT(mean_squared_error(added.mean), 0.4 * kNoise / 2);
+  const double alone = mean_squared_error(frame.mixture.image);
+  frame.add(history(flat(0.1f, 0, 0)));
+  EXPECT_LT(mean_squared_error(frame.mixture.image), 0.3 * alone);
+}
+
 TEST(History, AddsNoSamplesOfWhatHasChanged) {
   const Frame frame(7);
   const Samples added(frame, {flat(0.8f, kNoise / 4, 71), flat(0.8f, kNoise / 4, 72)});
@@ -163,6 +195,15 @@ TEST(History, TakesWhatWasMadeOfAllSamplesWhereItIsBetter) {
     EXPECT_LT(mean_squared_error(frame.mixture.image), most * alone);
     EXPECT_NEAR(frame.mixture.weights[0].data[7], 0.6f * (1 - weights.data[7]), 1e-6f);
   }
+}
+
+TEST(History, LetsNoGlintOfAFrameStay) {
+  Frame frame(11);
+  Mixture glint{flat(0, 0, 0), {flat(0, 0, 0), flat(0, 0, 0)}, {}};
+  for (Image* image : {&glint.image, &glint.halves[0], &glint.halves[1]}) std::fill_n(image->pixel(30, 30), 3, 100.0f);
+  const Image before = frame.mixture.image;
+  add_history(history(flat(0, 0, 0)), frame.input(), &glint, frame.mixture);
+  EXPECT_LE(frame.mixture.image.pixel(30, 30)[1] - before.pixel(30, 30)[1], 3.01f * Frame::std_deviation());
 }
 
 TEST(History, OfAnotherSizeIsAnError) {

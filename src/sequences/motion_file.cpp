@@ -98,7 +98,9 @@ double misfit(const Image& before, const Image& now, const MotionLayers& motion)
   const History moved = reproject(before, only_motion.depth, only_motion);
   double with = 0, without = 0;
   for (size_t i = 0; i < moved.known.size(); ++i) {
-    if (!moved.known[i]) continue;
+    if (!moved.known[i] ||
+        is_motion_edge(motion.motion, static_cast<int>(i) % now.width, static_cast<int>(i) / now.width))
+      continue;
     for (size_t c = 3 * i; c < 3 * i + 3; ++c) {
       const double brightness = std::abs(now.data[c]) + 0.1;
       with += std::abs(moved.image.data[c] - now.data[c]) / brightness;

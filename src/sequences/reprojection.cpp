@@ -47,21 +47,18 @@ float slope(const Image& depth, int x, int y) {
   return (std::isfinite(along_x) ? along_x : 0) + (std::isfinite(along_y) ? along_y : 0);
 }
 
-/// Something near moves otherwise.
-bool is_edge(const Image& motion, int x, int y) {
-  const float* here = motion.pixel(x, y);
-  for (int ny = std::max(y - 1, 0); ny <= std::min(y + 1, motion.height - 1); ++ny)
-    for (int nx = std::max(x - 1, 0); nx <= std::min(x + 1, motion.width - 1); ++nx)
-      for (int c : {0, 1})
-        if (!(std::abs(motion.pixel(nx, ny)[c] - here[c]) <= kEdge)) return true;
-  return false;
-}
-
 /// Where a pixel's point was.
 struct Place {
   int x, y;
   bool rests;
   Tap h, v;  // where it does not rest
+
+  /// The pixel that it was in.
+  std::array<int, 2> pixel(const Image& image) const {
+    if (rests) return {x, y};
+    return {std::clamp(h.first + (h.part < 0.5f ? 1 : 2), 0, image.width - 1),
+            std::clamp(v.first + (v.part < 0.5f ? 1 : 2), 0, image.height - 1)};
+  }
 
   /// The value of an image there; `difference`: that to linear interpolation.
   float value(const Image& image, int c, float& difference) const {
@@ -98,8 +95,7 @@ class Reprojection {
     const int width = depth_before_.width, height = depth_before_.height;
     const float old_x = static_cast<float>(x) + 0.5f + motion[0], old_y = static_cast<float>(y) + 0.5f + motion[1];
     if (!(old_x >= 0.5f && old_y >= 0.5f && old_x < static_cast<float>(width) - 0.5f &&
-          old_y < static_cast<float>(height) - 0.5f) ||
-        is_edge(now_.motion, x, y))
+          old_y < static_cast<float>(height) - 0.5f))
       return std::nullopt;
     const Tap h = tap(old_x), v = tap(old_y);
     for (const int j : {1, 2})
@@ -135,6 +131,39 @@ std::optional<float> move(const Image& before, const Place& place, float* value)
   return squares;
 }
 
+/// Takes the samples of the pixel where the point was, as they are: mixed with others they would have noise that is
+/// alike in neighbouring pixels, which denoisers take for detail. What the picture `moved` differs by from that pixel
+/// of `before` is added. Whether the value is finite.
+bool move_samples(const Image& samples, const Image& before, const Place& place, const float* moved, float* value) {
+  const auto [x, y] = place.pixel(before);
+  bool finite = true;
+  for (int c = 0; c < 3; ++c) {
+    value[c] = samples.pixel(x, y)[c] + (moved[c] - before.pixel(x, y)[c]);
+    finite = finite && std::isfinite(value[c]);
+  }
+  return finite;
+}
+
+/// How far the pixel may show what moves otherwise near it: the largest squared difference of what the picture shows
+/// where the neighbours' motions lead from `moved`; 0 where all move alike.
+float edge_error(const Image& before, const Image& motion, int x, int y, const float* moved) {
+  const float* here = motion.pixel(x, y);
+  float most = 0;
+  for (int ny = std::max(y - 1, 0); ny <= std::min(y + 1, motion.height - 1); ++ny)
+    for (int nx = std::max(x - 1, 0); nx <= std::min(x + 1, motion.width - 1); ++nx) {
+      const float* there = motion.pixel(nx, ny);
+      if (std::abs(there[0] - here[0]) <= kEdge && std::abs(there[1] - here[1]) <= kEdge) continue;
+      const auto within = [](float at, int size) { return std::clamp(at, 0.5f, static_cast<float>(size) - 0.5f); };
+      const Place other{x, y, false, tap(within(static_cast<float>(x) + 0.5f + there[0], motion.width)),
+                        tap(within(static_cast<float>(y) + 0.5f + there[1], motion.height))};
+      float value[3], squares = 0;
+      if (!move(before, other, value)) return kInfinity;
+      for (int c = 0; c < 3; ++c) squares += sqr(value[c] - moved[c]) / 3;
+      most = std::max(most, squares);
+    }
+  return most;
+}
+
 /// Means over 3 x 3 pixels, as far as they are in the image.
 Image smoothed(const Image& image) {
   Image result(image.width, image.height, 1);
@@ -151,6 +180,15 @@ Image smoothed(const Image& image) {
 
 }  // namespace
 
+bool is_motion_edge(const Image& motion, int x, int y) {
+  const float* here = motion.pixel(x, y);
+  for (int ny = std::max(y - 1, 0); ny <= std::min(y + 1, motion.height - 1); ++ny)
+    for (int nx = std::max(x - 1, 0); nx <= std::min(x + 1, motion.width - 1); ++nx)
+      for (const int c : {0, 1})
+        if (!(std::abs(motion.pixel(nx, ny)[c] - here[c]) <= kEdge)) return true;
+  return false;
+}
+
 History reproject(const Image& before, const Image& depth_before, const MotionLayers& now,
                   const std::array<Image, 2>& samples) {
   const int width = now.depth.width, height = now.depth.height;
@@ -165,6 +203,7 @@ History reproject(const Image& before, const Image& depth_before, const MotionLa
                   std::vector<unsigned char>(static_cast<size_t>(width) * height),
                   {}};
   if (has_samples) history.samples = {history.image, history.image};
+  Image edges(width, height, 1);
   const Reprojection reprojection(depth_before, now);
   parallel_for(height, 4, [&](int y) {
     for (int x = 0; x < width; ++x) {
@@ -173,12 +212,15 @@ History reproject(const Image& before, const Image& depth_before, const MotionLa
       const std::optional<float> squares = move(before, *place, history.image.pixel(x, y));
       bool known = squares.has_value();
       for (size_t i = 0; has_samples && i < samples.size(); ++i)
-        known = move(samples[i], *place, history.samples[i].pixel(x, y)) && known;
+        known = move_samples(samples[i], before, *place, history.image.pixel(x, y), history.samples[i].pixel(x, y)) &&
+                known;
       *history.squared_error.pixel(x, y) = squares.value_or(0);
+      if (!place->rests) *edges.pixel(x, y) = edge_error(before, now.motion, x, y, history.image.pixel(x, y));
       history.known[static_cast<size_t>(y) * width + x] = known;
     }
   });
   history.squared_error = smoothed(history.squared_error);
+  for (size_t i = 0; i < edges.data.size(); ++i) history.squared_error.data[i] += edges.data[i];
   return history;
 }
 

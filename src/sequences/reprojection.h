@@ -14,16 +14,22 @@ struct MotionLayers {
   bool knows_depth = true;
 };
 
+/// Whether what is shown next to a pixel, or in it, moves otherwise: by more than a quarter of a pixel.
+bool is_motion_edge(const Image& motion, int x, int y);
+
 /// `before`: the picture of the frame before, 3 channels, and `depth_before` its depth, in the same window of the frame
 /// as `now`. Where motion is less than a thousandth of a pixel, values are taken as they are. Otherwise they are
 /// interpolated by Catmull-Rom splines [Catmull1974], clamped to the four pixels around. `squared_error` is the squared
 /// difference to linear interpolation, its mean over the channels and 3 x 3 pixels.
 ///
-/// Not known is what lies out of the window; what was hidden, by depth: one of the four pixels around is not as far
-/// away as the point was; and, where things move against each other or the background (by more than a quarter of a
-/// pixel from a pixel to the next), the pixels at edges, which show both.
+/// Where things move against each other or the background (by more than a quarter of a pixel from a pixel to the next),
+/// pixels that move may show both: to the squared error is added how far what neighbours' motions lead to differs.
 ///
-/// `samples`: History::samples of the frame before, which are moved like the picture; or empty.
+/// Not known is what lies out of the window, and what was hidden, by depth: one of the four pixels around is not as far
+/// away as the point was.
+///
+/// `samples`: History::samples of the frame before, or empty. They are moved by whole pixels, so that their noise stays
+/// independent from pixel to pixel; what the moved picture differs by from the pixel that they are taken from is added.
 History reproject(const Image& before, const Image& depth_before, const MotionLayers& now,
                   const std::array<Image, 2>& samples = {});
 

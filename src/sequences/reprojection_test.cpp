@@ -105,21 +105,32 @@ TEST(Reprojection, TakesSlantedSurfaces) {
   EXPECT_TRUE(is_known(history, 5, 5));
 }
 
-TEST(Reprojection, LeavesOutEdgesOfWhatMovesOtherwise) {
+TEST(Reprojection, TellsEdgesOfWhatMovesOtherwise) {
   MotionLayers now = moving(1, 0);
   for (int y = 0; y < kHeight; ++y)
     for (int x = 12; x < kWidth; ++x) now.motion.pixel(x, y)[0] = 2;
-  const History history = reproject(waves(0, 0), constant(5), now);
-  for (const int x : {11, 12}) EXPECT_FALSE(is_known(history, x, 5));
-  for (const int x : {10, 13}) EXPECT_TRUE(is_known(history, x, 5));
+  const Image steps = image_of(3, [](int x, int, int) { return static_cast<float>(x); });
+  const History history = reproject(steps, constant(5), now);
+  for (const int x : {11, 12}) {
+    EXPECT_TRUE(is_known(history, x, 5));
+    EXPECT_NEAR(*history.squared_error.pixel(x, 5), 1, 1e-3) << "a pixel further it has another value, by 1";
+  }
+  for (const int x : {10, 13}) EXPECT_NEAR(*history.squared_error.pixel(x, 5), 0, 1e-6);
 }
 
-TEST(Reprojection, MovesSamplesLikeThePicture) {
-  const History history = reproject(waves(0, 0), constant(5), moving(-1.7f, 2.3f), {waves(0, 0), waves(3, 1)});
-  const History other = reproject(waves(3, 1), constant(5), moving(-1.7f, 2.3f));
-  EXPECT_EQ(history.samples[0].data, history.image.data);
-  EXPECT_EQ(history.samples[1].data, other.image.data);
-  EXPECT_EQ(history.known, other.known);
+TEST(Reprojection, MovesSamplesByWholePixelsAndWhatThePictureTells) {
+  const Image zeros(kWidth, kHeight, 3);
+  const Image noise = image_of(3, [](int x, int y, int c) { return static_cast<float>((7 * x + 5 * y + 3 * c) % 11); });
+  const History history = reproject(waves(0, 0), constant(5), moving(-1.7f, 2.3f), {zeros, noise});
+  for (int y = 4; y < kHeight - 4; ++y)
+    for (int x = 4; x < kWidth - 4; ++x)
+      for (int c = 0; c < 3; ++c) {
+        const float within = history.image.pixel(x, y)[c] - waves(0, 0).pixel(x - 2, y + 2)[c];
+        EXPECT_NEAR(history.samples[0].pixel(x, y)[c], within, 1e-5f);
+        EXPECT_NEAR(history.samples[1].pixel(x, y)[c], noise.pixel(x - 2, y + 2)[c] + within, 1e-5f);
+      }
+  const History rests = reproject(waves(0, 0), constant(5), moving(0, 0), {zeros, noise});
+  EXPECT_EQ(rests.samples[1].data, noise.data);
 }
 
 TEST(Reprojection, NeedsFramesOfOneSize) { EXPECT_THROW(reproject(Image(3, 2, 3), constant(5), moving(0, 0)), Error); }
