@@ -223,7 +223,7 @@ class Cluster(PackageTest):
         def kill(done, total):
             if done == 1:
                 killed.append(next(iter(self.client.run(os.getpid).values())))
-                os.kill(killed[0], signal.SIGKILL)
+                os.kill(killed[-1], signal.SIGKILL)
         before = os.getcwd()
         self.addCleanup(os.chdir, before)
         os.chdir(self.path)
@@ -237,11 +237,16 @@ class Cluster(PackageTest):
         covary.distributed.frames(self.client, ROOM, "there_#.exr", 1, 4, words)
         self.assertEqual([path.stat().st_mtime_ns for path in files], times)
         words[3] = "4"
-        waves = covary.distributed.frames(self.client, ROOM, "wave_#.exr", 1, 2, words, waves=2, seed=5)
+        waves = covary.distributed.frames(self.client, ROOM, "wave_#.exr", 1, 2, words, waves=2, seed=5,
+                                           progress=kill)
         self.assertEqual([path.name for path in waves], [f"wave_{n}-{k}.exr" for n in (1, 2) for k in (1, 2)])
-        self.run_program("render", str(ROOM), "-o", "second_#.exr", "--frames", "2", "--seed", "6", "--no-preview",
-                         "--quiet", *words)
-        self.assert_same_bits(covary.read_image("second_2.exr"), covary.read_image(waves[3]))
+        self.assertEqual(len(killed), 2)
+        for k in (1, 2):
+            self.run_program("render", str(ROOM), "-o", f"seed{k}_#.exr", "--frames", "1-2", "--seed", str(k + 4),
+                             "--no-preview", "--quiet", *words)
+        for n in (1, 2):
+            for k in (1, 2):
+                self.assert_same_bits(covary.read_image(f"seed{k}_{n}.exr"), covary.read_image(f"wave_{n}-{k}.exr"))
         self.assertIn("seed=", self.message_of(covary.UsageError, covary.distributed.frames, self.client, ROOM,
                                                "f_#.exr", 1, 2, ["--seed", "3"], waves=2))
         for options, message in ((["--history", "on"], "--history makes each frame of the one before"),
