@@ -25,7 +25,7 @@
 //
 // So b follows from the variances of both and from what has changed, and R'_A and R'_B are independent of each other.
 // The frame's denoiser makes a mixture D of them as it does of its own samples. D is a second candidate beside C, within
-// k max(s, s*) of M, so that a glint of one frame does not stay in the next ones; the frame's own samples judge both.
+// k max(s, s*) of M, so that a firefly of one frame does not stay in the next ones; the frame's own samples judge both.
 #pragma once
 
 #include <array>

@@ -197,12 +197,13 @@ TEST(History, TakesWhatWasMadeOfAllSamplesWhereItIsBetter) {
   }
 }
 
-TEST(History, LetsNoGlintOfAFrameStay) {
+TEST(History, LetsNoFireflyOfAFrameStay) {
   Frame frame(11);
-  Mixture glint{flat(0, 0, 0), {flat(0, 0, 0), flat(0, 0, 0)}, {}};
-  for (Image* image : {&glint.image, &glint.halves[0], &glint.halves[1]}) std::fill_n(image->pixel(30, 30), 3, 100.0f);
+  Mixture firefly{flat(0, 0, 0), {flat(0, 0, 0), flat(0, 0, 0)}, {}};
+  for (Image* image : {&firefly.image, &firefly.halves[0], &firefly.halves[1]})
+    std::fill_n(image->pixel(30, 30), 3, 100.0f);
   const Image before = frame.mixture.image;
-  add_history(history(flat(0, 0, 0)), frame.input(), &glint, frame.mixture);
+  add_history(history(flat(0, 0, 0)), frame.input(), &firefly, frame.mixture);
   EXPECT_LE(frame.mixture.image.pixel(30, 30)[1] - before.pixel(30, 30)[1], 3.01f * Frame::std_deviation());
 }
 
