@@ -24,8 +24,8 @@
 //     R'_h = Y_h + b t (R_h - Y_h),   t = 0.9 / (1 + c e / s'^2),   b by mix(): Y_B judges R_A, and Y_A judges R_B.
 //
 // So b follows from the variances of both and from what has changed, and R'_A and R'_B are independent of each other.
-// The frame's denoiser makes a mixture D of them as it does of its own samples. D is a second candidate beside C, within
-// k max(s, s*) of M, so that a firefly of one frame does not stay in the next ones; the frame's own samples judge both.
+// The frame's denoiser makes a mixture D of them as it does of its own samples. D is a second candidate beside C, in
+// M +- k max(s, s*), so that a firefly of one frame does not stay in the next ones; the frame's own samples judge both.
 #pragma once
 
 #include <array>
