@@ -13,8 +13,9 @@
 namespace covary {
 namespace {
 
-constexpr float kInterval = 3;   // k, in standard errors
-constexpr int kErrorWindow = 5;  // side, pixels
+constexpr float kInterval = 3;        // k, in standard errors
+constexpr int kErrorWindow = 5;       // side, pixels
+constexpr float kLeastScale = 0.02f;  // of relative standard errors
 /// c: both interpolations have errors in common, which their difference does not tell (docs/methods/sequences.md).
 constexpr float kOfMoving = 5;
 /// How much the weights of the whole image count (MixtureInput::prior).
@@ -32,10 +33,12 @@ float trust_at(const History& history, const Image& std_error, float scale, int 
   return variance > 0 ? variance / (variance + kOfMoving * *history.squared_error.pixel(x, y)) : 0;
 }
 
-/// Medians of the standard error over windows. That of a pixel alone is small where its samples happen to be dark and
-/// large where they are bright, so that history, limited by it, would darken frames: by 1.2 % of a still room with 8
-/// samples. Means would let what glints widen the intervals of all around it.
-Image steady(const Image& std_error) {
+/// Medians of relative standard errors over windows, times the picture. The error of a pixel alone is small where its
+/// samples happen to be dark and large where they are bright, so that history, limited by it, would darken frames: by
+/// 1.2 % of a still room with 8 samples. Means would let what glints widen the intervals of all around it, and absolute
+/// errors those of dark pixels among bright ones, where a reflection has moved on.
+Image steady(const Image& std_error, const Image& picture) {
+  const auto scale = [&](int x, int y, int c) { return std::abs(picture.pixel(x, y)[c]) + kLeastScale; };
   Image result = std_error;
   const int radius = kErrorWindow / 2;
   parallel_for(result.height, 8, [&](int y) {
@@ -45,16 +48,16 @@ Image steady(const Image& std_error) {
         window.clear();
         for (int j = std::max(y - radius, 0); j <= std::min(y + radius, result.height - 1); ++j)
           for (int i = std::max(x - radius, 0); i <= std::min(x + radius, result.width - 1); ++i)
-            window.push_back(std_error.pixel(i, j)[c]);
+            window.push_back(std_error.pixel(i, j)[c] / scale(i, j, c));
         const auto middle = window.begin() + static_cast<std::ptrdiff_t>(window.size() / 2);
         std::nth_element(window.begin(), middle, window.end());
-        result.pixel(x, y)[c] = *middle;
+        result.pixel(x, y)[c] = *middle * scale(x, y, c);
       }
   });
   return result;
 }
 
-/// C of a frame's image or of that of a half, whose error is `scale` times as large. `limits`: steady(std_error).
+/// C of a frame's image or of that of a half, whose error is `scale` times as large. `limits`: steady().
 Image candidate(const Image& frame, const History& history, const Image& std_error, const Image& limits, float scale) {
   Image result = frame;
   parallel_for(frame.height, 8, [&](int y) {
@@ -199,7 +202,7 @@ Image add_history(const History& before, const HistoryInput& input, const Mixtur
   const Image counts = counts_of(before, *input.guide);
   History history{before.image, before.squared_error, before.known, {}};
   multiply(light_factors(before, input, counts, {&before.image, &before.image}), history.image);
-  const Image limits = steady(*input.std_error);
+  const Image limits = steady(*input.std_error, frame.image);
   CandidateSet whole{frame.image, {candidate(frame.image, history, *input.std_error, limits, 1)}};
   std::array<CandidateSet, 2> halves;
   for (const int half : {0, 1}) {

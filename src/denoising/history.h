@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What frames before show of the same scene, mixed into a frame where held-out samples find that better (ours).
 //
-// M: the mixture of the frame alone, with the standard error s, of which s* is the median of 5 x 5 pixels; H: the
+// M: the mixture of the frame alone, with the standard error s; s*: M times the median of s / M of 5 x 5 pixels; H: the
 // history, moved to where it is seen now, of samples that are independent of the frame's. The candidate is
 //
 //     C = M + clamp(H - M, -k s*, k s*) / (1 + c e / s'^2),   e: squared error of H for being moved by parts of pixels,

@@ -197,6 +197,14 @@ TEST(History, TakesWhatWasMadeOfAllSamplesWhereItIsBetter) {
   }
 }
 
+TEST(History, LeavesDarkPixelsAmongBrightOnes) {
+  Frame frame(12);
+  for (Image* image : {&frame.mixture.image, &frame.mixture.halves[0], &frame.mixture.halves[1]})
+    std::fill_n(image->pixel(30, 30), 3, 0.0f);
+  frame.add(history(flat(0, 0, 0)));
+  EXPECT_LT(frame.mixture.image.pixel(30, 30)[1], 0.2f * Frame::std_deviation());
+}
+
 TEST(History, LetsNoFireflyOfAFrameStay) {
   Frame frame(11);
   Mixture firefly{flat(0, 0, 0), {flat(0, 0, 0), flat(0, 0, 0)}, {}};
