@@ -88,24 +88,36 @@ class PathRandom {
     return random;
   }
 
+  /// Whether the numbers are points of sequences.
+  bool in_sequence() const { return reversed_index_ != kNoIndex; }
+  /// The same numbers for loops over many paths, where they are not points of sequences: the key of a vertex, and the
+  /// one number, or the two, of an event there.
+  uint64_t vertex_key(uint32_t vertex) const { return key_ + uint64_t{vertex * kEventsPerVertex} * kStep; }
+  static float first_number(uint64_t vertex_key, Event event) {
+    return to_unit(static_cast<uint32_t>(event_bits(vertex_key, event) >> 32));
+  }
+  static Vec2 two_numbers(uint64_t vertex_key, Event event) {
+    const uint64_t z = event_bits(vertex_key, event);
+    return {to_unit(static_cast<uint32_t>(z >> 32)), to_unit(static_cast<uint32_t>(z))};
+  }
+
   /// One number in [0, 1), a multiple of 2^-24.
   float get_1d(uint32_t vertex, Event event) const {
-    const uint64_t z = bits(vertex, event);
+    const uint64_t z = event_bits(vertex_key(vertex), event);
     return to_unit(in_sequence() ? sobol_first(reversed_index_, z) : static_cast<uint32_t>(z >> 32));
   }
   /// Two independent numbers in [0, 1).
   Vec2 get_2d(uint32_t vertex, Event event) const {
-    uint64_t z = bits(vertex, event);
+    uint64_t z = event_bits(vertex_key(vertex), event);
     if (in_sequence()) z = sobol_point(reversed_index_, z);
     return {to_unit(static_cast<uint32_t>(z >> 32)), to_unit(static_cast<uint32_t>(z))};
   }
 
  private:
-  bool in_sequence() const { return reversed_index_ != kNoIndex; }
   static float to_unit(uint32_t u) { return static_cast<float>(u >> 8) * 0x1p-24f; }
-  uint64_t bits(uint32_t vertex, Event event) const {
-    const uint64_t dimension = vertex * kEventsPerVertex + static_cast<uint32_t>(event);  // less than 2^32
-    return mix64(key_ + (dimension + 1) * kStep);
+  /// Dimensions, numbers of vertices times kEventsPerVertex and more, are less than 2^32.
+  static uint64_t event_bits(uint64_t vertex_key, Event event) {
+    return mix64(vertex_key + (static_cast<uint64_t>(event) + 1) * kStep);
   }
   static constexpr uint64_t kStep = 0x9e3779b97f4a7c15ull;  // odd, so no two dimensions share a number
   static constexpr uint32_t kSubpathKinds = 2;

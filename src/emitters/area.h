@@ -8,6 +8,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "scene/emitter.h"
 #include "scene/shape.h"
@@ -30,6 +31,7 @@ class AreaLight final : public Emitter {
     return light;
   }
   const Shape* shape() const override { return shape_; }
+  const ParallelogramLight* parallelogram() const override { return parallelogram_ ? &*parallelogram_ : nullptr; }
 
   Spectrum surface_radiance(const SurfaceHit& hit, const Vec3& w) const override;
   /// Textured lights on shapes whose (u, v) cover the unit square (Shape::sample_uv): positions in proportion to the
@@ -63,6 +65,7 @@ class AreaLight final : public Emitter {
   bool textured_;
   bool samples_uv_ = false;
   const Shape* shape_ = nullptr;
+  std::optional<ParallelogramLight> parallelogram_;
 };
 
 }  // namespace covary

@@ -150,6 +150,7 @@ class PathTracer final : public Integrator {
       LambertianBlock& block = batch.block;
       if (block.size() == 0) return;
       block.find_surfaces(scene);
+      block.draw_numbers();
       if (connecting) connect_block(block);
       block.scatter();
       const bool roulette = depth + 1 >= tracer.lengths_.rr_depth;
@@ -176,7 +177,7 @@ class PathTracer final : public Integrator {
       if (scene.environment())  // the only lights with large tables
         for (const PrefetchStep step : {PrefetchStep::kTable, PrefetchStep::kValues})
           for (int l = 0; l < block.size(); ++l) emitters[l]->prefetch({block.u_light_x[l], block.u_light_y[l]}, step);
-      for (int l = 0; l < block.size(); ++l) block.sample_light(l, *emitters[l]);
+      block.sample_lights(emitters);
       block.connect(lights.pmf(*emitters[0]));
       for (int l = 0; l < block.size(); ++l) {
         if (is_black(block.contribution[l])) continue;

@@ -44,6 +44,9 @@ void LambertianBlock::add(uint32_t i, const Spectrum& path_throughput, float eta
   reflectance_.set(l, surface.model.reflectance);
   throughput.set(l, path_throughput);
   eta_[l] = eta;
+  keys_[l] = random.vertex_key(address);
+  drawn_ = random.in_sequence();
+  if (!drawn_) return;
   const Vec2 light = random.get_2d(address, Event::kLightPosition),
              direction = random.get_2d(address, Event::kDirection);
   u_choice[l] = random.get_1d(address, Event::kLightChoice);
@@ -51,6 +54,20 @@ void LambertianBlock::add(uint32_t i, const Spectrum& path_throughput, float eta
   u_primitive[l] = random.get_1d(address, Event::kLightPrimitive);
   u_x[l] = direction.x, u_y[l] = direction.y;
   u_roulette[l] = random.get_1d(address, Event::kRoulette);
+}
+
+void LambertianBlock::draw_numbers() {
+  if (drawn_) return;
+  for_each_lane([&](int l) {
+    const uint64_t key = keys_[l];
+    const Vec2 light = PathRandom::two_numbers(key, Event::kLightPosition),
+               direction = PathRandom::two_numbers(key, Event::kDirection);
+    u_choice[l] = PathRandom::first_number(key, Event::kLightChoice);
+    u_light_x[l] = light.x, u_light_y[l] = light.y;
+    u_primitive[l] = PathRandom::first_number(key, Event::kLightPrimitive);
+    u_x[l] = direction.x, u_y[l] = direction.y;
+    u_roulette[l] = PathRandom::first_number(key, Event::kRoulette);
+  });
 }
 
 void LambertianBlock::find_surfaces(const Scene& scene) {
@@ -74,8 +91,43 @@ void LambertianBlock::find_surfaces(const Scene& scene) {
   });
 }
 
-void LambertianBlock::sample_light(int l, const Emitter& emitter) {
-  const EmitterSample light = emitter.sample_towards(p[l], {u_light_x[l], u_light_y[l]}, u_primitive[l]);
+void LambertianBlock::sample_lights(const Emitter* const* lights) {
+  const ParallelogramLight* parallelograms[kCapacity];
+  bool any = false;
+  for (int l = 0; l < size_; ++l)
+    if ((parallelograms[l] = lights[l]->parallelogram())) set_parallelogram(l, *parallelograms[l]), any = true;
+  if (any) sample_parallelograms();
+  for (int l = 0; l < size_; ++l)
+    if (!parallelograms[l]) set_light(l, lights[l]->sample_towards(p[l], {u_light_x[l], u_light_y[l]}, u_primitive[l]));
+}
+
+void LambertianBlock::set_parallelogram(int l, const ParallelogramLight& light) {
+  const Parallelogram& surface = light.surface;
+  light_origin_.set(l, surface.origin), light_n_.set(l, surface.n);
+  light_dp_du_.set(l, surface.dp_du), light_dp_dv_.set(l, surface.dp_dv);
+  light_inverse_area_[l] = surface.inverse_area;
+  light_radiance_.set(l, light.radiance);
+  light_is_delta_[l] = false;
+}
+
+/// As TriangleMesh::sample_uv(), Shape::towards() and AreaLight::sample_towards(); lanes of other lights too, whose
+/// results are not used.
+void LambertianBlock::sample_parallelograms() {
+  for_each_lane([&](int l) {
+    const Vec3 at = light_origin_[l] + light_dp_du_[l] * u_light_x[l] + light_dp_dv_[l] * u_light_y[l];
+    const Vec3 to = at - p[l];
+    const float d2 = length_squared(to), inverse = 1 / std::sqrt(d2);
+    const Vec3 wi = to * inverse;
+    const float facing = dot(wi, light_n_[l]), cosine = std::abs(facing);
+    const bool seen = d2 > 0 && facing < 0 && cosine > Shape::kGrazing;
+    const float density = light_inverse_area_[l] * d2 / cosine;
+    light_wi_.set(l, wi);
+    light_distance_[l] = d2 * inverse;
+    light_pdf_[l] = seen ? density : 0;
+  });
+}
+
+void LambertianBlock::set_light(int l, const EmitterSample& light) {
   light_wi_.set(l, light.wi);
   light_distance_[l] = light.distance, light_pdf_[l] = light.pdf_solid_angle;
   light_radiance_.set(l, light.radiance);

@@ -72,8 +72,10 @@ class LambertianBlock {
 
   /// What TriangleMesh::fill() and Scene::resolve() find, and on which side the path came.
   void find_surfaces(const Scene& scene);
-  /// Samples a light for connect().
-  void sample_light(int lane, const Emitter& light);
+  /// The random numbers of all vertices.
+  void draw_numbers();
+  /// Samples a light of each vertex for connect().
+  void sample_lights(const Emitter* const* lights);
   /// Values of the surface for the light samples of sample_light(), weighted against direction sampling;
   /// their shadow rays. `pmf`: probability with which a light was chosen.
   void connect(float pmf);
@@ -98,12 +100,19 @@ class LambertianBlock {
  private:
   template <typename Body>
   void for_each_lane(const Body& body);
+  void set_light(int lane, const EmitterSample& light);
+  void set_parallelogram(int lane, const ParallelogramLight& light);
+  void sample_parallelograms();
 
   int size_ = 0;
+  bool drawn_ = false;             // the random numbers are there, as points of sequences
+  uint64_t keys_[kCapacity] = {};  // else: of the vertices' random numbers
   Vectors light_wi_;
   Floats light_distance_, light_pdf_;  // pdf 0: no sample
   Spectra light_radiance_;
   int32_t light_is_delta_[kCapacity] = {};
+  Vectors light_origin_, light_dp_du_, light_dp_dv_, light_n_;  // of parallelograms
+  Floats light_inverse_area_;
   struct Corner {
     Vectors p, n;
   };

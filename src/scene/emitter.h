@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "core/parallelogram.h"
 #include "core/ray.h"
 #include "core/spectrum.h"
 #include "scene/object.h"
@@ -52,6 +53,12 @@ inline SurfaceHit point_on_light(const Vec3& p, const Vec3& n, Vec2 uv) {
   hit.p = p, hit.ng = n, hit.frame = Frame(n), hit.uv = uv;
   return hit;
 }
+
+/// A flat area light that is sampled uniformly and emits the same radiance everywhere, on the side of its normal.
+struct ParallelogramLight {
+  Parallelogram surface;
+  Spectrum radiance;
+};
 
 /// Light from infinitely far away in one direction.
 struct EnvironmentLight {
@@ -114,6 +121,9 @@ class Emitter : public SceneObject {
   virtual Spectrum part_power(uint32_t /*part*/) const { return power(); }
   /// The surface of an area light, or null.
   virtual const Shape* shape() const { return nullptr; }
+  /// What sample_towards() samples where that is a parallelogram, so that many samples can be taken side by side; else
+  /// null.
+  virtual const ParallelogramLight* parallelogram() const { return nullptr; }
 
   /// This environment with a density from which the mean was taken off, for use together with a technique that covers
   /// all directions [Karlik2019]; null where that is the light itself.

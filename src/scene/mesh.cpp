@@ -66,7 +66,7 @@ TriangleMesh::TriangleMesh(MeshData data)
   parallelogram_ = find_parallelogram();
 }
 
-TriangleMesh::Parallelogram TriangleMesh::find_parallelogram() const {
+Parallelogram TriangleMesh::find_parallelogram() const {
   if (triangles_.size() != 2 || !has_uvs_) return {};
   // Each triangle must have three corners of the unit square in (u, v), and miss opposite ones.
   Vec2 missing[2] = {{0.5f, 0.5f}, {0.5f, 0.5f}};

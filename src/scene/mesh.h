@@ -52,6 +52,8 @@ class TriangleMesh final : public Shape {
   EmitterSample sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const override;
   /// Only for two triangles that make a parallelogram whose (u, v) cover the unit square, such as `rectangle`.
   AreaSample sample_uv(Vec2 uv) const override;
+  /// Null for other meshes.
+  const Parallelogram* parallelogram() const { return is_parallelogram() ? &parallelogram_ : nullptr; }
   std::shared_ptr<Shape> transformed(const Transform& to_world) const override;
   Spectrum vertex_colour(const SurfaceHit& hit) const override;
   Spectrum attribute(std::string_view name, const SurfaceHit& hit) const override;
@@ -91,16 +93,11 @@ class TriangleMesh final : public Shape {
   Discrete areas_;
   float inverse_area_ = 0;
 
-  /// p = origin + u dp_du + v dp_dv over the whole mesh; inverse_area == 0: it is no such parallelogram.
-  struct Parallelogram {
-    Vec3 origin, dp_du, dp_dv, n;
-    float inverse_area = 0;
-  };
   Parallelogram find_parallelogram() const;
   bool is_parallelogram() const { return parallelogram_.inverse_area > 0; }
   /// Sets the triangle and the barycentric coordinates of a point that was made from its (u, v).
   void find_triangle(AreaSample& at) const;
-  Parallelogram parallelogram_;
+  Parallelogram parallelogram_;  // inverse_area == 0: it is none
 };
 
 }  // namespace covary
