@@ -48,21 +48,21 @@ class Diffuse final : public Bsdf, public MaybeLambertian {
   explicit Diffuse(Parameters& p)
       : reflectance_(p, "reflectance", 0.5f),
         constant_(reflectance_.constant()),
-        lambertian_{reflectance_.constant()} {}
+        lambertian_{reflectance_.constant(), reflectance_.texture()} {}
 
   uint32_t flags() const override { return kDiffuseReflection; }
   const BsdfClosure* bind(const SurfaceHit& hit, bool, TransportMode, Arena& arena) const override {
     if (reflectance_.is_constant()) return &constant_;
     return arena.make<DiffuseClosure>(reflectance_.eval(hit));
   }
-  const Lambertian* lambertian() const override { return reflectance_.is_constant() ? &lambertian_ : nullptr; }
+  const Lambertian* lambertian() const override { return &lambertian_; }
   const Texture* main_texture() const override { return reflectance_.texture(); }
   Spectrum albedo(const SurfaceHit& hit) const override { return clamp01(reflectance_.eval(hit)); }
 
  private:
   ColourInput reflectance_;
   DiffuseClosure constant_;
-  Lambertian lambertian_;  // where it is constant
+  Lambertian lambertian_;
 };
 
 }  // namespace

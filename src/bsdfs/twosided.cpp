@@ -103,7 +103,7 @@ class TwoSided final : public Bsdf, public MaybeLambertian {
   TwoSided(BsdfPtr front, BsdfPtr back)
       : front_(std::move(front)), back_(std::move(back)), transmits_((flags() & kTransmission) != 0) {
     if (const Lambertian* nested = front_ == back_ ? lambertian_of(*front_) : nullptr)
-      lambertian_ = {nested->reflectance, true};
+      lambertian_ = {nested->reflectance, nested->texture, true};
   }
 
   uint32_t flags() const override { return front_->flags() | back_->flags(); }

@@ -42,6 +42,14 @@ void LambertianBlock::add(uint32_t i, const Spectrum& path_throughput, float eta
   both_sides_[l] = surface.model.both_sides;
   wo_.set(l, -ray.d);
   reflectance_.set(l, surface.model.reflectance);
+  if (const Texture* texture = surface.model.texture) {
+    TexturedHit& textured = textured_[n_textured_++];
+    textured.lane = l, textured.reflectance = texture;
+    textured.hit.shape = &mesh;
+    textured.hit.primitive = hit.primitive, textured.hit.barycentric = hit.barycentric;
+    textured.hit.uv = mesh.uv_at(hit.primitive, hit.barycentric);
+    texture->prefetch(textured.hit.uv);
+  }
   throughput.set(l, path_throughput);
   eta_[l] = eta;
   keys_[l] = random.vertex_key(address);
@@ -89,6 +97,11 @@ void LambertianBlock::find_surfaces(const Scene& scene) {
     const float cosine = dot(wo_[l], frame.n);
     side_[l] = cosine > 0 ? 1 : (both_sides_[l] && -cosine > 0 ? -1 : 0);
   });
+  for (int i = 0; i < n_textured_; ++i) {
+    auto& [l, reflectance, hit] = textured_[i];
+    hit.p = p[l], hit.ng = ng_[l], hit.frame = Frame(s_[l], t_[l], n_[l]);
+    reflectance_.set(l, reflectance->eval(hit));
+  }
 }
 
 void LambertianBlock::sample_lights(const Emitter* const* lights) {

@@ -65,12 +65,12 @@ class LambertianBlock {
 
   int size() const { return size_; }
   bool full() const { return size_ == kCapacity; }
-  void clear() { size_ = 0; }
+  void clear() { size_ = n_textured_ = 0; }
   /// Adds the vertex where the ray of path `index` of the batch met `surface`; `address`: of its random numbers.
   void add(uint32_t index, const Spectrum& path_throughput, float eta, const Ray& ray, const RayHit& hit,
            const LambertianMesh& surface, const PathRandom& random, uint32_t address);
 
-  /// What TriangleMesh::fill() and Scene::resolve() find, and on which side the path came.
+  /// What TriangleMesh::fill() and Scene::resolve() find, reflectances, and on which side the path came.
   void find_surfaces(const Scene& scene);
   /// The random numbers of all vertices.
   void draw_numbers();
@@ -121,6 +121,13 @@ class LambertianBlock {
   int32_t both_sides_[kCapacity] = {};
   Vectors wo_;  // in the world
   Spectra reflectance_;
+  struct TexturedHit {
+    int lane;
+    const Texture* reflectance;
+    SurfaceHit hit;  // what the texture may read is complete after find_surfaces()
+  };
+  int n_textured_ = 0;
+  TexturedHit textured_[kCapacity];
   Vectors ng_, s_, t_, n_;
   Floats offset_, side_;  // side: 1 or -1; 0: black from there
 };

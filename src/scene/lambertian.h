@@ -2,19 +2,21 @@
 #pragma once
 
 #include "core/spectrum.h"
+#include "scene/texture.h"
 
 namespace covary {
 
-/// f = reflectance / pi, at every point alike.
+/// f = reflectance / pi.
 struct Lambertian {
-  Spectrum reflectance;
-  bool both_sides = false;  ///< else black for directions below the shading normal
+  Spectrum reflectance;              ///< of all points, where there is no texture
+  const Texture* texture = nullptr;  ///< of the reflectance, or null
+  bool both_sides = false;           ///< else black for directions below the shading normal
 };
 
 /// What a Bsdf is, too, that may be no more than that. Integrators shade such surfaces many at a time.
 class MaybeLambertian {
  public:
-  /// Null where it is more: textured, for example.
+  /// Null where it is more.
   virtual const Lambertian* lambertian() const = 0;
 
  protected:

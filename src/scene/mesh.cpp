@@ -150,7 +150,7 @@ void TriangleMesh::fill(const Ray& /*ray*/, SurfaceHit& hit, bool with_derivativ
     const float l2 = length_squared(interpolated);
     if (l2 > 0) n = interpolated * (1 / std::sqrt(l2));
   }
-  hit.uv = has_uvs_ ? v0.uv * b0 + v1.uv * b1 + v2.uv * b2 : hit.barycentric;
+  hit.uv = uv_at(hit.primitive, hit.barycentric);
   if (!with_derivatives) {
     make_in_place(hit.frame, [&] { return Frame(n); });
     return;

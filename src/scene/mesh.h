@@ -71,6 +71,13 @@ class TriangleMesh final : public Shape {
   };
   const LargeVector<Vertex>& vertices() const { return vertices_; }
   const std::vector<std::array<uint32_t, 3>>& triangles() const { return triangles_; }
+  /// Surface parameters of a point of a triangle: the barycentric coordinates themselves where the mesh has none.
+  Vec2 uv_at(uint32_t triangle, Vec2 barycentric) const {
+    if (!has_uvs_) return barycentric;
+    const auto& t = triangles_[triangle];
+    const float b1 = barycentric.x, b2 = barycentric.y, b0 = 1 - b1 - b2;
+    return vertices_[t[0]].uv * b0 + vertices_[t[1]].uv * b1 + vertices_[t[2]].uv * b2;
+  }
   size_t n_degenerate() const { return n_degenerate_; }
 
  private:
