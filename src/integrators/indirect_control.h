@@ -44,9 +44,9 @@ class IndirectRecorder {
   struct Vertex {
     bool recorded = false, held_out = false;
     uint32_t cell = 0, bin = 0;
-    float weight = 0;  ///< of its samples in the sums
-    Spectrum scale;    ///< what contributions to the image are divided by
-    Spectrum control;  ///< not scaled
+    float weight = 0;   ///< of its samples in the sums
+    Spectrum scale;     ///< what contributions to the image are divided by
+    Spectrum control;   ///< not scaled
     Spectrum fraction;  ///< of the control that is in the image
   };
 
