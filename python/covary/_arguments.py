@@ -265,7 +265,7 @@ def checked(declared: Mapping[str, Rule] | None = None, /, **rules: Rule) -> Cal
                 bound = signature.bind(*arguments, **keywords)
             except TypeError:  # Python's own message, which names the function
                 return called(*arguments, **keywords)
-            for given, known in ((bound.arguments, rules), (bound.arguments.get("options", {}), more)):
+            for given, known in ((bound.arguments, rules), (bound.arguments.get("options", {}) if more else {}, more)):
                 given.update({name: rule(name, given[name]) for name, rule in known.items() if name in given})
             return called(*bound.args, **bound.kwargs)
 

@@ -127,7 +127,7 @@ class EarlierFilms(FilmsTest):
         (self.path / "out.passes" / "crn.exr").symlink_to("../elsewhere/crn.exr")
         before = self.tree()
         for more in ((), ("--overwrite",), ("--resume",)):
-            self.bad(1, "'out.passes/crn.exr' is ", *RENDER, *more)
+            self.bad(1, "'out.passes/crn.exr' already exists", *RENDER, *more)
             self.assertEqual(self.tree(), before)
         self.bad(1, "is a symbolic link; films are not written through links", *RENDER, "--overwrite")
 
