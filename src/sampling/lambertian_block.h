@@ -76,7 +76,7 @@ class LambertianBlock {
   void draw_numbers();
   /// Samples a light of each vertex for connect().
   void sample_lights(const Emitter* const* lights);
-  /// Values of the surface for the light samples of sample_light(), weighted against direction sampling;
+  /// Values of the surface for the light samples of sample_lights(), weighted against direction sampling;
   /// their shadow rays. `pmf`: probability with which a light was chosen.
   void connect(float pmf);
   /// Directions, drawn by the cosine, and what a path carries there.
