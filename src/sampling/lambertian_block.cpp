@@ -54,27 +54,30 @@ void LambertianBlock::add(uint32_t i, const Spectrum& path_throughput, float eta
   eta_[l] = eta;
   keys_[l] = random.vertex_key(address);
   drawn_ = random.in_sequence();
-  if (!drawn_) return;
-  const Vec2 light = random.get_2d(address, Event::kLightPosition),
-             direction = random.get_2d(address, Event::kDirection);
-  u_choice[l] = random.get_1d(address, Event::kLightChoice);
+  if (drawn_)
+    set_numbers(
+        l, [&](Event event) { return random.get_1d(address, event); },
+        [&](Event event) { return random.get_2d(address, event); });
+}
+
+/// `one`, `two`: give the one number, or the two, of an event at the vertex.
+template <typename One, typename Two>
+void LambertianBlock::set_numbers(int l, const One& one, const Two& two) {
+  const Vec2 light = two(Event::kLightPosition), direction = two(Event::kDirection);
+  u_choice[l] = one(Event::kLightChoice);
   u_light_x[l] = light.x, u_light_y[l] = light.y;
-  u_primitive[l] = random.get_1d(address, Event::kLightPrimitive);
+  u_primitive[l] = one(Event::kLightPrimitive);
   u_x[l] = direction.x, u_y[l] = direction.y;
-  u_roulette[l] = random.get_1d(address, Event::kRoulette);
+  u_roulette[l] = one(Event::kRoulette);
 }
 
 void LambertianBlock::draw_numbers() {
   if (drawn_) return;
   for_each_lane([&](int l) {
     const uint64_t key = keys_[l];
-    const Vec2 light = PathRandom::two_numbers(key, Event::kLightPosition),
-               direction = PathRandom::two_numbers(key, Event::kDirection);
-    u_choice[l] = PathRandom::first_number(key, Event::kLightChoice);
-    u_light_x[l] = light.x, u_light_y[l] = light.y;
-    u_primitive[l] = PathRandom::first_number(key, Event::kLightPrimitive);
-    u_x[l] = direction.x, u_y[l] = direction.y;
-    u_roulette[l] = PathRandom::first_number(key, Event::kRoulette);
+    set_numbers(
+        l, [key](Event event) { return PathRandom::first_number(key, event); },
+        [key](Event event) { return PathRandom::two_numbers(key, event); });
   });
 }
 

@@ -100,6 +100,8 @@ class LambertianBlock {
  private:
   template <typename Body>
   void for_each_lane(const Body& body);
+  template <typename One, typename Two>
+  void set_numbers(int lane, const One& one, const Two& two);
   void set_light(int lane, const EmitterSample& light);
   void set_parallelogram(int lane, const ParallelogramLight& light);
   void sample_parallelograms();
