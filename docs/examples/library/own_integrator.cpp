@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A custom integrator with an option: paths of at most so many reflections.
+// A custom integrator with an option: the maximum number of reflections.
 //
 //     own_integrator SCENE.xml [max-reflections=N]
 #include <covary/combine/registry.h>
