@@ -76,7 +76,7 @@ def signature(name, fixed, options):
 
 
 def combine_options(estimator):
-    """Without those that only say how passes are rendered."""
+    """The options without those that only say how passes are rendered."""
     return [option for option in estimator["options"] if not option["of_passes"]]
 
 

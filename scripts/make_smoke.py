@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Writes scenes/smoke.vol: the extinction of a plume of smoke on a grid, made of sums of random Gaussian puffs.
+"""Writes scenes/smoke.vol: the extinction of a plume of smoke on a grid, a sum of random Gaussian puffs.
 
     make_smoke.py smoke.vol
 """

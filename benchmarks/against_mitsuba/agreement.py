@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Do two renderers compute the same image? Tests across independent renders (seeds) of each.
 
-Pixels of one render are not the unit of evidence; whole renders with different seeds are. For each of the image mean,
-the means of 8 x 8 blocks and the pixels (all per colour channel), Welch's t compares R renders of one side with R of
-the other; both sides' noise is in it, and neither variance is trusted to equal the other. Over the many blocks and
-channels the false-positive probability is divided by Sidak's rule. Radiance has rare bright samples, so that t is not
-exactly t-distributed; for equal R the difference of two such means is symmetric, which makes the test conservative.
+The independent unit is the whole render with its seed, not the pixel. For the image mean, the means of 8 x 8 blocks and
+the pixels (all per colour channel), Welch's t-test compares R renders of one side with R of the other. It includes the
+noise of both sides and does not assume equal variances. Sidak's rule divides the false-positive probability among
+blocks and channels. Radiance has rare bright samples, so t is not exactly t-distributed; with equal R the difference of
+two such means is symmetric, which makes the test conservative.
 
-A fourth test looks at all blocks together: the sum over blocks and channels of the between-sides share of the variance,
-against its distribution when the 2R renders are assigned to the two sides at random. It needs no normality and finds
-differences that are small everywhere.
+A fourth test looks at all blocks together: the sum over blocks and channels of the fraction of the variance between
+sides, against its distribution when the 2R renders are assigned to the two sides at random. It needs no normality and
+finds differences that are small everywhere.
 """
 import dataclasses
 
@@ -48,12 +48,12 @@ def block_means(images, block=BLOCK):
 
 
 def sidak_each(alpha, tests):
-    """False-positive probability of each of `tests` tests so that the family's is `alpha`."""
+    """False-positive probability of each of `tests` tests, such that that of the family is `alpha`."""
     return -numpy.expm1(numpy.log1p(-alpha) / tests)
 
 
 def welch(reference, tested, alpha, power=0.99):
-    """Compares means over axis 0. `reference` (R1, ...), `tested` (R2, ...); alpha is the whole family's."""
+    """Compares means over axis 0. `reference` (R1, ...), `tested` (R2, ...); alpha is that of the whole family."""
     n1, n2 = len(reference), len(tested)
     mean1, mean2 = reference.mean(axis=0), tested.mean(axis=0)
     floor = (ROUNDING * numpy.abs(mean1)) ** 2
@@ -136,12 +136,12 @@ class Agreement:
 
     @property
     def trace(self):
-        """A difference smaller than the bounds that the finer tests still see."""
+        """Whether the finer tests see a difference that is within the bounds."""
         return self.pixels.rejects(self.alpha) or self.permutation_p < self.alpha
 
 
 def agreement(reference, tested, alpha, bound=0.005):
-    """Compares stacks of renders (R, h, w, 3). Pixels that are not finite in a render are dropped from all and
+    """Compares stacks of renders (R, h, w, 3). Pixels that are not finite in one render are left out of all, and
     counted."""
     finite = numpy.isfinite(reference).all(axis=(0, 3)) & numpy.isfinite(tested).all(axis=(0, 3))
     reference = numpy.where(finite[None, :, :, None], reference, 0).astype(numpy.float64)

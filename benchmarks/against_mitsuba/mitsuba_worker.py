@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Renders one scene with one Mitsuba variant, in a process of its own, because a process has one variant and a JIT that
-is warm once it has rendered. Called by against_mitsuba.py:
+"""Renders one scene with one Mitsuba variant in a separate process, because a process has only one variant, and its JIT
+is warm after the first render. Called by against_mitsuba.py:
 
     mitsuba_worker.py seeds VARIANT SCENE.xml WIDTHxHEIGHT SPP DEPTH THREADS OUT_FOLDER SEED...
         writes OUT_FOLDER/seedNNN.npy (height, width, 3), one render per seed
     mitsuba_worker.py times VARIANT SCENE.xml WIDTHxHEIGHT SPP DEPTH THREADS OUT.json RENDERS
-        writes the seconds of loading and of each of RENDERS renders (read-back and EXR file included)
+        writes the seconds of loading and of each of RENDERS renders (including read-back and EXR file)
 
-DEPTH is 'own' or a number; THREADS 0 leaves Mitsuba's choice (all cores).
+DEPTH is 'own' or a number; THREADS 0 leaves the choice to Mitsuba (all cores).
 """
 import json
 import os

@@ -17,11 +17,11 @@ HERE = pathlib.Path(__file__).resolve().parent
 
 
 class RenderError(Exception):
-    """A renderer failed; the message holds its command and the end of what it said."""
+    """A renderer failed; the message has its command and the end of its output."""
 
 
 def run(command, environment=None):
-    """Runs `command`; returns (wall seconds, peak bytes of memory of that child)."""
+    """Runs `command`; returns (wall seconds, the child's peak memory in bytes)."""
     with tempfile.TemporaryFile() as output:
         start = time.perf_counter()
         child = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT, env=environment)
@@ -46,7 +46,7 @@ def _mitsuba(what, variant, scene, settings, threads, out, *rest, environment=No
 
 
 def mitsuba_stack(name, scene, settings, seeds, cache, variant="llvm_ad_rgb", threads=0):
-    """(R, h, w, 3) renders for `seeds`, each kept in and taken from the folder `cache`."""
+    """(R, h, w, 3) renders for `seeds`, each cached in the folder `cache`."""
     mark = scene_files.fingerprint(scene_files.mitsuba_text(scene, settings))
     folder = pathlib.Path(cache) / name / f"{settings.width}x{settings.height}_{settings.spp}spp_{mark}"
     missing = [s for s in seeds if not (folder / f"seed{s:03}.npy").is_file()]
@@ -57,7 +57,7 @@ def mitsuba_stack(name, scene, settings, seeds, cache, variant="llvm_ad_rgb", th
 
 @dataclasses.dataclass(frozen=True)
 class Covary:
-    """The program under test and options it gets in every call."""
+    """The program under test, and the options that every call gets."""
 
     program: str
     options: tuple = ()
@@ -112,8 +112,7 @@ def read_channels(path, names):
 def mitsuba_times(variant, scene, settings, threads, renders, empty_kernel_cache):
     """{'load', 'render': [first, second, ...], 'wall', 'peak_bytes'} of one process, seconds.
 
-    `empty_kernel_cache`: with a home directory of its own, so that Dr.Jit finds none of the kernels it keeps on
-    disk."""
+    `empty_kernel_cache`: in a new home directory, so that Dr.Jit finds no cached kernels on disk."""
     with tempfile.TemporaryDirectory() as folder:
         environment = dict(os.environ)
         if empty_kernel_cache:

@@ -19,7 +19,7 @@ class SceneError(Exception):
 
 @dataclasses.dataclass(frozen=True)
 class Settings:
-    """What both renderers are told. max_depth None: the scene's own."""
+    """The settings of both renderers. max_depth None: the scene's own."""
 
     width: int
     height: int
@@ -52,7 +52,7 @@ def find(folder, names):
 
 
 def frame_size(path):
-    """Width and height the scene file asks for, <default> parameters resolved."""
+    """Width and height of the scene file, with <default> parameters resolved."""
     root = ET.parse(path).getroot()
     defaults = {d.get("name"): d.get("value") for d in root.iter("default")}
     size = {}
@@ -65,8 +65,8 @@ def frame_size(path):
 def scaled_size(path, pixels, multiple=8):
     """A frame of about `pixels` pixels and nearly the scene's aspect ratio, both sides divisible by `multiple`.
 
-    A distorted aspect ratio changes the picture (both renderers see the same), so it counts ten times as much as a
-    missed number of pixels."""
+    A distorted aspect ratio changes the picture (for both renderers), so it counts ten times as much as a missed number
+    of pixels."""
     width, height = frame_size(path)
 
     def cost(size):
@@ -87,8 +87,8 @@ def _set_integer(parent, name, value):
 
 
 def _swap_checkerboards_of_one_channel(root):
-    """Mitsuba 3.9.1 shows color1 where color0 belongs when a checkerboard is a weight or an opacity
-    (docs/scene-format.md, differences); exchanged once more, both renderers see the same picture."""
+    """Mitsuba 3.9.1 shows color1 where color0 belongs if a checkerboard is a weight or an opacity
+    (docs/scene-format.md, differences). Exchanging them once more gives both renderers the same picture."""
     for texture in root.iter("texture"):
         colours = [e for e in texture.findall("float") if e.get("name") in ("color0", "color1")]
         if texture.get("type") == "checkerboard":

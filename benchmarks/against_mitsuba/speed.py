@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Times of whole renders: covary against Mitsuba variants in one run, order alternated from round to round.
+"""Times of whole renders: covary against Mitsuba variants in one run, in alternating order from round to round.
 
-Seconds are those between the scene in memory and the EXR file on disk (`render`), and the same with reading the scene
-and building its acceleration structure (`total`). Mitsuba compiles kernels on first use: `warm` is its second render in
-one process, `cold` its first in the first round, when its on-disk kernel cache is empty. Python's start is left out of
-Mitsuba's figures. Every figure is the median over the rounds (`cold`: one measurement).
+`render` is the time in seconds from the scene in memory to the EXR file on disk, `total` also includes reading the
+scene and building its acceleration structure. Mitsuba compiles kernels on first use: `warm` is its second render in a
+process, `cold` its first in the first round, when its kernel cache on disk is empty. Mitsuba's figures exclude Python's
+start-up. Every figure is the median over the rounds (`cold`: one measurement).
 """
 import math
 import pathlib

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """blender_gain.py [--resolution 160x96] [--spp 192] [--seeds 2] [--reference-spp 1024]
 
-How much less error covary.blender has than Cycles in the closed room of tests/blender/room.py, with equal samples and
-in equal processor time, against Cycles with the sampler that is its default, and against the same with its denoiser.
-All have a box filter and no clamp. Errors are relMSE in product form against two references, means over the
-seeds; times are processor seconds of the whole process. Needs the Python packages covary and bpy."""
+How much less error covary.blender has than Cycles in the closed room of tests/blender/room.py, at equal samples and at
+equal processor time: against Cycles with its default sampler, without and with its denoiser. All have a box filter and
+no clamp. Errors are relMSE in product form against two references, means over the seeds; times are processor seconds of
+the whole process. Needs the Python packages covary and bpy."""
 import argparse
 import sys
 import tempfile
@@ -24,7 +24,7 @@ DEFAULT = "TABULATED_SOBOL" if bpy.app.version < (4, 2) else "AUTOMATIC"
 
 
 def cycles(scene, spp, seed, sampler=DEFAULT, denoise=False):
-    """Cycles in one go; image and processor seconds."""
+    """A single render by Cycles; image and processor seconds."""
     with tempfile.TemporaryDirectory() as folder, _cycles.settings(scene):
         scene.cycles.sampling_pattern, scene.cycles.scrambling_distance = sampler, 1
         scene.cycles.samples, scene.cycles.seed, scene.cycles.use_denoising = spp, seed, denoise

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""What a cluster of this machine costs: a render in one process with one thread, on one worker of Dask, and on two, one
-after the other, several rounds. Prints seconds by the clock and of the processor, medians over the rounds; the
-processor's are those of the workers alone, which is what more workers share."""
+"""The overhead of a cluster on this machine: several rounds of a render in one process with one thread, on one Dask
+worker, and on two. Prints wall and processor seconds, medians over the rounds; processor time is that of the workers
+alone, which is what more workers share."""
 import argparse
 import json
 import resource

@@ -2,9 +2,8 @@
 """Correlation between horizontally neighbouring pixels over the sample groups of a film.
 
 For a pixel, x_1 ... x_T are the grey values (mean of R, G and B) of its T group means. The correlation of two pixels is
-Pearson's over the T groups; what is reported is its average over all pairs (x, y), (x + 1, y). Pairs in which either
-pixel has the same value in all groups (black, or nothing but a constant emitter) have no correlation; they are left out
-and counted.
+Pearson's over the T groups, averaged over all pairs (x, y), (x + 1, y). Pairs with a pixel that has the same value in
+all groups (black, or a constant emitter alone) have no correlation; they are left out and counted.
 """
 import dataclasses
 

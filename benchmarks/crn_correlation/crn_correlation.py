@@ -3,10 +3,10 @@
 
     crn_correlation.py --scenes DIR [NAME...]
 
-Renders a 240 x 160 crop of each scene's own frame with 12 groups of 8 samples, with `--sampling crn` and
-`--sampling independent`, and prints the average correlation over groups of horizontally neighbouring pixels (see
-correlation.py), mean and standard deviation over seeds: all pixels share one set of common random numbers, so that one
-seed says little. Runs in the Python environment of ../against_mitsuba/setup (Mitsuba reads the EXR files).
+Renders a 240 x 160 crop of each scene's own frame with 12 groups of 8 samples, with `--sampling crn` and `--sampling
+independent`, and prints the average correlation over groups of horizontally neighbouring pixels (see correlation.py) as
+mean and standard deviation over seeds: all pixels share one set of common random numbers, so one seed says little. Runs
+in the Python environment of ../against_mitsuba/setup (Mitsuba reads the EXR files).
 """
 import argparse
 import json

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Do intervals of the relMSE hold on scenes that they were not fitted to? Predicted over true relMSE by scene, and how
-many intervals are given and hold the truth, of films of path tracing and images made of them.
+"""Do intervals of the relMSE hold on scenes that they were not fitted to? Prints predicted over true relMSE by scene,
+how many intervals are given, and how many of them contain the truth: for films of path tracing and images made of them.
 
     coverage.py kitchen house --scenes FOLDER [--spp 16 64 256] [--seeds 1 2 3] [--work FOLDER]
 
 Errors are in product form over two references and relative to the denoised references (docs/notes/error-estimates.md
-tells why). Films, references and what the program told of each image stay in --work (SCENE/KIND-SPP-SEED.json), so that
-a second run only makes what is missing. Needs NumPy, and Open Image Denoise where COVARY_OIDN or the environment has
-it."""
+explains why). Films, references and the program's report on each image stay in --work (SCENE/KIND-SPP-SEED.json), so
+that a second run only makes what is missing. Needs NumPy, and Open Image Denoise where COVARY_OIDN or the environment
+has it."""
 import argparse
 import itertools
 import json
@@ -29,7 +29,7 @@ UNKNOWN = 0.25
 
 
 def measured(scene, kind, spp, seed):
-    """What the program tells of an image, with its true relMSE and the standard error of that."""
+    """The program's report on an image, with its true relMSE and the standard error of that."""
     facts = scene.folder / f"{kind}-{spp}-{seed}.json"
     if facts.exists():
         return json.loads(facts.read_text())
@@ -55,13 +55,13 @@ def measured(scene, kind, spp, seed):
 
 
 def ratio_text(rows):
-    """Geometric mean of predicted over true, and the spread."""
+    """Geometric mean of predicted over true relMSE, and the spread."""
     logs = [math.log(row["predicted_relmse"] / row["relmse"]) for row in rows if row["relmse"] > 0]
     return f"{math.exp(numpy.mean(logs)):.2f} x/ {math.exp(numpy.std(logs)):.2f}" if logs else "-"
 
 
 def counts_text(rows):
-    """Images, of which given, of which hold; and predicted over true of all."""
+    """Numbers of images, of intervals given, and of those that hold; predicted over true relMSE of all images."""
     given = [row for row in rows if "predicted_relmse_low" in row]
     hold = sum(row["predicted_relmse_low"] <= row["relmse"] <= row["predicted_relmse_high"] for row in given)
     return f"{len(rows)} | {len(given)} | {hold} ({100 * hold / max(len(given), 1):.0f} %) | {ratio_text(rows)}"

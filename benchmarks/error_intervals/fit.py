@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """fit.py --program COVARY [--work FOLDER] [--only render|measure|fit]
 
-Fits the intervals that covary gives of its errors (src/risk/error_interval.h): renders the scenes of variants.py with
-few samples and with many, as far as FOLDER does not hold them yet; asks the program for the error sums of each image
-and compares the image with two references, relMSE in product form; writes both to renders.csv beside this file; and
-writes the coefficients that fit them best to src/risk/error_interval_table.h. Needs numpy.
+Fits the intervals that covary gives for its errors (src/risk/error_interval.h). It renders the scenes of variants.py
+with few samples and with many, unless FOLDER has them already; asks the program for the error sums of each image;
+compares the image with two references, relMSE in product form; writes both to renders.csv beside this file; and writes
+the coefficients that fit them best to src/risk/error_interval_table.h. Needs numpy.
 
-The middle is a ridge regression of log(relMSE / V), the spread one of the log of what it leaves open; a mixture that is
-the mean of the samples, V = v, has V as its error, and one that is it in part is drawn there. Each render counts by how
-well its references know its error. Quantiles are those of families of scenes that were left out, so that the interval
-is as wide as scenes differ from those that were fitted."""
+The middle is a ridge regression of log(relMSE / V), the spread one of the log of its residuals. A mixture that is the
+mean of the samples, V = v, has V as its error, and one that is the mean in part is shrunk towards that. Each render is
+weighted by how well its references know its error. Quantiles are those of families of scenes that were left out, so
+that the interval covers how much scenes differ from those that were fitted."""
 import argparse
 import csv
 import math
@@ -49,13 +49,13 @@ def features(row):
 
 
 def not_the_mean(row):
-    """1 less the part of the mean in a mixture, as fitted_error() has it: less is left for the features to explain."""
+    """1 minus the fraction of the mean in a mixture, as in fitted_error(): what is left for the features to explain."""
     mixes = row["kind"] in ("filters", "network", "pair-filters", "pair-network")
     return 1 - min(1, float(row["variance"]) / float(row["noise"])) if mixes else 1
 
 
 def weighted_ridge(x, y, weight):
-    """Coefficients; all but the first are drawn to 0."""
+    """Coefficients of a ridge regression; all but the first are shrunk towards 0."""
     penalty = numpy.full(x.shape[1], 1 / RIDGE**2)
     penalty[0] = 1e-6
     scale = numpy.maximum(x.std(0), 0.05)  # sigma is of the feature's own spread
@@ -66,14 +66,14 @@ def weighted_ridge(x, y, weight):
 
 
 def weighted_quantile(values, weights, part):
-    """The value below which this part of the weights is, half of its own included."""
+    """The value below which this fraction of the weights lies, including half of its own."""
     order = numpy.argsort(values)
     below = numpy.cumsum(weights[order]) - weights[order] / 2
     return numpy.interp(part * weights.sum(), below, values[order])
 
 
 class Fit:
-    """Of one kind: a, b, limits of log s and quantiles of r."""
+    """The fit of one kind of image: a, b, limits of log s and quantiles of r."""
 
     def __init__(self, rows, kind):
         self.rows = [row for row in rows if row["kind"] == kind and usable(row)]
@@ -134,7 +134,7 @@ class Fit:
 
 
 def usable(row):
-    """Whether an interval can be given, and the references know the error to half of it."""
+    """Whether an interval can be given, and the references determine the error to within half of it."""
     equal = 1 / float(row["groups"])  # the share of each of groups of equal light
     share = (float(row["light_of_largest"]) / max(float(row["light"]), 1e-30) - equal) / (1 - equal)
     return (float(row["variance"]) > 0 and float(row["relmse"]) > 2 * float(row["reference_noise"])

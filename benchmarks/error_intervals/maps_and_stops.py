@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where errors are told to be, and where renders to a wanted error end, against the truth.
+"""Compares error maps, and where renders with a target error stop, with the truth.
 
     maps    the error map of a single render, StdError^2 over brightness, against the mean error of many seeds: rank
             correlation (Spearman) over 16 x 9 regions of the image
     stops   true relMSE over the goal of --until relmse=GOAL, and the bounds that the interval gives
 
 Scenes are those of scenes/ ("room"), variants of them ("room-turned"), or those of --scenes ("kitchen"). Errors are in
-product form over two references, and relative to the denoised references (docs/notes/error-estimates.md tells why).
+product form over two references, and relative to the denoised references (docs/notes/error-estimates.md explains why).
 Films stay in --work. Needs NumPy, and Open Image Denoise where COVARY_OIDN or the environment has it.
 """
 import argparse
@@ -56,7 +56,7 @@ class Measured(Scene):
         self.truth = [read_image(path) for path in self.references()]
 
     def error_map(self, image):
-        """Squared error of each pixel, relative, without that of the references."""
+        """Relative squared error of each pixel, without that of the references."""
         return (self.weight * (image - self.truth[0]) * (image - self.truth[1])).mean(2)
 
 
@@ -67,7 +67,7 @@ def regions(errors):
 
 
 def spearman(a, b):
-    """Correlation of ranks; equal values get ranks in their order."""
+    """Rank correlation; equal values get ranks in their order."""
     ranks = [numpy.argsort(numpy.argsort(values)) for values in (a, b)]
     return numpy.corrcoef(*ranks)[0, 1]
 
@@ -88,8 +88,8 @@ def maps(options, scene):
 
 
 class Stop(NamedTuple):
-    """Where a render to a wanted error ended: samples per pixel, and over the goal the error, what was told of it, and
-    the bounds of the interval, None where none was given."""
+    """Where a render with a target error stopped: samples per pixel; then, relative to the target, the error, its
+    prediction, and the bounds of the interval, None if none was given."""
     samples: float
     true: float
     told: float
@@ -102,7 +102,7 @@ class Stop(NamedTuple):
 
 
 def stops(options, scene, spp):
-    """A stop for each seed. Without a goal of the scene's own: the error that a render of `spp` samples has."""
+    """A stop for each seed. If the scene has no target of its own, it is the error of a render of `spp` samples."""
     goal = options.goal or GOALS.get(scene.name)
     if not goal:
         goal = float(f"{scene.error_map(read_image(scene.render('auto', spp, PILOT_SEED))).mean():.2g}")
@@ -125,7 +125,7 @@ def stops(options, scene, spp):
 
 
 def summary(found):
-    """How well renders met their goals, and whether bounds warned of those that missed them by MOST_OVER or more."""
+    """How well renders met their targets, and whether bounds warned of those that missed them by MOST_OVER or more."""
     ratios = [stop.true for stop in found]
     given = [stop for stop in found if stop.high]
     over = [stop for stop in found if stop.true > MOST_OVER]

@@ -47,7 +47,7 @@ def render(arguments, scene, size, spp, seed, film, *more):
 
 
 def render_all(arguments):
-    """Films of every variant, where they are missing."""
+    """Renders the missing films of every variant."""
     folder = arguments.work
     for name in arguments.variants:
         scene = write_variant(name, SCENES, folder)
@@ -62,8 +62,8 @@ def render_all(arguments):
 
 
 def denoised_reference(arguments, name):
-    """What errors are relative to. Where references are dark by chance, their own brightness would make errors count
-    more just where the references' errors agree, which made a relMSE of .0075 one of .028 (Door, twice 512 samples)."""
+    """The image that errors are relative to. Relative to the references themselves, errors would count most where these
+    are dark by chance and their errors agree: that turned a relMSE of .0075 into .028 (Door, twice 512 samples)."""
     image = arguments.work / f"{name}-guide.exr"
     references = [arguments.work / f"{name}-ref-{seed}.exr" for seed in REFERENCE_SEEDS]
     if not image.exists():
@@ -78,7 +78,7 @@ def products(image, first, second, guide):
 
 
 def image_of(arguments, name, spp, seed, kind):
-    """The image of films, and what the program tells of it."""
+    """The image made of films, and the program's report on it."""
     image, facts = arguments.work / "image.exr", arguments.work / "facts.json"
     film = arguments.work / f"{name}-{spp}-{seed}.exr"
     if kind == "mean":  # the film is complete, so that nothing is rendered
@@ -98,7 +98,7 @@ def image_of(arguments, name, spp, seed, kind):
 
 
 def measure_all(arguments):
-    """A row for each image: kind, truth and the sums that the program tells; written after each scene."""
+    """A row for each image: kind, true error, and the program's sums; written after each scene."""
     rows = []
     for name in arguments.variants:
         references = [read_image(arguments.work / f"{name}-ref-{seed}.exr") for seed in REFERENCE_SEEDS]

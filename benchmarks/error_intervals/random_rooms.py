@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rooms of random size, light, clutter and material, the same for the same number: scenes that nobody chose, from such
-as any filter renders well to such whose light hardly any path finds."""
+"""Rooms of random size, light, clutter and material, determined by their number. So nobody chose these scenes, which
+range from ones that any filter renders well to ones whose light hardly any path finds."""
 import random
 
 HEAD = """<?xml version="1.0" encoding="utf-8"?>
@@ -34,7 +34,7 @@ def texture(r, name):
 
 
 def model(r, glass):
-    """A reflectance model; `glass`: how often it is a clear or a mirroring one."""
+    """A reflectance model; `glass`: how often it is glass or a mirror."""
     alpha = f'<float name="alpha" value="{r.uniform(0.03, 0.4):.3f}"/>'
     if r.random() < glass:
         return r.choice([
@@ -65,7 +65,7 @@ def ball(radius, at, inner):
 
 
 def light(power, area):
-    """Radiance, warm to cold, of an area that sends out so much."""
+    """Radiance, warm to cold, of an area with this power."""
     warm = power / area
     return f'<emitter type="area"><rgb name="radiance" value="{triple((warm, 0.85 * warm, 0.7 * warm))}"/></emitter>'
 
@@ -81,7 +81,7 @@ def walls(r, w, h, d):
 
 
 def lights(r, w, h, d, hidden):
-    """One to eight balls, bare or in a globe of glass, and sometimes a window."""
+    """One to eight spherical lights, bare or in a globe of glass, and sometimes a window."""
     text = ""
     for _ in range(r.choice([1, 1, 1, 2, 3, 8])):
         radius = 10**r.uniform(-2, -0.6)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The scenes that error intervals are fitted on: those of scenes/ and changes of them, easy and hard to render. Cameras
-are turned, lights made small, dim or bright, windows narrow, glass put before lights, rooms lit through a gap. And
-rooms that nobody chose (random_rooms.py)."""
+"""The scenes that error intervals are fitted to: those of scenes/, easy and hard variants of them, and random rooms
+(random_rooms.py). In variants, cameras are turned, lights are small, dim or bright, windows are narrow, glass covers
+lights, and rooms are lit through a gap."""
 from pathlib import Path
 
 from random_rooms import random_room
@@ -25,7 +25,7 @@ HOLE = """<shape type="cube">
 
 
 def changed(*pairs):
-    """Replaces texts that are there once or more."""
+    """Replaces texts that must occur at least once."""
     def change(text):
         for old, new in pairs:
             assert old in text, old
@@ -82,7 +82,7 @@ SIZES = ["160x90", "128x96", "160x90", "96x54", "160x90", "240x136", "120x120"]
 
 
 def family_of(name):
-    """The scene of which others are changes: a family is left out together, and counts as one. A random room is one."""
+    """The scene whose variants form a family, which is left out together and counts as one, as does a random room."""
     return name if name in RANDOM_ROOMS else VARIANTS[name][0]
 
 

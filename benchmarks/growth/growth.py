@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How the work of a render grows: a table of processor time and memory over the number of lights, triangles (of one
-mesh, or of instances of one of 20,000) or pixels.
+"""How the work of a render grows: a table of processor time and memory by the number of lights, triangles (of one mesh,
+or of instances of one of 20,000) or pixels.
 
     growth.py lights|triangles|instances|pixels [--covary PROGRAM] [--numbers N...] [--spp N] [--repeat N]
 
-Renders with plain path tracing on one thread, 96 x 54 pixels where pixels are not what grows. `read`: processor time of
-a render of one sample per pixel, reading and building included; `sample`: what each further sample of a pixel takes;
-each is the least of --repeat runs. Under the table are the exponents: p where the column grows like N^p, fitted to the
-second half of the rows, where constant parts count least. 0 is best for `sample` (but for more pixels), 1 for the rest.
+Renders with plain path tracing on one thread, at 96 x 54 pixels unless the number of pixels grows. `read` is the
+processor time of a render of one sample per pixel, including reading and building; `sample` that of each further sample
+of a pixel; both are the minimum of --repeat runs. Exponents under the table: a column grows like N^p, with p fitted to
+the second half of the rows, where constant parts count least. The best p is 0 for `sample`, 1 for the rest.
 """
 import argparse
 import json
@@ -48,14 +48,14 @@ def lamp(x, z, size, radiance):
 
 
 def lights_scene(n):
-    """n lamps in a square grid, whose power together does not depend on n."""
+    """n lamps in a square grid, whose total power does not depend on n."""
     side = math.ceil(math.sqrt(n))
     places = [((i % side + 0.5) / side * 8 - 4, (i // side + 0.5) / side * 8 - 4) for i in range(n)]
     return SCENE.format(shapes="\n".join([FLOOR] + [lamp(x, z, 0.5 / side, 40 * side * side / n) for x, z in places]))
 
 
 def write_hills(path, n):
-    """A square mesh of about n triangles, binary PLY; returns how many it has."""
+    """Writes a square mesh of about n triangles, binary PLY; returns their number."""
     side = max(1, round(math.sqrt(n / 2)))
     with open(path, "wb") as file:
         file.write(f"ply\nformat binary_little_endian 1.0\nelement vertex {(side + 1) ** 2}\nproperty float x\n"
@@ -84,7 +84,7 @@ def triangles_scene(n, folder):
 
 
 def instances_scene(n, folder):
-    """Copies of a mesh of 20,000 triangles in a square grid, n triangles together."""
+    """Instances of a mesh of 20,000 triangles in a square grid, n triangles in total."""
     count = write_hills(folder / "hills.ply", 20000)
     side = max(1, round(math.sqrt(n / count)))
     shapes = ["""  <shape type="shapegroup" id="hills"><shape type="ply"><string name="filename" value="hills.ply"/>

@@ -1,15 +1,15 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Have two ways to render a scene the same expectation? And how much noise has each?
+"""Do two ways to render a scene have the same expected image, and how much noise does each have?
 
     compare_integrators.py --scenes DIR [--first "--integrator path"] [--second "--integrator controlled-path"] [NAME]
 
-Tests by Welch's t over R independent images of each, not over pixels, whether the means of the image and of 8 x 8
+Welch's t-test over R independent images of each, not over pixels, tells whether the means of the image and of 8 x 8
 blocks differ (../against_mitsuba/agreement.py). The images are the R groups of samples of one film, which share one
-training; with --each-trained they are R renders with seeds and trainings of their own, and the samples of a training
-are part of the image. The noise is the mean over pixels, relative to the squared mean + 0.01, of the variance over the
-images, without the largest 1 %: its ratio says how many times fewer samples the second needs, those of the training
-counted. `detects`: smallest relative difference of the image's mean that is found with power 0.99. Needs
+training. With --each-trained they are R renders, each with its own seed and training, whose samples are part of the
+image. The noise is the variance over the images, relative to the squared mean + 0.01, averaged over pixels without the
+largest 1 %. The ratio of noises says how many times fewer samples the second way needs, including its training samples.
+`detects` is the smallest relative difference of the image means that is found with power 0.99. Needs
 `pip install numpy scipy`.
 """
 import argparse

@@ -1,20 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `make bench` prints and keeps: the time of each stage, what part of its limit it reaches, and its time over that
-of an earlier run.
+"""What `make bench` prints and keeps: the time of each stage, the fraction of its limit that it reaches, and its time
+over that of an earlier run.
 
-The limits are of one core, measured in the same run: fused multiply-adds on registers for stages that tell their
-floating-point operations (`flops`), the bandwidth of memory for those that tell the bytes they read (`bytes`), and for
+The limits are those of one core, measured in the same run: fused multiply-adds on registers for stages that report
+their floating-point operations (`flops`), memory bandwidth for those that report the bytes they read (`bytes`), and for
 whole paths (`rays` per second) the nearest hits of camera rays of the same scene, which are Embree and little else. The
-time of a stage is the least processor time of its repetitions; of one that uses all threads (`real_time`), time by the
-clock.
+time of a stage is the minimum processor time of its repetitions, or wall time if it uses all threads (`real_time`).
 
     stages.py --out FILE [--baseline FILE] [--history FILE] [--program TEXT] JSON...
 
-`--history` adds a row to a table of Markdown, benchmarks/results.md: the milliseconds of the stages that its head
-names, with the processor and the part of a multiply-add's peak as a measure of how busy the machine was. A stage that
-was not run leaves its place empty. Runs of different processors do not compare.
+`--history` adds a row to a Markdown table, benchmarks/results.md: the milliseconds of the stages in its header, the
+processor, and the fraction of the multiply-add peak as a measure of how busy the machine was. The cell of a stage that
+was not run stays empty. Runs on different processors do not compare.
 
-JSON: files that Google Benchmark wrote (`--benchmark_out`), those of machine_bench among them.
+JSON: files that Google Benchmark wrote (`--benchmark_out`), including those of machine_bench.
 """
 import argparse
 import json
@@ -39,7 +38,8 @@ def best_runs(runs):
 
 
 def limit_of(run, best):
-    """(What limits a stage, the part of it that is reached), or None where it does not tell or was not measured."""
+    """(What limits a stage, the fraction of that limit reached), or None if the stage does not report it or the limit
+    was not measured."""
     name = run["run_name"]
     if "flops" in run and ARITHMETIC in best:
         return "arithmetic", run["flops"] / best[ARITHMETIC]["items_per_second"]
@@ -63,7 +63,7 @@ def summarize(runs):
 
 
 def table(stages, baseline):
-    """Lines of a table of Markdown. `baseline`: stages of an earlier run; may be empty."""
+    """Lines of a Markdown table. `baseline`: stages of an earlier run; may be empty."""
     lines = ["| stage | ms | of its limit | over the earlier run |", "|---|---|---|---|"]
     for name, stage in stages.items():
         part = f"{stage['of_limit']:.0%} of {stage['limit']}" if "limit" in stage else ""
@@ -76,8 +76,7 @@ FIXED = ["program", "date", "processor", "peak"]
 
 
 def history_row(head, stages, best, program, date, processor):
-    """The row of a run for a table whose head is `head`;
-    ValueError where that does not begin with the fixed columns."""
+    """The row of a run for a table whose header is `head`; ValueError if that does not begin with the fixed columns."""
     columns = [column.strip() for column in head.strip().strip("|").split("|")]
     if columns[:len(FIXED)] != FIXED:
         raise ValueError(f"expected a table with the columns {', '.join(FIXED)} and names of stages, found: {head}")
@@ -97,7 +96,7 @@ def with_row(text, make_row):
 
 
 def processor_name():
-    """As the system calls it; empty where it does not tell."""
+    """The system's name for it; empty if it has none."""
     try:
         lines = pathlib.Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:

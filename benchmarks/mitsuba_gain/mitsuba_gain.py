@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """mitsuba_gain.py SCENE.xml… [--resolution 160x90] [--spp 48] [--seeds 3] [--reference-spp 1024]
 
-How much less error covary.mitsuba has than Mitsuba's own path, with equal samples and in equal processor time, and
-covary's IICV than its path, on the same scenes. Errors are relMSE in product form against two references of Mitsuba (of
-covary for its own), means over the seeds, and gains have standard errors; times are processor seconds of the whole
-process after a first call that compiles. Needs the Python package covary, Mitsuba 3 and, where it is not found,
+How much less error covary.mitsuba has than Mitsuba's `path`, at equal samples and at equal processor time, and covary's
+IICV than covary's `path`, on the same scenes. Errors are relMSE in product form against two references by Mitsuba (by
+covary for its own renders), means over the seeds; gains have standard errors. Times are processor seconds of the whole
+process after a first call that compiles. Needs the Python package covary, Mitsuba 3 and, if LLVM is not found,
 DRJIT_LIBLLVM_PATH."""
 import argparse
 import time
@@ -18,7 +18,7 @@ import numpy
 
 
 def load(path, width, height):
-    """The scene in this size with a box filter, as covary.mitsuba has it."""
+    """The scene at this size with a box filter, as covary.mitsuba renders it."""
     tree = ET.parse(path)
     for film in tree.iter("film"):
         for child in list(film):

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A copy of Mitsuba's data repository in which scene files may be written and everything else is a link."""
+"""A copy of Mitsuba's data repository in which scene files can be written and everything else is a link."""
 import pathlib
 
 
 def link_tree(folder, copy):
-    """The empty folder `copy` becomes a tree as `folder`, whose folders of scenes are real, so that what is written
+    """Makes the empty folder `copy` a tree like `folder`, whose folders of scenes are real, so that a file written
     there lies beside the files that it names."""
     folder, copy = pathlib.Path(folder), pathlib.Path(copy)
     for part in folder.iterdir():

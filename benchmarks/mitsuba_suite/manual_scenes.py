@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which scenes of Mitsuba's manual covary and Mitsuba load, and the processor time that either takes.
+"""Which scenes of Mitsuba's manual covary and Mitsuba load, and the processor time that each takes.
 
     manual_scenes.py FOLDER [--out FILE]
 
-FOLDER is a copy of github.com/mitsuba-renderer/mitsuba-data; its scenes are docs/scenes/*.xml. Mitsuba loads them in
-its variant scalar_rgb, each in a process of its own. Parameters that a scene leaves to the command line are 16. Times
-are user and system time in seconds of loading alone: of Mitsuba's mitsuba.load_file(), of `covary info` less that of
+FOLDER is a copy of github.com/mitsuba-renderer/mitsuba-data; its scenes are docs/scenes/*.xml. Mitsuba loads each in a
+separate process, in its variant scalar_rgb. Parameters that a scene leaves to the command line are set to 16. Times are
+user plus system time in seconds of loading alone: that of mitsuba.load_file(), and that of `covary info` minus that of
 `covary --version`.
 """
 import argparse
@@ -27,7 +27,7 @@ print("seconds", time.process_time() - start)
 
 
 def run(command, **options):
-    """Exit code, text, processor time of a child process."""
+    """Exit code, output and processor time of a child process."""
     before = os.times()
     result = subprocess.run(command, capture_output=True, text=True, check=False, **options)
     after = os.times()
@@ -36,14 +36,14 @@ def run(command, **options):
 
 
 def undefined(scene):
-    """name=16 of each parameter that the scene leaves to the command line: numbers of samples."""
+    """name=16 for each parameter that the scene leaves to the command line (they are numbers of samples)."""
     text = scene.read_text()
     defined = set(re.findall(r'<default\s+name="(\w+)"', text))
     return [f"{name}=16" for name in sorted(set(re.findall(r"\$(\w+)", text)) - defined)]
 
 
 def load_with_mitsuba(scene):
-    """Seconds, or None, and the last line of what it says."""
+    """Seconds, or None, and the last line of output."""
     code, text, _ = run([sys.executable, "-c", MITSUBA, str(scene), *undefined(scene)])
     lines = [line for line in text.splitlines() if line.strip()] or ["nothing"]
     if code == 0 and lines[-1].startswith("seconds"):

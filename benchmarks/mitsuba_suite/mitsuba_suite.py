@@ -3,11 +3,11 @@
 
     mitsuba_suite.py FOLDER [NAME...]      exit code 1 where a test that loads does not pass
 
-FOLDER is a copy of github.com/mitsuba-renderer/mitsuba-data, of which nothing is part of this repository; NAME a part
-of a test's name. The test of each scene is that of Mitsuba's own test_renders.py: at the size of the reference image, a
-budget of samples divided by the pixels, a Z-test of every value in XYZ with the stored variance of a sample (at least
-1e-4), and a significance of 0.01 for the image, divided among its pixels by Sidak's correction; 99.75 % of the values
-must be accepted. A test that fails and has a checkerboard for a number is rendered again with color0 and color1
+FOLDER is a copy of github.com/mitsuba-renderer/mitsuba-data, no part of which is in this repository; NAME is part of a
+test's name. The test of each scene is that of Mitsuba's own test_renders.py: the size of the reference image, a budget
+of samples divided by the pixels, and a Z-test of every value in XYZ with the stored variance of a sample (at least
+1e-4) at a significance of 0.01 for the image, divided among its pixels by Sidak's correction; 99.75 % of the values
+must be accepted. A test that fails and has a checkerboard in place of a number is rendered again with color0 and color1
 exchanged, as Mitsuba has them there; the table says so. Python needs numpy and Mitsuba, which reads the images.
 """
 import argparse
@@ -50,7 +50,7 @@ def normal_tails(z):
 
 
 def share_accepted(image, spp, reference, variance):
-    """The share of values that the Z-test accepts."""
+    """The fraction of values that the Z-test accepts."""
     variance = numpy.maximum(variance @ TO_XYZ.T, LEAST_VARIANCE)
     z = numpy.abs((image - reference) @ TO_XYZ.T) * numpy.sqrt(spp / variance)
     pixels = reference.shape[0] * reference.shape[1]
@@ -59,7 +59,7 @@ def share_accepted(image, spp, reference, variance):
 
 
 def render(options, scene, spp, out):
-    """What covary says where it fails, otherwise an empty text."""
+    """covary's message if it fails, otherwise an empty string."""
     command = [options.covary, "render", str(scene), "--estimator", "none", "--groups", "1", "--spp", str(spp),
                "--seed", str(options.seed), "--no-preview", "--overwrite", "-o", str(out)]
     integrator = scene.stem.rsplit("_", 1)[1]
@@ -76,7 +76,7 @@ def exchanged(text):
 
 
 def copy_with_colours_exchanged(folder, scene, copy):
-    """The scene in `copy`, a folder as `folder`."""
+    """The path of the scene in `copy`, a copy of `folder`."""
     link_tree(folder, copy)
     result = copy / scene.relative_to(folder)
     result.unlink()
@@ -85,7 +85,7 @@ def copy_with_colours_exchanged(folder, scene, copy):
 
 
 def run_as_mitsuba_has_it(options, scene, reference, variance):
-    """A row of the table, of the scene with its colours exchanged where it does not pass as it is."""
+    """A row of the table; if the scene does not pass, that of the scene with exchanged colours."""
     row = run_test(options, scene, reference, variance)
     if row[0] != "differs" or exchanged(scene.read_text()) == scene.read_text():
         return row
@@ -98,7 +98,7 @@ def run_as_mitsuba_has_it(options, scene, reference, variance):
 
 
 def run_test(options, scene, reference_path, variance_path):
-    """A row of the table: verdict, share accepted, ratio of means, samples per pixel, seconds, message."""
+    """A row of the table: verdict, fraction accepted, ratio of means, samples per pixel, seconds, message."""
     reference, variance = rgb(reference_path), rgb(variance_path)
     spp = max(1, int(options.samples) // (reference.shape[0] * reference.shape[1]))
     start = time.perf_counter()

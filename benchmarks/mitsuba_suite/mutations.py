@@ -4,9 +4,9 @@
     mutations.py FOLDER [--count N] [--seed S]      exit code 1 where a process was killed by a signal
 
 FOLDER is a copy of github.com/mitsuba-renderer/mitsuba-data; the files are those of tests/scenes and docs/scenes. A
-mutation is one to three of: a number becomes another or an extreme one, the name of a plugin or property becomes one of
-another file, an element is left out, doubled or exchanged, a byte changes, the end is cut off. It is rendered at
-12 x 12 pixels and two samples, within 2 GB (COVARY_MEMORY) and 60 s of processor time.
+mutation makes one to three changes: a number becomes a different or an extreme one; the name of a plugin or property
+becomes one of another file; an element is left out, duplicated or exchanged; a byte changes; the end is cut off. It is
+rendered at 12 x 12 pixels with two samples, within 2 GB (COVARY_MEMORY) and 60 s of processor time.
 """
 import argparse
 import collections

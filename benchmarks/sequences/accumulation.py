@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Exponential accumulation with reprojection, what to do better than: each frame is drawn to what the accumulated frame
-before shows of the same point. Where the point was follows from the layer P (position) and the known matrices of
-scenes.py, so that it also checks the motion vectors of a renderer."""
+"""Exponential accumulation with reprojection, the baseline: each frame is blended with what the previous accumulated
+frame shows of the same point. Where the point was follows from the layer P (position) and the known matrices of
+scenes.py. So it also checks a renderer's motion vectors."""
 import math
 
 import numpy
@@ -30,7 +30,7 @@ def projected(points, to_world, width, height, fov=54):
 
 
 def before(name, points, frame, frames):
-    """Where points of this frame were in the frame before it, in the world."""
+    """Where points of this frame were in the previous frame, in world space."""
     if name not in ("box", "mirror"):
         return points
     move = getattr(scenes, name)
@@ -44,8 +44,8 @@ def before(name, points, frame, frames):
 
 
 def motion(name, points, frame, frames):
-    """From each pixel's place in this frame to that of its point in the frame before, (height, width, 2) in pixels, x
-    to the right and y down; and the points themselves as they were then. Frames count from 1."""
+    """Motion from each pixel to the position of its point in the previous frame, (height, width, 2) in pixels, x to the
+    right and y down; and where the points were then. Frames count from 1."""
     height, width = points.shape[:2]
     then = before(name, points, frame, frames)
     here, there = (projected(place, scenes.camera(name, at, frames), width, height, scenes.fov(name))[0]
@@ -54,8 +54,8 @@ def motion(name, points, frame, frames):
 
 
 def motion_agreement(name, positions, vectors):
-    """The part of all pixels after the first frame whose motion by a renderer, (frames, height, width, 2 or more), is
-    within WITHIN pixels of the known one. Less than 1 at edges, where the layer P is a mean over surfaces."""
+    """The fraction of all pixels after the first frame whose motion by a renderer, (frames, height, width, 2 or more),
+    is within WITHIN pixels of the known one. It fails at edges, where the layer P is a mean over surfaces."""
     frames = len(positions)
     apart = [numpy.abs(motion(name, positions[index], index + 1, frames)[0] - vectors[index][..., :2]).max(-1)
              for index in range(1, frames)]
@@ -76,7 +76,7 @@ def bilinear(image, places):
 
 
 def accumulated(name, images, positions):
-    """Images and layers P (frames, height, width, 3) of a sequence; the images accumulated."""
+    """The accumulated images of a sequence's images and layers P, each (frames, height, width, 3)."""
     result, frames = [images[0]], len(images)
     height, width = images.shape[1:3]
     y, x = numpy.mgrid[0:height, 0:width] + 0.5

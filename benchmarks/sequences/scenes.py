@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Five sequences made of scenes/room.xml, with what moves known exactly: a moving camera, a turning box whose shadow
-moves along, a turning mirror, a lamp that is dimmed, and one in which nothing moves; and a camera that moves through
-Bitterli's Kitchen, where --kitchen tells its file.
+"""Five sequences made of scenes/room.xml whose motion is known exactly: a moving camera, a turning box and its shadow,
+a turning mirror, a lamp that is dimmed, and one in which nothing moves. A sixth moves the camera through Bitterli's
+Kitchen, if --kitchen names its file.
 
-NAME_0001.xml, NAME_0002.xml, … are scenes in which nothing moves, one for each frame; the references are renders of
-these, so that a fault of what interpolates motion shows as an error. A renderer of sequences takes one scene NAME.xml,
-with <animation>s of box and mirror and a camera path camera.json beside it; but those of each frame for `lamp`."""
+NAME_0001.xml, NAME_0002.xml, … are static scenes, one for each frame. The references are renders of these, so that a
+bug in the interpolation of motion shows as an error. A renderer of sequences takes one scene NAME.xml, with
+<animation>s of box and mirror and a camera path camera.json beside it; for `lamp` it takes the scenes of the frames."""
 import copy
 import json
 import math
@@ -22,7 +22,7 @@ ENDS = {"camera": (((0.5, 1.45, 3.8), (-0.1, 0.95, -1)), ((-0.2, 1.35, 3.0), (0.
 
 
 def part_of(frame, frames):
-    """How much of the sequence has passed, 0 to 1. Frames count from 1."""
+    """The fraction of the sequence that has passed, 0 to 1. Frames count from 1."""
     return (frame - 1) / max(1, frames - 1)
 
 
@@ -49,7 +49,8 @@ def rotate_y(degrees):
 
 
 def look_at(origin, target, up=(0, 1, 0)):
-    """From the camera to the world as Mitsuba has it: x to the left of the image, y up, z along the view."""
+    """The matrix from camera to world space in Mitsuba's convention: x to the left of the image, y up, z along the
+    view."""
     view = numpy.subtract(target, origin) / numpy.linalg.norm(numpy.subtract(target, origin))
     left = numpy.cross(up, view) / numpy.linalg.norm(numpy.cross(up, view))
     matrix = numpy.eye(4)
@@ -58,7 +59,7 @@ def look_at(origin, target, up=(0, 1, 0)):
 
 
 def camera(name, frame, frames):
-    """The camera's matrix to the world; those that do not move have the room's own."""
+    """The matrix from camera to world space; a camera that does not move has the room's own."""
     t = part_of(frame, frames) if name in ENDS else 0
     ends = [[numpy.array(point) for point in end] for end in ENDS.get(name, ENDS["camera"])]
     return look_at(*((1 - t) * first + t * last for first, last in zip(*ends)))
@@ -76,7 +77,7 @@ def mirror(frame, frames):
 
 
 def dimming(frame, frames):
-    """What is left of the lamp's radiance: falls to a tenth."""
+    """The fraction of the lamp's radiance that is left; it falls to a tenth."""
     return 10 ** -part_of(frame, frames)
 
 
@@ -89,7 +90,7 @@ MOVING = {"box": ("cube", "wood", box), "mirror": ("rectangle", "silver", mirror
 
 
 def add_shape(root, name):
-    """Adds what moves in the sequence; the shape, which has yet to be placed."""
+    """Adds the shape that moves in the sequence, which has yet to be placed, and returns it."""
     kind, bsdf, _ = MOVING[name]
     shape = ElementTree.SubElement(root, "shape", type=kind)
     ElementTree.SubElement(shape, "ref", id=bsdf)
@@ -150,8 +151,8 @@ def scene_file(path):
 
 
 def write_sequence(name, frames, folder, kitchen=None):
-    """Writes a sequence's files; the name of the scene, or the pattern of names, that a renderer of sequences takes.
-    `kitchen`: file of the scene of that sequence."""
+    """Writes a sequence's files. Returns the name of the scene, or the pattern of names, that a renderer of sequences
+    takes. `kitchen`: the scene file of that sequence."""
     room = scene_file(kitchen if name == "kitchen" else ROOM)
     for frame in range(1, frames + 1):
         ElementTree.ElementTree(scene_of(room, name, frame, frames)).write(folder / still_name(name, frame))

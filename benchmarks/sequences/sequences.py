@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """sequences.py references|measure --work FOLDER [NAME...]
 
-Five sequences, six with --kitchen (scenes.py): references of every frame, and a table of what methods make of few
-samples. `references` renders what FOLDER does not hold yet, two images of each frame; `measure` renders the methods
-and compares. Each frame alone is rendered from a scene of its own, in which nothing moves; `sequence` is one command
-for all frames. A frame's seed is that of --seeds plus 1,000,000 times its number, as the command for all frames has
-it. Needs numpy.
-Errors are given as multiples of those of `auto`, the mixture of each frame alone."""
+Renders references of every frame of five sequences (scenes.py), six with --kitchen, and compares methods with few
+samples. `references` renders what FOLDER does not hold yet, two images of each frame; `measure` renders the methods and
+compares them. Single frames are rendered from static scenes; `sequence` is one command for all frames. A frame's seed
+is that of --seeds plus 1,000,000 times its number, as in the command for all frames. Errors are multiples of those of
+`auto`, the mixture of each frame alone. Needs numpy."""
 import argparse
 import json
 import subprocess
@@ -40,7 +39,7 @@ def run(options, *words):
 
 
 def render(options, scene, spp, seed, out, *more):
-    """A render, unless the file is there: what is interrupted begins again with the first missing one."""
+    """Renders unless the file is there, so that an interrupted run continues with the first missing one."""
     if not out.exists():
         run(options, "render", scene, "--resolution", options.resolution, "--rfilter", "box", "--spp", spp, "--seed",
             seed, "--no-preview", "--quiet", *more, "-o", out)
@@ -75,7 +74,7 @@ def reference(options, name, frame, seed):
 
 
 def frames_alone(options, name, spp, seed, folder):
-    """Renders images by the network and by the mixture, and accumulates the latter."""
+    """Renders images denoised by the network and by the mixture, and accumulates the latter."""
     mixture, positions = [], []
     for frame in frame_numbers(options):
         scene = options.work / scenes.still_name(name, frame)
@@ -95,7 +94,7 @@ def frames_alone(options, name, spp, seed, folder):
 
 
 def sequence(options, name, spp, seed, folder):
-    """Renders all frames by one command; their motion vectors."""
+    """Renders all frames with one command; returns their motion vectors."""
     scene, more = write_sequence(options, name)
     last = folder / f"sequence_{options.frames:04d}.exr"
     render_sequence = [options.work / scene, *more, "--frames", f"1-{options.frames}"]
@@ -107,7 +106,7 @@ def sequence(options, name, spp, seed, folder):
 
 
 def render_methods(options, name, spp, seed, folder):
-    """The names of what is rendered then."""
+    """Renders all methods; returns their names."""
     folder.mkdir(exist_ok=True)
     positions = frames_alone(options, name, spp, seed, folder)
     methods = ["oidn"] * options.network + ["auto", "accumulation"]
@@ -119,7 +118,7 @@ def render_methods(options, name, spp, seed, folder):
 
 
 def compare(options, name, methods, folder):
-    """What `covary compare` says of each method."""
+    """The measures of `covary compare` for each method."""
     number = "0001" if name == "still" else "####"
     pairs = zip(("--reference", "--reference2"), REFERENCE_SEEDS)
     references = [word for option, seed in pairs
@@ -130,7 +129,7 @@ def compare(options, name, methods, folder):
 
 
 def measure(options):
-    """Prints a table of means over seeds, and keeps what it is made of."""
+    """Prints a table of means over seeds, and keeps the single values."""
     table = []
     titles = RATIOS + [f"worst {column}" for column in WORST]
     print(f"| sequence | spp | method | {' | '.join(titles).replace('_', ' ')} |\n|{'---|' * (3 + len(titles))}",

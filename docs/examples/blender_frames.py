@@ -5,8 +5,8 @@ b_0001.exr and so on. Then:
 
     covary denoise a_####.exr b_####.exr -o out_####.exr --motion Vector --motion-scale 1,-1 --depth Depth
 
-Vector's first two channels lead to where a point was in the frame before, in pixels, with y upwards. Runs as well where
-`import bpy` does (pip install bpy): python blender_frames.py SCENE.blend [SAMPLES [FRAMES]]
+Vector's first two channels point to where a point was in the previous frame, in pixels, y upwards. Also runs outside
+Blender (pip install bpy): python blender_frames.py SCENE.blend [SAMPLES [FRAMES]]
 """
 import os
 import sys

@@ -4,7 +4,7 @@
 
     covary denoise a.exr b.exr -o out.exr
 
-Runs as well where `import bpy` does (pip install bpy): python denoise_blender.py SCENE.blend [SAMPLES]
+Also runs outside Blender (pip install bpy): python denoise_blender.py SCENE.blend [SAMPLES]
 """
 import os
 import sys

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""denoise_luxcore.py RENDER.cfg [SAMPLES [RENDERS]]: two renders (or more) by LuxCore (pip install pyluxcore) with
-different seeds, their albedo and normal: a.exr, a.albedo.exr, a.normal.exr and the same of b. Then:
+"""denoise_luxcore.py RENDER.cfg [SAMPLES [RENDERS]]: two or more renders by LuxCore (pip install pyluxcore) with
+different seeds, and their albedo and normal: a.exr, a.albedo.exr, a.normal.exr, and the same for b. Then:
 
     covary denoise a.exr b.exr --albedo a.albedo.exr --normal a.normal.exr -o out.exr
 """

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""denoise_mitsuba.py SCENE.xml [SAMPLES [RENDERS]]: two renders by Mitsuba 3 with different seeds, a.exr and b.exr, or
-more. Then:
+"""denoise_mitsuba.py SCENE.xml [SAMPLES [RENDERS]]: two or more renders by Mitsuba 3 with different seeds, a.exr, b.exr
+and so on. Then:
 
     covary denoise ?.exr -o out.exr
 """

@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # frames_on_slurm.sh SCENE.xml OUT_####.exr FIRST-LAST [WAVESx]SAMPLES [OPTION…]: renders a sequence on a cluster with
-# Slurm. An array has a task for each wave of each frame, which renders SAMPLES samples per pixel (of the only wave, in
-# four groups) into OUT_.parts/FRAME-WAVE.exr with a seed of its own. A job after them denoises the frames one after the
-# other, each with the history of the frame before. OPTIONs are those of `covary render`, such as --camera-path. The
-# same command again, after anything was killed, renders what is missing.
+# Slurm. An array has a task for each wave of each frame, which renders SAMPLES samples per pixel (in four groups if
+# there is only one wave) into OUT_.parts/FRAME-WAVE.exr with its own seed. A job after them denoises the frames one
+# after the other, each with the history of the previous frame. OPTIONs are those of `covary render`, such as
+# --camera-path. If anything was killed, the same command renders what is missing.
 #
-# Scene, camera path, OUT and covary must be where all nodes see them. Partition, time and memory are chosen as for any
-# job, by SBATCH_PARTITION, SBATCH_TIMELIMIT, SBATCH_MEM_PER_NODE and the other variables of sbatch.
+# All nodes must see the scene, the camera path, OUT and covary. Choose partition, time and memory as for any job, with
+# SBATCH_PARTITION, SBATCH_TIMELIMIT, SBATCH_MEM_PER_NODE and the other variables of sbatch.
 #SBATCH --cpus-per-task=2 --requeue --open-mode=append --signal=B:TERM@60
 set -euo pipefail
 

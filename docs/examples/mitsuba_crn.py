@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """mitsuba_crn.py SCENE.xml FOLDER [--spp 96] [--groups 12] [--variant llvm_ad_rgb] [-D NAME=VALUE]
 
-Renders a scene by Mitsuba 3 (pip install mitsuba; its variants llvm_ad_rgb and cuda_ad_rgb) for `covary combine`:
+Renders a scene with Mitsuba 3 (pip install mitsuba; its variants llvm_ad_rgb and cuda_ad_rgb) for `covary combine`:
 FOLDER/crn_00.exr ... with common random numbers and FOLDER/independent_00.exr ... with independent ones, `--spp`
-samples per pixel of either kind, in `--groups` renders with different seeds. Then:
+samples per pixel of each kind, in `--groups` renders with different seeds. Then:
 
     covary combine --crn FOLDER/crn_*.exr --independent FOLDER/independent_*.exr -o out.exr
 """
@@ -18,7 +18,7 @@ import mitsuba as mi
 
 def define_sampler():
     class Common(mi.Sampler):
-        """All pixels get the same numbers: their streams depend on the seed and the index of the sample alone."""
+        """All pixels get the same numbers: streams depend only on the seed and the index of the sample."""
 
         def seed(self, seed, wavefront_size):
             super().seed(seed, wavefront_size)
@@ -41,7 +41,7 @@ def define_sampler():
 
 
 def scene_with(path, sampler, spp, parameters):
-    """The scene with this sampler, a filter one pixel wide (errors of pixels must not mix), and values in 32 bits."""
+    """The scene with this sampler, a box filter of one pixel (errors of pixels must not mix) and 32-bit values."""
     tree = ET.parse(path)
     for sensor in tree.iter("sensor"):
         for old in sensor.findall("sampler"):

@@ -5,9 +5,9 @@
 
     covary denoise a_####.exr b_####.exr -o out_####.exr
 
-Mitsuba has no layer of motion: the layers Motion and Depth are made here of the positions that it gives, for a scene in
-which the camera alone moves. Needs numpy. Between keys rotations are interpolated nearly evenly, not exactly as covary
-does.
+Mitsuba has no motion layer. This script makes the layers Motion and Depth from Mitsuba's positions, for a scene in
+which only the camera moves. Between keys, rotations are interpolated nearly evenly, but not exactly as covary does.
+Needs numpy.
 """
 import json
 import sys
@@ -19,7 +19,7 @@ mi.set_variant("scalar_rgb")  # "llvm_ad_rgb" where LLVM is installed: 2 to 8 ti
 
 
 def camera_at(path, time):
-    """The matrix from the camera to the world."""
+    """The matrix from camera to world space."""
     keys = path["keyframes"]
     matrices = [numpy.array(key["to_world"], float).reshape(4, 4) for key in keys]
     times = [key["time"] for key in keys]

@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # render_on_slurm.sh SCENE.xml OUT.exr SAMPLES TASKS [OPTION…]: renders a scene on a cluster with Slurm. An array of
-# two or more TASKS renders SAMPLES samples per pixel each, with a seed of its own, into OUT.parts/SEED.exr. A job after
+# two or more TASKS renders SAMPLES samples per pixel each, each with its own seed, into OUT.parts/SEED.exr. A job after
 # them denoises these together into OUT.exr, and merges them into OUT.mean.exr, the mean of all samples. OPTIONs are
-# those of `covary render`. The same command again, after anything was killed, renders what is missing.
+# those of `covary render`. If anything was killed, the same command renders what is missing.
 #
-# Scene, OUT and covary must be where all nodes see them. Partition, time and memory are chosen as for any job, by
-# SBATCH_PARTITION, SBATCH_TIMELIMIT, SBATCH_MEM_PER_NODE and the other variables of sbatch.
+# All nodes must see the scene, OUT and covary. Choose partition, time and memory as for any job, with SBATCH_PARTITION,
+# SBATCH_TIMELIMIT, SBATCH_MEM_PER_NODE and the other variables of sbatch.
 #SBATCH --cpus-per-task=2 --requeue --open-mode=append --signal=B:TERM@60
 set -euo pipefail
 

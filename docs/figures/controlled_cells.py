@@ -1,15 +1,15 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""controlled_cells.py RENDER.exr RENDER.training OUT.jpg WIDTH: what a render with control variates has learnt, where
-the camera sees it. WIDTH: pixels of a row. Needs `pip install numpy matplotlib pillow`.
+"""controlled_cells.py RENDER.exr RENDER.training OUT.jpg WIDTH: what a render with control variates has learnt at the
+surfaces that the camera sees. WIDTH: pixels of a row. Needs `pip install numpy matplotlib pillow`.
 
     covary render SCENE --integrator controlled-path --estimator none --aovs --save-training RENDER.training \\
         -o RENDER.exr
 
-Four pictures: the render; the mean coefficient of the lights, by their probabilities, less that of directions by the
-BSDF, by colour channel; the same with its sign (blue: what lights find is worth more); and the share of the control
-that is used, red where it is switched off, pale where a wider cell serves. docs/file-formats.md describes the file of
-the training."""
+Four pictures: the render; the mean coefficient of the lights, weighted by their probabilities, minus that of BSDF
+sampling, by colour channel; the same with its sign (blue: lights are worth more); and the fraction of the control that
+is used, red where it is switched off, pale where a wider cell is used. docs/file-formats.md describes the training
+file."""
 import pathlib
 import struct
 import sys
@@ -37,7 +37,7 @@ class Reader:
 
 
 class Table:
-    """The cells of a training file: number of the cell for each key, and its values."""
+    """The cells of a training file: the index of the cell for each key, and its values."""
 
     def __init__(self, path):
         reader = Reader(pathlib.Path(path).read_bytes())
@@ -58,7 +58,7 @@ class Table:
             reader.skip(16 * reader.take("I"))
 
     def find(self, position, normal):
-        """Number of the finest cell of a place, and whether it is of the finest level; -1 for none."""
+        """Index of the finest cell at a position, -1 for none; and whether it is of the finest level."""
         cell = np.clip((position - self.origin) / self.width, 0, self.resolution - 1).astype(int)
         axis = int(np.argmax(np.abs(normal)))
         kind = 2 * axis + (normal[axis] < 0) if self.by_normal else 6

@@ -4,9 +4,8 @@
 `pip install numpy matplotlib pillow`.
 
 The demonstrations of Hua et al. 2023, Sec. 5, in one dimension: one sample from a mixture of densities, without and
-with the control variate made of these densities. Above, the integrand and the densities times their probabilities;
-below, what one sample at x estimates, without control f/p and with it. Where that is a level line, there is no
-noise."""
+with the control variate made of these densities. Above: the integrand, and the densities times their probabilities.
+Below: the estimate from one sample at x, without control (f/p) and with it. Where it is constant, there is no noise."""
 import sys
 
 import matplotlib
@@ -39,7 +38,7 @@ def problems():
 
 
 def controlled(f, counts, densities):
-    """What a sample at x estimates with the best coefficients, from A beta = b by quadrature."""
+    """The estimate from a sample at x with the best coefficients, from A beta = b by quadrature."""
     p = counts @ densities
     r = counts[:, None] * densities / p
     beta = np.linalg.lstsq((r * p) @ r.T / N, r @ f / N, rcond=None)[0]

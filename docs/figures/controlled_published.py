@@ -5,8 +5,8 @@ et al. 2023, 640 x 480 pixels, from one render of each method, which FOLDER keep
 ten minutes of processor time.
 
 The variance of an image is that between its two groups, relative to the squared mean of all methods' images + 0.01,
-without the largest 0.1 %. 40 samples are rendered and told for 128: V = 1 / (120 / v + 8 / v0), with the variances of a
-sample with and without control, as the 8 samples of the training are in the image, too."""
+without the largest 0.1 %. Images have 40 samples; gains are converted to 128 of which 8 are training samples, which are
+part of the image: V = 1 / (120 / v + 8 / v0), with v and v0 the variance of a sample with and without control."""
 import subprocess
 import sys
 from pathlib import Path

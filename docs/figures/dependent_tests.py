@@ -45,7 +45,7 @@ class Scene:
                  "-o", self.at / f"{name}.exr", "--quiet", *options)
 
     def error(self, name):
-        """relMSE and the share of pixels with more than 5 % relative error."""
+        """relMSE and the fraction of pixels with more than 5 % relative error."""
         references = [self.at / f"reference90000000{i}.exr" for i in (1, 2)]
         both = ("--reference", references[0], "--reference2", references[1], "--json", "-")
         values = json.loads(self.run("compare", self.at / f"{name}.exr", *both, "--metric", "relmse,above5"))

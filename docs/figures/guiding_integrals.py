@@ -4,9 +4,9 @@
 2023. COVARY: the program. Needs `pip install numpy matplotlib pillow`.
 
 Rows are the skies of scenes/plane-under-sky.xml. From the left: the integrand, sky times BSDF and cosine; the density
-of half BSDF, half guide; the control variate with one coefficient for all channels, and with one for each. Directions
-above the plane, azimuth to the right, the zenith above. A control is shown with that multiple of the density added for
-which its integral is that of the integrand: such a multiple has no effect."""
+of the mixture of half BSDF, half guiding; the control variate with one coefficient for all channels, and with one per
+channel. Maps show the hemisphere above the plane, azimuth to the right, zenith at the top. A multiple of the density is
+added to each control variate, which has no effect, such that its integral is that of the integrand."""
 import sys
 
 import numpy as np

@@ -4,10 +4,10 @@
 docs/methods/guiding.md. COVARY: the program; DOOR.xml: Veach's ajar door, which is not part of the repository. Needs
 `pip install numpy matplotlib pillow`.
 
-Rows: the floor and the back wall, of rough metal, of scenes/glossy-box.xml, and the floor before the door. From the
-left: radiance that arrives; density of the mixture of BSDF and guide; control variate (red: positive, blue: negative),
-a multiple of the density added for which its integral is 0, since such multiples have no effect. All directions,
-azimuth to the right, +y above; brightness by a power of 1/3, up to the 99.8th percentile."""
+Rows: the floor and the back wall (rough metal) of scenes/glossy-box.xml, and the floor in front of the door. From the
+left: incident radiance; density of the mixture of BSDF and guiding; control variate (red: positive, blue: negative), to
+which a multiple of the density is added, which has no effect, such that its integral is 0. Maps show all directions,
+azimuth to the right, +y at the top; brightness is raised to the power 1/3 and ends at the 99.8th percentile."""
 import sys
 
 import numpy as np
@@ -21,7 +21,7 @@ def tone(image):
 
 
 def signed(control, density):
-    """Grey control without its part in proportion to the density, as colours."""
+    """The grey control variate without its part in proportion to the density, as colours."""
     area = np.sin(np.pi * (np.arange(HEIGHT) + 0.5) / HEIGHT)[:, None]
     grey, density = control.mean(axis=2), density.mean(axis=2)
     grey = grey - density * (area * grey).sum() / (area * density).sum()

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """iicv.py COVARY OUT.png: the picture of docs/methods/iicv.md. Needs `pip install pillow`.
 
-Top: a part of scenes/room.xml with 48 samples per pixel: the two inputs, the result, plain path tracing with all
-samples. Bottom: the coefficients of three pixels in their 11 x 11 windows, and the errors of result and plain path
-tracing."""
+Top: part of scenes/room.xml with 48 samples per pixel: the two inputs, the result, and plain path tracing with all
+samples. Bottom: the coefficients of three pixels in their 11 x 11 windows, and the errors of the result and of plain
+path tracing."""
 import json
 import pathlib
 import subprocess

@@ -16,7 +16,7 @@ from matplotlib import pyplot  # noqa: E402
 
 
 def probe(covary, scene, pixel, height, *options):
-    """Radiance, density and control in all directions, each [height, 2 height, 3]."""
+    """Radiance, density and control variate in all directions, each [height, 2 height, 3]."""
     with tempfile.TemporaryDirectory() as folder:
         out = pathlib.Path(folder) / "probe.exr"
         subprocess.run([covary, "probe", str(scene), "--pixel", pixel, "--height", str(height), *options, "-o",
@@ -27,7 +27,7 @@ def probe(covary, scene, pixel, height, *options):
 
 
 def save(rows, names, size, out):
-    """`rows`: a title and the pictures of each row; `names`: those of the columns; `size`: in inches."""
+    """`rows`: a title and the pictures of each row; `names`: titles of the columns; `size`: in inches."""
     figure, axes = pyplot.subplots(len(rows), len(names), figsize=size)
     for (title, pictures), row in zip(rows, axes):
         for axis, picture, name in zip(row, pictures, names):

@@ -54,7 +54,7 @@ def _shown(value: Any) -> str:
 
 
 def _is_bool(value: Any) -> bool:
-    """Also NumPy's."""
+    """True for booleans of Python and NumPy."""
     return isinstance(value, bool) or (type(value).__module__ == "numpy" and type(value).__name__ in ("bool", "bool_"))
 
 
@@ -65,7 +65,7 @@ def _bounds(low: float, high: float) -> str:
 
 
 def whole(low: float = -math.inf, high: float = math.inf) -> Rule:
-    """A whole number: of Python or NumPy, also as a float without a fraction such as 48.0."""
+    """A whole number of Python or NumPy, or a float without a fraction, such as 48.0."""
     def convert(value: Any) -> int:
         if _is_bool(value) or isinstance(value, (str, bytes)):
             raise _WrongType
@@ -95,7 +95,7 @@ def _float(value: Any) -> float:
 
 
 def real(low: float = -math.inf, *, above: bool = False) -> Rule:
-    """A finite number from `low` on, or above it."""
+    """A finite number of at least `low`, or with `above` greater than it."""
     def convert(value: Any) -> float:
         number = _float(value)
         if not math.isfinite(number) or number < low or (above and number == low):
@@ -173,12 +173,12 @@ def choice(names: Iterable[str]) -> Rule:
 
 
 def optional(rule: Rule) -> Rule:
-    """None, too."""
+    """What the rule accepts, or None."""
     return Rule(f"{rule.accepted}, or None", lambda value: None if value is None else rule.convert(value))
 
 
 def empty_or(rule: Rule) -> Rule:
-    """The empty text, too, if it means nothing."""
+    """What the rule accepts, or an empty string, which stands for no value."""
     return Rule(rule.accepted, lambda value: value if isinstance(value, str) and not value else rule.convert(value))
 
 
@@ -206,7 +206,7 @@ def list_of(rule: Rule, words: str) -> Rule:
 
 
 def mapping_of(rule: Rule, words: str) -> Rule:
-    """A mapping from texts to what the rule accepts."""
+    """A mapping from strings to what the rule accepts."""
     def convert(values: Any) -> dict[str, Any]:
         if not isinstance(values, Mapping):
             raise _WrongType
@@ -225,7 +225,7 @@ attribute_texts = mapping_of(text, "a mapping from texts to texts")
 
 
 def instance(words: str, accepts: Callable[[Any], bool]) -> Rule:
-    """An object of some kind."""
+    """An instance of a class."""
     def convert(value: Any) -> Any:
         if not accepts(value):
             raise _WrongType

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The start of any work on a cluster: a client of a chosen cluster, the same versions everywhere, and the scene files
-on every worker."""
+"""What any work on a cluster begins with: a client of the chosen cluster, a check that all machines have the same
+versions, and the scene files on every worker."""
 from __future__ import annotations
 
 import hashlib
@@ -118,7 +118,7 @@ def results(client: Any, run: Callable[..., Any],
 
 
 def _versions() -> tuple[str, str]:
-    """Of covary and distributed."""
+    """The versions of covary and distributed."""
     return _covary.version, importlib.metadata.version("distributed")
 
 

@@ -111,7 +111,7 @@ def kept_in_memory(scene: Any) -> Iterator[None]:
 
 
 def check(scene: Any, spp: int, groups: int = GROUPS) -> None:
-    """Raises UsageError for a scene whose groups cannot be rendered, and in an old Blender."""
+    """Raises UsageError for a scene whose groups cannot be rendered, and for an old Blender."""
     blender()
     if scene.render.engine != "CYCLES":
         raise UsageError(f"found the engine {scene.render.engine}; only Cycles has common random numbers: "
@@ -125,7 +125,7 @@ def check(scene: Any, spp: int, groups: int = GROUPS) -> None:
 
 @dataclass(frozen=True)
 class Group:
-    """Samples that Cycles renders in one go, of one of the two images."""
+    """Samples of one of the two images that Cycles takes in a single render."""
 
     #: "crn", with common random numbers, or "independent".
     kind: str

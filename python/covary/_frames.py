@@ -57,9 +57,9 @@ def frames(client: Any, scene: str | os.PathLike[str], output: str | os.PathLike
 
     output: a name with '#' for the frame number, "out_####.exr".
     options: further options of the command, e.g. ["--spp", "16", "--camera-path", "path.json"]. `--history` is refused,
-        because it makes a frame of the one before: `covary denoise` of frames does so afterwards.
-    waves: so many tasks of each frame, all with the samples that the options name. Number k of them has the seed
-        `seed` + k - 1 and writes OUTPUT with "-k" before its ending; `covary denoise` takes them all, without --groups.
+        because it makes each frame depend on the one before; use `covary denoise` on the frames afterwards.
+    waves: number of tasks per frame, each with the samples that the options name. Task k has the seed `seed` + k - 1
+        and writes OUTPUT with "-k" before its extension; `covary denoise` takes them all, without --groups.
     progress: called with (done, total) tasks.
 
     Raises UsageError and Error with the messages of the command.

@@ -58,14 +58,14 @@ _SCENE = optional(instance("a bpy.types.Scene", lambda value: hasattr(value, "cy
          progress=optional(function))
 def render(scene: Any = None, spp: int = 192, seed: int = 0, *, groups: int = 12, estimator: PairEstimator = "iicv",
            change: bool = True, progress: Progress | None = None, **options: OptionValue) -> BlenderResult:
-    """Renders a scene of Blender by Cycles, half of the samples with common random numbers and half with independent
-    ones, and combines both. All settings of the scene are as before afterwards.
+    """Renders a Blender scene with Cycles, half of the samples with common random numbers and half with independent
+    ones, and combines both. Afterwards, all settings of the scene are restored.
 
     scene: a bpy.types.Scene; by default that of the context.
     spp: samples per pixel of both images together, a multiple of 2 * groups.
-    seed: another one, other samples.
-    change: render also where settings of the scene must be changed in a way that changes the picture (clamping, the
-        denoiser, …), and say so in `warnings`; without it raise UsageError.
+    seed: different seeds give different samples.
+    change: render even if settings of the scene must be changed in a way that affects the picture (clamping, the
+        denoiser, …), and say so in `warnings`; otherwise raise UsageError.
     progress: called with (done, total) groups.
     """
     check_options(estimator, options)
@@ -103,7 +103,7 @@ def _combined(images: dict[str, list[Any]], spp: int, estimator: str, options: d
 
 @checked(result=instance("what render() returns", lambda value: isinstance(value, Result)), name=text)
 def show(result: Result, name: str = "covary") -> Any:
-    """The result as an image of Blender (float, linear), in place of one of this name, for the image editor."""
+    """The result as a Blender image (float, linear) for the image editor; replaces an image of the same name."""
     import numpy
 
     bpy = _cycles.blender()

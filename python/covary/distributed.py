@@ -2,10 +2,10 @@
 """Rendering on a Dask cluster (`pip install distributed`): tiles and ranges of samples on workers, which may join,
 leave and crash.
 
-A part is a tile of the frame and a seed. It alone determines what a worker renders, so a part that is lost with its
-worker is rendered again by any other with the same bits, and each part enters the film once. The tiles make up the same
-film as on one machine, bit for bit; films of several seeds are merged by merge_films(). With a folder, parts are saved
-as they arrive, and a restarted render uses them."""
+A part is a tile of the frame and a seed. These alone determine what a worker renders. So any worker can render a part
+that was lost with another, with the same bits, and each part enters the film once. The tiles make up the same film as
+on one machine, bit for bit; merge_films() merges films of several seeds. With a folder, parts are saved as they arrive,
+and a restarted render uses them."""
 from __future__ import annotations
 
 import os
@@ -230,17 +230,17 @@ def render(client: Any, scene: Scene | str | os.PathLike[str], spp: int, estimat
     estimator: as in covary.render(); by default the mean of independent samples, mixed with denoised images.
     sample_ranges: number of seeds, from `seed` on, among which the samples are divided; their films are merged.
         With 1 the result has the bits of `covary.render(scene, spp, estimator, seed=seed)`, with more those of
-        merge_films() of such renders, for any number of workers and whatever becomes of them.
-    tile: side of the tiles that are parts, in pixels.
-    folder: keeps each part as soon as it has come, on a disk of this machine; a render with the same scene and settings
-        takes what is there, also after this process has died.
+        merge_films() of such renders, for any number of workers, even if some fail.
+    tile: side of a tile, in pixels.
+    folder: where this machine saves each part as it arrives; a later render with the same scene and settings uses what
+        is there, even if this process has died.
     progress: called with (done, total) parts.
     on_image: called with the mean of all samples so far, at most every `image_seconds`.
     settings: further keywords of covary.render() for the passes: filter, sampling, sampler, groups, split.
     options: of the estimator, and denoise and oidn, whose guides are rendered, too.
 
-    Raises UsageError for estimators and integrators whose passes look beyond a tile, and for all that is wrong with
-    options, before anything is rendered; IoError when the scheduler dies.
+    Before anything is rendered, raises UsageError for estimators and integrators whose passes look beyond a tile, and
+    for all errors in options. Raises IoError when the scheduler dies.
     """
     from distributed.comm.core import CommClosedError  # type: ignore[import-not-found,import-untyped,unused-ignore]
 

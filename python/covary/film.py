@@ -19,9 +19,9 @@ _FILM = either("a covary.Film or the name of its file",
 
 @checked(films=list_of(_FILM, "a list of Film objects, or of names of their files"))
 def merge_films(films: Sequence[Film | str | PathLike[str]]) -> Film:
-    """The film of all samples of several films of one scene with different seeds, as `covary merge` makes it: the order
-    given does not matter, bit for bit. Of files only one is in memory at a time. Raises InputError where they do not
-    belong together or share a seed."""
+    """The film of all samples of several films of one scene with different seeds, as `covary merge` makes it, with the
+    same bits in any order. Only one file is in memory at a time. Raises InputError if the films do not belong together
+    or share a seed."""
     members = [film for film in films if isinstance(film, Film)]
     paths = [fspath(film) for film in films if not isinstance(film, Film)]
     if members and paths:
@@ -35,7 +35,7 @@ def film_from_groups(groups: Any, samples: int, *, sampling: str = "", seed: int
                      attributes: dict[str, str] | None = None) -> Film:
     """A film of group means [T, H, W, 3] of any renderer, `samples` per pixel of all groups together.
 
-    sampling: "crn" or "independent", which combine() then checks; seed: that merge_films() looks at.
+    sampling: "crn" or "independent", which combine() then checks; seed: the one that merge_films() compares.
     """
     known = {key: value for key, value in (("sampling", sampling), ("seed", "" if seed is None else str(seed)))
              if value}

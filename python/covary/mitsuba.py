@@ -61,9 +61,9 @@ def _module() -> Any:
 def _common_numbers(mi: Any, drjit: Any) -> Any:
     """The class of the CRN sampler."""
     class CommonNumbers(mi.Sampler):  # type: ignore[misc,unused-ignore]
-        """Numbers that depend on the seed and the index of the sample, and not on the pixel. Mitsuba traces the samples
-        of a pixel side by side: lane i is sample i mod n, for n samples a pixel in a pass. `pixels`: of the film, in
-        which groups of `group_pixels` pixels and `sample_count` samples lie one below the other."""
+        """Numbers that depend on the seed and the index of the sample, but not on the pixel. Mitsuba traces the samples
+        of a pixel side by side: lane i is sample i mod n, with n samples per pixel in a pass. `pixels`: size of the
+        film, in which groups of `group_pixels` pixels and `sample_count` samples lie one below the other."""
 
         def __init__(self, properties: Any) -> None:
             super().__init__(properties)
@@ -123,16 +123,16 @@ def _common_numbers(mi: Any, drjit: Any) -> Any:
 def _sensor_around(mi: Any, drjit: Any) -> Any:
     """The class of the wrapper sensor."""
     class Around(mi.Sensor):  # type: ignore[misc,unused-ignore]
-        """Another sensor with a film and a sampler of its own. With `groups`, the film holds the frame so many times,
-        one below the other and each followed by a row that is thrown away."""
+        """Gives another sensor its own film and sampler. With `groups`, the film holds that many frames, one below the
+        other, each followed by a row that is discarded."""
 
         def __init__(self, properties: Any) -> None:
             super().__init__(properties)
             self.inner, self.groups = properties["inner"], properties.get("groups", 0)
 
         def _of_frame(self, position: Any) -> Any:
-            """The position in the frame. Rounding may have moved one across the edge of its row: over the bottom, into
-            the upper half of the row between, or over the top, into the lower half."""
+            """The position in the frame. Rounding may have moved it across an edge of the frame: across the bottom into
+            the upper half of the row between frames, or across the top into the lower half."""
             if self.groups == 0:
                 return position
             height = _size(self.inner)[1]
@@ -157,8 +157,8 @@ def _sensor_around(mi: Any, drjit: Any) -> Any:
 def _surface_guides(mi: Any, drjit: Any) -> Any:
     """The class of the integrator of guides."""
     class SurfaceGuides(mi.SamplingIntegrator):  # type: ignore[misc,unused-ignore]
-        """Albedo and normal of the first surface, then of the first one that scatters light in more than single
-        directions, in the colour of the mirrors and the glass before it (src/integrators/aov.h)."""
+        """Albedo and normal of the first surface, then of the first one that is not purely specular, tinted by the
+        mirrors and the glass in front of it (src/integrators/aov.h)."""
 
         def aov_names(self) -> list[str]:
             return [f"{name}.{c}" for name in _GUIDES for c in "RGB"]
@@ -179,7 +179,7 @@ def _surface_guides(mi: Any, drjit: Any) -> Any:
             return mi.Spectrum(0.0), mi.Bool(True), [*first, *self._guides(behind, tint)]
 
         def _single(self, hit: Any) -> Any:
-            """Whether the surface only scatters light in single directions."""
+            """Whether the surface is purely specular."""
             flags = hit.bsdf().flags()
             return hit.is_valid() & ~mi.has_flag(flags, mi.BSDFFlags.Smooth) & mi.has_flag(flags, mi.BSDFFlags.Delta)
 
@@ -269,22 +269,22 @@ _INTEGRATOR = optional(instance("an Integrator of Mitsuba, its name, or a dictio
 def render(scene: Any, spp: int, seed: int = 0, integrator: Any = None, sensor: int = 0, *, groups: int = 12,
            estimator: PairEstimator = "iicv", aovs: bool = False, progress: Progress | None = None,
            **options: OptionValue) -> MitsubaResult:
-    """Renders a scene by Mitsuba, half of the samples with common random numbers and half with independent ones, and
+    """Renders a scene with Mitsuba, half of the samples with common random numbers and half with independent ones, and
     combines both.
 
     scene: a mitsuba.Scene, or the name of an XML file.
     spp: samples per pixel of both images together.
-    integrator: in place of the scene's: an Integrator, its name, or a dictionary for mitsuba.load_dict().
-    sensor: its number in the scene.
-    groups: of samples in each image, 3 or more; fewer where there are fewer samples.
-    aovs: also albedo and shading normals, "Albedo" and "N", and those of what is seen in mirrors and through glass,
-        "DenoisingAlbedo" and "DenoisingNormal". With `denoise` they are there, and guide it.
+    integrator: instead of the scene's; an Integrator, its name, or a dictionary for mitsuba.load_dict().
+    sensor: its index in the scene.
+    groups: number of groups of samples in each image, at least 3; fewer if there are fewer samples.
+    aovs: also render albedo and shading normals, "Albedo" and "N", and those seen in mirrors and through glass,
+        "DenoisingAlbedo" and "DenoisingNormal". With `denoise` they are always rendered, and guide it.
     progress: called with (done, total) groups.
     options: of the estimator.
 
-    The film's filter is replaced by a box, and a sampler other than `independent` by one, with warnings. As many groups
-    as fit are traced at once. Raises UsageError for what cannot work: a scalar variant, integrators of derivatives or
-    of light paths alone.
+    The film's filter is replaced by a box, and a sampler other than `independent` by that one, with warnings. As many
+    groups as fit are traced at once. Raises UsageError for what cannot work: a scalar variant, and integrators that
+    compute derivatives or trace light paths alone.
     """
     check_options(estimator, options)
     mi = _module()
@@ -325,7 +325,7 @@ def render(scene: Any, spp: int, seed: int = 0, integrator: Any = None, sensor: 
 
 
 def _stacks(count: int, groups: int, width: int, height: int) -> Iterator[tuple[int, int]]:
-    """Batches of groups that are traced together: how many, and samples of each; sizes differ by one at most."""
+    """Batches of groups that are traced together: how many, and samples of each; sizes differ by at most one."""
     for size, number in ((count // groups + 1, count % groups), (count // groups, groups - count % groups)):
         lanes = width * (height + 1) * size
         together = max(1, min(_LANES_OF_STACK // lanes, _ROWS_OF_STACK // (height + 1)))
