@@ -43,8 +43,8 @@ def literal(names):
 
 
 def type_and_default(option):
-    """Of the keyword argument. Options that are not given are not passed on, because one may change another's default:
-    None stands for them; flags are off."""
+    """Type and default of the keyword argument. Options that are not given, None, are not passed on, because an option
+    may change another's default; flags are off."""
     if option["type"] == "flag":
         return "bool", "False"
     text = "str | PathLike[str]" if option["is_path"] else "str"
@@ -60,7 +60,7 @@ def option_line(option):
 
 
 def listed(first, items, last):
-    """Items with commas, broken between items at 120 columns below the opening bracket that `first` ends with."""
+    """Items separated by commas, wrapped at 120 columns and aligned with the opening bracket at the end of `first`."""
     lines, indent = [first], " " * len(first)
     for number, item in enumerate(items):
         text = item + (last if number + 1 == len(items) else ",")
@@ -123,7 +123,7 @@ def arguments_of_render(source):
 
 
 def keywords_module(lists, own):
-    """What type checkers are told of keywords that render() takes as options are declared, beside its own arguments."""
+    """For type checkers: the keywords that render() takes as declared options, besides its own arguments."""
     types = {}
     for option in (option for options in lists for option in options):
         types.setdefault(identifier(option["name"]), set()).update(type_and_default(option)[0].split(" | "))

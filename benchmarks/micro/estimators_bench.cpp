@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The image-space estimators on a synthetic frame of 1280 x 720 pixels with 12 + 12 groups: the stages of iicv one by
 // one, and whole estimators. Stages run on one thread, estimators on all. items_per_second are pixels per second; flops
-// are counted from the formulas, with 20 for an exponential function, and bytes are what is read at least.
+// are counted from the formulas, with 20 for an exponential function, and bytes are the minimum that must be read.
 #include <benchmark/benchmark.h>
 #include <tbb/global_control.h>
 
@@ -63,7 +63,7 @@ const Input& input() {
 
 void count(benchmark::State& state) { state.SetItemsProcessed(state.iterations() * kWidth * kHeight); }
 
-/// What a stage does for each pixel, per second: "flops" or "bytes".
+/// Sets what a stage does for each pixel as a rate per second: "flops" or "bytes".
 void count_work(benchmark::State& state, const char* name, double per_pixel) {
   state.counters[name] =
       benchmark::Counter(per_pixel * kWidth * kHeight, benchmark::Counter::kIsIterationInvariantRate);

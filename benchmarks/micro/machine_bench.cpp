@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What one core of this machine can do at most: the roof under which docs/performance.md places the estimators.
+// The peak rates of one core of this machine: the roofline for the stages in docs/performance.md.
 #include <benchmark/benchmark.h>
 
 #include <vector>

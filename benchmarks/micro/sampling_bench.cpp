@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What learning a control variate costs: adding samples to sums, merging the sums of tiles, solving all cells, looking
-// coefficients up, and making clusters of lights. Cells and lights as in a scene of 280 lights on a grid of 64 cells
-// along the longest side, after 15 samples in each of 320 x 240 pixels. Solving and clustering use all threads.
+// The cost of learning a control variate: adding samples to sums, merging the sums of tiles, solving all cells, looking
+// up coefficients, and clustering lights. Cells and lights are as in a scene of 280 lights on a grid of 64 cells along
+// the longest side, after 15 samples in each of 320 x 240 pixels. Solving and clustering use all threads.
 #include <benchmark/benchmark.h>
 
 #include <map>

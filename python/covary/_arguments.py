@@ -151,12 +151,12 @@ def _scalar(value: Any) -> bool | int | float | str:
 
 
 flag = Rule("True or False", _flag)
-#: Of values whose reader has types of its own.
+#: For values whose reader checks their type.
 scalar = Rule("True, False, a number or text", _scalar)
 text = Rule("text", _text)
 path = Rule("the name of a file or folder, str or os.PathLike", _path)
 function = Rule("a function", _function)
-#: Checked where its memory is read.
+#: The code that reads an array's memory checks it.
 array = Rule("an array", lambda value: value)
 
 

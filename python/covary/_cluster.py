@@ -33,7 +33,7 @@ def _client(value: Any) -> Any:
     return value
 
 
-#: The argument `client`.
+#: The rule of the argument `client`.
 CLIENT = Rule("a dask.distributed.Client", _client)
 
 

@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from .film import Film
 
 Progress = Callable[[int, int], object]
-#: What `--denoise` of the command line takes.
+#: The values of `--denoise` on the command line.
 DenoiseMode = Literal["none", "auto", "bias", "balanced", "error"]
 DENOISE = choice(get_args(DenoiseMode))
 OIDN = empty_or(path)
-#: Checked with the pixels, by the module.
+#: The module checks these together with their pixels.
 IMAGE = Rule("a covary.Film or an array", array.convert)
 _LAYERS = optional(mapping_of(IMAGE, "a mapping from names to arrays"))
 
@@ -107,7 +107,7 @@ def check_options(estimator: str, options: Mapping[str, Any]) -> None:
 class InputReport:
     """The findings of check_inputs(). Correlations are (value, standard error), or None if they cannot be measured."""
 
-    #: Why combine() refuses the images, with the setting to change in the renderer that made them.
+    #: Why combine() refuses the images, and what to change in the renderer that made them.
     errors: list[str]
     warnings: list[str]
     notes: list[str]
@@ -116,7 +116,7 @@ class InputReport:
     crn_vertical: tuple[float, float] | None
     independent_horizontal: tuple[float, float] | None
     independent_vertical: tuple[float, float] | None
-    #: Of the errors of the same pixel in both images: 0.
+    #: Rank correlation of the errors of the same pixel in both images: 0.
     crn_independent: tuple[float, float] | None
     crn_mean: float
     independent_mean: float

@@ -12,7 +12,7 @@ from typing import Any
 from .errors import UsageError
 
 OLDEST = (3, 4, 0)
-#: Of each of the two images.
+#: Groups of each of the two images.
 GROUPS = 12
 
 

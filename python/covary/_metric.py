@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 class MetricResult:
     """An error of an image."""
 
-    #: Mean over the finite pixels.
+    #: The error: the mean over the finite pixels.
     value: float
     n_pixels: int
-    #: Pixels with a value that is not finite in the image or a reference; left out.
+    #: Pixels with a value that is not finite in the image or a reference; they are left out.
     n_non_finite: int
     #: The error of each pixel, [H, W].
     map: FloatArray = field(repr=False)

@@ -67,7 +67,7 @@ def text_options(options: Mapping[str, OptionValue], estimator: str) -> dict[str
     return texts
 
 
-#: Between the numbers of one value, where it is no comma.
+#: Separators between the numbers of a value, where not a comma.
 _SEPARATORS = {"resolution": "x", "split": ":"}
 
 

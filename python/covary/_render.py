@@ -144,7 +144,7 @@ def _check_scene_arguments(scene: PathOrScene, options: Mapping[str, Any]) -> No
         raise UsageError(f"{', '.join(found)}: not of render(), but of Scene.load(): render(Scene.load({load}), …)")
 
 
-#: Options that are keywords as they are declared. Not those that are arguments by another name, or of Scene.load().
+#: Options that are keywords as declared, without those that are arguments by another name or belong to Scene.load().
 _DECLARED = {name: rule for name, rule in declared_rules(_covary.render_options()).items()
              if name not in ("rfilter", "no_preview", "resolution")}
 

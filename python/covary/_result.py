@@ -22,29 +22,29 @@ class Result:
 
     #: Linear Rec. 709, [H, W, 3].
     image: FloatArray = field(repr=False)
-    #: Estimated standard error of each value, [H, W, 3]; None if the estimator has none, or was not asked.
+    #: Estimated standard error of each value, [H, W, 3]; None if the estimator has none, or was not asked for it.
     std_error: FloatArray | None = field(repr=False)
-    #: Estimated bias of each value where it is significant, positive where too bright, zero elsewhere, [H, W, 3]; None
-    #: where it is not known.
+    #: Estimated bias of each value where it is significant, positive if too bright, zero elsewhere, [H, W, 3]; None if
+    #: it is not known.
     bias: FloatArray | None = field(repr=False)
-    #: relMSE that the standard errors predict, with the image in place of a reference.
+    #: relMSE that the standard errors predict, relative to the image itself instead of a reference.
     predicted_relmse: float | None
-    #: Between which it is in 80 of 100 renders; None where that is not known, or cannot be given.
+    #: Bounds between which the relMSE lies in 80 of 100 renders; None if they are not known, or cannot be given.
     predicted_bounds: tuple[float, float] | None
-    #: Why it is not reliable, such as bounds that are further than a factor of 1.5 from it, few samples, or few pixels
-    #: that hold most of it; "" where nothing speaks against it.
+    #: Why the prediction is not reliable, such as bounds farther than a factor of 1.5 from it, few samples, or few
+    #: pixels that hold most of the error; "" if it is.
     prediction_doubt: str
-    #: What the checks of the inputs, or the render, warned of.
+    #: Warnings of the checks of the inputs, or of the render.
     warnings: list[str]
-    #: Pixels with a value that is not finite in an input; the mean of their finite groups stands there.
+    #: Pixels with a value that is not finite in an input; they have the mean of their finite groups.
     nonfinite_pixels: int
-    #: Name and options, as `covary:estimator` of files has them.
+    #: Name and options of the estimator, as in `covary:estimator` of files.
     estimator: str
-    #: Samples per pixel of all images together, on average; None where arrays do not tell.
+    #: Samples per pixel of all images together, on average; None if arrays do not know them.
     samples_per_pixel: float | None
-    #: Images beside it by name, [H, W, 3]: layers, which add up to it, and auxiliary images where they were asked for,
-    #: or guided a denoiser: "Albedo", "N", "P", and of what is seen behind mirrors and glass "DenoisingAlbedo",
-    #: "DenoisingNormal".
+    #: Further images by name, [H, W, 3]: layers, which add up to the image, and auxiliary images if they were asked for
+    #: or guided a denoiser: "Albedo", "N", "P", and "DenoisingAlbedo" and "DenoisingNormal", which are seen in mirrors
+    #: and through glass.
     aovs: dict[str, FloatArray] = field(repr=False)
 
     @checked(path=path)
@@ -75,11 +75,11 @@ class BadSample:
     #: Its pixel in the full frame.
     x: int
     y: int
-    #: Its number in the pixel, or of the light path where `light_path` says so.
+    #: Its index in the pixel, or that of the light path if `light_path` is set.
     sample: int
     value: tuple[float, float, float]
     light_path: bool
-    #: The command that takes it again, alone, and prints it.
+    #: The command that renders this sample alone and prints it.
     replay: str
 
     def __str__(self) -> str:
@@ -104,20 +104,20 @@ class RenderResult(Result):
     films: dict[str, _covary.Film] = field(repr=False)
     render_seconds: float
     estimate_seconds: float
-    #: Whether all passes have the samples that were planned.
+    #: Whether all passes have the planned samples.
     complete: bool
-    #: Whether the predicted error is at most the wanted one, where one was.
+    #: Whether the predicted error is at most the target; None without a target.
     until_reached: bool | None
-    #: Of denoised images: the part of predicted_relmse that is squared bias, and the relMSE that the mean of the
-    #: samples and each denoised image alone would have had, by name.
+    #: For denoised images: the fraction of predicted_relmse that is squared bias, and by name the relMSE that the mean
+    #: of the samples and each denoised image alone would have had.
     bias_share: float | None
     risks: dict[str, float]
-    #: Name and version of the neural network that took part; "" without one.
+    #: Name and version of the neural network that was used; "" without one.
     network: str
-    #: What 95 % of the blocks of 16 x 16 pixels do not exceed of the predicted error; None as predicted_relmse.
+    #: The predicted error that 95 % of the blocks of 16 x 16 pixels do not exceed; None if predicted_relmse is.
     predicted_relmse_p95: float | None
-    #: Samples of all passes that were not finite, and that were negative where none may be. They count as black.
+    #: Samples of all passes that were not finite, or negative although they must not be. They count as black.
     not_finite_samples: int
     negative_samples: int
-    #: The first of them in each pass, with the commands that replay them.
+    #: The first such samples of each pass, with the commands that replay them.
     bad_samples: list[BadSample]

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 class BlenderResult(Result):
     """The result of render()."""
 
-    #: "crn" and "independent", for other estimators.
+    #: "crn" and "independent", to try other estimators.
     films: dict[str, Film] = field(repr=False)
     render_seconds: float
 

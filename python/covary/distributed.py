@@ -38,11 +38,11 @@ if TYPE_CHECKING:
 
 __all__ = ["ClusterResult", "SceneFiles", "experiment", "frames", "main", "render"]
 
-#: Estimators that look at films after the passes, and do not change what passes take.
+#: Estimators that only use the finished films, and do not change what is sampled.
 _ESTIMATORS = ("iicv", "cv-baseline", "iduw", "none")
-#: Options of the image of one pass.
+#: Options of an image made from one pass.
 _OF_ONE_PASS = ("denoise", "oidn")
-#: Keywords of covary.render() that say what passes take.
+#: Keywords of covary.render() that say what is sampled.
 _SETTINGS = ("filter", "sampling", "sampler", "groups", "split")
 
 
@@ -158,12 +158,12 @@ class ClusterResult(Result):
     """The result of render()."""
 
     films: dict[str, Film] = field(repr=False)
-    #: Of the frame, and how many of them were in the folder already.
+    #: Number of parts of the frame, and how many of them were already in the folder.
     parts: int
     parts_kept: int
-    #: From the first part to the last.
+    #: Seconds from the first part to the last.
     render_seconds: float
-    #: As RenderResult has them; the first of each part.
+    #: As in RenderResult; the first bad samples of each part.
     not_finite_samples: int
     negative_samples: int
     bad_samples: list[BadSample]
@@ -175,7 +175,7 @@ class _Plan:
 
     scene: Scene
     estimator: str | None
-    options: dict[str, Any]  #: for combine(), or the image of one pass
+    options: dict[str, Any]  #: for combine(), or for the image of one pass
     settings: dict[str, Any]  #: for covary.render()
     parts: list[Part]
 

@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     from ._result import FloatArray
     from .estimators import PairEstimator
 
-#: Lanes that Mitsuba traces at once, and of groups that are traced together; one group may have more.
+#: Maximum number of lanes that Mitsuba traces at once, and of groups traced together; one group may have more.
 _MOST_LANES = 1 << 32
 _LANES_OF_STACK = 1 << 24
-#: Rows of groups that are traced together: positions of samples, 32-bit floats, keep 1/4096 of a pixel.
+#: Maximum number of rows of groups traced together: positions of samples, 32-bit floats, resolve 1/4096 of a pixel.
 _ROWS_OF_STACK = 4096
-#: Mirrors and panes of glass that guides see through.
+#: Maximum number of specular surfaces that guides follow.
 _FOLLOWED_BOUNCES = 8
 _GUIDES = ("Albedo", "N", "DenoisingAlbedo", "DenoisingNormal")
 _defined: dict[str, None] = {}
@@ -35,7 +35,7 @@ _defined: dict[str, None] = {}
 class MitsubaResult(Result):
     """The result of render()."""
 
-    #: "crn" and "independent", for other estimators: `covary.combine(films["crn"], films["independent"], …)`.
+    #: "crn" and "independent", to try other estimators: `covary.combine(films["crn"], films["independent"], …)`.
     films: dict[str, Film] = field(repr=False)
     render_seconds: float
     estimate_seconds: float

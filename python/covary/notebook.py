@@ -57,7 +57,7 @@ def _file_of(argument: str, image: Any, folder: Path, name: str) -> str:
     return path
 
 
-#: Arrays are checked with their memory, names of files by the program.
+#: Arrays are checked when their memory is read, names of files by the program.
 _IMAGES = Rule("an array, a result, the name of a file, or several of them", lambda value: value)
 
 

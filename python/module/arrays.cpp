@@ -28,7 +28,7 @@ constexpr const char* kArrays = "an array of NumPy or PyTorch, or one with DLPac
 
 std::string text_of(const std::vector<int64_t>& shape) { return fmt::format("[{}]", fmt::join(shape, ", ")); }
 
-/// The sizes that must be so, and -1 for those that need not.
+/// The required sizes, and -1 for those that are free.
 std::vector<int64_t> parse_shape(const std::string& shape) {
   std::vector<int64_t> sizes;
   std::stringstream words(shape);
@@ -51,7 +51,7 @@ void check_shape(const Floats& floats, const std::string& name, const std::strin
             .c_str());
 }
 
-/// NumPy array of memory that a vector holds, which goes when the array does.
+/// A NumPy array of the vector's memory, which is freed with the array.
 nb::object array_of(std::vector<float>&& values, const std::vector<size_t>& shape,
                     const std::vector<int64_t>& strides) {
   auto* kept = new std::vector<float>(std::move(values));
@@ -60,8 +60,8 @@ nb::object array_of(std::vector<float>&& values, const std::vector<size_t>& shap
                                                 strides.empty() ? nullptr : strides.data()));
 }
 
-/// Memory for so many floats, to be freed by std::free. Large arrays lie on large pages where the system has them: the
-/// first touch of 65,000 small ones would take longer than filling them.
+/// Memory for n floats, to be freed with std::free. Large arrays are on huge pages if the system has them: the first
+/// touch of 65,000 small pages would take longer than filling them.
 float* large_pages(size_t n) {
   constexpr size_t kPage = size_t{2} << 20;
   const size_t bytes = (n * sizeof(float) + kPage - 1) / kPage * kPage;
@@ -106,7 +106,7 @@ GroupedImage Groups::view() {
   const int64_t T = source_.shape[0], H = source_.shape[1], W = source_.shape[2];
   GroupedImage image{static_cast<int>(W), static_cast<int>(H), static_cast<int>(T), source_.data};
   const std::vector<int64_t>& s = source_.strides;
-  // A size of 1 leaves its stride open.
+  // With a size of 1, any stride will do.
   const auto lies = [&](int axis, int64_t stride) { return source_.shape[axis] == 1 || s[axis] == stride; };
   if (lies(0, 3) && lies(1, W * T * 3) && lies(2, T * 3) && lies(3, 1)) return image;
   constexpr int64_t kBlock = 128;  // pixels whose groups stay in the fastest memory while they are brought together

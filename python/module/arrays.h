@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Arrays of Python (NumPy, PyTorch, anything with DLPack or the buffer protocol) as images, and images as NumPy arrays.
+// Python arrays (NumPy, PyTorch, anything with DLPack or the buffer protocol) as images, and images as NumPy arrays.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -22,23 +22,23 @@ namespace covary::python {
 
 namespace nb = nanobind;
 
-/// "numpy.ndarray of float64"; what is known of an object that is not taken.
+/// "numpy.ndarray of float64": describes an object that is not accepted.
 std::string describe(nb::handle object);
 
-/// float32 values of a Python array where they lie, with any strides.
+/// The float32 values of a Python array in place, with any strides.
 struct Floats {
   nb::ndarray<nb::ro> owner;
   const float* data = nullptr;
   std::vector<int64_t> shape, strides;  ///< strides in floats
 };
 
-/// The array's values. `name` stands for the argument in messages, `shape` is that wanted, "H, W, 3"; a number in it is
-/// a size that the array must have. Raises TypeError for another type of object, values or device, and ValueError for
-/// another shape.
+/// The array's values. `name` stands for the argument in messages; `shape` is the expected shape, such as "H, W, 3",
+/// whose numbers are sizes that the array must have. Raises TypeError for another type of object, values or device, and
+/// ValueError for another shape.
 Floats floats_of(nb::handle array, const std::string& name, const std::string& shape);
 
-/// An array [T, H, W, 3] as a grouped image. Memory that is [H, W, T, 3] is used as it lies; other orders are brought
-/// into this one when view() is first called, which needs no GIL.
+/// An array [T, H, W, 3] as a grouped image. Memory in the order [H, W, T, 3] is used in place. view() copies other
+/// orders into this one when it is first called, which needs no GIL.
 class Groups {
  public:
   /// Raises like floats_of().
@@ -53,12 +53,12 @@ class Groups {
   std::unique_ptr<float[], decltype(&std::free)> ordered_{nullptr, std::free};
 };
 
-/// An array [H, W, 3] as an image of its own. Raises like floats_of(); `shape` may name the size that it must have.
+/// A copy of an array [H, W, 3] as an image. Raises like floats_of(); `shape` may name the size that it must have.
 Image image_of(nb::handle array, const std::string& name, const std::string& shape = "H, W, 3");
 
-/// [H, W, channels], or [H, W] with one channel, of the image's memory; None where it is empty.
+/// The image's memory as an array [H, W, channels], or [H, W] with one channel; None if the image is empty.
 nb::object array_of(Image&& image);
-/// "predicted_relmse", "predicted_bounds" (low, high), both None where not known, and "prediction_doubt".
+/// Adds "predicted_relmse" and "predicted_bounds" (low, high), both None if not known, and "prediction_doubt".
 void add_prediction(const std::optional<PredictedError>& predicted, nb::dict& to);
 /// [T, H, W, 3] of values in the order [H, W, T, 3].
 nb::object groups_array(std::vector<float>&& values, int width, int height, int groups);

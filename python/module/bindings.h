@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The parts of the extension module `covary._covary`, which the files of python/covary give their shape.
+// The parts of the extension module `covary._covary`, which the files of python/covary wrap.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -16,10 +16,10 @@ namespace covary::python {
 
 namespace nb = nanobind;
 
-/// Makes exceptions of the library those of covary.errors. Like Error(kUsage) and its kind, std::bad_alloc becomes
+/// Translates the library's exceptions: Error to those of covary.errors by its code, and std::bad_alloc to
 /// MemoryError.
 void bind_errors(nb::module_& module);
-/// Estimators, their options, metrics: what the typed functions of the package are made from.
+/// Estimators, their options, and metrics, from which the typed functions of the package are generated.
 void bind_registry(nb::module_& module);
 /// combine() and check_inputs().
 void bind_combine(nb::module_& module);

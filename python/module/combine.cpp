@@ -22,7 +22,7 @@ namespace {
 
 using Counts = nb::ndarray<const uint32_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
-/// One of the two images: an array [T, H, W, 3], or a film, which lies as estimators read it.
+/// One of the two images: an array [T, H, W, 3], or a film, whose memory has the order that estimators read.
 class Input {
  public:
   Input(nb::handle object, const std::string& name) : name_(name) {
@@ -33,9 +33,9 @@ class Input {
   int width() const { return film_ ? film_->width() : groups_->width(); }
   int height() const { return film_ ? film_->height() : groups_->height(); }
   int groups() const { return film_ ? film_->groups() : groups_->groups(); }
-  /// Per pixel, on average; 0 where that is not known.
+  /// Samples per pixel, on average; 0 if not known.
   double samples() const { return samples_; }
-  /// Of each pixel, all groups together. Raises where the image knows them.
+  /// Samples of each pixel in all groups together. Raises if the image has its own.
   void take_counts(std::span<const uint32_t> counts) {
     if (film_)
       throw Error(ErrorCode::kInput, name_ +
@@ -49,7 +49,7 @@ class Input {
     if (!counts_.empty()) image.counts = counts_.data(), image.mean_count = samples_;
     return image;
   }
-  /// What a film tells. Of an array nothing is known but its size: its place is `place` where that has this size.
+  /// The origin of a film. Of an array, only the size is known: its place is `place` if that has the same size.
   ImageOrigin origin(const ImagePlace& place) const {
     const CropWindow& w = place.window;
     if (!film_ && w.width == width() && w.height == height()) return {name_, place, "", "", ""};
@@ -78,7 +78,7 @@ class Input {
   double samples_ = 0;
 };
 
-/// The two images, or the independent one alone, and what an estimator is to make of them.
+/// The two images, or the independent one alone, and the request for what to make of them.
 struct Pair {
   std::optional<Input> crn;
   Input independent;
@@ -88,7 +88,7 @@ struct Pair {
   Pair(nb::handle crn_object, nb::handle independent_object, const Film* light)
       : independent(independent_object, "independent") {
     if (!crn_object.is_none()) crn.emplace(crn_object, "crn");
-    // An array has the place of a film beside it.
+    // An array takes the place of a film given with it.
     const Film* film = light ? light : crn && crn->film() ? crn->film() : independent.film();
     const ImagePlace place = film ? Input::origin_of(*film, "").place : ImagePlace{};
     if (crn) request.crn = source_of(*crn, place);
@@ -110,7 +110,7 @@ struct Pair {
   Pair(const Pair&) = delete;
   Pair& operator=(const Pair&) = delete;
 
-  /// `samples`: of each pixel of the CRN image, where it does not tell them.
+  /// `samples`: samples per pixel of the CRN image, if that does not know them.
   void take_counts(const Counts& counts, std::optional<int> samples) {
     if (counts.shape(0) != static_cast<size_t>(independent.height()) ||
         counts.shape(1) != static_cast<size_t>(independent.width()))
@@ -132,7 +132,7 @@ struct Pair {
   }
 
  private:
-  /// Rows of the arrays or films as they lie, which views bring into order when they are first asked for.
+  /// Rows of arrays or films in place; views reorder them when they are first asked for.
   static GroupedSource source_of(Input& input, const ImagePlace& place) {
     GroupedSource source;
     source.origin = input.origin(place);
@@ -152,7 +152,7 @@ struct CombineArguments {
   std::optional<int> samples;
 };
 
-/// What may come beside the two images; None where it does not.
+/// Optional inputs besides the two images; None if not given.
 struct Beside {
   nb::object counts, light, albedo, normal, denoising_albedo, denoising_normal;
   nb::dict layers;
@@ -209,7 +209,7 @@ const Film* film_of(nb::handle light) {
   return film;
 }
 
-/// Of two images, or of an independent one that is denoised.
+/// The estimator for two images, or for an independent one that is denoised.
 Estimator estimator_of(bool is_pair, const std::string& name, const OptionValues& options,
                        const DenoisingChoice& denoising) {
   if (is_pair) return with_denoising(make_pair_estimator(name, options), denoising);
@@ -277,8 +277,8 @@ std::vector<float> some_values(size_t n, size_t step) {
   return values;
 }
 
-/// Throws what combine() would for the options whatever the images are, by two of a few pixels: the range of some is
-/// checked when the image is made.
+/// Throws what combine() would throw for the options with any images, by combining two of a few pixels: the range of
+/// some options is checked only when the image is made.
 void check_pair_estimator(const std::string& name, const OptionValues& options, const std::string& denoise,
                           const std::string& oidn) {
   constexpr int kSide = 8, kGroups = 24;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What covary.distributed needs of the laboratory: where scenes are, how many parts there are, and the program itself.
+// What covary.distributed needs from lab/: where scenes are, how many parts there are, and how to run the program.
 #include <filesystem>
 
 #include "lab/plan.h"
@@ -23,7 +23,7 @@ std::vector<size_t> numbers_of_parts(const std::string& text) {
   return numbers;
 }
 
-/// Exit code, standard output and error of a program, which does not outlive this process.
+/// Exit code, standard output and standard error of a program, which ends with this process at the latest.
 nb::tuple run_program(const std::vector<std::string>& command) {
   lab::ProcessResult result;
   run_work([&](WorkState& state) { result = lab::run_process(command, &state.stop); }, nb::none());

@@ -15,7 +15,7 @@ namespace {
 
 using Attributes = std::map<std::string, std::string>;
 
-/// The name as the rules of Python's functions take it.
+/// The name, checked by the rule of Python's functions.
 std::string checked_path(nb::handle path) {
   return nb::cast<std::string>(nb::module_::import_("covary._arguments").attr("path")("path", path));
 }
@@ -74,7 +74,7 @@ Film from_groups(nb::object groups, uint32_t samples, const Attributes& attribut
   return film;
 }
 
-/// A view of the film's memory, which keeps the film.
+/// A view of the film's memory, which keeps the film alive.
 nb::object groups_of(nb::handle self) {
   const Film& film = nb::cast<const Film&>(self);
   const auto T = static_cast<size_t>(film.groups()), W = static_cast<size_t>(film.width());
@@ -90,7 +90,7 @@ nb::object counts_of(nb::handle self) {
       film.counts().data(), {static_cast<size_t>(film.height()), static_cast<size_t>(film.width())}, self));
 }
 
-/// The group means as they lie, [H, W, T, 3].
+/// The group means in their memory order, [H, W, T, 3].
 nb::object memory_of(nb::handle self) {
   const Film& film = nb::cast<const Film&>(self);
   return nb::cast(nb::ndarray<nb::numpy, const float, nb::ndim<4>>(

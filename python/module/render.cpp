@@ -61,13 +61,13 @@ std::shared_ptr<LoadedScene> load(const std::string& path, const SceneChoice& ch
   return scene;
 }
 
-/// What render() is asked for.
+/// The request to render().
 struct Choice {
   Options values, of_estimator;  ///< as the command line has them
   bool films_only = false;       ///< no image is made of the films
 };
 
-/// Values in the ranges of their options alone.
+/// The settings. Throws Error(kUsage) for values outside the ranges of their options.
 RenderSettings settings_of(const Options& values) {
   for (const Option& option : options_of<RenderSettings>())
     if (const auto given = values.find(option.name); given != values.end() && !accepted(option, given->second))
@@ -89,7 +89,7 @@ Plan plan_of(const RenderSettings& settings, const Choice& choice) {
   return plan;
 }
 
-/// The first samples of a pass that count as black, with what replays them.
+/// Adds the first samples of a pass that count as black, with the commands that replay them.
 void add_bad_samples(const Pass& pass, const Options& given, nb::list& list) {
   for (const BadSample& bad : pass.result.bad_samples) {
     nb::dict d;
@@ -170,8 +170,8 @@ nb::dict render_scene(const LoadedScene& scene, const Choice& choice, const Opti
   return made;
 }
 
-/// What render() would make of the films of its passes, in their order, and the auxiliary images: those of a render in
-/// parts. Has render()'s bits.
+/// What render() would make of the films of its passes, in their order, and of the auxiliary images, for renders in
+/// parts; with the same bits as render().
 nb::dict image_of_films(const Options& values, const Options& of_estimator, nb::dict films, nb::dict aovs) {
   const RenderSettings settings = settings_of(values);
   const Plan plan = plan_of(settings, {values, of_estimator});

@@ -28,7 +28,7 @@ class Event {
     set_ = true;
     changed_.notify_all();
   }
-  /// Whether it was set before the time was over.
+  /// Whether it was set before the time limit.
   bool wait() {
     std::unique_lock lock(mutex_);
     return changed_.wait_for(lock, kPoll, [this] { return set_; });
@@ -40,8 +40,8 @@ class Event {
   bool set_ = false;
 };
 
-/// A thread that works when asked. Threads are kept between calls, because each new one that enters TBB leaves some
-/// memory of TBB behind.
+/// A thread that waits for jobs. Threads are kept between calls, because each new one that enters TBB leaves some of
+/// TBB's memory behind.
 class Worker {
  public:
   Worker() {
@@ -68,7 +68,8 @@ class Worker {
   std::function<void()> job_;
 };
 
-/// Those without work; as many exist as calls have been at once. They live until the process ends, without destructors.
+/// Idle workers. There are as many workers as there were concurrent calls; they live, undestroyed, until the process
+/// ends.
 class Workers {
  public:
   static Workers& all() {
@@ -100,7 +101,7 @@ void check_not_forked() {
                 "by multiprocessing.get_context('spawn'), or use covary in them only");
 }
 
-/// Calls `progress` where the numbers have changed.
+/// Calls `progress` if the numbers have changed.
 class Reporter {
  public:
   explicit Reporter(nb::handle progress) : progress_(progress) {}

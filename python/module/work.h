@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Long work for a Python caller: without the GIL, ended by Ctrl-C, with progress.
+// Long work for a Python caller: without the GIL, interruptible by Ctrl-C, with progress.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -12,20 +12,20 @@ namespace covary::python {
 
 namespace nb = nanobind;
 
-/// What the work and its caller tell each other, from any thread.
+/// Shared by the work and its caller, on any thread.
 struct WorkState {
   std::atomic<bool> stop{false};  ///< the caller wants it to end
   std::atomic<uint64_t> done{0}, total{0};
 };
 
-/// Runs `work` in a thread of its own while this one waits without the GIL, looks for signals and calls `progress`
-/// (a function of done and total, or None), 20 times a second. Rethrows what the work threw; once a signal's handler or
-/// `progress` has raised, this is raised instead, when the work has ended. Throws Error(kUsage) in a process that was
-/// forked after the first call, because the threads of the library are not in it.
+/// Runs `work` on another thread. Meanwhile this thread waits without the GIL, checks for signals and calls `progress`
+/// (a function of done and total, or None), 20 times a second. Rethrows what the work threw. If a signal's handler or
+/// `progress` raised, that is raised instead once the work has ended. Throws Error(kUsage) in a process that was forked
+/// after the first call, because it lacks the library's threads.
 void run_work(const std::function<void(WorkState&)>& work, nb::handle progress);
 
-/// Runs `body`, whose parallel loops end early when `state.stop` is set: what it has made is then to be thrown away.
-/// Returns whether it came to its end.
+/// Runs `body`, whose parallel loops end early when `state.stop` is set; its results must then be discarded. Returns
+/// whether it ran to its end.
 bool run_stoppable(WorkState& state, const std::function<void()>& body);
 
 }  // namespace covary::python
