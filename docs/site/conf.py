@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The documentation as a site (scripts/docs): the Markdown of the repository as it is, in its own folders."""
+"""The documentation as a website (scripts/docs), from the repository's Markdown in place."""
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
