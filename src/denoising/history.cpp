@@ -87,22 +87,6 @@ Image limited(const Image& frame, const Image& accumulated, const Image& std_err
 /// Most of R that R' is made of, so that new samples always count.
 constexpr float kMostOfSamples = 0.9f;
 
-/// What squared errors of samples count: 1 / (F'^2 + 0.01) by the mean F of the frame's mixture and the history. By a
-/// picture made of the frame's samples alone, pixels that are bright by chance would count less, and with them what
-/// the history takes away.
-Image counts_of(const History& history, const Image& guide) {
-  Image counts(guide.width, guide.height, 1);
-  for (size_t i = 0; i < counts.data.size(); ++i) {
-    std::array<float, 3> mean;
-    for (size_t c = 0; c < 3; ++c) {
-      const float now = guide.data[3 * i + c];
-      mean[c] = history.known[i] ? 0.5f * (now + history.image.data[3 * i + c]) : now;
-    }
-    counts.data[i] = relative_weight(mean.data());
-  }
-  return counts;
-}
-
 /// Least and most that history is multiplied by.
 constexpr float kLeastFactor = 0.1f, kMostFactor = 10;
 
@@ -112,8 +96,8 @@ constexpr float kLeastFactor = 0.1f, kMostFactor = 10;
 ///
 /// over pixels that look alike, d: sum of what the frame's own samples differ by from them, of the variance v, which
 /// halves tell; r: their own sum. The shrinkage is that of James and Stein: where d is noise alone, f is near 1.
-Image light_factors(const History& history, const HistoryInput& input, const Image& counts,
-                    const std::array<const Image*, 2>& before) {
+Image light_factors(const History& history, const HistoryInput& input, const std::array<const Image*, 2>& before) {
+  const Image& counts = *input.common_counts;
   std::vector<unsigned char> valid = *input.valid;
   for (size_t i = 0; i < valid.size(); ++i) valid[i] = valid[i] && history.known[i];
   constexpr int kPlanes = 9;  // d, r and v of three channels
@@ -169,18 +153,26 @@ Mixture mixture_of(const HistoryInput& input, const CandidateSet& whole, const s
   return mix(of_history);
 }
 
-void check_size(const Image& before, const Image& now) {
-  if (before.width != now.width || before.height != now.height)
-    throw Error(ErrorCode::kInput, "the history has another size than the frame");
-}
-
 }  // namespace
 
+Image counts_of(const History& history, const Image& guide) {
+  if (history.image.width != guide.width || history.image.height != guide.height)
+    throw Error(ErrorCode::kInput, "the history has another size than the frame");
+  Image counts(guide.width, guide.height, 1);
+  for (size_t i = 0; i < counts.data.size(); ++i) {
+    std::array<float, 3> mean;
+    for (size_t c = 0; c < 3; ++c) {
+      const float now = guide.data[3 * i + c];
+      mean[c] = history.known[i] ? 0.5f * (now + history.image.data[3 * i + c]) : now;
+    }
+    counts.data[i] = relative_weight(mean.data());
+  }
+  return counts;
+}
+
 void add_samples(const History& history, const HistoryInput& input, Image& mean, std::array<Image, 2>& halves) {
-  check_size(history.samples[0], mean);
-  const Image counts = counts_of(history, *input.guide);
   std::array<Image, 2> samples = history.samples;
-  const Image factors = light_factors(history, input, counts, {&samples[0], &samples[1]});
+  const Image factors = light_factors(history, input, {&samples[0], &samples[1]});
   for (Image& half : samples) multiply(factors, half);
   Image before = samples[0];
   for (size_t i = 0; i < before.data.size(); ++i) before.data[i] = 0.5f * (before.data[i] + samples[1].data[i]);
@@ -191,17 +183,15 @@ void add_samples(const History& history, const HistoryInput& input, Image& mean,
   std::array<CandidateSet, 2> sets;
   for (const int half : {0, 1}) sets[half] = {halves[half], {with_samples(halves[half], samples[half], trust)}};
   HistoryInput counted = input;
-  counted.counts = {&counts, &counts};
+  counted.counts = {input.common_counts, input.common_counts};
   Mixture mixture = mixture_of(counted, {mean, {with_samples(mean, before, trust)}}, sets);
   mean = std::move(mixture.image);
   halves = std::move(mixture.halves);
 }
 
 Image add_history(const History& before, const HistoryInput& input, const Mixture* accumulated, Mixture& frame) {
-  check_size(before.image, frame.image);
-  const Image counts = counts_of(before, *input.guide);
   History history{before.image, before.squared_error, before.known, {}};
-  multiply(light_factors(before, input, counts, {&before.image, &before.image}), history.image);
+  multiply(light_factors(before, input, {&before.image, &before.image}), history.image);
   const Image limits = steady(*input.std_error, frame.image);
   CandidateSet whole{frame.image, {candidate(frame.image, history, *input.std_error, limits, 1)}};
   std::array<CandidateSet, 2> halves;

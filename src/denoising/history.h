@@ -52,15 +52,21 @@ struct HistoryInput {
   const Image* guide = nullptr;                       ///< as in MixtureInput
   const std::vector<unsigned char>* valid = nullptr;  ///< as there
   std::array<const Image*, 2> counts = {};            ///< as there
+  const Image* common_counts = nullptr;               ///< counts_of()
 };
 
+/// What squared errors of samples count: 1 / (F'^2 + 0.01) by the mean F of the frame's mixture and the history. By a
+/// picture made of the frame's samples alone, pixels that are bright by chance would count less, and with them what
+/// the history takes away. Throws Error(kInput) where sizes differ.
+Image counts_of(const History& history, const Image& guide);
+
 /// Adds History::samples to the frame's own: from Y, Y_A and Y_B to the mean of R'_A and R'_B and these. Bit-identical
-/// for any number of threads. Throws Error(kInput) where sizes differ.
+/// for any number of threads.
 void add_samples(const History& history, const HistoryInput& input, Image& mean, std::array<Image, 2>& halves);
 
 /// Adds the history to the frame's mixture and to its halves; `accumulated`: D and its halves, or null. The weights of
 /// `frame` become what is left to it; returned are those of C and D together, one channel. Bit-identical for any number
-/// of threads. Throws Error(kInput) where sizes differ.
+/// of threads.
 Image add_history(const History& history, const HistoryInput& input, const Mixture* accumulated, Mixture& frame);
 
 }  // namespace covary

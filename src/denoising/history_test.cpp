@@ -37,7 +37,7 @@ Moments moments_of(const Image& image) {
 struct Frame {
   std::array<Moments, 2> independent;
   Mixture mixture;
-  Image std_error, guide = flat(0, 0, 0);
+  Image std_error, guide = flat(0, 0, 0), common_counts;
   std::vector<unsigned char> valid = std::vector<unsigned char>(size_t{kSize} * kSize, 1);
 
   explicit Frame(uint64_t seed)
@@ -52,8 +52,13 @@ struct Frame {
     std::fill(std_error.data.begin(), std_error.data.end(), std_deviation());
   }
   static float std_deviation() { return static_cast<float>(std::sqrt(kFrameVariance / 2)); }
-  HistoryInput input() const { return {{&independent[0], &independent[1]}, &std_error, &guide, &valid, {}}; }
-  Image add(const History& history) { return add_history(history, input(), nullptr, mixture); }
+  HistoryInput input(const History& history) {
+    common_counts = counts_of(history, guide);
+    return {{&independent[0], &independent[1]}, &std_error, &guide, &valid, {}, &common_counts};
+  }
+  Image add(const History& history, const Mixture* accumulated = nullptr) {
+    return add_history(history, input(history), accumulated, mixture);
+  }
 };
 
 History history(Image image) {
@@ -127,17 +132,17 @@ TEST(History, HasNoPartWhereItIsUnknownOrUncertain) {
 struct Samples {
   std::array<Image, 2> halves;
   Image mean;
-  explicit Samples(const Frame& frame, const std::array<Image, 2>& before) : mean(kSize, kSize, 3) {
+  explicit Samples(Frame& frame, const std::array<Image, 2>& before) : mean(kSize, kSize, 3) {
     for (const int half : {0, 1}) halves[half] = mean_image(frame.independent[half]);
     for (size_t i = 0; i < mean.data.size(); ++i) mean.data[i] = 0.5f * (halves[0].data[i] + halves[1].data[i]);
     History all = history(flat(0, 0, 0));
     all.samples = before;
-    add_samples(all, frame.input(), mean, halves);
+    add_samples(all, frame.input(all), mean, halves);
   }
 };
 
 TEST(History, AddsSamplesByTheirVariance) {
-  const Frame frame(6);
+  Frame frame(6);
   const Samples added(frame, {flat(0, kNoise / 4, 71), flat(0, kNoise / 4, 72)});
   // The best weight of the history is 0.8, which leaves a fifth of the variance.
   EXPECT_NEAR(mean_squared_error(added.halves[0]) / kNoise, 0.2, 0.02);
@@ -153,14 +158,14 @@ TEST(History, AddsSamplesByTheirVariance) {
 TEST(History, CountsErrorsOfSamplesAlikeWhereTheyAreBrightByChance) {
   Frame frame(9);
   std::array<Image, 2> counts = {Image(kSize, kSize, 1), Image(kSize, kSize, 1)};
-  HistoryInput input = frame.input();
+  History same = history(flat(0, 0, 0));
+  HistoryInput input = frame.input(same);
   for (const int half : {0, 1}) {  // by pictures in which the half's noise is left
     for (int y = 0; y < kSize; ++y)
       for (int x = 0; x < kSize; ++x)
         *counts[half].pixel(x, y) = 1 / (0.01f + std::pow(frame.independent[half].mean.row(0, y)[x], 2.0f));
     input.counts[half] = &counts[half];
   }
-  History same = history(flat(0, 0, 0));
   same.samples = {flat(0, kNoise, 171), flat(0, kNoise, 172)};
   std::array<Image, 2> halves = {mean_image(frame.independent[0]), mean_image(frame.independent[1])};
   Image mean = halves[0];
@@ -179,7 +184,7 @@ TEST(History, FollowsLightThatIsDimmed) {
 }
 
 TEST(History, AddsNoSamplesOfWhatHasChanged) {
-  const Frame frame(7);
+  Frame frame(7);
   const Samples added(frame, {flat(0.8f, kNoise / 4, 71), flat(0.8f, kNoise / 4, 72)});
   EXPECT_LT(mean_squared_error(added.mean) / (kNoise / 2), 1.2);
 }
@@ -191,7 +196,7 @@ TEST(History, TakesWhatWasMadeOfAllSamplesWhereItIsBetter) {
     const Mixture better{flat(offset, kFrameVariance / 20, 81),
                          {flat(offset, kFrameVariance / 10, 82), flat(offset, kFrameVariance / 10, 83)},
                          {}};
-    const Image weights = add_history(history(flat(1, 0, 0)), frame.input(), &better, frame.mixture);
+    const Image weights = frame.add(history(flat(1, 0, 0)), &better);
     EXPECT_LT(mean_squared_error(frame.mixture.image), most * alone);
     EXPECT_NEAR(frame.mixture.weights[0].data[7], 0.6f * (1 - weights.data[7]), 1e-6f);
   }
@@ -211,7 +216,7 @@ TEST(History, LetsNoFireflyOfAFrameStay) {
   for (Image* image : {&firefly.image, &firefly.halves[0], &firefly.halves[1]})
     std::fill_n(image->pixel(30, 30), 3, 100.0f);
   const Image before = frame.mixture.image;
-  add_history(history(flat(0, 0, 0)), frame.input(), &firefly, frame.mixture);
+  frame.add(history(flat(0, 0, 0)), &firefly);
   EXPECT_LE(frame.mixture.image.pixel(30, 30)[1] - before.pixel(30, 30)[1], 3.01f * Frame::std_deviation());
 }
 

@@ -142,11 +142,11 @@ Mixture mixture_of_halves(const std::array<Image, 2>& halves, const std::vector<
 void use_history(const MixingHistory& use, const DenoisingParts& parts, const std::vector<CandidateMaker>& makers,
                  const PartsWeighting& chosen, const Image& frame_error, MixedParts& mixed,
                  std::vector<Image>& kept_samples) {
-  HistoryInput input{{&parts.halves[0].independent, &parts.halves[1].independent},
-                     &frame_error,
-                     &guide_of(mixed.whole),
-                     &parts.valid,
-                     {}};
+  const Image& guide = guide_of(mixed.whole);
+  HistoryInput input{
+      {&parts.halves[0].independent, &parts.halves[1].independent}, &frame_error, &guide, &parts.valid, {}, nullptr};
+  const Image common_counts = use.before ? counts_of(*use.before, guide) : Image();
+  input.common_counts = &common_counts;
   for (const int half : {0, 1})
     if (parts.is_mean) input.counts[half] = &mixed.counts[half];
   std::array<Image, 2> halves = {parts.halves[0].image.estimate, parts.halves[1].image.estimate};

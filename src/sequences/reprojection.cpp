@@ -144,23 +144,33 @@ bool move_samples(const Image& samples, const Image& before, const Place& place,
   return finite;
 }
 
-/// How far the pixel may show what moves otherwise near it: the largest squared difference of what the picture shows
-/// where the neighbours' motions lead from `moved`; 0 where all move alike.
-float edge_error(const Image& before, const Image& motion, int x, int y, const float* moved) {
+/// Whether `is_so` of a motion in the surrounding 3 x 3 pixels that differs from that of (x, y).
+template <class F>
+bool any_other_motion(const Image& motion, int x, int y, const F& is_so) {
   const float* here = motion.pixel(x, y);
-  float most = 0;
   for (int ny = std::max(y - 1, 0); ny <= std::min(y + 1, motion.height - 1); ++ny)
     for (int nx = std::max(x - 1, 0); nx <= std::min(x + 1, motion.width - 1); ++nx) {
       const float* there = motion.pixel(nx, ny);
-      if (std::abs(there[0] - here[0]) <= kEdge && std::abs(there[1] - here[1]) <= kEdge) continue;
-      const auto within = [](float at, int size) { return std::clamp(at, 0.5f, static_cast<float>(size) - 0.5f); };
-      const Place other{x, y, false, tap(within(static_cast<float>(x) + 0.5f + there[0], motion.width)),
-                        tap(within(static_cast<float>(y) + 0.5f + there[1], motion.height))};
-      float value[3], squares = 0;
-      if (!move(before, other, value)) return kInfinity;
-      for (int c = 0; c < 3; ++c) squares += sqr(value[c] - moved[c]) / 3;
-      most = std::max(most, squares);
+      const bool is_alike = std::abs(there[0] - here[0]) <= kEdge && std::abs(there[1] - here[1]) <= kEdge;
+      if (!is_alike && is_so(there)) return true;
     }
+  return false;
+}
+
+/// How far the pixel may show what moves otherwise near it: the largest squared difference of what the picture shows
+/// where the neighbours' motions lead from `moved`; 0 where all move alike.
+float edge_error(const Image& before, const Image& motion, int x, int y, const float* moved) {
+  float most = 0;
+  any_other_motion(motion, x, y, [&](const float* there) {
+    const auto within = [](float at, int size) { return std::clamp(at, 0.5f, static_cast<float>(size) - 0.5f); };
+    const Place other{x, y, false, tap(within(static_cast<float>(x) + 0.5f + there[0], motion.width)),
+                      tap(within(static_cast<float>(y) + 0.5f + there[1], motion.height))};
+    float value[3], squares = 0;
+    const bool is_finite = move(before, other, value).has_value();
+    for (int c = 0; c < 3; ++c) squares += sqr(value[c] - moved[c]) / 3;
+    most = is_finite ? std::max(most, squares) : kInfinity;
+    return !is_finite;
+  });
   return most;
 }
 
@@ -181,12 +191,7 @@ Image smoothed(const Image& image) {
 }  // namespace
 
 bool is_motion_edge(const Image& motion, int x, int y) {
-  const float* here = motion.pixel(x, y);
-  for (int ny = std::max(y - 1, 0); ny <= std::min(y + 1, motion.height - 1); ++ny)
-    for (int nx = std::max(x - 1, 0); nx <= std::min(x + 1, motion.width - 1); ++nx)
-      for (const int c : {0, 1})
-        if (!(std::abs(motion.pixel(nx, ny)[c] - here[c]) <= kEdge)) return true;
-  return false;
+  return any_other_motion(motion, x, y, [](const float*) { return true; });
 }
 
 History reproject(const Image& before, const Image& depth_before, const MotionLayers& now,
