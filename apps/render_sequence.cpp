@@ -22,6 +22,7 @@
 #include "plans/budget.h"
 #include "plans/camera_path.h"
 #include "plans/pass_files.h"
+#include "sequences/feature_slopes.h"
 #include "sequences/reprojection.h"
 
 namespace covary {
@@ -135,12 +136,14 @@ std::shared_ptr<const History> history_of(const std::string& path, const RenderR
   Image depth(before.image.width, before.image.height, 1);
   const std::vector<ExrPlane> planes = {{"Depth", ExrPlane::Type::kFloat, depth.data.data(), sizeof(float)}};
   ExrFile(path).read(planes);
-  std::array<Image, 2> samples;
   const std::vector<std::string> layers = image_layers(inspect_image(path).channels);
-  if (std::find(layers.begin(), layers.end(), kKeptSamples[0]) != layers.end())
-    for (size_t half = 0; half < samples.size(); ++half) samples[half] = read_image(path, kKeptSamples[half]).image;
-  return std::make_shared<History>(
-      reproject(before.image, depth, {request.beside.at("Depth"), request.beside.at("Motion")}, samples));
+  const auto kept = [&](size_t i) {
+    const bool is_kept = std::find(layers.begin(), layers.end(), kKeptSamples[i]) != layers.end();
+    return is_kept ? read_image(path, kKeptSamples[i]).image : Image();
+  };
+  return std::make_shared<History>(reproject(before.image, depth,
+                                             {request.beside.at("Depth"), request.beside.at("Motion")},
+                                             {kept(0), kept(1)}, history_features(kept(2), kept(3))));
 }
 
 class SequenceRender {

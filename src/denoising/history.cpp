@@ -16,13 +16,12 @@ namespace {
 constexpr float kInterval = 3;        // k, in standard errors
 constexpr int kErrorWindow = 5;       // side, pixels
 constexpr float kLeastScale = 0.02f;  // of relative standard errors
-/// c: both interpolations have errors in common, which their difference does not tell (docs/methods/sequences.md).
-constexpr float kOfMoving = 5;
 /// How much the weights of the whole image count (MixtureInput::prior).
-constexpr float kPrior = 1;
+constexpr float kPrior = 2;
 /// MixtureInput::bias_share. Halves have twice the variance of the frame and the same history, so that history counts
-/// right for the whole where its error, which for the halves is all bias, counts twice.
-constexpr float kShare = 2;
+/// right for the whole where its error, which for the halves is all bias, counts twice. But windows of few samples
+/// overrate it (docs/notes/sequences.md).
+constexpr float kShare = 1.4f;
 
 /// How far what was moved by parts of a pixel is to be trusted, beside a frame's image with an error `scale` times as
 /// large as that of the whole.
@@ -30,7 +29,7 @@ float trust_at(const History& history, const Image& std_error, float scale, int 
   if (!history.known[static_cast<size_t>(y) * history.image.width + x]) return 0;
   const float* s = std_error.pixel(x, y);
   const float variance = sqr(scale) * (sqr(s[0]) + sqr(s[1]) + sqr(s[2])) / 3;
-  return variance > 0 ? variance / (variance + kOfMoving * *history.squared_error.pixel(x, y)) : 0;
+  return variance > 0 ? variance / (variance + *history.squared_error.pixel(x, y)) : 0;
 }
 
 /// Medians of relative standard errors over windows, times the picture. The error of a pixel alone is small where its
@@ -154,6 +153,27 @@ Mixture mixture_of(const HistoryInput& input, const CandidateSet& whole, const s
 }
 
 }  // namespace
+
+void follow_features(History& history, const Image& albedo, const Image& normal) {
+  if (history.features.data.empty()) return;
+  for (const Image* image : {&albedo, &normal})
+    if (image->data.size() != history.image.data.size())
+      throw Error(ErrorCode::kInput, "the guides have another size than the history");
+  parallel_for(history.known.size(), 1024, [&](size_t i) {
+    if (!history.known[i]) return;
+    const float* const before = &history.features.data[6 * i];
+    const float* const slopes = &history.slopes.data[18 * i];
+    for (size_t c = 0; c < 3; ++c) {
+      float change = 0;
+      for (size_t f = 0; f < 6; ++f)
+        change += slopes[3 * f + c] * ((f < 3 ? albedo : normal).data[3 * i + f % 3] - before[f]);
+      if (!std::isfinite(change)) continue;
+      history.image.data[3 * i + c] += change;
+      for (Image& half : history.samples)
+        if (!half.data.empty()) half.data[3 * i + c] += change;
+    }
+  });
+}
 
 Image counts_of(const History& history, const Image& guide) {
   if (history.image.width != guide.width || history.image.height != guide.height)

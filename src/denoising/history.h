@@ -4,7 +4,7 @@
 // M: the mixture of the frame alone, with the standard error s; s*: M times the median of s / M of 5 x 5 pixels; H: the
 // history, moved to where it is seen now, of samples that are independent of the frame's. The candidate is
 //
-//     C = M + clamp(H - M, -k s*, k s*) / (1 + c e / s'^2),   e: squared error of H for being moved by parts of pixels,
+//     C = M + clamp(H - M, -k s*, k s*) / (1 + e / s'^2),     e: squared error of H for being moved by parts of pixels,
 //                                                             s'^2: mean of s^2 over the channels,
 //
 // so that history never leaves the interval in which the frame itself may be: what has changed (moving shadows, lamps
@@ -21,7 +21,7 @@
 // Where the samples of frames before are kept, they are denoised once more. With means of both halves of them, R_A and
 // R_B, and of the frame's own, Y_A and Y_B,
 //
-//     R'_h = Y_h + b t (R_h - Y_h),   t = 0.9 / (1 + c e / s'^2),   b by mix(): Y_B judges R_A, and Y_A judges R_B.
+//     R'_h = Y_h + b t (R_h - Y_h),   t = 0.9 / (1 + e / s'^2),     b by mix(): Y_B judges R_A, and Y_A judges R_B.
 //
 // So b follows from the variances of both and from what has changed, and R'_A and R'_B are independent of each other.
 // The frame's denoiser makes a mixture D of them as it does of its own samples. D is a second candidate beside C, in
@@ -41,10 +41,18 @@ struct History {
   Image squared_error;               ///< 1 channel: e
   std::vector<unsigned char> known;  ///< 0: nothing is known there
   std::array<Image, 2> samples;      ///< R_A and R_B, 3 channels; empty where they were not kept
+  /// Albedo and normal as the frame before had them there, and what the picture changes by with them: of feature i and
+  /// channel c at 3 i + c. Empty where they were not kept.
+  Image features, slopes;
 };
 
-/// Layers of a frame's file with R'_A and R'_B, EstimatorResult::kept_samples.
-inline constexpr std::array<const char*, 2> kKeptSamples = {"HistoryA", "HistoryB"};
+/// Adds to a history what this frame's features differ by from those that were moved, times the slopes: at edges and in
+/// textures, pixels show other parts of the same surfaces than before, and features tell which. Nothing where it has
+/// no features. Both have 3 channels. Throws Error(kInput) where sizes differ.
+void follow_features(History& history, const Image& albedo, const Image& normal);
+
+/// Layers of a frame's file with R'_A, R'_B, albedo and normal: EstimatorResult::kept_samples.
+inline constexpr std::array<const char*, 4> kKeptSamples = {"HistoryA", "HistoryB", "HistoryAlbedo", "HistoryNormal"};
 
 struct HistoryInput {
   std::array<const Moments*, 2> independent = {};     ///< as in MixtureInput

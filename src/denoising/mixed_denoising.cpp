@@ -158,7 +158,9 @@ void use_history(const MixingHistory& use, const DenoisingParts& parts, const st
     accumulated = mixture_of_halves(halves, makers, chosen);
   }
   if (use.before) add_history(*use.before, input, accumulated ? &*accumulated : nullptr, mixed.mixture);
-  if (use.keep_samples && uses_samples) std::move(halves.begin(), halves.end(), std::back_inserter(kept_samples));
+  if (!use.keep_samples) return;
+  kept_samples.assign(kKeptSamples.size(), Image());
+  if (uses_samples) std::move(halves.begin(), halves.end(), kept_samples.begin());
 }
 
 }  // namespace
@@ -242,13 +244,29 @@ MixedDenoising single_candidate(const GroupedImage& independent, const std::vect
 using Run = std::function<MixedDenoising(const GroupedImage& crn, const GroupedImage& independent,
                                          const PairSettings& settings)>;
 
+/// denoise_by_mixture() with guides for the history, which are kept for the next frame.
+MixedDenoising denoise_frame(DenoisingParts parts, const std::vector<CandidateMaker>& makers,
+                             const MixedDenoisingOptions& options, const PairSettings& settings,
+                             std::span<const Layer> layers) {
+  const Image *const albedo = settings.guides.albedo, *const normal = settings.guides.normal;
+  const bool has_guides = albedo && normal;
+  MixingHistory history = options.history;
+  if (history.before && has_guides) {
+    const auto before = std::make_shared<History>(*history.before);
+    follow_features(*before, *albedo, *normal);
+    history.before = before;
+  }
+  MixedDenoising out = denoise_by_mixture(std::move(parts), makers, options.mode, settings.std_error, layers, history);
+  if (history.keep_samples && has_guides) out.result.kept_samples[2] = *albedo, out.result.kept_samples[3] = *normal;
+  return out;
+}
+
 Run run_of_pair(const Estimator& base, const MixedDenoisingOptions& options, bool with_oidn) {
   return [=](const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings) {
     check_guides(settings.guides);
     std::vector<CandidateMaker> makers = {filtered_candidates(settings.guides)};
     if (with_oidn) makers.push_back(neural_candidates(settings.guides, options.oidn));
-    return denoise_by_mixture(parts_of_pair(base, crn, independent, settings), makers, options.mode, settings.std_error,
-                              {}, options.history);
+    return denoise_frame(parts_of_pair(base, crn, independent, settings), makers, options, settings, {});
   };
 }
 
@@ -259,8 +277,7 @@ Run run_of_mean(const MixedDenoisingOptions& options, bool with_oidn) {
     if (with_oidn) makers.push_back(neural_candidates(settings.guides, options.oidn, CandidateBase::kMean));
     makers.push_back(filtered_candidates(settings.guides, CandidateBase::kMean, !with_oidn));
     if (!can_be_mixed(independent)) return single_candidate(independent, makers, settings.layers);
-    return denoise_by_mixture(parts_of_mean(independent), makers, options.mode, settings.std_error, settings.layers,
-                              options.history);
+    return denoise_frame(parts_of_mean(independent), makers, options, settings, settings.layers);
   };
 }
 

@@ -255,19 +255,22 @@ TEST(MixedDenoising, OfFramesUsesSamplesOfFramesBefore) {
     const test::Grouped frame = test::noisy_image(kWidth, kHeight, 4, seed, 1.0f, 0);
     const EstimatorResult result =
         denoise_by_mixture(parts_of_mean(frame.view()), {same}, DenoiseMode::kAuto, false, {}, history).result;
-    ASSERT_EQ(result.kept_samples.size(), 2u);
+    ASSERT_EQ(result.kept_samples.size(), kKeptSamples.size());
     errors.push_back(square_error(result.estimate, 1 / kOutliers));
     history.before = std::make_shared<History>(History{result.estimate,
                                                        Image(kWidth, kHeight, 1),
                                                        std::vector<unsigned char>(size_t{kWidth} * kHeight, 1),
-                                                       {result.kept_samples[0], result.kept_samples[1]}});
+                                                       {result.kept_samples[0], result.kept_samples[1]},
+                                                       Image(),
+                                                       Image()});
   }
   EXPECT_LT(errors[1], 0.7 * errors[0]);
   EXPECT_LT(errors[3], 0.45 * errors[0]);
   same.network = false;
   const test::Grouped frame = test::noisy_image(kWidth, kHeight, 4, 55, 1.0f, 0);
   EXPECT_TRUE(denoise_by_mixture(parts_of_mean(frame.view()), {same}, DenoiseMode::kAuto, false, {}, history)
-                  .result.kept_samples.empty());
+                  .result.kept_samples[0]
+                  .data.empty());
 }
 
 TEST(MixedDenoising, OfASinglePassKeepsFirefliesFromCandidates) {

@@ -70,7 +70,7 @@ bool PlanRun::estimate() {
   }
   for (size_t i = 0; i < image.layers.size(); ++i) result_.aovs[layer_names_[i]] = std::move(image.layers[i]);
   for (size_t i = 0; i < image.kept_samples.size(); ++i)
-    result_.aovs[kKeptSamples[i]] = std::move(image.kept_samples[i]);
+    if (!image.kept_samples[i].data.empty()) result_.aovs[kKeptSamples[i]] = std::move(image.kept_samples[i]);
   double samples = 0;
   for (const Pass& pass : camera_passes(films())) samples += pass.film.mean_count();
   result_.predicted = predicted_error(image, samples, plan_.reliable_samples);

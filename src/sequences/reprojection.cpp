@@ -5,20 +5,24 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <tuple>
 #include <vector>
 
 #include "core/error.h"
 #include "core/parallel.h"
 #include "core/vec.h"
+#include "sequences/feature_slopes.h"
 
 namespace covary {
 namespace {
 
 constexpr float kAtRest = 1e-3f;          // pixels
 constexpr float kEdge = 0.25f;            // pixels of motion from a pixel to the next
+constexpr float kOfEdges = 0.2f;          // of the largest squared difference there
 constexpr float kRelative = 0.01f;        // of the depth that a pixel may differ by
 constexpr float kRelativeUnknown = 0.1f;  // where its change is not known
-constexpr float kOfSlope = 1.5f;          // and of the depth's change from pixel to pixel
+constexpr int kSlopes = std::tuple_size_v<FeatureSlopes>;
+constexpr float kOfSlope = 1.5f;  // and of the depth's change from pixel to pixel
 
 struct Tap {
   int first;                     // of four pixels
@@ -118,18 +122,57 @@ class Reprojection {
   const MotionLayers& now_;
 };
 
-/// Moves the pixel of an image to where it is now; its squared difference to linear interpolation, or nothing where a
-/// value is not finite.
-std::optional<float> move(const Image& before, const Place& place, float* value) {
+/// A colour and the features that belong to it.
+struct Shown {
+  std::array<float, 3> colour;
+  std::array<float, kHistoryFeatures> features = {};
+};
+
+/// A difference of colours beyond that of features: its square, mean over the channels.
+float squared(const Shown& difference, const FeatureSlopes& slopes) {
   float squares = 0;
-  for (int c = 0; c < 3; ++c) {
-    float difference;
-    value[c] = place.value(before, c, difference);
-    if (!std::isfinite(value[c])) return std::nullopt;
-    squares += sqr(difference) / 3;
+  for (size_t c = 0; c < 3; ++c) {
+    float rest = difference.colour[c];
+    for (size_t i = 0; i < kHistoryFeatures; ++i) rest -= slopes[3 * i + c] * difference.features[i];
+    squares += sqr(rest) / 3;
   }
   return squares;
 }
+
+Shown operator-(Shown a, const Shown& b) {
+  for (size_t c = 0; c < 3; ++c) a.colour[c] -= b.colour[c];
+  for (size_t i = 0; i < kHistoryFeatures; ++i) a.features[i] -= b.features[i];
+  return a;
+}
+
+/// The frame before.
+struct Before {
+  const Image& picture;
+  const Image& features;  // or empty
+
+  bool has_features() const { return !features.data.empty(); }
+
+  FeatureSlopes slopes(const Place& place) const {
+    if (place.rests || !has_features()) return {};
+    const auto [x, y] = place.pixel(picture);
+    return feature_slopes(picture, features, x, y);
+  }
+
+  /// Its pixel, moved to where it is now; nothing where a value is not finite. `difference`: that to linear
+  /// interpolation.
+  std::optional<Shown> at(const Place& place, Shown& difference) const {
+    Shown moved;
+    bool is_finite = true;
+    const auto interpolate = [&](const Image& image, int c, float& value, float& of_value) {
+      value = place.value(image, c, of_value);
+      is_finite = is_finite && std::isfinite(value);
+    };
+    for (size_t c = 0; c < 3; ++c) interpolate(picture, static_cast<int>(c), moved.colour[c], difference.colour[c]);
+    for (size_t i = 0; has_features() && i < kHistoryFeatures; ++i)
+      interpolate(features, static_cast<int>(i), moved.features[i], difference.features[i]);
+    return is_finite ? std::optional(moved) : std::nullopt;
+  }
+};
 
 /// Takes the samples of the pixel where the point was, as they are: mixed with others they would have noise that is
 /// alike in neighbouring pixels, which denoisers take for detail. What the picture `moved` differs by from that pixel
@@ -159,17 +202,17 @@ bool any_other_motion(const Image& motion, int x, int y, const F& is_so) {
 
 /// How far the pixel may show what moves otherwise near it: the largest squared difference of what the picture shows
 /// where the neighbours' motions lead from `moved`; 0 where all move alike.
-float edge_error(const Image& before, const Image& motion, int x, int y, const float* moved) {
+float edge_error(const Before& before, const Image& motion, int x, int y, const Shown& moved,
+                 const FeatureSlopes& slopes) {
   float most = 0;
   any_other_motion(motion, x, y, [&](const float* there) {
     const auto within = [](float at, int size) { return std::clamp(at, 0.5f, static_cast<float>(size) - 0.5f); };
     const Place other{x, y, false, tap(within(static_cast<float>(x) + 0.5f + there[0], motion.width)),
                       tap(within(static_cast<float>(y) + 0.5f + there[1], motion.height))};
-    float value[3], squares = 0;
-    const bool is_finite = move(before, other, value).has_value();
-    for (int c = 0; c < 3; ++c) squares += sqr(value[c] - moved[c]) / 3;
-    most = is_finite ? std::max(most, squares) : kInfinity;
-    return !is_finite;
+    Shown difference;
+    const std::optional<Shown> shown = before.at(other, difference);
+    most = shown ? std::max(most, squared(*shown - moved, slopes)) : kInfinity;
+    return !shown;
   });
   return most;
 }
@@ -195,37 +238,51 @@ bool is_motion_edge(const Image& motion, int x, int y) {
 }
 
 History reproject(const Image& before, const Image& depth_before, const MotionLayers& now,
-                  const std::array<Image, 2>& samples) {
+                  const std::array<Image, 2>& samples, const Image& features) {
   const int width = now.depth.width, height = now.depth.height;
   const bool has_samples = !samples[0].data.empty();
   std::vector<const Image*> images = {&before, &depth_before, &now.motion};
   if (has_samples) images.insert(images.end(), {&samples[0], &samples[1]});
+  if (!features.data.empty()) images.push_back(&features);
   for (const Image* image : images)
     if (image->width != width || image->height != height)
       throw Error(ErrorCode::kInput, "frames of a sequence differ in size");
   History history{Image(width, height, 3),
                   Image(width, height, 1),
                   std::vector<unsigned char>(static_cast<size_t>(width) * height),
-                  {}};
+                  {},
+                  Image(),
+                  Image()};
   if (has_samples) history.samples = {history.image, history.image};
+  if (!features.data.empty())
+    history.features = Image(width, height, kHistoryFeatures), history.slopes = Image(width, height, kSlopes);
+  const Before picture{before, features};
   Image edges(width, height, 1);
   const Reprojection reprojection(depth_before, now);
   parallel_for(height, 4, [&](int y) {
     for (int x = 0; x < width; ++x) {
       const std::optional<Place> place = reprojection.place(x, y);
       if (!place) continue;
-      const std::optional<float> squares = move(before, *place, history.image.pixel(x, y));
-      bool known = squares.has_value();
+      Shown difference;
+      const FeatureSlopes slopes = picture.slopes(*place);
+      const std::optional<Shown> moved = picture.at(*place, difference);
+      if (!moved) continue;
+      std::copy_n(moved->colour.begin(), 3, history.image.pixel(x, y));
+      if (picture.has_features()) {
+        std::copy_n(moved->features.begin(), kHistoryFeatures, history.features.pixel(x, y));
+        std::copy_n(slopes.begin(), kSlopes, history.slopes.pixel(x, y));
+      }
+      bool known = true;
       for (size_t i = 0; has_samples && i < samples.size(); ++i)
         known = move_samples(samples[i], before, *place, history.image.pixel(x, y), history.samples[i].pixel(x, y)) &&
                 known;
-      *history.squared_error.pixel(x, y) = squares.value_or(0);
-      if (!place->rests) *edges.pixel(x, y) = edge_error(before, now.motion, x, y, history.image.pixel(x, y));
+      *history.squared_error.pixel(x, y) = squared(difference, slopes);
+      if (!place->rests) *edges.pixel(x, y) = edge_error(picture, now.motion, x, y, *moved, slopes);
       history.known[static_cast<size_t>(y) * width + x] = known;
     }
   });
   history.squared_error = smoothed(history.squared_error);
-  for (size_t i = 0; i < edges.data.size(); ++i) history.squared_error.data[i] += edges.data[i];
+  for (size_t i = 0; i < edges.data.size(); ++i) history.squared_error.data[i] += kOfEdges * edges.data[i];
   return history;
 }
 

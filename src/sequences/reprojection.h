@@ -30,7 +30,10 @@ bool is_motion_edge(const Image& motion, int x, int y);
 ///
 /// `samples`: History::samples of the frame before, or empty. They are moved by whole pixels, so that their noise stays
 /// independent from pixel to pixel; what the moved picture differs by from the pixel that they are taken from is added.
+///
+/// `features`: albedo and normal of the frame before, 6 channels, or empty. History::slopes are those of `before` over
+/// them (feature_slopes.h), at the pixel where the point was; squared errors are then of what they leave.
 History reproject(const Image& before, const Image& depth_before, const MotionLayers& now,
-                  const std::array<Image, 2>& samples = {});
+                  const std::array<Image, 2>& samples = {}, const Image& features = {});
 
 }  // namespace covary

@@ -4,10 +4,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 
 #include "core/error.h"
+#include "sequences/feature_slopes.h"
 
 namespace covary {
 namespace {
@@ -113,7 +115,7 @@ TEST(Reprojection, TellsEdgesOfWhatMovesOtherwise) {
   const History history = reproject(steps, constant(5), now);
   for (const int x : {11, 12}) {
     EXPECT_TRUE(is_known(history, x, 5));
-    EXPECT_NEAR(*history.squared_error.pixel(x, 5), 1, 1e-3) << "a pixel further it has another value, by 1";
+    EXPECT_NEAR(*history.squared_error.pixel(x, 5), 0.2f, 1e-3) << "a fifth of the square of the difference, 1";
   }
   for (const int x : {10, 13}) EXPECT_NEAR(*history.squared_error.pixel(x, 5), 0, 1e-6);
 }
@@ -131,6 +133,45 @@ TEST(Reprojection, MovesSamplesByWholePixelsAndWhatThePictureTells) {
       }
   const History rests = reproject(waves(0, 0), constant(5), moving(0, 0), {zeros, noise});
   EXPECT_EQ(rests.samples[1].data, noise.data);
+}
+
+/// Shades whose edges lay within pixels, half a pixel further on: interpolation blurs them, but albedo tells them.
+TEST(Reprojection, FollowsFeaturesWithinAPixel) {
+  const auto albedo = [](float shift) {
+    return image_of(3, [=](int x, int y, int) {
+      const float at = (static_cast<float>(x) + shift) / 3;
+      const float part = std::clamp(3 * (at - std::floor(at)), 0.0f, 1.0f);  // of the pixel, box-filtered
+      const auto shade = [&](float column) {
+        return 0.2f + 0.2f * std::fmod(column + 4 + static_cast<float>(y / 3), 4.0f);
+      };
+      return (1 - part) * shade(std::floor(at) - 1) + part * shade(std::floor(at));
+    });
+  };
+  const auto picture = [&](float shift) {
+    Image image = albedo(shift);
+    for (float& value : image.data) value *= 5;
+    return image;
+  };
+  const Image normal(kWidth, kHeight, 3);
+  const Image features = history_features(albedo(0.5f), normal);
+  const auto largest_error = [&](const History& history, const Image& image) {
+    float most = 0;
+    for (int y = 4; y < kHeight - 4; ++y)
+      for (int x = 4; x < kWidth - 4; ++x)
+        most = std::max(most, std::abs(image.pixel(x, y)[1] - picture(1).pixel(x, y)[1]));
+    EXPECT_TRUE(is_known(history, 8, 8));
+    return most;
+  };
+  const std::array<Image, 2> samples = {picture(0.5f), picture(0.5f)};
+  History history = reproject(picture(0.5f), constant(5), moving(0.5f, 0), samples, features);
+  EXPECT_GT(largest_error(history, history.image), 0.15f);
+  follow_features(history, albedo(1), normal);
+  EXPECT_LT(largest_error(history, history.image), 0.03f);
+  EXPECT_LT(largest_error(history, history.samples[1]), 0.03f);
+  const History plain = reproject(picture(0.5f), constant(5), moving(0.5f, 0));
+  for (int x = 6; x < 12; ++x)
+    EXPECT_LE(*history.squared_error.pixel(x, 8), 0.01f * *plain.squared_error.pixel(x, 8) + 1e-6f);
+  EXPECT_THROW(follow_features(history, Image(3, 2, 3), normal), Error);
 }
 
 TEST(Reprojection, NeedsFramesOfOneSize) { EXPECT_THROW(reproject(Image(3, 2, 3), constant(5), moving(0, 0)), Error); }
