@@ -15,7 +15,7 @@ namespace covary {
 namespace {
 
 /// What the pixels around count, in groups, and the side of their window.
-constexpr float kPriorFreedom = 2;
+constexpr float kPriorFreedom = 8;
 constexpr int kVarianceWindow = 5;
 
 /// Pixels that the estimator leaves out may hold anything.
@@ -35,17 +35,24 @@ DenoisingPart part_of_pair(const Estimator& base, const GroupedImage& crn, const
   return part;
 }
 
-/// `scale` times the variance, of which `freedom` groups more than one tell, drawn to that around.
+/// `scale` times the variance, of which `freedom` groups more than one tell, drawn to that around: the mean with an
+/// exponent of 3/4, so that the noise of a bright light is not that of the dark pixels beside it.
 Image std_error_of(const Planes& variance, const std::vector<unsigned char>& valid, int freedom, float scale) {
   Image result(variance.width(), variance.height(), 3);
   std::array<Planes, 3> around;
-  for (int c = 0; c < 3; ++c) around[c] = box_mean(variance, valid, kVarianceWindow, 0, 0, c);
+  Planes lessened(result.width, result.height, 3, 0, 0);
+  parallel_for(result.height, 8, [&](int y) {
+    for (int c = 0; c < 3; ++c)
+      std::transform(variance.row(c, y), variance.row(c, y) + result.width, lessened.row(c, y),
+                     [](float v) { return std::sqrt(v) * std::sqrt(std::sqrt(v)); });
+  });
+  for (int c = 0; c < 3; ++c) around[c] = box_mean(lessened, valid, kVarianceWindow, 0, 0, c);
   const float own = static_cast<float>(freedom) / (static_cast<float>(freedom) + kPriorFreedom);
   parallel_for(result.height, 8, [&](int y) {
     for (int x = 0; x < result.width; ++x)
       for (int c = 0; c < 3; ++c) {
         if (!valid[static_cast<size_t>(y) * result.width + x]) continue;
-        const float mean = around[c].row(0, y)[x];
+        const float lessened_mean = around[c].row(0, y)[x], mean = lessened_mean * std::cbrt(lessened_mean);
         result.pixel(x, y)[c] = std::sqrt(scale * (own * variance.row(c, y)[x] + (1 - own) * mean));
       }
   });
