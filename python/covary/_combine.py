@@ -30,11 +30,11 @@ _LAYERS = optional(mapping_of(IMAGE, "a mapping from names to arrays"))
 
 @checked(crn=IMAGE, independent=IMAGE, estimator=text, light=IMAGE, counts=array,
          samples=optional(whole(1, _covary.most_samples)), denoise=DENOISE, albedo=array, normal=array,
-         denoising_albedo=array, denoising_normal=array, layers=_LAYERS, oidn=OIDN,
+         denoising_albedo=array, denoising_normal=array, position=array, layers=_LAYERS, oidn=OIDN,
          std_error=optional(flag), force=flag, progress=optional(function))
 def combine(crn: Any, independent: Any, estimator: PairEstimator = "iicv", *, light: Film | None = None,
             counts: Any = None, samples: int | None = None, denoise: DenoiseMode = "none", albedo: Any = None,
-            normal: Any = None, denoising_albedo: Any = None, denoising_normal: Any = None,
+            normal: Any = None, denoising_albedo: Any = None, denoising_normal: Any = None, position: Any = None,
             layers: Mapping[str, Any] | None = None, oidn: str | PathLike[str] = "", std_error: bool | None = None,
             force: bool = False, progress: Progress | None = None, **options: OptionValue) -> Result:
     """Combines `crn`, whose pixels share their random numbers, and `independent`, whose pixels do not, into one image.
@@ -50,10 +50,10 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = "iicv", *, li
         knows its own. Needs samples.
     samples: samples per pixel of the CRN image, for counts and for estimators that need them.
     denoise: mix in denoised images where held-out samples prefer them: for the least error ("auto", "error"), for
-        little bias ("bias"), or balanced. albedo, normal: guides [H, W, 3], the normal only with the albedo;
-        denoising_albedo, denoising_normal: guides seen through mirrors and glass, for the network (from render():
-        aovs["DenoisingAlbedo"], …); oidn: Open Image Denoise's library or its folder, by default searched for;
-        "off": not used.
+        little bias ("bias"), or balanced. albedo, normal, position: guides [H, W, 3], the others only with the albedo;
+        denoising_albedo, denoising_normal: guides seen through mirrors and glass (from render(): aovs["Albedo"],
+        "N", "P", "DenoisingAlbedo", "DenoisingNormal"); oidn: Open Image Denoise's library or its folder, by default
+        searched for; "off": not used.
     layers: parts of `independent` by name, such as direct light, in the same groups: denoised with it, they are in the
         result's aovs, and add up to its image with "Rest".
     std_error: estimate the error, too; by default if the estimator can.
@@ -65,7 +65,7 @@ def combine(crn: Any, independent: Any, estimator: PairEstimator = "iicv", *, li
     """
     check_no_passes(options, "here are images that are rendered: counts= tells the samples that their pixels have")
     return Result(**_covary.combine(crn, independent, None if counts is None else _counts(counts), light, albedo,
-                                    normal, denoising_albedo, denoising_normal, dict(layers or {}), estimator,
+                                    normal, denoising_albedo, denoising_normal, position, dict(layers or {}), estimator,
                                     text_options(options, estimator), denoise, fspath(oidn), force, std_error, samples,
                                     progress))
 
@@ -74,7 +74,7 @@ def guides_of(aovs: Mapping[str, Any]) -> dict[str, Any]:
     """Auxiliary images by the names of combine()'s guides; None for missing ones."""
     return {name: aovs.get(layer) for name, layer in (("albedo", "Albedo"), ("normal", "N"),
                                                       ("denoising_albedo", "DenoisingAlbedo"),
-                                                      ("denoising_normal", "DenoisingNormal"))}
+                                                      ("denoising_normal", "DenoisingNormal"), ("position", "P"))}
 
 
 def _counts(counts: Any) -> Any:

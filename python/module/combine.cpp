@@ -154,7 +154,7 @@ struct CombineArguments {
 
 /// Optional inputs besides the two images; None if not given.
 struct Beside {
-  nb::object counts, light, albedo, normal, denoising_albedo, denoising_normal;
+  nb::object counts, light, albedo, normal, denoising_albedo, denoising_normal, position;
   nb::dict layers;
 };
 
@@ -172,7 +172,7 @@ DenoisingChoice denoising_of(const std::string& mode, const std::string& oidn) {
 
 /// The guides of --denoise.
 struct GuideImages {
-  Image albedo, normal, denoising_albedo, denoising_normal;
+  Image albedo, normal, denoising_albedo, denoising_normal, position;
   GuideImages(const Beside& beside, const Estimator& estimator, const Input& image) {
     const std::string shape = fmt::format("{}, {}, 3", image.height(), image.width());
     const auto take = [&](nb::handle array, const char* name, Image& to) {
@@ -187,17 +187,19 @@ struct GuideImages {
     take(beside.normal, "normal", normal);
     take(beside.denoising_albedo, "denoising_albedo", denoising_albedo);
     take(beside.denoising_normal, "denoising_normal", denoising_normal);
+    take(beside.position, "position", position);
     const auto needs = [](const Image& guide, const Image& other, const char* name, const char* other_name) {
       if (guide.data.empty() || !other.data.empty()) return;
       throw Error(ErrorCode::kUsage, fmt::format("{}: it is a guide only together with {}", name, other_name));
     };
     needs(normal, albedo, "normal", "the albedo");
+    needs(position, albedo, "position", "the albedo");
     needs(denoising_normal, denoising_albedo, "denoising_normal", "denoising_albedo");
     if (!normal.data.empty()) needs(denoising_albedo, denoising_normal, "denoising_albedo", "denoising_normal");
   }
   Guides view() const {
     const auto or_null = [](const Image& image) { return image.data.empty() ? nullptr : &image; };
-    return {or_null(albedo), or_null(normal), or_null(denoising_albedo), or_null(denoising_normal)};
+    return {or_null(albedo), or_null(normal), or_null(denoising_albedo), or_null(denoising_normal), or_null(position)};
   }
 };
 
@@ -337,18 +339,21 @@ void bind_combine(nb::module_& module) {
   module.def(
       "combine",
       [](nb::object crn, nb::object independent, nb::object counts, nb::object light, nb::object albedo,
-         nb::object normal, nb::object denoising_albedo, nb::object denoising_normal, nb::dict layers,
-         const std::string& estimator, const OptionValues& options, const std::string& denoise, const std::string& oidn,
-         bool force, std::optional<bool> std_error, std::optional<int> samples, nb::object progress) {
-        return combine(crn, independent, {counts, light, albedo, normal, denoising_albedo, denoising_normal, layers},
+         nb::object normal, nb::object denoising_albedo, nb::object denoising_normal, nb::object position,
+         nb::dict layers, const std::string& estimator, const OptionValues& options, const std::string& denoise,
+         const std::string& oidn, bool force, std::optional<bool> std_error, std::optional<int> samples,
+         nb::object progress) {
+        return combine(crn, independent,
+                       {counts, light, albedo, normal, denoising_albedo, denoising_normal, position, layers},
                        {estimator, options, denoise, oidn, force, std_error, samples}, progress);
       },
       "crn"_a.none(), "independent"_a.none(), "counts"_a.none(), "light"_a.none(), "albedo"_a.none(), "normal"_a.none(),
-      "denoising_albedo"_a.none(), "denoising_normal"_a.none(), "layers"_a, "estimator"_a, "options"_a, "denoise"_a,
-      "oidn"_a, "force"_a, "std_error"_a.none(), "samples"_a.none(), "progress"_a.none(),
+      "denoising_albedo"_a.none(), "denoising_normal"_a.none(), "position"_a.none(), "layers"_a, "estimator"_a,
+      "options"_a, "denoise"_a, "oidn"_a, "force"_a, "std_error"_a.none(), "samples"_a.none(), "progress"_a.none(),
       nb::sig("def combine(crn: object, independent: object, counts: object | None, light: object | None, albedo: "
               "object | None, normal: object | None, denoising_albedo: object | None, denoising_normal: object | None, "
-              "layers: dict[str, typing.Any], estimator: str, options: dict[str, str], denoise: str, oidn: str, force: "
+              "position: object | None, layers: dict[str, typing.Any], estimator: str, options: dict[str, str], "
+              "denoise: str, oidn: str, force: "
               "bool, std_error: bool | None, samples: int | None, progress: typing.Any) -> dict[str, typing.Any]"));
   module.def(
       "check_pair_estimator", &check_pair_estimator, "estimator"_a, "options"_a, "denoise"_a, "oidn"_a,

@@ -40,6 +40,7 @@ struct FilterGuides {
   Planes all, normal;
   Image albedo;                 // at least kLeastAlbedo; empty where there is none
   std::vector<Image> features;  // of the regression; none: without it
+  Image position;               // likewise; empty where there is none
 };
 
 FilterGuides filter_guides(const Guides& guides, bool regression) {
@@ -52,6 +53,9 @@ FilterGuides filter_guides(const Guides& guides, bool regression) {
     const Guides behind_glass = network_guides(guides);
     result.features.push_back(*behind_glass.albedo);
     if (behind_glass.normal) result.features.push_back(*behind_glass.normal);
+    if (behind_glass.normal && behind_glass.normal->data != guides.normal->data)
+      result.features.push_back(*guides.normal);
+    if (guides.position) result.position = *guides.position;
   }
   result.all = planes(*guides.albedo, guides.normal ? 6 : 3);
   copy_guide(*guides.albedo, kAlbedoUnit, 0, result.all);
@@ -65,11 +69,12 @@ FilterGuides filter_guides(const Guides& guides, bool regression) {
 }
 
 const Planes* or_null(const Planes& planes) { return planes.count() > 0 ? &planes : nullptr; }
+const Image* or_null(const Image& image) { return image.data.empty() ? nullptr : &image; }
 
 /// The regression of sources, beside their images by another filter.
 std::vector<Image> regressed(const FilterGuides& guides, const CandidateInput& in, std::vector<const Image*> sources,
                              std::span<const Image> others) {
-  RegressionInput input{in.estimate, in.std_error, std::move(sources), {}};
+  RegressionInput input{in.estimate, in.std_error, std::move(sources), {}, or_null(guides.position)};
   for (const Image& other : others) input.others.push_back(&other);
   std::vector<const Image*> features;
   for (const Image& feature : guides.features) features.push_back(&feature);
@@ -79,19 +84,22 @@ std::vector<Image> regressed(const FilterGuides& guides, const CandidateInput& i
 /// Candidates of each of the inputs.
 std::vector<std::vector<Image>> filtered(const FilterGuides& guides, CandidateBase base,
                                          std::span<const CandidateInput> inputs) {
-  std::vector<NlMeansSteering> steerings;
-  for (const CandidateInput& in : inputs) {
-    std::vector<const Image*> sharp = {in.estimate};
-    if (base == CandidateBase::kPair) sharp.push_back(in.independent);
-    steerings.push_back({in.estimate, in.std_error, {{kSharp, sharp}, {kSmooth, {in.estimate}}}});
-  }
-  std::vector<Image> images = nl_means(steerings, or_null(guides.all), *inputs[0].valid);
-  const size_t n = images.size() / inputs.size();
   std::vector<std::vector<Image>> all(inputs.size());
-  for (size_t i = 0; i < images.size(); ++i) all[i / n].push_back(std::move(images[i]));
-  if (guides.albedo.data.empty()) return all;
+  std::vector<NlMeansSteering> steerings;
+  std::vector<Image> images;
+  if (guides.features.empty()) {
+    for (const CandidateInput& in : inputs) {
+      std::vector<const Image*> sharp = {in.estimate};
+      if (base == CandidateBase::kPair) sharp.push_back(in.independent);
+      steerings.push_back({in.estimate, in.std_error, {{kSharp, sharp}, {kSmooth, {in.estimate}}}});
+    }
+    images = nl_means(steerings, or_null(guides.all), *inputs[0].valid);
+    const size_t n = images.size() / inputs.size();
+    for (size_t i = 0; i < images.size(); ++i) all[i / n].push_back(std::move(images[i]));
+    if (guides.albedo.data.empty()) return all;
+    steerings.clear();
+  }
   std::deque<Image> demodulated;
-  steerings.clear();
   for (const CandidateInput& in : inputs) {
     const Image& image = demodulated.emplace_back(combined(*in.estimate, guides.albedo, std::divides<>()));
     const Image& error = demodulated.emplace_back(combined(*in.std_error, guides.albedo, std::divides<>()));
@@ -112,12 +120,17 @@ std::vector<std::vector<Image>> filtered_layers(const FilterGuides& guides, cons
   const auto n = static_cast<ptrdiff_t>(layers.size());
   std::vector<const Image*> sources;
   for (const Image& layer : layers) sources.push_back(&layer);
-  std::vector<NlMeansSteering> steerings = {{in.estimate, in.std_error, {{kSharp, sources}, {kSmooth, sources}}}};
-  std::vector<Image> images = nl_means(steerings, or_null(guides.all), *in.valid);
+  const std::vector<const Image*> given = sources;
+  std::vector<NlMeansSteering> steerings;
+  std::vector<Image> images;
   std::vector<std::vector<Image>> all;
-  all.emplace_back(images.begin(), images.begin() + n);
-  all.emplace_back(images.begin() + n, images.end());
-  if (guides.albedo.data.empty()) return all;
+  if (guides.features.empty()) {
+    steerings = {{in.estimate, in.std_error, {{kSharp, sources}, {kSmooth, sources}}}};
+    images = nl_means(steerings, or_null(guides.all), *in.valid);
+    all.emplace_back(images.begin(), images.begin() + n);
+    all.emplace_back(images.begin() + n, images.end());
+    if (guides.albedo.data.empty()) return all;
+  }
   std::deque<Image> demodulated;
   for (const Image* source : {in.estimate, in.std_error})
     demodulated.push_back(combined(*source, guides.albedo, std::divides<>()));
@@ -128,10 +141,7 @@ std::vector<std::vector<Image>> filtered_layers(const FilterGuides& guides, cons
   images = nl_means(steerings, or_null(guides.normal), *in.valid);
   for (Image& image : images) image = combined(image, guides.albedo, std::multiplies<>());
   all.push_back(std::move(images));
-  if (guides.features.empty()) return all;
-  std::vector<const Image*> given;
-  for (const Image& layer : layers) given.push_back(&layer);
-  all.insert(all.begin(), regressed(guides, in, std::move(given), all[0]));
+  if (!guides.features.empty()) all.insert(all.begin(), regressed(guides, in, given, all[0]));
   return all;
 }
 
@@ -195,10 +205,13 @@ CandidateMaker::Make one_by_one(std::function<std::vector<Image>(const Candidate
 CandidateMaker filtered_candidates(const Guides& guides, CandidateBase base, bool regression) {
   const auto kept = std::make_shared<FilterGuides>(filter_guides(guides, regression));
   CandidateMaker maker;
-  if (!kept->features.empty()) maker.names = {"regression"};
-  maker.names.emplace_back("sharp");
-  if (base == CandidateBase::kPair) maker.names.emplace_back("sharp-independent");
-  maker.names.emplace_back("smooth");
+  if (kept->features.empty()) {
+    maker.names = {"sharp"};
+    if (base == CandidateBase::kPair) maker.names.emplace_back("sharp-independent");
+    maker.names.emplace_back("smooth");
+  } else {
+    maker.names = {"regression"};
+  }
   if (!kept->albedo.data.empty()) maker.names.emplace_back("demodulated");
   maker.make = [kept, base](std::span<const CandidateInput> inputs) { return filtered(*kept, base, inputs); };
   maker.make_layers = [kept](const CandidateInput& input, std::span<const Image> layers) {
@@ -209,8 +222,8 @@ CandidateMaker filtered_candidates(const Guides& guides, CandidateBase base, boo
 
 Guides network_guides(const Guides& guides) {
   const bool has_both = guides.denoising_albedo && (guides.denoising_normal || !guides.normal);
-  if (!has_both) return {guides.albedo, guides.normal, nullptr, nullptr, guides.clean};
-  return {guides.denoising_albedo, guides.denoising_normal, nullptr, nullptr, guides.clean};
+  if (!has_both) return {guides.albedo, guides.normal, nullptr, nullptr, nullptr, guides.clean};
+  return {guides.denoising_albedo, guides.denoising_normal, nullptr, nullptr, nullptr, guides.clean};
 }
 
 CandidateMaker neural_candidates(const Guides& guides, const DenoiseOptions& options, CandidateBase base) {

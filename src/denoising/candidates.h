@@ -4,8 +4,9 @@
 // Without a neural network, NL-means (nl_means.h) steered by the estimator's image and its standard error, with albedo
 // and normal as guides, makes: that image with two bandwidths; the independent image with the same weights; and the
 // image divided by the albedo, filtered with the normal as the only guide and multiplied by the albedo; of a mean,
-// regression over albedo and normal. Open Image Denoise uses guides that were denoised first. Of a pair, it only
-// denoises the independent image: the other's errors are shared between pixels, which the network was not trained on.
+// regression over albedo, normal and position in place of the first two. Open Image Denoise uses guides that were
+// denoised first. Of a pair, it only denoises the independent image: the other's errors are shared between pixels,
+// which the network was not trained on.
 //
 // Where the image itself is the mean of the independent samples, the candidates made from the independent image are
 // left out, and Open Image Denoise's images get residual correction (ResidualOptions in residual_correction.h). The
@@ -59,8 +60,8 @@ CandidateMaker::Make one_by_one(std::function<std::vector<Image>(const Candidate
 /// Which image is denoised: that of a two-pass estimator, or the mean of independent samples.
 enum class CandidateBase { kPair, kMean };
 
-/// Filters without a network. Copies the guides. `regression`: regression.h's image as well, first, if there is an
-/// albedo; beside a network's images it gains next to nothing.
+/// Filters without a network. Copies the guides. `regression`: of a mean with an albedo, regression.h's image in place
+/// of NL-means of the image itself; beside a network's images it gains next to nothing.
 CandidateMaker filtered_candidates(const Guides& guides, CandidateBase base = CandidateBase::kPair,
                                    bool regression = false);
 /// Guides of a neural network: those seen in mirrors and through glass, where available.

@@ -103,6 +103,7 @@ void check_guides(const Guides& guides) {
   if (guides.normal) check_guide("the guide normal", *guides.normal);
   if (guides.denoising_albedo) check_guide("the guide albedo behind glass", *guides.denoising_albedo);
   if (guides.denoising_normal) check_guide("the guide normal behind glass", *guides.denoising_normal);
+  if (guides.position) check_guide("the guide position", *guides.position);
 }
 
 }  // namespace

@@ -24,9 +24,9 @@ struct UsualWeight {
 };
 constexpr UsualWeight kUsual[] = {{"oidn", 0.85f, 0},
                                   {"oidn-wide", 0.05f, 0},
-                                  {"regression", 0, 0.7f},
+                                  {"regression", 0, 0.9f},
                                   {"sharp", 0.05f, 0.1f},
-                                  {"demodulated", 0.05f, 0.2f}};
+                                  {"demodulated", 0.05f, 0.1f}};
 
 /// How much usual weights count for those of the whole image, with so many samples per pixel or fewer; less with more.
 constexpr float kCountOfUsual = 0.2f, kSamplesOfUsual = 16;

@@ -37,6 +37,7 @@ struct Guides {
   /// The same of what is seen in mirrors and through glass, in their colour; null: as above.
   const Image* denoising_albedo = nullptr;
   const Image* denoising_normal = nullptr;
+  const Image* position = nullptr;  ///< of the first surface, in any unit
   bool clean = false;  ///< have little noise, so that a network need not denoise them first
 };
 

@@ -19,11 +19,11 @@ constexpr int kStep = 3, kRadius = 10, kPatch = 1, kSide = 2 * kRadius + 1, kOff
 constexpr int kBorder = kRadius + kPatch;
 constexpr int kBandRows = 8;  // of windows
 constexpr float kBandwidth = 0.5f, kOfPatch = 27;
-/// Ridge of slopes; pixels that are a unit of place; weight of the other image.
-constexpr float kRidge = 5e-4f, kPlaceUnit = 6, kOfOther = 1;
+/// Ridges of slopes; pixels that are a unit of place; weight of the other image.
+constexpr float kRidge = 5e-4f, kRidgeOfPosition = 1e-3f, kPlaceUnit = 6, kOfOther = 1;
 constexpr float kSmallestVariance = 1e-10f, kLargestVariance = 1e30f;
-/// Terms of a plane: constant, columns, rows, features.
-constexpr int kMostTerms = 3 + kMostFeatures;
+/// Terms of a plane: constant, columns, rows, features, position.
+constexpr int kMostTerms = 3 + kMostFeatures + 3;
 
 using Terms = std::array<vfloat, kMostTerms>;
 /// Of pixels at all offsets of a row of windows.
@@ -47,9 +47,12 @@ class Regression {
         n_terms_(3),
         n_sources_(static_cast<int>(input.sources.size())) {
     for (const Image* feature : features) n_terms_ += feature->channels;
-    COVARY_CHECK(n_terms_ <= kMostTerms, "at most kMostFeatures");
+    COVARY_CHECK(n_terms_ <= 3 + kMostFeatures, "at most kMostFeatures");
+    first_of_position_ = n_terms_;
+    if (in_.position) n_terms_ += 3;
     std::vector<const Image*> images = {in_.image, in_.std_error};
     images.insert(images.end(), features.begin(), features.end());
+    if (in_.position) images.push_back(in_.position);
     first_source_ = 3 + n_terms_;
     images.insert(images.end(), in_.sources.begin(), in_.sources.end());
     planes_ = Planes(columns_, height_, kStep * (first_source_ + 3 * n_sources_), kBorder, 0);
@@ -177,6 +180,8 @@ class Regression {
     }
     shift.fill(max(total * kRidge, splat(1e-30f)));
     shift[0] = max(total * 1e-6f, splat(1e-30f));
+    for (int a = first_of_position_; a < n; ++a)
+      shift[a] = max(sums[batch::packed(a, a)] * kRidgeOfPosition, total * 1e-12f + splat(1e-30f));
     std::copy_n(&sums[batch::packed(n, 0)], n, planes[0].begin());
     batch::solve_shifted(sums.data(), shift.data(), n, planes[0].data(), inverse.data(), n_channels - 1);
     for (int c = 1; c < n_channels; ++c) {
@@ -227,7 +232,7 @@ class Regression {
   const RegressionInput& in_;
   const std::vector<unsigned char>& valid_;
   const int width_, height_, columns_;
-  int n_terms_, n_sources_, first_source_;
+  int n_terms_, n_sources_, first_of_position_, first_source_;
   Planes planes_, mask_;
 };
 

@@ -16,14 +16,15 @@ namespace covary {
 namespace {
 
 struct FittedPicture {
-  Image f, s, other, feature;
+  Image f, s, other, feature, position;
   std::vector<unsigned char> valid;
 
-  FittedPicture(int width, int height) : f(width, height, 3), s(f), other(f), feature(width, height, 2) {
+  FittedPicture(int width, int height) : f(width, height, 3), s(f), other(f), feature(width, height, 2), position(f) {
     valid.assign(static_cast<size_t>(width) * height, 1);
     for (int y = 0; y < height; ++y)
       for (int x = 0; x < width; ++x) {
         const uint64_t pixel = static_cast<uint64_t>(y) * width + x;
+        for (int i : {0, 1, 2}) position.pixel(x, y)[i] = 40 * test::noise(7, pixel, i);
         for (int i : {0, 1}) feature.pixel(x, y)[i] = test::noise(6, pixel, i);
         for (int c = 0; c < 3; ++c) {
           s.pixel(x, y)[c] = 0.1f + 0.05f * test::noise(3, pixel, c);
@@ -39,7 +40,7 @@ struct FittedPicture {
   }
   std::vector<Image> regressed(const std::vector<const Image*>& sources) const {
     const Image* const features[] = {&feature};
-    return covary::regressed({&f, &s, sources, std::vector(sources.size(), &other)}, features, valid);
+    return covary::regressed({&f, &s, sources, std::vector(sources.size(), &other), &position}, features, valid);
   }
 };
 
@@ -66,17 +67,20 @@ std::vector<double> by_formula(const FittedPicture& p) {
   for (size_t i = 0; i < p.valid.size(); ++i) sum.push_back(p.other.data[3 * i]);
   for (int y = 1; y < height + 2; y += 3)
     for (int x = 1; x < width + 2; x += 3) {
-      const float* centre = p.feature.pixel(std::min(x, width - 1), std::min(y, height - 1));
-      Eigen::MatrixXd a = Eigen::MatrixXd::Zero(5, 5);
-      Eigen::VectorXd b = Eigen::VectorXd::Zero(5);
+      const int centre_x = std::min(x, width - 1), centre_y = std::min(y, height - 1);
+      const float* centre = p.feature.pixel(centre_x, centre_y);
+      Eigen::MatrixXd a = Eigen::MatrixXd::Zero(8, 8);
+      Eigen::VectorXd b = Eigen::VectorXd::Zero(8);
       const auto for_each = [&](const auto& visit) {
         for (int qy = std::max(0, y - 10); qy <= std::min(height - 1, y + 10); ++qy)
           for (int qx = std::max(0, x - 10); qx <= std::min(width - 1, x + 10); ++qx) {
             const size_t pixel = static_cast<size_t>(qy) * width + qx;
             if (!p.valid[pixel]) continue;
             const float* q = p.feature.pixel(qx, qy);
-            Eigen::VectorXd t(5);
-            t << 1, (qx - x) / 6.0, (qy - y) / 6.0, q[0] - centre[0], q[1] - centre[1];
+            Eigen::VectorXd t(8);
+            const float *there = p.position.pixel(qx, qy), *here = p.position.pixel(centre_x, centre_y);
+            t << 1, (qx - x) / 6.0, (qy - y) / 6.0, q[0] - centre[0], q[1] - centre[1], there[0] - here[0],
+                there[1] - here[1], there[2] - here[2];
             visit(pixel, likeness(p, x, y, qx, qy), t);
           }
       };
@@ -86,6 +90,7 @@ std::vector<double> by_formula(const FittedPicture& p) {
       });
       const double ridge = 5e-4 * a(0, 0);
       for (int i = 1; i < 5; ++i) a(i, i) += ridge;
+      for (int i = 5; i < 8; ++i) a(i, i) *= 1.001;
       const Eigen::VectorXd plane = a.ldlt().solve(b);
       for_each([&](size_t pixel, double w, const Eigen::VectorXd& t) {
         sum[pixel] += w * plane.dot(t);
@@ -104,10 +109,11 @@ TEST(Regression, IsItsFormula) {
   for (size_t i = 0; i < expected.size(); ++i) ASSERT_NEAR(image.data[3 * i], expected[i], 2e-4) << i;
 }
 
-TEST(Regression, KeepsTextureThatFeaturesShow) {
+TEST(Regression, KeepsTextureThatFeaturesOrPositionsShow) {
   FittedPicture p(60, 45);
   p.other = nl_means(std::vector<NlMeansSteering>{{&p.f, &p.s, {{0.5f, {&p.f}}}}}, nullptr, p.valid)[0];
-  const Image image = p.regressed({&p.f})[0];
+  const Image* const features[] = {&p.feature};
+  const Image image = covary::regressed({&p.f, &p.s, {&p.f}, {&p.other}}, features, p.valid)[0];
   const auto error = [&](const Image& of) {
     double sum = 0;
     for (int y = 0; y < 45; ++y)
@@ -117,6 +123,13 @@ TEST(Regression, KeepsTextureThatFeaturesShow) {
   };
   EXPECT_LT(error(image), 0.5 * error(p.other));
   EXPECT_LT(error(image), 0.5 * error(p.f));
+  // The same features as a position, in millimetres say.
+  for (int y = 0; y < 45; ++y)
+    for (int x = 0; x < 60; ++x)
+      for (int c : {0, 1, 2}) p.position.pixel(x, y)[c] = 50 + 1000 * (c < 2 ? p.feature.pixel(x, y)[c] : 0);
+  const Image by_position = covary::regressed({&p.f, &p.s, {&p.f}, {&p.other}, &p.position}, {}, p.valid)[0];
+  EXPECT_LT(error(by_position), 0.5 * error(p.other));
+  EXPECT_LT(error(by_position), 0.5 * error(p.f));
 }
 
 TEST(Regression, OfPartsAddsUpToThatOfTheWhole) {

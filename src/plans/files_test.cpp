@@ -270,7 +270,7 @@ TEST(Failure, FilmsOfAFolderAreThereBeforeTheEstimate) {
   render(scene, plan, request);
 }
 
-TEST(Estimate, GetsGuidesOfTheFirstSurfaceAndOfThatBehindGlass) {
+TEST(Estimate, GetsAllAuxiliaryImagesAsGuides) {
   const LoadedScene scene = load_sized(kRoom);
   const TemporaryFolder folder;
   RenderRequest request = request_of(24);
@@ -282,12 +282,13 @@ TEST(Estimate, GetsGuidesOfTheFirstSurfaceAndOfThatBehindGlass) {
     guided = {{"Albedo", beside.guides.albedo->data},
               {"N", beside.guides.normal->data},
               {"DenoisingAlbedo", beside.guides.denoising_albedo->data},
-              {"DenoisingNormal", beside.guides.denoising_normal->data}};
+              {"DenoisingNormal", beside.guides.denoising_normal->data},
+              {"P", beside.guides.position->data}};
     return make(passes, row, n_rows, beside);
   };
   const RenderResult result = render(scene, plan, request);
   for (const auto& [name, data] : guided) EXPECT_EQ(data, result.aovs.at(name).data) << name;
-  EXPECT_EQ(guided.size(), 4u);
+  EXPECT_EQ(guided.size(), std::size(kAuxiliaryImages));
 }
 
 TEST(Failure, FilmsOfFailedPathLengthsAreKept) {

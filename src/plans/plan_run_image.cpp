@@ -35,10 +35,11 @@ constexpr double kEstimateOfInterrupted = 0.5;  // seconds that it may take; aft
 }  // namespace
 
 EstimatorResult PlanRun::estimate_rows(int first_row, int n_rows, std::span<const Film> layers) const {
-  std::array<Image, 4> images;
+  std::array<Image, 5> images;
   Beside beside{guides(), {}};
   Guides& g = beside.guides;
-  for (size_t i = 0; const Image** guide : {&g.albedo, &g.normal, &g.denoising_albedo, &g.denoising_normal})
+  for (size_t i = 0;
+       const Image** guide : {&g.albedo, &g.normal, &g.denoising_albedo, &g.denoising_normal, &g.position})
     if (*guide) images[i] = rows_of(**guide, first_row, n_rows), *guide = &images[i++];
   for (size_t i = 0; i < layers.size(); ++i)
     beside.layers.push_back({layer_names_[i], rows_of(layers[i], first_row, n_rows)});

@@ -60,7 +60,7 @@ Guides guides_among(const std::map<std::string, Image>& aovs) {
     const auto found = aovs.find(name);
     return found == aovs.end() ? nullptr : &found->second;
   };
-  return {find("Albedo"), find("N"), find("DenoisingAlbedo"), find("DenoisingNormal"), true};
+  return {find("Albedo"), find("N"), find("DenoisingAlbedo"), find("DenoisingNormal"), find("P"), true};
 }
 
 Sampler sampler_of(const LoadedScene& scene, const RenderRequest& request) {

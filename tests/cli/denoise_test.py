@@ -140,7 +140,7 @@ class Denoise(RenderTest):
                                 "--save-stages", "steps")
         self.assertEqual(facts["estimator"], "none --denoise error --oidn off")
         self.assertNotIn("note", facts)
-        self.assertTrue((self.path / "steps/weight-sharp.exr").exists())
+        self.assertTrue((self.path / "steps/weight-regression.exr").exists())
         self.assertLess(self.relmse("a.exr", "r.exr"), 0.5 * self.relmse("plain.exr", "r.exr"))
         # The independent film alone.
         alone = ("combine", "--independent", "films/independent.exr", "-o", "b.exr", "--quiet", "--error")

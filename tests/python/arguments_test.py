@@ -39,8 +39,9 @@ COMBINE = {"crn": NO_GROUPS, "independent": NO_GROUPS, "estimator": ("iicvv", ""
            "counts": (3, "x", [1], -numpy.ones((20, 24), int), numpy.ones((3, 3), int)),
            "samples": without_none(NO_SPP), "denoise": ("yes", "", *NO_TEXT), "albedo": without_none(NO_IMAGE),
            "normal": without_none(NO_IMAGE), "denoising_albedo": without_none(NO_IMAGE),
-           "denoising_normal": without_none(NO_IMAGE), "layers": (3, "x", [1], {"a": 3}, {3: NO_IMAGE}),
-           "oidn": ("/nowhere", *NO_TEXT), "std_error": (1, "yes"), "force": NO_FLAG,
+           "denoising_normal": without_none(NO_IMAGE), "position": without_none(NO_IMAGE),
+           "layers": (3, "x", [1], {"a": 3}, {3: NO_IMAGE}), "oidn": ("/nowhere", *NO_TEXT),
+           "std_error": (1, "yes"), "force": NO_FLAG,
            "progress": NO_FUNCTION}
 METRIC = {"image": NO_GROUPS, "reference": NO_GROUPS, "reference2": NO_IMAGE, "low_dynamic_range": NO_FLAG}
 NO_SCENE = (3, None, [1])
@@ -184,7 +185,8 @@ class Arguments(PackageTest):
             return {}
         guides = {"denoise": "balanced", "oidn": "off"}
         return {"albedo": guides, "normal": {**guides, "albedo": self.crn[0]}, "denoising_albedo": guides,
-                "denoising_normal": {**guides, "denoising_albedo": self.crn[0]}, "oidn": {"denoise": "balanced"},
+                "denoising_normal": {**guides, "denoising_albedo": self.crn[0]},
+                "position": {**guides, "albedo": self.crn[0]}, "oidn": {"denoise": "balanced"},
                 "counts": {"samples": 24}}.get(name, {})
 
     def refused(self, function, call, given, name, value):
@@ -256,10 +258,11 @@ class Arguments(PackageTest):
                 self.assertIn(parameter.default, (None, False))
 
     def test_options_of_combining_are_arguments(self):
-        """All that the library declares, under their names but for these; guides are four images, and some are of files
+        """All that the library declares, under their names but for these; guides are five images, and some are of files
         and of the program alone."""
         declared = {option["name"].replace("-", "_"): option for option in covary._covary.combine_options()}
-        other = {"error": ["std_error"], "guides": ["albedo", "normal", "denoising_albedo", "denoising_normal"]}
+        other = {"error": ["std_error"], "guides": ["albedo", "normal", "denoising_albedo", "denoising_normal",
+                                                  "position"]}
         files = {"output", "crn_layer", "independent_layer", "explain", "memory"}
         arguments = inspect.signature(covary.combine).parameters
         self.assertEqual({name for option in declared if option not in files for name in other.get(option, [option])},

@@ -124,7 +124,7 @@ class Denoise(BesideTest):
 
     def write_guides(self, names, images):
         self.write("guides", {f"{name}.{c}": image[:, :, i] for name, image in zip(names, images)
-                              for i, c in enumerate("XYZ" if name.endswith(("N", "Normal")) else "RGB")})
+                              for i, c in enumerate("XYZ" if name.endswith(("N", "Normal", "P")) else "RGB")})
 
     def test_guides_behind_glass(self):
         """Go to the network in place of the others."""
@@ -154,6 +154,17 @@ class Denoise(BesideTest):
         self.run_program("combine", "--independent", "independent.exr", "-o", "out.exr", "--denoise", "auto",
                          "--oidn", "off", "--guides", "guides.exr", "--quiet", "--error")
         self.assert_same_bits(result.image.reshape(-1, 3), rgb(self.path / "out.exr"))
+        position = numpy.stack([self.normal[..., 0], *numpy.mgrid[:HEIGHT, :WIDTH]], -1).astype(numpy.float32)
+        placed = covary.combine(None, independent, denoise="auto", oidn="off", albedo=self.albedo, normal=self.normal,
+                                position=position)
+        self.assertFalse((placed.image == result.image).all())
+        self.write_guides(("Albedo", "N", "P"), (self.albedo, self.normal, position))
+        self.run_program("combine", "--independent", "independent.exr", "-o", "out.exr", "--denoise", "auto",
+                         "--oidn", "off", "--guides", "guides.exr", "--quiet", "--error")
+        self.assert_same_bits(placed.image.reshape(-1, 3), rgb(self.path / "out.exr"))
+        self.assertEqual(self.message_of(covary.UsageError, covary.combine, None, independent, denoise="auto",
+                                         position=position),
+                         "position: it is a guide only together with the albedo")
         self.assertIn("crn: found None; without it, independent images can only be denoised",
                       self.message_of(covary.UsageError, covary.combine, None, independent))
         self.assertIn("crn: found None; 'iduw' needs the image with common random numbers",
