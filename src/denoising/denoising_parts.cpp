@@ -18,17 +18,6 @@ namespace {
 constexpr float kPriorFreedom = 8;
 constexpr int kVarianceWindow = 5;
 
-/// By how much auxiliary images differ where a mirror or glass is seen.
-constexpr float kSpecularDifference = 0.05f;
-
-/// Marks the pixels where a channel of the images differs.
-void mark_differences(const Image* first, const Image* behind, std::vector<unsigned char>& marks) {
-  if (!first || !behind) return;
-  marks.resize(first->data.size() / 3);
-  for (size_t i = 0; i < first->data.size(); ++i)
-    if (std::abs(first->data[i] - behind->data[i]) > kSpecularDifference) marks[i / 3] = 1;
-}
-
 /// Pixels that the estimator leaves out may hold anything.
 void make_finite(Image& image) {
   for (float& value : image.data)
@@ -127,13 +116,6 @@ DenoisingParts whole_of_mean(const GroupedImage& independent) {
   fill_invalid(independent, independent, parts.valid, parts.whole.image.estimate);
   parts.whole.image.nonfinite_pixels = n_nonfinite;
   return parts;
-}
-
-std::vector<unsigned char> pixels_behind_specular(const Guides& guides) {
-  std::vector<unsigned char> marks;
-  mark_differences(guides.albedo, guides.denoising_albedo, marks);
-  mark_differences(guides.normal, guides.denoising_normal, marks);
-  return marks;
 }
 
 DenoisingParts parts_of_mean(const GroupedImage& independent) {

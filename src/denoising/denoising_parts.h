@@ -30,17 +30,12 @@ struct DenoisingPart {
 struct DenoisingParts {
   DenoisingPart whole;
   std::array<DenoisingPart, 2> halves;
-  std::vector<unsigned char> valid;     ///< 0: the pixel is left out
-  std::vector<unsigned char> specular;  ///< pixels_behind_specular(); empty: unknown
+  std::vector<unsigned char> valid;  ///< 0: the pixel is left out
   /// The image is the mean of independent samples: noisy, but without a bias for residual correction to remove.
   bool is_mean = false;
   std::string name = "mean";  ///< of the image
   GroupedImage groups;        ///< the independent samples; the caller owns the memory
 };
-
-/// 1 where the auxiliary images of what is seen in mirrors and through glass differ from those of first hits by more
-/// than 0.05 in a channel; empty without such images.
-std::vector<unsigned char> pixels_behind_specular(const Guides& guides);
 
 /// Means of all pixels.
 Image mean_image(const Moments& moments);

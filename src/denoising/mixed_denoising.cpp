@@ -189,7 +189,7 @@ MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<Candid
     result.bias =
         held_out_bias({images, {&guide_of(mixed.halves[0]), &guide_of(mixed.halves[1])}, independent, &valid});
     result.risk_rows = image_risk({&result.estimate, images, &parts.whole.independent, independent, &parts.groups,
-                                   &guide_of(mixed.whole), &valid, parts.specular.empty() ? nullptr : &parts.specular});
+                                   &guide_of(mixed.whole), &valid});
     result.risk_kind = kind_of(makers, parts.is_mean);
     result.risks = risks_of(parts, mixed.halves, out.names, held_out, predicted_relmse(result));
   }
@@ -245,7 +245,7 @@ MixedDenoising single_candidate(const GroupedImage& independent, const std::vect
 using Run = std::function<MixedDenoising(const GroupedImage& crn, const GroupedImage& independent,
                                          const PairSettings& settings)>;
 
-/// denoise_by_mixture() with what guides tell: of the error, and for the history, which keeps them for the next frame.
+/// denoise_by_mixture() with guides for the history, which are kept for the next frame.
 MixedDenoising denoise_frame(DenoisingParts parts, const std::vector<CandidateMaker>& makers,
                              const MixedDenoisingOptions& options, const PairSettings& settings,
                              std::span<const Layer> layers) {
@@ -257,7 +257,6 @@ MixedDenoising denoise_frame(DenoisingParts parts, const std::vector<CandidateMa
     follow_features(*before, *albedo, *normal);
     history.before = before;
   }
-  parts.specular = pixels_behind_specular(settings.guides);
   MixedDenoising out = denoise_by_mixture(std::move(parts), makers, options.mode, settings.std_error, layers, history);
   if (history.keep_samples && has_guides) out.result.kept_samples[2] = *albedo, out.result.kept_samples[3] = *normal;
   return out;

@@ -55,24 +55,6 @@ Image iicv_of(const Inputs& in) {
   return make_estimator("iicv").apply(in.crn.view(), in.independent.view(), {}).estimate;
 }
 
-TEST(MixedDenoising, TellsTheNoiseBehindGlass) {
-  const Inputs in(4);
-  const Image first(kWidth, kHeight, 3);
-  Image behind = first;
-  for (int y = 0; y < kHeight; ++y)
-    for (int x = 0; x < kWidth / 2; ++x) behind.pixel(x, y)[1] = 0.06f;
-  Guides guides{&first, &first, &first, &behind};
-  const auto behind_of = [&] {
-    const RiskRow sums = sum_of(denoised(in, DenoiseMode::kAuto, guides).risk_rows);
-    return sums.noise_behind / sums.noise;
-  };
-  EXPECT_NEAR(behind_of(), 0.5, 0.1);
-  behind = first;
-  EXPECT_EQ(behind_of(), 0);
-  guides.denoising_normal = nullptr;
-  EXPECT_EQ(behind_of(), 0);
-}
-
 /// What the outliers, 5 times as bright on 1 % of the values, add to the mean.
 constexpr float kOutliers = 1.05f;
 

@@ -30,7 +30,6 @@ struct RiskRow {
   double variance = 0;                               ///< of the image: that between halves
   double noise = 0;                                  ///< v
   double noise_squares = 0;                          ///< of v of each pixel
-  double noise_behind = 0;                           ///< v of pixels that show a mirror or glass
   double light = 0;                                  ///< what the groups hold, over G' + 0.1
   double light_of_largest = 0;                       ///< what the largest group of each pixel holds
   double squared_deviations = 0, fourth_powers = 0;  ///< of groups: squared variance, and fourth moment
@@ -47,7 +46,6 @@ inline constexpr std::pair<const char*, double RiskRow::*> kRiskSums[] = {
     {"variance", &RiskRow::variance},
     {"noise", &RiskRow::noise},
     {"noise_squares", &RiskRow::noise_squares},
-    {"noise_behind", &RiskRow::noise_behind},
     {"light", &RiskRow::light},
     {"light_of_largest", &RiskRow::light_of_largest},
     {"squared_deviations", &RiskRow::squared_deviations},

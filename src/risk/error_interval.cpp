@@ -21,10 +21,6 @@ constexpr double kLeastOverVariance = 0.5, kMostOverVariance = 30;
 /// Fraction of the covariance that halves miss (docs/notes/error-estimates.md).
 constexpr double kMissingCovariance = 0.27;
 
-/// Of the noise at pixels that show a mirror or glass: the fit has no render with more (largest 0.51), and where there
-/// was more, filters had a bias that no feature tells from noise (docs/notes/error-estimates.md).
-constexpr double kMostBehind = 0.55;
-
 /// The logarithm of a ratio, and how much of it noise hides.
 struct Ratio {
   double log = 0, hidden = 1;
@@ -102,8 +98,6 @@ std::string unknown_error(const RiskRow& sums, ErrorKind kind, const LogError& e
   if (has_rare_light(sums))
     return fmt::format("{:.0f} % of the light are in one of {:.0f} groups of each pixel", 100 * share_of_largest(sums),
                        sums.groups);
-  if (kind != ErrorKind::kMean && sums.noise_behind > kMostBehind * sums.noise)
-    return fmt::format("{:.0f} % of the noise is in mirrors and behind glass", 100 * sums.noise_behind / sums.noise);
   if (std::max(error.high - error.middle, error.middle - error.low) > std::log(kMostFactor))
     return "few samples hold most of the light";
   return "";

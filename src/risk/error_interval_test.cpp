@@ -146,16 +146,6 @@ TEST(ErrorInterval, IsNotGivenWhereLightIsMissing) {
             "no interval can be given: 90 % of the light are in one of 12 groups of each pixel");
 }
 
-TEST(ErrorInterval, IsNotGivenWhereMostNoiseIsBehindGlass) {
-  RiskRow sums = known_sums();
-  sums.noise_behind = 0.5 * sums.noise;
-  EXPECT_EQ(unknown_error(sums, ErrorKind::kFilters, {0, -0.5, 0.5}), "");
-  sums.noise_behind = 0.6 * sums.noise;
-  EXPECT_EQ(unknown_error(sums, ErrorKind::kFilters, {0, -0.5, 0.5}),
-            "60 % of the noise is in mirrors and behind glass");
-  EXPECT_EQ(unknown_error(sums, ErrorKind::kMean, {0, -0.5, 0.5}), "") << "has no bias";
-}
-
 TEST(ErrorInterval, IsNotGivenOfBlackImages) {
   EstimatorResult result = result_of({}, ErrorKind::kFilters);
   apply_interval(result);

@@ -70,14 +70,12 @@ RiskRow risk_of_row(const ImageRiskInput& in, int y) {
   row.groups = in.groups->groups;
   double part = 0;
   for (int x = 0; x < width; ++x) {
-    const size_t i = static_cast<size_t>(y) * width + x;
-    if ((*in.valid)[i]) {
+    if ((*in.valid)[static_cast<size_t>(y) * width + x]) {
       const double w = relative_weight(in.guide->pixel(x, y));
       const PixelRisk pixel = risk_at(in, x, y);
       part += w * pixel.error;
       row.covariance += w * pixel.covariance, row.variance += w * pixel.variance;
       row.noise += w * pixel.noise, row.noise_squares += square(w * pixel.noise);
-      if (in.specular && (*in.specular)[i]) row.noise_behind += w * pixel.noise;
       row.values += 3;
       add_groups(in, x, y, w, row);
     }

@@ -30,7 +30,6 @@ struct ImageRiskInput {
   const GroupedImage* groups = nullptr;             ///< the groups whose mean is h
   const Image* guide = nullptr;                     ///< errors are relative to its brightness
   const std::vector<unsigned char>* valid = nullptr;
-  const std::vector<unsigned char>* specular = nullptr;  ///< not 0: the pixel shows a mirror or glass; null: unknown
 };
 
 /// Sums over each row of the image. Rows do not depend on each other, so those of bands can be joined. Bit-identical
