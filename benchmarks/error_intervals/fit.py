@@ -25,7 +25,7 @@ RIDGE, NOISE_FLOOR = 0.1, 0.1
 #: difference of logarithms from which on a render counts little
 OUTLIER = 0.5
 TRUSTED, LEAST, MOST, MISSING_COVARIANCE = 0.5, 0.5, 30, 0.27
-MOST_OF_LARGEST, MOST_FACTOR, FEWEST_PIXELS = 0.55, 5, 20
+MOST_OF_LARGEST, MOST_FACTOR, MOST_SPECULAR, FEWEST_PIXELS = 0.55, 5, 0.5, 20
 #: What bounds are off at least, of a median render: scenes of others differ more from ours than ours do
 LEAST_FACTOR = 1.15
 #: How far off bounds are, in the logarithm, of what holds 80 of 100 renders of families that were left out: rooms that
@@ -138,7 +138,7 @@ def usable(row):
     equal = 1 / float(row["groups"])  # the share of each of groups of equal light
     share = (float(row["light_of_largest"]) / max(float(row["light"]), 1e-30) - equal) / (1 - equal)
     return (float(row["variance"]) > 0 and float(row["relmse"]) > 2 * float(row["reference_noise"])
-            and share <= MOST_OF_LARGEST
+            and share <= MOST_OF_LARGEST and float(row["specular_noise"]) <= MOST_SPECULAR * float(row["noise"])
             and float(row["noise"])**2 >= FEWEST_PIXELS * float(row["noise_squares"]))
 
 
@@ -167,9 +167,9 @@ inline constexpr FittedErrors kFittedToFew[] = {{
 // clang-format on
 
 /// There is no interval where the largest group of each pixel has a larger share of the light that is not common to all
-/// groups, the bounds are further off than this factor, fewer pixels hold the noise, or there are fewer groups and the
-/// kind has no fit for few.
-inline constexpr double kMostOfLargest = {share}, kMostFactor = {factor};
+/// groups, the bounds are further off than this factor, a larger share of the noise is in mirrors or behind glass,
+/// fewer pixels hold the noise, or there are fewer groups and the kind has no fit for few.
+inline constexpr double kMostOfLargest = {share}, kMostFactor = {factor}, kMostSpecular = {specular};
 inline constexpr int kFewestPixels = {fewest}, kFewestGroups = {groups};
 
 }}  // namespace covary
@@ -185,7 +185,8 @@ def fit_all(arguments):
         fit.report()
         texts[kind.startswith("few")].append(fit.text())
     TABLE.write_text(TABLE_TEXT.format(rows="\n".join(texts[False]), few="\n".join(texts[True]), share=MOST_OF_LARGEST,
-                                       factor=MOST_FACTOR, fewest=FEWEST_PIXELS, groups=FEWEST_GROUPS))
+                                       factor=MOST_FACTOR, specular=MOST_SPECULAR, fewest=FEWEST_PIXELS,
+                                       groups=FEWEST_GROUPS))
 
 
 def main():

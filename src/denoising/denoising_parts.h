@@ -35,6 +35,7 @@ struct DenoisingParts {
   bool is_mean = false;
   std::string name = "mean";  ///< of the image
   GroupedImage groups;        ///< the independent samples; the caller owns the memory
+  Guides guides;              ///< tell the pixels seen in mirrors and through glass; the caller owns the memory
 };
 
 /// Means of all pixels.

@@ -189,7 +189,7 @@ MixedDenoising denoise_by_mixture(DenoisingParts parts, const std::vector<Candid
     result.bias =
         held_out_bias({images, {&guide_of(mixed.halves[0]), &guide_of(mixed.halves[1])}, independent, &valid});
     result.risk_rows = image_risk({&result.estimate, images, &parts.whole.independent, independent, &parts.groups,
-                                   &guide_of(mixed.whole), &valid});
+                                   &guide_of(mixed.whole), &valid, parts.guides});
     result.risk_kind = kind_of(makers, parts.is_mean);
     result.risks = risks_of(parts, mixed.halves, out.names, held_out, predicted_relmse(result));
   }
@@ -257,6 +257,7 @@ MixedDenoising denoise_frame(DenoisingParts parts, const std::vector<CandidateMa
     follow_features(*before, *albedo, *normal);
     history.before = before;
   }
+  parts.guides = settings.guides;
   MixedDenoising out = denoise_by_mixture(std::move(parts), makers, options.mode, settings.std_error, layers, history);
   if (history.keep_samples && has_guides) out.result.kept_samples[2] = *albedo, out.result.kept_samples[3] = *normal;
   return out;

@@ -96,9 +96,10 @@ Estimator mean_denoiser(DenoiseMode mode) {
   return with_denoising(make_estimator("none"), options);
 }
 
-EstimatorResult denoised_mean(const test::Grouped& image, DenoiseMode mode) {
+EstimatorResult denoised_mean(const test::Grouped& image, DenoiseMode mode, const Guides& guides = {}) {
   PairSettings settings;
   settings.std_error = true;
+  settings.guides = guides;
   return mean_denoiser(mode).apply({}, image.view(), settings);
 }
 
@@ -121,6 +122,19 @@ TEST(MixedDenoising, OfASinglePassTellsItsErrorByItsSamples) {
   const EstimatorResult of_pair = denoised(Inputs(1), DenoiseMode::kError);
   EXPECT_EQ(of_pair.risk_kind, ErrorKind::kPairFilters);
   EXPECT_EQ(of_pair.risk_rows.size(), static_cast<size_t>(kHeight));
+}
+
+TEST(MixedDenoising, TellsHowMuchNoiseIsBehindGlass) {
+  Image pane(kWidth, kHeight, 3), behind(kWidth, kHeight, 3);
+  std::fill(pane.data.begin(), pane.data.end(), 1.0f);
+  std::fill(behind.data.begin(), behind.data.end(), 0.5f);
+  const Inputs in(1);
+  for (const EstimatorResult& result : {denoised_mean(in.independent, DenoiseMode::kAuto, {&pane, nullptr, &behind}),
+                                        denoised(in, DenoiseMode::kError, {&pane, nullptr, &behind})}) {
+    const RiskRow sums = sum_of(result.risk_rows);
+    EXPECT_EQ(sums.specular_noise, sums.noise);
+  }
+  EXPECT_EQ(sum_of(denoised_mean(in.independent, DenoiseMode::kAuto).risk_rows).specular_noise, 0);
 }
 
 TEST(MixedDenoising, OfASinglePassHasLessErrorThanItsMean) {

@@ -30,6 +30,7 @@ struct RiskRow {
   double variance = 0;                               ///< of the image: that between halves
   double noise = 0;                                  ///< v
   double noise_squares = 0;                          ///< of v of each pixel
+  double specular_noise = 0;                         ///< v of pixels seen in mirrors or through glass
   double light = 0;                                  ///< what the groups hold, over G' + 0.1
   double light_of_largest = 0;                       ///< what the largest group of each pixel holds
   double squared_deviations = 0, fourth_powers = 0;  ///< of groups: squared variance, and fourth moment
@@ -46,6 +47,7 @@ inline constexpr std::pair<const char*, double RiskRow::*> kRiskSums[] = {
     {"variance", &RiskRow::variance},
     {"noise", &RiskRow::noise},
     {"noise_squares", &RiskRow::noise_squares},
+    {"specular_noise", &RiskRow::specular_noise},
     {"light", &RiskRow::light},
     {"light_of_largest", &RiskRow::light_of_largest},
     {"squared_deviations", &RiskRow::squared_deviations},

@@ -26,9 +26,14 @@ struct Ratio {
   double log = 0, hidden = 1;
 };
 
+/// R, but not much less than V.
+double risk_of(const RiskRow& s) {
+  return std::max(s.error + kMissingCovariance * s.covariance, kLeastOverVariance * s.variance);
+}
+
 /// R / V.
 Ratio ratio_of(const RiskRow& s) {
-  const double least = std::max(s.error + kMissingCovariance * s.covariance, kLeastOverVariance * s.variance);
+  const double least = risk_of(s);
   const double scatter = std::sqrt(std::max(0.0, s.squares - s.error * s.error / std::max(s.parts, 1.0))) / least;
   const double trust = 1 / (1 + scatter * scatter / (kTrusted * kTrusted));
   return {trust * std::log(std::min(least / s.variance, kMostOverVariance)), 1 - trust};
@@ -46,9 +51,13 @@ void scale(Image& std_error, double factor) {
 /// Whether images of this kind with few groups have a separate fit.
 bool fitted_to_few(ErrorKind kind) { return kind == ErrorKind::kFilters || kind == ErrorKind::kNetwork; }
 
+bool is_mixture(ErrorKind kind, double groups) {
+  return kind != ErrorKind::kMean && kind != ErrorKind::kPair && groups >= kFewestGroups;
+}
+
 /// Which part of log(relMSE / V) is left to the features of an image: less, the closer a mixture is to the mean.
 double not_the_mean(const RiskRow& sums, ErrorKind kind) {
-  if (kind == ErrorKind::kMean || kind == ErrorKind::kPair || sums.groups < kFewestGroups) return 1;
+  if (!is_mixture(kind, sums.groups)) return 1;
   return 1 - std::min(1.0, sums.variance / sums.noise);
 }
 
@@ -79,9 +88,14 @@ LogError fitted_error(const RiskRow& sums, ErrorKind kind) {
   const FittedErrors& fit = fit_of(kind, sums.groups);
   const ErrorFeatures x = error_features(sums);
   LogError error;
-  error.middle = std::log(sums.variance / sums.values) + not_the_mean(sums, kind) * dot(fit.middle, x);
+  const double part = not_the_mean(sums, kind);
+  error.middle = std::log(sums.variance / sums.values) + part * dot(fit.middle, x);
   const double spread = std::exp(std::clamp(dot(fit.log_spread, x), fit.least_log_spread, fit.most_log_spread));
   error.low = error.middle + fit.low * spread, error.high = error.middle + fit.high * spread;
+  if (is_mixture(kind, sums.groups)) {  // R sees light that the mixture left out; of few groups it is too noisy
+    const double risk = std::log(sums.variance / sums.values) + part * std::log(risk_of(sums) / sums.variance);
+    error.high = std::max(error.high, std::min(risk, error.middle + std::log(kMostFactor)));
+  }
   return error;
 }
 
@@ -98,6 +112,8 @@ std::string unknown_error(const RiskRow& sums, ErrorKind kind, const LogError& e
   if (has_rare_light(sums))
     return fmt::format("{:.0f} % of the light are in one of {:.0f} groups of each pixel", 100 * share_of_largest(sums),
                        sums.groups);
+  if (not_the_mean(sums, kind) * sums.specular_noise > kMostSpecular * sums.noise)  // of what the mixture removes
+    return fmt::format("{:.0f} % of the noise are in mirrors or behind glass", 100 * sums.specular_noise / sums.noise);
   if (std::max(error.high - error.middle, error.middle - error.low) > std::log(kMostFactor))
     return "few samples hold most of the light";
   return "";

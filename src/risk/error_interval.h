@@ -7,7 +7,7 @@
 //
 // r: the standardised residual, with quantiles from scenes left out of the fit; p: 1, for mixtures 1 - V / v, which is
 // 0 where they equal the mean h, whose error is V. No interval is given if few pixels or single groups hold most of the
-// noise or the light, or if the bounds are far apart.
+// noise or the light, if most of the noise is behind glass, or if the bounds are far apart.
 #pragma once
 
 #include <array>
@@ -32,7 +32,7 @@ using ErrorFeatures = std::array<double, kErrorFeatures>;
 /// method smooths halves more than the whole (docs/notes/error-estimates.md).
 ErrorFeatures error_features(const RiskRow& sums);
 
-/// The distribution of log(relMSE).
+/// The distribution of log(relMSE). The upper bound of a mixture of kFewestGroups groups or more is at least R.
 struct LogError {
   double middle = 0, low = 0, high = 0;
 };

@@ -45,9 +45,9 @@ inline constexpr FittedErrors kFittedToFew[] = {
 // clang-format on
 
 /// There is no interval where the largest group of each pixel has a larger share of the light that is not common to all
-/// groups, the bounds are further off than this factor, fewer pixels hold the noise, or there are fewer groups and the
-/// kind has no fit for few.
-inline constexpr double kMostOfLargest = 0.55, kMostFactor = 5;
+/// groups, the bounds are further off than this factor, a larger share of the noise is in mirrors or behind glass,
+/// fewer pixels hold the noise, or there are fewer groups and the kind has no fit for few.
+inline constexpr double kMostOfLargest = 0.55, kMostFactor = 5, kMostSpecular = 0.5;
 inline constexpr int kFewestPixels = 20, kFewestGroups = 8;
 
 }  // namespace covary

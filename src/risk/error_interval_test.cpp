@@ -116,6 +116,21 @@ TEST(ErrorInterval, OfAMixtureThatIsTheMeanIsAroundItsVariance) {
   EXPECT_NE(fitted_error(sums, ErrorKind::kPair).middle, std::log(sums.variance / sums.values));
 }
 
+/// A denoiser removes highlights that few samples found: the variance between its halves is small, R is not.
+TEST(ErrorInterval, OfAMixtureReachesToTheRiskThatSamplesTell) {
+  for (const ErrorKind kind : {ErrorKind::kFilters, ErrorKind::kNetwork, ErrorKind::kPairFilters}) {
+    RiskRow sums = known_sums();
+    const double usual = fitted_error(sums, kind).high;
+    sums.error = 400, sums.squares = 400 * 400;  // noisy, so that the middle hardly changes
+    const double risk = std::log(sums.variance / sums.values) + 0.95 * std::log((400 + 0.27 * 180) / 45);
+    const LogError error = fitted_error(sums, kind);
+    EXPECT_NEAR(error.high, std::min(risk, error.middle + std::log(kMostFactor)), 1e-12);
+    EXPECT_GT(error.high, usual + 0.1);
+    sums.groups = 4;
+    EXPECT_LT(fitted_error(sums, kind).high, error.high) << "of few groups R is too noisy";
+  }
+}
+
 TEST(ErrorInterval, IsNotGivenWhereFewPixelsHoldTheNoise) {
   RiskRow sums = known_sums();
   sums.noise_squares = sums.noise * sums.noise / 4;
@@ -144,6 +159,17 @@ TEST(ErrorInterval, IsNotGivenWhereLightIsMissing) {
   EXPECT_FALSE(predicted_error(result, 64, 0)->bounds);
   EXPECT_EQ(predicted_error(result, 64, 0)->doubt,
             "no interval can be given: 90 % of the light are in one of 12 groups of each pixel");
+}
+
+TEST(ErrorInterval, IsNotGivenWhereMostNoiseIsBehindGlass) {
+  RiskRow sums = known_sums();
+  sums.specular_noise = 0.49 * sums.noise;
+  EXPECT_EQ(unknown_error(sums, ErrorKind::kFilters, {0, -0.5, 0.5}), "");
+  sums.specular_noise = 0.67 * sums.noise;
+  EXPECT_EQ(unknown_error(sums, ErrorKind::kFilters, {0, -0.5, 0.5}),
+            "67 % of the noise are in mirrors or behind glass");
+  sums.variance = 0.4 * sums.noise;  // the mixture is the mean in part
+  EXPECT_EQ(unknown_error(sums, ErrorKind::kFilters, {0, -0.5, 0.5}), "");
 }
 
 TEST(ErrorInterval, IsNotGivenOfBlackImages) {

@@ -12,6 +12,8 @@ namespace {
 
 /// Pixels of a part of a row, whose errors are summed.
 constexpr int kPart = 16;
+/// Albedos or normals of one surface differ by no more, as sums over channels.
+constexpr float kSameSurface = 0.05f;
 
 /// A pixel's sums over its channels.
 struct PixelRisk {
@@ -38,6 +40,16 @@ PixelRisk risk_at(const ImageRiskInput& in, int x, int y) {
     pixel.variance += 0.25 * square(m[0] - m[1]);
   }
   return pixel;
+}
+
+/// Whether the surface behind mirrors and glass is not the first one.
+bool is_specular(const Guides& surfaces, int x, int y) {
+  const auto differ = [&](const Image* first, const Image* behind) {
+    if (!first || !behind) return false;
+    const float *a = first->pixel(x, y), *b = behind->pixel(x, y);
+    return std::abs(a[0] - b[0]) + std::abs(a[1] - b[1]) + std::abs(a[2] - b[2]) > kSameSurface;
+  };
+  return differ(surfaces.normal, surfaces.denoising_normal) || differ(surfaces.albedo, surfaces.denoising_albedo);
 }
 
 /// The fractions of light in a pixel's groups, and how much they differ.
@@ -76,6 +88,7 @@ RiskRow risk_of_row(const ImageRiskInput& in, int y) {
       part += w * pixel.error;
       row.covariance += w * pixel.covariance, row.variance += w * pixel.variance;
       row.noise += w * pixel.noise, row.noise_squares += square(w * pixel.noise);
+      if (is_specular(in.surfaces, x, y)) row.specular_noise += w * pixel.noise;
       row.values += 3;
       add_groups(in, x, y, w, row);
     }

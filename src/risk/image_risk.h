@@ -17,7 +17,7 @@
 #include <array>
 #include <vector>
 
-#include "estimators/estimator_result.h"
+#include "estimators/estimator.h"
 #include "filters/planes.h"
 
 namespace covary {
@@ -30,6 +30,7 @@ struct ImageRiskInput {
   const GroupedImage* groups = nullptr;             ///< the groups whose mean is h
   const Image* guide = nullptr;                     ///< errors are relative to its brightness
   const std::vector<unsigned char>* valid = nullptr;
+  Guides surfaces = {};  ///< tell mirrors and glass, where the surfaces behind them are known, too
 };
 
 /// Sums over each row of the image. Rows do not depend on each other, so those of bands can be joined. Bit-identical
