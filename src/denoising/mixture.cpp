@@ -36,7 +36,11 @@ void add_pixel(const MixtureInput& in, int m, int x, int y, float* sums) {
     }
   }
   // Error of the halves without 1 - 1 / bias_share of the variance: squared bias + variance / bias_share.
-  const float variance = 0.25f * (weight[0] + weight[1]), removed = (1 - 1 / in.bias_share) * variance;
+  const float variance = 0.25f * (weight[0] + weight[1]);
+  // Of a mean, a firefly of one half has a small weight there and a large one in the other half, which would count more
+  // noise than there is.
+  const float certain = in.counts[0] ? 0.5f * std::min(weight[0], weight[1]) : variance;
+  const float removed = (1 - 1 / in.bias_share) * certain;
   int plane = 0;
   for (int p = 0; p < m; ++p)
     for (int q = p; q < m; ++q, ++plane)

@@ -93,6 +93,30 @@ TEST(Mixture, FindsTheWeightOfLeastError) {
     }
 }
 
+/// Means whose errors count by their own standard error, as of independent samples with few fireflies: those of one
+/// half, weighted as pixels of the other, are no variance of the mean that a candidate lacks.
+TEST(Mixture, LeavesNoFirefliesWhereBiasCountsMore) {
+  const Image clean = flat(0.02f, 0, 0);
+  CandidateSet halves[2] = {{flat(0, 0.04, 11), {clean}}, {flat(0, 0.04, 12), {clean}}};
+  Image counts[2] = {Image(kSize, kSize, 1), Image(kSize, kSize, 1)};
+  for (uint64_t i = 0; i < kSize * kSize; ++i)
+    for (int half : {0, 1}) {
+      const float firefly = test::noise(13, i, half) > 0.45f ? 10 : 0;
+      for (int c = 0; c < 3; ++c) halves[half].base.data[3 * i + c] += firefly;
+      counts[half].data[i] = 1 / (0.3f + 2 * (0.04f + firefly * firefly));
+    }
+  const Moments independent[2] = {moments_of(halves[0].base, 0.04f), moments_of(halves[1].base, 0.04f)};
+  const CandidateSet whole{average(halves[0].base, halves[1].base), {clean}};
+  const Image guide = flat(0, 0, 0);
+  const std::vector<unsigned char> valid(size_t{kSize} * kSize, 1);
+  for (const float bias_share : {1.0f, 2.0f, 4.0f}) {
+    MixtureInput input{&whole, {&halves[0], &halves[1]}, {&independent[0], &independent[1]}, &guide, &valid};
+    input.bias_share = bias_share;
+    input.counts = {&counts[0], &counts[1]};
+    EXPECT_GT(mean_weight(mix(input), 0), 0.9) << bias_share;
+  }
+}
+
 TEST(Mixture, GivesAPerfectCandidateTheWholeAndBadOnesNothing) {
   const Experiment experiment(2);
   const auto perfect_and_bad = [&](int half) {
