@@ -143,17 +143,16 @@ class Regression {
     return exp2_of_nonpositive(min(sum * (-0.5f * kLog2E / (kOfPatch * kBandwidth * kBandwidth)), vfloat{}));
   }
 
-  /// What the pixels of row y + dy are at, counted from the centres.
-  void find_terms(int x, int y, int dy, RowTerms& terms) const {
-    const Place centre(0);
+  /// What the pixels of row y + dy are at, counted from the centres, times roots of their weights.
+  void find_terms(int x, int y, int dy, const vfloat* roots, RowTerms& terms) const {
     for (int k = 0; k < kSide; ++k) {
-      terms[0][k] = splat(1);
-      terms[1][k] = splat(static_cast<float>(k - kRadius) / kPlaceUnit);
-      terms[2][k] = splat(static_cast<float>(dy) / kPlaceUnit);
+      terms[0][k] = roots[k];
+      terms[1][k] = roots[k] * (static_cast<float>(k - kRadius) / kPlaceUnit);
+      terms[2][k] = roots[k] * (static_cast<float>(dy) / kPlaceUnit);
     }
     for (int a = 3; a < n_terms_; ++a) {
-      const vfloat own = value(3 + a, centre, x, y);
-      for (int k = 0; k < kSide; ++k) terms[a][k] = value(3 + a, Place(k - kRadius), x, y + dy) - own;
+      const vfloat own = value(3 + a, Place(0), x, y);
+      for (int k = 0; k < kSide; ++k) terms[a][k] = roots[k] * (value(3 + a, Place(k - kRadius), x, y + dy) - own);
     }
   }
 
@@ -164,11 +163,9 @@ class Regression {
     std::vector<vfloat> sums(batch::packed_size(n + n_channels)), of_row(sums.size());
     for (int dy = -kRadius; dy <= kRadius; ++dy) {
       if (y + dy < 0 || y + dy >= height_) continue;
-      find_terms(x, y, dy, w.terms);
       const vfloat* const roots = &w.roots[(dy + kRadius) * kSide];
+      find_terms(x, y, dy, roots, w.terms);
       std::array<vfloat, kSide> colours;
-      for (int a = 0; a < n; ++a)
-        for (int k = 0; k < kSide; ++k) w.terms[a][k] *= roots[k];
       batch::gram(w.terms[0].data(), kSide, 1, n, kSide, of_row.data());
       for (size_t i = 0; i < batch::packed_size(n); ++i) sums[i] += of_row[i];
       for (int c = 0; c < n_channels; ++c) {
@@ -188,11 +185,13 @@ class Regression {
       std::copy_n(&sums[batch::packed(n + c, 0)], n, planes[c].begin());
       batch::substitute_back(sums.data(), inverse.data(), n, planes[c].data());
     }
+    // From differences to the centres to values.
+    for (Terms& plane : planes)
+      for (int a = 3; a < n; ++a) plane[0] -= plane[a] * value(3 + a, Place(0), x, y);
   }
 
   /// Adds what the planes are at the pixels of row y + dy, `row` of the sums.
-  void predict(int x, int y, int dy, int row, const std::vector<Terms>& planes, Windows& w, Planes& sums) const {
-    find_terms(x, y, dy, w.terms);
+  void predict(int x, int y, int dy, int row, const std::vector<Terms>& planes, const Windows& w, Planes& sums) const {
     const auto add = [&](int c, const Place& place, vfloat term) {
       float* const sum = sums.row(kStep * c + place.residue, row) + x + place.column;
       store(sum, load(sum) + term);
@@ -201,8 +200,10 @@ class Regression {
       const Place place(k - kRadius);
       const vfloat root = w.roots[(dy + kRadius) * kSide + k], weight = root * root;
       for (int c = 0; c < 3 * n_sources_; ++c) {
-        vfloat prediction = planes[c][0];
-        for (int a = 1; a < n_terms_; ++a) prediction += planes[c][a] * w.terms[a][k];
+        const Terms& plane = planes[c];
+        vfloat prediction = plane[0] + plane[1] * (static_cast<float>(k - kRadius) / kPlaceUnit) +
+                            plane[2] * (static_cast<float>(dy) / kPlaceUnit);
+        for (int a = 3; a < n_terms_; ++a) prediction += plane[a] * value(3 + a, place, x, y + dy);
         add(c, place, weight * prediction);
       }
       add(3 * n_sources_, place, weight);
