@@ -71,10 +71,10 @@ FilterGuides filter_guides(const Guides& guides, bool regression) {
 const Planes* or_null(const Planes& planes) { return planes.count() > 0 ? &planes : nullptr; }
 const Image* or_null(const Image& image) { return image.data.empty() ? nullptr : &image; }
 
-/// The regression of sources, beside their images by another filter.
+/// The regression of sources, beside their images by another filter. Of halves it is coarse: they only tell weights.
 std::vector<Image> regressed(const FilterGuides& guides, const CandidateInput& in, std::vector<const Image*> sources,
-                             std::span<const Image> others) {
-  RegressionInput input{in.estimate, in.std_error, std::move(sources), {}, or_null(guides.position)};
+                             std::span<const Image> others, bool is_half) {
+  RegressionInput input{in.estimate, in.std_error, std::move(sources), {}, or_null(guides.position), is_half};
   for (const Image& other : others) input.others.push_back(&other);
   std::vector<const Image*> features;
   for (const Image& feature : guides.features) features.push_back(&feature);
@@ -109,7 +109,7 @@ std::vector<std::vector<Image>> filtered(const FilterGuides& guides, CandidateBa
   for (size_t i = 0; i < all.size(); ++i) {
     all[i].push_back(combined(images[i], guides.albedo, std::multiplies<>()));
     if (!guides.features.empty())
-      all[i].insert(all[i].begin(), regressed(guides, inputs[i], {inputs[i].estimate}, {all[i].data(), 1})[0]);
+      all[i].insert(all[i].begin(), regressed(guides, inputs[i], {inputs[i].estimate}, {all[i].data(), 1}, i > 0)[0]);
   }
   return all;
 }
@@ -141,7 +141,7 @@ std::vector<std::vector<Image>> filtered_layers(const FilterGuides& guides, cons
   images = nl_means(steerings, or_null(guides.normal), *in.valid);
   for (Image& image : images) image = combined(image, guides.albedo, std::multiplies<>());
   all.push_back(std::move(images));
-  if (!guides.features.empty()) all.insert(all.begin(), regressed(guides, in, given, all[0]));
+  if (!guides.features.empty()) all.insert(all.begin(), regressed(guides, in, given, all[0], false));
   return all;
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lanes are windows side by side, whose centres are three pixels apart. So planes hold each third column: of value
-// number `c` plane 3 c + r has the columns 3 i + r. Every band of rows adds to sums of its own, with a border; they are
-// put together in the bands' order.
+// Lanes are windows side by side, whose centres are kStep pixels apart. So planes hold each column of that distance:
+// of value number `c` plane kStep c + r has the columns kStep i + r. Every band of rows adds to sums of its own, with a
+// border; they are put together in the bands' order.
 #include "filters/regression.h"
 
 #include <array>
@@ -15,7 +15,7 @@ namespace {
 
 using namespace lanes;
 
-constexpr int kStep = 3, kRadius = 10, kPatch = 1, kSide = 2 * kRadius + 1, kOffsets = kSide * kSide;
+constexpr int kRadius = 10, kPatch = 1, kSide = 2 * kRadius + 1, kOffsets = kSide * kSide;
 constexpr int kBorder = kRadius + kPatch;
 constexpr int kBandRows = 8;  // of windows
 constexpr float kBandwidth = 0.5f, kOfPatch = 27;
@@ -30,12 +30,16 @@ using Terms = std::array<vfloat, kMostTerms>;
 using RowTerms = std::array<std::array<vfloat, kSide>, kMostTerms>;
 
 /// Plane and column of the pixel `dx` columns from the centres.
-struct Place {
-  explicit Place(int dx) : residue((1 + dx + kStep * kBorder) % kStep), column((1 + dx - residue) / kStep) {}
+template <int kStep>
+struct PlaceOf {
+  explicit PlaceOf(int dx) : residue((1 + dx + kStep * kBorder) % kStep), column((1 + dx - residue) / kStep) {}
   int residue, column;
 };
 
+template <int kStep>
 class Regression {
+  using Place = PlaceOf<kStep>;
+
  public:
   Regression(const RegressionInput& input, std::span<const Image* const> features,
              const std::vector<unsigned char>& valid)
@@ -241,7 +245,7 @@ class Regression {
 
 std::vector<Image> regressed(const RegressionInput& input, std::span<const Image* const> features,
                              const std::vector<unsigned char>& valid) {
-  return Regression(input, features, valid).run();
+  return input.coarse ? Regression<4>(input, features, valid).run() : Regression<3>(input, features, valid).run();
 }
 
 }  // namespace covary

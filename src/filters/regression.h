@@ -26,6 +26,7 @@ struct RegressionInput {
   const Image* std_error = nullptr;
   std::vector<const Image*> sources, others;
   const Image* position = nullptr;  ///< of the surfaces, in any unit; or null
+  bool coarse = false;              ///< planes around every fourth pixel of every fourth row instead
 };
 
 /// The images of the sources. All images have three channels and one size, and all values are finite; they may be

@@ -38,9 +38,10 @@ struct FittedPicture {
     const float* q = feature.pixel(x, y);
     return 1 + 0.4f * q[0] - 0.2f * static_cast<float>(c) * q[1] + 0.01f * static_cast<float>(x - y);
   }
-  std::vector<Image> regressed(const std::vector<const Image*>& sources) const {
+  std::vector<Image> regressed(const std::vector<const Image*>& sources, bool coarse = false) const {
     const Image* const features[] = {&feature};
-    return covary::regressed({&f, &s, sources, std::vector(sources.size(), &other), &position}, features, valid);
+    return covary::regressed({&f, &s, sources, std::vector(sources.size(), &other), &position, coarse}, features,
+                             valid);
   }
 };
 
@@ -61,12 +62,12 @@ double likeness(const FittedPicture& p, int x, int y, int qx, int qy) {
 }
 
 /// The formula of regression.h for the image itself, channel 0.
-std::vector<double> by_formula(const FittedPicture& p) {
+std::vector<double> by_formula(const FittedPicture& p, int step) {
   const int width = p.f.width, height = p.f.height;
   std::vector<double> sum, total(p.valid.size(), 1);
   for (size_t i = 0; i < p.valid.size(); ++i) sum.push_back(p.other.data[3 * i]);
-  for (int y = 1; y < height + 2; y += 3)
-    for (int x = 1; x < width + 2; x += 3) {
+  for (int y = 1; y <= height + step - 2; y += step)
+    for (int x = 1; x <= width + step - 2; x += step) {
       const int centre_x = std::min(x, width - 1), centre_y = std::min(y, height - 1);
       const float* centre = p.feature.pixel(centre_x, centre_y);
       Eigen::MatrixXd a = Eigen::MatrixXd::Zero(8, 8);
@@ -104,9 +105,11 @@ std::vector<double> by_formula(const FittedPicture& p) {
 TEST(Regression, IsItsFormula) {
   FittedPicture p(62, 50);  // more than one band of rows and one vector of windows, neither a multiple of three
   p.valid[20 * 62 + 30] = 0;
-  const Image image = p.regressed({&p.f})[0];
-  const std::vector<double> expected = by_formula(p);
-  for (size_t i = 0; i < expected.size(); ++i) ASSERT_NEAR(image.data[3 * i], expected[i], 2e-4) << i;
+  for (const bool coarse : {false, true}) {
+    const Image image = p.regressed({&p.f}, coarse)[0];
+    const std::vector<double> expected = by_formula(p, coarse ? 4 : 3);
+    for (size_t i = 0; i < expected.size(); ++i) ASSERT_NEAR(image.data[3 * i], expected[i], 2e-4) << i;
+  }
 }
 
 TEST(Regression, KeepsTextureThatFeaturesOrPositionsShow) {
