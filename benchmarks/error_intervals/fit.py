@@ -20,8 +20,9 @@ from measure import FEWEST_GROUPS, HERE, KINDS, measure_all, render_all
 from variants import SCENES, family_of
 
 TABLE, DATA = HERE.parent.parent / "src/risk/error_interval_table.h", HERE / "renders.csv"
-#: Sigma of the prior of each coefficient but the constant; what is added to the reference's noise
-RIDGE, NOISE_FLOOR = 0.1, 0.1
+#: Sigma of the prior of each coefficient but the constant, for kinds of which most is known from other scenes
+#: (docs/notes) and for others; what is added to the reference's noise
+RIDGE, USUAL_RIDGE, NOISE_FLOOR = {"filters": 0.04, "network": 0.04}, 0.1, 0.1
 #: difference of logarithms from which on a render counts little
 OUTLIER = 0.5
 TRUSTED, LEAST, MOST, MISSING_COVARIANCE = 0.5, 0.5, 30, 0.27
@@ -54,9 +55,9 @@ def not_the_mean(row):
     return 1 - min(1, float(row["variance"]) / float(row["noise"])) if mixes else 1
 
 
-def weighted_ridge(x, y, weight):
+def weighted_ridge(x, y, weight, sigma):
     """Coefficients of a ridge regression; all but the first are shrunk towards 0."""
-    penalty = numpy.full(x.shape[1], 1 / RIDGE**2)
+    penalty = numpy.full(x.shape[1], 1 / sigma**2)
     penalty[0] = 1e-6
     scale = numpy.maximum(x.std(0), 0.05)  # sigma is of the feature's own spread
     scale[0] = 1
@@ -111,13 +112,14 @@ class Fit:
     def coefficients(self, use):
         x, of_middle, y, noise = self.x[use], self.of_middle[use], self.y[use], self.noise[use]
         weight = 1 / (NOISE_FLOOR + noise**2) / numpy.sqrt(self.size[use] / self.size.mean())
-        middle = weighted_ridge(of_middle, y, weight)
+        sigma = RIDGE.get(self.kind, USUAL_RIDGE)
+        middle = weighted_ridge(of_middle, y, weight, sigma)
         for _ in range(20):  # renders that nothing explains, which light that was not found makes, count little
-            middle = weighted_ridge(of_middle, y, weight / (1 + ((y - of_middle @ middle) / OUTLIER)**2)**2)
+            middle = weighted_ridge(of_middle, y, weight / (1 + ((y - of_middle @ middle) / OUTLIER)**2)**2, sigma)
         left = numpy.log(numpy.clip(abs(y - of_middle @ middle), 0.03, 1)) + 0.635  # E log |normal number| = -0.635
         wanted = numpy.array([1, 0, 1, 0, 0, 1, 1, 1, 0])  # what speaks for noise and for rare light
         spread = numpy.zeros(x.shape[1])
-        spread[wanted > 0] = weighted_ridge(x[:, wanted > 0], left, weight / 4)
+        spread[wanted > 0] = weighted_ridge(x[:, wanted > 0], left, weight / 4, sigma)
         return middle, spread
 
     def text(self):
