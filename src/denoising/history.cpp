@@ -15,7 +15,9 @@ namespace {
 
 constexpr float kInterval = 3;        // k, in standard errors
 constexpr int kErrorWindow = 5;       // side, pixels
-constexpr float kLeastScale = 0.02f;  // of relative standard errors
+constexpr float kLeastScale = 0.02f;  // of colours
+/// Of a colour, that features may change it by.
+constexpr float kMostOfColour = 0.2f;
 /// How much the weights of the whole image count (MixtureInput::prior).
 constexpr float kPrior = 2;
 /// MixtureInput::bias_share. Halves have twice the variance of the frame and the same history, so that history counts
@@ -163,15 +165,20 @@ void follow_features(History& history, const Image& albedo, const Image& normal)
     if (!history.known[i]) return;
     const float* const before = &history.features.data[6 * i];
     const float* const slopes = &history.slopes.data[18 * i];
+    float squares = 0;
     for (size_t c = 0; c < 3; ++c) {
+      float& colour = history.image.data[3 * i + c];
       float change = 0;
       for (size_t f = 0; f < 6; ++f)
         change += slopes[3 * f + c] * ((f < 3 ? albedo : normal).data[3 * i + f % 3] - before[f]);
-      if (!std::isfinite(change)) continue;
-      history.image.data[3 * i + c] += change;
+      squares += sqr(change) / 3;
+      const float most = kMostOfColour * (std::abs(colour) + kLeastScale);
+      change = std::isfinite(change) ? std::clamp(change, -most, most) : 0;
+      colour += change;
       for (Image& half : history.samples)
         if (!half.data.empty()) half.data[3 * i + c] += change;
     }
+    history.squared_error.data[i] += squares;
   });
 }
 

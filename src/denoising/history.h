@@ -47,8 +47,9 @@ struct History {
 };
 
 /// Adds to a history what this frame's features differ by from those that were moved, times the slopes: at edges and in
-/// textures, pixels show other parts of the same surfaces than before, and features tell which. Nothing where it has
-/// no features. Both have 3 channels. Throws Error(kInput) where sizes differ.
+/// textures, pixels show other parts of the same surfaces than before, and features tell which. At most a fifth of the
+/// colour, because slopes of blurred pictures of very bright light are too large; squared_error grows by the square of
+/// the whole difference. Nothing without features. Both have 3 channels. Throws Error(kInput) where sizes differ.
 void follow_features(History& history, const Image& albedo, const Image& normal);
 
 /// Layers of a frame's file with R'_A, R'_B, albedo and normal: EstimatorResult::kept_samples.

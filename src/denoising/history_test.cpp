@@ -220,6 +220,22 @@ TEST(History, LetsNoFireflyOfAFrameStay) {
   EXPECT_LE(frame.mixture.image.pixel(30, 30)[1] - before.pixel(30, 30)[1], 3.01f * Frame::std_deviation());
 }
 
+TEST(History, ChangesLittleByFeatures) {
+  for (const auto& [slope, change] : {std::pair{0.5f, 0.05f}, std::pair{50.0f, 0.2f * (kTruth + 0.02f)}}) {
+    History all = history(flat(0, 0, 0));
+    all.samples = {flat(0, 0, 0), flat(0, 0, 0)};
+    all.features = Image(kSize, kSize, 6), all.slopes = Image(kSize, kSize, 18);
+    all.slopes.pixel(7, 5)[3 * 4 + 1] = slope;  // of green over the normal's y
+    Image normal(kSize, kSize, 3);
+    for (int x = 0; x < kSize; ++x) normal.pixel(x, 5)[1] = 0.1f;
+    follow_features(all, Image(kSize, kSize, 3), normal);
+    EXPECT_NEAR(all.image.pixel(7, 5)[1], kTruth + change, 1e-5f);
+    EXPECT_NEAR(all.samples[1].pixel(7, 5)[1], kTruth + change, 1e-5f);
+    EXPECT_NEAR(*all.squared_error.pixel(7, 5), slope * slope * 0.01f / 3, 1e-4f * slope * slope);
+    EXPECT_EQ(all.image.pixel(8, 5)[1], static_cast<float>(kTruth));
+  }
+}
+
 TEST(History, OfAnotherSizeIsAnError) {
   Frame frame(5);
   EXPECT_THROW(frame.add({Image(3, 2, 3), Image(3, 2, 1), std::vector<unsigned char>(6), {}}), Error);
