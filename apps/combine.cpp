@@ -122,8 +122,8 @@ nlohmann::ordered_json json_of(const Correlation& c) {
 struct GuideImages {
   std::optional<Image> albedo, normal;                      // of the first surface, where the file has both
   std::optional<Image> denoising_albedo, denoising_normal;  // behind mirrors and glass
+  bool clean = false;                                       // a film's own
   std::optional<Image> position;
-  bool clean = false;  // a film's own
   Guides view() const {
     const auto or_null = [](const std::optional<Image>& image) { return image ? &*image : nullptr; };
     Guides guides{or_null(albedo),           or_null(normal),   or_null(denoising_albedo),
@@ -143,9 +143,12 @@ GuideImages read_guides(const CombineOptions& o, const Estimator& estimator, con
                                       [&](const auto& c) { return c.name.starts_with(std::string(name) + "."); });
     return is_there ? std::optional(named_guide(o.guides, info, name)) : std::nullopt;
   };
-  GuideImages guides{
-      own("Albedo"),          own("N"), own("DenoisingAlbedo"),
-      own("DenoisingNormal"), own("P"), info.attributes.contains(std::string("covary:") + film_key::kCleanGuides)};
+  GuideImages guides{own("Albedo"),
+                     own("N"),
+                     own("DenoisingAlbedo"),
+                     own("DenoisingNormal"),
+                     info.attributes.contains(std::string("covary:") + film_key::kCleanGuides),
+                     find_guide(o.guides, info, GuideKind::kPosition)};
   if (!guides.albedo) guides.albedo = find_guide(o.guides, info, GuideKind::kAlbedo);
   if (!guides.normal) guides.normal = find_guide(o.guides, info, GuideKind::kNormal);
   if (!guides.albedo)

@@ -64,7 +64,7 @@ void warn_of_values(const std::string& path, const Image& image) {
 /// The guide layers, each averaged over the files that have it.
 class GuideLayers {
  public:
-  std::optional<Image> albedo, normal;
+  std::optional<Image> albedo, normal, position;
 
   explicit GuideLayers(const Options& o) {
     if (o.no_guides) return;
@@ -72,12 +72,17 @@ class GuideLayers {
       const ImageInfo info = inspect_image(path);
       add(path, guide(path, info, o.albedo, GuideKind::kAlbedo), albedo, n_albedo_);
       add(path, guide(path, info, o.normal, GuideKind::kNormal), normal, n_normal_);
+      add(path, find_guide(path, info, GuideKind::kPosition), position, n_position_);
     }
     divide(albedo, n_albedo_);
     divide(normal, n_normal_);
+    divide(position, n_position_);
     if (!albedo) normal.reset();  // Open Image Denoise only takes normals together with an albedo
   }
-  Guides view() const { return {albedo ? &*albedo : nullptr, normal ? &*normal : nullptr}; }
+  Guides view() const {
+    const auto or_null = [](const std::optional<Image>& image) { return image ? &*image : nullptr; };
+    return {or_null(albedo), or_null(normal), nullptr, nullptr, or_null(position)};
+  }
   const char* text() const {
     return normal ? "guided by albedo and normal" : albedo ? "guided by albedo" : "without guides";
   }
@@ -111,7 +116,7 @@ class GuideLayers {
       for (float& value : sum->data) value /= n;
   }
 
-  float n_albedo_ = 0, n_normal_ = 0;
+  float n_albedo_ = 0, n_normal_ = 0, n_position_ = 0;
 };
 
 void denoise_by_network(const Options& o, const GuideLayers& guides, ProgressLine& progress) {

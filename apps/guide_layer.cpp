@@ -33,6 +33,12 @@ constexpr std::array<std::string_view, 9> kNormal = {
     "normals"              // V-Ray
 };
 
+constexpr std::array<std::string_view, 3> kPosition = {
+    "P",         // covary --aovs, pbrt-v4, Arnold
+    "Position",  // Blender
+    "position"   // Mitsuba 3 by our example
+};
+
 bool has_three_channels(const ImageInfo& info, const std::string& layer) {
   return std::count_if(info.channels.begin(), info.channels.end(), [&](const ExrFile::Channel& c) {
            return c.name.starts_with(layer + ".") && c.name.find('.', layer.size() + 1) == std::string::npos;
@@ -49,8 +55,8 @@ Image checked_guide(const std::string& path, const std::string& layer) {
 
 std::optional<Image> find_guide(const std::string& path, const ImageInfo& info, GuideKind kind) {
   const std::vector<std::string> layers = image_layers(info.channels);
-  const auto names = kind == GuideKind::kAlbedo ? std::span<const std::string_view>(kAlbedo) : std::span(kNormal);
-  for (const std::string_view name : names)
+  const std::span<const std::string_view> all[] = {kAlbedo, kNormal, kPosition};
+  for (const std::string_view name : all[static_cast<int>(kind)])
     for (const std::string& layer : layers)
       if (last_part(layer) == name && has_three_channels(info, layer)) return checked_guide(path, layer);
   return std::nullopt;

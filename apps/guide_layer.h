@@ -9,8 +9,9 @@
 
 namespace covary {
 
-/// Albedo and normal of the first surface that is not a mirror or glass, or else of the first one.
-enum class GuideKind { kAlbedo, kNormal };
+/// Albedo and normal of the first surface that is not a mirror or glass, or else of the first one; position of the
+/// first one.
+enum class GuideKind { kAlbedo, kNormal, kPosition };
 
 /// The guide layer of the image at `path` by the renderers' names (table in docs/other-renderers.md); if there are
 /// several, the first in the table. Throws like read_image() and check_guide().

@@ -47,7 +47,7 @@ void declare(Settings& s, CombineSettings& v) {
   s.one_of("estimator", v.estimator, pair_estimator_names(), "iicv, or a method to compare with");
   declare(s, v.denoising);
   s.group("");
-  s.text("guides", v.guides, "FILE", "For `denoise`: image (EXR) of the same pixels with the layers Albedo and N",
+  s.text("guides", v.guides, "FILE", "For `denoise`: image (EXR) of the same pixels with the layers Albedo, N and P",
          kFile);
   s.texts("layers", v.layers, "LAYER",
           "For `denoise`: layers of the independent image's files to denoise with it; with Rest, they add up to the "

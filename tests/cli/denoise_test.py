@@ -164,6 +164,22 @@ class Denoise(RenderTest):
         self.bad(1, "all groups are identical: the same seed was rendered twice", "denoise", "plain.exr", "copy.exr",
                  "-o", "e.exr", *PLAIN)
 
+    def test_positions(self):
+        """Guide filters, from films and from files of guides."""
+        self.good("render", ROOM, *SMALL, "-o", "film.exr", "--estimator", "none", "--spp", "8", "--groups", "4",
+                  "--aovs")
+        self.good("denoise", "film.exr", "-o", "a.exr", "--albedo", "Albedo", "--normal", "N", *PLAIN, "--quiet")
+        data = (self.path / "film.exr").read_bytes()
+        size = struct.unpack("<4i", header(data)[0]["dataWindow"])
+        for layers in (("Albedo", "N", "P"), ("Albedo", "N")):
+            guides = {name: values for name, values in read_exr(data).items() if name.split(".")[0] in layers}
+            self.write("guides.exr", exr(guides | {c: guides["Albedo.R"] for c in "RGB"}, (size[2] + 1, size[3] + 1)))
+            self.good("combine", "--independent", "film.exr", "--guides", "guides.exr", "-o", "b.exr", "--denoise",
+                      "auto", *PLAIN, "--quiet")
+            if "P" in layers:
+                self.same("a.exr", "b.exr")
+        self.assertGreater(self.relmse("a.exr", "b.exr"), 0)
+
     def test_interval(self):
         render = ("render", MATERIALS, *SMALL[:2], "-o", "a.exr", "--spp", "48", *PLAIN, "--passes", "films", "--json",
                   "a.json")
