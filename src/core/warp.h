@@ -35,14 +35,18 @@ inline Vec3 square_to_sphere(Vec2 u) {
 }
 inline float sphere_pdf_solid_angle() { return 1 / (4 * kPi); }
 
+/// The direction of square_to_cone() above `d` on the unit disk. `one_minus_cos`: |d|^2 one_minus_cos_max, which is
+/// uniform in [0, one_minus_cos_max).
+inline Vec3 disk_to_cone(Vec2 d, float one_minus_cos, float one_minus_cos_max) {
+  const float scale = safe_sqrt(one_minus_cos_max * (2 - one_minus_cos));  // sin(theta) / |d|
+  return {d.x * scale, d.y * scale, 1 - one_minus_cos};
+}
 /// Uniform in the cone of directions around +z whose cosine is at least `cos_max`; `one_minus_cos_max` is passed
 /// because it is small for distant lights and its difference from 1 would lose digits.
 inline Vec3 square_to_cone(Vec2 u, float one_minus_cos_max) {
   const Vec2 d = square_to_disk(u);
-  const float r2 = d.x * d.x + d.y * d.y;                                  // uniform in [0, 1)
-  const float one_minus_cos = r2 * one_minus_cos_max;                      // uniform in [0, 1 - cos_max)
-  const float scale = safe_sqrt(one_minus_cos_max * (2 - one_minus_cos));  // sin(theta) / sqrt(r2)
-  return {d.x * scale, d.y * scale, 1 - one_minus_cos};
+  const float r2 = d.x * d.x + d.y * d.y;  // uniform in [0, 1)
+  return disk_to_cone(d, r2 * one_minus_cos_max, one_minus_cos_max);
 }
 inline float cone_pdf_solid_angle(float one_minus_cos_max) { return 1 / (kTwoPi * one_minus_cos_max); }
 

@@ -9,6 +9,7 @@
 #include "core/warp.h"
 #include "emitters/lattice.h"
 #include "emitters/registry.h"
+#include "scene/analytic_shape.h"
 #include "scene/mesh.h"
 
 namespace covary {
@@ -23,6 +24,8 @@ void AreaLight::attach(const Shape* shape) {
   samples_uv_ = textured_ && shape->sample_uv({0.5f, 0.5f}).pdf_area > 0;
   if (const auto* mesh = dynamic_cast<const TriangleMesh*>(shape); mesh && !textured_ && mesh->parallelogram())
     parallelogram_ = {*mesh->parallelogram(), constant_};
+  if (const auto* sphere = dynamic_cast<const Sphere*>(shape); sphere && !textured_)
+    sphere_ = {sphere->ball(), constant_};
 }
 
 Spectrum AreaLight::surface_radiance(const SurfaceHit& hit, const Vec3& w) const {

@@ -32,6 +32,7 @@ class AreaLight final : public Emitter {
   }
   const Shape* shape() const override { return shape_; }
   const ParallelogramLight* parallelogram() const override { return parallelogram_ ? &*parallelogram_ : nullptr; }
+  const SphereLight* sphere() const override { return sphere_ ? &*sphere_ : nullptr; }
 
   Spectrum surface_radiance(const SurfaceHit& hit, const Vec3& w) const override;
   /// Textured lights on shapes whose (u, v) cover the unit square (Shape::sample_uv): positions in proportion to the
@@ -66,6 +67,7 @@ class AreaLight final : public Emitter {
   bool samples_uv_ = false;
   const Shape* shape_ = nullptr;
   std::optional<ParallelogramLight> parallelogram_;
+  std::optional<SphereLight> sphere_;
 };
 
 }  // namespace covary

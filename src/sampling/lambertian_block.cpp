@@ -108,13 +108,18 @@ void LambertianBlock::find_surfaces(const Scene& scene) {
 }
 
 void LambertianBlock::sample_lights(const Emitter* const* lights) {
-  const ParallelogramLight* parallelograms[kCapacity];
-  bool any = false;
+  bool parallelograms = false, spheres = false;
+  for (int l = 0; l < size_; ++l) {
+    is_open_[l] = true, is_sphere_[l] = false;
+    if (const ParallelogramLight* parallelogram = lights[l]->parallelogram())
+      set_parallelogram(l, *parallelogram), is_open_[l] = false, parallelograms = true;
+    else if (const SphereLight* sphere = lights[l]->sphere())
+      set_sphere(l, *sphere), spheres = true;
+  }
+  if (parallelograms) sample_parallelograms();
+  if (spheres) sample_spheres();
   for (int l = 0; l < size_; ++l)
-    if ((parallelograms[l] = lights[l]->parallelogram())) set_parallelogram(l, *parallelograms[l]), any = true;
-  if (any) sample_parallelograms();
-  for (int l = 0; l < size_; ++l)
-    if (!parallelograms[l]) set_light(l, lights[l]->sample_towards(p[l], {u_light_x[l], u_light_y[l]}, u_primitive[l]));
+    if (is_open_[l]) set_light(l, lights[l]->sample_towards(p[l], {u_light_x[l], u_light_y[l]}, u_primitive[l]));
 }
 
 void LambertianBlock::set_parallelogram(int l, const ParallelogramLight& light) {
@@ -140,6 +145,51 @@ void LambertianBlock::sample_parallelograms() {
     light_wi_.set(l, wi);
     light_distance_[l] = d2 * inverse;
     light_pdf_[l] = seen ? density : 0;
+  });
+}
+
+void LambertianBlock::set_sphere(int l, const SphereLight& light) {
+  is_sphere_[l] = true;
+  light_origin_.set(l, light.surface.center);
+  light_radius_[l] = light.surface.radius, light_sign_[l] = light.surface.sign;
+  light_radiance_.set(l, light.radiance);
+  light_is_delta_[l] = false;
+}
+
+/// As Sphere::sample_towards() and AreaLight::sample_towards(), from outside; other lanes stay as they are. In several
+/// loops, because compilers would round some sums otherwise than there.
+void LambertianBlock::sample_spheres() {
+  for_each_lane([&](int l) {
+    const Ball ball{light_origin_[l], light_radius_[l], light_sign_[l]};
+    const float sin2_max = ball.squared_sine(p[l]);
+    is_sphere_[l] = is_sphere_[l] && sin2_max < 1;
+    const Vec2 place = warp::square_to_disk({u_light_x[l], u_light_y[l]});
+    cone_x_[l] = place.x, cone_y_[l] = place.y;
+    const float most = Ball::one_minus_cos(sin2_max);
+    one_minus_cos_max_[l] = most;
+    one_minus_cos_[l] = (place.x * place.x + place.y * place.y) * most;
+  });
+  for_each_lane([&](int l) {
+    const Ball ball{light_origin_[l], light_radius_[l], light_sign_[l]};
+    const float most = one_minus_cos_max_[l];
+    sphere_wi_.set(l, ball.direction(p[l], warp::disk_to_cone({cone_x_[l], cone_y_[l]}, one_minus_cos_[l], most)));
+  });
+  for_each_lane([&](int l) {
+    const Ball ball{light_origin_[l], light_radius_[l], light_sign_[l]};
+    const Vec3 from = p[l], wi = sphere_wi_[l];
+    sphere_distance_[l] = ball.distance(from, wi);
+    light_n_.set(l, ball.outward(from, wi, sphere_distance_[l]) * ball.sign);
+  });
+  for_each_lane([&](int l) {
+    const bool taken = is_sphere_[l];
+    const Vec3 wi = sphere_wi_[l];
+    const float density = warp::cone_pdf_solid_angle(one_minus_cos_max_[l]);
+    const float seen = dot(light_n_[l], wi) < 0 ? density : 0;
+    light_wi_.x[l] = taken ? wi.x : light_wi_.x[l], light_wi_.y[l] = taken ? wi.y : light_wi_.y[l];
+    light_wi_.z[l] = taken ? wi.z : light_wi_.z[l];
+    light_distance_[l] = taken ? sphere_distance_[l] : light_distance_[l];
+    light_pdf_[l] = taken ? seen : light_pdf_[l];
+    is_open_[l] = taken ? 0 : is_open_[l];
   });
 }
 

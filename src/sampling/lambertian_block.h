@@ -105,6 +105,8 @@ class LambertianBlock {
   void set_light(int lane, const EmitterSample& light);
   void set_parallelogram(int lane, const ParallelogramLight& light);
   void sample_parallelograms();
+  void set_sphere(int lane, const SphereLight& light);
+  void sample_spheres();
 
   int size_ = 0;
   bool drawn_ = false;             // the random numbers are there, as points of sequences
@@ -115,6 +117,11 @@ class LambertianBlock {
   int32_t light_is_delta_[kCapacity] = {};
   Vectors light_origin_, light_dp_du_, light_dp_dv_, light_n_;  // of parallelograms
   Floats light_inverse_area_;
+  Floats light_radius_, light_sign_;  // of spheres, whose centre is light_origin_
+  Floats cone_x_, cone_y_, one_minus_cos_, one_minus_cos_max_, sphere_distance_;
+  Vectors sphere_wi_;
+  // Whether it is such a light; whether there is no sample yet.
+  int32_t is_sphere_[kCapacity] = {}, is_open_[kCapacity] = {};
   struct Corner {
     Vectors p, n;
   };

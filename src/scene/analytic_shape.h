@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "core/sphere.h"
 #include "core/transform.h"
 #include "scene/shape.h"
 
@@ -27,6 +28,7 @@ class Sphere final : public AnalyticShape {
   /// From outside: uniform in the cone the sphere subtends.
   EmitterSample sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const override;
   float pdf_solid_angle(const Vec3& reference, const SurfaceHit& hit) const override;
+  Ball ball() const { return {center_, radius_, sign_}; }
 
  private:
   /// Of a world direction, along the sphere's own axes; keeps the length.

@@ -10,6 +10,7 @@
 #include "core/parallelogram.h"
 #include "core/ray.h"
 #include "core/spectrum.h"
+#include "core/sphere.h"
 #include "scene/object.h"
 #include "scene/surface_hit.h"
 
@@ -57,6 +58,12 @@ inline SurfaceHit point_on_light(const Vec3& p, const Vec3& n, Vec2 uv) {
 /// A flat area light that is sampled uniformly and emits the same radiance everywhere, on the side of its normal.
 struct ParallelogramLight {
   Parallelogram surface;
+  Spectrum radiance;
+};
+
+/// A sphere that emits the same radiance everywhere, sampled as it is seen.
+struct SphereLight {
+  Ball surface;
   Spectrum radiance;
 };
 
@@ -124,6 +131,8 @@ class Emitter : public SceneObject {
   /// What sample_towards() samples where that is a parallelogram, so that many samples can be taken side by side; else
   /// null.
   virtual const ParallelogramLight* parallelogram() const { return nullptr; }
+  /// The same for a sphere.
+  virtual const SphereLight* sphere() const { return nullptr; }
 
   /// This environment with a density from which the mean was taken off, for use together with a technique that covers
   /// all directions [Karlik2019]; null where that is the light itself.

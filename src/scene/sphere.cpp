@@ -84,18 +84,14 @@ AreaSample Sphere::sample_area(Vec2 u, float /*u_primitive*/) const {
 }
 
 EmitterSample Sphere::sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const {
-  const Vec3 to_center = center_ - reference;
-  const float d2 = length_squared(to_center), sin2_max = radius_ * radius_ / d2;
+  const Ball seen = ball();
+  const float sin2_max = seen.squared_sine(reference);
   if (!(sin2_max < 1)) return Shape::sample_towards(reference, u, u_primitive);
-  // 1 - cos(theta_max) without cancellation.
-  const float one_minus_cos_max = sin2_max / (1 + safe_sqrt(1 - sin2_max));
-  const Vec3 local = warp::square_to_cone(u, one_minus_cos_max);
+  const float one_minus_cos_max = Ball::one_minus_cos(sin2_max);
   EmitterSample sample;
-  sample.wi = Frame(to_center * (1 / std::sqrt(d2))).to_world(local);
-  // Nearer intersection of the direction with the sphere.
-  const float b = dot(to_center, sample.wi), half_chord = safe_sqrt(radius_ * radius_ - std::max(0.0f, d2 - b * b));
-  sample.distance = b - half_chord;
-  const Vec3 outward = normalize(reference + sample.wi * sample.distance - center_);
+  sample.wi = seen.direction(reference, warp::square_to_cone(u, one_minus_cos_max));
+  sample.distance = seen.distance(reference, sample.wi);
+  const Vec3 outward = seen.outward(reference, sample.wi, sample.distance);
   sample.p = center_ + outward * radius_;
   sample.n = outward * sign_;
   // Of no use where the light emits alike everywhere, in which case its power is known.

@@ -251,8 +251,14 @@ TEST(HideEmitters, LightsAreInvisibleButShine) {
 }
 
 TEST(PlantedBugs, WithoutOneThePartsGiveTheBitsOfPath) {
-  const std::string xml = scene_text(std::string(kPlane) + kSphereLight + kDimSky, 16, 16, -1, "");
-  EXPECT_TRUE(same_bits(render(load_text(xml), 8, 0), render(load_text(xml, 0, with(Bug::kNone)), 8, 0)));
+  // `path` samples spheres side by side where it sees them from outside.
+  const std::string around =
+      "<shape type='sphere'><float name='radius' value='90'/><boolean name='flip_normals' value='true'/>"
+      "<emitter type='area'><rgb name='radiance' value='0.5'/></emitter></shape>";
+  for (const std::string& light : {std::string(kDimSky), around}) {
+    const std::string xml = scene_text(kPlane + (kSphereLight + light), 16, 16, -1, "");
+    EXPECT_TRUE(same_bits(render(load_text(xml), 8, 0), render(load_text(xml, 0, with(Bug::kNone)), 8, 0)));
+  }
 }
 
 }  // namespace
