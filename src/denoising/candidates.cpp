@@ -41,15 +41,17 @@ struct FilterGuides {
   Image albedo;                 // at least kLeastAlbedo; empty where there is none
   std::vector<Image> features;  // of the regression; none: without it
   Image position;               // likewise; empty where there is none
+  bool nl_means = true;         // of the image itself, too
 };
 
-FilterGuides filter_guides(const Guides& guides, bool regression) {
+FilterGuides filter_guides(const Guides& guides, FilterKinds kinds) {
   FilterGuides result;
   const auto planes = [&](const Image& like, int count) {
     return Planes(like.width, like.height, count, kNlMeansRadius, 0.0f);
   };
   if (!guides.albedo) return result;
-  if (regression) {
+  if (kinds != FilterKinds::kNlMeans) {
+    result.nl_means = kinds == FilterKinds::kAll;
     const Guides behind_glass = network_guides(guides);
     result.features.push_back(*behind_glass.albedo);
     if (behind_glass.normal) result.features.push_back(*behind_glass.normal);
@@ -87,7 +89,7 @@ std::vector<std::vector<Image>> filtered(const FilterGuides& guides, CandidateBa
   std::vector<std::vector<Image>> all(inputs.size());
   std::vector<NlMeansSteering> steerings;
   std::vector<Image> images;
-  if (guides.features.empty()) {
+  if (guides.nl_means) {
     for (const CandidateInput& in : inputs) {
       std::vector<const Image*> sharp = {in.estimate};
       if (base == CandidateBase::kPair) sharp.push_back(in.independent);
@@ -109,7 +111,7 @@ std::vector<std::vector<Image>> filtered(const FilterGuides& guides, CandidateBa
   for (size_t i = 0; i < all.size(); ++i) {
     all[i].push_back(combined(images[i], guides.albedo, std::multiplies<>()));
     if (!guides.features.empty())
-      all[i].insert(all[i].begin(), regressed(guides, inputs[i], {inputs[i].estimate}, {all[i].data(), 1}, i > 0)[0]);
+      all[i].insert(all[i].begin(), regressed(guides, inputs[i], {inputs[i].estimate}, {&all[i].back(), 1}, i > 0)[0]);
   }
   return all;
 }
@@ -124,7 +126,7 @@ std::vector<std::vector<Image>> filtered_layers(const FilterGuides& guides, cons
   std::vector<NlMeansSteering> steerings;
   std::vector<Image> images;
   std::vector<std::vector<Image>> all;
-  if (guides.features.empty()) {
+  if (guides.nl_means) {
     steerings = {{in.estimate, in.std_error, {{kSharp, sources}, {kSmooth, sources}}}};
     images = nl_means(steerings, or_null(guides.all), *in.valid);
     all.emplace_back(images.begin(), images.begin() + n);
@@ -141,7 +143,7 @@ std::vector<std::vector<Image>> filtered_layers(const FilterGuides& guides, cons
   images = nl_means(steerings, or_null(guides.normal), *in.valid);
   for (Image& image : images) image = combined(image, guides.albedo, std::multiplies<>());
   all.push_back(std::move(images));
-  if (!guides.features.empty()) all.insert(all.begin(), regressed(guides, in, given, all[0], false));
+  if (!guides.features.empty()) all.insert(all.begin(), regressed(guides, in, given, all.back(), false));
   return all;
 }
 
@@ -202,15 +204,14 @@ CandidateMaker::Make one_by_one(std::function<std::vector<Image>(const Candidate
   };
 }
 
-CandidateMaker filtered_candidates(const Guides& guides, CandidateBase base, bool regression) {
-  const auto kept = std::make_shared<FilterGuides>(filter_guides(guides, regression));
+CandidateMaker filtered_candidates(const Guides& guides, CandidateBase base, FilterKinds kinds) {
+  const auto kept = std::make_shared<FilterGuides>(filter_guides(guides, kinds));
   CandidateMaker maker;
-  if (kept->features.empty()) {
-    maker.names = {"sharp"};
+  if (!kept->features.empty()) maker.names = {"regression"};
+  if (kept->nl_means) {
+    maker.names.emplace_back("sharp");
     if (base == CandidateBase::kPair) maker.names.emplace_back("sharp-independent");
     maker.names.emplace_back("smooth");
-  } else {
-    maker.names = {"regression"};
   }
   if (!kept->albedo.data.empty()) maker.names.emplace_back("demodulated");
   maker.make = [kept, base](std::span<const CandidateInput> inputs) { return filtered(*kept, base, inputs); };

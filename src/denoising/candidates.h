@@ -60,10 +60,12 @@ CandidateMaker::Make one_by_one(std::function<std::vector<Image>(const Candidate
 /// Which image is denoised: that of a two-pass estimator, or the mean of independent samples.
 enum class CandidateBase { kPair, kMean };
 
-/// Filters without a network. Copies the guides. `regression`: of a mean with an albedo, regression.h's image in place
-/// of NL-means of the image itself; beside a network's images it gains next to nothing.
+/// NL-means of the image and of the image over its albedo; of a mean with an albedo, regression.h in place of the
+/// former, or all three. Beside a network's images the regression gains next to nothing.
+enum class FilterKinds { kNlMeans, kRegression, kAll };
+/// Filters without a network. Copies the guides.
 CandidateMaker filtered_candidates(const Guides& guides, CandidateBase base = CandidateBase::kPair,
-                                   bool regression = false);
+                                   FilterKinds kinds = FilterKinds::kNlMeans);
 /// Guides of a neural network: those seen in mirrors and through glass, where available.
 Guides network_guides(const Guides& guides);
 /// Images denoised by a neural network. Throws like denoise().

@@ -272,12 +272,21 @@ Run run_of_pair(const Estimator& base, const MixedDenoisingOptions& options, boo
   };
 }
 
+/// Without a network, from so many samples per pixel on, NL-means of the image itself is worth its time beside the
+/// regression; measured (docs/notes/denoising.md).
+constexpr double kManySamples = 64;
+
+FilterKinds kinds_for(const GroupedImage& image, bool with_network) {
+  if (with_network) return FilterKinds::kNlMeans;
+  return mean_samples(image) < kManySamples ? FilterKinds::kRegression : FilterKinds::kAll;
+}
+
 Run run_of_mean(const MixedDenoisingOptions& options, bool with_oidn) {
   return [=](const GroupedImage&, const GroupedImage& independent, const PairSettings& settings) {
     check_guides(settings.guides);
     std::vector<CandidateMaker> makers;
     if (with_oidn) makers.push_back(neural_candidates(settings.guides, options.oidn, CandidateBase::kMean));
-    makers.push_back(filtered_candidates(settings.guides, CandidateBase::kMean, !with_oidn));
+    makers.push_back(filtered_candidates(settings.guides, CandidateBase::kMean, kinds_for(independent, with_oidn)));
     if (!can_be_mixed(independent)) return single_candidate(independent, makers, settings.layers);
     return denoise_frame(parts_of_mean(independent), makers, options, settings, settings.layers);
   };

@@ -137,6 +137,25 @@ TEST(MixedDenoising, TellsHowMuchNoiseIsBehindGlass) {
   EXPECT_EQ(sum_of(denoised_mean(in.independent, DenoiseMode::kAuto).risk_rows).specular_noise, 0);
 }
 
+TEST(MixedDenoising, OfManySamplesMixesNlMeansBesideTheRegression) {
+  const Inputs in(1);
+  Image albedo(kWidth, kHeight, 3);
+  std::fill(albedo.data.begin(), albedo.data.end(), 0.5f);
+  PairSettings settings;
+  settings.guides.albedo = &albedo;
+  std::vector<uint32_t> counts(static_cast<size_t>(kWidth) * kHeight, 63);
+  GroupedImage image = in.independent.view();
+  image.counts = counts.data();
+  const auto has_sharp = [&] {
+    const std::map<std::string, Image> stages = mean_denoiser(DenoiseMode::kAuto).stages({}, image, settings);
+    EXPECT_TRUE(stages.contains("candidate-regression"));
+    return stages.contains("candidate-sharp");
+  };
+  EXPECT_FALSE(has_sharp());
+  std::fill(counts.begin(), counts.end(), 64);
+  EXPECT_TRUE(has_sharp());
+}
+
 TEST(MixedDenoising, OfASinglePassHasLessErrorThanItsMean) {
   const Inputs in(1);
   const Estimator estimator = mean_denoiser(DenoiseMode::kError);

@@ -46,11 +46,7 @@ Image counts_of(const DenoisingPart& part, const Image& guide) {
 }
 
 float count_of_usual(const GroupedImage& image) {
-  double samples = 0;
-  for (int y = 0; y < image.height; ++y)
-    for (int x = 0; x < image.width; ++x) samples += image.count(x, y);
-  samples /= static_cast<double>(image.width) * image.height;
-  return kCountOfUsual * static_cast<float>(std::min(1.0, kSamplesOfUsual / std::max(samples, 1.0)));
+  return kCountOfUsual * static_cast<float>(std::min(1.0, kSamplesOfUsual / std::max(mean_samples(image), 1.0)));
 }
 
 /// Of all candidates, with a sum of 1; empty where none is known.
@@ -99,6 +95,13 @@ void limit_by_network(const CandidateInput& in, CandidateSet& set) {
 }
 
 }  // namespace
+
+double mean_samples(const GroupedImage& image) {
+  double samples = 0;
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x) samples += image.count(x, y);
+  return samples / (static_cast<double>(image.width) * image.height);
+}
 
 bool has_network(const std::vector<CandidateMaker>& makers) {
   return std::any_of(makers.begin(), makers.end(), [](const CandidateMaker& m) { return m.network; });

@@ -35,6 +35,9 @@ std::vector<CandidateSet> candidates_of(const std::vector<const DenoisingPart*>&
 /// The first candidate: the image with little noise.
 inline const Image& guide_of(const CandidateSet& set) { return set.candidates[0]; }
 
+/// Samples per pixel; without counts, one in each group.
+double mean_samples(const GroupedImage& image);
+
 /// Whether any of them come from a neural network.
 bool has_network(const std::vector<CandidateMaker>& makers);
 
