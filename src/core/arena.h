@@ -10,7 +10,7 @@
 
 namespace covary {
 
-/// Small fixed store for objects that live as long as one path vertex (BSDF closures). No destructors are run.
+/// Fixed-size arena for objects that live as long as one path vertex (BSDF closures). Runs no destructors.
 class Arena {
  public:
   template <typename T, typename... Args>
@@ -25,7 +25,7 @@ class Arena {
     return object;
   }
   void reset() { used_ = 0; }
-  /// Bytes in use, and how many there are.
+  /// Bytes in use; capacity in bytes.
   size_t used() const { return used_; }
   static constexpr size_t kCapacity = 4096;
 

@@ -16,8 +16,8 @@ inline uint64_t hash_bytes(std::string_view text) { return hash_bytes(std::as_by
 /// 16 lower-case hexadecimal digits.
 std::string hash_text(uint64_t hash);
 
-/// XXH3-128 (seed 0) of the text as 32 lower-case hexadecimal digits: a name for what the text describes, with no
-/// chance of two texts sharing one that matters in practice (10^9 keys: 10^-21).
+/// XXH3-128 (seed 0) of the text as 32 lower-case hexadecimal digits. The chance of two texts sharing a key is
+/// negligible (10^-21 for 10^9 keys).
 std::string key_text(std::string_view text);
 
 }  // namespace covary

@@ -12,7 +12,7 @@ TEST(ContentHash, AgreesWithPublishedValuesOfXxh64) {
   EXPECT_EQ(hash_bytes(std::string_view("")), 0xef46db3751d8e999ull);
   EXPECT_EQ(hash_bytes(std::string_view("a")), 0xd24ec4f1a98c6e5bull);
   EXPECT_EQ(hash_bytes(std::string_view("abc")), 0x44bc2cf5ad770999ull);
-  // Longer than the 32 bytes of one stripe, with rests of 8, 4 and 1 bytes.
+  // Longer than one 32-byte stripe, with tails of 8, 4 and 1 bytes.
   EXPECT_EQ(hash_bytes(std::string_view("Nobody inspects the spammish repetition")), 0xfbcea83c8a378bf1ull);
 }
 

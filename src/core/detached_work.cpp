@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::chrono::milliseconds kPoll{20};
 
-/// Set once, by the thread that has done its job.
+/// Set once, by the job's thread, when the job is done.
 class Ending {
  public:
   void set(std::exception_ptr error) {
@@ -29,7 +29,7 @@ class Ending {
     const std::lock_guard lock(mutex_);
     return ended_;
   }
-  /// Throws Stopped where the work around the caller is to end before.
+  /// Throws Stopped if the surrounding work is stopped first.
   void wait() {
     std::unique_lock lock(mutex_);
     while (!changed_.wait_for(lock, kPoll, [this] { return ended_; })) throw_if_stopped();
@@ -50,7 +50,7 @@ struct Job {
   std::thread thread;
 };
 
-/// The jobs left behind. Joined when the process exits, as they use libraries that are then taken down.
+/// The abandoned jobs. Joined when the process exits, because they use libraries that are torn down afterwards.
 class Jobs {
  public:
   static Jobs& left() {
@@ -64,7 +64,7 @@ class Jobs {
     const std::lock_guard lock(mutex_);
     jobs_.push_back(std::move(job));
   }
-  /// Waits for all; those that have ended before a Stopped stay in the list.
+  /// Waits for all of them; if Stopped interrupts it, finished jobs remain in the list.
   void wait() {
     std::vector<std::shared_ptr<Ending>> endings;
     {
@@ -105,7 +105,7 @@ void run_detached(std::function<void()> job, const std::function<void()>& cancel
     } catch (...) {
       error = std::current_exception();
     }
-    work = nullptr;  // what the job owns is given back before anybody is told that it has ended
+    work = nullptr;  // release what the job owns before announcing that it has ended
     ending->set(std::move(error));
   });
   try {

@@ -26,7 +26,7 @@ TEST(RunDetached, WaitsForTheJobAndThrowsWhatItThrows) {
   EXPECT_FALSE(has_detached_work());
 }
 
-/// The job ends only after the caller has left it: a caller that waited for it would hang.
+/// The job ends only after the caller has abandoned it: a caller that waited for it would hang.
 TEST(RunDetached, LeavesTheJobBehindWhenStopped) {
   struct Shared {
     std::atomic<bool> begun{false}, may_end{false}, cancelled{false}, ended{false};
@@ -49,7 +49,7 @@ TEST(RunDetached, LeavesTheJobBehindWhenStopped) {
   EXPECT_FALSE(shared->ended);
   EXPECT_TRUE(has_detached_work());
 
-  // The next job can be stopped while it waits for the first one, and begins only after it.
+  // The next job can be stopped while it waits for the first one, and starts only after it.
   std::atomic<bool> second{false}, asked{false};
   EXPECT_FALSE(run_stoppable([&] { return asked.exchange(true); },
                              [&] { run_detached([&] { second = true; }, [] { FAIL() << "it has not begun"; }); }));

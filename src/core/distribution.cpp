@@ -11,7 +11,7 @@ namespace covary {
 
 namespace {
 
-/// Sum of the weights; throws when they are no distribution.
+/// Sum of the weights; throws if they do not form a distribution.
 double checked_sum(std::span<const float> weights) {
   if (weights.empty()) throw Error(ErrorCode::kInput, "a distribution needs at least one weight");
   double sum = 0;
@@ -26,7 +26,7 @@ double checked_sum(std::span<const float> weights) {
 }
 
 /// The point at `fraction` of cell `index` of `n` equal cells of [0, 1). Rounding must not move it into the next cell,
-/// which pdf() would then look up: that one may be empty.
+/// which may be empty and is where pdf() would look.
 float point_of_cell(uint32_t index, float fraction, int n) {
   const auto cell = static_cast<int>(index);
   float x = (static_cast<float>(index) + fraction) / static_cast<float>(n);
@@ -43,14 +43,14 @@ Discrete::Discrete(std::span<const float> weights) : cdf_(weights.size() + 1), s
     running += weights[i];
     cdf_[i + 1] = static_cast<float>(running / sum_);
   }
-  // Rounding must not leave a gap below one; cells of zero weight at the end get the same bound and stay empty.
+  // Rounding must not leave a gap below one; trailing cells of zero weight get the same bound and stay empty.
   for (size_t i = weights.size(); i > 0 && (i == weights.size() || weights[i] == 0); --i) cdf_[i] = 1;
 
   const auto n = static_cast<uint32_t>(weights.size());
   guide_.resize(n);
   uint32_t cell = 0;
   for (uint32_t i = 0; i < n; ++i) {
-    // Scaled as in sample(), so that rounding there cannot start behind the cell.
+    // Scaled as in sample(), so that rounding cannot make the search start past the cell.
     while (cell + 1 < n && static_cast<uint32_t>(cdf_[cell + 1] * static_cast<float>(n)) < i) ++cell;
     guide_[i] = cell;
   }
@@ -64,7 +64,7 @@ AliasTable::AliasTable(std::span<const float> weights) : cells_(weights.size()) 
     mass[i] = weights[i] * scale;
     (mass[i] < 1 ? small : large).push_back(i);
   }
-  // Fill each cell that is not full from one that overflows.
+  // Fill up each cell that is not full from one that overflows.
   while (!small.empty() && !large.empty()) {
     const uint32_t i = small.back(), from = large.back();
     small.pop_back();
@@ -72,7 +72,7 @@ AliasTable::AliasTable(std::span<const float> weights) : cells_(weights.size()) 
     mass[from] -= 1 - mass[i];
     if (mass[from] < 1) small.push_back(from), large.pop_back();
   }
-  // What is left differs from a full cell by rounding only.
+  // The remaining cells differ from full ones by rounding only.
   for (const std::vector<uint32_t>* rest : {&small, &large})
     for (const uint32_t i : *rest) cells_[i] = {1, i};
 }

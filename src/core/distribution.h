@@ -20,12 +20,12 @@ class Discrete {
   struct Result {
     uint32_t index;
     float pmf;       ///< probability of `index`
-    float remapped;  ///< `u` stretched over the cell it fell into: again uniform in [0, 1), independent of index
+    float remapped;  ///< `u` rescaled within its cell: again uniform in [0, 1), independent of index
   };
   /// `u` in [0, 1). Indices of zero weight are never returned.
   Result sample(float u) const {
-    // First cell whose upper bound exceeds u; it has positive weight because its bounds differ. The guide table leaves
-    // about one step of the search on average (Chen and Asau 1974).
+    // The first cell whose upper bound exceeds u; its weight is positive because its bounds differ. After the guide
+    // table, the search takes about one step on average (Chen and Asau 1974).
     const auto n = static_cast<uint32_t>(guide_.size());
     uint32_t index = guide_[std::min(static_cast<uint32_t>(u * static_cast<float>(n)), n - 1)];
     while (cdf_[index + 1] <= u) ++index;
@@ -43,7 +43,7 @@ class Discrete {
   double sum_ = 0;
 };
 
-/// The same as Discrete by an alias table (Walker 1977, Vose 1991): one look into memory, but neighbouring numbers may
+/// Same as Discrete, but by an alias table (Walker 1977, Vose 1991): one memory access, but neighbouring numbers may
 /// give distant indices. For large tables whose result does not depend on the pixel.
 class AliasTable {
  public:
@@ -53,14 +53,14 @@ class AliasTable {
     uint32_t index;
     float remapped;  ///< again uniform in [0, 1), independent of index
   };
-  /// Asks memory for what sample(u) will read.
+  /// Prefetches what sample(u) will read.
   void prefetch(float u) const { __builtin_prefetch(&cells_[cell_of(u * static_cast<float>(cells_.size()))]); }
   /// `u` in [0, 1).
   Result sample(float u) const {
     const float x = u * static_cast<float>(cells_.size());
     const uint32_t i = cell_of(x);
     const Cell& cell = cells_[i];
-    // Values are chosen, not branches: a wrong guess would be found out only when memory has answered.
+    // Select values instead of branching: a misprediction would be noticed only once memory has answered.
     const float f = x - static_cast<float>(i);
     const bool own = f < cell.own;
     const float lower = own ? 0 : cell.own, width = own ? cell.own : 1 - cell.own;
@@ -69,8 +69,8 @@ class AliasTable {
 
  private:
   struct Cell {
-    float own;       // fraction of the cell that is its own index
-    uint32_t other;  // the rest
+    float own;       // fraction of the cell that belongs to its own index
+    uint32_t other;  // index of the rest
   };
   /// `x` in [0, n].
   uint32_t cell_of(float x) const {
@@ -99,7 +99,7 @@ class PiecewiseConstant2D {
  private:
   int width_ = 0, height_ = 0;
   Discrete rows_;
-  std::vector<Discrete> columns_;  // one per row; empty rows hold a uniform one that is never chosen
+  std::vector<Discrete> columns_;  // one per row; empty rows hold a uniform one that is never sampled
 };
 
 }  // namespace covary

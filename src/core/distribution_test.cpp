@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Discrete and PiecewiseConstant2D: frequencies and positions follow the weights, empty cells are never drawn, numbers
-// are passed on undamaged, wrong weights are refused.
+// Discrete and PiecewiseConstant2D: frequencies and positions follow the weights, empty cells are never sampled,
+// remapped numbers stay uniform, invalid weights are rejected.
 #include "core/distribution.h"
 
 #include <gtest/gtest.h>
@@ -49,7 +49,7 @@ TEST(Discrete, SmallExample) {
   EXPECT_EQ(r.index, 2u);
   EXPECT_EQ(r.pmf, 0.5f);
   EXPECT_EQ(r.remapped, 0.5f);
-  EXPECT_EQ(d.sample(0.25f).index, 2u);  // the border belongs to the next cell that is not empty
+  EXPECT_EQ(d.sample(0.25f).index, 2u);  // the boundary belongs to the next non-empty cell
   EXPECT_EQ(d.sample(0.25f).remapped, 0);
 }
 
@@ -85,8 +85,8 @@ TEST(Discrete, SampleReturnsWhatPmfSaysAndStretchesTheNumber) {
   }
 }
 
-// N = 300 000, alpha = 5e-7. 17 cells: detects 1.8 % rms with power 0.99, 1000 cells: 3.5 %. Planted bug: weights
-// changed by 10 % up and down in turn.
+// N = 300 000, alpha = 5e-7. Detects 1.8 % rms with power 0.99 for 17 cells, 3.5 % for 1000. Planted bug: weights
+// alternately raised and lowered by 10 %.
 TEST(Discrete, FrequenciesAreTheWeights) {
   for (const int n : {2, 17, 1000})
     for (const bool planted : {false, true}) {
@@ -104,7 +104,7 @@ TEST(Discrete, FrequenciesAreTheWeights) {
 }
 
 // The remapped number is uniform and independent of the index. N = 200 000 in 128 cells, alpha = 5e-7: detects 2.8 %
-// rms with power 0.99. Planted bug: the number itself is passed on.
+// rms with power 0.99. Planted bug: the number itself is returned.
 TEST(Discrete, RemappedNumberIsIndependentOfTheIndex) {
   const std::vector<float> weights{1, 3, 0, 0.5f, 2};
   const Discrete d(weights);
@@ -113,7 +113,7 @@ TEST(Discrete, RemappedNumberIsIndependentOfTheIndex) {
         [&](const PathRandom& random) {
           const float u = random.get_1d(0, Event::kLightChoice);
           const Discrete::Result r = d.sample(u);
-          // The index becomes a strip, filled by another number.
+          // Each index is a strip, filled by a second number.
           return std::optional(Vec2{(r.index + random.get_1d(1, Event::kLobe)) / 5, planted ? u : r.remapped});
         },
         [&](const Vec2& p) { return 5 * d.pmf(std::min(4, int(p.x * 5))); }, {.name = "remapped", .n_samples = 200000});
@@ -163,7 +163,7 @@ TEST(PiecewiseConstant2D, DensityIsTheWeights) {
       EXPECT_EQ(r.pdf, d.pdf(r.uv)) << r.uv.x << " " << r.uv.y << " in " << size.width << " x " << size.height;
       EXPECT_GT(r.pdf, 0);
     }
-    // Numbers at the rim of cells, where rounding could move the point to the next one.
+    // Numbers at cell boundaries, where rounding could move the point into the next cell.
     for (int x = 0; x < size.width; ++x)
       for (const float at : {0.0f, -0x1p-24f, 0x1p-24f}) {
         const float u = std::clamp(float(x) / size.width + at, 0.0f, kOneMinusEpsilon);
@@ -175,7 +175,7 @@ TEST(PiecewiseConstant2D, DensityIsTheWeights) {
 }
 
 TEST(PiecewiseConstant2D, RoundingKeepsPointsInTheirCells) {
-  // Every second cell is empty; the numbers reach the last float of a cell.
+  // Every second cell is empty; the numbers include the last float of a cell.
   constexpr int kWidth = 4097;
   std::vector<float> weights(kWidth);
   for (int i = 0; i < kWidth; i += 2) weights[i] = 1;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The one exception type of the library, and checks for programming errors.
+// The library's only exception type, and checks for programming errors.
 #pragma once
 
 #include <stdexcept>
@@ -11,12 +11,13 @@ namespace covary {
 
 enum class ErrorCode {
   kUsage,     ///< a wrong option or combination of options; exit code 2
-  kInput,     ///< a file whose content is wrong or not supported
+  kInput,     ///< a file whose content is wrong or unsupported
   kIo,        ///< a file that cannot be opened, read or written
   kInternal,  ///< a bug in covary
 };
 
-/// What the library throws. The library never prints, exits or aborts; programs turn this into a message and exit code.
+/// Every error the library throws. The library never prints, exits or aborts; programs turn this into a message and
+/// exit code.
 class Error : public std::runtime_error {
  public:
   Error(ErrorCode code, const std::string& message) : std::runtime_error(message), code_(code) {}
@@ -26,8 +27,8 @@ class Error : public std::runtime_error {
   ErrorCode code_;
 };
 
-/// Names among `candidates` nearest to `name` by edit distance, best first, at most `count`; none farther than half of
-/// the name's length.
+/// The `candidates` nearest to `name` by edit distance, best first, at most `count`; none farther than half the length
+/// of `name`.
 std::vector<std::string> nearest_names(const std::string& name, const std::vector<std::string>& candidates,
                                        size_t count = 3);
 
@@ -36,7 +37,7 @@ std::string did_you_mean(const std::string& name, const std::vector<std::string>
 
 }  // namespace covary
 
-/// Programming errors: always on, so not for inner loops.
+/// Checks for programming errors. Always on, so not for inner loops.
 #define COVARY_CHECK(condition, message)                                                                 \
   do {                                                                                                   \
     if (!(condition))                                                                                    \

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Orthonormal frames, and trigonometry of directions given in the local frame whose z axis is the normal.
+// Orthonormal frames, and trigonometry of directions in a local frame whose z axis is the normal.
 #pragma once
 
 #include "core/vec.h"
@@ -13,10 +13,10 @@ struct Frame {
   Frame() = default;
   Frame(const Vec3& s_, const Vec3& t_, const Vec3& n_) : s(s_), t(t_), n(n_) {}
 
-  /// A frame around the unit normal `n` that varies continuously over the whole sphere but for one small cap: the axes
-  /// of a fixed frame (e1, e2, pole), turned by the shortest rotation that takes the pole to the normal. Continuity is
-  /// what keeps common random numbers correlated: neighbouring pixels scatter in the same directions. The usual
-  /// constructions jump where a coordinate changes sign, which is where walls have their normals.
+  /// A frame around the unit normal `n` that varies continuously over the whole sphere except one small cap: the axes
+  /// of a fixed frame (e1, e2, pole), rotated along the shortest arc from the pole to the normal. Continuity keeps
+  /// common random numbers correlated: neighbouring pixels scatter in the same directions. The usual constructions jump
+  /// where a coordinate changes sign, which is where the normals of walls lie.
   explicit Frame(const Vec3& normal) : n(normal) {
     constexpr Vec3 kPole{0.48f, 0.64f, 0.6f}, kE1{0.8f, -0.6f, 0}, kE2{0.36f, 0.48f, -0.8f};
     const float c = 1 + dot(n, kPole);
@@ -30,8 +30,8 @@ struct Frame {
     }
   }
 
-  /// A frame around `normal` whose s axis is the tangent made orthogonal to the normal; falls back to Frame(normal)
-  /// when the tangent is parallel to the normal or zero.
+  /// A frame around `normal` whose s axis is the tangent orthogonalised against it; falls back to Frame(normal) when
+  /// the tangent is parallel to the normal or zero.
   static Frame from_tangent(const Vec3& normal, const Vec3& tangent) {
     const Vec3 s = tangent - normal * dot(normal, tangent);
     const float l2 = length_squared(s);

@@ -20,7 +20,7 @@ double orthonormality_error(const Frame& f) {
 
 TEST(Frame, IsOrthonormalAndRightHandedEverywhere) {
   for (uint64_t i = 0; i < 100000; ++i) {
-    // Every second normal lies around the opposite of the pole, where the construction changes.
+    // Every second normal lies near the antipode of the pole, where the construction switches.
     const Vec3 d = random_direction(i);
     const Vec3 n = i % 2 ? d : normalize(Vec3{-0.48f, -0.64f, -0.6f} + d * 0.2f);
     ASSERT_LT(orthonormality_error(Frame(n)), 1e-4) << n.x << " " << n.y << " " << n.z;

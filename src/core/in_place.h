@@ -7,9 +7,8 @@
 
 namespace covary {
 
-/// target = make(), built where it is to stay. An assignment would build a temporary piece by piece and copy it with
-/// wide loads at once, which have to wait until the narrow stores have reached the cache: some twenty cycles each time,
-/// a tenth of a path's time in all.
+/// target = make(), constructed in place. An assignment would build a temporary field by field and copy it with wide
+/// loads right away, which stall on store forwarding: about twenty cycles each time, a tenth of a path's time in total.
 template <typename T, typename Make>
 void make_in_place(T& target, Make&& make) {
   static_assert(std::is_trivially_destructible_v<T>);

@@ -5,11 +5,11 @@
 
 namespace covary {
 
-/// Values of JSON files nest this deep at most: everything that walks through them may call itself.
+/// Maximum nesting depth of JSON files: code that walks them may recurse.
 inline constexpr int kMaxJsonDepth = 64;
 
-/// The line of a JSON text, from 1 on, on which arrays and objects begin to nest deeper than kMaxJsonDepth; 0: on none.
-/// To be asked before a text is parsed. The text need not be JSON.
+/// Line of a JSON text, counted from 1, at which arrays and objects first nest deeper than kMaxJsonDepth; 0 if none
+/// does. Call before parsing. The text need not be valid JSON.
 int line_nested_too_deep(std::string_view text);
 
 }  // namespace covary

@@ -19,8 +19,8 @@ struct Parts {
   Eigen::Matrix3d scale;
 };
 
-/// M = R S by the singular value decomposition M = U D V^T: R = U V^T and S = V D V^T [Shoemake1992, §4]. Of a matrix
-/// that mirrors, S does, so that R is a rotation.
+/// M = R S by the singular value decomposition M = U D V^T: R = U V^T and S = V D V^T [Shoemake1992, §4]. If M contains
+/// a reflection, it goes into S, so that R is a rotation.
 Parts parts_of(const Matrix4& m) {
   const Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> matrix(m[0].data());
   const Eigen::Matrix3d linear = matrix.topLeftCorner<3, 3>();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Transformations over time, given at some times and interpolated between them.
+// Keyframed transformations, interpolated over time.
 #pragma once
 
 #include <memory>
@@ -14,16 +14,16 @@ struct TransformKey {
   Matrix4 matrix;  ///< affine: the last row is 0 0 0 1
 };
 
-/// Between two keys the parts of M = T R S are interpolated: translation T and scale S (a symmetric matrix) linearly,
-/// rotation R on the shortest arc of unit quaternions, as Mitsuba does with `<animation>`. The parts are those of the
-/// polar decomposition [Shoemake1992]. Before the first key and behind the last one, the transformation rests.
+/// Between two keys, the parts of M = T R S are interpolated: translation T and scale S (a symmetric matrix) linearly,
+/// rotation R by slerp of unit quaternions, as Mitsuba does with `<animation>`. The parts come from the polar
+/// decomposition [Shoemake1992]. Constant before the first key and after the last.
 class KeyedTransform {
  public:
-  /// Throws Error(kInput) without keys, where times do not increase or are not finite, and for a matrix that is
-  /// singular, not finite or not affine; the message names the key by its index from 0.
+  /// Throws Error(kInput) if there are no keys, if times do not increase or are not finite, or if a matrix is singular,
+  /// not finite or not affine; the message names the key by its index from 0.
   explicit KeyedTransform(std::vector<TransformKey> keys);
 
-  /// At the time of a key exactly its matrix, and between keys of the same matrix that one.
+  /// Exactly the key's matrix at the time of a key, and between keys with equal matrices.
   Transform at(double time) const;
   const std::vector<TransformKey>& keys() const { return keys_; }
   double first_time() const { return keys_.front().time; }

@@ -9,7 +9,7 @@ namespace covary {
 
 void ask_for_huge_pages([[maybe_unused]] void* memory, [[maybe_unused]] size_t size) {
 #ifdef __linux__
-  madvise(memory, size, MADV_HUGEPAGE);  // a hint: refusal does no harm
+  madvise(memory, size, MADV_HUGEPAGE);  // a hint: failure is harmless
 #endif
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Arrays that are read at random places: they begin on a cache line, so that records that fit a line stay in one, and
-// large ones ask for huge pages, so that a read seldom has to look for its page first.
+// Arrays for random access: aligned to cache lines, so that records that fit into a line do not straddle two, and with
+// huge pages for large ones, so that reads rarely miss the TLB.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +9,7 @@
 
 namespace covary {
 
-/// Asks the system for huge pages, where it has them; `memory` begins on one.
+/// Asks the system for huge pages if it has them; `memory` must be aligned to one.
 void ask_for_huge_pages(void* memory, size_t size);
 
 template <typename T>

@@ -17,11 +17,11 @@ namespace {
 
 constexpr const char* kVariable = "COVARY_MEMORY";
 constexpr double kShare = 0.75;      // of the machine
-constexpr double kUnlimited = 1e18;  // a control group without a limit says "max", or a number of this size
+constexpr double kUnlimited = 1e18;  // a control group without a limit reports "max", or a number of this size
 
 double page_bytes() { return static_cast<double>(sysconf(_SC_PAGESIZE)); }
 
-/// Bytes that the program holds.
+/// Resident memory of the program, in bytes.
 double held_bytes() {
   std::ifstream file("/proc/self/statm");
   double size = 0, resident = 0;

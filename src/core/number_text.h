@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Numbers as options have them: decimal digits ("010" is ten, "0x10" is none), nothing behind them, never not-a-number.
+// Parsing of numbers in options: decimal digits only ("010" is ten, "0x10" is invalid), nothing after them, never NaN.
 #pragma once
 
 #include <charconv>
@@ -16,7 +16,7 @@ inline std::string_view without_plus(std::string_view text) {
   return text;
 }
 
-/// The number that the text is, with an optional sign; nothing where it is none or T does not hold it.
+/// The number in the text, with an optional sign; nothing if it is not one or T cannot hold it.
 template <typename T>
 std::optional<T> parse_number(std::string_view text) {
   text = without_plus(text);
@@ -29,8 +29,8 @@ std::optional<T> parse_number(std::string_view text) {
 /// Likewise; finite, with an optional fraction and exponent.
 std::optional<double> parse_real(std::string_view text);
 
-/// Numbers from 0 on between separators; nothing where there are not exactly `count`. Whole numbers are at most half of
-/// what they can be, so that two of them can be added.
+/// Exactly `count` non-negative numbers, separated by `separator`; nothing otherwise. Whole numbers are at most half
+/// the range of int64_t, so that two of them can be added.
 std::optional<std::vector<int64_t>> parse_whole_numbers(std::string_view text, char separator, size_t count);
 std::optional<std::vector<double>> parse_reals(std::string_view text, char separator, size_t count);
 

@@ -22,9 +22,9 @@
 
 namespace covary {
 
-/// Calls body(i) for every i of [0, n), in any order and on as many threads as `tbb::global_control` allows; a thread
-/// takes `chunk` (at least 1) neighbours at a time. Loops may be nested. The first exception of a body is thrown here,
-/// once all threads have stopped; iterations not begun by then are left out. Throws Stopped inside run_stoppable().
+/// Calls body(i) for every i in [0, n), in any order and on as many threads as `tbb::global_control` allows; a thread
+/// takes `chunk` (at least 1) consecutive i at a time. Loops may nest. Rethrows the first exception of a body once all
+/// threads have stopped; iterations not yet begun are skipped. Throws Stopped inside run_stoppable().
 #ifndef COVARY_PLAIN_THREADS
 template <typename Index, typename Body>
 void parallel_for(Index n, std::type_identity_t<Index> chunk, const Body& body) {
@@ -37,8 +37,8 @@ void parallel_for(Index n, std::type_identity_t<Index> chunk, const Body& body) 
   throw_if_stopped();
 }
 #else
-// For the thread sanitizer: TBB's library is built without it, so that the hand-overs between its threads look like
-// races.
+// For ThreadSanitizer: the TBB library is built without it, so that synchronisation between its threads goes unseen and
+// shows up as races.
 template <typename Index, typename Body>
 void parallel_for(Index n, std::type_identity_t<Index> chunk, const Body& body) {
   std::atomic<Index> next{0};
@@ -47,7 +47,7 @@ void parallel_for(Index n, std::type_identity_t<Index> chunk, const Body& body) 
   std::mutex error_mutex;
   const auto work = [&] {
     try {
-      // Relaxed: the counter must not order the bodies, or it would hide their races.
+      // Relaxed: the counter must not order the bodies, which would hide their races.
       for (Index first;
            !failed.load(std::memory_order_relaxed) && (first = next.fetch_add(chunk, std::memory_order_relaxed)) < n;)
         for (Index i = first; i < std::min(n, first + chunk); ++i) body(i);
@@ -66,24 +66,23 @@ void parallel_for(Index n, std::type_identity_t<Index> chunk, const Body& body) 
 }
 #endif
 
-/// The same, one iteration at a time.
+/// Same, one iteration at a time.
 template <typename Index, typename Body>
 void parallel_for(Index n, const Body& body) {
   parallel_for(n, 1, body);
 }
 
-/// One T for each thread that asks for it.
+/// One T per thread that asks for it.
 template <typename T>
 class PerThread {
  public:
-  /// That of the calling thread, made of the arguments when it first asks. It stays where it is. May be called by
-  /// several threads at once.
+  /// The calling thread's T, constructed from the arguments on first use. Its address is stable. Thread-safe.
   template <typename... Arguments>
   T& local(const Arguments&... arguments) {
     const std::lock_guard lock(mutex_);
     return values_.try_emplace(std::this_thread::get_id(), arguments...).first->second;
   }
-  /// Calls f(T&) for each, in any order. Not while threads still use theirs.
+  /// Calls f(T&) for each, in any order. Not while threads are still using theirs.
   template <typename Function>
   void for_each(const Function& f) {
     for (auto& [thread, value] : values_) f(value);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Numbers with addresses: uniform along every coordinate of the address, independent between neighbouring addresses,
-// and the pixel, nothing else, left out for common random numbers.
+// Addressable random numbers: uniform along every coordinate of the address, independent between neighbouring
+// addresses, and for common random numbers the pixel, and only the pixel, is left out.
 #include "core/random.h"
 
 #include <gtest/gtest.h>
@@ -36,7 +36,7 @@ PathRandom path(const Address& a) {
 }
 Vec2 covary_numbers(const Address& a) { return path(a).get_2d(a.vertex, a.event); }
 
-/// Planted bug: coordinates are combined by addition of multiples, as if hashing were not needed.
+/// Planted bug: coordinates are combined as a sum of multiples, without hashing.
 Vec2 additive_numbers(const Address& a) {
   const double k = a.seed * 0.618033988749895 + a.pass * 0.7548776662466927 + a.pixel * 0.5698402909980532 +
                    a.sample * 0.8191725133961645 + a.vertex * 0.6710436067037893 + double(a.event) * 0.2865123 +
@@ -45,7 +45,7 @@ Vec2 additive_numbers(const Address& a) {
   return {float(k - std::floor(k)) * kOneMinusEpsilon, float(l - std::floor(l)) * kOneMinusEpsilon};
 }
 
-/// The ways to walk through addresses: one coordinate runs, the others stay.
+/// Ways to walk through addresses: one coordinate varies, the others are fixed.
 struct Walk {
   const char* name;
   void (*step)(Address& a, uint64_t by);
@@ -80,8 +80,8 @@ Chi2Result test_uniform(const Generator& generator, const Walk& walk) {
     return generator(a);
   });
 }
-/// Pairs of numbers whose addresses differ by one step of `walk`; they run through the samples, or for samples through
-/// the pixels.
+/// Pairs of numbers whose addresses differ by one step of `walk`, over many samples, or over pixels if the walk is
+/// along samples.
 Chi2Result test_independent(const Generator& generator, const Walk& walk) {
   return test_pairs(walk.name, kPairs, [&](int i) {
     Address a;
@@ -93,7 +93,7 @@ Chi2Result test_independent(const Generator& generator, const Walk& walk) {
 }
 
 // N = 200 000 pairs in 1024 cells, alpha = 5e-7 on either side (a sequence may also be too regular): detects, with
-// power 0.99, a density wrong by 4.3 % rms. Planted bugs: numbers on a lattice, and numbers pushed up by 3 %.
+// power 0.99, a density wrong by 4.3 % rms. Planted bugs: numbers on a lattice, and numbers skewed upwards by 3 %.
 TEST(PathRandom, IsUniformAlongEveryCoordinate) {
   const auto accepted = [](const Chi2Result& r) { return r.accepted && r.p_value < 1 - statistics::test_alpha(); };
   const Generator pushed = [](const Address& a) {
@@ -101,7 +101,7 @@ TEST(PathRandom, IsUniformAlongEveryCoordinate) {
     return Vec2{std::pow(u.x, 0.94f) * kOneMinusEpsilon, u.y};
   };
   for (const Walk& walk : kWalks) {
-    if (walk.name == std::string("events")) continue;  // there are only twelve
+    if (walk.name == std::string("events")) continue;  // there are too few
     const Chi2Result result = test_uniform(covary_numbers, walk);
     EXPECT_TRUE(accepted(result)) << result.message;
     EXPECT_FALSE(accepted(test_uniform(additive_numbers, walk))) << walk.name;
@@ -117,8 +117,8 @@ TEST(PathRandom, NeighbouringAddressesAreIndependent) {
   }
 }
 
-// Correlation of N = 200 000 pairs, alpha = 5e-7: detects |r| = 0.0165 with power 0.99. Planted bug: pairs that share a
-// twentieth of their numbers.
+// Correlation of N = 200 000 pairs, alpha = 5e-7: detects |r| = 0.0165 with power 0.99. Planted bug: a twentieth of the
+// pairs share their numbers.
 TEST(PathRandom, NeighbouringAddressesAreUncorrelated) {
   for (const Walk& walk : kWalks)
     for (const bool planted : {false, true}) {
@@ -136,7 +136,7 @@ TEST(PathRandom, NeighbouringAddressesAreUncorrelated) {
     }
 }
 
-// The two numbers of one event, and numbers of two events. Planted bug: one event read twice, for a choice and for a
+// The two numbers of one event, and numbers of two events. Planted bug: the same event read for both a choice and a
 // sample.
 TEST(PathRandom, EventsAreIndependent) {
   const auto test = [](Event first, Event second) {
@@ -150,8 +150,7 @@ TEST(PathRandom, EventsAreIndependent) {
   EXPECT_FALSE(test(Event::kDirection, Event::kDirection).accepted);
 }
 
-// N = 400 000 in 256 cells of the lowest 8 of 24 bits, alpha = 5e-7: detects 2.3 % rms. Planted bug: numbers of 20
-// bits.
+// N = 400 000 in 256 cells of the lowest 8 of 24 bits, alpha = 5e-7: detects 2.3 % rms. Planted bug: 20-bit numbers.
 TEST(PathRandom, LowBitsAreUniform) {
   for (const bool planted : {false, true}) {
     std::vector<double> observed(256), probabilities(256, 1.0 / 256);
@@ -197,8 +196,8 @@ TEST(PathRandom, CommonNumbersLeaveOutThePixelAndNothingElse) {
   EXPECT_EQ(random.get_2d(2, Event::kDirection), copy.get_2d(2, Event::kDirection));
 }
 
-// Numbers of Sobol' points: the samples of a group share the sequence of an event, and everything else has one of its
-// own. N and alpha as above; pairs run through pixels. Planted bug: a step that does not change the address.
+// Sobol' numbers: the samples of a group share the sequence of an event; any other change of address gives another
+// sequence. N and alpha as above; pairs vary over pixels. Planted bug: a step that does not change the address.
 TEST(PathRandom, SequencesOfNeighbouringAddressesAreIndependent) {
   struct Point {
     Address address;
@@ -246,7 +245,7 @@ TEST(PathRandom, SamplesOfAGroupArePointsOfOneSequenceForEachEvent) {
   }
 }
 
-// Films that are continued or merged rely on these.
+// Resuming and merging films rely on these values.
 TEST(PathRandom, AddressesKeepTheirNumbers) {
   const auto bits = [](float u) { return static_cast<uint32_t>(u * 0x1p24f); };
   const PathRandom random(Sampling::kIndependent, 7, 1, 1000, 3), crn(Sampling::kCrn, 7, 1, 1000, 3);
@@ -262,7 +261,7 @@ TEST(PathRandom, AddressesKeepTheirNumbers) {
   EXPECT_EQ(bits(sobol.subpath(Subpath::kLight).get_1d(0, Event::kPixel)), 9880291u);
 }
 
-// Of 10 000 pairs of 24-bit numbers from two seeds 0.0006 are expected to be equal; from one seed all are.
+// Of 10 000 pairs of 24-bit numbers from two seeds, 0.0006 are expected to be equal; from one seed, all are.
 TEST(PathRandom, SeedsGiveDifferentNumbers) {
   int n_equal = 0;
   for (uint64_t i = 0; i < 10000; ++i)
@@ -270,8 +269,8 @@ TEST(PathRandom, SeedsGiveDifferentNumbers) {
   EXPECT_LE(n_equal, 2);
 }
 
-// Every input bit flips every output bit in half of N = 10 000 trials; 4096 comparisons share alpha = 5e-7: |z| > 6.4,
-// which detects a probability off by 0.044 with power 0.99. Planted bug: one multiplication without the shifts.
+// Flipping any input bit flips each output bit in half of N = 10 000 trials; 4096 comparisons share alpha = 5e-7: |z| >
+// 6.4, which detects a probability off by 0.044 with power 0.99. Planted bug: one multiplication without shifts.
 TEST(Mix64, EveryInputBitFlipsEveryOutputBit) {
   const auto worst_z = [](uint64_t (*mix)(uint64_t)) {
     double worst = 0;

@@ -6,9 +6,9 @@
 
 namespace covary {
 
-/// The words as a POSIX shell needs them: separated by spaces, with quotes where necessary.
+/// The words joined into a POSIX shell command line: separated by spaces, quoted where necessary.
 std::string shell_text(const std::vector<std::string>& words);
-/// The words of such a text, quotes removed.
+/// Splits such a text into words, with quotes removed.
 std::vector<std::string> words_of_shell_text(const std::string& text);
 
 }  // namespace covary

@@ -6,7 +6,7 @@
 namespace covary {
 namespace {
 
-/// The same as reverse_bits() for 64 bits.
+/// As reverse_bits(), for 64 bits.
 uint64_t reverse_bits_64(uint64_t x) {
   x = __builtin_bswap64(x);
   x = (x & 0x0f0f0f0f0f0f0f0full) << 4 | (x >> 4 & 0x0f0f0f0f0f0f0f0full);
@@ -14,8 +14,8 @@ uint64_t reverse_bits_64(uint64_t x) {
   return (x & 0x5555555555555555ull) << 1 | (x >> 1 & 0x5555555555555555ull);
 }
 
-/// A random permutation in which a bit depends on itself and lower ones only [LaineKarras2011]; with the bits in
-/// reverse order an Owen scramble. Operations and constants of [Vegdahl2021], which mix better than the first ones.
+/// A random permutation in which each bit depends only on itself and lower bits [LaineKarras2011]; with bits reversed,
+/// an Owen scramble. Operations and constants of [Vegdahl2021], which mix better than the original ones.
 uint32_t permute_upwards(uint32_t x, uint32_t seed) {
   x ^= x * 0x3d20adeau;
   x += seed;
@@ -24,8 +24,8 @@ uint32_t permute_upwards(uint32_t x, uint32_t seed) {
   return x ^ (x * 0x53a22864u);
 }
 
-/// Sobol's second coordinate with its bits in reverse order. The matrix of its generators is Pascal's triangle modulo
-/// 2: bits are coefficients of a polynomial p(x) over GF(2), of which this is p(1 + x), by halves [Ahmed2024].
+/// Sobol's second coordinate with its bits reversed. Its generator matrix is Pascal's triangle modulo 2: reading the
+/// bits as coefficients of a polynomial p(x) over GF(2), the result is p(1 + x), computed by halves [Ahmed2024].
 uint32_t pascal_product(uint32_t bits) {
   bits ^= bits >> 16 & 0x0000ffffu;
   bits ^= bits >> 8 & 0x00ff00ffu;
@@ -34,11 +34,11 @@ uint32_t pascal_product(uint32_t bits) {
   return bits ^ (bits >> 1 & 0x55555555u);
 }
 
-/// [Burley2020] Listing 3: the order of points.
+/// [Burley2020] Listing 3: shuffles the order of the points.
 uint32_t shuffled(uint32_t reversed_index, uint64_t key) {
   return reverse_bits(permute_upwards(reversed_index, static_cast<uint32_t>(key)));
 }
-/// The coordinates with their bits in reverse order; of the first, before its scramble, that is the index.
+/// The coordinates with their bits reversed; before scrambling, the first is the index itself.
 uint32_t reversed_x(uint32_t index, uint64_t key) { return permute_upwards(index, static_cast<uint32_t>(key >> 32)); }
 uint32_t reversed_y(uint32_t index, uint64_t key) {
   return permute_upwards(pascal_product(index), static_cast<uint32_t>(mix64(key)));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scrambled Sobol' points: a net in every run of 2^m points, each point uniform, and means of sequences with different
-// keys as little related as independent ones.
+// Scrambled Sobol' points: every run of 2^m points is a net, each point is uniform, and means of sequences with
+// different keys are as uncorrelated as independent ones.
 #include "core/sobol.h"
 
 #include <gtest/gtest.h>
@@ -24,7 +24,7 @@ using Sequence = std::function<Point(uint32_t index, uint64_t key)>;
 
 Point unpacked(uint64_t bits) { return {static_cast<uint32_t>(bits >> 32), static_cast<uint32_t>(bits)}; }
 Point sobol(uint32_t index, uint64_t key) { return unpacked(sobol_point(reverse_bits(index), mix64(key))); }
-/// Planted bugs: independent numbers; one coordinate twice; the same order of points and scramble for every key.
+/// Planted bugs: independent numbers; both coordinates equal; the same order and scramble for every key.
 Point independent(uint32_t index, uint64_t key) { return unpacked(combine64(key, index)); }
 Point diagonal(uint32_t index, uint64_t key) {
   const Point p = sobol(index, key);
@@ -37,7 +37,7 @@ TEST(Sobol, SingleNumbersAreFirstCoordinates) {
     EXPECT_EQ(sobol_first(reverse_bits(index), mix64(3)), sobol_point(reverse_bits(index), mix64(3)) >> 32);
 }
 
-/// Whether points first … first + 2^m - 1 are a (0, m, 2)-net: one in each box of sides 2^-a and 2^(a - m).
+/// Whether points first … first + 2^m - 1 are a (0, m, 2)-net: one in each box with sides 2^-a and 2^(a - m).
 bool is_net(const Sequence& sequence, uint64_t key, uint32_t first, int m) {
   for (int a = 0; a <= m; ++a) {
     std::set<uint64_t> boxes;
@@ -77,17 +77,17 @@ TEST(Sobol, EachPointIsUniformOverKeys) {
   EXPECT_FALSE(test(one_key, 1).accepted);
 }
 
-/// Smooth in both coordinates, with mean 0 and a mixed term.
+/// Smooth in both coordinates, with mean 0 and a cross term.
 double smooth(const Point& p) { return p.u() * p.u() - 1.0 / 3 + (p.u() - 0.5) * (p.v() - 0.5) + p.v() - 0.5; }
-/// Of points 0 … n - 1.
+/// Mean over points 0 … n - 1.
 double mean_of(const Sequence& sequence, uint64_t key, uint32_t n, double (*value)(const Point&) = smooth) {
   double sum = 0;
   for (uint32_t i = 0; i < n; ++i) sum += value(sequence(i, key));
   return sum / n;
 }
 
-// 100 000 keys; the numbers of points are and are not powers of two. Alpha = 5e-7; with n = 5, where the mean of a key
-// deviates by 0.13, a bias of 0.003 is found with power 0.99. Planted bug: the points of one key.
+// 100 000 keys, with n both powers of two and not. Alpha = 5e-7; at n = 5, where the means have a standard deviation of
+// 0.13, detects a bias of 0.003 with power 0.99. Planted bug: all points from one key.
 TEST(Sobol, MeansAreUnbiasedForAnyNumberOfPoints) {
   for (const uint32_t n : {1u, 3u, 5u, 8u, 12u}) {
     statistics::Moments right, planted;
@@ -98,8 +98,8 @@ TEST(Sobol, MeansAreUnbiasedForAnyNumberOfPoints) {
   EXPECT_GT(std::abs(mean_of(one_key, 0, 5)), 0.003);
 }
 
-// Variance of means over 4 000 keys relative to that of independent points: theory has n^-3 instead of n^-1 for smooth
-// functions.
+// Variance of means over 4 000 keys relative to independent points: for smooth functions, theory predicts n^-3 instead
+// of n^-1.
 TEST(Sobol, MeansOfSmoothFunctionsVaryLess) {
   const auto variance = [](const Sequence& sequence, uint32_t n) {
     statistics::Moments m;
@@ -112,7 +112,7 @@ TEST(Sobol, MeansOfSmoothFunctionsVaryLess) {
 }
 
 // Means of 5 points of neighbouring keys, 100 000 pairs, alpha = 5e-7: detects a correlation of 0.023 with power 0.99.
-// The functions are smooth, and of the first digits. Planted bug: two sequences of one key.
+// For smooth functions and functions of the leading digits. Planted bug: two sequences with one key.
 TEST(Sobol, MeansOfNeighbouringKeysAreUncorrelated) {
   const auto digits = [](const Point& p) { return double(p.x >> 29 & 1) + double(p.y >> 30 & 1) * (p.x >> 31) - 0.75; };
   for (double (*value)(const Point&) : {+smooth, +digits})
@@ -124,9 +124,10 @@ TEST(Sobol, MeansOfNeighbouringKeysAreUncorrelated) {
     }
 }
 
-// Two sequences side by side: how much the mean of a product over 16 samples varies, relative to independent samples,
-// over 100 000 pairs of keys. The orders are trees whose branches were swapped, with which it is 1.6, known to 0.02,
-// and not 1. Planted bug: one order for both sequences, whose keys differ in the bits that scramble coordinates alone.
+// Two padded sequences: variance of the mean of a product over 16 samples relative to independent samples, over 100 000
+// pairs of keys. Orders are shuffled by swapping branches of a binary tree, for which the ratio is 1.6 (known to 0.02)
+// instead of 1. Planted bug: one order for both sequences, whose keys differ only in the bits that scramble
+// coordinates.
 TEST(Sobol, SequencesSideBySideAreVisitedInOrdersOfTheirOwn) {
   const auto ratio = [](bool planted) {
     statistics::Moments m;

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::chrono::milliseconds kPoll{20};
 
-/// Cancels a group of tasks once `stop` says so.
+/// Cancels a task group once `stop` returns true.
 class Watcher {
  public:
   Watcher(const std::function<bool()>& stop, tbb::task_group_context& context)
@@ -38,14 +38,14 @@ class Watcher {
   std::mutex mutex_;
   std::condition_variable ended_;
   bool end_ = false;
-  std::thread thread_;  // the last, as it uses the others
+  std::thread thread_;  // declared last because it uses the other members
 };
 
 }  // namespace
 
 bool run_stoppable(const std::function<bool()>& stop, const std::function<void()>& body) {
   if (stop()) return false;
-  // Loops inside belong to the context, which cancels them.
+  // Loops inside inherit the context, which cancels them.
   tbb::task_group_context context;
   std::exception_ptr error;
   bool ended = false;

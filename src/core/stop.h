@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Work that can be ended before its end: by Ctrl-C, by a caller who has changed their mind, by a time limit.
+// Work that can be stopped early: by Ctrl-C, by a caller, by a time limit.
 #pragma once
 
 #include <atomic>
@@ -8,22 +8,21 @@
 
 namespace covary {
 
-/// Leaves work that run_stoppable() has ended; nobody but that function catches it.
+/// Unwinds work that run_stoppable() has stopped; only that function catches it.
 class Stopped : public std::exception {
  public:
   const char* what() const noexcept override { return "stopped"; }
 };
 
-/// Runs `body` in this thread and asks `stop` 50 times a second in another one. Once it says yes, the loops of
-/// parallel_for() inside begin no more iterations and throw Stopped: no code sees their halves. Returns whether `body`
-/// came to its end before; what it has made otherwise is to be thrown away. An exception of `body` is thrown on, except
-/// after a stop.
+/// Runs `body` in this thread while another thread polls `stop` 50 times a second. Once it returns true, parallel_for()
+/// loops inside start no further iterations and throw Stopped, so that no code sees partial results. Returns whether
+/// `body` ran to completion; if not, its results must be discarded. Rethrows an exception of `body` unless stopped.
 bool run_stoppable(const std::function<bool()>& stop, const std::function<void()>& body);
 
-/// The same with a flag; null: nothing stops it.
+/// Same with a flag; null: never stops.
 bool run_stoppable(const std::atomic<bool>* stop, const std::function<void()>& body);
 
-/// Throws Stopped inside of work that is to end: between long steps that are no parallel loops.
+/// Throws Stopped inside work that has been stopped: for use between long serial steps.
 void throw_if_stopped();
 
 }  // namespace covary

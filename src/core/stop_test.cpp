@@ -28,7 +28,7 @@ TEST(RunStoppable, ThrowsWhatTheWorkThrows) {
                std::runtime_error);
 }
 
-// The sanitizer's own loops know nothing of TBB's groups of tasks.
+// The loops used under ThreadSanitizer know nothing of TBB task groups.
 #ifndef COVARY_PLAIN_THREADS
 bool stopped() {
   try {
@@ -39,7 +39,7 @@ bool stopped() {
   return false;
 }
 
-/// An iteration asks for the end and waits until it has come, so that the loop cannot end before.
+/// An iteration requests the stop and waits until it takes effect, so that the loop cannot end first.
 TEST(RunStoppable, LoopsEndAndNothingAfterThemIsRun) {
   std::atomic<bool> stop{false};
   std::atomic<int> begun{0};

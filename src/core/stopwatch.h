@@ -5,12 +5,12 @@
 
 namespace covary {
 
-/// Wall-clock time. It runs from the moment it is made; it is not affected by changes of the system's clock.
+/// Wall-clock time since construction, from a monotonic clock.
 class Stopwatch {
  public:
-  /// Seconds since it was made, or since the last lap().
+  /// Seconds since construction or the last lap().
   double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
-  /// Returns seconds() and begins again at zero.
+  /// Returns seconds() and restarts at zero.
   double lap() {
     const Clock::time_point now = Clock::now();
     const double seconds = std::chrono::duration<double>(now - start_).count();

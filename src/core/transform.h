@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Affine and projective maps as 4 x 4 matrices, with their inverse. Double precision: scenes chain many of them.
+// Affine and projective maps as 4 x 4 matrices with their inverses, in double precision because scenes chain many of
+// them.
 #pragma once
 
 #include <array>
@@ -19,10 +20,10 @@ class Transform {
 
   static Transform translate(const Vec3& v);
   static Transform scale(const Vec3& v);
-  /// Rotation by `degrees` around `axis` (any length but zero).
+  /// Rotation by `degrees` around `axis` (of any nonzero length).
   static Transform rotate(const Vec3& axis, double degrees);
-  /// Camera frame: origin at `origin`, +z towards `target`, y axis in the half plane of `up`; x points left as seen
-  /// from the camera (Mitsuba's convention). Throws Error(kInput) when the directions are degenerate.
+  /// Camera frame: origin at `origin`, +z towards `target`, y in the half plane of `up`; x points left as seen from the
+  /// camera (Mitsuba's convention). Throws Error(kInput) when the directions are degenerate.
   static Transform look_at(const Vec3& origin, const Vec3& target, const Vec3& up);
 
   Vec3 point(const Vec3& p) const;   ///< with perspective division

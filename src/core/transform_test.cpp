@@ -52,7 +52,7 @@ TEST(Transform, InverseUndoes) {
     expect_near(kGeneral.inverse().point(kGeneral.point(p)), p, 1e-4f);
     expect_near(kGeneral.inverse().vector(kGeneral.vector(p)), p, 1e-4f);
   }
-  // Far from the origin and finely scaled: double precision carries it.
+  // Far from the origin at a tiny scale: needs double precision.
   const Transform far = Transform::translate({1e5f, 0, 0}) * Transform::scale({1e-6f, 1e-6f, 1e-6f});
   expect_near((far.inverse() * far).point({1, 2, 3}), {1, 2, 3}, 1e-3f);
 }
@@ -60,7 +60,7 @@ TEST(Transform, InverseUndoes) {
 TEST(Transform, NormalsStayPerpendicular) {
   const Vec3 n{0, 0.6f, 0.8f}, tangents[] = {{1, 0, 0}, {0, 0.8f, -0.6f}};
   for (const Vec3& t : tangents) EXPECT_NEAR(dot(kGeneral.normal(n), kGeneral.vector(t)), 0, 1e-5f);
-  EXPECT_GT(std::abs(dot(kGeneral.vector(n), kGeneral.vector(tangents[1]))), 0.1f);  // the plain map does not do it
+  EXPECT_GT(std::abs(dot(kGeneral.vector(n), kGeneral.vector(tangents[1]))), 0.1f);  // vector() would not do
 }
 
 TEST(Transform, LookAtSeesTheTargetAlongZ) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sine and cosine together, and the angle of a point, inlined: the maps of sampling need little else. Errors below
-// 1e-7.
+// Inlined sine and cosine of one angle, and the angle of a point: nearly all that sampling needs. Errors below 1e-7.
 #pragma once
 
 #include <algorithm>
@@ -12,14 +11,14 @@ struct SinCos {
   float sin, cos;
 };
 
-/// For x in [-pi/4, pi/4], by Taylor series; the first terms left out are below 3e-8.
+/// For x in [-pi/4, pi/4], by Taylor series; the first omitted terms are below 3e-8.
 inline SinCos sincos_octant(float x) {
   const float x2 = x * x;
   return {x * (1 + x2 * (-1.0f / 6 + x2 * (1.0f / 120 + x2 * (-1.0f / 5040 + x2 * (1.0f / 362880))))),
           1 + x2 * (-0.5f + x2 * (1.0f / 24 + x2 * (-1.0f / 720 + x2 * (1.0f / 40320))))};
 }
 
-/// Of the angle 2 pi `turns`, any finite number of moderate size.
+/// Sine and cosine of the angle 2 pi `turns`, for any `turns` of moderate size.
 inline SinCos sincos_turns(float turns) {
   const float quarters = std::nearbyint(4 * turns);
   const SinCos rest = sincos_octant((turns - 0.25f * quarters) * 6.28318530717958647692f);
@@ -32,7 +31,7 @@ inline SinCos sincos_turns(float turns) {
 inline float angle_turns(float y, float x) {
   const float ax = std::abs(x), ay = std::abs(y), larger = std::max(ax, ay);
   const float t = larger > 0 ? std::min(ax, ay) / larger : 0, t2 = t * t;
-  // atan(t) / t on [0, 1]: polynomial in t^2 of least relative error (1.5e-8), exact at 0.
+  // atan(t) / t on [0, 1]: minimax polynomial in t^2 (relative error 1.5e-8), exact at 0.
   float p = 2.97454997e-3f;
   for (const float c :
        {-0.0165810324f, 0.0435533113f, -0.0758056059f, 0.10678933f, -0.142142076f, 0.199941371f, -0.33333167f, 1.0f})

@@ -7,13 +7,13 @@
 
 namespace covary {
 
-/// Exit code of work that Ctrl-C ended, as shells have it: 128 + the number of the signal.
+/// Exit code of work interrupted by Ctrl-C, as in shells: 128 + signal number.
 inline constexpr int kInterrupted = 130;
 
-/// Work that ended before it was as wanted; what there is was kept.
+/// Work that ended early; what was finished is kept.
 class Unfinished : public Error {
  public:
-  /// `exit_code`: what the program ends with.
+  /// `exit_code`: exit code of the program.
   Unfinished(int exit_code, const std::string& message) : Error(ErrorCode::kIo, message), exit_code_(exit_code) {}
   int exit_code() const { return exit_code_; }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Two- and three-component vectors of single precision: points, directions, normals.
+// Single-precision vectors of two and three components: points, directions, normals.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +13,7 @@ inline constexpr float kPi = 3.14159265358979323846f;
 inline constexpr float kTwoPi = 2 * kPi;
 inline constexpr float kInvPi = 1 / kPi;
 inline constexpr float kInfinity = std::numeric_limits<float>::infinity();
-/// The largest float below one: upper bound of every random number.
+/// The largest float below one: upper bound of all random numbers.
 inline constexpr float kOneMinusEpsilon = 0x1.fffffep-1f;
 
 inline float sqr(float x) { return x * x; }

@@ -11,8 +11,8 @@ namespace covary::warp {
 /// Uniform on the unit disk by the concentric map (Shirley & Chiu 1997); density 1/pi per unit area.
 inline Vec2 square_to_disk(Vec2 u) {
   const float x = 2 * u.x - 1, y = 2 * u.y - 1;
-  // Radius along the larger coordinate; the angle is measured from its axis, within 45 degrees. Which coordinate is the
-  // larger cannot be predicted: values are chosen, not branches.
+  // Radius along the larger coordinate; the angle is measured from its axis, within 45 degrees. Which coordinate is
+  // larger is unpredictable, so values are selected instead of branching.
   const bool along_x = std::abs(x) > std::abs(y);
   const float radius = along_x ? x : y, other = along_x ? y : x;
   const SinCos a = sincos_octant((kPi / 4) * (other / (radius == 0 ? 1 : radius)));
@@ -35,14 +35,8 @@ inline Vec3 square_to_sphere(Vec2 u) {
 }
 inline float sphere_pdf_solid_angle() { return 1 / (4 * kPi); }
 
-/// The direction of square_to_cone() above `d` on the unit disk. `one_minus_cos`: |d|^2 one_minus_cos_max, which is
-/// uniform in [0, one_minus_cos_max).
-inline Vec3 disk_to_cone(Vec2 d, float one_minus_cos, float one_minus_cos_max) {
-  const float scale = safe_sqrt(one_minus_cos_max * (2 - one_minus_cos));  // sin(theta) / |d|
-  return {d.x * scale, d.y * scale, 1 - one_minus_cos};
-}
-/// Uniform in the cone of directions around +z whose cosine is at least `cos_max`; `one_minus_cos_max` is passed
-/// because it is small for distant lights and its difference from 1 would lose digits.
+/// Uniform in the cone of directions around +z whose cosine is at least `cos_max`. Takes `one_minus_cos_max` because it
+/// is tiny for distant lights, and computing it from cos_max would cancel.
 inline Vec3 square_to_cone(Vec2 u, float one_minus_cos_max) {
   const Vec2 d = square_to_disk(u);
   const float r2 = d.x * d.x + d.y * d.y;  // uniform in [0, 1)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every warp: points follow the density (chi-square), |det of the map| times density is 1 (exact, by differences), and
-// planted bugs are rejected.
+// Every warp: points follow the density (chi-square), |det J| times density is 1 (finite differences), and planted bugs
+// are rejected.
 #include "core/warp.h"
 
 #include <gtest/gtest.h>
@@ -124,7 +124,7 @@ TEST(Warp, Tent) {
   }
 }
 
-// Area of the image of a small square around u, over the square's area: the reciprocal of the density. Central
+// Area of the image of a small square around u over the square's area: the reciprocal of the density. Central
 // differences with step 1/256 are exact to about 1e-4 away from the kinks of the concentric map.
 template <typename Map>
 double jacobian(const Map& map, Vec2 u) {
