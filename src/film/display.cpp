@@ -35,7 +35,7 @@ constexpr std::array<const char*, 3> kChannels{"R", "G", "B"};
 class Packet {
  public:
   explicit Packet(uint8_t type) {
-    add(uint32_t{0});  // the length, known at the end
+    add(uint32_t{0});  // placeholder for the length
     add(type);
   }
   template <typename T>
@@ -88,7 +88,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 constexpr auto kConnectTime = std::chrono::seconds(3);
-constexpr auto kStallTime = std::chrono::seconds(10);  // without a byte taken, the viewer counts as lost
+constexpr auto kStallTime = std::chrono::seconds(10);  // the viewer counts as lost if it accepts no byte for this long
 constexpr auto kLastTime = std::chrono::seconds(2);
 constexpr size_t kPacketBytes = 1 << 20;
 
@@ -109,7 +109,7 @@ Address parse_address(const std::string& text) {
 
 }  // namespace
 
-/// The thread that sends, and what it shares with the render.
+/// The sending thread, and the state it shares with the render.
 struct Display::Connection {
   std::string address_text, name;
   Address address;
@@ -119,7 +119,7 @@ struct Display::Connection {
   std::condition_variable changed;
   std::optional<Image> next;
   bool lost = false, closing = false;
-  Clock::time_point deadline = Clock::time_point::max();  // of the last image, set when closing
+  Clock::time_point deadline = Clock::time_point::max();  // for the last image, set when closing
 
   int descriptor = -1;
   std::thread thread;
@@ -168,7 +168,7 @@ struct Display::Connection {
     if (descriptor < 0) fail(fmt::format("cannot connect: {}", std::strerror(reason)));
   }
 
-  /// Sets the descriptor, or returns why it could not.
+  /// Sets the descriptor, or returns errno.
   int try_connect(const addrinfo& a) {
     const int candidate = socket(a.ai_family, a.ai_socktype | SOCK_NONBLOCK | SOCK_CLOEXEC, a.ai_protocol);
     if (candidate < 0) return errno;
@@ -190,7 +190,7 @@ struct Display::Connection {
     return deadline;
   }
 
-  /// Waits in short steps, because closing may shorten the wait.
+  /// Polls in short steps, because closing may shorten the wait.
   bool wait_writable(Clock::duration longest) const {
     const auto end = Clock::now() + longest;
     while (Clock::now() < std::min(end, last_moment())) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Live preview in tev (https://github.com/Tom94/tev) by its network protocol. A render never waits for the viewer:
-// images are handed to a thread, which sends the newest one; what the viewer is too slow for is left out.
+// Live preview in tev (https://github.com/Tom94/tev) over its network protocol. A render never waits for the viewer:
+// images go to a thread that sends the newest one and drops those the viewer is too slow for.
 #pragma once
 
 #include <cstdint>
@@ -21,26 +21,26 @@ namespace covary {
 ///                      height, n int64 offsets, n int64 strides [both in floats], floats
 namespace tev {
 std::vector<uint8_t> create_image(const std::string& name, int width, int height);
-/// The rows from `first_row` on, at most `n_rows`; 3 channels, interleaved.
+/// Rows from `first_row` on, at most `n_rows`; 3 interleaved channels.
 std::vector<uint8_t> update_image(const std::string& name, const Image& image, int first_row, int n_rows);
 }  // namespace tev
 
 class Display {
  public:
-  /// `address`: "HOST:PORT" or "[IPv6]:PORT". `name`: of the image in the viewer. Connects in a thread; `warn` is
-  /// called from there, at most once, when the viewer cannot be reached or is lost; then nothing more is sent. Throws
-  /// Error(kUsage) when the address is not of this form.
+  /// `address`: "HOST:PORT" or "[IPv6]:PORT". `name`: name of the image in the viewer. Connects in a thread, which
+  /// calls `warn`, at most once, when the viewer cannot be reached or the connection is lost; nothing more is sent
+  /// then. Throws Error(kUsage) for an address of another form.
   Display(const std::string& address, std::string name, std::function<void(const std::string&)> warn);
-  /// Waits for the last image to be sent, at most two seconds.
+  /// Waits at most two seconds for the last image to be sent.
   ~Display();
   Display(const Display&) = delete;
   Display& operator=(const Display&) = delete;
 
-  /// Whether update() would send something soon: connected, or not yet given up, and no image is waiting. Saves making
-  /// an image that would be left out.
+  /// Whether update() would send something soon: connected or still trying, and no image pending. Saves computing an
+  /// image that would be dropped.
   bool ready() const;
-  /// Hands over an image of 3 channels to show; returns at once. All images must have one size. An image that has not
-  /// been sent yet is replaced.
+  /// Queues a 3-channel image for display and returns at once. All images must have the same size. Replaces an image
+  /// that has not been sent yet.
   void update(Image image);
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The bytes of packets, and viewers that are missing or slow. tests/display decodes what a render sends.
+// Bytes of packets; missing and slow viewers. tests/display decodes what a render sends.
 #include "film/display.h"
 
 #include <arpa/inet.h>
@@ -21,7 +21,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// A socket on a free port of this machine that accepts connections and reads nothing.
+/// A listening socket on a free local port that accepts connections and reads nothing.
 class SilentServer {
  public:
   SilentServer() : descriptor_(socket(AF_INET, SOCK_STREAM, 0)) {
@@ -99,7 +99,7 @@ TEST(Display, AMissingViewerIsOneWarningAndNoWait) {
 TEST(Display, AViewerThatReadsNothingHoldsUpNobody) {
   const SilentServer server;
   std::atomic<int> warnings{0};
-  std::vector<Image> images(10, Image(1024, 1024, 3));  // 12 MB each, more than sockets hold
+  std::vector<Image> images(10, Image(1024, 1024, 3));  // 12 MB each, more than socket buffers hold
   auto start = Clock::now();
   Clock::duration updates{};
   {

@@ -29,13 +29,13 @@ namespace covary {
 namespace Imf = OPENEXR_IMF_NAMESPACE;
 namespace {
 
-/// More pixels than this in one direction is taken as damage.
+/// An image larger than this in either direction is taken as damage.
 constexpr int kMaxSize = 1 << 18;
-/// Tiles with more pixels than this in one direction are taken as damage.
+/// Tiles larger than this in either direction are taken as damage.
 constexpr int kMaxTile = 1 << 12;
 
-/// OutputFile as OpenEXR's stream. OpenEXR ignores errors in its last write, the table of lines; OutputFile remembers
-/// them for commit().
+/// OutputFile as an OpenEXR stream. OpenEXR ignores errors in its last write, the line offset table; OutputFile
+/// remembers them for commit().
 class Stream : public Imf::OStream {
  public:
   Stream(OutputFile& file, const std::string& name) : Imf::OStream(name.c_str()), file_(file) {}
@@ -47,7 +47,7 @@ class Stream : public Imf::OStream {
   OutputFile& file_;
 };
 
-/// Sets OpenEXR up: limits, and as many threads as the rest of the program may use now.
+/// Configures OpenEXR: limits, and as many threads as the rest of the program may use now.
 void prepare_library() {
   static std::mutex mutex;
   static int current = -1;
@@ -55,7 +55,7 @@ void prepare_library() {
   if (current < 0) Imf::Header::setMaxImageSize(kMaxSize, kMaxSize), Imf::Header::setMaxTileSize(kMaxTile, kMaxTile);
   const auto allowed =
       static_cast<int>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
-  const int wanted = allowed > 1 ? allowed : 0;  // 0: the calling thread works itself
+  const int wanted = allowed > 1 ? allowed : 0;  // 0: the calling thread does the work
   if (wanted != current) Imf::setGlobalThreadCount(current = wanted);
 }
 
@@ -82,9 +82,8 @@ std::string compression_name(Imf::Compression compression) {
   return i < std::size(kNames) ? kNames[i] : "unknown";
 }
 
-/// Bytes of pixels per byte of file that a compression does not exceed: run lengths of 128 in two bytes, deflate's 1032
-/// (pxr24 drops a quarter before). For the others, which pack a black block into a few bytes, nothing so sharp is
-/// known.
+/// Upper bound on bytes of pixels per byte of file: runs of 128 in two bytes, 1032 for deflate (after pxr24 has dropped
+/// a quarter). No such bound is known for the others, which pack a black block into a few bytes.
 double largest_ratio(const std::string& compression) {
   if (compression == "none") return 1;
   if (compression == "rle") return 64;
@@ -95,7 +94,7 @@ double largest_ratio(const std::string& compression) {
 
 const char* type_name(ExrPlane::Type type) { return type == ExrPlane::Type::kUint ? "uint" : "float"; }
 
-/// Windows and channels (each "name type") as the checksum of the header takes them.
+/// Windows and channels (each "name type") as hashed for the header's checksum.
 std::string shape_text(const ImagePlace& place, const std::vector<std::string>& channels) {
   const CropWindow& w = place.window;
   return fmt::format("{} {} {} {} {} {}\n{}", place.frame_width, place.frame_height, w.x, w.y, w.width, w.height,
@@ -174,7 +173,7 @@ ExrFile::~ExrFile() = default;
 
 ExrFile::ExrFile(const std::string& path, ChecksumPolicy checksums) : path_(path) {
   prepare_library();
-  // OpenEXR's own messages do not tell a missing file from a damaged one.
+  // OpenEXR's own messages do not distinguish a missing file from a damaged one.
   if (!is_exr(path)) fail(path, "not an EXR file");
   check_exr_header(path);
   try {

@@ -13,13 +13,12 @@
 namespace covary {
 namespace {
 
-/// From this size of a group on, its mean is rounded up or down in turns.
+/// Groups of at least this size have their running means dithered.
 constexpr uint32_t kDitheredSize = 4096;
 
-/// A running mean of `size` samples and one more, as float. A sample that differs from a mean of many by little does
-/// not move it to the next float: rounded to the nearest, all such samples would be lost, and rare ones that differ by
-/// more would not. So a large group's mean is rounded up as often as its fraction says, by the multiples of the golden
-/// ratio.
+/// Running mean of `size` + 1 samples, as float. With many samples, one that differs little from the mean does not move
+/// it to the next float: rounding to nearest would lose all of these but not the rare ones that differ more, a bias. So
+/// a large group's mean is rounded up as often as its fraction says, dithered by multiples of the golden ratio.
 float rounded(double mean, uint32_t size) {
   if (size < kDitheredSize) return static_cast<float>(mean);
   constexpr int kDropped = 29;  // bits that a double has more than a float
@@ -28,8 +27,8 @@ float rounded(double mean, uint32_t size) {
   return static_cast<float>(std::bit_cast<double>(bits));
 }
 
-/// Adds a sample to the mean squared deviation of `count` samples from the means of their groups. Its group's mean
-/// moves towards it, so that of the squared deviation from the mean before only the part `share` counts [Welford1962].
+/// Adds a sample to the mean squared deviation of `count` samples from their group means. The group's mean moves
+/// towards it, so that only the fraction `share` of the squared deviation from the old mean counts [Welford1962].
 void add_deviation(double share, const float* mean, const Spectrum& sample, uint32_t count, float* deviation) {
   for (int c = 0; c < 3; ++c) {
     const double difference = static_cast<double>((&sample.r)[c]) - mean[c];

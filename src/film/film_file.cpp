@@ -14,18 +14,18 @@ namespace covary {
 namespace {
 
 constexpr const char* kPrefix = "covary:";
-constexpr const char* kFormat = "film";  // attribute covary:film, version of the format
+constexpr const char* kFormat = "film";  // attribute covary:film: version of the format
 constexpr const char* kFormatVersion = "1";
 constexpr const char* kGroups = "groups";
 constexpr const char* kFileChecksums = "checksums";
 constexpr const char* kSamples = "samples";              // attribute covary:samples and channel `samples`
 constexpr const char* kVariance = "variance_in_groups";  // channels .R .G .B, in some films
-constexpr const char* kStdError = "StdError";            // layer that follows from the groups
-constexpr const char* kShown = "shown";                  // "more": R G B hold more than the samples of the groups
-constexpr const char* kFewest = "samples_fewest";        // of any pixel; only where pixels differ
+constexpr const char* kStdError = "StdError";            // layer computed from the groups
+constexpr const char* kShown = "shown";                  // "more": R G B contain more than the groups' samples
+constexpr const char* kFewest = "samples_fewest";        // fewest in any pixel; only if pixels differ
 constexpr const char* kMost = "samples_most";
 
-/// Attributes that follow from the film's numbers: written, and not kept in Film::attributes when read.
+/// Attributes computed when writing, which reading does not keep in Film::attributes.
 bool is_derived(const std::string& key) {
   return key == kFormat || key == kGroups || key == kSamples || key == kFewest || key == kMost ||
          key == kFileChecksums || key == kShown || key == film_key::kPredicted || key == film_key::kPredictedBounds ||
@@ -34,8 +34,8 @@ bool is_derived(const std::string& key) {
 
 std::string group_name(int group) { return fmt::format("group{:02d}", group); }
 
-/// The channels of a film and where their values lie; the same list serves writing and reading.
-/// `means` holds the image of R G B where these are not the channels of the one group.
+/// The channels of a film and where their values are stored; the same list serves writing and reading.
+/// `means` holds the image for R G B unless these are the channels of a single group.
 std::vector<ExrPlane> film_planes(Film& film, Image& means) {
   std::vector<ExrPlane> planes;
   const auto add_rgb = [&](const std::array<std::string, 3>& names, float* data, size_t values_per_pixel) {
@@ -69,15 +69,15 @@ std::vector<ExrPlane> film_planes(Film& film, Image& means) {
   throw Error(ErrorCode::kInput, path + ": " + what);
 }
 
-/// The layer of a channel: "Albedo" for "Albedo.R", "" for "R".
+/// The layer a channel belongs to: "Albedo" for "Albedo.R", "" for "R".
 std::string layer_of(const std::string& channel) {
   const size_t dot = channel.rfind('.');
   return channel.substr(0, dot == std::string::npos ? 0 : dot);
 }
 
-constexpr const char* kDepth = "Depth";  // the one auxiliary image of a single channel
+constexpr const char* kDepth = "Depth";  // the only auxiliary image with a single channel
 
-/// The names of the auxiliary images: Depth, and every triple of channels that is no group, mean, error or variance.
+/// Names of the auxiliary images: Depth, and every channel triple that is not a group, mean, error or variance.
 std::vector<std::string> find_aovs(const ExrFile& file, bool has_groups) {
   std::vector<std::string> names;
   for (const ExrFile::Channel& channel : file.channels()) {
@@ -88,7 +88,7 @@ std::vector<std::string> find_aovs(const ExrFile& file, bool has_groups) {
   return names;
 }
 
-/// Attributes of a film, derived ones included, without the prefix.
+/// Attributes of a film, including derived ones, without the prefix.
 std::map<std::string, std::string> film_attributes(const ExrFile& file, const std::string& path) {
   std::map<std::string, std::string> attributes;
   for (const auto& [name, value] : file.attributes())
@@ -134,7 +134,7 @@ void write_film(const std::string& path, const Film& film, const Image& std_erro
 
   if (!film.shown.data.empty()) derive(kShown, "more");
   Image means = !film.shown.data.empty() ? film.shown : film.groups() > 1 ? film.mean_image() : Image();
-  // The list of planes serves reading, too, and so wants a film it may write to; write_exr only reads.
+  // The list of planes also serves reading and so needs a mutable film; write_exr only reads it.
   std::vector<ExrPlane> planes = film_planes(const_cast<Film&>(film), means);
   if (!std_error.data.empty()) add_image_planes(kStdError, const_cast<Image&>(std_error), planes);
   write_exr(path, {film.frame_width(), film.frame_height(), film.crop()}, attributes, planes,
@@ -148,7 +148,7 @@ Film read_film(const std::string& path) {
   const int groups = parse_number<int>(text).value_or(0);
   if (groups < 1 || groups > Film::kMaxGroups)
     fail(path, fmt::format("attribute covary:groups is '{}'; expected 1 to {}", text, Film::kMaxGroups));
-  // Before memory is taken: all channels must be there, with the right type.
+  // Before allocating: all channels must exist, with the right type.
   if (!file.find(group_name(groups - 1) + ".R") && groups > 1)
     fail(path, fmt::format("channel {}.R of a film with {} groups is missing", group_name(groups - 1), groups));
 

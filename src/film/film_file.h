@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Films on disk: multi-channel float EXR files, described in docs/file-formats.md. Writing and reading a film gives the
-// same bits.
+// Films on disk: multi-channel float EXR files, described in docs/file-formats.md. Round trips are bit-exact.
 #pragma once
 
 #include <array>
@@ -12,26 +11,26 @@
 
 namespace covary {
 
-/// Attributes of files alone, which follow from the image: its predicted relMSE, and the two bounds between which that
-/// is in 80 of 100 renders, with a space between them.
+/// Attributes of files only, derived from the image: its predicted relMSE, and two bounds, separated by a space, that
+/// contain it in 80 of 100 renders.
 namespace film_key {
 inline constexpr const char* kPredicted = "predicted_relmse";
 inline constexpr const char* kPredictedBounds = "predicted_relmse_80";
-inline constexpr const char* kCleanGuides = "clean_guides";  ///< "true": the auxiliary images have little noise
+inline constexpr const char* kCleanGuides = "clean_guides";  ///< "true": the auxiliary images are nearly noise-free
 }  // namespace film_key
 
-/// kPredictedBounds of a file; empty where it has none.
+/// kPredictedBounds of a file; empty if it has none.
 std::optional<std::array<double, 2>> predicted_bounds(const ImageInfo& file);
 
-/// Writes `film`; the file appears under its name only when complete. `std_error`, where not empty, is the standard
-/// error of what the file shows, for the layer StdError, which is not read. Throws Error(kIo).
+/// Writes `film`; the file appears under its name only when complete. `std_error`, if not empty, is the standard error
+/// of the shown image, for the layer StdError, which is never read back. Throws Error(kIo).
 void write_film(const std::string& path, const Film& film, const Image& std_error = {});
 
-/// Reads a film written by write_film. Throws Error(kIo) when the file cannot be read and Error(kInput) when it is not
-/// a film or is damaged.
+/// Reads a film written by write_film. Throws Error(kIo) when the file cannot be read, Error(kInput) when it is not a
+/// film or is damaged.
 Film read_film(const std::string& path);
 
-/// The attributes alone, without reading pixels; throws like read_film.
+/// Only the attributes, without reading pixels; throws like read_film.
 std::map<std::string, std::string> read_film_attributes(const std::string& path);
 
 }  // namespace covary

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Films: adding samples, merging, and the round trip through a file.
+// Films: adding samples, merging, file round trips.
 #include "film/film.h"
 
 #include <gtest/gtest.h>
@@ -49,7 +49,7 @@ bool same_bits(const Film& a, const Film& b) {
 
 TEST(Film, SetsAPixelExactly) {
   Film film(2, 1, {0, 0, 2, 1}, 1);
-  const Spectrum value(0.1f, -1e-30f, 3e38f);  // times 49 it would not be a float
+  const Spectrum value(0.1f, -1e-30f, 3e38f);  // times 49, it would overflow float
   film.set(1, 0, 49, value);
   EXPECT_EQ(film.mean(1, 0), value);
   EXPECT_EQ(film.count(1, 0), 49u);
@@ -96,8 +96,8 @@ TEST(Film, HoldsFewerSamplesThanGroups) {
   EXPECT_EQ(film.group_mean(0, 0, 2), Spectrum(0));
 }
 
-// After some thousand of these samples, 99.9 % of them move the mean by less than half the distance of floats. Rounded
-// to the nearest, all of those would be lost, and the mean would be too large by 4e-4.
+// After some thousand of these samples, 99.9 % of them move the mean by less than half a float spacing. Rounding to
+// nearest would lose all of those, and the mean would be too large by 4e-4.
 TEST(Film, ALargeMeanForgetsNoSmallDifferences) {
   Film film(1, 1, {0, 0, 1, 1}, 1);
   double sum = 0;
@@ -207,8 +207,8 @@ TEST(Film, ResumedThroughAFileGivesTheSameBits) {
   EXPECT_TRUE(same_bits(whole, resumed));
 }
 
-// Where the means are exactly representable, merging is adding the samples of the second film after those of the first,
-// bit for bit, also where groups have unequal sizes. All means are: a group's samples are equal within a film, and
+// Where means are exactly representable, merging equals adding the second film's samples after the first's, bit for
+// bit, even with groups of unequal sizes. All means are exact here: a group's samples are equal within a film, and
 // multiples of 2520, which every number up to 10 divides.
 TEST(Film, MergeIsExactWhereMeansAre) {
   Film both(3, 1, {0, 0, 3, 1}, 2), a = both, b = both;
@@ -224,9 +224,9 @@ TEST(Film, MergeIsExactWhereMeansAre) {
   EXPECT_TRUE(same_bits(merge_films(films, std::vector<std::string>{"a", "b"}), both));
 }
 
-// In general a merge differs from accumulating by roundings. Each is at most 2^-24 of the mean, and the one of sample k
-// has weight k / n in a mean of n, so that they add up to at most (n + 1) / 2 times that: here 11 for the 21 samples,
-// and 8.5 and 3, weighted by 16 and 5, with one more, for the merged ones; all values have one sign.
+// In general a merge differs from accumulation by rounding errors. Each is at most 2^-24 of the mean, and the one of
+// sample k has weight k / n in a mean of n, so that they add up to at most (n + 1) / 2 times that: here 11 for the 21
+// samples, and for the merged ones 8.5 and 3, weighted by 16 and 5, plus one. All values have the same sign.
 TEST(Film, MergeEqualsAccumulationUpToRounding) {
   Film both = test_film(12, 1, 16);
   const std::vector films{test_film(12, 1, 16), test_film(12, 2, 5)};
@@ -241,7 +241,7 @@ TEST(Film, MergeEqualsAccumulationUpToRounding) {
   EXPECT_EQ(merged.attributes.at(film_key::kComplete), "true");
 }
 
-// Groups of pixels with common random numbers must hold the same samples.
+// Groups of pixels with common random numbers must contain the same samples.
 TEST(Film, MergeKeepsCommonRandomNumbersTogether) {
   Film a(2, 1, {0, 0, 2, 1}, 4), b = a;
   a.attributes = {{film_key::kSeed, "1"}, {film_key::kSampling, "crn"}};

@@ -11,7 +11,7 @@
 namespace covary {
 namespace {
 
-/// Every group must have samples, or it has no mean.
+/// Every group needs samples to have a mean.
 void check_counts(const char* name, const GroupedImage& image, std::vector<std::string>& problems) {
   if (!image.counts) return;
   const size_t n_pixels = static_cast<size_t>(image.width) * image.height;

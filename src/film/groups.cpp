@@ -22,7 +22,7 @@ std::vector<uint32_t> split_samples(uint32_t total, std::span<const double> part
   double parts_left = std::accumulate(parts.begin(), parts.end(), 0.0);
   uint64_t left = total;
   for (size_t i = 0; i < parts.size(); ++i) {
-    // Enough must be left for the rest. 1e-9: parts are rounded.
+    // Leave enough for the remaining parts. 1e-9: parts are rounded.
     const uint64_t later = uint64_t{fewest} * (parts.size() - 1 - i);
     const uint64_t most = std::max<uint64_t>(left > later ? left - later : 0, fewest);
     const auto share = static_cast<uint64_t>(static_cast<double>(left) * parts[i] / parts_left + 0.5 + 1e-9);

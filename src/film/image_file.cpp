@@ -28,14 +28,14 @@ std::string lower(std::string text) {
   return text;
 }
 
-/// How renderers name the channels of a colour, in small letters.
+/// Suffixes renderers use for the channels of a colour, in lower case.
 constexpr std::array kSuffixes = {std::array{"r", "g", "b"}, std::array{"red", "green", "blue"}};
-/// What they call the picture among their layers, in small letters (docs/other-renderers.md).
+/// Names renderers give their picture among the layers, in lower case (docs/other-renderers.md).
 constexpr std::array kPictures = {"combined", "ci", "c", "rgba", "rgb", "beauty"};
 
 using Suffixes = std::array<const char*, 3>;
 
-/// The channels of `layer` that end so, in small letters; empty where one is missing.
+/// The channels of `layer` with these suffixes, compared in lower case; empty if one is missing.
 std::vector<std::string> channels_that_end(const std::vector<ExrFile::Channel>& channels, const std::string& layer,
                                            const Suffixes& suffixes) {
   const std::string prefix = layer.empty() ? "" : layer + ".";
@@ -51,10 +51,10 @@ std::vector<std::string> channels_that_end(const std::vector<ExrFile::Channel>& 
   return names;
 }
 
-/// The channels of `layer` when it has three that belong together, or one of luminance; empty when not.
+/// The channels of `layer` if it has three that belong together, or luminance alone; empty otherwise.
 std::vector<std::string> find_layer(const std::vector<ExrFile::Channel>& channels, const std::string& layer) {
   std::vector<Suffixes> accepted(kSuffixes.begin(), kSuffixes.end());
-  // X Y Z without a layer would be a colour space, not the components of a vector.
+  // X Y Z without a layer name would be a colour space, not the components of a vector.
   if (!layer.empty()) accepted.push_back({"x", "y", "z"});
   accepted.push_back({"y", "y", "y"});
   for (const Suffixes& suffixes : accepted)
@@ -62,7 +62,7 @@ std::vector<std::string> find_layer(const std::vector<ExrFile::Channel>& channel
   return {};
 }
 
-/// Channels by the layer they are of, and the layers' names in the file's order.
+/// Channels by layer, and the layers' names in the file's order.
 struct ChannelsByLayer {
   std::vector<std::string> names;
   std::unordered_map<std::string, std::vector<ExrFile::Channel>> channels;
@@ -83,8 +83,8 @@ struct Layer {
   std::vector<std::string> channels;  ///< three, or one three times
 };
 
-/// What may be given as a layer: every prefix with three channels. Looks at each channel a few times, whatever their
-/// number.
+/// All valid layer names: every prefix with three channels. Visits each channel only a few times, however many there
+/// are.
 std::vector<Layer> find_layers(const std::vector<ExrFile::Channel>& channels) {
   const ChannelsByLayer by_layer(channels);
   std::vector<Layer> layers;
@@ -94,7 +94,7 @@ std::vector<Layer> find_layers(const std::vector<ExrFile::Channel>& channels) {
   return layers;
 }
 
-constexpr size_t kMostNamed = 20;  // layers and channels in a message
+constexpr size_t kMostNamed = 20;  // layers and channels listed in a message
 
 constexpr double kImageBytes = 3 * sizeof(float);  // per pixel
 
@@ -166,7 +166,7 @@ std::vector<Image> read_layers(const ExrFile& file, const std::string& path, std
   std::vector<Image> images;
   std::vector<ExrPlane> planes;
   std::vector<size_t> grey;
-  images.reserve(layers.size());  // planes point into them
+  images.reserve(layers.size());  // planes point into them, so no reallocation
   for (const std::string& layer : layers) {
     const std::vector<std::string> names = layer_channels(path, file.channels(), layer);
     Image& image = images.emplace_back(window.width, n_rows, 3);

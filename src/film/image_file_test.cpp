@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Images of other programs: pixel types, windows, tiles, parts, layers; and files that are damaged.
+// Images of other programs: pixel types, windows, tiles, parts, layers; and damaged files.
 #include "film/image_file.h"
 
 #include <OpenEXR/ImfChannelList.h>
@@ -40,7 +40,7 @@ std::string content(const std::string& path) {
 
 void write(const std::string& path, const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
 
-/// Values that half represents exactly.
+/// Values that are exact in half precision.
 std::vector<Imf::Rgba> half_pixels(int width, int height) {
   std::vector<Imf::Rgba> pixels(static_cast<size_t>(width) * height);
   for (int y = 0; y < height; ++y)
@@ -52,7 +52,7 @@ TEST(ImageFile, ReadsHalfWithAWindowAnywhere) {
   const std::string path = test_file("half.exr");
   const std::vector<Imf::Rgba> pixels = half_pixels(7, 5);
   {
-    // Display window from (10, 20); the data window sticks out of it on the left.
+    // Display window from (10, 20); the data window extends beyond it on the left.
     const Imath::Box2i display({10, 20}, {29, 39}), window({8, 22}, {14, 26});
     Imf::RgbaOutputFile file(path.c_str(), display, window, Imf::WRITE_RGBA);
     file.setFrameBuffer(pixels.data() - window.min.x - window.min.y * 7, 1, 7);
@@ -136,7 +136,7 @@ TEST(ImageFile, ChoosesLayers) {
   EXPECT_EQ(layer_channels("f", {{"Y", ""}}, ""), (Names{"Y", "Y", "Y"}));
   EXPECT_EQ(layer_channels("f", {{"v.r", ""}, {"v.g", ""}, {"v.b", ""}, {"depth", ""}}, ""),
             (Names{"v.r", "v.g", "v.b"}));
-  // X Y Z without a layer is a colour space that would be shown in wrong colours.
+  // X Y Z without a layer name is a colour space and would be shown in wrong colours.
   EXPECT_TRUE(contains(message_of([] {
                          layer_channels("f", {{"X", ""}, {"Z", ""}, {"W", ""}}, "");
                        }),
@@ -151,7 +151,7 @@ TEST(ImageFile, SrgbRoundTrip) {
   EXPECT_NEAR(linear_to_srgb(0.5f), 0.735357f, 1e-6);  // 1.055 * 0.5^(1/2.4) - 0.055
 }
 
-/// Bytes are decoded by a table, to the bits that OpenImageIO and srgb_to_linear() make of each value.
+/// Bytes are decoded by a table, to the same bits that OpenImageIO followed by srgb_to_linear() gives.
 TEST(ImageFile, BytesAreDecodedAsFloatsAre) {
   std::vector<uint8_t> rgb(3 * 256);
   for (size_t i = 0; i < rgb.size(); ++i) rgb[i] = static_cast<uint8_t>(i);
@@ -162,7 +162,7 @@ TEST(ImageFile, BytesAreDecodedAsFloatsAre) {
   for (size_t i = 0; i < floats.size(); ++i) EXPECT_EQ(image.data[i], srgb_to_linear(floats[i])) << i;
 }
 
-/// OpenEXR's threads are as many as the rest of the program may use, one meaning none beside the caller.
+/// OpenEXR uses as many threads as the rest of the program may; one means the calling thread only.
 TEST(ImageFile, ExrFilesUseTheThreadsThatAreAllowed) {
   const std::string path = test_file("a.exr");
   std::vector<float> values(64 * 64);
@@ -244,7 +244,7 @@ TEST(FilmFile, RejectsFilesThatAreNoFilms) {
   EXPECT_EQ(message(), "no error") << "groups may have different sizes";
 }
 
-// Every length of the file, and bytes changed at random, give the film or an Error; never anything else.
+// The file truncated to every length, or with random bytes changed, gives the film or an Error, never anything else.
 TEST(FilmFile, DamagedFilesAreErrors) {
   const std::string path = test_file("f.exr"), damaged = test_file("d.exr");
   write_film(path, small_film());
@@ -269,7 +269,7 @@ TEST(FilmFile, DamagedFilesAreErrors) {
   EXPECT_GT(n_errors, 400);
 }
 
-// A header that promises 200 000 x 200 000 pixels must not make the reader take memory for them.
+// A header that declares 200 000 x 200 000 pixels must not make the reader allocate them.
 TEST(FilmFile, AbsurdSizesAreErrors) {
   const std::string path = test_file("f.exr");
   write_film(path, small_film());

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kImageBytes = 3 * sizeof(float);  // per pixel
 
-/// Channels `sources` of pixels with `n_channels` values, each decoded.
+/// Copies channels `sources` of pixels with `n_channels` values, decoding each value.
 template <typename T, typename Decode>
 void fill(const std::vector<T>& values, size_t n_channels, const std::array<size_t, 3>& sources, const Decode& decode,
           Image& image) {
@@ -20,7 +20,7 @@ void fill(const std::vector<T>& values, size_t n_channels, const std::array<size
     for (size_t c = 0; c < 3; ++c) image.data[p * 3 + c] = decode(values[p * n_channels + sources[c]]);
 }
 
-/// Linear values of bytes, as OpenImageIO and srgb_to_linear() make them of each.
+/// Linear value of each byte, with the bits of OpenImageIO followed by srgb_to_linear().
 std::array<float, 256> linear_bytes() {
   std::array<float, 256> linear{};
   for (size_t i = 0; i < linear.size(); ++i) linear[i] = srgb_to_linear(static_cast<float>(i) * (1.0f / 255));

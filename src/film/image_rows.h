@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Images of any renderer read row by row, for those that are larger than memory.
+// Row-by-row reading of images of any renderer that are larger than memory.
 #pragma once
 
 #include <memory>
@@ -11,10 +11,10 @@
 
 namespace covary {
 
-/// An open image, of which three channels are read as linear RGB.
+/// An open image file, of which three channels are read as linear RGB.
 class ImageRows {
  public:
-  /// `layer` as in read_image(), which throws likewise. Reads no pixel yet.
+  /// `layer` as in read_image(), and the same errors. Reads no pixels yet.
   explicit ImageRows(const std::string& path, const std::string& layer = "",
                      ChecksumPolicy checksums = ChecksumPolicy::kCheck);
 
@@ -22,9 +22,8 @@ class ImageRows {
   /// Whether the file holds 8- or 16-bit integers.
   bool low_dynamic_range() const { return low_dynamic_range_; }
 
-  /// `n_rows` rows from `first_row` of the window on. Formats without rows of their own (tiles, but for EXR) are read
-  /// as a whole, once. The checksums of a film are checked before its first rows are given away. Throws like
-  /// read_image().
+  /// `n_rows` rows of the window, starting at `first_row`. Formats without row access (tiles, except in EXR) are read
+  /// whole, once. The checksums of a film are verified before its first rows are returned. Throws like read_image().
   Image read(int first_row, int n_rows);
   Image read_all() { return read(0, place_.window.height); }
 
@@ -35,10 +34,10 @@ class ImageRows {
   ImagePlace place_;
   bool low_dynamic_range_ = false;
   std::vector<std::string> names_;     // of the three channels
-  std::unique_ptr<ExrFile> exr_;       // either this
-  std::unique_ptr<ImageReader> file_;  // or that
-  bool checked_ = false;               // the checksums
-  Image whole_;                        // of a file without rows
+  std::unique_ptr<ExrFile> exr_;       // exactly one of
+  std::unique_ptr<ImageReader> file_;  // these two is set
+  bool checked_ = false;               // whether checksums were verified
+  Image whole_;                        // of a format without row access
 };
 
 }  // namespace covary

@@ -25,7 +25,7 @@ Image noise(int width, int height) {
 
 ImagePlace place_of(const Image& image) { return {image.width, image.height, {0, 0, image.width, image.height}}; }
 
-/// A file of each kind of format.
+/// One file of each format.
 std::vector<std::string> files_of(const Image& image) {
   std::vector<std::string> paths;
   for (const char* ending : {"exr", "png", "pfm", "tif", "hdr"}) {
@@ -40,7 +40,7 @@ TEST(ImageRows, AreThoseOfTheWholeImage) {
     const Image whole = read_image(path).image;
     ImageRows file(path);
     EXPECT_EQ(file.low_dynamic_range(), read_image(path).low_dynamic_range) << path;
-    // Down, with rows twice, and back up.
+    // Downwards, with overlapping rows, and back up.
     for (const auto& [first, n] : std::vector<std::pair<int, int>>{{0, 4}, {3, 5}, {8, 3}, {2, 1}, {0, 11}, {5, 6}}) {
       const Image rows = file.read(first, n);
       ASSERT_EQ(rows.height, n);

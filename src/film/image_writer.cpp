@@ -19,7 +19,7 @@ namespace {
 
 constexpr const char* kSoftwareKey = "Software";
 constexpr const char* kSoftware = "covary";
-constexpr int kLargestJpeg = 65500;          // of libjpeg
+constexpr int kLargestJpeg = 65500;          // limit of libjpeg
 constexpr float kLargestRgbe = 0x1.fep126f;  // 255 / 256 times the power of 2 of the largest exponent
 
 void write_content(const std::string& path, const std::vector<unsigned char>& content) {
@@ -28,7 +28,7 @@ void write_content(const std::string& path, const std::vector<unsigned char>& co
   file.commit();
 }
 
-/// Encoded with the sRGB curve; negative values and not-a-number are black.
+/// sRGB-encoded bytes; negative values and NaN become black.
 std::vector<uint8_t> display_bytes(const Image& linear) {
   std::vector<uint8_t> encoded(linear.data.size());
   for (size_t i = 0; i < encoded.size(); ++i) {
@@ -50,7 +50,7 @@ void write_encoded(const std::string& path, const char* format, const ImageToEnc
 }
 
 void write_jpeg(const std::string& path, const Image& linear) {
-  // Larger ones would make libjpeg end the program.
+  // libjpeg would terminate the program for larger ones.
   if (std::max(linear.width, linear.height) > kLargestJpeg)
     throw Error(ErrorCode::kIo, fmt::format("cannot write {}: {} x {} pixels; a JPEG holds up to {} in each direction",
                                             path, linear.width, linear.height, kLargestJpeg));
@@ -67,10 +67,10 @@ void write_float(const std::string& path, const char* format, const Image& linea
   write_encoded(path, format, image);
 }
 
-/// Radiance's format holds no sign.
+/// Radiance's format has no sign.
 void write_hdr(const std::string& path, Image linear) {
   for (float& value : linear.data)
-    value = value > 0 ? std::min(value, kLargestRgbe) : 0;  // not-a-number is not above 0
+    value = value > 0 ? std::min(value, kLargestRgbe) : 0;  // NaN compares false, which gives 0
   write_float(path, "hdr", linear);
 }
 
@@ -93,7 +93,7 @@ void write_image(const std::string& path, const Image& linear, const ImagePlace&
   COVARY_CHECK(linear.channels == 3, "a picture of 3 channels");
   const std::string extension = lower_extension(path);
   if (extension == ".exr") {
-    Image copy = linear;  // planes point into an image that they could change
+    Image copy = linear;  // planes need mutable memory
     std::vector<ExrPlane> planes;
     add_image_planes("", copy, planes);
     write_exr(path, place, attributes, planes);

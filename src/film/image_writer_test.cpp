@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures written in each format come back as they were, as far as the format can hold them.
+// Round trips through each format preserve pictures up to the format's precision.
 #include "film/image_writer.h"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ using test_support::contains, test_support::message_of, test_support::test_file;
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
-/// Values from -1 to 40, among them some that only a float can hold.
+/// Values from -1 to 40, some of which need full float precision.
 Image picture() {
   Image image(7, 5, 3);
   for (size_t i = 0; i < image.data.size(); ++i) image.data[i] = 0.4f * static_cast<float>(i) - 1 + 1e-5f;
@@ -65,7 +65,7 @@ TEST(ImageWriter, ExrKeepsTheWindow) {
   EXPECT_EQ(read_image(test_file("a.exr")).place, place);
 }
 
-/// A common exponent, 8 bits for the largest channel; nothing below 0, no infinity, no NaN.
+/// A shared exponent, 8 bits for the largest channel; nothing negative, no infinity, no NaN.
 TEST(ImageWriter, HdrHoldsItsRange) {
   Image image = picture();
   image.pixel(2, 2)[0] = kNan;
@@ -105,7 +105,7 @@ TEST(ImageWriter, KnowsItsOwnPngs) {
   }
   const size_t keyword = bytes.find("Software"), value = bytes.find("covary", keyword);
   ASSERT_TRUE(keyword != std::string::npos && value != std::string::npos);
-  bytes.replace(value, 6, "gimp 2");  // its checksum is wrong now, as after any damage
+  bytes.replace(value, 6, "gimp 2");  // now its checksum is wrong, as after any damage
   std::ofstream(path, std::ios::binary) << bytes;
   EXPECT_FALSE(is_own_png(path));
   write_image(test_file("a.jpg"), picture(), {}, {});

@@ -68,7 +68,7 @@ std::string kind_of(const Attributes& film) {
   return attribute(film, film_key::kLight).empty() ? "camera samples" : "camera samples with a light film added";
 }
 
-/// Films of light paths and of camera samples are two parts of an image.
+/// Films of light paths and of camera samples are two parts of an image and must not be merged.
 void check_light(const Attributes& a, const Attributes& b, const std::string& name_a, const std::string& name_b) {
   if (kind_of(a) != kind_of(b))
     throw Error(ErrorCode::kInput, fmt::format("films cannot be merged: {} holds {}, {} holds {}; merge each kind "
@@ -76,7 +76,7 @@ void check_light(const Attributes& a, const Attributes& b, const std::string& na
                                                name_a, kind_of(a), name_b, kind_of(b)));
 }
 
-/// What all films share, plus the seeds; `order` becomes the films' indices by their smallest seeds.
+/// Attributes common to all films, plus the seeds; `order` receives the film indices sorted by smallest seed.
 Attributes merge_attributes(std::span<const Attributes> films, std::span<const std::string> names,
                             std::vector<size_t>& order) {
   std::map<uint64_t, size_t> owner;  // seed -> film
@@ -114,14 +114,14 @@ Attributes merge_attributes(std::span<const Attributes> films, std::span<const s
 /// Sums of n_i m_i for the groups of each pixel.
 class GroupSums {
  public:
-  /// `before`: samples of each pixel in the films that were added already.
+  /// `before`: samples of each pixel in the films already added.
   void add(const Film& film, std::span<const uint32_t> before) {
     const int T = film.groups();
     sums_.resize(film.data().size());
     for (size_t p = 0; p < before.size(); ++p)
       for (int g = 0; g < T; ++g) {
         const size_t from = (p * T + g) * 3, to = (p * T + (before[p] % T + g) % T) * 3;
-        // Times T: where groups have equal sizes, these are the weights of whole pixels.
+        // Times T: with equal group sizes, these are the weights of whole pixels.
         const double weight = static_cast<double>(group_size(film.counts()[p], T, g)) * T;
         for (size_t c = 0; c < 3; ++c) sums_[to + c] += weight * film.data()[from + c];
       }
@@ -141,7 +141,7 @@ class GroupSums {
   std::vector<double> sums_;
 };
 
-/// Groups of pixels of a film of common random numbers must all move by the same number.
+/// A film of common random numbers must shift the groups of all its pixels by the same number.
 void check_shared_numbers(const Film& film, const Film& merged, const std::string& name) {
   const auto T = static_cast<uint32_t>(film.groups());
   std::optional<uint32_t> first;
@@ -180,8 +180,8 @@ class WeightedSum {
   std::vector<double> sums_;
 };
 
-/// The mean squared deviation V of a pixel's samples from the means m_g of their groups, for films that keep it: from
-/// the sum of the squares of all samples, N V + sum_g N_g m_g^2, which adds up over films.
+/// The mean squared deviation V of a pixel's samples from their group means m_g, for films that keep it: from the sum
+/// of squares of all samples, N V + sum_g N_g m_g^2, which is additive over films.
 class SquareSums {
  public:
   void add(const Film& film) {
@@ -189,7 +189,7 @@ class SquareSums {
     for (size_t i = 0; i < sums_.size(); ++i)
       sums_[i] += static_cast<double>(film.counts()[i / 3]) * film.variance_in_groups()[i] + squared_means(film, i);
   }
-  /// Of the merged film, whose groups have their means already.
+  /// For the merged film, whose group means must already be set.
   void variance(Film& film) const {
     for (size_t i = 0; i < sums_.size(); ++i)
       if (const uint32_t n = film.counts()[i / 3]; n > 0)
@@ -208,7 +208,7 @@ class SquareSums {
   std::vector<double> sums_;
 };
 
-/// Merges films that `with_film(i, use)` hands out one after another.
+/// Merges the films that `with_film(i, use)` provides one at a time.
 Film merge(std::span<const Attributes> attributes, std::span<const std::string> names,
            const std::function<void(size_t, const std::function<void(const Film&)>&)>& with_film) {
   std::vector<size_t> order;
@@ -265,7 +265,7 @@ Film merge_film_files(std::span<const std::string> paths) {
   std::vector<Attributes> attributes;
   for (const std::string& path : paths) attributes.push_back(read_film_attributes(path));
   const ImageInfo first = inspect_image(paths[0]);
-  constexpr double kValue = 2 * sizeof(float) + sizeof(double);  // of the film that is read, the merged one, and sums
+  constexpr double kValue = 2 * sizeof(float) + sizeof(double);  // the film being read, the merged one, and sums
   require_image_memory(paths[0], first.place.window.width, first.place.window.height,
                        kValue * static_cast<double>(first.channels.size()));
   return merge(attributes, paths, [&](size_t i, const auto& use) { use(read_film(paths[i])); });

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Merging: the film of all samples of several films.
+// Merging: one film with all samples of several films.
 //
-// Films are taken in the order of their smallest seeds, so the order given does not matter, bit for bit. The samples of
-// a pixel are numbered on from film to film: where the first has n samples, sample s of the second is sample n + s of
-// the merged film, and so group g becomes group (n + g) mod T. Per group the merged mean is (sum_i n_i m_i) / (sum_i
-// n_i) with the sizes n_i of the groups that meet, in double over all films at once, rounded to float.
+// Films are ordered by their smallest seeds, so that the result does not depend on the order given, bit for bit. A
+// pixel's samples are numbered consecutively across films: if the first has n samples, sample s of the second becomes
+// sample n + s of the merged film, and so group g becomes group (n + g) mod T. The merged mean of a group is (sum_i n_i
+// m_i) / (sum_i n_i), n_i being the sizes of the groups merged into it, accumulated in double over all films and then
+// rounded to float.
 #pragma once
 
 #include <span>
@@ -15,13 +16,13 @@
 namespace covary {
 
 /// Throws Error(kInput) when the films differ in frame, crop, groups, sampling, scene hash, settings or the list of
-/// auxiliary images, or when two share a seed, because then they hold the same samples; and when films of common random
-/// numbers have counts that would move the groups of pixels differently, which then would not share their random
-/// numbers any more; and when light films and others are mixed. `names` stand for the films in error messages. Of the
-/// attributes those remain that all films share, and all seeds; `complete` is "true" when all are.
+/// auxiliary images; when two share a seed, and so contain the same samples; when films of common random numbers have
+/// counts that would shift the groups of pixels differently, so that these would no longer share random numbers; and
+/// when light films and others are mixed. `names` identify the films in error messages. Attributes that all films share
+/// are kept, as are all seeds; `complete` is "true" if all films are complete.
 Film merge_films(std::span<const Film> films, std::span<const std::string> names);
 
-/// The same for films in files, of which only one is in memory at a time.
+/// Same for film files, of which only one is in memory at a time.
 Film merge_film_files(std::span<const std::string> paths);
 
 }  // namespace covary

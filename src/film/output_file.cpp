@@ -26,7 +26,7 @@ namespace covary {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr int kMaxLinks = 40;  // as many as Linux follows
+constexpr int kMaxLinks = 40;  // same as Linux
 
 [[noreturn]] void fail_to_write(const std::string& path, const std::string& why) {
   throw Error(ErrorCode::kIo, fmt::format("cannot write {}: {}", path, why));
@@ -43,7 +43,7 @@ std::string follow_links(const std::string& given) {
   return path.string();
 }
 
-/// The descriptor of standard output or error when that is the file `status` tells of; -1 when not.
+/// The descriptor of standard output or error if that is the file described by `status`; -1 otherwise.
 int standard_stream(const struct stat& status) {
   for (const int stream : {STDOUT_FILENO, STDERR_FILENO}) {
     struct stat other {};
@@ -52,14 +52,14 @@ int standard_stream(const struct stat& status) {
   return -1;
 }
 
-/// An open descriptor of a special file.
+/// Opens a special file.
 int open_special(const std::string& path) {
   struct stat status {};
   const int stream = stat(path.c_str(), &status) == 0 ? standard_stream(status) : -1;
   return stream >= 0 ? fcntl(stream, F_DUPFD_CLOEXEC, 3) : open(path.c_str(), O_WRONLY | O_CLOEXEC);
 }
 
-/// errno, or 0 when everything was written.
+/// Returns errno, or 0 when everything was written.
 int write_all(int descriptor, const char* data, size_t size) {
   while (size > 0) {
     const ssize_t n = write(descriptor, data, size);
@@ -76,7 +76,7 @@ OutputTarget output_target(const std::string& path) {
   if (stat(path.c_str(), &status) == 0) {
     if (S_ISDIR(status.st_mode)) fail_to_write(path, "it is a folder");
     if (!S_ISREG(status.st_mode) || standard_stream(status) >= 0) return {path, true};
-    // A rename would replace it nevertheless; the superuser may write anything, whatever its mode says.
+    // A rename would replace it anyway; the superuser may write any file, whatever its mode.
     if ((status.st_mode & (S_IWUSR | S_IWGRP | S_IWOTH)) == 0 || access(path.c_str(), W_OK) != 0)
       fail_to_write(path, "the file there is write-protected; give another name, or permit writing it");
   } else if (errno == ENAMETOOLONG) {
@@ -163,10 +163,10 @@ void OutputFile::commit() {
   if (failure_ || std::fflush(file_) != 0) fail("write");
   if (target_.is_special) return send();
   if (fsync(fileno(file_)) != 0) fail("write");
-  close_file();  // some network file systems tell of a failed write only here
+  close_file();  // some network file systems report a failed write only here
   if (std::rename(temporary_.path().c_str(), target_.path.c_str()) != 0) fail("put in place");
   temporary_.release();
-  // Makes the rename itself durable; a file system that cannot do this is no reason to fail.
+  // Makes the rename itself durable; a file system that does not support this is no reason to fail.
   const std::string folder = fs::path(target_.path).parent_path().string();
   const int descriptor = open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor >= 0) {
@@ -185,10 +185,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr size_t kMostOpen = 64;  // further ones are not known to the handler, and the next call removes them
+constexpr size_t kMostOpen = 64;  // the handler does not know files beyond these; the next create() for the same target
+                                  // removes them
 constexpr const char* kEnding = ".part";
 
-/// Names without allocation, for the handler.
+/// A path without allocation, for the signal handler.
 struct Slot {
   enum State : int { kFree, kTaken, kKnown };
   std::atomic<int> state{kFree};
@@ -214,7 +215,7 @@ struct PartName {
   pid_t process;
 };
 
-/// ".NAME.PID-N.part" as UnfinishedFile makes it.
+/// ".NAME.PID-N.part", the names that UnfinishedFile creates.
 std::optional<PartName> parse_part_name(const std::string& name) {
   if (!name.starts_with('.') || !name.ends_with(kEnding)) return {};
   const std::string body = name.substr(1, name.size() - 1 - std::strlen(kEnding));
@@ -226,8 +227,8 @@ std::optional<PartName> parse_part_name(const std::string& name) {
   return PartName{body.substr(0, dot), *process};
 }
 
-/// Whoever made the file is dead: no process has its number, and on other machines, which may share the file system,
-/// none holds its lock.
+/// Whether the file's creator is dead: no process has its id, and no process on another machine that may share the file
+/// system holds its lock.
 bool is_left_over(const fs::path& path, pid_t process) {
   if (kill(process, 0) == 0 || errno != ESRCH) return false;
   const int file = open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC | O_NONBLOCK);
@@ -237,7 +238,7 @@ bool is_left_over(const fs::path& path, pid_t process) {
   return unlocked;
 }
 
-/// The left over files of a folder by their targets' names. A folder is looked at once, because it may be large.
+/// Removes leftover files for `target` in a folder, which is scanned only once because it may be large.
 void remove_left_over(const fs::path& folder, const std::string& target) {
   static std::mutex mutex;
   static std::map<fs::path, std::multimap<std::string, fs::path>> known;
@@ -264,7 +265,7 @@ void remove_unfinished_files() noexcept {
 }
 
 int UnfinishedFile::create(const std::string& target) {
-  // The name is unique among processes and threads; a long file name is cut so that the temporary one is valid, too.
+  // The name is unique among processes and threads; a long file name is truncated so that the temporary one is valid.
   static std::atomic<unsigned> counter{0};
   const fs::path folder = fs::path(target).parent_path();
   const std::string name = fs::path(target).filename().string().substr(0, 200);

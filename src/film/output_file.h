@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files that appear under their name only when complete: written to a temporary name in the same folder, flushed to the
-// device, then renamed. Devices, pipes and standard output get all bytes at once at the end.
+// Files that appear under their name only when complete: written under a temporary name in the same folder, flushed to
+// disk, then renamed. Devices, pipes and standard output get all bytes at once at the end.
 #pragma once
 
 #include <cstddef>
@@ -10,13 +10,13 @@
 
 namespace covary {
 
-// Temporary files of outputs while they are written: which there are in this process, so that a signal that ends it
-// leaves none, and which others have left that were killed.
+// Temporary output files: a registry of those of this process, so that a fatal signal leaves none behind, and removal
+// of those left by killed processes.
 
-/// Removes every temporary file of this process; for a signal's handler before it ends the program.
+/// Removes every temporary file of this process; for signal handlers, before they end the program.
 void remove_unfinished_files() noexcept;
 
-/// Such a file, known to remove_unfinished_files() from before it is made until it has another name or is gone.
+/// Such a file; remove_unfinished_files() knows it from before its creation until it is renamed or removed.
 class UnfinishedFile {
  public:
   UnfinishedFile() = default;
@@ -24,11 +24,11 @@ class UnfinishedFile {
   UnfinishedFile(const UnfinishedFile&) = delete;
   UnfinishedFile& operator=(const UnfinishedFile&) = delete;
 
-  /// Makes the temporary file for `target` in the same folder, and removes those for the same target whose process is
-  /// dead. Returns a descriptor, or -1 with errno.
+  /// Creates the temporary file for `target` in the same folder, and removes those for the same target whose process is
+  /// dead. Returns a descriptor, or -1 with errno set.
   int create(const std::string& target);
   const std::string& path() const { return path_; }
-  /// The file has got its name.
+  /// Call after the file was renamed.
   void release();
 
  private:
@@ -38,24 +38,24 @@ class UnfinishedFile {
 
 /// Where an output goes.
 struct OutputTarget {
-  std::string path;         ///< symbolic links followed, also to a file that is not there yet
+  std::string path;         ///< symbolic links resolved, even if the final file does not exist yet
   bool is_special = false;  ///< a device, a pipe, a socket, or the file that is this program's standard output
 };
 
-/// Throws Error(kIo) when the folder is missing or not writable, or `path` names a folder, a file that is
-/// write-protected, or nothing at all.
+/// Throws Error(kIo) when the folder is missing or not writable, or `path` is empty or names a folder or a
+/// write-protected file.
 OutputTarget output_target(const std::string& path);
 
-/// Makes the temporary file and removes it, so that a long render finds out at its beginning what permissions do not
-/// tell: limits, quotas, odd file systems. Throws Error(kIo).
+/// Creates and removes the temporary file, so that a long render detects at the start what permissions do not reveal:
+/// limits, quotas, unusual file systems. Throws Error(kIo).
 void try_output(const OutputTarget& target);
 
 class OutputFile {
  public:
-  /// Creates the temporary file; special files are kept in memory until commit(). Throws like output_target().
+  /// Creates the temporary file; output to special files is buffered until commit(). Throws like output_target().
   explicit OutputFile(const std::string& path);
-  /// Removes the temporary file unless commit() succeeded. So does a signal that ends the program, and after a death
-  /// of another kind the next OutputFile of the same path.
+  /// Removes the temporary file unless commit() succeeded. A signal that ends the program removes it too; after any
+  /// other death, the next OutputFile for the same path does.
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
@@ -63,8 +63,8 @@ class OutputFile {
   void write(const void* data, size_t size);
   uint64_t position();
   void seek(uint64_t position);
-  /// Flushes to the device and renames, or sends everything to the special file. Throws Error(kIo) when any write
-  /// failed, also an earlier one.
+  /// Flushes to disk and renames, or sends everything to the special file. Throws Error(kIo) if this or any earlier
+  /// write failed.
   void commit();
 
  private:

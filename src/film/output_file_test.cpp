@@ -32,7 +32,7 @@ size_t n_files(const fs::path& folder) {
   return static_cast<size_t>(std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
 }
 
-/// While it lives, files cannot grow beyond `bytes`: what a full disk looks like to a program.
+/// While it exists, files cannot grow beyond `bytes`, as if the disk were full.
 class FullDisk {
  public:
   explicit FullDisk(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
@@ -108,7 +108,7 @@ TEST(OutputFile, SendsEverythingToSpecialFiles) {
   std::string received;
   std::thread reader([&] { received = content(pipe); });
   Film film(16, 9, {0, 0, 16, 9}, 1);
-  write_film(pipe, film);  // EXR files are not written in order
+  write_film(pipe, film);  // EXR files are not written sequentially
   reader.join();
   write_film(test_file("film.exr"), film);
   EXPECT_EQ(received, content(test_file("film.exr")));
@@ -137,7 +137,7 @@ TEST(OutputFile, SaysWhyItCannotWrite) {
       contains(message_of([] { OutputFile("/proc/self/covary.exr"); }), "cannot write /proc/self/covary.exr: "));
 }
 
-// The limit takes effect in the header, amid the pixels, and in OpenEXR's last write, whose failure it hides.
+// The limit takes effect in the header, amid the pixels, and in OpenEXR's last write, whose failure OpenEXR hides.
 TEST(OutputFile, AFullDiskLeavesTheOldFile) {
   Film film(64, 64, {0, 0, 64, 64}, 2);
   for (size_t i = 0; i < film.data().size(); ++i) film.data()[i] = static_cast<float>((i * 2654435761u) % 65537);

@@ -53,7 +53,7 @@ bool Outputs::identify(const std::string& path, Identity& identity) {
   struct stat status {};
   if (stat(path.c_str(), &status) == 0) {
     identity = {status.st_dev, status.st_ino, ""};
-    return !S_ISCHR(status.st_mode);  // /dev/null may be named twice
+    return !S_ISCHR(status.st_mode);  // /dev/null may be used twice
   }
   const fs::path target = output_target(path).path;
   if (stat(target.has_parent_path() ? target.parent_path().c_str() : ".", &status) != 0) return false;
@@ -95,7 +95,7 @@ void Outputs::writes(const std::string& option, const std::string& path, OutputK
 void Outputs::writes_derived_png(const std::string& option, const std::string& path, const std::string& remedy) {
   writes(option, path, OutputKind::kPng);
   std::error_code ignored;
-  // Only regular files are looked into: a pipe would wait for a writer.
+  // Only regular files are opened: a pipe would block waiting for a writer.
   if (fs::exists(path, ignored) && !(fs::is_regular_file(path, ignored) && is_own_png(path)))
     usage(fmt::format("{} would replace '{}', which covary did not make; {}", option, path, remedy));
 }

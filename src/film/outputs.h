@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What one command reads and writes, told before its work begins, so that no file is lost by it: an output is never an
-// input of the same command, nor another of its outputs, and its name says what it holds.
+// The files a command reads and writes, declared before it starts, so that none is lost: an output is never an input of
+// the same command, nor another of its outputs, and its name matches its content.
 #pragma once
 
 #include <sys/types.h>
@@ -10,32 +10,32 @@
 
 namespace covary {
 
-/// What an output holds; its name must end accordingly, in upper or lower case. Special files (/dev/null, pipes) may
-/// hold anything.
+/// What an output contains; its name must have a matching extension, in upper or lower case. Special files (/dev/null,
+/// pipes) may contain anything.
 enum class OutputKind {
   kFilm,   ///< a film or a result: .exr
   kImage,  ///< what write_image() writes: .exr, .png, .hdr, .pfm, .jpg, .jpeg, .tif, .tiff
   kPng,    ///< .png
   kScene,  ///< .xml
-  kPage,   ///< .html, .htm
+  kPage,   ///< JSON, CSV: any name except an image's, a scene's or a page's; "" and "-" mean standard output
   kText,   ///< JSON, CSV: any name that is not that of an image, a scene or a page; "" and "-" mean standard output
 };
 
 class Outputs {
  public:
-  /// A file that the command reads. One that is not there is left to its reader.
+  /// A file that the command reads. A missing one is left to its reader to report.
   void reads(const std::string& path);
   void reads(const std::vector<std::string>& paths);
-  /// A file that the command writes; `option` ("-o", "the preview") names it in messages. Throws Error(kIo) where
-  /// nothing can be written there.
+  /// A file that the command writes; `option` ("-o", "the preview") names it in messages. Throws Error(kIo) if it
+  /// cannot be written.
   void writes(const std::string& option, const std::string& path, OutputKind kind);
-  /// A picture (PNG) whose name was not given but made from another one: it may replace only what covary made. `remedy`
-  /// tells what to do instead: "use --no-preview".
+  /// A picture (PNG) whose name was derived from another one: it may replace only what covary made. `remedy` says what
+  /// to do instead: "use --no-preview".
   void writes_derived_png(const std::string& option, const std::string& path, const std::string& remedy);
-  // All of them throw Error(kUsage) where two files are one, or a name ends wrongly.
+  // All of these throw Error(kUsage) when two files are the same, or a name has the wrong extension.
 
  private:
-  /// A file by device and inode; one that is not there by its folder's, and its name.
+  /// A file by device and inode; one that does not exist, by its folder's device and inode, and its name.
   struct Identity {
     dev_t device = 0;
     ino_t inode = 0;
@@ -51,7 +51,7 @@ class Outputs {
   std::vector<Entry> inputs_, outputs_;
 };
 
-/// Whether both paths lead to one file that is there, through whatever links.
+/// Whether both paths lead to the same existing file, through any links.
 bool is_same_file(const std::string& a, const std::string& b);
 
 }  // namespace covary

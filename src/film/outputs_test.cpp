@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// No command overwrites what it reads, writes one file twice, or gives a file a name that hides what it is.
+// No command overwrites its inputs, writes one file twice, or gives a file a name that belies its content.
 #include "film/outputs.h"
 
 #include <gtest/gtest.h>
@@ -48,7 +48,7 @@ TEST(Outputs, AnInputThatIsMissingIsLeftToItsReader) {
 TEST(Outputs, TwoOutputsAreTwoFiles) {
   const std::string path = test_file("a.txt");
   fs::create_symlink(test_folder(), test_file("folder"));
-  fs::create_symlink("a.txt", test_file("link.txt"));  // to a file that is not there
+  fs::create_symlink("a.txt", test_file("link.txt"));  // a dangling link
   for (const std::string& other : {path, test_file("folder/a.txt"), test_file("link.txt")}) {
     Outputs outputs;
     outputs.writes("--json", path, OutputKind::kText);
@@ -98,7 +98,7 @@ TEST(Outputs, SayBeforeTheWorkThatNothingCanBeWritten) {
 TEST(Outputs, WriteProtectedFilesAreNotReplaced) {
   const std::string path = test_file("a.exr");
   write_text_file(path, "film");
-  fs::permissions(path, fs::perms::owner_read | fs::perms::group_read);  // also where the superuser runs this
+  fs::permissions(path, fs::perms::owner_read | fs::perms::group_read);  // even for the superuser
   const std::string expected =
       "cannot write " + path + ": the file there is write-protected; give another name, or permit writing it";
   EXPECT_EQ(message_of([&] { Outputs().writes("-o", path, OutputKind::kFilm); }, ErrorCode::kIo), expected);

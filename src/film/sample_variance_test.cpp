@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The variance of samples that films keep: its value, its bits however a film came about, files and merging.
+// The sample variance that films keep: its value, bits that do not depend on how a film was made, files and merging.
 #include "film/groups.h"
 
 #include <gtest/gtest.h>
@@ -36,7 +36,7 @@ Film film_of(int groups, uint64_t seed, uint32_t first, uint32_t last) {
   return film;
 }
 
-/// Two passes over the samples, in double.
+/// Two-pass variance, in double.
 Spectrum direct_variance(const std::vector<Spectrum>& samples) {
   float result[3];
   for (int c = 0; c < 3; ++c) {

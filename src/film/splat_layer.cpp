@@ -13,7 +13,7 @@ namespace {
 
 constexpr size_t kMaxBadSplats = 10;
 
-/// Rows that are summed together: their sums in double precision take about 3 MB at most, where a row does.
+/// Rows that are summed together: their sums in double precision take at most about 3 MB, unless one row takes more.
 int band_rows(const Film& film) {
   const size_t sums_per_row = static_cast<size_t>(film.width()) * static_cast<size_t>(film.groups());
   return static_cast<int>(std::clamp<size_t>((size_t{1} << 17) / sums_per_row, 1, 16));
@@ -64,7 +64,7 @@ void SplatLayer::add(uint64_t path, int x, int y, const Spectrum& value) {
 void SplatLayer::finish_round() {
   COVARY_CHECK(first_ < end_ && film_.count(0, 0) == first_, "a round of the film as it is");
   const size_t n = end_ - first_;
-  // By pixel, within a pixel in path order.
+  // Sorted by pixel, in path order within a pixel.
   parallel_for(n, [&](size_t i) {
     std::vector<Splat>& splats = bundles_[i].splats;
     std::stable_sort(splats.begin(), splats.end(), [](const Splat& a, const Splat& b) { return a.pixel < b.pixel; });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Light films: sums of splats, their normalisation, and the same bits for any threads and interruptions.
+// Light films: sums of splats, normalisation, and bits that do not depend on threads and interruptions.
 #include "film/splat_layer.h"
 
 #include <gtest/gtest.h>
@@ -37,8 +37,8 @@ struct Splat {
   Spectrum value;
 };
 
-/// Up to three splats of a light path, half of them on few pixels; values span six powers of ten, so that sums in
-/// another order have other bits. Some lie outside of the crop.
+/// Up to three splats of a light path, half of them on a few pixels; values span six powers of ten, so that summing in
+/// another order changes bits. Some lie outside the crop.
 std::vector<Splat> splats_of(uint64_t path, uint64_t seed) {
   const PathRandom random(Sampling::kIndependent, seed, 0, 0, path);
   std::vector<Splat> splats(static_cast<size_t>(random.get_1d(0, Event::kLobe) * 4));
@@ -58,7 +58,7 @@ void trace_bundle(SplatLayer& layer, uint32_t bundle, uint64_t seed) {
     for (const Splat& splat : splats_of(path, seed)) layer.add(path, splat.x, splat.y, splat.value);
 }
 
-/// Traces light paths until the film has `target` bundles. `rounds`: stop after so many.
+/// Traces light paths until the film has `target` bundles, or for `rounds` rounds.
 SplatCounts trace(Film& film, uint32_t target, int threads = 1, int rounds = 1000, uint64_t seed = 1) {
   const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
   SplatLayer layer(film);
@@ -100,7 +100,7 @@ TEST(SplatLayer, SumsInPathOrderAndDividesByTheNumberOfLightPaths) {
       n_other_bits += film.data()[i] != reversed[i] / static_cast<float>(paths_per_group);
     }
     EXPECT_GT(n_lit, 1000u);
-    EXPECT_GT(n_other_bits, n_lit / 2);  // the values are such that another order shows
+    EXPECT_GT(n_other_bits, n_lit / 2);  // the values are such that the order matters
   }
 }
 
@@ -121,7 +121,7 @@ TEST(SplatLayer, BitsDoNotDependOnThreads) {
 TEST(SplatLayer, InterruptionsLeaveNoTrace) {
   Film whole = light_film(12);
   trace(whole, kTarget);
-  // One round; half of a round, given up; the film written and read; the rest.
+  // One round; half a round, abandoned; the film written and read; the rest.
   Film part = light_film(12);
   trace(part, kTarget, 2, 1);
   const Film after_one_round = part;
@@ -138,7 +138,7 @@ TEST(SplatLayer, InterruptionsLeaveNoTrace) {
   trace(resumed, kTarget, 7);
   EXPECT_TRUE(same_bits(whole, resumed));
   EXPECT_FALSE(SplatLayer(resumed).begin_round(kTarget));  // complete
-  // A round that is begun again has forgotten what it had.
+  // Restarting a round discards what it had.
   Film again = light_film(12);
   SplatLayer layer(again);
   while (layer.begin_round(kTarget)) {
@@ -184,7 +184,7 @@ TEST(SplatLayer, BadSplatsAreCountedAndLeftOut) {
         layer.add(path, 6, 4, Spectrum(2));
         if (i == 17) layer.add(path, 7, 4, Spectrum(1, -1, 1));
         if (i == 18) layer.add(path, 7, 4, Spectrum(nan, 1, 1));
-        layer.add(path, 4, 4, Spectrum(nan));  // outside of the crop
+        layer.add(path, 4, 4, Spectrum(nan));  // outside the crop
       }
     });
     layer.finish_round();
