@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Layout of the work: tiles of the image in parallel; in a tile, kLanes pixels at a time, one per lane. Per pixel, what
-// a neighbour contributes (a "record") lies contiguous in memory, so that a neighbour is a few vector loads and a
-// transposition.
+// Tiles of the image are processed in parallel; within a tile, kLanes pixels at a time, one per lane. What a pixel
+// contributes as a neighbour (its "record") is contiguous in memory, so that reading a neighbour takes a few vector
+// loads and a transposition.
 #include "estimators/control_variates.h"
 
 #include <fmt/format.h>
@@ -20,8 +20,8 @@ namespace {
 using namespace lanes;
 
 constexpr int kTileWidth = 64, kTileHeight = 32;
-/// Part of the degrees of freedom that a fit leaves at least, for the error estimate; less is the fit of an
-/// interpolation.
+/// Minimum fraction of the degrees of freedom assumed to remain after a fit, for the error estimate; a fit with less is
+/// an interpolation.
 constexpr float kFewestFreedom = 0.1f;
 
 /// Scratch memory of one thread.
@@ -93,7 +93,7 @@ class Regression {
     w.gamma.resize(k);
   }
 
-  /// Reads the records at `source` (one per lane) into lanes: first the contrasts, then the tail.
+  /// Transposes the records at `source` (one per lane) into lanes: first the contrasts, then the tail.
   void gather(const float* const* source, vfloat* contrasts, vfloat* tail) const {
     for (int first = 0; first < layout_.size; first += kLanes) {
       vfloat block[kLanes];
@@ -112,7 +112,7 @@ class Regression {
     const int n_lanes = std::min(kLanes, tile.x1 - x), k = s_.k, n_tail = layout_.size - layout_.contrasts;
     search_.find(in_.crn_moments->mean, x, y, w.keys.data(), w.chosen.data());
 
-    // Lanes beyond the tile repeat its last pixel's record; what they compute is not used.
+    // Lanes beyond the tile repeat its last pixel's record; their results are discarded.
     const float* target[kLanes];
     for (int l = 0; l < kLanes; ++l) target[l] = record(tile, std::min(x + l, tile.x1 - 1), y, w);
     gather(target, w.y.data(), w.y_tail.data());
@@ -134,7 +134,7 @@ class Regression {
     }
   }
 
-  /// Writes the coefficients of channel c at the probe's pixel.
+  /// Stores the coefficients of channel c at the probe's pixel.
   void answer(int c, int x, const Workspace& w) const {
     const int lane = s_.probe->x - x;
     if (!valid_[static_cast<size_t>(s_.probe->y) * in_.crn.width + s_.probe->x]) return;
@@ -149,21 +149,21 @@ class Regression {
     }
   }
 
-  /// Sum over the channels [first, first + count) of an element of the tail.
+  /// Sum of a tail element over the channels [first, first + count).
   vfloat channel_sum(const vfloat* tail, int offset, int first, int count) const {
     vfloat total = tail_value(tail, offset + first);
     for (int c = first + 1; c < first + count; ++c) total += tail_value(tail, offset + c);
     return total;
   }
 
-  /// That sum of a penalty, of which records hold the sum of all channels where these share their coefficients.
+  /// Same for a penalty: if channels share their coefficients, records already hold the sum of all channels.
   vfloat penalty_sum(const vfloat* tail, int offset, int first) const {
     return tail_value(tail, offset + (layout_.penalties == 1 ? 0 : first));
   }
 
-  /// The condition on the coefficients as a row of X and y (one for each channel, like a contrast of the groups),
-  /// scaled by sqrt(mean_constraint (T - 1) S / N). The CRN mean has an error of the size of the light that it lacks;
-  /// the variance of a group is T times that of the mean.
+  /// The soft constraint on the coefficients as a row of X and y (one per channel, like a contrast of the groups),
+  /// scaled by sqrt(mean_constraint (T - 1) S / N). The CRN mean has an error as large as the light it lacks; the
+  /// variance of a group is T times that of the mean.
   void scale_condition(int first, int count, Workspace& w) const {
     const int k = s_.k, n_tail = layout_.size - layout_.contrasts;
     vfloat S = {}, N = {};
@@ -184,7 +184,7 @@ class Regression {
     }
   }
 
-  /// V_h,i of [YM2025] Eq. (10) for the channels [first, first + count), summed over them.
+  /// V_h,i of [YM2025] Eq. (10), summed over the channels [first, first + count).
   void find_penalties(int first, int count, Workspace& w) const {
     const int k = s_.k, n_tail = layout_.size - layout_.contrasts;
     vfloat homogeneous = {};
@@ -221,8 +221,8 @@ class Regression {
   ///   beta = (X^T X + (T - 1) V_h)^-1 X^T y
   /// or, with fewer rows than neighbours, with Z = X V_h^-1/2, as
   ///   V_h^1/2 beta = gamma = Z^T (Z Z^T + (T - 1) I)^-1 y.
-  /// Leaves in gamma the coefficients of what is in x: X, or Z in the second case; in freedom the degrees of freedom
-  /// that the fit takes from the groups, trace(X (X^T X + (T - 1) V_h)^-1 X^T), over their number.
+  /// On return, gamma holds the coefficients of the matrix in x: X, or Z in the second case; freedom holds the degrees
+  /// of freedom of the fit, trace(X (X^T X + (T - 1) V_h)^-1 X^T), as a fraction of those of the groups.
   void find_coefficients(int first, int count, Workspace& w) const {
     const int k = s_.k, all = layout_.contrasts, step = count == 3 ? 1 : 3, rows = all / step;
     const int group_rows = layout_.group_contrasts / step;
@@ -280,12 +280,12 @@ class Regression {
     w.freedom /= static_cast<float>((T_ - 1) * count);
   }
 
-  /// Eq. (7) for one channel, and Eq. (8) where asked for.
+  /// Eq. (7) for one channel, and Eq. (8) if requested.
   void finish_channel(int c, int x, int y, int n_lanes, Workspace& w) const {
     const int k = s_.k, n_tail = layout_.size - layout_.contrasts;
     vfloat estimate = load(in_.crn_moments->mean.row(c, y) + x);
     for (int i = 0; i < k; ++i) estimate -= w.beta[i] * tail_value(w.tail.data() + i * n_tail, layout_.difference + c);
-    // Squares of values beyond 10^18 overflow; such pixels show the independent image.
+    // Squares of values above 10^18 overflow; such pixels take the independent image.
     for (int l = 0; l < n_lanes; ++l)
       result_.estimate.pixel(x + l, y)[c] = std::isfinite(estimate[l]) ? estimate[l] : in_.h->row(c, y)[x + l];
     if (!s_.std_error) return;
@@ -296,8 +296,8 @@ class Regression {
   }
 
   /// The first three terms of [YM2025] Eq. (8): variance of f - sum_i beta_i g_i. The coefficients were fitted to the
-  /// same groups, so that their residuals are too small; generalised cross-validation [GHW1979] corrects
-  /// that by the degrees of freedom. Light that the CRN image lacks is an error of f and all g_i at once.
+  /// same groups, so that the residuals are too small; generalised cross-validation [GHW1979] corrects this by the
+  /// degrees of freedom. Light missing from the CRN image is an error of f and all g_i at once.
   vfloat crn_variance(int c, const Workspace& w) const {
     const vfloat squares = batch::residual_squares(w.x.data() + c, layout_.contrasts, 3, w.y.data() + c, w.gamma.data(),
                                                    s_.k, layout_.group_contrasts / 3);
@@ -309,8 +309,8 @@ class Regression {
   }
 
   /// The last term of Eq. (8): sum_i beta_i^2 var h_i. Penalties that contain the sample variance give large
-  /// coefficients to pixels whose sample variance happens to be small; to that part, the neighbours' mean variance is
-  /// used for all.
+  /// coefficients to pixels whose sample variance happens to be small; for that fraction, the mean variance of the
+  /// neighbours is used instead.
   vfloat independent_variance(int c, const Workspace& w) const {
     const int n_tail = layout_.size - layout_.contrasts;
     vfloat own = {}, variances = {}, squares = {}, count = {};
@@ -319,7 +319,7 @@ class Regression {
       own += w.beta[i] * w.beta[i] * variance;
       squares += w.beta[i] * w.beta[i];
       variances += variance;
-      count += w.beta[i] != 0.0f ? splat(1.0f) : vfloat{};  // places outside the frame have no coefficient
+      count += w.beta[i] != 0.0f ? splat(1.0f) : vfloat{};  // pixels outside the frame have no coefficient
     }
     return (1 - s_.sample_fraction) * own + s_.sample_fraction * squares * variances / max(count, splat(1.0f));
   }

@@ -32,8 +32,8 @@ EstimatorResult cv_baseline(const GroupedImage& crn, const GroupedImage& indepen
   const int border = std::max(options.window, kMissingWindow) / 2;
   const Moments g = moments(crn, valid, border, kFar), h = moments(independent, valid, border, 0.0f);
   ControlVariateSettings settings = common_settings(options);
-  // [YM2025] Eq. (6) is Eq. (10) with V_h = 0; a ridge on X^T X is one of 1 / (T - 1) times its size on X^T X / (T -
-  // 1), and both are relative to the mean diagonal.
+  // [YM2025] Eq. (6) is Eq. (10) with V_h = 0. The ridge needs no scaling by 1 / (T - 1): it is relative to the mean
+  // diagonal, of X^T X here and of X^T X / (T - 1) there.
   settings.ridge = options.ridge;
   ControlVariateInput input{crn, &g, &h.mean, nullptr, &h.variance_of_mean};
   std::optional<Planes> missing;

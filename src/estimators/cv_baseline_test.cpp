@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The baseline of plain control variates against the double-precision reference, identities, degenerate inputs.
+// Plain control variates (baseline) against the double-precision reference; identities; degenerate inputs.
 #include "estimators/cv_baseline.h"
 
 #include <gtest/gtest.h>
@@ -28,7 +28,7 @@ TEST(CvBaseline, WithARidgeAgreesWithTheReference) {
   }
 }
 
-/// Minimum norm: against the pseudo-inverse.
+/// Minimum norm: compared with the pseudo-inverse.
 TEST(CvBaseline, WithoutRidgeIsTheMinimumNormSolution) {
   const test::Grouped crn = test::crn_image(30, 20, 12, 1), independent = test::independent_image(30, 20, 12, 2);
   const GroupedImage view = crn.view(), independent_view = independent.view();
@@ -55,7 +55,7 @@ TEST(CvBaseline, WithoutRidgeIsTheMinimumNormSolution) {
       }
 }
 
-/// Least squares with shared coefficients and the target among the neighbours: the target itself.
+/// Least squares with shared coefficients and the target among the neighbours selects the target itself.
 TEST(CvBaseline, WithSharedCoefficientsIsTheIndependentImage) {
   const test::Grouped crn = test::crn_image(30, 20, 12, 1), independent = test::independent_image(30, 20, 12, 2);
   CvBaselineOptions options;
@@ -67,7 +67,7 @@ TEST(CvBaseline, WithSharedCoefficientsIsTheIndependentImage) {
         EXPECT_NEAR(fast.estimate.pixel(x, y)[c], reference::mean(independent.view(), x, y)[c], 5e-3) << x << ", " << y;
 }
 
-/// A sky: bright, and hardly any noise but that of rounding. The solution of smallest norm must not blow it up.
+/// A sky: bright, with hardly any noise beyond rounding. The minimum-norm solution must not amplify it.
 TEST(CvBaseline, SmallestNormIsBoundedWherePixelsHardlyVary) {
   test::Grouped crn = test::crn_image(60, 40, 12, 3), independent = test::independent_image(60, 40, 12, 4);
   for (float noise : {0.0f, 1e-7f, 1e-6f, 1e-4f, 1e-2f}) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An estimator with its options, as everything else sees it: what it needs of a render, what it can do, and how.
+// An estimator with its options, as seen by everything else: its requirements, its capabilities, and its functions.
 #pragma once
 
 #include <algorithm>
@@ -20,52 +20,51 @@
 
 namespace covary {
 
-/// The passes that an estimator makes its image of.
+/// The render passes that an estimator consumes.
 enum class EstimatorPasses {
-  kPair,     ///< one with common random numbers and one with independent ones: Estimator::apply
-  kSamples,  ///< an independent one, whose pixels are made of all their samples: Estimator::estimate_pixel
-  /// An independent one, in groups: Estimator::apply, whose first image is empty.
+  kPair,     ///< a CRN pass and an independent pass: Estimator::apply
+  kSamples,  ///< an independent pass, each pixel computed from all its samples: Estimator::estimate_pixel
+  /// An independent pass, in groups: Estimator::apply, whose first image is empty.
   kIndependent,
-  kAny,  ///< one of either kind, whose mean is the image: the film needs no estimator
+  kAny,  ///< a pass of either kind whose mean is the image: the film needs no estimator
 };
 
-/// What the surfaces behind the pixels look like: images of three channels, of the same size as the image. Null where
-/// not known; there is no normal without an albedo.
+/// Auxiliary images of the surfaces behind the pixels: three channels, of the image's size. Null if unknown; a normal
+/// is given only together with an albedo.
 struct Guides {
   const Image* albedo = nullptr;  ///< reflectance, in [0, 1]
   const Image* normal = nullptr;  ///< in [-1, 1]
-  /// The same of what is seen in mirrors and through glass, in their colour; null: as above.
+  /// Same, but of what is seen through mirrors and glass, tinted by them; null: use those above.
   const Image* denoising_albedo = nullptr;
   const Image* denoising_normal = nullptr;
-  const Image* position = nullptr;  ///< of the first surface, in any unit
-  bool clean = false;  ///< have little noise, so that a network need not denoise them first
+  bool clean = false;  ///< nearly noise-free, so that a network need not prefilter them
 };
 
-/// A part of the samples' light, such as that which comes straight from lights.
+/// A component of the image, such as direct light.
 struct Layer {
   std::string name;
-  GroupedImage image;  ///< that part of each group of the independent image
+  GroupedImage image;  ///< that component of each group of the independent image
 };
 
-/// What an estimator of a pair is told beside the images.
+/// Settings of an estimator of a pair, beside the images.
 struct PairSettings {
-  int64_t crn_samples = 1;  ///< samples per pixel of the CRN image, > 0; read where needs_sample_count says so
-  bool std_error = false;   ///< estimate the standard error, too; where predicts_error says that it can
-  bool held_out = true;     ///< with the standard error, also EstimatorResult::held_out
-  Guides guides;            ///< read where reads_guides says so
-  /// Layers that together are the independent image; read where splits_layers says so.
+  int64_t crn_samples = 1;  ///< samples per pixel of the CRN image, > 0; used if needs_sample_count
+  bool std_error = false;   ///< also estimate the standard error; used if predicts_error
+  bool held_out = true;     ///< together with the standard error, also compute EstimatorResult::held_out
+  Guides guides;            ///< used if reads_guides
+  /// Layers that sum to the independent image; used if splits_layers.
   std::span<const Layer> layers;
 };
 
-/// Samples of a pixel, and of each the first random numbers that it was made of: [sample][dimension].
+/// Estimates a pixel from its samples and, for each, the first random numbers it was made from: [sample][dimension].
 using PixelFunction = std::function<Spectrum(std::span<const Spectrum> values, std::span<const float> coordinates)>;
 
-/// Memory that an estimator takes beside its input, in bytes per pixel, about.
+/// Approximate memory of an estimator beyond its input, in bytes per pixel.
 struct EstimatorMemory {
   double always = 0;
-  /// In bytes: no more than this and its result, of estimators that work on parts of large images one after the other.
+  /// In bytes: upper limit, beside the result, for estimators that process large images in parts.
   double largest_part = std::numeric_limits<double>::infinity();
-  /// More where both images have so many groups that halves of them are held out: at once, and for each group.
+  /// Additional memory if both images have enough groups to hold out halves: fixed, and per group.
   double of_halves = 0, of_halves_per_group = 0;
   int groups_for_halves = 0;
 
@@ -79,51 +78,51 @@ struct EstimatorMemory {
 
 struct Estimator {
   EstimatorPasses passes = EstimatorPasses::kPair;
-  std::string name;     ///< registered one
+  std::string name;     ///< as registered
   std::string summary;  ///< a few words, for lists
   std::string text;     ///< name and options as given: "iicv --paper --k 50"
 
-  std::string network;  ///< name and version of the neural network that takes part; empty where none does
+  std::string network;  ///< name and version of the neural network it uses; empty if none
 
-  bool predicts_error = false;  ///< that of its result
-  /// Its predicted error is to be calibrated by held-out samples (held_out_error.h).
+  bool predicts_error = false;  ///< whether it predicts the error of its result
+  /// Whether its predicted error should be calibrated by held-out samples (held_out_error.h).
   bool holds_out = false;
-  /// Samples per pixel, of all passes together, below which the predicted error was measured to be unreliable.
+  /// Samples per pixel, over all passes, below which the predicted error was found to be unreliable.
   uint32_t reliable_samples = 0;
-  bool needs_sample_count = false;  ///< PairSettings::crn_samples
-  /// Groups of samples that it needs in each pass. All estimators take groups that differ in size by a sample.
+  bool needs_sample_count = false;  ///< whether it uses PairSettings::crn_samples
+  /// Minimum number of groups in each pass. All estimators accept groups whose sizes differ by one sample.
   int fewest_groups = 1;
-  bool reads_guides = false;   ///< PairSettings::guides
-  bool splits_layers = false;  ///< PairSettings::layers
-  /// Parts of the samples for the CRN and the independent pass where nothing else is asked for; they add up to 1.
+  bool reads_guides = false;   ///< whether it uses PairSettings::guides
+  bool splits_layers = false;  ///< whether it uses PairSettings::layers
+  /// Default fractions of the samples for the CRN and the independent pass; they sum to 1.
   std::array<double, 2> split = {0.5, 0.5};
 
-  std::optional<AdaptiveSampling> adaptive;  ///< not of estimators of the samples of a pixel
+  std::optional<AdaptiveSampling> adaptive;  ///< never set for kSamples estimators
 
-  // Of a pair, and of an independent pass in groups.
+  // For pairs, and for independent passes in groups.
   std::function<EstimatorResult(const GroupedImage& crn, const GroupedImage& independent, const PairSettings& settings)>
       apply;
-  int reach = 0;           ///< rows beyond its own that a band of rows needs; -1: the whole image is needed
-  EstimatorMemory memory;  ///< that `apply` takes
-  /// The control variates of a pixel; empty function where the estimator has none.
+  int reach = 0;           ///< extra rows on each side that a band of rows needs; -1: needs the whole image
+  EstimatorMemory memory;  ///< memory of `apply`
+  /// The control variates of a pixel; an empty function if the estimator has none.
   std::function<std::vector<ControlVariate>(const GroupedImage& crn, const GroupedImage& independent, int x, int y)>
       explain;
 
-  /// Images of single steps by name, for files; empty function where the estimator has none.
+  /// Images of intermediate steps by name, for output; an empty function if the estimator has none.
   std::function<std::map<std::string, Image>(const GroupedImage& crn, const GroupedImage& independent,
                                              const PairSettings& settings)>
       stages;
 
-  // Of the samples of a pixel.
+  // For kSamples estimators.
   PixelFunction estimate_pixel;
-  int dimensions = 0;  ///< random numbers of each sample that estimate_pixel() reads
+  int dimensions = 0;  ///< random numbers per sample that estimate_pixel() reads
   /// Name and all options that change its pixels, for the film's settings: "polynomials dimensions=4".
   std::string film_settings;
-  /// What is wrong with so many samples per pixel; empty if nothing is.
+  /// Problems with this number of samples per pixel; empty if there are none.
   std::function<std::vector<std::string>(uint32_t samples)> check_samples;
 };
 
-/// Estimator::explain for an estimator of grouped images whose options have a probe.
+/// Estimator::explain for an estimator of grouped images whose options include a probe.
 template <typename Function, typename Options>
 auto explain_by_probe(Function function, const Options& options) {
   return [function, options](const GroupedImage& crn, const GroupedImage& independent, int x, int y) {

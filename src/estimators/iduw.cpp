@@ -28,7 +28,8 @@ std::vector<std::string> IduwOptions::validate() const {
 
 namespace {
 
-/// Fills the border by reflection about the outermost pixels (… 2 1 | 0 1 2 …), repeatedly for images smaller than it.
+/// Fills the border by reflection at the outermost pixels (… 2 1 | 0 1 2 …), repeatedly for images smaller than the
+/// border.
 void reflect_border(Planes& planes) {
   const auto reflected = [](int i, int n) {
     if (n == 1) return 0;
@@ -40,7 +41,7 @@ void reflect_border(Planes& planes) {
     for (int y = -border; y < h + border; ++y) {
       float* row = planes.row(c, y);
       const float* source = planes.row(c, reflected(y, h));
-      // Columns outside first: in rows of the image itself, the columns inside are the source.
+      // Border columns first: in rows of the image itself, the inner columns are the source.
       for (int x = -border; x < 0; ++x) row[x] = source[reflected(x, w)];
       for (int x = w; x < w + border; ++x) row[x] = source[reflected(x, w)];
       if (y < 0 || y >= h) std::copy_n(source, w, row);
@@ -64,7 +65,7 @@ class Iduw {
         radius_(o.window / 2),
         n_(static_cast<float>(o.samples)),
         normalise_(1.0f / static_cast<float>(o.window * o.window - 1)) {
-    // Invalid pixels get opposite values in the two parts that make a weight, so that the weight is zero.
+    // Invalid pixels get opposite values in the two halves that make a weight, so that the weight is zero.
     for (int half : {0, 1}) {
       z_half_[half] = means(crn, valid, radius_, half, 2, half ? -kFar : kFar);
       y_half_[half] = means(independent, valid, radius_, half, 2, 0);
@@ -98,7 +99,7 @@ class Iduw {
         vfloat sum = {};
         for_each_neighbour(x, y, [&](int qx, int qy) {
           const vfloat change = (a - load(z_half_[0].row(c, qy) + qx)) - (b - load(z_half_[1].row(c, qy) + qx));
-          const vfloat weight = exp_of_nonpositive(-gamma * n_ * change * change);  // [Back2023], as iduw.h has it
+          const vfloat weight = exp_of_nonpositive(-gamma * n_ * change * change);  // [Back2023], as in iduw.h
           sum += weight * (centre - (load(z_.row(c, qy) + qx) - load(y_.row(c, qy) + qx)));
         });
         const vfloat value = load(y_.row(c, y) + x) + normalise_ * sum;
@@ -176,7 +177,7 @@ EstimatorResult iduw(const GroupedImage& crn, const GroupedImage& independent, c
 
 Estimator make_iduw(Settings& parameters) {
   IduwOptions o;
-  o.samples = 1;  // until an image is there
+  o.samples = 1;  // placeholder until the image is known
   parameters.whole("window", o.window, kWindowRange, kWindowHelp);
   throw_if_any("iduw", o.validate());
 

@@ -54,7 +54,7 @@ TEST(Iduw, BitsDoNotDependOnThreads) {
 TEST(Iduw, DegenerateInputs) {
   IduwOptions options;
   options.samples = 16;
-  // No noise in CRN: every weight is 1, and the result is the CRN picture moved to the window's independent mean.
+  // No noise in CRN: every weight is 1, and the result is the CRN image shifted to the window's independent mean.
   const test::Grouped flat = test::constant_image(20, 20, 4, 0.5f), black = test::constant_image(20, 20, 4, 0);
   for (float v : iduw(flat.view(), flat.view(), options).estimate.data) EXPECT_NEAR(v, 0.5f, 1e-6f);
   for (float v : iduw(black.view(), black.view(), options).estimate.data) EXPECT_EQ(v, 0.0f);

@@ -89,8 +89,8 @@ int iicv_reach(const IicvOptions& options) {
 }
 
 double iicv_bytes_per_pixel(const IicvOptions& options) {
-  // Planes of floats: moments of both images, the result and its error, the pilot's error, light that the CRN image
-  // lacks and what finds it, residuals for their correction.
+  // Planes of floats: moments of both images, the result and its error, the pilot's error, light missing from the CRN
+  // image and the buffers to find it; then the buffers of the residual correction.
   int planes = 2 * 6 + 6 + 3 + 3 + 6;
   if (options.residual_correction) planes += 8 + 4;
   return planes * sizeof(float) + 1;
@@ -98,7 +98,7 @@ double iicv_bytes_per_pixel(const IicvOptions& options) {
 
 namespace {
 
-/// Options that others leave without an effect.
+/// Rejects options that others make ineffective.
 void check_effects(Settings& p, const IicvOptions& o) {
   const bool sample = o.penalty == Penalty::kSample;
   p.only_if(!sample, {"pilot-window"}, "with `penalty` sample, which has no pilot");
@@ -134,7 +134,7 @@ Estimator make_iicv(Settings& parameters) {
   check_effects(p, o);
   std::vector<std::string> problems = o.validate();
   AdaptiveSampling standard;
-  standard.least_min_spp = 1;  // the plan rounds up to one of each group
+  standard.least_min_spp = 1;  // the plan rounds up to one per group
   standard.most_first_spp = std::numeric_limits<int>::max();
   standard.reads_groups = true;
   Estimator estimator;
@@ -144,7 +144,7 @@ Estimator make_iicv(Settings& parameters) {
 
   estimator.summary = "imperfect image-space control variates";
   estimator.predicts_error = true;
-  // Without it the bias of a half is too much larger than that of the whole (docs/methods/error-estimates.md).
+  // Without it, the bias of a half exceeds that of the whole by too much (docs/methods/error-estimates.md).
   estimator.holds_out = o.residual_correction;
   estimator.reliable_samples = kReliableSamples;
   estimator.fewest_groups = 3;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// IICV against the double-precision reference, identities, degenerate inputs, determinism.
+// IICV against the double-precision reference; identities; degenerate inputs; determinism.
 #include "estimators/iicv.h"
 
 #include <gtest/gtest.h>
@@ -23,8 +23,8 @@ using reference::compare, reference::Difference, reference::neighbours, referenc
 using reference::Rgb, reference::RgbImage;
 using test_support::message_of;
 
-/// Both forms of the system (k below and above the number of rows), both kinds of coefficients, symmetric or not, with
-/// and without the target, several group counts.
+/// Both forms of the system (k below and above the number of rows), shared and per-channel coefficients, symmetric or
+/// not, with and without the target, several numbers of groups.
 TEST(Iicv, AgreesWithTheReference) {
   struct Case {
     int k, window, groups;
@@ -67,7 +67,7 @@ TEST(Iicv, SampleVariancesAsPenaltiesAgreeWithTheReference) {
             2e-3);
 }
 
-/// The condition on the coefficients and the mixed penalty.
+/// The mean constraint and the mixed penalty.
 TEST(Iicv, ConservationAgreesWithTheReference) {
   const test::Grouped crn = test::crn_image(41, 27, 12, 1), independent = test::independent_image(41, 27, 12, 2);
   const RgbImage error = pilot_of(crn.view(), independent.view(), 11);
@@ -85,12 +85,12 @@ TEST(Iicv, ConservationAgreesWithTheReference) {
   }
 }
 
-/// Rare light: a CRN image that misses it in whole regions, entirely or but for a little of its own.
+/// Rare light: a CRN image that misses it in whole regions, entirely or except for a trace.
 struct RareLight {
   static constexpr int width = 41, height = 27;
   test::Grouped crn, independent;
-  /// `trace`: of other light, part of all, in the black regions. One of `rarity` groups of the independent image has
-  /// found the light.
+  /// `trace`: light from another source in the black regions, relative to all light. One in `rarity` groups of the
+  /// independent image has found the light.
   explicit RareLight(uint64_t seed, float trace = 0, float rarity = 3)
       : crn(test::crn_image(width, height, 12, seed)),
         independent(test::independent_image(width, height, 12, seed + 1)) {
@@ -128,7 +128,7 @@ TEST(Iicv, MissingLightAgreesWithTheReference) {
   }
 }
 
-/// Where the CRN image is black it has no variance either, and yet it is not certain.
+/// Where the CRN image is black it has no variance either, but it is not certain.
 TEST(Iicv, FindsTheLightThatTheCrnImageMisses) {
   double error = 0, of_independent = 0, predicted = 0;
   for (const uint64_t seed : {1, 5, 9}) {
@@ -152,7 +152,7 @@ TEST(Iicv, FindsTheLightThatTheCrnImageMisses) {
   EXPECT_LT(predicted, 4 * error);
 }
 
-/// A little light of another lamp leaves a variance that is as little, and no certainty either.
+/// A trace of light from another lamp leaves an equally small variance, and no certainty either.
 TEST(Iicv, FindsTheLightThatTheCrnImageMissesButForATrace) {
   for (const float trace : {0.0f, 1e-5f, 1e-3f, 1e-2f}) {
     int dark = 0, certain = 0, all = 0;
@@ -173,7 +173,7 @@ TEST(Iicv, FindsTheLightThatTheCrnImageMissesButForATrace) {
   }
 }
 
-/// The published estimate stays; its error is told.
+/// The published estimate is unchanged; its standard error reveals the problem.
 TEST(Iicv, AsPublishedItIsBlackThereButSaysHowUncertain) {
   const RareLight in(1);
   IicvOptions options = IicvOptions::paper();
@@ -185,7 +185,7 @@ TEST(Iicv, AsPublishedItIsBlackThereButSaysHowUncertain) {
   EXPECT_NEAR(result.std_error.pixel(5, 13)[0], test::expected(5, 13, 0), 0.4 * test::expected(5, 13, 0));
 }
 
-/// Light that is seen directly, and a background without any, are certain.
+/// Directly visible light sources and a black background are certain.
 TEST(Iicv, WhatIsTheSameInBothImagesIsCertain) {
   test::Grouped crn = test::crn_image(41, 27, 12, 1), independent = test::independent_image(41, 27, 12, 2);
   for (test::Grouped* image : {&crn, &independent})
@@ -201,7 +201,7 @@ TEST(Iicv, WhatIsTheSameInBothImagesIsCertain) {
     }
 }
 
-/// Everything the defaults add: mixed penalty, condition, residual correction.
+/// Everything the defaults add: mixed penalty, mean constraint, residual correction.
 TEST(Iicv, DefaultsAgreeWithTheReference) {
   for (const auto& [width, height] : {std::pair{41, 27}, {60, 6}, {1, 1}, {5, 40}}) {
     const test::Grouped crn = test::crn_image(width, height, 12, 1),
@@ -250,7 +250,7 @@ TEST(Iicv, ScalingTheInputsScalesTheResultExactly) {
   }
 }
 
-/// A visible lamp: bright, and nearly without noise. Single precision must hold.
+/// A visible lamp: bright and nearly noise-free. Single precision must suffice.
 TEST(Iicv, BrightPixelsWithLittleNoiseAreKept) {
   test::Grouped crn = test::crn_image(40, 30, 12, 3), independent = test::independent_image(40, 30, 12, 4);
   const auto paint = [](test::Grouped& image, float noise) {
@@ -271,7 +271,7 @@ TEST(Iicv, BrightPixelsWithLittleNoiseAreKept) {
   }
 }
 
-/// Values whose squares overflow: finite results, here those of the independent image.
+/// Values whose squares overflow: results are finite, here those of the independent image.
 TEST(Iicv, AbsurdlyLargeValuesGiveFiniteResults) {
   test::Grouped crn = test::crn_image(40, 30, 12, 3), independent = test::independent_image(40, 30, 12, 4);
   for (int i = 0; i < 36; ++i)
@@ -282,7 +282,7 @@ TEST(Iicv, AbsurdlyLargeValuesGiveFiniteResults) {
   for (float v : result.estimate.data) ASSERT_TRUE(std::isfinite(v));
 }
 
-/// No variance in the CRN image: nothing to explain, the result is the CRN mean.
+/// No variance in the CRN image: nothing to regress on, and the result is the CRN mean.
 TEST(Iicv, WithoutCrnVarianceIsTheCrnMean) {
   test::Grouped crn = test::constant_image(30, 20, 12, 0.25f);
   const test::Grouped independent = test::independent_image(30, 20, 12, 4);
@@ -294,7 +294,7 @@ TEST(Iicv, WithoutCrnVarianceIsTheCrnMean) {
   }
 }
 
-/// An image worked on in bands of rows has the bits of the whole.
+/// Processing an image in bands of rows gives the bits of the whole.
 TEST(Iicv, BandsGiveTheSameBits) {
   const test::Grouped crn = test::crn_image(50, 140, 6, 3), independent = test::independent_image(50, 140, 6, 4);
   IicvOptions options;
@@ -327,7 +327,7 @@ TEST(Iicv, BlackIsBlack) {
   }
 }
 
-/// An independent image without error: the coefficient of the target goes to 1 and the result to that image.
+/// An error-free independent image: the coefficient of the target tends to 1 and the result to that image.
 TEST(Iicv, WithAnExactIndependentImageIsTheIndependentImage) {
   const test::Grouped crn = test::crn_image(30, 20, 12, 3);
   test::Grouped exact = test::constant_image(30, 20, 12, 0);
@@ -345,8 +345,8 @@ TEST(Iicv, WithAnExactIndependentImageIsTheIndependentImage) {
       }
 }
 
-/// One sample of a small bright light, met by the independent image alone, stays near its pixel: what a wide mean of
-/// residuals gives back must be more than its noise.
+/// A single sample of a small bright light, found by the independent image only, stays near its pixel: a wide mean of
+/// residuals must exceed its own noise to be given back.
 TEST(Iicv, ABrightSampleIsNotSpreadOverTheDarkAround) {
   test::Grouped crn = test::crn_image(64, 48, 12, 3), independent = test::independent_image(64, 48, 12, 4);
   for (test::Grouped* image : {&crn, &independent})
@@ -356,14 +356,14 @@ TEST(Iicv, ABrightSampleIsNotSpreadOverTheDarkAround) {
   const EstimatorResult bright = iicv(crn.view(), independent.view());
   for (int y = 0; y < 48; ++y)
     for (int x = 0; x < 64; ++x) {
-      if (std::max(std::abs(x - 22), std::abs(y - 21)) <= 10) continue;  // its neighbourhood of the regression
+      if (std::max(std::abs(x - 22), std::abs(y - 21)) <= 10) continue;  // the regression window around it
       for (int c = 0; c < 3; ++c)
         EXPECT_NEAR(bright.estimate.pixel(x, y)[c], plain.estimate.pixel(x, y)[c], 2e-4) << x << ", " << y;
     }
 }
 
-/// Bits do not depend on the number of threads, nor on where a pixel lies in a tile or vector: inside a crop, farther
-/// than the windows reach from its border, they are those of the whole image.
+/// Bits depend neither on the number of threads nor on a pixel's place in a tile or vector: inside a crop, farther from
+/// its border than the windows reach, they are those of the whole image.
 TEST(Iicv, BitsDoNotDependOnThreadsTilesOrCrops) {
   const test::Grouped crn = test::crn_image(150, 120, 6, 3), independent = test::independent_image(150, 120, 6, 4);
   IicvOptions options;
@@ -396,7 +396,7 @@ TEST(Iicv, BitsDoNotDependOnThreadsTilesOrCrops) {
         ASSERT_EQ(part.estimate.pixel(x, y)[c], one.estimate.pixel(x0 + x, y0 + y)[c]) << x << ", " << y;
 }
 
-/// A bad value spoils its own pixel at most, and is counted.
+/// A non-finite value spoils its own pixel at most, and is counted.
 TEST(Iicv, NonFiniteValuesStayWhereTheyAre) {
   const test::Grouped crn = test::crn_image(100, 30, 6, 3), independent = test::independent_image(100, 30, 6, 4);
   const EstimatorResult good = iicv(crn.view(), independent.view());
@@ -409,9 +409,9 @@ TEST(Iicv, NonFiniteValuesStayWhereTheyAre) {
   EXPECT_EQ(result.nonfinite_pixels, 3);
   EXPECT_EQ(good.nonfinite_pixels, 0);
   for (float v : result.estimate.data) ASSERT_TRUE(std::isfinite(v));
-  // Far from all three nothing changes.
+  // Far from all three, nothing changes.
   EXPECT_EQ(result.estimate.pixel(95, 25)[0], good.estimate.pixel(95, 25)[0]);
-  // The pixel itself: the mean of its finite groups in both images; without any, zero.
+  // The pixel itself: the mean of its finite groups in both images; zero if there are none.
   double sum = 0;
   for (int t = 0; t < 6; ++t)
     sum += (t == 1 ? 0 : crn.view().pixel(10, 12)[3 * t + 1]) + independent.view().pixel(10, 12)[3 * t + 1];

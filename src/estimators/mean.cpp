@@ -15,7 +15,7 @@ struct ChannelMean {
   double mean = 0, std_error = 0;
 };
 
-/// Of T values, three apart, from equal numbers of samples.
+/// Over T values with stride 3, each from the same number of samples.
 ChannelMean mean_of_equal(const float* groups, int T) {
   double sum = 0, squares = 0;
   for (int t = 0; t < T; ++t) sum += groups[3 * t];
@@ -23,7 +23,7 @@ ChannelMean mean_of_equal(const float* groups, int T) {
   return {sum / T, T > 1 ? std::sqrt(squares / (T - 1) / T) : 0};
 }
 
-/// The same from `count` samples in groups of sizes that differ; groups without samples do not count.
+/// Same for `count` samples in groups of unequal sizes; empty groups are ignored.
 ChannelMean mean_of_unequal(const float* groups, int T, uint32_t count) {
   const auto used = static_cast<int>(std::min<uint32_t>(T, count));
   double sum = 0, squares = 0;

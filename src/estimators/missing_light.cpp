@@ -12,13 +12,13 @@ namespace {
 
 using namespace lanes;
 
-/// Squared: how many standard deviations a difference must have to be beyond noise.
+/// Squared number of standard deviations by which a difference must exceed noise.
 constexpr float kSignificant = 9;
-/// The same where the CRN image does not tell its own noise: of K bright pixels alone, a difference has K.
+/// Same where the CRN image does not tell its own noise: a difference due to K bright pixels alone reaches K.
 constexpr float kLeastSignificant = 2;
-/// Least variance of a CRN pixel, relative to that of an independent one, that is believed.
+/// Smallest credible variance of a CRN pixel, relative to that of an independent one.
 constexpr float kCredible = 0.01f;
-/// Squared: differences between pixels that are alike, relative to the missing light.
+/// Squared difference tolerated between similar pixels, relative to the missing light.
 constexpr float kAlike = 1.0f / 16;
 
 /// tau^2 of missing_light.h.
@@ -40,14 +40,15 @@ Planes tolerance(const Moments& g, const Moments& h, const std::vector<unsigned 
   parallel_for(height, 8, [&](int y) {
     for (int x = 0; x < width; ++x) {
       const float d = result.row(0, y)[x];
-      // The sum of three channels: of grey, three times the squared norm and the summed variance.
+      // d sums three channels: for grey, d^2 is three times the squared norm, and 3 noise three times the summed
+      // variance.
       result.row(0, y)[x] = kAlike / 3 * std::max(0.0f, d * d - 3 * noise.row(0, y)[x] / kPixels);
     }
   });
   return result;
 }
 
-/// D of missing_light.h, and summed over RGB its variance v and the variance V of a pixel of h.
+/// D of missing_light.h; its variance v and the variance V of a pixel of h, both summed over RGB.
 struct Difference {
   vfloat mean[3], variance, of_pixel;
 };
@@ -71,7 +72,7 @@ Difference guided_difference(const Moments& g, const Moments& h, const Planes& v
   return {{m0 / weights, m1 / weights, m2 / weights}, variance / (weights * weights), of_pixel / weights};
 }
 
-/// The planes added up, border included.
+/// The sum of the planes, border included.
 Planes sum_of_planes(const Planes& p) {
   Planes sum(p.width(), p.height(), 1, p.border(), 0);
   parallel_for(p.height() + 2 * p.border(), 8, [&](int row) {

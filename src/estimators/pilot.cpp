@@ -36,7 +36,7 @@ Rgb guided_mean(const Moments& g, const Planes& image, const Planes* counts, int
   return {sum.r * inverse, sum.g * inverse, sum.b * inverse};
 }
 
-/// Stores the first n lanes of `values` at row y, columns x …
+/// Stores the first n lanes of `values` at row y, from column x on.
 void store_rgb(Planes& planes, int x, int y, int n, const Rgb& values) {
   const vfloat* v[3] = {&values.r, &values.g, &values.b};
   for (int c = 0; c < 3; ++c) {
@@ -59,7 +59,7 @@ Planes pilot_error(const Moments& g, const Moments& h, int window, int border) {
                              : guided_mean<false>(g, h.mean, nullptr, radius, x, y);
     const Rgb value = load_rgb(h.mean, x, y);
     const vfloat r = pilot.r - value.r, gg = pilot.g - value.g, b = pilot.b - value.b;
-    // [YM2025] Eq. (11) but for its factor n, which belongs to the groups (control_variates.h).
+    // [YM2025] Eq. (11) without its factor n, which belongs to the groups (control_variates.h).
     store_rgb(squares, x, y, n, {r * r, gg * gg, b * b});
   });
   return squares;

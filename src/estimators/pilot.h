@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Error of the independent image by a pilot estimate: Yang & Moon 2025, Eq. (11).
+// Error of the independent image, by a pilot estimate: Yang & Moon 2025, Eq. (11).
 #pragma once
 
 #include "filters/planes.h"
@@ -7,12 +7,12 @@
 namespace covary {
 
 /// (cross-bilateral mean of h over the window - h)^2 per channel, weights
-///   w_j = exp(-||g_j - g_i||^2 / variance of g_i),   the norm over RGB, the variance summed over RGB.
-/// `g`: moments of the CRN image with kFar outside; `h`: moments of the independent image with 0 outside. The result's
-/// border is `border` wide and kUseless. Bandwidth 0 (all CRN groups equal) gives weight 1 to pixels with exactly the
-/// same value, 0 to others.
+///   w_j = exp(-||g_j - g_i||^2 / variance of g_i),   norm over RGB, variance summed over RGB.
+/// `g`: moments of the CRN image with kFar outside; `h`: moments of the independent image with 0 outside. The result
+/// has a border of `border` pixels set to kUseless. Bandwidth 0 (all CRN groups equal) gives weight 1 to pixels with
+/// exactly the same value, 0 to others.
 ///
-/// Where pixels of the independent image have unequal counts n_j, weights are n_j w_j.
+/// If pixels of the independent image have unequal counts n_j, weights are n_j w_j.
 Planes pilot_error(const Moments& g, const Moments& h, int window, int border);
 
 }  // namespace covary

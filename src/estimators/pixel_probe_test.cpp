@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The control variates that a probe reports are those the estimate was made of.
+// The control variates that a probe reports are those that made the estimate.
 #include "estimators/estimator_result.h"
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@
 namespace covary {
 namespace {
 
-/// [YM2025] Eq. (7) with the coefficients of the probe.
+/// [YM2025] Eq. (7) with the probe's coefficients.
 reference::Rgb estimate_from(const PixelProbe& probe, const GroupedImage& crn, const GroupedImage& independent) {
   reference::Rgb f = reference::mean(crn, probe.x, probe.y);
   for (const ControlVariate& v : probe.control_variates) {
@@ -53,7 +53,7 @@ TEST(PixelProbe, ExplainsTheEstimate) {
 
 TEST(PixelProbe, LeavesOutPlacesOutsideTheFrame) {
   const test::Grouped crn = test::crn_image(4, 3, 12, 5),
-                      independent = test::independent_image(4, 3, 12, 5);  // twelve pixels for 25 control variates
+                      independent = test::independent_image(4, 3, 12, 5);  // fewer pixels than the 25 control variates
   IicvOptions options = IicvOptions::paper();
   PixelProbe probe{1, 1, {}};
   options.probe = &probe;

@@ -21,28 +21,28 @@ PixelRecords::PixelRecords(const ControlVariateInput& input, const ControlVariat
   for (int j = 1; j < T_; ++j) weights_[j] = 1.0f / std::sqrt(static_cast<float>(j) * static_cast<float>(j + 1));
 }
 
-/// Contrast j: (x_0 + … + x_{j-1} - j x_j) / sqrt(j (j + 1)). `squares`: sums of their squares per channel.
+/// Contrast j: (x_0 + … + x_{j-1} - j x_j) / sqrt(j (j + 1)). `squares`: sum of squared contrasts per channel.
 void PixelRecords::make_contrasts(const float* p, float* record, float* squares) const {
-  typedef float Rgb __attribute__((vector_size(4 * sizeof(float))));  // and one more, which is not used
+  typedef float Rgb __attribute__((vector_size(4 * sizeof(float))));  // the fourth lane is unused
   Rgb sum = {p[0], p[1], p[2], 0}, total = {};
   const auto add = [&](int j, Rgb value) {
     const Rgb contrast = (sum - static_cast<float>(j) * value) * weights_[j];
     sum += value;
     total += contrast * contrast;
-    std::memcpy(record + 3 * (j - 1), &contrast, sizeof contrast);  // what follows is written later
+    std::memcpy(record + 3 * (j - 1), &contrast, sizeof contrast);  // the spilled lane is overwritten later
   };
   for (int j = 1; j < T_ - 1; ++j) {
     Rgb value;
     std::memcpy(&value, p + 3 * j, sizeof value);
     add(j, value);
   }
-  const float* last = p + 3 * (T_ - 1);  // beyond it there may be nothing to read
+  const float* last = p + 3 * (T_ - 1);  // memory beyond it may not be readable
   if (T_ > 1) add(T_ - 1, Rgb{last[0], last[1], last[2], 0});
   for (int c = 0; c < 3; ++c) squares[c] = total[c];
 }
 
-/// The same for groups of unequal sizes, with weights w_t = size T / count of mean 1: with W = w_0 + … + w_{j-1},
-/// ((w_0 x_0 + … + w_{j-1} x_{j-1}) / W - x_j) sqrt(w_j W / (W + w_j)). The squares add up to sum w_t (x_t - mean)^2.
+/// Same for groups of unequal sizes, with weights w_t = size T / count, of mean 1: with W = w_0 + … + w_{j-1}, ((w_0
+/// x_0 + … + w_{j-1} x_{j-1}) / W - x_j) sqrt(w_j W / (W + w_j)). The squares sum to sum w_t (x_t - mean)^2.
 void PixelRecords::make_weighted_contrasts(const float* p, uint32_t count, float* record, float* squares) const {
   const auto weight = [&, unit = static_cast<float>(T_) / static_cast<float>(count)](int t) {
     return unit * static_cast<float>(group_size(count, T_, t));
@@ -60,7 +60,7 @@ void PixelRecords::make_weighted_contrasts(const float* p, uint32_t count, float
   }
 }
 
-/// For pixels whose weights w_t differ from their neighbours': sqrt(w_t) (x_t - mean).
+/// If weights w_t differ between pixels: sqrt(w_t) (x_t - mean).
 void PixelRecords::make_centred_means(const float* p, uint32_t count, const float* mean, float* record,
                                       float* squares) const {
   for (int t = 0; t < T_; ++t) {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a pixel contributes to the regressions of its neighbours (control_variates.h), contiguous in memory.
+// Per-pixel input of the regressions of its neighbours (control_variates.h), contiguous in memory.
 //
-// The T centred group means of a pixel span only T - 1 dimensions. They are replaced by T - 1 orthonormal contrasts
-// (Helmert), which have the same inner products: no centring, and systems of T - 1 instead of T rows. Weights of groups
-// turn that space; where they differ between pixels, the T weighted and centred means are kept.
+// The T centred group means of a pixel span only T - 1 dimensions. They are replaced by T - 1 orthonormal (Helmert)
+// contrasts, which have the same inner products: no centring, and systems of T - 1 instead of T rows. Group weights
+// rotate that space; if they differ between pixels, the T weighted and centred means are kept instead.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 
 namespace covary {
 
-/// Offsets in the record of a pixel.
+/// Offsets within a pixel's record.
 struct RecordLayout {
   /// `shared`: whether channels share their coefficients, and so their penalties.
   RecordLayout(int rows, bool condition, bool shared)
@@ -27,16 +27,16 @@ struct RecordLayout {
         group_variance(error + penalties),
         size(group_variance + penalties),
         stride((size + lanes::kLanes - 1) / lanes::kLanes * lanes::kLanes) {}
-  int penalties;        ///< 1: sums over the channels; 3: one for each
-  int group_contrasts;  ///< number of contrasts (or centred means) of the groups, all channels: [contrast][rgb], at 0
-  int contrasts;        ///< the same with the row of the condition, which acts like one more contrast
+  int penalties;        ///< 1: summed over channels; 3: one per channel
+  int group_contrasts;  ///< number of group contrasts (or centred means) in all channels: [contrast][rgb], at offset 0
+  int contrasts;        ///< same including the row of the mean constraint, which acts like one more contrast
   int difference;       ///< g - h
   int h_variance;       ///< variance of h
-  int missing;          ///< light that g lacks
-  int error;            ///< `penalties` of them: error variance of h for the penalty, times T
-  int group_variance;   ///< `penalties` of them: sample variance of the CRN groups
+  int missing;          ///< light missing from g
+  int error;            ///< `penalties` values: error variance of h for the penalty, times T
+  int group_variance;   ///< `penalties` values: sample variance of the CRN groups
   int size;
-  int stride;  ///< floats from a record to the next: whole vectors
+  int stride;  ///< floats from one record to the next: whole vectors
 };
 
 class PixelRecords {
@@ -47,14 +47,14 @@ class PixelRecords {
 
   const RecordLayout& layout() const { return layout_; }
 
-  /// Writes the record of a pixel, layout().size floats; of one outside the image, one that contributes nothing.
+  /// Writes the record of a pixel, layout().size floats; outside the image, a record that contributes nothing.
   void fill(int x, int y, float* record) const;
 
  private:
   void make_contrasts(const float* p, float* record, float* squares) const;
   void make_weighted_contrasts(const float* p, uint32_t count, float* record, float* squares) const;
   void make_centred_means(const float* p, uint32_t count, const float* mean, float* record, float* squares) const;
-  /// Three channels, or their sum.
+  /// Stores the three channels, or their sum.
   void put_penalties(const float* values, float* to) const;
   float missing(int c, int x, int y) const { return in_.missing ? in_.missing->row(c, y)[x] : 0.0f; }
 

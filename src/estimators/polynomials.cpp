@@ -13,14 +13,14 @@
 namespace covary {
 namespace {
 
-constexpr int kSize = 32;  // 28 functions of 6 dimensions, 3 channels, and one to fill rows of kLanes
+constexpr int kSize = 32;  // 28 functions in 6 dimensions, 3 channels, and one to fill rows of kLanes
 constexpr int kLanes = 8;
-constexpr size_t kBlock = 4;  // samples that are added at once, so that sums are loaded and stored less often
-/// Pivots of the normal matrix, relative to the number of samples, are near 1 for many samples. Below this the
+constexpr size_t kBlock = 4;  // samples added at once, to reduce loads and stores of the sums
+/// Pivots of the normal matrix, relative to the number of samples, are near 1 for many samples. Below this, the
 /// coordinates do not determine the coefficients.
 constexpr double kSmallestPivot = 1e-10;
 
-/// The functions of degree 1 and 2 at one point, orthonormal on [0, 1)^d.
+/// The basis functions of degree 1 and 2 at one point, orthonormal on [0, 1)^d.
 void evaluate_basis(const float* u, int dimensions, double* basis) {
   int n = 0;
   for (int i = 0; i < dimensions; ++i) basis[n++] = std::sqrt(3.0) * (2.0 * u[i] - 1);
@@ -52,12 +52,12 @@ Spectrum polynomials(std::span<const Spectrum> values, std::span<const float> co
   throw_if_any("polynomials", problems);
 
   const auto n = static_cast<double>(values.size());
-  double mean[3] = {0, 0, 0};  // of the values, and at the end the estimate
+  double mean[3] = {0, 0, 0};  // of the values; finally the estimate
   for (const Spectrum& value : values)
     for (int c = 0; c < 3; ++c) mean[c] += value[c];
   for (double& m : mean) m /= n;
 
-  // Inner products over the samples of the basis, the constant function last, and of the values less their mean.
+  // Inner products over the samples of the basis (constant function last) and of the values minus their mean.
   const int constant = options.n_coefficients() - 1, size = constant + 4;
   static_assert((PolynomialsOptions::kMaxDimensions + 1) * (PolynomialsOptions::kMaxDimensions + 2) / 2 + 3 <= kSize);
   alignas(64) double products[kSize][kSize] = {};
@@ -75,8 +75,8 @@ Spectrum polynomials(std::span<const Spectrum> values, std::span<const float> co
           for (size_t b = 0; b < kBlock; ++b) products[i][lane] += v[b][i] * v[b][lane];
   }
 
-  // Least squares by eliminating one function after the other. When only the constant one is left, its coefficient is
-  // the quotient of what is left of its products: the integral of the fit, as the integrals of all others are zero.
+  // Least squares by eliminating one function after another. Once only the constant remains, its coefficient is the
+  // quotient of its remaining products: the integral of the fit, as all other basis functions integrate to zero.
   const auto determined = [&](int k) { return products[k][k] > kSmallestPivot * n; };
   int k = 0;
   for (; k < constant && determined(k); ++k) {
@@ -87,7 +87,7 @@ Spectrum polynomials(std::span<const Spectrum> values, std::span<const float> co
       for (int j = k + 1; j <= i; ++j) products[i][j] -= factor * column[j];
     }
   }
-  // [Salaun2022]: the mean less sum beta_i (m_i - M_i).
+  // [Salaun2022]: the mean minus sum beta_i (m_i - M_i).
   if (k == constant && determined(constant))
     for (int c = 0; c < 3; ++c) mean[c] += products[constant + 1 + c][constant] / products[constant][constant];
   return {static_cast<float>(mean[0]), static_cast<float>(mean[1]), static_cast<float>(mean[2])};
@@ -98,7 +98,7 @@ Estimator make_polynomials(Settings& parameters) {
   parameters.whole("dimensions", o.dimensions, {.low = 1, .high = PolynomialsOptions::kMaxDimensions},
                    "How many of a path's first random numbers the polynomials depend on",
                    {.effect = OptionEffect::kPasses});
-  o.samples = std::numeric_limits<uint32_t>::max();  // until they are known
+  o.samples = std::numeric_limits<uint32_t>::max();  // placeholder until the number is known
   throw_if_any("polynomials", o.validate());
 
   Estimator estimator;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Polynomial control variates against a slow reference, exactness, degenerate input, noise and bias.
+// Polynomial control variates against a slow reference; exactness, degenerate input, noise and bias.
 #include "estimators/polynomials.h"
 
 #include <gtest/gtest.h>
@@ -26,7 +26,7 @@ struct Samples {
   Spectrum estimate() const { return polynomials(values, coordinates, dimensions); }
 };
 
-/// Coordinates are multiples of 2^-24, as those of paths.
+/// Coordinates are multiples of 2^-24, like those of paths.
 float uniform(std::mt19937& random) { return static_cast<float>(random() >> 8) * 0x1p-24f; }
 
 template <typename Function>
@@ -40,7 +40,7 @@ Samples sample(int n, int dimensions, std::mt19937& random, const Function& f) {
   return samples;
 }
 
-/// Mean of one channel and its standard deviation.
+/// Mean and standard deviation of one channel.
 std::pair<double, double> mean_of(const std::vector<Spectrum>& values, int channel) {
   statistics::Moments moments;
   for (const Spectrum& v : values) moments.add(v[channel]);
@@ -54,7 +54,7 @@ TEST(Polynomials, AgreesWithTheReference) {
   for (const int d : {1, 2, 3, 4, 5, 6})
     for (const int n : {5, 17, 24, 48, 64, 65, 128, 192, 1000}) {
       if (PolynomialsOptions{d, static_cast<uint32_t>(n)}.n_coefficients() >= n) continue;
-      // A trend, many black samples and a long tail, as pixels have.
+      // A trend, many black samples and a long tail, as in real pixels.
       const Samples samples = sample(n, d, random, [&](const float* u) {
         const float v = random() % 4 ? std::exp(2 * normal(random)) : 0;
         return Spectrum(v, 0.1f * v + u[0], 1 + u[0] * u[d - 1] * u[d - 1]);
@@ -88,12 +88,12 @@ TEST(Polynomials, IntegratesPolynomialsOfDegreeTwoExactly) {
     };
     for (const int n : {static_cast<int>(terms.size()) + 2, 200}) {
       const Samples samples = sample(n, d, random, f);
-      // Values have 24 bits, and with one sample more than coefficients their rounding is multiplied.
+      // Values have 24 bits; with one sample more than coefficients, their rounding is amplified.
       const double tolerance = n == 200 ? 1e-6 : 1e-3;
       for (int c = 0; c < 3; ++c)
         EXPECT_NEAR(samples.estimate()[c], expected[c], tolerance) << "d " << d << ", n " << n;
     }
-    // The planted bug: one degree more is not integrated exactly.
+    // Planted bug: a polynomial of one degree more is not integrated exactly.
     const Samples cubic = sample(200, d, random, [&](const float* u) { return f(u) + Spectrum(u[0] * u[0] * u[0]); });
     EXPECT_GT(std::abs(cubic.estimate().r - expected.r - 0.25), 1e-5);
   }
@@ -122,7 +122,7 @@ TEST(Polynomials, CoordinatesThatDetermineNothingLeaveTheMean) {
     EXPECT_NEAR(samples.estimate().r, mean_of(samples.values, 0).first, 1e-6);
   };
   Samples samples = sample(60, 3, random, f);
-  for (int s = 0; s < 60; ++s) samples.coordinates[3 * s + 2] = 0.25f;  // one number is always the same
+  for (int s = 0; s < 60; ++s) samples.coordinates[3 * s + 2] = 0.25f;  // one number is constant
   expect_mean(samples);
   samples = sample(60, 3, random, f);
   for (int s = 0; s < 60; ++s) samples.coordinates[3 * s + 1] = samples.coordinates[3 * s];  // two are equal
@@ -167,14 +167,14 @@ std::vector<double> legendre(const double* u) {
   return b;
 }
 
-/// What theory says of the estimator for smooth(), by quadrature.
+/// Theoretical properties of the estimator for smooth(), by quadrature.
 struct Theory {
   double integral = 0, variance = 0, residual_variance = 0;
-  double bias_times_n = 0;  ///< in the limit of many samples: -E[r |b|^2], r: residual of the best fit, b: the basis
+  double bias_times_n = 0;  ///< asymptotically: -E[r |b|^2], r: residual of the best fit, b: the basis
 };
 
 Theory theory() {
-  // Gauss-Legendre, 5 points: exact to degree 9 in each number.
+  // Gauss-Legendre, 5 points: exact up to degree 9 in each coordinate.
   const double a = std::sqrt(5 - 2 * std::sqrt(10.0 / 7)) / 3, b = std::sqrt(5 + 2 * std::sqrt(10.0 / 7)) / 3;
   const double wa = (322 + 13 * std::sqrt(70.0)) / 1800, wb = (322 - 13 * std::sqrt(70.0)) / 1800;
   const double nodes[5] = {(1 - b) / 2, (1 - a) / 2, 0.5, (1 + a) / 2, (1 + b) / 2};
@@ -210,8 +210,8 @@ Theory theory() {
   return t;
 }
 
-/// K pixels of n samples each. `scale` other than 1 plants a bug: coordinates that are not what the samples were made
-/// of.
+/// K pixels of n samples each. A `scale` other than 1 plants a bug: the coordinates are not those that made the
+/// samples.
 statistics::Moments many_pixels(int n, int k, float scale) {
   std::mt19937 random(5);
   statistics::Moments moments;
@@ -234,8 +234,8 @@ TEST(Polynomials, NoiseFallsAndTheBiasIsWhatTheorySays) {
   const double plain = std::sqrt(t.variance / kSamples);
   const statistics::Moments moments = many_pixels(kSamples, kPixels, 1);
 
-  // That of the residual's mean is the least there can be; fitting 15 coefficients adds about a tenth, and more where
-  // residuals are large far from the middle.
+  // The variance of the mean residual is the lower bound; fitting 15 coefficients adds about a tenth, and more if
+  // residuals are large far from the centre.
   const double least = t.residual_variance / kSamples;
   EXPECT_GT(moments.sample_variance(), 0.95 * least);
   EXPECT_LT(moments.sample_variance(), 1.3 * least);
@@ -244,7 +244,7 @@ TEST(Polynomials, NoiseFallsAndTheBiasIsWhatTheorySays) {
   EXPECT_LT(
       statistics::smallest_detectable(std::sqrt(moments.sample_variance()), kPixels, statistics::test_alpha(), 0.99),
       0.01 * plain);
-  // Terms of order 1 / n^2 are at most a part of 2 * 15 / n of the first.
+  // Terms of order 1 / n^2 are at most a fraction 2 * 15 / n of the first.
   const double bias = t.bias_times_n / kSamples, slack = std::abs(bias) * 30 / kSamples;
   const statistics::TestResult right = statistics::z_test(moments.mean(), moments.variance_of_mean(), t.integral + bias,
                                                           statistics::test_alpha(), slack);

@@ -14,23 +14,23 @@
 namespace covary {
 namespace {
 
-constexpr uint32_t kMost = 1u << 30;  // samples of any pixel
+constexpr uint32_t kMost = 1u << 30;  // maximum samples of any pixel
 constexpr double kOffset = 0.01;      // of squared brightness
 constexpr double kLeastShare = 0.7, kLargestShare = 2;
-constexpr double kDamping = 0.5;  // power of the relative deviation that least-error is proportional to
+constexpr double kDamping = 0.5;  // exponent of e for least-error
 // Limits and window of kDenoised.
 constexpr double kLeastOfFiltered = 0.5, kLargestOfFiltered = 4;
 constexpr int kFilteredWindow = 15;
 constexpr int kBisections = 60;
 
-/// Rounding up must not follow from the last bits of a power or a logarithm.
+/// Rounding up must not depend on the last bits of a power or logarithm.
 double rounded_up(double samples) { return std::ceil(samples - 1e-6); }
 
-/// What pixels want for a factor s: demand s - already, before limits and rounding.
+/// Samples that pixels demand for a factor s: of_pixel s - already, before limits and rounding.
 struct Demand {
   std::vector<double> of_pixel;
-  double already = 0;    ///< samples that count, too
-  double for_error = 0;  ///< factor that leads to the relative error, where one is given
+  double already = 0;    ///< samples that already count
+  double for_error = 0;  ///< the factor that gives the relative error, if one is given
 };
 
 /// Brightness |C| of each pixel.
@@ -43,8 +43,8 @@ Planes brightness(const FilterInput& input) {
   return plane;
 }
 
-/// (3 sigma)^2 / |C|^2 of each pixel, of [Csonka2002] Sec. 5, N = (3 sigma / (eps |C|))^2 - n; other allocations than
-/// equal-error average |C|, too, and add 0.01 to its square.
+/// (3 sigma)^2 / |C|^2 of each pixel, as in [Csonka2002] Sec. 5, N = (3 sigma / (eps |C|))^2 - n; except for
+/// equal-error, with |C| averaged as well and 0.01 added to its square.
 std::vector<double> squared_errors(const GroupedImage& image, const CountOptions& options) {
   long n_nonfinite = 0;
   const std::vector<unsigned char> valid = finite_pixels(image, image, n_nonfinite);
@@ -108,15 +108,15 @@ Demand demand_of(const GroupedImage& image, const CountOptions& options, std::sp
     std::fill(errors.begin(), errors.end(), 1.0);
   demand.of_pixel = std::move(errors);
   if (options.tops_up) demand.already = mean_count(image);
-  // Mean of squared error / (s share), the share being one on average; exact for uniform counts.
+  // Mean of squared error / (s share), where shares have mean one; exact for uniform counts.
   demand.for_error = mean_square * per_error;
   return demand;
 }
 
-/// The published filter averages pixels of equal numbers only, so that uniform ones may not differ at all.
+/// The published filter averages only pixels with equal numbers, so that uniform ones must not differ at all.
 bool all_equal(const CountOptions& options) { return options.classes && options.allocation == Allocation::kUniform; }
 
-/// Turns demands into numbers.
+/// Converts demands to numbers of samples.
 class Rounding {
  public:
   Rounding(const CountOptions& options, uint32_t multiple)
@@ -139,7 +139,7 @@ class Rounding {
 
 std::vector<uint32_t> counts_for(const Demand& demand, double factor, const Rounding& rounding) {
   std::vector<uint32_t> counts(demand.of_pixel.size());
-  // N[p] of [Csonka2002] Sec. 5, with 1 / eps^2 as the factor; below zero it is none, and classes are rounded up.
+  // N[p] of [Csonka2002] Sec. 5, with 1 / eps^2 as the factor; negative results become zero; rounded up to classes.
   for (size_t i = 0; i < counts.size(); ++i) counts[i] = rounding(factor * demand.of_pixel[i] - demand.already);
   return counts;
 }
@@ -148,7 +148,7 @@ double sum_of(const std::vector<uint32_t>& counts) {
   return static_cast<double>(std::accumulate(counts.begin(), counts.end(), uint64_t{0}));
 }
 
-/// Numbers that add up to `total`, or come near as limits allow; fewer where pixels of equal demand may not differ.
+/// Numbers that sum to `total`, as nearly as limits allow; fewer if pixels of equal demand must not differ.
 std::vector<uint32_t> counts_within(const Demand& demand, double total, const Rounding& rounding, bool may_differ) {
   double low = -30 * std::log(10.0), high = 40 * std::log(10.0);
   std::vector<uint32_t> fewer = counts_for(demand, std::exp(low), rounding), more;
@@ -163,7 +163,7 @@ std::vector<uint32_t> counts_within(const Demand& demand, double total, const Ro
     (too_many ? more : fewer) = std::move(counts);
   }
   if (!may_differ) return fewer;
-  // Pixels of equal demand step together. As many of them as the total allows take the step, spread evenly.
+  // Pixels of equal demand step together. Let as many of them step as the total allows, evenly spread.
   const double part = (total - sum_of(fewer)) / (sum_of(more) - sum_of(fewer));
   double due = 0;
   for (size_t i = 0; i < fewer.size(); ++i) {

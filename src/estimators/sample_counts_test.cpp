@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Numbers of samples from the noise of a first pass: budgets, classes, limits, and images without noise.
+// Numbers of samples from the noise of a first pass: budgets, classes, limits, and noise-free images.
 #include "estimators/sample_counts.h"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ using test_support::contains, test_support::message_of;
 constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 constexpr int kWidth = 40, kHeight = 25;
 
-/// Two groups of one sample each, brightness 0.1 … 5, relative deviations 0.02 … 3.
+/// Two groups of one sample each, brightness 0.1 … 5, relative standard deviations 0.02 … 3.
 test::Grouped noisy_first_pass() {
   test::Grouped image = test::constant_image(kWidth, kHeight, 2, 0);
   for (int y = 0; y < kHeight; ++y)
@@ -78,7 +78,7 @@ TEST(SampleCounts, MeetTheBudget) {
 TEST(SampleCounts, UniformIsTheSameForAll) {
   const test::Grouped image = noisy_first_pass();
   for (const uint32_t n : sample_counts(image.view(), 43, options_of(Allocation::kUniform))) EXPECT_EQ(n, 43u);
-  // The published filter leaves out neighbours with other numbers, so that a pattern of two classes would disable it.
+  // The published filter ignores neighbours with other numbers, so that a pattern of two classes would disable it.
   CountOptions classes = options_of(Allocation::kUniform);
   classes.classes = true;
   for (const double budget : {43.0, 43.9})
@@ -150,7 +150,7 @@ TEST(SampleCounts, LeastErrorIsProportionalToTheRootOfRelativeDeviation) {
     EXPECT_NEAR(counts[p], 10000 * shares[p] / mean_share, 2 + 1e-4 * counts[p]) << p;
 }
 
-/// The error that was asked for is the root of the mean square of what all pixels have.
+/// The requested error is the root mean square over all pixels.
 TEST(SampleCounts, UniformHasTheRelativeErrorOnAverage) {
   const test::Grouped image = noisy_first_pass();
   CountOptions options = options_of(Allocation::kUniform);
@@ -231,7 +231,7 @@ TEST(SampleCounts, SayWhatIsWrong) {
   EXPECT_TRUE(contains(message(options), "min-spp is -1"));
 }
 
-/// Four times the squared error, twice the samples, those of the first pass among them; limits on both sides.
+/// Four times the squared error, twice the samples, including those of the first pass; limits on both sides.
 TEST(SampleCounts, OfAFilteredImageFollowTheRootOfItsErrorAndTopUp) {
   constexpr int kSide = 96, kFirst = 8;
   const test::Grouped first = test::constant_image(kSide, kSide, kFirst, 1);

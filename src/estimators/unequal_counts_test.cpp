@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Counts of samples: groups of unequal sizes within a pixel, and pixels with unequal counts. Where all is equal, counts
-// change no bit; elsewhere estimators agree with the double-precision reference, which weights as their headers say.
+// Counts of samples: groups of unequal sizes within a pixel, and pixels with unequal counts. If all are equal, counts
+// do not change a bit; otherwise estimators agree with the double-precision reference, weighted as their headers say.
 #include <gtest/gtest.h>
 
 #include "core/error.h"
@@ -24,7 +24,7 @@ using test_support::contains, test_support::message_of;
 
 constexpr int kWidth = 41, kHeight = 27, kGroups = 12;
 
-/// The same count everywhere, or, with `spread`, counts from `count` to count + spread - 1 like noise.
+/// The same count everywhere or, with `spread`, pseudo-random counts from `count` to count + spread - 1.
 test::Grouped with_counts(test::Grouped image, uint32_t count, uint32_t spread = 1) {
   image.counts.resize(static_cast<size_t>(image.width) * image.height);
   for (size_t i = 0; i < image.counts.size(); ++i)
@@ -61,7 +61,7 @@ TEST(UnequalCounts, EqualOnesChangeNoBit) {
   EXPECT_EQ(a.mean_difference_sigmas, b.mean_difference_sigmas);
 }
 
-/// What the reference makes of defaults or of the published settings.
+/// Results of the reference for the defaults or the published settings.
 struct Expected {
   RgbImage estimate, std_error;
 };
@@ -87,7 +87,7 @@ Expected reference_result(const GroupedImage& crn, const GroupedImage& independe
   return expected;
 }
 
-// Groups of sizes 1 and 2, in both images; counts that differ between pixels of the independent image, of both, and of
+// Groups of sizes 1 and 2 in both images; counts that differ between pixels of the independent image, of both, and of
 // the CRN image only.
 TEST(UnequalCounts, IicvAgreesWithTheReference) {
   const test::Grouped crn = crn_image(), independent = independent_image();
@@ -117,7 +117,7 @@ TEST(UnequalCounts, IicvAgreesWithTheReference) {
   }
 }
 
-// Parts of an image whose counts differ only elsewhere must give the bits of the whole.
+// Parts of an image whose counts differ only elsewhere must have the bits of the whole.
 TEST(UnequalCounts, APartWithEqualCountsGivesTheBitsOfTheWhole) {
   test::Grouped crn = test::crn_image(40, 260, 6, 1), independent = test::independent_image(40, 260, 6, 2);
   independent.counts.assign(static_cast<size_t>(40) * 260, 12);
@@ -134,10 +134,10 @@ TEST(UnequalCounts, APartWithEqualCountsGivesTheBitsOfTheWhole) {
       for (int c = 0; c < 3; ++c) ASSERT_EQ(all.estimate.pixel(x, y)[c], part.estimate.pixel(x, y)[c]) << y;
 }
 
-// Group means of samples with variance 1/12: the squared standard error must be (1/12) / N on average, for the
-// estimator of the mean and for the moments that the others are made of. Of 40,000 pixels and T - 1 degrees of freedom
-// each, the average has a relative standard deviation of at most sqrt(2 / 40000) = 0.007; six of them are allowed.
-// Without weights it is too large by up to 12.5 % (sizes 1 and 2, half and half).
+// Group means of samples with variance 1/12: the squared standard error must be (1/12) / N on average, for the mean
+// estimator and for the moments used by the others. Over 40,000 pixels with T - 1 degrees of freedom each, the average
+// has a relative standard deviation of at most sqrt(2 / 40000) = 0.007; six of them are allowed. Without weights it is
+// too large by up to 12.5 % (sizes 1 and 2, half of each).
 TEST(UnequalCounts, VariancesOfMeansAreUnbiased) {
   constexpr int kSide = 200;
   for (const auto& [groups, count] : {std::pair{2, 3u}, {8, 12u}, {12, 13u}, {12, 23u}}) {
