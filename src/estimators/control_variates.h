@@ -102,8 +102,8 @@ inline constexpr const char* kExcludeTargetHelp = "Leave the target out of its o
 inline constexpr std::pair<const char*, bool> kCoefficients[] = {{"shared", true}, {"per-channel", false}};
 inline constexpr const char* kCoefficientsHelp = "One coefficient for all channels, or one per channel";
 
-/// Estimator::reliable_samples of Eq. (8) of [YM2025]. Measured on crops of three scenes, 8 to 192 samples per pixel, 6
-/// seeds (docs/notes/iicv.md): with fewer, IICV as published predicts 0.3 to 0.6 of its true squared error.
+/// Estimator::reliable_samples for Eq. (8) of [YM2025]. Measured on crops of three scenes, 8 to 192 samples per pixel,
+/// 6 seeds (docs/notes/iicv.md): with fewer samples, IICV as published predicts 0.3 to 0.6 of its true squared error.
 inline constexpr uint32_t kReliableSamples = 48;
 
 }  // namespace covary

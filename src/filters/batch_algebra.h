@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Small dense linear algebra for kLanes systems of the same size at once, one per lane: Gram matrix, Cholesky
-// factorisation, solve. Lower triangles are packed by rows: element (i, j), j <= i, at i (i + 1) / 2 + j.
+// Small dense linear algebra on kLanes systems of the same size at once, one per lane: Gram matrix, Cholesky
+// factorisation, solve. Lower triangles are packed by rows: element (i, j), j <= i, is at i (i + 1) / 2 + j.
 #pragma once
 
 #include <cstddef>
@@ -16,11 +16,11 @@ constexpr size_t packed_size(size_t n) { return packed(n, 0); }
 
 namespace detail {
 
-// Register tile: kTile x kTile accumulators and kTile operands. Its loops are unrolled, so that it stays in registers.
+// Register tile: kTile x kTile accumulators and kTile operands. Loops over it are unrolled, to keep it in registers.
 inline constexpr int kTile = lanes::kLanes == 16 ? 5 : 3;
 
-/// Calls tile.template operator()<N>(i), N = kTile, for the rows i, i + N, … from `begin` on, and with what is left of
-/// the rows before `end`, if any.
+/// Calls tile.template operator()<N>(i), N = kTile, for rows i, i + N, … from `begin` on, and once more with a smaller
+/// N for the remaining rows before `end`, if any.
 template <int N = kTile, typename Tile>
 inline void for_each_tile(int begin, int end, const Tile& tile) {
   int i = begin;
@@ -29,7 +29,7 @@ inline void for_each_tile(int begin, int end, const Tile& tile) {
     if (i < end) for_each_tile<N - 1>(i, end, tile);
 }
 
-/// Rows [i0, i0 + NA), columns [j0, j0 + NB) of the matrix of products, where i0 >= j0 + NB or i0 = j0, NA = NB.
+/// Rows [i0, i0 + NA), columns [j0, j0 + NB) of the Gram matrix, where either i0 >= j0 + NB, or i0 = j0 and NA = NB.
 template <int NA, int NB, bool diagonal>
 inline void gram_tile(const vfloat* X, ptrdiff_t row, ptrdiff_t sum, int n, int i0, int j0, vfloat* G) {
   const vfloat *A = X + i0 * row, *B = X + j0 * row;
@@ -62,8 +62,8 @@ inline void gram_tile(const vfloat* X, ptrdiff_t row, ptrdiff_t sum, int n, int 
 
 }  // namespace detail
 
-/// Lower triangle of the m x m matrix of inner products of m vectors of length n; element s of vector i lies at
-/// X[i * row + s * sum].
+/// Lower triangle of the m x m matrix of inner products of m vectors of length n; element s of vector i is at X[i * row
+/// + s * sum].
 inline void gram(const vfloat* X, ptrdiff_t row, ptrdiff_t sum, int m, int n, vfloat* G) {
   using namespace detail;
   for_each_tile(0, m, [&]<int NA>(int i) {
@@ -114,7 +114,7 @@ inline vfloat residual_squares(const vfloat* X, ptrdiff_t row, ptrdiff_t sum, co
 
 namespace detail {
 
-/// What columns before j0 of the Cholesky factor leave of rows [i0, i0 + NA), columns [j0, j0 + NB).
+/// Rows [i0, i0 + NA), columns [j0, j0 + NB), after subtracting columns before j0 of the Cholesky factor.
 template <int NA, int NB, bool diagonal>
 inline void subtract_columns(const vfloat* G, int i0, int j0, vfloat (&c)[NA][NB]) {
   const vfloat *A[NA], *B[NB];
@@ -144,8 +144,7 @@ inline void subtract_columns(const vfloat* G, int i0, int j0, vfloat (&c)[NA][NB
   }
 }
 
-/// Columns [j0, j0 + NB) of the factor, those before being known: the block on the diagonal, whose pivots are inverted
-/// into `inverse`.
+/// Columns [j0, j0 + NB) of the factor, given those before: the diagonal block, whose inverted pivots go to `inverse`.
 template <int NB>
 inline void factor_diagonal(vfloat* G, const vfloat* shift, int j0, vfloat* inverse) {
   vfloat c[NB][NB];
@@ -167,7 +166,7 @@ inline void factor_diagonal(vfloat* G, const vfloat* shift, int j0, vfloat* inve
   }
 }
 
-/// The rows [i0, i0 + NA) of these columns, below that block.
+/// Rows [i0, i0 + NA) of the same columns, below the diagonal block.
 template <int NA, int NB>
 inline void factor_rows(vfloat* G, int i0, int j0, const vfloat* inverse) {
   vfloat c[NA][NB];
@@ -185,7 +184,7 @@ inline void factor_rows(vfloat* G, int i0, int j0, const vfloat* inverse) {
 
 }  // namespace detail
 
-/// x = L^-T x, by columns of L^T, that is by rows of L. `L`, `inverse`: what solve_shifted leaves.
+/// x = L^-T x, by columns of L^T, that is, by rows of L. `L`, `inverse`: as left by solve_shifted.
 inline void substitute_back(const vfloat* L, const vfloat* inverse, int m, vfloat* x) {
   for (int j = m - 1; j >= 0; --j) {
     const vfloat* const Lj = L + packed(j, 0);
@@ -195,13 +194,13 @@ inline void substitute_back(const vfloat* L, const vfloat* inverse, int m, vfloa
 }
 
 /// Solves (G + diag(shift)) x = b for positive semidefinite G and m positive shifts. `G`: packed, m rows, with room for
-/// 1 + n_more rows; on return it holds, below the diagonal, the Cholesky factor L. `bx`: b on entry, x on return.
-/// `inverse`: receives the inverses of the m diagonal elements of L. In exact arithmetic no pivot is below its shift;
-/// rounding is kept from going there. `n_more` right-hand sides b' in the first m elements of rows m + 1, … are
-/// replaced by L^-1 b'.
+/// 1 + n_more further rows; on return it holds, below the diagonal, the Cholesky factor L. `bx`: b on entry, x on
+/// return. `inverse`: receives the inverses of the m diagonal elements of L. In exact arithmetic no pivot is below its
+/// shift; rounding is prevented from violating that. `n_more` right-hand sides b' in the first m elements of rows m +
+/// 1, … are replaced by L^-1 b'.
 inline void solve_shifted(vfloat* G, const vfloat* shift, int m, vfloat* bx, vfloat* inverse, int n_more = 0) {
   using namespace detail;
-  // b is carried along as row m, which then holds L^-1 b.
+  // b is appended as row m, which then holds L^-1 b.
   vfloat* const last = G + packed(m, 0);
   for (int j = 0; j < m; ++j) last[j] = bx[j];
   const int n_rows = m + 1 + n_more;
@@ -215,8 +214,8 @@ inline void solve_shifted(vfloat* G, const vfloat* shift, int m, vfloat* bx, vfl
 
 namespace detail {
 
-/// Sums of squares of the columns [j0, j0 + N) of L^-1, by forward substitution of all at once. `columns`: scratch for
-/// N m vectors.
+/// Sums of squares of columns [j0, j0 + N) of L^-1, by simultaneous forward substitution. `columns`: scratch for N m
+/// vectors.
 template <int N>
 inline void inverse_squares(const vfloat* L, const vfloat* inverse, int m, int j0, vfloat* columns,
                             vfloat (&squares)[N]) {
@@ -224,7 +223,7 @@ inline void inverse_squares(const vfloat* L, const vfloat* inverse, int m, int j
   for (int i = j0; i < m; ++i) {
     const vfloat* const Li = L + packed(i, 0);
     vfloat* const row = columns + static_cast<ptrdiff_t>(i) * N;
-    // Terms q - j of one parity together; columns are zero above the diagonal.
+    // Terms with q - j of equal parity are summed together; columns are zero above the diagonal.
     vfloat sums[2][N] = {};
     int q = j0;
     for (; q + 1 < i; q += 2) {
@@ -255,10 +254,10 @@ inline void inverse_squares(const vfloat* L, const vfloat* inverse, int m, int j
 
 }  // namespace detail
 
-/// Columns of an inverse factor at once.
+/// Columns of an inverse factor computed at once.
 inline constexpr int kColumnsAtOnce = 4;
 
-/// Sum of weight_i (A^-1)_ii for A = G + diag(shift), from what solve_shifted leaves. `columns`: scratch for
+/// Sum of weight_i (A^-1)_ii for A = G + diag(shift), from the results of solve_shifted. `columns`: scratch for
 /// kColumnsAtOnce m vectors.
 inline vfloat inverse_trace(const vfloat* L, const vfloat* inverse, const vfloat* weight, int m, vfloat* columns) {
   // A^-1 = L^-T L^-1

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lanes and the algebra of many small systems, against the standard library and Eigen in double precision.
+// Lanes and batched algebra, against the standard library and Eigen in double precision.
 #include "filters/batch_algebra.h"
 
 #include <gtest/gtest.h>
@@ -65,7 +65,7 @@ TEST(BatchAlgebra, GramAndSolveAgreeWithEigen) {
         std::vector<vfloat> shift(m);
         for (int i = 0; i < m; ++i)
           for (int l = 0; l < kLanes; ++l) shift[i][l] = 0.8f + test::noise(m + 60, i, l);
-        // Two more right-hand sides: the same, and twice that.
+        // Two more right-hand sides: the same, and twice it.
         vfloat* const more[] = {&solved[batch::packed(m + 1, 0)], &solved[batch::packed(m + 2, 0)]};
         for (int i = 0; i < m; ++i) more[0][i] = b[i], more[1][i] = 2 * b[i];
         batch::solve_shifted(solved.data(), shift.data(), m, x.data(), inverse.data(), 2);
@@ -100,7 +100,7 @@ TEST(BatchAlgebra, GramAndSolveAgreeWithEigen) {
   }
 }
 
-/// Products and residuals of vectors stored by rows and by columns, for every rest of a register tile.
+/// Products and residuals of vectors stored by rows and by columns, for every remainder of a register tile.
 TEST(BatchAlgebra, ProductsAndResidualsAgreeWithEigen) {
   for (int m : {1, 2, 3, 4, 5, 7, 25})
     for (int n : {1, 2, 6, 11, 13, 36})
@@ -127,7 +127,7 @@ TEST(BatchAlgebra, ProductsAndResidualsAgreeWithEigen) {
       }
 }
 
-/// Rank 1 with 1e7 times the shift: rounding would make pivots negative; the solution must stay near the exact one.
+/// Rank 1 with 1e7 times the shift: rounding would make pivots negative; the solution must stay close to the exact one.
 TEST(BatchAlgebra, SolveSurvivesNearlySingularSystems) {
   const int m = 12;
   std::vector<vfloat> X(m), G(batch::packed_size(m + 1)), b(m), inverse(m);

@@ -21,8 +21,8 @@ Spectrum mean_of(const GroupedImage& image, int x, int y) {
   return {static_cast<float>(sum[0] * scale), static_cast<float>(sum[1] * scale), static_cast<float>(sum[2] * scale)};
 }
 
-/// Variance of one sample as a scalar: (sum of the channels' standard deviations)^2, the most that the variance of
-/// colour_length() can be, and exact where channels vary in proportion.
+/// Variance of one sample as a scalar: (sum of the channels' standard deviations)^2, an upper bound on the variance of
+/// colour_length(), exact if channels vary proportionally.
 float scalar_variance(const Spectrum& variance) {
   const float sum = std::sqrt(variance.r) + std::sqrt(variance.g) + std::sqrt(variance.b);
   return sum * sum;
@@ -57,7 +57,7 @@ Planes mean_planes(const GroupedImage& image, const std::vector<unsigned char>& 
 Planes box_mean(const Planes& image, const std::vector<unsigned char>& valid, int window, int border, float outside,
                 int plane) {
   const int width = image.width(), height = image.height(), radius = window / 2;
-  // Of each row the sums of its windows and how many valid pixels these have.
+  // For each row, the sums over its windows and their numbers of valid pixels.
   const auto pixels = static_cast<size_t>(width);
   std::vector<double> sums(valid.size());
   std::vector<int> numbers(valid.size());

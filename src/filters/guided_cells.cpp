@@ -9,8 +9,8 @@ using namespace lanes;
 
 namespace {
 
-constexpr float kBandwidth = 0.5f;     // of the target's brightness
-constexpr float kLeastSquare = 1e-4f;  // of the bandwidth
+constexpr float kBandwidth = 0.5f;     // relative to the target's brightness
+constexpr float kLeastSquare = 1e-4f;  // minimum squared bandwidth
 
 }  // namespace
 

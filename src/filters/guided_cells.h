@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sums of what pixels contribute, by square cells, with the means of a guide; and over pixels that look like a target:
-// of cells of 4 x 4 pixels, in a window of 15 x 15 cells,
-//     w_ij = exp(-||G_j - G_i||^2 / ((0.5 G'_i)^2 + 1e-4)),   G: a guide, G'_i: mean of its channels at the target.
+// Sums of per-pixel contributions over square cells, with the means of a guide image; and sums over similar pixels:
+// over cells of 4 x 4 pixels, in a window of 15 x 15 cells, with weights
+//     w_ij = exp(-||G_j - G_i||^2 / ((0.5 G'_i)^2 + 1e-4)),   G: guide, G'_i: mean of its channels at the target.
 #pragma once
 
 #include <algorithm>
@@ -12,9 +12,9 @@
 namespace covary {
 
 /// `count` sums over the valid pixels of each cell of side x side pixels: planes 0 to 2 are the means of the guide,
-/// kFar in cells without valid pixels and in the border, planes from 3 on the sums. A row of cells is a row; column x
-/// holds the cell of pixel x. `border`: in columns, and rows of cells. `add(x, y, sums)` adds what the valid pixel
-/// contributes to the sums of its cell; called from any thread.
+/// kFar in cells without valid pixels and in the border; the sums are in planes 3 and up. A row of cells is one row;
+/// column x holds the cell that contains pixel x. `border`: in columns, and in rows of cells. `add(x, y, sums)` adds
+/// the contribution of a valid pixel to the sums of its cell; called from any thread.
 template <typename Add>
 Planes sums_by_cell(int side, int border, const Image& guide, const std::vector<unsigned char>& valid, int count,
                     const Add& add) {
@@ -35,7 +35,7 @@ Planes sums_by_cell(int side, int border, const Image& guide, const std::vector<
           add(x, y, sums.data());
         }
       if (n == 0) continue;
-      // Beyond the last column, too: neighbouring cells are read a multiple of `side` from any column of a cell.
+      // Beyond the last column as well: neighbouring cells are read at multiples of `side` from any column of a cell.
       for (int x = x0; x < x0 + side; ++x) {
         for (int c = 0; c < 3; ++c) cells.row(c, row)[x] = mean[c] / n;
         for (int i = 0; i < count; ++i) cells.row(3 + i, row)[x] = sums[static_cast<size_t>(i)];
@@ -47,7 +47,7 @@ Planes sums_by_cell(int side, int border, const Image& guide, const std::vector<
 
 class GuidedCells {
  public:
-  /// `count`, `add`: as of sums_by_cell().
+  /// `count`, `add`: as for sums_by_cell().
   template <typename Add>
   GuidedCells(const Image& guide, const std::vector<unsigned char>& valid, int count, const Add& add)
       : guide_(guide), count_(count), cells_(sums_by_cell(kCell, kReach, guide, valid, count, add)) {}
@@ -56,7 +56,7 @@ class GuidedCells {
   void sum(int x, int y, lanes::vfloat* sums) const;
 
  private:
-  static constexpr int kCell = 4, kRadius = 7;  // side of a cell, in pixels; of the window, in cells
+  static constexpr int kCell = 4, kRadius = 7;  // side of a cell in pixels; radius of the window in cells
   static constexpr int kReach = kCell * kRadius;
   const Image& guide_;
   int count_;

@@ -12,13 +12,14 @@ namespace {
 
 constexpr int kRadius = 8;
 constexpr float kSpatial = 4, kAlbedo = 0.1f, kNormal = 0.3f;  // standard deviations
-constexpr int kGuides = 6, kFinite = 9, kCount = 10;           // planes: guides, RGB, 1 where RGB is finite or 0
+constexpr int kGuides = 6, kFinite = 9, kCount = 10;           // planes: guides, RGB, 1 where RGB is finite, otherwise
+                                                               // 0
 
 bool same_size(const Image& a, const Image& b) {
   return a.width == b.width && a.height == b.height && a.channels == 3 && b.channels == 3;
 }
 
-/// Guides in units in which a distance d has the weight 2^(-d²), and the image; zeros outside.
+/// The guides, scaled such that a distance d has weight 2^(-d²), and the image; zeros outside.
 Planes planes_of(const Image& rgb, const Image& albedo, const Image& normal) {
   Planes planes(rgb.width, rgb.height, kCount, kRadius, 0);
   const auto unit = [](float deviation) { return std::sqrt(0.5f * lanes::kLog2E) / deviation; };

@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kSide = 24;
 
-/// Every pixel as `value(x, y)`, in all channels.
+/// An image with `value(x, y)` in all channels.
 template <typename Value>
 Image image(const Value& value) {
   Image result(kSide, kSide, 3);
@@ -43,7 +43,7 @@ TEST(JointBilateral, KeepsEdgesOfAlbedoAndNormal) {
     EXPECT_LT(result.pixel(kSide / 2 - 1, 5)[0], 0.02f);
     EXPECT_GT(result.pixel(kSide / 2, 5)[0], 0.98f);
   }
-  // Without a guide the edge is lost.
+  // Without a guide, the edge is lost.
   EXPECT_GT(joint_bilateral(image(step), constant(0.5f), constant(0)).pixel(kSide / 2 - 1, 5)[0], 0.3f);
 }
 

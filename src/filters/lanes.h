@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Vectors of kLanes floats, one lane per pixel, so that per-pixel algebra reads like scalar code. They are compiler
-// vectors (GCC, Clang): plain operators, any instruction set. A lane never looks at another one, hence results do not
-// depend on which pixels share a vector.
+// Vectors of kLanes floats, one lane per pixel, so that per-pixel algebra reads like scalar code. Compiler vector
+// extensions (GCC, Clang): plain operators, any instruction set. Lanes never interact, so results do not depend on
+// which pixels share a vector.
 #pragma once
 
 #include <algorithm>
@@ -29,7 +29,7 @@ typedef int32_t vint __attribute__((vector_size(sizeof(int32_t) * kLanes)));
 inline vfloat splat(float value) { return vfloat{} + value; }
 inline vint splat_int(int32_t value) { return vint{} + value; }
 
-/// Loads and stores need no alignment.
+/// Unaligned loads and stores.
 inline vfloat load(const float* p) {
   vfloat v;
   std::memcpy(&v, p, sizeof v);
@@ -37,7 +37,7 @@ inline vfloat load(const float* p) {
 }
 inline void store(float* p, vfloat v) { std::memcpy(p, &v, sizeof v); }
 
-/// Keeps v in a register. Compilers rather read it from memory again for each of its uses, which then wait for loads.
+/// Keeps v in a register. Compilers tend to reload it from memory for each use, which makes the uses wait for loads.
 inline void keep_in_register([[maybe_unused]] vfloat& v) {
 #if defined(__AVX512F__) || defined(__AVX__)
   asm("" : "+v"(v));
@@ -47,9 +47,9 @@ inline void keep_in_register([[maybe_unused]] vfloat& v) {
 inline vint bits(vfloat v) { return reinterpret_cast<vint>(v); }
 inline vfloat from_bits(vint v) { return reinterpret_cast<vfloat>(v); }
 
-/// a > b ? a : b and a < b ? a : b; compilers make comparisons and blends of these, which take longer.
+/// a > b ? a : b and a < b ? a : b, which compilers turn into slower comparisons and blends.
 #ifdef __AVX512F__
-inline constexpr __mmask16 kAll = 0xffff;  // functions with masks, which are not used, because of GCC bug 105593
+inline constexpr __mmask16 kAll = 0xffff;  // masked intrinsics with all lanes set, because of GCC bug 105593
 inline vfloat max(vfloat a, vfloat b) { return _mm512_maskz_max_ps(kAll, a, b); }
 inline vfloat min(vfloat a, vfloat b) { return _mm512_maskz_min_ps(kAll, a, b); }
 #else
@@ -72,7 +72,7 @@ inline vfloat sqrt(vfloat v) {
   return r;
 }
 
-/// 1 / v for v of 1e-37 to 1e37, relative error below 2e-7.
+/// 1 / v for v from 1e-37 to 1e37, relative error below 2e-7.
 inline vfloat reciprocal(vfloat v) {
 #ifdef __AVX512F__
   const vfloat r = _mm512_maskz_rcp14_ps(kAll, v);
@@ -82,8 +82,8 @@ inline vfloat reciprocal(vfloat v) {
 #endif
 }
 
-/// While one lives, results of its thread that are too small for a normal float (below 1.2e-38) are zero. Products of
-/// Gaussian weights are often so small, and some processors take a hundred times longer for them.
+/// While an object exists, results in its thread too small for a normal float (below 1.2e-38) become zero. Products of
+/// Gaussian weights are often that small, and some processors take a hundred times longer for denormals.
 class FlushTiny {
  public:
 #ifdef __SSE__
@@ -102,7 +102,7 @@ inline constexpr float kLog2E = 1.44269504f;
 
 /// 2^x for x <= 0, relative error below 2e-7; 0 below -126, and for NaN.
 inline vfloat exp2_of_nonpositive(vfloat x) {
-  // 2^x = 2^f 2^n with f in [-1/2, 1/2]. The polynomial has the least relative error of its degree, and p(0) = 1.
+  // 2^x = 2^f 2^n with f in [-1/2, 1/2]. Minimax polynomial (relative error) with p(0) = 1.
   const auto of_fraction = [](vfloat f) {
     vfloat p = splat(1.32647273e-3f);
     p = p * f + 9.67151299e-3f;
@@ -116,7 +116,7 @@ inline vfloat exp2_of_nonpositive(vfloat x) {
   const vfloat n = _mm512_maskz_roundscale_ps(kAll, x, _MM_FROUND_TO_NEAREST_INT);
   return _mm512_maskz_scalef_ps(kAll, of_fraction(x - n), n);
 #else
-  const vfloat shifted = x + 12582912.0f;  // its last bits are the nearest integer
+  const vfloat shifted = x + 12582912.0f;  // its low bits are the nearest integer
   const vfloat p = of_fraction(x - (shifted - 12582912.0f));
   return x > splat(-126.0f) ? from_bits(bits(p) + (bits(shifted) << 23)) : vfloat{};
 #endif
@@ -125,7 +125,7 @@ inline vfloat exp2_of_nonpositive(vfloat x) {
 /// e^x for x <= 0, relative error below 3e-7 + 1e-7 |x|; 0 below -88.
 inline vfloat exp_of_nonpositive(vfloat x) { return exp2_of_nonpositive(x * kLog2E); }
 
-/// Lane l of the result is lane order[l] of a followed by b.
+/// Lane l of the result is lane order[l] of the concatenation of a and b.
 inline vfloat shuffle(vfloat a, vfloat b, vint order) {
 #ifdef __clang__
   vfloat result;
@@ -136,7 +136,7 @@ inline vfloat shuffle(vfloat a, vfloat b, vint order) {
 #endif
 }
 
-/// Lane l of the result is lane l + n of a followed by b.
+/// Lane l of the result is lane l + n of the concatenation of a and b.
 template <int n>
 inline vfloat shift(vfloat a, vfloat b) {
   vint order;
@@ -146,7 +146,7 @@ inline vfloat shift(vfloat a, vfloat b) {
 
 namespace detail {
 
-/// In each block of four lanes: a0 b0 a1 b1, or a2 b2 a3 b3.
+/// For each block of four lanes: a0 b0 a1 b1, or a2 b2 a3 b3.
 template <bool high>
 inline vfloat interleave(vfloat a, vfloat b) {
   vint order;
@@ -154,7 +154,7 @@ inline vfloat interleave(vfloat a, vfloat b) {
   return shuffle(a, b, order);
 }
 
-/// In each block of four lanes: a0 a1 b0 b1, or a2 a3 b2 b3.
+/// For each block of four lanes: a0 a1 b0 b1, or a2 a3 b2 b3.
 template <bool high>
 inline vfloat interleave_pairs(vfloat a, vfloat b) {
   vint order;
@@ -162,7 +162,7 @@ inline vfloat interleave_pairs(vfloat a, vfloat b) {
   return shuffle(a, b, order);
 }
 
-/// Blocks of four lanes: `first` and `second` of a, then of b.
+/// Blocks of four lanes: blocks `first` and `second` of a, then those of b.
 template <int first, int second>
 inline vfloat select_blocks(vfloat a, vfloat b) {
   vint order;
@@ -176,14 +176,14 @@ inline vfloat select_blocks(vfloat a, vfloat b) {
 /// Transposes a kLanes x kLanes block in place: rows[i][j] <-> rows[j][i].
 [[gnu::always_inline]] inline void transpose(vfloat (&rows)[kLanes]) {
   using namespace detail;
-  // Blocks of 4 x 4, each in its place.
+  // Transpose within each 4 x 4 block.
   for (int i = 0; i < kLanes; i += 4) {
     const vfloat a = interleave<false>(rows[i], rows[i + 1]), b = interleave<true>(rows[i], rows[i + 1]);
     const vfloat c = interleave<false>(rows[i + 2], rows[i + 3]), d = interleave<true>(rows[i + 2], rows[i + 3]);
     rows[i] = interleave_pairs<false>(a, c), rows[i + 1] = interleave_pairs<true>(a, c);
     rows[i + 2] = interleave_pairs<false>(b, d), rows[i + 3] = interleave_pairs<true>(b, d);
   }
-  // Then the blocks.
+  // Then transpose the blocks.
   for (int i = 0; i < 4; ++i) {
     if constexpr (kLanes == 16) {
       const vfloat a = select_blocks<0, 1>(rows[i], rows[i + 4]), b = select_blocks<2, 3>(rows[i], rows[i + 4]);

@@ -11,12 +11,12 @@ namespace {
 
 /// Ridge of the normal equations, relative to their mean diagonal.
 constexpr float kRidge = 1e-3f;
-/// Sweeps over all pairs of candidates; more change weights by less than 0.01 (mixture_test).
+/// Sweeps over all pairs of candidates; more sweeps change weights by less than 0.01 (mixture_test).
 constexpr int kSweeps = 24;
 
 }  // namespace
 
-/// By exact steps along the edges between two candidates. The base image, number m, has zero rows.
+/// By exact line search along the edge between each pair of candidates. The base image, number m, has zero rows.
 void solve_mixture(int m, const vfloat* sums, const float* prior, float strength, vfloat* x) {
   std::array<std::array<vfloat, kMostCandidates>, kMostCandidates> a;
   std::array<vfloat, kMostCandidates> b;
@@ -43,7 +43,7 @@ void solve_mixture(int m, const vfloat* sums, const float* prior, float strength
   for (int sweep = 0; sweep < kSweeps; ++sweep)
     for (int p = 0; p < m; ++p)
       for (int q = p + 1; q <= m; ++q) {
-        // Moves `step` of weight from q to p. Along an edge that is not convex, to its better end.
+        // Moves weight `step` from q to p; along a non-convex edge, to its better end.
         const vfloat curvature = element(p, p) + element(q, q) - 2 * element(p, q);
         const vfloat slope = gradient[q] - gradient[p];
         const vfloat wanted =

@@ -18,13 +18,13 @@ NeighbourSearch::NeighbourSearch(int k, int window, bool include_target) : k_(k)
 
 namespace {
 
-/// Smallest and largest of keys. Key 0 is left out of the smallest: mostly it is the target's own, of distance zero.
+/// Smallest and largest key. The smallest ignores key 0, which is mostly the target's own, with distance zero.
 struct KeyRange {
   vint smallest, largest;
 };
 
 /// A key is the squared distance with the candidate's index in its lowest bits. Non-negative floats compare like their
-/// bits, so keys are distinct integers in the order wanted.
+/// bit patterns, so keys are distinct integers in the desired order.
 KeyRange make_keys(const Planes& guide, int x, int y, std::span<const Offset> offsets, int index_mask, vint* keys) {
   const vfloat f0 = load(guide.row(0, y) + x), f1 = load(guide.row(1, y) + x), f2 = load(guide.row(2, y) + x);
   KeyRange range{splat_int(INT32_MAX), splat_int(0)};
@@ -41,7 +41,7 @@ KeyRange make_keys(const Planes& guide, int x, int y, std::span<const Offset> of
   return range;
 }
 
-/// How many of n keys are at or below `threshold`.
+/// Number of the n keys at or below `threshold`.
 vint count_below(const vint* keys, int n, vint threshold) {
   vint even = {}, odd = {};
   int j = 0;
@@ -55,8 +55,8 @@ vint count_below(const vint* keys, int n, vint threshold) {
   return even + odd;
 }
 
-/// A threshold with exactly k of the n keys at or below it: count(low) < k <= count(high). Guesses alternate between
-/// interpolation and bisection.
+/// A threshold with exactly k of the n keys at or below it; invariant: count(low) < k <= count(high). Guesses alternate
+/// between interpolation and bisection.
 vint find_threshold(const vint* keys, int n, int k, KeyRange range) {
   if (k == 1) range.smallest = keys[0] < range.smallest ? keys[0] : range.smallest;
   vint low = range.smallest - 1, high = range.largest, below = -(keys[0] < range.smallest), above = splat_int(n);
@@ -76,7 +76,7 @@ vint find_threshold(const vint* keys, int n, int k, KeyRange range) {
     above = enough ? count : above;
     low = enough ? low : middle;
     below = enough ? below : count;
-    // A lane with exactly k keys is done; closing its interval keeps it so.
+    // A lane with exactly k keys is done; closing its interval keeps it that way.
     low = count == k ? high : low;
     if (!any(high - low > 1)) return high;
   }
@@ -94,7 +94,7 @@ void NeighbourSearch::find(const Planes& guide, int x, int y, vint* keys, uint16
     vint taken = {};
     for (int j = first; j < std::min(n, first + kWord); ++j)
       taken |= (keys[j] <= threshold) & static_cast<int32_t>(1u << (j - first));
-    keys[word] = taken;  // keys up to this word are not needed any more
+    keys[word] = taken;  // keys up to this word are no longer needed
   }
   const int n_words = (n + kWord - 1) / kWord;
   for (int l = 0; l < kLanes; ++l) {
@@ -102,7 +102,7 @@ void NeighbourSearch::find(const Planes& guide, int x, int y, vint* keys, uint16
     for (int word = 0; word < n_words; word += 2) {
       uint64_t taken = static_cast<uint32_t>(keys[word][l]);
       if (word + 1 < n_words) taken |= uint64_t{static_cast<uint32_t>(keys[word + 1][l])} << kWord;
-      // A few at a time without looking whether there are so many: what is too much is overwritten by what follows.
+      // Write several at a time without checking how many are left: excess entries are overwritten by what follows.
       uint16_t* next = to + std::popcount(taken);
       for (; to < next; to += kNeighboursAtOnce)
         for (int i = 0; i < kNeighboursAtOnce; ++i, taken &= taken - 1)

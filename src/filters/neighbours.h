@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The k pixels of a window whose CRN means are nearest to the target's (Yang & Moon 2025, Sec. 4): the control variates
-// of a pixel. kLanes horizontally adjacent targets at a time.
+// of a pixel. Processes kLanes horizontally adjacent targets at a time.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ class NeighbourSearch {
   static constexpr int kNeighboursAtOnce = 8;
 
  public:
-  /// `k` at most the number of candidates: window^2, one less where the target itself is left out.
+  /// `k`: at most the number of candidates, which is window^2, or one less without the target itself.
   NeighbourSearch(int k, int window, bool include_target);
 
   int k() const { return k_; }
@@ -22,10 +22,10 @@ class NeighbourSearch {
   const std::vector<Offset>& offsets() const { return offsets_; }
   size_t chosen_size() const { return static_cast<size_t>(k_) * lanes::kLanes + kNeighboursAtOnce; }
 
-  /// Chooses for the pixels (x + lane, y). chosen[lane * k + i] is an index into offsets(), ascending in i. `guide`:
-  /// three planes with a border of at least window / 2, kFar where there is no pixel; such candidates are taken only
-  /// when nothing else is left. Distances that agree to 14 bits count as equal; of equals the one nearer to the target
-  /// wins. `keys`: scratch for offsets().size() vectors; `chosen` has chosen_size() elements.
+  /// Selects neighbours of the pixels (x + lane, y). chosen[lane * k + i] is an index into offsets(), ascending in i.
+  /// `guide`: three planes with a border of at least window / 2, kFar where there is no pixel; such candidates are
+  /// chosen only if there are no others. Distances that agree to 14 bits count as equal; ties go to the one nearer to
+  /// the target. `keys`: scratch for offsets().size() vectors; `chosen` must have chosen_size() elements.
   void find(const Planes& guide, int x, int y, lanes::vint* keys, uint16_t* chosen) const;
 
  private:

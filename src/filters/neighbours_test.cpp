@@ -22,7 +22,7 @@ Planes means(const test::Grouped& image, int border) {
   return moments(image.view(), valid, border, kFar).mean;
 }
 
-/// Sizes that are no multiple of the lanes; borders; with and without the target; few and many candidates.
+/// Sizes that are not multiples of the lanes; borders; with and without the target; few and many candidates.
 TEST(Neighbours, AreTheNearestInValue) {
   const test::Grouped image = test::crn_image(37, 21, 4, 5);
   for (const auto& [k, window, include_target] :
@@ -53,7 +53,7 @@ TEST(Neighbours, AreTheNearestInValue) {
             different.insert(index);
             if (!inside(search.offsets()[index])) continue;
             ++n_inside;
-            // No nearer candidate may have been left out, up to the 14 bits a distance is compared with.
+            // No nearer candidate may have been missed, up to the 14 bits with which distances are compared.
             const double limit = all[std::min<size_t>(k, all.size()) - 1];
             EXPECT_LE(distance(search.offsets()[index]), limit * (1 + 1.0 / 8192) + 1e-12) << x << ", " << y;
           }
@@ -72,7 +72,7 @@ TEST(Neighbours, OfEqualValuesAreTheNearestInSpace) {
   search.find(guide, 12, 20, found.keys.data(), found.chosen.data());
   for (int l = 0; l < lanes::kLanes; ++l)
     for (int i = 0; i < 25; ++i) EXPECT_EQ(found.chosen[l * 25 + i], i);
-  // Offsets go outwards from the target.
+  // Offsets are ordered outwards from the target.
   EXPECT_EQ(search.offsets()[0].dx, 0);
   EXPECT_EQ(search.offsets()[0].dy, 0);
   for (size_t i = 1; i < search.offsets().size(); ++i) {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tiles of the image in parallel; in a tile bands of rows from top to bottom, and in a band a few offsets o = j - i
-// after the other. All loops run along rows. The pair of pixels (p, p + o) tells the weight of p + o for p, `forward`,
-// and of p for p + o, `backward`: both have the same distance of guides and the same quotient. So half of all offsets
-// are enough, if pairs are looked at that reach into the tile from outside. Distances of patches are sums over rows of
-// three pixels, then over three rows, of which the last two are kept. Weights live no longer than a row.
+// Tiles of the image are processed in parallel; within a tile, bands of rows from top to bottom, and within a band a
+// few offsets o = j - i at a time. All inner loops run along rows. A pixel pair (p, p + o) gives the weight of p + o
+// for p, `forward`, and of p for p + o, `backward`: both have the same guide distance and the same quotient. So half of
+// all offsets suffice, if pairs that reach into the tile from outside are included. Patch distances are summed over
+// rows of three pixels, then over three rows, of which the last two are kept. Weights are not kept beyond a row.
 #include "filters/nl_means.h"
 
 #include <algorithm>
@@ -21,26 +21,27 @@ using namespace lanes;
 
 constexpr int kPatch = 1;  // radius
 constexpr int kBorder = kNlMeansRadius + kPatch;
-constexpr float kOfPatch = 3 * (2 * kPatch + 1) * (2 * kPatch + 1);  // values
-/// Pairs in a row that are looked at; pixels of a tile, so that the pairs touching them are no more. `kTileHeight`: not
-/// many more pairs than pixels. `kBand`: what its rows read and write stays in the second-level cache.
+constexpr float kOfPatch = 3 * (2 * kPatch + 1) * (2 * kPatch + 1);  // values in a patch
+/// Maximum number of pairs in a row; tile width such that the pairs touching the tile are no more. `kTileHeight`: pairs
+/// are not many more than pixels. `kBand`: the data of its rows stays in the L2 cache.
 constexpr int kRow = 256, kTileWidth = kRow - kNlMeansRadius - 2 * kPatch, kTileHeight = 64, kBand = 16;
-/// From row to row and from plane to plane of a tile with its border.
+/// Strides between rows and between planes of a tile with its border.
 constexpr ptrdiff_t kStride = kTileWidth + 2 * kBorder + kLanes, kPlane = kStride * (kTileHeight + 2 * kBorder);
-/// Rows of a total: three channels and the weights.
+/// Values per pixel in a total: three channels and the sum of weights.
 constexpr int kSums = 4;
-/// Offsets whose pixels are added together.
+/// Offsets whose pixels are summed together.
 constexpr int kAtOnce = 7;
-/// Sums of two squared errors below this are taken for none; squared errors above that for it.
+/// Sums of two squared errors below the first count as none; squared errors are limited to the second.
 constexpr float kSmallestVariance = 1e-10f, kLargestVariance = 1e30f;
 
-/// What both directions of a pair are made of, summed over three channels: with v, u the variances of its pixels,
-/// A = ((f - f')^2 - min(v, u)) / (v + u) and B = v / (v + u). Forward its distance is A - B, backward A - (1 - B).
+/// The terms common to both directions of a pair, summed over three channels: with v, u the variances of its pixels, A
+/// = ((f - f')^2 - min(v, u)) / (v + u) and B = v / (v + u). The forward distance is A - B, the backward one A - (1 -
+/// B).
 struct PairSums {
   vfloat a = {}, b = {};
 };
 
-/// Of pixels in a row and those `there` floats on.
+/// For pixels in a row and those `there` floats further on.
 PairSums pixel_sums(const float* f, const float* variance, ptrdiff_t there) {
   PairSums sum;
   for (int c = 0; c < 3; ++c, f += kPlane, variance += kPlane) {
@@ -54,10 +55,10 @@ PairSums pixel_sums(const float* f, const float* variance, ptrdiff_t there) {
   return sum;
 }
 
-/// Sums over three neighbours from each lane of a on, which b follows.
+/// Sums over three neighbours, starting at each lane of a, which b continues.
 vfloat sum_of_three(vfloat a, vfloat b) { return a + shift<1>(a, b) + shift<2>(a, b); }
 
-/// Part of the image, and the pixels p of pairs (p, p + (dx, dy)) that touch it, counted from its corner.
+/// A part of the image, and the pixels p of pairs (p, p + (dx, dy)) that touch it, relative to its corner.
 struct Tile {
   int x, y, width, height;
 
@@ -65,8 +66,8 @@ struct Tile {
   int n_pairs(int dx) const { return width + std::abs(dx); }
 };
 
-/// The channels of the part of an image around a tile as planes from number `first` on, continued beyond its frame by
-/// its outermost pixels.
+/// Copies the image around a tile to planes `first` and up, channel by channel, repeating the frame's outermost pixels
+/// beyond it.
 void copy_around(const Tile& tile, const Image& image, bool is_error, int first, Planes& planes) {
   for (int y = -kBorder; y < tile.height + kBorder; ++y) {
     const float* const pixels = image.pixel(0, std::clamp(tile.y + y, 0, image.height - 1));
@@ -80,19 +81,19 @@ void copy_around(const Tile& tile, const Image& image, bool is_error, int first,
   }
 }
 
-/// An image that is averaged, and with the weights of which tasks.
+/// An image to be averaged, and the tasks whose weights it uses.
 struct Source {
   struct Use {
-    size_t task, total;  // places among weights and totals
+    size_t task, total;  // indices into weights and totals
   };
   const Image* image;
   std::vector<Use> uses;
 };
 
-/// An image that steers, with what is averaged by it, first itself. Tasks go from the widest to the narrowest.
+/// A steering image with the images averaged by it, itself first. Tasks are ordered from widest to narrowest.
 struct Steering {
   const Image* std_error;
-  std::vector<float> scales;  // of each task, from distances to exponents; 0: four times the exponent before
+  std::vector<float> scales;  // per task, from distances to exponents; 0: four times the previous exponent
   std::vector<Source> sources;
 
   /// Planes of a tile: the image, its squared errors, and all other sources.
@@ -120,21 +121,21 @@ class Filter {
   }
 
  private:
-  /// Values of pairs in a row, from the first pair on.
+  /// Values of pairs in a row, starting with the first pair.
   struct alignas(sizeof(vfloat)) Row {
     std::array<float, kRow + sizeof(vfloat) / sizeof(float) + kNlMeansRadius> data;
     float* begin() { return data.data(); }
     const float* begin() const { return data.data(); }
   };
-  using Rows = std::array<Row, kAtOnce>;  // of offsets
-  /// What is done at once for kAtOnce offsets.
+  using Rows = std::array<Row, kAtOnce>;  // one per offset
+  /// Scratch for kAtOnce offsets at a time.
   struct Buffers {
-    std::vector<Planes> planes;                     // of each steering
+    std::vector<Planes> planes;                     // per steering
     Planes mask;                                    // 1 at valid pixels, 0 elsewhere and outside
     std::array<std::array<Rows, 2>, kBand> guides;  // exp(-||q_p - q_(p + o)||^2), for valid p + o, and for valid p
-    std::array<std::array<Rows, 2>, 2> pair_sums;   // A and B, summed over three; of even rows and of odd ones
-    std::vector<std::array<Rows, 2>> weights;       // of each task, forward and backward
-    std::vector<float> totals;                      // of each row of the tile
+    std::array<std::array<Rows, 2>, 2> pair_sums;   // A and B, summed over three pixels; for even and odd rows
+    std::vector<std::array<Rows, 2>> weights;       // per task, forward and backward
+    std::vector<float> totals;                      // per row of the tile
   };
   struct Result {
     size_t total;
@@ -208,7 +209,7 @@ class Filter {
         b.mask.row(0, y)[x] = valid_[static_cast<size_t>(tile.y + y) * width_ + tile.x + x];
   }
 
-  /// The pixels themselves, whose weight is 1.
+  /// Adds the pixels themselves, with weight 1.
   void add_own(const Tile& tile, int y, Buffers& b) const {
     const float* const mask = b.mask.row(0, y);
     for (size_t i = 0; i < steerings_.size(); ++i)
@@ -223,13 +224,13 @@ class Filter {
         }
   }
 
-  /// What the pairs of rows `first` to `end` - 1 add to both of their pixels.
+  /// Adds the contributions of the pairs of rows `first` to `end` - 1 to both of their pixels.
   void add_pairs(const Tile& tile, int first, int end, const Offsets& o, Buffers& b) const {
     for (int y = first; y < end; ++y)
       for (int k = 0; k < o.n; ++k) find_guide_likenesses(tile, y, o.dx + k, o.dy, k, b.guides[y - first], b);
     for (size_t i = 0; i < steerings_.size(); ++i)
       for (int y = first - kPatch; y < end + kPatch; ++y) {
-        const int row = y - kPatch;  // whose patches are complete with this one
+        const int row = y - kPatch;  // this row completes its patches
         for (int k = 0; k < o.n; ++k)
           if (row < first)
             find_weights<false>(i, tile, y, o.dx + k, o.dy, k, nullptr, b);
@@ -262,8 +263,8 @@ class Filter {
     }
   }
 
-  /// Distances of the pairs of row y, and from them and those of the two rows before the weights of row y - 1: of
-  /// offset number k.
+  /// For offset number k: distances of the pairs of row y, and from these and the two previous rows the weights of row
+  /// y - 1.
   template <bool with_weights>
   [[gnu::noinline]] void find_weights(size_t steering, const Tile& tile, int y, int dx, int dy, int k,
                                       const Rows* guides, Buffers& b) const {
@@ -311,8 +312,8 @@ class Filter {
     }
   }
 
-  /// Adds the pixels of row `from` to the totals of another one: those at the offsets from its pixels, or at the
-  /// opposite ones (sign -1).
+  /// Adds the pixels of row `from` to the totals of another row: those at the offsets from its pixels, or at the
+  /// opposite offsets (sign -1).
   void add_row(size_t steering, const Tile& tile, int from, const Offsets& o, int sign, float* total,
                const Buffers& b) const {
     const Planes& planes = b.planes[steering];
@@ -326,12 +327,12 @@ class Filter {
     }
   }
 
-  /// With the weights of n tasks.
+  /// Same, for the weights of n tasks.
   template <int n>
   [[gnu::noinline]] void add_values(const float* values, int width, const Offsets& o, int sign, const Source::Use* uses,
                                     float* total, const Buffers& b) const {
     const auto& of_first = b.weights[uses[0].task][sign > 0 ? 0 : 1];
-    const float* weights[kAtOnce];  // of the first task at column 0, and how far from there are those of each
+    const float* weights[kAtOnce];  // of the first task at column 0, and the distances from there to those of each
     for (int k = 0; k < o.n; ++k) weights[k] = of_first[k].begin() + std::max(0, sign * (o.dx + k));
     float* sums[n];
     ptrdiff_t place[n];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// NL-means against its formula in double precision, and what windows and masks do to it.
+// NL-means against its formula in double precision; effects of windows and masks.
 #include "filters/nl_means.h"
 
 #include <gtest/gtest.h>

@@ -20,7 +20,7 @@ Planes::Planes(int width, int height, int count, int border, float value)
 
 namespace {
 
-/// Whether no exponent is the one of infinities and NaN. Integers, whose sum has no order.
+/// Whether no value has the exponent of infinity and NaN. Integer arithmetic, which can be vectorised in any order.
 bool all_finite(const float* values, size_t n) {
   constexpr uint32_t kExponent = 0x7f800000;
   uint32_t bad = 0;
@@ -28,7 +28,7 @@ bool all_finite(const float* values, size_t n) {
   return bad == 0;
 }
 
-/// Whether n pixels in a row are finite in both images.
+/// Whether n consecutive pixels are finite in both images.
 bool all_finite(const GroupedImage& a, const GroupedImage& b, int x, int y, int n) {
   const auto are_finite = [&](const GroupedImage& image) {
     return all_finite(image.pixel(x, y), static_cast<size_t>(n) * 3 * image.groups);
@@ -62,13 +62,13 @@ struct PixelMoments {
   float mean[3] = {}, variance[3] = {};
 };
 
-/// Three channels and one more that is not used.
+/// Three channels; the fourth is unused.
 typedef float Rgb __attribute__((vector_size(4 * sizeof(float))));
 
 /// Groups of equal sizes.
 PixelMoments equal_moments(const float* p, int groups, int first, int step) {
   const int n = (groups - first + step - 1) / step;
-  const float* const end = p + 3 * (groups - 1);  // beyond the last group there may be nothing to read
+  const float* const end = p + 3 * (groups - 1);  // memory beyond the last group may not be readable
   const Rgb last = {end[0], end[1], end[2], 0};
   const auto at = [&](int t) {
     Rgb value;

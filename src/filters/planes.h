@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Planar images with a border, so that windows can be read with plain vector loads and no index tests.
+// Planar images with a border, so that windows can be read with plain vector loads and without bounds checks.
 #pragma once
 
 #include <algorithm>
@@ -14,7 +14,7 @@
 namespace covary {
 
 /// `count` images of width x height floats, each with `border` more pixels on every side (and room to read kLanes
-/// floats from any column inside). The border keeps the value it was made with.
+/// floats from any valid column). The border keeps its initial value.
 class Planes {
  public:
   Planes() = default;
@@ -38,7 +38,7 @@ class Planes {
   std::vector<float> data_;
 };
 
-/// Calls batch(x, y, n) for the pixels (x … x + n - 1, y), n <= kLanes, of all batches of an image, rows in parallel.
+/// Calls batch(x, y, n) for all batches of pixels (x … x + n - 1, y), n <= kLanes, of an image, rows in parallel.
 template <typename Batch>
 void for_each_batch(int width, int height, const Batch& batch) {
   parallel_for(height, 4, [&](int y) {
@@ -48,30 +48,30 @@ void for_each_batch(int width, int height, const Batch& batch) {
 }
 
 /// Value of guide images outside the frame and at pixels with non-finite input: farther from every real pixel than any
-/// bandwidth, and its square is still finite.
+/// bandwidth, but with a finite square.
 inline constexpr float kFar = 1e18f;
-/// Error variance of such pixels: no coefficient.
+/// Error variance of such pixels, which prevents a coefficient.
 inline constexpr float kUseless = 1e30f;
 
-/// Mean and variance of a grouped image as planes. Groups of unequal sizes are weighted by them.
+/// Mean and variance of a grouped image as planes, weighted by group sizes.
 struct Moments {
   Planes mean;              ///< 3 planes; `outside` beyond the frame and at invalid pixels
   Planes variance_of_mean;  ///< 3 planes: sample variance of the groups / T; kUseless outside; zero where T = 1
-  /// 1 plane: samples of the pixel over the image's mean, 1 outside; null where pixels all have the same number.
+  /// 1 plane: samples of the pixel relative to the image's mean, 1 outside; null if all pixels have the same number.
   std::optional<Planes> relative_count;
 };
 
-/// Marks pixels whose values are all finite in both images (1) or not (0).
+/// 1 for pixels whose values are all finite in both images, otherwise 0.
 std::vector<unsigned char> finite_pixels(const GroupedImage& a, const GroupedImage& b, long& n_nonfinite);
 
 /// Moments of `image` from the groups first, first + step, first + 2 step, …
 Moments moments(const GroupedImage& image, const std::vector<unsigned char>& valid, int border, float outside,
                 int first = 0, int step = 1);
 
-/// Writes, at every invalid pixel of `result`, the mean of the finite groups of both images, or zero.
+/// Sets every invalid pixel of `result` to the mean of the finite groups of both images, or zero.
 void fill_invalid(const GroupedImage& a, const GroupedImage& b, const std::vector<unsigned char>& valid, Image& result);
 
-/// Offsets of the window x window square around a pixel, from the centre outwards: by squared distance, then row, then
+/// Offsets in the window x window square around a pixel, from the centre outwards: by squared distance, then row, then
 /// column.
 struct Offset {
   int dx, dy;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lanes are windows side by side, whose centres are kStep pixels apart. So planes hold each column of that distance:
-// of value number `c` plane kStep c + r has the columns kStep i + r. Every band of rows adds to sums of its own, with a
-// border; they are put together in the bands' order.
+// Lanes hold adjacent windows, whose centres are three pixels apart. So each plane holds every third column: plane 3 c
+// + r of value `c` has the columns 3 i + r. Every band of rows accumulates its own sums, with a border; these are
+// combined in the order of the bands.
 #include "filters/regression.h"
 
 #include <array>
@@ -19,20 +19,19 @@ constexpr int kRadius = 10, kPatch = 1, kSide = 2 * kRadius + 1, kOffsets = kSid
 constexpr int kBorder = kRadius + kPatch;
 constexpr int kBandRows = 8;  // of windows
 constexpr float kBandwidth = 0.5f, kOfPatch = 27;
-/// Ridges of slopes; pixels that are a unit of place; weight of the other image.
-constexpr float kRidge = 5e-4f, kRidgeOfPosition = 1e-3f, kPlaceUnit = 6, kOfOther = 1;
+/// Ridge of slopes; pixels per unit of position; weight of the other image.
+constexpr float kRidge = 5e-4f, kPlaceUnit = 6, kOfOther = 1;
 constexpr float kSmallestVariance = 1e-10f, kLargestVariance = 1e30f;
-/// Terms of a plane: constant, columns, rows, features, position.
-constexpr int kMostTerms = 3 + kMostFeatures + 3;
+/// Terms of a model: constant, columns, rows, features.
+constexpr int kMostTerms = 3 + kMostFeatures;
 
 using Terms = std::array<vfloat, kMostTerms>;
-/// Of pixels at all offsets of a row of windows.
+/// For pixels at all offsets in a row of windows.
 using RowTerms = std::array<std::array<vfloat, kSide>, kMostTerms>;
 
-/// Plane and column of the pixel `dx` columns from the centres.
-template <int kStep>
-struct PlaceOf {
-  explicit PlaceOf(int dx) : residue((1 + dx + kStep * kBorder) % kStep), column((1 + dx - residue) / kStep) {}
+/// Plane and column of the pixels `dx` columns from the centres.
+struct Place {
+  explicit Place(int dx) : residue((1 + dx + kStep * kBorder) % kStep), column((1 + dx - residue) / kStep) {}
   int residue, column;
 };
 
@@ -86,11 +85,11 @@ class Regression {
 
  private:
   struct Windows {
-    std::array<vfloat, kOffsets> roots;  // of weights
+    std::array<vfloat, kOffsets> roots;  // square roots of weights
     RowTerms terms;
   };
 
-  /// Beyond the frame its outermost pixels are repeated.
+  /// The outermost pixels are repeated beyond the frame.
   void copy(const Image& image, bool is_error, int first) {
     parallel_for(height_ + 2 * kBorder, 16, [&](int row) {
       const int y = row - kBorder;
@@ -110,7 +109,7 @@ class Regression {
     return load(planes_.row(kStep * c + place.residue, y) + x + place.column);
   }
 
-  /// `row` of windows, which is `from` in the sums.
+  /// `row`: row of windows; `from`: the row of the sums where it begins.
   void add_windows(int x, int row, int from, Planes& sums) const {
     Windows w;
     const int y = kStep * row + 1;
@@ -147,8 +146,9 @@ class Regression {
     return exp2_of_nonpositive(min(sum * (-0.5f * kLog2E / (kOfPatch * kBandwidth * kBandwidth)), vfloat{}));
   }
 
-  /// What the pixels of row y + dy are at, counted from the centres, times roots of their weights.
-  void find_terms(int x, int y, int dy, const vfloat* roots, RowTerms& terms) const {
+  /// The terms of the pixels of row y + dy, relative to the centres.
+  void find_terms(int x, int y, int dy, RowTerms& terms) const {
+    const Place centre(0);
     for (int k = 0; k < kSide; ++k) {
       terms[0][k] = roots[k];
       terms[1][k] = roots[k] * (static_cast<float>(k - kRadius) / kPlaceUnit);
@@ -160,7 +160,7 @@ class Regression {
     }
   }
 
-  /// The planes of all channels, from the weights, whose sums are `total`.
+  /// Fits the models of all channels, given the weights, whose sum is `total`.
   void fit(int x, int y, vfloat total, Windows& w, std::vector<Terms>& planes) const {
     const int n = n_terms_, n_channels = 3 * n_sources_;
     Terms products, inverse, shift;
@@ -194,8 +194,9 @@ class Regression {
       for (int a = 3; a < n; ++a) plane[0] -= plane[a] * value(3 + a, Place(0), x, y);
   }
 
-  /// Adds what the planes are at the pixels of row y + dy, `row` of the sums.
-  void predict(int x, int y, int dy, int row, const std::vector<Terms>& planes, const Windows& w, Planes& sums) const {
+  /// Adds the models' predictions for the pixels of row y + dy to `row` of the sums.
+  void predict(int x, int y, int dy, int row, const std::vector<Terms>& planes, Windows& w, Planes& sums) const {
+    find_terms(x, y, dy, w.terms);
     const auto add = [&](int c, const Place& place, vfloat term) {
       float* const sum = sums.row(kStep * c + place.residue, row) + x + place.column;
       store(sum, load(sum) + term);

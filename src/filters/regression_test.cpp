@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Regression against its formula in double precision, and what it keeps that weighted means blur.
+// Regression against its formula in double precision; it preserves what weighted means blur.
 #include "filters/regression.h"
 
 #include <gtest/gtest.h>
@@ -33,7 +33,7 @@ struct FittedPicture {
         }
       }
   }
-  /// A plane over features and place.
+  /// A first-order function of features and position.
   float expected(int x, int y, int c) const {
     const float* q = feature.pixel(x, y);
     return 1 + 0.4f * q[0] - 0.2f * static_cast<float>(c) * q[1] + 0.01f * static_cast<float>(x - y);
@@ -45,7 +45,7 @@ struct FittedPicture {
   }
 };
 
-/// Weight of a pixel in the window around another, which may be outside.
+/// Weight of a pixel in the window of another, which may be outside the frame.
 double likeness(const FittedPicture& p, int x, int y, int qx, int qy) {
   const auto at = [&](const Image& image, int px, int py) {
     return image.pixel(std::clamp(px, 0, image.width - 1), std::clamp(py, 0, image.height - 1));

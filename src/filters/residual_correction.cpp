@@ -17,17 +17,17 @@ namespace {
 constexpr int kGuide = 0, kResidual = 3, kWeight = 6, kVariance = 7, kPlanes = 8;
 /// Side of the cells of the wide mean.
 constexpr int kCell = 2;
-/// Bandwidths of the wide mean and of the second correction over that of the narrow mean.
+/// Bandwidths of the wide mean and of the second correction, relative to the narrow mean's.
 constexpr float kWidening = 4, kSecondWidening = 12;
-/// Variance of the narrow mean, relative to that of the estimate, at which both means count equally. 0.1 to 3 trade
-/// bias for error, slowly (docs/notes/iicv.md).
+/// Variance of the narrow mean, relative to that of the estimate, at which both means count equally. Values from 0.1 to
+/// 3 trade bias for error, slowly (docs/notes/iicv.md).
 constexpr float kNoise = 0.2f;
-/// Variance of a wide mean, relative to that of the estimate, at which half of it is given back.
+/// Variance of a wide mean, relative to that of the estimate, at which half of it is restored.
 constexpr float kWideNoise = 1;
-constexpr float kLeastSquare = 1e-4f;  // of the bandwidth of the residual
+constexpr float kLeastSquare = 1e-4f;  // minimum squared bandwidth of the residual
 
-/// Of cells of side x side pixels with the guide F^: sums over the valid pixels of n (h - F^), n and n^2 var h (over
-/// RGB), with n the pixel's count over the image's mean.
+/// Cells of side x side pixels with the guide F^: sums over the valid pixels of n (h - F^), n and n^2 var h (over RGB),
+/// where n is the pixel's count relative to the image's mean.
 Planes make_cells(int side, const Moments& h, const std::vector<unsigned char>& valid, const Image& f, int border) {
   const auto add = [&](int x, int y, float* sums) {
     const float n = h.relative_count ? h.relative_count->row(0, y)[x] : 1.0f;
@@ -43,10 +43,10 @@ Planes make_cells(int side, const Moments& h, const std::vector<unsigned char>& 
 /// Weighted mean of residuals around kLanes pixels.
 struct GuidedMean {
   vfloat weights = {}, residuals[3] = {}, squares = {};  ///< squares: sum of w^2 var h
-  /// Where nothing is alike, there is nothing to give back.
+  /// Zero if nothing is similar.
   vfloat value(int c) const { return residuals[c] / max(weights, splat(1e-20f)); }
-  /// t / (t + v), v the mean's variance, summed over RGB, t = `tolerated`. 0 without weights, or beyond the range of
-  /// floats.
+  /// t / (t + v), where v is the mean's variance summed over RGB and t = `tolerated`. 0 without weights, or beyond the
+  /// range of floats.
   vfloat share(vfloat tolerated) const {
     const vfloat excess = (squares + splat(1e-30f)) / max(tolerated * weights * weights, splat(1e-37f));
     return excess >= 0.0f ? 1 / (1 + excess) : vfloat{};
@@ -68,8 +68,8 @@ GuidedMean guided_mean(const Planes& cells, int radius, int x, int y, const vflo
   return {weights, {r0, r1, r2}, squares};
 }
 
-/// Adds to each valid pixel what `correction(x, y, f, variance)` gives, three vfloats for the pixels (x + lane, y)
-/// whose values are f and whose squared standard errors, summed over RGB, are `variance`.
+/// Adds correction(x, y, f, variance) to each valid pixel: three vfloats for the pixels (x + lane, y) with values f and
+/// squared standard errors `variance`, summed over RGB.
 template <typename Correction>
 void add_everywhere(const std::vector<unsigned char>& valid, const Image& std_error, const Correction& correction,
                     Image& estimate) {

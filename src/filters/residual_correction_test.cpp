@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a denoiser took away is given back where it lacks, whatever the side of the cells.
+// What a denoiser removed is restored where it is missing, for any side of the cells.
 #include "filters/residual_correction.h"
 
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 namespace covary {
 namespace {
 
-/// The estimate is grey; h grows from row to row. A window holds rows on both sides of a pixel's own.
+/// The estimate is grey; h grows from row to row. A window contains rows on both sides of the pixel's own.
 TEST(ResidualCorrection, GivesBackTheResidualOfTheRowsAround) {
   constexpr int kWidth = 40, kHeight = 64, kWindow = 9;
   const std::vector<unsigned char> valid(kWidth * kHeight, 1);

@@ -1,22 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cross-bilateral sums over the places of a window that look like its centre: pixels, or cells of them.
+// Cross-bilateral sums over the places (pixels, or cells of them) in a window that are similar to its centre.
 #pragma once
 
 #include "filters/planes.h"
 
 namespace covary {
 
-/// Planes that tell which places are alike, and where to look.
+/// The guide planes that determine similarity, and the window.
 struct AlikeWindow {
   const Planes& guide;
   int first;     ///< plane of red; green and blue follow
-  int radius;    ///< in places; the planes' borders must hold the window
+  int radius;    ///< in places; the border of the planes must cover the window
   int step = 1;  ///< columns from one place to the next
 };
 
 /// Calls add(w, column, row) for the places around (x + lane, y), with their weights in the lanes,
-///     w = exp(-||guide - centre||^2 / bandwidth^2),   0 where the norm is large or a NaN.
-/// Weights of `kAtOnce` places are computed side by side, which hides how long an exponential takes.
+///     w = exp(-||guide - centre||^2 / bandwidth^2),   0 if the norm is huge or NaN.
+/// Weights of `kAtOnce` places are computed together, to hide the latency of the exponential.
 template <int kAtOnce = 1, typename Add>
 [[gnu::always_inline]] inline void add_alike(const AlikeWindow& window, int x, int y, const lanes::vfloat* centre,
                                              lanes::vfloat squared_bandwidth, const Add& add) {
