@@ -10,11 +10,12 @@ namespace {
 using namespace lanes;
 
 constexpr int kNewtonSteps = 24;
-constexpr float kTolerance = 1e-5f;  // of both sides of the equation, relative
-/// Variances are at least this, relative to the square of the brightness that has no noise.
+constexpr float kTolerance = 1e-5f;  // relative residual of the equation
+/// Minimum variance, relative to the squared brightness, where there is no noise.
 constexpr float kLeastVariance = 1e-12f;
 
-/// 1 / v_q and 3 sqrt(v_q) of every pixel for sigma = 1; pixels without samples have weight 0 and are no beginning.
+/// 1 / v_q and 3 sqrt(v_q) of every pixel for sigma = 1; pixels without samples have weight 0 and give no initial
+/// bound.
 struct Precision {
   Planes weight, radius;
 
@@ -32,7 +33,7 @@ struct Precision {
     });
   }
 
-  /// sigma^2 of a pixel, or nearly nothing.
+  /// sigma^2 of a pixel, at least a tiny positive value.
   static float positive_variance(const FilterInput& input, int x, int y) {
     const Spectrum colour(input.dependent.row(0, y)[x], input.dependent.row(1, y)[x], input.dependent.row(2, y)[x]);
     const float brightness = std::min(colour_length(colour), 1e6f);
@@ -55,8 +56,8 @@ class Window {
     for (int l = 0; l < n; ++l) variance_[l] = Precision::positive_variance(input_, x + l, y);
     const vfloat right_side = 9.0f * variance_;
     vfloat lambda = read_differences(scale ? load(scale->row(0, y) + x) : splat(1));
-    // Newton from above: the left side is convex, so that each step stays above the solution. A pixel's steps do not
-    // depend on the others of its batch.
+    // Newton from above: the left side is convex, so every step stays above the solution. A pixel's steps do not depend
+    // on the others in its batch.
     for (int step = 0; step < kNewtonSteps; ++step) {
       const auto [sum, slope] = left_side(lambda);
       const vfloat excess = max(sum - right_side, splat(0));
@@ -68,7 +69,7 @@ class Window {
   }
 
  private:
-  /// Calls f(i, offset of the row, column) for every place of the window.
+  /// Calls f(i, row, column) for every place in the window.
   template <typename F>
   void for_each(const F& f) const {
     size_t i = 0;
@@ -82,7 +83,7 @@ class Window {
     return zero;
   }
 
-  /// Returns an upper bound of lambda: no pixel alone may exceed the right side.
+  /// Returns an upper bound on lambda: each pixel's term alone must not exceed the right side.
   vfloat read_differences(vfloat scale) {
     const Planes& d = input_.dependent;
     const vfloat r = load(d.row(0, y_) + x_), g = load(d.row(1, y_) + x_), b = load(d.row(2, y_) + x_);

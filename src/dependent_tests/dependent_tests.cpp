@@ -14,9 +14,8 @@
 namespace covary {
 namespace {
 
-/// Factors for the differences of the CRN image: where few of its samples found the light, all of it is too dark, and
-/// so are its differences. Brightness over brightness of the windows' means, at least 1; kFar where only the
-/// independent image has light.
+/// Factors for the differences of the CRN image: if few of its samples found the light, it is too dark, and so are its
+/// differences. Ratio of the windows' mean brightness, at least 1; kFar where only the independent image has light.
 Planes difference_scale(const FilterInput& input, const std::vector<unsigned char>& valid, int window) {
   const auto brightness = [&](const Planes& colours) {
     Planes planes(input.width(), input.height(), 1, 0, 0);
@@ -69,7 +68,7 @@ Image image_of(const Planes& planes) {
   return image;
 }
 
-/// v of least_error_mixture.h: variance of the independent image's means, by its own samples where these tell.
+/// v of least_error_mixture.h: variance of the independent image's means, from its own samples if there are enough.
 Planes noise_of_means(const GroupedImage& crn, const GroupedImage& independent) {
   Planes noise(crn.width, crn.height, 1, 0, 0);
   parallel_for(crn.height, 8, [&](int y) {
@@ -83,7 +82,7 @@ Planes noise_of_means(const GroupedImage& crn, const GroupedImage& independent) 
   return noise;
 }
 
-/// Writes the mixture of least measured error where pixels have independent samples.
+/// Writes the mixture of least measured error to pixels that have independent samples.
 void mix(const GroupedImage& crn, const GroupedImage& independent, const std::vector<unsigned char>& valid,
          const DependentTestsOptions& options, const FilterInput& input, const FilteredImage& filtered,
          const Planes* scale, Image& result) {
@@ -102,7 +101,7 @@ void mix(const GroupedImage& crn, const GroupedImage& independent, const std::ve
 }
 
 void check(const GroupedImage& crn, const GroupedImage& independent, std::vector<std::string>& problems) {
-  // Pixels may lack samples, which check_inputs() looks for where counts are given.
+  // Pixels may be without samples, which check_inputs() would reject if it knew the counts.
   GroupedImage without_counts[2] = {crn, independent};
   for (GroupedImage& image : without_counts) image.counts = nullptr;
   check_inputs(without_counts[0], without_counts[1], 1, 1, problems);
@@ -110,7 +109,7 @@ void check(const GroupedImage& crn, const GroupedImage& independent, std::vector
     problems.push_back("the CRN image has 1 group, at least 2 are needed where films do not keep sample variances");
 }
 
-/// The image of the whole of two images at once, whose pixels with valid = 0 are left out.
+/// Processes two whole images at once; pixels with valid = 0 are ignored.
 Image filter_and_combine(const GroupedImage& crn, const GroupedImage& independent,
                          const std::vector<unsigned char>& valid, const DependentTestsOptions& options,
                          DependentTestsStages* stages) {
@@ -137,7 +136,7 @@ Image filter_and_combine(const GroupedImage& crn, const GroupedImage& independen
   return estimate;
 }
 
-/// Rows of a band without those around it that it needs; small ones would spend their time on these.
+/// Rows in a band, without the surrounding ones it needs; small bands would spend most time on the latter.
 int rows_of_band(int width, int reach) {
   constexpr int kFewest = 64;
   const double rows = kDependentTestsBand / (kDependentTestsBytesPerPixel * width);
@@ -211,7 +210,7 @@ int dependent_tests_reach(const DependentTestsOptions& options) {
 
 namespace {
 
-/// Options that others leave without an effect.
+/// Rejects options that others make ineffective.
 void check_effects(Settings& p, const DependentTestsOptions& o) {
   const bool exact = o.filter == DependentFilter::kExact;
   p.only_if(exact, {"window", "guard"}, "with the published filter (`paper`, `filter` paper)");
@@ -221,7 +220,7 @@ void check_effects(Settings& p, const DependentTestsOptions& o) {
 
 const OptionTraits kPasses{.effect = OptionEffect::kPasses};
 
-/// Its own options; those of --adaptive are asked for before.
+/// Declares its own options; those of --adaptive were declared before.
 void declare(Settings& p, DependentTestsOptions& o) {
   static constexpr std::pair<const char*, DependentFilter> kFilters[] = {{"exact", DependentFilter::kExact},
                                                                          {"paper", DependentFilter::kPaper}};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The filters of dependent tests: weights against their definitions, the error bound, what happens with many samples
-// and with none, and the whole estimator.
+// Filters of dependent tests: weights against their definitions, the error bound, the limits of many and of no samples,
+// and the whole estimator.
 #include "dependent_tests/dependent_tests.h"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ using test_support::contains, test_support::message_of;
 
 constexpr int kWidth = 19, kHeight = 13;
 
-/// Colours of the CRN image with differences of about `contrast`; a sample has the deviation 1 in the norm.
+/// Colours of the CRN image with differences of about `contrast`; a sample has standard deviation 1 in the norm.
 FilterInput random_input(uint64_t seed, float contrast, float count, int border = 16) {
   FilterInput input;
   input.dependent = Planes(kWidth, kHeight, 3, border, kFar);
@@ -41,7 +41,7 @@ FilterInput random_input(uint64_t seed, float contrast, float count, int border 
   return input;
 }
 
-/// A pixel of a window, seen from its centre.
+/// A pixel of a window, relative to its centre.
 struct Partner {
   int x, y;
   double difference, variance;  // Delta_q and v_q
@@ -71,7 +71,7 @@ double bound_of(const std::vector<Partner>& window, const std::vector<double>& w
   return 3 * std::sqrt(squares) + distortion;
 }
 
-/// The published weights, computed anew for one side.
+/// The published weights, recomputed for a given side.
 std::vector<double> published_weights(const FilterInput& input, int x, int y, int m) {
   const std::vector<Partner> window = partners(input, x, y, -((m - 1) / 2), m / 2);
   const auto M = static_cast<double>(window.size());
@@ -89,8 +89,8 @@ std::vector<double> published_weights(const FilterInput& input, int x, int y, in
   return weights;
 }
 
-/// Minimises the bound over weights >= 0 with sum 1 without knowing its solution: moves weight between pairs of pixels
-/// in ever smaller steps.
+/// Minimises the bound over weights >= 0 with sum 1 without using the known solution: moves weight between pairs of
+/// pixels in ever smaller steps.
 std::vector<double> minimise(const std::vector<Partner>& window) {
   std::vector<double> weights(window.size(), 1.0 / static_cast<double>(window.size()));
   double squares = 0, distortion = 0;
@@ -152,7 +152,7 @@ TEST(BoundFilter, IsNeverAboveThePublishedBound) {
     }
 }
 
-/// Both filters leave an image of one colour as it is, borders included: weights add up to 1.
+/// Both filters preserve a constant image, borders included: weights sum to 1.
 TEST(Filters, WeightsAddUpToOne) {
   FilterInput input = random_input(5, 0.4f, 20);
   for (int y = 0; y < kHeight; ++y)
@@ -173,7 +173,7 @@ TEST(Filters, ManySamplesMakeTheExactOneVanishAndNotThePublishedOne) {
   EXPECT_LT(exact_centre[0], 0.2);
   EXPECT_NEAR(exact_centre[1], 1, 1e-3);
   EXPECT_LT(published_centre[1], 0.6);
-  // Its limit: weights (mean Delta - Delta_q)^+ d_q.
+  // In the limit, the weights are (mean Delta - Delta_q)^+ d_q.
   const FilterInput input = random_input(6, 0.2f, 1e9f);
   const std::vector<Partner> window = partners(input, 9, 6, -1, 2);
   double mean = 0, sum = 0;
@@ -202,7 +202,7 @@ TEST(RegionFilter, IncrementalSumsEqualDirectOnes) {
 }
 
 TEST(RegionFilter, GrowsWhileTheCentreLosesWeight) {
-  // One colour: f = 1/M, so that f*[0] is 1, 0.631, 0.225 …
+  // Constant colour: f = 1/M, so that f*[0] is 1, 0.631, 0.225 …
   const FilterInput input = random_input(8, 0, 10);
   const auto region = [&](float drop, int most) {
     return region_filter(input, {.max_region = most, .min_centre_drop = drop}).region.pixel(9, 6)[0];
@@ -250,7 +250,7 @@ TEST(Filters, PixelsWithoutSamplesOrNoise) {
   for (const float value : bound_filter(silent, 5).colour.data) EXPECT_TRUE(std::isfinite(value));
 }
 
-/// The result, and its parts put together by hand.
+/// The result, and its parts combined by hand.
 TEST(DependentTests, CombinesByCountsOrByWorth) {
   const test::Grouped crn = test::crn_image(24, 18, 6, 1);
   test::Grouped independent = test::independent_image(24, 18, 4, 1);
@@ -275,7 +275,7 @@ TEST(DependentTests, CombinesByCountsOrByWorth) {
   }
 }
 
-/// A CRN image that is too bright in all its pixels alike, as its numbers are common to them, is left out.
+/// A CRN image that is too bright in all pixels, since they share their numbers, is rejected.
 TEST(DependentTests, MeasuresTheErrorOfTheCrnImage) {
   test::Grouped crn = test::crn_image(48, 40, 6, 1);
   const test::Grouped independent = test::independent_image(48, 40, 12, 1);
@@ -295,7 +295,7 @@ TEST(DependentTests, MeasuresTheErrorOfTheCrnImage) {
   EXPECT_LT(std::abs(measured - truth), 0.3 * std::abs(worth - truth));
 }
 
-/// A pixel without samples of its own is combined by what the filtered image is worth there.
+/// A pixel without samples of its own is combined by the effective number of samples of the filtered image.
 TEST(DependentTests, PixelsWithoutSamplesAreCombinedByWorth) {
   const test::Grouped crn = test::crn_image(24, 18, 6, 1);
   test::Grouped independent = test::independent_image(24, 18, 4, 1);
@@ -321,7 +321,7 @@ TEST(DependentTests, WithoutIndependentSamplesItIsTheCrnImage) {
   }
 }
 
-/// A CRN image that is all black says that all pixels are alike.
+/// An all-black CRN image claims that all pixels are alike.
 TEST(DependentTests, TheGuardKeepsWhatTheCrnImageDoesNotSee) {
   const test::Grouped black = test::constant_image(30, 30, 2, 0);
   const test::Grouped independent = test::independent_image(30, 30, 4, 3);
@@ -361,7 +361,7 @@ TEST(DependentTests, HasTheSameBitsForAnyNumberOfThreads) {
   }
 }
 
-/// Rows farther away than the reach change nothing.
+/// Rows beyond the reach change nothing.
 TEST(DependentTests, LooksNoFartherThanItsReach) {
   const test::Grouped crn = test::crn_image(20, 90, 3, 5);
   const test::Grouped independent = test::independent_image(20, 90, 3, 5);
@@ -376,7 +376,7 @@ TEST(DependentTests, LooksNoFartherThanItsReach) {
   }
 }
 
-/// With stages, images are taken as a whole.
+/// With stages, images are processed as a whole.
 TEST(DependentTests, LargeImagesAreTakenInBands) {
   constexpr int width = 2500, height = 150;
   ASSERT_GT(width * height * kDependentTestsBytesPerPixel, kDependentTestsBand);

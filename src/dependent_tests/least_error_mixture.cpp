@@ -12,11 +12,11 @@ namespace {
 
 using namespace lanes;
 
-constexpr int kBrightnessWindow = 7;  // side of the means of the weights' brightness
-constexpr float kOffset = 0.01f;      // of squared brightness, as in relMSE
-constexpr int kBlock = 32;            // rows that are worked on together
+constexpr int kBrightnessWindow = 7;  // side of the window over which brightness is averaged for the weights
+constexpr float kOffset = 0.01f;      // added to squared brightness, as in relMSE
+constexpr int kBlock = 32;            // rows processed together
 
-/// 1 / (brightness^2 + 0.01) of each pixel, 0 where it is left out.
+/// 1 / (brightness^2 + 0.01) of each pixel, 0 for pixels left out.
 Planes error_weights(const FilterInput& input, std::vector<unsigned char> used) {
   Planes brightness(input.width(), input.height(), 1, 0, 0);
   parallel_for(input.height(), 8, [&](int y) {
@@ -35,7 +35,7 @@ Planes error_weights(const FilterInput& input, std::vector<unsigned char> used) 
   return weights;
 }
 
-/// The sums of n_normal_sums().
+/// Computes the n_normal_sums() sums, and the weights from them.
 class Mixer {
  public:
   Mixer(const FilterInput& input, const Planes& noise, const Planes& weights,
@@ -82,7 +82,7 @@ class Mixer {
     }
   }
 
-  /// Sums of rows first … last - 1, column by column, with the borders.
+  /// Column sums over rows first … last - 1, borders included.
   void add_columns(const Planes& terms, int i, int first, int last, Planes& columns) const {
     for (int x = 0; x < input_.width(); x += kLanes) {
       vfloat sum{};

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // The mixture of images with the least estimated error (ours). Given the noisy mean C_i of a pixel's independent
-// samples, and images X_j that are linear in such means with weights that do not depend on them, o_j of which is the
-// pixel's own weight (filtered images; an image of other samples with o_j = 0),
+// samples, and images X_j that are linear in such means with weights that do not depend on them, o_j being the weight
+// of the pixel itself (filtered images, or an image of other samples with o_j = 0),
 //
 //     G = C_i + sum_j a_j (X_j - C_i)
 //
-// has the expected squared error, but for a constant, of [Mallows1973]
+// has the expected squared error, up to a constant, of [Mallows1973]
 //
 //     sum_jk a_j a_k <X_j - C_i, X_k - C_i> - 2 sum_j a_j v (1 - o_j),        v = sum over channels of var C_i,
 //
-// without bias and whatever the errors of X_j are: noise, distortion, or errors common to whole regions. It is summed
-// over a window around each pixel, with the weights of relMSE, and made least over a >= 0, sum a <= 1. As v goes to 0,
-// so do the a_j of images that keep an error.
+// estimated without bias, whatever the errors of X_j: noise, distortion, or errors common to whole regions. It is
+// summed over a window around each pixel, with the weights of relMSE, and minimised over a >= 0, sum a <= 1. As v tends
+// to 0, so do the a_j of images with a remaining error.
 #pragma once
 
 #include <span>
@@ -26,15 +26,15 @@ struct MixtureCandidate {
   const Image* own_weight = nullptr;  ///< o_j, one channel; null: 0
 };
 
-/// At most so many candidates.
+/// Maximum number of candidates.
 inline constexpr int kMixtureCandidates = 3;
 
-/// `noise`: one plane, v of each pixel. Pixels that are not valid or have no samples (input.count) are left out of the
-/// sums, and keep their C_i. `window`: side of the windows of the sums, odd. Bit-identical for any number of threads.
+/// `noise`: one plane, v of each pixel. Pixels that are invalid or without samples (input.count) are left out of the
+/// sums and keep their C_i. `window`: side of the windows of the sums, odd. Bit-identical for any number of threads.
 Image least_error_mixture(const FilterInput& input, const Planes& noise, const std::vector<unsigned char>& valid,
                           std::span<const MixtureCandidate> candidates, int window);
 
-/// How far from a pixel, in rows or columns, input and candidates can influence it.
+/// Radius of influence of input and candidates on a pixel, in rows or columns.
 int least_error_mixture_reach(int window);
 
 }  // namespace covary

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Mixtures of images: coefficients against sums and solutions written out, and images whose errors are known.
+// Mixtures of images: coefficients against explicit sums and solutions, and images with known errors.
 #include "dependent_tests/least_error_mixture.h"
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kWidth = 60, kHeight = 50;
 
-/// An image of one colour with noise of standard deviation `noise` in each channel.
+/// A constant image with noise of standard deviation `noise` in each channel.
 struct Scene {
   FilterInput input;
   Planes noise = Planes(kWidth, kHeight, 1, 0, 0);
@@ -29,7 +29,7 @@ struct Scene {
         noise.row(0, y)[x] = static_cast<float>(3 * deviation * deviation);
       }
   }
-  /// Uniform with the standard deviation `deviation`.
+  /// Uniform with standard deviation `deviation`.
   static float random(uint64_t seed, int x, int y, int c, double deviation) {
     const double uniform = test::noise(seed, static_cast<uint64_t>(y * kWidth + x), static_cast<uint64_t>(c));
     return static_cast<float>(uniform * std::sqrt(12.0) * deviation);
@@ -54,12 +54,12 @@ double mean_square_error(const Image& image) {
   return sum / static_cast<double>(image.data.size());
 }
 
-/// The x of least x'Ax / 2 - b'x over x >= 0, sum x <= 1, among the solutions for all sets of weights that are not
-/// zero, where their sum is free and where it is 1.
+/// Minimises x'Ax / 2 - b'x over x >= 0, sum x <= 1, among the solutions for all sets of nonzero weights, with their
+/// sum free or equal to 1.
 Eigen::Vector3d least_over_simplex(const Eigen::Matrix3d& A, const Eigen::Vector3d& b) {
   Eigen::Vector3d best = Eigen::Vector3d::Zero();
   for (int set = 1; set < 16; ++set) {
-    Eigen::Matrix4d system = Eigen::Matrix4d::Identity();  // the last row: the multiplier of the sum
+    Eigen::Matrix4d system = Eigen::Matrix4d::Identity();  // the last row: the Lagrange multiplier of the sum
     Eigen::Vector4d right = Eigen::Vector4d::Zero();
     for (int j = 0; j < 3; ++j) {
       if (!(set >> j & 1)) continue;
@@ -119,7 +119,7 @@ TEST(LeastErrorMixture, EqualsTheSolutionWrittenOut) {
   EXPECT_EQ(result.pixel(12, 9)[0], scene.input.independent.row(0, 9)[12]) << "left out";
 }
 
-/// Two images with independent errors of variances v and w have the least error v w / (v + w) together.
+/// Combining two images with independent errors of variances v and w gives the minimum error v w / (v + w).
 TEST(LeastErrorMixture, WeightsIndependentErrorsByTheirVariance) {
   const Scene scene(0.3);
   const Image other = noisy(5, 1, 0.15);
@@ -127,7 +127,7 @@ TEST(LeastErrorMixture, WeightsIndependentErrorsByTheirVariance) {
   EXPECT_NEAR(mean_square_error(scene.mix({{&other, nullptr}}, 31)), v * w / (v + w), 0.03 * w);
 }
 
-/// An error that is common to all pixels of an image is seen as one of any other kind.
+/// An error common to all pixels of an image is detected like any other.
 TEST(LeastErrorMixture, LeavesAnImageThatIsWrong) {
   const Scene scene(0.1);
   const Image wrong = noisy(6, 1.7, 0.01), right = noisy(7, 1, 0.01);
@@ -135,7 +135,7 @@ TEST(LeastErrorMixture, LeavesAnImageThatIsWrong) {
   EXPECT_LT(mean_square_error(scene.mix({{&wrong, nullptr}, {&right, nullptr}}, 31)), 0.0003);
 }
 
-/// An image a quarter of which is the pixel's own samples, the rest as many others: half of each is best.
+/// An image of which a quarter is the pixel's own samples, the rest as many others: half of each is best.
 TEST(LeastErrorMixture, CountsThePixelsOwnSamplesOnce) {
   const Scene scene(0.3);
   const Image other = noisy(8, 1, 0.3);

@@ -16,7 +16,7 @@ using namespace lanes;
 struct Place {
   int dx, dy;
   float distance;
-  float side;  ///< of the smallest square that has it
+  float side;  ///< of the smallest square that contains it
 };
 
 /// The pixels that the square of side m adds to that of side m - 1 are [first[m - 1], first[m]).
@@ -37,13 +37,13 @@ struct Places {
   }
 };
 
-/// A region of each lane: side m, pixels M inside the frame, sum of their Delta.
+/// The region of each lane: side m, number M of pixels inside the frame, sum of their Delta.
 struct Region {
   vfloat side = splat(1), size = splat(1), differences{};
 };
 
-/// Weights before they are divided by their sum, [Csonka2002] Sec. 4: with f = 1/M + sqrt(N) / (3 sigma sqrt(M)) (mean
-/// of Delta - Delta_q) and d = m / sqrt(2) - distance, the weights are f* = max(f, 0) d over their sum.
+/// Weights before normalisation, [Csonka2002] Sec. 4: with f = 1/M + sqrt(N) / (3 sigma sqrt(M)) (mean of Delta -
+/// Delta_q) and d = m / sqrt(2) - distance, the weights are f* = max(f, 0) d over their sum.
 struct Kernel {
   vfloat slope, offset, height;  // f = offset - slope * Delta, d = height - distance
 
@@ -63,7 +63,7 @@ bool any(vint mask) {
   return all != 0;
 }
 
-/// The regions of kLanes pixels next to each other.
+/// The regions of kLanes adjacent pixels.
 class RegionBatch {
  public:
   RegionBatch(const FilterInput& input, const RegionOptions& options, const Places& places)
@@ -85,7 +85,7 @@ class RegionBatch {
   }
 
  private:
-  /// Lets regions grow while pixels are of one class and the weight of the centre falls enough.
+  /// Grows the regions while their pixels are of one class and the centre's weight falls enough.
   Region grown() {
     Region region, accepted;
     vfloat centre_weight = splat(1);
@@ -107,7 +107,8 @@ class RegionBatch {
     return accepted;
   }
 
-  /// Adds the pixels that side m adds and that lie inside the frame. Says where one of them has another class.
+  /// Adds the pixels that side m adds and that lie inside the frame. Returns the lanes where one of them has another
+  /// class.
   vint add_places(int m, Region& region) {
     const Planes& d = input_.dependent;
     const vfloat r = load(d.row(0, y_) + x_), g = load(d.row(1, y_) + x_), b = load(d.row(2, y_) + x_);

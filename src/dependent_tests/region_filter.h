@@ -5,17 +5,17 @@
 //     f_q  = 1/M + sqrt(N) / (3 sigma sqrt(M)) (sum_r Delta_r / M - Delta_q),   Delta_q = |C_d[p] - C_d[q]|
 //     f*_q = f_q^+ d_q / sum_r f_r^+ d_r,
 //
-// sigma and N those of p, d_q = max(m / sqrt(2) - distance, 0) a pyramid that ends at the corners of the square. Growth
-// ends where a pixel has another number of samples than p, or where f*_p falls by less than min_centre_drop; the last
-// region accepted counts.
+// sigma and N are those of p, and d_q = max(m / sqrt(2) - distance, 0) is a pyramid that ends at the corners of the
+// square. Growth stops when a pixel has another number of samples than p, or when f*_p falls by less than
+// min_centre_drop; the last accepted region counts.
 //
-// Left open by the paper and chosen here: squares of even side reach one pixel farther to the right and down, so that
-// regions are nested; pixels outside the frame are left out; a pixel without noise (sigma = 0) or samples (N = 0)
-// stays alone.
+// Left open in the paper and chosen here: squares of even side extend one pixel farther to the right and down, so that
+// regions are nested; pixels outside the frame are ignored; a pixel without noise (sigma = 0) or samples (N = 0) stays
+// alone.
 //
-// The weights are not those that minimise the error bound, which the text says they come from: the root of the sum of
-// their squares is replaced by 1 / sqrt(M), negative ones are cut off. In the limit of many samples they tend to
-// (mean Delta - Delta_q)^+ d_q and not to 1 at p, so that the filter never vanishes. bound_filter.h has the minimiser.
+// The weights do not minimise the error bound that the paper derives them from: the root of their sum of squares is
+// replaced by 1 / sqrt(M), and negative ones are clamped. In the limit of many samples they tend to (mean Delta -
+// Delta_q)^+ d_q and not to 1 at p, so that the filter never vanishes. bound_filter.h has the minimiser.
 #pragma once
 
 #include "filters/filter_input.h"
@@ -25,20 +25,20 @@ namespace covary {
 struct RegionOptions {
   /// Largest side m of a region, 1 … 63; 1: no filter. Default 4 ([Csonka2002] Sec. 6).
   int max_region = 4;
-  /// Delta f[0]_min, >= 0: regions grow while the weight of the centre falls by at least so much. Default 0.01
+  /// Delta f[0]_min, >= 0: regions grow while the centre's weight falls by at least this much. Default 0.01
   /// ([Csonka2002] Fig. 4).
   float min_centre_drop = 0.01f;
 };
 
-/// What a filter makes of the independent image. One channel each, but `colour`.
+/// Result of filtering the independent image. One channel each, except `colour`.
 struct FilteredImage {
   Image colour;         ///< RGB; zero where no pixel of the window has samples
-  Image region;         ///< pixels that the mean is made of
+  Image region;         ///< number of pixels averaged
   Image centre_weight;  ///< of the pixel itself
   /// The error bound eps = 3 sqrt(sum f_q^2 sigma_q^2 / N_q) + sum f_q Delta_q ([Csonka2002] Sec. 4) in units of the
   /// norm; infinite where there are no samples.
   Image bound;
-  /// Samples that the mean is worth, sigma^2 / (sum f_q^2 sigma_q^2 / N_q).
+  /// Effective number of samples of the mean, sigma^2 / (sum f_q^2 sigma_q^2 / N_q).
   Image effective_samples;
 
   FilteredImage(int width, int height)
