@@ -12,18 +12,18 @@ namespace covary {
 namespace {
 
 constexpr uint32_t kCoarsest = 4;  // cells along the longest side of the pyramid's last grid, below its root
-constexpr uint32_t kChunk = 32;    // cells that a thread takes at a time
+constexpr uint32_t kChunk = 32;    // cells per task
 
-/// The cells of one grid while they are solved, neighbours along a curve through space: arrays over cells, and over
-/// lights seen in cells.
+/// The cells of one grid while they are solved, ordered along a space-filling curve: arrays over cells, and over lights
+/// seen in cells.
 struct Level {
   SystemLayout layout;
   std::vector<CellKey> keys;
   std::vector<double> heads;
-  std::vector<size_t> first;  // of each cell's lights, and their number
+  std::vector<size_t> first;  // index of each cell's first light, and their total number
   std::vector<uint32_t> lights;
   std::vector<float> rows;
-  std::vector<uint32_t> parents;  // in the level above; empty where there is none
+  std::vector<uint32_t> parents;  // in the level above; empty if there is none
   std::vector<Spectrum> light_values, dense_values, scales, light_sums;
 
   uint32_t n_cells() const { return static_cast<uint32_t>(keys.size()); }
@@ -39,7 +39,7 @@ struct Level {
             {lights.data() + first[cell], n_lights(cell)},
             {rows.data() + first[cell] * layout.row_size(), n_lights(cell) * layout.row_size()}};
   }
-  /// Room for cells and, once first is known, for lights.
+  /// Allocates the arrays over cells and, once first is known, over lights.
   void resize_cells(size_t n) {
     keys.resize(n), first.resize(n + 1), heads.resize(n * layout.head_size());
     dense_values.resize(n * layout.n_dense), scales.resize(n, Spectrum(1)), light_sums.resize(n);
@@ -50,7 +50,7 @@ struct Level {
   }
 };
 
-/// Order in which the children of each cell of every coarser grid are neighbours: the bits of x, y, z interleaved.
+/// An order in which the children of each cell of every coarser grid are adjacent: Morton code of x, y, z.
 uint64_t curve_position(CellKey key) {
   const auto spread = [](uint64_t v) {
     v = (v | v << 32) & 0x001f00000000ffffull;
@@ -62,7 +62,7 @@ uint64_t curve_position(CellKey key) {
   return uint64_t{key.kind()} << 51 | spread(key.z()) << 2 | spread(key.y()) << 1 | spread(key.x());
 }
 
-/// A set of lights that is read in increasing order.
+/// A set of lights that can be read in increasing order.
 class LightSetBits {
  public:
   explicit LightSetBits(size_t n_lights) : words_((n_lights + 63) / 64) {}
@@ -78,7 +78,7 @@ class LightSetBits {
   std::vector<uint64_t> words_;
 };
 
-/// Calls body(first, last) for parts of [0, n).
+/// Calls body(first, last) for consecutive parts of [0, n), in parallel.
 template <typename Body>
 void parallel_parts(uint32_t n, const Body& body) {
   parallel_for((n + kChunk - 1) / kChunk,
@@ -95,7 +95,7 @@ Level finest_level(const SystemSums& sums, size_t n_lights) {
   std::vector<uint32_t> place(n);
   for (uint32_t i = 0; i < n; ++i) place[order[i].second] = i;
 
-  // Rows of a cell together, in any order; then by light.
+  // Group rows by cell, in any order; then sort them by light.
   for (size_t i = 0; i < sums.n_rows(); ++i) ++level.first[place[sums.row_cell(i)] + 1];
   level.resize_lights();
   std::vector<uint32_t> rows(sums.n_rows());
@@ -119,7 +119,7 @@ Level finest_level(const SystemSums& sums, size_t n_lights) {
   return level;
 }
 
-/// The level above: cells twice as wide, or a single one, the root, that knows no normals.
+/// The level above: cells twice as wide, or the root, a single cell that does not distinguish normals.
 Level coarser_level(Level& finer, size_t n_lights, bool root) {
   const auto parent_key = [&](uint32_t i) { return root ? CoefficientTable::root_key() : finer.keys[i].coarser(1); };
   std::vector<uint32_t> child;  // the first of each parent
@@ -172,7 +172,7 @@ void solve_cell(Level& level, uint32_t i, const Level* above, const std::vector<
     for (int c = 0; c < 3; ++c) sum[c] += count * value[c];
   };
   if (above) {
-    // The prior: what the parent has for the lights of the cell, all of which it has seen.
+    // The prior: the parent's coefficients for the lights of the cell, all of which it has seen.
     const uint32_t parent = level.parents[i];
     const size_t m = level.layout.n_dense;
     std::copy_n(above->dense_values.data() + parent * m, m, own.dense.begin());
@@ -192,7 +192,7 @@ void solve_cell(Level& level, uint32_t i, const Level* above, const std::vector<
     level.scales[i] = best_fraction(level.system(i), level.scales[i], settings.prior_vertices, settings.monochrome);
 }
 
-/// Finest first; `resolution` of that, or 0 for no others.
+/// Finest first; `resolution`: that of the finest, or 0 for no coarser levels.
 std::vector<Level> levels_of(const SystemSums& sums, uint32_t resolution, size_t n_lights) {
   std::vector<Level> levels;
   levels.push_back(finest_level(sums, n_lights));
@@ -210,7 +210,7 @@ std::vector<size_t> lights_per_cell(const std::vector<Level>& levels) {
   return lights;
 }
 
-/// Adds the cells of a level to a table; `first_above` is the number of the first cell of the level above there.
+/// Adds the cells of a level to a table; `first_above`: index there of the first cell of the level above.
 void add_to_table(Level& level, uint32_t first_above, CoefficientTable& table) {
   std::vector<CoefficientTable::NewCell> cells(level.n_cells());
   for (uint32_t i = 0; i < level.n_cells(); ++i) {
@@ -285,7 +285,7 @@ void CoefficientCache::update() {
 }
 
 std::vector<float> CoefficientCache::best_selection() const {
-  constexpr double kKept = 0.2;  // part of the former probabilities: lights may matter where no sample has been yet
+  constexpr double kKept = 0.2;  // fraction of the former probabilities: lights may matter where no sample has been yet
   const std::span<const double> residuals = sums_.light_residuals();
   std::vector<double> roots(light_counts_.size());
   double count = 0, sum = 0;

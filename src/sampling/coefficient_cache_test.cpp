@@ -16,16 +16,16 @@ namespace {
 const Bounds3 kUnit{{0, 0, 0}, {1, 1, 1}};
 const Vec3 kUp{0, 0, 1};
 
-/// Vertices on the floor of a unit room with `n` lights. Each takes one sample of a light, all as probable, and one of
-/// a direction, which finds light number (x coordinate · n) in half of all cases and nothing in the others.
+/// Vertices on the floor of a unit room with `n` lights. Each takes one light sample, uniformly chosen, and one
+/// direction sample, which finds light (x coordinate · n) half of the time and nothing otherwise.
 class Room {
  public:
-  using Light = std::function<Spectrum(const Vec3& position, uint32_t light)>;  // f/p where light samples are alone
+  using Light = std::function<Spectrum(const Vec3& position, uint32_t light)>;  // f/p if only light samples find it
   Room(uint32_t n, Light light) : n_(n), light_(std::move(light)) {}
 
   std::vector<float> counts() const { return std::vector<float>(n_, 1.0f / static_cast<float>(n_)); }
 
-  /// One vertex: its estimate without control, and the control by the table's coefficients.
+  /// One vertex: its plain estimate, and its control with the table's coefficients.
   struct Vertex {
     CellKey key;
     Spectrum plain, control;
@@ -39,7 +39,7 @@ class Room {
     v.key = cache.key(position, kUp);
     const auto pick = [&](float x) { return std::min(static_cast<uint32_t>(x * static_cast<float>(n_)), n_ - 1); };
     const uint32_t chosen = pick(random.get_1d(1, Event::kLightChoice)), met = pick(u.x);
-    // Where a direction finds a light, both techniques could have; elsewhere the technique that did alone.
+    // Where a direction finds a light, both techniques could have found it; otherwise only the one that did.
     const float probability = 1.0f / static_cast<float>(n_);
     const auto share = [&](uint32_t light) { return light == met ? probability / (probability + 0.5f) : 1.0f; };
     v.r[0] = 1 - share(chosen);
@@ -77,7 +77,7 @@ class Room {
     for (const SystemSums& tile : sums) cache.absorb(tile);
     cache.update();
   }
-  /// Mean and second moment of plain and controlled estimates over new vertices.
+  /// Mean and second moment of plain and controlled estimates over fresh vertices.
   struct Moments {
     double plain = 0, controlled = 0, plain_squared = 0, controlled_squared = 0;
   };
@@ -100,7 +100,7 @@ class Room {
   Light light_;
 };
 
-/// Brightness that depends on place and light, never on which sample finds it.
+/// Brightness that depends on place and light, not on the technique.
 Spectrum smooth_light(const Vec3& p, uint32_t light) {
   const float x = p.x * 4 - static_cast<float>(light % 4);
   return Spectrum(1, 2 / (1 + x * x), p.y) * (1 + static_cast<float>(light % 3));
@@ -134,7 +134,7 @@ TEST(CoefficientCache, ControlsTakeAwayNoiseAndKeepTheMean) {
   EXPECT_LT(m.controlled_squared - m.controlled * m.controlled, 0.6 * plain);
 }
 
-/// Every cell's sum over all lights is that of what it has for them one by one.
+/// Every cell's sum over all lights equals the sum of its coefficients for them.
 TEST(CoefficientCache, SumOverLightsHoldsThoseOfTheParentToo) {
   const Room room(40, smooth_light);
   for (const bool pyramid : {true, false}) {
@@ -189,7 +189,7 @@ TEST(CoefficientCache, PointsOutsideBelongToTheNearestCell) {
   EXPECT_EQ(0u, flat.key({1, 1, 1}, kUp).x());
 }
 
-/// Halving the coordinates of a cell gives the cell of the coarser grid, also where the resolution is odd.
+/// Halving the coordinates of a cell gives the cell of the coarser grid, even for odd resolutions.
 TEST(CoefficientCache, GridsAreNested) {
   for (uint32_t resolution : {1u, 7u, 64u, 100u}) {
     CellGrid fine(kUnit, resolution, true);
@@ -220,7 +220,7 @@ TEST(CoefficientCache, RefusesImpossibleResolutions) {
   }
 }
 
-/// The control of a cell whose first wave was a bad sample of it does harm, which the next wave finds.
+/// The control of a cell with an unrepresentative first wave does harm, which the next wave detects.
 TEST(CoefficientCache, SwitchesOffControlsThatDoHarm) {
   CacheSettings settings;
   settings.resolution = 1, settings.prior_vertices = 0, settings.prior_samples = 0;
@@ -375,7 +375,7 @@ TEST_F(TrainingFile, IsRefusedWhenItIsSomethingElse) {
   EXPECT_EQ("a.training: is damaged: its content does not match its checksum", refused(bytes_ + "x", "scene 1"));
 }
 
-/// Contents that a checksum would let through: refused or harmless.
+/// Content changes that a checksum would let through: rejected or harmless.
 TEST(TrainingFileBody, ManyMutationsAreRefusedOrHarmless) {
   const Room room(4, smooth_light);
   CacheSettings settings;
@@ -388,7 +388,7 @@ TEST(TrainingFileBody, ManyMutationsAreRefusedOrHarmless) {
     std::string mutated = body;
     for (uint64_t n = 0; n <= i % 3; ++n) {
       const uint64_t dice = mix64(7 * i + n);
-      // Numbers at the head and in the first cells decide over sizes.
+      // Numbers in the header and in the first cells determine sizes.
       mutated[dice % std::min<size_t>(mutated.size(), i % 2 ? 100 : 600)] ^= static_cast<char>(1 << (dice >> 32) % 8);
     }
     if (i % 5 == 0) mutated.resize(mix64(i) % mutated.size());
@@ -404,7 +404,7 @@ TEST(TrainingFileBody, ManyMutationsAreRefusedOrHarmless) {
   EXPECT_GT(n_accepted, 100);
 }
 
-// c_k in proportion to the root of c_k S_k: here of 0.25 · 1 and 0.75 · 12, so 0.5 : 3; a fifth stays as it was.
+// c_k proportional to the root of c_k S_k: here of 0.25 · 1 and 0.75 · 12, so 0.5 : 3; a fifth stays as it was.
 TEST(LightSelectionByResiduals, IsThatOfLeastVariance) {
   CoefficientCache cache({{0, 0, 0}, {1, 1, 1}}, {0.25f, 0.75f}, 1, {});
   EXPECT_TRUE(cache.best_selection().empty());

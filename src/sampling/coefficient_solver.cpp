@@ -9,8 +9,8 @@
 namespace covary {
 namespace {
 
-// Least weight of the prior, relative to the diagonal: it decides what samples leave open and costs 1e-8 of a
-// coefficient elsewhere.
+// Minimum weight of the prior, relative to the diagonal: it decides what samples leave undetermined and changes other
+// coefficients by 1e-8.
 constexpr double kLeastPrior = 1e-8;
 
 using Layout = SystemLayout;
@@ -28,8 +28,8 @@ Spectrum spectrum(const Rgb& v) {
   return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
 }
 
-/// What the prior adds to the diagonal of A. The weight of one sample is that of a typical one, Σw² / Σw: where a few
-/// samples have nearly all of the weight, these few are what the prior is compared with.
+/// What the prior adds to the diagonal of A. One sample has the weight of a typical one, Σw² / Σw: if a few samples
+/// have nearly all the weight, the prior is compared with these few.
 class Prior {
  public:
   Prior(const SystemView& system, const SolveSettings& settings) {
@@ -42,11 +42,10 @@ class Prior {
   double weight_ = 0;
 };
 
-/// Right-hand sides of (A + weight of the prior) x = b − A (prior + constant); x is the solution's difference from the
-/// prior.
+/// Right-hand sides of (A + prior weight) x = b − A (prior + constant); x is the solution minus the prior.
 struct Residuals {
   std::vector<Rgb> lights;
-  DenseRgb dense;  // a column for each technique
+  DenseRgb dense;  // one column per technique
 };
 
 Residuals residuals(const SystemView& system, const CoefficientsView& prior, bool monochrome) {
@@ -57,7 +56,7 @@ Residuals residuals(const SystemView& system, const CoefficientsView& prior, boo
   result.lights.resize(system.lights.size());
   result.dense.resize(3, m);
 
-  // Sums of A's rows are Σ w r, because the weights r of a sample add up to one.
+  // Row sums of A are Σ w r, because the weights r of a sample sum to one.
   std::vector<double> light_sums(system.lights.size());
   double dense_sums[Layout::kMaxDense];
   Rgb total = rgb(head + Layout::kValue);
@@ -87,7 +86,7 @@ Residuals residuals(const SystemView& system, const CoefficientsView& prior, boo
   }
   for (uint32_t j = 0; j < m; ++j) total -= dense_sums[j] * rgb(prior.dense[j]);
 
-  // The constant that makes the prior's residuals vanish in the mean.
+  // The constant that makes the mean residual of the prior vanish.
   const double weight = head[Layout::kWeight];
   const Rgb constant = weight > 0 ? Rgb(total / weight) : Rgb(Rgb::Zero());
   for (size_t k = 0; k < result.lights.size(); ++k) result.lights[k] -= light_sums[k] * constant;
@@ -100,11 +99,11 @@ Residuals residuals(const SystemView& system, const CoefficientsView& prior, boo
   return result;
 }
 
-/// Solves matrix · x = right for each row of `right`. Techniques whose diagonal in A is not above zero are left out:
-/// x = 0.
+/// Solves matrix · x = right for each row of `right`. Techniques whose diagonal in A is not positive are left out: x =
+/// 0.
 template <typename Matrix, typename Right>
 void solve_scaled(Matrix& matrix, const double* diagonal, Right& right) {
-  // A unit diagonal, so that techniques of very different weight do not disturb each other.
+  // Scale to a unit diagonal, so that techniques of very different weight do not disturb each other.
   const Eigen::Index n = matrix.rows();
   Eigen::Matrix<double, Eigen::Dynamic, 1, 0, Matrix::MaxRowsAtCompileTime, 1> scale(n);
   for (Eigen::Index i = 0; i < n; ++i) scale[i] = diagonal[i] > 0 ? 1 / std::sqrt(diagonal[i]) : 0;
@@ -115,7 +114,7 @@ void solve_scaled(Matrix& matrix, const double* diagonal, Right& right) {
   right = (factors.solve(scale.asDiagonal() * right.transpose()).transpose() * scale.asDiagonal()).eval();
 }
 
-/// Adds the differences to the prior, unless one is not finite.
+/// Adds the differences to the prior, unless any is not finite.
 template <typename Dense>
 void add_differences(const std::vector<Rgb>& lights, const Dense& dense, CoefficientsView& coefficients) {
   bool finite = dense.allFinite();
@@ -126,7 +125,7 @@ void add_differences(const std::vector<Rgb>& lights, const Dense& dense, Coeffic
     coefficients.dense[j] += spectrum(dense.col(static_cast<Eigen::Index>(j)).array());
 }
 
-/// A system by channel: each channel as a system of its own, of whose solution the others are dropped.
+/// A by-channel system: solves each channel as a system of its own and keeps only that channel of the solution.
 void solve_by_channel(const SystemView& system, const SolveSettings& settings, CoefficientsView coefficients) {
   const Layout& layout = system.layout;
   const Layout single{layout.n_dense};
@@ -169,7 +168,7 @@ void solve_block_arrow(const SystemView& system, const SolveSettings& settings, 
     matrix(j, j) = prior.diagonal(matrix(j, j));
     diagonal[j] = matrix(j, j);
   }
-  // The lights' rows, put into the others: [Hua2023] Eq. (32).
+  // Eliminate the rows of the lights: [Hua2023] Eq. (32).
   std::vector<double> inverse(system.lights.size());
   for (size_t k = 0; k < system.lights.size(); ++k) {
     const float* row = &system.rows[k * layout.row_size()];
@@ -222,8 +221,8 @@ Spectrum best_fraction(const SystemView& system, const Spectrum& parent, double 
   const double* head = system.head.data();
   const double n = head[Layout::kHeldOut], weight = head[Layout::kHeldOutWeight];
   if (!(n > 0 && weight > 0)) return parent;
-  // Both have the means taken off: that of the plain estimate, times what noise is left of the control's mean of 0,
-  // would hide the fraction.
+  // Both are centred: otherwise the mean of the plain estimate, times the residual noise in the control's mean (0 in
+  // expectation), would hide the fraction.
   const Rgb control = rgb(head + Layout::kControl) / weight;
   Rgb cross = rgb(head + Layout::kPlainControl) - rgb(head + Layout::kPlain) * control;
   Rgb second = rgb(head + Layout::kControlSquared);
@@ -232,8 +231,8 @@ Spectrum best_fraction(const SystemView& system, const Spectrum& parent, double 
   const double prior = prior_vertices / n;
   Spectrum result = parent;
   for (int c = 0; c < 3; ++c) {
-    if (!(squared[c] > 1e-9 * second[c])) continue;  // one vertex, or equal ones, say nothing
-    // The least variance of plain + s · control lies at s = −Cov(plain, control) / Var(control).
+    if (!(squared[c] > 1e-9 * second[c])) continue;  // one vertex, or identical ones, carry no information
+    // The variance of plain + s · control is minimal at s = −Cov(plain, control) / Var(control).
     const double fraction = (-cross[c] / squared[c] + prior * parent[c]) / (1 + prior);
     result[c] = static_cast<float>(std::clamp(fraction, 0.0, 1.0));
   }

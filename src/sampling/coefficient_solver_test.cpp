@@ -101,7 +101,7 @@ TEST(CoefficientSolver, BlockArrowEqualsDenseOnRandomSystems) {
       }
 }
 
-// Weights of each channel give what three systems give of which each has the weights of one channel.
+// Separate weights per channel give the same as three systems, each with the weights of one channel.
 TEST(CoefficientSolver, ChannelsWithWeightsOfTheirOwnAreSystemsOfTheirOwn) {
   Numbers numbers;
   for (const uint32_t m : {1u, 2u}) {
@@ -133,14 +133,14 @@ TEST(CoefficientSolver, ChannelsWithWeightsOfTheirOwnAreSystemsOfTheirOwn) {
   }
 }
 
-/// Systems that leave combinations of coefficients open: they keep the prior.
+/// Systems that leave combinations of coefficients undetermined: these keep the prior.
 TEST(CoefficientSolver, BlockArrowEqualsDenseOnSingularSystems) {
   Numbers numbers;
   for (const float spread : {0.0f, 1e-6f, 1e-3f}) {
     OneCell cell(3);
     for (uint32_t light = 0; light < 5; ++light)
       for (int s = 0; s < 6; ++s) {
-        // Always nearly the same shares, and a third dense technique that never has any.
+        // Nearly constant shares, and a third dense technique that never has any.
         const float share = 0.3f + spread * numbers.next();
         const float r[] = {0.5f * (1 - share), 0.5f * (1 - share), 0};
         cell.add(1, {numbers.next(), 1, 2}, light, share, r);
@@ -160,7 +160,7 @@ TEST(CoefficientSolver, WithoutSamplesTheResultIsThePrior) {
   EXPECT_EQ(prior.dense, result.dense);
 }
 
-/// A technique that no sample knows keeps its prior and does not disturb the others.
+/// A technique that no sample uses keeps its prior and does not disturb the others.
 TEST(CoefficientSolver, TechniquesWithoutSamplesLeaveTheSystem) {
   Numbers numbers;
   OneCell with(2), without(1);
@@ -177,7 +177,7 @@ TEST(CoefficientSolver, TechniquesWithoutSamplesLeaveTheSystem) {
   EXPECT_LT(largest_difference({more.lights, {more.dense[0]}}, fewer), 1e-6f);
 }
 
-/// Σ_j A_kj = Σ w r_k, since the weights r of each sample add up to one.
+/// Σ_j A_kj = Σ w r_k, since the weights r of each sample sum to one.
 TEST(CoefficientSolver, RowsAddUpToTheWeightsOfTheirTechnique) {
   Numbers numbers;
   OneCell cell(3);
@@ -213,15 +213,15 @@ TEST(CoefficientSolver, LittleDataStaysNearThePrior) {
   OneCell cell(0);
   for (int s = 0; s < 4; ++s) cell.add(1, Spectrum(4), 0, 1, {});
   for (int s = 0; s < 4; ++s) cell.add(1, Spectrum(0), 1, 1, {});
-  // The mean is 2, so coefficients lie 2 above and below it; with a prior of 4 samples, half of that.
+  // The mean is 2, so coefficients are 2 above and below it; with a prior of 4 samples, half of that.
   const Coefficients free = fast(cell.view(), cell.zeros());
   EXPECT_NEAR(4, free.lights[0].r - free.lights[1].r, 1e-5);
   const Coefficients drawn = fast(cell.view(), cell.zeros(), {4});
   EXPECT_NEAR(2, drawn.lights[0].r - drawn.lights[1].r, 1e-5);
 }
 
-/// A light that directions find now and then, and light samples never: its weights r are tiny, and without a prior its
-/// coefficient would be as large as they are small.
+/// A light found now and then by directions and never by light samples: its weights r are tiny, and without a prior its
+/// coefficient would be correspondingly large.
 TEST(CoefficientSolver, TinyWeightsGiveNoLargeCoefficients) {
   OneCell cell(1);
   const float always = 1, nearly = 1 - 1e-4f;
@@ -231,7 +231,7 @@ TEST(CoefficientSolver, TinyWeightsGiveNoLargeCoefficients) {
   EXPECT_LT(std::abs(fast(cell.view(), cell.zeros(), {4}).lights[0].r), 0.01f);
 }
 
-/// A sample that has nearly all of the weight is one sample.
+/// A sample with nearly all the weight counts as one sample.
 TEST(CoefficientSolver, OneHeavySampleIsNotMuchData) {
   OneCell cell(0);
   for (int s = 0; s < 100; ++s) cell.add(1e-3f, Spectrum(1), s % 2, 1, {});
@@ -245,7 +245,7 @@ TEST(CoefficientSolver, ShareOfTheControlIsWhatHeldOutVerticesSay) {
   const auto share = [&](double prior) { return best_fraction(cell.view(), {1, 0.5f, 0}, prior, false); };
   EXPECT_EQ(Spectrum(1, 0.5f, 0), share(10)) << "no data";
   for (int i = 0; i < 10; ++i) {
-    // Red: the control takes away all noise. Green: half of it would be best. Blue: it adds noise.
+    // Red: the control removes all noise. Green: half of it would be best. Blue: it adds noise.
     const float sign = i % 2 ? 1.0f : -1.0f;
     cell.sums.add_held_out(cell.cell, 1, Spectrum(1 + sign), {-sign, -2 * sign, sign});
   }
@@ -256,7 +256,7 @@ TEST(CoefficientSolver, ShareOfTheControlIsWhatHeldOutVerticesSay) {
   EXPECT_EQ(one.r, one.b);
 }
 
-/// A plain estimate with a large mean and a control whose mean is by chance not 0.
+/// A plain estimate with a large mean and a control whose sample mean is not 0.
 TEST(CoefficientSolver, ShareIsOneWhereTheControlLeavesAConstant) {
   OneCell cell(0);
   const float controls[] = {-1, 0.5f, 3, 2, 0.25f};

@@ -20,7 +20,7 @@ uint32_t nearest_axis(const Vec3& n) {
   return static_cast<uint32_t>(2 * axis + (n[axis] < 0 ? 1 : 0));
 }
 
-constexpr size_t kChunk = 64;  // cells that a thread fills at a time
+constexpr size_t kChunk = 64;  // cells per task
 
 }  // namespace
 
@@ -109,7 +109,7 @@ void CoefficientTable::reserve(std::span<const size_t> lights_per_cell) {
 
 uint32_t CoefficientTable::slots_for(size_t n_lights) const {
   if (n_lights == 0) return 0;
-  // At least one slot stays empty, so that a search ends.
+  // At least one slot stays empty, so that searches terminate.
   const uint32_t slots = std::bit_ceil(static_cast<uint32_t>(n_lights + n_lights / 2 + 1));
   return slots < n_lights_ ? slots : kEveryLight;
 }

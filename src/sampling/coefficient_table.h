@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Coefficients of control variates for every place of a scene, as paths look them up: cells of a grid by position and
-// normal, each with its own lights, and coarser cells for what finer ones have not seen.
+// Lookup of control-variate coefficients along paths: cells of a grid by position and normal, each with its own lights,
+// and coarser cells for what finer ones have not seen.
 #pragma once
 
 #include <cstddef>
@@ -16,23 +16,23 @@
 
 namespace covary {
 
-/// Which cell a point lies in. The cells are cubes, `resolution` of them along the longest side of the bounds.
+/// Maps points to cells: cubes, `resolution` of them along the longest side of the bounds.
 class CellGrid {
  public:
   static constexpr uint32_t kMaxResolution = 1u << 16;
-  static constexpr uint32_t kEveryNormal = 6;  ///< CellKey::kind() where normals are not told apart
+  static constexpr uint32_t kEveryNormal = 6;  ///< CellKey::kind() when normals are not distinguished
   CellGrid() = default;
-  /// Throws Error(kUsage) when the resolution is 0 or above kMaxResolution. `by_normal` tells apart the six directions
-  /// to which normals can be nearest.
+  /// Throws Error(kUsage) when the resolution is 0 or above kMaxResolution. `by_normal` distinguishes normals by the
+  /// nearest of the six axis directions.
   CellGrid(const Bounds3& bounds, uint32_t resolution, bool by_normal);
-  /// Points outside of the bounds belong to the nearest cell. `normal` need not have unit length.
+  /// Points outside the bounds belong to the nearest cell. `normal` need not have unit length.
   CellKey key(const Vec3& position, const Vec3& normal) const;
   uint32_t resolution() const { return resolution_; }
   bool by_normal() const { return by_normal_; }
   /// The grid with cells twice as wide.
   CellGrid coarser() const;
   float cell_width() const { return cell_width_; }
-  uint32_t level() const { return level_; }  ///< of its keys: how often coarser() was called
+  uint32_t level() const { return level_; }  ///< of its keys: number of coarser() calls
 
  private:
   friend class CoefficientTable;
@@ -42,7 +42,7 @@ class CellGrid {
   bool by_normal_ = true;
 };
 
-/// Immutable once made; look-ups are thread-safe. The control of a vertex is
+/// Immutable once built; lookups are thread-safe. The control of a vertex is
 ///
 ///     control = light_sum + Σ_j N_j dense_j − Σ_s ( light(s) r_light(s) + Σ_j dense_j r_j(s) ),
 ///
@@ -58,24 +58,24 @@ class CoefficientTable {
   const CellGrid& grid() const { return grid_; }
   uint32_t n_lights() const { return n_lights_; }
   uint32_t n_dense() const { return n_dense_; }
-  /// The finest cell that holds coefficients for the place, or kNone: plain sampling.
+  /// The finest cell with coefficients for the place, or kNone: no control.
   uint32_t find(CellKey key) const;
-  /// Asks memory for what find(key) reads.
+  /// Prefetches what find(key) reads.
   void prefetch(CellKey key) const { index_.prefetch(key.bits); }
-  /// Asks memory for what scale(), light_sum() and dense() of a cell read.
+  /// Prefetches what scale(), light_sum() and dense() read for a cell.
   void prefetch_cell(uint32_t cell) const {
     __builtin_prefetch(&cells_[cell]), __builtin_prefetch(&dense_[size_t{cell} * n_dense_]);
   }
-  /// Asks memory for what light() reads.
+  /// Prefetches what light() reads.
   void prefetch_light(uint32_t cell, uint32_t light) const;
 
-  /// Share of the control to use in `cell`, in [0, 1]; is_black() where the cell is switched off.
+  /// Fraction of the control to use in `cell`, in [0, 1]; is_black() if the cell is switched off.
   Spectrum scale(uint32_t cell) const { return cells_[cell].scale; }
   /// Σ_k N_k β_k over all lights.
   Spectrum light_sum(uint32_t cell) const { return cells_[cell].light_sum; }
   /// β of a dense technique.
   Spectrum dense(uint32_t cell, uint32_t j) const { return dense_[size_t{cell} * n_dense_ + j]; }
-  /// β of a light: that of the finest of the cell and its ancestors which have seen the light, otherwise zero.
+  /// β of a light: from the finest of the cell and its ancestors that has seen the light, otherwise zero.
   Spectrum light(uint32_t cell, uint32_t light) const {
     const Cell& own = cells_[cell];
     return own.n_slots == kEveryLight ? slots_[own.first + light].value : light_of(cell, light);
@@ -84,55 +84,55 @@ class CoefficientTable {
   uint32_t n_cells() const { return static_cast<uint32_t>(cells_.size()); }
   uint32_t n_switched_off() const;
   size_t bytes() const;
-  /// About the bytes of a table of so many cells that hold so many coefficients of lights.
+  /// Approximate size in bytes of a table of `n_cells` cells with `n_values` coefficients of lights.
   static size_t expected_bytes(size_t n_cells, size_t n_values) { return n_cells * 2 * sizeof(Cell) + n_values * 32; }
   uint64_t hash() const;
-  /// Makes room for cells that hold coefficients of so many lights each.
+  /// Reserves memory for cells with these numbers of coefficients of lights.
   void reserve(std::span<const size_t> lights_per_cell);
 
-  /// A cell to be added. Lights that are not in `lights` have the parent's coefficients.
+  /// A cell to be added. Lights not in `lights` have the parent's coefficients.
   struct NewCell {
     CellKey key;
-    uint32_t parent = kNone;  ///< number of the parent, which was added before, or kNone
+    uint32_t parent = kNone;  ///< index of the parent, added before, or kNone
     Spectrum scale, light_sum;
     std::span<const uint32_t> lights;        ///< in increasing order
     std::span<const Spectrum> light_values;  ///< β of `lights`
     std::span<const Spectrum> dense_values;  ///< β of the dense techniques
   };
-  /// Adds cells, in parallel; they get the next numbers. The cell with root_key() serves every place for which no other
+  /// Adds cells, in parallel, with consecutive indices. The cell with root_key() serves every place for which no other
   /// is found.
   void add_cells(std::span<const NewCell> cells);
   static CellKey root_key() { return {0, 0, 0, 0, 255}; }
 
-  /// Multiplies the coefficients of each light. Sums over lights stay: they are right where the expected numbers of the
-  /// lights' samples are divided by the same factors.
+  /// Multiplies the coefficients of each light. Sums over lights are unchanged: they remain correct if the expected
+  /// numbers of samples are divided by the same factors.
   void scale_lights(std::span<const float> factors);
-  /// How probable lights (or clusters) are where that was learnt too, relative to one another; otherwise empty.
+  /// Relative probabilities of lights (or clusters), if these were learnt too; otherwise empty.
   const std::vector<float>& selection() const { return selection_; }
   void set_selection(std::vector<float> selection) { selection_ = std::move(selection); }
 
-  /// All of the table as bytes, as docs/file-formats.md describes them. `key` names what the coefficients belong to
+  /// Serialises the table, as described in docs/file-formats.md. `key` identifies what the coefficients belong to
   /// (scene and settings).
   std::string to_bytes(const std::string& key) const;
-  /// Reads to_bytes(). `where` names the source in messages. Throws Error(kInput) when the bytes are truncated,
-  /// damaged, of another version, or made with another key.
+  /// Deserialises to_bytes(). `where` names the source in messages. Throws Error(kInput) when the bytes are truncated,
+  /// damaged, of another version, or have another key.
   static CoefficientTable from_bytes(std::string_view bytes, const std::string& key, const std::string& where);
-  /// What to_bytes() has behind its header, and back. Throws Error(kInput) for bytes that are not such.
+  /// The content of to_bytes() after its header, and back. Throws Error(kInput) for invalid bytes.
   std::string body() const;
   static CoefficientTable from_body(std::string_view bytes, const std::string& where);
 
  private:
-  // A cell that has seen many of the lights holds a value for each light there is, inherited ones too; others hold an
-  // open-addressing table of those they have seen, and a set of bits, one for each of some lights, that says of most
-  // others without a look at the table that they are not there.
+  // A cell that has seen many of the lights stores a value for every light, inherited ones included; others store an
+  // open-addressing table of those they have seen, and a bit set over groups of lights that usually rejects the others
+  // without touching the table.
   static constexpr uint32_t kEveryLight = kNone;
   struct alignas(64) Cell {
     Spectrum scale, light_sum;
     uint32_t parent = kNone;
     uint32_t n_slots = 0;  // a power of two, 0 for no lights, or kEveryLight
-    size_t first = 0;      // of slots_
+    size_t first = 0;      // index into slots_
     uint64_t bits[2] = {};
-    uint64_t unused = 0;  // no byte is left undefined, see hash()
+    uint64_t unused = 0;  // no byte is left uninitialised, see hash()
 
     void note(uint32_t light) { bits[light >> 6 & 1] |= uint64_t{1} << (light & 63); }
     bool may_hold(uint32_t light) const { return bits[light >> 6 & 1] >> (light & 63) & 1; }
@@ -149,7 +149,7 @@ class CoefficientTable {
 
   CellGrid grid_;
   uint32_t n_lights_ = 0, n_dense_ = 0;
-  uint32_t last_level_ = 0;  // highest level of a cell but for the root
+  uint32_t last_level_ = 0;  // highest level of any cell except the root
   uint32_t root_ = kNone;
   KeyIndex index_;
   LargeVector<Cell> cells_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the theory promises [Hua2023] (Sec. 3 to 5), by quadrature over integrands and densities in one and two
+// Theoretical properties of [Hua2023] (Sec. 3 to 5), by quadrature over integrands and densities in one and two
 // dimensions: no random numbers, so every statement is exact up to rounding.
 #include <gtest/gtest.h>
 
@@ -18,14 +18,14 @@ struct Coefficients {
   std::vector<Spectrum> lights, dense;
 };
 
-/// A technique of sampling: expected number of samples, density at each node.
+/// A sampling technique: expected number of samples, density at each node.
 struct Technique {
   double count;
   std::vector<double> density;
-  uint32_t strategy;  ///< techniques of one strategy are components of its mixture, of which one is chosen at random
+  uint32_t strategy;  ///< techniques of one strategy are components of its mixture, one of which is chosen at random
 };
 
-/// An integral over equal cells of the unit line or square, with what samples it.
+/// An integral over equal cells of the unit line or square, with its sampling techniques.
 struct Problem {
   size_t n_nodes;
   std::vector<Spectrum> integrand;
@@ -37,7 +37,7 @@ struct Problem {
       for (const Technique& t : *list) sum += t.count * t.density[x];
     return sum;
   }
-  /// The light that has density at x; lights do not overlap.
+  /// The light whose density is positive at x; lights do not overlap.
   uint32_t light_at(size_t x) const {
     for (uint32_t k = 0; k < lights.size(); ++k)
       if (lights[k].density[x] > 0) return k;
@@ -74,7 +74,7 @@ struct Problem {
     return found;
   }
 
-  /// Variance of the estimate that takes the samples of each strategy, with coefficients β.
+  /// Variance of the estimate with one set of samples per strategy and coefficients β.
   Spectrum variance(const Coefficients& beta) const {
     Spectrum result;
     for (int c = 0; c < 3; ++c) {
@@ -113,7 +113,7 @@ std::vector<double> normalised(std::vector<double> values) {
   return values;
 }
 
-/// f at the middles of n cells of [0, 1], as a density.
+/// f at the midpoints of n cells of [0, 1], as a density.
 std::vector<double> density(size_t n, const std::function<double(double)>& f) {
   std::vector<double> values(n);
   for (size_t i = 0; i < n; ++i) values[i] = f((static_cast<double>(i) + 0.5) / static_cast<double>(n));
@@ -128,7 +128,7 @@ std::vector<Spectrum> integrand(size_t n, const std::function<Spectrum(double)>&
 
 double bump(double x, double centre, double width) { return std::exp(-0.5 * std::pow((x - centre) / width, 2)); }
 
-/// Three lights side by side with chosen probabilities, a broad BSDF and an environment; nothing matches anything.
+/// Three adjacent lights with given probabilities, a broad BSDF and an environment; no density matches the integrand.
 Problem many_lights() {
   constexpr size_t n = 600;
   Problem problem{n, {}, {}, {}};
@@ -179,7 +179,7 @@ TEST(ControlledMixture, EqualCoefficientsAreThePlainEstimate) {
   }
 }
 
-/// The gradient of the variance vanishes, and every step away makes it larger.
+/// The gradient of the variance vanishes, and every step away increases it.
 TEST(ControlledMixture, NoOtherCoefficientsAreBetter) {
   const Problem problem = many_lights();
   const Coefficients best = problem.solve();
@@ -194,7 +194,7 @@ TEST(ControlledMixture, NoOtherCoefficientsAreBetter) {
     }
 }
 
-/// One coefficient for all channels: no worse than plain in the sum, no better than one for each.
+/// One coefficient for all channels: no worse than plain in total, no better than one per channel.
 TEST(ControlledMixture, MonochromeLiesBetweenPlainAndColour) {
   const Problem problem = many_lights();
   const auto total = [](const Spectrum& v) { return v.r + v.g + v.b; };
@@ -248,7 +248,7 @@ TEST(ControlledMixture, IsNeverWorseThanTheBalanceHeuristic) {
   }
 }
 
-/// [Kondapaneni2019]: the techniques of multiple importance sampling alone, each as a whole. Their best coefficients
+/// [Kondapaneni2019]: the techniques of multiple importance sampling only, each as a whole. Their optimal coefficients
 /// solve Σ_j α_j ∫ p_i p_j / p = ∫ f p_i / p (Eq. 16 there); here β_j = α_j / n_j up to a constant.
 TEST(ControlledMixture, OptimalMultipleImportanceSamplingIsASpecialCase) {
   Problem problem = many_lights();
@@ -283,9 +283,8 @@ TEST(ControlledMixture, OptimalMultipleImportanceSamplingIsASpecialCase) {
   EXPECT_NEAR(beta[2] - beta[0], found.dense[2].r - found.dense[0].r, 1e-4);
 }
 
-/// [Vevoda2018]: a control for light samples alone, the mean of their weighted contributions for each light. It is
-/// what comes of samples that know of no technique but their own: α_k = N_k β_k is the part of F that light k's samples
-/// find.
+/// [Vevoda2018]: a control for light samples only, the mean weighted contribution of each light. It results from
+/// samples that know no technique but their own: α_k = N_k β_k is the part of F found by samples of light k.
 TEST(ControlledMixture, MeanContributionsOfLightsAreASpecialCase) {
   const Problem problem = many_lights();
   SystemSums sums(SystemLayout{0});
@@ -308,7 +307,7 @@ TEST(ControlledMixture, MeanContributionsOfLightsAreASpecialCase) {
                 found[k].r - found[0].r, 1e-4);
 }
 
-/// Sec. 5 speaks of mixtures: one sample, of a component chosen at random.
+/// Sec. 5 is about mixtures: one sample, of a randomly chosen component.
 Problem mixture(size_t n, std::vector<std::pair<double, std::vector<double>>> components) {
   Problem problem{n, {}, {}, {}};
   for (auto& [share, values] : components) problem.dense.push_back({share, std::move(values), 0});
@@ -331,7 +330,7 @@ TEST(ControlledMixture, TakesAwayColourNoise) {
   EXPECT_GT(total(problem.variance(problem.solve(true))), 0.8f * plain);
 }
 
-/// Sec. 5.2, Fig. 4: a sine, sampled by its positive and its negative part.
+/// Sec. 5.2, Fig. 4: a sine, sampled by its positive and negative parts.
 TEST(ControlledMixture, TakesAwayTheNoiseOfSigns) {
   constexpr size_t n = 400;
   const auto sine = [](double x) { return std::sin(2 * static_cast<double>(kPi) * x); };
@@ -340,14 +339,14 @@ TEST(ControlledMixture, TakesAwayTheNoiseOfSigns) {
   problem.integrand = integrand(n, [&](double x) { return Spectrum(static_cast<float>(sine(x))); });
   EXPECT_NEAR(std::pow(2 / static_cast<double>(kPi), 2), problem.plain_variance().r, 1e-4);
   EXPECT_NEAR(0, problem.variance(problem.solve()).r, 1e-6);
-  // Densities that fit less well: nearly all of the noise still goes.
+  // Densities that fit less well: nearly all of the noise is still removed.
   Problem rough = mixture(n, {{0.5, density(n, [](double x) { return x < 0.5 ? x * (0.5 - x) : 0; })},
                               {0.5, density(n, [](double x) { return x > 0.5 ? (x - 0.5) * (1 - x) : 0; })}});
   rough.integrand = problem.integrand;
   EXPECT_LT(rough.variance(rough.solve()).r, 0.05f * rough.plain_variance().r);
 }
 
-/// Sec. 5.3.1, Fig. 5: one component is perfect, and rarely chosen.
+/// Sec. 5.3.1, Fig. 5: one component is perfect but rarely chosen.
 TEST(ControlledMixture, RestoresThePerfectComponentOfAMixture) {
   constexpr size_t n = 400;
   const auto sky = [](double x) { return 1 - 0.5 * x; };
@@ -357,7 +356,7 @@ TEST(ControlledMixture, RestoresThePerfectComponentOfAMixture) {
   EXPECT_NEAR(0, problem.variance(problem.solve()).r, 1e-6);
 }
 
-/// Sec. 5.3.2, Fig. 6: two components sample the dark sky, and the sun too little.
+/// Sec. 5.3.2, Fig. 6: two components oversample the dark sky and undersample the sun.
 TEST(ControlledMixture, EasesOversampling) {
   constexpr size_t n = 400;
   const auto light = [](double x) { return 1 + 30 * bump(x, 0.7, 0.02); };

@@ -60,7 +60,7 @@ void GuidingField::add(std::span<const GuidingSample> samples) {
   }
 }
 
-/// Splits a range of samples at the mean position of the axis in which they lie farthest apart, or makes it a leaf.
+/// Splits a range of samples at the mean position along the axis of largest variance, or makes it a leaf.
 void GuidingField::split(const Range& range, std::vector<Range>& pending, std::vector<Range>& leaves) {
   const std::span<GuidingSample> samples = std::span(samples_).subspan(range.first, range.last - range.first);
   if (samples.size() > settings_.leaf_samples && range.depth < settings_.max_depth) {

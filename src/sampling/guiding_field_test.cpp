@@ -12,7 +12,7 @@
 namespace covary {
 namespace {
 
-/// Light from +x where x < 0, and from +y elsewhere.
+/// Light from +x for x < 0, and from +y elsewhere.
 std::vector<GuidingSample> two_rooms(size_t n, uint64_t seed = 1) {
   std::vector<GuidingSample> samples;
   for (size_t i = 0; i < n; ++i) {

@@ -10,7 +10,7 @@
 
 namespace covary {
 
-/// Calls body(lane) for all vertices and up to the end of the last vector; what lies there is not used.
+/// Calls body(lane) for all vertices, rounded up to whole vectors; the excess results are unused.
 template <typename Body>
 void LambertianBlock::for_each_lane(const Body& body) {
   constexpr int kLanes = 16;
@@ -60,7 +60,7 @@ void LambertianBlock::add(uint32_t i, const Spectrum& path_throughput, float eta
         [&](Event event) { return random.get_2d(address, event); });
 }
 
-/// `one`, `two`: give the one number, or the two, of an event at the vertex.
+/// `one`, `two`: return one number, or two, of an event at the vertex.
 template <typename One, typename Two>
 void LambertianBlock::set_numbers(int l, const One& one, const Two& two) {
   const Vec2 light = two(Event::kLightPosition), direction = two(Event::kDirection);
@@ -90,7 +90,7 @@ void LambertianBlock::find_surfaces(const Scene& scene) {
     const Vec3 interpolated = corners_[0].n[l] * b0 + corners_[1].n[l] * b1 + corners_[2].n[l] * b2;
     const float l2 = length_squared(interpolated);
     const float scale = 1 / std::sqrt(l2);
-    const bool smooth = l2 > 0;  // a mesh without normals has zero vectors
+    const bool smooth = l2 > 0;  // zero vectors if the mesh has no normals
     const Vec3 n{smooth ? interpolated.x * scale : ng.x, smooth ? interpolated.y * scale : ng.y,
                  smooth ? interpolated.z * scale : ng.z};
     const Frame frame(n);
@@ -131,8 +131,8 @@ void LambertianBlock::set_parallelogram(int l, const ParallelogramLight& light) 
   light_is_delta_[l] = false;
 }
 
-/// As TriangleMesh::sample_uv(), Shape::towards() and AreaLight::sample_towards(); lanes of other lights too, whose
-/// results are not used.
+/// As TriangleMesh::sample_uv(), Shape::towards() and AreaLight::sample_towards(); also run for lanes with other
+/// lights, whose results are unused.
 void LambertianBlock::sample_parallelograms() {
   for_each_lane([&](int l) {
     const Vec3 at = light_origin_[l] + light_dp_du_[l] * u_light_x[l] + light_dp_dv_[l] * u_light_y[l];

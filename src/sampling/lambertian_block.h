@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Path vertices on triangle meshes whose surface is Lambertian, which most vertices of most scenes are, shaded side by
-// side in the lanes of vector registers [Afra2016]. Same values as vertex by vertex, in the same order of operations.
+// Path vertices on Lambertian triangle meshes, the most common case in most scenes, shaded together in SIMD lanes
+// [Afra2016]. Results match shading vertex by vertex, with the same order of operations.
 #pragma once
 
 #include <cstdint>
@@ -13,16 +13,16 @@
 
 namespace covary {
 
-/// A mesh that does not emit, in the world's own space, with its surface.
+/// A non-emissive mesh without instance transform, with its BSDF.
 struct LambertianMesh {
   const TriangleMesh* mesh = nullptr;
   Lambertian model;
 };
 
-/// Which hits lie on such meshes. An object is for one thread and one scene, in which nothing moves meanwhile.
+/// Finds hits on such meshes. An object serves one thread and one scene, which must not change meanwhile.
 class LambertianMeshes {
  public:
-  /// Null where the hit of `ray`, one that was found, lies on another surface.
+  /// Null if the hit of `ray`, which must exist, is on another surface.
   const LambertianMesh* find(const Scene& scene, const Ray& ray, const RayHit& hit) {
     if (hit.instance != RayHit::kNone) return nullptr;
     if (hit.geometry >= known_.size()) known_.resize(hit.geometry + 1);
@@ -30,7 +30,7 @@ class LambertianMeshes {
     if (!known.asked) ask(scene, ray, hit, known);
     return known.surface.mesh ? &known.surface : nullptr;
   }
-  /// Of a hit for which find() was not null.
+  /// For hits where find() was not null.
   const LambertianMesh& at(const RayHit& hit) const { return known_[hit.geometry].surface; }
 
  private:
@@ -42,8 +42,8 @@ class LambertianMeshes {
   std::vector<Known> known_;  // by geometry
 };
 
-/// Some vertices of a batch as arrays, one for each number of a vertex. The functions work on the first `size` of them;
-/// each is a loop without branches that compilers turn into vector instructions.
+/// Some vertices of a batch as structure of arrays. The functions process the first `size` vertices; each is a
+/// branch-free loop that compilers vectorise.
 class LambertianBlock {
  public:
   static constexpr int kCapacity = 64;
@@ -66,33 +66,33 @@ class LambertianBlock {
   int size() const { return size_; }
   bool full() const { return size_ == kCapacity; }
   void clear() { size_ = n_textured_ = 0; }
-  /// Adds the vertex where the ray of path `index` of the batch met `surface`; `address`: of its random numbers.
+  /// Adds the vertex where the ray of path `index` of the batch hit `surface`; `address`: that of its random numbers.
   void add(uint32_t index, const Spectrum& path_throughput, float eta, const Ray& ray, const RayHit& hit,
            const LambertianMesh& surface, const PathRandom& random, uint32_t address);
 
-  /// What TriangleMesh::fill() and Scene::resolve() find, reflectances, and on which side the path came.
+  /// Computes what TriangleMesh::fill() and Scene::resolve() do, reflectances, and the side from which the path came.
   void find_surfaces(const Scene& scene);
-  /// The random numbers of all vertices.
+  /// Draws the random numbers of all vertices.
   void draw_numbers();
-  /// Samples a light of each vertex for connect().
+  /// Samples a light for each vertex, for connect().
   void sample_lights(const Emitter* const* lights);
-  /// Values of the surface for the light samples of sample_lights(), weighted against direction sampling;
-  /// their shadow rays. `pmf`: probability with which a light was chosen.
+  /// Contributions of the light samples of sample_lights(), MIS-weighted against direction sampling, and their shadow
+  /// rays. `pmf`: probability with which a light was chosen.
   void connect(float pmf);
-  /// Directions, drawn by the cosine, and what a path carries there.
+  /// Cosine-weighted directions, and the throughput along them.
   void scatter();
-  /// Russian roulette; `survival`: probability of what each path carries.
+  /// Russian roulette; `survival`: each path's survival probability.
   void survive(Sampling sampling);
 
   uint32_t index[kCapacity] = {};
   // Random numbers of the vertex.
   Floats u_choice, u_light_x, u_light_y, u_primitive, u_x, u_y, u_roulette;
   Vectors p;
-  // By connect(): black where nothing is to be traced.
+  // Set by connect(): black if no ray need be traced.
   Spectra contribution;
   Vectors shadow_o, shadow_d;
   Floats shadow_t;
-  // By scatter() and survive().
+  // Set by scatter() and survive().
   Spectra throughput;
   Floats pdf, survival;  // pdf 0: the path ends
   Vectors o, d;
@@ -109,8 +109,8 @@ class LambertianBlock {
   void sample_spheres();
 
   int size_ = 0;
-  bool drawn_ = false;             // the random numbers are there, as points of sequences
-  uint64_t keys_[kCapacity] = {};  // else: of the vertices' random numbers
+  bool drawn_ = false;             // the random numbers are already set, as points of sequences
+  uint64_t keys_[kCapacity] = {};  // otherwise: keys of the vertices' random numbers
   Vectors light_wi_;
   Floats light_distance_, light_pdf_;  // pdf 0: no sample
   Spectra light_radiance_;
@@ -128,17 +128,17 @@ class LambertianBlock {
   Corner corners_[3];
   Floats b1_, b2_, eta_;
   int32_t both_sides_[kCapacity] = {};
-  Vectors wo_;  // in the world
+  Vectors wo_;  // in world space
   Spectra reflectance_;
   struct TexturedHit {
     int lane;
     const Texture* reflectance;
-    SurfaceHit hit;  // what the texture may read is complete after find_surfaces()
+    SurfaceHit hit;  // what textures may read is complete after find_surfaces()
   };
   int n_textured_ = 0;
   TexturedHit textured_[kCapacity];
   Vectors ng_, s_, t_, n_;
-  Floats offset_, side_;  // side: 1 or -1; 0: black from there
+  Floats offset_, side_;  // side: 1 or -1; 0: black from that side
 };
 
 }  // namespace covary

@@ -13,17 +13,17 @@ namespace {
 
 constexpr uint32_t kNone = ~0u;
 
-/// A node of the tree of lights: a light, or two nodes together.
+/// A node of the light tree: a light, or a pair of nodes.
 struct Node {
   Bounds3 bounds;
   Vec3 axis;
   double half_angle = 0;  // radians, of the cone that holds all normals
   double power = 0;
   uint32_t first = kNone, second = kNone;  // children
-  double cost = 0;                         // how unlike its lights are
+  double cost = 0;                         // dissimilarity of its lights
 };
 
-/// The smallest cone around two cones.
+/// The smallest cone that contains two cones.
 void merge_cones(const Node& a, const Node& b, Node& result) {
   const Node& wide = a.half_angle >= b.half_angle ? a : b;
   const Node& narrow = a.half_angle >= b.half_angle ? b : a;
@@ -53,7 +53,7 @@ class Builder {
     }
   }
 
-  /// The tree over the lights `order`, which are neighbours along a curve through space.
+  /// The tree over the lights `order`, sorted along a space-filling curve.
   uint32_t build(std::span<const uint32_t> order) {
     std::vector<uint32_t> top = agglomerate(order);
     combine(top, 1);
@@ -62,9 +62,9 @@ class Builder {
   const Node& node(uint32_t i) const { return nodes_[i]; }
 
  private:
-  static constexpr size_t kTogether = 16;  // so few lights are compared with each other
+  static constexpr size_t kTogether = 16;  // at most this many lights are compared with each other
 
-  /// How many nodes stand for n lights when they are compared with those of a neighbouring part, [Gu2013] Sec. 3.2.
+  /// Number of nodes kept for n lights when they are combined with a neighbouring part, [Gu2013] Sec. 3.2.
   static size_t kept(size_t n) {
     return std::max<size_t>(
         1, static_cast<size_t>(std::lround(0.5 * std::pow(kTogether, 0.6) * std::pow(static_cast<double>(n), 0.4))));
@@ -83,7 +83,7 @@ class Builder {
     return nodes;
   }
 
-  /// Joins the most similar two of `nodes` until `n` are left.
+  /// Merges the most similar pair of `nodes` until `n` are left.
   void combine(std::vector<uint32_t>& nodes, size_t n) {
     struct Partner {
       size_t index = 0;
@@ -108,7 +108,7 @@ class Builder {
       i = std::min(i, best[i].index);
       nodes_.push_back(joined(nodes[i], nodes[j]));
       nodes[i] = static_cast<uint32_t>(nodes_.size() - 1);
-      // The last one takes the free place.
+      // Move the last one into the free slot.
       const size_t last = nodes.size() - 1;
       nodes[j] = nodes[last], best[j] = best[last];
       nodes.pop_back(), best.pop_back();
@@ -143,7 +143,7 @@ class Builder {
   std::vector<Node> nodes_;
 };
 
-/// Order of the lights' centres along a Z-shaped curve through their bounds.
+/// Order of the lights' centres along a Morton curve through their bounds.
 std::vector<uint32_t> curve_order(std::span<const ClusterLight> lights) {
   Bounds3 bounds;
   for (const ClusterLight& light : lights)
@@ -179,7 +179,7 @@ LightClusters cluster_lights(std::span<const ClusterLight> lights, uint32_t limi
     return result;
   }
   Builder tree(lights, scene_diagonal);
-  // The tree is cut where lights are most unlike, until there are `limit` parts.
+  // Cut the tree where lights are least similar, until there are `limit` parts.
   using Part = std::pair<double, uint32_t>;
   std::priority_queue<Part> parts;
   const auto push = [&](uint32_t node) {
@@ -191,7 +191,7 @@ LightClusters cluster_lights(std::span<const ClusterLight> lights, uint32_t limi
     parts.pop();
     push(node.first), push(node.second);
   }
-  // Numbers in the order of first lights.
+  // Number clusters in the order of their first lights.
   std::vector<uint32_t> part_of(n, kNone), number(n, kNone);
   for (; !parts.empty(); parts.pop()) {
     std::vector<uint32_t> todo{parts.top().second};

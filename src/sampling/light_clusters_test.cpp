@@ -35,7 +35,7 @@ TEST(LightClusters, EachLightStaysAloneWhereTheLimitAllows) {
   EXPECT_THROW(cluster_lights({}, 0, 1), Error);
 }
 
-/// Three lamps of 50 bulbs each, mixed up in their order.
+/// Three lamps of 50 bulbs each, in mixed order.
 TEST(LightClusters, NeighboursComeTogether) {
   std::vector<ClusterLight> lights;
   const Vec3 lamps[] = {{0, 0, 3}, {5, 0, 3}, {2, 6, 3}};
@@ -54,7 +54,7 @@ TEST(LightClusters, LightsOnBothSidesOfAPanelStayApart) {
   for (uint32_t i = 0; i < 40; ++i) EXPECT_EQ(i % 2, clusters.cluster_of[i]);
 }
 
-/// Powerful lights keep clusters of their own longer than weak ones.
+/// Powerful lights keep their own clusters longer than weak ones.
 TEST(LightClusters, WeakLightsAreMergedFirst) {
   std::vector<ClusterLight> lights;
   for (uint32_t i = 0; i < 20; ++i)
@@ -78,7 +78,7 @@ TEST(LightClusters, ReachTheLimitAndAreNumberedByTheirFirstLights) {
   }
 }
 
-/// Mean squared distance to other lights of the cluster: far below that of clusters drawn by lot.
+/// Mean squared distance to other lights of the cluster: far below that of random clusters.
 TEST(LightClusters, ManyLightsGiveTightClusters) {
   const std::vector<ClusterLight> lights = random_lights(4000);
   const auto spread = [&](const std::vector<uint32_t>& cluster_of, uint32_t n) {
@@ -89,12 +89,12 @@ TEST(LightClusters, ManyLightsGiveTightClusters) {
     return sum;
   };
   const LightClusters clusters = cluster_lights(lights, 64, 0);
-  // 64 cubes of the unit cube would have 3/16.
+  // 64 cubes in the unit cube would have 3/16.
   EXPECT_LT(spread(clusters.cluster_of, 64), 0.3);
 }
 
 TEST(LightClusters, EqualAndOddLightsAreNoTrouble) {
-  std::vector<ClusterLight> lights(100);  // no bounds, no power, all around
+  std::vector<ClusterLight> lights(100);  // no extent, no power, all directions
   EXPECT_EQ(3u, cluster_lights(lights, 3, 1).n_clusters);
   for (ClusterLight& light : lights) light = light_at({1, 2, 3});
   EXPECT_EQ(3u, cluster_lights(lights, 3, 0).n_clusters);

@@ -12,7 +12,7 @@ PowerLights::PowerLights(const Scene& scene) : emitters_(scene.emitters()) {
   std::vector<LightPower> powers;
   for (const auto& emitter : emitters_) powers.push_back({luminance(emitter->power()), emitter->knows_power()});
   const std::vector<double> weights = weights_by_power(powers);
-  // The table keeps sums as floats, whose last digit a positive weight must reach.
+  // The table stores cumulative sums as floats, whose last digit a positive weight must reach.
   const double least = 0x1p-22 * std::accumulate(weights.begin(), weights.end(), 0.0);
   std::vector<float> table;
   for (const double weight : weights) table.push_back(static_cast<float>(weight > 0 ? std::max(weight, least) : 0));

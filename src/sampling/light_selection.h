@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which light to sample. A selection is made for one scene, which must outlive it; it is read by many threads.
+// Light selection. A selection is made for one scene, which must outlive it; reading is thread-safe.
 #pragma once
 
 #include <algorithm>
@@ -13,18 +13,18 @@
 
 namespace covary {
 
-/// Uniformly among all lights, as [Hua2023] and Mitsuba do. Costs nothing to make.
+/// Uniform over all lights, as in [Hua2023] and Mitsuba. Free to construct.
 class UniformLights {
  public:
   explicit UniformLights(const Scene& scene)
       : emitters_(scene.emitters()), pmf_(1 / static_cast<float>(emitters_.size())) {}
   bool empty() const { return emitters_.empty(); }
-  /// The light that `u` in [0, 1) chooses; there must be one.
+  /// The light chosen by `u` in [0, 1); there must be at least one.
   const Emitter& select(float u) const {
     const size_t n = emitters_.size();
     return *emitters_[std::min(static_cast<size_t>(u * static_cast<float>(n)), n - 1)];
   }
-  /// Probability that select() gives this light of the scene.
+  /// Probability with which select() returns this light.
   float pmf(const Emitter&) const { return pmf_; }
 
  private:
@@ -32,8 +32,8 @@ class UniformLights {
   float pmf_;
 };
 
-/// In proportion to the luminance of Emitter::power(), by sampling/light_selection.h. A light that is known to have no
-/// power is never chosen; where none has any, or one has infinitely much, all are equally likely.
+/// Proportional to the luminance of Emitter::power(), by weights_by_power(). A light known to have no power is never
+/// chosen; if none has any, or one's is infinite, all are equally likely.
 class PowerLights {
  public:
   explicit PowerLights(const Scene& scene);
@@ -47,7 +47,7 @@ class PowerLights {
   std::unordered_map<const Emitter*, float> pmfs_;
 };
 
-/// Ray from a surface to a light sample, short of the light itself.
+/// Ray from a surface to a light sample, ending just short of the light.
 inline Ray shadow_ray(const SurfaceHit& hit, const EmitterSample& light) {
   const Vec3 o = offset_origin(hit, light.wi);
   if (light.distance == kInfinity) return {o, light.wi, kInfinity};
@@ -56,15 +56,15 @@ inline Ray shadow_ray(const SurfaceHit& hit, const EmitterSample& light) {
   return {o, d * (1 / distance), distance * (1 - 10 * kRayEpsilon)};
 }
 
-// Weights by which lights are chosen in proportion to their powers. A light may become unlikely, never impossible.
+// Weights for choosing lights in proportion to their power. A light may become unlikely, never impossible.
 
 struct LightPower {
-  double power;  ///< at least 0; any number where none is known
-  bool exact;    ///< false: an estimate from some points, Emitter::knows_power()
+  double power;  ///< at least 0; arbitrary if unknown
+  bool exact;    ///< false: estimated from a few points, Emitter::knows_power()
 };
 
-/// In proportion to the powers. A light whose power is an estimate weighs at least 1 % of the mean light, so that one
-/// whose few bright points were missed is found. All weigh the same where no power is positive or one is not finite.
+/// Proportional to power. A light whose power is an estimate weighs at least 1 % of the mean light, so that one whose
+/// few bright points were missed is still found. All weights are equal if no power is positive or one is not finite.
 std::vector<double> weights_by_power(std::span<const LightPower> lights);
 
 }  // namespace covary

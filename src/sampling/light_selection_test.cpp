@@ -11,7 +11,7 @@
 namespace covary {
 namespace {
 
-/// Has power, known or estimated, and nothing else.
+/// An emitter with a power, known or estimated, and nothing else.
 class PowerOnly final : public Emitter {
  public:
   explicit PowerOnly(float power, bool known = true) : power_(power), known_(known) {}
@@ -39,8 +39,8 @@ std::vector<double> pmfs(const auto& lights, const Scene& scene) {
   return result;
 }
 
-// N = 200 000 choices among the lights, alpha = 5e-7: with four lights finds, with power 0.99, an error of 1.7 % rms of
-// their probabilities.
+// N = 200 000 choices among the lights, alpha = 5e-7: with four lights, detects an error of 1.7 % rms in their
+// probabilities with power 0.99.
 statistics::Chi2Result test_choices(const auto& lights, const Scene& scene, const std::vector<double>& probabilities) {
   std::vector<double> observed(scene.emitters().size());
   for (int i = 0; i < 200000; ++i) {

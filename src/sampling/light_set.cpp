@@ -11,7 +11,7 @@
 namespace covary {
 namespace {
 
-constexpr uint32_t kSteps = 1u << 24;  // of random numbers
+constexpr uint32_t kSteps = 1u << 24;  // number of distinct random numbers
 constexpr uint32_t kMaxLights = 1u << 22;
 
 std::vector<double> weights_by_power(const LargeVector<Light>& lights) {
@@ -39,7 +39,7 @@ std::vector<double> weights_by_area(const LargeVector<Light>& lights) {
   return weights;
 }
 
-/// Before normalisation.
+/// Unnormalised weights.
 std::vector<double> weights_of(const LargeVector<Light>& lights, LightSelection selection) {
   switch (selection) {
     case LightSelection::kTriangle:
@@ -53,8 +53,8 @@ std::vector<double> weights_of(const LargeVector<Light>& lights, LightSelection 
   throw Error(ErrorCode::kInternal, "unknown selection of lights");
 }
 
-/// Multiples of 2^-24 near the weights' parts of the whole, at least one for each positive weight, so that the
-/// probability with which a random number selects a light is exactly what the light's density is multiplied with.
+/// Normalised weights rounded to multiples of 2^-24, at least one step for each positive weight, so that the
+/// probability with which a random number selects a light exactly equals the factor in the light's density.
 std::vector<float> whole_steps(const std::vector<double>& weights) {
   const auto n_positive =
       static_cast<double>(std::count_if(weights.begin(), weights.end(), [](double weight) { return weight > 0; }));
@@ -66,7 +66,8 @@ std::vector<float> whole_steps(const std::vector<double>& weights) {
   for (size_t i = 0; i < weights.size(); ++i) {
     double n = 0;
     if (weights[i] > 0) {
-      const double exact = weights[i] / sum * (kSteps - n_positive) + rest;  // what rounding left goes to the next
+      const double exact = weights[i] / sum * (kSteps - n_positive) + rest;  // the rounding remainder carries over to
+                                                                             // the next
       n = std::floor(std::max(exact, 0.0));
       rest = exact - n;
       n += 1;

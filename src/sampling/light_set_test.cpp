@@ -109,7 +109,7 @@ TEST(LightSet, FindsNumberAndDensityOfASampleAtItsHit) {
     }
 }
 
-// The parts' densities, weighted like `path` chooses among triangles, add up to that of the whole light.
+// The parts' densities, weighted as `path` chooses among triangles, sum to that of the whole light.
 TEST(LightSet, PartsByAreaMakeUpTheWhole) {
   const ManyLights lights;
   const LightSet set(*lights.scene, LightSelection::kShape);
@@ -127,7 +127,7 @@ TEST(LightSet, PartsCarryThePowerOfTheWhole) {
   EXPECT_NEAR(luminance(mesh.part_power(0) + mesh.part_power(1)), luminance(mesh.power()), 1e-5);
 }
 
-/// A spotlight through a picture of 300 x 300 texels whose only bright ones are 2 x 2 at the given place.
+/// A spotlight projecting a texture of 300 x 300 texels, of which only 2 x 2 at the given place are bright.
 std::shared_ptr<Emitter> spot_with_bright_texels(int x, int y) {
   TexelImage image;
   image.width = image.height = 300, image.channels = 3;
@@ -144,14 +144,14 @@ TEST(LightSet, FindsThePowerOfASpotWithFewBrightTexels) {
   parts.emitters.push_back(spot_with_bright_texels(141, 157));
   parts.emitters.push_back(make_plugin<Emitter>(emitter_plugins(), "emitter", "point", {}).object);
   parts.camera = std::make_shared<Camera>(CameraSettings{}, 4, 4);
-  // Its intensity is 1e5 in 4 of the 300^2 texels of a square of side 2 tan 20 degrees at distance 1.
+  // Its intensity is 1e5 in 4 of the 300^2 texels of a square with side 2 tan 20 degrees at distance 1.
   const double spot = 4e5 * std::pow(2 * std::tan(20 * M_PI / 180) / 300, 2);
   EXPECT_NEAR(mean(parts.emitters[0]->power()), spot, 0.02 * spot);
   const LightSet set(Scene(std::move(parts)), LightSelection::kPower);
   EXPECT_NEAR(set[0].pmf, spot / (spot + 4 * M_PI), 0.02 * set[0].pmf);
 }
 
-/// Black wherever its power is looked for, as a texture can be between the points of an estimate.
+/// Black wherever its power is probed, as a texture can be between the points of an estimate.
 class SeemsBlack final : public Emitter {
  public:
   EmitterSample sample_towards(const Vec3&, Vec2, float) const override { return {}; }

@@ -14,7 +14,7 @@ using Weight = float (*)(float, float);
 float unweighted(float, float) { return 1; }
 float without_square(float a, float b) { return a / (a + b); }
 
-/// Largest deviation of the two techniques' weights from a sum of one.
+/// Largest deviation from one of the sum of the two techniques' weights.
 float worst_sum(Weight first, Weight second) {
   float worst = 0;
   for (const float a : kDensities)
@@ -26,10 +26,10 @@ TEST(Mis, WeightsOfBothTechniquesSumToOne) {
   const Weight over_pdf = [](float a, float b) { return mis::power_over_pdf(a, b) * a; };
   EXPECT_LT(worst_sum(mis::balance, mis::balance), 1e-6f);
   EXPECT_LT(worst_sum(mis::power, mis::power), 1e-6f);
-  // Planted bugs: no weight, and two heuristics mixed.
+  // Planted bugs: no weight, and mixed heuristics.
   EXPECT_GT(worst_sum(mis::power, unweighted), 0.5f);
   EXPECT_GT(worst_sum(mis::power, without_square), 0.1f);
-  // Where 1 / density has the range of float, so that the product with the density has a meaning.
+  // Only where 1 / density is within the range of float, so that its product with the density is meaningful.
   for (const float a : kDensities)
     for (const float b : kDensities) {
       if (a < 1e-30f || a > 1e30f) continue;

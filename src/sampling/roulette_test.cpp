@@ -20,13 +20,13 @@ TEST(Roulette, AlwaysMayEndAPath) {
 }
 
 TEST(Roulette, RefractionThatScalesRadianceDoesNotCount) {
-  // Into glass of index 1.5 radiance is divided by 1.5 squared; the path carries as much as before.
+  // On entering glass of index 1.5, radiance is divided by 1.5 squared; the path carries as much as before.
   const float scale = 1 / (1.5f * 1.5f);
   EXPECT_FLOAT_EQ(roulette::survival_probability(Spectrum(0.6f * scale), 1.5f, Sampling::kIndependent), 0.6f);
 }
 
-// Mean of survivor_weight for survivors and 0 for the others, N = 200 000, alpha = 5e-7: finds a bias of 1.6 % of the
-// standard deviation with power 0.99. Planted bug: survivors are not raised.
+// Mean of survivor_weight for survivors and 0 for the others, N = 200 000, alpha = 5e-7: detects a bias of 1.6 % of the
+// standard deviation with power 0.99. Planted bug: survivors are not reweighted.
 TEST(Roulette, KeepsTheMean) {
   for (const float brightness : {0.05f, 0.4f, 0.9f, 5.0f}) {
     const float survival = roulette::survival_probability(Spectrum(brightness), 1, Sampling::kIndependent);

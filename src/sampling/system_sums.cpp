@@ -66,8 +66,8 @@ uint32_t SystemSums::cell(CellKey key) {
   return number;
 }
 
-// The terms of one sample in A and b of [Hua2023] Eq. (21), in balance weights: r_k = N_k λ_k / p, λ_k being that of
-// Eq. (18); `weight` is that of Eqs. (25) and (29).
+// The terms of one sample in A and b of [Hua2023] Eq. (21), in balance weights: r_k = N_k λ_k / p with λ_k of Eq. (18);
+// `weight` is that of Eqs. (25) and (29).
 void SystemSums::add(uint32_t cell, float weight, const ControlledSample& sample) {
   const Spectrum weighted = sample.value * weight;
   if (!(weight >= 0 && std::isfinite(weight)) || !is_finite(weighted)) {
@@ -90,7 +90,7 @@ void SystemSums::add(uint32_t cell, float weight, const ControlledSample& sample
   rows_.resize(rows_index_.keys().size() * layout_.row_size());
   float* row = &rows_[size_t{number} * layout_.row_size()];
   const float r = sample.r_light;
-  row[SystemLayout::kDiagonal] += weight * r * r;  // the light's own row of Eq. (32): A_kk, b_k, A_kj
+  row[SystemLayout::kDiagonal] += weight * r * r;  // the light's own row in Eq. (32): A_kk, b_k, A_kj
   for (int c = 0; c < 3; ++c) row[SystemLayout::kRowValue + static_cast<uint32_t>(c)] += r * weighted[c];
   for (uint32_t j = 0; j < layout_.n_dense; ++j) row[SystemLayout::kRowDense + j] += weight * r * sample.r_dense[j];
 }

@@ -7,7 +7,7 @@
 namespace covary::vmf {
 
 Vec3 sample(const Vmf& lobe, Vec2 u) {
-  // By inversion of the distribution of 1 − cos θ, with the digits of small angles kept.
+  // Invert the distribution of 1 − cos θ, without losing precision at small angles.
   const float t = lobe.kappa < 1e-5f ? 2 * u.y : -std::log1p(u.y * std::expm1(-2 * lobe.kappa)) / lobe.kappa;
   const float one_minus_cos = std::clamp(t, 0.0f, 2.0f);
   const float sin = safe_sqrt(one_minus_cos * (2 - one_minus_cos));

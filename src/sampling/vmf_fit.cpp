@@ -11,10 +11,10 @@ namespace covary {
 namespace {
 
 constexpr int kMax = VmfLobes::kMax;
-constexpr size_t kBlock = 256;  // samples whose sums are kept in single precision
+constexpr size_t kBlock = 256;  // samples summed in single precision
 
-/// Sums over the samples of a lobe, each times its part γ of the sample. Directions are taken relative to the lobe's
-/// mean: all that is summed is small where the lobe is narrow.
+/// Sums over the samples, each weighted by the lobe's responsibility γ. Directions are relative to the lobe's mean: all
+/// terms are small if the lobe is narrow.
 struct alignas(32) BlockSums {
   float weight[kMax] = {}, dx[kMax] = {}, dy[kMax] = {}, dz[kMax] = {}, squared[kMax] = {}, inverse[kMax] = {};
 };
@@ -30,7 +30,7 @@ void add_block(const BlockSums& block, int n, std::array<LobeSums, kMax>& sums) 
   }
 }
 
-/// The lobe most likely to have made a direction of which all densities underflow.
+/// The lobe most likely to have produced a direction for which all densities underflow.
 int nearest_lobe(const VmfLobes& lobes, const Vec3& w) {
   int nearest = 0;
   float best = -kInfinity;
@@ -41,7 +41,7 @@ int nearest_lobe(const VmfLobes& lobes, const Vec3& w) {
   return nearest;
 }
 
-/// Writes the part of each lobe in `w`, which add up to 1; returns the density of the mixture.
+/// Writes the responsibilities of the lobes for `w`, which sum to 1; returns the density of the mixture.
 float responsibilities(const VmfLobes& lobes, const Vec3& w, float* gamma) {
   const float density = lobes.pdfs(w, gamma);
   if (density > 1e-30f) {
@@ -57,7 +57,7 @@ float responsibilities(const VmfLobes& lobes, const Vec3& w, float* gamma) {
 /// log v(mean) of a lobe; double precision.
 double log_peak(double kappa) { return kappa - vmf::log_integral_of_exponential(kappa); }
 
-/// The lobe of the same mean direction and mean cosine as two together.
+/// The lobe with the mean direction and mean cosine of two lobes together.
 Vmf merged(const Vmf& a, double weight_a, const Vmf& b, double weight_b) {
   const double ra = weight_a * (1 - vmf::one_minus_mean_cosine(a.kappa));
   const double rb = weight_b * (1 - vmf::one_minus_mean_cosine(b.kappa));
@@ -81,7 +81,7 @@ double integral_of_ratio(const Vmf& a, const Vmf& b, const Vmf& c) {
                   vmf::log_integral_of_exponential(k.norm()));
 }
 
-/// χ² divergence of two lobes from the one that would replace them, ∫ (wa a + wb b)² / (w c) − w, w = wa + wb.
+/// χ² divergence of two lobes from the lobe that would replace them, ∫ (wa a + wb b)² / (w c) − w, w = wa + wb.
 double merge_cost(const VmfLobes& lobes, int i, int j) {
   const double wa = lobes.weight[i], wb = lobes.weight[j], w = wa + wb;
   if (!(wa > 0 && wb > 0)) return 0;
@@ -115,9 +115,9 @@ VmfFit::VmfFit(std::span<const GuidingSample> samples, const Vec3& pivot, const 
   double sum = 0, sum_squares = 0;
   for (const GuidingSample& s : samples) {
     if (!(s.weight > 0)) continue;
-    // The light lies at position + direction / inverse_distance.
+    // The light's origin is position + direction / inverse_distance.
     const Vec3 to_light = s.direction + (s.position - pivot) * s.inverse_distance;
-    const float distance = length(to_light);  // as a multiple of the sample's
+    const float distance = length(to_light);  // relative to the sample's distance
     const bool usable = distance > 1e-3f;
     directions_.push_back(usable ? to_light * (1 / distance) : s.direction);
     inverse_distances_.push_back(usable ? s.inverse_distance / distance : s.inverse_distance);

@@ -24,7 +24,7 @@ const VmfMixture& three_planted() {
   return mixture;
 }
 
-/// Directions of another density with the weights that make them those of the mixture.
+/// Directions from another density, with weights that make them samples of the mixture.
 std::vector<GuidingSample> samples_of(const VmfMixture& mixture, size_t n, uint64_t seed = 1) {
   std::vector<GuidingSample> samples;
   for (size_t i = 0; i < n; ++i) {
@@ -55,7 +55,7 @@ TEST(VmfFit, RecoversPlantedMixtures) {
   VmfMixture mixture = VmfFit(samples, {}, {}).fit();
   EXPECT_LT(divergence(three_planted().lobes, mixture.lobes), 0.02);
   EXPECT_GT(divergence(three_planted().lobes, uniform_lobes(16, 5, {}).lobes), 0.5);
-  // With as many lobes as were planted, each begun somewhere near, they are the planted ones.
+  // With as many lobes as were planted, each started nearby, the fit recovers the planted ones.
   VmfFitSettings three;
   three.n_lobes = three.max_lobes = 3, three.split_above = 1e9, three.merge_below = 0, three.tolerance = 1e-7;
   mixture = VmfFit(samples, {}, three)
@@ -116,7 +116,7 @@ TEST(VmfFit, SplitsALobeThatHidesTwo) {
   EXPECT_EQ(fit.split(mixture), 0);
 }
 
-/// Samples seen from points spread over a square, of a small light above it.
+/// Samples seen from points spread over a square, lit by a small light above it.
 std::vector<GuidingSample> near_light(size_t n, bool with_distance) {
   const Vec3 light = {0, 0, 1};
   std::vector<GuidingSample> samples;
@@ -173,14 +173,14 @@ TEST(VmfFit, DegenerateInputsAreDefined) {
   expect_valid(narrow, "all in one direction");
   EXPECT_GT(narrow.lobes.pdf({0, 0, 1}), 100);
 
-  // One sample with nearly all of the weight must not become a needle.
+  // One sample with nearly all the weight must not become a needle-thin lobe.
   std::vector<GuidingSample> outlier = samples_of(three_planted(), 1000);
   outlier.push_back(huge);
   const VmfMixture mixture = VmfFit(outlier, {}, {}).fit();
   expect_valid(mixture, "an outlier");
   EXPECT_LT(mixture.lobes.pdf({0, 0, 1}), 10);
 
-  // Positions at the light, where no direction leads to it.
+  // Positions at the light itself, from which no direction leads to it.
   GuidingSample at_light = one;
   at_light.inverse_distance = 1, at_light.position = {0, 0, -1};
   expect_valid(VmfFit(std::vector{at_light}, {0, 0, 0}, {}).fit(), "pivot at the light");

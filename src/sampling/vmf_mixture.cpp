@@ -39,7 +39,7 @@ int VmfLobes::choose(float u) const {
   int chosen = 0;
   float sum = 0;
   for (int k = 0; k < n; ++k) {
-    if (weight[k] > 0 && u >= sum) chosen = k;  // the last one with weight where rounding leaves a rest
+    if (weight[k] > 0 && u >= sum) chosen = k;  // the last one with weight, if rounding leaves a remainder
     sum += weight[k];
   }
   return chosen;
@@ -68,7 +68,7 @@ void VmfLobes::multiply_by_cosine(const Vec3& normal) {
 }
 
 void VmfMixture::see_from(const Vec3& p, VmfLobes& written) const {
-  VmfLobes& __restrict seen = written;  // or the loop is not vectorised
+  VmfLobes& __restrict seen = written;  // __restrict is needed for vectorisation
   const Vec3 d = pivot - p;
   const int end = lobes.padded();
   seen.n = lobes.n;
@@ -77,7 +77,7 @@ void VmfMixture::see_from(const Vec3& p, VmfLobes& written) const {
                 dz = lobes.z[k] + d.z * inverse_distance[k];
     const float squared = dx * dx + dy * dy + dz * dz;
     const float scale = 1 / std::sqrt(std::max(squared, 1e-12f));
-    const bool far = squared > 1e-8f;  // at the light itself every direction would do
+    const bool far = squared > 1e-8f;  // at the light itself, any direction would do
     seen.x[k] = far ? dx * scale : lobes.x[k];
     seen.y[k] = far ? dy * scale : lobes.y[k];
     seen.z[k] = far ? dz * scale : lobes.z[k];

@@ -14,7 +14,7 @@ namespace {
 
 const Vec3 kDirection = normalize(Vec3{0.3f, -0.7f, 0.4f});
 
-/// ∫ v over the sphere, by the trapezoidal rule in t = 1 − cos θ over the range that has the mass.
+/// ∫ v over the sphere, by the trapezoidal rule in t = 1 − cos θ over the range that contains the mass.
 double integral(float kappa) {
   const Vmf lobe{{0, 0, 1}, kappa};
   const double end = std::min(2.0, 40.0 / std::max(kappa, 1e-3f));
@@ -45,8 +45,8 @@ TEST(Vmf, SamplesHaveTheDensityForEveryConcentration) {
     const auto sample = [&](const PathRandom& random) -> std::optional<Vec3> {
       return vmf::sample(lobe, random.get_2d(0, Event::kGuide));
     };
-    // In the frame of the lobe, stretched so that its width is that of the sphere: t = 1 − cos θ has a density of its
-    // own, uniform after the distribution function.
+    // In the frame of the lobe, stretched so that its width is that of the sphere: t = 1 − cos θ is made uniform by its
+    // own distribution function.
     const auto to_square = [&](const Vec3& w) -> Vec2 {
       const Frame frame(kDirection);
       const double t = 0.5 * length_squared(w - kDirection);
@@ -119,7 +119,7 @@ TEST(VmfMixture, ProductWithTheCosineIsProportionalToTheProduct) {
   const double norm = statistics::integrate_sphere([&](const Vec3& w) { return lobes.pdf(w) * vmf::pdf(cosine, w); });
   for (const Vec3& w : {normal, kDirection, Vec3{0, 0, 1}, Vec3{1, 0, 0}, Vec3{0, 0, -1}})
     EXPECT_NEAR(product.pdf(w) * norm / (lobes.pdf(w) * vmf::pdf(cosine, w)), 1, 1e-3);
-  // The true cosine: the share of directions above the horizon, and the overlap with the true product.
+  // With the true cosine: the fraction of directions above the horizon, and the overlap with the true product.
   const auto true_product = [&](const Vec3& w) { return lobes.pdf(w) * std::max(dot(w, normal), 0.0f); };
   const double true_norm = statistics::integrate_sphere(true_product);
   const auto distance = [&](const VmfLobes& l) {
@@ -156,7 +156,7 @@ TEST(VmfMixture, LobesPointToTheirLightsFromEverywhere) {
   const VmfMixture moved = mixture.moved_to(p);
   EXPECT_NEAR(1 / moved.inverse_distance[0], length(light - p), 1e-4);
   EXPECT_NEAR(length(moved.at(mixture.pivot).lobe(0).mean - kDirection), 0, 1e-6);
-  for (const Vec3& w : {light - light, kDirection}) {  // at the light itself: some direction
+  for (const Vec3& w : {light - light, kDirection}) {  // at the light itself: any direction
     const Vec3 mean = mixture.at(light + w * 0.0f).lobe(0).mean;
     EXPECT_NEAR(length(mean), 1, 1e-5);
   }
