@@ -14,20 +14,20 @@ namespace covary {
 namespace {
 
 constexpr size_t kImages = std::size(kAuxiliaryImages);
-/// The image P, whose unit is the scene's.
+/// The image P, in scene units.
 constexpr size_t kPosition = 2;
-/// Samples after which a pixel asks whether the standard errors of its means are small enough (measured:
+/// Samples between checks whether the standard errors of a pixel's means are small enough (measured:
 /// docs/notes/denoising.md).
 constexpr uint32_t kRound = 16;
 constexpr float kTolerance = 0.01f;
 
-/// What one camera ray adds to each image.
+/// Contribution of one camera ray to each image.
 using AuxiliarySample = std::array<Vec3, kImages>;
 
 Vec3 to_vec(const Spectrum& colour) { return {colour.r, colour.g, colour.b}; }
 
-/// Goes on from `hit`, as long as it is mirror or glass, to the surface behind. Returns what the way there lets
-/// through; false where the ray leaves the scene.
+/// Continues from `hit`, while it is mirror or glass, to the surface behind, and multiplies `throughput` along the way;
+/// false if the ray leaves the scene.
 bool follow(const Scene& scene, const PathRandom& random, Arena& arena, Ray ray, SurfaceHit& hit,
             Spectrum& throughput) {
   for (int bounce = 0; bounce < kFollowedBounces && !(hit.bsdf_flags & kSmooth); ++bounce) {
@@ -37,7 +37,7 @@ bool follow(const Scene& scene, const PathRandom& random, Arena& arena, Ray ray,
     const uint32_t vertex = kDeltaVertices + bounce;
     const BsdfSample next =
         bsdf->sample(wo, random.get_1d(vertex, Event::kLobe), random.get_2d(vertex, Event::kDirection));
-    if (!next.valid()) return true;  // a surface that reflects nothing ends the way
+    if (!next.valid()) return true;  // a surface that reflects nothing ends the path
     throughput *= next.weight;
     const Vec3 wi = hit.frame.to_world(next.wi);
     ray = Ray{offset_origin(hit, wi), wi, kInfinity};
@@ -46,9 +46,9 @@ bool follow(const Scene& scene, const PathRandom& random, Arena& arena, Ray ray,
   return true;
 }
 
-/// Where there are media: goes on to the first surface that is more than a boundary, as the sample's path does, or to
-/// the collision before it. Then the values are the scattering albedo there, no normal, and the position; true. False:
-/// `ray` is the one to that surface, or leaves the scene.
+/// With media: continues to the first surface that is more than a boundary, like the sample's path, or to a collision
+/// before it. At a collision, sets the values (scattering albedo, no normal, position) and returns true. Otherwise
+/// returns false, and `ray` is the one to that surface, or leaves the scene.
 bool ends_in_medium(const Scene& scene, const PathRandom& random, Ray& ray, AuxiliarySample& values) {
   const Medium* medium = scene.camera_medium();
   const int channel = channel_of(random);
@@ -94,11 +94,11 @@ AuxiliarySample auxiliary_sample(const Scene& scene, const CameraSample& sample,
   return values;
 }
 
-/// Means over the samples of a pixel: `most`, or as many rounds as it takes until each is known to kTolerance.
+/// Means over the samples of a pixel: `most`, or as many rounds as it takes to reach kTolerance.
 AuxiliarySample auxiliary_means(const Scene& scene, const PassSettings& settings, int x, int y, uint32_t most,
                                 Arena& arena) {
   AuxiliarySample sums{}, squares{};
-  float largest = kInfinity;  // variance of the means of albedos and normals
+  float largest = kInfinity;  // variance of the means, over albedos and normals
   uint32_t n = 0;
   while (n < most && largest > sqr(kTolerance)) {
     for (const uint32_t end = std::min(most, n + kRound); n < end; ++n) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Auxiliary images: what the surfaces behind each pixel look like.
+// Auxiliary images (AOVs): properties of the surfaces behind each pixel.
 #pragma once
 
 #include <atomic>
@@ -9,10 +9,10 @@
 
 namespace covary {
 
-/// The names of all auxiliary images, in film.aovs and as layers of files.
+/// Names of all auxiliary images, in film.aovs and as layers of files.
 inline constexpr const char* kAuxiliaryImages[] = {"Albedo", "N", "P", "DenoisingAlbedo", "DenoisingNormal"};
 
-/// Mirrors and glass that are followed to the surface behind them.
+/// Maximum number of mirror and glass bounces that are followed to the surface behind.
 inline constexpr int kFollowedBounces = 8;
 
 /// Fills film.aovs with the images, each the mean over filtered camera rays: `most` of them, or as many rounds of 16 as
@@ -20,17 +20,18 @@ inline constexpr int kFollowedBounces = 8;
 ///
 ///     Albedo           reflectance of the first surface, in [0, 1]
 ///     N, P             its shading normal and position in world space
-///     DenoisingAlbedo  reflectance of the first surface that scatters light in more than single directions, times what
-///                      the mirrors and panes of glass before it let through, in [0, 1]
+///     DenoisingAlbedo  reflectance of the first surface with more than delta lobes, times the throughput of the
+///                      mirrors and panes of glass before it, in [0, 1]
 ///     DenoisingNormal  its shading normal in world space
 ///
-/// In participating media a ray ends where the sample's path first scatters, if that comes before a surface: with the
-/// scattering albedo there, no normal, and the position. Boundaries of media (bsdf `null`) are then passed.
+/// In participating media, a ray ends where the sample's path first scatters, if that comes before a surface: there,
+/// the values are the scattering albedo, no normal, and the position. Boundaries of media (bsdf `null`) are then
+/// passed.
 ///
-/// Where a ray meets a surface of mirror or glass, one direction is drawn as a path's is, at most kFollowedBounces
-/// times; a ray that is still between mirrors then takes the last of them. Rays that leave the scene count as zero. The
-/// random numbers are the points of a Sobol' sequence with the pass's key: as good as four times as many independent
-/// ones. Ends at the next row once `stop` is true, and leaves film.aovs as it is.
+/// At a mirror or glass surface, one direction is sampled as for a path, at most kFollowedBounces times; a ray that is
+/// still between mirrors then takes the last of them. Rays that leave the scene count as zero. The random numbers are
+/// points of a Sobol' sequence with the pass's key, as good as four times as many independent ones. If `stop` becomes
+/// true, ends at the next row and leaves film.aovs unchanged.
 void render_aovs(const Scene& scene, const PassSettings& pass, uint32_t most, Film& film,
                  const std::atomic<bool>* stop = nullptr);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Stands for the integrator that a trial before the render finds best.
+// Placeholder for the integrator that a trial before the render finds best.
 #include "core/error.h"
 #include "integrators/registry.h"
 

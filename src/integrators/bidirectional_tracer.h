@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bidirectional path tracing whose parts can be exchanged [Veach1997] §10. A camera sample traces a subpath from the
-// light and one from the camera, and joins each vertex of one to each vertex of the other; the weights of multiple
-// importance sampling (bdpt_weights.h) share out each path among the techniques (s, t) that find it, s vertices from
-// the light and t from the camera:
-//     s = 0   the camera subpath meets a light;
-//     s = 1   a light sample, with the numbers and densities that `path` has for it;
-//     s >= 2  the subpaths are joined;
-//     t = 1   a light subpath is joined to the lens: a pass of its own (light_pass.h), if light is traced.
+// Bidirectional path tracing with replaceable parts [Veach1997] §10. A camera sample traces a subpath from a light and
+// one from the camera, and connects each vertex of one to each vertex of the other; multiple importance sampling
+// weights (bdpt_weights.h) divide each path among the techniques (s, t) that find it, with s vertices from the light
+// and t from the camera:
+//     s = 0   the camera subpath hits a light;
+//     s = 1   a light sample, with the numbers and densities that `path` uses;
+//     s >= 2  the subpaths are connected;
+//     t = 1   a light subpath is connected to the lens: a pass of its own (light_pass.h), if light is traced.
 // (1, 1) is left out, since s = 0 finds directly visible lights without noise.
 //
-// It estimates what `path` estimates. As there, null surfaces are vertices that block connections.
+// It estimates the same image as `path`. As there, null surfaces are vertices that block connections.
 #pragma once
 
 #include <memory>
@@ -27,9 +27,9 @@
 
 namespace covary {
 
-/// What bidirectional path tracing keeps for a thread.
+/// Per-thread state of bidirectional path tracing.
 struct BidirectionalBatch final : ThreadState {
-  /// What is added to a sample if nothing lies on the ray of the same place in `rays`.
+  /// Contribution to a sample if the ray at the same index in `rays` is unoccluded.
   struct Connection {
     Spectrum value;
     float weight;
@@ -40,7 +40,7 @@ struct BidirectionalBatch final : ThreadState {
   std::vector<SubpathSums> sums;  ///< of the camera subpaths, by sample
   LightSubpaths light;
   std::vector<PathRandom> light_randoms;  ///< numbers of the light subpaths in `light`
-  std::vector<uint32_t> light_path;       ///< which of them a sample has
+  std::vector<uint32_t> light_path;       ///< index into these, per sample
   std::vector<Connection> connections;
   std::vector<Ray> rays;
   std::vector<uint8_t> blocked;
@@ -104,7 +104,7 @@ class BidirectionalTracer final : public LightTracingIntegrator {
  private:
   using Path = PathBatch::Path;
   using State = BidirectionalBatch;
-  /// A vertex of a camera subpath with its surface bound.
+  /// A vertex of a camera subpath with its BSDF bound.
   struct CameraVertex {
     const SurfaceHit& hit;
     const Vec3& wo;
@@ -114,7 +114,7 @@ class BidirectionalTracer final : public LightTracingIntegrator {
     int t;
   };
 
-  /// What follow_paths() does at each edge of camera subpaths.
+  /// Steps of follow_paths() at each edge of camera subpaths.
   struct Steps {
     const BidirectionalTracer& tracer;
     const Scene& scene;
@@ -156,11 +156,11 @@ class BidirectionalTracer final : public LightTracingIntegrator {
     void connect(int /*depth*/) { tracer.trace_connections(scene, samples, state, context); }
   };
 
-  /// Most surfaces that a light subpath needs if it is joined to t vertices from the camera.
+  /// Maximum number of surfaces a light subpath needs when connected to t vertices from the camera.
   int max_surfaces(int t) const { return std::min(lengths_.max_depth - t, parts_.max_light_vertices() - 1); }
 
-  /// With common random numbers all pixels have the same light subpath in a sample: it is traced once, and kept for
-  /// the batches that follow.
+  /// With common random numbers, all pixels share a sample's light subpath: it is traced once and kept for the
+  /// following batches.
   void trace_light_subpaths(const Scene& scene, std::span<const CameraSample> samples, State& state,
                             PathContext& context) const {
     std::vector<PathRandom>& kept = state.light_randoms;
@@ -183,8 +183,8 @@ class BidirectionalTracer final : public LightTracingIntegrator {
     state.light.trace(parts_, scene, *emission_lights_, mis_, kept, max_surfaces(2), lengths_.rr_depth, context);
   }
 
-  /// The place of a light subpath among those that are kept, or their number. The samples of a pixel come in their
-  /// order, and then those of the next.
+  /// Index of a light subpath among the kept ones, or their number. All samples of a pixel come in order, followed by
+  /// those of the next pixel.
   static uint32_t place_of(const PathRandom& random, size_t guess, const std::vector<PathRandom>& kept) {
     if (random.sampling() != Sampling::kCrn) return static_cast<uint32_t>(kept.size());
     if (guess < kept.size() && kept[guess] == random) return static_cast<uint32_t>(guess);
@@ -197,13 +197,13 @@ class BidirectionalTracer final : public LightTracingIntegrator {
     path.sample = i;
     state.sums[i] = {};
     if (!traces_light()) return;
-    // The ray begins on the near plane, but densities count from the lens.
+    // The ray starts on the near plane, but densities are relative to the lens.
     const Vec3& d = sample.ray.d;
     path.previous_p = sample.ray.o - d * (scene.camera().settings().near_clip / to_camera_.vector(d).z);
     state.sums[i].vcm = mis_.raised(light_paths_per_spp() / scene.camera().pdf_direction(d));
   }
 
-  /// s = 0: contribution of what the path's ray met.
+  /// s = 0: contribution of what the path's ray hit.
   Spectrum emission(const Scene& scene, const UniformLights& lights, int depth, const Path& path, const Ray& ray,
                     const SurfaceHit& hit, const State& state) const {
     const Emitter* emitter = emitter_met(path, hit, scene.environment(), lengths_.hide_emitters);
@@ -224,7 +224,7 @@ class BidirectionalTracer final : public LightTracingIntegrator {
     return radiance * static_cast<float>(weight);
   }
 
-  /// Draws the next ray of a camera subpath; false where it ends.
+  /// Samples the next ray of a camera subpath; false if the path ends.
   bool go_on(int depth, const PathVertex& at, Path& path, SubpathSums& sums, Ray& ray) const {
     const PathRandom& random = at.sample.random;
     const BsdfSample next =
@@ -298,7 +298,7 @@ class BidirectionalTracer final : public LightTracingIntegrator {
     state.rays.push_back(ray);
   }
 
-  /// Adds the connections that nothing hides.
+  /// Adds the unoccluded connections.
   void trace_connections(const Scene& scene, std::span<CameraSample> samples, State& state,
                          PathContext& context) const {
     state.blocked.resize(state.rays.size());
@@ -313,7 +313,7 @@ class BidirectionalTracer final : public LightTracingIntegrator {
     state.connections.clear(), state.rays.clear();
   }
 
-  /// t = 1: adds the splat of a vertex of a light subpath.
+  /// t = 1: splats a vertex of a light subpath.
   void join_to_lens(const Scene& scene, const LightPaths& paths, uint64_t path, const LightVertex& end,
                     std::vector<LightSplat>& splats, PathContext& context) const {
     const int n_edges = static_cast<int>(end.n_vertices);
@@ -338,7 +338,7 @@ class BidirectionalTracer final : public LightTracingIntegrator {
     splats.push_back({path, pixel.x, pixel.y, value * static_cast<float>(weight)});
   }
 
-  /// Whether the camera sees the vertex, past area lights where these are hidden.
+  /// Whether the camera sees the vertex, passing through area lights if these are hidden.
   bool reaches_lens(const Scene& scene, const LightVertex& end, const LensSample& lens, PathContext& context) const {
     const Vec3 o = offset_origin(end.p, end.ng, end.offset, lens.wi);
     const float distance = length(lens.near_p - o);

@@ -14,10 +14,10 @@ namespace covary {
 
 enum class ControlKind {
   kOff,     ///< no control variate: the plain estimate with the balance heuristic
-  kRgb,     ///< one coefficient for each colour channel
+  kRgb,     ///< one coefficient per colour channel
   kMono,    ///< one coefficient for all
-  kVevoda,  ///< for light samples alone, one coefficient for each colour channel, after [Vevoda2018]
-  /// Optimal MIS weights of each pixel's direct light, from the pixel's samples so far [Kondapaneni2019].
+  kVevoda,  ///< for light samples only, one coefficient per colour channel, after [Vevoda2018]
+  /// Optimal MIS weights for the direct light of each pixel, from its samples so far [Kondapaneni2019].
   kOptimalMis,
 };
 
@@ -29,43 +29,43 @@ struct ControlSettings {
   LightSelection lights = LightSelection::kPower;
   uint32_t grid = kAutomaticGrid;  ///< cells along the longest side of the scene
   uint32_t train_spp = 16;         ///< samples per pixel to learn from
-  uint32_t clusters = 256;         ///< most clusters of lights
+  uint32_t clusters = 256;         ///< maximum number of light clusters
   uint32_t memory_mib = 256;       ///< of sums and coefficients while training
-  bool relative = true;            ///< least relative variance [Hua2023] §4.2.1, otherwise least variance
-  bool oidn = false;               ///< pixels' values from the first samples by Open Image Denoise
-  bool prefix = true;              ///< samples weigh by the throughput before them [Hua2023] §4.4
+  bool relative = true;            ///< minimise relative variance [Hua2023] §4.2.1, otherwise absolute variance
+  bool oidn = false;               ///< denoise the first samples' pixel values with Open Image Denoise
+  bool prefix = true;              ///< weight samples by the throughput before them [Hua2023] §4.4
   bool albedo = true;              ///< see by_albedo()
   bool indirect = false;           ///< see controls_indirect()
   bool paper = false;              ///< as published, see solves_once() and CacheSettings::published()
 
-  /// Those of [Hua2023] (Sec. 6.1): lights by triangle, 8 samples per pixel; 64 cells.
+  /// Those of [Hua2023] (Sec. 6.1): light selection by triangle, 8 samples per pixel; 64 cells.
   static ControlSettings published();
 
   bool on() const { return kind != ControlKind::kOff; }
-  /// Whether anything is learnt: coefficients, or how to choose lights.
+  /// Whether anything is learnt: coefficients, or light selection.
   bool learns() const { return on() || lights == LightSelection::kLearned; }
   /// Samples per pixel of training, if any.
   uint32_t training_spp() const { return learns() ? train_spp : 0; }
-  /// Whether lights are chosen as learnt: by a wave that ends when half of the training has been taken, or later.
+  /// Whether lights are selected as learnt: from the first wave on that ends after at least half of the training.
   bool learns_lights() const;
   bool ends_selection(uint32_t wave_end) const { return 2 * wave_end >= train_spp && wave_end < train_spp; }
-  /// Training samples per pixel that first make an estimate of each pixel's value, and no coefficients.
+  /// Training samples per pixel that only estimate each pixel's value first, without coefficients.
   uint32_t pilot_spp() const {
     if (!learns() || !relative || per_pixel()) return 0;
     return train_spp >= 4 && !paper ? 2 : std::min(train_spp / 2, 1u);
   }
-  /// Whether the training is done by plain samples and coefficients are solved once after it, as published.
+  /// Whether training uses plain samples and coefficients are solved once after it, as published.
   bool solves_once() const { return paper && !per_pixel(); }
-  /// Whether each pixel has its own coefficients, for the first surface, instead of each cell of space.
+  /// Whether each pixel has its own coefficients, for the first surface, instead of each spatial cell.
   bool per_pixel() const { return kind == ControlKind::kOptimalMis; }
-  /// Whether there is a coefficient of each light and technique for each cell.
+  /// Whether each cell has a coefficient for each light and technique.
   bool has_cells() const { return kind == ControlKind::kRgb || kind == ControlKind::kMono; }
-  /// Whether the coefficients of a vertex are multiplied by its albedo: where there is one for each cell.
+  /// Whether the coefficients of a vertex are multiplied by its albedo: only if they belong to cells.
   bool by_albedo() const { return albedo && has_cells(); }
-  /// Whether light that other surfaces reflect is controlled by bins of directions, too.
+  /// Whether light reflected by other surfaces is controlled as well, by bins of directions.
   bool controls_indirect() const { return indirect && has_cells(); }
   CacheSettings cache(uint32_t resolution) const;
-  /// That of the bins of directions: wider cells, because there are many bins and their light is noisy.
+  /// For the bins of directions: wider cells, because there are many bins and their light is noisy.
   CacheSettings indirect_cache(uint32_t resolution) const;
 };
 
@@ -101,7 +101,7 @@ inline void declare(Settings& s, ControlSettings& v) {
   s.whole("cv-memory", v.memory_mib, {.low = 1, .high = 1 << 30},
           "Memory limit of the training in MiB, beyond which cells are widened", {.film = "memory={}"});
   s.choice("cv-variance", v.relative, kVariances, "Minimise relative or absolute variance", {.film = "variance={}"});
-  // Without a word in films where it is the default, as it is of all films from before there was the option.
+  // Omitted from the film's settings at its default, which all films from before this option have.
   s.choice("cv-surrogate", v.oidn, kSurrogates, "How the first samples are denoised: by a filter or Open Image Denoise",
            {.film = v.oidn ? "surrogate={}" : ""});
   s.on_off("cv-prefix", v.prefix, "Weight training samples by the path's throughput before the vertex",

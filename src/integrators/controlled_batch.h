@@ -11,22 +11,22 @@
 
 namespace covary {
 
-/// A vertex whose samples are not all taken yet: its light samples, and the direction sample, which is known when the
+/// A vertex whose samples are not complete yet: its light samples, and the direction sample, which is known once the
 /// next surface is found.
 struct ControlledVertex {
-  bool open = false;                        ///< light techniques take part
+  bool open = false;                        ///< light techniques are used
   Spectrum throughput;                      ///< of the path before the vertex
   Spectrum direction_weight;                ///< f cos / pdf of the direction sample
-  uint32_t cell = CoefficientTable::kNone;  ///< where its coefficients lie; kNone: no control
-  Spectrum albedo_scale{1};                 ///< what coefficients are multiplied by
-  Spectrum control;  ///< what the control adds to the plain estimate, so far, over the albedo scale
+  uint32_t cell = CoefficientTable::kNone;  ///< cell of its coefficients; kNone: no control
+  Spectrum albedo_scale{1};                 ///< factor on the coefficients
+  Spectrum control;  ///< what the control adds to the plain estimate so far, divided by the albedo scale
 
-  // While coefficients are learnt:
+  // Only while learning coefficients:
   bool recorded = false;
   uint32_t sums_cell = 0;  ///< of ControlledBatch::sums
   float weight = 0;        ///< of its samples in the sums
-  Spectrum weights;        ///< that of each channel, where the sums are by channel
-  Spectrum plain;          ///< the plain estimate without the throughput, so far, over the albedo scale
+  Spectrum weights;        ///< per channel, if the sums are by channel
+  Spectrum plain;          ///< the plain estimate so far, without the throughput, divided by the albedo scale
 };
 
 struct ControlledPathState : PathState {
@@ -34,7 +34,7 @@ struct ControlledPathState : PathState {
 };
 
 struct ControlledChoice : LightSetChoice {
-  bool in_cell = false;  ///< key says where its coefficients are learnt and looked up
+  bool in_cell = false;  ///< key is valid: where its coefficients are learnt and looked up
   CellKey key;
   uint32_t cell = CoefficientTable::kNone;  ///< of the table
 };
@@ -42,7 +42,7 @@ struct ControlledChoice : LightSetChoice {
 struct ControlledConnection {
   Spectrum value;     ///< f/p
   uint32_t sample;    ///< of the path
-  uint32_t cluster;   ///< that was sampled, or ControlledSample::kNoLight: the environment
+  uint32_t cluster;   ///< sampled, or ControlledSample::kNoLight: the environment
   float r_technique;  ///< balance weight of the technique that took the sample
 };
 
@@ -56,13 +56,13 @@ struct ControlledBatch final : CameraBatch<ControlledPathState, ControlledChoice
   }
 
   std::vector<EmitterSample> environments;
-  std::vector<ControlledVertex> vertices;  ///< the last one of each path, by Path::sample
-  std::vector<uint32_t> ended;             ///< samples of the paths that end at their last vertex
+  std::vector<ControlledVertex> vertices;  ///< the last vertex of each path, by Path::sample
+  std::vector<uint32_t> ended;             ///< samples whose paths end at their last vertex
 
   bool recording = false;
   SystemSums sums;
   IndirectRecorder indirect;
-  size_t last_cells = 0, last_rows = 0;  ///< of the last tile's sums: the next is likely to need as much room
+  size_t last_cells = 0, last_rows = 0;  ///< of the last tile's sums: the next one is likely to need as much memory
 };
 
 }  // namespace covary

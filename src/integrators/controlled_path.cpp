@@ -13,7 +13,7 @@
 namespace covary {
 namespace {
 
-/// What the samples of one tile taught.
+/// What the samples of one tile contribute to training.
 struct SumsRecord final : TrainingRecord {
   SystemSums sums, indirect;
 };
@@ -47,8 +47,8 @@ void ControlledPath::prepare(const Scene& scene) {
   controlled_.indirect = &indirect_table();
 }
 
-/// The longer side of the frame where pixels have coefficients. Otherwise by what the camera sees: cells as wide as 8
-/// pixels in the mean over the image, where that gives 32 to 256 cells; 64 where it sees nothing.
+/// With per-pixel coefficients, the longer side of the frame. Otherwise from what the camera sees: cells as wide as 8
+/// pixels on average over the image, clamped to 32 to 256 cells; 64 if it sees nothing.
 uint32_t ControlledPath::resolution() const {
   if (settings_.per_pixel())
     return static_cast<uint32_t>(std::max(scene_->camera().width(), scene_->camera().height()));
@@ -70,7 +70,7 @@ uint32_t ControlledPath::resolution() const {
   return static_cast<uint32_t>(std::clamp(max_component(size) / (8 * sum / n), 32.0, 256.0));
 }
 
-/// Chooses clusters with these probabilities, relative to one another, and their lights as before.
+/// Selects clusters with these relative probabilities, and lights within clusters as before.
 void ControlledPath::select(const std::vector<float>& clusters) {
   const std::vector<float> counts = expected_samples(clusters_, lights_);
   std::vector<double> weights;
@@ -157,8 +157,8 @@ void ControlledPath::update() {
   const bool solve = end == training_spp() || !settings_.solves_once();
   if (settings_.on() && solve) cache_.update();
   if (controlled_.indirect && solve) indirect_cache_.update();
-  // Lights are chosen by what was learnt as soon as half of the samples have been taken: the other half then teaches
-  // the coefficients of this choice.
+  // Switch to the learnt light selection once half of the samples have been taken: the other half then trains the
+  // coefficients for this selection.
   std::vector<float> best;
   if (controlled_.residuals && selection.empty() && settings_.ends_selection(end)) best = cache_.best_selection();
   cache_.forget_residuals();

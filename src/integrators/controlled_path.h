@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `controlled-path`: path tracing with control variates made of the sampling densities, learned in cells of space
+// `controlled-path`: path tracing with control variates built from the sampling densities, learnt in spatial cells
 // [Hua2023]. controlled_tracer.h has the estimator, sampling/coefficient_cache.h the learning.
 #pragma once
 
@@ -27,9 +27,9 @@ class ControlledPath : public LearningIntegrator {
   std::string settings_text() const override;
   /// The coefficients in use.
   const CoefficientTable& table() const { return given_ ? *given_ : cache_.table(); }
-  /// Those of the bins of directions; without cells where they are not learnt.
+  /// Those of the bins of directions; without cells if they are not learnt.
   const CoefficientTable& indirect_table() const { return given_ ? given_indirect_ : indirect_cache_.table(); }
-  /// Takes coefficients that were learnt before, in place of a training; after prepare(), before the training.
+  /// Uses previously learnt coefficients instead of training; call after prepare() and before training.
   void use(CoefficientTable table, CoefficientTable indirect = {});
   const LightSet& lights() const { return lights_; }
 
@@ -41,12 +41,12 @@ class ControlledPath : public LearningIntegrator {
   bool allows_negative() const override { return settings_.on(); }
   std::optional<int> longest_path() const override { return lengths_.max_depth; }
   IntegratorReport report() const override;
-  /// Whether the probabilities of lights were learnt.
+  /// Whether light probabilities were learnt.
   bool selects_by_learning() const { return !table().selection().empty(); }
   WaveWeights wave_weights() const override {
     return settings_.paper || settings_.per_pixel() ? WaveWeights::kSamples : WaveWeights::kVariance;
   }
-  /// 0 once coefficients were given.
+  /// 0 if coefficients were given.
   uint32_t training_spp() const override { return given_ ? 0 : settings_.training_spp(); }
   uint32_t pilot_spp() const override { return settings_.pilot_spp(); }
   bool pilot_goes_on() const override { return !settings_.solves_once(); }
@@ -82,17 +82,17 @@ class ControlledPath : public LearningIntegrator {
 
   PathLengthSettings lengths_;
   ControlSettings settings_;
-  const Scene* scene_ = nullptr;  // that of prepare()
+  const Scene* scene_ = nullptr;  // as passed to prepare()
   LightSet lights_;
   LightClusters clusters_;
-  std::shared_ptr<const Emitter> compensated_;  // the environment as it is sampled, where it is not the scene's own
+  std::shared_ptr<const Emitter> compensated_;  // the environment as sampled, if that is not the scene's own
   CoefficientCache cache_;
   CoefficientCache indirect_cache_;
   std::optional<CoefficientTable> given_;
   CoefficientTable given_indirect_;
   ControlledScene controlled_{};
-  /// Memory of solving over that of sums and coefficients: a copy of both, ordered, and sums of threads; at most 2.9
-  /// times as much was measured.
+  /// Memory of solving relative to that of sums and coefficients: a sorted copy of both, and the threads' sums; at most
+  /// 2.9 times as much was measured.
   static constexpr size_t kSolving = 3;
   size_t training_bytes_ = 0;  // of sums and coefficients at the end of the training
 };

@@ -1,29 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
-// Path tracing with control variates made of the sampling densities [Hua2023]. A vertex takes one sample of a light,
-// one of the environment if there is one, and one direction from its BSDF. With p the sum of the densities with which
-// they find a point, and r_k the part of technique k in it (the balance heuristic), its estimate is
+// Path tracing with control variates built from the sampling densities [Hua2023]. A vertex takes one light sample, one
+// environment sample if there is an environment, and one direction from its BSDF. With p the sum of the densities with
+// which they find a point, and r_k the fraction of technique k in it (balance heuristic), its estimate is
 //
 //     Σ_s f/p + Σ_k N_k β_k − Σ_s Σ_k β_k r_k(s),                                       [Hua2023] Eq. (17)
 //
-// see sampling/coefficient_solver.h. The second and third term have the same expectation whatever the coefficients β
-// are, as long as they do not depend on the samples; f is the light that reaches the vertex from emitters, and what
-// other surfaces reflect is left to the path. The estimate is unbiased, and can be negative.
+// see sampling/coefficient_solver.h. The second and third terms have the same expectation for any coefficients β that
+// do not depend on the samples; f is the light arriving at the vertex from emitters, and what other surfaces reflect is
+// left to the rest of the path. The estimate is unbiased, and can be negative.
 //
-// For Σ_s r_k(s) to have the expectation N_k, each sample must have its r, found or not:
-// - Σ_k r_k = 1 at every sample. A direction that fails, or comes from a delta lobe, or meets no light, cannot be found
-//   by other techniques: its own r is 1. So is that of a delta light, and of a light sample that something hides.
+// For Σ_s r_k(s) to have expectation N_k, each sample must contribute its r, whether or not it found light:
+// - Σ_k r_k = 1 at every sample. A direction that fails, comes from a delta lobe, or hits no light cannot be found by
+//   other techniques: its own r is 1. So is that of a delta light, and of an occluded light sample.
 // - A light sample of a point that reflects or emits nothing towards the vertex needs no ray: its r is 1. A direction
-//   sample that meets such a point treats it as no light, its own r is 1. That splits the point in two, one for each
-//   technique, neither of which adds light. The rule depends on vertex and direction alone, or it would be biased.
-// - Σ_k N_k β_k is added where, and only where, the samples are taken: not at surfaces of delta lobes, and not for
-//   lengths of paths that are left out.
-// - Russian roulette comes after the next surface is found, which is the last that a vertex asks for: it would
-//   otherwise have to return the rest of the control of those it ends.
+//   sample that hits such a point treats it as no light; its own r is 1. That splits the point in two, one per
+//   technique, neither of which adds light. The rule must depend on vertex and direction alone, or it would cause bias.
+// - Σ_k N_k β_k is added where, and only where, the samples are taken: not at surfaces with delta lobes only, and not
+//   for excluded path lengths.
+// - Russian roulette comes after the next surface is found, the last thing a vertex needs: otherwise it would have to
+//   return the remaining control of the vertices it terminates.
 //
-// Coefficients may be multiplied by any number that depends on the vertex alone. By the albedo, the vertices of a cell
-// share coefficients although their surface is textured.
+// Coefficients may be multiplied by any number that depends on the vertex alone. Scaling by the albedo lets the
+// vertices of a cell share coefficients even if their surface is textured.
 //
-// `Parts` says what tests exchange to plant bugs: controlled_parts.h.
+// `Parts` is what tests replace to plant bugs: controlled_parts.h.
 #pragma once
 
 #include <algorithm>
@@ -67,7 +67,7 @@ class ControlledTracer {
 
   // The steps of follow_paths().
 
-  /// Adds the emission of what the path's ray met, which closes the vertex from which the ray came.
+  /// Adds the emission of what the path's ray hit, which completes the vertex the ray came from.
   void arrive(int depth, size_t i) {
     const Path& path = batch_.paths[i];
     const SurfaceHit& hit = batch_.hits[i];
@@ -144,7 +144,7 @@ class ControlledTracer {
     return true;
   }
 
-  /// Finishes the light samples, and the vertices of paths that have ended.
+  /// Completes the light samples, and the vertices of paths that have ended.
   void connect(int depth) {
     trace_connections(depth + 2);
     if constexpr (Parts::kCloseEnded)
@@ -152,7 +152,7 @@ class ControlledTracer {
   }
 
  private:
-  /// In which cells the vertices lie.
+  /// Computes the cells of the vertices.
   void choose_cells(int depth) {
     for (size_t i = 0; i < batch_.paths.size(); ++i) {
       ControlledBatch::LightChoice& choice = batch_.choices[i];
@@ -164,7 +164,7 @@ class ControlledTracer {
     }
   }
 
-  /// Where their coefficients lie; one loop asks memory for what the next one reads.
+  /// Looks up their coefficients; each loop prefetches what the next one reads.
   void find_cells() {
     const auto of_each_vertex = [this](const auto& visit) {
       for (size_t i = 0; i < batch_.paths.size(); ++i)
@@ -180,7 +180,7 @@ class ControlledTracer {
     });
   }
 
-  /// The cell of a surface that a ray meets, by its normal on the side of the ray.
+  /// The cell of a surface hit by a ray, by its normal on the side of the ray.
   static CellKey cell_of(const CellGrid& grid, const Ray& ray, const SurfaceHit& hit) {
     return grid.key(hit.p, dot(hit.frame.n, ray.d) < 0 ? hit.frame.n : -hit.frame.n);
   }
@@ -198,7 +198,7 @@ class ControlledTracer {
 
   bool uses_cells() const { return batch_.recording || table_.n_cells() > 0; }
 
-  /// Begins the estimate of a vertex: Σ N β of its control.
+  /// Begins the estimate of a vertex with Σ N β of its control.
   void open(ControlledVertex& vertex, const Path& path, const SurfaceHit& hit,
             const ControlledBatch::LightChoice& choice) {
     vertex.throughput = path.throughput;
@@ -219,15 +219,15 @@ class ControlledTracer {
     vertex.plain = Spectrum();
   }
 
-  /// Weights of the samples of a vertex in the sums, by channel, and their mean.
+  /// Weights of a vertex's samples in the sums, by channel, and their mean.
   Spectrum weights_of(const Path& path, const Spectrum& albedo_scale) const {
     const Spectrum importance = context_.importance.empty() ? Spectrum(1) : context_.importance[path.sample];
     return variance_weights((control_.prefix ? path.throughput : Spectrum(1)) * albedo_scale, importance);
   }
   float weight_of(const Path& path, const Spectrum& albedo_scale) const { return mean(weights_of(path, albedo_scale)); }
 
-  /// Control of the light that comes by way of the next surface, indirect_control.h; before the path's throughput holds
-  /// the direction that `u` chose.
+  /// Control of light arriving via the next surface, indirect_control.h; call before the path's throughput includes the
+  /// direction that `u` sampled.
   void control_indirect(int depth, const Path& path, const Ray& ray, const SurfaceHit& hit, Vec2 u) {
     const int edges = depth + 3;
     if (depth >= IndirectRecorder::kVertices || edges > lengths_.max_depth) return;
@@ -251,7 +251,7 @@ class ControlledTracer {
                                                   fraction};
   }
 
-  /// The albedo of a surface; not zero, since a black surface can have highlights.
+  /// The albedo of a surface; never zero, since a black surface can have highlights.
   Spectrum albedo_scale_of(const SurfaceHit& hit) const {
     constexpr float kLeast = 0.02f;
     Spectrum albedo = hit.bsdf->albedo(hit);
@@ -271,8 +271,8 @@ class ControlledTracer {
     return cluster == kNoLight ? table_.dense(cell, ControlledScene::kEnvironment) : table_.light(cell, cluster);
   }
 
-  /// One sample of a vertex, its value f/p, and balance weights: `r_light` of a light's cluster, or of the environment
-  /// for kNoLight, and 1 − r_light of the BSDF.
+  /// Accounts for one sample of a vertex with value f/p and balance weights: `r_light` of a light's cluster, or of the
+  /// environment for kNoLight, and 1 − r_light of the BSDF.
   void take(ControlledVertex& vertex, const Spectrum& value, uint32_t cluster, float r_light) {
     Spectrum control(0);
     if (vertex.cell != CoefficientTable::kNone) {
@@ -300,7 +300,7 @@ class ControlledTracer {
     vertex.plain += value;
   }
 
-  /// Next-event estimation: f cos L / p, if nothing lies between. `pmf`: with which the light was chosen.
+  /// Next-event estimation: f cos L / p, if unoccluded. `pmf`: selection probability of the light.
   void add_light(const PathVertex& at, const Path& path, const EmitterSample& light, uint32_t cluster, float pmf) {
     if (light.pdf_solid_angle > 0 && !is_black(light.radiance)) {
       const BsdfValue f = at.bsdf.eval(at.wo, at.hit.frame.to_local(light.wi));
@@ -318,7 +318,7 @@ class ControlledTracer {
     take(batch_.vertices[path.sample], Spectrum(), cluster, 1);
   }
 
-  /// Finishes the light samples, now that it is known which are hidden.
+  /// Completes the light samples, once occlusion is known.
   void trace_connections(int edges) {
     visit_connections(scene_, batch_, context_, [&](const ControlledBatch::Connection& connection, bool hidden) {
       ControlledVertex& vertex = batch_.vertices[connection.sample];
@@ -328,7 +328,7 @@ class ControlledTracer {
     });
   }
 
-  /// Adds to the radiance of a sample what came by paths of so many edges.
+  /// Adds a contribution of paths with `edges` edges to the radiance of a sample.
   void add(uint32_t sample, int edges, const Spectrum& value) {
     samples_[sample].radiance += value;
     if (batch_.indirect.recording) [[unlikely]]
@@ -339,7 +339,7 @@ class ControlledTracer {
       by_part.radiance[sample * by_part.n_parts + place] += value;
   }
 
-  /// Ends the estimate of a vertex, which is of paths of so many edges.
+  /// Ends the estimate of a vertex, which belongs to paths with `edges` edges.
   void close(uint32_t sample, int edges, bool ended) {
     ControlledVertex& vertex = batch_.vertices[sample];
     vertex.open = false;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `depth`: the distance from the near plane to the first surface along each camera ray, 0 where there is none.
+// `depth`: the distance from the near plane to the first surface along each camera ray, 0 if there is none.
 #include "integrators/path_lengths.h"
 #include "integrators/path_steps.h"
 #include "passes/integrator.h"

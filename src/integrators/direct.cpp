@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// `direct`: emission seen by the camera and direct light, by several light samples and several direction samples of the
-// first surface, combined by multiple importance sampling with the power heuristic [Veach1997] §9.2. Of N and M samples
-// the densities are weighted by N / (N + M) and M / (N + M), as in Mitsuba. Without light samples, lights that are a
-// point or a direction are dark; without direction samples, mirrors are.
+// `direct`: directly visible emission and direct light, by several light samples and several direction samples of the
+// first surface, combined by multiple importance sampling with the power heuristic [Veach1997] §9.2. With N and M
+// samples, densities are weighted by N / (N + M) and M / (N + M), as in Mitsuba. Without light samples, point and
+// directional lights are black; without direction samples, mirrors are.
 #include "integrators/path_lengths.h"
 #include "integrators/path_steps.h"
 #include "passes/integrator.h"
@@ -65,7 +65,7 @@ class DirectIntegrator final : public Integrator {
     return *hit.bsdf->bind(hit, wo.z > 0, TransportMode::kRadiance, context.arena);
   }
 
-  /// Light sample k of every path.
+  /// Takes light sample k for every path.
   void sample_light(const Scene& scene, const UniformLights& lights, uint32_t k, std::span<CameraSample> samples,
                     PathBatch& batch, PathContext& context) const {
     for (PathBatch::Path& path : batch.paths) path.n_smooth = k;  // the address of the numbers
@@ -88,7 +88,7 @@ class DirectIntegrator final : public Integrator {
     add_connections(scene, samples, batch, context);
   }
 
-  /// Direction sample k of every path.
+  /// Takes direction sample k for every path.
   void sample_direction(const Scene& scene, const UniformLights& lights, uint32_t k, std::span<CameraSample> samples,
                         const PathBatch& batch, PathContext& context) const {
     const float each = 1 / static_cast<float>(settings_.bsdf_samples);
@@ -113,7 +113,7 @@ class DirectIntegrator final : public Integrator {
 
   struct Found {
     Spectrum radiance;
-    float pdf = 0;  // with which light samples find it
+    float pdf = 0;  // density of finding it by light samples
   };
   static Found light_along(const Scene& scene, const UniformLights& lights, const Vec3& from, const Ray& ray,
                            bool hide_environment, PathContext& context) {

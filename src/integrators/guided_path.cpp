@@ -16,7 +16,7 @@ namespace {
 
 constexpr uint32_t kMaxClusters = 5000;
 
-/// What the samples of one tile taught.
+/// What the samples of one tile contribute to training.
 struct SamplesRecord final : TrainingRecord {
   std::vector<GuidingSample> samples;
   SystemSums sums;
@@ -35,9 +35,9 @@ GuidingSettings GuideSettings::field() const {
 
 CacheSettings GuideSettings::cache() const {
   CacheSettings settings;
-  settings.pyramid = false;  // lobes of one leaf are not those of another
+  settings.pyramid = false;  // lobes of different leaves are unrelated
   settings.monochrome = control == ControlKind::kMono;
-  settings.memory_limit = std::numeric_limits<size_t>::max();  // leaves have no wider ones
+  settings.memory_limit = std::numeric_limits<size_t>::max();  // leaves cannot be widened
   return settings;
 }
 
@@ -145,10 +145,10 @@ IntegratorReport GuidedPath::report() const {
 
 namespace {
 
-/// PassSettings::pass of probes, so that they share no numbers with renders.
+/// PassSettings::pass of probes, so that they share no random numbers with renders.
 constexpr uint32_t kProbePass = 1u << 28;
 
-/// What the surface does with directions.
+/// Directional scattering of the surface.
 class Surface {
  public:
   Surface(const GuidedPath& integrator, const SurfaceHit& hit, const Vec3& to_viewer)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// `guided-path`: path tracing that learns where light comes from and samples there [Ruppert2020]. guided_tracer.h has
-// the estimator, sampling/guiding_field.h the learning.
+// `guided-path`: path tracing that learns the incident light and samples it [Ruppert2020]. guided_tracer.h has the
+// estimator, sampling/guiding_field.h the learning.
 #pragma once
 
 #include <memory>
@@ -19,14 +19,14 @@ namespace covary {
 
 struct GuideSettings {
   static constexpr uint32_t kMaxTrainingSpp = 1u << 16;
-  static constexpr float kLearnedFraction = 0;  ///< a fraction for each leaf of the field
+  static constexpr float kLearnedFraction = 0;  ///< a learned fraction per leaf of the field
   static constexpr uint32_t kMinLeafSamples = 200, kMaxLeafSamples = 1u << 22;
 
-  uint32_t lobes = 16;  ///< of a leaf at first, 1 to VmfLobes::kMax; splitting makes up to twice as many
-  uint32_t leaf_samples = GuidingSettings().leaf_samples;  ///< a leaf with more is split, kMinLeafSamples or more
+  uint32_t lobes = 16;  ///< initially per leaf, 1 to VmfLobes::kMax; splitting makes up to twice as many
+  uint32_t leaf_samples = GuidingSettings().leaf_samples;  ///< a leaf with more is split; at least kMinLeafSamples
   uint32_t train_spp = 16;                                 ///< samples per pixel to learn from
-  float fraction = 0.5f;                    ///< of directions that are guided, in (0, 1), or kLearnedFraction
-  float roughness = 0.3f;                   ///< lobes of BSDFs that are less rough are not guided
+  float fraction = 0.5f;                    ///< fraction of guided directions, in (0, 1), or kLearnedFraction
+  float roughness = 0.3f;                   ///< BSDF lobes of lower roughness are not guided
   bool nee = true;                          ///< light samples (next-event estimation)
   ControlKind control = ControlKind::kOff;  ///< control variates on the lobes: kOff, kRgb or kMono
   uint32_t control_train_spp = 32;          ///< samples per pixel to learn their coefficients from, after the lobes
@@ -71,11 +71,11 @@ class GuidedPath : public LearningIntegrator {
 
   std::shared_ptr<Integrator> clone() const override { return std::make_shared<GuidedPath>(lengths_, settings_); }
   const GuideSettings& settings() const { return settings_; }
-  /// What was learnt so far, or given.
+  /// The field learnt so far, or given.
   const GuidingField& field() const { return given_ ? *given_ : field_; }
-  /// Coefficients of control variates that were learnt so far, or given.
+  /// The control-variate coefficients learnt so far, or given.
   const CoefficientTable& table() const { return given_table_ ? *given_table_ : cache_.table(); }
-  /// What paths are traced with; after prepare().
+  /// What paths are traced with; valid after prepare().
   const GuidedScene& guided() const { return guided_; }
   std::string settings_text() const override;
 
@@ -84,7 +84,7 @@ class GuidedPath : public LearningIntegrator {
   void trace(const Scene& scene, std::span<CameraSample> samples, PathContext& context) const override {
     trace_with<GuidedParts>(scene, samples, context);
   }
-  /// 0 once a field was given.
+  /// 0 if a field was given.
   uint32_t training_spp() const override { return given_ ? 0 : settings_.training_spp(); }
   size_t training_memory() const override { return field_.training_memory(); }
   std::unique_ptr<TrainingRecord> take_record(ThreadState& state) const override;
@@ -112,16 +112,16 @@ class GuidedPath : public LearningIntegrator {
   uint64_t state_hash() const override;
 
  private:
-  /// Waves that begin with so many samples teach the field; those behind, if any, the control.
+  /// Waves that begin before this many samples train the field; later ones, if any, the control.
   bool learns_field() const { return trained_spp() < settings_.train_spp; }
   void begin_batch(GuidedBatch& batch) const;
 
   PathLengthSettings lengths_;
   GuideSettings settings_;
-  const Scene* scene_ = nullptr;  // that of prepare()
+  const Scene* scene_ = nullptr;  // as passed to prepare()
   LightSet lights_;
   LightClusters clusters_;
-  std::shared_ptr<const Emitter> compensated_;  // the environment as it is sampled, where it is not the scene's own
+  std::shared_ptr<const Emitter> compensated_;  // the environment as sampled, if that is not the scene's own
   GuidingField field_;
   std::optional<GuidingField> given_;
   CoefficientCache cache_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Directions at one vertex of a guided path: the mixture of the BSDF and of what the field has learnt there.
+// Directions at one vertex of a guided path: the mixture of the BSDF and the field learnt there.
 #pragma once
 
 #include <algorithm>
@@ -15,35 +15,35 @@
 
 namespace covary {
 
-/// What does not change while paths are traced.
+/// Constant while paths are traced.
 struct GuidedScene {
   const LightSet* lights;      ///< sampled at each vertex; null: no light samples
-  const Emitter* environment;  ///< as it is sampled, or null
+  const Emitter* environment;  ///< as sampled, or null
   const GuidingField* field;
   float fraction;                        ///< of guided directions
-  bool learned_fraction;                 ///< each leaf has its own instead
-  float min_roughness;                   ///< BSDF lobes that are less rough are not guided
-  const CoefficientTable* table;         ///< coefficients of control variates; without cells: no control
-  std::span<const uint32_t> cluster_of;  ///< for each light
+  bool learned_fraction;                 ///< use each leaf's own fraction instead
+  float min_roughness;                   ///< BSDF lobes of lower roughness are not guided
+  const CoefficientTable* table;         ///< control-variate coefficients; without cells: no control
+  std::span<const uint32_t> cluster_of;  ///< cluster of each light
 };
 
-/// The correct ones.
+/// The correct parts.
 struct GuidedParts {
   /// Density of the mixture of BSDF and guide, with the fraction `g` of guided directions.
   static float mixture_pdf(float g, float pdf_bsdf, float pdf_guide) { return (1 - g) * pdf_bsdf + g * pdf_guide; }
-  /// Whether a direction that failed counts as a sample of the control.
+  /// Whether a failed direction counts as a sample of the control.
   static constexpr bool kCountFailed = true;
-  /// The cell of the coefficients for a direction at a vertex whose Σ N β is that of `cell`.
+  /// The cell of the coefficients for a direction at a vertex whose Σ N β comes from `cell`.
   static uint32_t direction_cell(uint32_t cell, uint32_t /*n_cells*/) { return cell; }
-  /// A direction of the lobes `guide` of a leaf.
+  /// Samples a direction from the lobes `guide` of a leaf.
   static Vec3 sample_guide(const VmfLobes& guide, const GuidingField&, uint32_t /*leaf*/, float u_lobe, Vec2 u) {
     return guide.sample(u_lobe, u);
   }
 };
 
-/// Probability of the BSDF lobes that guiding can replace: those with a density in the mirror direction that is at most
-/// that of a microfacet lobe of the given roughness α, D / (4 cos θ) <= 1 / (4 π α² cos θ) [Walter2007] Eq. (14). Delta
-/// lobes have none. 0 for surfaces that transmit light other than by delta lobes.
+/// Probability of the BSDF lobes that guiding can replace: those whose density in the mirror direction is at most that
+/// of a microfacet lobe with the given roughness α, D / (4 cos θ) <= 1 / (4 π α² cos θ) [Walter2007] Eq. (14). Excludes
+/// delta lobes. 0 for surfaces that transmit light other than by delta lobes.
 inline float guidable_fraction(const BsdfClosure& bsdf, const Vec3& wo, float min_roughness) {
   if (bsdf.flags() & (kGlossyTransmission | kDiffuseTransmission)) return 0;
   float pmfs[kMaxLobes], pdfs[kMaxLobes];
@@ -62,17 +62,16 @@ struct GuidedDirection {
   float pdf_bsdf = 0, pdf_guide = 0;
 };
 
-/// How directions are drawn at a vertex.
+/// Direction sampling at a vertex.
 template <typename Parts>
 struct Guide {
   float guidable = 0;  ///< probability of the BSDF lobes that guiding can replace
-  float fraction = 0;  ///< g; 0: the BSDF alone
+  float fraction = 0;  ///< g; 0: BSDF only
   uint32_t leaf = 0;
   VmfLobes lobes;
-  alignas(32) float parts[VmfLobes::kMax];  ///< of pdf(), by lobe, where the guide draws directions
+  alignas(32) float parts[VmfLobes::kMax];  ///< of pdf(), by lobe, if the guide samples directions
 
-  /// Sets fraction and lobes to those of the leaf at a surface that is seen from `wo`, where guidable > 0 and the leaf
-  /// guides.
+  /// Sets fraction and lobes to those of the leaf at a surface seen from `wo`, if guidable > 0 and the leaf can guide.
   void see(const GuidedScene& guided, const SurfaceHit& hit, const Vec3& wo) {
     const GuidingLeaf& own = guided.field->leaf(leaf);
     if (guidable == 0 || own.mixture.lobes.n == 0) return;

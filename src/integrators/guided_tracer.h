@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// Path tracing that draws directions from a mixture of the BSDF and of what a guiding field has learnt [Ruppert2020].
-// At a vertex a fraction g of directions comes from the lobes of the field's leaf, seen from the vertex and multiplied
-// by the cosine; the density of every direction, whichever drew it, is that of the mixture,
+// Path tracing that samples directions from a mixture of the BSDF and a learnt guiding field [Ruppert2020]. At a
+// vertex, a fraction g of directions comes from the lobes of the field's leaf, as seen from the vertex and multiplied
+// by the cosine; the density of every direction, whichever technique sampled it, is that of the mixture,
 //
 //     p(w) = (1 − g) p_bsdf(w) + g p_guide(w),
 //
-// and so is the one that light samples are weighted against (balance heuristic). Hence the estimate is unbiased for any
-// field. g is the fraction of guided directions times the probability of those BSDF lobes that guiding can replace:
-// neither delta lobes nor narrow ones. Russian roulette looks at the throughput that the path would have if the BSDF
-// had drawn its directions: guided ones of high density have little, and that is no reason to end their paths.
+// as is the density that light samples are weighted against (balance heuristic). Hence the estimate is unbiased for any
+// field. g is the fraction of guided directions times the probability of the BSDF lobes that guiding can replace:
+// neither delta nor narrow lobes. Russian roulette uses the throughput that the path would have with BSDF sampling:
+// guided directions of high density have low throughput, which is no reason to end their paths.
 //
-// guided_surface.h has the mixture, guided_vertex_control.h the control variates of --cv. `Parts` says what tests
-// exchange to plant bugs; see GuidedParts.
+// guided_surface.h has the mixture, guided_vertex_control.h the control variates of --cv. `Parts` is what tests replace
+// to plant bugs; see GuidedParts.
 #pragma once
 
 #include <span>
@@ -49,7 +49,7 @@ class GuidedTracer {
 
   // The steps of follow_paths().
 
-  /// Adds the emission of what the path's ray met, which closes the vertex from which the ray came.
+  /// Adds the emission of what the path's ray hit, which completes the vertex the ray came from.
   void arrive(int depth, size_t i) {
     const Path& path = batch_.paths[i];
     if (path.recorded) batch_.last_step(path.sample).sample.inverse_distance = path.found ? 1 / batch_.hits[i].t : 0;
@@ -61,7 +61,7 @@ class GuidedTracer {
     control_.close(path.sample);
   }
 
-  /// Roulette is judged by what BSDF sampling alone would carry; see above.
+  /// Roulette uses the throughput of BSDF sampling; see above.
   bool goes_on(int depth, Path& path) {
     if (depth < lengths_.rr_depth) return true;
     const float weight =
@@ -114,7 +114,7 @@ class GuidedTracer {
     return true;
   }
 
-  /// Finishes the light samples, and the vertices of paths that have ended.
+  /// Completes the light samples, and the vertices of paths that have ended.
   void connect(int /*depth*/) {
     if (connecting_) trace_connections();
     if (batch_.recording) begin_steps();
@@ -123,7 +123,7 @@ class GuidedTracer {
   }
 
  private:
-  /// Sets `r_light` and `light` where a light sample could have found what was met.
+  /// Sets `r_light` and `light_cluster` if a light sample could have found the same point.
   void add_emission(int depth, size_t i, float& r_light, uint32_t& light_cluster) {
     const Path& path = batch_.paths[i];
     const SurfaceHit& hit = batch_.hits[i];
@@ -148,7 +148,7 @@ class GuidedTracer {
     samples_[path.sample].radiance += radiance * r;
   }
 
-  /// The leaves in which the vertices lie, before they are read.
+  /// Finds the leaves of the vertices before they are read.
   void find_leaves() {
     if (field_.n_leaves() == 0) return;
     for (size_t i = 0; i < batch_.paths.size(); ++i) {
@@ -170,7 +170,7 @@ class GuidedTracer {
     guide_.see(guided_, hit, wo);
   }
 
-  /// Next-event estimation: f cos L / p, if nothing lies between. `pmf`: with which the light of `cluster` was chosen;
+  /// Next-event estimation: f cos L / p, if unoccluded. `pmf`: selection probability of the light of `cluster`;
   /// kNoLight: the environment.
   void add_light(const PathVertex& at, const Path& path, const EmitterSample& light, float pmf, uint32_t cluster) {
     const bool active = batch_.vertices[path.sample].active;
@@ -208,7 +208,7 @@ class GuidedTracer {
     if (active) control_.take_light(path.sample, {{}, cluster, 1, {}}, kNoWeights);
   }
 
-  /// Adds the light samples that nothing hides.
+  /// Adds the unoccluded light samples.
   void trace_connections() {
     visit_connections(scene_, batch_, context_, [&](const GuidedBatch::Connection& connection, bool hidden) {
       if (!hidden) samples_[connection.sample].radiance += connection.radiance;
@@ -222,7 +222,7 @@ class GuidedTracer {
     });
   }
 
-  /// Appends a direction sample to the path's trail.
+  /// Records a direction sample of the path.
   void record(Path& path, const Vec3& p, const Vec3& wi, const GuidedDirection& direction) {
     uint32_t& n = batch_.n_steps[path.sample];
     if (n == GuidedBatch::kMaxSteps) return;
@@ -238,13 +238,14 @@ class GuidedTracer {
                    .guidable = guide_.guidable};
   }
 
-  /// The light samples of their own vertices are taken: what is added from now on came along the directions recorded.
+  /// The vertices' own light samples are complete: contributions from now on arrive along the recorded directions.
   void begin_steps() {
     for (const Path& path : batch_.paths)
       if (path.recorded) batch_.last_step(path.sample).before = samples_[path.sample].radiance;
   }
 
-  /// The radiance that arrived along each direction recorded: what the path gained behind it, over its throughput.
+  /// Computes the radiance that arrived along each recorded direction: the path's later contributions over its
+  /// throughput.
   void finish_steps() {
     for (uint32_t i = 0; i < samples_.size(); ++i)
       for (uint32_t n = 0; n < batch_.n_steps[i]; ++n) {
@@ -267,7 +268,7 @@ class GuidedTracer {
   PathContext& context_;
   GuidedBatch& batch_;
   bool connecting_ = false;  // vertices take light samples
-  Guide<Parts> guide_;       // of the vertex at hand
+  Guide<Parts> guide_;       // of the current vertex
   GuidedVertexControl<Parts> control_;
 };
 

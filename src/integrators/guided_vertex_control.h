@@ -9,12 +9,12 @@
 
 namespace covary {
 
-/// The control variates of the vertices of a batch (guided_batch.h): opened at a vertex, closed when its direction
-/// and light samples are taken; and what each of them teaches.
+/// The control variates of the vertices of a batch (guided_batch.h): opened at a vertex, closed once its direction and
+/// light samples are complete; and the training data of each vertex.
 template <typename Parts>
 class GuidedVertexControl {
  public:
-  /// `guide`: of the vertex at hand; it is read by open() and, with the parts of its last pdf(), by densities(),
+  /// `guide`: that of the current vertex; read by open() and, with the parts of its last pdf(), by densities(),
   /// weighted_coefficients(), balance_weights() and keep_direction().
   GuidedVertexControl(const GuidedScene& guided, const Guide<Parts>& guide, std::span<CameraSample> samples,
                       PathContext& context, GuidedBatch& batch)
@@ -26,7 +26,7 @@ class GuidedVertexControl {
         context_(context),
         batch_(batch) {}
 
-  /// Begins the control of a vertex: Σ N β. Only directions that are guided have one.
+  /// Begins the control of a vertex with Σ N β. Only vertices with guided directions have one.
   void open(const GuidedBatch::Path& path, bool connecting) {
     ControlledVertexState& vertex = batch_.vertices[path.sample];
     vertex.active = false;
@@ -61,14 +61,15 @@ class GuidedVertexControl {
     step.held_out = vertex.cell != CoefficientTable::kNone;
   }
 
-  /// Takes N λ of the techniques that draw directions, for that of the guide's last pdf(); returns their sum.
+  /// Stores N λ of the techniques that sample directions, for the direction of the guide's last pdf(); returns their
+  /// sum.
   float densities(float pdf_bsdf, float pdf_guide) {
     n_lobes_ = guide_.lobes.n;
     bsdf_density_ = (1 - guide_.fraction) * pdf_bsdf;
     return bsdf_density_ + guide_.fraction * pdf_guide;
   }
 
-  /// Σ β N λ / Σ N λ over densities(), whose sum is `pdf`.
+  /// Σ β N λ / Σ N λ over the techniques of densities(), whose sum is `pdf`.
   Spectrum weighted_coefficients(uint32_t sample, float pdf) const {
     Spectrum sum;
     if (batch_.vertices[sample].cell == CoefficientTable::kNone || !(pdf > 0)) return sum;
@@ -79,7 +80,7 @@ class GuidedVertexControl {
     return sum * (1 / pdf);
   }
 
-  /// N λ / `sum` of each technique that draws directions.
+  /// N λ / `sum` for each technique that samples directions.
   TechniqueDensities balance_weights(float sum) const {
     TechniqueDensities r{};
     if (!(sum > 0)) return r;
@@ -89,13 +90,13 @@ class GuidedVertexControl {
     return r;
   }
 
-  /// Keeps what the control of the direction sample, the guide's last one, needs; it is taken when the next surface is
-  /// found.
+  /// Stores what the control needs about the direction sample, the guide's last one; it is applied when the next
+  /// surface is found.
   void keep_direction(uint32_t sample, const GuidedDirection& direction, bool followed) {
     float pdf = 1;
     if (direction.sample.valid() && !direction.sample.is_delta())
       pdf = densities(direction.pdf_bsdf, direction.pdf_guide);
-    else  // nothing else finds it
+    else  // no other technique finds it
       n_lobes_ = 0, bsdf_density_ = 1;
     ControlledVertexState& vertex = batch_.vertices[sample];
     vertex.direction = weighted_coefficients(sample, pdf);
@@ -119,7 +120,7 @@ class GuidedVertexControl {
     step.light = cluster, step.r_light = r_light;
   }
 
-  /// The same of a light sample; `r`: balance weights of the techniques that draw directions.
+  /// Same for a light sample; `r`: balance weights of the techniques that sample directions.
   void take_light(uint32_t sample, const GuidedBatch::ConnectionParts& parts, const TechniqueDensities& r) {
     ControlledVertexState& vertex = batch_.vertices[sample];
     if (vertex.cell != CoefficientTable::kNone)
@@ -143,14 +144,14 @@ class GuidedVertexControl {
     batch_.control_steps[vertex.step].control = vertex.control;
   }
 
-  /// The light samples of the vertices are taken: what is added from now on came along their directions.
+  /// The vertices' light samples are complete: contributions from now on arrive along their directions.
   void begin_steps() {
     for (const GuidedBatch::Path& path : batch_.paths)
       if (const ControlledVertexState& vertex = batch_.vertices[path.sample]; vertex.active && vertex.step != ~0u)
         batch_.control_steps[vertex.step].before = samples_[path.sample].radiance;
   }
 
-  /// Adds the direction samples to the sums: what the path gained behind each of them, without the vertex's control.
+  /// Adds the direction samples to the sums: the path's later contributions, without the vertex's own control.
   void finish_steps() {
     for (size_t i = 0; i < batch_.control_steps.size(); ++i) {
       ControlStep& step = batch_.control_steps[i];
@@ -179,7 +180,7 @@ class GuidedVertexControl {
                     {value, of_light ? light : ControlledSample::kNoLight, of_light ? r_light : 0, r});
   }
 
-  static constexpr size_t kMaxControlSteps = 16;  // of a path, in the mean over a batch
+  static constexpr size_t kMaxControlSteps = 16;  // per path, on average over a batch
   const GuidedScene& guided_;
   const Guide<Parts>& guide_;
   const GuidingField& field_;
@@ -187,7 +188,7 @@ class GuidedVertexControl {
   std::span<CameraSample> samples_;
   PathContext& context_;
   GuidedBatch& batch_;
-  int n_lobes_ = 0;         // whose densities are those of the guide's last pdf(); others have none
+  int n_lobes_ = 0;         // with densities from the guide's last pdf(); others have none
   float bsdf_density_ = 0;  // N λ of the BSDF there
 };
 

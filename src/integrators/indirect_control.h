@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// A control variate for light that reaches a vertex by way of other surfaces. No density knows it, but its direction is
-// made of two random numbers u. Their square is divided into K bins, each as probable as any other, and with β_k for
-// bin k, learned in cells of space,
+// A control variate for light reaching a vertex via other surfaces. No density describes it, but its direction is a
+// function of two random numbers u. Their unit square is divided into K equally probable bins, and with β_k for bin k,
+// learnt in spatial cells,
 //
 //     (1/K) Σ_k β_k − β_k(u)
 //
-// has the expectation zero whatever β is. It is a system of sampling/coefficient_solver.h whose K techniques share no
-// sample: N_k = 1/K, and r is 1 for the bin that was met. The least variance has β_k = mean of the light in bin k,
-// and directions that fail bring none.
+// has expectation zero for any β. It is a system of sampling/coefficient_solver.h whose K techniques share no samples:
+// N_k = 1/K, and r is 1 for the bin that was hit. The variance is minimal for β_k = mean of the light in bin k, where
+// failed directions count as zero.
 #pragma once
 
 #include <algorithm>
@@ -20,7 +20,7 @@
 namespace covary {
 
 /// The bins: a square of kSide x kSide. Their sides are multiples of the step of the random numbers, so that they are
-/// equally probable to the last bit.
+/// exactly equally probable.
 struct DirectionBins {
   static constexpr uint32_t kSide = 8, kCount = kSide * kSide;
   static uint32_t of(Vec2 u) {
@@ -31,11 +31,11 @@ struct DirectionBins {
   static std::vector<float> counts() { return std::vector<float>(kCount, 1.0f / kCount); }
 };
 
-/// What is recorded of the paths of a batch while the coefficients are learnt. What arrives at a vertex by other
-/// surfaces is known when the path has ended.
+/// Training records of the paths of a batch. What arrives at a vertex via other surfaces is known once the path has
+/// ended.
 class IndirectRecorder {
  public:
-  static constexpr int kVertices = 8;  ///< of a path that have a control; later ones matter little
+  static constexpr int kVertices = 8;  ///< vertices of a path that have a control; later ones matter little
 
   SystemSums sums;
   bool recording = false;
@@ -45,9 +45,9 @@ class IndirectRecorder {
     bool recorded = false, held_out = false;
     uint32_t cell = 0, bin = 0;
     float weight = 0;   ///< of its samples in the sums
-    Spectrum scale;     ///< what contributions to the image are divided by
-    Spectrum control;   ///< not scaled
-    Spectrum fraction;  ///< of the control that is in the image
+    Spectrum scale;     ///< factor that contributions to the image are divided by
+    Spectrum control;   ///< unscaled
+    Spectrum fraction;  ///< fraction of the control applied in the image
   };
 
   /// Begins n paths.
@@ -57,11 +57,11 @@ class IndirectRecorder {
     by_length_.assign(n * kLengths, Spectrum());
   }
   Vertex& vertex(size_t path, int depth) { return vertices_[path * kVertices + static_cast<size_t>(depth)]; }
-  /// Adds what a path of so many edges brings to the image.
+  /// Adds the contribution to the image of a path with `edges` edges.
   void add(size_t path, int edges, const Spectrum& value) {
     by_length_[path * kLengths + std::min(static_cast<size_t>(edges - 1), kLengths - 1)] += value;
   }
-  /// Ends the paths: adds what was seen to the sums.
+  /// Ends the paths: adds the records to the sums.
   void finish() {
     if (!recording) return;
     for (size_t path = 0; path * kVertices < vertices_.size(); ++path) {
@@ -72,7 +72,7 @@ class IndirectRecorder {
   }
 
  private:
-  // Light that other surfaces send to vertex d has come by d + 3 edges or more, the last number for all of more.
+  // Light that other surfaces send to vertex d has d + 3 edges or more; the last entry collects all longer paths.
   static constexpr size_t kLengths = kVertices + 2;
 
   void record(const Vertex& v, const Spectrum& contribution) {

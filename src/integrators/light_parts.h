@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The groups of lights that parts of radiances come from: Integrator::by_light().
+// The light groups that parts of the radiance come from: Integrator::by_light().
 #pragma once
 
 #include <cstddef>
@@ -16,12 +16,12 @@ class LightParts {
   explicit LightParts(std::span<const std::string> groups) {
     for (const std::string& group : groups) places_.emplace(group, places_.size());
   }
-  /// Before the first light of a batch.
+  /// Call before the first contribution of a batch.
   void begin(size_t n_samples, PathContext& context) const {
     context.by_part.n_parts = places_.size() + 1;
     context.by_part.radiance.assign(n_samples * context.by_part.n_parts, Spectrum());
   }
-  /// What the light adds to the radiance of a sample of the batch.
+  /// Adds a light's contribution to the radiance of a sample of the batch.
   void add(const Emitter& light, uint32_t sample, const Spectrum& radiance, PathContext& context) const {
     const auto found = places_.find(light.group());
     const size_t place = found == places_.end() ? places_.size() : found->second;

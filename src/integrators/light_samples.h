@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What tracers share that sample one light of a LightSet at each vertex, and the environment apart from it.
+// Shared by tracers that sample one light of a LightSet at each vertex, and the environment separately.
 #pragma once
 
 #include <span>
@@ -12,10 +12,10 @@
 
 namespace covary {
 
-/// Addresses of the numbers of environment samples: those of the vertex, apart from all others.
+/// Offset of the addresses of environment samples' numbers, distinct from all others.
 inline constexpr uint32_t kEnvironmentVertices = 1u << 21;
 
-/// Which light a vertex samples, and with which numbers.
+/// The light that a vertex samples, and the random numbers for it.
 struct LightSetChoice {
   bool open = false;   ///< the surface can use light samples
   uint32_t light = 0;  ///< number of the light
@@ -23,8 +23,8 @@ struct LightSetChoice {
   float u_primitive = 0;
 };
 
-/// What the vertices of `batch` are to sample; nothing without `connect`. All choices come first, so that memory
-/// answers to one while the others are made. `environment`: as it is sampled, or null.
+/// Chooses what the vertices of `batch` sample; nothing without `connect`. All choices are made first, so that the
+/// prefetches of one overlap with the making of others. `environment`: as sampled, or null.
 template <typename Batch>
 void choose_lights(const LightSet& lights, const Emitter* environment, std::span<const CameraSample> samples,
                    bool connect, Batch& batch) {
@@ -49,7 +49,7 @@ void choose_lights(const LightSet& lights, const Emitter* environment, std::span
     if (batch.choices[i].open) environment->prefetch(batch.choices[i].u_environment, PrefetchStep::kValues);
 }
 
-/// The light and environment samples of all vertices; those without have densities of 0.
+/// The light and environment samples of all vertices; densities are 0 where there are none.
 template <typename Batch>
 void sample_lights(const LightSet& lights, const Emitter* environment, Batch& batch) {
   for (size_t i = 0; i < batch.paths.size(); ++i) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Subpaths from the lights, for bidirectional path tracing: emission, then a walk by the sampling of the surfaces, for
-// many paths together, one edge at a time.
+// Subpaths from the lights, for bidirectional path tracing: emission, then a random walk by BSDF sampling, for many
+// paths together, one edge at a time.
 #pragma once
 
 #include <memory>
@@ -17,19 +17,19 @@
 
 namespace covary {
 
-/// A vertex of a light subpath that can be connected: on a surface with more than delta lobes.
+/// A connectible vertex of a light subpath: on a surface with more than delta lobes.
 struct LightVertex {
   Vec3 p;
   Vec3 ng;                  ///< unit geometric normal
   float offset;             ///< SurfaceHit::offset
   Frame frame;              ///< shading frame
   Vec3 ng_local;            ///< ng in the frame
-  Vec3 wo;                  ///< towards the vertex before, in the frame
+  Vec3 wo;                  ///< towards the previous vertex, in the frame
   const BsdfClosure* bsdf;  ///< bound for importance
-  Spectrum throughput;      ///< of the subpath up to here, densities of emission included
+  Spectrum throughput;      ///< of the subpath up to here, including emission densities
   SubpathSums sums;
-  uint32_t n_vertices;  ///< of the subpath up to here, the light and delta vertices included
-  uint32_t address;     ///< vertex of its random numbers
+  uint32_t n_vertices;  ///< of the subpath up to here, including the light and delta vertices
+  uint32_t address;     ///< address of its random numbers
   bool on_light;        ///< the surface emits
 };
 
@@ -45,7 +45,7 @@ class ClosureStore {
     } catch (const Error&) {
       if (fresh) throw;
     }
-    begin_arena();  // the rest was too small
+    begin_arena();  // the current arena is too full
     return hit.bsdf->bind(hit, wo_front, mode, *arenas_[n_used_ - 1]);
   }
 
@@ -59,29 +59,29 @@ class ClosureStore {
   size_t n_used_ = 0;
 };
 
-/// Light subpaths that are traced together, and the arrays that it takes.
+/// Light subpaths that are traced together, with the arrays needed.
 class LightSubpaths {
  public:
-  /// Traces a subpath for each of `randoms`, which hold its own numbers, of at most `max_surfaces` vertices beside the
-  /// light; roulette begins after `rr_depth` edges. `parts`: those of the integrator (bidirectional_tracer.h).
+  /// Traces a subpath for each of `randoms`, its random numbers, with at most `max_surfaces` vertices beside the light;
+  /// roulette begins after `rr_depth` edges. `parts`: those of the integrator (bidirectional_tracer.h).
   template <typename Parts>
   void trace(const Parts& parts, const Scene& scene, const PowerLights& lights, const BidirectionalMis& mis,
              std::span<const PathRandom> randoms, int max_surfaces, int rr_depth, PathContext& context);
 
-  /// The vertices of a path that can be connected.
+  /// The connectible vertices of a path.
   std::span<const LightVertex> path(size_t path) const { return vertices_.path(path); }
 
  private:
   struct Path {
     Spectrum throughput;
-    float scale;  ///< roulette looks at throughput * scale
+    float scale;  ///< roulette uses throughput * scale
     SubpathSums sums;
     Vec3 previous_p;
-    uint32_t index;         ///< among those that are traced together
+    uint32_t index;         ///< among those traced together
     uint32_t n_smooth = 0;  ///< vertices so far on surfaces with more than delta lobes
     bool ends = false;      ///< at its next vertex
   };
-  /// How a path begins.
+  /// How a path started.
   struct Start {
     const Emitter* emitter;
     Vec3 n;
@@ -92,10 +92,10 @@ class LightSubpaths {
 
   template <typename Parts>
   void emit(const Parts& parts, const Scene& scene, const PowerLights& lights, std::span<const PathRandom> randoms);
-  /// The sums of a path at the first surface that it meets.
+  /// The sums of a path at the first surface it hits.
   static SubpathSums first_sums(const Scene& scene, const BidirectionalMis& mis, const Start& start, const Path& path,
                                 const Ray& ray, const SurfaceHit& hit, double cosine);
-  /// One vertex: keeps it, and draws the next ray; false where the path ends.
+  /// Processes one vertex: stores it and samples the next ray; false if the path ends.
   template <typename Parts>
   bool scatter(const Parts& parts, const BidirectionalMis& mis, const PathRandom& random, int depth, bool last,
                bool roulette, const SurfaceHit& hit, Path& path, Ray& ray);
@@ -183,7 +183,7 @@ bool LightSubpaths::scatter(const Parts& parts, const BidirectionalMis& mis, con
                             bool last, bool roulette, const SurfaceHit& hit, Path& path, Ray& ray) {
   const Vec3 wo = hit.frame.to_local(-ray.d), ng = hit.frame.to_local(hit.ng);
   const bool smooth = hit.bsdf_flags & kSmooth;
-  // Mirrors and glass are counted apart, as on camera subpaths.
+  // Mirrors and glass are counted separately, as on camera subpaths.
   const uint32_t vertex = smooth ? kFirstSurfaceVertex + path.n_smooth++ : kDeltaVertices + depth;
   if (last && !smooth) return false;
   const BsdfClosure* bsdf = closures_.bind(hit, wo.z > 0, parts.light_mode());
@@ -196,12 +196,12 @@ bool LightSubpaths::scatter(const Parts& parts, const BidirectionalMis& mis, con
   if (!next.valid() || is_black(next.weight)) return false;
   path.throughput *= next.weight * parts.adjoint_factor(wo, next.wi, ng);
   if (roulette) {
-    // As for independent numbers also where they are common: all pixels then share the subpath, whatever its length.
+    // Roulette for independent numbers even if they are common: all pixels then share the subpath, whatever its length.
     const float survival = parts.survival_probability(path.throughput * path.scale, 1, Sampling::kIndependent);
     if (random.get_1d(vertex, Event::kRoulette) < survival)
       path.throughput *= parts.survivor_weight(survival);
     else if (std::isnan(survival))
-      path.ends = true;  // joined once more, so that the samples are bad ones, not black
+      path.ends = true;  // connect once more, so that the samples become bad ones instead of black
     else
       return false;
   }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// How far light gets in a medium. Where the extinction varies, flights are drawn for the largest one, and collisions
-// with the difference, null collisions, change nothing [Novak2018] (delta tracking, ratio tracking).
-// Colour channels share paths: distances are drawn for one channel, and each channel is weighted by the mean of the
-// densities that the three have for the same path, which is the balance heuristic over the channel [Miller2019].
-// Numbers are addressed by the vertex before the flight and the count of collisions since.
+// Free-flight sampling in media. If the extinction varies, flights are sampled for its majorant, and null collisions
+// fill in the difference [Novak2018] (delta tracking, ratio tracking). Colour channels share paths: distances are
+// sampled for one channel, and each channel is weighted by the mean of the three channels' densities for the same path,
+// which is the balance heuristic over channels [Miller2019]. Random numbers are addressed by the vertex before the
+// flight and the number of collisions since.
 #pragma once
 
 #include <atomic>
@@ -14,22 +14,22 @@
 
 namespace covary {
 
-/// A path's throughput and densities, channel by channel, all divided by the density of the path's own channel.
+/// A path's throughput and densities per channel, up to a common factor.
 struct SpectralWeights {
   Spectrum throughput{1};
-  Spectrum pdf_path{1};   ///< density of the path as it is sampled
-  Spectrum pdf_light{1};  ///< the same if its last edges were a connection to a light
-  /// Divides all three by the same, which changes no estimate and keeps them in the range of floats.
+  Spectrum pdf_path{1};   ///< density of the path as sampled
+  Spectrum pdf_light{1};  ///< same, if its last edges were a connection to a light
+  /// Divides all three by the same number, which changes no estimate and keeps them within the range of float.
   void normalise() {
     const float scale = 1 / mean(pdf_path);
     throughput *= scale, pdf_path *= scale, pdf_light *= scale;
   }
 };
 
-/// The numbers of flights between two vertices at which light scatters.
+/// The random numbers of flights between two scattering vertices.
 class FlightNumbers {
  public:
-  /// `vertex`: how many such vertices lie before.
+  /// `vertex`: number of such vertices before.
   FlightNumbers(const PathRandom& path, uint32_t vertex) : random_(path.subpath(Subpath::kCamera, vertex + 1)) {}
   float distance(Event event) const { return random_.get_1d(step_, event); }
   float collision() { return random_.get_1d(step_++, Event::kCollision); }
@@ -40,7 +40,7 @@ class FlightNumbers {
   uint32_t step_ = 0;
 };
 
-/// The channel after which a path draws its distances; 0 … 2.
+/// The channel by which a path samples its distances; 0 … 2.
 inline int channel_of(const PathRandom& path) {
   return std::min(static_cast<int>(3 * path.get_1d(0, Event::kCollision)), 2);
 }
@@ -54,14 +54,14 @@ inline float free_distance(float extinction, float u) {
   return extinction > 0 ? -std::log1p(-u) / extinction : kInfinity;
 }
 
-/// What is left of the largest extinction.
+/// The majorant minus the extinction, at least 0.
 inline Spectrum null_extinction(const Spectrum& majorant, const Spectrum& extinction) {
   const Spectrum rest = majorant - extinction;
   return {std::max(rest.r, 0.0f), std::max(rest.g, 0.0f), std::max(rest.b, 0.0f)};
 }
 
-/// Flies along `ray` up to `far`, drawing for `channel`. Returns the distance at which light scatters; infinity where
-/// it comes through, or `stop` became true.
+/// Flies along `ray` up to `far`, sampling for `channel`. Returns the distance at which light scatters; infinity if it
+/// passes through, or `stop` became true.
 inline float fly(const Medium& medium, const Ray& ray, float far, int channel, FlightNumbers& numbers,
                  SpectralWeights& weights, const std::atomic<bool>* stop) {
   float t = 0;
@@ -100,7 +100,7 @@ inline float fly(const Medium& medium, const Ray& ray, float far, int channel, F
   return kInfinity;
 }
 
-/// Estimates what comes through from 0 to `far`, exactly where the extinction is constant. Here `pdf_path` is that of
+/// Estimates the transmittance from 0 to `far`; exact if the extinction is constant. Here `pdf_path` is the density of
 /// fly(), `pdf_light` that of this function.
 inline void come_through(const Medium& medium, const Ray& ray, float far, int channel, FlightNumbers& numbers,
                          SpectralWeights& weights, const std::atomic<bool>* stop) {

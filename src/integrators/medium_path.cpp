@@ -9,10 +9,10 @@
 namespace covary {
 namespace {
 
-/// What passes the surface that a ray along `d` hit.
+/// Null transmission of the surface hit by a ray along `d`.
 NullPassage null_passage(const SurfaceHit& hit, const Vec3& d) {
   const Vec3 wo = hit.frame.to_local(-d);
-  Arena arena;  // the path's own still holds the closure at its vertex
+  Arena arena;  // the path's own arena still holds the closure at its vertex
   return hit.bsdf->bind(hit, wo.z > 0, TransportMode::kRadiance, arena)->null_passage(wo);
 }
 
@@ -32,7 +32,7 @@ MediumPath::MediumPath(const Scene& scene, const PathLengthSettings& lengths, Ca
       ray_(sample.ray),
       medium_(scene.camera_medium()) {}
 
-/// One ray, to the next surface or collision. False where the path ends.
+/// Traces one ray, to the next surface or collision. False if the path ends.
 bool MediumPath::advance() {
   SurfaceHit hit;
   ++context_.n_rays;
@@ -109,7 +109,7 @@ bool MediumPath::scatter_on_surface(const SurfaceHit& hit) {
   if (last && !passes) return false;
   weights_.throughput *= next.weight;
   eta_ *= next.eta;
-  if (passes) {  // goes on as the direction before; a light sample passes with certainty
+  if (passes) {  // continue with the state of the previous direction; a light sample passes with certainty
     weights_.pdf_light *= 1 / bsdf->null_passage(wo).pmf;
   } else if (next.is_delta()) {
     only_direction_ = true;
@@ -134,11 +134,11 @@ bool MediumPath::play_roulette(uint32_t vertex) {
     weights_.throughput *= roulette::survivor_weight(survival);
     return true;
   }
-  if (std::isnan(survival)) sample_.radiance = throughput;  // a bad sample, not a black one
+  if (std::isnan(survival)) sample_.radiance = throughput;  // a bad sample instead of a black one
   return false;
 }
 
-/// Light that the ray met, on a surface or, without `hit`, at infinity.
+/// Adds light hit by the ray, on a surface or, without `hit`, at infinity.
 void MediumPath::add_emission(const Emitter& emitter, const SurfaceHit* hit) {
   if (depth_ + 1 < lengths_.min_depth || (!hit && lengths_.hide_emitters && only_null_)) return;
   const EnvironmentLight light =
@@ -163,8 +163,8 @@ EmitterSample MediumPath::sample_light(const Emitter& emitter, const Vec3& p, ui
                                 random.get_1d(vertex, Event::kLightPrimitive));
 }
 
-/// Adds a sample of the light. `value`: of the surface, with its cosine, or of the phase function; `pdf_direction`:
-/// density with which that draws the direction.
+/// Adds a light sample. `value`: of the BSDF with its cosine, or of the phase function; `pdf_direction`: density with
+/// which that samples the direction.
 void MediumPath::connect(const EmitterSample& light, const Emitter& emitter, const Ray& shadow, const Medium* medium,
                          const Spectrum& value, float pdf_direction) {
   const Spectrum unblocked = weights_.throughput * value * light.radiance;
@@ -176,7 +176,7 @@ void MediumPath::connect(const EmitterSample& light, const Emitter& emitter, con
   add(emitter, unblocked * weights.throughput * (1 / mean(weights_.pdf_path * pdf)));
 }
 
-/// Follows a shadow ray through boundaries and media; false where nothing arrives.
+/// Follows a shadow ray through boundaries and media; false if nothing arrives.
 bool MediumPath::light_arrives(Ray ray, const Medium* medium, SpectralWeights& weights) {
   FlightNumbers numbers(sample_.random, n_smooth_);
   SurfaceHit hit;

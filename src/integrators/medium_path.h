@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Path tracing through participating media: `path` in scenes that have some. One path at a time.
+// Path tracing through participating media: `path` in scenes that have any. One path at a time.
 //
 // At each vertex, on a surface or in a medium, a light sample and a direction sample are combined by the balance
-// heuristic over both techniques and the colour channel [Miller2019]. Both see through surfaces that let light pass
-// straight (boundaries of bsdf `null`, masks, panes): light samples by the transmittance, directions by chance. Such
-// passages are no edges of a path, as in Mitsuba's `volpath`.
+// heuristic over both techniques and the colour channel [Miller2019]. Both pass through surfaces that let light pass
+// straight (boundaries with bsdf `null`, masks, panes): light samples by transmittance, directions by chance. Such
+// crossings are not counted as path edges, as in Mitsuba's `volpath`.
 #pragma once
 
 #include "integrators/light_parts.h"
@@ -17,7 +17,7 @@ namespace covary {
 
 class MediumPath {
  public:
-  /// `parts`: or null; the sample is the one of this `number` of the batch.
+  /// `parts` may be null; `number`: index of the sample in the batch.
   MediumPath(const Scene& scene, const PathLengthSettings& lengths, CameraSample& sample, PathContext& context,
              const LightParts* parts = nullptr, uint32_t number = 0);
   /// Sets the radiance of the sample.
@@ -61,12 +61,12 @@ class MediumPath {
   float eta_ = 1;
   int depth_ = 0;  // edges so far
   uint32_t n_smooth_ = 0, n_delta_ = 0;
-  Vec3 previous_p_;             // where the last direction was drawn
-  bool only_direction_ = true;  // no light sample could have found what the ray meets
-  bool only_null_ = true;       // nothing that scatters met so far
+  Vec3 previous_p_;             // where the last direction was sampled
+  bool only_direction_ = true;  // no light sample could have found what the ray hits
+  bool only_null_ = true;       // no scattering so far
 };
 
-/// Whether light passes a surface as if it were not there.
+/// Whether light passes a surface as if it were absent.
 inline bool is_boundary(const SurfaceHit& hit) { return hit.bsdf_flags == kNullTransmission; }
 
 }  // namespace covary

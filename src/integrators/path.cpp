@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// `path`: path tracing (path_tracer.h) with uniform light selection, the power heuristic and BSDF sampling; where a
-// scene has participating media, by medium_path.h.
+// `path`: path tracing (path_tracer.h) with uniform light selection, the power heuristic and BSDF sampling; in scenes
+// with participating media, by medium_path.h.
 #include <algorithm>
 
 #include "integrators/medium_path.h"
@@ -9,13 +9,13 @@
 namespace covary {
 namespace {
 
-constexpr int kDirectEdges = 2;  // of paths from the camera by one surface to a light
+constexpr int kDirectEdges = 2;  // camera, one surface, light
 
 struct Plain : PathParts {
   static constexpr bool kInBlocks = true;
 };
 
-/// Tells apart from which lights radiance comes.
+/// Separates radiance by the lights it comes from.
 struct ByLight : Plain {
   std::shared_ptr<const LightParts> parts;
   void begin(size_t n_samples, PathContext& context) const { parts->begin(n_samples, context); }

@@ -10,30 +10,30 @@
 
 namespace covary {
 
-/// What a camera path that goes on carries.
+/// State of an active camera path.
 struct PathState {
   Spectrum throughput{1};
-  float eta = 1;               ///< product of relative indices, undoes the radiance scaling in roulette
-  Vec3 previous_p;             ///< where the last direction sample started
+  float eta = 1;               ///< product of relative indices of refraction; undoes the radiance scaling in roulette
+  Vec3 previous_p;             ///< origin of the last direction sample
   float previous_pdf = 1;      ///< its density per unit solid angle
   bool previous_delta = true;  ///< it came from a delta lobe or the camera
-  bool only_null = true;       ///< nothing but null surfaces met so far
+  bool only_null = true;       ///< only null surfaces hit so far
   bool found = false;          ///< whether the ray hit a surface
-  uint32_t sample = 0;         ///< which of the batch
-  uint32_t n_smooth = 0;       ///< vertices so far on surfaces that have more than delta lobes
+  uint32_t sample = 0;         ///< index of the sample in the batch
+  uint32_t n_smooth = 0;       ///< vertices so far on surfaces with more than delta lobes
 };
 
-/// Camera paths that an integrator advances together, and for each of them what its loops hand on to one another.
-/// `PathType`: what a path carries, a PathState or more; `ChoiceType`: which light a vertex samples, and with which
-/// numbers; `ConnectionType`: a light sample that counts if nothing lies between.
+/// Camera paths that an integrator advances together, and the per-path arrays passed between its loops. `PathType`:
+/// state of a path, a PathState or more; `ChoiceType`: the light that a vertex samples, and the random numbers for it;
+/// `ConnectionType`: a light sample that counts if unoccluded.
 template <typename PathType, typename ChoiceType, typename ConnectionType>
 struct CameraBatch : ThreadState {
   using Path = PathType;
   using LightChoice = ChoiceType;
   using Connection = ConnectionType;
 
-  /// Makes room for n fresh paths, with so many connections of a vertex; what else the arrays hold is old and is
-  /// overwritten before it is read.
+  /// Allocates n fresh paths, with at most this many connections per vertex; other arrays keep stale contents, which
+  /// are overwritten before they are read.
   void start(size_t n, size_t n_connections_each = 1) {
     paths.resize(n), rays.resize(n);
     for (Path& path : paths) make_in_place(path, [] { return Path(); });
@@ -46,27 +46,27 @@ struct CameraBatch : ThreadState {
   void resize(size_t n) { paths.resize(n), rays.resize(n); }
 
   std::vector<Path> paths;
-  std::vector<Ray> rays;  ///< the next one of each path
+  std::vector<Ray> rays;  ///< the next ray of each path
   std::vector<RayHit> ray_hits;
   std::vector<SurfaceHit> hits;
   std::vector<LightChoice> choices;
   std::vector<EmitterSample> lights;
   size_t n_connections = 0;
   std::vector<Connection> connections;
-  std::vector<Ray> shadow_rays;  ///< one of each connection
+  std::vector<Ray> shadow_rays;  ///< one per connection
   std::vector<uint8_t> blocked;
-  std::vector<uint8_t> goes_on;  ///< whether a path is followed further
-  std::vector<uint32_t> alive;   ///< places of the paths that go on
+  std::vector<uint8_t> goes_on;  ///< whether a path continues
+  std::vector<uint32_t> alive;   ///< indices of the paths that continue
 };
 
-/// A light that was chosen.
+/// A selected light.
 struct EmitterChoice {
   const Emitter* emitter = nullptr;  ///< null: the surface cannot use light samples
   Vec2 u;
   float u_primitive = 0;
 };
 
-/// What a light sample adds to the radiance of which sample of the batch.
+/// Contribution of a light sample to a sample of the batch.
 struct LightConnection {
   Spectrum radiance;
   uint32_t sample;
@@ -76,7 +76,7 @@ struct LightConnection {
 struct PathBatch final : CameraBatch<PathState, EmitterChoice, LightConnection> {
   LambertianMeshes meshes;
   LambertianBlock block;
-  std::vector<const Emitter*> connected;  ///< the lights of the connections, where lights are told apart
+  std::vector<const Emitter*> connected;  ///< the lights of the connections, if lights are separated
 };
 
 }  // namespace covary

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Steps of camera paths that advance together, common to the integrators that trace them. A `Batch` has the arrays of
-// PathBatch that a step names.
+// Steps of camera paths that advance together, shared by the integrators that trace them. A `Batch` has those arrays of
+// PathBatch that a step uses.
 #pragma once
 
 #include <cmath>
@@ -14,14 +14,14 @@
 
 namespace covary {
 
-/// Begins a path with the ray of each sample.
+/// Begins one path per sample, with its camera ray.
 template <typename Batch>
 void start_paths(std::span<const CameraSample> samples, Batch& batch) {
   batch.start(samples.size());
   for (uint32_t i = 0; i < samples.size(); ++i) batch.rays[i] = samples[i].ray, batch.paths[i].sample = i;
 }
 
-/// Follows the camera ray past area lights until something else is hit.
+/// Continues the camera ray through area lights until something else is hit.
 template <typename Path>
 void skip_area_lights(const Scene& scene, Path& path, Ray& ray, SurfaceHit& hit, PathContext& context) {
   while (path.found && hit.emitter) {
@@ -32,11 +32,11 @@ void skip_area_lights(const Scene& scene, Path& path, Ray& ray, SurfaceHit& hit,
   }
 }
 
-/// The mark of a hit that is left as it was found.
+/// Marks a hit that was set apart.
 inline void leave_apart(SurfaceHit& hit) { hit.bsdf = nullptr, hit.bsdf_flags = 0, hit.emitter = nullptr; }
 
-/// Nearest hits of all rays; `depth`: edges before them. Hits that `set_apart` are left as they were found, and have no
-/// BSDF.
+/// Nearest hits of all rays; `depth`: edges before them. Hits for which `set_apart` is true are left unresolved and
+/// have no BSDF.
 template <typename Batch, typename SetApart>
 void find_surfaces(const Scene& scene, int depth, bool hide_emitters, Batch& batch, PathContext& context,
                    const SetApart& set_apart) {
@@ -62,7 +62,7 @@ void find_surfaces(const Scene& scene, int depth, bool hide_emitters, Batch& bat
   find_surfaces(scene, depth, hide_emitters, batch, context, [](size_t) { return false; });
 }
 
-/// Removes the paths of which `keep` is false; it is asked once for each, in their order.
+/// Removes the paths for which `keep` is false; it is called once per path, in order.
 template <typename Batch, typename Keep>
 void keep_paths(Batch& batch, const Keep& keep) {
   size_t n_kept = 0;
@@ -81,21 +81,21 @@ void keep_paths(Batch& batch, const Keep& keep) {
   batch.resize(n_kept);
 }
 
-/// The vertex at which a path reads the random numbers of the surface that it has met. Mirrors and glass have addresses
-/// of their own: a path that met one reads, at the surfaces behind it, the same numbers as its neighbour that did not.
+/// The vertex at which a path reads the random numbers of the surface it has hit. Mirrors and glass have their own
+/// addresses: behind one, a path reads the same numbers as its neighbour that did not hit one.
 inline uint32_t next_vertex(PathState& path, const SurfaceHit& hit, int depth) {
   return hit.bsdf_flags & kSmooth ? kFirstSurfaceVertex + path.n_smooth++
                                   : kDeltaVertices + static_cast<uint32_t>(depth);
 }
 
-/// What a direction sample does to all that a path carries.
+/// Updates the path's state for a direction sample.
 inline void scatter_path(PathState& path, const BsdfSample& next) {
   path.throughput *= next.weight;
   path.eta *= next.eta;
   if (!(next.flags & kNullTransmission)) path.only_null = false;
 }
 
-/// Leads a path on from a surface, in the world's direction `wi` of the sample.
+/// Continues a path from a surface in the sample's world direction `wi`.
 inline void lead_on(PathState& path, Ray& ray, const SurfaceHit& hit, const BsdfSample& next, const Vec3& wi) {
   path.previous_p = hit.p;
   path.previous_pdf = next.pdf;
@@ -103,7 +103,7 @@ inline void lead_on(PathState& path, Ray& ray, const SurfaceHit& hit, const Bsdf
   make_in_place(ray, [&] { return Ray{offset_origin(hit, wi), wi, kInfinity}; });
 }
 
-/// Calls visit(connection, whether something hides it) for each connection of the batch, of which none is left.
+/// Calls visit(connection, whether it is occluded) for each connection of the batch, and removes them all.
 template <typename Batch, typename Visit>
 void visit_connections(const Scene& scene, Batch& batch, PathContext& context, const Visit& visit) {
   const size_t n = batch.n_connections;
@@ -113,18 +113,18 @@ void visit_connections(const Scene& scene, Batch& batch, PathContext& context, c
   batch.n_connections = 0;
 }
 
-/// Russian roulette by `parts` (roulette.h) with the number of `vertex`, for a path that carries `throughput`: the
-/// factor of survivors, or 0 where the path ends.
+/// Russian roulette by `parts` (roulette.h) with the random number of `vertex`, for a path of the given `throughput`:
+/// the factor for survivors, or 0 if the path ends.
 template <typename Parts>
 float play_roulette(const Parts& parts, const PathState& path, const Spectrum& throughput, uint32_t vertex,
                     CameraSample& sample) {
   const float survival = parts.survival_probability(throughput, path.eta, sample.random.sampling());
   if (sample.random.get_1d(vertex, Event::kRoulette) < survival) return parts.survivor_weight(survival);
-  if (std::isnan(survival)) sample.radiance = path.throughput;  // a bad sample, not a black one
+  if (std::isnan(survival)) sample.radiance = path.throughput;  // a bad sample instead of a black one
   return 0;
 }
 
-/// Adds the light samples that nothing hides.
+/// Adds the unoccluded light samples.
 inline void add_connections(const Scene& scene, std::span<CameraSample> samples, PathBatch& batch,
                             PathContext& context) {
   visit_connections(scene, batch, context, [&](const LightConnection& connection, bool hidden) {
@@ -132,7 +132,7 @@ inline void add_connections(const Scene& scene, std::span<CameraSample> samples,
   });
 }
 
-/// Removes the paths that are not among Batch::alive, with their next rays.
+/// Removes the paths that are not in Batch::alive, and their rays.
 template <typename Batch>
 void keep_alive(Batch& batch) {
   for (size_t n = 0; n < batch.alive.size(); ++n)
@@ -140,35 +140,34 @@ void keep_alive(Batch& batch) {
   batch.resize(batch.alive.size());
 }
 
-/// The light that the ray of a path may have met, of a surface or the environment, or null.
+/// The emitter that the ray of a path may have hit, on a surface or the environment, or null.
 inline const Emitter* emitter_met(const PathState& path, const SurfaceHit& hit, const Emitter* environment,
                                   bool hide_emitters) {
   if (path.found) return hit.emitter;
   return hide_emitters && path.only_null ? nullptr : environment;
 }
-/// What it sends along the ray; the density is that of the environment.
+/// Its radiance along the ray; the density is that of the environment.
 inline EnvironmentLight light_met(const Emitter& emitter, const PathState& path, const Ray& ray,
                                   const SurfaceHit& hit) {
   return path.found ? EnvironmentLight{emitter.surface_radiance(hit, -ray.d)} : emitter.environment(ray.d);
 }
 
-/// A surface that a path has reached, ready to be sampled.
+/// A surface that a path has reached, ready for sampling.
 struct PathVertex {
   const SurfaceHit& hit;
   const BsdfClosure& bsdf;
-  Vec3 wo;               ///< to where the path came from, in the surface's frame
+  Vec3 wo;               ///< direction the path came from, in the surface's frame
   uint32_t address;      ///< of its random numbers
   CameraSample& sample;  ///< of the path
 };
 
-/// The loop of all integrators that follow paths from the camera. The paths of a batch that has been started advance
-/// together, one edge at a time, in short loops whose iterations do not depend on each other: while one waits for
-/// memory or a division, the processor works on the next. What an integrator does at each edge, its `steps` say,
-/// `depth` edges from the camera:
-/// - arrive(depth, i): the ray of path i has found what it meets, or left the scene;
-/// - goes_on(depth, path): whether a path that has met a surface is followed further;
-/// - sample_lights(depth): for the vertices of all paths that are left;
-/// - scatter(depth, i, vertex): connects the vertex, draws the next ray; false where the path ends;
+/// The loop of all integrators that follow paths from the camera. The paths of a started batch advance together, one
+/// edge at a time, in short loops with independent iterations: while one waits for memory or a division, the processor
+/// works on the next. The `steps` of an integrator at each edge, `depth` edges from the camera:
+/// - arrive(depth, i): the ray of path i has hit something, or left the scene;
+/// - goes_on(depth, path): whether a path that has hit a surface continues;
+/// - sample_lights(depth): for the vertices of all remaining paths;
+/// - scatter(depth, i, vertex): connects the vertex and samples the next ray; false if the path ends;
 /// - connect(depth): traces the connections.
 template <typename Batch, typename Steps>
 void follow_paths(const Scene& scene, const PathLengthSettings& lengths, std::span<CameraSample> samples, Batch& batch,
@@ -207,8 +206,8 @@ void follow_paths(const Scene& scene, const PathLengthSettings& lengths, std::sp
   }
 }
 
-/// One light sample for each vertex whose surface can use it. All choices come first, so that memory answers to one
-/// while the others are made.
+/// One light sample for each vertex whose surface can use it. All choices are made first, so that the prefetches of one
+/// overlap with the making of others.
 template <typename Lights>
 void sample_lights(const Scene& scene, const Lights& lights, std::span<const CameraSample> samples, PathBatch& batch) {
   for (size_t i = 0; i < batch.paths.size(); ++i) {

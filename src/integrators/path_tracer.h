@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Unidirectional path tracing whose parts can be exchanged. At each vertex one light sample (next-event estimation)
-// and one direction sample are combined by multiple importance sampling [Veach1997] §9.2; Russian roulette ends paths.
+// Unidirectional path tracing with replaceable parts. At each vertex, one light sample (next-event estimation) and one
+// direction sample are combined by multiple importance sampling [Veach1997] §9.2; Russian roulette ends paths.
 //
-// The estimator is unbiased. A surface with a null lobe (mask, null) blocks light samples; light behind it is found by
-// paths that pass straight through, which carry full weight because no light sample could have found it.
+// Unbiased. A surface with a null lobe (mask, null) blocks light samples; light behind it is found by paths that pass
+// straight through, with full weight because no light sample could have found it.
 #pragma once
 
 #include <cmath>
@@ -22,47 +22,47 @@
 
 namespace covary {
 
-/// The parts of `path`. Others derive from it and hide what they do otherwise; calls are resolved when the template
-/// below is compiled, so exchanging one costs nothing. Many threads use one object; its functions are const but for
+/// The parts of `path`. Others derive from it and hide the functions they replace; calls are resolved when the template
+/// below is compiled, so replacing one costs nothing. Many threads share one object; all functions are const except
 /// prepare().
 struct PathParts : roulette::Parts {
-  /// Whether light choice, directions, their weights and roulette are those below, so that Lambertian vertices may be
-  /// shaded in blocks, which have the same.
+  /// Whether light selection, directions, their weights and roulette are the ones below, so that Lambertian vertices
+  /// may be shaded in blocks, which use the same.
   static constexpr bool kInBlocks = false;
 
   /// Called before the first path.
   void prepare(const Scene&) {}
 
-  /// For those who tell apart from which lights radiance comes: that a batch of samples begins, what a light adds to
-  /// the radiance of a sample, and which light connection number n of the batch is with.
+  /// For separating radiance by light: called when a batch of samples begins, when a light adds to the radiance of a
+  /// sample, and to record and look up the light of connection number n of the batch.
   void begin(size_t /*n_samples*/, PathContext&) const {}
   void add_light(const Emitter* /*light*/, uint32_t /*sample*/, const Spectrum& /*radiance*/, PathContext&) const {}
   void connect_with(const Emitter& /*light*/, size_t /*n*/, PathBatch&) const {}
   const Emitter* light_of(size_t /*n*/, const PathBatch&) const { return nullptr; }
 
-  /// How to choose a light; see UniformLights for what the result must be able to do.
+  /// Light selection; see UniformLights for the required interface.
   UniformLights lights(const Scene& scene) const { return UniformLights(scene); }
 
-  /// Draws the direction in which a path goes on from `hit`, reading the numbers of `vertex`. Guiding mixes another
-  /// distribution in; pdf is then that of the mixture.
+  /// Samples the direction in which a path continues from `hit`, reading the random numbers of `vertex`. With guiding,
+  /// another distribution is mixed in; pdf is then that of the mixture.
   BsdfSample sample_direction(const BsdfClosure& bsdf, const SurfaceHit& /*hit*/, const Vec3& wo,
                               const PathRandom& random, uint32_t vertex) const {
     return bsdf.sample(wo, random.get_1d(vertex, Event::kLobe), random.get_2d(vertex, Event::kDirection));
   }
-  /// Value of the surface, and the density with which sample_direction() draws `wi`, delta lobes excluded.
+  /// BSDF value, and the density with which sample_direction() samples `wi`, without delta lobes.
   BsdfValue eval_direction(const BsdfClosure& bsdf, const SurfaceHit& /*hit*/, const Vec3& wo, const Vec3& wi) const {
     return bsdf.eval(wo, wi);
   }
 
-  /// Weight of light that a direction sample of density `pdf` found and light sampling finds with `pdf_light`.
+  /// Weight of light found by a direction sample of density `pdf`, which light sampling finds with `pdf_light`.
   float direction_weight(float pdf, float pdf_light) const { return mis::power(pdf, pdf_light); }
-  /// Weight of a light sample, divided by its density `pdf_light`; direction sampling finds it with `pdf`.
+  /// Weight of a light sample over its density `pdf_light`; direction sampling finds it with `pdf`.
   float light_weight_over_pdf(bool is_delta, float pdf_light, float pdf) const {
     return is_delta ? 1 / pdf_light : mis::power_over_pdf(pdf_light, pdf);
   }
 };
 
-/// The integrator made of `Parts`, which has the functions of PathParts.
+/// The integrator built from `Parts`, which has the functions of PathParts.
 template <typename Parts>
 class PathTracer final : public Integrator {
  public:
@@ -86,7 +86,7 @@ class PathTracer final : public Integrator {
   std::string description() const override { return name_ + " " + lengths_.text(); }
 
  private:
-  /// What follow_paths() does at each edge.
+  /// Steps of follow_paths().
   struct Steps {
     using Path = PathBatch::Path;
     using Lights = decltype(std::declval<const Parts&>().lights(std::declval<const Scene&>()));
@@ -132,7 +132,7 @@ class PathTracer final : public Integrator {
       return true;
     }
 
-    /// Lambertian vertices of meshes, which are shaded in blocks.
+    /// Lambertian mesh vertices, which are shaded in blocks.
     bool sets_apart(const Ray& ray, const RayHit& hit) {
       return Parts::kInBlocks && batch.meshes.find(scene, ray, hit);
     }
@@ -201,7 +201,7 @@ class PathTracer final : public Integrator {
       });
     }
 
-    /// Contribution of what the path's ray met, weighted against light sampling.
+    /// Contribution of what the path's ray hit, weighted against light sampling.
     Spectrum emission(const Path& path, const Ray& ray, const SurfaceHit& hit) const {
       const Emitter* emitter = emitter_met(path, hit, scene.environment(), tracer.lengths_.hide_emitters);
       if (!emitter) return {};
@@ -212,8 +212,8 @@ class PathTracer final : public Integrator {
       return radiance * tracer.parts_.direction_weight(path.previous_pdf, lights.pmf(*emitter) * pdf_light);
     }
 
-    /// Next-event estimation: f cos L / pdf, weighted against direction sampling, if nothing lies between.
-    /// `light`: a sample of `emitter`.
+    /// Next-event estimation: f cos L / pdf, weighted against direction sampling, if unoccluded. `light`: a sample of
+    /// `emitter`.
     void connect_light(const Emitter& emitter, const Path& path, const PathVertex& vertex, const EmitterSample& light) {
       if (is_black(light.radiance)) return;
       const SurfaceHit& hit = vertex.hit;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The first numbers that a path reads, as coordinates of its sample: primary sample space. They are functions of the
-// sample's address, so nothing is recorded while paths are traced.
+// The first random numbers that a path reads, as coordinates of its sample (primary sample space). They are functions
+// of the sample's address, so nothing needs recording while paths are traced.
 #pragma once
 
 #include <array>
@@ -11,10 +11,10 @@
 
 namespace covary {
 
-/// Address of the first vertex on a surface that has more than delta lobes; paths count those from here, and vertices
-/// on mirrors and glass apart.
+/// Address of the first vertex on a surface with more than delta lobes; paths count such vertices from here, and those
+/// on mirrors and glass separately.
 inline constexpr uint32_t kFirstSurfaceVertex = 1;
-/// Address of the first vertex on a surface that has delta lobes only.
+/// Address of the first vertex on a surface with delta lobes only.
 inline constexpr uint32_t kDeltaVertices = 1u << 20;
 
 /// Two numbers that are read together.
@@ -22,8 +22,8 @@ struct PrimaryPair {
   uint32_t vertex;
   Event event;
 };
-/// In the order of reading. Numbers that choose (light, part of a light, lobe) are left out, because a value is not a
-/// smooth function of them, and so is the position on the lens, which most cameras do not read.
+/// In reading order. Numbers that make discrete choices (light, part of a light, lobe) are left out, because a value is
+/// not a smooth function of them, and so is the lens position, which most cameras do not read.
 inline constexpr std::array<PrimaryPair, 3> kPrimaryPairs = {{
     {0, Event::kPixel},
     {kFirstSurfaceVertex, Event::kLightPosition},

@@ -22,14 +22,14 @@ struct IntegratorPlugin {
 std::span<const IntegratorPlugin> integrator_plugins();
 /// The one of that name, or null.
 const IntegratorPlugin* find_integrator(std::string_view name);
-/// What their settings are: those of paths and those of their own. `name` is registered.
+/// The settings of paths and of the integrator. `name` must be registered.
 std::vector<Option> options_of_integrator(const std::string& name);
-/// Those of all; equal names are one option.
+/// Those of all integrators; equal names are one option.
 std::vector<Option> options_of_integrators();
 std::vector<std::string> integrator_names();
-/// Names of those that have the option, without dashes; empty where none has.
+/// Names of the integrators with this option, given without dashes; empty if there is none.
 std::vector<std::string> integrators_with_option(const std::string& option);
-/// Declares settings of paths and of the integrator, and makes it.
+/// Declares the settings of paths and of the integrator, and constructs it.
 std::shared_ptr<Integrator> make_integrator(const IntegratorPlugin& plugin, Settings& settings);
 
 }  // namespace covary

@@ -31,8 +31,8 @@ std::string row_of(const Option& option) {
                      as_arguments(option.help));
 }
 
-/// The page has below the heading of each integrator a row for each of its options, and no others; those that all have
-/// stand with `path`.
+/// Below the heading of each integrator, the page has a row for each of its options, and no others; common options are
+/// listed with `path`.
 TEST(IntegratorRegistry, IsDocumented) {
   const std::vector<Option> of_path = options_of_integrator("path");
   std::map<std::string, std::string> expected, found;

@@ -16,7 +16,7 @@ std::vector<std::string> texts(const SubpathStore<std::string>& store, size_t pa
 TEST(SubpathStore, PutsTheVerticesOfAPathSideBySide) {
   SubpathStore<std::string> store;
   store.start(4);
-  // As a batch of paths comes: one edge of all that are alive at a time; path 1 has no vertex.
+  // In the order of a batch of paths: one edge of all active paths at a time; path 1 has no vertex.
   for (const auto& [path, text] : {std::pair{0u, "a0"}, {2u, "c0"}, {3u, "d0"}, {0u, "a1"}, {3u, "d1"}, {3u, "d2"}})
     store.append(path, text);
   store.finish();
