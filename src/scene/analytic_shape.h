@@ -7,7 +7,7 @@
 
 namespace covary {
 
-/// A shape with a formula instead of triangles; the ray tracer calls intersect().
+/// A shape given by a formula instead of triangles; the ray tracer calls intersect().
 class AnalyticShape : public Shape {
  public:
   /// Distance of the nearest intersection in (0, ray.t_max), or infinity.
@@ -31,7 +31,7 @@ class Sphere final : public AnalyticShape {
   Ball ball() const { return {center_, radius_, sign_}; }
 
  private:
-  /// Of a world direction, along the sphere's own axes; keeps the length.
+  /// World direction to the sphere's own axes; preserves length.
   Vec3 to_local(const Vec3& d) const { return {dot(axes_[0], d), dot(axes_[1], d), dot(axes_[2], d)}; }
 
   Transform to_world_;

@@ -42,7 +42,7 @@ Camera::Camera(const CameraSettings& settings, int width, int height)
       std::abs(length(z_) - 1) > tolerance)
     throw Error(ErrorCode::kInput, "the to_world transformation of a sensor must not scale");
 
-  // The axes need not be orthonormal to the last digit.
+  // The axes need not be exactly orthonormal.
   const Vec3 z_area = cross(x_, y_);
   const float volume = dot(z_area, z_);
   to_x_ = cross(y_, z_) * (1 / volume);
@@ -77,7 +77,7 @@ Ray Camera::orthographic_ray(float sx, float sy) const {
 }
 
 float Camera::pdf_direction(const Vec3& d) const {
-  // The ray meets the image plane at d / z, where an area fills the solid angle area * z^3 (for skewed axes, times
+  // The ray meets the image plane at d / z, where an area covers the solid angle area * z^3 (for skewed axes, times
   // their volume).
   const float z = dot(to_z_, d);
   return z > 0 ? pixels_per_area_ / (z * z * z) : 0;
@@ -92,7 +92,7 @@ Vec2 Camera::project(const Vec3& p, const Vec3& d) const {
   const float inverse_z = 1 / dot(to_z_, d);
   float x = dot(to_x_, d) * inverse_z, y = dot(to_y_, d) * inverse_z;
   if (!is_delta()) {
-    // Where the ray meets the plane in focus, seen from the middle of the lens.
+    // Where the ray meets the focal plane, seen from the centre of the lens.
     const Vec3 o = p - origin_;
     const float z = dot(to_z_, o), inverse_focus = 1 / settings_.focus_distance;
     x += (dot(to_x_, o) - z * x) * inverse_focus;

@@ -10,16 +10,17 @@
 
 namespace covary {
 
-/// Which extent of the film the field of view spans (Mitsuba's names).
+/// Which extent of the film the field of view refers to (Mitsuba's names).
 enum class FovAxis { kX, kY, kDiagonal, kSmaller, kLarger };
 
-/// Half of the extent along x at distance 1 of an image of that field of view; `aspect`: width over height.
+/// Half the extent along x at distance 1 of an image with this field of view; `aspect`: width over height.
 float half_extent_x(float fov_degrees, FovAxis axis, float aspect);
 
-/// Perspective camera with a pinhole or a thin lens, or one whose rays are parallel.
+/// Perspective camera with a pinhole or a thin lens, or orthographic camera.
 struct CameraSettings {
   Transform to_world;
-  bool orthographic = false;  ///< rays along z from the square [-1, 1]^2, as high as the film is for its width
+  bool orthographic = false;  ///< parallel rays along z from the square [-1, 1]^2, with the height scaled by the film's
+                              ///< aspect
   float fov_degrees = 50;     ///< full angle, in (0, 180)
   FovAxis fov_axis = FovAxis::kX;
   float near_clip = 1e-2f, far_clip = 1e4f;  ///< distances along the viewing axis
@@ -28,20 +29,20 @@ struct CameraSettings {
   float focus_distance = 1;                  ///< distance along the viewing axis in focus (thin lens)
 };
 
-/// A point of the lens as seen from a reference point in the scene. In EmitterSample's terms the camera is a light that
-/// emits importance: a light path that arrives at the reference point adds throughput * importance / pdf_solid_angle
-/// to the film, once nothing hides the lens.
+/// A point on the lens as seen from a reference point in the scene. In the terms of EmitterSample, the camera is a
+/// light that emits importance: a light path arriving at the reference point adds throughput * importance /
+/// pdf_solid_angle to the film if the lens is visible.
 struct LensSample {
   Vec3 wi;             ///< unit direction from the reference point to the lens
   float distance = 0;  ///< to the lens
   Vec3 p;              ///< point on the lens; the camera's position for a pinhole
-  Vec3 near_p;         ///< on the near plane between them: what lies before it does not hide the reference point
-  Vec2 film;           ///< where the ray meets the film, in pixels of the full frame, which it may leave
-  /// Camera::importance() in the direction of the reference point; for a pinhole already times the cosine at the lens
-  /// and divided by the distance squared.
+  Vec3 near_p;         ///< on the near plane between them: what is in front of it does not occlude the reference point
+  Vec2 film;           ///< film position of the ray, in pixels of the full frame, possibly outside it
+  /// Camera::importance() towards the reference point; for a pinhole, already multiplied by the cosine at the lens and
+  /// divided by the squared distance.
   float importance = 0;
   float pdf_solid_angle = 0;  ///< density of wi at the reference point; 1 for a pinhole; 0: not between the clip planes
-  float pdf_direction = 0;    ///< Camera::pdf_direction() in the direction of the reference point
+  float pdf_direction = 0;    ///< Camera::pdf_direction() towards the reference point
 };
 
 class Camera : public SceneObject {
@@ -52,22 +53,22 @@ class Camera : public SceneObject {
   /// uniform in [0,1)^2. The origin lies on the near plane, t_max on the far plane.
   Ray ray(Vec2 film, Vec2 lens) const;
 
-  // What follows describes rays through any point of the film plane, also outside the frame, with density 1 per pixel
-  // of film area: the measurement is that of one pixel. Directions `d` are unit vectors that leave the camera.
+  // The following describes rays through any point of the film plane, including outside the frame, with density 1 per
+  // pixel of film area: the measurement is that of one pixel. Directions `d` are unit vectors leaving the camera.
   /// Pinhole: the position of the lens is a delta.
   bool is_delta() const { return !(settings_.aperture_radius > 0); }
-  /// All rays are parallel. What describes directions, project() and sample_towards() are then of no use: no light path
-  /// finds the camera.
+  /// All rays are parallel. The functions of directions, project() and sample_towards() are then unavailable: no light
+  /// path finds the camera.
   bool is_orthographic() const { return settings_.orthographic; }
   /// Density of the lens position, per unit area of the lens; 1 for a pinhole.
   float pdf_position() const { return pdf_position_; }
-  /// Density of the ray's direction per unit solid angle; the same for every point of the lens. 0 behind the camera.
+  /// Density of the ray's direction per unit solid angle; the same for all points on the lens. 0 behind the camera.
   float pdf_direction(const Vec3& d) const;
-  /// Importance We of the direction [Veach1997] §3.7: its integral over directions through a film area, times the
-  /// cosine at the lens, and over the lens (or at the pinhole) is that area in pixels.
+  /// Importance We of the direction [Veach1997] §3.7: its integral over the directions through a film area, times the
+  /// cosine at the lens, and over the lens (or at the pinhole), is that area in pixels.
   float importance(const Vec3& d) const;
-  /// The film position, in pixels of the full frame, of a ray through the point `p` in direction `d`; the inverse of
-  /// ray(). A pinhole looks at `d` alone. `d` must not lead backwards (pdf_direction() > 0).
+  /// Film position, in pixels of the full frame, of a ray through the point `p` in direction `d`; inverse of ray(). A
+  /// pinhole uses only `d`. `d` must point forwards (pdf_direction() > 0).
   Vec2 project(const Vec3& p, const Vec3& d) const;
   /// Samples the lens uniformly as seen from `reference`; `u` uniform in [0,1)^2.
   LensSample sample_towards(const Vec3& reference, Vec2 u) const;

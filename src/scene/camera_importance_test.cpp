@@ -31,7 +31,7 @@ CameraSettings settings(const Transform& to_world, float fov, float aperture, fl
   return s;
 }
 
-/// A transformation that the camera accepts although its axes are not at right angles.
+/// A transformation with non-orthogonal axes that the camera still accepts.
 Transform skewed() {
   Matrix4 m{};
   for (int i = 0; i < 4; ++i) m[i][i] = 1;
@@ -48,7 +48,7 @@ const Case kCases[] = {
     {"skewed_thin_lens", settings(skewed(), 60, 0.3f, 2), 32, 24},
 };
 
-/// Over the sphere, by the midpoint rule; edges of the frame cost about 0.2 %.
+/// Over the sphere, by the midpoint rule; edges of the frame cost about 0.2 % accuracy.
 template <typename Function>
 double integral(const Function& f) {
   constexpr int kGrid = 700;
@@ -84,7 +84,7 @@ TEST_P(CameraImportance, ProjectionInvertsRays) {
   }
 }
 
-// Solid angle of a pixel's quarter, by the vector area of the directions at its corners, times the density.
+// Solid angle of a quarter pixel, by the vector area of the directions at its corners, times the density.
 TEST_P(CameraImportance, DirectionDensityIsTheInverseOfSolidAnglePerPixel) {
   for (int i = 0; i < 200; ++i) {
     const PathRandom random(Sampling::kIndependent, 4, 0, 0, i);
@@ -96,8 +96,8 @@ TEST_P(CameraImportance, DirectionDensityIsTheInverseOfSolidAnglePerPixel) {
   }
 }
 
-// Directions from one point of the lens. N = 400 000: sees 2.0 % rms error of the density with power 0.99. The edges of
-// the frame, where the density jumps, are resolved by the quadrature to 1 %.
+// Directions from one point on the lens. N = 400 000: detects a 2.0 % rms error of the density with power 0.99. The
+// edges of the frame, where the density jumps, are resolved by the quadrature to 1 %.
 TEST_P(CameraImportance, DirectionsFollowTheirDensity) {
   const Vec2 lens{0.3f, 0.8f};
   const Vec3 on_lens = camera_.sample_towards(camera_.ray({1, 1}, lens).at(1), lens).p;
@@ -111,7 +111,7 @@ TEST_P(CameraImportance, DirectionsFollowTheirDensity) {
   };
   const auto result = statistics::chi2_sphere(sampler, density, {.name = GetParam().name, .mass_tolerance = 1e-2});
   EXPECT_TRUE(result.accepted) << result.message;
-  // Planted: the cosine to the fourth power, that is importance in place of the density, with the right mass.
+  // Planted bug: the cosine to the fourth power, i.e. importance instead of the density, with the right mass.
   const auto cubed = [&](const Vec3& d) -> double { return density(d) > 0 ? camera_.pdf_direction(d) : 0; };
   const auto fourth = [&](const Vec3& d) -> double { return density(d) > 0 ? camera_.importance(d) : 0; };
   const double scale = integral(cubed) / integral(fourth) / (width() * height());
@@ -132,8 +132,8 @@ TEST_P(CameraImportance, IntegralOfImportanceIsTheFilmArea) {
   EXPECT_NEAR(found * lens_area, expected, 5e-3 * expected);
 }
 
-// A patch that emits with radiance 1 to all sides, seen by camera rays and by its points sampling the lens, must leave
-// the same mean and the same moments on the film. Both are averages over lattices of 512^2 points (error below 0.2 %).
+// A patch emitting radiance 1 in all directions, seen by camera rays and by its points sampling the lens, must give the
+// same mean and the same moments on the film. Both are averages over lattices of 512^2 points (error below 0.2 %).
 TEST_P(CameraImportance, LightTracingMeetsTheCamerasRays) {
   const Transform& to_world = GetParam().settings.to_world;
   const Vec3 corner = to_world.point({-0.3f, -0.2f, 1.4f}), e1 = to_world.vector({0.8f, 0.1f, 0.4f});

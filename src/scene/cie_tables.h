@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// CIE tables at 5 nm from 360 to 830 nm: colour matching functions of the 1931 2 degree standard observer, and the
-// relative spectral power of standard illuminant D65 (100 at 560 nm). Numbers published by the CIE (CIE 015, ISO
-// 11664).
+// CIE tables in steps of 5 nm from 360 to 830 nm: colour matching functions of the 1931 2 degree standard observer, and
+// the relative spectral power of standard illuminant D65 (100 at 560 nm). Published by the CIE (CIE 015, ISO 11664).
 #pragma once
 
 namespace covary::cie {

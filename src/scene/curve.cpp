@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Embree finds the hits and tells the parameter along the segment; what follows from it is Mitsuba's, so that textures
-// lie as they do there. On a tube p = c(v) + r(v) rad the normal is (|c'|^2 - rad r . c'') rad - r' c', normalised.
+// Embree finds the hits and gives the parameter along the segment; the rest follows Mitsuba, so that textures are
+// placed as they are there. On a tube p = c(v) + r(v) rad the normal is (|c'|^2 - rad r . c'') rad - r' c', normalised.
 #include "scene/curve.h"
 
 #include <cmath>
@@ -12,7 +12,7 @@
 namespace covary {
 namespace {
 
-/// Two directions across the unit tangent from which the angle around the curve is counted.
+/// Two directions orthogonal to the unit tangent, the reference for the angle around the curve.
 std::pair<Vec3, Vec3> axes_across(const Vec3& tangent) {
   const Vec3 guide{0, 0, 1}, across = guide - tangent * dot(tangent, guide);
   const float l = length(across);
@@ -80,7 +80,7 @@ void CurveShape::fill(const Ray& ray, SurfaceHit& hit, bool with_derivatives) co
     return;
   }
   hit.dp_du = cross(tangent, rad) * kTwoPi;
-  // Along the curve at a fixed angle; the twist of the axes across is left out.
+  // Along the curve at a fixed angle; the twist of the reference axes is neglected.
   const float stretch = speed2 > 0 ? 1 - dot(rad, m.ddc) / speed2 : 1;
   hit.dp_dv = (m.dc * stretch + (radius > 0 ? rad * (m.dr / radius) : Vec3{})) * n_segments;
   hit.frame = Frame::from_tangent(hit.ng, hit.dp_du);

@@ -13,12 +13,12 @@ enum class CurveKind { kLinear, kBspline };
 /// A control point: x, y, z and the radius there, laid out as the ray tracer reads it.
 using CurvePoint = std::array<float, 4>;
 
-/// Round tubes around curves of straight pieces or of cubic B-splines, the latter with open ends; seen from outside
-/// alone. (u, v) = (angle around the curve / 2 pi, position along all segments in [0, 1]). They cannot emit light.
+/// Round tubes around piecewise linear curves or cubic B-splines, the latter with open ends; visible from outside only.
+/// (u, v) = (angle around the curve / 2 pi, position along all segments in [0, 1]). They cannot emit light.
 class CurveShape final : public Shape {
  public:
-  /// `segments`: the first control point of each; a segment has 2 of them (linear) or 4 (B-spline). Throws
-  /// Error(kInput) for an index out of range, or numbers that are not finite.
+  /// `segments`: the first control point of each; a segment has 2 control points (linear) or 4 (B-spline). Throws
+  /// Error(kInput) if an index is out of range or a number is not finite.
   CurveShape(CurveKind kind, std::vector<CurvePoint> points, std::vector<uint32_t> segments);
 
   Bounds3 bounds() const override { return bounds_; }
@@ -34,7 +34,7 @@ class CurveShape final : public Shape {
   const std::vector<uint32_t>& segments() const { return segments_; }
 
  private:
-  /// Centre line and radius at the parameter v of a segment, with derivatives by v.
+  /// Centre line and radius at parameter v of a segment, with derivatives by v.
   struct Centre {
     Vec3 c, dc, ddc;
     float dr;  // of the radius

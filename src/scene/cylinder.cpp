@@ -6,8 +6,8 @@
 namespace covary {
 namespace {
 
-/// Axes at right angles to the unit vector n [Duff2017]. Unlike those of Frame they jump where n.z changes sign, but
-/// they are Mitsuba's, and textures begin at the first.
+/// Axes orthogonal to the unit vector n [Duff2017]. Unlike those of Frame they jump where n.z changes sign, but they
+/// are Mitsuba's, and textures start at the first axis.
 Frame axes_around(const Vec3& n) {
   const float sign = std::copysign(1.0f, n.z), a = -1 / (sign + n.z), b = n.x * n.y * a;
   return {{1 + sign * n.x * n.x * a, sign * b, -sign * n.x}, {b, sign + n.y * n.y * a, -n.y}, n};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files that stand inside of a scene's own file: the property `data` of a mesh or an image has the bytes of a file in
-// place of `filename`, its name.
+// Files embedded in a scene's own file: the property `data` of a mesh or image holds the bytes of a file instead of its
+// name, `filename`.
 #pragma once
 
 #include <string>
@@ -12,13 +12,12 @@ namespace covary {
 
 inline constexpr std::string_view kEmbeddedData = "data";
 
-/// The bytes of a mesh (PLY) or image in place of `filename`; null when the object names a file. They live as long as
-/// its description.
+/// The embedded bytes of a mesh (PLY) or image; null if the object names a file. They live as long as its description.
 inline const std::string* find_embedded(Parameters& parameters) {
   const std::string name(kEmbeddedData);
   for (const Property& property : parameters.object().properties)
     if (property.name == name) {
-      parameters.get_string(name, "");  // known, or an error where it is no text
+      parameters.get_string(name, "");  // marks it as known; an error if it is not a string
       return std::get_if<std::string>(&property.value);
     }
   return nullptr;

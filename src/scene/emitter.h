@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Light sources. The density of each technique is available on its own and names its measure.
+// Light sources. The density of each technique can be queried separately, and its name gives the measure.
 #pragma once
 
 #include <cstdint>
@@ -22,12 +22,12 @@ struct EmitterSample {
   float distance = kInfinity;  ///< to the light; infinite for environments and directional lights
   Vec3 p, n;                   ///< point and unit geometric normal on the light (unset when infinitely far)
   Vec2 uv;                     ///< surface parameters of p (area lights)
-  /// Emitted towards the reference point; for delta lights the irradiance on a surface facing wi, already divided by
-  /// distance squared.
+  /// Emitted towards the reference point; for delta lights, the irradiance on a surface facing wi, already divided by
+  /// the squared distance.
   Spectrum radiance;
   /// Density of wi at the reference point; 1 (a discrete probability) for delta lights; 0: sampling failed.
   float pdf_solid_angle = 0;
-  bool is_delta = false;  ///< position or direction is a delta; BSDF sampling cannot hit it
+  bool is_delta = false;  ///< position or direction is a delta; BSDF sampling cannot hit the light
 };
 
 /// Start of a light path.
@@ -42,20 +42,20 @@ struct EmissionSample {
   bool delta_position = false, delta_direction = false;
 };
 
-/// Densities of Emitter::sample_emission(), in the units of EmissionSample; 1 for what is a delta.
+/// Densities of Emitter::sample_emission(), in the units of EmissionSample; 1 for deltas.
 struct EmissionPdf {
   float position = 0;
   float direction = 0;
 };
 
-/// A point on an area light, with what the densities of Emitter look at.
+/// A point on an area light, with what Emitter's densities need.
 inline SurfaceHit point_on_light(const Vec3& p, const Vec3& n, Vec2 uv) {
   SurfaceHit hit;
   hit.p = p, hit.ng = n, hit.frame = Frame(n), hit.uv = uv;
   return hit;
 }
 
-/// A flat area light that is sampled uniformly and emits the same radiance everywhere, on the side of its normal.
+/// A flat area light that is sampled uniformly and emits constant radiance on the side of its normal.
 struct ParallelogramLight {
   Parallelogram surface;
   Spectrum radiance;
@@ -75,35 +75,35 @@ struct EnvironmentLight {
 
 enum class PrefetchStep {
   kTable,   ///< the entry of a sampling table
-  kValues,  ///< what that entry leads to
+  kValues,  ///< the values that the entry refers to
 };
 
 class Emitter : public SceneObject {
  public:
-  /// Of the group of lights that compositors tell from others: its id in the scene's file; empty without one.
+  /// Light group for compositing: its id in the scene file; empty if none.
   const std::string& group() const { return group_; }
   void set_group(std::string group) { group_ = std::move(group); }
-  /// The light as it shines in a scene with these bounds of everything that can be hit (never an empty radius). Lights
-  /// infinitely far away return a copy that knows where the scene lies; null: the light itself.
+  /// The light in a scene whose hittable geometry has these bounds (never of zero radius). Lights at infinity return a
+  /// copy that knows the scene's position; null: the light itself.
   virtual std::shared_ptr<const Emitter> in_scene(const Bounds3& /*bounds*/) const { return nullptr; }
-  /// Infinitely far lights that a ray leaving the scene can hit (environment map, constant).
+  /// Lights at infinity that a ray leaving the scene can hit (environment map, constant).
   virtual bool is_environment() const { return false; }
-  /// All light comes from one point.
+  /// All light is emitted from one point.
   virtual bool is_delta_position() const { return false; }
-  /// All light goes in one direction.
+  /// All light travels in one direction.
   virtual bool is_delta_direction() const { return false; }
-  /// Position or direction is a delta: only sample_towards() finds this light.
+  /// Position or direction is a delta: only sample_towards() can find this light.
   bool is_delta() const { return is_delta_position() || is_delta_direction(); }
-  /// Light from infinitely far away: emitted rays start on a disk outside the scene.
+  /// Light from infinitely far away: emission rays start on a disk outside the scene.
   bool is_infinite() const { return is_environment() || is_delta_direction(); }
 
-  /// Radiance an area light emits at a hit on its own shape in world direction `w` (away from the surface).
+  /// Radiance that an area light emits from a hit on its own shape in world direction `w` (away from the surface).
   virtual Spectrum surface_radiance(const SurfaceHit& /*hit*/, const Vec3& /*w*/) const { return {}; }
-  /// What arrives along a ray that leaves the scene in world direction `d`; environments only.
+  /// Radiance along a ray leaving the scene in world direction `d`; environments only.
   virtual EnvironmentLight environment(const Vec3& /*d*/) const { return {}; }
 
-  /// Asks memory for what sample_towards() with this `u` will read, step by step, for many samples before the first is
-  /// taken. Changes no result.
+  /// Prefetches what sample_towards() will read for this `u`, step by step, for many samples before the first is taken.
+  /// Does not change results.
   virtual void prefetch(Vec2 /*u*/, PrefetchStep) const {}
   /// Samples the light as seen from `reference`. `u` uniform in [0,1)^2, `u_primitive` a third number.
   virtual EmitterSample sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const = 0;
@@ -111,16 +111,16 @@ class Emitter : public SceneObject {
   virtual float pdf_solid_angle(const Vec3& /*reference*/, const SurfaceHit& /*hit*/) const { return 0; }
 
   // Lights of several parts, such as the triangles of a mesh, can be sampled part by part.
-  /// Parts that can be sampled one by one.
+  /// Number of parts that can be sampled separately.
   virtual uint32_t n_parts() const { return 1; }
-  /// The part on which a point of this area light lies.
+  /// The part that contains a point on this area light.
   virtual uint32_t part_of(const SurfaceHit& /*hit*/) const { return 0; }
   /// sample_towards() of one part.
   virtual EmitterSample sample_part_towards(uint32_t /*part*/, const Vec3& reference, Vec2 u, float u_primitive) const {
     return sample_towards(reference, u, u_primitive);
   }
-  /// Density of sample_part_towards() per unit solid angle at `reference` for the point `hit` of this area light and
-  /// the part on which it lies.
+  /// Density of sample_part_towards() per unit solid angle at `reference` for the point `hit` on this area light and
+  /// the part that contains it.
   virtual float pdf_part_solid_angle(const Vec3& reference, const SurfaceHit& hit) const {
     return pdf_solid_angle(reference, hit);
   }
@@ -128,26 +128,26 @@ class Emitter : public SceneObject {
   virtual Spectrum part_power(uint32_t /*part*/) const { return power(); }
   /// The surface of an area light, or null.
   virtual const Shape* shape() const { return nullptr; }
-  /// What sample_towards() samples where that is a parallelogram, so that many samples can be taken side by side; else
+  /// What sample_towards() samples if that is a parallelogram, so that many samples can be taken at once; otherwise
   /// null.
   virtual const ParallelogramLight* parallelogram() const { return nullptr; }
   /// The same for a sphere.
   virtual const SphereLight* sphere() const { return nullptr; }
 
-  /// This environment with a density from which the mean was taken off, for use together with a technique that covers
-  /// all directions [Karlik2019]; null where that is the light itself.
+  /// This environment with the mean subtracted from its density, for use with a technique that covers all directions
+  /// [Karlik2019]; null if that is the light itself.
   virtual std::shared_ptr<const Emitter> mis_compensated() const { return nullptr; }
 
-  /// Samples a ray that leaves the light, for paths that start there.
+  /// Samples a ray leaving the light, for paths that start there.
   virtual EmissionSample sample_emission(Vec2 u_position, Vec2 u_direction, float u_primitive) const = 0;
-  /// Densities of sample_emission() for light that leaves in world direction `w` (unit, away from the light) at the
-  /// point `hit` of an area light; other lights do not look at the point. Parts that are deltas are taken as met.
+  /// Densities of sample_emission() for light leaving in world direction `w` (unit, away from the light) at the point
+  /// `hit` on an area light; other lights ignore the point. Deltas are assumed to be matched.
   virtual EmissionPdf pdf_emission(const SurfaceHit& hit, const Vec3& w) const = 0;
 
-  /// Emitted power, summed over the surface and directions, in RGB; infinite lights: through the scene's bounding
-  /// sphere.
+  /// Emitted power, integrated over surface and directions, in RGB; for lights at infinity, through the scene's
+  /// bounding sphere.
   virtual Spectrum power() const = 0;
-  /// False where power() and part_power() look at some points only, as of a texture: what they find black may shine.
+  /// False if power() and part_power() only probe some points, e.g. of a texture: what appears black may emit light.
   virtual bool knows_power() const { return true; }
 
  private:

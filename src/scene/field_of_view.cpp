@@ -28,7 +28,7 @@ FieldOfView get_field_of_view(Parameters& p) {
                                      : FovAxis::kX;
     return view;
   }
-  // Focal length of a lens before a 36 x 24 mm film, as photographers say it.
+  // Focal length in terms of 36 x 24 mm film, as in photography.
   std::string text = p.get_string("focal_length", "50mm");
   if (text.ends_with("mm")) text.resize(text.size() - 2);
   const std::optional<double> given = parse_real(text);

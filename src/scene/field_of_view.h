@@ -11,7 +11,7 @@ struct FieldOfView {
   FovAxis axis = FovAxis::kX;
 };
 
-/// The parameters `fov` with `fov_axis`, or `focal_length`, of what is like a camera.
+/// Reads the parameters `fov` with `fov_axis`, or `focal_length`, of a camera-like object.
 FieldOfView get_field_of_view(Parameters& parameters);
 
 }  // namespace covary

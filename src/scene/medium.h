@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Participating media: what light meets between surfaces.
+// Participating media.
 #pragma once
 
 #include <algorithm>
@@ -10,12 +10,12 @@
 
 namespace covary {
 
-/// Into which directions a medium scatters. The density is the value: phase functions are sampled exactly.
+/// Phase function. Its density equals its value: phase functions are sampled exactly.
 class PhaseFunction : public SceneObject {
  public:
-  /// Per unit solid angle, for a path that came along `d` and goes on along `w`; both are unit vectors.
+  /// Per unit solid angle, for a path arriving along `d` and continuing along `w`; both are unit vectors.
   virtual float pdf(const Vec3& d, const Vec3& w) const = 0;
-  /// Draws w.
+  /// Samples w.
   virtual Vec3 sample(const Vec3& d, Vec2 u) const = 0;
 };
 
@@ -23,18 +23,18 @@ using PhasePtr = std::shared_ptr<const PhaseFunction>;
 
 /// What a medium is made of.
 struct MediumSettings {
-  VolumePtr extinction;  ///< per unit of length, before `scale`
-  VolumePtr albedo;      ///< fraction of the extinction that is scattering, in [0, 1]
+  VolumePtr extinction;  ///< per unit length, before `scale`
+  VolumePtr albedo;      ///< single-scattering albedo, in [0, 1]
   PhasePtr phase;
   float scale = 1;          ///< factor on the extinction
-  bool homogeneous = true;  ///< the extinction is constant, and there is no bound
+  bool homogeneous = true;  ///< constant extinction, without bounds
   bool sample_lights = true;
 };
 
 class Medium final : public SceneObject {
  public:
   struct Coefficients {
-    Spectrum extinction, scattering;  ///< per unit of length
+    Spectrum extinction, scattering;  ///< per unit length
   };
 
   explicit Medium(MediumSettings settings)
@@ -46,15 +46,15 @@ class Medium final : public SceneObject {
     const Spectrum extinction = settings_.homogeneous ? majorant_ : settings_.extinction->eval(p) * settings_.scale;
     return {extinction, extinction * settings_.albedo->eval(p)};
   }
-  /// No extinction lies above it.
+  /// Upper bound on the extinction.
   const Spectrum& majorant() const { return majorant_; }
-  /// The extinction is majorant() everywhere.
+  /// Whether the extinction equals majorant() everywhere.
   bool homogeneous() const { return settings_.homogeneous; }
   const PhaseFunction& phase() const { return *settings_.phase; }
-  /// Whether its points look for lights; otherwise directions alone find them.
+  /// Whether light is sampled at scattering points; otherwise only scattered directions find it.
   bool sample_lights() const { return settings_.sample_lights; }
 
-  /// Cuts [near, far] of the ray to where the medium is; false where nothing is left.
+  /// Clips [near, far] of the ray to the medium; false if nothing is left.
   bool clip(const Ray& ray, float& near, float& far) const {
     if (settings_.homogeneous) return near < far;
     for (int axis = 0; axis < 3; ++axis) {

@@ -45,7 +45,7 @@ TriangleMesh::TriangleMesh(MeshData data)
     bounds_.extend(data.positions[i]);
   }
 
-  // Degenerate triangles cannot be hit and have no normal: they are left out.
+  // Degenerate triangles cannot be hit and have no normal: drop them.
   size_t kept = 0;
   for (size_t i = 0; i < triangles_.size(); ++i) {
     std::array<uint32_t, 3> t = triangles_[i];
@@ -68,7 +68,7 @@ TriangleMesh::TriangleMesh(MeshData data)
 
 Parallelogram TriangleMesh::find_parallelogram() const {
   if (triangles_.size() != 2 || !has_uvs_) return {};
-  // Each triangle must have three corners of the unit square in (u, v), and miss opposite ones.
+  // Each triangle must have three corners of the unit square in (u, v), and the missing corners must be opposite.
   Vec2 missing[2] = {{0.5f, 0.5f}, {0.5f, 0.5f}};
   for (int i = 0; i < 2; ++i)
     for (int corner = 0; corner < 4; ++corner) {
@@ -110,7 +110,7 @@ AreaSample TriangleMesh::sample_uv(Vec2 uv) const {
 }
 
 void TriangleMesh::find_triangle(AreaSample& at) const {
-  float deepest = -kInfinity;  // the smallest weight of a vertex: not negative inside, but for rounding
+  float deepest = -kInfinity;  // the smallest vertex weight: non-negative inside, up to rounding
   for (uint32_t i = 0; i < triangles_.size(); ++i) {
     const auto& t = triangles_[i];
     const Vec2 uv0 = vertices_[t[0]].uv, d1 = vertices_[t[1]].uv - uv0, d2 = vertices_[t[2]].uv - uv0, d = at.uv - uv0;
@@ -128,7 +128,7 @@ void TriangleMesh::prepare_sampling() {
   for (const auto& t : triangles_) {
     const Vertex &v0 = vertices_[t[0]], &v1 = vertices_[t[1]], &v2 = vertices_[t[2]];
     const Vec3 e1 = v1.p - v0.p, e2 = v2.p - v0.p, normal = cross(e1, e2);
-    // Without texture coordinates the surface parameters are the barycentric coordinates.
+    // Without texture coordinates, the surface parameters are the barycentric coordinates.
     facets_.push_back({v0.p, e1, e2, normalize(normal), v0.uv, has_uvs_ ? v1.uv - v0.uv : Vec2{1, 0},
                        has_uvs_ ? v2.uv - v0.uv : Vec2{0, 1}});
     areas.push_back(0.5f * length(normal));
@@ -167,7 +167,7 @@ void TriangleMesh::fill(const Ray& /*ray*/, SurfaceHit& hit, bool with_derivativ
 }
 
 AreaSample TriangleMesh::sample_area(Vec2 u, float u_primitive) const {
-  // One map for the whole parallelogram is cheaper than a choice of triangle, and continuous.
+  // One map for the whole parallelogram is cheaper than choosing a triangle, and continuous.
   if (is_parallelogram()) return TriangleMesh::sample_uv(u);
   const uint32_t triangle = areas_.sample(u_primitive).index;
   const Facet& facet = facets_[triangle];
@@ -211,7 +211,7 @@ std::shared_ptr<Shape> TriangleMesh::transformed(const Transform& to_world) cons
     if (has_normals_) data.normals.push_back(normalize(to_world.normal(vertex.n)));
     if (has_uvs_) data.uvs.push_back(vertex.uv);
   }
-  if (to_world.flips_handedness())  // keeps the side of the geometric normal
+  if (to_world.flips_handedness())  // keeps the geometric normal on the same side
     for (auto& t : data.triangles) std::swap(t[1], t[2]);
   return std::make_shared<TriangleMesh>(std::move(data));
 }

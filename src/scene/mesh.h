@@ -12,7 +12,7 @@
 
 namespace covary {
 
-/// Numbers stored with a mesh under a name, `vertex_…` or `face_…`: one or three for each vertex or triangle.
+/// A named mesh attribute, `vertex_…` or `face_…`: one or three numbers per vertex or triangle.
 struct MeshAttribute {
   std::string name;
   bool per_face = false;
@@ -27,14 +27,14 @@ struct MeshData {
   std::vector<Vec2> uvs;          ///< one per vertex, or empty
   std::vector<Spectrum> colours;  ///< one per vertex, or empty
   std::vector<std::array<uint32_t, 3>> triangles;
-  std::vector<MeshAttribute> attributes;  ///< others than the colours of the vertices
+  std::vector<MeshAttribute> attributes;  ///< other than vertex colours
   bool flip_normals = false;              ///< reverse geometric and shading normals
 };
 
 class TriangleMesh final : public Shape {
  public:
-  /// Throws Error(kInput) when arrays differ in length, an index is out of range or a position is not finite.
-  /// Degenerate triangles (zero area) are dropped and counted.
+  /// Throws Error(kInput) if array lengths differ, an index is out of range or a position is not finite. Degenerate
+  /// triangles (zero area) are dropped and counted.
   explicit TriangleMesh(MeshData data);
 
   Bounds3 bounds() const override { return bounds_; }
@@ -42,7 +42,7 @@ class TriangleMesh final : public Shape {
   float area() const override { return static_cast<float>(areas_.sum()); }
   size_t n_primitives() const override { return triangles_.size(); }
   AreaSample sample_area(Vec2 u, float u_primitive) const override;
-  // Parts of a parallelogram with (u, v) over the unit square: one; of other meshes: each triangle.
+  // Parts: a parallelogram with (u, v) over the unit square is one part; other meshes have one per triangle.
   uint32_t n_parts() const override { return is_parallelogram() ? 1 : static_cast<uint32_t>(triangles_.size()); }
   uint32_t triangles_per_part() const override { return is_parallelogram() ? 2 : 1; }
   float part_area(uint32_t part) const override;
@@ -50,7 +50,7 @@ class TriangleMesh final : public Shape {
   Bounds3 part_bounds(uint32_t part) const override;
   Vec3 part_normal(uint32_t part) const override;
   EmitterSample sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const override;
-  /// Only for two triangles that make a parallelogram whose (u, v) cover the unit square, such as `rectangle`.
+  /// Only for two triangles forming a parallelogram whose (u, v) cover the unit square, such as `rectangle`.
   AreaSample sample_uv(Vec2 uv) const override;
   /// Null for other meshes.
   const Parallelogram* parallelogram() const { return is_parallelogram() ? &parallelogram_ : nullptr; }
@@ -60,18 +60,18 @@ class TriangleMesh final : public Shape {
   bool has_attribute(std::string_view name) const override;
   bool has_attributes() const override { return !colours_.empty() || !attributes_.empty(); }
   bool has_vertex_colour() const override { return !colours_.empty(); }
-  /// Makes sample_area(), area() and all about parts ready; called by the scene for meshes that emit. Not needed
+  /// Prepares sample_area(), area() and everything about parts; called by the scene for emissive meshes. Not needed
   /// otherwise.
   void prepare_sampling();
 
-  /// Vertices lie in one record each, so that a hit touches few cache lines and the ray tracer shares the array.
+  /// One record per vertex, so that a hit touches few cache lines and the ray tracer shares the array.
   struct Vertex {
     Vec3 p, n;
     Vec2 uv;
   };
   const LargeVector<Vertex>& vertices() const { return vertices_; }
   const std::vector<std::array<uint32_t, 3>>& triangles() const { return triangles_; }
-  /// Surface parameters of a point of a triangle: the barycentric coordinates themselves where the mesh has none.
+  /// Surface parameters of a point on a triangle: its barycentric coordinates if the mesh has none.
   Vec2 uv_at(uint32_t triangle, Vec2 barycentric) const {
     if (!has_uvs_) return barycentric;
     const auto& t = triangles_[triangle];
@@ -89,7 +89,7 @@ class TriangleMesh final : public Shape {
   bool has_normals_ = false, has_uvs_ = false;
   size_t n_degenerate_ = 0;
 
-  /// What sampling reads of a triangle, ready to use.
+  /// Precomputed triangle data for sampling.
   struct Facet {
     Vec3 p, e1, e2, n;  // point = p + b1 e1 + b2 e2
     Vec2 uv, duv1, duv2;
@@ -102,9 +102,9 @@ class TriangleMesh final : public Shape {
 
   Parallelogram find_parallelogram() const;
   bool is_parallelogram() const { return parallelogram_.inverse_area > 0; }
-  /// Sets the triangle and the barycentric coordinates of a point that was made from its (u, v).
+  /// Sets triangle and barycentric coordinates of a point that was constructed from its (u, v).
   void find_triangle(AreaSample& at) const;
-  Parallelogram parallelogram_;  // inverse_area == 0: it is none
+  Parallelogram parallelogram_;  // inverse_area == 0: not a parallelogram
 };
 
 }  // namespace covary

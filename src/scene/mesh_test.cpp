@@ -50,7 +50,7 @@ TEST(TriangleMesh, InterpolatesPositionNormalAndTextureCoordinates) {
   expect_near(hit.frame.n, normalize(data.normals[0] * 0.5f + data.normals[1] * 0.5f));
   EXPECT_NEAR(hit.uv.x, 0.5f, 1e-6f);
   EXPECT_NEAR(hit.uv.y, 0.75f, 1e-6f);
-  // u runs along x over two units, v along y over a third of a unit.
+  // u spans two units along x, v a third of a unit along y.
   expect_near(hit.dp_du, {2, 0, 0});
   expect_near(hit.dp_dv, {0, 1.0f / 3, 0});
   EXPECT_NEAR(dot(hit.frame.s, hit.frame.n), 0, 1e-6f);

@@ -56,7 +56,7 @@ void Diagnostics::throw_if_errors() const {
 
 namespace {
 
-/// "a float", "an rgb colour", "a bsdf", …: what the file holds, for messages.
+/// "a float", "an rgb colour", "a bsdf", …: type of the value in the file, for messages.
 std::string type_name(const Value& value) {
   struct Visitor {
     std::string operator()(bool) const { return "a boolean"; }
@@ -82,8 +82,7 @@ std::string quoted_list(const std::vector<std::string>& names) {
   return text;
 }
 
-/// "lie in [0, 1]", "be at least 0", …: what must be true of a value, where the largest number of a type means no
-/// limit.
+/// "lie in [0, 1]", "be at least 0", …: the requirement on a value, where the numeric limit of a type means no bound.
 template <typename T>
 std::string range_text(T lowest, T highest) {
   const bool bounded_below = lowest > std::numeric_limits<T>::lowest();
@@ -108,7 +107,7 @@ const Property* Parameters::find(const std::string& name) {
     if (property.name != name) continue;
     used_[i] = true;
     const ObjectPtr* object = std::get_if<ObjectPtr>(&property.value);
-    return object && !*object ? nullptr : &property;  // null: a value that was reported as wrong when it was read
+    return object && !*object ? nullptr : &property;  // null: already reported as invalid when it was read
   }
   return nullptr;
 }
@@ -309,7 +308,7 @@ void Parameters::report_unknown() {
     if (used_[i]) continue;
     const Property& property = object_.properties[i];
     const ObjectPtr* object = std::get_if<ObjectPtr>(&property.value);
-    if (object && !*object) continue;  // a value that was reported as wrong when it was read
+    if (object && !*object) continue;  // already reported as invalid when it was read
     if (property.name.empty()) {
       const std::string nested = object ? subject(**object) : type_name(property.value);
       diagnostics_.error(property.where, fmt::format("{} cannot hold {}", subject(object_), nested));

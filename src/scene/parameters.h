@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The description of one object of a scene file, and typed access to its parameters. Plugins (BSDFs, textures, …) are
-// made from Parameters only; they never see XML. Whatever a plugin does not ask for is reported as an unknown
-// parameter, with the names it did ask for as suggestions.
+// constructed from Parameters only; they never see XML. Parameters that a plugin does not query are reported as
+// unknown, with the queried names as suggestions.
 #pragma once
 
 #include <cstdint>
@@ -32,13 +32,13 @@ struct SourceLocation {
 class Diagnostics {
  public:
   void error(const SourceLocation& where, const std::string& message);
-  /// Harmless; a repeated message of the same kind should be counted by the caller and given once.
+  /// Harmless problem; callers should count repeated messages of one kind and report them once.
   void warn(const SourceLocation& where, const std::string& message);
-  /// Takes over everything `other` holds; for objects that are made in parallel.
+  /// Takes over all entries of `other`; for objects constructed in parallel.
   void append(const Diagnostics& other);
   bool has_errors() const { return !errors_.empty(); }
-  /// Throws Error(kInput) with all errors, sorted by file and line, one a line "file:line:column: message"; of more
-  /// than 100 their number stands in place of the rest.
+  /// Throws Error(kInput) with all errors, sorted by file and line, one per line as "file:line:column: message"; after
+  /// 100 errors, the number of remaining ones.
   void throw_if_errors() const;
   const std::vector<std::string>& warnings() const { return warnings_; }
 
@@ -51,12 +51,12 @@ class Diagnostics {
   std::vector<std::string> warnings_;
 };
 
-/// A spectrum given by wavelength (nm) and value pairs, strictly increasing in wavelength, linear in between and zero
-/// outside. A single pair is a constant spectrum (its wavelength does not matter): <spectrum value="0.5">.
+/// A spectrum given by pairs of wavelength (nm) and value, strictly increasing in wavelength, linearly interpolated,
+/// zero outside. A single pair is a constant spectrum (its wavelength is ignored): <spectrum value="0.5">.
 struct SampledSpectrum {
   std::vector<std::pair<float, float>> samples;
 };
-/// <rgb>: three numbers taken as linear RGB.
+/// <rgb>: three numbers interpreted as linear RGB.
 struct ColourValue {
   Spectrum rgb;
 };
@@ -64,8 +64,8 @@ struct ColourValue {
 struct ObjectDescription;
 using ObjectPtr = std::shared_ptr<const ObjectDescription>;
 
-/// A null ObjectPtr stands for a value that could not be read; the reason is in the diagnostics, and getters then
-/// behave as if the parameter were absent.
+/// A null ObjectPtr stands for a value that could not be read; the reason is in the diagnostics, and getters behave as
+/// if the parameter were absent.
 using Value = std::variant<bool, int64_t, double, std::string, Vec3, ColourValue, SampledSpectrum, Transform,
                            KeyedTransformPtr, ObjectPtr>;
 
@@ -83,14 +83,14 @@ struct ObjectDescription {
   std::vector<Property> properties;
 };
 
-/// How a sampled spectrum becomes RGB. Reflectances are seen under D65, the white of linear RGB, and clamped to [0, 1];
-/// indices of refraction likewise, but they may exceed 1. Emission is taken as it is.
+/// How a sampled spectrum is converted to RGB. Reflectances are lit by D65, the white of linear RGB, and clamped to [0,
+/// 1]; so are indices of refraction, but without the upper limit. Emission is converted as it is.
 enum class SpectrumRole { kReflectance, kEmission, kIndex };
 
 class ObjectFactory;
 
-/// Typed access. Every getter marks the name as known; a missing required parameter, a wrong type or a value out of
-/// range is recorded in Diagnostics and the getter returns a usable default, so that all problems are found in one run.
+/// Typed access. Every getter marks the name as known; if a required parameter is missing, has the wrong type or is out
+/// of range, it records this in Diagnostics and returns a usable default, so that all problems are found in one run.
 class Parameters {
  public:
   Parameters(const ObjectDescription& object, ObjectFactory& factory, Diagnostics& diagnostics);
@@ -103,26 +103,26 @@ class Parameters {
   int get_int(const std::string& name, int fallback, int lowest, int highest);
   float get_float(const std::string& name, float fallback, float lowest = -kInfinity, float highest = kInfinity);
   std::string get_string(const std::string& name, const std::string& fallback);
-  /// One of `choices`; anything else is an error that lists them.
+  /// One of `choices`; for anything else, an error that lists them.
   std::string get_choice(const std::string& name, const std::string& fallback, const std::vector<std::string>& choices);
   std::string require_string(const std::string& name);
   Vec3 get_vec3(const std::string& name, const Vec3& fallback);
   Transform get_transform(const std::string& name);  ///< identity when absent
-  /// An <animation>; null when absent, and where it is a <transform>, which get_transform() then gives.
+  /// An <animation>; null when absent, or if it is a <transform>, which get_transform() returns.
   KeyedTransformPtr find_animation(const std::string& name);
-  /// A colour that may not be textured: number, rgb or spectrum.
+  /// A colour that cannot be textured: number, rgb or spectrum.
   Spectrum get_spectrum(const std::string& name, const Spectrum& fallback, SpectrumRole role);
   /// A texture; numbers and colours become ConstantTexture.
   TexturePtr get_texture(const std::string& name, const Spectrum& fallback,
                          SpectrumRole role = SpectrumRole::kReflectance);
   TexturePtr get_texture(const std::string& name, float fallback);
-  /// The same, null when absent.
+  /// Same, but null when absent.
   TexturePtr find_texture(const std::string& name, SpectrumRole role = SpectrumRole::kReflectance);
-  /// File relative to the scene's search paths; "" and an error when it does not exist.
+  /// File relative to the scene's search paths; "" and an error if it does not exist.
   std::string require_file(const std::string& name);
 
-  /// All nested objects of class T that no other getter has taken, in file order ("bsdf" inside "twosided").
-  /// `kind` is the tag they must have, e.g. "bsdf".
+  /// All nested objects of class T not taken by another getter, in file order ("bsdf" inside "twosided"). `kind` is
+  /// their required tag, e.g. "bsdf".
   template <typename T>
   std::vector<std::shared_ptr<const T>> children(const std::string& kind) {
     std::vector<std::shared_ptr<const T>> result;
@@ -131,16 +131,16 @@ class Parameters {
     return result;
   }
 
-  /// Whether the parameter is a nested object, or a reference to one.
+  /// Whether the parameter is a nested object or a reference to one.
   bool holds_object(const std::string& name);
-  /// The nested object of that name, null when absent; an error where it is not a <kind>.
+  /// The nested object with this name, null when absent; an error if it is not a <kind>.
   std::shared_ptr<const SceneObject> find_object(const std::string& name, const std::string& kind);
 
   /// Records an error about this object, or about one of its parameters.
   void error(const std::string& message);
   void error_at(const std::string& parameter, const std::string& message);
   void warn(const std::string& message);
-  /// Reports every property nobody asked for. The factory calls it after the plugin was made.
+  /// Reports every property that was not queried. The factory calls it after constructing the plugin.
   void report_unknown();
 
  private:
@@ -154,26 +154,26 @@ class Parameters {
   std::vector<bool> used_;
 };
 
-/// Makes scene objects out of descriptions, each only once (objects referenced by id are shared). Implemented by io.
+/// Constructs scene objects from descriptions, each only once (objects referenced by id are shared). Implemented by io.
 class ObjectFactory {
  public:
   virtual ~ObjectFactory() = default;
-  /// Null when the object could not be made; the reason is then in the diagnostics.
+  /// Null if the object could not be constructed; the reason is in the diagnostics.
   virtual std::shared_ptr<const SceneObject> make(const ObjectPtr& description) = 0;
-  /// Absolute path of a file named in the scene; nullopt when no such file exists.
+  /// Absolute path of a file named in the scene; nullopt if there is no such file.
   virtual std::optional<std::string> resolve_file(const std::string& name, const SourceLocation& where) = 0;
 };
 
-/// One line of a module's registry: plugin name and how to make it. `make` returns null after recording an error.
+/// One line of a module's registry: plugin name and factory function. `make` returns null after recording an error.
 template <typename T>
 struct Plugin {
   const char* name;
   std::shared_ptr<T> (*make)(Parameters& parameters);
 };
 
-/// Linear Rec. 709 RGB of a sampled spectrum (CIE 1931 2° observer), negative components clamped to 0. A reflectance or
-/// index of 1 everywhere maps to (1,1,1), within 0.2 % when it is sampled. An emission of 1 everywhere has Y = 1 and
-/// the chromaticity of illuminant E, which is not neutral in this space: (1.205, 0.948, 0.909).
+/// Linear Rec. 709 RGB of a sampled spectrum (CIE 1931 2° observer), with negative components clamped to 0. A constant
+/// reflectance or index of 1 gives (1,1,1), to within 0.2 % when sampled. A constant emission of 1 has Y = 1 and the
+/// chromaticity of illuminant E, which is not neutral in this space: (1.205, 0.948, 0.909).
 Spectrum spectrum_to_rgb(const SampledSpectrum& spectrum, SpectrumRole role);
 
 }  // namespace covary

@@ -12,7 +12,7 @@ namespace {
 using test_support::GivenObjects;
 using test_support::message_of;
 
-/// An object with given properties; property i stands in line i + 2.
+/// An object with given properties; property i is on line i + 2.
 class ParametersTest : public ::testing::Test {
  protected:
   Parameters& with(const test_support::NamedValues& values) {
@@ -43,7 +43,7 @@ TEST_F(ParametersTest, ReturnsValuesOfEveryType) {
                         {"t", Transform::translate({1, 0, 0})}});
   EXPECT_TRUE(p.get_bool("b", false));
   EXPECT_EQ(p.get_int("i", 0, 0, 10), 7);
-  EXPECT_EQ(p.get_float("i", 0), 7.0f);  // integers are numbers
+  EXPECT_EQ(p.get_float("i", 0), 7.0f);  // integers are accepted as numbers
   EXPECT_EQ(p.get_float("f", 0), 0.25f);
   EXPECT_EQ(p.get_string("s", ""), "text");
   EXPECT_EQ(p.require_string("s"), "text");
@@ -177,7 +177,7 @@ TEST(Diagnostics, SortsAndMergesErrors) {
   diagnostics.error({"a.xml", 10, 1}, "third");
   other.error({"a.xml", 2, 7}, "second");
   other.error({"a.xml", 2, 3}, "first");
-  other.error({"a.xml", 2, 3}, "first");  // said twice, shown once
+  other.error({"a.xml", 2, 3}, "first");  // reported twice, shown once
   other.warn({"a.xml", 3, 1}, "odd");
   diagnostics.append(other);
   EXPECT_EQ(message_of([&] { diagnostics.throw_if_errors(); }),

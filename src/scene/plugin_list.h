@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A module's registry out of one list of names.
+// Defines a module's registry from one list of names.
 #pragma once
 
 #include "scene/parameters.h"
@@ -7,9 +7,9 @@
 #define COVARY_DECLARE_PLUGIN(Type, name) std::shared_ptr<Type> make_##name(Parameters& parameters);
 #define COVARY_PLUGIN_ROW(Type, name) {#name, make_##name},
 
-/// Defines `function`, which returns the plugins of a type, and declares make_NAME() of each, which its own file
-/// defines, and which returns null after recording an error. LIST(PLUGIN, Type) has PLUGIN(Type, NAME) for each name
-/// of scene files, sorted.
+/// Defines `function`, which returns the plugins of a type, and declares make_NAME() for each, which the plugin's own
+/// file defines and which returns null after recording an error. LIST(PLUGIN, Type) expands to PLUGIN(Type, NAME) for
+/// each name used in scene files, sorted.
 #define COVARY_PLUGINS(Type, function, LIST)                                    \
   LIST(COVARY_DECLARE_PLUGIN, Type)                                             \
   std::span<const Plugin<Type>> function() {                                    \

@@ -17,14 +17,14 @@ bool is_number(const Option& option) {
 
 bool is_boolean(const Option& option) { return option.is_switch() || option.type == Option::Type::kFlag; }
 
-/// What the property must be.
+/// The required type of the property.
 std::string wanted(const Option& option) {
   if (is_boolean(option)) return "a boolean";
   if (option.type == Option::Type::kWhole) return "an integer";
   return option.type == Option::Type::kReal ? "a float" : "a string";
 }
 
-/// The property's value as the option's text; nothing where it is of another type. The getters mark it as used.
+/// The property's value as the option's text; nothing if it has another type. The getters mark it as used.
 std::optional<std::string> text_of(Parameters& parameters, const Property& property, const Option& option) {
   const Value& value = property.value;
   const std::string& name = property.name;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Options (settings/settings.h) read from the properties of an object of a scene file, whose names have "_" for "-",
-// and from what a caller gives in place of these.
+// Options (settings/settings.h) read from the properties of an object in a scene file, with "_" for "-" in names, and
+// from overrides given by the caller.
 #pragma once
 
 #include <optional>
@@ -14,8 +14,8 @@ namespace covary {
 
 class PropertySource final : public SettingsSource {
  public:
-  /// Values of the caller, by name, take the place of properties. A wrong value of a property is recorded in the
-  /// diagnostics of `parameters`, one of the caller throws Error(kUsage).
+  /// Values from the caller, by name, override properties. An invalid property is recorded in the diagnostics of
+  /// `parameters`; an invalid value from the caller throws Error(kUsage).
   explicit PropertySource(Parameters& parameters, OptionValues of_caller = {})
       : parameters_(parameters), of_caller_(std::move(of_caller)) {}
 
@@ -30,7 +30,7 @@ class PropertySource final : public SettingsSource {
   bool only_caller_ = false;
 };
 
-/// Settings that have a declare(), as the properties say.
+/// Reads settings that have a declare() from properties.
 template <typename T>
 T read_settings(Parameters& parameters, T settings = {}) {
   PropertySource source(parameters);
@@ -39,8 +39,8 @@ T read_settings(Parameters& parameters, T settings = {}) {
   return settings;
 }
 
-/// Makes the properties of these options known, so that they are no error: they are those of an object that another one
-/// takes the place of.
+/// Marks the properties of these options as known, so that they are not errors: they belong to an object that another
+/// one replaces.
 void ignore_properties(Parameters& parameters, const std::vector<Option>& options);
 
 }  // namespace covary

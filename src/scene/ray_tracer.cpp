@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scene/ray_tracer.h"
 
-// CMakeLists.txt takes Embree 4 where both are installed, too.
+// CMakeLists.txt also prefers Embree 4 if both are installed.
 #if __has_include(<embree4/rtcore.h>)
 #include <embree4/rtcore.h>
 #else
@@ -58,7 +58,7 @@ void analytic_occluded(const RTCOccludedFunctionNArguments* args) {
 }
 
 void set_mesh(RTCGeometry geometry, const TriangleMesh& mesh) {
-  // Embree reads 16 bytes of each vertex; the record is longer than that, so the last one is safe too.
+  // Embree reads 16 bytes per vertex; a record is longer than that, so reading the last one is safe too.
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, mesh.vertices().data(), 0,
                              sizeof(TriangleMesh::Vertex), mesh.vertices().size());
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.triangles().data(), 0,
@@ -73,7 +73,7 @@ void set_analytic(RTCGeometry geometry, const AnalyticShape& shape) {
   rtcSetGeometryOccludedFunction(geometry, analytic_occluded);
 }
 
-/// Curves are seen from outside alone, as in Mitsuba; Embree has that as an option of its own compilation.
+/// Curves are visible from outside only, as in Mitsuba; in Embree, that is only a compile-time option.
 void pass_from_inside(const RTCFilterFunctionNArguments* args) {
   for (unsigned i = 0; i < args->N; ++i) {
     if (!args->valid[i]) continue;
@@ -101,7 +101,7 @@ RTCGeometryType type_of(const Shape& shape) {
                                              : RTC_GEOMETRY_TYPE_ROUND_BSPLINE_CURVE;
 }
 
-/// Makes the geometry, of the shape's type, that of the shape.
+/// Sets the geometry, which must be of the shape's type, to the shape.
 void set_shape(RTCGeometry geometry, const Shape& shape) {
   if (const auto* mesh = dynamic_cast<const TriangleMesh*>(&shape))
     set_mesh(geometry, *mesh);
@@ -120,10 +120,10 @@ void set_placement(RTCGeometry geometry, const Transform& to_world) {
   rtcCommitGeometry(geometry);
 }
 
-/// Rays are handed to Embree in packets: camera rays gain most, scattered ones a little, single ones lose little.
+/// Rays are passed to Embree in packets: camera rays gain most, scattered ones a little; single ones lose little.
 constexpr size_t kPacket = 16;
 
-/// What all rays have and Embree leaves as it is.
+/// Sets the fields that are the same for all rays and unchanged by Embree.
 void begin_packet(RTCRay16& packet) {
   for (size_t i = 0; i < kPacket; ++i)
     packet.tnear[i] = 0, packet.time[i] = 0, packet.mask[i] = ~0u, packet.id[i] = 0, packet.flags[i] = 0;
@@ -135,7 +135,7 @@ void set_ray(RTCRay16& packet, size_t i, const Ray& ray) {
   packet.tfar[i] = ray.t_max;
 }
 
-/// What a query says of itself: Embree 3 has it in the context, Embree 4 beside it.
+/// Query arguments: Embree 3 has them in the context, Embree 4 separately.
 class Query {
  public:
 #if RTC_VERSION_MAJOR >= 4
@@ -172,7 +172,7 @@ class Query {
 #endif
 };
 
-/// Moves a hit found in a group's space to the world.
+/// Transforms a hit in a group's space to world space.
 void place(SurfaceHit& hit, const Transform& to_world, bool with_derivatives) {
   hit.p = to_world.point(hit.p);
   hit.ng = normalize(to_world.normal(hit.ng));
@@ -197,7 +197,7 @@ void release(RTCDevice device, RTCScene top, const auto& groups) {
 RayTracer::Group RayTracer::make_group(std::span<const ShapePtr> shapes, bool moves) const {
   Group group;
   group.scene = rtcNewScene(device_);
-  // By Embree's manual, "low" is the quality that gives each geometry a hierarchy of its own (of medium quality).
+  // According to Embree's manual, "low" quality builds a separate hierarchy (of medium quality) per geometry.
   rtcSetSceneBuildQuality(group.scene, moves ? RTC_BUILD_QUALITY_LOW : RTC_BUILD_QUALITY_MEDIUM);
   if (moves) rtcSetSceneFlags(group.scene, RTC_SCENE_FLAG_DYNAMIC);
   for (const ShapePtr& shape : shapes) {
@@ -238,7 +238,7 @@ RayTracer::RayTracer(std::span<const ShapePtr> shapes, std::span<const Instance>
       placed_.push_back({&group, instance.to_world});
     }
     rtcCommitScene(top_.scene);
-  } catch (...) {  // too little memory, or a stop (core/stop.h), of which Embree makes an error
+  } catch (...) {  // out of memory, or a stop (core/stop.h), which Embree turns into an error
     release(device_, top_.scene, groups_);
     throw;
   }
@@ -279,7 +279,7 @@ void RayTracer::nearest(std::span<const Ray> rays, std::span<RayHit> hits, bool 
                          packet.hit.primID[i],
                          packet.hit.geomID[i],
                          packet.hit.instID[0][i]};
-    // What resolve() reads of a mesh is asked for ahead: here the triangles, below their vertices.
+    // Prefetch what resolve() reads of a mesh: the triangles here, their vertices below.
     for (size_t i = first; i < first + n; ++i)
       if (const TriangleMesh* mesh = mesh_of(hits[i])) __builtin_prefetch(&mesh->triangles()[hits[i].primitive]);
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The one place that knows Embree, version 3 or 4.
+// The only code that uses Embree, version 3 or 4.
 #pragma once
 
 #include <memory>
@@ -16,17 +16,17 @@ namespace covary {
 
 class RayTracer {
  public:
-  /// `moves`: some of them will be moved. Their hierarchy then has two levels, so that only what moved and the upper
-  /// level are built again.
+  /// `moves`: whether any of them will move. The hierarchy then has two levels, so that only moved parts and the upper
+  /// level are rebuilt.
   RayTracer(std::span<const ShapePtr> shapes, std::span<const Instance> instances, bool moves);
   ~RayTracer();
   RayTracer(const RayTracer&) = delete;
   RayTracer& operator=(const RayTracer&) = delete;
 
-  /// Puts another shape in place of the one of that index: one of the same class, with as many primitives.
+  /// Replaces the shape with this index by another of the same class, with as many primitives.
   void move_shape(size_t index, const Shape& shape);
   void move_instance(size_t index, const Transform& to_world);
-  /// After moving, before the next ray.
+  /// Call after moving and before tracing rays.
   void commit();
 
   void nearest(std::span<const Ray> rays, std::span<RayHit> hits, bool coherent) const;
@@ -34,12 +34,12 @@ class RayTracer {
   void occluded(std::span<const Ray> rays, std::span<uint8_t> blocked) const;
 
  private:
-  struct Group {  // shapes of one Embree scene, indexed by geometry id
+  struct Group {  // shapes in one Embree scene, indexed by geometry id
     RTCSceneTy* scene = nullptr;
     std::vector<const Shape*> shapes;
-    std::vector<const TriangleMesh*> meshes;  // the same; null where it is no mesh
+    std::vector<const TriangleMesh*> meshes;  // the same; null if not a mesh
   };
-  /// The mesh that was hit in the world's own space, or null.
+  /// The mesh that was hit without an instance transform, or null.
   const TriangleMesh* mesh_of(const RayHit& hit) const {
     return hit.found() && hit.instance == RayHit::kNone ? top_.meshes[hit.geometry] : nullptr;
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shapes as the ray tracer sees them: where rays hit, what lies there, and that sampling agrees with it.
+// Shapes in the ray tracer: hit positions, surface properties there, and consistency with sampling.
 #include <gtest/gtest.h>
 
 #include <memory>
@@ -13,7 +13,7 @@
 namespace covary {
 namespace {
 
-/// Reflects nothing; asks for derivatives so that every field of a hit is filled.
+/// Black; asks for derivatives so that every field of a hit is filled.
 class BlackBsdf final : public Bsdf {
  public:
   uint32_t flags() const override { return 0; }
@@ -39,7 +39,7 @@ void expect_near(const Vec3& a, const Vec3& b, float tolerance = 2e-5f) {
                                       << ", " << b.z << ")";
 }
 
-/// (dp_du, dp_dv) against finite differences of the point as a function of (u, v) on nearby hits.
+/// Compares (dp_du, dp_dv) with finite differences of the point as a function of (u, v) at nearby hits.
 void expect_derivatives(const Scene& scene, const Ray& ray) {
   SurfaceHit at;
   ASSERT_TRUE(scene.intersect(ray, at));
@@ -84,7 +84,7 @@ TEST(RayTracer, DiskRespectsItsEdgeAndOrientation) {
   expect_derivatives(*scene, {{0.5f, 0.3f, 3}, normalize(Vec3{0.1f, 0, -1})});
 }
 
-// Mitsuba 3.9.1, scalar_rgb: the points of u = 0 and u = 0.25, v = 0.5 of cylinders of radius 1 from the origin.
+// Mitsuba 3.9.1, scalar_rgb: the points u = 0 and u = 0.25, v = 0.5 of cylinders of radius 1 from the origin.
 TEST(RayTracer, CylinderHasTheTextureCoordinatesOfMitsuba) {
   struct Case {
     Vec3 axis, at_0, at_quarter;
@@ -138,7 +138,7 @@ TEST(RayTracer, InstancesArePlacedCopies) {
   EXPECT_EQ(scene->n_triangles(), 2u);
 }
 
-/// Every sampled point is where a ray in the sampled direction first meets the shape, and both densities agree.
+/// Every sampled point is where a ray in the sampled direction first hits the shape, and both densities agree.
 void expect_sampling_agrees(const std::shared_ptr<Shape>& shape, const Vec3& reference, bool nearest_only) {
   const auto scene = scene_of({shape});
   int visible = 0;
@@ -150,7 +150,7 @@ void expect_sampling_agrees(const std::shared_ptr<Shape>& shape, const Vec3& ref
     expect_near(reference + sample.wi * sample.distance, sample.p, 1e-4f);
     SurfaceHit hit;
     ASSERT_TRUE(scene->intersect({reference, sample.wi}, hit)) << i;
-    if (!nearest_only && std::abs(hit.t - sample.distance) > 1e-3f) continue;  // a farther part of the shape
+    if (!nearest_only && std::abs(hit.t - sample.distance) > 1e-3f) continue;  // a farther point on the shape
     ++visible;
     expect_near(hit.p, sample.p, 2e-4f);
     expect_near(hit.ng, sample.n, 1e-3f);

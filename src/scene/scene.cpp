@@ -38,7 +38,7 @@ void Scene::measure() {
       bounds_.extend(instance.to_world.bounds(shape->bounds()));
       n_triangles_ += dynamic_cast<const TriangleMesh*>(shape.get()) ? shape->n_primitives() : 0;
     }
-  if (bounds_.empty()) bounds_ = {{-1, -1, -1}, {1, 1, 1}};  // lights at infinity still need a sphere to shine through
+  if (bounds_.empty()) bounds_ = {{-1, -1, -1}, {1, 1, 1}};  // lights at infinity still need a bounding sphere
   offset_unit_ = std::min(1.0f, std::max(max_component(abs(bounds_.lower)), max_component(abs(bounds_.upper))));
 }
 

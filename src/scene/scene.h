@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Everything light can meet: shapes, lights, camera; and the queries integrators need.
+// The scene: shapes, lights and camera, and the queries that integrators need.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@
 
 namespace covary {
 
-/// Shapes that are placed several times.
+/// Shapes that are instanced.
 struct ShapeGroup : SceneObject {
   std::vector<ShapePtr> shapes;
 };
@@ -28,29 +28,29 @@ struct Instance {
   Transform to_world;
 };
 
-/// A shape or an instance that moves.
+/// Animation of a shape or an instance.
 struct Movement {
-  KeyedTransformPtr to_world;  ///< from its own space into the scene
-  size_t index = 0;            ///< in SceneParts::shapes; of an instance, in SceneParts::instances
-  /// The shape where a transformation takes it, with its BSDF, media and light; empty: an instance moves. May throw
+  KeyedTransformPtr to_world;  ///< from its own space to world space
+  size_t index = 0;            ///< in SceneParts::shapes, or for an instance, in SceneParts::instances
+  /// The shape under a transformation, with its BSDF, media and light; empty: an instance moves. May throw
   /// Error(kInput).
   std::function<ShapePtr(const Transform&)> shape_at;
 };
 
-/// What a loader hands over. What moves stands where it is at the time 0.
+/// The result of a loader. Animated parts are at their positions at time 0.
 struct SceneParts {
-  std::vector<ShapePtr> shapes;  ///< each with a BSDF and perhaps an area light set
+  std::vector<ShapePtr> shapes;  ///< each with a BSDF and perhaps an area light
   std::vector<Instance> instances;
   std::vector<Movement> movements;
   std::vector<std::shared_ptr<const Emitter>> emitters;  ///< in file order, area lights of `shapes` included
   std::shared_ptr<const Camera> camera;
-  MediumPtr camera_medium;   ///< in which the camera stands; null: none
-  std::string first_medium;  ///< where the file names the first medium that is used; empty: there is none
+  MediumPtr camera_medium;   ///< that the camera is in; null: none
+  std::string first_medium;  ///< location in the file of the first medium that is used; empty: there is none
 };
 
 enum class FilterKind { kBox, kTent, kGaussian };
-/// Reconstruction filter. Every sample contributes to one pixel only, with weight one: its position inside the filter's
-/// footprint is drawn from the filter itself.
+/// Reconstruction filter. Every sample contributes to one pixel only, with weight one: its position within the filter's
+/// footprint is sampled from the filter itself.
 struct FilterSettings {
   FilterKind kind = FilterKind::kBox;
   float radius = 0.5f;  ///< in pixels: box 0.5, tent 1, gaussian 4 standard deviations
@@ -59,7 +59,7 @@ struct FilterSettings {
 
 class RayTracer;
 
-/// What the ray tracer knows of a hit; Scene::resolve makes a SurfaceHit of it.
+/// A hit as found by the ray tracer; Scene::resolve turns it into a SurfaceHit.
 struct RayHit {
   static constexpr uint32_t kNone = ~0u;
   float t = kInfinity;
@@ -68,38 +68,38 @@ struct RayHit {
   bool found() const { return geometry != kNone; }
 };
 
-/// Offset of ray origins against self-intersection, relative to the size of coordinates.
+/// Offset of ray origins against self-intersection, relative to the magnitude of coordinates.
 inline constexpr float kRayEpsilon = 1500 * 0x1p-24f;
 
 class Scene {
  public:
-  /// Builds the ray tracer's hierarchy.
+  /// Builds the acceleration structure.
   explicit Scene(SceneParts parts);
   ~Scene();
   Scene(const Scene&) = delete;
   Scene& operator=(const Scene&) = delete;
 
-  /// Nearest surface along the ray; false when there is none. The same as nearest() and resolve().
+  /// Nearest surface along the ray; false if there is none. Same as nearest() followed by resolve().
   bool intersect(const Ray& ray, SurfaceHit& hit) const;
-  /// Nearest hits of many rays. `coherent`: they start at one place and go roughly the same way.
+  /// Nearest hits of many rays. `coherent`: they share an origin and have similar directions.
   void nearest(std::span<const Ray> rays, std::span<RayHit> hits, bool coherent) const;
-  /// What lies at a hit of `ray` that was found.
+  /// Surface properties at a hit of `ray`, which must exist.
   void resolve(const Ray& ray, const RayHit& found, SurfaceHit& hit) const;
-  /// Whether anything lies on the ray before t_max.
+  /// Whether anything is hit along the ray before t_max.
   bool occluded(const Ray& ray) const;
-  /// The same for many rays; 1 where blocked.
+  /// Same for many rays; 1 if occluded.
   void occluded(std::span<const Ray> rays, std::span<uint8_t> blocked) const;
 
-  /// Whether anything but the camera moves.
+  /// Whether anything except the camera moves.
   bool moves() const { return !parts_.movements.empty(); }
   /// 0 until move_to().
   double time() const { return time_; }
-  /// Places what moves where it is at that time; what rests is not built again. Not while the scene is in use. Throws
-  /// Error(kInput) where a shape cannot have its transformation, such as a sphere a scale by axes.
+  /// Moves everything to its position at that time; static parts are not rebuilt. Not while the scene is in use. Throws
+  /// Error(kInput) if a shape does not support its transformation, such as a sphere with non-uniform scale.
   void move_to(double time);
-  /// What moved since another time: for each movement, the map from where its points are now to where they were then.
+  /// Motion since another time: for each movement, the map from current positions to positions then.
   std::vector<Transform> displacements(double then) const;
-  /// The index in displacements() of the surface that was hit, or -1 where it rests.
+  /// Index in displacements() of the surface that was hit, or -1 if it is static.
   int movement_of(const RayHit& found) const {
     if (movements_.empty()) return -1;
     return movements_[found.instance == RayHit::kNone ? found.geometry : found.instance];
@@ -107,22 +107,22 @@ class Scene {
 
   const Camera& camera() const { return *parts_.camera; }
   std::span<const std::shared_ptr<const Emitter>> emitters() const { return parts_.emitters; }
-  /// The light at infinity that rays leaving the scene meet, or null.
+  /// The light at infinity that rays leaving the scene hit, or null.
   const Emitter* environment() const { return environment_; }
   bool has_media() const { return !parts_.first_medium.empty(); }
   /// SceneParts::first_medium
   const std::string& first_medium() const { return parts_.first_medium; }
   const Medium* camera_medium() const { return parts_.camera_medium.get(); }
   const Bounds3& bounds() const { return bounds_; }
-  /// Distance off a surface at `p` at which rays that leave it begin, against self-intersection.
+  /// Offset from a surface at `p` of the origins of rays leaving it, against self-intersection.
   float ray_offset(const Vec3& p) const { return (offset_unit_ + max_component(abs(p))) * kRayEpsilon; }
   size_t n_triangles() const { return n_triangles_; }
   size_t n_shapes() const { return parts_.shapes.size(); }
   double build_seconds() const { return build_seconds_; }
 
  private:
-  void measure();       // bounds, sampling of lights
-  void place_lights();  // into the bounds
+  void measure();       // bounds, preparation of lights for sampling
+  void place_lights();  // tells them the bounds
 
   SceneParts parts_;
   std::unique_ptr<RayTracer> tracer_;
@@ -135,7 +135,7 @@ class Scene {
   double build_seconds_ = 0;
 };
 
-/// `p`, on a surface of the geometric normal `ng`, moved by `offset` to the side of the surface `w` points to.
+/// `p`, on a surface with geometric normal `ng`, moved by `offset` to the side of the surface that `w` points to.
 inline Vec3 offset_origin(const Vec3& p, const Vec3& ng, float offset, const Vec3& w) {
   return p + ng * std::copysign(offset, dot(ng, w));
 }

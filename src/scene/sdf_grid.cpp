@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Ray tracing of grids of signed distances: H. Hansson-Söderlund, A. Evans, T. Akenine-Möller, "Ray Tracing of Signed
-// Distance Function Grids", JCGT 11 (3), 2022. A ray walks through the cells; within one, the interpolated distance is
-// a cubic polynomial of the ray's parameter, which is cut at its extrema and bisected. Shading normals are theirs, too:
-// gradients of the eight cells around a point, normalised and interpolated.
+// Ray tracing of signed distance grids: H. Hansson-Söderlund, A. Evans, T. Akenine-Möller, "Ray Tracing of Signed
+// Distance Function Grids", JCGT 11 (3), 2022. A ray steps through the cells; within one, the interpolated distance is
+// a cubic polynomial in the ray parameter, which is split at its extrema and bisected. Shading normals follow the
+// paper, too: gradients of the eight cells around a point, normalised and interpolated.
 #include "scene/sdf_grid.h"
 
 #include <algorithm>
@@ -20,7 +20,7 @@ struct Cubic {
   double at(double t) const { return ((c[3] * t + c[2]) * t + c[1]) * t + c[0]; }
 };
 
-/// Product of a polynomial of degree `degree` and a + b t, in place.
+/// Multiplies a polynomial of degree `degree` by a + b t, in place.
 void multiply(Cubic& p, int degree, double a, double b) {
   for (int k = degree + 1; k > 0; --k) p.c[k] = (k <= degree ? p.c[k] * a : 0) + p.c[k - 1] * b;
   p.c[0] *= a;
@@ -97,7 +97,7 @@ float SdfGrid::zero_in(const Cell& cell, const Vec3& o, const Vec3& d, float nea
     const int corner[3] = {k & 1, k >> 1 & 1, k >> 2};
     const float v = grid_.at(x + corner[0], y + corner[1], z + corner[2]);
     positive |= v >= 0, negative |= v <= 0;
-    // The weight of a corner is a product of three linear functions, counted from `near` to keep digits.
+    // The weight of a corner is a product of three linear functions, expanded around `near` for precision.
     Cubic term{{v, 0, 0, 0}};
     for (int axis = 0; axis < 3; ++axis) {
       const double p = double{o[axis]} + double{near} * d[axis] - cell.i[axis];
@@ -158,7 +158,7 @@ float SdfGrid::value(const Vec3& p) const {
   return sum;
 }
 
-/// Of the interpolation in a cell, by local coordinates.
+/// Gradient of the interpolation within a cell, in local coordinates.
 Vec3 SdfGrid::gradient(const Vec3& p, const int (&cell)[3]) const {
   Vec3 g;
   for (int axis = 0; axis < 3; ++axis) {

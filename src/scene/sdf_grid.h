@@ -7,9 +7,9 @@
 
 namespace covary {
 
-/// Signed distances (positive outside) at the corners of the cells of a grid over [0, 1]^3.
+/// Signed distances (positive outside) at the grid points over [0, 1]^3.
 struct SdfValues {
-  int size[3] = {0, 0, 0};    ///< corners along x, y, z; at least 2
+  int size[3] = {0, 0, 0};    ///< grid points along x, y, z; at least 2
   std::vector<float> values;  ///< values[(z * size[1] + y) * size[0] + x]
 
   float at(int x, int y, int z) const {
@@ -17,11 +17,11 @@ struct SdfValues {
   }
 };
 
-/// The surface where signed distances, interpolated between their grid's corners, are 0 (see sdf_grid.cpp), under
-/// `to_world`. No surface parameters, and no light.
+/// The zero level set of signed distances, interpolated between grid points (see sdf_grid.cpp), under `to_world`. It
+/// has no surface parameters and cannot emit light.
 class SdfGrid final : public AnalyticShape {
  public:
-  /// `smooth`: shading normals are interpolated between cells. Throws Error(kInput) where no cell holds a surface.
+  /// `smooth`: interpolate shading normals between cells. Throws Error(kInput) if no cell contains a surface.
   SdfGrid(const Transform& to_world, SdfValues grid, bool smooth, bool flip_normals);
 
   float intersect(const Ray& ray) const override;
@@ -36,7 +36,7 @@ class SdfGrid final : public AnalyticShape {
   struct Cell {
     int i[3];
   };
-  /// The nearest zero within a cell, as a parameter of the ray in units of cells, in [near, far]; infinity: none.
+  /// The nearest zero within a cell, as a ray parameter in units of cells, in [near, far]; infinity: none.
   float zero_in(const Cell& cell, const Vec3& o, const Vec3& d, float near, float far) const;
   float value(const Vec3& p) const;  // p in units of cells, clamped to the grid
   Vec3 gradient(const Vec3& p, const int (&cell)[3]) const;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Grids of signed distances whose surfaces are known: a plane, where the interpolation is exact, and a sphere.
+// Signed distance grids with known surfaces: a plane, where the interpolation is exact, and a sphere.
 #include "scene/sdf_grid.h"
 
 #include <gtest/gtest.h>
@@ -44,7 +44,7 @@ TEST(SdfGrid, PlaneIsExact) {
     EXPECT_NEAR(dot(hit.p - Vec3{2, 1, 1}, n), 0, 1e-5f);
     EXPECT_LT(length(hit.ng - n), 1e-3f);
     EXPECT_LT(length(hit.frame.n - n), 1e-3f) << smooth;
-    // From below, and from a point between the surface and the border.
+    // From below, and from a point between the surface and the boundary.
     EXPECT_NEAR(hit_of(plane, {{2.1f, 0.9f, -9}, {0, 0, 1}, kInfinity}).p.z, hit.p.z, 1e-4f);
     EXPECT_EQ(plane.intersect({hit.p + n * 1e-2f, {0, 0, 1}, kInfinity}), kInfinity);
     EXPECT_EQ(plane.intersect({ray.o, ray.d, hit.t * 0.99f}), kInfinity);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Surfaces. Ray intersection itself is in ray_tracer.h; a Shape says what lies at a point and samples its area.
+// Surfaces. Ray intersection itself is in ray_tracer.h; a Shape describes its points and samples its area.
 #pragma once
 
 #include <cstdint>
@@ -27,31 +27,33 @@ struct AreaSample {
 class Shape : public SceneObject {
  public:
   virtual Bounds3 bounds() const = 0;
-  /// Completes a hit of this shape: p, ng, frame and uv (and dp_du, dp_dv, with the frame aligned to dp_du, if
-  /// `with_derivatives`) from t, primitive and barycentric as the ray tracer left them.
+  /// Completes a hit on this shape: p, ng, frame and uv (and dp_du, dp_dv, with the frame aligned to dp_du, if
+  /// `with_derivatives`) from the t, primitive and barycentric set by the ray tracer.
   virtual void fill(const Ray& ray, SurfaceHit& hit, bool with_derivatives) const = 0;
   virtual float area() const = 0;
   virtual size_t n_primitives() const { return 1; }
-  /// Uniform by area. `u_primitive` chooses among parts (triangles).
+  /// Uniform by area. `u_primitive` selects a part (triangle).
   virtual AreaSample sample_area(Vec2 u, float u_primitive) const = 0;
-  /// Parts that are sampled one by one: the triangles of a mesh; 1 where the shape is sampled as a whole.
+  /// Number of parts that can be sampled separately: the triangles of a mesh; 1 if the shape is sampled as a whole.
   virtual uint32_t n_parts() const { return 1; }
-  /// Triangles that a part stands for; 1 where there are none.
+  /// Number of triangles in a part; 1 if there are none.
   virtual uint32_t triangles_per_part() const { return 1; }
   virtual float part_area(uint32_t /*part*/) const { return area(); }
   /// Uniform by area on one part.
   virtual AreaSample sample_part(uint32_t /*part*/, Vec2 u) const { return sample_area(u, 0); }
-  /// Bounds of one part, for those that group parts by their places.
+  /// Bounds of one part, for spatial grouping.
   virtual Bounds3 part_bounds(uint32_t /*part*/) const { return bounds(); }
-  /// Unit geometric normal of a part that is flat; zero where it varies.
+  /// Unit geometric normal of a flat part; zero if it varies.
   virtual Vec3 part_normal(uint32_t /*part*/) const { return {}; }
-  /// Point by surface parameters (for textured lights): only shapes whose (u, v) cover the unit square once.
-  /// Returns pdf_area for a density of 1 per unit (u, v) area; pdf_area == 0: not supported by this shape.
+  /// Point with given surface parameters (for textured lights): only for shapes whose (u, v) cover the unit square
+  /// once. Its pdf_area is for a density of 1 per unit (u, v) area; pdf_area == 0: not supported by this shape.
   virtual AreaSample sample_uv(Vec2 /*uv*/) const { return {}; }
-  /// Samples the shape as seen from `reference`; default: uniform by area. pdf in solid angle at reference.
+  /// Samples the shape as seen from `reference`; default: uniform by area. The pdf is per unit solid angle at
+  /// `reference`.
   virtual EmitterSample sample_towards(const Vec3& reference, Vec2 u, float u_primitive) const;
   virtual float pdf_solid_angle(const Vec3& reference, const SurfaceHit& hit) const;
-  /// A point sampled by area as seen from `reference`, its density converted to solid angle; pdf 0 for grazing views.
+  /// Converts a point sampled by area to a sample from `reference`, with its pdf in solid angle; pdf 0 at grazing
+  /// angles.
   static EmitterSample towards(const Vec3& reference, const AreaSample& area) {
     EmitterSample sample;
     const Vec3 d = area.p - reference;
@@ -65,24 +67,25 @@ class Shape : public SceneObject {
     sample.pdf_solid_angle = cosine > kGrazing ? area.pdf_area * d2 / cosine : 0;
     return sample;
   }
-  /// Interpolated colour stored at the vertices ("vertex_color"), white where the mesh has none.
+  /// Interpolated vertex colour ("vertex_color"), white if the mesh has none.
   virtual Spectrum vertex_colour(const SurfaceHit& /*hit*/) const { return Spectrum(1); }
   virtual bool has_vertex_colour() const { return false; }
-  /// What a mesh stores under a name such as "face_color", interpolated where it is by vertex; white where it has none.
+  /// A mesh attribute by name, such as "face_color", interpolated if per vertex; white if the mesh does not have it.
   virtual Spectrum attribute(std::string_view /*name*/, const SurfaceHit& /*hit*/) const { return Spectrum(1); }
   virtual bool has_attribute(std::string_view /*name*/) const { return false; }
-  /// Whether there are such values, or colours of vertices.
+  /// Whether there are any attributes or vertex colours.
   virtual bool has_attributes() const { return false; }
-  /// Whether it can be a light: whether area() and the functions that sample it are there.
+  /// Whether it can be a light, i.e. implements area() and the sampling functions.
   virtual bool can_emit() const { return true; }
 
   /// Cosines below this count as zero.
   static constexpr float kGrazing = 1e-12f;
 
-  /// A copy moved by `to_world`, without BSDF and emitter. Throws Error(kInput) when the shape cannot be moved so.
+  /// A transformed copy, without BSDF and emitter. Throws Error(kInput) if the shape does not support the
+  /// transformation.
   virtual std::shared_ptr<Shape> transformed(const Transform& to_world) const = 0;
 
-  /// Takes over the BSDF and the media of another shape.
+  /// Copies the BSDF and the media of another shape.
   void share_surface(const Shape& other) {
     set_bsdf(other.bsdf_);
     set_media(other.interior_, other.exterior_);
@@ -96,20 +99,20 @@ class Shape : public SceneObject {
     bsdf_flags_ = bsdf_ ? bsdf_->flags() : 0;
     main_texture_ = bsdf_ ? bsdf_->main_texture() : nullptr;
   }
-  /// The flags and the main texture of bsdf(), at hand without asking it.
+  /// Cached flags and main texture of bsdf().
   uint32_t bsdf_flags() const { return bsdf_flags_; }
   const Texture* main_texture() const { return main_texture_; }
   /// Whether hits on this shape need dp_du, dp_dv and an aligned frame.
   bool needs_derivatives() const { return needs_derivatives_; }
-  /// The media on the sides of the surface; null: none, or nothing is known. `interior` is where the geometric normal
-  /// does not point.
+  /// The media on both sides of the surface; null: none or unknown. `interior` is on the side opposite the geometric
+  /// normal.
   void set_media(MediumPtr interior, MediumPtr exterior) {
     bounds_medium_ = interior || exterior;
     interior_ = std::move(interior), exterior_ = std::move(exterior);
   }
-  /// Whether other media may lie on the sides than the one that a ray comes through.
+  /// Whether the media on its sides may differ from the one that a ray comes through.
   bool bounds_medium() const { return bounds_medium_; }
-  /// The medium into which `w` leads from a point of the geometric normal `ng`.
+  /// The medium that `w` leads into from a point with geometric normal `ng`.
   const Medium* medium_towards(const Vec3& ng, const Vec3& w) const {
     return (dot(ng, w) > 0 ? exterior_ : interior_).get();
   }

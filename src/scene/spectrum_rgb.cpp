@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Spectra to linear RGB: X = k ∫ S(λ) x̄(λ) W(λ) dλ and likewise Y, Z, with W = 1 for emission and W = D65 for
-// reflectances and indices. The sums run over 1000 equidistant wavelengths, and the result is clamped, as Mitsuba 3
-// does in its RGB modes, so that both programs see the same colours.
+// Spectra to linear RGB: X = k ∫ S(λ) x̄(λ) W(λ) dλ, likewise Y and Z, with W = 1 for emission and W = D65 for
+// reflectances and indices. Sums use 1000 equidistant wavelengths, and the result is clamped, as in Mitsuba 3's RGB
+// modes, so that both programs give the same colours.
 #include <algorithm>
 
 #include "scene/cie_tables.h"
@@ -11,9 +11,9 @@ namespace covary {
 namespace {
 
 constexpr int kSteps = 1000;
-/// Makes Y of S = 1 equal to 1 (the sum below is over 1000 points, not 999 intervals: 0.1 % less).
+/// Normalises S = 1 to Y = 1 (the sum below is over 1000 points, not 999 intervals: 0.1 % less).
 constexpr double kNormalisationY = 1 / 106.7502593994140625;
-/// Makes Y of S = 1 under D65 equal to 1.
+/// Normalises S = 1 under D65 to Y = 1.
 constexpr double kNormalisationD65 = 1 / 98.99741751876255;
 
 /// The table's row at `wavelength`, linearly interpolated.

@@ -8,7 +8,7 @@
 namespace covary {
 namespace {
 
-/// Length of the images of the three axes; throws unless they are equal and orthogonal.
+/// Common length of the transformed axes; throws unless they have equal lengths and are orthogonal.
 float similarity_scale(const Transform& t) {
   const Vec3 x = t.vector({1, 0, 0}), y = t.vector({0, 1, 0}), z = t.vector({0, 0, 1});
   const float l = length(x), tolerance = 1e-3f * l;
@@ -41,14 +41,14 @@ Bounds3 Sphere::bounds() const {
 }
 
 float Sphere::intersect(const Ray& ray) const {
-  // Double precision: large spheres seen from far away lose too many digits in single precision.
+  // Double precision: for large spheres seen from far away, single precision is not enough.
   const double ox = double(ray.o.x) - center_.x, oy = double(ray.o.y) - center_.y, oz = double(ray.o.z) - center_.z;
   const double b = ox * ray.d.x + oy * ray.d.y + oz * ray.d.z;
   const double a = double(ray.d.x) * ray.d.x + double(ray.d.y) * ray.d.y + double(ray.d.z) * ray.d.z;
   const double c = ox * ox + oy * oy + oz * oz - double(radius_) * radius_;
   const double discriminant = b * b - a * c;
   if (discriminant < 0) return kInfinity;
-  // The root with the larger magnitude first, the other from their product: no cancellation.
+  // The root with the larger magnitude first, the other from their product, to avoid cancellation.
   const double q = -(b + std::copysign(std::sqrt(discriminant), b));
   const double t0 = std::min(q / a, c / q), t1 = std::max(q / a, c / q);
   const double t = t0 > 0 ? t0 : t1;
@@ -94,7 +94,7 @@ EmitterSample Sphere::sample_towards(const Vec3& reference, Vec2 u, float u_prim
   const Vec3 outward = seen.outward(reference, sample.wi, sample.distance);
   sample.p = center_ + outward * radius_;
   sample.n = outward * sign_;
-  // Of no use where the light emits alike everywhere, in which case its power is known.
+  // Not needed for constant emission, in which case the light's power is known.
   if (!emitter() || !emitter()->knows_power()) sample.uv = spherical_uv(to_local(outward));
   sample.pdf_solid_angle = warp::cone_pdf_solid_angle(one_minus_cos_max);
   return sample;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A point on a surface, as the ray tracer found it or an emitter sampled it.
+// A point on a surface, as found by the ray tracer or sampled by an emitter.
 #pragma once
 
 #include <cstdint>
@@ -19,16 +19,16 @@ struct SurfaceHit {
   Vec3 ng;              ///< unit geometric normal (the side depends on the shape's orientation, not on the ray)
   Frame frame;          ///< shading frame; frame.n is the interpolated normal
   Vec2 uv;              ///< surface parameters
-  Vec3 dp_du, dp_dv;    ///< position derivatives; filled in only when bsdf->needs_derivatives()
+  Vec3 dp_du, dp_dv;    ///< position derivatives; only set if bsdf->needs_derivatives()
   const Shape* shape = nullptr;
   const Bsdf* bsdf = nullptr;        ///< never null for a hit
   uint32_t bsdf_flags = 0;           ///< of bsdf
-  float offset = 0;                  ///< distance off the surface at which rays that leave it begin
+  float offset = 0;                  ///< offset from the surface of the origins of rays leaving it
   const Emitter* emitter = nullptr;  ///< area light of this surface, or null
   uint32_t primitive = 0;            ///< triangle index within a mesh
   Vec2 barycentric;                  ///< weights of the triangle's 2nd and 3rd vertex
 
-  /// Colour stored at the vertices, interpolated; see Shape::vertex_colour.
+  /// Interpolated vertex colour; see Shape::vertex_colour.
   Spectrum vertex_colour() const;
 };
 

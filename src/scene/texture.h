@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Textures: functions on surfaces with values in RGB or in one channel.
+// Textures: functions on surfaces, with RGB or single-channel values.
 #pragma once
 
 #include <memory>
@@ -11,27 +11,27 @@ namespace covary {
 
 class Texture : public SceneObject {
  public:
-  /// Linear RGB value at the point. Not clamped: models clamp reflectances themselves when they must.
+  /// Linear RGB value at the point. Not clamped: models clamp reflectances themselves if necessary.
   virtual Spectrum eval(const SurfaceHit& hit) const = 0;
-  /// One-channel value: the luminance of a colour texture, the first channel of a raw or grey one.
+  /// Single-channel value: the luminance of a colour texture, the first channel of a raw or grey one.
   virtual float eval_1(const SurfaceHit& hit) const = 0;
   /// Derivatives of eval_1 with respect to the surface parameters (u, v), for bump maps.
   virtual Vec2 grad_1(const SurfaceHit& hit) const = 0;
-  /// Asks memory for what eval() at these surface parameters will read. Changes no result.
+  /// Prefetches what eval() will read at these surface parameters. Does not change results.
   virtual void prefetch(Vec2 /*uv*/) const {}
-  /// True when eval does not depend on the point.
+  /// True if eval does not depend on the point.
   virtual bool is_constant() const { return false; }
-  /// Mean of eval_1 over the texture, used for the probability of sampling lobes (not for values).
+  /// Mean of eval_1 over the texture, used for lobe sampling probabilities (not for values).
   virtual float mean() const = 0;
 
-  /// Width over height of the image that a projector throws; 1 where it has no pixels.
+  /// Aspect ratio (width over height) of the image as projected; 1 if it has no pixels.
   virtual float aspect() const { return 1; }
 
   struct PositionSample {
     Vec2 uv;
     float pdf;  ///< per unit area of the (u, v) unit square
   };
-  /// Point of the (u, v) unit square with density roughly proportional to the luminance; uniform by default.
+  /// Samples a point of the (u, v) unit square with density roughly proportional to luminance; uniform by default.
   virtual PositionSample sample_position(Vec2 u) const { return {u, 1}; }
   virtual float pdf_position(Vec2 /*uv*/) const { return 1; }
 };

@@ -9,14 +9,14 @@
 
 namespace covary {
 
-/// A colour at each point of space.
+/// A colour at every point in space.
 class Volume : public SceneObject {
  public:
   virtual Spectrum eval(const Vec3& p) const = 0;
-  /// No value lies above or below these, channel by channel.
+  /// Bounds on the values, per channel.
   virtual Spectrum largest() const = 0;
   virtual Spectrum smallest() const = 0;
-  /// A box around the volume; eval() has values outside, too.
+  /// A box around the volume; eval() is also defined outside.
   virtual Bounds3 bounds() const = 0;
   virtual bool is_constant() const { return false; }
 };
