@@ -19,8 +19,8 @@
 
 namespace covary {
 
-/// State of an integrator for one thread, kept between calls of trace(): arrays that are expensive to allocate, and
-/// what samples teach until it is collected.
+/// Per-thread state of an integrator, kept between calls of trace(): arrays that are expensive to allocate, and
+/// training data until it is collected.
 class ThreadState {
  public:
   virtual ~ThreadState() = default;
@@ -30,7 +30,7 @@ class Integrator;
 class LearningIntegrator;
 class LightTracingIntegrator;
 
-/// Parts of the samples' radiance: by the path length in edges, or by light source.
+/// The radiance of samples, split by path length in edges or by light source.
 struct RadianceByPart {
   size_t n_parts = 0;              ///< paths of 1 … n_parts edges, or groups of lights, are separated; 0: none
   std::vector<Spectrum> radiance;  ///< n_parts values for each sample, in the order of trace()
@@ -67,7 +67,7 @@ struct CameraSample {
 /// What an integrator reports about a render besides its image.
 struct IntegratorReport {
   using Number = std::variant<uint64_t, double>;
-  std::string name;  ///< of the numbers together; empty if there are none
+  std::string name;  ///< title of the numbers; empty if there are none
   std::vector<std::pair<std::string, Number>> numbers;
   std::string summary;  ///< one line
   std::vector<std::string> warnings;
@@ -90,7 +90,7 @@ class Integrator : public SceneObject {
   /// True if samples of a correct estimate may be negative, as differences are. The film then keeps them; otherwise
   /// they count as errors and enter as black.
   virtual bool allows_negative() const { return false; }
-  /// Registered name and settings, for a film's attributes: equal text, equal estimator.
+  /// Registered name and settings, for a film's attributes: equal text means equal estimator.
   virtual std::string description() const = 0;
 
   // Optional capabilities; callers query these, never the integrator's type.
@@ -111,11 +111,11 @@ class Integrator : public SceneObject {
   /// The integrators it stands for, the simplest first: a trial before the render chooses one
   /// (plans/integrator_trial.h), because this one does not trace. Empty for all others.
   virtual std::span<const std::shared_ptr<Integrator>> choices() const { return {}; }
-  /// What the integrator cannot see of the scene, as warnings.
+  /// Warnings about what the integrator cannot render in the scene.
   virtual std::vector<std::string> blind_spots(const Scene& /*scene*/) const { return {}; }
   /// Whether it supports participating media.
   virtual bool sees_media() const { return false; }
-  /// After the render.
+  /// Call after the render.
   virtual IntegratorReport report() const { return {}; }
 };
 

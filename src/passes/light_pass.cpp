@@ -13,7 +13,7 @@
 namespace covary {
 namespace {
 
-/// What one thread keeps.
+/// Per-thread state.
 struct Worker {
   explicit Worker(const Integrator& integrator) : context(integrator) {}
   PathContext context;
@@ -24,7 +24,7 @@ LightPaths light_paths_of(const PassSettings& settings, const CropWindow& window
   return {settings.seed, settings.pass, first, count, SplatFilter(settings.filter), window};
 }
 
-/// Traces the paths and puts their splats in the order of paths.
+/// Traces the paths and sorts their splats by path.
 void trace_sorted(const Scene& scene, const LightTracingIntegrator& integrator, const LightPaths& paths,
                   std::vector<LightSplat>& splats, PathContext& context) {
   splats.clear();

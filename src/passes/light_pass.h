@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Light tracing: what paths from the lights add to the film. An integrator that traces light (bidirectional path
-// tracing) splits its techniques: camera samples have those that end in their own pixel. Those that connect a light
-// path to the lens land on any pixel; a separate pass traces light paths for them, into a light film
-// (film/splat_layer.h) beside the films of camera samples. The image is what is made of the camera's films, plus the
-// light film.
+// Light tracing: contributions of paths from the lights. An integrator that traces light (bidirectional path tracing)
+// splits its techniques: camera samples take those that end in their own pixel. Those that connect a light path to the
+// lens can end in any pixel; for them, a separate pass traces light paths into a light film (film/splat_layer.h) beside
+// the films of camera samples. The image is what an estimator makes from the camera's films, plus the light film.
 //
-// Light paths are numbered, and every random number of one is a function of (seed, pass, path): the film has the same
-// bits for any number of threads and after interruptions.
+// Light paths are numbered, and every random number of a light path is a function of (seed, pass, path): the film is
+// bit-identical for any number of threads and after interruptions.
 #pragma once
 
 #include <cstdint>
@@ -54,16 +53,16 @@ struct LightPaths {
   SplatFilter filter;
   CropWindow window;  ///< pixels that are rendered
 
-  /// The numbers of a path. Its walk uses those of subpath(Subpath::kLight), like the light subpath of a camera sample.
-  /// What connects vertex v of the walk to the lens uses these at vertex v: kLens for the point on the lens, kPixel for
-  /// pixel_at().
+  /// The random numbers of a path. Its walk uses those of subpath(Subpath::kLight), like the light subpath of a camera
+  /// sample. Connecting vertex v of the walk to the lens uses these at vertex v: kLens for the point on the lens,
+  /// kPixel for pixel_at().
   PathRandom random(uint64_t path) const { return {Sampling::kIndependent, seed, pass, 0, path}; }
-  /// The pixel of a splat at the film position; weight 0 if no rendered pixel gets it, so that nothing more needs
+  /// The pixel of a splat at a film position; weight 0 if it is in no rendered pixel, so that nothing more needs
   /// tracing. `u`: kPixel.
   SplatPixel pixel_at(Vec2 film, Vec2 u) const;
 };
 
-/// What a light path adds to the pixel (x, y) of the full frame.
+/// Contribution of a light path to the pixel (x, y) of the full frame.
 struct LightSplat {
   uint64_t path;
   int x, y;
@@ -87,14 +86,13 @@ class LightTracingIntegrator : public Integrator {
   /// Whether there is a light pass beside the camera's. If not, techniques that connect a light path to the lens have
   /// weight 0.
   bool traces_light() const { return paths_per_spp_ > 0; }
-  /// Light paths per sample in each rendered pixel: how many samples of the techniques that connect to the lens a pixel
-  /// has for one of each other technique (film density 1 per pixel area). Used for MIS weights. 0 if no light is
-  /// traced.
+  /// Light paths per sample in each rendered pixel: the number of samples of lens-connecting techniques per pixel for
+  /// each sample of other techniques (film density 1 per pixel area). Used for MIS weights. 0 if no light is traced.
   double light_paths_per_spp() const { return paths_per_spp_; }
 
-  /// Appends the splats of the paths, those of a path together, in an order that depends on the path alone; the paths
-  /// may come in any order. A path's splats do not depend on which others are traced with it. Values that are not
-  /// finite or negative are passed on, because the pass counts them. Thread-safe.
+  /// Appends the splats of the paths, grouped by path, in an order that depends on the path alone; paths may come in
+  /// any order. A path's splats do not depend on which others are traced with it. Non-finite and negative values are
+  /// passed on, for the pass to count them. Thread-safe.
   virtual void trace_light_paths(const Scene& scene, const LightPaths& paths, std::vector<LightSplat>& splats,
                                  PathContext& context) const = 0;
 
@@ -120,11 +118,11 @@ const LightTracingIntegrator* light_tracer(const Integrator& integrator);
 PassResult render_light_pass(const Scene& scene, const LightTracingIntegrator& integrator, const PassSettings& settings,
                              Film& film);
 
-/// Samples of a light film at the end of the round that begins with `count`, for a film of `groups` groups: one in each
-/// group, then four times as many each time, later the next multiple of SplatLayer's rounds.
+/// Samples of a light film at the end of the round that begins with `count`, for a film of `groups` groups: first one
+/// per group, then four times as many each time, later the next multiple of SplatLayer's rounds.
 uint32_t light_round_end(uint32_t count, int groups);
 
-/// What one light path adds to a film with this crop window in render_light_pass().
+/// The contributions of one light path to a film with this crop window in render_light_pass().
 struct ReplayedLightPath {
   std::vector<LightSplat> splats;
   uint64_t n_rays = 0;

@@ -21,7 +21,7 @@ class Projection {
     const Vec3 local = to_camera_.point(p);
     return local.z * length(camera_.settings().to_world.vector({0, 0, 1}));
   }
-  /// False: `p` is behind the camera.
+  /// Returns false if `p` is behind the camera.
   bool position(const Vec3& p, Vec2& film) const {
     if (!camera_.is_orthographic()) return position_of_direction(normalize(p - origin_), film);
     const Vec3 local = to_camera_.point(p);
@@ -29,7 +29,7 @@ class Projection {
     film = {0.5f * (1 - local.x) * width, 0.5f * (1 - local.y * width / height) * height};
     return local.z > 0;
   }
-  /// Of a point at infinity; the camera is no orthographic one.
+  /// For a point at infinity; not for orthographic cameras.
   bool position_of_direction(const Vec3& d, Vec2& film) const {
     if (!(camera_.pdf_direction(d) > 0)) return false;
     film = camera_.project(origin_, d);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Points whose place in the frame before is known in closed form.
+// Points whose position in the previous frame is known in closed form.
 #include "passes/motion.h"
 
 #include <fmt/format.h>
@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kWidth = 20, kHeight = 10;
 
-/// A wall at z = 5 that fills the part x > 0 (on the left of the image) of the view from the origin along z.
+/// A wall at z = 5 covering x > 0 (on the left of the image) in the view from the origin along z.
 LoadedScene wall(const std::string& sensor = "perspective") {
   return load_scene_text(
       fmt::format(R"(<scene version="3.0.0">
@@ -50,7 +50,7 @@ TEST(MotionImages, LeadToThePointInTheFrameBefore) {
   // 0.3 to the left, 0.2 up and 1 farther away: the camera has moved to the origin since.
   const MotionImages images =
       motion_images(*scene.scene, moved(scene, Transform::translate({0.3f, 0.2f, -1})), 0, kFrame);
-  const double half = std::tan(25 * M_PI / 180), pixel = kWidth / (2 * half);  // pixels for a unit at distance 1
+  const double half = std::tan(25 * M_PI / 180), pixel = kWidth / (2 * half);  // pixels per unit at distance 1
   for (const int x : {0, 4, 9})
     for (const int y : {0, 7}) {
       const double wx = (kWidth / 2.0 - (x + 0.5)) / pixel * 5, wy = (kHeight / 2.0 - (y + 0.5)) / pixel * 5;
@@ -95,7 +95,7 @@ TEST(MotionImages, OfParallelRaysFollowTheScaleOfTheFrame) {
   EXPECT_NEAR(motion[2], 2, 1e-4f);
 }
 
-/// A square in front of the camera turns about the axis of view, 30 degrees a frame, while it comes nearer.
+/// A square in front of the camera rotates about the viewing axis, 30 degrees per frame, while it comes nearer.
 TEST(MotionImages, FollowShapesThatMove) {
   const LoadedScene scene = load_scene_text(fmt::format(R"(<scene version="3.0.0">
     <sensor type="perspective"><float name="fov" value="50"/><film type="hdrfilm">

@@ -14,7 +14,7 @@ namespace covary {
 /// of one call. The clock starts at construction.
 class PassLimits {
  public:
-  /// `total`: samples that the call is to take.
+  /// `total`: samples that the call will take.
   PassLimits(const PassSettings& settings, uint64_t total) : settings_(settings), total_(total) {}
 
   /// Thread-safe, like advance().
@@ -22,7 +22,7 @@ class PassLimits {
     return out_of_time_.load(std::memory_order_relaxed) ||
            (settings_.stop && settings_.stop->load(std::memory_order_relaxed));
   }
-  /// Call after each piece of work, with its number of samples.
+  /// Call after each piece of work, with the number of samples it took.
   void advance(uint64_t n_new) {
     const uint64_t now = done_.fetch_add(n_new) + n_new;
     if (settings_.seconds > 0 && watch_.seconds() >= settings_.seconds) out_of_time_ = true;
@@ -38,7 +38,7 @@ class PassLimits {
   std::atomic<bool> out_of_time_{false};
 };
 
-/// Sorts by pixel and sample and keeps the first few, independently of the order in which they came.
+/// Sorts by pixel and sample and keeps the first few, independently of the order in which they arrived.
 void keep_first(std::vector<BadSample>& samples);
 
 }  // namespace covary

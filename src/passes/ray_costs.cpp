@@ -10,7 +10,7 @@ namespace covary {
 namespace {
 
 constexpr int kCell = 4;    // side in pixels
-constexpr int kRadius = 4;  // cells around one that are averaged
+constexpr int kRadius = 4;  // radius in cells of the average
 
 }  // namespace
 

@@ -19,14 +19,14 @@ namespace {
 constexpr int kTileSize = 16;
 constexpr int kBatchSize = 256;  // paths traced together; larger ones leave the cache
 constexpr size_t kMaxBadSamples = 10;
-constexpr size_t kLearnerTiles = 128;  // whose records are held at a time
-constexpr double kRoundSeconds = 0.5;  // between checkpoints where pixels are estimated from all their samples
+constexpr size_t kLearnerTiles = 128;  // tiles whose records are held at a time
+constexpr double kRoundSeconds = 0.5;  // between checkpoints, if pixels are estimated from all their samples
 
-/// Offset from the pixel centre, drawn from a gaussian with the given standard deviation cut off at `radius`, by
-/// inversion of its cumulative distribution: the inverse error function of [Giles2012], then one Newton step. Not a
-/// library's function: those differ between versions in the last bits, and with them every image.
+/// Offset from the pixel centre, from a Gaussian with the given standard deviation truncated at `radius`, by inverting
+/// its cumulative distribution: the inverse error function of [Giles2012], then one Newton step. Not a library
+/// function: those differ between versions in the last bits, and with them every image.
 float interval_to_gaussian(float u, float stddev, float radius) {
-  const double tail = std::erf(radius / (stddev * std::sqrt(2.0)));  // mass inside the cut-off
+  const double tail = std::erf(radius / (stddev * std::sqrt(2.0)));  // mass inside the truncation
   const double p = std::clamp((2.0 * u - 1.0) * tail, -1 + 1e-15, 1 - 1e-15);
   double w = -std::log((1 - p) * (1 + p)), x;
   if (w < 5) {
@@ -47,7 +47,7 @@ float interval_to_gaussian(float u, float stddev, float radius) {
   return static_cast<float>(x * stddev * std::sqrt(2.0));
 }
 
-/// Samples begin … end - 1 of the pixel (x, y) of the film are to be taken.
+/// Samples begin … end - 1 are to be taken of the film's pixel (x, y).
 struct PixelWork {
   int x, y;
   uint32_t begin, end;
@@ -60,8 +60,8 @@ struct Worker {
   PathContext context;
   bool allows_negative;
   std::vector<PixelWork> pixels;
-  std::vector<CameraSample> samples;  // of these pixels, one after another
-  std::vector<Spectrum> importance;   // of the pixels of these samples, where there is one
+  std::vector<CameraSample> samples;  // of these pixels, contiguous per pixel
+  std::vector<Spectrum> importance;   // per sample, that of its pixel; empty if not used
   uint64_t n_samples = 0, n_not_finite = 0, n_negative = 0;
   std::vector<BadSample> bad_samples;
   double seconds = 0, estimate_seconds = 0;  // in tiles, and in settings.estimate
@@ -99,7 +99,7 @@ bool is_good(const Spectrum& value, int x, int y, uint64_t sample, Worker& worke
   return false;
 }
 
-/// The sample count up to which the pixels of a film are taken.
+/// Limits on the samples of pixels in one wave.
 struct Wave {
   const SampleTarget& target;
   uint32_t end;  // no pixel beyond
@@ -109,7 +109,7 @@ struct Wave {
   }
 };
 
-/// Traces the samples of worker.pixels and adds them to the film; after a stop, neither.
+/// Traces the samples of worker.pixels and adds them to the film; if stopped, adds nothing.
 void trace_pixels(const Scene& scene, const Integrator& integrator, const PassSettings& settings, Film& film,
                   Worker& worker) {
   size_t n_samples = 0;
@@ -130,7 +130,7 @@ void trace_pixels(const Scene& scene, const Integrator& integrator, const PassSe
     worker.context.importance =
         std::span(worker.importance).subspan(worker.importance.empty() ? 0 : i, worker.importance.empty() ? 0 : n);
     integrator.trace(scene, std::span(worker.samples).subspan(i, n), worker.context);
-    if (worker.context.stopped()) return;  // the samples may be halves
+    if (worker.context.stopped()) return;  // the samples may be incomplete
   }
 
   CameraSample* sample = worker.samples.data();
@@ -172,7 +172,7 @@ uint64_t render_tile(const Scene& scene, const Integrator& integrator, const Pas
   return worker.n_samples - before;
 }
 
-/// Calls render(i) for each of n tiles. A learner gets the tiles' records in order, some tiles at a time.
+/// Calls render(i) for each of n tiles. A learner gets the tiles' records in order, a batch of tiles at a time.
 template <typename Render>
 void render_tiles(size_t n, LearningIntegrator* learner, const Integrator& integrator, PerThread<Worker>& workers,
                   const Render& render) {
@@ -188,7 +188,7 @@ void render_tiles(size_t n, LearningIntegrator* learner, const Integrator& integ
   }
 }
 
-/// An integrator that learns must be trained, or learn from this pass.
+/// Checks that an integrator that learns is trained, or learns from this pass.
 void check_learner(const Integrator& integrator, const PassSettings& settings, const Film& film) {
   const LearningIntegrator* learning = integrator.learning();
   const LearningIntegrator* learner = settings.learner;
@@ -256,8 +256,8 @@ PassResult render_pass(const Scene& scene, const Integrator& integrator, const P
   uint32_t reached = settings.spp.reached(film);
 
   PerThread<Worker> workers;
-  // In waves, so that all pixels advance together. If pixels are estimated from all their samples, their one wave is
-  // split into rounds of some time.
+  // Render in waves, so that all pixels advance together. If pixels are estimated from all their samples, their single
+  // wave is split into timed rounds.
   while (reached < largest && !limits.ended()) {
     const Wave wave{settings.spp, settings.estimate
                                       ? largest

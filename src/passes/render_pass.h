@@ -32,7 +32,7 @@ class SampleTarget {
   /// The largest number of any pixel.
   uint32_t largest() const { return largest_; }
   bool is_map() const { return !map_.empty(); }
-  /// Of all pixels.
+  /// Mean over all pixels.
   double mean() const {
     return map_.empty() ? largest_ : std::accumulate(map_.begin(), map_.end(), 0.0) / static_cast<double>(map_.size());
   }
@@ -48,7 +48,8 @@ class SampleTarget {
     }
     return sum;
   }
-  /// The largest N such that every pixel of `film` has N samples or its target; largest() if all have their targets.
+  /// The largest N such that every pixel of `film` has at least N samples or its target; largest() if all have reached
+  /// their targets.
   uint32_t reached(const Film& film) const {
     uint32_t fewest = largest_;
     for (size_t i = 0; i < film.counts().size(); ++i)
@@ -61,7 +62,7 @@ class SampleTarget {
   std::vector<uint32_t> map_;
 };
 
-/// This many samples in the middle pixel of each square of stride x stride pixels, none in others.
+/// `samples` in the centre pixel of each stride x stride square, none elsewhere.
 inline SampleTarget one_in_each_square(const CropWindow& window, int stride, uint32_t samples) {
   if (stride == 1) return samples;
   std::vector<uint32_t> map(static_cast<size_t>(window.width) * window.height);
@@ -72,7 +73,7 @@ inline SampleTarget one_in_each_square(const CropWindow& window, int stride, uin
 
 class LearningIntegrator;
 
-/// The value of a pixel from all its samples together. Called by several threads at once.
+/// The value of a pixel, computed from all its samples jointly. Called from several threads at once.
 using PixelEstimate = std::function<Spectrum(std::span<const CameraSample>)>;
 
 /// "independent" or "crn": attribute of films.
@@ -83,10 +84,10 @@ const char* sampler_name(Sampler sampler);
 struct PassSettings {
   Sampling sampling = Sampling::kIndependent;
   Sampler sampler = Sampler::kIndependent;
-  /// Of the film; with Sampler::kSobol, sample s uses point s / groups of the sequences of group s mod groups.
+  /// Groups of the film; with Sampler::kSobol, sample s uses point s / groups of the sequences of group s mod groups.
   int groups = 1;
   uint64_t seed = 0;
-  uint32_t pass = 0;  ///< position in the plan; passes of one plan never share numbers
+  uint32_t pass = 0;  ///< index in the plan; passes of one plan never share random numbers
   SampleTarget spp;   ///< samples per pixel to reach
   /// No pixel gets more samples than this; the rest is left for later calls.
   uint32_t limit = UINT32_MAX;

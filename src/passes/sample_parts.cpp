@@ -12,7 +12,7 @@ namespace {
 
 constexpr size_t kBatch = 256;  // samples traced together
 
-/// One thread's.
+/// Per-thread state.
 struct Worker {
   explicit Worker(const Integrator& integrator) : context(integrator) {}
   PathContext context;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Films of the parts of samples that an integrator separates (PathContext::by_part), such as the light of single lamps:
-// the samples are traced again with the same random numbers.
+// Films of the parts of samples that an integrator separates (PathContext::by_part), such as the light of individual
+// lamps: the samples are traced again with the same random numbers.
 #pragma once
 
 #include <span>
@@ -13,14 +13,14 @@
 
 namespace covary {
 
-/// Brings film i of `parts` to part i of the samples of `film`; the films of `parts` have the same groups, counts and
-/// window. Takes as long as the film did. `settings`: those of the film's pass; returns early, with fewer samples, once
-/// settings.stop is true. Samples that are black in the film because they are not finite or negative are black in all
-/// parts.
+/// Adds to film i of `parts` part i of the samples of `film`, until counts match; the films of `parts` have the same
+/// groups and window. Takes as long as rendering `film` did. `settings`: those of the film's pass; returns early, with
+/// fewer samples, once settings.stop is true. Samples that are black in the film because they are negative or not
+/// finite are black in all parts.
 void trace_parts(const Scene& scene, const Integrator& integrator, const PassSettings& settings, const Film& film,
                  std::span<Film> parts);
 
-/// Films without samples, for parts of the samples of `film`.
+/// Empty films for parts of the samples of `film`.
 std::vector<Film> films_of_parts(const Film& film, size_t n_parts, int groups);
 
 /// The groups of the scene's lights (Emitter::group()), in order, without lights that have none.
@@ -32,24 +32,24 @@ std::vector<std::string> light_groups(const Scene& scene);
 /// The layers' names, in films and files.
 inline constexpr const char* kLayerNames[] = {"Direct", "Indirect"};
 
-/// Brings `direct` to the part of the samples of `film` with at most two edges (Integrator::of_direct_light(),
-/// prepared), in the same groups. `settings`: those of the film's pass. Returns early, with fewer samples, once
-/// settings.stop is true.
+/// Adds to `direct` the part of the samples of `film` with at most two edges (Integrator::of_direct_light(), prepared),
+/// in the same groups. `settings`: those of the film's pass. Returns early, with fewer samples, once settings.stop is
+/// true.
 void trace_direct_light(const Scene& scene, const Integrator& direct_light, const PassSettings& settings,
                         const Film& film, Film& direct);
 
-/// The rest of a film without that part of the same samples.
+/// The remainder of a film without its direct light, from the same samples.
 Film indirect_light(const Film& film, const Film& direct);
 
 // The image by path length in edges: directly visible lights (1), one reflection (2), …
 
-/// Longest path length that gets an image; longer paths are in none.
+/// Longest path length that gets an image; longer paths are excluded.
 inline constexpr int kMostEdges = 16;
 
-/// Image i holds the part of the film's samples with paths of i + 1 edges; there is one image per length, at most
-/// kMostEdges. They add up to the film's mean if no path is longer. Traces the samples again, which takes as long as
-/// the film did. `settings`: those of the film's render; once stop is true, returns none. Throws Error(kUsage) for an
-/// integrator without Integrator::longest_path().
+/// Image i contains the part of the film's samples with paths of i + 1 edges; there is one image per length, at most
+/// kMostEdges. They sum to the film's mean if no path is longer. Traces the samples again, which takes as long as
+/// rendering the film did. `settings`: those of the film's render; returns none once stop is true. Throws Error(kUsage)
+/// for an integrator without Integrator::longest_path().
 std::vector<Image> path_length_images(const Scene& scene, const Integrator& integrator, const PassSettings& settings,
                                       const Film& film);
 

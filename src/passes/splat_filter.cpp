@@ -8,7 +8,7 @@
 namespace covary {
 namespace {
 
-constexpr double kFarthest = 1 << 24;  // pixels from the frame's corner: beyond, none of any frame is near
+constexpr double kFarthest = 1 << 24;  // pixels from the frame's corner: too far from any frame
 
 }  // namespace
 
@@ -32,8 +32,7 @@ double SplatFilter::density(double distance) const {
 
 SplatFilter::Choice SplatFilter::choose(double position, double u) const {
   if (!(std::abs(position) < kFarthest)) return {};
-  // Centres within the radius; of two centres at its ends the lower one: a box of one pixel holds its upper left
-  // corner.
+  // Centres within the radius; of two at both ends, only the lower: a box of one pixel includes its upper left corner.
   const int first = static_cast<int>(std::floor(position - filter_.radius - 0.5)) + 1;
   const int last = static_cast<int>(std::floor(position + filter_.radius - 0.5));
   double sum = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reconstruction filters for splats, which land anywhere on the film: the counterpart of film_position() in
+// Reconstruction filters for splats, which fall anywhere on the film: the counterpart of film_position() in
 // render_pass.h.
 #pragma once
 
@@ -8,7 +8,7 @@
 
 namespace covary {
 
-/// A pixel of the full frame, or beside it, that gets a splat times `weight`; none if that is 0.
+/// A pixel of the full frame, or outside it, that receives a splat times `weight`; none if that is 0.
 struct SplatPixel {
   int x = 0, y = 0;
   float weight = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A splat goes to one pixel, and on average to each as much as the filter says.
+// Each splat goes to one pixel, and on average each pixel gets what the filter prescribes.
 #include "passes/splat_filter.h"
 
 #include <gtest/gtest.h>
@@ -30,7 +30,7 @@ TEST(SplatFilter, ABoxIsThePixelItself) {
     ASSERT_EQ(pixel.y, std::floor(p.y));
     ASSERT_EQ(pixel.weight, 1);
   }
-  EXPECT_EQ(box.pixel({3, 4}, {0.5f, 0.5f}).x, 3);  // a corner belongs to the pixel right of and below it
+  EXPECT_EQ(box.pixel({3, 4}, {0.5f, 0.5f}).x, 3);  // a corner belongs to the pixel to its lower right
   EXPECT_EQ(box.pixel({3, 4}, {0.5f, 0.5f}).y, 4);
 }
 
@@ -38,7 +38,7 @@ TEST(SplatFilter, WeightsSumToOneOverTheFilm) {
   for (const FilterSettings& filter : kAll) {
     const SplatFilter splat(filter);
     double sum = 0;
-    constexpr int kSteps = 200;  // in a pixel
+    constexpr int kSteps = 200;  // per pixel
     for (int i = 0; i < kSteps; ++i)
       for (int k = 0; k < kSteps; ++k)
         sum += splat.pixel({3 + (i + 0.5f) / kSteps, 7 + (k + 0.5f) / kSteps}, {0.3f, 0.8f}).weight;
@@ -49,7 +49,7 @@ TEST(SplatFilter, WeightsSumToOneOverTheFilm) {
     ASSERT_NEAR(SplatFilter(kTent).pixel(random_of(i).get_2d(0, Event::kPixel), {0.1f, 0.9f}).weight, 1, 1e-6);
 }
 
-// Uniform splats, seen from one pixel, lie around its centre like the positions of camera samples do.
+// Relative to a pixel's centre, its splats from uniform positions are distributed like its camera samples.
 TEST(SplatFilter, APixelGetsSplatsWhereItsCameraSamplesLie) {
   constexpr int kN = 400000, kBins = 24;
   for (const FilterSettings& filter : kAll) {
@@ -69,7 +69,7 @@ TEST(SplatFilter, APixelGetsSplatsWhereItsCameraSamplesLie) {
       samples[bin(film_position(filter, 5, 6, random_of(i + kN)).x)] += 1.0 / kN;
     }
     for (int b = 0; b < kBins; ++b) {
-      if (samples[b] * kN < 100) continue;  // the ends of a gaussian, where no spread can be measured
+      if (samples[b] * kN < 100) continue;  // too few in the tails of a Gaussian to measure a spread
       const double variance = (squares[b] + samples[b]) / kN;
       EXPECT_LT(std::abs(splats[b] - samples[b]), 5 * std::sqrt(variance)) << static_cast<int>(filter.kind) << " " << b;
     }

@@ -39,7 +39,7 @@ std::string LearningIntegrator::training_text() const { return frozen_ ? hash_te
 
 namespace {
 
-/// Whether the importance of pixels is computed from the current image, for the remaining waves.
+/// Whether to compute the importance of pixels from the current image, for the remaining waves.
 bool asks_for_importance(const LearningIntegrator& integrator) {
   const uint32_t now = integrator.trained_spp(), pilot = integrator.pilot_spp();
   return now == pilot || (pilot > 0 && now > pilot && now < integrator.training_spp() && integrator.pilot_goes_on());

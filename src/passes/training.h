@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// Integrators that learn: from the samples of some waves of a pass they collect what later samples use, e.g. sums in
-// cells of space, or mixtures of directions for guiding.
+// Integrators that learn: in some waves of a pass they collect from samples what later samples use, e.g. sums in
+// spatial cells, or directional mixtures for guiding.
 //
 //     wave of 1 sample per pixel, wave of 1 more, of 2, of 4, …          (render_pass.h: wave_end)
 //       trace()        threads record into their states
-//       take_record()  a tile's samples, which one thread takes in a fixed order, become one record
-//       absorb()       records in the order of tiles: sums have the same bits for any number of threads
-//       end_wave()     what the next wave's trace() reads
-//     freeze()         from here on a sample is a function of its address alone, as those of other integrators
+//       take_record()  the samples of a tile, taken by one thread in a fixed order, become one record
+//       absorb()       records in the order of tiles: sums are bit-identical for any number of threads
+//       end_wave()     builds what the next wave's trace() reads
+//     freeze()         from here on, a sample is a function of its address alone, as for other integrators
 //
-// The samples of a wave only depend on earlier waves, so their mean is unbiased and they may stay in the film
-// (PassSettings::learner). train() below, with which a planned render begins, makes an image of them
-// (training_image.h). The hash of the frozen state goes into a film's attributes: films with different training are not
+// The samples of a wave depend only on earlier waves, so their mean is unbiased and they may stay in the film
+// (PassSettings::learner). train() below, with which a planned render begins, makes an image from them
+// (training_image.h). The hash of the frozen state becomes a film attribute: films with different training cannot be
 // continued, but may be merged, because each is unbiased.
 #pragma once
 
@@ -57,7 +57,7 @@ class LearningIntegrator : public Integrator {
   /// Adds a record. Called by one thread at a time, in the order of tiles, never null.
   virtual void absorb(const TrainingRecord& record) = 0;
 
-  /// Whether the training can be saved, by the two functions below.
+  /// Whether the training can be saved and loaded, by the two functions below.
   virtual bool keeps_training() const { return false; }
   /// The training as bytes; after freeze().
   virtual std::string trained_bytes() const { return {}; }
@@ -73,7 +73,7 @@ class LearningIntegrator : public Integrator {
   virtual std::optional<GuideProbe> probe(const Scene& scene, const Ray& ray, int height, uint32_t spp,
                                           uint64_t seed) const;
 
-  /// Forgets the training, if any.
+  /// Discards the training, if any.
   void restart();
   /// Ends a wave after which each pixel has taken `spp` samples; called when no thread traces.
   void end_wave(uint32_t spp);
@@ -121,14 +121,14 @@ struct TrainingSettings {
   /// PassSettings::seed of the training: renders of different seeds learn from different samples.
   uint64_t seed = 0;
   TrainingImage* image = nullptr;  ///< if set, receives the image of the samples
-  int stride = 1;                  ///< one pixel in each square of this side is used; 1 with an `image`
+  int stride = 1;                  ///< trains on one pixel in each square of this side; must be 1 with an `image`
 };
 
 /// Trains a prepared integrator from scratch, with training_spp() independent samples in each pixel, and freezes it.
 /// False if stopped before that; it can be trained again.
 bool train(const Scene& scene, LearningIntegrator& integrator, const TrainingSettings& settings);
 
-// What a guided integrator knows at a surface, as functions of the direction: latitude-longitude images around the y
+// The knowledge of a guided integrator at a surface, as functions of direction: latitude-longitude images around the y
 // axis.
 
 /// Row 0 is +y. Column 0 begins at +x and turns towards +z.

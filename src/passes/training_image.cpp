@@ -10,15 +10,15 @@
 namespace covary {
 namespace {
 
-constexpr double kTrimmed = 0.001;         // fraction of the squares that is ignored: a few bright samples say little
-constexpr size_t kFewestValues = 3 * 128;  // with fewer, all waves count by their samples
+constexpr double kTrimmed = 0.001;         // fraction of largest squares ignored: a few bright samples say little
+constexpr size_t kFewestValues = 3 * 128;  // with fewer, waves are weighted by their samples
 
 size_t colour_of(const Film& film, size_t pixel) {
   const auto width = static_cast<size_t>(film.width());
   return (pixel % width + pixel / width) & 1;
 }
 
-/// Mean of the values without the largest; 1 if there are too few, or all are zero.
+/// Mean without the largest values; 1 if there are too few values, or all are zero.
 double trimmed_mean(std::vector<float>& values) {
   const size_t n = values.size() - static_cast<size_t>(kTrimmed * static_cast<double>(values.size()));
   if (values.size() < kFewestValues) return 1;
@@ -78,7 +78,7 @@ void WaveCombination::add(const Film& film, std::span<const Spectrum> importance
 
 TrainingImage WaveCombination::result() const {
   TrainingImage result{sum_, {}};
-  // Earlier waves are no better than the last: if they seem so, the last has met rare bright samples.
+  // Earlier waves are no better than the last: if they seem so, the last one met rare bright samples.
   for (size_t colour = 0; colour < 2; ++colour)
     result.samples[colour] = std::min<double>(end_, weight_sums_[colour] * last_variance_[colour]);
   for (int y = 0; y < sum_.height; ++y)

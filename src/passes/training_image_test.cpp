@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Waves of a training as an image. Samples are normal numbers around the pixel's value, with a standard deviation that
-// falls from wave to wave; 64 x 64 pixels, fixed seeds.
+// The waves of a training as an image. Samples are Gaussian around the pixel's value, with a standard deviation that
+// decreases from wave to wave; 64 x 64 pixels, fixed seeds.
 #include "passes/training_image.h"
 
 #include <gtest/gtest.h>
@@ -62,8 +62,8 @@ TEST(TrainingImage, OrIsTheMeanOfAllSamples) {
   EXPECT_NEAR(mean_square_error(image.mean), (4 * 16 + 4) / 64.0, 0.05);
 }
 
-// The pixel's own samples have no part in its weights: rare bright samples in the pixels of one colour leave those of
-// the others as they were, and change how these count.
+// The pixel's own samples do not affect its weights: rare bright samples in the pixels of one colour leave the others
+// unchanged and affect only the weights of these.
 TEST(TrainingImage, WeightsAreThoseOfOtherPixels) {
   const auto image = [](bool bright) {
     Film film = new_film();
@@ -77,7 +77,7 @@ TEST(TrainingImage, WeightsAreThoseOfOtherPixels) {
     return waves.result();
   };
   const TrainingImage plain = image(false), bright = image(true);
-  // The first wave has become worse for the weights of odd pixels.
+  // The first wave now gets less weight in odd pixels.
   EXPECT_NEAR(plain.samples[0], bright.samples[0], 1e-9);
   EXPECT_NEAR(plain.samples[1], 4, 0.3);
   EXPECT_NEAR(bright.samples[1], 2, 0.1);
@@ -100,7 +100,7 @@ TEST(TrainingImage, ErrorsCountByTheImportanceOfTheirPixel) {
   WaveCombination waves(WaveWeights::kVariance);
   add_samples(film, 2, 1, 1), waves.add(film, importance);
   add_samples(film, 2, 1, 1);
-  for (int y = 0; y < kSide; ++y)  // noise where nothing counts
+  for (int y = 0; y < kSide; ++y)  // noise where importance is zero
     for (int x = kSide / 2; x < kSide; ++x) film.data()[static_cast<size_t>(y * kSide + x) * 6] += 50 * normal(x + y);
   waves.add(film, importance);
   EXPECT_NEAR(waves.result().samples[0], 4, 0.3);
